@@ -1,0 +1,175 @@
+"""Bytes <-> Frame: the framing of rosserial protocol 2, and nothing else.
+
+    ff fe | length (2, little endian) | ~(length bytes) | id (2, little endian) | payload | ~(id and payload)
+
+`~(x)` is 255 minus the sum of the bytes x modulo 256. Source: ros_lib node_handle.h (publish() and the
+states of spinOnce()).
+"""
+
+import struct
+import zlib
+from typing import List, NamedTuple, Optional, Union
+
+from .errors import FrameTooLongError, TopicIdError
+
+Bytes = Union[bytes, bytearray, memoryview]
+
+SYNC = b"\xff\xfe"
+"""Start of every frame; the second byte is the version of the protocol (0xff was version 1)."""
+
+HEADER_LENGTH = 7
+"""Bytes before the payload: sync 2, length 2, length checksum 1, topic id 2."""
+
+OVERHEAD_LENGTH = 8
+"""Bytes that a frame adds to its payload: the header and the checksum."""
+
+LONGEST_PAYLOAD_LENGTH = 0xFFFF
+"""What the 16-bit length field can say."""
+
+DEFAULT_MAX_PAYLOAD_LENGTH = 4096
+"""The robot's own buffers, in and out (INPUT_SIZE and OUTPUT_SIZE of the firmware's NodeHandle_)."""
+
+# Ids with a meaning of their own (rosserial_msgs/TopicInfo, node_handle.h). Topics begin at 100.
+ID_PUBLISHER = 0  # also: an empty frame with this id asks the robot for its topics
+ID_SUBSCRIBER = 1
+ID_SERVICE_SERVER_PUBLISHER = 2  # the answers of a service that the robot offers
+ID_SERVICE_SERVER_SUBSCRIBER = 3  # its requests
+ID_SERVICE_CLIENT_PUBLISHER = 4  # the requests of a service that the robot calls
+ID_SERVICE_CLIENT_SUBSCRIBER = 5  # its answers
+ID_PARAMETER_REQUEST = 6
+ID_LOG = 7
+ID_TIME = 10
+ID_TX_STOP = 11
+FIRST_TOPIC_ID = 100
+
+_HEADER = struct.Struct("<2sHBH")
+_LENGTH = struct.Struct("<H")
+
+# zlib.adler32 & 0xffff is (1 + sum of the bytes) mod 65521. Up to 256 bytes the sum is at most 65280, so
+# nothing wraps and the sum is exact, at a fraction of the cost of sum() over a bytes object.
+_EXACT_ADLER_LENGTH = 256
+
+
+class Frame(NamedTuple):
+    """One frame that was read whole and whose checksums are right."""
+
+    topic_id: int
+    payload: bytes
+
+
+def sum_bytes(data: Bytes) -> int:
+    """Return the sum of all bytes of data, 0 for none."""
+    length = len(data)
+    if length <= _EXACT_ADLER_LENGTH:
+        return (zlib.adler32(data) & 0xFFFF) - 1
+    total = 0
+    view = memoryview(data)
+    for start in range(0, length, _EXACT_ADLER_LENGTH):
+        total += (zlib.adler32(view[start : start + _EXACT_ADLER_LENGTH]) & 0xFFFF) - 1
+    return total
+
+
+def encode_frame(topic_id: int, payload: Bytes) -> bytes:
+    """Return the frame that carries payload under topic_id.
+
+    Raises: TopicIdError for an id outside 0..65535, FrameTooLongError for more than 65535 bytes of payload.
+    """
+    if not 0 <= topic_id <= 0xFFFF:
+        raise TopicIdError("topic id %r is outside 0..65535" % (topic_id,))
+    length = len(payload)
+    if length > LONGEST_PAYLOAD_LENGTH:
+        raise FrameTooLongError("a payload of %d bytes does not fit a frame (at most 65535)" % length)
+    length_checksum = 255 - ((length & 0xFF) + (length >> 8)) % 256
+    checksum = 255 - ((topic_id & 0xFF) + (topic_id >> 8) + sum_bytes(payload)) % 256
+    return b"%b%b%c" % (_HEADER.pack(SYNC, length, length_checksum, topic_id), payload, checksum)
+
+
+class FrameReader:
+    """Cuts a stream of bytes into frames, whatever arrives.
+
+    Wrong bytes are counted and passed over, never raised: after a frame with a wrong checksum the search
+    goes on one byte behind its start, so a good frame that it seemed to contain is not lost. The reader
+    keeps at most one frame of unread bytes.
+
+    Attributes:
+        frames: good frames so far.
+        bad_frames: frame starts whose length or payload checksum was wrong, or that were too long.
+        skipped_bytes: bytes that belonged to no good frame.
+    """
+
+    def __init__(self, max_payload_length: int = DEFAULT_MAX_PAYLOAD_LENGTH) -> None:
+        """Accept payloads of at most max_payload_length bytes; longer frames count as bad."""
+        self.max_payload_length = max_payload_length
+        self.frames = 0
+        self.bad_frames = 0
+        self.skipped_bytes = 0
+        self._rest = b""
+
+    @property
+    def buffered_length(self) -> int:
+        """Bytes of a frame that is not complete yet."""
+        return len(self._rest)
+
+    def receive_bytes(self, data: Bytes) -> List[Frame]:
+        """Return the frames that data completes, in order. Never raises, whatever data holds."""
+        buffer = self._rest + bytes(data) if self._rest else bytes(data)
+        end = len(buffer)
+        frames: List[Frame] = []
+        position = 0
+        while True:
+            if buffer[position : position + 2] != SYNC:
+                start = self._find_sync(buffer, position)
+                self.skipped_bytes += start - position
+                position = start
+            if end - position < OVERHEAD_LENGTH:
+                if self._has_bad_length(buffer, position, end):
+                    position = self._skip_bad_start(position)
+                    continue
+                break
+            _, length, length_checksum, topic_id = _HEADER.unpack_from(buffer, position)
+            if (length + (length >> 8) + length_checksum) & 0xFF != 0xFF or length > self.max_payload_length:
+                position = self._skip_bad_start(position)
+                continue
+            frame_end = position + OVERHEAD_LENGTH + length
+            if frame_end > end:
+                break
+            payload = buffer[position + HEADER_LENGTH : frame_end - 1]
+            if (topic_id + (topic_id >> 8) + sum_bytes(payload) + buffer[frame_end - 1]) & 0xFF != 0xFF:
+                position = self._skip_bad_start(position)
+                continue
+            frames.append(Frame(topic_id, payload))
+            position = frame_end
+        self._rest = buffer[position:]
+        self.frames += len(frames)
+        return frames
+
+    @staticmethod
+    def _find_sync(buffer: bytes, position: int) -> int:
+        """Return where the next frame may start; the end, or the last byte if that may be a half sync."""
+        start = buffer.find(SYNC, position)
+        if start >= 0:
+            return start
+        end = len(buffer)
+        return end - 1 if end > position and buffer[end - 1] == SYNC[0] else end
+
+    def _has_bad_length(self, buffer: bytes, position: int, end: int) -> bool:
+        """Return whether an incomplete header already shows that it is none, so that nothing waits for it."""
+        if end - position < 5:
+            return False
+        length: int = _LENGTH.unpack_from(buffer, position + 2)[0]
+        return (
+            length + (length >> 8) + buffer[position + 4]
+        ) & 0xFF != 0xFF or length > self.max_payload_length
+
+    def _skip_bad_start(self, position: int) -> int:
+        self.bad_frames += 1
+        self.skipped_bytes += 1
+        return position + 1
+
+
+def decode_frame(data: Bytes) -> Optional[Frame]:
+    """Return the one frame that data holds from first to last byte, or None if it holds anything else."""
+    frames = FrameReader(LONGEST_PAYLOAD_LENGTH).receive_bytes(data)
+    if len(frames) == 1 and len(data) == OVERHEAD_LENGTH + len(frames[0].payload):
+        return frames[0]
+    return None

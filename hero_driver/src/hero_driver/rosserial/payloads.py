@@ -1,0 +1,214 @@
+"""Payloads of rosserial's own frames <-> Python values; payloads of topics are not looked at here.
+
+Field order is the wire of rosserial_msgs: TopicInfo (id, name, type, md5, buffer size), Log (level, text),
+RequestParam (name and the lists ints, floats, strings) and std_msgs/Time (seconds, nanoseconds).
+Little endian, strings and lists with a 32-bit length in front.
+"""
+
+import struct
+from typing import List, NamedTuple, Sequence, Tuple
+
+from .errors import PayloadError
+from .frames import Bytes
+
+_UINT16 = struct.Struct("<H")
+_UINT32 = struct.Struct("<I")
+_INT32 = struct.Struct("<i")
+_TIME = struct.Struct("<II")
+
+LOG_DEBUG = 0
+LOG_INFO = 1
+LOG_WARN = 2
+LOG_ERROR = 3
+LOG_FATAL = 4
+
+
+
+class TopicInfo(NamedTuple):
+    """What a peer declares about one topic, or about one direction of one service."""
+
+    topic_id: int
+    name: str  # as sent: with or without a leading slash
+    message_type: str  # e.g. "nav_msgs/Odometry"
+    md5sum: str  # 32 hexadecimal digits
+    buffer_length: int  # bytes, the longest payload that the peer can hold
+
+
+class Log(NamedTuple):
+    """One log line of the peer."""
+
+    level: int  # LOG_DEBUG..LOG_FATAL
+    text: str
+
+
+class WireTime(NamedTuple):
+    """A point in time, as two unsigned 32-bit numbers; the robot asks for the time with zeros."""
+
+    secs: int
+    nsecs: int
+
+
+class _Cursor:
+    """Reads fields one after another; every short or odd field is a PayloadError that names it."""
+
+    def __init__(self, data: Bytes, what: str) -> None:
+        self._data = bytes(data)
+        self._what = what
+        self._position = 0
+
+    def read_bytes(self, length: int, field: str) -> bytes:
+        start, end = self._position, self._position + length
+        if end > len(self._data):
+            raise PayloadError(
+                "%s: field %s needs %d bytes, %d are left" % (self._what, field, length, len(self._data) - start)
+            )
+        self._position = end
+        return self._data[start:end]
+
+    def read_uint16(self, field: str) -> int:
+        value: int = _UINT16.unpack(self.read_bytes(2, field))[0]
+        return value
+
+    def read_uint32(self, field: str) -> int:
+        value: int = _UINT32.unpack(self.read_bytes(4, field))[0]
+        return value
+
+    def read_int32(self, field: str) -> int:
+        value: int = _INT32.unpack(self.read_bytes(4, field))[0]
+        return value
+
+    def read_float32(self, field: str) -> float:
+        value: float = struct.unpack("<f", self.read_bytes(4, field))[0]
+        return value
+
+    def read_text(self, field: str) -> str:
+        # Peers are not trusted to send UTF-8: what cannot be read stays visible as an escape.
+        return self.read_bytes(self.read_uint32(field), field).decode("utf-8", "backslashreplace")
+
+    def finish(self) -> None:
+        left = len(self._data) - self._position
+        if left:
+            raise PayloadError("%s: %d bytes follow its last field" % (self._what, left))
+
+
+def _encode_text(text: str) -> bytes:
+    data = text.encode("utf-8")
+    return _UINT32.pack(len(data)) + data
+
+
+def encode_topic_info(info: TopicInfo) -> bytes:
+    """Return the payload that declares info (frame ids 0..5 say in which direction)."""
+    return b"".join(
+        (
+            _UINT16.pack(info.topic_id),
+            _encode_text(info.name),
+            _encode_text(info.message_type),
+            _encode_text(info.md5sum),
+            _INT32.pack(info.buffer_length),
+        )
+    )
+
+
+def decode_topic_info(payload: Bytes) -> TopicInfo:
+    """Return what payload declares.
+
+    Raises: PayloadError if it is cut short or longer than its fields.
+    """
+    cursor = _Cursor(payload, "TopicInfo")
+    info = TopicInfo(
+        cursor.read_uint16("topic_id"),
+        cursor.read_text("topic_name"),
+        cursor.read_text("message_type"),
+        cursor.read_text("md5sum"),
+        cursor.read_int32("buffer_size"),
+    )
+    cursor.finish()
+    return info
+
+
+def encode_log(log: Log) -> bytes:
+    """Return the payload of one log line."""
+    return bytes((log.level,)) + _encode_text(log.text)
+
+
+def decode_log(payload: Bytes) -> Log:
+    """Return the log line in payload, colour codes and all.
+
+    Raises: PayloadError if it is cut short or longer than its fields.
+    """
+    cursor = _Cursor(payload, "Log")
+    level = cursor.read_bytes(1, "level")[0]
+    log = Log(level, cursor.read_text("msg"))
+    cursor.finish()
+    return log
+
+
+def encode_time(time: WireTime) -> bytes:
+    """Return the eight bytes of time.
+
+    Raises: PayloadError if a part does not fit 32 bits.
+    """
+    try:
+        return _TIME.pack(time.secs, time.nsecs)
+    except struct.error as error:
+        raise PayloadError("Time: %r does not fit two 32-bit numbers (%s)" % (time, error)) from error
+
+
+def decode_time(payload: Bytes) -> WireTime:
+    """Return the time in payload.
+
+    Raises: PayloadError unless payload has eight bytes.
+    """
+    if len(payload) != _TIME.size:
+        raise PayloadError("Time: has %d bytes instead of 8" % len(payload))
+    return WireTime(*_TIME.unpack(payload))
+
+
+def split_seconds(time_s: float) -> WireTime:
+    """Return time_s (s, not negative) as whole seconds and nanoseconds."""
+    nanoseconds = int(round(time_s * 1e9))
+    return WireTime(nanoseconds // 10**9, nanoseconds % 10**9)
+
+
+def encode_parameter_request(name: str) -> bytes:
+    """Return the payload with which a peer asks for the parameter called name."""
+    return _encode_text(name)
+
+
+def decode_parameter_request(payload: Bytes) -> str:
+    """Return the name of the parameter that a peer asks for.
+
+    Raises: PayloadError if it is cut short or longer than its field.
+    """
+    cursor = _Cursor(payload, "RequestParam")
+    name = cursor.read_text("name")
+    cursor.finish()
+    return name
+
+
+def encode_parameter_answer(ints: Sequence[int], floats: Sequence[float], strings: Sequence[str]) -> bytes:
+    """Return the payload that answers a parameter request; at most one of the lists is usually not empty.
+
+    Raises: PayloadError if a number does not fit 32 bits (floats are single precision).
+    """
+    try:
+        parts = [_UINT32.pack(len(ints)), struct.pack("<%di" % len(ints), *ints)]
+        parts += [_UINT32.pack(len(floats)), struct.pack("<%df" % len(floats), *floats)]
+    except (struct.error, OverflowError) as error:
+        raise PayloadError("RequestParam: a number does not fit 32 bits (%s)" % error) from error
+    parts.append(_UINT32.pack(len(strings)))
+    parts += [_encode_text(text) for text in strings]
+    return b"".join(parts)
+
+
+def decode_parameter_answer(payload: Bytes) -> Tuple[List[int], List[float], List[str]]:
+    """Return the lists (ints, floats, strings) of a parameter answer.
+
+    Raises: PayloadError if it is cut short or longer than its fields.
+    """
+    cursor = _Cursor(payload, "RequestParam answer")
+    ints = [cursor.read_int32("ints") for _ in range(cursor.read_uint32("ints"))]
+    floats = [cursor.read_float32("floats") for _ in range(cursor.read_uint32("floats"))]
+    strings = [cursor.read_text("strings") for _ in range(cursor.read_uint32("strings"))]
+    cursor.finish()
+    return ints, floats, strings

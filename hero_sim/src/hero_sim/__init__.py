@@ -1,0 +1,1 @@
+"""HeRo robots without hardware, behind the same TCP socket as the real ones."""
