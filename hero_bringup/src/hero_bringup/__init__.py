@@ -1,0 +1,1 @@
+"""Programs that start and watch a swarm of HeRo robots."""
