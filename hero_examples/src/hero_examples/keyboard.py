@@ -1,0 +1,156 @@
+"""A terminal -> single key presses, and the terminal back as it was, whatever ends the program.
+
+Knows no robot and no ROS. Sources: termios(3); ECMA-48 for the arrow keys.
+"""
+
+import os
+import subprocess
+import sys
+import termios
+import tty
+from types import TracebackType
+from typing import IO, Any, List, Optional, Tuple, Type
+
+ARROWS = {
+    "\x1b[A": "up",
+    "\x1b[B": "down",
+    "\x1b[C": "right",
+    "\x1b[D": "left",
+    "\x1bOA": "up",
+    "\x1bOB": "down",
+    "\x1bOC": "right",
+    "\x1bOD": "left",
+}
+"""What terminals send for the arrow keys, in normal and in application mode."""
+
+# Waits for a line from the program. The end of the pipe without one means that the program died.
+GUARD_SCRIPT = 'read -r line || stty "$1" <&1'
+
+
+class NoTerminalError(Exception):
+    """There is no terminal to read keys from."""
+
+
+class Keyboard:
+    """The keys of a terminal, one by one, without waiting for return and without showing them.
+
+    Ctrl-C still sends its signal. As a context manager it puts the terminal's settings back at the end. A guard, a
+    small process of its own, does so even when this program is killed or crashes.
+    """
+
+    def __init__(self) -> None:
+        """Find the terminal. Raises: NoTerminalError."""
+        self.file = open_terminal()
+        self._settings: List[Any] = []
+        self._guard: Optional["subprocess.Popen[bytes]"] = None
+        self._unfinished = ""
+
+    def __enter__(self) -> "Keyboard":
+        self._settings = termios.tcgetattr(self.file)
+        self._guard = start_guard(self.file)
+        tty.setcbreak(self.file, termios.TCSANOW)
+        settings = termios.tcgetattr(self.file)
+        # Ctrl-Z would leave a program that neither reads keys nor stops the robot, so it is a key like any other.
+        settings[6][termios.VSUSP] = b"\0"
+        termios.tcsetattr(self.file, termios.TCSANOW, settings)
+        return self
+
+    def __exit__(
+        self,
+        kind: Optional[Type[BaseException]],
+        error: Optional[BaseException],
+        traceback: Optional[TracebackType],
+    ) -> None:
+        try:
+            # FLUSH: keys that are still held down are not for the shell.
+            termios.tcsetattr(self.file, termios.TCSAFLUSH, self._settings)
+        except termios.error:
+            return  # the terminal is closed: nothing is left to put back
+        finally:
+            self._end_guard()
+            self.file.close()
+
+    def _end_guard(self) -> None:
+        """Tell the guard that the terminal is in order."""
+        if self._guard is not None and self._guard.stdin is not None:
+            try:
+                self._guard.communicate(b"done\n", timeout=1.0)
+            except subprocess.TimeoutExpired:
+                self._guard.kill()
+            self._guard = None
+
+    def fileno(self) -> int:
+        """Return what to wait on."""
+        return self.file.fileno()
+
+    def read_keys(self) -> Optional[List[str]]:
+        """Return the keys that were pressed since the last call; None if the terminal is gone.
+
+        A key is its character, or "up", "down", "left", "right" for an arrow. Call when the terminal can be read.
+        """
+        try:
+            data = os.read(self.file.fileno(), 1024)
+        except OSError:
+            return None
+        if not data:
+            return None
+        text, self._unfinished = self._unfinished + data.decode("utf-8", "replace"), ""
+        keys, self._unfinished = split_keys(text)
+        return keys
+
+
+def split_keys(text: str) -> Tuple[List[str], str]:
+    """Return the keys in text, and the rest of it if that may be the start of an arrow key."""
+    keys: List[str] = []
+    while text:
+        if text[0] != "\x1b":
+            keys.append(text[0])
+            text = text[1:]
+        elif text[:3] in ARROWS:
+            keys.append(ARROWS[text[:3]])
+            text = text[3:]
+        elif text in ("\x1b[", "\x1bO"):
+            return keys, text
+        else:
+            text = text[1:]  # a lone escape, or a sequence that means nothing here: its letters are dropped too
+            if text[:1] in ("[", "O"):
+                text = text[1:].lstrip("0123456789;")[1:]
+    return keys, ""
+
+
+def open_terminal() -> IO[bytes]:
+    """Return the terminal for reading and setting, unbuffered.
+
+    Standard input, if it is one. A node under roslaunch is in a session of its own, where /dev/tty does not open,
+    but it has roslaunch's standard streams.
+
+    Raises: NoTerminalError with what to do.
+    """
+    for stream in (sys.__stdin__, sys.__stdout__, sys.__stderr__):
+        if stream is not None and not stream.closed and os.isatty(stream.fileno()):
+            return _open_terminal_device(os.ttyname(stream.fileno()))
+    try:
+        return _open_terminal_device("/dev/tty")
+    except OSError:
+        raise NoTerminalError(
+            "no terminal to read keys from: start it in a plain terminal, with neither input nor output redirected"
+        ) from None
+
+
+def _open_terminal_device(path: str) -> IO[bytes]:
+    # NOCTTY: opening a terminal must not make it this session's own.
+    return os.fdopen(os.open(path, os.O_RDONLY | os.O_NOCTTY), "rb", buffering=0)
+
+
+def start_guard(terminal: IO[bytes]) -> "subprocess.Popen[bytes]":
+    """Start the process that puts the terminal's present settings back when this one dies without a word."""
+    saved = subprocess.run(["stty", "-g"], stdin=terminal, stdout=subprocess.PIPE, check=True).stdout.decode().strip()
+    # A session of its own: signals to this program's group do not reach it, and a background process may set the
+    # terminal only if that is not its controlling one. The pipe is its input, so the terminal is its output.
+    return subprocess.Popen(
+        ["sh", "-c", GUARD_SCRIPT, "guard", saved],
+        stdin=subprocess.PIPE,
+        stdout=terminal,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )

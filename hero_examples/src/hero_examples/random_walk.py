@@ -1,0 +1,116 @@
+"""Node random_walk: proximity of any set of robots -> a random walk that avoids obstacles, one process for all."""
+
+import math
+import random
+from typing import List, NamedTuple, Optional
+
+import rospy
+
+from .control_laws import STANDSTILL, WanderLaw, WanderMemory, wander
+from .program import Program, ProgramError, check_number, parse_robot_ids, read_parameters, run
+from .robot import MAX_LINEAR_M_S, Robot, StaleDataError
+from .swarm_start import WaitReport, open_swarm
+
+RATE_HZ = 10.0
+"""Commands per second and robot: the robot takes no more than about 19, and stops by itself after 2 s without."""
+
+LED_PERIOD_S = 2.0
+"""Between two messages of the same colour: the robot goes dark 15 s after the last one."""
+
+WALKING_COLOR = "green"
+BENDING_COLOR = "yellow"
+ESCAPING_COLOR = "red"
+WAITING_COLOR = "blue"
+
+
+class Parameters(NamedTuple):
+    """The checked parameters of the node."""
+
+    robot_ids: Optional[List[int]]
+    """None for all that the driver reports."""
+    law: WanderLaw
+    seed: Optional[int]
+
+
+def load_parameters() -> Parameters:
+    """Return the node's private parameters. Raises: ProgramError."""
+    given = read_parameters({"robots": "0", "linear_m_s": 0.10, "turn_rad_s": 1.5, "seed": -1})
+    seed = given["seed"]
+    if isinstance(seed, bool) or not isinstance(seed, int):
+        raise ProgramError("~seed is %r, but must be a whole number; -1 draws one" % (seed,))
+    law = WanderLaw(
+        cruise_m_s=check_number("linear_m_s", given["linear_m_s"], 0.0, MAX_LINEAR_M_S, "m/s"),
+        turn_rad_s=check_number("turn_rad_s", given["turn_rad_s"], 0.1, 4.0, "rad/s"),
+    )
+    return Parameters(parse_robot_ids("robots", given["robots"]), law, None if seed < 0 else seed)
+
+
+class Walker:
+    """The random walk of one robot."""
+
+    def __init__(self, robot: Robot, law: WanderLaw, seed: Optional[int]) -> None:
+        """seed: of this walk, None for a different one each time."""
+        self.robot = robot
+        self.waiting_for: Optional[str] = "the first proximity message"
+        self._law = law
+        self._random = random.Random(seed)
+        self._memory = WanderMemory()
+        self._color = ""
+        self._steps_since_color = 0
+
+    def step(self) -> None:
+        """Send the next command: a standstill while the robot's sensors are silent."""
+        try:
+            ranges = self.robot.proximity
+        except StaleDataError as error:
+            self.waiting_for = str(error)
+            self._memory = WanderMemory()
+            self.robot.drive(*STANDSTILL)
+            self._show(WAITING_COLOR)
+            return
+        if all(math.isnan(range_m) for range_m in ranges):
+            self.waiting_for = "usable ranges on %s/proximity: is its infrared calibration set?" % self.robot.namespace
+            self.robot.drive(*STANDSTILL)
+            self._show(WAITING_COLOR)
+            return
+        self.waiting_for = None
+        command, self._memory = wander(ranges, self._memory, self._random.random(), self._law)
+        self.robot.drive(*command)
+        if self._memory.escape_sign:
+            self._show(ESCAPING_COLOR)
+        else:
+            self._show(WALKING_COLOR if command.linear_m_s >= self._law.cruise_m_s else BENDING_COLOR)
+
+    def _show(self, color: str) -> None:
+        self._steps_since_color += 1
+        if color != self._color or self._steps_since_color >= LED_PERIOD_S * RATE_HZ:
+            self.robot.led(color)
+            self._color = color
+            self._steps_since_color = 0
+
+
+def walk(program: Program, parameters: Parameters) -> None:
+    """Let the robots walk until the program is to end."""
+    with open_swarm(program, parameters.robot_ids, odom=False) as swarm:
+        walkers = [
+            Walker(robot, parameters.law, None if parameters.seed is None else parameters.seed + robot.robot_id)
+            for robot in swarm
+        ]
+        rospy.loginfo("random walk of %s", ", ".join(robot.name for robot in swarm))
+        report = WaitReport()
+        while program.sleep(1.0 / RATE_HZ):
+            for walker in walkers:
+                walker.step()
+            report.update({walker.robot.name: walker.waiting_for for walker in walkers})
+        swarm.led("off")
+    rospy.loginfo("random walk ended, robots stopped")
+
+
+def _main() -> None:
+    with Program("random_walk") as program:
+        walk(program, load_parameters())
+
+
+def main() -> None:
+    """Run the node."""
+    run(_main)

@@ -1,0 +1,460 @@
+"""One robot, or a swarm, as an object: methods become messages, the newest messages become properties.
+
+    from hero_examples import Robot
+
+    with Robot(0) as robot:
+        robot.wait_until_ready(timeout_s=10)
+        robot.drive(0.1, 0.0, duration_s=2.0)
+        print(robot.pose, robot.nearest())
+
+Knows the topics under /hero_N only, so that simulated and real robots are the same to it. Units: metres, radians,
+seconds. Frames (REP 103, 105): poses are in hero_N/odom, velocities and ranges in hero_N/base_link: x ahead, y to
+the left, angles counter-clockwise from straight ahead.
+"""
+
+import math
+import signal
+import sys
+import threading
+import time
+from types import FrameType, TracebackType
+from typing import Any, Callable, Dict, Iterable, Iterator, List, NamedTuple, Optional, Sequence, Tuple, Type, Union
+
+import rospy
+from geometry_msgs.msg import Twist
+from hero_msgs.msg import RobotArray
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import LaserScan
+from std_msgs.msg import ColorRGBA
+
+from . import control_laws
+from .control_laws import Pose
+
+MAX_LINEAR_M_S = 0.20
+"""The firmware clamps linear.x to this (config.h)."""
+
+MAX_TURN_RAD_S = 8.0
+"""The firmware clamps angular.z to this (config.h)."""
+
+STOP_GAP_S = 0.06
+"""Between the two messages of a stop: the firmware drops a Twist that comes within 50 ms of the one before."""
+
+SEND_TIME_S = 0.05
+"""rospy sends on threads of its own and does not say when it has; this is many times what a send takes."""
+
+REPEAT_PERIOD_S = 0.1
+"""Between the commands of a timed drive: well within the robot's watchdog of about 2 s."""
+
+FRESH_ODOM_S = 0.5
+"""Odometry comes about 29 times a second; older than this is stale. Wi-Fi gaps of 0.1 s are common."""
+
+FRESH_PROXIMITY_S = 1.0
+"""Proximity comes about 5 times a second; older than this is stale."""
+
+DISCOVERY_TOPIC = "/hero_driver/robots"
+
+COLORS: Dict[str, Tuple[float, float, float]] = {
+    "off": (0.0, 0.0, 0.0),
+    "red": (1.0, 0.0, 0.0),
+    "green": (0.0, 1.0, 0.0),
+    "blue": (0.0, 0.0, 1.0),
+    "yellow": (1.0, 1.0, 0.0),
+    "magenta": (1.0, 0.0, 1.0),
+    "cyan": (0.0, 1.0, 1.0),
+    "white": (1.0, 1.0, 1.0),
+    "orange": (1.0, 0.4, 0.0),
+}
+
+Color = Union[str, Sequence[float]]
+
+Sleep = Callable[[float], bool]
+"""Waits for so many seconds and tells whether to go on; `Program.sleep` is one."""
+
+POLL_PERIOD_S = 0.02
+"""Between two looks at whether a robot is ready."""
+
+
+class RobotError(Exception):
+    """A robot cannot do what it was asked for; the text says why and what to do."""
+
+
+class RobotNotReadyError(RobotError):
+    """The robot, or something of it, is not there."""
+
+
+class StaleDataError(RobotError):
+    """The newest message is missing or too old to act upon."""
+
+
+class GoalError(RobotError):
+    """The robot did not reach its goal; `reason` says why."""
+
+
+class Velocity(NamedTuple):
+    """How the robot moves, in its own frame."""
+
+    linear_m_s: float
+    turn_rad_s: float
+
+
+class Obstacle(NamedTuple):
+    """The nearest thing that a proximity sensor sees."""
+
+    range_m: float
+    """From the robot's centre."""
+    bearing_rad: float
+    """Counter-clockwise from straight ahead, -pi..pi."""
+
+
+def sleep_unless_shutdown(duration_s: float) -> bool:
+    """Wait for duration_s; return whether ROS still runs."""
+    time.sleep(duration_s)
+    return not rospy.is_shutdown()
+
+
+def start_node(name: str = "hero_program") -> None:
+    """Start a ROS node for a plain script, unless one runs already.
+
+    Ctrl-C raises KeyboardInterrupt as in every Python program, SIGTERM and SIGHUP raise SystemExit, so that `with`
+    blocks stop their robots before ROS goes down.
+    """
+    if rospy.core.is_initialized():
+        return
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, _raise_exit)
+        signal.signal(signal.SIGHUP, _raise_exit)
+    rospy.init_node(name, anonymous=True, disable_signals=True)
+
+
+def _raise_exit(number: int, frame: Optional[FrameType]) -> None:
+    for ending in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(ending, signal.SIG_IGN)  # a second one must not break off the stopping of the robots
+    sys.exit(128 + number)
+
+
+class Robot:
+    """One robot by the number in its name: Robot(3) is /hero_3.
+
+    Data properties hand out the newest message only while it is fresh, else they raise StaleDataError. As a context
+    manager it stops the robot at the end, also after an error.
+    """
+
+    def __init__(self, robot_id: int, odom: bool = True, proximity: bool = True) -> None:
+        """Connect to the topics of /hero_{robot_id}; odom, proximity: whether to subscribe to these.
+
+        Starts a node if the program has none yet. Returns at once: see wait_until_ready().
+        """
+        if isinstance(robot_id, bool) or not isinstance(robot_id, int) or robot_id < 0:
+            raise ValueError("a robot is named by its number, 0 or more, not by %r" % (robot_id,))
+        start_node()
+        self.robot_id = robot_id
+        self.name = "hero_%d" % robot_id
+        self.namespace = "/" + self.name
+        self._newest: Dict[str, Tuple[float, Any]] = {}
+        self._cmd_vel = rospy.Publisher(
+            self.namespace + "/velocity_controller/cmd_vel", Twist, queue_size=1
+        )
+        self._led = rospy.Publisher(self.namespace + "/led", ColorRGBA, queue_size=1)
+        self._subscribers: Dict[str, rospy.Subscriber] = {}
+        if odom:
+            self._subscribe("odom", Odometry)
+        if proximity:
+            self._subscribe("proximity", LaserScan)
+
+    def _subscribe(self, topic: str, message_class: Type[Any]) -> None:
+        self._subscribers[topic] = rospy.Subscriber(
+            "%s/%s" % (self.namespace, topic),
+            message_class,
+            self._receive_message,
+            callback_args=topic,
+            queue_size=1,
+            tcp_nodelay=True,
+        )
+
+    def _receive_message(self, message: Any, topic: str) -> None:
+        self._newest[topic] = (time.monotonic(), message)
+
+    # ------------------------------------------------------------------ what the robot says
+
+    def age_s(self, topic: str) -> float:
+        """Return the seconds since the last message of "odom" or "proximity" arrived; inf before the first."""
+        newest = self._newest.get(topic)
+        return math.inf if newest is None else time.monotonic() - newest[0]
+
+    def _read_fresh(self, topic: str, limit_s: float) -> Any:
+        newest = self._newest.get(topic)
+        if newest is None:
+            raise StaleDataError(
+                "no message on %s/%s yet: is the robot on, and does the driver run?" % (self.namespace, topic)
+            )
+        age_s = time.monotonic() - newest[0]
+        if age_s > limit_s:
+            raise StaleDataError(
+                "the last message on %s/%s came %.1f s ago: has the robot gone?" % (self.namespace, topic, age_s)
+            )
+        return newest[1]
+
+    @property
+    def odometry(self) -> Odometry:
+        """The newest odometry message as it came. Raises: StaleDataError."""
+        return self._read_fresh("odom", FRESH_ODOM_S)
+
+    @property
+    def pose(self) -> Pose:
+        """Where the robot is, (x_m, y_m, yaw_rad) in the frame hero_N/odom. Raises: StaleDataError."""
+        pose = self.odometry.pose.pose
+        return Pose(pose.position.x, pose.position.y, yaw_of(pose.orientation))
+
+    @property
+    def velocity(self) -> Velocity:
+        """How the robot moves by its odometry. Raises: StaleDataError."""
+        twist = self.odometry.twist.twist
+        return Velocity(twist.linear.x, twist.angular.z)
+
+    @property
+    def proximity(self) -> List[float]:
+        """Eight ranges in metres from the robot's centre, straight ahead first, counter-clockwise, 45 degrees apart.
+
+        inf: nothing in range (about 0.24 m); 0.0: too close to measure; nan: the sensor gives nothing usable.
+        Raises: StaleDataError.
+        """
+        return front_first(self._read_fresh("proximity", FRESH_PROXIMITY_S))
+
+    def nearest(self) -> Optional[Obstacle]:
+        """Return the nearest thing that a sensor sees, None if there is none. Raises: StaleDataError."""
+        return nearest_obstacle(self.proximity)
+
+    @property
+    def connected(self) -> bool:
+        """Whether somebody takes the robot's commands: the driver, while the robot is known to it."""
+        return self._cmd_vel.get_num_connections() > 0
+
+    def missing(self) -> Optional[str]:
+        """Return what keeps the robot from being driven, in words; None if nothing does."""
+        if not self.connected:
+            return "nobody takes %s: is the driver running, and has the robot joined it?" % self._cmd_vel.name
+        for topic in self._subscribers:
+            if self.age_s(topic) > FRESH_PROXIMITY_S:
+                return "nothing comes on %s/%s: is the robot on and in reach?" % (self.namespace, topic)
+        return None
+
+    def wait_until_ready(self, timeout_s: float = 10.0, sleep: Sleep = sleep_unless_shutdown) -> "Robot":
+        """Wait until the robot takes commands and sends what was subscribed to; return the robot itself.
+
+        Raises: RobotNotReadyError after timeout_s, saying what is missing.
+        """
+        deadline_s = time.monotonic() + timeout_s
+        while True:
+            missing = self.missing()
+            if missing is None:
+                return self
+            if time.monotonic() >= deadline_s or not sleep(POLL_PERIOD_S):
+                raise RobotNotReadyError("%s is not ready after %g s: %s" % (self.name, timeout_s, missing))
+
+    # ------------------------------------------------------------------ what the robot is told
+
+    def drive(self, linear_m_s: float, turn_rad_s: float, duration_s: Optional[float] = None) -> None:
+        """Move with these speeds, which are cut to what the robot can do (0.20 m/s, 8 rad/s).
+
+        linear_m_s: positive ahead. turn_rad_s: positive to the left. duration_s: keep it up for so long, then stop;
+        None sends one command and returns: the robot obeys it until the next one, for about two seconds at most.
+        """
+        if duration_s is None:
+            self._send_twist(linear_m_s, turn_rad_s)
+            return
+        end_s = time.monotonic() + duration_s
+        try:
+            while not rospy.is_shutdown():
+                rest_s = end_s - time.monotonic()
+                if rest_s <= 0.0:
+                    break
+                self._send_twist(linear_m_s, turn_rad_s)
+                time.sleep(min(REPEAT_PERIOD_S, rest_s))
+        finally:
+            self.stop()
+
+    def _send_twist(self, linear_m_s: float, turn_rad_s: float) -> None:
+        if not (math.isfinite(linear_m_s) and math.isfinite(turn_rad_s)):
+            raise ValueError("speeds must be finite, not %r m/s and %r rad/s" % (linear_m_s, turn_rad_s))
+        twist = Twist()
+        twist.linear.x = max(-MAX_LINEAR_M_S, min(MAX_LINEAR_M_S, linear_m_s))
+        twist.angular.z = max(-MAX_TURN_RAD_S, min(MAX_TURN_RAD_S, turn_rad_s))
+        if not rospy.is_shutdown():
+            self._cmd_vel.publish(twist)
+
+    def stop(self) -> None:
+        """Stop, surely: returns when two stops, further apart than the robot's filter, are sent (about 0.2 s)."""
+        stop_all([self])
+
+    def led(self, color: Color) -> None:
+        """Show a colour: a name of COLORS, or (red, green, blue) each 0..1. The robot goes dark 15 s later."""
+        red, green, blue = parse_color(color)
+        if not rospy.is_shutdown():
+            self._led.publish(ColorRGBA(red, green, blue, 1.0))
+
+    # ------------------------------------------------------------------ end
+
+    def close(self) -> None:
+        """Stop the robot and leave its topics; safe twice."""
+        self.stop()
+        self._disconnect()
+
+    def _disconnect(self) -> None:
+        for subscriber in self._subscribers.values():
+            subscriber.unregister()
+        self._subscribers = {}
+
+    def __enter__(self) -> "Robot":
+        return self
+
+    def __exit__(
+        self,
+        kind: Optional[Type[BaseException]],
+        error: Optional[BaseException],
+        traceback: Optional[TracebackType],
+    ) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return "Robot(%d)" % self.robot_id
+
+
+class Swarm:
+    """Several robots; iterate it, or take one by its number: swarm[3]."""
+
+    def __init__(self, robot_ids: Iterable[int], odom: bool = True, proximity: bool = True) -> None:
+        """Connect to the robots with these numbers; odom, proximity: see Robot."""
+        self.robots = [Robot(robot_id, odom, proximity) for robot_id in robot_ids]
+        self._by_id = {robot.robot_id: robot for robot in self.robots}
+
+    @classmethod
+    def discover(
+        cls, timeout_s: float = 10.0, odom: bool = True, proximity: bool = True, sleep: Sleep = sleep_unless_shutdown
+    ) -> "Swarm":
+        """Return all robots that the driver reports as ready, as soon as there is at least one.
+
+        Raises: RobotNotReadyError after timeout_s without the driver or without a robot.
+        """
+        start_node()
+        deadline_s = time.monotonic() + timeout_s
+        newest: List[RobotArray] = []
+        subscriber = rospy.Subscriber(DISCOVERY_TOPIC, RobotArray, newest.append, queue_size=1)
+        try:
+            while time.monotonic() < deadline_s and sleep(POLL_PERIOD_S):
+                ids = ready_ids(newest[-1]) if newest else []
+                if ids:
+                    return cls(ids, odom, proximity)
+        finally:
+            subscriber.unregister()
+        if not newest:
+            raise RobotNotReadyError(
+                "nothing on %s within %g s: is the driver running?" % (DISCOVERY_TOPIC, timeout_s)
+            )
+        raise RobotNotReadyError("no robot joined the driver within %g s: are they on?" % timeout_s)
+
+    def wait_until_ready(self, timeout_s: float = 10.0, sleep: Sleep = sleep_unless_shutdown) -> "Swarm":
+        """Wait until every robot is ready; return the swarm itself.
+
+        Raises: RobotNotReadyError after timeout_s, for the first robot that is not.
+        """
+        deadline_s = time.monotonic() + timeout_s
+        for robot in self.robots:
+            robot.wait_until_ready(max(0.0, deadline_s - time.monotonic()), sleep)
+        return self
+
+    def stop(self) -> None:
+        """Stop all robots at once; returns when the stops are sent (about 0.2 s)."""
+        stop_all(self.robots)
+
+    def led(self, color: Color) -> None:
+        """Show a colour on all robots."""
+        for robot in self.robots:
+            robot.led(color)
+
+    def close(self) -> None:
+        """Stop all robots and leave their topics; safe twice."""
+        self.stop()
+        for robot in self.robots:
+            robot._disconnect()
+
+    def __getitem__(self, robot_id: int) -> Robot:
+        return self._by_id[robot_id]
+
+    def __iter__(self) -> Iterator[Robot]:
+        return iter(self.robots)
+
+    def __len__(self) -> int:
+        return len(self.robots)
+
+    def __enter__(self) -> "Swarm":
+        return self
+
+    def __exit__(
+        self,
+        kind: Optional[Type[BaseException]],
+        error: Optional[BaseException],
+        traceback: Optional[TracebackType],
+    ) -> None:
+        self.close()
+
+
+def stop_all(robots: Sequence[Robot]) -> None:
+    """Send every robot two stops, far enough apart that none is dropped, and wait until they are out."""
+    if not robots:
+        return
+    for robot in robots:
+        robot._send_twist(0.0, 0.0)
+    # The first stop may itself come within 50 ms of the last command, and then only the second one counts.
+    time.sleep(STOP_GAP_S)
+    for robot in robots:
+        robot._send_twist(0.0, 0.0)
+    time.sleep(SEND_TIME_S)
+
+
+def ready_ids(robots: RobotArray) -> List[int]:
+    """Return the numbers of the robots that can be driven now, sorted."""
+    return sorted(robot.id for robot in robots.robots if robot.state == robot.READY and robot.id >= 0)
+
+
+def parse_color(color: Color) -> Tuple[float, float, float]:
+    """Return (red, green, blue), each 0..1.
+
+    Raises: ValueError with the names that are known.
+    """
+    if isinstance(color, str):
+        if color not in COLORS:
+            raise ValueError("no colour %r; there are: %s" % (color, ", ".join(COLORS)))
+        return COLORS[color]
+    values = [float(value) for value in color]
+    if len(values) != 3 or not all(0.0 <= value <= 1.0 for value in values):
+        raise ValueError("a colour is a name or three numbers 0..1, not %r" % (color,))
+    return values[0], values[1], values[2]
+
+
+def yaw_of(orientation: Any) -> float:
+    """Return the turn about z, -pi..pi, of a geometry_msgs/Quaternion."""
+    return math.atan2(
+        2.0 * (orientation.w * orientation.z + orientation.x * orientation.y),
+        1.0 - 2.0 * (orientation.y ** 2 + orientation.z ** 2),
+    )
+
+
+def front_first(scan: LaserScan) -> List[float]:
+    """Return the scan's ranges starting straight ahead, with -inf (REP 117: too close) as 0.0."""
+    count = len(scan.ranges)
+    if count == 0 or scan.angle_increment <= 0.0:
+        return []
+    front = int(round(-scan.angle_min / scan.angle_increment))
+    return [
+        0.0 if scan.ranges[(front + index) % count] == -math.inf else scan.ranges[(front + index) % count]
+        for index in range(count)
+    ]
+
+
+def nearest_obstacle(ranges: Sequence[float]) -> Optional[Obstacle]:
+    """Return the nearest of ranges that start straight ahead and go round counter-clockwise, None if all are free."""
+    seen = [(range_m, index) for index, range_m in enumerate(ranges) if math.isfinite(range_m)]
+    if not seen:
+        return None
+    range_m, index = min(seen)
+    return Obstacle(range_m, control_laws.wrap_angle(index * 2.0 * math.pi / len(ranges)))
