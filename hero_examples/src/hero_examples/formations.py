@@ -1,0 +1,107 @@
+"""A formation, as read from YAML -> the places of its robots. Pure.
+
+    shape: circle           # or line, grid, points
+    center: [0.0, 0.0]      # m, of the whole
+    spacing_m: 0.25         # between neighbours
+    turn_deg: 0.0           # of the whole, counter-clockwise
+    columns: 4              # grid only; default: as square as it gets
+    points: [[0, 0], [0.3, 0]]   # points only: m, relative to center
+"""
+
+import math
+from typing import Any, Dict, List, Tuple
+
+Point = Tuple[float, float]
+
+SHAPES = ("circle", "grid", "line", "points")
+
+KEYS = ("shape", "center", "spacing_m", "turn_deg", "columns", "points")
+
+DEFAULT_SPACING_M = 0.25
+
+
+class FormationError(ValueError):
+    """A formation that cannot be taken; the text names the key, the value and what it must be."""
+
+
+def place_formation(formation: Any, count: int, least_spacing_m: float) -> List[Point]:
+    """Return count places, m, in the frame in which center is given.
+
+    least_spacing_m: nearer to each other robots would not get into their places.
+    Raises: FormationError.
+    """
+    if not isinstance(formation, dict):
+        raise FormationError("a formation is a table with %s, not %r" % (", ".join(KEYS), formation))
+    unknown = sorted(set(formation) - set(KEYS))
+    if unknown:
+        raise FormationError("formation: unknown key %r; known are: %s" % (unknown[0], ", ".join(KEYS)))
+    shape = formation.get("shape", "circle")
+    if shape not in SHAPES:
+        raise FormationError("formation: shape is %r, but must be one of: %s" % (shape, ", ".join(SHAPES)))
+    center = _read_point("center", formation.get("center", [0.0, 0.0]))
+    spacing_m = _read_number("spacing_m", formation.get("spacing_m", DEFAULT_SPACING_M))
+    turn_rad = math.radians(_read_number("turn_deg", formation.get("turn_deg", 0.0)))
+    if shape == "circle":
+        places = _circle(count, spacing_m)
+    elif shape == "line":
+        places = [((index - (count - 1) / 2.0) * spacing_m, 0.0) for index in range(count)]
+    elif shape == "grid":
+        places = _grid(count, spacing_m, formation)
+    else:
+        places = _read_points(formation, count)
+    _check_spacing(places, least_spacing_m)
+    cos, sin = math.cos(turn_rad), math.sin(turn_rad)
+    return [(center[0] + x * cos - y * sin, center[1] + x * sin + y * cos) for x, y in places]
+
+
+def _circle(count: int, spacing_m: float) -> List[Point]:
+    """Return places on a circle on which neighbours are spacing_m apart, as the crow flies."""
+    if count == 1:
+        return [(0.0, 0.0)]
+    radius_m = spacing_m / (2.0 * math.sin(math.pi / count))
+    angles = [2.0 * math.pi * index / count for index in range(count)]
+    return [(radius_m * math.cos(angle), radius_m * math.sin(angle)) for angle in angles]
+
+
+def _grid(count: int, spacing_m: float, formation: Dict[str, Any]) -> List[Point]:
+    columns = formation.get("columns", math.ceil(math.sqrt(count)))
+    if isinstance(columns, bool) or not isinstance(columns, int) or columns < 1:
+        raise FormationError("formation: columns is %r, but must be a whole number, 1 or more" % (columns,))
+    rows = math.ceil(count / columns)
+    return [
+        (
+            (index % columns - (columns - 1) / 2.0) * spacing_m,
+            ((rows - 1) / 2.0 - index // columns) * spacing_m,
+        )
+        for index in range(count)
+    ]
+
+
+def _read_points(formation: Dict[str, Any], count: int) -> List[Point]:
+    points = formation.get("points")
+    if not isinstance(points, list) or len(points) < count:
+        raise FormationError("formation: points must be a list of at least %d places [x, y] in m" % count)
+    return [_read_point("points", point) for point in points]
+
+
+def _check_spacing(places: List[Point], least_spacing_m: float) -> None:
+    for index, first in enumerate(places):
+        for second in places[:index]:
+            apart_m = math.dist(first, second)
+            if apart_m < least_spacing_m:
+                raise FormationError(
+                    "formation: two places are %.3f m apart, but robots need %.2f m: make spacing_m larger"
+                    % (apart_m, least_spacing_m)
+                )
+
+
+def _read_number(key: str, value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        raise FormationError("formation: %s is %r, but must be a number" % (key, value))
+    return float(value)
+
+
+def _read_point(key: str, value: Any) -> Point:
+    if not isinstance(value, (list, tuple)) or len(value) != 2:
+        raise FormationError("formation: %s holds %r, but must hold [x, y] in m" % (key, value))
+    return _read_number(key, value[0]), _read_number(key, value[1])

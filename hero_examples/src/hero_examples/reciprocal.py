@@ -1,0 +1,188 @@
+"""Where all robots are and want to go -> velocities with which they do not meet: reciprocal avoidance (ORCA).
+
+Pure, numpy only. Each robot takes half of the change that keeps a pair apart for `horizon_s`; every other robot
+gives a half plane of allowed velocities, and the robot takes the allowed one nearest to the one it wants.
+Source: J. van den Berg, S. Guy, M. Lin, D. Manocha, Reciprocal n-body collision avoidance, ISRR 2009.
+
+ORCA is made for discs that move any way at once. A robot with two wheels cannot move sideways, but a point `ahead_m`
+in front of its axle can: v = u . heading, w = u . left / ahead_m. So the disc is put around that point and made
+larger by ahead_m, which covers the body whatever way it turns (J. Snape et al., Smooth and collision-free
+navigation for multiple robots under differential-drive constraints, IROS 2010). ORCA was chosen over potential
+fields and priorities because it is symmetric (same rule for all, no order among robots), local, and does not swing.
+"""
+
+import math
+from typing import NamedTuple, Optional, Sequence, Tuple
+
+import numpy as np
+
+from .control_laws import Command, Pose
+
+_TINY = 1e-9
+
+_SLACK_HALVINGS = 12
+"""Of at most a few m/s: leaves less than a millimetre a second."""
+
+
+class AvoidanceLaw(NamedTuple):
+    """How robots keep apart."""
+
+    body_m: float = 0.0369
+    """Radius of the body."""
+    ahead_m: float = 0.03
+    """The point that is steered lies so far in front of the axle; small: quick turns, large: wide berth."""
+    margin_m: float = 0.008
+    """Added to the radius for late and wrong odometry and for wheels that lag."""
+    horizon_s: float = 3.0
+    """Robots are kept apart for so long ahead."""
+    neighbours: int = 6
+    """So many of the nearest robots are looked at: more do not fit around one."""
+    max_linear_m_s: float = 0.08
+    max_turn_rad_s: float = 2.5
+
+    @property
+    def radius_m(self) -> float:
+        """Of the disc around the steered point."""
+        return self.body_m + self.ahead_m + self.margin_m
+
+
+def steered_point(pose: Pose, ahead_m: float) -> np.ndarray:
+    """Return the point (2,) ahead_m in front of the robot's axle."""
+    return np.array([pose.x_m + ahead_m * math.cos(pose.yaw_rad), pose.y_m + ahead_m * math.sin(pose.yaw_rad)])
+
+
+def steered_velocity(pose: Pose, command: Command, ahead_m: float) -> np.ndarray:
+    """Return the velocity (2,) of the steered point under command; the opposite of steer()."""
+    ahead = np.array([math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)])
+    left = np.array([-ahead[1], ahead[0]])
+    return command.linear_m_s * ahead + command.turn_rad_s * ahead_m * left
+
+
+def steer(pose: Pose, velocity: np.ndarray, law: AvoidanceLaw) -> Command:
+    """Return the command that moves the steered point with velocity (2,), or slower the same way."""
+    cos, sin = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
+    linear_m_s = float(velocity[0] * cos + velocity[1] * sin)
+    turn_rad_s = float(velocity[1] * cos - velocity[0] * sin) / law.ahead_m
+    excess = max(abs(linear_m_s) / law.max_linear_m_s, abs(turn_rad_s) / law.max_turn_rad_s, 1.0)
+    return Command(linear_m_s / excess, turn_rad_s / excess)
+
+
+def half_plane(
+    offset: np.ndarray, velocity: np.ndarray, radius_m: float, horizon_s: float, step_s: float
+) -> Tuple[np.ndarray, float]:
+    """Return (normal, depth): own velocity changes c with c . normal >= depth keep a pair apart for horizon_s.
+
+    offset: other minus own place (2,). velocity: own minus other velocity (2,). radius_m: sum of both radii.
+    step_s: time in which discs that overlap already shall come apart. depth is for both robots together.
+    """
+    distance_m = float(np.hypot(*offset))
+    if distance_m <= radius_m:
+        # Overlap: leave it within one step.
+        w = velocity - offset / step_s
+        length = float(np.hypot(*w))
+        normal = w / length if length > _TINY else np.array([-1.0, 0.0])
+        return normal, radius_m / step_s - length
+    # The forbidden velocities are a cone towards the other robot, cut off by a disc at offset / horizon_s.
+    w = velocity - offset / horizon_s
+    towards = float(w @ offset)
+    length = float(np.hypot(*w))
+    if towards < 0.0 and towards**2 > radius_m**2 * length**2:
+        return w / length, radius_m / horizon_s - length
+    leg = math.sqrt(distance_m**2 - radius_m**2)
+    side = 1.0 if offset[0] * w[1] - offset[1] * w[0] > 0.0 else -1.0
+    direction = (
+        np.array([offset[0] * leg - side * offset[1] * radius_m, side * offset[0] * radius_m + offset[1] * leg])
+        / distance_m**2
+    )
+    normal = side * np.array([-direction[1], direction[0]])
+    return normal, -float(velocity @ normal)
+
+
+def nearest_allowed(
+    wanted: np.ndarray, normals: np.ndarray, bounds: np.ndarray, max_speed_m_s: float
+) -> np.ndarray:
+    """Return the velocity nearest to wanted with normals @ v >= bounds and no faster than max_speed_m_s.
+
+    Where there is none, all half planes give way by the same, least amount. normals (N, 2), bounds (N,).
+    """
+    found = _best_corner(wanted, normals, bounds, max_speed_m_s)
+    if found is not None:
+        return found
+    found = np.zeros(2)
+    low_m_s, high_m_s = 0.0, float(np.max(bounds))  # standing still needs no more than the largest bound
+    for _ in range(_SLACK_HALVINGS):
+        slack_m_s = (low_m_s + high_m_s) / 2.0
+        better = _best_corner(wanted, normals, bounds - slack_m_s, max_speed_m_s)
+        if better is None:
+            low_m_s = slack_m_s
+        else:
+            high_m_s, found = slack_m_s, better
+    return found
+
+
+def _best_corner(
+    wanted: np.ndarray, normals: np.ndarray, bounds: np.ndarray, max_speed_m_s: float
+) -> Optional[np.ndarray]:
+    """Return the allowed velocity nearest to wanted, None if there is none.
+
+    The nearest point of a convex set with straight edges and an arc is wanted itself, its foot on an edge, or a
+    corner: there are few enough to try them all.
+    """
+    speed = float(np.hypot(*wanted))
+    candidates = [wanted if speed <= max_speed_m_s else wanted * (max_speed_m_s / speed)]
+    feet = wanted + (bounds - normals @ wanted)[:, None] * normals
+    half_chords_m2 = max_speed_m_s**2 - bounds**2
+    crossing = half_chords_m2 >= 0.0
+    along = np.column_stack((-normals[:, 1], normals[:, 0]))
+    middles = bounds[crossing, None] * normals[crossing]
+    arms = np.sqrt(half_chords_m2[crossing])[:, None] * along[crossing]
+    first, second = np.triu_indices(len(bounds), 1)
+    cross = normals[first, 0] * normals[second, 1] - normals[first, 1] * normals[second, 0]
+    meeting = np.abs(cross) > 1e-6
+    first, second, cross = first[meeting], second[meeting], cross[meeting]
+    corners = np.column_stack(
+        (
+            bounds[first] * normals[second, 1] - bounds[second] * normals[first, 1],
+            bounds[second] * normals[first, 0] - bounds[first] * normals[second, 0],
+        )
+    ) / cross[:, None]
+    points = np.vstack((np.array(candidates), feet, middles + arms, middles - arms, corners))
+    allowed = np.all(points @ normals.T >= bounds - _TINY, axis=1)
+    allowed &= np.hypot(points[:, 0], points[:, 1]) <= max_speed_m_s + _TINY
+    if not allowed.any():
+        return None
+    points = points[allowed]
+    best: np.ndarray = points[np.argmin(np.sum((points - wanted) ** 2, axis=1))]
+    return best
+
+
+def avoid_others(
+    places: np.ndarray,
+    velocities: np.ndarray,
+    wanted: np.ndarray,
+    law: AvoidanceLaw,
+    step_s: float,
+    robots: Sequence[int],
+) -> np.ndarray:
+    """Return the velocities (len(robots), 2) of the steered points of the chosen robots.
+
+    places, velocities, wanted: of the steered points of all robots, each (N, 2), in one common frame. step_s: time
+    between two calls. robots: indices of those whose velocity is asked for.
+    """
+    answers = np.zeros((len(robots), 2))
+    for row, own in enumerate(robots):
+        offsets = places - places[own]
+        distances_m = np.hypot(offsets[:, 0], offsets[:, 1])
+        reach_m = 2.0 * (law.radius_m + law.max_linear_m_s * law.horizon_s)
+        near = [i for i in np.argsort(distances_m, kind="stable") if i != own and distances_m[i] < reach_m]
+        near = near[: law.neighbours]
+        normals = np.zeros((len(near), 2))
+        bounds = np.zeros(len(near))
+        for index, other in enumerate(near):
+            normal, depth = half_plane(
+                offsets[other], velocities[own] - velocities[other], 2.0 * law.radius_m, law.horizon_s, step_s
+            )
+            normals[index] = normal
+            bounds[index] = float(velocities[own] @ normal) + 0.5 * depth
+        answers[row] = nearest_allowed(wanted[own], normals, bounds, law.max_linear_m_s)
+    return answers

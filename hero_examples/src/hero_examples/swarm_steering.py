@@ -1,0 +1,71 @@
+"""Poses and goals of a swarm -> one command each, without collisions: going to goals on top of ORCA. Pure."""
+
+import math
+from typing import List, Optional, Sequence, Tuple
+
+import numpy as np
+
+from .control_laws import BRISK, STANDSTILL, Command, GoToLaw, Pose, go_to_point
+from .reciprocal import AvoidanceLaw, avoid_others, steer, steered_point
+
+DOCKING_M = 0.05
+"""Nearer to its goal than this a robot steers its centre there, no longer the point ahead of the axle."""
+
+SPEED_GAIN = 0.8
+"""Wanted speed in m/s per metre to the goal, 1/s."""
+
+NUDGE = 0.05
+"""Share of the wanted speed that is turned to a random side: breaks the symmetry in which all robots wait."""
+
+
+class SwarmSteering:
+    """Brings every robot to its goal; a robot that has arrived stands, and gives way only by standing.
+
+    Poses and goals of all robots are in one frame.
+    """
+
+    def __init__(
+        self, goals: Sequence[Tuple[float, float]], law: AvoidanceLaw, step_s: float, seed: int, tolerance_m: float = 0.01
+    ) -> None:
+        """step_s: time between two calls of step(); seed: of the small random nudges."""
+        self.goals = [(float(x), float(y)) for x, y in goals]
+        self.law = law
+        self.step_s = step_s
+        self.arrived = [False] * len(self.goals)
+        self._dock_law: GoToLaw = BRISK._replace(tolerance_m=tolerance_m, max_linear_m_s=law.max_linear_m_s)
+        self._random = np.random.RandomState(seed)
+        self._last_places: Optional[np.ndarray] = None
+        self._velocities = np.zeros((len(self.goals), 2))
+
+    def step(self, poses: Sequence[Pose]) -> List[Command]:
+        """Return the next command of every robot."""
+        places = np.array([steered_point(pose, self.law.ahead_m) for pose in poses])
+        if self._last_places is not None:
+            # What robots really do, not what they were told: their motors take half a second to follow.
+            self._velocities = (places - self._last_places) / self.step_s
+        self._last_places = places
+        distances_m = [math.dist(goal, pose[:2]) for goal, pose in zip(self.goals, poses)]
+        self.arrived = [
+            done and distance_m < 2.0 * self._dock_law.tolerance_m or distance_m < self._dock_law.tolerance_m
+            for done, distance_m in zip(self.arrived, distances_m)
+        ]
+        wanted = np.array([self._want(*item) for item in zip(self.goals, poses, distances_m)])
+        moving = [index for index, done in enumerate(self.arrived) if not done]
+        allowed = avoid_others(places, self._velocities, wanted, self.law, self.step_s, moving)
+        commands = [STANDSTILL] * len(poses)
+        for velocity, index in zip(allowed, moving):
+            free = float(np.hypot(*(velocity - wanted[index]))) < 0.25 * float(np.hypot(*wanted[index]))
+            if distances_m[index] < DOCKING_M and free:
+                commands[index] = go_to_point(poses[index], *self.goals[index], self._dock_law)
+            else:
+                commands[index] = steer(poses[index], velocity, self.law)
+        return commands
+
+    def _want(self, goal: Tuple[float, float], pose: Pose, distance_m: float) -> np.ndarray:
+        """Return the velocity (2,) straight to the goal, with a small nudge."""
+        way = np.array([goal[0] - pose.x_m, goal[1] - pose.y_m])
+        speed_m_s = min(self.law.max_linear_m_s, SPEED_GAIN * distance_m)
+        straight = way * (speed_m_s / max(distance_m, 1e-9))
+        side = np.array([-straight[1], straight[0]])
+        nudged: np.ndarray = straight + side * NUDGE * self._random.uniform(-1.0, 1.0)
+        return nudged
