@@ -1,0 +1,97 @@
+"""Who may connect: the address allow-list, the limits on connections and on what one of them may send. Pure."""
+
+import collections
+import ipaddress
+from dataclasses import dataclass
+from typing import Counter, Optional, Tuple, Union
+
+Network = Union[ipaddress.IPv4Network, ipaddress.IPv6Network]
+
+RATE_WINDOW_S = 1.0
+"""Rates are judged over windows of this length."""
+
+GARBAGE_LENGTH_MAX = 65536
+"""Bytes without a good frame after which a peer is none of ours; a robot's truncated frame has below 1 kB."""
+
+
+@dataclass(frozen=True)
+class AdmissionLimits:
+    """Limits on connections."""
+
+    allow: Tuple[Network, ...] = ()  # empty: every address
+    max_connections: int = 200
+    max_connections_per_address: int = 200
+    max_unidentified: int = 100
+
+
+class Admission:
+    """Counts connections and says which one is one too many."""
+
+    def __init__(self, limits: AdmissionLimits) -> None:
+        self._limits = limits
+        self._by_host: Counter[str] = collections.Counter()
+        self._total = 0
+        self.unidentified = 0
+
+    def admit(self, host: str) -> Optional[str]:
+        """Count a connection from host; return why it is refused, None if it may stay."""
+        refusal = self._find_refusal(host)
+        if refusal is None:
+            self._total += 1
+            self._by_host[host] += 1
+            self.unidentified += 1
+        return refusal
+
+    def release(self, host: str) -> None:
+        """An admitted connection from host is gone."""
+        self._total -= 1
+        self._by_host[host] -= 1
+        if not self._by_host[host]:
+            del self._by_host[host]
+
+    def _find_refusal(self, host: str) -> Optional[str]:
+        limits = self._limits
+        if limits.allow:
+            address = ipaddress.ip_address(host.split("%")[0])
+            mapped = getattr(address, "ipv4_mapped", None)
+            if not any((mapped or address) in network for network in limits.allow):
+                return "address not in ~allow"
+        if self._total >= limits.max_connections:
+            return "more than %d connections (~max_connections)" % limits.max_connections
+        if self._by_host[host] >= limits.max_connections_per_address:
+            return "more than %d connections of one address (~max_connections_per_address)" % (
+                limits.max_connections_per_address
+            )
+        if self.unidentified >= limits.max_unidentified:
+            return "more than %d connections that did not say who they are (~max_unidentified)" % (
+                limits.max_unidentified
+            )
+        return None
+
+
+class RateGuard:
+    """Judges what one connection sends, over windows of RATE_WINDOW_S."""
+
+    def __init__(self, max_frames_per_s: float, max_bytes_per_s: float, now_s: float) -> None:
+        self._max_frames = max_frames_per_s * RATE_WINDOW_S
+        self._max_bytes = max_bytes_per_s * RATE_WINDOW_S
+        self._window_end_s = now_s + RATE_WINDOW_S
+        self._frames = 0
+        self._bytes = 0
+        self._garbage_length = 0
+
+    def count(self, frames: int, length: int, now_s: float) -> Optional[str]:
+        """Count a read of length bytes that completed frames; return why it is too much, else None."""
+        if now_s >= self._window_end_s:
+            self._window_end_s = now_s + RATE_WINDOW_S
+            self._frames = self._bytes = 0
+        self._frames += frames
+        self._bytes += length
+        self._garbage_length = 0 if frames else self._garbage_length + length
+        if self._frames > self._max_frames:
+            return "more than %d frames per second (~max_frames_per_s)" % self._max_frames
+        if self._bytes > self._max_bytes:
+            return "more than %d bytes per second (~max_bytes_per_s)" % self._max_bytes
+        if self._garbage_length > GARBAGE_LENGTH_MAX:
+            return "%d bytes without one good frame: this does not speak rosserial" % self._garbage_length
+        return None

@@ -1,0 +1,262 @@
+"""What one robot sends -> what ROS programs should get: corrected odometry, proximity, stamps, own transforms.
+
+Takes payloads and times of arrival, returns payloads with the names of their topics; knows no ROS and no
+socket. Everything that is not named here passes through untouched.
+"""
+
+import collections
+from dataclasses import dataclass
+from typing import Callable, Deque, Dict, List, NamedTuple, Optional, Set, Tuple
+
+from . import wire_messages
+from .odometry import Pose, TickOdometry, Twist, WheelGeometry
+from .stamps import NS_PER_S, StampFilter
+
+TRANSFORMS = "/tf"
+"""Name under which single transforms are returned; they are collected over all robots."""
+
+STOCK_SCAN_TIME_S = 0.2
+"""The robot scans at 5 Hz (RangeSensor rate 5); it leaves scan_time zero."""
+
+OFFSET_SAMPLES = 64
+"""Stamps over which the clock offset is a median: about two seconds of odometry."""
+
+HELD_MAX = 32
+"""Messages that may wait for the encoder reading of their own burst; a burst has two."""
+
+
+class Output(NamedTuple):
+    """One message for one topic."""
+
+    name: str
+    payload: bytes
+
+
+Outputs = List[Output]
+Clean = Callable[[bytes, int], Outputs]
+
+_NONE: Outputs = []
+
+
+@dataclass(frozen=True)
+class CleaningSettings:
+    """The parameters that matter here, as in config.DriverConfig."""
+
+    odometry: str
+    geometry: WheelGeometry
+    pose_covariance: Tuple[float, ...]
+    twist_covariance: Tuple[float, ...]
+    stamps: str
+    max_future_s: float
+    max_age_s: float
+
+
+class MessageCleaner:
+    """The data of one robot; one per robot, kept over its reconnects.
+
+    Attributes:
+        odometry: the robot's tick odometry.
+        refused: messages that could not be used.
+        foreign_frames: transforms of frames that are not the robot's own, by name, for the report.
+    """
+
+    def __init__(self, namespace: str, settings: CleaningSettings) -> None:
+        self._namespace = namespace
+        self._frame_prefix = namespace.lstrip("/").encode() + b"/"
+        self._stamps = StampFilter(settings.stamps == "arrival", settings.max_future_s, settings.max_age_s)
+        self._writer = wire_messages.OdometryWriter(settings.pose_covariance, settings.twist_covariance)
+        self._uses_ticks = settings.odometry == "ticks"
+        self._offsets_ns: Deque[int] = collections.deque(maxlen=OFFSET_SAMPLES)
+        self._seqs: Dict[str, int] = {}
+        self._own_frames: Dict[bytes, str] = {}
+        self._known_foreign: Set[bytes] = set()
+        self.odometry = TickOdometry(settings.geometry)
+        self.refused = 0
+        self.foreign_frames: Set[str] = set()
+        self._odom_name = namespace + "/odom"
+        self._odom_frames = wire_messages.join_frames(self._frame_prefix + b"odom", self._frame_prefix + b"base_link")
+        self._raw_name = namespace + "/odom_raw"
+        self._proximity_name = namespace + "/proximity"
+        self._has_encoder = False
+        self._encoder_follows = True
+        self._encoder_stamp_ns = -1
+        self._held: List[Tuple[bool, int, bytes, int]] = []  # is odometry, robot's stamp, payload, arrival
+
+    def restart(self, rebooted: bool) -> None:
+        """A new connection begins; after a reboot the robot's counters begin anew too."""
+        self._has_encoder = False
+        self._encoder_stamp_ns = -1
+        self._encoder_follows = True
+        self._held = []
+        if rebooted:
+            self.odometry.expect_reset()
+
+    @property
+    def clock_offset_s(self) -> float:
+        """Median of stamp minus arrival; 0 while nothing came. Positive: the robot's clock is ahead."""
+        if not self._offsets_ns:
+            return 0.0
+        return sorted(self._offsets_ns)[len(self._offsets_ns) // 2] / NS_PER_S
+
+    @property
+    def corrected_stamps(self) -> int:
+        """Stamps that were replaced so far."""
+        return self._stamps.corrected
+
+    def find_derived(self, name: str, message_type: str) -> Dict[str, str]:
+        """Return the topics, with types, that exist besides the one called name."""
+        if name == self._odom_name and message_type == "nav_msgs/Odometry":
+            return {self._raw_name: message_type}
+        if name == self._namespace + "/laser" and message_type == "sensor_msgs/LaserScan":
+            return {self._proximity_name: message_type}
+        return {}
+
+    def choose(self, name: str, message_type: str) -> Clean:
+        """Return what turns a payload of the topic called name, and its arrival (ns), into outputs."""
+        if name == TRANSFORMS and message_type == "tf2_msgs/TFMessage":
+            return self._clean_transforms
+        if name == self._odom_name and message_type == "nav_msgs/Odometry":
+            return self._clean_odometry
+        if name == self._namespace + "/encoder" and message_type == "hero_msgs/Encoder":
+            self._has_encoder = self._uses_ticks
+            return lambda payload, arrival_ns: self._clean_encoder(name, payload, arrival_ns)
+        if name == self._namespace + "/laser" and message_type == "sensor_msgs/LaserScan":
+            return lambda payload, arrival_ns: self._clean_laser(name, payload, arrival_ns)
+        if name == self._namespace + "/imu" and message_type == "sensor_msgs/Imu":
+            return lambda payload, arrival_ns: self._clean_stamped(name, payload, arrival_ns)
+        return lambda payload, arrival_ns: [Output(name, payload)]
+
+    def _count(self, name: str) -> int:
+        seq = self._seqs.get(name, -1) + 1
+        self._seqs[name] = seq
+        return seq
+
+    def _refuse(self) -> Outputs:
+        self.refused += 1
+        return _NONE
+
+    def _clean_stamped(self, name: str, payload: bytes, arrival_ns: int) -> Outputs:
+        header = wire_messages.read_header(payload)
+        if header is None:
+            return self._refuse()
+        stamp_ns = self._stamps.correct(name, header.stamp_ns, arrival_ns)
+        return [Output(name, wire_messages.restamp(payload, self._count(name), stamp_ns))]
+
+    def _clean_laser(self, name: str, payload: bytes, arrival_ns: int) -> Outputs:
+        header = wire_messages.read_header(payload)
+        if header is None:
+            return self._refuse()
+        stamp_ns = self._stamps.correct(self._proximity_name, header.stamp_ns, arrival_ns)
+        proximity = wire_messages.make_proximity(
+            payload, self._count(self._proximity_name), stamp_ns, STOCK_SCAN_TIME_S
+        )
+        outputs = [Output(name, payload)]
+        if proximity is None:
+            self.refused += 1
+        else:
+            outputs.append(Output(self._proximity_name, proximity))
+        return outputs
+
+    # Odometry. In one burst the robot sends odom, tf and then the encoder reading that belongs to them
+    # (all with one stamp), so odom and its transform wait for the reading, which follows within the burst.
+
+    def _clean_odometry(self, payload: bytes, arrival_ns: int) -> Outputs:
+        header = wire_messages.read_header(payload)
+        if header is None:
+            return self._refuse()
+        self._offsets_ns.append(header.stamp_ns - arrival_ns)
+        outputs = [Output(self._raw_name, payload)]
+        if self._has_encoder:
+            outputs = self._release_stale(header.stamp_ns) + outputs
+            if self._encoder_follows and header.stamp_ns != self._encoder_stamp_ns:
+                self._hold(True, header.stamp_ns, payload, arrival_ns)
+                return outputs
+        return outputs + self._write_odometry(header.stamp_ns, payload, arrival_ns)
+
+    def _hold(self, is_odometry: bool, stamp_ns: int, payload: bytes, arrival_ns: int) -> None:
+        if len(self._held) < HELD_MAX:
+            self._held.append((is_odometry, stamp_ns, payload, arrival_ns))
+        else:
+            self.refused += 1
+
+    def _clean_encoder(self, name: str, payload: bytes, arrival_ns: int) -> Outputs:
+        header = wire_messages.read_header(payload)
+        ticks = None if header is None else wire_messages.read_encoder_ticks(payload, header)
+        if header is None or ticks is None:
+            return self._refuse()
+        self._encoder_stamp_ns = header.stamp_ns
+        self.odometry.integrate(ticks[0], ticks[1], header.stamp_ns / NS_PER_S)
+        stamp_ns = self._stamps.correct(name, header.stamp_ns, arrival_ns)
+        outputs = [Output(name, wire_messages.restamp(payload, self._count(name), stamp_ns))]
+        return outputs + self._release()
+
+    def _release_stale(self, stamp_ns: int) -> Outputs:
+        """Let go what still waits when a new burst begins: this robot's readings do not follow its odom."""
+        if not self._held or self._held[0][1] == stamp_ns:
+            return _NONE
+        self._encoder_follows = False
+        return self._release()
+
+    def _release(self) -> Outputs:
+        held, self._held = self._held, []
+        outputs: Outputs = []
+        for is_odometry, stamp_ns, payload, arrival_ns in held:
+            write = self._write_odometry if is_odometry else self._write_odom_transform
+            outputs += write(stamp_ns, payload, arrival_ns)
+        return outputs
+
+    def _find_estimate(self) -> Optional[Tuple[Pose, Twist]]:
+        return (self.odometry.pose, self.odometry.twist) if self._has_encoder else None
+
+    def _write_odometry(self, stamp_ns: int, payload: bytes, arrival_ns: int) -> Outputs:
+        stamp_ns = self._stamps.correct(self._odom_name, stamp_ns, arrival_ns)
+        written = self._writer.rewrite(
+            payload, self._count(self._odom_name), stamp_ns, self._find_estimate()
+        )
+        return self._refuse() if written is None else [Output(self._odom_name, written)]
+
+    def _write_odom_transform(self, stamp_ns: int, tail: bytes, arrival_ns: int) -> Outputs:
+        estimate = self._find_estimate()
+        if estimate is not None:
+            tail = wire_messages.pack_transform_tail(estimate[0])
+        stamp_ns = self._stamps.correct("tf base_link", stamp_ns, arrival_ns)
+        return [Output(TRANSFORMS, wire_messages.pack_transform(stamp_ns, self._odom_frames, tail))]
+
+    def _clean_transforms(self, payload: bytes, arrival_ns: int) -> Outputs:
+        transforms = wire_messages.read_transforms(payload)
+        if transforms is None:
+            return self._refuse()
+        outputs: Outputs = []
+        for stamp_ns, frames, tail in transforms:
+            key = self._own_frames.get(frames)
+            if key is None:
+                key = self._admit_frames(frames)
+                if key is None:
+                    continue
+            if frames == self._odom_frames and self._has_encoder:
+                outputs += self._release_stale(stamp_ns)
+                if self._encoder_follows and stamp_ns != self._encoder_stamp_ns:
+                    self._hold(False, stamp_ns, tail, arrival_ns)
+                else:
+                    outputs += self._write_odom_transform(stamp_ns, tail, arrival_ns)
+                continue
+            stamp_ns = self._stamps.correct(key, stamp_ns, arrival_ns)
+            outputs.append(Output(TRANSFORMS, wire_messages.pack_transform(stamp_ns, frames, tail)))
+        return outputs
+
+    def _admit_frames(self, frames: bytes) -> Optional[str]:
+        """Return the key of a pair of frames seen for the first time, None if the robot may not send it."""
+        if frames in self._known_foreign:
+            self.refused += 1
+            return None
+        parent, child = wire_messages.split_frames(frames)
+        prefix = self._frame_prefix
+        if not parent.startswith(prefix) or not child.startswith(prefix) or len(self._own_frames) >= HELD_MAX:
+            self.refused += 1
+            if len(self._known_foreign) < HELD_MAX:
+                self._known_foreign.add(frames)
+                self.foreign_frames.add("%s -> %s" % (ascii(parent.decode("latin-1")), ascii(child.decode("latin-1"))))
+            return None
+        key = "tf " + child[len(prefix) :].decode("latin-1")
+        self._own_frames[frames] = key
+        return key

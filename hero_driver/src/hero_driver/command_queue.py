@@ -1,0 +1,110 @@
+"""Commands to one robot, from ROS threads to the thread of the sockets.
+
+Velocities are shaped (command_shaping), everything else goes in order and never waits behind them. Queues
+are bounded: a velocity that waits is replaced by a newer one, of the rest the oldest is dropped and counted.
+"""
+
+import collections
+import threading
+from typing import Deque, Dict, List, Optional, Tuple
+
+from .command_shaping import ZERO_TWIST, CheckedTwist, VelocityShaper
+
+QUEUE_LENGTH = 50
+"""Commands other than velocities that may wait for one robot."""
+
+IN_FLIGHT_MAX = 2048
+"""Bytes that the robot has not acknowledged beyond which nothing is written: about its TCP window (2144 B)."""
+
+RETRY_S = 0.01
+"""How soon to look again whether the robot has acknowledged."""
+
+RECENTLY_S = 5.0
+"""A motion topic used within this time may still drive the robot: its longest watchdog is 4.0 s."""
+
+Command = Tuple[str, bytes]
+
+
+class CommandQueue:
+    """What waits to be sent to one robot; every method may be called from any thread."""
+
+    def __init__(self, max_age_s: float) -> None:
+        self._lock = threading.Lock()
+        self._max_age_s = max_age_s
+        self._shapers: Dict[str, VelocityShaper] = {}
+        self._offered_s: Dict[str, float] = {}
+        self._waiting: Deque[Command] = collections.deque()
+        self.dropped = 0
+
+    def offer_velocity(self, name: str, command: CheckedTwist, now_s: float) -> None:
+        """Take a velocity for the topic called name."""
+        with self._lock:
+            shaper = self._shapers.get(name)
+            if shaper is None:
+                shaper = self._shapers[name] = VelocityShaper()
+            shaper.offer(command)
+            self._offered_s[name] = now_s
+
+    def offer(self, name: str, payload: bytes) -> None:
+        """Take anything else."""
+        with self._lock:
+            if len(self._waiting) >= QUEUE_LENGTH:
+                self._waiting.popleft()
+                self.dropped += 1
+            self._waiting.append((name, payload))
+
+    def halt(self, always: Optional[str], now_s: float) -> None:
+        """Forget all velocities and stop every velocity topic used recently, and the one called always."""
+        with self._lock:
+            if always is not None and always not in self._shapers:
+                self._shapers[always] = VelocityShaper()
+            for name, shaper in self._shapers.items():
+                if name == always or now_s - self._offered_s.get(name, -RECENTLY_S) < RECENTLY_S:
+                    shaper.offer(CheckedTwist(ZERO_TWIST, True))
+                shaper.discard_motion()
+
+    def clear(self) -> None:
+        """Forget everything: the connection is gone."""
+        with self._lock:
+            self.dropped += len(self._waiting)
+            self._waiting.clear()
+            self._shapers.clear()
+            self._offered_s.clear()
+
+    @property
+    def is_idle(self) -> bool:
+        """Whether nothing waits."""
+        with self._lock:
+            return not self._waiting and all(shaper.is_idle for shaper in self._shapers.values())
+
+    def take(self, in_flight_length: int, velocity_acknowledged: bool, now_s: float) -> List[Command]:
+        """Return what may be sent now.
+
+        in_flight_length: bytes that the robot has not acknowledged; velocity_acknowledged: whether the last
+        velocity is not among them. Two velocities in flight could reach the robot together, and it would
+        take the older one.
+        """
+        commands: List[Command] = []
+        with self._lock:
+            if velocity_acknowledged:
+                for name, shaper in self._shapers.items():
+                    if now_s - self._offered_s.get(name, now_s) > self._max_age_s:
+                        shaper.discard_motion()
+                    payload = shaper.take(now_s)
+                    if payload is not None:
+                        commands.append((name, payload))
+            while self._waiting and in_flight_length < IN_FLIGHT_MAX:
+                in_flight_length += len(self._waiting[0][1])
+                commands.append(self._waiting.popleft())
+        return commands
+
+    def due_in_s(self, velocity_acknowledged: bool, now_s: float) -> Optional[float]:
+        """Return in how many seconds to call take() again, None if nothing waits."""
+        with self._lock:
+            if self._waiting:
+                return RETRY_S
+            delays = [shaper.due_in_s(now_s) for shaper in self._shapers.values()]
+            due = [delay for delay in delays if delay is not None]
+        if not due:
+            return None
+        return min(due) if velocity_acknowledged else max(RETRY_S, min(due))

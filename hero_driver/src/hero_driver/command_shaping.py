@@ -1,0 +1,112 @@
+"""Turns a stream of velocity commands into one that the robot accepts whole, so that a stop is never lost.
+
+The firmware drops a velocity that arrives within 50 ms of the last accepted one, stops included
+(VelocityControl.ino:159, PositionControl.ino:160). So: newest wins, commands are spaced, a zero is always
+sent and sent once more. Pure: payloads and time go in, payloads come out.
+"""
+
+import math
+import struct
+from typing import NamedTuple, Optional
+
+COMMAND_INTERVAL_S = 0.06
+"""Time between two velocities to one robot: the firmware's 50 ms and some room for its 51 ms read cycle."""
+
+ZERO_REPEATS = 1
+"""How often a zero is sent again."""
+
+LINEAR_LIMIT_M_S = 0.20
+"""The firmware's own limit (config.h:60)."""
+
+TURN_LIMIT_RAD_S = 8.0
+"""The firmware's own limit (config.h:61)."""
+
+TWIST_LENGTH = 48
+_TWIST = struct.Struct("<6d")
+
+ZERO_TWIST = bytes(TWIST_LENGTH)
+
+MOTOR_HALT_US = 1500
+HALTED_MOTORS = struct.pack("<hh", MOTOR_HALT_US, MOTOR_HALT_US)
+
+
+class CheckedTwist(NamedTuple):
+    """A velocity command that may be sent."""
+
+    payload: bytes
+    is_zero: bool  # the robot is told to stand still
+
+
+def check_twist(payload: bytes, clamp: bool) -> Optional[CheckedTwist]:
+    """Return the command in payload (geometry_msgs/Twist), or None if a component is not finite.
+
+    With clamp, linear.x and angular.z are brought into the firmware's limits; the robot uses only these two.
+    """
+    if len(payload) != TWIST_LENGTH:
+        return None
+    components = _TWIST.unpack(payload)
+    linear_m_s, turn_rad_s = components[0], components[5]
+    if not math.isfinite(sum(map(abs, components))):
+        # A sum of finite numbers may overflow; only then are the six looked at one by one.
+        if not all(map(math.isfinite, components)):
+            return None
+    if clamp:
+        clamped_m_s = max(-LINEAR_LIMIT_M_S, min(LINEAR_LIMIT_M_S, linear_m_s))
+        clamped_rad_s = max(-TURN_LIMIT_RAD_S, min(TURN_LIMIT_RAD_S, turn_rad_s))
+        if clamped_m_s != linear_m_s or clamped_rad_s != turn_rad_s:
+            payload = _TWIST.pack(clamped_m_s, *components[1:5], clamped_rad_s)
+    return CheckedTwist(payload, linear_m_s == 0.0 and turn_rad_s == 0.0)
+
+
+class VelocityShaper:
+    """The pending velocity commands of one topic of one robot.
+
+    At most one zero and one later command wait; a zero that waits is never replaced by what comes after it.
+    """
+
+    def __init__(self, interval_s: float = COMMAND_INTERVAL_S) -> None:
+        self._interval_s = interval_s
+        self._zero_pending = False
+        self._newest: Optional[CheckedTwist] = None
+        self._repeats_left = 0
+        self._next_s = -math.inf
+
+    @property
+    def is_idle(self) -> bool:
+        """Whether nothing waits to be sent."""
+        return not self._zero_pending and self._newest is None and self._repeats_left == 0
+
+    def offer(self, command: CheckedTwist) -> None:
+        """Take a command; it replaces one that waits, except a zero."""
+        if command.is_zero:
+            self._zero_pending = True
+            self._newest = None
+        else:
+            self._newest = command
+
+    def discard_motion(self) -> None:
+        """Forget what waits except stops; used when motion is held or the robot went away."""
+        self._newest = None
+
+    def due_in_s(self, now_s: float) -> Optional[float]:
+        """Return in how many seconds take() has something, None if nothing waits."""
+        if self.is_idle:
+            return None
+        return max(0.0, self._next_s - now_s)
+
+    def take(self, now_s: float) -> Optional[bytes]:
+        """Return the payload to send now, if any."""
+        if now_s < self._next_s or self.is_idle:
+            return None
+        self._next_s = now_s + self._interval_s
+        if self._zero_pending:
+            self._zero_pending = False
+            self._repeats_left = ZERO_REPEATS
+            return ZERO_TWIST
+        if self._newest is not None:
+            payload = self._newest.payload
+            self._newest = None
+            self._repeats_left = 0
+            return payload
+        self._repeats_left -= 1
+        return ZERO_TWIST

@@ -1,0 +1,213 @@
+"""The node's private parameters: read once, checked, frozen.
+
+Each field below is a parameter; its metadata holds unit, range and meaning, from which the table in the
+README is checked.
+"""
+
+import dataclasses
+import difflib
+import ipaddress
+from dataclasses import dataclass
+from typing import Any, Dict, Mapping, Tuple
+
+from .admission import AdmissionLimits, Network
+from .odometry import WheelGeometry
+from .rosserial.session import SessionLimits
+from .transport import Address
+
+DEFAULT_PORT = 11411
+
+
+class ConfigError(Exception):
+    """A parameter is unknown or out of range; the text names it, its value and what is allowed."""
+
+
+def _number(default: Any, low: float, high: float, unit: str, text: str) -> Any:
+    return dataclasses.field(
+        default=default, metadata={"unit": unit, "range": (low, high), "text": text}
+    )
+
+
+def _choice(default: str, options: Tuple[str, ...], text: str) -> Any:
+    return dataclasses.field(default=default, metadata={"unit": "", "options": options, "text": text})
+
+
+def _plain(default: Any, text: str, unit: str = "") -> Any:
+    return dataclasses.field(default=default, metadata={"unit": unit, "text": text})
+
+
+@dataclass(frozen=True)
+class DriverConfig:
+    """All parameters of the driver."""
+
+    host: str = _plain("0.0.0.0", "address to listen on; empty: do not listen, only dial ~robots")
+    port: int = _number(DEFAULT_PORT, 0, 65535, "", "TCP port to listen on; 0: any free one")
+    robots: Tuple[Address, ...] = _plain((), "robots that are TCP servers, to be dialled: a list of {host, port}")
+    namespace_policy: str = _choice(
+        "robot", ("robot", "any"), "robot: HeRos only, each within /hero_N and /tf; any: every name and type"
+    )
+    allow: Tuple[Network, ...] = _plain((), "networks (CIDR) that robots may come from; empty: all")
+    max_connections: int = _number(200, 1, 5000, "", "connections in total")
+    max_connections_per_address: int = _number(200, 1, 5000, "", "connections of one address")
+    max_unidentified: int = _number(100, 1, 5000, "", "connections that have not said who they are")
+    max_topics: int = _number(64, 1, 1000, "", "ids that one robot may declare")
+    max_name_length: int = _number(128, 16, 1024, "characters", "longest name of a topic or type")
+    max_payload_length: int = _number(4096, 64, 65535, "bytes", "longest payload of a frame from a robot")
+    max_frames_per_s: int = _number(5000, 10, 1000000, "1/s", "frames from one robot; stock robots send 211")
+    max_bytes_per_s: int = _number(2000000, 1000, 100000000, "bytes/s", "from one robot; stock robots send 44051")
+    declare_timeout_s: float = _number(20.0, 2.0, 600.0, "s", "time to declare a topic, else it is disconnected")
+    silence_timeout_s: float = _number(6.0, 3.0, 600.0, "s", "silence after which a connection is closed")
+    grace_s: float = _number(10.0, 0.0, 3600.0, "s", "time that the topics of a robot stay up after it left")
+    service_timeout_s: float = _number(5.0, 0.1, 600.0, "s", "time that a robot has to answer a service call")
+    parameters_outside: bool = _plain(False, "robots may read parameters outside their own namespace")
+    clamp: bool = _plain(False, "bring velocities into the firmware's limits (0.20 m/s, 8.0 rad/s)")
+    command_max_age_s: float = _number(
+        2.0, 0.1, 60.0, "s", "a motion command that could not be sent for so long is dropped; stops are not"
+    )
+    odometry: str = _choice(
+        "ticks", ("ticks", "robot"), "ticks: odom from the encoder ticks; robot: the robot's own estimate"
+    )
+    wheel_diameter_m: float = _number(0.0492, 0.001, 1.0, "m", "diameter of a wheel")
+    wheel_separation_m: float = _number(0.063, 0.001, 1.0, "m", "distance between the wheels")
+    ticks_per_turn: float = _number(288.0, 1.0, 1000000.0, "", "encoder ticks per turn of a wheel")
+    pose_covariance: Tuple[float, ...] = _plain(
+        (1e-4, 1e-4, 1e-9, 1e-9, 1e-9, 1e-2), "diagonal of odom's pose covariance: x, y, z, roll, pitch, yaw",
+        "m^2, rad^2",
+    )
+    twist_covariance: Tuple[float, ...] = _plain(
+        (1e-4, 1e-9, 1e-9, 1e-9, 1e-9, 1e-2), "diagonal of odom's twist covariance: x, y, z, roll, pitch, yaw",
+        "m^2/s^2, rad^2/s^2",
+    )
+    stamps: str = _choice("robot", ("robot", "arrival"), "whose clock stamps messages")
+    max_future_s: float = _number(0.05, 0.0, 10.0, "s", "a robot's stamp further ahead is replaced by its arrival")
+    max_age_s: float = _number(5.0, 0.1, 3600.0, "s", "a robot's stamp further back is replaced by its arrival")
+    transform_period_s: float = _number(0.01, 0.001, 1.0, "s", "transforms of all robots are collected so long")
+    report_period_s: float = _number(1.0, 0.1, 60.0, "s", "time between two messages on ~robots and /diagnostics")
+
+    @property
+    def session_limits(self) -> SessionLimits:
+        """What one conversation may do."""
+        return SessionLimits(
+            self.max_payload_length,
+            self.max_topics,
+            self.max_name_length,
+            self.declare_timeout_s,
+            self.silence_timeout_s,
+        )
+
+    @property
+    def admission_limits(self) -> AdmissionLimits:
+        """Who may connect."""
+        return AdmissionLimits(
+            self.allow, self.max_connections, self.max_connections_per_address, self.max_unidentified
+        )
+
+    @property
+    def wheel_geometry(self) -> WheelGeometry:
+        """What turns ticks into metres."""
+        return WheelGeometry(self.wheel_diameter_m, self.wheel_separation_m, self.ticks_per_turn)
+
+
+def read_config(parameters: Mapping[str, Any]) -> DriverConfig:
+    """Return the checked configuration in parameters (names without "~").
+
+    Raises: ConfigError.
+    """
+    fields = {field.name: field for field in dataclasses.fields(DriverConfig)}
+    values: Dict[str, Any] = {}
+    for name, value in parameters.items():
+        if name not in fields:
+            near = difflib.get_close_matches(name, fields, 1)
+            raise ConfigError(
+                "parameter ~%s is not known%s; known are: %s"
+                % (name, "; did you mean ~%s?" % near[0] if near else "", ", ".join(sorted(fields)))
+            )
+        values[name] = _check(fields[name], value)
+    config = DriverConfig(**values)
+    if not config.host and not config.robots:
+        raise ConfigError(
+            "parameter ~host is empty and ~robots too: the driver would neither listen nor dial;"
+            " give an address to listen on (0.0.0.0 for all) or robots to dial"
+        )
+    return config
+
+
+def _check(field: "dataclasses.Field[Any]", value: Any) -> Any:
+    if field.name in _READERS:
+        return _READERS[field.name](field.name, value)
+    if "options" in field.metadata:
+        if value not in field.metadata["options"]:
+            raise _make_error(field.name, value, "one of " + ", ".join(field.metadata["options"]))
+        return value
+    if "range" in field.metadata:
+        return _check_number(field, value)
+    if not isinstance(value, type(field.default)):
+        raise _make_error(field.name, value, "true or false" if isinstance(field.default, bool) else "a text")
+    return value
+
+
+def _check_number(field: "dataclasses.Field[Any]", value: Any) -> Any:
+    low, high = field.metadata["range"]
+    is_whole = isinstance(field.default, int)
+    allowed = "a %snumber from %g to %g%s" % (
+        "whole " if is_whole else "", low, high, " (%s)" % field.metadata["unit"] if field.metadata["unit"] else ""
+    )
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise _make_error(field.name, value, allowed)
+    if not low <= value <= high or (is_whole and value != int(value)):
+        raise _make_error(field.name, value, allowed)
+    return int(value) if is_whole else float(value)
+
+
+def _read_robots(name: str, value: Any) -> Tuple[Address, ...]:
+    allowed = "a list of {host: name or address, port: 1 to 65535}"
+    if not isinstance(value, list):
+        raise _make_error(name, value, allowed)
+    addresses = []
+    for entry in value:
+        if not isinstance(entry, dict) or not set(entry) <= {"host", "port"} or not isinstance(
+            entry.get("host"), str
+        ):
+            raise _make_error(name, entry, allowed)
+        port = entry.get("port", DEFAULT_PORT)
+        if isinstance(port, bool) or not isinstance(port, int) or not 1 <= port <= 65535 or not entry["host"]:
+            raise _make_error(name, entry, allowed)
+        addresses.append(Address(entry["host"], port))
+    if len(set(addresses)) != len(addresses):
+        raise _make_error(name, value, "a list that names no robot twice")
+    return tuple(addresses)
+
+
+def _read_networks(name: str, value: Any) -> Tuple[Network, ...]:
+    allowed = "a list of networks such as 10.42.0.0/24"
+    if not isinstance(value, list) or not all(isinstance(entry, str) for entry in value):
+        raise _make_error(name, value, allowed)
+    networks = []
+    for entry in value:
+        try:
+            networks.append(ipaddress.ip_network(entry))
+        except ValueError as error:
+            raise _make_error(name, entry, "%s (%s)" % (allowed, error)) from error
+    return tuple(networks)
+
+
+def _read_diagonal(name: str, value: Any) -> Tuple[float, ...]:
+    allowed = "a list of 6 numbers that are not negative"
+    if not isinstance(value, (list, tuple)) or len(value) != 6:
+        raise _make_error(name, value, allowed)
+    for entry in value:
+        if isinstance(entry, bool) or not isinstance(entry, (int, float)) or not 0.0 <= entry < float("inf"):
+            raise _make_error(name, value, allowed)
+    return tuple(float(entry) for entry in value)
+
+
+_READERS = {
+    "robots": _read_robots,
+    "allow": _read_networks,
+    "pose_covariance": _read_diagonal,
+    "twist_covariance": _read_diagonal,
+}
+
+
+def _make_error(name: str, value: Any, allowed: str) -> ConfigError:
+    return ConfigError("parameter ~%s is %r; it must be %s" % (name, value, allowed))

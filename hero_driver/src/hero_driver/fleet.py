@@ -1,0 +1,133 @@
+"""Who is here: arrival, identity, return, duplicate, departure with a grace period. Pure; time enters as now_s.
+
+A robot is known by its namespace. It has at most one connection that counts; a second one from the same
+address is the robot after a power cycle and takes over, one from another address is a second robot with the
+same id and has to wait.
+"""
+
+import enum
+from dataclasses import dataclass, field
+from typing import Any, Dict, List, Optional
+
+from .names import Identity
+
+ALIVE_S = 3.0
+"""A robot that was heard within this time is alive: stock robots speak at least every 2.5 s."""
+
+FLAP_S = 5.0
+"""Two take-overs within this time, while the loser is alive, are two robots behind one address, not one that
+boots twice (a boot takes 1.6 s, and the connection of a robot without power is not alive)."""
+
+
+class RobotState(enum.Enum):
+    """As in hero_msgs/Robot."""
+
+    JOINING = 0
+    READY = 1
+    AWAY = 2
+    REFUSED = 3
+
+
+class Verdict(enum.Enum):
+    """What becomes of a connection that said who it is."""
+
+    ARRIVED = "arrived"  # first time
+    RETURNED = "returned"  # was away
+    TOOK_OVER = "took over"  # the old connection is dead or of the same robot: close it
+    REFUSED = "refused"  # the robot that is here stays
+
+
+@dataclass
+class RobotRecord:
+    """What is known of one robot, over all its connections."""
+
+    identity: Identity
+    host: str
+    address: str
+    link: Optional[Any]
+    state: RobotState
+    since_s: float
+    last_heard_s: float
+    joined_s: float
+    reconnects: int = 0
+    firmware: str = ""
+    hardware: str = ""
+    config: str = ""
+    booted_s: Optional[float] = None
+    last_error: str = ""
+    dropped_messages: int = 0
+    bad_frames: int = 0  # of earlier connections
+    frames: int = 0  # of earlier connections
+    received_length: int = 0
+    refused: Dict[str, str] = field(default_factory=dict)  # address -> reason, of duplicates
+
+    def enter(self, state: RobotState, now_s: float) -> None:
+        """Change the state and note since when."""
+        if state is not self.state:
+            self.state = state
+            self.since_s = now_s
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What fleet.identify() says about a connection."""
+
+    verdict: Verdict
+    record: RobotRecord
+    old_link: Optional[Any] = None  # to be closed, when the verdict is TOOK_OVER
+    reason: str = ""  # when REFUSED
+
+
+class Fleet:
+    """All robots by namespace."""
+
+    def __init__(self, grace_s: float) -> None:
+        self.robots: Dict[str, RobotRecord] = {}
+        self._grace_s = grace_s
+
+    def identify(self, link: Any, identity: Identity, host: str, address: str, now_s: float) -> Decision:
+        """Decide about a connection (link) from address that says it is identity."""
+        record = self.robots.get(identity.namespace)
+        if record is None:
+            record = RobotRecord(
+                identity, host, address, link, RobotState.JOINING, now_s, last_heard_s=now_s, joined_s=now_s
+            )
+            self.robots[identity.namespace] = record
+            return Decision(Verdict.ARRIVED, record)
+        old_link = record.link
+        if old_link is not None:
+            is_alive = now_s - record.last_heard_s < ALIVE_S
+            is_flapping = is_alive and record.reconnects > 0 and now_s - record.joined_s < FLAP_S
+            if is_alive and (host != record.host or is_flapping):
+                reason = "two robots call themselves %s: %s is here and stays, %s is refused; give one of them" \
+                    " another id on its configuration page" % (identity.namespace, record.address, address)
+                record.refused[address] = reason
+                return Decision(Verdict.REFUSED, record, reason=reason)
+        record.host, record.address, record.link = host, address, link
+        record.joined_s = record.last_heard_s = now_s
+        record.reconnects += 1
+        record.refused.pop(address, None)
+        record.enter(RobotState.JOINING, now_s)
+        verdict = Verdict.RETURNED if old_link is None else Verdict.TOOK_OVER
+        return Decision(verdict, record, old_link)
+
+    def leave(self, link: Any, reason: str, now_s: float) -> Optional[RobotRecord]:
+        """A connection is gone; return the robot that is away now, None if it was nobody's."""
+        for record in self.robots.values():
+            if record.link is link:
+                record.link = None
+                record.last_error = reason
+                record.enter(RobotState.AWAY, now_s)
+                return record
+        return None
+
+    def collect_expired(self, now_s: float) -> List[RobotRecord]:
+        """Forget the robots that were away for longer than the grace period, and return them."""
+        expired = [
+            record
+            for record in self.robots.values()
+            if record.state is RobotState.AWAY and now_s - record.since_s >= self._grace_s
+        ]
+        for record in expired:
+            del self.robots[record.identity.namespace]
+        return expired

@@ -1,0 +1,498 @@
+"""The owner of all conversations: connects links, sessions, the fleet and the robots' bridges.
+
+    in    transport -> receive_data() -> session -> events -> fleet -> robot bridge
+    out   robot bridge -> command queue -> send_commands() -> session -> transport
+
+Everything here runs on the thread of the sockets, except what says otherwise. It never blocks.
+"""
+
+import time
+from typing import Callable, Dict, List, Optional
+
+from . import log_lines, names
+from .admission import Admission, RateGuard
+from .cleaning import CleaningSettings, MessageCleaner
+from .config import DriverConfig
+from .fleet import Decision, Fleet, RobotRecord, RobotState, Verdict
+from .log_relay import LogRelay
+from .names import Identity
+from .parameter_server import (
+    EMPTY_ANSWER,
+    ParameterAnswer,
+    ParameterRefusedError,
+    read_parameter,
+    resolve_parameter,
+)
+from .robot_bridge import BridgeContext, RobotBridge
+from .robot_status import Peer, RobotStatus, describe_robot
+from .rosserial.errors import RosserialError
+from .rosserial.payloads import LOG_DEBUG, LOG_ERROR, LOG_FATAL, LOG_INFO, LOG_WARN, Log
+from .rosserial.session import (
+    Event,
+    LogReceived,
+    MessageReceived,
+    ParameterRequested,
+    Problem,
+    Session,
+    SessionEnded,
+    Topic,
+    TopicDeclared,
+)
+from .service_client import ServiceClients
+from .transform_collector import TransformCollector
+from .transport import EventLoop, Link, LinkHandler
+from .worker import Worker
+
+NS_PER_S = 10**9
+
+LOG_LEVELS = {LOG_DEBUG: "debug", LOG_INFO: "info", LOG_WARN: "warn", LOG_ERROR: "error", LOG_FATAL: "fatal"}
+
+LOG_LINES_PER_S = 100
+"""Log lines of one robot that reach /rosout; a robot that tunes its motors sends 47 per second."""
+
+REBOOT_SLACK_S = 2.0
+"""An uptime that implies a boot later than the known one by more than this is a reboot."""
+
+FLEET_POLL_S = 0.1
+
+HALT_SETTLE_S = 0.12
+"""After a robot's TCP has acknowledged a stop, its firmware may need two read cycles of 51 ms to take it."""
+
+
+class Gateway(LinkHandler):
+    """All robots of one driver."""
+
+    def __init__(
+        self,
+        config: DriverConfig,
+        log: LogRelay,
+        registrar: Worker,
+        clock_ns: Callable[[], int],
+        on_change: Callable[[], None],
+    ) -> None:
+        """clock_ns gives ROS time; on_change() is called when a robot's state changes (it must not block)."""
+        self._config = config
+        self._log = log
+        self._registrar = registrar
+        self._clock_ns = clock_ns
+        self._on_change = on_change
+        self._admission = Admission(config.admission_limits)
+        self._parameter_worker = Worker("parameters", 1000, lambda error: log.log("error", str(error)))
+        self._service_clients = ServiceClients(config, log)
+        self._loop: EventLoop
+        self._transforms: TransformCollector
+        self._context: BridgeContext
+        self.peers: Dict[Link, Peer] = {}
+        self.fleet = Fleet(config.grace_s)
+        self.bridges: Dict[str, RobotBridge] = {}
+        self.stopped = False
+        self.refused_connections = 0
+
+    def open(self, loop: EventLoop) -> None:
+        """Begin to serve what loop brings."""
+        self._loop = loop
+        self._transforms = TransformCollector(self._config.transform_period_s, loop.call_later)
+        self._context = BridgeContext(
+            registrar=self._registrar,
+            log=self._log.log_throttled,
+            wake=self._wake,
+            add_transform=self._transforms.add,
+            after_publishing=loop.call_soon,
+            is_stopped=lambda: self.stopped,
+            clamp=self._config.clamp,
+            service_timeout_s=self._config.service_timeout_s,
+            command_max_age_s=self._config.command_max_age_s,
+        )
+        loop.call_later(FLEET_POLL_S, self._poll_fleet)
+
+    def close(self) -> None:
+        """End the workers; the loop has ended before."""
+        self._parameter_worker.close()
+        self._service_clients.close()
+
+    # What the transport calls.
+
+    def open_link(self, link: Link) -> Optional[str]:
+        refusal = self._admission.admit(link.address.host)
+        if refusal is not None:
+            self.refused_connections += 1
+            return refusal
+        now_s = time.monotonic()
+        session = Session(self._config.session_limits, now_s)
+        guard = RateGuard(self._config.max_frames_per_s, self._config.max_bytes_per_s, now_s)
+        peer = Peer(link, session, guard)
+        link.peer = peer
+        self.peers[link] = peer
+        self.poll_link(link, now_s)
+        return None
+
+    def receive_data(self, link: Link, data: bytes, now_s: float) -> None:
+        peer: Peer = link.peer
+        session = peer.session
+        frames_before = session.reader.frames
+        arrival_ns = self._clock_ns()
+        events = session.receive_bytes(data, now_s, arrival_ns / NS_PER_S)
+        refusal = peer.guard.count(session.reader.frames - frames_before, len(data), now_s)
+        if refusal is not None:
+            link.close(refusal)
+            return
+        for frame in session.take_frames():
+            link.send_frame(frame)
+        if peer.record is not None and not peer.refused:
+            peer.record.last_heard_s = now_s
+        bridge = peer.bridge
+        for event in events:
+            if type(event) is MessageReceived:
+                if bridge is not None:
+                    bridge.receive_message(event.topic, event.payload, arrival_ns)
+                if event.topic.kind.value >= 4 and bridge is not None:
+                    self._call_service(peer, event.topic, event.payload)
+            else:
+                self._receive_event(peer, event, now_s)
+                if link.closed:
+                    return
+                bridge = peer.bridge
+
+    def poll_link(self, link: Link, now_s: float) -> None:
+        peer: Peer = link.peer
+        for event in peer.session.poll(now_s):
+            self._receive_event(peer, event, now_s)
+        if not link.closed:
+            for frame in peer.session.take_frames():
+                link.send_frame(frame)
+
+    def close_link(self, link: Link, reason: str) -> None:
+        peer: Optional[Peer] = self.peers.pop(link, None)
+        if peer is None:
+            self._log.log_throttled(
+                "warn", "refused " + link.address.host, "connection of %s refused: %s" % (link.address, reason)
+            )
+            return
+        self._admission.release(link.address.host)
+        if peer.record is None:
+            self._admission.unidentified -= 1
+            self._log.log_throttled(
+                "warn", "nobody " + link.address.host + reason[:12],
+                "connection of %s, which never said which robot it is, ended: %s" % (link.address, reason),
+            )
+            return
+        if peer.refused:
+            peer.record.refused.pop(str(link.address), None)
+            self._on_change()
+            return
+        record = peer.record
+        record.frames += peer.session.reader.frames
+        record.bad_frames += peer.session.reader.bad_frames
+        record.received_length += link.received_length
+        now_s = time.monotonic()
+        if self.fleet.leave(link, reason, now_s) is not None:
+            self._log.log_throttled(
+                "warn", "left " + record.identity.namespace,
+                "%s left (%s): %s" % (peer.label, link.address, reason),
+            )
+            self._on_change()
+        if peer.bridge is not None:
+            peer.bridge.detach(reason)
+        self._promote_duplicate(record.identity, now_s)
+
+    def report_trouble(self, text: str) -> None:
+        self._log.log_throttled("warn", "trouble " + text[:40], text)
+
+    # What a session tells.
+
+    def _receive_event(self, peer: Peer, event: Event, now_s: float) -> None:
+        if isinstance(event, TopicDeclared):
+            self._declare(peer, event.topic, now_s)
+        elif isinstance(event, LogReceived):
+            self._receive_log(peer, event.log, now_s)
+        elif isinstance(event, ParameterRequested):
+            self._answer_parameter(peer, event.name)
+        elif isinstance(event, Problem):
+            self._complain(peer, event.text)
+        elif isinstance(event, SessionEnded):
+            peer.link.close(event.reason)
+
+    def _complain(self, peer: Peer, text: str) -> None:
+        if peer.record is not None:
+            peer.record.dropped_messages += 1
+            peer.record.last_error = text
+        self._log.log_throttled("error", peer.label + text[:80], "%s: %s" % (peer.label, text))
+
+    def _declare(self, peer: Peer, topic: Topic, now_s: float) -> None:
+        if peer.record is None and not self._identify(peer, topic, now_s):
+            return
+        if peer.refused or peer.bridge is None or peer.record is None:
+            return
+        name = self._resolve(topic.info.name, peer.bridge.identity)
+        if name is None:
+            self._complain(
+                peer,
+                "topic %s refused: outside %s (~namespace_policy is robot)"
+                % (ascii(topic.info.name), peer.bridge.identity.namespace),
+            )
+            return
+        peer.bridge.declare(topic, name)
+        if peer.record.state is not RobotState.READY:
+            peer.record.enter(RobotState.READY, now_s)
+            self._on_change()
+
+    def _resolve(self, topic_name: str, identity: Identity) -> Optional[str]:
+        if self._config.namespace_policy == "robot":
+            return names.resolve(topic_name, identity)
+        if identity.namespace.startswith("/" + names.HERO_PREFIX):
+            return names.resolve(topic_name, identity) or topic_name
+        return topic_name
+
+    def _identify(self, peer: Peer, topic: Topic, now_s: float) -> bool:
+        """Find out which robot a peer is from the first name that tells; return whether it is settled."""
+        identity = names.identify(topic.info.name)
+        address = peer.link.address
+        if identity is None:
+            if self._config.namespace_policy == "robot":
+                if topic.info.name not in names.TF_TOPICS:
+                    self._complain(
+                        peer,
+                        "topic %s refused: not a name below /hero_N; for devices that are no HeRos set"
+                        " ~namespace_policy to any" % ascii(topic.info.name),
+                    )
+                return False
+            identity = names.identify_any(topic.info.name, address.host)
+        decision = self.fleet.identify(peer.link, identity, address.host, str(address), now_s)
+        self._admission.unidentified -= 1
+        peer.record = decision.record
+        if decision.verdict is Verdict.REFUSED:
+            peer.refused = True
+            self._log.log_throttled("error", "duplicate " + identity.namespace + address.host, decision.reason)
+            self._on_change()
+            return False
+        self._join(peer, decision)
+        return True
+
+    def _join(self, peer: Peer, decision: Decision) -> None:
+        record = decision.record
+        identity = record.identity
+        if decision.old_link is not None and not decision.old_link.closed:
+            # The record belongs to the new connection already, so the old one's end changes nothing.
+            decision.old_link.close("the robot connected again from %s" % peer.link.address)
+        bridge = self.bridges.get(identity.namespace)
+        if bridge is None:
+            is_hero = names.identify(identity.namespace + "/x") == identity
+            cleaner = MessageCleaner(identity.namespace, self._cleaning_settings()) if is_hero else None
+            bridge = self.bridges[identity.namespace] = RobotBridge(identity, cleaner, self._context)
+        peer.bridge = bridge
+        rebooted = peer.boot is not None
+        if bridge.cleaner is not None:
+            bridge.cleaner.restart(rebooted and decision.verdict is not Verdict.ARRIVED)
+        bridge.attach()
+        self._log.log("info", "%s %s (%s)" % (bridge.label, decision.verdict.value, peer.link.address))
+        self._on_change()
+        early_logs, peer.early_logs = peer.early_logs, []
+        for log in early_logs:
+            self._receive_log(peer, log, record.joined_s)
+
+    def _cleaning_settings(self) -> CleaningSettings:
+        config = self._config
+        return CleaningSettings(
+            config.odometry,
+            config.wheel_geometry,
+            config.pose_covariance,
+            config.twist_covariance,
+            config.stamps,
+            config.max_future_s,
+            config.max_age_s,
+        )
+
+    def _promote_duplicate(self, identity: Identity, now_s: float) -> None:
+        """Let a robot in that waited because another one had its id, by asking for its topics again."""
+        for peer in list(self.peers.values()):
+            if peer.refused and peer.record is not None and peer.record.identity == identity:
+                peer.link.close("the robot with the same id left; this one may try again")
+                return
+
+    def _receive_log(self, peer: Peer, log: Log, now_s: float) -> None:
+        line = log_lines.read_log_line(log.text)
+        if line.boot is not None:
+            peer.boot = line.boot
+        if peer.bridge is None or peer.record is None:
+            if len(peer.early_logs) < 10:
+                peer.early_logs.append(log)
+            return
+        if peer.refused:
+            return
+        record = peer.record
+        if line.boot is not None:
+            record.firmware, record.hardware, record.config = line.boot
+        if line.heartbeat is not None:
+            self._receive_heartbeat(peer, record, line.heartbeat.uptime_s, now_s)
+            self._log.log("debug", "%s: %s" % (peer.label, line.text))
+            return
+        if now_s - peer.log_window_s >= 1.0:
+            peer.log_window_s, peer.log_count = now_s, 0
+        peer.log_count += 1
+        if peer.log_count > LOG_LINES_PER_S:
+            record.dropped_messages += 1
+            return
+        self._log.log(LOG_LEVELS.get(log.level, "error"), "%s: %s" % (peer.label, line.text))
+
+    def _receive_heartbeat(self, peer: Peer, record: RobotRecord, uptime_s: float, now_s: float) -> None:
+        booted_s = now_s - uptime_s
+        if record.booted_s is not None and booted_s - record.booted_s > REBOOT_SLACK_S:
+            self._log.log("warn", "%s rebooted %.1f s ago" % (peer.label, uptime_s))
+            if peer.bridge is not None and peer.bridge.cleaner is not None and peer.boot is None:
+                peer.bridge.cleaner.restart(rebooted=True)
+        # Delays of the network only make a boot look later, so the earliest is the best.
+        if record.booted_s is None or booted_s < record.booted_s or booted_s - record.booted_s > REBOOT_SLACK_S:
+            record.booted_s = booted_s
+
+    # Parameters and services that robots ask for.
+
+    def _answer_parameter(self, peer: Peer, name: str) -> None:
+        bridge = peer.bridge
+        if bridge is None or peer.refused:
+            return
+        namespace = bridge.identity.namespace
+        may_leave = self._config.parameters_outside or self._config.namespace_policy == "any"
+
+        def read() -> None:
+            try:
+                answer = read_parameter(resolve_parameter(name, namespace, may_leave))
+            except ParameterRefusedError as error:
+                self._log.log_throttled("warn", namespace + name[:100], "%s: %s" % (peer.label, error))
+                answer = EMPTY_ANSWER
+            self._loop.call_soon(lambda: self._send_parameter(peer, answer))
+
+        if not self._parameter_worker.submit(read):
+            self._complain(peer, "asks for too many parameters at once")
+
+    def _send_parameter(self, peer: Peer, answer: ParameterAnswer) -> None:
+        try:
+            peer.link.send_frame(peer.session.encode_parameter_answer(*answer))
+        except RosserialError as error:
+            self._complain(peer, str(error))
+
+    def _call_service(self, peer: Peer, topic: Topic, request: bytes) -> None:
+        bridge = peer.bridge
+        if bridge is None:
+            return
+        name = self._resolve(topic.info.name, bridge.identity)
+        answers = [
+            other
+            for other in peer.session.topics.values()
+            if other.kind.value == 5 and other.info.name == topic.info.name
+        ]
+        if name is None or not answers:
+            return
+
+        def send(payload: bytes) -> None:
+            self._loop.call_soon(lambda: self._send_message(peer, answers[0].info.topic_id, payload))
+
+        self._service_clients.call(bridge.label, name, topic.info, answers[0].info, request, send)
+
+    # Commands.
+
+    def _wake(self, bridge: RobotBridge) -> None:
+        """Commands for a robot wait; from any thread."""
+        self._loop.call_soon(lambda: self._send_to(bridge))
+
+    def _send_to(self, bridge: RobotBridge) -> None:
+        record = self.fleet.robots.get(bridge.identity.namespace)
+        if record is not None and record.link is not None and not record.link.closed:
+            peer: Peer = record.link.peer
+            if not peer.send_due:
+                self._send_commands(peer)
+            else:
+                # A timer is set already; commands other than velocities need not wait for it.
+                self._send_now(peer)
+
+    def _send_commands(self, peer: Peer) -> None:
+        peer.send_due = False
+        bridge = peer.bridge
+        if bridge is None or peer.link.closed:
+            return
+        delay_s = bridge.commands.due_in_s(self._send_now(peer), time.monotonic())
+        if delay_s is not None:
+            peer.send_due = True
+            self._loop.call_later(delay_s, lambda: self._send_commands(peer))
+
+    def _send_now(self, peer: Peer) -> bool:
+        """Send what may go out; return whether the robot has acknowledged the last velocity."""
+        link, bridge = peer.link, peer.bridge
+        if bridge is None:
+            return True
+        in_flight = link.read_unacknowledged_length()
+        acknowledged = link.written_length - in_flight >= peer.velocity_mark
+        for name, payload in bridge.commands.take(in_flight, acknowledged, time.monotonic()):
+            topic_id = bridge.find_id(name)
+            if topic_id is None:
+                bridge.refused_commands += 1
+                continue
+            self._send_message(peer, topic_id, payload)
+            if name.endswith("/cmd_vel"):
+                peer.velocity_mark = link.written_length
+                acknowledged = False
+        return acknowledged
+
+    def _send_message(self, peer: Peer, topic_id: int, payload: bytes) -> None:
+        if peer.link.closed:
+            return
+        try:
+            frame = peer.session.encode_message(topic_id, payload)
+        except RosserialError as error:
+            self._complain(peer, str(error))
+            return
+        peer.link.send_frame(frame)
+
+    # Reports.
+
+    def list_robots(self, now_s: float) -> List[RobotStatus]:
+        """Return the state of every robot, sorted by namespace."""
+        statuses = []
+        for record in self.fleet.robots.values():
+            bridge = self.bridges.get(record.identity.namespace)
+            peer: Optional[Peer] = record.link.peer if record.link is not None else None
+            statuses.append(describe_robot(record, bridge, peer, now_s))
+        return sorted(statuses, key=lambda status: (status.number, status.namespace))
+
+    # Stop.
+
+    def set_stopped(self, stopped: bool) -> None:
+        """Hold all motion, or let it go on; from any thread."""
+        self.stopped = stopped
+        if stopped:
+            self._loop.call_soon(self.halt_all)
+        self._on_change()
+
+    def halt_all(self) -> None:
+        """Stop every robot."""
+        for bridge in self.bridges.values():
+            bridge.halt()
+
+    def halt_and_wait(self, deadline_s: float, then: Callable[[], None]) -> None:
+        """Stop every robot and call then() when all have got it twice, or at deadline_s (monotonic)."""
+        self.stopped = True
+        self.halt_all()
+
+        def check() -> None:
+            now_s = time.monotonic()
+            if now_s < deadline_s and not all(self._has_halted(peer) for peer in self.peers.values()):
+                self._loop.call_later(0.02, check)
+            else:
+                self._loop.call_later(HALT_SETTLE_S, then)
+
+        check()
+
+    @staticmethod
+    def _has_halted(peer: Peer) -> bool:
+        if peer.bridge is None:
+            return True
+        return peer.bridge.commands.is_idle and peer.link.read_unacknowledged_length() == 0
+
+    def _poll_fleet(self) -> None:
+        now_s = time.monotonic()
+        for record in self.fleet.collect_expired(now_s):
+            bridge = self.bridges.pop(record.identity.namespace, None)
+            if bridge is not None:
+                bridge.close()
+                self._log.log("info", "%s is gone; its topics and services are taken down" % bridge.label)
+            self._on_change()
+        self._loop.call_later(FLEET_POLL_S, self._poll_fleet)

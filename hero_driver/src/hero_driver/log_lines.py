@@ -1,0 +1,61 @@
+"""Log lines of a robot -> clean text and what they tell about it: versions at boot, uptime once a second.
+
+The texts are the firmware's (ROSHandle.ino:92, 116). Log texts are untrusted: what could forge a line, move
+a cursor or colour a terminal is taken out. Pure.
+"""
+
+import re
+from typing import NamedTuple, Optional
+
+LONGEST_TEXT = 400
+
+_ANSI = re.compile(r"\x1b\[[0-?]*[ -/]*[@-~]|\x1b.")
+_CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029]+")
+_NAME = re.compile(r"^\[/?(hero_\d+|HERO)\]\s*")
+_BOOT = re.compile(
+    r"Firmware:\s*(?P<firmware>\S+)\s*\|\s*Hardware:\s*(?P<hardware>\S+)\s*\|"
+    r"(?:\s*Config:\s*(?P<config>\S+)\s*\|)?"
+)
+_HEARTBEAT = re.compile(r"^Conn?ected at time (?P<millis>\d{1,10})$")
+
+
+class BootLine(NamedTuple):
+    """What a robot says of itself when it starts; config is empty with firmware before v3.8."""
+
+    firmware: str
+    hardware: str
+    config: str
+
+
+class Heartbeat(NamedTuple):
+    """What a robot says once a second."""
+
+    uptime_s: float
+
+
+class LogLine(NamedTuple):
+    """One log line, read."""
+
+    text: str  # without name, colours and control characters, of bounded length
+    boot: Optional[BootLine]
+    heartbeat: Optional[Heartbeat]
+
+
+def clean_text(text: str) -> str:
+    """Return untrusted text as one line without control characters, at most LONGEST_TEXT long."""
+    clean = _CONTROL.sub(" ", _ANSI.sub("", text)).strip()
+    return clean if len(clean) <= LONGEST_TEXT else clean[: LONGEST_TEXT - 3] + "..."
+
+
+def read_log_line(text: str) -> LogLine:
+    """Return what a log text of a robot says."""
+    body = _NAME.sub("", clean_text(text))
+    boot = heartbeat = None
+    match = _BOOT.search(body)
+    if match is not None:
+        boot = BootLine(*(part[:32] for part in (match["firmware"], match["hardware"], match["config"] or "")))
+    else:
+        match = _HEARTBEAT.match(body)
+        if match is not None:
+            heartbeat = Heartbeat(int(match["millis"]) / 1000.0)
+    return LogLine(body, boot, heartbeat)

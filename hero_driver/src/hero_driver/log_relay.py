@@ -1,0 +1,57 @@
+"""Log lines to /rosout on a thread of their own, the same complaint at most once in a while.
+
+rospy writes to the terminal and a file when it logs; both can block, so the thread of the sockets hands
+lines over here. When too many wait they are dropped and the number is logged.
+"""
+
+import time
+from typing import Dict, Tuple
+
+import rospy
+
+from .worker import Worker
+
+QUEUE_LENGTH = 2000
+THROTTLE_S = 10.0
+KNOWN_KEYS_MAX = 1000
+
+_LOG_FUNCTIONS = {
+    "debug": rospy.logdebug,
+    "info": rospy.loginfo,
+    "warn": rospy.logwarn,
+    "error": rospy.logerr,
+    "fatal": rospy.logfatal,
+}
+
+
+class LogRelay:
+    """Where every other thread of the driver logs."""
+
+    def __init__(self) -> None:
+        self._worker = Worker("log relay", QUEUE_LENGTH, lambda error: None)
+        self._last: Dict[str, Tuple[float, int]] = {}
+        self._reported_drops = 0
+
+    def log(self, level: str, text: str) -> None:
+        """Log one line at level debug, info, warn, error or fatal."""
+        dropped = self._worker.refused_jobs
+        if dropped != self._reported_drops:
+            text = "%s (%d log lines before it were dropped)" % (text, dropped - self._reported_drops)
+        if self._worker.submit(lambda: _LOG_FUNCTIONS[level]("%s", text)):
+            self._reported_drops = dropped
+
+    def log_throttled(self, level: str, key: str, text: str) -> None:
+        """Log one line unless one with the same key was logged in the last THROTTLE_S; say how many were not."""
+        now_s = time.monotonic()
+        last_s, suppressed = self._last.get(key, (None, 0))
+        if last_s is not None and now_s - last_s < THROTTLE_S:
+            self._last[key] = (last_s, suppressed + 1)
+            return
+        if len(self._last) >= KNOWN_KEYS_MAX:
+            self._last.clear()
+        self._last[key] = (now_s, 0)
+        self.log(level, "%s (and %d times more before)" % (text, suppressed) if suppressed else text)
+
+    def close(self) -> None:
+        """Write what waits and end the thread."""
+        self._worker.close(drain=True)

@@ -1,0 +1,137 @@
+"""Type names on the wire -> ROS classes that carry message bytes unread, their md5 checked.
+
+The firmware speaks of hero_common, the package that this suite's hero_msgs replaces on the PC, and of the
+tf package of old; both have equals with the same md5.
+"""
+
+from typing import Any, Dict, Tuple
+
+import genpy
+import roslib.message
+
+PACKAGE_ALIASES = {"hero_common": "hero_msgs"}
+TYPE_ALIASES = {"tf/tfMessage": "tf2_msgs/TFMessage"}
+
+
+class MessageTypeError(Exception):
+    """A declared type cannot be used; the text says which, why and what to do."""
+
+
+def apply_aliases(type_name: str) -> str:
+    """Return the ROS type that stands for type_name on this side."""
+    if type_name in TYPE_ALIASES:
+        return TYPE_ALIASES[type_name]
+    package, _, name = type_name.partition("/")
+    return "%s/%s" % (PACKAGE_ALIASES.get(package, package), name)
+
+
+class RawMessage(genpy.Message):
+    """A message as its bytes; subclasses stand for one ROS type each and look like it from outside."""
+
+    __slots__ = ["data"]
+    _slot_types = ["uint8[]"]
+    _has_header = False  # so that rospy leaves the sequence number to the bytes
+
+    def __init__(self, data: bytes = b"") -> None:
+        self.data = data
+
+    def serialize(self, buff: Any) -> None:
+        """Write the bytes to buff."""
+        buff.write(self.data)
+
+    def deserialize(self, data: bytes) -> "RawMessage":
+        """Take the bytes as they are."""
+        self.data = data
+        return self
+
+
+_raw_classes: Dict[Any, Any] = {}
+
+
+def make_raw_class(message_class: Any) -> Any:
+    """Return the class that carries messages of message_class as bytes; the same one for every call."""
+    raw_class = _raw_classes.get(message_class)
+    if raw_class is None:
+        raw_class = type(
+            "Raw" + message_class.__name__,
+            (RawMessage,),
+            {
+                "__slots__": [],
+                "_type": message_class._type,
+                "_md5sum": message_class._md5sum,
+                "_full_text": message_class._full_text,
+            },
+        )
+        _raw_classes[message_class] = raw_class
+    return raw_class
+
+
+def make_raw_service(service_class: Any) -> Any:
+    """Return the service class that carries requests and answers of service_class as bytes."""
+    raw_class = _raw_classes.get(service_class)
+    if raw_class is None:
+        raw_class = type(
+            "Raw" + service_class.__name__,
+            (object,),
+            {
+                "_type": service_class._type,
+                "_md5sum": service_class._md5sum,
+                "_request_class": make_raw_class(service_class._request_class),
+                "_response_class": make_raw_class(service_class._response_class),
+            },
+        )
+        _raw_classes[service_class] = raw_class
+    return raw_class
+
+
+def find_message_class(type_name: str, md5sum: str) -> Any:
+    """Return the class of the message type that a robot calls type_name.
+
+    May read files; not for the thread that owns the sockets. Raises: MessageTypeError.
+    """
+    ros_type = apply_aliases(type_name)
+    message_class = _load(roslib.message.get_message_class, ros_type)
+    _check_md5sum("type", type_name, ros_type, md5sum, message_class._md5sum)
+    return message_class
+
+
+def find_service_class(type_name: str, request_md5sum: str, response_md5sum: str) -> Any:
+    """Return the class of the service type that a robot calls type_name; it declares one md5 per half.
+
+    May read files; not for the thread that owns the sockets. Raises: MessageTypeError.
+    """
+    ros_type = apply_aliases(type_name)
+    service_class = _load(roslib.message.get_service_class, ros_type)
+    halves: Tuple[Tuple[str, str, Any], ...] = (
+        ("request of service type", request_md5sum, service_class._request_class),
+        ("answer of service type", response_md5sum, service_class._response_class),
+    )
+    for what, md5sum, half in halves:
+        _check_md5sum(what, type_name, ros_type, md5sum, half._md5sum)
+    return service_class
+
+
+def _load(loader: Any, ros_type: str) -> Any:
+    package = ros_type.partition("/")[0]
+    try:
+        found = loader(ros_type)
+    except (ImportError, ValueError) as error:
+        raise MessageTypeError(
+            "type %s cannot be loaded (%s): build the package %s again and source its workspace"
+            % (ros_type, error, package)
+        ) from error
+    if found is None:
+        raise MessageTypeError(
+            "type %s is not known here: install or build the package %s and source its workspace"
+            " before the driver starts" % (ros_type, package)
+        )
+    return found
+
+
+def _check_md5sum(what: str, type_name: str, ros_type: str, theirs: str, ours: str) -> None:
+    if theirs != ours:
+        raise MessageTypeError(
+            "%s %s has md5 %s at the robot, but %s has %s here: build the version of package %s that fits the"
+            " robot's firmware and source its workspace"
+            % (what, type_name, theirs, ros_type, ours, ros_type.partition("/")[0])
+        )

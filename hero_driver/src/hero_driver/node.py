@@ -1,0 +1,210 @@
+"""main(): reads the parameters, wires everything, waits, and stops all robots at the end."""
+
+import errno
+import os
+import queue
+import signal
+import sys
+import threading
+import time
+from typing import Any, Callable, List, Optional
+
+import rosgraph
+import rospy
+from std_msgs.msg import Bool
+from std_srvs.srv import SetBool, SetBoolResponse
+
+from .config import ConfigError, DriverConfig, read_config
+from .gateway import Gateway
+from .log_relay import LogRelay
+from .reports import FleetStatus, Reporter
+from .transport import Address, EventLoop, TransportSettings
+from .worker import Worker
+
+NODE_NAME = "hero_driver"
+
+REGISTRAR_QUEUE_LENGTH = 20000
+"""Topics that may wait for the ROS master: 200 robots of 24 topics that come, leave and come again."""
+
+HALT_LIMIT_S = 1.2
+"""At the end robots get this long to take their stop twice; 0.2 s is usual."""
+
+REPORT_CHECK_S = 0.1
+
+
+def make_ros_clock() -> Callable[[], int]:
+    """Return a function that gives ROS time in nanoseconds: simulated where /use_sim_time is set."""
+    if rospy.get_param("/use_sim_time", False):
+        return lambda: rospy.Time.now().to_nsec()
+    return time.time_ns
+
+
+class DriverNode:
+    """The whole driver: open() until close()."""
+
+    def __init__(self, config: DriverConfig) -> None:
+        self._config = config
+        self._ended = threading.Event()
+        self._changed = threading.Event()
+        self._log = LogRelay()
+        self._registrar = Worker(
+            "registrar",
+            REGISTRAR_QUEUE_LENGTH,
+            lambda error: self._log.log(
+                "error", "a topic or service could not be set up: %s: %s" % (type(error).__name__, error)
+            ),
+        )
+        self._gateway = Gateway(config, self._log, self._registrar, make_ros_clock(), self._changed.set)
+        settings = TransportSettings(config.host, config.port, config.robots, config.silence_timeout_s)
+        self._loop = EventLoop(settings, self._gateway)
+        self._thread = threading.Thread(target=self._run_loop, name="sockets", daemon=True)
+        self._crash: Optional[BaseException] = None
+        self._reporter: Reporter
+        self._stopped_publisher: rospy.Publisher
+        self._services: List[rospy.Service] = []
+
+    def open(self) -> None:
+        """Listen, dial and serve. Raises: OSError if the port cannot be had."""
+        self._loop.open()
+        self._gateway.open(self._loop)
+        self._reporter = Reporter()
+        self._stopped_publisher = rospy.Publisher("~stopped", Bool, queue_size=1, latch=True)
+        self._stopped_publisher.publish(Bool(False))
+        self._services.append(rospy.Service("~stop", SetBool, self._serve_stop))
+        self._thread.start()
+        self._log.log("info", self._describe_start())
+
+    def spin(self) -> int:
+        """Report until end() is called; return the exit code."""
+        next_report_s = time.monotonic()
+        while not self._ended.is_set():
+            # The first reports of a burst of changes may be put off a little, so that 50 robots make a few.
+            self._ended.wait(REPORT_CHECK_S)
+            now_s = time.monotonic()
+            is_due = now_s >= next_report_s
+            if is_due or self._changed.is_set():
+                self._changed.clear()
+                self._report(is_due)
+            if is_due:
+                next_report_s = now_s + self._config.report_period_s
+        if self._crash is not None:
+            rospy.logfatal("the driver broke: %s: %s", type(self._crash).__name__, self._crash)
+            return 1
+        return 0
+
+    def end(self) -> None:
+        """Let spin() return; from any thread or signal handler."""
+        self._ended.set()
+
+    def close(self) -> None:
+        """Stop all robots, then close their connections; safe to call twice."""
+        if self._thread.is_alive():
+            halted = threading.Event()
+            deadline_s = time.monotonic() + HALT_LIMIT_S
+            self._loop.call_soon(lambda: self._gateway.halt_and_wait(deadline_s, halted.set))
+            halted.wait(HALT_LIMIT_S + 0.3)
+            self._loop.stop()
+            self._thread.join(1.0)
+        self._registrar.close()
+        self._gateway.close()
+        self._log.close()
+
+    def _run_loop(self) -> None:
+        try:
+            self._loop.run()
+        except BaseException as error:  # the node must end when its only worker does
+            self._crash = error
+            self.end()
+            raise
+
+    def _describe_start(self) -> str:
+        parts = []
+        if self._loop.listening is not None:
+            parts.append("listening on %s, robots must dial this machine at that port" % (self._loop.listening,))
+        if self._config.robots:
+            parts.append("dialling %s" % ", ".join(str(address) for address in self._config.robots))
+        return "hero_driver: %s" % "; ".join(parts)
+
+    def _report(self, is_periodic: bool) -> None:
+        answers: "queue.Queue[FleetStatus]" = queue.Queue()
+        self._loop.call_soon(lambda: answers.put(self._take_status()))
+        try:
+            status = answers.get(timeout=1.0)
+        except queue.Empty:
+            return
+        if is_periodic:
+            self._reporter.measure_rates(status)
+        self._reporter.publish(status)
+        if is_periodic:
+            self._reporter.diagnose()
+
+    def _take_status(self) -> FleetStatus:
+        """Runs on the thread of the sockets."""
+        now_s = time.monotonic()
+        listening: Optional[Address] = self._loop.listening
+        return FleetStatus(
+            now_s,
+            "" if listening is None else str(listening),
+            self._gateway.stopped,
+            len(self._gateway.peers),
+            self._gateway.refused_connections,
+            self._gateway.list_robots(now_s),
+        )
+
+    def _serve_stop(self, request: Any) -> SetBoolResponse:
+        self._gateway.set_stopped(bool(request.data))
+        self._stopped_publisher.publish(Bool(bool(request.data)))
+        text = "all robots are stopped and held" if request.data else "robots may move"
+        rospy.logwarn("%s (~stop)", text)
+        return SetBoolResponse(True, text)
+
+
+def main(argv: Optional[List[str]] = None) -> int:
+    """Run the node; return its exit code."""
+    # The driver handles signals itself: robots are stopped before ROS goes down.
+    rospy.init_node(NODE_NAME, argv=argv, disable_signals=True)
+    try:
+        config = read_config(_read_private_parameters())
+    except ConfigError as error:
+        rospy.logfatal("hero_driver cannot start: %s", error)
+        return 2
+    node = DriverNode(config)
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, lambda *_: node.end())
+    rospy.core.add_preshutdown_hook(lambda reason: node.end())
+    try:
+        node.open()
+    except OSError as error:
+        rospy.logfatal("hero_driver cannot start: %s", _explain_bind_error(config, error))
+        return 2
+    try:
+        return node.spin()
+    finally:
+        node.close()
+        rospy.signal_shutdown("the driver ended")
+
+
+def _read_private_parameters() -> Any:
+    try:
+        parameters = rospy.get_param("~", {})
+    except (rosgraph.MasterException, OSError) as error:
+        raise ConfigError("the ROS master cannot be asked for parameters: %s" % error) from error
+    return parameters if isinstance(parameters, dict) else {}
+
+
+def _explain_bind_error(config: DriverConfig, error: OSError) -> str:
+    where = "~host %s, ~port %d" % (config.host, config.port)
+    if error.errno == errno.EADDRINUSE:
+        return "%s is in use: end the other program (ss -ltnp 'sport = :%d' names it) or choose another ~port" % (
+            where, config.port
+        )
+    if error.errno == errno.EACCES:
+        return "%s may not be used without privileges: choose a ~port above 1023" % where
+    if error.errno == errno.EADDRNOTAVAIL:
+        return "%s is not an address of this machine: use one that `ip address` shows, or 0.0.0.0" % where
+    return "%s cannot be listened on: %s" % (where, os.strerror(error.errno) if error.errno else error)
+
+
+def run() -> None:
+    """Entry point of the script."""
+    sys.exit(main())

@@ -1,0 +1,168 @@
+"""The state of the fleet -> ~robots (hero_msgs/RobotArray, latched) and /diagnostics (REP 107).
+
+Runs on the main thread of the node; gets the states as values from the thread of the sockets.
+"""
+
+from typing import Any, Callable, Dict, List, NamedTuple, Tuple
+
+import diagnostic_updater
+import rospy
+from diagnostic_msgs.msg import DiagnosticStatus
+from hero_msgs.msg import Robot, RobotArray
+
+from .fleet import RobotState
+from .robot_status import RobotStatus
+
+LARGE_CLOCK_OFFSET_S = 0.5
+"""Beyond it stamps of the robot are of little use; the figures that were published stay below 0.1 s."""
+
+
+class FleetStatus(NamedTuple):
+    """What one report tells."""
+
+    now_s: float  # monotonic, when it was put together
+    listening: str
+    stopped: bool
+    connections: int
+    refused_connections: int
+    robots: List[RobotStatus]
+
+
+class Reporter:
+    """The publishers of both reports."""
+
+    def __init__(self) -> None:
+        self._publisher = rospy.Publisher("~robots", RobotArray, queue_size=5, latch=True)
+        self._updater = diagnostic_updater.Updater()
+        self._updater.setHardwareID("hero swarm")
+        self._updater.add("driver", self._diagnose_driver)
+        self._known: Dict[str, RobotStatus] = {}
+        self._rates: Dict[str, Tuple[float, float]] = {}
+        self._last_counts: Dict[str, Tuple[float, int, int]] = {}
+        self._status = FleetStatus(0.0, "", False, 0, 0, [])
+
+    def publish(self, status: FleetStatus) -> None:
+        """Publish ~robots."""
+        self._status = status
+        ros_now = rospy.Time.now()
+        message = RobotArray(listening=status.listening, stopped=status.stopped)
+        message.header.stamp = ros_now
+        for robot in status.robots:
+            message.robots.append(self._describe(robot, status.now_s, ros_now))
+            for reason in robot.refused:
+                message.robots.append(
+                    Robot(
+                        id=robot.number,
+                        namespace=robot.namespace,
+                        address=reason.split(" is here and stays, ")[-1].split(" ")[0],
+                        state=Robot.REFUSED,
+                        last_error=reason,
+                    )
+                )
+        self._publisher.publish(message)
+
+    def measure_rates(self, status: FleetStatus) -> None:
+        """Take the rates since the last call; once per report period."""
+        for robot in status.robots:
+            last = self._last_counts.get(robot.namespace)
+            if last is not None and status.now_s > last[0]:
+                elapsed_s = status.now_s - last[0]
+                self._rates[robot.namespace] = (
+                    (robot.frames - last[1]) / elapsed_s,
+                    (robot.received_length - last[2]) / elapsed_s,
+                )
+            self._last_counts[robot.namespace] = (status.now_s, robot.frames, robot.received_length)
+        for namespace in set(self._last_counts) - {robot.namespace for robot in status.robots}:
+            del self._last_counts[namespace]
+            self._rates.pop(namespace, None)
+
+    def diagnose(self) -> None:
+        """Publish /diagnostics."""
+        robots = {robot.namespace: robot for robot in self._status.robots}
+        for namespace in set(self._known) - set(robots):
+            self._updater.removeByName(namespace.lstrip("/"))
+        for namespace in sorted(set(robots) - set(self._known)):
+            self._updater.add(namespace.lstrip("/"), self._make_robot_task(namespace))
+        self._known = robots
+        self._updater.force_update()
+
+    def _describe(self, robot: RobotStatus, now_s: float, ros_now: rospy.Time) -> Robot:
+        frames_per_s, bytes_per_s = self._rates.get(robot.namespace, (0.0, 0.0))
+        age = rospy.Duration.from_sec(now_s - robot.since_s)
+        return Robot(
+            id=robot.number,
+            namespace=robot.namespace,
+            address=robot.address,
+            state=robot.state.value,
+            firmware=robot.firmware,
+            hardware=robot.hardware,
+            config=robot.config,
+            since=ros_now - age if ros_now.to_sec() > age.to_sec() else rospy.Time(0),
+            uptime=rospy.Duration.from_sec(robot.uptime_s),
+            reconnects=robot.reconnects,
+            frames_per_s=frames_per_s,
+            bytes_per_s=bytes_per_s,
+            dropped_messages=robot.dropped_messages,
+            bad_frames=robot.bad_frames,
+            clock_offset=robot.clock_offset_s,
+            last_error=robot.last_error,
+        )
+
+    def _diagnose_driver(self, stat: Any) -> Any:
+        status = self._status
+        ready = sum(robot.state is RobotState.READY for robot in status.robots)
+        text = "%d of %d robots ready" % (ready, len(status.robots))
+        if status.stopped:
+            stat.summary(DiagnosticStatus.WARN, text + "; all motion is held by ~stop")
+        else:
+            stat.summary(DiagnosticStatus.OK, text)
+        stat.add("listening", status.listening)
+        stat.add("connections", status.connections)
+        stat.add("refused connections", status.refused_connections)
+        return stat
+
+    def _make_robot_task(self, namespace: str) -> Callable[[Any], Any]:
+        def diagnose(stat: Any) -> Any:
+            robot = self._known[namespace]
+            stat.summary(*_judge(robot))
+            frames_per_s, bytes_per_s = self._rates.get(namespace, (0.0, 0.0))
+            for key, value in (
+                ("address", robot.address),
+                ("state", robot.state.name),
+                ("firmware", robot.firmware),
+                ("hardware", robot.hardware),
+                ("config", robot.config),
+                ("uptime (s)", "%.0f" % robot.uptime_s),
+                ("reconnects", robot.reconnects),
+                ("frames per second", "%.1f" % frames_per_s),
+                ("bytes per second", "%.0f" % bytes_per_s),
+                ("dropped messages", robot.dropped_messages),
+                ("bad frames", robot.bad_frames),
+                ("clock offset (s)", "%.4f" % robot.clock_offset_s),
+                ("corrected stamps", robot.corrected_stamps),
+                ("odometry resets", robot.odometry_resets),
+                ("refused transforms", ", ".join(robot.foreign_frames)),
+                ("refused duplicates", "; ".join(robot.refused)),
+                ("last error", robot.last_error),
+            ):
+                stat.add(key, value)
+            return stat
+
+        return diagnose
+
+
+def _judge(robot: RobotStatus) -> Tuple[int, str]:
+    """Return level and text of a robot's diagnostic status."""
+    if robot.refused:
+        return DiagnosticStatus.ERROR, robot.refused[0]
+    if robot.complaint:
+        return DiagnosticStatus.ERROR, robot.complaint
+    if robot.state is RobotState.AWAY:
+        return DiagnosticStatus.ERROR, "away: %s" % robot.last_error
+    if robot.state is RobotState.JOINING:
+        return DiagnosticStatus.WARN, "joining"
+    if robot.foreign_frames:
+        return DiagnosticStatus.WARN, "sends transforms that are not its own: %s" % ", ".join(robot.foreign_frames)
+    if abs(robot.clock_offset_s) > LARGE_CLOCK_OFFSET_S:
+        return DiagnosticStatus.WARN, "its clock is off by %.2f s" % robot.clock_offset_s
+    return DiagnosticStatus.OK, "ready"

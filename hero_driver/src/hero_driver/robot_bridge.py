@@ -1,0 +1,362 @@
+"""One robot's place in ROS: its publishers, subscribers and services. ROS begins here.
+
+receive_message() and the other methods without a comment run on the thread of the sockets and never block;
+what needs the ROS master is a job for the registrar. Endpoints stay up when the connection goes and are
+there again when the robot returns.
+"""
+
+import time
+from typing import Any, Callable, Dict, List, Optional, Tuple
+
+import rospy
+
+from . import message_types
+from .cleaning import TRANSFORMS, Clean, MessageCleaner, Output
+from .command_queue import CommandQueue
+from .command_shaping import HALTED_MOTORS, check_twist
+from .message_types import MessageTypeError
+from .names import Identity
+from .rosserial.session import Topic, TopicKind
+from .services import RobotService
+from .worker import Worker
+
+PUBLISHER_QUEUE_LENGTH = 50
+"""Messages per subscriber that wait when it is slow: more than a second of odometry; then the oldest goes."""
+
+VELOCITY_SUFFIX = "/cmd_vel"
+VELOCITY_CONTROLLER = "/velocity_controller/cmd_vel"
+MOTOR_TYPE = "hero_msgs/Motor"
+TWIST_TYPE = "geometry_msgs/Twist"
+CALIBRATION_SUFFIX = "/pid_calibration"
+
+
+class BridgeContext:
+    """What all bridges share."""
+
+    def __init__(
+        self,
+        registrar: Worker,
+        log: Callable[[str, str, str], None],
+        wake: Callable[["RobotBridge"], None],
+        add_transform: Callable[[bytes], None],
+        after_publishing: Callable[[Callable[[], None]], None],
+        is_stopped: Callable[[], bool],
+        clamp: bool,
+        service_timeout_s: float,
+        command_max_age_s: float,
+    ) -> None:
+        """Take what the rest of the driver does for bridges.
+
+        wake(bridge): commands wait (any thread); log(level, throttle key, text); after_publishing(call): run
+        call on the thread of the sockets, when what it publishes now is out.
+        """
+        self.registrar = registrar
+        self.log = log
+        self.wake = wake
+        self.add_transform = add_transform
+        self.after_publishing = after_publishing
+        self.is_stopped = is_stopped
+        self.clamp = clamp
+        self.service_timeout_s = service_timeout_s
+        self.command_max_age_s = command_max_age_s
+
+
+class Outlet:
+    """A publisher that may not be there yet."""
+
+    def __init__(self) -> None:
+        self.publisher: Optional[rospy.Publisher] = None
+        self.raw_class: Any = None
+
+    def publish(self, payload: bytes) -> None:
+        """Publish payload if somebody listens."""
+        publisher = self.publisher
+        if publisher is None or not publisher.get_num_connections():
+            return
+        try:
+            publisher.publish(self.raw_class(payload))
+        except rospy.ROSException:
+            # The publisher was closed by the shutdown of the node in between; nobody listens any more.
+            self.publisher = None
+
+
+class RobotBridge:
+    """The endpoints of one robot."""
+
+    def __init__(self, identity: Identity, cleaner: Optional[MessageCleaner], context: BridgeContext) -> None:
+        """cleaner is None for devices that are no HeRos: their messages pass through as they are."""
+        self.identity = identity
+        self.label = identity.namespace.lstrip("/")
+        self.cleaner = cleaner
+        self.commands = CommandQueue(context.command_max_age_s)
+        self.refused_commands = 0
+        self._context = context
+        self._closed = False
+        self._connected = False
+        self._outlets: Dict[str, Outlet] = {}
+        self._subscribers: Dict[str, Tuple[str, rospy.Subscriber]] = {}
+        self._services: Dict[str, RobotService] = {}
+        self._service_halves: Dict[Tuple[str, TopicKind], Topic] = {}
+        self._servers: Dict[str, Any] = {}
+        self._clean: Dict[int, Clean] = {}
+        self._ids: Dict[str, int] = {}
+        self._motor_used_s = 0.0
+        self._errors: Dict[str, str] = {}
+
+    # The connection's life.
+
+    def attach(self) -> None:
+        """A connection stands; its topics are declared next."""
+        self._clean.clear()
+        self._ids.clear()
+        self._service_halves.clear()
+        self._connected = True
+
+    def detach(self, reason: str) -> None:
+        """The connection is gone; endpoints stay, calls that wait fail now, commands that wait are dropped."""
+        self._connected = False
+        self._clean.clear()
+        self._ids.clear()
+        self.commands.clear()
+        for service in list(self._services.values()):
+            service.fail(reason)
+
+    def close(self) -> None:
+        """Take all endpoints down; safe to call twice."""
+        if self._closed:
+            return
+        self._closed = True
+        self.detach("the robot left")
+        # This thread is the one that publishes: once it has let go of a publisher, that can be unregistered.
+        publishers = [outlet.publisher for outlet in self._outlets.values() if outlet.publisher is not None]
+        self._outlets.clear()
+        self._context.registrar.submit(lambda: self._unregister(publishers))
+
+    @property
+    def last_error(self) -> str:
+        """The newest complaint about a declared topic that still holds, empty if there is none."""
+        return next(reversed(list(self._errors.values())), "")
+
+    # From the robot.
+
+    def declare(self, topic: Topic, name: str) -> None:
+        """The robot declared topic, which is called name in ROS."""
+        info, kind = topic.info, topic.kind
+        ros_type = message_types.apply_aliases(info.message_type)
+        if kind is TopicKind.PUBLISHER:
+            derived = self._choose_cleaning(topic, name, ros_type)
+            self._submit(lambda: self._advertise(name, info.message_type, info.md5sum, derived))
+        elif kind is TopicKind.SUBSCRIBER:
+            self._ids[name] = info.topic_id
+            self._submit(lambda: self._subscribe(name, info.message_type, info.md5sum))
+        elif kind in (TopicKind.SERVICE_ANSWERS, TopicKind.SERVICE_REQUESTS):
+            self._declare_service_half(topic, name)
+
+    def receive_message(self, topic: Topic, payload: bytes, arrival_ns: int) -> None:
+        """The robot sent a message; arrival_ns is ROS time."""
+        clean = self._clean.get(topic.info.topic_id)
+        if clean is None:
+            return
+        for name, output in clean(payload, arrival_ns):
+            if name == TRANSFORMS:
+                self._context.add_transform(output)
+            else:
+                self._outlets[name].publish(output)
+
+    def _choose_cleaning(self, topic: Topic, name: str, ros_type: str) -> Dict[str, str]:
+        """Set up the way of a topic's messages; return the topics (with types) that are made of it besides."""
+        topic_id = topic.info.topic_id
+        derived: Dict[str, str] = {}
+        if self.cleaner is None:
+            self._clean[topic_id] = lambda payload, arrival_ns: [Output(name, payload)]
+        else:
+            derived = self.cleaner.find_derived(name, ros_type)
+            self._clean[topic_id] = self.cleaner.choose(name, ros_type)
+        for outlet_name in (name, *derived):
+            if outlet_name != TRANSFORMS or self.cleaner is None:
+                self._outlets.setdefault(outlet_name, Outlet())
+        return derived
+
+    def _declare_service_half(self, topic: Topic, name: str) -> None:
+        self._service_halves[name, topic.kind] = topic
+        requests = self._service_halves.get((name, TopicKind.SERVICE_REQUESTS))
+        answers = self._service_halves.get((name, TopicKind.SERVICE_ANSWERS))
+        if requests is None or answers is None:
+            return
+        if requests.info.message_type != answers.info.message_type:
+            self._complain(name, "service %s refused: its halves are %s and %s" % (
+                name, requests.info.message_type, answers.info.message_type
+            ))
+            return
+        service = self._services.get(name)
+        if service is None:
+            service = RobotService(
+                name, self._context.service_timeout_s, lambda request: self._send_request(name, request)
+            )
+            self._services[name] = service
+        receive_answer = service.receive_answer
+        self._ids[name] = requests.info.topic_id
+        self._clean[answers.info.topic_id] = lambda payload, arrival_ns: receive_answer(payload) or []
+        self._submit(
+            lambda: self._serve(name, requests.info.message_type, requests.info.md5sum, answers.info.md5sum)
+        )
+
+    # To the robot.
+
+    def find_id(self, name: str) -> Optional[int]:
+        """Return the id under which the robot receives the topic or service called name."""
+        return self._ids.get(name)
+
+    def halt(self) -> None:
+        """Stop the robot, on every topic that may drive it."""
+        now_s = time.monotonic()
+        velocity = self.identity.namespace + VELOCITY_CONTROLLER
+        self.commands.halt(velocity if velocity in self._ids else None, now_s)
+        if now_s - self._motor_used_s < 2.0:
+            motors = self.identity.namespace + "/cmd_motor"
+            if motors in self._ids:
+                self.commands.offer(motors, HALTED_MOTORS)
+        self._context.wake(self)
+
+    def _receive_command(self, message: Any, name_and_type: Tuple[str, str]) -> None:
+        """A ROS program sent a message for the robot (a thread of rospy's)."""
+        name, ros_type = name_and_type
+        if not self._connected:
+            self.refused_commands += 1
+            return
+        payload = message.data
+        if ros_type == TWIST_TYPE and name.endswith(VELOCITY_SUFFIX) and self.cleaner is not None:
+            if not self._take_velocity(name, payload):
+                return
+        elif ros_type == MOTOR_TYPE and self.cleaner is not None:
+            if self._context.is_stopped() and payload != HALTED_MOTORS:
+                self.refused_commands += 1
+                return
+            self._motor_used_s = time.monotonic()
+            self.commands.offer(name, payload)
+        else:
+            self.commands.offer(name, payload)
+        self._context.wake(self)
+
+    def _take_velocity(self, name: str, payload: bytes) -> bool:
+        command = check_twist(payload, self._context.clamp)
+        if command is None:
+            self.refused_commands += 1
+            self._context.log(
+                "warn",
+                name,
+                "%s: a velocity on %s is not finite and was refused; mend the program that sends it" % (
+                    self.label, name
+                ),
+            )
+            return False
+        if self._context.is_stopped() and not command.is_zero:
+            self.refused_commands += 1
+            return False
+        self.commands.offer_velocity(name, command, time.monotonic())
+        return True
+
+    def _send_request(self, name: str, request: bytes) -> Optional[str]:
+        """Send a service request (a thread of rospy's)."""
+        if not self._connected or name not in self._ids:
+            return "the robot is not connected"
+        if name.endswith(CALIBRATION_SUFFIX) and self._context.is_stopped():
+            return "it moves the robot, and ~stop holds all motion"
+        self.commands.offer(name, request)
+        self._context.wake(self)
+        return None
+
+    # Jobs of the registrar; these may block.
+
+    def _submit(self, job: Callable[[], None]) -> None:
+        if not self._context.registrar.submit(job):
+            self._complain("registrar", "too many topics wait for the ROS master; is it reachable?")
+
+    def _complain(self, name: str, text: str) -> None:
+        if self._errors.get(name) != text:
+            self._errors.pop(name, None)
+            self._errors[name] = text
+            self._context.log("error", self.identity.namespace + name + text, "%s: %s" % (self.label, text))
+
+    def _advertise(self, name: str, message_type: str, md5sum: str, derived: Dict[str, str]) -> None:
+        message_class = self._find_message_class(name, message_type, md5sum)
+        if message_class is None:
+            return
+        for outlet_name in (name, *derived):
+            outlet = self._outlets.get(outlet_name)
+            if outlet is not None:
+                self._open_outlet(outlet, outlet_name, message_class)
+
+    def _find_message_class(self, name: str, message_type: str, md5sum: str) -> Optional[Any]:
+        """Return the class of a topic; None, after one clear complaint, if it cannot be used."""
+        if self._closed:
+            return None
+        try:
+            message_class = message_types.find_message_class(message_type, md5sum)
+        except MessageTypeError as error:
+            self._complain(name, "topic %s refused: %s" % (name, error))
+            return None
+        self._errors.pop(name, None)
+        return message_class
+
+    def _open_outlet(self, outlet: Outlet, name: str, message_class: Any) -> None:
+        raw_class = message_types.make_raw_class(message_class)
+        if outlet.publisher is not None:
+            if outlet.raw_class is raw_class:
+                return
+            old, outlet.publisher = outlet.publisher, None
+            self._context.after_publishing(lambda: self._submit(old.unregister))
+        outlet.raw_class = raw_class
+        outlet.publisher = rospy.Publisher(
+            name, raw_class, queue_size=PUBLISHER_QUEUE_LENGTH, tcp_nodelay=True
+        )
+
+    def _subscribe(self, name: str, message_type: str, md5sum: str) -> None:
+        message_class = self._find_message_class(name, message_type, md5sum)
+        if message_class is None:
+            return
+        ros_type = message_class._type
+        known = self._subscribers.get(name)
+        if known is not None:
+            if known[0] == ros_type:
+                return
+            known[1].unregister()
+        self._subscribers[name] = (
+            ros_type,
+            rospy.Subscriber(
+                name,
+                message_types.make_raw_class(message_class),
+                self._receive_command,
+                callback_args=(name, ros_type),
+                queue_size=PUBLISHER_QUEUE_LENGTH,
+                tcp_nodelay=True,
+            ),
+        )
+
+    def _serve(self, name: str, message_type: str, request_md5sum: str, answer_md5sum: str) -> None:
+        if self._closed or name in self._servers:
+            return
+        try:
+            service_class = message_types.find_service_class(message_type, request_md5sum, answer_md5sum)
+        except MessageTypeError as error:
+            self._ids.pop(name, None)
+            self._complain(name, "service %s refused: %s" % (name, error))
+            return
+        self._errors.pop(name, None)
+        raw_class = message_types.make_raw_service(service_class)
+        service = self._services[name]
+
+        def handle(request: Any) -> Any:
+            return raw_class._response_class(service.call(request.data))
+
+        self._servers[name] = rospy.Service(name, raw_class, handle)
+
+    def _unregister(self, publishers: List[rospy.Publisher]) -> None:
+        for publisher in publishers:
+            publisher.unregister()
+        for _, subscriber in self._subscribers.values():
+            subscriber.unregister()
+        for server in self._servers.values():
+            server.shutdown("the robot left")
+        self._subscribers.clear()
+        self._servers.clear()

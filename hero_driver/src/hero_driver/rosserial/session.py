@@ -1,0 +1,288 @@
+"""One conversation with one robot: bytes in -> events out, commands in -> bytes out.
+
+The session asks for the robot's topics until it has them, answers its time requests, keeps what the robot
+declared and lets nothing else out. It holds no socket and no clock: time enters as `now_s` (monotonic, s)
+and `time_of_day_s` (ROS time, s). A peer's mistake is a Problem event or a counter, never an exception.
+Source: ros_lib node_handle.h (negotiateTopics, requestSyncTime, spinOnce) and the stock robot as measured.
+"""
+
+import enum
+import re
+from dataclasses import dataclass
+from typing import Dict, List, NamedTuple, Optional, Sequence, Union
+
+from . import frames, payloads
+from .errors import FrameTooLongError, PayloadError, TopicIdError
+from .frames import Bytes, FrameReader, encode_frame
+from .payloads import Log, TopicInfo
+
+REQUEST_INTERVAL_S = 1.5
+"""Between two requests for topics while none were declared: the robot's boot takes 1.07 s (LEDStatus.ino:93)."""
+
+TIME_WITHOUT_TOPICS_S = 0.2
+"""How long topics may stay away after a time request while nothing is declared. In a whole handshake they
+follow in the same burst (node_handle.h:301); alone it is the zero-topic handshake, cured by a new request."""
+
+REPEAT_INTERVAL_S = 0.5
+"""Between two requests for topics when a peer proves that it runs but declared nothing."""
+
+UNDECLARED_REPEATS = 5
+"""Requests that undeclared ids may cause while the robot has declared something else."""
+
+BUFFER_LENGTH_MIN = 1
+
+_MESSAGE_TYPE = re.compile(r"^[a-zA-Z][a-zA-Z0-9_]*/[a-zA-Z][a-zA-Z0-9_]*$")
+_MD5SUM = re.compile(r"^[0-9a-f]{32}$")
+_NAME = re.compile(r"^[/~]?[a-zA-Z][a-zA-Z0-9_/]*$")
+
+
+class TopicKind(enum.Enum):
+    """What a declared id carries, seen from the robot; the value is the id of the declaring frame."""
+
+    PUBLISHER = frames.ID_PUBLISHER
+    SUBSCRIBER = frames.ID_SUBSCRIBER
+    SERVICE_ANSWERS = frames.ID_SERVICE_SERVER_PUBLISHER
+    SERVICE_REQUESTS = frames.ID_SERVICE_SERVER_SUBSCRIBER
+    CLIENT_REQUESTS = frames.ID_SERVICE_CLIENT_PUBLISHER
+    CLIENT_ANSWERS = frames.ID_SERVICE_CLIENT_SUBSCRIBER
+
+    @property
+    def is_from_robot(self) -> bool:
+        """Whether the robot sends this id (else it receives it)."""
+        return self in _FROM_ROBOT
+
+
+_FROM_ROBOT = frozenset((TopicKind.PUBLISHER, TopicKind.SERVICE_ANSWERS, TopicKind.CLIENT_REQUESTS))
+_KIND_BY_FRAME_ID = {kind.value: kind for kind in TopicKind}
+
+
+@dataclass(frozen=True)
+class Topic:
+    """One declared id of this conversation."""
+
+    info: TopicInfo
+    kind: TopicKind
+
+
+class MessageReceived(NamedTuple):
+    """The robot sent a payload on a topic that it declared."""
+
+    topic: Topic
+    payload: bytes
+
+
+class TopicDeclared(NamedTuple):
+    """The robot declared a topic that is new, or differs from what it had declared under this id."""
+
+    topic: Topic
+
+
+class LogReceived(NamedTuple):
+    """The robot sent a log line."""
+
+    log: Log
+
+
+class TimeRequested(NamedTuple):
+    """The robot asked for the time; the answer is among take_frames()."""
+
+
+class ParameterRequested(NamedTuple):
+    """The robot asks for a parameter; answer with encode_parameter_answer()."""
+
+    name: str
+
+
+class Problem(NamedTuple):
+    """The robot sent something that cannot be used; text says what and why. Nothing else is affected."""
+
+    text: str
+
+
+class SessionEnded(NamedTuple):
+    """The conversation is useless and should be closed; reason says why."""
+
+    reason: str
+
+
+Event = Union[
+    MessageReceived, TopicDeclared, LogReceived, TimeRequested, ParameterRequested, Problem, SessionEnded
+]
+
+
+@dataclass(frozen=True)
+class SessionLimits:
+    """What one peer may do before it is refused."""
+
+    max_payload_length: int = frames.DEFAULT_MAX_PAYLOAD_LENGTH
+    max_topics: int = 64
+    max_name_length: int = 128
+    declare_timeout_s: float = 20.0
+    silence_timeout_s: float = 6.0
+
+
+class Session:
+    """The state of one conversation; one per connection, never reused.
+
+    Attributes:
+        topics: declared topics by id.
+        reader: the frame reader, for its counters.
+        undeclared_messages: messages on ids that were not declared.
+    """
+
+    def __init__(self, limits: SessionLimits, now_s: float) -> None:
+        self.topics: Dict[int, Topic] = {}
+        self.reader = FrameReader(limits.max_payload_length)
+        self.undeclared_messages = 0
+        self.opened_s = now_s
+        self.last_receive_s = now_s
+        self._limits = limits
+        self._outgoing: List[bytes] = []
+        self._last_request_s: Optional[float] = None
+        self._request_due_s: Optional[float] = now_s
+        self._undeclared_repeats = 0
+
+    def receive_bytes(self, data: Bytes, now_s: float, time_of_day_s: float) -> List[Event]:
+        """Return the events that data causes, in order. Never raises, whatever data holds."""
+        events: List[Event] = []
+        topics = self.topics
+        self.last_receive_s = now_s
+        for topic_id, payload in self.reader.receive_bytes(data):
+            topic = topics.get(topic_id)
+            if topic is not None and topic.kind in _FROM_ROBOT:
+                events.append(MessageReceived(topic, payload))
+                continue
+            try:
+                event = self._receive_special(topic_id, payload, now_s, time_of_day_s)
+            except PayloadError as error:
+                event = Problem(str(error))
+            if event is not None:
+                events.append(event)
+        return events
+
+    def poll(self, now_s: float) -> List[Event]:
+        """Do what is due by now_s; call it at least a few times per second."""
+        if now_s - self.last_receive_s > self._limits.silence_timeout_s:
+            return [SessionEnded("silent for %.1f s" % (now_s - self.last_receive_s))]
+        if not self.topics and now_s - self.opened_s > self._limits.declare_timeout_s:
+            return [SessionEnded("declared no topic within %.1f s" % self._limits.declare_timeout_s)]
+        if self._request_due_s is not None and now_s >= self._request_due_s:
+            self._outgoing.append(encode_frame(frames.ID_PUBLISHER, b""))
+            self._last_request_s = now_s
+            self._request_due_s = None if self.topics else now_s + REQUEST_INTERVAL_S
+        return []
+
+    def take_frames(self) -> List[bytes]:
+        """Return the frames that the session itself wants to send, and forget them."""
+        outgoing, self._outgoing = self._outgoing, []
+        return outgoing
+
+    def encode_message(self, topic_id: int, payload: Bytes) -> bytes:
+        """Return the frame that sends payload to the robot.
+
+        Raises: TopicIdError unless this connection declared topic_id as something that the robot receives
+        (the robot indexes an array with the id unchecked, node_handle.h:326), FrameTooLongError for more
+        than the robot's buffer (unchecked too, node_handle.h:232).
+        """
+        topic = self.topics.get(topic_id)
+        if topic is None or topic.kind in _FROM_ROBOT:
+            raise TopicIdError("id %d was not declared as something that this robot receives" % topic_id)
+        if len(payload) > topic.info.buffer_length:
+            raise FrameTooLongError(
+                "%s: a message of %d bytes does not fit the robot's buffer of %d bytes"
+                % (topic.info.name, len(payload), topic.info.buffer_length)
+            )
+        return encode_frame(topic_id, payload)
+
+    def encode_parameter_answer(
+        self, ints: Sequence[int], floats: Sequence[float], strings: Sequence[str]
+    ) -> bytes:
+        """Return the frame that answers a ParameterRequested.
+
+        Raises: PayloadError for numbers outside 32 bits, FrameTooLongError for more than the robot's buffer.
+        """
+        payload = payloads.encode_parameter_answer(ints, floats, strings)
+        if len(payload) > self._limits.max_payload_length:
+            raise FrameTooLongError(
+                "a parameter of %d bytes does not fit the robot's buffer of %d bytes"
+                % (len(payload), self._limits.max_payload_length)
+            )
+        return encode_frame(frames.ID_PARAMETER_REQUEST, payload)
+
+    def _receive_special(
+        self, topic_id: int, payload: bytes, now_s: float, time_of_day_s: float
+    ) -> Optional[Event]:
+        if topic_id in _KIND_BY_FRAME_ID:
+            return self._declare(_KIND_BY_FRAME_ID[topic_id], payload)
+        if topic_id == frames.ID_TIME:
+            payloads.decode_time(payload)
+            answer = payloads.encode_time(payloads.split_seconds(time_of_day_s))
+            self._outgoing.append(encode_frame(frames.ID_TIME, answer))
+            if not self.topics:
+                self._expect_topics_by(now_s + TIME_WITHOUT_TOPICS_S)
+            return TimeRequested()
+        if topic_id == frames.ID_LOG:
+            log = payloads.decode_log(payload)
+            if not self.topics:
+                self._expect_topics_by(self._earliest_repeat_s(now_s))
+            return LogReceived(log)
+        if topic_id == frames.ID_PARAMETER_REQUEST:
+            return ParameterRequested(payloads.decode_parameter_request(payload))
+        return self._receive_undeclared(topic_id, now_s)
+
+    def _receive_undeclared(self, topic_id: int, now_s: float) -> Optional[Event]:
+        self.undeclared_messages += 1
+        if not self.topics:
+            self._expect_topics_by(self._earliest_repeat_s(now_s))
+            return None
+        if self._undeclared_repeats >= UNDECLARED_REPEATS or self._request_due_s is not None:
+            return None
+        self._undeclared_repeats += 1
+        self._request_due_s = self._earliest_repeat_s(now_s)
+        return Problem("sends id %d, which it did not declare; asked again for its topics" % topic_id)
+
+    def _earliest_repeat_s(self, now_s: float) -> float:
+        return now_s if self._last_request_s is None else max(now_s, self._last_request_s + REPEAT_INTERVAL_S)
+
+    def _expect_topics_by(self, due_s: float) -> None:
+        if self._request_due_s is None or due_s < self._request_due_s:
+            self._request_due_s = due_s
+
+    def _declare(self, kind: TopicKind, payload: bytes) -> Optional[Event]:
+        info = payloads.decode_topic_info(payload)
+        complaint = self._find_fault(info)
+        if complaint is not None:
+            return Problem("topic %s refused: %s" % (_shorten(info.name), complaint))
+        topic = Topic(info, kind)
+        if not self.topics:
+            self._request_due_s = None
+        elif self.topics.get(info.topic_id) == topic:
+            return None
+        elif info.topic_id not in self.topics and len(self.topics) >= self._limits.max_topics:
+            return Problem(
+                "topic %s refused: more than %d topics (max_topics)" % (info.name, self._limits.max_topics)
+            )
+        self.topics[info.topic_id] = topic
+        return TopicDeclared(topic)
+
+    def _find_fault(self, info: TopicInfo) -> Optional[str]:
+        """Return what is wrong with a declaration, or None."""
+        limit = self._limits.max_name_length
+        if len(info.name) > limit:
+            return "its name has %d characters, more than %d (max_name_length)" % (len(info.name), limit)
+        if not _NAME.match(info.name) or "//" in info.name or info.name.endswith("/"):
+            return "its name is not a ROS name"
+        if len(info.message_type) > limit or not _MESSAGE_TYPE.match(info.message_type):
+            return "its type %s is not of the form package/Type" % _shorten(info.message_type)
+        if not _MD5SUM.match(info.md5sum):
+            return "its md5 %s is not 32 hexadecimal digits" % _shorten(info.md5sum)
+        if info.topic_id < frames.FIRST_TOPIC_ID:
+            return "its id %d is below %d" % (info.topic_id, frames.FIRST_TOPIC_ID)
+        if info.buffer_length < BUFFER_LENGTH_MIN:
+            return "its buffer_size is %d" % info.buffer_length
+        return None
+
+
+def _shorten(text: str) -> str:
+    """Return untrusted text quoted, escaped and short enough for one line of a log."""
+    return ascii(text if len(text) <= 60 else text[:57] + "...")

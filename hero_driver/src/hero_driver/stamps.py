@@ -1,0 +1,47 @@
+"""Robot stamps -> stamps that ROS programs can trust: not in the future, never backwards, not uptime.
+
+The robot's clock is set anew every 2.5 s and jumps then (node_handle.h:361); before the first answer it
+counts from boot. Pure: stamps are integers in nanoseconds since the epoch, time of arrival comes in.
+"""
+
+from typing import Dict
+
+NS_PER_S = 10**9
+
+STEP_NS = 1000
+"""How far a stamp is put behind the one before it when the robot's clock went back: 1 us keeps them distinct."""
+
+
+class StampFilter:
+    """Corrects the stamps of all topics of one robot."""
+
+    def __init__(self, use_arrival: bool, max_future_s: float, max_age_s: float) -> None:
+        """Take the time of arrival instead of the robot's with use_arrival, or outside the two limits.
+
+        max_future_s: how far a stamp may lie after its arrival; max_age_s: how far before.
+        """
+        self._use_arrival = use_arrival
+        self._max_future_ns = int(max_future_s * NS_PER_S)
+        self._max_age_ns = int(max_age_s * NS_PER_S)
+        self._last_ns: Dict[str, int] = {}
+        self.corrected = 0
+
+    def correct(self, topic: str, stamp_ns: int, arrival_ns: int) -> int:
+        """Return the stamp (ns) to publish on topic for a message stamped stamp_ns that came at arrival_ns."""
+        ahead_ns = stamp_ns - arrival_ns
+        result_ns = stamp_ns
+        if self._use_arrival:
+            result_ns = arrival_ns
+        elif ahead_ns > self._max_future_ns or -ahead_ns > self._max_age_ns:
+            result_ns = arrival_ns
+            self.corrected += 1
+        last_ns = self._last_ns.get(topic)
+        if last_ns is not None and result_ns <= last_ns:
+            if last_ns - result_ns > self._max_age_ns:
+                # Not the robot's clock went back but ours: ROS time was reset (a bag or simulation restarted).
+                self._last_ns.clear()
+            else:
+                result_ns = last_ns + STEP_NS
+                self.corrected += 1
+        self._last_ns[topic] = result_ns
+        return result_ns

@@ -1,0 +1,45 @@
+"""Transforms of all robots -> few tf messages: what arrives within a period goes out as one TFMessage.
+
+One message for each transform, as robots send them, would make every listener of /tf handle 150 messages
+per robot and second, and a small queue would lose most of them. Runs on the thread of the sockets.
+"""
+
+from typing import Callable, List
+
+import rospy
+from tf2_msgs.msg import TFMessage
+
+from . import wire_messages
+from .message_types import make_raw_class
+
+QUEUE_LENGTH = 200
+"""Two seconds of messages for a listener that is slow."""
+
+TRANSFORMS_MAX = 500
+"""A message is sent early when it holds so many: 50 kB, about 3 s of one robot, 30 ms of a hundred."""
+
+
+class TransformCollector:
+    """The publisher of /tf."""
+
+    def __init__(self, period_s: float, call_later: Callable[[float, Callable[[], None]], None]) -> None:
+        """Collect for period_s; call_later(delay_s, call) runs call on the same thread."""
+        self._period_s = period_s
+        self._call_later = call_later
+        self._raw_class = make_raw_class(TFMessage)
+        self._publisher = rospy.Publisher("/tf", self._raw_class, queue_size=QUEUE_LENGTH, tcp_nodelay=True)
+        self._transforms: List[bytes] = []
+
+    def add(self, transform: bytes) -> None:
+        """Take the bytes of one geometry_msgs/TransformStamped."""
+        if not self._transforms:
+            self._call_later(self._period_s, self.publish)
+        self._transforms.append(transform)
+        if len(self._transforms) >= TRANSFORMS_MAX:
+            self.publish()
+
+    def publish(self) -> None:
+        """Publish what was collected."""
+        transforms, self._transforms = self._transforms, []
+        if transforms and self._publisher.get_num_connections():
+            self._publisher.publish(self._raw_class(wire_messages.pack_transform_message(transforms)))

@@ -1,0 +1,221 @@
+"""The few message types that the driver reads or writes, as bytes in and bytes out, at fixed offsets.
+
+Message bytes pass through unread wherever possible; this is what remains: headers, odometry, encoder,
+transforms, laser scans. Field order is that of the ROS message definitions. Pure.
+"""
+
+import math
+import struct
+from typing import List, NamedTuple, Optional, Sequence, Tuple
+
+from .odometry import Pose, Twist
+from .stamps import NS_PER_S
+
+_HEADER = struct.Struct("<IIII")  # seq, secs, nsecs, length of frame_id
+_LENGTH = struct.Struct("<I")
+_SEQ_AND_STAMP = struct.Struct("<III")
+_STAMP = struct.Struct("<II")
+_ENCODER_TICKS = struct.Struct("<2d")
+_POSE = struct.Struct("<7d")
+_TWIST = struct.Struct("<6d")
+_COVARIANCE = struct.Struct("<36d")
+
+STAMP_OFFSET = 4  # of a message that begins with a header
+TRANSFORM_TAIL_LENGTH = _POSE.size  # translation and rotation
+ODOMETRY_TAIL_LENGTH = _POSE.size + _COVARIANCE.size + _TWIST.size + _COVARIANCE.size
+ENCODER_TAIL_LENGTH = 11 * 8
+
+PROXIMITY_BEAMS = 8
+STOCK_BEAMS = 16
+BODY_RADIUS_M = 0.0368  # RangeSensor.ino:66; ranges count from the robot's centre
+NEAREST_M = 0.01  # RangeSensor.ino:123, the firmware's clamp, from the body's rim
+FARTHEST_M = 0.20  # what range_max of the firmware means; beyond it stands for nothing in range
+CLAMP_TOLERANCE_M = 1e-4
+
+
+class Header(NamedTuple):
+    """The part of std_msgs/Header that matters here."""
+
+    stamp_ns: int
+    frame_id: bytes
+    end: int  # offset of the first byte behind the header
+
+
+def read_header(payload: bytes) -> Optional[Header]:
+    """Return the header at the start of payload, or None if payload is too short for it."""
+    if len(payload) < _HEADER.size:
+        return None
+    _, secs, nsecs, length = _HEADER.unpack_from(payload)
+    end = _HEADER.size + length
+    if end > len(payload):
+        return None
+    return Header(secs * NS_PER_S + nsecs, payload[_HEADER.size : end], end)
+
+
+def pack_stamp(stamp_ns: int) -> bytes:
+    """Return the eight bytes of a stamp."""
+    return _STAMP.pack(*divmod(stamp_ns, NS_PER_S))
+
+
+def restamp(payload: bytes, seq: int, stamp_ns: int) -> bytes:
+    """Return payload, which begins with a header, with another sequence number and stamp."""
+    secs, nsecs = divmod(stamp_ns, NS_PER_S)
+    return _SEQ_AND_STAMP.pack(seq & 0xFFFFFFFF, secs, nsecs) + payload[_SEQ_AND_STAMP.size :]
+
+
+def read_encoder_ticks(payload: bytes, header: Header) -> Optional[Tuple[float, float]]:
+    """Return (left_ticks, right_ticks) of a hero_msgs/Encoder, or None if its length is wrong."""
+    if len(payload) - header.end != ENCODER_TAIL_LENGTH:
+        return None
+    left, right = _ENCODER_TICKS.unpack_from(payload, header.end)
+    return left, right
+
+
+class OdometryWriter:
+    """Writes nav_msgs/Odometry of one robot; covariances and frames are put in once."""
+
+    def __init__(self, pose_covariance: Sequence[float], twist_covariance: Sequence[float]) -> None:
+        """Take the diagonals of both covariances (x, y, z, roll, pitch, yaw), in m^2 and rad^2, per s^2."""
+        self._pose_covariance = _COVARIANCE.pack(*_make_diagonal(pose_covariance))
+        self._twist_covariance = _COVARIANCE.pack(*_make_diagonal(twist_covariance))
+
+    def rewrite(
+        self, payload: bytes, seq: int, stamp_ns: int, estimate: Optional[Tuple[Pose, Twist]]
+    ) -> Optional[bytes]:
+        """Return the robot's message with stamp and covariances, and with another estimate if one is given.
+
+        None if the length of payload is wrong.
+        """
+        tail = len(payload) - ODOMETRY_TAIL_LENGTH
+        header = read_header(payload)
+        if header is None or header.end + _LENGTH.size > tail:
+            return None
+        if header.end + _LENGTH.size + _LENGTH.unpack_from(payload, header.end)[0] != tail:
+            return None
+        if estimate is None:
+            pose = payload[tail : tail + _POSE.size]
+            twist_start = tail + _POSE.size + _COVARIANCE.size
+            twist = payload[twist_start : twist_start + _TWIST.size]
+        else:
+            pose = _pack_pose(estimate[0])
+            twist = _TWIST.pack(estimate[1].linear_m_s, 0.0, 0.0, 0.0, 0.0, estimate[1].turn_rad_s)
+        head = restamp(payload[:tail], seq, stamp_ns)
+        return b"".join((head, pose, self._pose_covariance, twist, self._twist_covariance))
+
+
+class Transform(NamedTuple):
+    """One geometry_msgs/TransformStamped as it lies in a tf message."""
+
+    stamp_ns: int
+    frames: bytes  # frame_id and child_frame_id with their lengths, as on the wire
+    tail: bytes  # translation and rotation
+
+
+def read_transforms(payload: bytes) -> Optional[List[Transform]]:
+    """Return the transforms of a tf2_msgs/TFMessage, or None if it is not one from first to last byte."""
+    if len(payload) < _LENGTH.size:
+        return None
+    count = _LENGTH.unpack_from(payload)[0]
+    position = _LENGTH.size
+    transforms = []
+    for _ in range(count):
+        if position + _HEADER.size > len(payload):
+            return None
+        _, secs, nsecs, length = _HEADER.unpack_from(payload, position)
+        child_start = position + _HEADER.size + length
+        if child_start + _LENGTH.size > len(payload):
+            return None
+        frames_end = child_start + _LENGTH.size + _LENGTH.unpack_from(payload, child_start)[0]
+        end = frames_end + TRANSFORM_TAIL_LENGTH
+        if end > len(payload):
+            return None
+        frames_start = position + _SEQ_AND_STAMP.size
+        transforms.append(
+            Transform(secs * NS_PER_S + nsecs, payload[frames_start:frames_end], payload[frames_end:end])
+        )
+        position = end
+    return transforms if position == len(payload) else None
+
+
+def split_frames(frames: bytes) -> Tuple[bytes, bytes]:
+    """Return (frame_id, child_frame_id) of Transform.frames."""
+    length = _LENGTH.unpack_from(frames)[0]
+    child = _LENGTH.size + length
+    return frames[_LENGTH.size : child], frames[child + _LENGTH.size :]
+
+
+def join_frames(frame_id: bytes, child_frame_id: bytes) -> bytes:
+    """Undo split_frames()."""
+    return b"".join((_LENGTH.pack(len(frame_id)), frame_id, _LENGTH.pack(len(child_frame_id)), child_frame_id))
+
+
+def pack_transform(stamp_ns: int, frames: bytes, tail: bytes) -> bytes:
+    """Return the bytes of one geometry_msgs/TransformStamped (seq 0)."""
+    secs, nsecs = divmod(stamp_ns, NS_PER_S)
+    return _SEQ_AND_STAMP.pack(0, secs, nsecs) + frames + tail
+
+
+def pack_transform_tail(pose: Pose) -> bytes:
+    """Return translation and rotation of pose."""
+    return _pack_pose(pose)
+
+
+def pack_transform_message(transforms: Sequence[bytes]) -> bytes:
+    """Return the tf2_msgs/TFMessage of transforms, each from pack_transform()."""
+    return _LENGTH.pack(len(transforms)) + b"".join(transforms)
+
+
+_STOCK_SCAN_TAIL = struct.Struct("<7fI16fI16f")
+_PROXIMITY_TAIL = struct.Struct("<7fI8fI8f")
+
+
+def make_proximity(payload: bytes, seq: int, stamp_ns: int, scan_time_s: float) -> Optional[bytes]:
+    """Return the sensor_msgs/LaserScan of the eight real beams in a stock laser message, by REP 117.
+
+    The stock message has 16 ranges of which the odd ones are averages, an increment that matches none of
+    them and finite values for nothing in range (RangeSensor.ino:66-72, 123-125, 167-173).
+    None if payload is not a stock laser message.
+    """
+    header = read_header(payload)
+    if header is None or len(payload) - header.end != _STOCK_SCAN_TAIL.size:
+        return None
+    fields = _STOCK_SCAN_TAIL.unpack_from(payload, header.end)
+    if fields[7] != STOCK_BEAMS or fields[24] != STOCK_BEAMS:
+        return None
+    range_min_m, range_max_m = BODY_RADIUS_M + NEAREST_M, BODY_RADIUS_M + FARTHEST_M
+    ranges_m = []
+    for range_m, reading in zip(fields[8:24:2], fields[25:41:2]):
+        if math.isnan(range_m) and reading <= 0.0:
+            # Noise around no reflection at all: the firmware takes the root of a negative number.
+            range_m = math.inf
+        elif range_m >= range_max_m - CLAMP_TOLERANCE_M:
+            range_m = math.inf
+        elif range_m <= range_min_m + CLAMP_TOLERANCE_M:
+            range_m = -math.inf
+        ranges_m.append(range_m)
+    increment_rad = 2.0 * math.pi / PROXIMITY_BEAMS
+    tail = _PROXIMITY_TAIL.pack(
+        -math.pi,
+        -math.pi + (PROXIMITY_BEAMS - 1) * increment_rad,
+        increment_rad,
+        0.0,
+        scan_time_s,
+        range_min_m,
+        range_max_m,
+        PROXIMITY_BEAMS,
+        *ranges_m,
+        PROXIMITY_BEAMS,
+        *fields[25:41:2]
+    )
+    return restamp(payload[: header.end], seq, stamp_ns) + tail
+
+
+def _pack_pose(pose: Pose) -> bytes:
+    half_rad = pose.yaw_rad / 2.0
+    return _POSE.pack(pose.x_m, pose.y_m, 0.0, 0.0, 0.0, math.sin(half_rad), math.cos(half_rad))
+
+
+def _make_diagonal(values: Sequence[float]) -> List[float]:
+    matrix = [0.0] * 36
+    matrix[::7] = values
+    return matrix
