@@ -1,0 +1,7 @@
+"""`python3 -m hero_sim`."""
+
+import sys
+
+from .main import main
+
+sys.exit(main())

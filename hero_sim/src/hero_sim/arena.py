@@ -1,0 +1,148 @@
+"""The flat world that robots drive in: walls, round obstacles and where robots start.
+
+Pure: numpy only; files are read in arena_file. Frame `world`: x right, y up, m; angles counter-clockwise, rad.
+"""
+
+import math
+from typing import List, NamedTuple, Tuple
+
+import numpy as np
+
+from .kinematics import BODY_RADIUS_M
+
+Pose = Tuple[float, float, float]
+
+START_GAP_M = 0.05
+"""Free space kept around a robot that is placed by chance."""
+
+_MOST_TRIES = 2000
+
+
+class ArenaError(ValueError):
+    """An arena that cannot be used; the text says what is wrong and where."""
+
+
+class Arena(NamedTuple):
+    """Walls, obstacles and starts of one world.
+
+    Attributes:
+        name: for people.
+        segments_m: walls and the edges of polygons, shape (S, 4), x1 y1 x2 y2.
+        circles_m: round obstacles, shape (C, 3), x y radius.
+        starts: poses (x m, y m, theta rad) of the first robots; the others are placed by chance.
+        bounds_m: x min, y min, x max, y max of the area in which robots are placed.
+    """
+
+    name: str
+    segments_m: np.ndarray
+    circles_m: np.ndarray
+    starts: Tuple[Pose, ...]
+    bounds_m: Tuple[float, float, float, float]
+
+
+def outline(corners_m: List[Tuple[float, float]]) -> List[Tuple[float, float, float, float]]:
+    """Return the walls (x1 y1 x2 y2) that close the polygon of corners_m."""
+    following = corners_m[1:] + corners_m[:1]
+    return [(x1, y1, x2, y2) for (x1, y1), (x2, y2) in zip(corners_m, following)]
+
+
+def build_rectangle(width_m: float, height_m: float, robots: int) -> Arena:
+    """Return a rectangular field around the origin with robots spread over it in rows.
+
+    Each start looks along the rim, counter-clockwise, so that nobody drives at a neighbour or a wall at once.
+    """
+    x_m, y_m = width_m / 2.0, height_m / 2.0
+    columns = max(1, int(math.ceil(math.sqrt(robots))))
+    rows = max(1, -(-robots // columns))
+    starts: List[Pose] = []
+    for index in range(robots):
+        row, column = divmod(index, columns)
+        start_x = -x_m + width_m * (column + 0.5) / columns
+        start_y = -y_m + height_m * (row + 0.5) / rows
+        starts.append((start_x, start_y, _tangent(start_x, start_y)))
+    walls = outline([(-x_m, -y_m), (x_m, -y_m), (x_m, y_m), (-x_m, y_m)])
+    return Arena("rectangle", np.array(walls), np.empty((0, 3)), tuple(starts), (-x_m, -y_m, x_m, y_m))
+
+
+def build_default(robots: int) -> Arena:
+    """Return a square field: 1.5 m wide for up to four robots, wider for more so that they stay apart."""
+    columns = max(1, int(math.ceil(math.sqrt(robots))))
+    side_m = max(1.5, 0.4 * columns)
+    return build_rectangle(side_m, side_m, robots)
+
+
+def _tangent(x_m: float, y_m: float) -> float:
+    """Return the heading along the nearer wall, counter-clockwise around the origin; 0 at the origin."""
+    if abs(x_m) < 1e-9 and abs(y_m) < 1e-9:
+        return 0.0
+    if abs(x_m) > abs(y_m) + 1e-9:
+        return math.pi / 2.0 if x_m > 0.0 else -math.pi / 2.0
+    if abs(y_m) > abs(x_m) + 1e-9:
+        return math.pi if y_m > 0.0 else 0.0
+    # On a diagonal both walls are equally near: take the one that lies ahead counter-clockwise.
+    if x_m > 0.0:
+        return math.pi if y_m > 0.0 else math.pi / 2.0
+    return -math.pi / 2.0 if y_m > 0.0 else 0.0
+
+
+def measure_clearance(points_m: np.ndarray, arena: Arena) -> np.ndarray:
+    """Return the distance (m) of each point (P, 2) to the nearest wall or obstacle's rim, negative inside one."""
+    clearance_m = np.full(len(points_m), np.inf)
+    if len(arena.segments_m):
+        clearance_m = np.minimum(clearance_m, distance_to_segments(points_m, arena.segments_m)[0].min(axis=1))
+    if len(arena.circles_m):
+        apart_m = np.hypot(*(points_m[:, None, :] - arena.circles_m[:, :2]).transpose(2, 0, 1))
+        clearance_m = np.minimum(clearance_m, (apart_m - arena.circles_m[:, 2]).min(axis=1))
+    return clearance_m
+
+
+def distance_to_segments(
+    points_m: np.ndarray, segments_m: np.ndarray
+) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the distance (m) of each point to each segment and the nearest points' x and y, all (P, S)."""
+    start, along = segments_m[:, :2], segments_m[:, 2:] - segments_m[:, :2]
+    length_m2 = np.maximum((along**2).sum(axis=1), 1e-18)
+    to_x = points_m[:, 0, None] - start[:, 0]
+    to_y = points_m[:, 1, None] - start[:, 1]
+    share = np.clip((to_x * along[:, 0] + to_y * along[:, 1]) / length_m2, 0.0, 1.0)
+    near_x = start[:, 0] + share * along[:, 0]
+    near_y = start[:, 1] + share * along[:, 1]
+    return np.hypot(points_m[:, 0, None] - near_x, points_m[:, 1, None] - near_y), near_x, near_y
+
+
+def place_robots(arena: Arena, robots: int, rng: np.random.RandomState) -> np.ndarray:
+    """Return start poses, shape (robots, 3): the arena's own first, then free places drawn from rng.
+
+    Raises: ArenaError if a start touches something or if no free place is left.
+    """
+    poses: List[Pose] = []
+    for index in range(robots):
+        if index < len(arena.starts):
+            pose = arena.starts[index]
+            if not _is_free(pose, poses, arena, BODY_RADIUS_M):
+                raise ArenaError(
+                    "arena %s: start %d at (%.3f, %.3f) touches a wall, an obstacle or another start; robots "
+                    "need %.3f m around their centre" % (arena.name, index, pose[0], pose[1], BODY_RADIUS_M)
+                )
+            poses.append(pose)
+            continue
+        poses.append(_draw_place(arena, poses, rng, robots))
+    return np.array(poses, dtype=float).reshape(-1, 3)
+
+
+def _draw_place(arena: Arena, poses: List[Pose], rng: np.random.RandomState, robots: int) -> Pose:
+    x_min, y_min, x_max, y_max = arena.bounds_m
+    for _ in range(_MOST_TRIES):
+        pose = (rng.uniform(x_min, x_max), rng.uniform(y_min, y_max), rng.uniform(-math.pi, math.pi))
+        if _is_free(pose, poses, arena, BODY_RADIUS_M + START_GAP_M):
+            return pose
+    raise ArenaError(
+        "arena %s: no free place for robot %d of %d; take fewer robots or a larger arena"
+        % (arena.name, len(poses) + 1, robots)
+    )
+
+
+def _is_free(pose: Pose, poses: List[Pose], arena: Arena, radius_m: float) -> bool:
+    if measure_clearance(np.array([pose[:2]]), arena)[0] < radius_m:
+        return False
+    return all(math.hypot(pose[0] - x, pose[1] - y) >= radius_m + BODY_RADIUS_M for x, y, _ in poses)

@@ -1,0 +1,132 @@
+"""Frames from the server -> what the robot does, and the answers of its services.
+
+Pure. Texts and behaviour are the firmware's (files named in messages and flash); ids as declared.
+"""
+
+from typing import TYPE_CHECKING, Callable, Dict, Optional
+
+from hero_driver.rosserial import frames
+
+from . import declarations as ids
+from . import messages
+
+if TYPE_CHECKING:
+    from .firmware import Firmware
+
+
+class CommandTable:
+    """The callbacks of one robot, by topic id."""
+
+    def __init__(self, firmware: "Firmware") -> None:
+        """Serve firmware."""
+        self._firmware = firmware
+        self._callbacks: Dict[int, Callable[[bytes, int], Optional[bytes]]] = {
+            ids.ID_LED: self._set_light,
+            ids.ID_LASER_ENABLE: self._enable_laser,
+            ids.ID_IR_CALIBRATION: self._calibrate_ir,
+            ids.ID_SET_ODOM: self._set_odom,
+            ids.ID_CMD_MOTOR: self._drive_motors,
+            ids.ID_MOTORS_PARAMETERS: self._set_motors,
+            ids.ID_POSITION_CMD_VEL: self._drive_position,
+            ids.ID_POSITION_PID_PARAMETERS: self._set_position_pid,
+            ids.ID_POSITION_PID_CALIBRATION: self._tune_position,
+            ids.ID_VELOCITY_CMD_VEL: self._drive_velocity,
+            ids.ID_VELOCITY_PID_PARAMETERS: self._set_velocity_pid,
+            ids.ID_VELOCITY_PID_CALIBRATION: self._tune_velocity,
+        }
+
+    def receive(self, frame: frames.Frame, millis: int, now_ms: int) -> Optional[bytes]:
+        """Do what frame says; return the frame of the answer if it called a service.
+
+        Raises: CommandError for a payload that is not the declared message.
+        """
+        del now_ms
+        callback = self._callbacks.get(frame.topic_id)
+        # The slots without a subscriber are empty: the firmware ignores them.
+        return None if callback is None else callback(frame.payload, millis)
+
+    def _set_light(self, payload: bytes, millis: int) -> None:
+        self._firmware.sensing.set_light(millis, messages.decode_color(payload))
+
+    def _enable_laser(self, payload: bytes, millis: int) -> None:
+        del millis
+        self._firmware.sensing.laser_enabled = messages.decode_bool(payload)
+
+    def _drive_velocity(self, payload: bytes, millis: int) -> None:
+        twist = messages.decode_twist(payload)
+        if self._firmware.motors.receive_velocity(millis, twist.linear_m_s, twist.turn_rad_s):
+            self._log_reset()
+
+    def _drive_position(self, payload: bytes, millis: int) -> None:
+        twist = messages.decode_twist(payload)
+        if self._firmware.motors.receive_position(millis, twist.linear_m_s, twist.turn_rad_s):
+            self._log_reset()
+
+    def _log_reset(self) -> None:
+        self._firmware.log("\x1b[93m[/%s] Reseting PID...\x1b[0m" % self._firmware.name)
+
+    def _drive_motors(self, payload: bytes, millis: int) -> None:
+        self._firmware.motors.receive_pulses(millis, *messages.decode_motor(payload))
+
+    def _calibrate_ir(self, payload: bytes, millis: int) -> bytes:
+        del millis
+        flash = self._firmware.flash
+        flash.ir_calibration_counts_m2 = list(messages.decode_ir_calibration(payload))
+        flash.save()
+        text = "IR calibration parameters have been successfully recorded!"
+        self._firmware.log(text)
+        return _answer(ids.ID_IR_CALIBRATION_ANSWER, True, text)
+
+    def _set_odom(self, payload: bytes, millis: int) -> bytes:
+        del millis
+        self._firmware.sensing.odometry.set_pose(*messages.decode_set_odom(payload))
+        self._firmware.log("[HERO] Odometry was changed!")
+        return _answer(ids.ID_SET_ODOM_ANSWER, True, "Odometry was changed!")
+
+    def _set_motors(self, payload: bytes, millis: int) -> bytes:
+        del millis
+        centres_us = messages.decode_motor(payload)
+        self._firmware.flash.motor_centres_us = [float(centre) for centre in centres_us]
+        self._firmware.flash.save()
+        self._firmware.motors.centres_us = (float(centres_us[0]), float(centres_us[1]))
+        text = "Motor Parameters has been succesfully recorded!"
+        self._firmware.log(text)
+        return _answer(ids.ID_MOTORS_PARAMETERS_ANSWER, True, text)
+
+    def _set_position_pid(self, payload: bytes, millis: int) -> bytes:
+        del millis
+        self._firmware.flash.position_pid = list(messages.decode_pid(payload))
+        return self._record_pid(ids.ID_POSITION_PID_PARAMETERS_ANSWER, self._firmware.flash.position_pid)
+
+    def _set_velocity_pid(self, payload: bytes, millis: int) -> bytes:
+        del millis
+        self._firmware.flash.velocity_pid = list(messages.decode_pid(payload))
+        return self._record_pid(ids.ID_VELOCITY_PID_PARAMETERS_ANSWER, self._firmware.flash.velocity_pid)
+
+    def _record_pid(self, answer_id: int, gains: list) -> bytes:
+        firmware = self._firmware
+        firmware.log("[%s] Left  Motor PID = [%.3f, %.3f, %.3f]" % ((firmware.name,) + tuple(gains[:3])))
+        firmware.log("[%s] Right Motor PID = [%.3f, %.3f, %.3f]" % ((firmware.name,) + tuple(gains[3:])))
+        firmware.log("[%s] Recording values in the flash..." % firmware.name)
+        firmware.flash.save()
+        text = "PID Parameters has been succesfully recorded!"
+        firmware.log("[%s] %s" % (firmware.name, text))
+        return _answer(answer_id, True, text)
+
+    def _tune_position(self, payload: bytes, millis: int) -> bytes:
+        del payload
+        return self._tune(ids.ID_POSITION_PID_CALIBRATION_ANSWER, millis)
+
+    def _tune_velocity(self, payload: bytes, millis: int) -> bytes:
+        del payload
+        return self._tune(ids.ID_VELOCITY_PID_CALIBRATION_ANSWER, millis)
+
+    def _tune(self, answer_id: int, millis: int) -> bytes:
+        self._firmware.log("[%s] Starting Motors Auto Tuning! Wait..." % self._firmware.name)
+        self._firmware.motors.start_tuning(millis)
+        # The firmware never sets success here (VelocityControl.ino:229-245).
+        return _answer(answer_id, False, "PID Autotuning!")
+
+
+def _answer(topic_id: int, success: bool, text: str) -> bytes:
+    return frames.encode_frame(topic_id, messages.encode_answer(success, text))

@@ -1,0 +1,434 @@
+"""One robot by the rules of the stock firmware (v3.8): bytes and time in, bytes and motor commands out.
+
+Pure: no socket, no clock, no thread. Time enters in whole milliseconds, as the firmware's millis() counts it,
+so the robot runs as fast as its caller likes. Two things stand for the hardware: a Body (wheels, sensors,
+motors) and a radio, which looks at wants_connection, connects and carries outbox away.
+Source: the firmware's files named at the constants, and measurements of the complete stock firmware.
+"""
+
+from typing import Callable, List, NamedTuple, Optional, Tuple
+
+import numpy as np
+
+from hero_driver.rosserial import errors as wire_errors
+from hero_driver.rosserial import frames, payloads
+
+from . import declarations
+from .commands import CommandTable
+from .errors import CommandError
+from .flash import Flash
+from .motor_control import TUNING, Body, MotorControl
+from .robot_clock import RobotClock
+from .sensing import Sensing
+
+VERSIONS = "Firmware: v3.8 | Hardware: v2.5 | Config: v2.3"
+
+BOOT_MS = 518
+"""From power-on to the attempt to connect (Wi-Fi that is there at once)."""
+
+IMU_LOG_MS = 57
+"""From the connection to the line about the IMU (IMUSensor.ino:99)."""
+
+WELCOME_MS = 1120
+"""From the connection to the first pass of loop(): lights of welcome (LEDStatus.ino:93-108)."""
+
+CONNECT_TIMEOUT_MS = 5000
+"""WiFiClient's limit for a connect or a write; everything stands still meanwhile."""
+
+SPIN_MS = 51
+"""Between two looks at what came in, configured: SYNC_RATE 20 Hz (config.h:49), 1000/20 + 1."""
+
+UNCONFIGURED_SPIN_MS = 101
+"""The same while unconfigured: loop() waits 50 ms, and the gate passes every second time."""
+
+LOG_MS = 1001
+UNCONFIGURED_LOG_MS = 1019
+"""Between two lines "Conected at time" (ROSHandle.ino:116)."""
+
+TIME_REQUEST_MS = 2500
+TIME_LOST_MS = 11000
+"""SYNC_SECONDS 5: * 500 between requests, * 2200 without an answer until unconfigured (node_handle.h)."""
+
+_PHASE_OFF = "off"
+_PHASE_BOOT = "boot"  # dialling for the first time
+_PHASE_SETUP = "setup"  # connected or not, the lights of welcome play
+_PHASE_LOOP = "loop"
+
+_TIME_REQUEST = frames.encode_frame(frames.ID_TIME, bytes(8))
+
+
+class FirmwareOptions(NamedTuple):
+    """What the people who start the simulator choose for a robot."""
+
+    imu_hat: bool = False
+    exact_odometry: bool = False
+    address: str = "127.0.0.1"  # as the boot line names it
+
+
+class Firmware:
+    """The program of one robot.
+
+    Times of attributes and arguments are the caller's; the robot's own count from power-on is inside.
+
+    Attributes:
+        name: hero_N, in topics and frames.
+        due_ms: when run() has to be called next.
+        connected: whether the radio has a connection.
+        wants_connection: set while the firmware dials.
+        outbox: frames for the radio, in order.
+        configured: whether the robot streams.
+    """
+
+    def __init__(
+        self,
+        robot_id: int,
+        body: Body,
+        flash: Flash,
+        rng: np.random.RandomState,
+        options: FirmwareOptions,
+        report: Callable[[str], None],
+    ) -> None:
+        """Build a robot that is switched off; report takes lines for the people who watch."""
+        self.robot_id = robot_id
+        self.name = "hero_%d" % robot_id
+        self.options = options
+        self.flash = flash
+        self.rng = rng
+        self.outbox: List[bytes] = []
+        self.connected = False
+        self.wants_connection = False
+        self.configured = False
+        self.due_ms = 0
+        self.zero_topics_next = False
+        self.answer_delay_ms = 0
+        self.crash_reason: Optional[str] = None
+        self._body = body
+        self._report = report
+        self._phase = _PHASE_OFF
+        self._booted_at_ms = 0
+        self._setup: List[Tuple[int, Callable[[int], None]]] = []
+        self._start_programs()
+
+    def _start_programs(self) -> None:
+        """Give everything that lives in RAM its first value."""
+        self.clock = RobotClock()
+        self.motors = MotorControl(self._body)
+        self.motors.centres_us = tuple(self.flash.motor_centres_us)  # type: ignore[assignment]
+        self.sensing = Sensing(self.name, self._body, self.options.imu_hat, self.options.exact_odometry, self.flash)
+        self.commands = CommandTable(self)
+        self._declarations = declarations.encode_declarations(self.name)
+        self.configured = False
+        self.outbox.clear()
+        self.wants_connection = False
+        self._received = bytearray()
+        self._pending: List[frames.Frame] = []
+        self._partial_at_ms: Optional[int] = None
+        self._answers: List[Tuple[int, bytes]] = []
+        self._advertised = False
+        self._blocked_until_ms: Optional[int] = None
+        self._next_spin_ms = 0
+        self._next_log_ms = 0
+        self._requested_at_ms = 0
+        self._last_request_ms = 0
+        self._last_answer_ms = 0
+        self._arrived_at_ms = 0
+
+    # -- power ---------------------------------------------------------------------------------------------
+
+    def switch_on(self, now_ms: int, robot_id: Optional[int] = None) -> None:
+        """Boot at now_ms, as robot robot_id if that is given (a robot whose flash was erased)."""
+        if robot_id is not None:
+            self.robot_id = robot_id
+            self.name = "hero_%d" % robot_id
+        self._body.halt()
+        self._start_programs()
+        self._booted_at_ms = now_ms
+        self._phase = _PHASE_BOOT
+        self._setup = []
+        self.sensing.show_searching()
+        self.due_ms = now_ms + BOOT_MS
+
+    def switch_off(self) -> None:
+        """Cut the power; the radio has to be told apart."""
+        self._phase = _PHASE_OFF
+        self._body.halt()
+        self._start_programs()
+        self.sensing.show_dark()
+        self.due_ms = _NEVER_MS
+
+    @property
+    def is_on(self) -> bool:
+        """Whether the robot has power."""
+        return self._phase != _PHASE_OFF
+
+    def freeze(self, now_ms: int, for_ms: int) -> None:
+        """Stand still in the program for for_ms: nothing is read, sent or watched, the motors keep their pulses."""
+        self._body.hold()
+        self._blocked_until_ms = now_ms + for_ms
+        self.due_ms = now_ms + for_ms
+
+    # -- radio ---------------------------------------------------------------------------------------------
+
+    def connection_made(self, now_ms: int) -> None:
+        """Be told that the radio has a connection."""
+        self.connected = True
+        self.wants_connection = False
+        self._received.clear()
+        self._pending.clear()
+        if self._phase == _PHASE_BOOT:
+            self._begin_setup(now_ms)
+        elif self._blocked_until_ms is not None:
+            self._unblock(now_ms)
+
+    def connection_failed(self, now_ms: int) -> None:
+        """Be told that nobody answers; the next look at the radio tries again."""
+        self.wants_connection = False
+        if self._phase == _PHASE_BOOT and self.due_ms > now_ms:
+            self._begin_setup(now_ms)
+        elif self._blocked_until_ms is not None:
+            self._unblock(now_ms)
+
+    def connection_lost(self) -> None:
+        """Be told that the connection ended; the firmware notices when it looks next."""
+        self.connected = False
+
+    def receive_bytes(self, now_ms: int, data: bytes) -> None:
+        """Take bytes into the radio's buffer; they are read at the next spin."""
+        if not self._received:
+            self._arrived_at_ms = now_ms
+        self._received += data
+
+    def block_writing(self, now_ms: int) -> None:
+        """Be told that the radio cannot take more: the whole loop stands until it can, or 5 s."""
+        if self._blocked_until_ms is None and self._phase == _PHASE_LOOP:
+            self.freeze(now_ms, CONNECT_TIMEOUT_MS)
+
+    def unblock_writing(self, now_ms: int) -> None:
+        """Be told that the radio takes bytes again."""
+        if self._blocked_until_ms is not None and not self.wants_connection:
+            self._unblock(now_ms)
+
+    def _unblock(self, now_ms: int) -> None:
+        self._blocked_until_ms = None
+        self.due_ms = now_ms
+
+    def _dial(self, now_ms: int) -> None:
+        self.wants_connection = True
+        self._blocked_until_ms = now_ms + CONNECT_TIMEOUT_MS
+        self.due_ms = self._blocked_until_ms
+
+    def send(self, data: bytes) -> None:
+        """Hand frames to the radio; without a connection they are lost."""
+        if self.connected:
+            self.outbox.append(data)
+
+    def log(self, text: str) -> None:
+        """Send a log line (level info, as all of the firmware's are)."""
+        self.send(frames.encode_frame(frames.ID_LOG, payloads.encode_log(payloads.Log(payloads.LOG_INFO, text))))
+
+    # -- time passes ---------------------------------------------------------------------------------------
+
+    def run(self, now_ms: int) -> None:
+        """Do everything that is due at now_ms, and set due_ms."""
+        if self._phase == _PHASE_OFF:
+            self.due_ms = _NEVER_MS
+            return
+        if self._blocked_until_ms is not None:
+            if now_ms < self._blocked_until_ms:
+                return
+            self._blocked_until_ms = None
+            self.wants_connection = False
+        if self._phase == _PHASE_BOOT:
+            self._dial_first(now_ms)
+        elif self._phase == _PHASE_SETUP:
+            self._run_setup(now_ms)
+        else:
+            self._run_loop(now_ms)
+
+    def _dial_first(self, now_ms: int) -> None:
+        if self.connected:
+            self._begin_setup(now_ms)
+        elif not self.wants_connection and now_ms < self._booted_at_ms + BOOT_MS + CONNECT_TIMEOUT_MS:
+            self.wants_connection = True
+            self.due_ms = self._booted_at_ms + BOOT_MS + CONNECT_TIMEOUT_MS
+        else:
+            self.wants_connection = False
+            self._begin_setup(now_ms)
+
+    def _begin_setup(self, now_ms: int) -> None:
+        """Go on with setup() after the attempt to connect (ROSHandle.ino:92-94, firmware.ino:114-140)."""
+        self._phase = _PHASE_SETUP
+        self.log("\x1b[94m[/%s] %s | IP: %s \x1b[0m" % (self.name, VERSIONS, self.options.address))
+        # The first spin comes before anything is advertised; a request that is in by then meets no topics.
+        first_spin_ms = now_ms + int(self.rng.randint(0, 3))
+        self._setup = [
+            (first_spin_ms, self._spin_before_advertising),
+            (now_ms + IMU_LOG_MS, self._log_imu),
+            (now_ms + WELCOME_MS, self._enter_loop),
+        ]
+        self.due_ms = first_spin_ms
+
+    def _run_setup(self, now_ms: int) -> None:
+        while self._setup and self._setup[0][0] <= now_ms:
+            self._setup.pop(0)[1](now_ms)
+        if self._setup:
+            self.due_ms = self._setup[0][0]
+
+    def _spin_before_advertising(self, now_ms: int) -> None:
+        if self.connected:
+            self._read_frames(self._to_millis(now_ms), now_ms)
+
+    def _log_imu(self, now_ms: int) -> None:
+        del now_ms
+        self._advertised = True
+        if self.options.imu_hat:
+            self.log("\x1b[92m[%s] IMU hat detected!\x1b[0m" % self.name)
+        else:
+            self.log("\x1b[91m[%s] IMU is not working or not connected! Error: 1\x1b[0m" % self.name)
+
+    def _enter_loop(self, now_ms: int) -> None:
+        self._phase = _PHASE_LOOP
+        self._next_spin_ms = self._next_log_ms = now_ms
+        self.sensing.begin(self._to_millis(now_ms))
+        self._run_loop(now_ms)
+
+    def _to_millis(self, now_ms: int) -> int:
+        return now_ms - self._booted_at_ms
+
+    def _run_loop(self, now_ms: int) -> None:
+        """Be one pass of loop() (firmware.ino:160-190)."""
+        millis = self._to_millis(now_ms)
+        if now_ms >= self._next_log_ms:
+            self.log("\x1b[96m[/%s] Conected at time %d\x1b[0m" % (self.name, millis))
+            self._next_log_ms = now_ms + (LOG_MS if self.configured else UNCONFIGURED_LOG_MS)
+        if now_ms >= self._next_spin_ms:
+            self._spin(millis, now_ms)
+            self._next_spin_ms = now_ms + (SPIN_MS if self.configured else UNCONFIGURED_SPIN_MS)
+            if self._phase != _PHASE_LOOP or self._blocked_until_ms is not None:
+                return
+        self._send_answers(now_ms)
+        due_ms = min(self._next_log_ms, self._next_spin_ms)
+        if self.configured:
+            due_ms = min(due_ms, self._run_configured(millis, now_ms))
+        if self._answers:
+            due_ms = min(due_ms, max(self._answers[0][0], now_ms + 1))
+        self.due_ms = due_ms
+
+    def _run_configured(self, millis: int, now_ms: int) -> int:
+        """Run controllers and sensors; return when they have to run next (caller's time)."""
+        if self.motors.due_ms is not None and millis >= self.motors.due_ms and self.motors.run(millis):
+            self.sensing.read_encoders(millis, now_ms)
+            if self.motors.mode == TUNING:
+                self.log("[%s] Tunning Motor Set: %d" % (self.name, millis))
+        if millis >= self.sensing.due_ms:
+            self.send(self.sensing.run_cycle(millis, now_ms, self.clock.stamp(millis)))
+        next_millis = self.sensing.due_ms
+        if self.motors.due_ms is not None:
+            next_millis = min(next_millis, self.motors.due_ms)
+        return max(self._booted_at_ms + next_millis, now_ms + 1)
+
+    # -- conversation --------------------------------------------------------------------------------------
+
+    def _spin(self, millis: int, now_ms: int) -> None:
+        """Be NodeHandle::spinOnce()."""
+        if not self.connected:
+            # Each attempt to read connects anew (ArduinoTcpHardware.h:99-108).
+            self._dial(now_ms)
+        if self.configured and millis - self._last_answer_ms > TIME_LOST_MS:
+            self._unconfigure()
+        if self.connected:
+            self._read_frames(millis, now_ms)
+        if self.configured and millis - self._last_request_ms > TIME_REQUEST_MS:
+            self._request_time(millis)
+            self._last_request_ms = millis
+
+    def _read_frames(self, millis: int, now_ms: int) -> None:
+        if self._partial_at_ms is not None and now_ms - self._partial_at_ms > PARTIAL_FRAME_MS:
+            # Its beginning was forgotten; what came since is read as if it stood alone.
+            self._partial_at_ms = None
+        data = bytes(self._received)
+        self._received.clear()
+        reader = frames.FrameReader(frames.LONGEST_PAYLOAD_LENGTH)
+        queue = self._pending + reader.receive_bytes(data)
+        self._pending = []
+        if reader.buffered_length:
+            self._partial_at_ms = now_ms
+        while queue:
+            frame = queue.pop(0)
+            if not self._receive_frame(frame, millis, now_ms):
+                # After a request of topics spinOnce() returns; the rest waits for the next one.
+                self._pending = queue
+                return
+
+    def _receive_frame(self, frame: frames.Frame, millis: int, now_ms: int) -> bool:
+        """Take one frame; return whether the firmware goes on reading."""
+        if frame.topic_id == frames.ID_PUBLISHER:
+            self._answer_topics(millis)
+            return False
+        if len(frame.payload) > declarations.BUFFER_LENGTH:
+            self.crash_reason = "a payload of %d bytes for its buffer of 4096" % len(frame.payload)
+            return False
+        if frame.topic_id == frames.ID_TIME:
+            self._receive_time(frame.payload, millis)
+        elif frame.topic_id == frames.ID_TX_STOP:
+            self._unconfigure()
+        elif frame.topic_id == frames.ID_PARAMETER_REQUEST:
+            pass  # this firmware asks for no parameters, so it ignores answers
+        elif not declarations.ID_LED <= frame.topic_id <= declarations.ID_LAST_SUBSCRIBER_SLOT:
+            self.crash_reason = "id %d, which is outside its table of subscribers" % frame.topic_id
+            return False
+        else:
+            self._receive_command(frame, millis, now_ms)
+        return True
+
+    def _receive_command(self, frame: frames.Frame, millis: int, now_ms: int) -> None:
+        try:
+            answer = self.commands.receive(frame, millis, now_ms)
+        except CommandError as error:
+            self._report("%s: %s" % (self.name, error))
+            return
+        # Without a configured link the callback runs, but its answer is not sent (node_handle.h:478).
+        if answer is not None and self.configured:
+            wait_ms = int(self.rng.randint(ANSWER_MS[0], ANSWER_MS[1] + 1)) + self.answer_delay_ms
+            self._answers.append((max(self._arrived_at_ms + wait_ms, now_ms), answer))
+
+    def _send_answers(self, now_ms: int) -> None:
+        while self._answers and self._answers[0][0] <= now_ms:
+            answer = self._answers.pop(0)[1]
+            if self.configured:
+                self.send(answer)
+
+    def _answer_topics(self, millis: int) -> None:
+        self._request_time(millis)
+        if self._advertised and not self.zero_topics_next:
+            self.send(self._declarations)
+        self.zero_topics_next = False
+        self.configured = True
+        self._last_request_ms = self._last_answer_ms = millis
+
+    def _request_time(self, millis: int) -> None:
+        self.send(_TIME_REQUEST)
+        self._requested_at_ms = millis
+
+    def _receive_time(self, payload: bytes, millis: int) -> None:
+        try:
+            answer = payloads.decode_time(payload)
+        except wire_errors.PayloadError as error:
+            self._report("%s: %s" % (self.name, error))
+            return
+        self.clock.take_answer(answer, self._requested_at_ms, millis)
+        self._last_answer_ms = millis
+
+    def _unconfigure(self) -> None:
+        """Stop streaming; loop() no longer calls the controllers, so a moving robot moves on."""
+        self.configured = False
+        self.motors.freeze()
+
+
+_NEVER_MS = 2**62
+
+ANSWER_MS = (42, 75)
+"""From the arrival of a service call to its answer (measured)."""
+
+PARTIAL_FRAME_MS = 20
+"""SERIAL_MSG_TIMEOUT (node_handle.h:96); less than SPIN_MS, so a frame in two pieces rarely gets through."""

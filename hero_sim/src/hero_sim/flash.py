@@ -1,0 +1,69 @@
+"""The parameters that a robot keeps without power, in memory and, where a folder is given, in one file per robot.
+
+Borders: the only file of the simulated robot that touches the file system besides arena_file.
+"""
+
+import json
+import os
+from typing import List, Optional
+
+import numpy as np
+
+from .errors import OptionError
+
+_LENGTHS = {"ir_calibration_counts_m2": 8, "motor_centres_us": 2, "velocity_pid": 6, "position_pid": 6}
+
+DEFAULT_PID = [1.0, 0.5, 0.01, 1.0, 0.5, 0.01]
+"""lkp lki lkd rkp rki rkd of a fresh robot. Assumption: they are told on, but the motor model has its own lags."""
+
+
+class Flash:
+    """What one robot keeps: calibration of the sensors, middle of the servos, PID parameters.
+
+    Attributes:
+        ir_calibration_counts_m2: one per sensor; NaN for a robot that was never calibrated.
+        motor_centres_us: servo pulse at which each wheel stands.
+        velocity_pid, position_pid: lkp lki lkd rkp rki rkd.
+    """
+
+    def __init__(self, ir_calibration_counts_m2: List[float], path: Optional[str] = None) -> None:
+        """Begin with a calibration, then take over what the file at path holds; None keeps nothing.
+
+        Raises: OptionError if the file is there but cannot be read or is not ours.
+        """
+        self.ir_calibration_counts_m2 = [float(value) for value in np.asarray(ir_calibration_counts_m2)]
+        self.motor_centres_us = [1500.0, 1500.0]
+        self.velocity_pid = list(DEFAULT_PID)
+        self.position_pid = list(DEFAULT_PID)
+        self._path = path
+        if path is not None and os.path.exists(path):
+            self._load(path)
+
+    def _load(self, path: str) -> None:
+        try:
+            with open(path, encoding="utf-8") as file:
+                content = json.load(file)
+        except (OSError, ValueError) as error:
+            raise OptionError("flash file %s cannot be read: %s; delete it to begin anew" % (path, error)) from error
+        for key, length in _LENGTHS.items():
+            values = content.get(key) if isinstance(content, dict) else None
+            if not isinstance(values, list) or len(values) != length:
+                raise OptionError(
+                    "flash file %s: %s must be a list of %d numbers; delete the file to begin anew" % (path, key, length)
+                )
+            try:
+                setattr(self, key, [float(value) for value in values])
+            except (TypeError, ValueError) as error:
+                raise OptionError("flash file %s: %s: %s" % (path, key, error)) from error
+
+    def save(self) -> None:
+        """Write the file, whole or not at all."""
+        if self._path is None:
+            return
+        folder = os.path.dirname(self._path)
+        if folder:
+            os.makedirs(folder, exist_ok=True)
+        content = {key: getattr(self, key) for key in _LENGTHS}
+        with open(self._path + ".new", "w", encoding="utf-8") as file:
+            json.dump(content, file, indent=1)
+        os.replace(self._path + ".new", self._path)

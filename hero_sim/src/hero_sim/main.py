@@ -1,0 +1,92 @@
+"""Command line -> a running swarm. Needs Python and numpy; neither ROS nor a ROS master."""
+
+import argparse
+import signal
+import sys
+from typing import List, Optional
+
+from .errors import SimulatorError
+
+DEFAULT_PORT = 11411
+"""The port that stock robots dial."""
+
+MOST_ROBOTS = 1000
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """Return the parser of the command line."""
+    parser = argparse.ArgumentParser(
+        prog="hero_sim", description="HeRo robots without hardware, behind the same TCP socket as real ones."
+    )
+    parser.add_argument("--robots", type=int, default=1, metavar="N", help="number of robots (1)")
+    parser.add_argument("--first-id", type=int, default=0, metavar="K", help="id of the first robot (0)")
+    parser.add_argument("--host", default=None, help="where the driver runs (127.0.0.1); with --serve: own address")
+    parser.add_argument("--port", type=int, default=DEFAULT_PORT, help="port of the driver (%(default)s)")
+    parser.add_argument(
+        "--serve", type=int, default=None, metavar="PORT", help="do not dial: robot i is a TCP server on PORT + i"
+    )
+    parser.add_argument("--seed", type=int, default=0, help="seed of everything that is drawn by chance (0)")
+    parser.add_argument("--seconds", type=float, default=None, metavar="S", help="end by itself after S seconds")
+    parser.add_argument("--imu-hat", action="store_true", help="robots have the IMU hat")
+    parser.add_argument(
+        "--firmware-odometry",
+        choices=("stock", "exact"),
+        default="stock",
+        help="stock loses distance under velocity control as the firmware does (stock)",
+    )
+    parser.add_argument("--quiet", action="store_true", help="say nothing but errors")
+    return parser
+
+
+def check_options(options: argparse.Namespace) -> None:
+    """Raise OptionError for a value that cannot be used."""
+    from .errors import OptionError
+
+    if not 1 <= options.robots <= MOST_ROBOTS:
+        raise OptionError("--robots %d: must be 1..%d" % (options.robots, MOST_ROBOTS))
+    if options.first_id < 0:
+        raise OptionError("--first-id %d: must be 0 or more" % options.first_id)
+    port = options.port if options.serve is None else options.serve
+    name = "--port" if options.serve is None else "--serve"
+    last = port if options.serve is None else port + options.robots - 1
+    if not (1 <= port and last <= 65535):
+        raise OptionError("%s %d: ports must be 1..65535 (%d robots)" % (name, port, options.robots))
+    if options.seconds is not None and not options.seconds > 0:
+        raise OptionError("--seconds %g: must be more than 0" % options.seconds)
+    if not 0 <= options.seed < 2**32:
+        raise OptionError("--seed %d: must be 0..4294967295" % options.seed)
+
+
+def report(text: str) -> None:
+    """Write a line for people."""
+    print("hero_sim: " + text, flush=True)
+
+
+def main(arguments: Optional[List[str]] = None) -> int:
+    """Run the simulator; return the exit code."""
+    options = build_parser().parse_args(arguments)
+    try:
+        import numpy  # noqa: F401
+    except ImportError:
+        print("hero_sim: numpy is missing; install it: apt install python3-numpy, or pip install numpy", file=sys.stderr)
+        return 1
+    from .build import build_simulator
+
+    try:
+        check_options(options)
+        simulator = build_simulator(options, (lambda text: None) if options.quiet else report)
+    except SimulatorError as error:
+        print("hero_sim: %s" % error, file=sys.stderr)
+        return 1
+
+    def stop(signal_number: int, frame: object) -> None:
+        del signal_number, frame
+        simulator.stopping = True
+
+    signal.signal(signal.SIGINT, stop)
+    signal.signal(signal.SIGTERM, stop)
+    try:
+        simulator.run(options.seconds)
+    finally:
+        simulator.link.close_all()
+    return 0

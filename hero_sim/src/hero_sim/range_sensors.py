@@ -1,0 +1,141 @@
+"""Poses, walls and obstacles -> what the eight infrared sensors of each robot read.
+
+Pure: numpy only, over robots x beams x obstacles at once. No noise is drawn here: the caller passes it in.
+Source of the infrared model: measurements that the robot's authors published (signal of a TCRT5000 against a
+white wall) and RangeSensor.ino for the way the firmware turns the signal into a distance.
+"""
+
+import math
+from typing import Optional, Tuple
+
+import numpy as np
+
+from .kinematics import BODY_RADIUS_M
+
+BEAMS = 8
+BEAM_ANGLES_RAD = -math.pi + np.arange(BEAMS) * (math.pi / 4.0)
+"""Directions in the body frame, counter-clockwise; index 4 looks straight ahead."""
+
+ALPHA_COUNTS_M2 = 0.423
+BETA_COUNTS = -0.93
+"""signal = alpha * cos(angle of incidence) / distance^2 + beta, fitted to the published table (3 to 18 cm)."""
+
+SATURATION_COUNTS = 950.0
+"""The signal of anything nearer than about 2 cm."""
+
+NOISE_COUNTS = 1.3
+"""Standard deviation of one reading (published: 1 to 1.6 counts)."""
+
+CALIBRATION_DISTANCE_M = 0.10
+"""Distance of the wall when a robot is calibrated: alpha_i = mean(signal) * 0.10^2."""
+
+# The diode does not see a line but a cone. Its rim is modelled by two more rays, which count less.
+# Assumption: half angle and weight are not in the published data.
+_CONE_RAD = np.array([0.0, -0.21, 0.21])
+_CONE_WEIGHT = np.array([1.0, 0.7, 0.7])
+
+MIN_DISTANCE_M = 0.01
+MAX_DISTANCE_M = 0.22
+"""Clamp of the firmware's distance, before it adds the body radius (RangeSensor.ino:123)."""
+
+_FAR_M = 1e6
+
+
+def cast_at_segments(
+    origins_m: np.ndarray, angles_rad: np.ndarray, segments_m: np.ndarray
+) -> Tuple[np.ndarray, np.ndarray]:
+    """Return distance (m) and cosine of incidence of the first wall on each ray, both of shape (R, A).
+
+    origins_m (R, 2); angles_rad (R, A) in the world; segments_m (S, 4) as x1 y1 x2 y2. Far away: 1e6 m.
+    """
+    if not len(segments_m):
+        return np.full(angles_rad.shape, _FAR_M), np.zeros(angles_rad.shape)
+    ray_x, ray_y = np.cos(angles_rad)[..., None], np.sin(angles_rad)[..., None]
+    start_x = segments_m[:, 0] - origins_m[:, 0, None, None]
+    start_y = segments_m[:, 1] - origins_m[:, 1, None, None]
+    along_x = segments_m[:, 2] - segments_m[:, 0]
+    along_y = segments_m[:, 3] - segments_m[:, 1]
+    cross = ray_x * along_y - ray_y * along_x
+    parallel = np.abs(cross) < 1e-12
+    safe = np.where(parallel, 1.0, cross)
+    distance_m = (start_x * along_y - start_y * along_x) / safe
+    share = (start_x * ray_y - start_y * ray_x) / safe
+    hit = ~parallel & (distance_m >= 0.0) & (share >= 0.0) & (share <= 1.0)
+    distance_m = np.where(hit, distance_m, _FAR_M)
+    first = np.argmin(distance_m, axis=-1)[..., None]
+    cosine = np.abs(cross) / np.maximum(np.hypot(along_x, along_y), 1e-12)
+    return np.take_along_axis(distance_m, first, -1)[..., 0], np.take_along_axis(cosine, first, -1)[..., 0]
+
+
+def cast_at_circles(
+    origins_m: np.ndarray,
+    angles_rad: np.ndarray,
+    circles_m: np.ndarray,
+    own: Optional[np.ndarray] = None,
+) -> Tuple[np.ndarray, np.ndarray]:
+    """Return distance (m) and cosine of incidence of the first circle on each ray, both of shape (R, A).
+
+    circles_m (C, 3) as x y radius; own (R,) is the index of the circle that is the robot itself.
+    """
+    if not len(circles_m):
+        return np.full(angles_rad.shape, _FAR_M), np.zeros(angles_rad.shape)
+    ray_x, ray_y = np.cos(angles_rad)[..., None], np.sin(angles_rad)[..., None]
+    to_x = circles_m[:, 0] - origins_m[:, 0, None, None]
+    to_y = circles_m[:, 1] - origins_m[:, 1, None, None]
+    radius_m = circles_m[:, 2]
+    ahead_m = ray_x * to_x + ray_y * to_y
+    aside_m = ray_x * to_y - ray_y * to_x
+    inside_m2 = radius_m**2 - aside_m**2
+    hit = (inside_m2 > 0.0) & (ahead_m > 0.0)
+    if own is not None:
+        hit[np.arange(len(own)), :, own] = False
+    depth_m = np.sqrt(np.where(hit, inside_m2, 0.0))
+    distance_m = np.where(hit, np.maximum(ahead_m - depth_m, 0.0), _FAR_M)
+    first = np.argmin(distance_m, axis=-1)[..., None]
+    cosine = depth_m / radius_m
+    return np.take_along_axis(distance_m, first, -1)[..., 0], np.take_along_axis(cosine, first, -1)[..., 0]
+
+
+def measure_signals(
+    poses: np.ndarray,
+    which: np.ndarray,
+    segments_m: np.ndarray,
+    circles_m: np.ndarray,
+    alpha_counts_m2: np.ndarray,
+) -> np.ndarray:
+    """Return the noiseless signal (counts) of the eight sensors of the robots which, shape (R, 8).
+
+    poses (N, 3) of all robots, who see each other as round bodies; which (R,) indices into poses;
+    alpha_counts_m2 (R, 8) of each sensor.
+    """
+    seen = poses[which]
+    rays = BEAM_ANGLES_RAD[:, None] + _CONE_RAD
+    angles_rad = (seen[:, 2, None, None] + rays).reshape(len(which), -1)
+    bodies_m = np.column_stack((poses[:, :2], np.full(len(poses), BODY_RADIUS_M)))
+    wall_m, wall_cosine = cast_at_segments(seen[:, :2], angles_rad, segments_m)
+    round_m, round_cosine = cast_at_circles(
+        seen[:, :2], angles_rad, np.vstack((bodies_m, circles_m)), own=np.asarray(which)
+    )
+    nearer = round_m < wall_m
+    distance_m = np.where(nearer, round_m, wall_m) - BODY_RADIUS_M
+    cosine = np.where(nearer, round_cosine, wall_cosine)
+    bright = cosine / np.maximum(distance_m, 1e-3) ** 2
+    bright = (bright.reshape(len(which), BEAMS, len(_CONE_RAD)) * _CONE_WEIGHT).max(axis=-1)
+    return np.minimum(alpha_counts_m2 * bright + BETA_COUNTS, SATURATION_COUNTS)
+
+
+def calibrate(alpha_counts_m2: np.ndarray) -> np.ndarray:
+    """Return the calibration that a robot with these sensors gets from a wall at 10 cm (counts m^2)."""
+    square_m2 = CALIBRATION_DISTANCE_M**2
+    return (alpha_counts_m2 / square_m2 + BETA_COUNTS) * square_m2
+
+
+def convert_to_ranges(counts: np.ndarray, calibration_counts_m2: np.ndarray) -> np.ndarray:
+    """Return the firmware's ranges (m from the robot's centre): NaN for a calibration that is erased.
+
+    Nothing in reach gives 0.2568 m, above the firmware's own range_max of 0.2368 m (RangeSensor.ino:123-125).
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        distance_m = np.sqrt(calibration_counts_m2 / np.asarray(counts, dtype=float))
+    # NaN goes through a clip unchanged, as through the firmware's constrain().
+    return BODY_RADIUS_M + np.clip(distance_m, MIN_DISTANCE_M, MAX_DISTANCE_M)
