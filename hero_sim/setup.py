@@ -3,4 +3,8 @@
 from catkin_pkg.python_setup import generate_distutils_setup
 from setuptools import setup
 
-setup(**generate_distutils_setup(packages=["hero_sim"], package_dir={"": "src"}))
+setup(
+    **generate_distutils_setup(
+        packages=["hero_sim"], package_dir={"": "src"}, package_data={"hero_sim": ["arenas/*.yaml"]}
+    )
+)

@@ -31,6 +31,7 @@ class Arena(NamedTuple):
         circles_m: round obstacles, shape (C, 3), x y radius.
         starts: poses (x m, y m, theta rad) of the first robots; the others are placed by chance.
         bounds_m: x min, y min, x max, y max of the area in which robots are placed.
+        polygons_m: the corners of each solid polygon, whose edges are among the segments.
     """
 
     name: str
@@ -38,6 +39,7 @@ class Arena(NamedTuple):
     circles_m: np.ndarray
     starts: Tuple[Pose, ...]
     bounds_m: Tuple[float, float, float, float]
+    polygons_m: Tuple[np.ndarray, ...] = ()
 
 
 def outline(corners_m: List[Tuple[float, float]]) -> List[Tuple[float, float, float, float]]:
@@ -93,7 +95,20 @@ def measure_clearance(points_m: np.ndarray, arena: Arena) -> np.ndarray:
     if len(arena.circles_m):
         apart_m = np.hypot(*(points_m[:, None, :] - arena.circles_m[:, :2]).transpose(2, 0, 1))
         clearance_m = np.minimum(clearance_m, (apart_m - arena.circles_m[:, 2]).min(axis=1))
+    for corners_m in arena.polygons_m:
+        clearance_m = np.where(_lies_inside(points_m, corners_m), -np.abs(clearance_m), clearance_m)
     return clearance_m
+
+
+def _lies_inside(points_m: np.ndarray, corners_m: np.ndarray) -> np.ndarray:
+    """Return which points (P,) lie inside the polygon: a ray to the right crosses its outline an odd number of times."""
+    following_m = np.roll(corners_m, -1, axis=0)
+    y_m = points_m[:, 1, None]
+    straddles = (corners_m[:, 1] > y_m) != (following_m[:, 1] > y_m)
+    rise_m = following_m[:, 1] - corners_m[:, 1]
+    share = (y_m - corners_m[:, 1]) / np.where(rise_m == 0.0, 1.0, rise_m)
+    cross_x_m = corners_m[:, 0] + share * (following_m[:, 0] - corners_m[:, 0])
+    return (straddles & (points_m[:, 0, None] < cross_x_m)).sum(axis=1) % 2 == 1
 
 
 def distance_to_segments(

@@ -1,23 +1,50 @@
 """Options -> a simulator that is ready to run: arena, places, world, robots and connections."""
 
 import argparse
+import os
 from typing import Callable, List
 
 import numpy as np
 
 from . import arena as arenas
+from .arena_file import load_arena
 from .errors import OptionError
+from .fault_injector import FaultInjector
+from .faults import parse_fault
 from .firmware import Firmware, FirmwareOptions
 from .flash import Flash
 from .motor_control import Body
-from .range_sensors import calibrate
+from .range_sensors import FACTORY_CALIBRATION_COUNTS_M2, calibrate
 from .simulator import Simulator
 from .swarm import Swarm
 from .tcp_link import TcpLink
+from .wifi import PROFILES, Radio
 from .world import World
 
 BOOT_SPREAD_MS = 200
 """Robots that are started together come up within this time of each other."""
+
+
+_SEEDS_BEFORE_ROBOTS = 4
+_SEEDS_PER_ROBOT = 2
+
+
+def draw_seeds(options: argparse.Namespace) -> np.ndarray:
+    """Return the seeds of all streams of chance: places, world, boot times, faults, then two per robot."""
+    size = _SEEDS_BEFORE_ROBOTS + _SEEDS_PER_ROBOT * options.robots
+    return np.random.RandomState(options.seed).randint(0, 2**31 - 1, size=size)
+
+
+def _build_flash(options: argparse.Namespace, world: World, index: int) -> Flash:
+    calibration_counts_m2 = {
+        "calibrated": calibrate(world.alpha_counts_m2[index]).tolist(),
+        "factory": [FACTORY_CALIBRATION_COUNTS_M2] * 8,
+        "erased": [float("nan")] * 8,
+    }[options.ir]
+    path = None
+    if options.flash_dir is not None:
+        path = os.path.join(options.flash_dir, "hero_%d.json" % (options.first_id + index))
+    return Flash(calibration_counts_m2, path)
 
 
 def build_swarm(options: argparse.Namespace, address: str, report: Callable[[str], None]) -> Swarm:
@@ -26,23 +53,23 @@ def build_swarm(options: argparse.Namespace, address: str, report: Callable[[str
     Raises: OptionError for an arena in which the robots find no place.
     """
     # One stream of chance for each purpose, so that one more draw here does not change everything there.
-    seeds = np.random.RandomState(options.seed).randint(0, 2**31 - 1, size=3 + options.robots)
+    seeds = draw_seeds(options)
     try:
-        arena = arenas.build_default(options.robots)
+        arena = load_arena(options.arena) if options.arena else arenas.build_default(options.robots)
         poses = arenas.place_robots(arena, options.robots, np.random.RandomState(seeds[0]))
     except arenas.ArenaError as error:
         raise OptionError(str(error)) from error
-    world = World(arena, poses, np.random.RandomState(seeds[1]))
+    world = World(arena, poses, np.random.RandomState(seeds[1]), errors=0.0 if options.perfect else 1.0)
     firmware_options = FirmwareOptions(options.imu_hat, options.firmware_odometry == "exact", address)
     robots: List[Firmware] = []
     for index in range(options.robots):
-        flash = Flash(calibrate(world.alpha_counts_m2[index]).tolist())
+        flash = _build_flash(options, world, index)
         robots.append(
             Firmware(
                 options.first_id + index,
                 Body(world, index),
                 flash,
-                np.random.RandomState(seeds[3 + index]),
+                np.random.RandomState(seeds[_SEEDS_BEFORE_ROBOTS + _SEEDS_PER_ROBOT * index]),
                 firmware_options,
                 report,
             )
@@ -50,6 +77,16 @@ def build_swarm(options: argparse.Namespace, address: str, report: Callable[[str
     swarm = Swarm(world, robots)
     swarm.switch_on(np.random.RandomState(seeds[2]), BOOT_SPREAD_MS)
     return swarm
+
+
+def describe_start(options: argparse.Namespace, host: str) -> str:
+    """Return what the robots are about to do, in one line."""
+    first, last = options.first_id, options.first_id + options.robots - 1
+    who = "hero_%d" % first if first == last else "hero_%d .. hero_%d" % (first, last)
+    if options.serve is None:
+        return "%s: dialling %s:%d" % (who, host, options.port)
+    ports = "%d" % options.serve if first == last else "%d..%d" % (options.serve, options.serve + last - first)
+    return "%s: awaiting a driver on %s, port %s" % (who, host, ports)
 
 
 def build_simulator(options: argparse.Namespace, report: Callable[[str], None]) -> Simulator:
@@ -65,10 +102,18 @@ def build_simulator(options: argparse.Namespace, report: Callable[[str], None]) 
     except OptionError:
         link.close_all()
         raise
-    last = options.first_id + options.robots - 1
-    who = "hero_%d" % last if options.robots == 1 else "hero_%d .. hero_%d" % (options.first_id, last)
-    if serve:
-        report("%s: each awaits a driver, on %s, ports %d..%d" % (who, host, options.serve, options.serve + options.robots - 1))
-    else:
-        report("%s: dialling %s:%d" % (who, host, options.port))
-    return Simulator(swarm, link, report)
+    seeds = draw_seeds(options)
+    radios = [
+        Radio(PROFILES[options.wifi], np.random.RandomState(seed))
+        for seed in seeds[_SEEDS_BEFORE_ROBOTS + 1 :: _SEEDS_PER_ROBOT]
+    ]
+    simulator = Simulator(swarm, link, radios, report, options.speed)
+    simulator.injector = FaultInjector(simulator, np.random.RandomState(seeds[3]), report)
+    try:
+        for text in options.fault:
+            simulator.injector.add(parse_fault(text))
+    except OptionError:
+        link.close_all()
+        raise
+    report(describe_start(options, host))
+    return simulator

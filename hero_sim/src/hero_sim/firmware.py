@@ -222,6 +222,11 @@ class Firmware:
         if self.connected:
             self.outbox.append(data)
 
+    @property
+    def is_blocked(self) -> bool:
+        """Whether the program stands still, in a connect, in a write or frozen."""
+        return self._blocked_until_ms is not None
+
     def log(self, text: str) -> None:
         """Send a log line (level info, as all of the firmware's are)."""
         self.send(frames.encode_frame(frames.ID_LOG, payloads.encode_log(payloads.Log(payloads.LOG_INFO, text))))

@@ -5,7 +5,8 @@ import signal
 import sys
 from typing import List, Optional
 
-from .errors import SimulatorError
+from .errors import OptionError, SimulatorError
+from .faults import KINDS
 
 DEFAULT_PORT = 11411
 """The port that stock robots dial."""
@@ -25,6 +26,9 @@ def build_parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--serve", type=int, default=None, metavar="PORT", help="do not dial: robot i is a TCP server on PORT + i"
     )
+    parser.add_argument(
+        "--arena", default=None, metavar="FILE", help="YAML file, or empty, obstacles, maze (a field of its own)"
+    )
     parser.add_argument("--seed", type=int, default=0, help="seed of everything that is drawn by chance (0)")
     parser.add_argument("--seconds", type=float, default=None, metavar="S", help="end by itself after S seconds")
     parser.add_argument("--imu-hat", action="store_true", help="robots have the IMU hat")
@@ -34,14 +38,38 @@ def build_parser() -> argparse.ArgumentParser:
         default="stock",
         help="stock loses distance under velocity control as the firmware does (stock)",
     )
+    parser.add_argument(
+        "--ir",
+        choices=("calibrated", "factory", "erased"),
+        default="calibrated",
+        help="infrared calibration in a robot's flash: measured at 10 cm, 0.5 for all, or none: NaN (calibrated)",
+    )
+    parser.add_argument(
+        "--flash-dir", default=None, metavar="DIR", help="keep the robots' parameters here, a file per robot (nowhere)"
+    )
+    parser.add_argument(
+        "--wifi", choices=("ideal", "router", "hotspot", "bad"), default="ideal", help="how the network is (ideal)"
+    )
+    parser.add_argument(
+        "--fault",
+        action="append",
+        default=[],
+        metavar="KIND[@S][:key=value,..]",
+        help="let something go wrong S simulated seconds after the start, e.g. vanish@5:robot=1,for=3; "
+        "more than one is possible; --fault help lists all",
+    )
+    parser.add_argument(
+        "--speed", type=float, default=1.0, metavar="X", help="simulated seconds per second (%(default)s)"
+    )
+    parser.add_argument(
+        "--perfect", action="store_true", help="all robots alike: no wheel errors, no slip (sensors stay noisy)"
+    )
     parser.add_argument("--quiet", action="store_true", help="say nothing but errors")
     return parser
 
 
 def check_options(options: argparse.Namespace) -> None:
     """Raise OptionError for a value that cannot be used."""
-    from .errors import OptionError
-
     if not 1 <= options.robots <= MOST_ROBOTS:
         raise OptionError("--robots %d: must be 1..%d" % (options.robots, MOST_ROBOTS))
     if options.first_id < 0:
@@ -53,8 +81,19 @@ def check_options(options: argparse.Namespace) -> None:
         raise OptionError("%s %d: ports must be 1..65535 (%d robots)" % (name, port, options.robots))
     if options.seconds is not None and not options.seconds > 0:
         raise OptionError("--seconds %g: must be more than 0" % options.seconds)
+    if not 0.01 <= options.speed <= 100:
+        raise OptionError("--speed %g: must be 0.01..100" % options.speed)
     if not 0 <= options.seed < 2**32:
         raise OptionError("--seed %d: must be 0..4294967295" % options.seed)
+
+
+def describe_faults() -> List[str]:
+    """Return one line for each kind of fault, with its keys and their defaults."""
+    lines = ["KIND[@SECONDS][:robot=ID,key=value,...]; without robot it happens to every robot."]
+    for kind, (text, values) in sorted(KINDS.items()):
+        keys = "".join(" %s=%g" % item for item in sorted(values.items()))
+        lines.append("  %-13s %s%s" % (kind, text, " (%s)" % keys.strip() if keys else ""))
+    return lines
 
 
 def report(text: str) -> None:
@@ -65,6 +104,9 @@ def report(text: str) -> None:
 def main(arguments: Optional[List[str]] = None) -> int:
     """Run the simulator; return the exit code."""
     options = build_parser().parse_args(arguments)
+    if "help" in options.fault:
+        print("\n".join(describe_faults()))
+        return 0
     try:
         import numpy  # noqa: F401
     except ImportError:

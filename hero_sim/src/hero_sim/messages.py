@@ -254,9 +254,16 @@ def _unpack(form: str, payload: bytes, what: str) -> Tuple:
     return struct.unpack(form, payload)
 
 
+def _refuse_unusable(values: Sequence[float], what: str) -> None:
+    # The firmware would compute on with it; nobody can say what a real robot does then.
+    if not all(abs(value) < 1e30 for value in values):
+        raise CommandError("%s with %s, with which a real robot would do anything" % (what, list(values)))
+
+
 def decode_twist(payload: bytes) -> Twist:
     """Return what a geometry_msgs/Twist commands. Raises: CommandError for a wrong length."""
     values = _unpack("<6d", payload, "Twist")
+    _refuse_unusable((values[0], values[5]), "Twist")
     return Twist(values[0], values[5])
 
 
@@ -277,7 +284,9 @@ def decode_bool(payload: bytes) -> bool:
 
 def decode_set_odom(payload: bytes) -> Tuple[float, float, float]:
     """Return the pose (m, m, rad) of a SetOdom request. Raises: CommandError."""
-    return _unpack("<3d", payload, "SetOdom")
+    values = _unpack("<3d", payload, "SetOdom")
+    _refuse_unusable(values, "SetOdom")
+    return values
 
 
 def decode_pid(payload: bytes) -> Tuple[float, ...]:

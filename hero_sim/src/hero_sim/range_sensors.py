@@ -26,6 +26,9 @@ SATURATION_COUNTS = 950.0
 NOISE_COUNTS = 1.3
 """Standard deviation of one reading (published: 1 to 1.6 counts)."""
 
+FACTORY_CALIBRATION_COUNTS_M2 = 0.5
+"""What the firmware takes for alpha until it is calibrated."""
+
 CALIBRATION_DISTANCE_M = 0.10
 """Distance of the wall when a robot is calibrated: alpha_i = mean(signal) * 0.10^2."""
 

@@ -56,7 +56,7 @@ class Sensing:
         """Build the sensors of the robot called name (hero_N)."""
         self.due_ms = 0
         self.laser_enabled = True
-        self.odometry = WheelOdometry(exact_odometry)
+        self.odometry = WheelOdometry(exact_odometry, *body.world.travels_m[body.index].tolist())
         self._body = body
         self._imu_hat = imu_hat
         self._flash = flash

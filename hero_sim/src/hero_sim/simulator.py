@@ -4,11 +4,15 @@ The only file that reads a clock. It asks the swarm to catch up, carries bytes b
 """
 
 import time
-from typing import Callable, List, Optional
+from typing import TYPE_CHECKING, Callable, List, Optional, Set
 
 from . import tcp_link
 from .swarm import Swarm
 from .tcp_link import TcpLink
+from .wifi import Radio
+
+if TYPE_CHECKING:
+    from .fault_injector import FaultInjector
 
 _LONGEST_WAIT_S = 0.05
 """So that a stop from a signal or another thread is seen soon."""
@@ -25,21 +29,33 @@ class Simulator:
     Attributes:
         swarm, link: what it joins.
         stopping: set from anywhere to end run().
+        injector: takes faults for the robots, None if nobody can.
         late_s: wall-clock time given up because the machine was too slow or asleep.
     """
 
-    def __init__(self, swarm: Swarm, link: TcpLink, report: Callable[[str], None], speed: float = 1.0) -> None:
-        """Join swarm and link; speed is simulated seconds per second of wall clock."""
+    def __init__(
+        self,
+        swarm: Swarm,
+        link: TcpLink,
+        radios: List[Radio],
+        report: Callable[[str], None],
+        speed: float = 1.0,
+    ) -> None:
+        """Join a swarm, its radios and their link; speed is simulated seconds per second of wall clock."""
         self.swarm = swarm
         self.link = link
+        self.radios = radios
         self.speed = speed
         self.stopping = False
         self.paused = False
         self.late_s = 0.0
+        self.injector: Optional["FaultInjector"] = None
         self.before_advance: Optional[Callable[[int], None]] = None
         self._report = report
         self._said_unreachable = False
         self._said_connected = [False] * len(swarm.robots)
+        self._away_until_ms = [0] * len(swarm.robots)
+        self._carrying: Set[int] = set()
 
     def run(self, seconds: Optional[float] = None) -> None:
         """Run until stopping is set, or for so many simulated seconds."""
@@ -60,7 +76,11 @@ class Simulator:
                 wanted_ms = min(wanted_ms, end_ms)
             if self.before_advance is not None:
                 self.before_advance(swarm.now_ms)
-            self._serve(swarm.advance(wanted_ms) if not self.paused else range(0))
+            if not self.paused:
+                for index in swarm.advance(wanted_ms):
+                    self.serve_robot(index)
+            if self._carrying:
+                self._carry(swarm.now_ms)
             wait_s = _LONGEST_WAIT_S
             if not self.paused:
                 next_ms = min(swarm.next_due_ms, swarm.world.time_ms + 10)
@@ -68,46 +88,94 @@ class Simulator:
             for event in self.link.poll(min(max(wait_s, _SHORTEST_WAIT_S), _LONGEST_WAIT_S)):
                 self._take_event(event)
 
-    def _serve(self, touched: List[int]) -> None:
-        for index in touched:
-            self.serve_robot(index)
-
     def serve_robot(self, index: int) -> None:
         """Carry away what a robot wants to send, and dial for it if it wants that."""
         robot = self.swarm.robots[index]
         if robot.outbox:
-            for data in robot.outbox:
-                self.link.send(index, data)
+            self._carry_up(index, robot.outbox)
             robot.outbox.clear()
         if robot.crash_reason is not None:
-            self._crash(index, robot.crash_reason)
-        elif robot.wants_connection and not self.link.serve:
-            if not self.link.is_dialling(index):
-                self.link.dial(index)
+            self._report("%s crashed: the server sent %s; the robot restarts" % (robot.name, robot.crash_reason))
+            self.reboot(index)
         elif robot.wants_connection:
-            robot.connection_failed(self.swarm.now_ms)
-            self.swarm.reschedule(index)
+            self._connect(index)
 
-    def _crash(self, index: int, reason: str) -> None:
-        """A frame came that a real robot does not survive: it starts again, without closing anything."""
+    def _carry_up(self, index: int, pieces: List[bytes]) -> None:
+        radio, link, now_ms = self.radios[index], self.link, self.swarm.now_ms
+        if not radio.is_transparent(now_ms):
+            for data in pieces:
+                radio.put_up(now_ms, data)
+            self._carrying.add(index)
+            return
+        if link.has_unsent(index):
+            # The firmware's write ran into its limit of 5 s: what is left of it is lost, half a frame perhaps.
+            link.drop_unsent(index)
+        for data in pieces:
+            link.send(index, data)
+
+    def _carry(self, now_ms: int) -> None:
+        """Let through what has arrived over the radios."""
+        for index in list(self._carrying):
+            radio = self.radios[index]
+            up = radio.take_up(now_ms)
+            if up:
+                self.link.send(index, up)
+            down = radio.take_down(now_ms)
+            if down:
+                self.swarm.robots[index].receive_bytes(now_ms, down)
+            if not radio.is_carrying:
+                self._carrying.discard(index)
+
+    def _connect(self, index: int) -> None:
         robot = self.swarm.robots[index]
-        self._report("%s crashed: the server sent %s; the robot restarts" % (robot.name, reason))
-        self.reboot(index)
+        now_ms = self.swarm.now_ms
+        if self.link.serve and self.link.is_open(index):
+            robot.connection_made(now_ms)
+        elif self.link.serve or now_ms < self._away_until_ms[index]:
+            robot.connection_failed(now_ms)
+        elif self.link.is_dialling(index):
+            return
+        else:
+            self.link.dial(index)
+            return
+        self.swarm.reschedule(index)
+
+    def _drop_connection(self, index: int, orderly: bool) -> None:
+        if orderly:
+            self.link.close(index)
+        else:
+            self.link.abandon(index)
+        self.radios[index].clear()
+        self.swarm.robots[index].connection_lost()
+        self._said_connected[index] = False
+
+    def switch_off(self, index: int) -> None:
+        """Cut a robot's power: the driver gets no word of it."""
+        self._drop_connection(index, orderly=False)
+        self.swarm.robots[index].switch_off()
+        self.swarm.reschedule(index)
 
     def reboot(self, index: int, robot_id: Optional[int] = None) -> None:
         """Restart a robot at once; its old connection is left without a word, as by a real one."""
-        robot = self.swarm.robots[index]
-        self.link.abandon(index)
-        robot.connection_lost()
-        robot.switch_off()
-        robot.switch_on(self.swarm.now_ms, robot_id)
+        self.switch_off(index)
+        self.swarm.robots[index].switch_on(self.swarm.now_ms, robot_id)
         self.swarm.reschedule(index)
+
+    def leave(self, index: int, for_ms: int) -> None:
+        """Close a robot's connection and keep it from dialling for for_ms."""
+        self._away_until_ms[index] = self.swarm.now_ms + for_ms
+        self._drop_connection(index, orderly=True)
 
     def _take_event(self, event: tcp_link.LinkEvent) -> None:
         robot = self.swarm.robots[event.index]
         now_ms = self.swarm.now_ms
         if event.kind == tcp_link.DATA:
-            robot.receive_bytes(now_ms, event.data)
+            radio = self.radios[event.index]
+            if radio.is_transparent(now_ms):
+                robot.receive_bytes(now_ms, event.data)
+            else:
+                radio.put_down(now_ms, event.data)
+                self._carrying.add(event.index)
             return
         if event.kind == tcp_link.MADE:
             if robot.is_on:
@@ -117,6 +185,7 @@ class Simulator:
             self._report_failure(event.data.decode())
             robot.connection_failed(now_ms)
         elif event.kind == tcp_link.LOST:
+            self.radios[event.index].clear()
             robot.connection_lost()
             self._said_connected[event.index] = False
             self._report("%s lost its connection: %s" % (robot.name, event.data.decode()))

@@ -60,7 +60,6 @@ class TcpLink:
         self._abandoned: List[socket.socket] = []
         self._events: List[LinkEvent] = []
         self._address = self._resolve(host, port)
-        self.own_addresses: List[str] = [self.find_own_address()] * count
         if serve:
             for index in range(count):
                 self._listen(index, port + index)
@@ -123,6 +122,16 @@ class TcpLink:
         """Return whether a dial() of this robot is still under way."""
         connection = self._connections[index]
         return connection is not None and connection.dialling
+
+    def is_open(self, index: int) -> bool:
+        """Return whether a robot has a connection."""
+        connection = self._connections[index]
+        return connection is not None and not connection.dialling
+
+    def has_unsent(self, index: int) -> bool:
+        """Return whether the driver has not taken all that a robot sent."""
+        connection = self._connections[index]
+        return connection is not None and bool(connection.unsent)
 
     def send(self, index: int, data: bytes) -> None:
         """Send data for a robot, later if the driver does not read now (poll() reports BLOCKED)."""

@@ -12,8 +12,9 @@ from .kinematics import TICK_M, WHEEL_SEPARATION_M
 
 FILTER_MEASURE_ERROR = 1.0
 FILTER_FIRST_ERROR = 1.0
-FILTER_PROCESS_NOISE = 0.01
-"""One-dimensional Kalman filter in front of the speeds."""
+FILTER_PROCESS_NOISE_S_M = 10.0
+"""Kalman filter in front of the speeds. Only the ratios count; they reproduce the decay of the speeds that the
+stock robot sends after a stop to five digits."""
 
 
 class _SpeedFilter:
@@ -27,7 +28,7 @@ class _SpeedFilter:
         gain = self._error / (self._error + FILTER_MEASURE_ERROR)
         change_m_s = gain * (speed_m_s - self.value_m_s)
         self.value_m_s += change_m_s
-        self._error = (1.0 - gain) * self._error + abs(change_m_s) * FILTER_PROCESS_NOISE
+        self._error = (1.0 - gain) * self._error + abs(change_m_s) * FILTER_PROCESS_NOISE_S_M
         return self.value_m_s
 
 
@@ -39,13 +40,14 @@ class WheelOdometry:
         ticks: counts of the left and right wheel since the last set_pose(), as last read.
     """
 
-    def __init__(self, exact: bool = False) -> None:
-        """With exact, no interval is missed (a robot with the firmware's fault repaired)."""
+    def __init__(self, exact: bool = False, left_m: float = 0.0, right_m: float = 0.0) -> None:
+        """Count from wheel travels left_m and right_m on; with exact, no interval is missed (a robot with the
+        firmware's fault repaired)."""
         self.pose = (0.0, 0.0, 0.0)
         self.ticks = (0, 0)
         self._exact = exact
-        self._base_ticks = (0, 0)
-        self._ticks_before_reset = (0, 0)
+        self._counted_ticks = (math.floor(left_m / TICK_M), math.floor(right_m / TICK_M))
+        self._base_ticks = self._counted_ticks
         self._integrated_ticks = (0, 0)
         self._diff_ticks = (0, 0)
         self._read_at_us = 0
@@ -58,7 +60,7 @@ class WheelOdometry:
         """Take over the wheels' travel (m) at now_us of the robot's own clock; overwrites the last interval."""
         left = math.floor(left_m / TICK_M)
         right = math.floor(right_m / TICK_M)
-        self._ticks_before_reset = (left, right)
+        self._counted_ticks = (left, right)
         ticks = (left - self._base_ticks[0], right - self._base_ticks[1])
         self._diff_ticks = (ticks[0] - self.ticks[0], ticks[1] - self.ticks[1])
         self.ticks = ticks
@@ -89,7 +91,7 @@ class WheelOdometry:
     def set_pose(self, x_m: float, y_m: float, theta_rad: float) -> None:
         """Begin anew at this pose; the tick counters go to zero (Odometry.ino:234)."""
         self.pose = (x_m, y_m, theta_rad)
-        self._base_ticks = self._ticks_before_reset
+        self._base_ticks = self._counted_ticks
         self.ticks = self._diff_ticks = self._integrated_ticks = (0, 0)
 
     def set_heading(self, theta_rad: float) -> None:

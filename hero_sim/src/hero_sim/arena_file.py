@@ -1,0 +1,149 @@
+"""A YAML file -> an Arena, or one line that says where the file is wrong.
+
+Borders: the only file that needs PyYAML, and only when an arena is read. The format is in the README.
+"""
+
+import math
+import os
+from typing import Any, Dict, List, Tuple
+
+import numpy as np
+
+from .arena import Arena, outline
+from .errors import OptionError
+
+SHIPPED = ("empty", "obstacles", "maze")
+"""Arenas that come with the simulator; --arena takes these names too."""
+
+_LARGEST_M = 1000.0
+_KEYS = ("name", "bounds_m", "walls_m", "circles_m", "polygons_m", "starts_m_deg")
+
+
+def find_arena(name: str) -> str:
+    """Return the path of a shipped arena, or name itself as a path."""
+    if name in SHIPPED:
+        return os.path.join(os.path.dirname(os.path.abspath(__file__)), "arenas", name + ".yaml")
+    return name
+
+
+def load_arena(name: str) -> Arena:
+    """Return the arena of a shipped name or of the file at that path.
+
+    Raises: OptionError with file, line and reason.
+    """
+    path = find_arena(name)
+    try:
+        import yaml
+    except ImportError as error:
+        raise OptionError(
+            "--arena %s: PyYAML is missing; install it: apt install python3-yaml, or pip install PyYAML" % name
+        ) from error
+    try:
+        with open(path, encoding="utf-8") as file:
+            root = yaml.compose(file, Loader=yaml.SafeLoader)
+    except OSError as error:
+        raise OptionError(
+            "arena %s cannot be read: %s; shipped are %s" % (path, error.strerror, ", ".join(SHIPPED))
+        ) from error
+    except UnicodeDecodeError as error:
+        raise OptionError("arena %s is not a text file in UTF-8: %s" % (path, error)) from error
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        line = mark.line + 1 if mark is not None else 1
+        raise OptionError("%s:%d: %s" % (path, line, getattr(error, "problem", None) or error)) from error
+    return _Reader(path).read(root)
+
+
+class _Reader:
+    """Reads the nodes of one file, which know their lines."""
+
+    def __init__(self, path: str) -> None:
+        self._path = path
+
+    def _fail(self, node: Any, reason: str) -> OptionError:
+        line = node.start_mark.line + 1 if node is not None else 1
+        return OptionError("%s:%d: %s" % (self._path, line, reason))
+
+    def read(self, root: Any) -> Arena:
+        if root is None or root.id != "mapping":
+            raise self._fail(root, "an arena is a mapping with the keys %s" % ", ".join(_KEYS))
+        nodes: Dict[str, Any] = {}
+        for key_node, value_node in root.value:
+            if key_node.value not in _KEYS:
+                raise self._fail(key_node, "unknown key %r; known are %s" % (key_node.value, ", ".join(_KEYS)))
+            if key_node.value in nodes:
+                raise self._fail(key_node, "key %r is there twice" % key_node.value)
+            nodes[key_node.value] = value_node
+        segments: List[Tuple[float, float, float, float]] = []
+        for node in self._items(nodes.get("walls_m"), "walls_m"):
+            points = self._points(node, 2, "a wall")
+            segments += [(x1, y1, x2, y2) for (x1, y1), (x2, y2) in zip(points, points[1:])]
+        polygons: List[np.ndarray] = []
+        for node in self._items(nodes.get("polygons_m"), "polygons_m"):
+            corners = self._points(node, 3, "a polygon")
+            segments += outline(corners)
+            polygons.append(np.array(corners))
+        circles = []
+        for node in self._items(nodes.get("circles_m"), "circles_m"):
+            x_m, y_m, radius_m = self._numbers(node, 3, "a circle: x, y, radius")
+            if radius_m <= 0:
+                raise self._fail(node, "a circle's radius must be more than 0, not %g" % radius_m)
+            circles.append((x_m, y_m, radius_m))
+        starts = []
+        for node in self._items(nodes.get("starts_m_deg"), "starts_m_deg"):
+            x_m, y_m, heading_deg = self._numbers(node, 3, "a start: x, y, heading in degrees")
+            starts.append((x_m, y_m, math.radians(heading_deg)))
+        bounds_m = self._bounds(nodes.get("bounds_m"), root, segments)
+        name = str(nodes["name"].value) if "name" in nodes else os.path.basename(self._path)
+        return Arena(
+            name,
+            np.array(segments, dtype=float).reshape(-1, 4),
+            np.array(circles, dtype=float).reshape(-1, 3),
+            tuple(starts),
+            bounds_m,
+            tuple(polygons),
+        )
+
+    def _bounds(
+        self, node: Any, root: Any, segments: List[Tuple[float, float, float, float]]
+    ) -> Tuple[float, float, float, float]:
+        if node is not None:
+            x_min, y_min, x_max, y_max = self._numbers(node, 4, "bounds_m: x min, y min, x max, y max")
+            if not (x_min < x_max and y_min < y_max):
+                raise self._fail(node, "bounds_m: the minimum must be less than the maximum")
+            return x_min, y_min, x_max, y_max
+        if not segments:
+            raise self._fail(root, "an arena without walls needs bounds_m: [x min, y min, x max, y max]")
+        ends = np.array(segments).reshape(-1, 2)
+        return (float(ends[:, 0].min()), float(ends[:, 1].min()), float(ends[:, 0].max()), float(ends[:, 1].max()))
+
+    def _items(self, node: Any, key: str) -> List[Any]:
+        if node is None or node.id == "scalar" and node.value in ("", "null", "~"):
+            return []
+        if node.id != "sequence":
+            raise self._fail(node, "%s must be a list" % key)
+        items: List[Any] = node.value
+        return items
+
+    def _points(self, node: Any, least: int, what: str) -> List[Tuple[float, float]]:
+        if node.id != "sequence" or len(node.value) < least:
+            raise self._fail(node, "%s must be a list of at least %d points [x, y]" % (what, least))
+        points = []
+        for point in node.value:
+            x_m, y_m = self._numbers(point, 2, "a point: x, y")
+            points.append((x_m, y_m))
+        return points
+
+    def _numbers(self, node: Any, count: int, what: str) -> List[float]:
+        if node.id != "sequence" or len(node.value) != count:
+            raise self._fail(node, "expected %d numbers for %s" % (count, what))
+        numbers = []
+        for item in node.value:
+            try:
+                number = float(item.value)
+            except (TypeError, ValueError) as error:
+                raise self._fail(item, "%r is not a number (%s)" % (item.value, what)) from error
+            if not abs(number) <= _LARGEST_M:
+                raise self._fail(item, "%s is not between -1000 and 1000 (%s)" % (item.value, what))
+            numbers.append(number)
+        return numbers
