@@ -1,0 +1,149 @@
+"""What lies in this repository (packages, modules, imports), for the tests of its rules. Changes nothing.
+
+Run as a program it prints the modules that know nothing of ROS, which script/lint gives to mypy.
+"""
+
+import ast
+import subprocess
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+from typing import Dict, List, NamedTuple
+
+ROOT = Path(__file__).resolve().parents[2]
+
+ROS_MODULES = {
+    # module that is imported: package to declare
+    "actionlib": "actionlib",
+    "diagnostic_updater": "diagnostic_updater",
+    "genpy": "genpy",
+    "rosbag": "rosbag",
+    "rosgraph": "rosgraph",
+    "roslaunch": "roslaunch",
+    "roslib": "roslib",
+    "rosnode": "rosnode",
+    "rospkg": "python3-rospkg",
+    "rospy": "rospy",
+    "rosservice": "rosservice",
+    "rostest": "rostest",
+    "rostopic": "rostopic",
+    "rosunit": "rosunit",
+    "tf": "tf",
+    "tf2_ros": "tf2_ros",
+    "std_srvs": "std_srvs",
+}
+OTHER_MODULES = {
+    "numpy": "python3-numpy",
+    "yaml": "python3-yaml",
+    "matplotlib": "python3-matplotlib",
+    "scipy": "python3-scipy",
+}
+
+
+class Import(NamedTuple):
+    """One import statement: the full name of the module, e.g. hero_driver.rosserial.frames, and where."""
+
+    module: str
+    line: int
+
+    @property
+    def top(self):
+        return self.module.split(".")[0]
+
+
+def list_files(*suffixes: str) -> List[Path]:
+    """Files of the repository that git knows or would add, that exist, and end as given."""
+    command = ["git", "-C", str(ROOT), "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
+    try:
+        listed = subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout.decode().split("\0")
+        paths = [ROOT / name for name in listed if name]
+    except (OSError, subprocess.CalledProcessError):  # not a clone: an unpacked archive
+        paths = [path for path in ROOT.rglob("*") if ".work" not in path.parts and ".git" not in path.parts]
+    return sorted({path for path in paths if path.is_file() and str(path).endswith(suffixes or ("",))})
+
+
+def list_packages() -> List[str]:
+    """Names of the catkin packages, which are also their directories."""
+    return sorted(path.parent.name for path in ROOT.glob("*/package.xml"))
+
+
+def list_python_files() -> List[Path]:
+    """Python modules and the scripts without extension."""
+    return [path for path in list_files() if path.suffix == ".py" or is_python_script(path)]
+
+
+def is_python_script(path: Path) -> bool:
+    if path.suffix:
+        return False
+    with open(path, "rb") as file:
+        first_line = file.readline()
+    return first_line.startswith(b"#!") and b"python" in first_line
+
+
+def package_of(path: Path) -> str:
+    """The catkin package that a file belongs to, or the top directory's name."""
+    return path.relative_to(ROOT).parts[0]
+
+
+def module_name(path: Path) -> str:
+    """The name by which a file below <package>/src is imported."""
+    parts = list(path.relative_to(ROOT / package_of(path) / "src").with_suffix("").parts)
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def read_imports(path: Path) -> List[Import]:
+    """All imports of a file, wherever they stand in it; relative ones resolved."""
+    tree = ast.parse(path.read_text(encoding="utf-8"), filename=str(path))
+    imports = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            imports += [Import(alias.name, node.lineno) for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            base = node.module or ""
+            if node.level:
+                package = module_name(path).split(".")
+                if path.name != "__init__.py":
+                    package = package[:-1]
+                package = package[: len(package) - node.level + 1]
+                base = ".".join(package + ([base] if base else []))
+            imports.append(Import(base, node.lineno))
+            # `from .rosserial import frames` names a module too
+            imports += [Import(f"{base}.{alias.name}", node.lineno) for alias in node.names]
+    return imports
+
+
+def list_source_modules() -> Dict[str, Path]:
+    """Modules below every <package>/src by their names."""
+    return {
+        module_name(path): path
+        for path in list_python_files()
+        if path.suffix == ".py" and path.relative_to(ROOT).parts[1:2] == ("src",)
+    }
+
+
+def is_ros_import(module: str) -> bool:
+    top = module.split(".")[0]
+    return top in ROS_MODULES or top.endswith("_msgs")
+
+
+def list_pure_modules() -> List[Path]:
+    """Modules below src/ that import nothing of ROS, neither themselves nor through others of ours."""
+    modules = list_source_modules()
+    imports = {name: {found.module for found in read_imports(path)} for name, path in modules.items()}
+    impure = {name for name, imported in imports.items() if any(map(is_ros_import, imported))}
+    while True:
+        infected = {name for name, imported in imports.items() if name not in impure and imported & impure}
+        if not infected:
+            return [path for name, path in sorted(modules.items()) if name not in impure]
+        impure |= infected
+
+
+def read_dependencies(package: str, *kinds: str) -> List[str]:
+    """What package.xml of a package declares, of the given kinds (exec_depend, ...), or of every kind."""
+    root = ElementTree.parse(ROOT / package / "package.xml").getroot()
+    tags = kinds or ("depend", "build_depend", "buildtool_depend", "exec_depend", "test_depend")
+    return [element.text.strip() for tag in tags for element in root.findall(tag)]
+
+
+if __name__ == "__main__":
+    for pure_module in list_pure_modules():
+        print(pure_module.relative_to(ROOT))
