@@ -58,6 +58,7 @@ class Terminal:
 
     def __init__(self, *arguments):
         self.master_fd, self.slave_fd = pty.openpty()
+        self.open_fds = [self.master_fd, self.slave_fd]
         self.before = termios.tcgetattr(self.slave_fd)
         program = subprocess.check_output(["catkin_find", "--first-only", "--libexec", "hero_examples", "teleop"])
         self.shell = subprocess.Popen(
@@ -107,11 +108,13 @@ class Terminal:
         self.shell.kill()
         self.shell.wait()
         wait_for(lambda: not pid or not os.path.exists("/proc/%d" % pid), "the end of teleop with its terminal")
-        for fd in (self.master_fd, self.slave_fd):
-            try:
-                os.close(fd)
-            except OSError:
-                continue
+        self.hang_up()
+
+    def hang_up(self):
+        """Close the terminal as a terminal window does; safe twice."""
+        for fd in self.open_fds:
+            os.close(fd)
+        self.open_fds = []
 
 
 class TeleopTest(unittest.TestCase):
@@ -226,8 +229,7 @@ class TeleopTest(unittest.TestCase):
         terminal = self.start()
         self.drive(terminal)
         pid = terminal.teleop_pid()
-        os.close(terminal.slave_fd)
-        os.close(terminal.master_fd)
+        terminal.hang_up()
         wait_for(lambda: not os.path.exists("/proc/%d" % pid) or terminal.shell.poll() is not None, "the end")
         wait_for(lambda: self.recorder.received[-1][1:] == (0.0, 0.0), "the stop")
         wait_for(lambda: time.monotonic() - self.recorder.received[-1][0] > 0.5, "the last message")
