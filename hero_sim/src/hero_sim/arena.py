@@ -1,6 +1,7 @@
 """The flat world that robots drive in: walls, round obstacles and where robots start.
 
-Pure: numpy only; files are read in arena_file. Frame `world`: x right, y up, m; angles counter-clockwise, rad.
+Pure: numpy only; files are read in arena_file. Frame `world`: x right, y up, m; angles counter-clockwise,
+rad.
 """
 
 import math
@@ -88,7 +89,8 @@ def _tangent(x_m: float, y_m: float) -> float:
 
 
 def measure_clearance(points_m: np.ndarray, arena: Arena) -> np.ndarray:
-    """Return the distance (m) of each point (P, 2) to the nearest wall or obstacle's rim, negative inside one."""
+    """Return the distance (m) of each point (P, 2) to the nearest wall or obstacle's rim, negative inside
+    one."""
     clearance_m = np.full(len(points_m), np.inf)
     if len(arena.segments_m):
         clearance_m = np.minimum(clearance_m, distance_to_segments(points_m, arena.segments_m)[0].min(axis=1))
@@ -101,7 +103,8 @@ def measure_clearance(points_m: np.ndarray, arena: Arena) -> np.ndarray:
 
 
 def _lies_inside(points_m: np.ndarray, corners_m: np.ndarray) -> np.ndarray:
-    """Return which points (P,) lie inside the polygon: a ray to the right crosses its outline an odd number of times."""
+    """Return which points (P,) lie inside the polygon: a ray to the right crosses its outline an odd number
+    of times."""
     following_m = np.roll(corners_m, -1, axis=0)
     y_m = points_m[:, 1, None]
     straddles = (corners_m[:, 1] > y_m) != (following_m[:, 1] > y_m)

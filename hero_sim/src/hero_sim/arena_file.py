@@ -36,7 +36,8 @@ def load_arena(name: str) -> Arena:
         import yaml
     except ImportError as error:
         raise OptionError(
-            "--arena %s: PyYAML is missing; install it: apt install python3-yaml, or pip install PyYAML" % name
+            "--arena %s: PyYAML is missing; install it: apt install python3-yaml, or pip install PyYAML"
+            % name
         ) from error
     try:
         with open(path, encoding="utf-8") as file:
@@ -70,7 +71,9 @@ class _Reader:
         nodes: Dict[str, Any] = {}
         for key_node, value_node in root.value:
             if key_node.value not in _KEYS:
-                raise self._fail(key_node, "unknown key %r; known are %s" % (key_node.value, ", ".join(_KEYS)))
+                raise self._fail(
+                    key_node, "unknown key %r; known are %s" % (key_node.value, ", ".join(_KEYS))
+                )
             if key_node.value in nodes:
                 raise self._fail(key_node, "key %r is there twice" % key_node.value)
             nodes[key_node.value] = value_node
@@ -115,7 +118,12 @@ class _Reader:
         if not segments:
             raise self._fail(root, "an arena without walls needs bounds_m: [x min, y min, x max, y max]")
         ends = np.array(segments).reshape(-1, 2)
-        return (float(ends[:, 0].min()), float(ends[:, 1].min()), float(ends[:, 0].max()), float(ends[:, 1].max()))
+        return (
+            float(ends[:, 0].min()),
+            float(ends[:, 1].min()),
+            float(ends[:, 0].max()),
+            float(ends[:, 1].max()),
+        )
 
     def _items(self, node: Any, key: str) -> List[Any]:
         if node is None or node.id == "scalar" and node.value in ("", "null", "~"):

@@ -85,7 +85,9 @@ def describe_start(options: argparse.Namespace, host: str) -> str:
     who = "hero_%d" % first if first == last else "hero_%d .. hero_%d" % (first, last)
     if options.serve is None:
         return "%s: dialling %s:%d" % (who, host, options.port)
-    ports = "%d" % options.serve if first == last else "%d..%d" % (options.serve, options.serve + last - first)
+    ports = (
+        "%d" % options.serve if first == last else "%d..%d" % (options.serve, options.serve + last - first)
+    )
     return "%s: awaiting a driver on %s, port %s" % (who, host, ports)
 
 

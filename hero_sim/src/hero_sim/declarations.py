@@ -1,7 +1,7 @@
 """What one robot declares: its topics and services in the stock order, with the stock ids.
 
-Pure. Source: TopicInfo frames of the stock robot (firmware v3.8); ids are given in call order, publishers from
-125 (100 + 25 subscriber slots) and subscribers from 100 (ros.h of the firmware).
+Pure. Source: TopicInfo frames of the stock robot (firmware v3.8); ids are given in call order, publishers
+from 125 (100 + 25 subscriber slots) and subscribers from 100 (ros.h of the firmware).
 """
 
 from typing import List, NamedTuple, Tuple
@@ -66,13 +66,17 @@ _EMPTY_MD5 = "d41d8cd98f00b204e9800998ecf8427e"
 
 DECLARATIONS: Tuple[Declaration, ...] = (
     Declaration(_PUB, ID_LASER, "/%s/laser", "sensor_msgs/LaserScan", "90c7ef2dc6895d81024acba2ac42f369"),
-    Declaration(_ANS, ID_IR_CALIBRATION_ANSWER, "/%s/ir_calibration", "hero_common/SetIRCalibration", ANSWER_MD5),
+    Declaration(
+        _ANS, ID_IR_CALIBRATION_ANSWER, "/%s/ir_calibration", "hero_common/SetIRCalibration", ANSWER_MD5
+    ),
     Declaration(_PUB, ID_IMU, "/%s/imu", "sensor_msgs/Imu", "6a62c6daae103f4ff57a132d6f95cec2"),
     Declaration(_PUB, ID_ENCODER, "/%s/encoder", "hero_common/Encoder", "b5586cdbae9b740afc6a1f403a2d7dde"),
     Declaration(_PUB, ID_TF, "/tf", "tf/tfMessage", "94810edda583a504dfda3829e70d7eec"),
     Declaration(_PUB, ID_ODOM, "/%s/odom", "nav_msgs/Odometry", "cd5e73d190d741a2f92e81eda573aca7"),
     Declaration(_ANS, ID_SET_ODOM_ANSWER, "/%s/set_odom", "hero_common/SetOdom", ANSWER_MD5),
-    Declaration(_ANS, ID_MOTORS_PARAMETERS_ANSWER, "/%s/motors_parameters", "hero_common/SetMotor", ANSWER_MD5),
+    Declaration(
+        _ANS, ID_MOTORS_PARAMETERS_ANSWER, "/%s/motors_parameters", "hero_common/SetMotor", ANSWER_MD5
+    ),
     Declaration(
         _ANS,
         ID_POSITION_PID_PARAMETERS_ANSWER,
@@ -103,7 +107,9 @@ DECLARATIONS: Tuple[Declaration, ...] = (
     ),
     Declaration(_SUB, ID_LED, "/%s/led", "std_msgs/ColorRGBA", "a29a96539573343b1310c73607334b00"),
     # The one name that the firmware sends without a leading slash (RangeSensor.ino:79).
-    Declaration(_SUB, ID_LASER_ENABLE, "%s/laser_enable", "std_msgs/Bool", "8b94c1b53db61fb6aed406028ad6332a"),
+    Declaration(
+        _SUB, ID_LASER_ENABLE, "%s/laser_enable", "std_msgs/Bool", "8b94c1b53db61fb6aed406028ad6332a"
+    ),
     Declaration(
         _REQ,
         ID_IR_CALIBRATION,

@@ -20,7 +20,9 @@ _SPOILED_LOG = frames.encode_frame(
 class FaultInjector:
     """Spoils robots of one simulator."""
 
-    def __init__(self, simulator: Simulator, rng: np.random.RandomState, report: Callable[[str], None]) -> None:
+    def __init__(
+        self, simulator: Simulator, rng: np.random.RandomState, report: Callable[[str], None]
+    ) -> None:
         """Draw garbage from rng; the simulator calls back between its steps."""
         self._simulator = simulator
         self._rng = rng
@@ -48,7 +50,9 @@ class FaultInjector:
         found = [index for index, robot in enumerate(robots) if robot.robot_id == fault.robot_id]
         if not found:
             here = ", ".join(str(robot.robot_id) for robot in robots)
-            raise OptionError("fault %s: robot %d is not simulated here (%s)" % (fault.kind, fault.robot_id, here))
+            raise OptionError(
+                "fault %s: robot %d is not simulated here (%s)" % (fault.kind, fault.robot_id, here)
+            )
         return found
 
     def _schedule(self, at_ms: int, action: Callable[[], None]) -> None:
@@ -109,5 +113,7 @@ class FaultInjector:
         if fault.kind == faults.BAD_LENGTH:
             return _SPOILED_LOG[:4] + bytes((_SPOILED_LOG[4] ^ 0x55,)) + _SPOILED_LOG[5:]
         if fault.kind == faults.LONG_FRAME:
-            return frames.encode_frame(frames.ID_LOG, bytes(frames.LONGEST_PAYLOAD_LENGTH))[: frames.HEADER_LENGTH]
+            return frames.encode_frame(frames.ID_LOG, bytes(frames.LONGEST_PAYLOAD_LENGTH))[
+                : frames.HEADER_LENGTH
+            ]
         return frames.encode_frame(int(fault.values["id"]) & 0xFFFF, b"\x01\x02\x03\x04")

@@ -30,7 +30,10 @@ KINDS: Dict[str, Tuple[str, Dict[str, float]]] = {
     LEAVE: ("closes its connection (FIN) and dials again after for, still streaming", {"for": 3.0}),
     DUPLICATE: ("starts again with the id of another robot (as one whose flash was erased)", {"of": -1.0}),
     ZERO_TOPICS: ("starts again and answers the first request without declaring anything", {}),
-    FROZEN: ("its program stands still for so long; the connection stays, the motors keep their pulses", {"for": 5.0}),
+    FROZEN: (
+        "its program stands still for so long; the connection stays, the motors keep their pulses",
+        {"for": 5.0},
+    ),
     STALL: ("its radio carries nothing for so long, then everything at once", {"for": 2.0}),
     GARBAGE: ("sends random bytes between two frames", {"bytes": 200.0}),
     HALF_FRAME: ("sends the first half of a frame, and the next frame right behind it", {}),

@@ -114,7 +114,9 @@ class Firmware:
         self.clock = RobotClock()
         self.motors = MotorControl(self._body)
         self.motors.centres_us = tuple(self.flash.motor_centres_us)  # type: ignore[assignment]
-        self.sensing = Sensing(self.name, self._body, self.options.imu_hat, self.options.exact_odometry, self.flash)
+        self.sensing = Sensing(
+            self.name, self._body, self.options.imu_hat, self.options.exact_odometry, self.flash
+        )
         self.commands = CommandTable(self)
         self._declarations = declarations.encode_declarations(self.name)
         self.configured = False
@@ -162,7 +164,8 @@ class Firmware:
         return self._phase != _PHASE_OFF
 
     def freeze(self, now_ms: int, for_ms: int) -> None:
-        """Stand still in the program for for_ms: nothing is read, sent or watched, the motors keep their pulses."""
+        """Stand still in the program for for_ms: nothing is read, sent or watched, the motors keep their
+        pulses."""
         self._body.hold()
         self._blocked_until_ms = now_ms + for_ms
         self.due_ms = now_ms + for_ms
@@ -229,7 +232,9 @@ class Firmware:
 
     def log(self, text: str) -> None:
         """Send a log line (level info, as all of the firmware's are)."""
-        self.send(frames.encode_frame(frames.ID_LOG, payloads.encode_log(payloads.Log(payloads.LOG_INFO, text))))
+        self.send(
+            frames.encode_frame(frames.ID_LOG, payloads.encode_log(payloads.Log(payloads.LOG_INFO, text)))
+        )
 
     # -- time passes ---------------------------------------------------------------------------------------
 
@@ -281,7 +286,7 @@ class Firmware:
 
     def _spin_before_advertising(self, now_ms: int) -> None:
         if self.connected:
-            self._read_frames(self._to_millis(now_ms), now_ms)
+            self._read_frames(self.to_millis(now_ms), now_ms)
 
     def _log_imu(self, now_ms: int) -> None:
         del now_ms
@@ -294,15 +299,16 @@ class Firmware:
     def _enter_loop(self, now_ms: int) -> None:
         self._phase = _PHASE_LOOP
         self._next_spin_ms = self._next_log_ms = now_ms
-        self.sensing.begin(self._to_millis(now_ms))
+        self.sensing.begin(self.to_millis(now_ms))
         self._run_loop(now_ms)
 
-    def _to_millis(self, now_ms: int) -> int:
+    def to_millis(self, now_ms: int) -> int:
+        """Return the robot's own count at now_ms, from power-on."""
         return now_ms - self._booted_at_ms
 
     def _run_loop(self, now_ms: int) -> None:
         """Be one pass of loop() (firmware.ino:160-190)."""
-        millis = self._to_millis(now_ms)
+        millis = self.to_millis(now_ms)
         if now_ms >= self._next_log_ms:
             self.log("\x1b[96m[/%s] Conected at time %d\x1b[0m" % (self.name, millis))
             self._next_log_ms = now_ms + (LOG_MS if self.configured else UNCONFIGURED_LOG_MS)

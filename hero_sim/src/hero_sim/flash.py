@@ -1,4 +1,5 @@
-"""The parameters that a robot keeps without power, in memory and, where a folder is given, in one file per robot.
+"""The parameters that a robot keeps without power, in memory and, where a folder is given, in one file per
+robot.
 
 Borders: the only file of the simulated robot that touches the file system besides arena_file.
 """
@@ -14,7 +15,8 @@ from .errors import OptionError
 _LENGTHS = {"ir_calibration_counts_m2": 8, "motor_centres_us": 2, "velocity_pid": 6, "position_pid": 6}
 
 DEFAULT_PID = [1.0, 0.5, 0.01, 1.0, 0.5, 0.01]
-"""lkp lki lkd rkp rki rkd of a fresh robot. Assumption: they are told on, but the motor model has its own lags."""
+"""lkp lki lkd rkp rki rkd of a fresh robot. Assumption: they are told on, but the motor model has its own
+lags."""
 
 
 class Flash:
@@ -44,12 +46,15 @@ class Flash:
             with open(path, encoding="utf-8") as file:
                 content = json.load(file)
         except (OSError, ValueError) as error:
-            raise OptionError("flash file %s cannot be read: %s; delete it to begin anew" % (path, error)) from error
+            raise OptionError(
+                "flash file %s cannot be read: %s; delete it to begin anew" % (path, error)
+            ) from error
         for key, length in _LENGTHS.items():
             values = content.get(key) if isinstance(content, dict) else None
             if not isinstance(values, list) or len(values) != length:
                 raise OptionError(
-                    "flash file %s: %s must be a list of %d numbers; delete the file to begin anew" % (path, key, length)
+                    "flash file %s: %s must be a list of %d numbers; delete the file to begin anew"
+                    % (path, key, length)
                 )
             try:
                 setattr(self, key, [float(value) for value in values])

@@ -21,16 +21,27 @@ def build_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--robots", type=int, default=1, metavar="N", help="number of robots (1)")
     parser.add_argument("--first-id", type=int, default=0, metavar="K", help="id of the first robot (0)")
-    parser.add_argument("--host", default=None, help="where the driver runs (127.0.0.1); with --serve: own address")
+    parser.add_argument(
+        "--host", default=None, help="where the driver runs (127.0.0.1); with --serve: own address"
+    )
     parser.add_argument("--port", type=int, default=DEFAULT_PORT, help="port of the driver (%(default)s)")
     parser.add_argument(
-        "--serve", type=int, default=None, metavar="PORT", help="do not dial: robot i is a TCP server on PORT + i"
+        "--serve",
+        type=int,
+        default=None,
+        metavar="PORT",
+        help="do not dial: robot i is a TCP server on PORT + i",
     )
     parser.add_argument(
-        "--arena", default=None, metavar="FILE", help="YAML file, or empty, obstacles, maze (a field of its own)"
+        "--arena",
+        default=None,
+        metavar="FILE",
+        help="YAML file, or empty, obstacles, maze (a field of its own)",
     )
     parser.add_argument("--seed", type=int, default=0, help="seed of everything that is drawn by chance (0)")
-    parser.add_argument("--seconds", type=float, default=None, metavar="S", help="end by itself after S seconds")
+    parser.add_argument(
+        "--seconds", type=float, default=None, metavar="S", help="end by itself after S seconds"
+    )
     parser.add_argument("--imu-hat", action="store_true", help="robots have the IMU hat")
     parser.add_argument(
         "--firmware-odometry",
@@ -45,10 +56,16 @@ def build_parser() -> argparse.ArgumentParser:
         help="infrared calibration in a robot's flash: measured at 10 cm, 0.5 for all, or none: NaN (calibrated)",
     )
     parser.add_argument(
-        "--flash-dir", default=None, metavar="DIR", help="keep the robots' parameters here, a file per robot (nowhere)"
+        "--flash-dir",
+        default=None,
+        metavar="DIR",
+        help="keep the robots' parameters here, a file per robot (nowhere)",
     )
     parser.add_argument(
-        "--wifi", choices=("ideal", "router", "hotspot", "bad"), default="ideal", help="how the network is (ideal)"
+        "--wifi",
+        choices=("ideal", "router", "hotspot", "bad"),
+        default="ideal",
+        help="how the network is (ideal)",
     )
     parser.add_argument(
         "--fault",
@@ -62,7 +79,9 @@ def build_parser() -> argparse.ArgumentParser:
         "--speed", type=float, default=1.0, metavar="X", help="simulated seconds per second (%(default)s)"
     )
     parser.add_argument(
-        "--perfect", action="store_true", help="all robots alike: no wheel errors, no slip (sensors stay noisy)"
+        "--perfect",
+        action="store_true",
+        help="all robots alike: no wheel errors, no slip (sensors stay noisy)",
     )
     parser.add_argument("--quiet", action="store_true", help="say nothing but errors")
     return parser
@@ -77,7 +96,7 @@ def check_options(options: argparse.Namespace) -> None:
     port = options.port if options.serve is None else options.serve
     name = "--port" if options.serve is None else "--serve"
     last = port if options.serve is None else port + options.robots - 1
-    if not (1 <= port and last <= 65535):
+    if not (port >= 1 and last <= 65535):
         raise OptionError("%s %d: ports must be 1..65535 (%d robots)" % (name, port, options.robots))
     if options.seconds is not None and not options.seconds > 0:
         raise OptionError("--seconds %g: must be more than 0" % options.seconds)
@@ -110,7 +129,10 @@ def main(arguments: Optional[List[str]] = None) -> int:
     try:
         import numpy  # noqa: F401
     except ImportError:
-        print("hero_sim: numpy is missing; install it: apt install python3-numpy, or pip install numpy", file=sys.stderr)
+        print(
+            "hero_sim: numpy is missing; install it: apt install python3-numpy, or pip install numpy",
+            file=sys.stderr,
+        )
         return 1
     from .build import build_simulator
 

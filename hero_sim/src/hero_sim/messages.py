@@ -31,7 +31,8 @@ _LASER_M = (0.0, 0.0, 0.051)
 LASER_ANGLE_INCREMENT_RAD = 0.395
 LASER_RANGE_MIN_M = 0.036835
 LASER_RANGE_MAX_M = 0.236835
-"""Fields of the stock LaserScan; the increment fits neither 15 nor 16 steps of a turn (RangeSensor.ino:67-72)."""
+"""Fields of the stock LaserScan; the increment fits neither 15 nor 16 steps of a turn
+(RangeSensor.ino:67-72)."""
 
 _ANGULAR_COVARIANCE = (
     0.6175054311752319, -0.22783495485782623, -0.3221839368343353,
@@ -82,7 +83,8 @@ class _Template:
 
 
 class CycleMessages:
-    """One odom frame, five transforms and one encoder frame back to back: what a robot sends 29 times a second."""
+    """One odom frame, five transforms and one encoder frame back to back: what a robot sends 29 times a
+    second."""
 
     _POSE = struct.Struct("<7d")
     _TWIST = struct.Struct("<6d")
@@ -125,9 +127,7 @@ class CycleMessages:
         self._encoder = starts[6] + self._encoder_values
 
     @staticmethod
-    def _build_transform(
-        parent: str, child: str, place_m: Sequence[float], turn: Sequence[float]
-    ) -> bytes:
+    def _build_transform(parent: str, child: str, place_m: Sequence[float], turn: Sequence[float]) -> bytes:
         values = round_to_float32(list(place_m) + list(turn))
         return _LENGTH.pack(1) + _header(0, parent) + _text(child) + struct.pack("<7d", *values)
 
@@ -154,7 +154,9 @@ class CycleMessages:
         self._TWIST.pack_into(data, self._twist, linear, 0.0, 0.0, 0.0, 0.0, turn)
         left_rad, right_rad = (_wheel_half_angle(ticks) for ticks in tf_ticks)
         left_y, left_w, right_y, right_w = self._TURN32.unpack(
-            self._TURN32.pack(math.sin(left_rad), math.cos(left_rad), math.sin(right_rad), math.cos(right_rad))
+            self._TURN32.pack(
+                math.sin(left_rad), math.cos(left_rad), math.sin(right_rad), math.cos(right_rad)
+            )
         )
         self._TURN.pack_into(data, self._left_turn, 0.0, left_y, 0.0, left_w)
         self._TURN.pack_into(data, self._right_turn, 0.0, right_y, 0.0, right_w)
@@ -190,7 +192,9 @@ class LaserMessages:
         self._start = self._template.payload_starts[0]
         self._ranges = self._start + len(head) + 4
 
-    def encode(self, seq: int, stamp: Tuple[int, int], ranges_m: Sequence[float], counts: Sequence[float]) -> bytes:
+    def encode(
+        self, seq: int, stamp: Tuple[int, int], ranges_m: Sequence[float], counts: Sequence[float]
+    ) -> bytes:
         """Return the frame for the eight sensors: odd values are averages of their neighbours (quirk of the
         firmware, RangeSensor.ino:167)."""
         data = self._template.data

@@ -134,7 +134,8 @@ class MotorControl:
         self._off_at_ms = now_ms + MOTOR_HOLD_MS
         self.due_ms = self._off_at_ms + 1
         left_m_s, right_m_s = (
-            _convert_pulse(pulse_us, centre_us) for pulse_us, centre_us in zip((left_us, right_us), self.centres_us)
+            _convert_pulse(pulse_us, centre_us)
+            for pulse_us, centre_us in zip((left_us, right_us), self.centres_us)
         )
         self._body.push((left_m_s, right_m_s))
 

@@ -18,7 +18,8 @@ BEAM_ANGLES_RAD = -math.pi + np.arange(BEAMS) * (math.pi / 4.0)
 
 ALPHA_COUNTS_M2 = 0.423
 BETA_COUNTS = -0.93
-"""signal = alpha * cos(angle of incidence) / distance^2 + beta, fitted to the published table (3 to 18 cm)."""
+"""signal = alpha * cos(angle of incidence) / distance^2 + beta, fitted to the published table (3 to 18
+cm)."""
 
 SATURATION_COUNTS = 950.0
 """The signal of anything nearer than about 2 cm."""

@@ -19,9 +19,11 @@ class RobotClock:
         self.synchronised = False
 
     def take_answer(self, answer: WireTime, requested_at_ms: int, now_ms: int) -> None:
-        """Set the clock: the answer is taken as the time at which the request was sent, plus the time since."""
+        """Set the clock: the answer is taken as the time at which the request was sent, plus the time
+        since."""
         answered_ns = answer.secs * _NS_PER_S + answer.nsecs
-        # Both the time since the request and millis() count from the same clock, so the waiting time drops out.
+        # Both the time since the request and millis() count from the same clock, so the waiting time drops
+        # out.
         self.offset_ns = answered_ns + (now_ms - requested_at_ms) * 10**6 - now_ms * 10**6
         self.synchronised = True
 

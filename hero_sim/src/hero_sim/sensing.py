@@ -1,6 +1,7 @@
 """Wheels and infrared of one robot -> the frames that it sends 29 times a second.
 
-Pure. Order within a cycle and gates as measured on the stock robot: imu, laser, odom, five transforms, encoder.
+Pure. Order within a cycle and gates as measured on the stock robot: imu, laser, odom, five transforms,
+encoder.
 """
 
 import math
@@ -21,9 +22,10 @@ LASER_GATE_MS = 200
 """/laser comes with the first cycle after more than this."""
 
 LASER_READ_MS = 1
-"""How long reading the infrared sensors holds the cycle up; with it /laser comes every 205 ms, as measured."""
+"""How long reading the infrared sensors holds the cycle up; with it /laser comes every 205 ms, as
+measured."""
 
-IMU_UNIT_QUATERNION = 16382.0 / 16384.0
+IMU_UNIT_QUATERNION = 16383.0 / 16384.0
 """The largest part of a quaternion that the hat sends (0.99994, a 14-bit fixed point number)."""
 
 IMU_FULL_TURN_COUNTS_PER_RAD_S = 16.4 * 180.0 / math.pi

@@ -49,7 +49,7 @@ class Simulator:
         self.stopping = False
         self.paused = False
         self.late_s = 0.0
-        self.injector: Optional["FaultInjector"] = None
+        self.injector: Optional[FaultInjector] = None
         self.before_advance: Optional[Callable[[int], None]] = None
         self._report = report
         self._said_unreachable = False
@@ -95,7 +95,9 @@ class Simulator:
             self._carry_up(index, robot.outbox)
             robot.outbox.clear()
         if robot.crash_reason is not None:
-            self._report("%s crashed: the server sent %s; the robot restarts" % (robot.name, robot.crash_reason))
+            self._report(
+                "%s crashed: the server sent %s; the robot restarts" % (robot.name, robot.crash_reason)
+            )
             self.reboot(index)
         elif robot.wants_connection:
             self._connect(index)
@@ -108,7 +110,8 @@ class Simulator:
             self._carrying.add(index)
             return
         if link.has_unsent(index):
-            # The firmware's write ran into its limit of 5 s: what is left of it is lost, half a frame perhaps.
+            # The firmware's write ran into its limit of 5 s: what is left of it is lost, half a frame
+            # perhaps.
             link.drop_unsent(index)
         for data in pieces:
             link.send(index, data)
@@ -167,34 +170,34 @@ class Simulator:
         self._drop_connection(index, orderly=True)
 
     def _take_event(self, event: tcp_link.LinkEvent) -> None:
-        robot = self.swarm.robots[event.index]
+        robot = self.swarm.robots[event.robot_index]
         now_ms = self.swarm.now_ms
         if event.kind == tcp_link.DATA:
-            radio = self.radios[event.index]
+            radio = self.radios[event.robot_index]
             if radio.is_transparent(now_ms):
                 robot.receive_bytes(now_ms, event.data)
             else:
                 radio.put_down(now_ms, event.data)
-                self._carrying.add(event.index)
+                self._carrying.add(event.robot_index)
             return
         if event.kind == tcp_link.MADE:
             if robot.is_on:
                 robot.connection_made(now_ms)
-            self._report_connection(event.index)
+            self._report_connection(event.robot_index)
         elif event.kind == tcp_link.FAILED:
             self._report_failure(event.data.decode())
             robot.connection_failed(now_ms)
         elif event.kind == tcp_link.LOST:
-            self.radios[event.index].clear()
+            self.radios[event.robot_index].clear()
             robot.connection_lost()
-            self._said_connected[event.index] = False
+            self._said_connected[event.robot_index] = False
             self._report("%s lost its connection: %s" % (robot.name, event.data.decode()))
         elif event.kind == tcp_link.BLOCKED:
             robot.block_writing(now_ms)
         else:
             robot.unblock_writing(now_ms)
-        self.swarm.reschedule(event.index)
-        self.serve_robot(event.index)
+        self.swarm.reschedule(event.robot_index)
+        self.serve_robot(event.robot_index)
 
     def _report_connection(self, index: int) -> None:
         self._said_unreachable = False

@@ -21,7 +21,8 @@ UNBLOCKED = "unblocked"
 
 _READ_LENGTH = 65536
 _MOST_UNSENT = 1 << 20
-"""Bytes kept for a driver that does not read; the robot stands still by then, so more means a fault of ours."""
+"""Bytes kept for a driver that does not read; the robot stands still by then, so more means a fault of
+ours."""
 
 # Like the ESP8266, whose own send buffer is two segments: a server that does not read is felt soon.
 _SEND_BUFFER_LENGTH = 16384
@@ -30,7 +31,7 @@ _SEND_BUFFER_LENGTH = 16384
 class LinkEvent(NamedTuple):
     """What happened to the connection of one robot."""
 
-    index: int
+    robot_index: int
     kind: str
     data: bytes = b""  # received bytes, or the reason in words
 
@@ -69,7 +70,9 @@ class TcpLink:
         try:
             found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
         except (OSError, UnicodeError) as error:
-            raise OptionError("host %r cannot be resolved: %s; give a name or an address" % (host, error)) from error
+            raise OptionError(
+                "host %r cannot be resolved: %s; give a name or an address" % (host, error)
+            ) from error
         # IPv4 first: robots know nothing else.
         found.sort(key=lambda entry: entry[0] != socket.AF_INET)
         return found[0][0], found[0][4]
@@ -93,7 +96,8 @@ class TcpLink:
         self._selector.register(listener, selectors.EVENT_READ, index)
 
     def find_own_address(self) -> str:
-        """Return the address of this machine on the way to the driver, as a robot's boot line would name it."""
+        """Return the address of this machine on the way to the driver, as a robot's boot line would name
+        it."""
         family, address = self._address
         with socket.socket(family, socket.SOCK_DGRAM) as probe:
             try:

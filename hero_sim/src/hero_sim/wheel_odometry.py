@@ -13,8 +13,8 @@ from .kinematics import TICK_M, WHEEL_SEPARATION_M
 FILTER_MEASURE_ERROR = 1.0
 FILTER_FIRST_ERROR = 1.0
 FILTER_PROCESS_NOISE_S_M = 10.0
-"""Kalman filter in front of the speeds. Only the ratios count; they reproduce the decay of the speeds that the
-stock robot sends after a stop to five digits."""
+"""Kalman filter in front of the speeds. Only the ratios count; they reproduce the decay of the speeds that
+the stock robot sends after a stop to five digits."""
 
 
 class _SpeedFilter:
@@ -57,7 +57,8 @@ class WheelOdometry:
         self._filtered_m_s = (0.0, 0.0)
 
     def read_encoders(self, now_us: int, left_m: float, right_m: float) -> None:
-        """Take over the wheels' travel (m) at now_us of the robot's own clock; overwrites the last interval."""
+        """Take over the wheels' travel (m) at now_us of the robot's own clock; overwrites the last
+        interval."""
         left = math.floor(left_m / TICK_M)
         right = math.floor(right_m / TICK_M)
         self._counted_ticks = (left, right)
@@ -86,7 +87,11 @@ class WheelOdometry:
         x_m, y_m, theta_rad = self.pose
         heading_rad = theta_rad + turn_rad / 2.0
         theta_rad = math.remainder(theta_rad + turn_rad, 2.0 * math.pi)
-        self.pose = (x_m + travel_m * math.cos(heading_rad), y_m + travel_m * math.sin(heading_rad), theta_rad)
+        self.pose = (
+            x_m + travel_m * math.cos(heading_rad),
+            y_m + travel_m * math.sin(heading_rad),
+            theta_rad,
+        )
 
     def set_pose(self, x_m: float, y_m: float, theta_rad: float) -> None:
         """Begin anew at this pose; the tick counters go to zero (Odometry.ino:234)."""

@@ -7,13 +7,14 @@ fitted to the stock robot: one velocity command of 0.1 m/s drives 0.13 to 0.17 m
 and a stop takes about 0.15 s.
 """
 
+import math
 from typing import List
 
 import numpy as np
 
 from . import range_sensors
 from .arena import Arena, distance_to_segments
-from .kinematics import BODY_RADIUS_M, MAX_LINEAR_M_S, join_wheels, move_along_arc
+from .kinematics import BODY_RADIUS_M, join_wheels, move_along_arc
 
 STEP_MS = 10
 """Length of a physics step; the fastest robot moves 3 mm in it, far less than its radius."""
@@ -44,7 +45,9 @@ class World:
         speeds_m_s, travels_m: of the wheels (N, 2).
     """
 
-    def __init__(self, arena: Arena, poses: np.ndarray, rng: np.random.RandomState, errors: float = 1.0) -> None:
+    def __init__(
+        self, arena: Arena, poses: np.ndarray, rng: np.random.RandomState, errors: float = 1.0
+    ) -> None:
         """Place robots at poses; errors scales the seeded differences between robots, 0 makes all alike."""
         count = len(poses)
         self.arena = arena
@@ -59,7 +62,12 @@ class World:
         # Wheel diameters differ by a few tenths of a per cent, so a straight command bends a little.
         self.roll_scale = 1.0 + errors * rng.normal(0.0, 0.003, (count, 2))
         self.slip_scale = errors * 0.02
-        self.alpha_counts_m2 = range_sensors.ALPHA_COUNTS_M2 * (1.0 + errors * rng.normal(0.0, 0.02, (count, 8)))
+        # Servos of one kind differ by some per cent; the PIDs make up for it, pulses of cmd_motor show it.
+        self.servo_gain = 1.0 + errors * rng.normal(0.0, 0.03, (count, 2))
+        self.ripple_m_s = errors * 0.003
+        self.alpha_counts_m2 = range_sensors.ALPHA_COUNTS_M2 * (
+            1.0 + errors * rng.normal(0.0, 0.02, (count, 8))
+        )
         self._rng = rng
         self.present = np.ones(count, dtype=bool)
         self.wheel_rows: List[List[float]] = []
@@ -85,7 +93,11 @@ class World:
         # Travel is taken with the speed of the step's start, so that reads within the step meet its end.
         rolled_m = self.speeds_m_s * step_s
         self.travels_m += rolled_m
-        self.speeds_m_s += (self.commands_m_s - self.speeds_m_s) * -np.expm1(-step_s / MOTOR_LAG_S)
+        reached_m_s = self.commands_m_s * self.servo_gain
+        if self.ripple_m_s:
+            running_m_s = self._rng.normal(0.0, self.ripple_m_s, reached_m_s.shape)
+            reached_m_s = np.where(self.commands_m_s == 0.0, 0.0, reached_m_s + running_m_s)
+        self.speeds_m_s += (reached_m_s - self.speeds_m_s) * -math.expm1(-step_s / MOTOR_LAG_S)
         self.speeds_m_s[np.abs(self.speeds_m_s) < 1e-6] = 0.0
         self.time_ms += STEP_MS
         if rolled_m.any():
@@ -97,8 +109,10 @@ class World:
         if self.slip_scale:
             ground_m = ground_m * (1.0 - np.abs(self._rng.normal(0.0, self.slip_scale, ground_m.shape)))
         before = self.poses[:, :2].copy()
-        x_m, y_m, theta_rad = move_along_arc(*self.poses.T, ground_m[:, 0], ground_m[:, 1])
-        self.poses[:, 0], self.poses[:, 1], self.poses[:, 2] = x_m, y_m, theta_rad
+        moved = move_along_arc(
+            self.poses[:, 0], self.poses[:, 1], self.poses[:, 2], ground_m[:, 0], ground_m[:, 1]
+        )
+        self.poses[:] = np.column_stack(moved)
         self._separate(before)
 
     def _separate(self, before: np.ndarray) -> None:
@@ -164,9 +178,9 @@ class World:
             np.fill_diagonal(distance_m2, np.inf)
             bad |= (distance_m2 < (2.0 * BODY_RADIUS_M - slack_m) ** 2).any(axis=1)
         if len(self.arena.segments_m):
-            bad |= (
-                distance_to_segments(positions, self.arena.segments_m)[0] < BODY_RADIUS_M - slack_m
-            ).any(axis=1)
+            bad |= (distance_to_segments(positions, self.arena.segments_m)[0] < BODY_RADIUS_M - slack_m).any(
+                axis=1
+            )
         for x_m, y_m, radius_m in self.arena.circles_m:
             bad |= np.hypot(positions[:, 0] - x_m, positions[:, 1] - y_m) < radius_m + BODY_RADIUS_M - slack_m
         return bad
@@ -177,7 +191,8 @@ class World:
         return np.column_stack((linear_m_s, turn_rad_s))
 
     def read_infrared(self, which: np.ndarray) -> np.ndarray:
-        """Return one noisy reading (whole counts, 0..1023) of the eight sensors of the robots which, (R, 8)."""
+        """Return one noisy reading (whole counts, 0..1023) of the eight sensors of the robots which, (R,
+        8)."""
         signals = range_sensors.measure_signals(
             self.poses, which, self.arena.segments_m, self.arena.circles_m, self.alpha_counts_m2[which]
         )
@@ -191,6 +206,3 @@ class World:
         for motion in (self.targets_m_s, self.pid_lag_s, self.commands_m_s, self.speeds_m_s):
             motion[:] = 0.0
         self._publish_rows()
-
-
-__all__ = ["MAX_LINEAR_M_S", "STEP_MS", "World"]

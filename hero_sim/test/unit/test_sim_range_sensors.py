@@ -1,0 +1,121 @@
+import math
+
+import numpy as np
+import pytest
+
+from hero_sim import range_sensors
+from hero_sim.arena import build_default
+from hero_sim.kinematics import BODY_RADIUS_M
+from hero_sim.world import World
+
+NO_WALLS = np.empty((0, 4))
+NO_CIRCLES = np.empty((0, 3))
+ALPHA = np.full((1, 8), range_sensors.ALPHA_COUNTS_M2)
+
+
+def wall_at(distance_m):
+    """A long wall in front of the front sensor of a robot at the origin."""
+    x_m = BODY_RADIUS_M + distance_m
+    return np.array([[x_m, -5.0, x_m, 5.0]])
+
+
+def measure(segments, circles=NO_CIRCLES, poses=((0.0, 0.0, 0.0),)):
+    poses = np.array(poses, dtype=float)
+    alpha = np.repeat(ALPHA, 1, axis=0)
+    return range_sensors.measure_signals(poses, np.array([0]), segments, circles, alpha)[0]
+
+
+@pytest.mark.parametrize("distance_m", [0.03, 0.05, 0.08, 0.10, 0.15, 0.18])
+def test_the_signal_follows_the_published_law(distance_m):
+    expected = 0.423 / distance_m**2 - 0.93
+    assert measure(wall_at(distance_m))[4] == pytest.approx(expected, rel=1e-6)
+
+
+def test_a_near_wall_saturates_the_sensor():
+    assert measure(wall_at(0.02))[4] == range_sensors.SATURATION_COUNTS
+    assert measure(wall_at(0.005))[4] == range_sensors.SATURATION_COUNTS
+
+
+def test_a_slanted_wall_returns_less_light():
+    # 60 degrees: the ray meets the wall at 0.1 m from the sensor, half of the light comes back.
+    reach_m = BODY_RADIUS_M + 0.1
+    across = np.array([math.cos(math.radians(30.0)), math.sin(math.radians(30.0))])
+    middle = np.array([reach_m, 0.0])
+    segment = np.concatenate((middle - across, middle + across))[None]
+    distance_m, cosine = range_sensors.cast_at_segments(np.zeros((1, 2)), np.zeros((1, 1)), segment)
+    assert distance_m[0, 0] == pytest.approx(reach_m)
+    assert cosine[0, 0] == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("distance_m", np.arange(0.03, 0.181, 0.01))
+def test_ranges_err_less_than_half_a_centimetre_to_18_cm(distance_m):
+    calibration = range_sensors.calibrate(ALPHA[0])
+    range_m = range_sensors.convert_to_ranges(measure(wall_at(distance_m)), calibration)[4]
+    assert range_m - BODY_RADIUS_M == pytest.approx(distance_m, abs=0.005)
+
+
+def test_ranges_err_less_than_6_mm_at_19_cm():
+    # The published offset of -0.93 counts weighs most where the signal is weakest.
+    calibration = range_sensors.calibrate(ALPHA[0])
+    range_m = range_sensors.convert_to_ranges(measure(wall_at(0.19)), calibration)[4]
+    assert range_m - BODY_RADIUS_M == pytest.approx(0.19, abs=0.006)
+
+
+def test_nothing_in_reach_is_a_finite_range_above_range_max():
+    ranges_m = range_sensors.convert_to_ranges(np.array([0.0, 1.0]), np.array([0.42, 0.42]))
+    assert ranges_m == pytest.approx([0.256835, 0.256835])
+
+
+def test_an_erased_calibration_makes_every_range_nan():
+    assert np.isnan(range_sensors.convert_to_ranges(np.full(8, 60.0), np.full(8, np.nan))).all()
+
+
+def test_the_stock_capture_gives_the_stock_ranges():
+    # Readings and ranges of one /laser of a stock robot with the factory's 0.5.
+    counts = np.array([10.0, 20.0, 40.0, 160.0, 400.0, 900.0, 320.0, 80.0])
+    expected = [0.2568350, 0.1949489, 0.1486384, 0.0927367, 0.0721903, 0.0604052, 0.0763635, 0.1158919]
+    assert range_sensors.convert_to_ranges(counts, np.full(8, 0.5)) == pytest.approx(expected, abs=2e-7)
+
+
+def test_beams_go_counter_clockwise_from_behind_and_the_fifth_looks_ahead():
+    circle = np.array([[0.0, 0.15, 0.03]])  # to the left
+    signals = measure(NO_WALLS, circle)
+    assert int(np.argmax(signals)) == 6
+    assert range_sensors.BEAM_ANGLES_RAD[4] == pytest.approx(0.0)
+    assert range_sensors.BEAM_ANGLES_RAD[6] == pytest.approx(math.pi / 2)
+
+
+def test_a_robot_sees_another_robot_and_not_itself():
+    signals = measure(NO_WALLS, poses=((0.0, 0.0, math.pi / 2), (0.0, 0.2, 0.0)))
+    assert int(np.argmax(signals)) == 4
+    assert signals[4] == pytest.approx(0.423 / (0.2 - 2 * BODY_RADIUS_M) ** 2 - 0.93)
+    assert np.allclose(np.delete(signals, 4), range_sensors.BETA_COUNTS)
+
+
+def test_the_nearer_thing_hides_the_farther():
+    signals = measure(wall_at(0.15), poses=((0.0, 0.0, 0.0), (0.15, 0.0, 0.0)))
+    assert signals[4] == pytest.approx(0.423 / (0.15 - 2 * BODY_RADIUS_M) ** 2 - 0.93)
+
+
+def test_all_robots_at_once_read_what_each_reads_alone():
+    arena = build_default(9)
+    rng = np.random.RandomState(3)
+    poses = np.column_stack((rng.uniform(-0.6, 0.6, (9, 2)), rng.uniform(-3, 3, 9)))
+    alpha = rng.normal(0.423, 0.01, (9, 8))
+    everybody = np.arange(9)
+    together = range_sensors.measure_signals(poses, everybody, arena.segments_m, NO_CIRCLES, alpha)
+    for index in everybody:
+        which = np.array([index])
+        alone = range_sensors.measure_signals(poses, which, arena.segments_m, NO_CIRCLES, alpha[which])
+        assert np.allclose(alone[0], together[index])
+
+
+def test_readings_are_whole_counts_with_the_published_noise():
+    arena = build_default(1)
+    arena = arena._replace(segments_m=wall_at(0.10))
+    world = World(arena, np.zeros((1, 3)), np.random.RandomState(0), errors=0.0)
+    readings = np.array([world.read_infrared(np.array([0]))[0, 4] for _ in range(2000)])
+    assert (readings == np.rint(readings)).all()
+    assert readings.mean() == pytest.approx(0.423 / 0.01 - 0.93, abs=0.15)
+    assert readings.std() == pytest.approx(1.3, abs=0.15)
+    assert readings.min() >= 0

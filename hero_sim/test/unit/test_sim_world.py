@@ -1,0 +1,152 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hero_sim import world as worlds
+from hero_sim.arena import build_default, build_rectangle, place_robots
+from hero_sim.arena_file import SHIPPED, load_arena
+from hero_sim.kinematics import BODY_RADIUS_M, split_to_wheels
+
+
+def build_world(robots=1, arena=None, errors=0.0, poses=None, seed=0):
+    arena = arena or build_default(robots)
+    if poses is None:
+        poses = place_robots(arena, robots, np.random.RandomState(seed))
+    return worlds.World(arena, np.array(poses, dtype=float), np.random.RandomState(seed), errors)
+
+
+def command(world, index, linear_m_s, turn_rad_s):
+    """Give servo pulses without a controller: speeds follow the motor's lag alone."""
+    world.commands_m_s[index] = split_to_wheels(linear_m_s, turn_rad_s)
+
+
+def run(world, seconds):
+    for _ in range(int(round(seconds * 1000 / worlds.STEP_MS))):
+        world.step()
+
+
+def test_a_wheel_answers_a_step_like_a_first_order_lag():
+    world = build_world()
+    command(world, 0, 0.1, 0.0)
+    for step in range(1, 40):
+        world.step()
+        expected_m_s = 0.1 * (1.0 - math.exp(-step * worlds.STEP_MS / 1000.0 / worlds.MOTOR_LAG_S))
+        assert world.speeds_m_s[0] == pytest.approx([expected_m_s] * 2, rel=1e-6)
+
+
+def test_a_straight_line_is_as_long_as_the_wheels_rolled():
+    world = build_world()
+    command(world, 0, 0.1, 0.0)
+    run(world, 4.0)
+    # The lag costs its time constant times the speed, and a step that starts from rest one step more.
+    assert world.poses[0, 0] == pytest.approx(0.1 * (4.0 - worlds.MOTOR_LAG_S), abs=1.5e-3)
+    assert world.poses[0, 1:] == pytest.approx([0.0, 0.0], abs=1e-12)
+    assert world.travels_m[0] == pytest.approx([world.poses[0, 0]] * 2)
+
+
+def test_a_circle_has_the_radius_of_speed_over_turn_rate():
+    world = build_world()
+    world.speeds_m_s[0] = world.commands_m_s[0] = split_to_wheels(0.1, 0.5)
+    points = []
+    for _ in range(1257):
+        world.step()
+        points.append(world.poses[0, :2].copy())
+    distance_m = np.hypot(*(np.array(points) - (0.0, 0.2)).T)
+    assert distance_m == pytest.approx(np.full(1257, 0.2), abs=1e-4)
+
+
+def test_a_spin_stays_on_the_spot():
+    world = build_world()
+    command(world, 0, 0.0, 3.0)
+    run(world, 3.0)
+    assert world.poses[0, :2] == pytest.approx([0.0, 0.0], abs=1e-12)
+    assert world.poses[0, 2] == pytest.approx(3.0 * (3.0 - worlds.MOTOR_LAG_S), abs=0.04)
+
+
+def test_a_robot_stops_at_a_wall_and_its_wheels_turn_on():
+    world = build_world(arena=build_rectangle(1.0, 1.0, 1))
+    command(world, 0, 0.2, 0.0)
+    run(world, 10.0)
+    assert world.poses[0, 0] == pytest.approx(0.5 - BODY_RADIUS_M, abs=1e-6)
+    assert world.travels_m[0, 0] > 1.9
+
+
+def test_a_robot_slides_along_a_wall_that_it_meets_at_an_angle():
+    world = build_world(arena=build_rectangle(1.0, 3.0, 1), poses=[(0.0, 0.0, math.pi / 4)])
+    command(world, 0, 0.2, 0.0)
+    run(world, 6.0)
+    assert world.poses[0, 0] == pytest.approx(0.5 - BODY_RADIUS_M, abs=1e-6)
+    assert world.poses[0, 1] > 0.7
+
+
+def test_a_robot_pushes_another_but_never_enters_it():
+    world = build_world(2, arena=build_rectangle(2.0, 1.0, 1), poses=[(-0.3, 0.0, 0.0), (0.0, 0.0, 0.0)])
+    command(world, 0, 0.1, 0.0)
+    for _ in range(600):
+        world.step()
+        assert math.hypot(*(world.poses[0, :2] - world.poses[1, :2])) >= 2 * BODY_RADIUS_M - 1e-6
+    assert world.poses[1, 0] > 0.1
+
+
+wheel_speeds = st.floats(-0.28, 0.28, allow_nan=False)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    arena=st.sampled_from(("default",) + SHIPPED),
+    robots=st.integers(1, 9),
+    seed=st.integers(0, 2**31),
+    commands=st.lists(st.lists(wheel_speeds, min_size=18, max_size=18), min_size=1, max_size=6),
+)
+def test_nobody_is_ever_inside_a_wall_or_another_robot(arena, robots, seed, commands):
+    arena = build_default(robots) if arena == "default" else load_arena(arena)
+    world = build_world(robots, arena, errors=1.0, seed=seed)
+    x_min, y_min, x_max, y_max = arena.bounds_m
+    for speeds in commands:
+        world.commands_m_s[:] = np.array(speeds).reshape(9, 2)[:robots]
+        for _ in range(150):
+            world.step()
+            assert not world.find_overlaps(1e-6).any()
+    assert (world.poses[:, :2] > (x_min, y_min)).all()
+    assert (world.poses[:, :2] < (x_max, y_max)).all()
+
+
+def test_robots_that_are_pressed_into_a_corner_stay_apart():
+    poses = [(0.1 * x, 0.1 * y, math.pi / 4) for x in range(4) for y in range(4)]
+    world = build_world(16, arena=build_rectangle(1.2, 1.2, 1), poses=poses, errors=1.0)
+    world.commands_m_s[:] = 0.28
+    for _ in range(1500):
+        world.step()
+        assert not world.find_overlaps(1e-6).any()
+
+
+def test_the_same_seed_gives_the_same_way():
+    ways = []
+    for _ in range(2):
+        world = build_world(5, errors=1.0, seed=7)
+        world.commands_m_s[:] = 0.15
+        run(world, 5.0)
+        ways.append((world.poses.tolist(), world.read_infrared(np.arange(5)).tolist()))
+    assert ways[0] == ways[1]
+
+
+def test_another_seed_gives_another_way():
+    ways = []
+    for seed in (1, 2):
+        world = build_world(1, errors=1.0, seed=seed)
+        world.commands_m_s[:] = 0.1
+        run(world, 3.0)
+        ways.append(world.poses.tolist())
+    assert ways[0] != ways[1]
+
+
+def test_reading_wheels_within_a_step_meets_the_end_of_the_step():
+    world = build_world()
+    command(world, 0, 0.2, 0.0)
+    run(world, 0.2)
+    foreseen_m = world.read_wheels(0, world.time_ms + worlds.STEP_MS)
+    world.step()
+    assert world.read_wheels(0, world.time_ms) == pytest.approx(foreseen_m)
