@@ -1,0 +1,66 @@
+"""The borders between the layers, as ARCHITECTURE.md draws them: who may import what."""
+
+import pytest
+import sources
+
+MODULES = sources.list_source_modules()
+NOT_IN_THE_CORE = {"asyncio", "logging", "rospy", "select", "selectors", "socket", "ssl", "threading", "time"}
+SOCKETS = {"asyncio", "socket", "socketserver", "ssl"}
+# The one module on each side that owns sockets.
+SOCKET_OWNERS = {"hero_driver.transport", "hero_sim.tcp_link"}
+
+
+def imports_of(name):
+    return sources.read_imports(MODULES[name])
+
+
+def modules_below(package):
+    return [name for name in MODULES if name == package or name.startswith(package + ".")]
+
+
+@pytest.mark.parametrize("name", modules_below("hero_driver.rosserial"))
+def test_the_rosserial_core_imports_nothing_of_ours_no_clock_and_no_socket(name):
+    for found in imports_of(name):
+        assert found.top not in NOT_IN_THE_CORE, f"line {found.line}"
+        assert not sources.is_ros_import(found.module), f"line {found.line}"
+        if found.top.startswith("hero_"):
+            assert found.module.startswith("hero_driver.rosserial"), f"line {found.line}"
+
+
+@pytest.mark.parametrize("name", sorted(MODULES))
+def test_only_the_transports_touch_sockets(name):
+    touched = {found.top for found in imports_of(name)} & SOCKETS
+    assert not touched or name in SOCKET_OWNERS, f"{name} imports {', '.join(sorted(touched))}"
+
+
+@pytest.mark.parametrize("name", sorted(MODULES))
+def test_nothing_imports_a_node(name):
+    assert not [found for found in imports_of(name) if found.module.endswith(".node")]
+
+
+@pytest.mark.parametrize("name", modules_below("hero_sim"))
+def test_the_simulator_shares_frames_and_payloads_with_the_driver_and_nothing_else(name):
+    core = "hero_driver.rosserial"
+    shared = [f"{core}.{module}" for module in ("errors", "frames", "payloads")]
+    for found in imports_of(name):
+        if found.top == "hero_driver" and found.module != core:  # `from hero_driver.rosserial import ...`
+            allowed = any(
+                found.module == module or found.module.startswith(module + ".") for module in shared
+            )
+            assert allowed, f"line {found.line}: {found.module}"
+
+
+@pytest.mark.parametrize("name", modules_below("hero_examples") + modules_below("hero_tutorial"))
+def test_examples_and_lessons_know_topics_only(name):
+    assert not [found for found in imports_of(name) if found.top in ("hero_driver", "hero_sim")]
+
+
+@pytest.mark.parametrize("name", modules_below("hero_driver"))
+def test_the_driver_knows_nothing_of_the_packages_built_on_it(name):
+    others = {"hero_sim", "hero_examples", "hero_tutorial", "hero_bringup", "hero_description"}
+    assert not [found for found in imports_of(name) if found.top in others]
+
+
+def test_the_layers_that_the_rules_name_exist():
+    core = {f"hero_driver.rosserial.{module}" for module in ("errors", "frames", "payloads", "session")}
+    assert (core | SOCKET_OWNERS) <= set(MODULES)

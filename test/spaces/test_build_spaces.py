@@ -1,0 +1,175 @@
+"""Proof that the suite builds with each of catkin's tools in a new workspace, and starts from what they make.
+
+Each workspace gets a copy of the repository, so that nothing is found by accident in another place; the
+install space is tried after its sources and its build are gone.
+"""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+SCRATCH = ROOT / ".work" / "spaces"
+BUILD_TIMEOUT_S = 600.0
+PROBE_TIMEOUT_S = 120.0
+NODE_START_S = 3
+LAUNCH_FILES = sorted(ROOT.glob("*/launch/*.launch"))
+PACKAGES = sorted(path.parent.name for path in ROOT.glob("*/package.xml"))
+NODES = sorted(path for path in ROOT.glob("*/nodes/*") if path.is_file())
+CMAKE_ARGUMENTS = f"-DPYTHON_EXECUTABLE={sys.executable}"
+
+# Without the variables of a workspace that happens to be sourced.
+OVERLAY = ("CMAKE_PREFIX_PATH", "ROS_PACKAGE_PATH", "PYTHONPATH", "LD_LIBRARY_PATH", "PKG_CONFIG_PATH")
+FROM_OTHER_ROS = bool(os.environ.get("CONDA_PREFIX")) or Path("/opt/ros/noetic").exists()
+ENVIRONMENT = {name: value for name, value in os.environ.items() if FROM_OTHER_ROS or name not in OVERLAY}
+
+
+def run(script, directory, timeout_s=PROBE_TIMEOUT_S):
+    """Run a bash script and return its output; its failure fails the test with that output."""
+    process = subprocess.Popen(
+        ["bash", "-eo", "pipefail", "-c", script],
+        cwd=str(directory),
+        env=ENVIRONMENT,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        start_new_session=True,
+    )
+    try:
+        output = process.communicate(timeout=timeout_s)[0].decode(errors="replace")
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)
+        output = process.communicate()[0].decode(errors="replace") + f"\nno end after {timeout_s:.0f} s"
+    assert process.returncode == 0, f"{script}\n{output[-6000:]}"
+    return output
+
+
+def copy_sources(destination):
+    """Copy the packages, without what git ignores, to a directory of a new workspace."""
+    ignored = shutil.ignore_patterns("__pycache__", "*.pyc", ".*_cache", ".hypothesis")
+    for package in PACKAGES:
+        shutil.copytree(str(ROOT / package), str(destination / package), ignore=ignored)
+
+
+class Space:
+    """A built workspace: sourcing `setup` makes the suite available."""
+
+    def __init__(self, setup, directory):
+        self.setup = setup
+        self.directory = directory
+
+    def run(self, script):
+        return run(f". {self.setup}\n{script}", self.directory)
+
+
+def new_workspace(name):
+    workspace = SCRATCH / name
+    shutil.rmtree(str(workspace), ignore_errors=True)
+    (workspace / "src").mkdir(parents=True)
+    copy_sources(workspace / "src" / "hero")
+    return workspace
+
+
+def build_with_catkin_build():
+    workspace = new_workspace("catkin_build")
+    script = f"catkin config --init --cmake-args {CMAKE_ARGUMENTS} && catkin build --no-status --summarize"
+    run(script, workspace, BUILD_TIMEOUT_S)
+    return Space(workspace / "devel" / "setup.bash", workspace)
+
+
+def build_with_catkin_make():
+    workspace = new_workspace("catkin_make")
+    run(f"catkin_make {CMAKE_ARGUMENTS}", workspace, BUILD_TIMEOUT_S)
+    return Space(workspace / "devel" / "setup.bash", workspace)
+
+
+def build_and_install():
+    workspace = new_workspace("install_space")
+    script = (
+        f"catkin config --init --install --cmake-args {CMAKE_ARGUMENTS} -DCATKIN_ENABLE_TESTING=OFF"
+        " && catkin build --no-status --summarize"
+    )
+    run(script, workspace, BUILD_TIMEOUT_S)
+    for gone in ("src", "build", "devel"):
+        shutil.rmtree(str(workspace / gone))
+    return Space(workspace / "install" / "setup.bash", workspace)
+
+
+BUILDERS = {
+    "catkin_build": build_with_catkin_build,
+    "catkin_make": build_with_catkin_make,
+    "install": build_and_install,
+}
+
+
+@pytest.fixture(scope="module", params=sorted(BUILDERS))
+def space(request):
+    """Each kind of workspace, built once; removed at the end of the tests if they pass."""
+    return BUILDERS[request.param]()
+
+
+def test_every_package_is_found_in_the_workspace_and_nowhere_else(space):
+    found = space.run(f"for name in {' '.join(PACKAGES)}; do rospack find $name; done").split()
+    assert len(found) == len(PACKAGES)
+    assert all(path.startswith(str(space.directory)) for path in found), found
+
+
+def test_every_module_can_be_imported(space):
+    modules = []
+    for package in PACKAGES:
+        source = ROOT / package / "src"
+        for path in sorted(source.rglob("*.py")):
+            name = ".".join(path.relative_to(source).with_suffix("").parts)
+            if not name.endswith("__main__"):
+                modules.append(name[: -len(".__init__")] if name.endswith(".__init__") else name)
+    modules += ["hero_msgs.msg", "hero_msgs.srv"]
+    program = "\n".join(f"import {name}; print({name}.__file__)" for name in modules)
+    space.run(f"{sys.executable} - <<'END'\n{program}\nEND")
+
+
+def test_every_launch_file_can_be_read(space):
+    for path in LAUNCH_FILES:
+        package = path.parents[1].name
+        listed = space.run(f"roslaunch --files {package} {path.name}")
+        assert path.name in listed
+        space.run(f"roslaunch --nodes {package} {path.name}")
+
+
+def test_rosrun_finds_every_node_and_python_has_what_it_imports(space):
+    for path in NODES:
+        package = path.parents[1].name
+        first_line = space.run(f"head -n 1 $(catkin_find --first-only --libexec {package} {path.name})")
+        assert first_line.startswith("#!"), path.name
+        # A node that knows no --help waits for a master, in vain, until it is killed.
+        start = f"timeout -s KILL {NODE_START_S} rosrun {package} {path.name} --help"
+        output = space.run(f"export ROS_MASTER_URI=http://localhost:1\n({start}) 2>&1 || true")
+        assert "Traceback" not in output and "No module named" not in output, f"{path.name}:\n{output}"
+
+
+def test_driver_and_simulated_robots_start_and_their_odometry_arrives(space):
+    """The main path of the suite, on ports of its own, from this workspace."""
+    program = textwrap.dedent(
+        """
+        . {setup}
+        read -r master_port robot_port < <({python} {free_ports})
+        export ROS_MASTER_URI=http://localhost:$master_port ROS_HOSTNAME=localhost ROS_HOME={directory}/ros_home
+        roslaunch -p $master_port hero_bringup hero_bringup.launch host:=127.0.0.1 port:=$robot_port sim:=2 \\
+            >{directory}/launch.log 2>&1 &
+        launch=$!
+        trap 'kill -INT $launch; wait $launch || true; tail -n 40 {directory}/launch.log' EXIT
+        {python} {wait_for_odometry} hero_0 hero_1
+        """
+    ).format(
+        setup=space.setup,
+        directory=space.directory,
+        python=sys.executable,
+        free_ports=Path(__file__).with_name("free_ports.py"),
+        wait_for_odometry=Path(__file__).with_name("wait_for_odometry.py"),
+    )
+    run(program, space.directory)
