@@ -268,6 +268,52 @@ def go_to_pose(pose: Pose, goal: Pose, law: GoToPoseLaw = GoToPoseLaw(), at_goal
     return Command(linear_m_s, turn_rad_s)
 
 
+class DetourLaw(NamedTuple):
+    """How a robot goes around what its sensors see on the way."""
+
+    influence_m: float = 0.18
+    """Obstacles nearer than this push."""
+    body_m: float = 0.05
+    """At this range one beam pushes `push` times as hard as the goal pulls."""
+    push: float = 2.5
+    swirl: float = 0.8
+    """Share of the push that acts sideways, so that the robot slides along a wall and does not stop before it."""
+    turn_gain: float = 2.0
+    max_linear_m_s: float = 0.08
+    max_turn_rad_s: float = 2.0
+
+
+def bend_around(
+    command: Command, bearing_rad: float, distance_m: float, ranges: Sequence[float], law: DetourLaw = DetourLaw()
+) -> Command:
+    """Return command, or what goes around an obstacle that is nearer than both the goal and law.influence_m.
+
+    bearing_rad, distance_m: of the goal, from the robot. Every obstacle pushes away, and sideways towards the side
+    on which the goal is. A closed pocket holds the robot: going home from there needs a map.
+    """
+    seen = [
+        (index * 2.0 * math.pi / len(ranges), 0.0 if math.isnan(range_m) else range_m)
+        for index, range_m in enumerate(ranges)
+    ]
+    near = [(angle_rad, range_m) for angle_rad, range_m in seen if range_m < min(law.influence_m, distance_m)]
+    near = [item for item in near if abs(wrap_angle(item[0] - bearing_rad)) < math.radians(100.0)]
+    if not near:
+        return command
+    force_x, force_y = math.cos(bearing_rad), math.sin(bearing_rad)
+    for angle_rad, range_m in near:
+        strength = law.push * min(1.0, (law.influence_m - range_m) / (law.influence_m - law.body_m)) ** 2
+        side = 1.0 if wrap_angle(bearing_rad - angle_rad) >= 0.0 else -1.0
+        force_x -= strength * (math.cos(angle_rad) + side * law.swirl * math.sin(angle_rad))
+        force_y -= strength * (math.sin(angle_rad) - side * law.swirl * math.cos(angle_rad))
+    towards_rad = math.atan2(force_y, force_x)
+    turn_rad_s = clamp(law.turn_gain * towards_rad, law.max_turn_rad_s)
+    # Sensors and eyes are ahead: a detour is never driven backwards.
+    speed_m_s = law.max_linear_m_s * max(0.0, math.cos(towards_rad)) * min(1.0, math.hypot(force_x, force_y))
+    if min(split_sectors(ranges)) < law.body_m + 0.02:
+        speed_m_s = 0.0
+    return Command(speed_m_s, turn_rad_s)
+
+
 class FollowLaw(NamedTuple):
     """How a robot keeps behind another one."""
 

@@ -17,8 +17,9 @@ import signal
 import sys
 import threading
 import time
+from concurrent.futures import Future
 from types import FrameType, TracebackType
-from typing import Any, Callable, Dict, Iterable, Iterator, List, NamedTuple, Optional, Sequence, Tuple, Type, Union
+from typing import Any, Callable, Dict, Iterable, Iterator, List, Optional, Sequence, Tuple, Type
 
 import rospy
 from geometry_msgs.msg import Twist
@@ -27,8 +28,9 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import ColorRGBA
 
-from . import control_laws
 from .control_laws import Pose
+from .goal_pursuit import DEFAULT_LAW, DEFAULT_TIMEOUT_S, DEFAULT_TOLERANCE_M, Goal, GoalPursuit, State
+from .readings import Color, Obstacle, Velocity, front_first, nearest_obstacle, parse_color, yaw_of
 
 MAX_LINEAR_M_S = 0.20
 """The firmware clamps linear.x to this (config.h)."""
@@ -53,20 +55,6 @@ FRESH_PROXIMITY_S = 1.0
 
 DISCOVERY_TOPIC = "/hero_driver/robots"
 
-COLORS: Dict[str, Tuple[float, float, float]] = {
-    "off": (0.0, 0.0, 0.0),
-    "red": (1.0, 0.0, 0.0),
-    "green": (0.0, 1.0, 0.0),
-    "blue": (0.0, 0.0, 1.0),
-    "yellow": (1.0, 1.0, 0.0),
-    "magenta": (1.0, 0.0, 1.0),
-    "cyan": (0.0, 1.0, 1.0),
-    "white": (1.0, 1.0, 1.0),
-    "orange": (1.0, 0.4, 0.0),
-}
-
-Color = Union[str, Sequence[float]]
-
 Sleep = Callable[[float], bool]
 """Waits for so many seconds and tells whether to go on; `Program.sleep` is one."""
 
@@ -87,23 +75,7 @@ class StaleDataError(RobotError):
 
 
 class GoalError(RobotError):
-    """The robot did not reach its goal; `reason` says why."""
-
-
-class Velocity(NamedTuple):
-    """How the robot moves, in its own frame."""
-
-    linear_m_s: float
-    turn_rad_s: float
-
-
-class Obstacle(NamedTuple):
-    """The nearest thing that a proximity sensor sees."""
-
-    range_m: float
-    """From the robot's centre."""
-    bearing_rad: float
-    """Counter-clockwise from straight ahead, -pi..pi."""
+    """The robot did not reach its goal; the text says why."""
 
 
 def sleep_unless_shutdown(duration_s: float) -> bool:
@@ -220,6 +192,20 @@ class Robot:
         """
         return front_first(self._read_fresh("proximity", FRESH_PROXIMITY_S))
 
+    def fresh_pose(self) -> Optional[Pose]:
+        """Return the pose, or None where `pose` would raise."""
+        try:
+            return self.pose
+        except StaleDataError:
+            return None
+
+    def fresh_proximity(self) -> List[float]:
+        """Return the ranges, or eight times nan (not known) where `proximity` would raise."""
+        try:
+            return self.proximity
+        except StaleDataError:
+            return [math.nan] * 8
+
     def nearest(self) -> Optional[Obstacle]:
         """Return the nearest thing that a sensor sees, None if there is none. Raises: StaleDataError."""
         return nearest_obstacle(self.proximity)
@@ -286,8 +272,54 @@ class Robot:
         """Stop, surely: returns when two stops, further apart than the robot's filter, are sent (about 0.2 s)."""
         stop_all([self])
 
+    def go_to(
+        self,
+        x_m: float,
+        y_m: float,
+        yaw_rad: Optional[float] = None,
+        timeout_s: float = DEFAULT_TIMEOUT_S,
+        tolerance_m: float = DEFAULT_TOLERANCE_M,
+        law: str = DEFAULT_LAW,
+        avoid: bool = False,
+        sleep: Sleep = sleep_unless_shutdown,
+    ) -> None:
+        """Drive to a place in hero_N/odom, end in heading yaw_rad if given, and return when the robot stands there.
+
+        law: see goal_pursuit.LAWS. avoid: go around what the proximity sensors see.
+        Raises: GoalError with the reason if it is not reached; the robot stands then, too.
+        """
+        pursuit = GoalPursuit(Goal(x_m, y_m, yaw_rad), time.monotonic(), tolerance_m, timeout_s, law)
+        try:
+            while pursuit.state is State.ACTIVE:
+                self.drive(*pursuit.step(self.fresh_pose(), self.fresh_proximity() if avoid else None, time.monotonic()))
+                if not sleep(REPEAT_PERIOD_S):
+                    raise GoalError("%s did not reach its goal: the program ends" % self.name)
+        finally:
+            self.stop()
+        if pursuit.state is State.FAILED:
+            raise GoalError("%s did not reach (%g, %g): %s" % (self.name, x_m, y_m, pursuit.reason))
+
+    def start_go_to(self, x_m: float, y_m: float, **options: Any) -> "Future[None]":
+        """Begin go_to() on a thread of its own; the future is done, or holds the GoalError, when it ends.
+
+        Several robots at once: start all, then ask each future for its result().
+        """
+        future: "Future[None]" = Future()
+        future.set_running_or_notify_cancel()
+        thread = threading.Thread(target=self._finish_go_to, args=(future, x_m, y_m, options), daemon=True)
+        thread.start()
+        return future
+
+    def _finish_go_to(self, future: "Future[None]", x_m: float, y_m: float, options: Dict[str, Any]) -> None:
+        try:
+            self.go_to(x_m, y_m, **options)
+        except Exception as error:  # whatever it is, it belongs to whoever asks for the result
+            future.set_exception(error)
+        else:
+            future.set_result(None)
+
     def led(self, color: Color) -> None:
-        """Show a colour: a name of COLORS, or (red, green, blue) each 0..1. The robot goes dark 15 s later."""
+        """Show a colour: a name of readings.COLORS, or (red, green, blue) each 0..1. The robot goes dark 15 s later."""
         red, green, blue = parse_color(color)
         if not rospy.is_shutdown():
             self._led.publish(ColorRGBA(red, green, blue, 1.0))
@@ -414,47 +446,3 @@ def stop_all(robots: Sequence[Robot]) -> None:
 def ready_ids(robots: RobotArray) -> List[int]:
     """Return the numbers of the robots that can be driven now, sorted."""
     return sorted(robot.id for robot in robots.robots if robot.state == robot.READY and robot.id >= 0)
-
-
-def parse_color(color: Color) -> Tuple[float, float, float]:
-    """Return (red, green, blue), each 0..1.
-
-    Raises: ValueError with the names that are known.
-    """
-    if isinstance(color, str):
-        if color not in COLORS:
-            raise ValueError("no colour %r; there are: %s" % (color, ", ".join(COLORS)))
-        return COLORS[color]
-    values = [float(value) for value in color]
-    if len(values) != 3 or not all(0.0 <= value <= 1.0 for value in values):
-        raise ValueError("a colour is a name or three numbers 0..1, not %r" % (color,))
-    return values[0], values[1], values[2]
-
-
-def yaw_of(orientation: Any) -> float:
-    """Return the turn about z, -pi..pi, of a geometry_msgs/Quaternion."""
-    return math.atan2(
-        2.0 * (orientation.w * orientation.z + orientation.x * orientation.y),
-        1.0 - 2.0 * (orientation.y ** 2 + orientation.z ** 2),
-    )
-
-
-def front_first(scan: LaserScan) -> List[float]:
-    """Return the scan's ranges starting straight ahead, with -inf (REP 117: too close) as 0.0."""
-    count = len(scan.ranges)
-    if count == 0 or scan.angle_increment <= 0.0:
-        return []
-    front = int(round(-scan.angle_min / scan.angle_increment))
-    return [
-        0.0 if scan.ranges[(front + index) % count] == -math.inf else scan.ranges[(front + index) % count]
-        for index in range(count)
-    ]
-
-
-def nearest_obstacle(ranges: Sequence[float]) -> Optional[Obstacle]:
-    """Return the nearest of ranges that start straight ahead and go round counter-clockwise, None if all are free."""
-    seen = [(range_m, index) for index, range_m in enumerate(ranges) if math.isfinite(range_m)]
-    if not seen:
-        return None
-    range_m, index = min(seen)
-    return Obstacle(range_m, control_laws.wrap_angle(index * 2.0 * math.pi / len(ranges)))

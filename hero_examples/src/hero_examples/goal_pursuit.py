@@ -1,0 +1,167 @@
+"""One goal, and what the robot knows step by step -> commands, and an end: reached, or failed with a reason. Pure.
+
+Poses and the goal are in one frame, normally hero_N/odom; time enters as now_s.
+"""
+
+import enum
+import math
+from typing import Callable, Dict, NamedTuple, Optional, Sequence
+
+from .control_laws import (
+    BRISK,
+    STANDSTILL,
+    Command,
+    GoToLaw,
+    GoToPoseLaw,
+    Pose,
+    bend_around,
+    go_to_point,
+    go_to_pose,
+    wrap_angle,
+)
+
+SETTLE_S = 0.5
+"""A robot that has stood so long at its goal has reached it; it needs about 0.15 s to come to rest."""
+
+AIM_SHARE = 0.7
+"""The robot stops at this share of the tolerance, so that it is still within after coming to rest."""
+
+SILENCE_S = 2.0
+"""So long without a pose, and the goal has failed: the robot has gone."""
+
+DEFAULT_TOLERANCE_M = 0.01
+
+DEFAULT_TIMEOUT_S = 120.0
+
+
+class State(enum.Enum):
+    """How far a pursuit is."""
+
+    ACTIVE = "active"
+    REACHED = "reached"
+    FAILED = "failed"
+
+
+class Goal(NamedTuple):
+    """Where a robot shall go."""
+
+    x_m: float
+    y_m: float
+    yaw_rad: Optional[float] = None
+    """Heading at the end; None for any."""
+
+
+def _tutorial(pose: Pose, goal: Goal, tolerance_m: float) -> Command:
+    return go_to_point(pose, goal.x_m, goal.y_m, GoToLaw(tolerance_m=tolerance_m))
+
+
+def _brisk(pose: Pose, goal: Goal, tolerance_m: float) -> Command:
+    return go_to_point(pose, goal.x_m, goal.y_m, BRISK._replace(tolerance_m=tolerance_m))
+
+
+def _smooth(pose: Pose, goal: Goal, tolerance_m: float) -> Command:
+    if goal.yaw_rad is None:
+        return _brisk(pose, goal, tolerance_m)
+    target = Pose(goal.x_m, goal.y_m, goal.yaw_rad)
+    return go_to_pose(pose, target, GoToPoseLaw(tolerance_m=tolerance_m))
+
+
+LAWS: Dict[str, Callable[[Pose, Goal, float], Command]] = {
+    "tutorial": _tutorial,
+    "brisk": _brisk,
+    "smooth": _smooth,
+}
+"""tutorial: slow, any heading. brisk: quicker, any heading. smooth: brisk, and a curve into the heading if given."""
+
+DEFAULT_LAW = "smooth"
+
+
+class GoalPursuit:
+    """The way of one robot to one goal.
+
+    Attributes:
+        state: see State; once it is not ACTIVE it stays, and step() commands a standstill.
+        reason: why it failed, for people; empty otherwise.
+        distance_m: from the goal at the last step; nan before the first pose.
+    """
+
+    def __init__(
+        self,
+        goal: Goal,
+        now_s: float,
+        tolerance_m: float = DEFAULT_TOLERANCE_M,
+        timeout_s: float = DEFAULT_TIMEOUT_S,
+        law: str = DEFAULT_LAW,
+    ) -> None:
+        """Begin at now_s; law: a key of LAWS. Raises: ValueError for a law that is not there."""
+        if law not in LAWS:
+            raise ValueError("no law %r; there are: %s" % (law, ", ".join(LAWS)))
+        self.goal = goal
+        self.state = State.ACTIVE
+        self.reason = ""
+        self.distance_m = math.nan
+        self._tolerance_m = tolerance_m
+        self._timeout_s = timeout_s
+        self._law = LAWS[law]
+        self._start_s = now_s
+        self._last_pose_s = now_s
+        self._standing_since_s: Optional[float] = None
+        self._blocked_m = math.inf
+        self._at_goal = False
+
+    def step(self, pose: Optional[Pose], ranges: Optional[Sequence[float]], now_s: float) -> Command:
+        """Return the next command.
+
+        pose: None while it is not known. ranges: as in control_laws, to go around what they see; None: do not look.
+        """
+        if self.state is not State.ACTIVE:
+            return STANDSTILL
+        if now_s - self._start_s > self._timeout_s:
+            return self._fail(self._tell_time_limit())
+        if pose is None:
+            if now_s - self._last_pose_s > SILENCE_S:
+                return self._fail("no odometry for %g s" % SILENCE_S)
+            return STANDSTILL
+        self._last_pose_s = now_s
+        self.distance_m = math.hypot(self.goal.x_m - pose.x_m, self.goal.y_m - pose.y_m)
+        # Where it stops is inside the tolerance, and it stays until it is outside: no jumping to and fro at the rim.
+        self._at_goal = self.distance_m < self._tolerance_m * (1.0 if self._at_goal else AIM_SHARE)
+        command = self._arrive(pose) if self._at_goal else self._approach(pose, ranges)
+        if not self._at_goal or command != STANDSTILL:
+            self._standing_since_s = None
+        elif self._standing_since_s is None:
+            self._standing_since_s = now_s
+        elif now_s - self._standing_since_s >= SETTLE_S:
+            self.state = State.REACHED
+        return command
+
+    def _arrive(self, pose: Pose) -> Command:
+        """Return the command at the goal: only the heading is left."""
+        if self.goal.yaw_rad is None or self._law is not _smooth:
+            return STANDSTILL
+        target = Pose(self.goal.x_m, self.goal.y_m, self.goal.yaw_rad)
+        return go_to_pose(pose, target, GoToPoseLaw(), at_goal=True)
+
+    def _approach(self, pose: Pose, ranges: Optional[Sequence[float]]) -> Command:
+        command = self._law(pose, self.goal, AIM_SHARE * self._tolerance_m)
+        if ranges is None:
+            return command
+        bearing_rad = wrap_angle(
+            math.atan2(self.goal.y_m - pose.y_m, self.goal.x_m - pose.x_m) - pose.yaw_rad
+        )
+        bent = bend_around(command, bearing_rad, self.distance_m, ranges)
+        self._blocked_m = min(ranges) if bent != command else math.inf
+        return bent
+
+    def _fail(self, reason: str) -> Command:
+        self.state = State.FAILED
+        self.reason = reason
+        return STANDSTILL
+
+    def _tell_time_limit(self) -> str:
+        text = "not there after %g s" % self._timeout_s
+        if not math.isnan(self.distance_m):
+            text += ", %.3f m are left" % self.distance_m
+        if math.isfinite(self._blocked_m):
+            text += "; something is in the way, %.2f m from the robot" % self._blocked_m
+        return text
