@@ -3,4 +3,8 @@
 from catkin_pkg.python_setup import generate_distutils_setup
 from setuptools import setup
 
-setup(**generate_distutils_setup(packages=["hero_driver", "hero_driver.rosserial"], package_dir={"": "src"}))
+setup(
+    **generate_distutils_setup(
+        packages=["hero_driver", "hero_driver.rosserial", "hero_driver.transport"], package_dir={"": "src"}
+    )
+)

@@ -52,7 +52,7 @@ class Admission:
     def _find_refusal(self, host: str) -> Optional[str]:
         limits = self._limits
         if limits.allow:
-            address = ipaddress.ip_address(host.split("%")[0])
+            address = ipaddress.ip_address(host.split("%", maxsplit=1)[0])
             mapped = getattr(address, "ipv4_mapped", None)
             if not any((mapped or address) in network for network in limits.allow):
                 return "address not in ~allow"

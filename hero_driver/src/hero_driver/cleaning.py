@@ -74,7 +74,9 @@ class MessageCleaner:
         self.refused = 0
         self.foreign_frames: Set[str] = set()
         self._odom_name = namespace + "/odom"
-        self._odom_frames = wire_messages.join_frames(self._frame_prefix + b"odom", self._frame_prefix + b"base_link")
+        self._odom_frames = wire_messages.join_frames(
+            self._frame_prefix + b"odom", self._frame_prefix + b"base_link"
+        )
         self._raw_name = namespace + "/odom_raw"
         self._proximity_name = namespace + "/proximity"
         self._has_encoder = False
@@ -210,9 +212,7 @@ class MessageCleaner:
 
     def _write_odometry(self, stamp_ns: int, payload: bytes, arrival_ns: int) -> Outputs:
         stamp_ns = self._stamps.correct(self._odom_name, stamp_ns, arrival_ns)
-        written = self._writer.rewrite(
-            payload, self._count(self._odom_name), stamp_ns, self._find_estimate()
-        )
+        written = self._writer.rewrite(payload, self._count(self._odom_name), stamp_ns, self._find_estimate())
         return self._refuse() if written is None else [Output(self._odom_name, written)]
 
     def _write_odom_transform(self, stamp_ns: int, tail: bytes, arrival_ns: int) -> Outputs:
@@ -255,7 +255,9 @@ class MessageCleaner:
             self.refused += 1
             if len(self._known_foreign) < HELD_MAX:
                 self._known_foreign.add(frames)
-                self.foreign_frames.add("%s -> %s" % (ascii(parent.decode("latin-1")), ascii(child.decode("latin-1"))))
+                self.foreign_frames.add(
+                    "%s -> %s" % (ascii(parent.decode("latin-1")), ascii(child.decode("latin-1")))
+                )
             return None
         key = "tf " + child[len(prefix) :].decode("latin-1")
         self._own_frames[frames] = key

@@ -23,9 +23,7 @@ class ConfigError(Exception):
 
 
 def _number(default: Any, low: float, high: float, unit: str, text: str) -> Any:
-    return dataclasses.field(
-        default=default, metadata={"unit": unit, "range": (low, high), "text": text}
-    )
+    return dataclasses.field(default=default, metadata={"unit": unit, "range": (low, high), "text": text})
 
 
 def _choice(default: str, options: Tuple[str, ...], text: str) -> Any:
@@ -42,7 +40,9 @@ class DriverConfig:
 
     host: str = _plain("0.0.0.0", "address to listen on; empty: do not listen, only dial ~robots")
     port: int = _number(DEFAULT_PORT, 0, 65535, "", "TCP port to listen on; 0: any free one")
-    robots: Tuple[Address, ...] = _plain((), "robots that are TCP servers, to be dialled: a list of {host, port}")
+    robots: Tuple[Address, ...] = _plain(
+        (), "robots that are TCP servers, to be dialled: a list of {host, port}"
+    )
     namespace_policy: str = _choice(
         "robot", ("robot", "any"), "robot: HeRos only, each within /hero_N and /tf; any: every name and type"
     )
@@ -54,8 +54,12 @@ class DriverConfig:
     max_name_length: int = _number(128, 16, 1024, "characters", "longest name of a topic or type")
     max_payload_length: int = _number(4096, 64, 65535, "bytes", "longest payload of a frame from a robot")
     max_frames_per_s: int = _number(5000, 10, 1000000, "1/s", "frames from one robot; stock robots send 211")
-    max_bytes_per_s: int = _number(2000000, 1000, 100000000, "bytes/s", "from one robot; stock robots send 44051")
-    declare_timeout_s: float = _number(20.0, 2.0, 600.0, "s", "time to declare a topic, else it is disconnected")
+    max_bytes_per_s: int = _number(
+        2000000, 1000, 100000000, "bytes/s", "from one robot; stock robots send 44051"
+    )
+    declare_timeout_s: float = _number(
+        20.0, 2.0, 600.0, "s", "time to declare a topic, else it is disconnected"
+    )
     silence_timeout_s: float = _number(6.0, 3.0, 600.0, "s", "silence after which a connection is closed")
     grace_s: float = _number(10.0, 0.0, 3600.0, "s", "time that the topics of a robot stay up after it left")
     service_timeout_s: float = _number(5.0, 0.1, 600.0, "s", "time that a robot has to answer a service call")
@@ -71,18 +75,28 @@ class DriverConfig:
     wheel_separation_m: float = _number(0.063, 0.001, 1.0, "m", "distance between the wheels")
     ticks_per_turn: float = _number(288.0, 1.0, 1000000.0, "", "encoder ticks per turn of a wheel")
     pose_covariance: Tuple[float, ...] = _plain(
-        (1e-4, 1e-4, 1e-9, 1e-9, 1e-9, 1e-2), "diagonal of odom's pose covariance: x, y, z, roll, pitch, yaw",
+        (1e-4, 1e-4, 1e-9, 1e-9, 1e-9, 1e-2),
+        "diagonal of odom's pose covariance: x, y, z, roll, pitch, yaw",
         "m^2, rad^2",
     )
     twist_covariance: Tuple[float, ...] = _plain(
-        (1e-4, 1e-9, 1e-9, 1e-9, 1e-9, 1e-2), "diagonal of odom's twist covariance: x, y, z, roll, pitch, yaw",
+        (1e-4, 1e-9, 1e-9, 1e-9, 1e-9, 1e-2),
+        "diagonal of odom's twist covariance: x, y, z, roll, pitch, yaw",
         "m^2/s^2, rad^2/s^2",
     )
     stamps: str = _choice("robot", ("robot", "arrival"), "whose clock stamps messages")
-    max_future_s: float = _number(0.05, 0.0, 10.0, "s", "a robot's stamp further ahead is replaced by its arrival")
-    max_age_s: float = _number(5.0, 0.1, 3600.0, "s", "a robot's stamp further back is replaced by its arrival")
-    transform_period_s: float = _number(0.01, 0.001, 1.0, "s", "transforms of all robots are collected so long")
-    report_period_s: float = _number(1.0, 0.1, 60.0, "s", "time between two messages on ~robots and /diagnostics")
+    max_future_s: float = _number(
+        0.05, 0.0, 10.0, "s", "a robot's stamp further ahead is replaced by its arrival"
+    )
+    max_age_s: float = _number(
+        5.0, 0.1, 3600.0, "s", "a robot's stamp further back is replaced by its arrival"
+    )
+    transform_period_s: float = _number(
+        0.01, 0.001, 1.0, "s", "transforms of all robots are collected so long"
+    )
+    report_period_s: float = _number(
+        1.0, 0.1, 60.0, "s", "time between two messages on ~robots and /diagnostics"
+    )
 
     @property
     def session_limits(self) -> SessionLimits:
@@ -150,7 +164,10 @@ def _check_number(field: "dataclasses.Field[Any]", value: Any) -> Any:
     low, high = field.metadata["range"]
     is_whole = isinstance(field.default, int)
     allowed = "a %snumber from %g to %g%s" % (
-        "whole " if is_whole else "", low, high, " (%s)" % field.metadata["unit"] if field.metadata["unit"] else ""
+        "whole " if is_whole else "",
+        low,
+        high,
+        " (%s)" % field.metadata["unit"] if field.metadata["unit"] else "",
     )
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise _make_error(field.name, value, allowed)
@@ -165,8 +182,10 @@ def _read_robots(name: str, value: Any) -> Tuple[Address, ...]:
         raise _make_error(name, value, allowed)
     addresses = []
     for entry in value:
-        if not isinstance(entry, dict) or not set(entry) <= {"host", "port"} or not isinstance(
-            entry.get("host"), str
+        if (
+            not isinstance(entry, dict)
+            or not set(entry) <= {"host", "port"}
+            or not isinstance(entry.get("host"), str)
         ):
             raise _make_error(name, entry, allowed)
         port = entry.get("port", DEFAULT_PORT)

@@ -99,8 +99,10 @@ class Fleet:
             is_alive = now_s - record.last_heard_s < ALIVE_S
             is_flapping = is_alive and record.reconnects > 0 and now_s - record.joined_s < FLAP_S
             if is_alive and (host != record.host or is_flapping):
-                reason = "two robots call themselves %s: %s is here and stays, %s is refused; give one of them" \
+                reason = (
+                    "two robots call themselves %s: %s is here and stays, %s is refused; give one of them"
                     " another id on its configuration page" % (identity.namespace, record.address, address)
+                )
                 record.refused[address] = reason
                 return Decision(Verdict.REFUSED, record, reason=reason)
         record.host, record.address, record.link = host, address, link

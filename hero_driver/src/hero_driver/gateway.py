@@ -113,6 +113,7 @@ class Gateway(LinkHandler):
     # What the transport calls.
 
     def open_link(self, link: Link) -> Optional[str]:
+        """Begin a conversation, unless the limits are against it."""
         refusal = self._admission.admit(link.address.host)
         if refusal is not None:
             self.refused_connections += 1
@@ -127,6 +128,7 @@ class Gateway(LinkHandler):
         return None
 
     def receive_data(self, link: Link, data: bytes, now_s: float) -> None:
+        """Pass bytes to the session and its events on; the hot path of the driver."""
         peer: Peer = link.peer
         session = peer.session
         frames_before = session.reader.frames
@@ -154,6 +156,7 @@ class Gateway(LinkHandler):
                 bridge = peer.bridge
 
     def poll_link(self, link: Link, now_s: float) -> None:
+        """Let the session do what is due."""
         peer: Peer = link.peer
         for event in peer.session.poll(now_s):
             self._receive_event(peer, event, now_s)
@@ -162,17 +165,21 @@ class Gateway(LinkHandler):
                 link.send_frame(frame)
 
     def close_link(self, link: Link, reason: str) -> None:
+        """Note a departure; the robot's endpoints stay up for the grace period."""
         peer: Optional[Peer] = self.peers.pop(link, None)
         if peer is None:
             self._log.log_throttled(
-                "warn", "refused " + link.address.host, "connection of %s refused: %s" % (link.address, reason)
+                "warn",
+                "refused " + link.address.host,
+                "connection of %s refused: %s" % (link.address, reason),
             )
             return
         self._admission.release(link.address.host)
         if peer.record is None:
             self._admission.unidentified -= 1
             self._log.log_throttled(
-                "warn", "nobody " + link.address.host + reason[:12],
+                "warn",
+                "nobody " + link.address.host + reason[:12],
                 "connection of %s, which never said which robot it is, ended: %s" % (link.address, reason),
             )
             return
@@ -187,7 +194,8 @@ class Gateway(LinkHandler):
         now_s = time.monotonic()
         if self.fleet.leave(link, reason, now_s) is not None:
             self._log.log_throttled(
-                "warn", "left " + record.identity.namespace,
+                "warn",
+                "left " + record.identity.namespace,
                 "%s left (%s): %s" % (peer.label, link.address, reason),
             )
             self._on_change()
@@ -196,6 +204,7 @@ class Gateway(LinkHandler):
         self._promote_duplicate(record.identity, now_s)
 
     def report_trouble(self, text: str) -> None:
+        """Log what the network has to say."""
         self._log.log_throttled("warn", "trouble " + text[:40], text)
 
     # What a session tells.
@@ -262,7 +271,9 @@ class Gateway(LinkHandler):
         peer.record = decision.record
         if decision.verdict is Verdict.REFUSED:
             peer.refused = True
-            self._log.log_throttled("error", "duplicate " + identity.namespace + address.host, decision.reason)
+            self._log.log_throttled(
+                "error", "duplicate " + identity.namespace + address.host, decision.reason
+            )
             self._on_change()
             return False
         self._join(peer, decision)
@@ -341,7 +352,11 @@ class Gateway(LinkHandler):
             if peer.bridge is not None and peer.bridge.cleaner is not None and peer.boot is None:
                 peer.bridge.cleaner.restart(rebooted=True)
         # Delays of the network only make a boot look later, so the earliest is the best.
-        if record.booted_s is None or booted_s < record.booted_s or booted_s - record.booted_s > REBOOT_SLACK_S:
+        if (
+            record.booted_s is None
+            or booted_s < record.booted_s
+            or booted_s - record.booted_s > REBOOT_SLACK_S
+        ):
             record.booted_s = booted_s
 
     # Parameters and services that robots ask for.

@@ -31,6 +31,9 @@ HALT_LIMIT_S = 1.2
 
 REPORT_CHECK_S = 0.1
 
+PORT_WAIT_S = 2.0
+"""How long a port may be in use: a node that replaces one of the same name starts while that one still stops."""
+
 
 def make_ros_clock() -> Callable[[], int]:
     """Return a function that gives ROS time in nanoseconds: simulated where /use_sim_time is set."""
@@ -65,7 +68,7 @@ class DriverNode:
 
     def open(self) -> None:
         """Listen, dial and serve. Raises: OSError if the port cannot be had."""
-        self._loop.open()
+        self._open_loop()
         self._gateway.open(self._loop)
         self._reporter = Reporter()
         self._stopped_publisher = rospy.Publisher("~stopped", Bool, queue_size=1, latch=True)
@@ -109,6 +112,17 @@ class DriverNode:
         self._gateway.close()
         self._log.close()
 
+    def _open_loop(self) -> None:
+        deadline_s = time.monotonic() + PORT_WAIT_S
+        while True:
+            try:
+                self._loop.open()
+            except OSError as error:
+                if error.errno != errno.EADDRINUSE or time.monotonic() > deadline_s or self._ended.wait(0.1):
+                    raise
+            else:
+                return
+
     def _run_loop(self) -> None:
         try:
             self._loop.run()
@@ -120,13 +134,15 @@ class DriverNode:
     def _describe_start(self) -> str:
         parts = []
         if self._loop.listening is not None:
-            parts.append("listening on %s, robots must dial this machine at that port" % (self._loop.listening,))
+            parts.append(
+                "listening on %s, robots must dial this machine at that port" % (self._loop.listening,)
+            )
         if self._config.robots:
             parts.append("dialling %s" % ", ".join(str(address) for address in self._config.robots))
         return "hero_driver: %s" % "; ".join(parts)
 
     def _report(self, is_periodic: bool) -> None:
-        answers: "queue.Queue[FleetStatus]" = queue.Queue()
+        answers: queue.Queue[FleetStatus] = queue.Queue()
         self._loop.call_soon(lambda: answers.put(self._take_status()))
         try:
             status = answers.get(timeout=1.0)
@@ -195,8 +211,9 @@ def _read_private_parameters() -> Any:
 def _explain_bind_error(config: DriverConfig, error: OSError) -> str:
     where = "~host %s, ~port %d" % (config.host, config.port)
     if error.errno == errno.EADDRINUSE:
-        return "%s is in use: end the other program (ss -ltnp 'sport = :%d' names it) or choose another ~port" % (
-            where, config.port
+        return (
+            "%s is in use: end the other program (ss -ltnp 'sport = :%d' names it) or choose another ~port"
+            % (where, config.port)
         )
     if error.errno == errno.EACCES:
         return "%s may not be used without privileges: choose a ~port above 1023" % where

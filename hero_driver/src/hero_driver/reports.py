@@ -8,6 +8,7 @@ from typing import Any, Callable, Dict, List, NamedTuple, Tuple
 import diagnostic_updater
 import rospy
 from diagnostic_msgs.msg import DiagnosticStatus
+
 from hero_msgs.msg import Robot, RobotArray
 
 from .fleet import RobotState
@@ -162,7 +163,9 @@ def _judge(robot: RobotStatus) -> Tuple[int, str]:
     if robot.state is RobotState.JOINING:
         return DiagnosticStatus.WARN, "joining"
     if robot.foreign_frames:
-        return DiagnosticStatus.WARN, "sends transforms that are not its own: %s" % ", ".join(robot.foreign_frames)
+        return DiagnosticStatus.WARN, "sends transforms that are not its own: %s" % ", ".join(
+            robot.foreign_frames
+        )
     if abs(robot.clock_offset_s) > LARGE_CLOCK_OFFSET_S:
         return DiagnosticStatus.WARN, "its clock is off by %.2f s" % robot.clock_offset_s
     return DiagnosticStatus.OK, "ready"

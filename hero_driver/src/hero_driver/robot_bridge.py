@@ -17,6 +17,7 @@ from .command_shaping import HALTED_MOTORS, check_twist
 from .message_types import MessageTypeError
 from .names import Identity
 from .rosserial.session import Topic, TopicKind
+from .service_requests import find_request_fault, is_success, read_set_odom_pose
 from .services import RobotService
 from .worker import Worker
 
@@ -28,6 +29,7 @@ VELOCITY_CONTROLLER = "/velocity_controller/cmd_vel"
 MOTOR_TYPE = "hero_msgs/Motor"
 TWIST_TYPE = "geometry_msgs/Twist"
 CALIBRATION_SUFFIX = "/pid_calibration"
+SET_ODOM_TYPE = "hero_msgs/SetOdom"
 
 
 class BridgeContext:
@@ -184,22 +186,40 @@ class RobotBridge:
         if requests is None or answers is None:
             return
         if requests.info.message_type != answers.info.message_type:
-            self._complain(name, "service %s refused: its halves are %s and %s" % (
-                name, requests.info.message_type, answers.info.message_type
-            ))
+            self._complain(
+                name,
+                "service %s refused: its halves are %s and %s"
+                % (name, requests.info.message_type, answers.info.message_type),
+            )
             return
         service = self._services.get(name)
         if service is None:
+            ros_type = message_types.apply_aliases(requests.info.message_type)
             service = RobotService(
-                name, self._context.service_timeout_s, lambda request: self._send_request(name, request)
+                name,
+                ros_type,
+                self._context.service_timeout_s,
+                lambda request: self._send_request(name, ros_type, request),
             )
             self._services[name] = service
-        receive_answer = service.receive_answer
+        known_service = service
         self._ids[name] = requests.info.topic_id
-        self._clean[answers.info.topic_id] = lambda payload, arrival_ns: receive_answer(payload) or []
+        self._clean[answers.info.topic_id] = lambda payload, _: self._receive_answer(known_service, payload)
         self._submit(
             lambda: self._serve(name, requests.info.message_type, requests.info.md5sum, answers.info.md5sum)
         )
+
+    def _receive_answer(self, service: RobotService, payload: bytes) -> List[Output]:
+        request = service.receive_answer(payload)
+        if (
+            request is not None
+            and self.cleaner is not None
+            and service.service_type == SET_ODOM_TYPE
+            and is_success(payload)
+        ):
+            # The answer comes before the first reading of the counters that the robot has just zeroed.
+            self.cleaner.odometry.set_pose(read_set_odom_pose(request))
+        return []
 
     # To the robot.
 
@@ -245,9 +265,8 @@ class RobotBridge:
             self._context.log(
                 "warn",
                 name,
-                "%s: a velocity on %s is not finite and was refused; mend the program that sends it" % (
-                    self.label, name
-                ),
+                "%s: a velocity on %s is not finite and was refused; mend the program that sends it"
+                % (self.label, name),
             )
             return False
         if self._context.is_stopped() and not command.is_zero:
@@ -256,8 +275,11 @@ class RobotBridge:
         self.commands.offer_velocity(name, command, time.monotonic())
         return True
 
-    def _send_request(self, name: str, request: bytes) -> Optional[str]:
-        """Send a service request (a thread of rospy's)."""
+    def _send_request(self, name: str, service_type: str, request: bytes) -> Optional[str]:
+        """Send a service request (a thread of rospy's); return why not, if so."""
+        fault = find_request_fault(service_type, request) if self.cleaner is not None else None
+        if fault is not None:
+            return fault
         if not self._connected or name not in self._ids:
             return "the robot is not connected"
         if name.endswith(CALIBRATION_SUFFIX) and self._context.is_stopped():

@@ -21,7 +21,9 @@ class Peer:
     guard: RateGuard
     record: Optional[RobotRecord] = None
     bridge: Optional[RobotBridge] = None
-    refused: bool = False  # a duplicate: kept open and ignored, so that it does not dial in 20 times per second
+    refused: bool = (
+        False  # a duplicate: kept open and ignored, so that it does not dial in 20 times per second
+    )
     boot: Optional[log_lines.BootLine] = None
     early_logs: List[Log] = field(default_factory=list)
     log_window_s: float = 0.0

@@ -18,37 +18,42 @@ Send = Callable[[bytes], Optional[str]]
 class RobotService:
     """One service of one robot, over all its connections."""
 
-    def __init__(self, name: str, timeout_s: float, send: Send) -> None:
+    def __init__(self, name: str, service_type: str, timeout_s: float, send: Send) -> None:
         self.name = name
+        self.service_type = service_type
         self._timeout_s = timeout_s
         self._send = send
         self._call_lock = threading.Lock()
         self._changed = threading.Condition()
+        self._request = b""
         self._answer: Optional[bytes] = None
         self._failure: Optional[str] = None
         self._is_waiting = False
         self._late_until_s = 0.0
-        self._closed = False
 
     def call(self, request: bytes) -> bytes:
         """Return the robot's answer to request. Raises: rospy.ServiceException with the reason of a failure."""
         deadline_s = time.monotonic() + self._timeout_s
         if not self._call_lock.acquire(timeout=self._timeout_s):
             raise rospy.ServiceException(
-                "%s is busy: earlier calls took longer than %.1f s (~service_timeout_s)" % (self.name, self._timeout_s)
+                "%s is busy: earlier calls took longer than %.1f s (~service_timeout_s)"
+                % (self.name, self._timeout_s)
             )
         try:
             return self._call_alone(request, max(deadline_s, time.monotonic() + self._timeout_s / 2.0))
         finally:
             self._call_lock.release()
 
-    def receive_answer(self, payload: bytes) -> None:
-        """The robot answered; an answer that nobody waits for is dropped."""
+    def receive_answer(self, payload: bytes) -> Optional[bytes]:
+        """Take the robot's answer; return the request that it answers, None if there was none."""
         with self._changed:
             if self._is_waiting:
                 self._answer = payload
                 self._changed.notify_all()
+            elif self._late_until_s == 0.0:
+                return None
             self._late_until_s = 0.0
+            return self._request
 
     def fail(self, reason: str) -> None:
         """End a call that waits, because the robot left."""
@@ -66,6 +71,7 @@ class RobotService:
                     % (self.name, self._late_until_s - time.monotonic())
                 )
             self._answer = self._failure = None
+            self._request = request
             self._is_waiting = True
         try:
             refusal = self._send(request)
@@ -87,6 +93,7 @@ class RobotService:
                 if left_s <= 0.0:
                     self._late_until_s = time.monotonic() + self._timeout_s
                     raise rospy.ServiceException(
-                        "%s was not answered within %.1f s (~service_timeout_s)" % (self.name, self._timeout_s)
+                        "%s was not answered within %.1f s (~service_timeout_s)"
+                        % (self.name, self._timeout_s)
                     )
                 self._changed.wait(left_s)

@@ -146,7 +146,7 @@ def split_frames(frames: bytes) -> Tuple[bytes, bytes]:
 
 def join_frames(frame_id: bytes, child_frame_id: bytes) -> bytes:
     """Undo split_frames()."""
-    return b"".join((_LENGTH.pack(len(frame_id)), frame_id, _LENGTH.pack(len(child_frame_id)), child_frame_id))
+    return b"".join(_LENGTH.pack(len(name)) + name for name in (frame_id, child_frame_id))
 
 
 def pack_transform(stamp_ns: int, frames: bytes, tail: bytes) -> bytes:
@@ -205,7 +205,7 @@ def make_proximity(payload: bytes, seq: int, stamp_ns: int, scan_time_s: float) 
         PROXIMITY_BEAMS,
         *ranges_m,
         PROXIMITY_BEAMS,
-        *fields[25:41:2]
+        *fields[25:41:2],
     )
     return restamp(payload[: header.end], seq, stamp_ns) + tail
 

@@ -1,4 +1,4 @@
-"""Threads for what can block (the ROS master, files, terminals), so that the thread of the sockets never does.
+"""Threads for what can block (the ROS master, files, terminals), so that the sockets' thread never does.
 
 A Worker does jobs one after another, in the order in which they came, from a bounded queue.
 """

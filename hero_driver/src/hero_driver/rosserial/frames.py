@@ -81,7 +81,7 @@ def encode_frame(topic_id: int, payload: Bytes) -> bytes:
         raise FrameTooLongError("a payload of %d bytes does not fit a frame (at most 65535)" % length)
     length_checksum = 255 - ((length & 0xFF) + (length >> 8)) % 256
     checksum = 255 - ((topic_id & 0xFF) + (topic_id >> 8) + sum_bytes(payload)) % 256
-    return b"%b%b%c" % (_HEADER.pack(SYNC, length, length_checksum, topic_id), payload, checksum)
+    return b"".join((_HEADER.pack(SYNC, length, length_checksum, topic_id), payload, bytes((checksum,))))
 
 
 class FrameReader:

@@ -23,7 +23,6 @@ LOG_ERROR = 3
 LOG_FATAL = 4
 
 
-
 class TopicInfo(NamedTuple):
     """What a peer declares about one topic, or about one direction of one service."""
 
@@ -60,7 +59,8 @@ class _Cursor:
         start, end = self._position, self._position + length
         if end > len(self._data):
             raise PayloadError(
-                "%s: field %s needs %d bytes, %d are left" % (self._what, field, length, len(self._data) - start)
+                "%s: field %s needs %d bytes, %d are left"
+                % (self._what, field, length, len(self._data) - start)
             )
         self._position = end
         return self._data[start:end]
@@ -166,7 +166,7 @@ def decode_time(payload: Bytes) -> WireTime:
 
 def split_seconds(time_s: float) -> WireTime:
     """Return time_s (s, not negative) as whole seconds and nanoseconds."""
-    nanoseconds = int(round(time_s * 1e9))
+    nanoseconds = round(time_s * 1e9)
     return WireTime(nanoseconds // 10**9, nanoseconds % 10**9)
 
 

@@ -1,0 +1,272 @@
+"""The loop that owns all sockets, timers and the clock, and the listening socket with them."""
+
+import collections
+import errno
+import heapq
+import itertools
+import os
+import selectors
+import socket
+import threading
+import time
+from typing import Any, Callable, Deque, Dict, List, NamedTuple, Optional, Tuple
+
+from .dialler import Dialler, DiallerOwner, Resolver
+from .link import Address, Link, LinkHandler, LinkOwner, describe_error
+
+LISTEN_BACKLOG = 256
+"""A whole swarm reconnects within 51 ms when the driver comes back (ArduinoTcpHardware.h:99)."""
+
+POLL_INTERVAL_S = 0.1
+"""Sessions are polled this often for what is due (repeated requests, silence)."""
+
+
+ACCEPT_PAUSE_S = 0.5
+"""Rest of the listener when the process has no file descriptors left; those connected go on."""
+
+
+class TransportSettings(NamedTuple):
+    """Where and how to connect."""
+
+    host: str  # empty: do not listen
+    port: int  # 0: any free one
+    dial: Tuple[Address, ...]
+    user_timeout_s: float
+    """After this time without acknowledgement the kernel gives a connection up (TCP_USER_TIMEOUT)."""
+
+
+class EventLoop(LinkOwner, DiallerOwner):
+    """The thread that owns all sockets. open(), then run() on that thread, stop() from any."""
+
+    def __init__(self, settings: TransportSettings, handler: LinkHandler) -> None:
+        self._settings = settings
+        self._handler = handler
+        self._selector = selectors.DefaultSelector()
+        self._listener: Optional[socket.socket] = None
+        self._links: Dict[int, Link] = {}
+        self._timers: List[Tuple[float, int, Callable[[], None]]] = []
+        self._timer_numbers = itertools.count()
+        self._calls: Deque[Callable[[], None]] = collections.deque()
+        self._wake_lock = threading.Lock()
+        self._is_awake = False
+        self._wake_read, self._wake_write = os.pipe()
+        os.set_blocking(self._wake_read, False)
+        os.set_blocking(self._wake_write, False)
+        self._running = True
+        self._dial_resolver = Resolver()
+        self.listening: Optional[Address] = None
+
+    def open(self) -> None:
+        """Bind the listening socket and begin to dial.
+
+        Raises: OSError if the address cannot be bound.
+        """
+        if self._settings.host:
+            self._listener = _listen(self._settings.host, self._settings.port)
+            self.listening = Address(*self._listener.getsockname()[:2])
+            self._selector.register(self._listener, selectors.EVENT_READ, None)
+        self._selector.register(self._wake_read, selectors.EVENT_READ, None)
+        for address in self._settings.dial:
+            Dialler(self, address).dial()
+        self.call_later(POLL_INTERVAL_S, self._poll_links)
+
+    def run(self) -> None:
+        """Serve until stop(); then close everything."""
+        select = self._selector.select
+        while self._running:
+            timeout_s = max(0.0, self._timers[0][0] - time.monotonic()) if self._timers else None
+            for key, mask in select(timeout_s):
+                link = key.data
+                if link is None:
+                    self._serve_own(key.fd)
+                elif isinstance(link, Dialler):
+                    link.finish()
+                else:
+                    if mask & selectors.EVENT_WRITE:
+                        self._serve_write(link)
+                    if mask & selectors.EVENT_READ and not link.closed:
+                        self._serve_read(link)
+            self._run_due()
+        self._close_all()
+
+    def stop(self) -> None:
+        """Let run() return; from any thread."""
+        self.call_soon(self._end)
+
+    def call_soon(self, call: Callable[[], None]) -> None:
+        """Run call on the loop's thread, soon; from any thread."""
+        self._calls.append(call)
+        with self._wake_lock:
+            if self._is_awake:
+                return
+            self._is_awake = True
+        os.write(self._wake_write, b"\0")
+
+    def call_later(self, delay_s: float, call: Callable[[], None]) -> None:
+        """Run call after delay_s; only from the loop's thread."""
+        heapq.heappush(self._timers, (time.monotonic() + delay_s, next(self._timer_numbers), call))
+
+    def watch(self, link: Link, writable: bool) -> None:
+        """Choose whether the loop waits until link can be written."""
+        mask = selectors.EVENT_READ | (selectors.EVENT_WRITE if writable else 0)
+        self._selector.modify(link, mask, link)
+
+    def close_link(self, link: Link, reason: str) -> None:
+        """Close link and tell the handler; safe to call twice."""
+        if link.closed:
+            return
+        del self._links[link.fileno()]
+        self._selector.unregister(link)
+        link.discard()
+        self._handler.close_link(link, reason)
+
+    def add_link(self, sock: socket.socket, address: Address, dialled: bool) -> Optional[Link]:
+        """Take over a connected socket; return its link, or None if it was refused or broke already."""
+        link = Link(self, sock, address, dialled)
+        try:
+            self._set_options(sock)
+        except OSError as error:
+            # The peer may be gone already.
+            link.discard()
+            self._handler.report_trouble(
+                "connection of %s broke at once: %s" % (address, describe_error(error))
+            )
+            return None
+        self._links[sock.fileno()] = link
+        self._selector.register(link, selectors.EVENT_READ, link)
+        refusal = self._handler.open_link(link)
+        if refusal is not None:
+            link.close(refusal)
+            return None
+        return link
+
+    def _set_options(self, sock: socket.socket) -> None:
+        sock.setblocking(False)
+        # The robot drops a frame whose parts arrive more than 20 ms apart (node_handle.h:199), so nothing
+        # may wait for an acknowledgement.
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+        user_timeout_ms = int(self._settings.user_timeout_s * 1000)
+        for option, value in (
+            ("TCP_KEEPIDLE", max(1, user_timeout_ms // 2000)),
+            ("TCP_KEEPINTVL", 1),
+            ("TCP_KEEPCNT", 3),
+            ("TCP_USER_TIMEOUT", user_timeout_ms),
+        ):
+            if hasattr(socket, option):
+                sock.setsockopt(socket.IPPROTO_TCP, getattr(socket, option), value)
+
+    def _serve_own(self, fd: int) -> None:
+        if fd == self._wake_read:
+            with self._wake_lock:
+                os.read(self._wake_read, 1)
+                self._is_awake = False
+            for _ in range(len(self._calls)):
+                self._calls.popleft()()
+        else:
+            self._accept()
+
+    def _accept(self) -> None:
+        listener = self._listener
+        if listener is None:
+            return
+        for _ in range(LISTEN_BACKLOG):
+            try:
+                sock, address = listener.accept()
+            except (BlockingIOError, InterruptedError, ConnectionAbortedError):
+                return
+            except OSError as error:
+                self._pause_accept(listener, error)
+                return
+            self.add_link(sock, Address(*address[:2]), dialled=False)
+
+    def _pause_accept(self, listener: socket.socket, error: OSError) -> None:
+        remedy = ""
+        if error.errno in (errno.EMFILE, errno.ENFILE):
+            remedy = "; raise the limit of open files (ulimit -n) and start again"
+        self._handler.report_trouble(
+            "cannot take more connections (%s)%s; those connected go on" % (describe_error(error), remedy)
+        )
+        self._selector.unregister(listener)
+
+        def resume() -> None:
+            if self._listener is not None:
+                self._selector.register(listener, selectors.EVENT_READ, None)
+
+        self.call_later(ACCEPT_PAUSE_S, resume)
+
+    def _serve_read(self, link: Link) -> None:
+        try:
+            data = link.read()
+        except OSError as error:
+            self.close_link(link, "read failed: %s" % describe_error(error))
+            return
+        if data is None:
+            return
+        if not data:
+            self.close_link(link, "closed by the robot")
+            return
+        link.received_length += len(data)
+        self._handler.receive_data(link, data, time.monotonic())
+
+    def _serve_write(self, link: Link) -> None:
+        if link.flush() and not link.closed:
+            self.watch(link, writable=False)
+
+    def _run_due(self) -> None:
+        now_s = time.monotonic()
+        while self._timers and self._timers[0][0] <= now_s:
+            heapq.heappop(self._timers)[2]()
+
+    def _poll_links(self) -> None:
+        now_s = time.monotonic()
+        for link in list(self._links.values()):
+            if not link.closed:
+                self._handler.poll_link(link, now_s)
+        self.call_later(POLL_INTERVAL_S, self._poll_links)
+
+    def _end(self) -> None:
+        self._running = False
+
+    def _close_all(self) -> None:
+        if self._listener is not None:
+            self._listener.close()
+            self._listener = None
+        for link in list(self._links.values()):
+            self.close_link(link, "the driver ends")
+        self._selector.close()
+        self._dial_resolver.close()
+
+    # What the diallers use.
+
+    def resolve(self, address: Address, then: Callable[[Optional[Any], str], None]) -> None:
+        """Look address up on a thread of its own, then call then(sockaddr info or None, error) on the loop."""
+        self._dial_resolver.resolve(address, lambda info, error: self.call_soon(lambda: then(info, error)))
+
+    def watch_dialler(self, dialler: "Dialler", sock: socket.socket) -> None:
+        """Call dialler.finish() when sock has connected or failed."""
+        self._selector.register(sock, selectors.EVENT_WRITE, dialler)
+
+    def unwatch_dialler(self, sock: socket.socket) -> None:
+        """Undo watch_dialler()."""
+        self._selector.unregister(sock)
+
+    def report_trouble(self, text: str) -> None:
+        """Pass text on to the handler."""
+        self._handler.report_trouble(text)
+
+
+def _listen(host: str, port: int) -> socket.socket:
+    infos = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
+    family, kind, protocol, _, target = infos[0]
+    sock = socket.socket(family, kind, protocol)
+    try:
+        # A driver that starts again must not wait for the old one's connections to time out.
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        sock.bind(target)
+        sock.listen(LISTEN_BACKLOG)
+        sock.setblocking(False)
+    except OSError:
+        sock.close()
+        raise
+    return sock

@@ -1,0 +1,163 @@
+"""One TCP connection: reads, and writes each frame with one send or keeps it until the socket takes it."""
+
+import collections
+import fcntl
+import socket
+import struct
+import termios
+from typing import Any, Callable, Deque, NamedTuple, Optional
+
+READ_LENGTH = 65536
+"""One read takes all that a robot can have sent: 1 s of stock data has 44 kB."""
+
+_INT = struct.Struct("i")
+
+
+class Address(NamedTuple):
+    """The far or near end of a connection."""
+
+    host: str
+    port: int
+
+    def __str__(self) -> str:
+        return "[%s]:%d" % self if ":" in self.host else "%s:%d" % self
+
+
+class LinkHandler:
+    """What the transport calls, always on the loop's thread."""
+
+    def open_link(self, link: "Link") -> Optional[str]:
+        """A connection stands; return a reason to refuse it, or None."""
+        raise NotImplementedError
+
+    def receive_data(self, link: "Link", data: bytes, now_s: float) -> None:
+        """Bytes came in."""
+        raise NotImplementedError
+
+    def close_link(self, link: "Link", reason: str) -> None:
+        """The connection is gone, by whichever side."""
+        raise NotImplementedError
+
+    def poll_link(self, link: "Link", now_s: float) -> None:
+        """Called every POLL_INTERVAL_S for each connection."""
+        raise NotImplementedError
+
+    def report_trouble(self, text: str) -> None:
+        """Something about the network itself should reach the user's eyes."""
+        raise NotImplementedError
+
+
+class LinkOwner:
+    """What a link needs of the loop that owns it."""
+
+    def call_soon(self, call: Callable[[], None]) -> None:
+        """Run call on the loop's thread, soon; from any thread."""
+        raise NotImplementedError
+
+    def watch(self, link: "Link", writable: bool) -> None:
+        """Choose whether the loop waits until link can be written."""
+        raise NotImplementedError
+
+    def close_link(self, link: "Link", reason: str) -> None:
+        """Close link and tell the handler; safe to call twice."""
+        raise NotImplementedError
+
+
+class Link:
+    """One TCP connection to one robot."""
+
+    def __init__(self, loop: LinkOwner, sock: socket.socket, address: Address, dialled: bool) -> None:
+        self.address = address
+        self.dialled = dialled
+        self.closed = False
+        self.peer: Any = None  # the handler's own record of who is at the other end
+        self.written_length = 0  # bytes that the system has taken so far
+        self.received_length = 0
+        self._loop = loop
+        self._socket = sock
+        self._unsent: Deque[bytes] = collections.deque()
+
+    def send_frame(self, frame: bytes) -> None:
+        """Write one whole frame with one send, or keep it until the socket takes it."""
+        if self.closed:
+            return
+        if self._unsent:
+            self._unsent.append(frame)
+            return
+        rest = self._write(frame)
+        if rest:
+            self._unsent.append(rest)
+            self._loop.watch(self, writable=True)
+
+    @property
+    def unsent_frames(self) -> int:
+        """Frames that the socket has not taken yet, one of them perhaps in part."""
+        return len(self._unsent)
+
+    def read_unacknowledged_length(self) -> int:
+        """Return how many bytes the peer's TCP has not acknowledged, 0 where the system cannot tell."""
+        if self.closed:
+            return 0
+        try:
+            # SIOCOUTQ has the number of TIOCOUTQ (tcp(7)).
+            answer = fcntl.ioctl(self._socket.fileno(), termios.TIOCOUTQ, b"\0\0\0\0")
+        except OSError:
+            return 0
+        length: int = _INT.unpack(answer)[0]
+        return length
+
+    def close(self, reason: str) -> None:
+        """Close the connection; safe to call twice."""
+        self._loop.close_link(self, reason)
+
+    def fileno(self) -> int:
+        """Return the socket's file descriptor."""
+        return self._socket.fileno()
+
+    def read(self) -> Optional[bytes]:
+        """Return bytes, b"" at the end of the stream, None if there is nothing to read now.
+
+        Raises: OSError when the connection broke.
+        """
+        try:
+            return self._socket.recv(READ_LENGTH)
+        except (BlockingIOError, InterruptedError):
+            return None
+
+    def flush(self) -> bool:
+        """Write what is left over; return whether nothing is left.
+
+        Raises: OSError when the connection broke.
+        """
+        while self._unsent:
+            rest = self._write(self._unsent[0])
+            if rest:
+                self._unsent[0] = rest
+                return False
+            self._unsent.popleft()
+        return True
+
+    def discard(self) -> None:
+        """Close the socket itself; only the loop calls this."""
+        self.closed = True
+        self._unsent.clear()
+        self._socket.close()
+
+    def _write(self, data: bytes) -> bytes:
+        """Return what the socket did not take."""
+        try:
+            sent = self._socket.send(data)
+        except (BlockingIOError, InterruptedError):
+            return data
+        except OSError as error:
+            # Not closed at once: the caller is still busy with this link.
+            reason = "write failed: %s" % describe_error(error)
+            self._loop.call_soon(lambda: self.close(reason))
+            return b""
+        self.written_length += sent
+        return data[sent:]
+
+
+def describe_error(error: OSError) -> str:
+    """Return what went wrong, in the system's words."""
+    return error.strerror or str(error)
