@@ -79,7 +79,7 @@ class CommandTable:
 
     def _set_odom(self, payload: bytes, millis: int) -> bytes:
         del millis
-        self._firmware.sensing.odometry.set_pose(*messages.decode_set_odom(payload))
+        self._firmware.sensing.set_odometry(*messages.decode_set_odom(payload))
         self._firmware.log("[HERO] Odometry was changed!")
         return _answer(ids.ID_SET_ODOM_ANSWER, True, "Odometry was changed!")
 

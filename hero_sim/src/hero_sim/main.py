@@ -3,10 +3,13 @@
 import argparse
 import signal
 import sys
-from typing import List, Optional
+from typing import TYPE_CHECKING, List, Optional
 
 from .errors import OptionError, SimulatorError
 from .faults import KINDS
+
+if TYPE_CHECKING:
+    from .simulator import Simulator
 
 DEFAULT_PORT = 11411
 """The port that stock robots dial."""
@@ -120,6 +123,17 @@ def report(text: str) -> None:
     print("hero_sim: " + text, flush=True)
 
 
+def stop_on_signals(simulator: "Simulator") -> None:
+    """End simulator.run() at Ctrl-C and SIGTERM."""
+
+    def stop(signal_number: int, frame: object) -> None:
+        del signal_number, frame
+        simulator.stopping = True
+
+    signal.signal(signal.SIGINT, stop)
+    signal.signal(signal.SIGTERM, stop)
+
+
 def main(arguments: Optional[List[str]] = None) -> int:
     """Run the simulator; return the exit code."""
     options = build_parser().parse_args(arguments)
@@ -142,13 +156,7 @@ def main(arguments: Optional[List[str]] = None) -> int:
     except SimulatorError as error:
         print("hero_sim: %s" % error, file=sys.stderr)
         return 1
-
-    def stop(signal_number: int, frame: object) -> None:
-        del signal_number, frame
-        simulator.stopping = True
-
-    signal.signal(signal.SIGINT, stop)
-    signal.signal(signal.SIGTERM, stop)
+    stop_on_signals(simulator)
     try:
         simulator.run(options.seconds)
     finally:

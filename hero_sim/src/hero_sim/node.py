@@ -1,17 +1,132 @@
-"""The simulator as a ROS node: the same command line, ended by ROS.
+"""The simulator as a ROS node: the same command line, and on top ground truth, markers, services and /clock.
 
-ROS begins here; the robots themselves talk to the driver over TCP and never over ROS.
+ROS begins here and in ground_truth. The robots themselves talk to the driver over TCP and never over ROS.
+Services come in on threads of rospy; they put what they want into a queue, and the simulator's thread does it
+between two steps.
 """
 
+import os
+import queue
+import signal
 import sys
+import threading
+from typing import Callable, List, Tuple
 
 import rospy
+from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse, Trigger, TriggerRequest, TriggerResponse
 
 from . import main as command_line
+from .build import build_simulator
+from .errors import SimulatorError
+from .faults import parse_fault
+from .ground_truth import GroundTruth
+from .simulator import Simulator
+from .srv import InjectFault, InjectFaultRequest, InjectFaultResponse
+
+SERVICE_LIMIT_S = 2.0
+"""A service call that the simulator's thread does not serve by then is answered with a failure."""
+
+Answer = Tuple[bool, str]
+
+
+class ServiceDesk:
+    """Takes wishes from rospy's threads, lets the simulator's thread fulfil them, and hands the answers
+    back."""
+
+    def __init__(self, simulator: Simulator) -> None:
+        self._simulator = simulator
+        self._wishes: queue.Queue[Tuple[Callable[[], Answer], queue.Queue]] = queue.Queue(maxsize=100)
+        inject = simulator.before_advance
+        assert inject is not None  # build_simulator gave it the faults' queue
+        self._inject = inject
+        simulator.before_advance = self._run
+        rospy.Service("~fault", InjectFault, self._serve_fault)
+        rospy.Service("~pause", SetBool, self._serve_pause)
+        rospy.Service("~reset", Trigger, self._serve_reset)
+
+    def _run(self, now_ms: int) -> None:
+        """Fulfil what was wished since the last step (simulator's thread)."""
+        while True:
+            try:
+                wish, answer = self._wishes.get_nowait()
+            except queue.Empty:
+                break
+            answer.put(wish())
+        self._inject(now_ms)
+
+    def _ask(self, wish: Callable[[], Answer]) -> Answer:
+        answer: queue.Queue[Answer] = queue.Queue()
+        try:
+            self._wishes.put_nowait((wish, answer))
+            return answer.get(timeout=SERVICE_LIMIT_S)
+        except (queue.Empty, queue.Full):
+            return False, "the simulator did not answer within %g s" % SERVICE_LIMIT_S
+
+    def _serve_fault(self, request: InjectFaultRequest) -> InjectFaultResponse:
+        if request.fault == "help":
+            return InjectFaultResponse(True, "\n".join(command_line.describe_faults()))
+
+        def inject() -> Answer:
+            injector = self._simulator.injector
+            if injector is None:
+                return False, "this simulator takes no faults"
+            try:
+                return True, injector.add(parse_fault(request.fault))
+            except SimulatorError as error:
+                return False, str(error)
+
+        return InjectFaultResponse(*self._ask(inject))
+
+    def _serve_pause(self, request: SetBoolRequest) -> SetBoolResponse:
+        def pause() -> Answer:
+            self._simulator.paused = request.data
+            return True, "paused" if request.data else "running"
+
+        return SetBoolResponse(*self._ask(pause))
+
+    def _serve_reset(self, request: TriggerRequest) -> TriggerResponse:
+        del request
+
+        def reset() -> Answer:
+            self._simulator.swarm.reset()
+            return True, "every robot stands at its start; its own odometry does not know"
+
+        return TriggerResponse(*self._ask(reset))
 
 
 def main() -> None:
-    """Run the simulator until ROS shuts down."""
-    arguments = rospy.myargv(sys.argv)[1:]
+    """Run the simulator until ROS or a signal ends it."""
+    arguments: List[str] = rospy.myargv(sys.argv)[1:]
+    parser = command_line.build_parser()
+    parser.add_argument("--clock", action="store_true", help="publish /clock: nodes with use_sim_time follow")
+    options = parser.parse_args(arguments)
+    if "help" in options.fault:
+        print("\n".join(command_line.describe_faults()))
+        return
+    # Until the master answers, init_node() waits in vain for as long as it takes: let a signal end that.
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
     rospy.init_node("hero_sim", disable_signals=True)
-    sys.exit(command_line.main(arguments))
+    try:
+        command_line.check_options(options)
+        simulator = build_simulator(options, (lambda text: None) if options.quiet else rospy.loginfo)
+    except SimulatorError as error:
+        rospy.logfatal("hero_sim: %s", error)
+        _leave(1)
+    command_line.stop_on_signals(simulator)
+    rospy.on_shutdown(lambda: setattr(simulator, "stopping", True))
+    GroundTruth(simulator, options.clock)
+    ServiceDesk(simulator)
+    try:
+        simulator.run(options.seconds)
+    finally:
+        simulator.link.close_all()
+    _leave(0)
+
+
+def _leave(code: int) -> None:
+    """End the process: ROS is told, but a master that is gone does not hold us up for long."""
+    telling = threading.Thread(target=rospy.signal_shutdown, args=("hero_sim ends",), daemon=True)
+    telling.start()
+    telling.join(timeout=0.7)
+    sys.stdout.flush()
+    os._exit(code)

@@ -52,6 +52,7 @@ class Sensing:
         due_ms: when run_cycle() has to be called.
         laser_enabled: whether /laser is sent; not kept over a restart.
         odometry: what the robot believes of its wheels.
+        odom_origin: where its odom frame truly lies (x m, y m, theta rad), as of the last time it was set.
     """
 
     def __init__(self, name: str, body: Body, imu_hat: bool, exact_odometry: bool, flash: Flash) -> None:
@@ -72,6 +73,28 @@ class Sensing:
         self._imu_start_rad = float(body.world.poses[body.index, 2])
         self._light = _DARK
         self._light_until_ms = 0
+        self.odom_origin = self._find_odom_origin()
+
+    def set_odometry(self, x_m: float, y_m: float, theta_rad: float) -> None:
+        """Take a pose for the odometry."""
+        self.odometry.set_pose(x_m, y_m, theta_rad)
+        self.odom_origin = self._find_odom_origin()
+
+    def anchor_odometry(self) -> None:
+        """Be told that somebody carried the robot: its odometry goes on, so its odom frame moved with it."""
+        self.odometry.resets += 1
+        self.odom_origin = self._find_odom_origin()
+
+    def _find_odom_origin(self) -> Tuple[float, float, float]:
+        x_m, y_m, theta_rad = self._body.world.poses[self._body.index].tolist()
+        odom_x_m, odom_y_m, odom_theta_rad = self.odometry.pose
+        turn_rad = theta_rad - odom_theta_rad
+        cosine, sine = math.cos(turn_rad), math.sin(turn_rad)
+        return (
+            x_m - (cosine * odom_x_m - sine * odom_y_m),
+            y_m - (sine * odom_x_m + cosine * odom_y_m),
+            turn_rad,
+        )
 
     def begin(self, now_ms: int) -> None:
         """Be told that loop() begins."""

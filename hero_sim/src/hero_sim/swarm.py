@@ -63,6 +63,14 @@ class Swarm:
             if self.world.time_ms >= until_ms and not (queue and queue[0][0] <= until_ms):
                 return sorted(touched)
 
+    def reset(self) -> None:
+        """Put every robot back to its start, standing, as if somebody carried it there."""
+        for robot in self.robots:
+            robot.motors.halt()
+        self.world.reset()
+        for robot in self.robots:
+            robot.sensing.anchor_odometry()
+
     @property
     def next_due_ms(self) -> int:
         """When the next robot has to run."""
