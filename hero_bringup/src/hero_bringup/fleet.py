@@ -237,7 +237,7 @@ class FleetProgram:
         return 0
 
     def run_lines(self) -> None:
-        """Print the fleet every few seconds until the time is over."""
+        """Print the fleet every few seconds until the time is over, and once more then."""
         next_print_s = time.monotonic() + self._options.period
         while self._going():
             time.sleep(max(0.0, min(DRAW_PERIOD_S, self._seconds_left())))
@@ -245,6 +245,7 @@ class FleetProgram:
             if time.monotonic() >= next_print_s:
                 next_print_s += self._options.period
                 self.print_fleet()
+        self.print_fleet()
 
     def run_screen(self, keyboard: Keyboard) -> None:
         """Show the table in place until the time is over or a key ends it."""

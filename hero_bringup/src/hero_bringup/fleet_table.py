@@ -10,7 +10,7 @@ from typing import Any, Dict, List, Optional, Sequence
 from .fleet_state import Obstacle, Pose, RobotRow
 
 HEADINGS = ("ROBOT", "ADDRESS", "STATE", "ODOM", "FROM ROBOT", "POSE x y yaw", "WAY", "NEAREST", "")
-RIGHT_ALIGNED = {"ODOM", "FROM ROBOT", "POSE x y yaw", "WAY", "NEAREST"}
+RIGHT_ALIGNED = {"ODOM", "FROM ROBOT", "POSE x y yaw", "WAY"}
 DIRECTIONS = ("ahead", "ahead left", "left", "behind left", "behind", "behind right", "right", "ahead right")
 
 
