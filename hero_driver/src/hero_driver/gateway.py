@@ -12,20 +12,14 @@ from typing import Callable, Dict, List, Optional
 from . import log_lines, names
 from .admission import Admission, RateGuard
 from .cleaning import CleaningSettings, MessageCleaner
+from .command_sender import CommandSender
 from .config import DriverConfig
 from .fleet import Decision, Fleet, RobotRecord, RobotState, Verdict
 from .log_relay import LogRelay
 from .names import Identity
-from .parameter_server import (
-    EMPTY_ANSWER,
-    ParameterAnswer,
-    ParameterRefusedError,
-    read_parameter,
-    resolve_parameter,
-)
 from .robot_bridge import BridgeContext, RobotBridge
+from .robot_requests import RobotRequests
 from .robot_status import Peer, RobotStatus, describe_robot
-from .rosserial.errors import RosserialError
 from .rosserial.payloads import LOG_DEBUG, LOG_ERROR, LOG_FATAL, LOG_INFO, LOG_WARN, Log
 from .rosserial.session import (
     Event,
@@ -37,10 +31,10 @@ from .rosserial.session import (
     SessionEnded,
     Topic,
     TopicDeclared,
+    TopicKind,
 )
-from .service_client import ServiceClients
 from .transform_collector import TransformCollector
-from .transport import EventLoop, Link, LinkHandler
+from .transport import THE_DRIVER_ENDS, EventLoop, Link, LinkHandler
 from .worker import Worker
 
 NS_PER_S = 10**9
@@ -77,9 +71,9 @@ class Gateway(LinkHandler):
         self._clock_ns = clock_ns
         self._on_change = on_change
         self._admission = Admission(config.admission_limits)
-        self._parameter_worker = Worker("parameters", 1000, lambda error: log.log("error", str(error)))
-        self._service_clients = ServiceClients(config, log)
         self._loop: EventLoop
+        self._sender: CommandSender
+        self._requests: RobotRequests
         self._transforms: TransformCollector
         self._context: BridgeContext
         self.peers: Dict[Link, Peer] = {}
@@ -91,11 +85,13 @@ class Gateway(LinkHandler):
     def open(self, loop: EventLoop) -> None:
         """Begin to serve what loop brings."""
         self._loop = loop
+        self._sender = CommandSender(loop.call_soon, loop.call_later, self._find_peer, self._complain)
+        self._requests = RobotRequests(self._config, self._log, loop.call_soon, self._complain)
         self._transforms = TransformCollector(self._config.transform_period_s, loop.call_later)
         self._context = BridgeContext(
             registrar=self._registrar,
             log=self._log.log_throttled,
-            wake=self._wake,
+            wake=self._sender.wake,
             add_transform=self._transforms.add,
             after_publishing=loop.call_soon,
             is_stopped=lambda: self.stopped,
@@ -107,8 +103,7 @@ class Gateway(LinkHandler):
 
     def close(self) -> None:
         """End the workers; the loop has ended before."""
-        self._parameter_worker.close()
-        self._service_clients.close()
+        self._requests.close()
 
     # What the transport calls.
 
@@ -146,9 +141,10 @@ class Gateway(LinkHandler):
         for event in events:
             if type(event) is MessageReceived:
                 if bridge is not None:
-                    bridge.receive_message(event.topic, event.payload, arrival_ns)
-                if event.topic.kind.value >= 4 and bridge is not None:
-                    self._call_service(peer, event.topic, event.payload)
+                    if event.topic.kind is TopicKind.CLIENT_REQUESTS:
+                        self._call_service(peer, event.topic, event.payload)
+                    else:
+                        bridge.receive_message(event.topic, event.payload, arrival_ns)
             else:
                 self._receive_event(peer, event, now_s)
                 if link.closed:
@@ -194,7 +190,7 @@ class Gateway(LinkHandler):
         now_s = time.monotonic()
         if self.fleet.leave(link, reason, now_s) is not None:
             self._log.log_throttled(
-                "warn",
+                "debug" if reason == THE_DRIVER_ENDS else "warn",
                 "left " + record.identity.namespace,
                 "%s left (%s): %s" % (peer.label, link.address, reason),
             )
@@ -215,7 +211,7 @@ class Gateway(LinkHandler):
         elif isinstance(event, LogReceived):
             self._receive_log(peer, event.log, now_s)
         elif isinstance(event, ParameterRequested):
-            self._answer_parameter(peer, event.name)
+            self._requests.answer_parameter(peer, event.name)
         elif isinstance(event, Problem):
             self._complain(peer, event.text)
         elif isinstance(event, SessionEnded):
@@ -359,103 +355,18 @@ class Gateway(LinkHandler):
         ):
             record.booted_s = booted_s
 
-    # Parameters and services that robots ask for.
-
-    def _answer_parameter(self, peer: Peer, name: str) -> None:
-        bridge = peer.bridge
-        if bridge is None or peer.refused:
-            return
-        namespace = bridge.identity.namespace
-        may_leave = self._config.parameters_outside or self._config.namespace_policy == "any"
-
-        def read() -> None:
-            try:
-                answer = read_parameter(resolve_parameter(name, namespace, may_leave))
-            except ParameterRefusedError as error:
-                self._log.log_throttled("warn", namespace + name[:100], "%s: %s" % (peer.label, error))
-                answer = EMPTY_ANSWER
-            self._loop.call_soon(lambda: self._send_parameter(peer, answer))
-
-        if not self._parameter_worker.submit(read):
-            self._complain(peer, "asks for too many parameters at once")
-
-    def _send_parameter(self, peer: Peer, answer: ParameterAnswer) -> None:
-        try:
-            peer.link.send_frame(peer.session.encode_parameter_answer(*answer))
-        except RosserialError as error:
-            self._complain(peer, str(error))
-
     def _call_service(self, peer: Peer, topic: Topic, request: bytes) -> None:
-        bridge = peer.bridge
-        if bridge is None:
-            return
-        name = self._resolve(topic.info.name, bridge.identity)
-        answers = [
-            other
-            for other in peer.session.topics.values()
-            if other.kind.value == 5 and other.info.name == topic.info.name
-        ]
-        if name is None or not answers:
-            return
+        name = None if peer.bridge is None else self._resolve(topic.info.name, peer.bridge.identity)
+        if name is not None:
+            self._requests.call_service(peer, topic, name, request, self._sender.send_message)
 
-        def send(payload: bytes) -> None:
-            self._loop.call_soon(lambda: self._send_message(peer, answers[0].info.topic_id, payload))
-
-        self._service_clients.call(bridge.label, name, topic.info, answers[0].info, request, send)
-
-    # Commands.
-
-    def _wake(self, bridge: RobotBridge) -> None:
-        """Commands for a robot wait; from any thread."""
-        self._loop.call_soon(lambda: self._send_to(bridge))
-
-    def _send_to(self, bridge: RobotBridge) -> None:
+    def _find_peer(self, bridge: RobotBridge) -> Optional[Peer]:
+        """Return the connection of a bridge's robot, None if it is away."""
         record = self.fleet.robots.get(bridge.identity.namespace)
-        if record is not None and record.link is not None and not record.link.closed:
-            peer: Peer = record.link.peer
-            if not peer.send_due:
-                self._send_commands(peer)
-            else:
-                # A timer is set already; commands other than velocities need not wait for it.
-                self._send_now(peer)
-
-    def _send_commands(self, peer: Peer) -> None:
-        peer.send_due = False
-        bridge = peer.bridge
-        if bridge is None or peer.link.closed:
-            return
-        delay_s = bridge.commands.due_in_s(self._send_now(peer), time.monotonic())
-        if delay_s is not None:
-            peer.send_due = True
-            self._loop.call_later(delay_s, lambda: self._send_commands(peer))
-
-    def _send_now(self, peer: Peer) -> bool:
-        """Send what may go out; return whether the robot has acknowledged the last velocity."""
-        link, bridge = peer.link, peer.bridge
-        if bridge is None:
-            return True
-        in_flight = link.read_unacknowledged_length()
-        acknowledged = link.written_length - in_flight >= peer.velocity_mark
-        for name, payload in bridge.commands.take(in_flight, acknowledged, time.monotonic()):
-            topic_id = bridge.find_id(name)
-            if topic_id is None:
-                bridge.refused_commands += 1
-                continue
-            self._send_message(peer, topic_id, payload)
-            if name.endswith("/cmd_vel"):
-                peer.velocity_mark = link.written_length
-                acknowledged = False
-        return acknowledged
-
-    def _send_message(self, peer: Peer, topic_id: int, payload: bytes) -> None:
-        if peer.link.closed:
-            return
-        try:
-            frame = peer.session.encode_message(topic_id, payload)
-        except RosserialError as error:
-            self._complain(peer, str(error))
-            return
-        peer.link.send_frame(frame)
+        if record is None or record.link is None or record.link.closed:
+            return None
+        peer: Peer = record.link.peer
+        return peer
 
     # Reports.
 

@@ -25,6 +25,10 @@ ACCEPT_PAUSE_S = 0.5
 """Rest of the listener when the process has no file descriptors left; those connected go on."""
 
 
+THE_DRIVER_ENDS = "the driver ends"
+"""Reason with which all links are closed at the end."""
+
+
 class TransportSettings(NamedTuple):
     """Where and how to connect."""
 
@@ -233,7 +237,7 @@ class EventLoop(LinkOwner, DiallerOwner):
             self._listener.close()
             self._listener = None
         for link in list(self._links.values()):
-            self.close_link(link, "the driver ends")
+            self.close_link(link, THE_DRIVER_ENDS)
         self._selector.close()
         self._dial_resolver.close()
 

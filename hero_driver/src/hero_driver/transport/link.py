@@ -71,7 +71,7 @@ class Link:
         self.dialled = dialled
         self.closed = False
         self.peer: Any = None  # the handler's own record of who is at the other end
-        self.written_length = 0  # bytes that the system has taken so far
+        self.handed_length = 0  # bytes of all frames given to send_frame()
         self.received_length = 0
         self._loop = loop
         self._socket = sock
@@ -81,6 +81,7 @@ class Link:
         """Write one whole frame with one send, or keep it until the socket takes it."""
         if self.closed:
             return
+        self.handed_length += len(frame)
         if self._unsent:
             self._unsent.append(frame)
             return
@@ -89,22 +90,20 @@ class Link:
             self._unsent.append(rest)
             self._loop.watch(self, writable=True)
 
-    @property
-    def unsent_frames(self) -> int:
-        """Frames that the socket has not taken yet, one of them perhaps in part."""
-        return len(self._unsent)
-
     def read_unacknowledged_length(self) -> int:
-        """Return how many bytes the peer's TCP has not acknowledged, 0 where the system cannot tell."""
+        """Return how many bytes of frames the peer's TCP has not acknowledged.
+
+        Where the system cannot tell, only those that the socket has not taken.
+        """
         if self.closed:
             return 0
         try:
             # SIOCOUTQ has the number of TIOCOUTQ (tcp(7)).
             answer = fcntl.ioctl(self._socket.fileno(), termios.TIOCOUTQ, b"\0\0\0\0")
         except OSError:
-            return 0
+            answer = _INT.pack(0)
         length: int = _INT.unpack(answer)[0]
-        return length
+        return length + sum(map(len, self._unsent))
 
     def close(self, reason: str) -> None:
         """Close the connection; safe to call twice."""
@@ -154,7 +153,6 @@ class Link:
             reason = "write failed: %s" % describe_error(error)
             self._loop.call_soon(lambda: self.close(reason))
             return b""
-        self.written_length += sent
         return data[sent:]
 
 

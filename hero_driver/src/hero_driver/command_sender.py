@@ -1,0 +1,81 @@
+"""Commands that wait -> frames on their way: takes from the robots' command queues what may go out now.
+
+Runs on the thread of the sockets, except wake(). A robot that does not acknowledge is asked again later and
+delays no other.
+"""
+
+import time
+from typing import Callable, Optional
+
+from .robot_bridge import VELOCITY_SUFFIX, RobotBridge
+from .robot_status import Peer
+from .rosserial.errors import RosserialError
+
+
+class CommandSender:
+    """The way out of the driver."""
+
+    def __init__(
+        self,
+        call_soon: Callable[[Callable[[], None]], None],
+        call_later: Callable[[float, Callable[[], None]], None],
+        find_peer: Callable[[RobotBridge], Optional[Peer]],
+        complain: Callable[[Peer, str], None],
+    ) -> None:
+        """Take the loop's functions; find_peer gives a robot's connection, complain reports its trouble."""
+        self._call_soon = call_soon
+        self._call_later = call_later
+        self._find_peer = find_peer
+        self._complain = complain
+
+    def wake(self, bridge: RobotBridge) -> None:
+        """Commands for a robot wait; from any thread."""
+        self._call_soon(lambda: self._serve(bridge))
+
+    def send_message(self, peer: Peer, topic_id: int, payload: bytes) -> None:
+        """Send one message now, if the connection declared its id and it fits."""
+        if peer.link.closed:
+            return
+        try:
+            frame = peer.session.encode_message(topic_id, payload)
+        except RosserialError as error:
+            self._complain(peer, str(error))
+            return
+        peer.link.send_frame(frame)
+
+    def _serve(self, bridge: RobotBridge) -> None:
+        peer = self._find_peer(bridge)
+        if peer is None:
+            return
+        if peer.send_due:
+            # A timer is set already for what has to wait; the rest need not.
+            self._send_ready(peer)
+        else:
+            self._send_and_come_back(peer)
+
+    def _send_and_come_back(self, peer: Peer) -> None:
+        peer.send_due = False
+        if peer.bridge is None or peer.link.closed:
+            return
+        delay_s = peer.bridge.commands.due_in_s(self._send_ready(peer), time.monotonic())
+        if delay_s is not None:
+            peer.send_due = True
+            self._call_later(delay_s, lambda: self._send_and_come_back(peer))
+
+    def _send_ready(self, peer: Peer) -> bool:
+        """Send what may go out; return whether the robot has acknowledged the last velocity."""
+        link, bridge = peer.link, peer.bridge
+        if bridge is None:
+            return True
+        in_flight = link.read_unacknowledged_length()
+        acknowledged = link.handed_length - in_flight >= peer.velocity_mark
+        for name, payload in bridge.commands.take(in_flight, acknowledged, time.monotonic()):
+            topic_id = bridge.find_id(name)
+            if topic_id is None:
+                bridge.refused_commands += 1
+                continue
+            self.send_message(peer, topic_id, payload)
+            if name.endswith(VELOCITY_SUFFIX):
+                peer.velocity_mark = link.handed_length
+                acknowledged = False
+        return acknowledged

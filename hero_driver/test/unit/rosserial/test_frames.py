@@ -1,0 +1,254 @@
+"""Frames: the same ones come out whatever pieces, noise and errors they came with."""
+
+import pytest
+from hero_driver.rosserial.errors import FrameTooLongError, RosserialError, TopicIdError
+from hero_driver.rosserial.frames import Frame, FrameReader, decode_frame, encode_frame, sum_bytes
+from hypothesis import given
+from hypothesis import strategies as st
+from vectors import GOOD, TIME_REQUEST, VECTORS, build_frame
+
+ALL = b"".join(vector.data for vector in VECTORS)
+ALL_FRAMES = [Frame(vector.topic_id, vector.payload) for vector in VECTORS]
+
+NOISES = {
+    "zeros": bytes(50),
+    "text": b"GET / HTTP/1.1\r\nHost: robot\r\n\r\n",
+    "half a sync": b"\xff",
+    "many half syncs": b"\xff" * 20,
+    "sync without frame": b"\xff\xfe",
+    "syncs one after another": b"\xff\xfe" * 9,
+    "protocol 1": bytes.fromhex("ff ff 00 00 ff 00 00 ff"),
+    "wrong length checksum": bytes.fromhex("ff fe 00 00 fe 00 00 ff"),
+    "wrong checksum": bytes.fromhex("ff fe 01 00 fe 65 00 01 98"),
+    "frame cut in its header": TIME_REQUEST[:5],
+    "too long": bytes.fromhex("ff fe 01 10 ee 65 00"),
+    "longest length": bytes.fromhex("ff fe ff ff 01 65 00"),
+}
+
+by_vector = pytest.mark.parametrize("vector", VECTORS, ids=lambda vector: vector.name)
+
+payloads = st.binary(max_size=600)
+topic_ids = st.integers(0, 0xFFFF)
+# Bytes of which real starts of frames are made come often.
+noise = st.lists(
+    st.one_of(st.binary(max_size=20), st.sampled_from([b"\xff", b"\xff\xfe", TIME_REQUEST, TIME_REQUEST[:9]]))
+).map(b"".join)
+
+
+def read_in_pieces(data, cuts):
+    reader = FrameReader()
+    frames = []
+    positions = [0, *sorted(cuts), len(data)]
+    for start, end in zip(positions, positions[1:]):
+        frames += reader.receive_bytes(data[start:end])
+    return frames, reader
+
+
+@by_vector
+def test_a_frame_is_encoded_as_written_by_hand(vector):
+    assert encode_frame(vector.topic_id, vector.payload) == vector.data
+
+
+@by_vector
+def test_a_frame_is_read_whole(vector):
+    reader = FrameReader()
+    assert reader.receive_bytes(vector.data) == [(vector.topic_id, vector.payload)]
+    assert (reader.frames, reader.bad_frames, reader.skipped_bytes, reader.buffered_length) == (1, 0, 0, 0)
+
+
+@by_vector
+def test_a_frame_is_read_byte_by_byte_and_comes_with_its_last_byte(vector):
+    reader = FrameReader()
+    for position in range(len(vector.data) - 1):
+        assert reader.receive_bytes(vector.data[position : position + 1]) == []
+        assert reader.buffered_length == position + 1
+    assert reader.receive_bytes(vector.data[-1:]) == [(vector.topic_id, vector.payload)]
+    assert (reader.bad_frames, reader.skipped_bytes, reader.buffered_length) == (0, 0, 0)
+
+
+@by_vector
+def test_a_frame_is_read_from_any_two_pieces(vector):
+    for cut in range(len(vector.data) + 1):
+        assert read_in_pieces(vector.data, [cut])[0] == [(vector.topic_id, vector.payload)]
+
+
+def test_frames_back_to_back_are_all_read():
+    assert FrameReader().receive_bytes(ALL) == ALL_FRAMES
+    assert read_in_pieces(ALL, range(len(ALL)))[0] == ALL_FRAMES
+
+
+@pytest.mark.parametrize("name", NOISES)
+@by_vector
+def test_a_frame_is_read_after_noise(vector, name):
+    reader = FrameReader()
+    frames = reader.receive_bytes(NOISES[name] + vector.data + GOOD.data)
+    # A header without its frame waits for the bytes that it promises, so it may swallow what follows it.
+    assert frames[-1] == (GOOD.topic_id, GOOD.payload)
+    assert frames[:-1] == [(vector.topic_id, vector.payload)]
+    assert reader.skipped_bytes == len(NOISES[name])
+
+
+@pytest.mark.parametrize("missing", range(1, 9))
+def test_frames_are_read_again_after_one_that_was_cut_short(missing):
+    cut = TIME_REQUEST[:-missing]
+    reader = FrameReader()
+    frames = reader.receive_bytes(cut + GOOD.data * 3)
+    assert frames[-2:] == [(GOOD.topic_id, GOOD.payload)] * 2
+    assert reader.skipped_bytes >= len(cut)
+
+
+@by_vector
+def test_a_frame_with_any_bit_flipped_is_refused_and_counted_and_the_next_is_read(vector):
+    for bit in range(8 * len(vector.data)):
+        broken = bytearray(vector.data)
+        broken[bit // 8] ^= 1 << bit % 8
+        reader = FrameReader()
+        # Two bad lengths: a flip there may promise up to 4096 bytes, which have to come before it is found out.
+        frames = reader.receive_bytes(bytes(broken) + GOOD.data)
+        assert frames == [(GOOD.topic_id, GOOD.payload)], "bit %d" % bit
+        assert reader.skipped_bytes == len(vector.data)
+        assert reader.bad_frames >= 1 or bit < 16
+
+
+@by_vector
+def test_a_frame_with_any_bit_flipped_is_refused_byte_by_byte_too(vector):
+    for bit in range(0, 8 * min(len(vector.data), 80)):
+        broken = bytearray(vector.data)
+        broken[bit // 8] ^= 1 << bit % 8
+        data = bytes(broken) + GOOD.data
+        assert read_in_pieces(data, range(len(data)))[0] == [(GOOD.topic_id, GOOD.payload)], "bit %d" % bit
+
+
+def test_a_good_frame_inside_a_broken_one_is_not_lost():
+    broken = build_frame(130, GOOD.data)[:-1] + b"\x00"
+    reader = FrameReader()
+    assert reader.receive_bytes(broken) == [(GOOD.topic_id, GOOD.payload)]
+    assert reader.bad_frames == 1
+    assert reader.skipped_bytes == 8
+
+
+def test_the_longest_payload_is_read_and_a_longer_one_is_bad_as_soon_as_its_header_is_there():
+    reader = FrameReader(max_payload_length=100)
+    assert reader.receive_bytes(build_frame(125, bytes(100))) == [(125, bytes(100))]
+    assert reader.receive_bytes(build_frame(125, bytes(101))[:5]) == []
+    assert reader.bad_frames == 1
+    assert reader.buffered_length == 0
+    assert reader.receive_bytes(GOOD.data) == [(GOOD.topic_id, GOOD.payload)]
+
+
+def test_the_robots_own_buffer_length_is_read_by_default():
+    assert FrameReader().receive_bytes(build_frame(125, b"\xff" * 4096)) == [(125, b"\xff" * 4096)]
+
+
+@given(data=st.binary(max_size=3000))
+def test_arbitrary_bytes_never_raise_and_every_byte_is_accounted_for(data):
+    reader = FrameReader(200)
+    frames = reader.receive_bytes(data)
+    assert reader.frames == len(frames)
+    used = sum(len(frame.payload) + 8 for frame in frames)
+    assert used + reader.skipped_bytes + reader.buffered_length == len(data)
+
+
+@given(before=noise, sent=st.lists(st.tuples(topic_ids, payloads), max_size=5), between=noise, data=st.data())
+def test_any_cut_of_a_stream_gives_the_same_frames_and_counters(before, sent, between, data):
+    stream = before + between.join(build_frame(*frame) for frame in sent) + between
+    whole, whole_reader = read_in_pieces(stream, [])
+    cuts = data.draw(st.lists(st.integers(0, len(stream)), max_size=20))
+    pieces, reader = read_in_pieces(stream, cuts)
+    assert pieces == whole
+    assert (reader.frames, reader.bad_frames, reader.skipped_bytes, reader.buffered_length) == (
+        whole_reader.frames,
+        whole_reader.bad_frames,
+        whole_reader.skipped_bytes,
+        whole_reader.buffered_length,
+    )
+
+
+@given(chunks=st.lists(st.one_of(noise, st.binary(max_size=2000)), max_size=20), limit=st.integers(0, 300))
+def test_at_most_one_frame_waits_in_memory(chunks, limit):
+    reader = FrameReader(limit)
+    for chunk in chunks:
+        reader.receive_bytes(chunk)
+        assert reader.buffered_length < limit + 8
+
+
+@given(before=st.binary(max_size=300))
+def test_frames_are_read_again_after_any_noise(before):
+    reader = FrameReader(400)
+    frames = reader.receive_bytes(before + GOOD.data * 100)
+    assert frames[-40:] == [(GOOD.topic_id, GOOD.payload)] * 40
+
+
+@given(topic_id=topic_ids, payload=payloads)
+def test_what_is_encoded_is_read_back(topic_id, payload):
+    data = encode_frame(topic_id, payload)
+    assert data == build_frame(topic_id, payload)
+    assert decode_frame(data) == Frame(topic_id, payload)
+    assert encode_frame(topic_id, bytearray(payload)) == encode_frame(topic_id, memoryview(payload)) == data
+
+
+@given(data=st.binary(max_size=40), topic_id=topic_ids, payload=st.binary(max_size=20))
+def test_decode_frame_takes_one_whole_frame_and_nothing_else(data, topic_id, payload):
+    frame = build_frame(topic_id, payload)
+    assert decode_frame(frame + b"\x00") is None
+    assert decode_frame(b"\x00" + frame) is None
+    assert decode_frame(frame + frame) is None
+    assert decode_frame(frame[:-1]) is None
+    decoded = decode_frame(data)
+    assert decoded is None or build_frame(*decoded) == data
+
+
+@pytest.mark.parametrize("length", [0, 1, 255, 256, 257, 511, 512, 513, 4096, 65535])
+def test_the_sum_of_bytes_is_exact_at_every_length(length):
+    for data in (b"\xff" * length, bytes(range(256)) * 256):
+        assert sum_bytes(data[:length]) == sum(data[:length])
+
+
+@given(data=st.binary(max_size=5000))
+def test_the_sum_of_any_bytes_is_that_of_python(data):
+    assert sum_bytes(data) == sum(data) == sum_bytes(bytearray(data)) == sum_bytes(memoryview(data))
+
+
+@pytest.mark.parametrize("topic_id", [-1, 65536])
+def test_an_id_that_does_not_fit_is_an_error_of_ours(topic_id):
+    with pytest.raises(TopicIdError, match="0..65535"):
+        encode_frame(topic_id, b"")
+    assert issubclass(TopicIdError, RosserialError)
+
+
+def test_a_payload_that_does_not_fit_is_an_error_of_ours():
+    assert decode_frame(encode_frame(1, bytes(65535))) == (1, bytes(65535))
+    with pytest.raises(FrameTooLongError, match="65536"):
+        encode_frame(1, bytes(65536))
+
+
+def test_a_whole_conversation_of_a_real_robot_is_read_without_a_bad_frame(read_capture):
+    reader = FrameReader()
+    frames = reader.receive_bytes(read_capture("A.robot_to_server.bin"))
+    assert len(frames) == 3171
+    assert (reader.bad_frames, reader.skipped_bytes, reader.buffered_length) == (0, 0, 0)
+    assert [frame.topic_id for frame in frames].count(129) == 2180
+    assert b"".join(build_frame(*frame) for frame in frames) == read_capture("A.robot_to_server.bin")
+
+
+def test_a_capture_in_pieces_of_odd_sizes_gives_the_same_frames(read_capture):
+    data = read_capture("A.robot_to_server.bin")[:60000]
+    whole = FrameReader().receive_bytes(data)
+    for size in (1, 7, 536, 1460):
+        assert read_in_pieces(data, range(0, len(data), size))[0] == whole
+
+
+def test_what_a_server_sent_to_a_real_robot_is_read_and_encoded_again(read_capture):
+    data = read_capture("A.server_to_robot.bin")
+    frames = FrameReader().receive_bytes(data)
+    assert len(frames) == 42
+    assert b"".join(encode_frame(*frame) for frame in frames) == data
+
+
+@pytest.mark.parametrize("name", ["C_zero_topics.robot_to_server.bin", "E_imu_hat.robot_to_server.bin"])
+def test_a_capture_that_ends_in_the_middle_of_a_frame_waits_for_its_end(read_capture, name):
+    reader = FrameReader()
+    reader.receive_bytes(read_capture(name))
+    assert reader.bad_frames == 0
+    assert reader.skipped_bytes == 0
+    assert 0 < reader.buffered_length < 735
