@@ -103,7 +103,6 @@ def test_a_frame_with_any_bit_flipped_is_refused_and_counted_and_the_next_is_rea
         broken = bytearray(vector.data)
         broken[bit // 8] ^= 1 << bit % 8
         reader = FrameReader()
-        # Two bad lengths: a flip there may promise up to 4096 bytes, which have to come before it is found out.
         frames = reader.receive_bytes(bytes(broken) + GOOD.data)
         assert frames == [(GOOD.topic_id, GOOD.payload)], "bit %d" % bit
         assert reader.skipped_bytes == len(vector.data)

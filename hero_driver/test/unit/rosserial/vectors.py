@@ -59,13 +59,13 @@ VECTORS = [
     Vector("laser on", bytes.fromhex("ff fe 01 00 fe 65 00 01 99"), 101, b"\x01"),
     Vector(
         "orange light",
-        bytes.fromhex("ff fe 10 00 ef 64 00 0000803f 0000003f 00000000 0000803f df"),
+        bytes.fromhex("ff fe 10 00 ef 64 00 0000803f 0000003f 00000000 0000803f de"),
         100,
         bytes.fromhex("0000803f 0000003f 00000000 0000803f"),
     ),
     Vector(
         "drive 0.1 m/s, turn -1 rad/s",
-        bytes.fromhex("ff fe 30 00 cf 6d 00 9a9999999999b93f") + bytes(38) + bytes.fromhex("f0bf b3"),
+        bytes.fromhex("ff fe 30 00 cf 6d 00 9a9999999999b93f") + bytes(38) + bytes.fromhex("f0bf 54"),
         109,
         bytes.fromhex("9a9999999999b93f") + bytes(38) + bytes.fromhex("f0bf"),
     ),
@@ -73,14 +73,14 @@ VECTORS = [
         "declaration of /tf",
         bytes.fromhex("ff fe 41 00 be 00 00 8100 03000000 2f7466 0c000000 74662f74664d657373616765 20000000")
         + b"94810edda583a504dfda3829e70d7eec"
-        + bytes.fromhex("00100000 0b"),
+        + bytes.fromhex("00100000 67"),
         0,
         bytes.fromhex("8100 03000000") + b"/tf" + bytes.fromhex("0c000000") + b"tf/tfMessage"
         + bytes.fromhex("20000000") + b"94810edda583a504dfda3829e70d7eec" + bytes.fromhex("00100000"),
     ),
     Vector(
         "log line",
-        bytes.fromhex("ff fe 14 00 eb 07 00 01 0f000000") + b"Reseting PID..." + bytes.fromhex("0f"),
+        bytes.fromhex("ff fe 14 00 eb 07 00 01 0f000000") + b"Reseting PID..." + bytes.fromhex("20"),
         7,
         bytes.fromhex("01 0f000000") + b"Reseting PID...",
     ),
