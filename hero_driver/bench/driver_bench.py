@@ -1,0 +1,242 @@
+"""Loads a rosserial TCP server with an emulated swarm and prints one table, and JSON with --json.
+
+Starts its own ROS master, the server, listeners and commanders, each in a process of its own; CPU time is
+taken from the operating system's accounting (/proc). Run it with script/bench driver.
+"""
+
+import argparse
+import json
+import os
+import signal
+import socket
+import statistics
+import subprocess
+import sys
+import time
+import timeit
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+TICKS_PER_S = os.sysconf("SC_CLK_TCK")
+SETTLE_S = 3.0
+
+DRIVER_COMMAND = "rosrun hero_driver hero_driver _port:={port}"
+
+
+def find_free_port():
+    """Return a TCP port that is free now."""
+    with socket.socket() as sock:
+        sock.bind(("127.0.0.1", 0))
+        return sock.getsockname()[1]
+
+
+def measure_machine_us():
+    """Return the time (us) of summing 768 bytes, by which CPU figures of machines are compared."""
+    data = bytes(range(256)) * 3
+    return timeit.timeit(lambda: sum(data), number=100000) * 10.0
+
+
+def read_stolen_and_busy_s():
+    """Return the CPU seconds of the whole machine so far (all but idle and waiting)."""
+    fields = [int(field) for field in Path("/proc/stat").read_text().splitlines()[0].split()[1:9]]
+    return (sum(fields) - fields[3] - fields[4]) / TICKS_PER_S
+
+
+def find_tree(pid):
+    """Return pid and all its descendants."""
+    children = {}
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit():
+            try:
+                parent = int((entry / "stat").read_text().rpartition(")")[2].split()[1])
+            except (OSError, ValueError):
+                continue
+            children.setdefault(parent, []).append(int(entry.name))
+    found, todo = [], [pid]
+    while todo:
+        found.append(todo.pop())
+        todo += children.get(found[-1], [])
+    return found
+
+
+def read_cpu_s(pid):
+    """Return the CPU seconds that the process tree of pid has used."""
+    total = 0
+    for member in find_tree(pid):
+        try:
+            fields = Path("/proc/%d/stat" % member).read_text().rpartition(")")[2].split()
+        except OSError:
+            continue
+        total += int(fields[11]) + int(fields[12])
+    return total / TICKS_PER_S
+
+
+def read_memory_mb(pid):
+    """Return the resident memory (MB) of the process tree of pid."""
+    total_kb = 0
+    for member in find_tree(pid):
+        try:
+            lines = Path("/proc/%d/status" % member).read_text().splitlines()
+        except OSError:
+            continue
+        total_kb += sum(int(line.split()[1]) for line in lines if line.startswith("VmRSS"))
+    return total_kb / 1000.0
+
+
+def percentile_ms(values_s, share):
+    """Return a percentile (ms) of sorted values, None for none."""
+    return None if not values_s else values_s[min(len(values_s) - 1, int(share * len(values_s)))] * 1e3
+
+
+def wait_for_port(port, process):
+    """Return when something listens on port."""
+    deadline_s = time.monotonic() + 30.0
+    while time.monotonic() < deadline_s and process.poll() is None:
+        with socket.socket() as sock:
+            if sock.connect_ex(("127.0.0.1", port)) == 0:
+                return
+        time.sleep(0.05)
+    raise SystemExit("bench: the server does not listen on port %d; see what it printed above" % port)
+
+
+def start(command, environment, **options):
+    """Start a program in a process group of its own."""
+    return subprocess.Popen(command, env=environment, start_new_session=True, text=True, **options)
+
+
+def stop(process, number=signal.SIGINT):
+    """End a program and return what it printed."""
+    if process.poll() is None:
+        os.killpg(process.pid, number)
+    try:
+        return process.communicate(timeout=15)[0]
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)
+        return process.communicate()[0]
+
+
+def run_once(options, count, environment):
+    """Return the figures of one run with count robots."""
+    port = find_free_port()
+    server = start(options.server_command.format(port=port).split(), environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    load = [sys.executable, str(HERE / "ros_load.py")]
+    try:
+        wait_for_port(port, server)
+        # The probe of the port was a connection too: let the server forget it.
+        time.sleep(1.0)
+        arguments = ["--robots", str(count)]
+        listener = start([*load, "listen", *arguments], environment, stdout=subprocess.PIPE)
+        commander = start([*load, "command", *arguments], environment, stdout=subprocess.PIPE)
+        time.sleep(SETTLE_S)
+        swarm = start(
+            [sys.executable, str(HERE / "emulated_swarm.py"), "--port", str(port), *arguments]
+            + ["--seconds", str(options.seconds + 2 * SETTLE_S), "--speed", str(options.speed)],
+            environment,
+            stdout=subprocess.PIPE,
+        )
+        time.sleep(SETTLE_S + count * 0.03)
+        window_start_s = time.time()
+        before = (time.monotonic(), read_cpu_s(server.pid), read_cpu_s(listener.pid), read_stolen_and_busy_s())
+        time.sleep(options.seconds)
+        after = (time.monotonic(), read_cpu_s(server.pid), read_cpu_s(listener.pid), read_stolen_and_busy_s())
+        window_end_s = time.time()
+        memory_mb = read_memory_mb(server.pid)
+        sent = json.loads(swarm.communicate(timeout=120)[0])
+        time.sleep(0.5)
+        listened = json.loads(stop(listener))
+        commanded = json.loads(stop(commander))
+    finally:
+        stop(server)
+    elapsed_s = after[0] - before[0]
+
+    def count_in_window(times_s):
+        return sum(window_start_s <= time_s < window_end_s for time_s in times_s)
+
+    def list_delays_s(pairs):
+        return sorted(end_s - start_s for start_s, end_s in pairs if window_start_s <= start_s < window_end_s)
+
+    ages_s, delays_s = list_delays_s(listened["odoms_s"]), list_delays_s(sent["commands_s"])
+    return {
+        "robots": count,
+        "server_cpu_percent": 100.0 * (after[1] - before[1]) / elapsed_s,
+        "subscriber_cpu_percent": 100.0 * (after[2] - before[2]) / elapsed_s,
+        "machine_busy_cores": (after[3] - before[3]) / elapsed_s,
+        "odom_delivered_percent": 100.0 * len(ages_s) / max(1, count_in_window(sent["odom_stamps_s"])),
+        "transforms_delivered_percent": 100.0 * listened["transforms"] / max(1, sent["transforms"]),
+        "odom_p50_ms": percentile_ms(ages_s, 0.5),
+        "odom_p99_ms": percentile_ms(ages_s, 0.99),
+        "command_delivered_percent": 100.0 * len(delays_s) / max(1, count_in_window(commanded["commands_s"])),
+        "command_p50_ms": percentile_ms(delays_s, 0.5),
+        "command_p99_ms": percentile_ms(delays_s, 0.99),
+        "joined_s": sent["joined_s"],
+        "thrown_out": sent["thrown_out"],
+        "memory_mb": memory_mb,
+    }
+
+
+ROWS = (
+    ("server CPU, % of one core", "server_cpu_percent", "%.1f"),
+    ("subscribing process CPU, %", "subscriber_cpu_percent", "%.1f"),
+    ("odom delivered, %", "odom_delivered_percent", "%.2f"),
+    ("transforms delivered, %", "transforms_delivered_percent", "%.2f"),
+    ("odom latency p50, ms", "odom_p50_ms", "%.2f"),
+    ("odom latency p99, ms", "odom_p99_ms", "%.2f"),
+    ("cmd_vel delivered, %", "command_delivered_percent", "%.2f"),
+    ("cmd_vel latency p50, ms", "command_p50_ms", "%.2f"),
+    ("cmd_vel latency p99, ms", "command_p99_ms", "%.2f"),
+    ("last robot synchronised, s", "joined_s", "%.2f"),
+    ("robots thrown out", "thrown_out", "%d"),
+    ("server memory, MB", "memory_mb", "%.0f"),
+    ("whole machine busy, cores", "machine_busy_cores", "%.2f"),
+)
+
+
+def print_table(results, machine_us):
+    """Print medians over the repeats, one column for each number of robots."""
+    print("sum of 768 bytes: %.2f us" % machine_us)
+    print("| | %s |" % " | ".join("%d robots" % result["robots"] for result in results))
+    print("|---|%s" % ("---|" * len(results)))
+    for title, key, form in ROWS:
+        cells = ["-" if result[key] is None else form % result[key] for result in results]
+        print("| %s | %s |" % (title, " | ".join(cells)))
+
+
+def take_medians(runs):
+    """Return one result from several."""
+    result = {}
+    for key in runs[0]:
+        values = [run[key] for run in runs if run[key] is not None]
+        result[key] = statistics.median(values) if values else None
+    return result
+
+
+def main():
+    """Run from the command line."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--robots", type=int, nargs="+", default=[20, 50, 100])
+    parser.add_argument("--seconds", type=float, default=10.0, help="measured time of one run")
+    parser.add_argument("--repeats", type=int, default=1, help="runs of which the median is printed")
+    parser.add_argument("--speed", type=float, default=1.0, help="multiplies the rates of the robots")
+    parser.add_argument("--server-command", default=DRIVER_COMMAND, help="{port} stands for the port")
+    parser.add_argument("--json", metavar="FILE", help="write the figures there")
+    options = parser.parse_args()
+    master_port = find_free_port()
+    environment = dict(os.environ, ROS_MASTER_URI="http://localhost:%d" % master_port)
+    master = start(["roscore", "-p", str(master_port)], environment, stdout=subprocess.DEVNULL)
+    machine_us = measure_machine_us()
+    try:
+        wait_for_port(master_port, master)
+        results = []
+        for count in options.robots:
+            runs = [run_once(options, count, environment) for _ in range(options.repeats)]
+            results.append(take_medians(runs))
+    finally:
+        stop(master)
+    print_table(results, machine_us)
+    if options.json:
+        report = {"sum_of_768_bytes_us": machine_us, "load_average": os.getloadavg(), "results": results}
+        Path(options.json).write_text(json.dumps(report, indent=2) + "\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,230 @@
+"""Many robots at stock rates as cheaply as possible, to load a rosserial TCP server; no physics.
+
+Prints one JSON line at the end: what was sent, what commands came, how late. Needs neither ROS nor numpy.
+Rates and sizes are those of the stock robot: bursts of odom, five transforms and encoder 29.4 times per
+second, laser 4.98, log 0.98, time request every 2.53 s.
+"""
+
+import argparse
+import heapq
+import json
+import selectors
+import socket
+import struct
+import time
+
+from hero_driver.rosserial import frames, payloads
+from hero_driver.rosserial.payloads import TopicInfo
+
+BURST_PERIOD_S = 0.034
+LASER_PERIOD_S = 0.201
+LOG_PERIOD_S = 1.02
+TIME_PERIOD_S = 2.53
+
+LASER, IMU, ENCODER, TRANSFORMS, ODOM = 125, 127, 128, 129, 130
+LED, LASER_ENABLE, MOTOR, POSITION, VELOCITY = 100, 101, 104, 106, 109
+
+MD5 = {
+    "sensor_msgs/LaserScan": "90c7ef2dc6895d81024acba2ac42f369",
+    "sensor_msgs/Imu": "6a62c6daae103f4ff57a132d6f95cec2",
+    "hero_common/Encoder": "b5586cdbae9b740afc6a1f403a2d7dde",
+    "tf/tfMessage": "94810edda583a504dfda3829e70d7eec",
+    "nav_msgs/Odometry": "cd5e73d190d741a2f92e81eda573aca7",
+    "std_msgs/ColorRGBA": "a29a96539573343b1310c73607334b00",
+    "std_msgs/Bool": "8b94c1b53db61fb6aed406028ad6332a",
+    "hero_common/Motor": "44d4249d207ce6a89de3d72080e4d0b5",
+    "geometry_msgs/Twist": "9f195f881246fdfa2798d1d3eebca84a",
+}
+
+
+def declare(number):
+    """Return the frames with which robot number declares its topics (services are left out)."""
+    prefix = "/hero_%d" % number
+    publishers = (
+        (LASER, prefix + "/laser", "sensor_msgs/LaserScan"),
+        (IMU, prefix + "/imu", "sensor_msgs/Imu"),
+        (ENCODER, prefix + "/encoder", "hero_common/Encoder"),
+        (TRANSFORMS, "/tf", "tf/tfMessage"),
+        (ODOM, prefix + "/odom", "nav_msgs/Odometry"),
+    )
+    subscribers = (
+        (LED, prefix + "/led", "std_msgs/ColorRGBA"),
+        (LASER_ENABLE, prefix[1:] + "/laser_enable", "std_msgs/Bool"),
+        (MOTOR, prefix + "/cmd_motor", "hero_common/Motor"),
+        (POSITION, prefix + "/position_controller/cmd_vel", "geometry_msgs/Twist"),
+        (VELOCITY, prefix + "/velocity_controller/cmd_vel", "geometry_msgs/Twist"),
+    )
+    parts = [frames.encode_frame(frames.ID_TIME, bytes(8))]
+    for frame_id, topics in ((frames.ID_PUBLISHER, publishers), (frames.ID_SUBSCRIBER, subscribers)):
+        for topic_id, name, kind in topics:
+            info = TopicInfo(topic_id, name, kind, MD5[kind], 4096)
+            parts.append(frames.encode_frame(frame_id, payloads.encode_topic_info(info)))
+    return b"".join(parts)
+
+
+def text(value):
+    """Return value as it lies in a message."""
+    return struct.pack("<I", len(value)) + value.encode()
+
+
+class Templates:
+    """The messages of one robot, to which only stamps are added."""
+
+    def __init__(self, number):
+        name = "hero_%d/" % number
+        self.odom_tail = text(name + "odom") + text(name + "base_link") + bytes(680)
+        self.encoder_tail = text(name + "encoder") + bytes(88)
+        pose = struct.pack("<7d", 0, 0, 0, 0, 0, 0, 1)
+        self.transform_tails = [text(name + "odom") + text(name + "base_link") + pose] + [
+            text(name + "base_link") + text(name + child) + pose
+            for child in ("left_wheel_link", "right_wheel_link", "hat_link", "laser_link")
+        ]
+        scan = struct.pack("<7f", -3.1416, 3.1416, 0.395, 0, 0, 0.0368, 0.2368)
+        self.laser_tail = text(name + "laser_link") + scan + (struct.pack("<I", 16) + bytes(64)) * 2
+
+    def make_burst(self, stamp):
+        """Return one burst with stamp (8 bytes)."""
+        encode = frames.encode_frame
+        parts = [encode(ODOM, b"\xff\xff\xff\xff" + stamp + self.odom_tail)]
+        head = b"\x01\0\0\0\0\0\0\0" + stamp
+        parts += [encode(TRANSFORMS, head + tail) for tail in self.transform_tails]
+        parts.append(encode(ENCODER, b"\xff\xff\xff\xff" + stamp + self.encoder_tail))
+        return b"".join(parts)
+
+    def make_laser(self, stamp):
+        """Return one laser frame with stamp (8 bytes)."""
+        return frames.encode_frame(LASER, b"\0\0\0\0" + stamp + self.laser_tail)
+
+
+class EmulatedRobot:
+    """One connection."""
+
+    def __init__(self, number, address, speed):
+        self.number = number
+        self.speed = speed
+        self.templates = Templates(number)
+        self.reader = frames.FrameReader()
+        self.socket = socket.create_connection(address)
+        self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self.socket.setblocking(False)
+        self.synchronised_s = None
+        self.closed = False
+        self.bursts = self.lasers = self.stalls = 0
+        self.stamps_s = []  # when bursts were sent
+        self.commands_s = []  # pairs: when a command was sent, when it came
+
+    def send(self, data):
+        """Send all of data; a server that does not read is counted and waited for."""
+        view = memoryview(data)
+        while view:
+            try:
+                view = view[self.socket.send(view) :]
+            except BlockingIOError:
+                self.stalls += 1
+                time.sleep(0.001)
+            except OSError:
+                self.closed = True
+                return
+
+    def receive(self, now_s):
+        """Take what the server sends; return whether the handshake was completed by it."""
+        try:
+            data = self.socket.recv(65536)
+        except OSError:
+            data = b""
+        if not data:
+            self.closed = True
+            return False
+        is_new = False
+        for topic_id, payload in self.reader.receive_bytes(data):
+            if topic_id == frames.ID_PUBLISHER:
+                self.send(declare(self.number))
+            elif topic_id == frames.ID_TIME and self.synchronised_s is None:
+                self.synchronised_s = now_s
+                is_new = True
+            elif topic_id == VELOCITY:
+                # The commander writes the time of sending into linear.y, which robots ignore.
+                self.commands_s.append((struct.unpack_from("<d", payload, 8)[0], time.time()))
+        return is_new
+
+
+def run(address, count, seconds, speed, first=0):
+    """Return the result of count robots for seconds after all have joined."""
+    started_s = time.monotonic()
+    robots = [EmulatedRobot(first + index, address, speed) for index in range(count)]
+    selector = selectors.DefaultSelector()
+    for robot in robots:
+        selector.register(robot.socket, selectors.EVENT_READ, robot)
+    due = []
+    order = 0
+    all_joined_s = None
+    measure_end_s = started_s + seconds + 30.0
+    while True:
+        now_s = time.monotonic()
+        if now_s >= measure_end_s:
+            break
+        timeout_s = max(0.0, due[0][0] - now_s) if due else 0.05
+        for key, _ in selector.select(min(timeout_s, 0.05)):
+            robot = key.data
+            if robot.receive(time.monotonic()):
+                phase_s = BURST_PERIOD_S * (robot.number * 0.618 % 1.0)
+                for kind in ("burst", "laser", "log", "time"):
+                    order += 1
+                    heapq.heappush(due, (time.monotonic() + phase_s, order, kind, robot))
+            if robot.closed:
+                selector.unregister(robot.socket)
+        if all_joined_s is None and all(robot.synchronised_s is not None for robot in robots):
+            all_joined_s = max(robot.synchronised_s for robot in robots)
+            measure_end_s = time.monotonic() + seconds
+        now_s = time.monotonic()
+        while due and due[0][0] <= now_s:
+            due_s, _, kind, robot = heapq.heappop(due)
+            if robot.closed:
+                continue
+            time_ns = time.time_ns()
+            stamp = struct.pack("<II", *divmod(time_ns, 10**9))
+            if kind == "burst":
+                robot.send(robot.templates.make_burst(stamp))
+                robot.bursts += 1
+                robot.stamps_s.append(time_ns / 1e9)
+                period_s = BURST_PERIOD_S
+            elif kind == "laser":
+                robot.send(robot.templates.make_laser(stamp))
+                robot.lasers += 1
+                period_s = LASER_PERIOD_S
+            elif kind == "log":
+                line = "\x1b[96m[/hero_%d] Conected at time %d\x1b[0m" % (robot.number, now_s * 1000 % 10**9)
+                robot.send(frames.encode_frame(frames.ID_LOG, payloads.encode_log(payloads.Log(1, line))))
+                period_s = LOG_PERIOD_S
+            else:
+                robot.send(frames.encode_frame(frames.ID_TIME, bytes(8)))
+                period_s = TIME_PERIOD_S
+            order += 1
+            heapq.heappush(due, (due_s + period_s / speed, order, kind, robot))
+    return {
+        "joined_s": None if all_joined_s is None else all_joined_s - started_s,
+        "thrown_out": sum(robot.closed for robot in robots),
+        "transforms": 5 * sum(robot.bursts for robot in robots),
+        "lasers": sum(robot.lasers for robot in robots),
+        "stalls": sum(robot.stalls for robot in robots),
+        "odom_stamps_s": [stamp_s for robot in robots for stamp_s in robot.stamps_s],
+        "commands_s": [pair for robot in robots for pair in robot.commands_s],
+    }
+
+
+def main():
+    """Run from the command line."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--host", default="127.0.0.1")
+    parser.add_argument("--port", type=int, default=11411)
+    parser.add_argument("--robots", type=int, default=20)
+    parser.add_argument("--first-id", type=int, default=0)
+    parser.add_argument("--seconds", type=float, default=10.0, help="time after the last robot has joined")
+    parser.add_argument("--speed", type=float, default=1.0, help="multiplies all rates")
+    options = parser.parse_args()
+    address = (options.host, options.port)
+    print(json.dumps(run(address, options.robots, options.seconds, options.speed, options.first_id)))
+
+
+if __name__ == "__main__":
+    main()
