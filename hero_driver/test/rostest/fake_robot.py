@@ -59,7 +59,11 @@ STOCK_DECLARATIONS = (
     Declaration(SUB, 100, "/{}/led", "std_msgs/ColorRGBA", "a29a96539573343b1310c73607334b00"),
     Declaration(SUB, 101, "{}/laser_enable", "std_msgs/Bool", "8b94c1b53db61fb6aed406028ad6332a"),
     Declaration(
-        REQUESTS, 102, "/{}/ir_calibration", "hero_common/SetIRCalibration", "27748d949ad62e65750ad22074426005"
+        REQUESTS,
+        102,
+        "/{}/ir_calibration",
+        "hero_common/SetIRCalibration",
+        "27748d949ad62e65750ad22074426005",
     ),
     Declaration(REQUESTS, 103, "/{}/set_odom", "hero_common/SetOdom", "938fa65709584ad8e77d238529be13b8"),
     Declaration(SUB, 104, "/{}/cmd_motor", "hero_common/Motor", "44d4249d207ce6a89de3d72080e4d0b5"),
@@ -129,9 +133,9 @@ def encode_answer(success: bool, message: str) -> bytes:
 
 def boot_line(name: str, firmware: str = "v3.8") -> str:
     """Return what a robot says first after power-on."""
-    return (
-        "\x1b[94m[/%s] Firmware: %s | Hardware: v2.5 | Config: v2.3 | IP: 10.42.0.17 \x1b[0m"
-        % (name, firmware)
+    return "\x1b[94m[/%s] Firmware: %s | Hardware: v2.5 | Config: v2.3 | IP: 10.42.0.17 \x1b[0m" % (
+        name,
+        firmware,
     )
 
 

@@ -1,0 +1,260 @@
+"""What the rostests of the driver share: waiting for conditions, watching topics, and drivers with own parameters."""
+
+import os
+import re
+import signal
+import subprocess
+import threading
+import time
+import unittest
+
+import rosgraph
+import roslib.packages
+import rospy
+from fake_robot import FakeRobot
+from rosgraph_msgs.msg import Log as RosLog
+
+from hero_msgs.msg import Robot, RobotArray
+
+DEADLINE_S = 20.0
+NODE = "/hero_driver"
+
+
+def wait_for(condition, what, deadline_s=DEADLINE_S):
+    """Return the first true value of condition(); fail with what was waited for."""
+    end_s = time.monotonic() + deadline_s
+    while True:
+        value = condition()
+        if value:
+            return value
+        if time.monotonic() > end_s:
+            raise AssertionError("waited %g s for %s" % (deadline_s, what() if callable(what) else what))
+        time.sleep(0.005)
+
+
+class Recorder:
+    """All messages of one topic, in order of arrival."""
+
+    def __init__(self, topic, message_class, connected=True):
+        """With connected, return only when a publisher is connected."""
+        self.topic = topic
+        self.messages = []
+        self.subscriber = rospy.Subscriber(
+            topic, message_class, self.messages.append, queue_size=None, tcp_nodelay=True
+        )
+        if connected:
+            self.wait_connected()
+
+    def wait_connected(self):
+        """Wait until a publisher sends to this recorder."""
+        wait_for(lambda: self.subscriber.get_num_connections() > 0, "a publisher of " + self.topic)
+
+    def wait_count(self, count):
+        """Wait for so many messages; return them."""
+        wait_for(
+            lambda: len(self.messages) >= count,
+            lambda: "%d messages on %s, got %d" % (count, self.topic, len(self.messages)),
+        )
+        return self.messages
+
+    def wait_message(self, condition, what):
+        """Return the first message that condition() likes."""
+        return wait_for(lambda: next(filter(condition, list(self.messages)), None), what)
+
+
+def wait_payloads(robot, name, count=1):
+    """Return the first payloads that a robot received on a topic or service, once it has so many."""
+    wait_for(
+        lambda: len(robot.payloads_on(name)) >= count,
+        lambda: "%d payloads on %s at %s, got %d" % (count, name, robot.name, len(robot.payloads_on(name))),
+    )
+    return robot.payloads_on(name)[:count]
+
+
+def wait_frames(robot, topic_id, count=1):
+    """Return the first payloads that a robot received under an id, once it has so many."""
+    wait_for(
+        lambda: len(robot.payloads_with_id(topic_id)) >= count,
+        lambda: "%d frames %d at %s" % (count, topic_id, robot.name),
+    )
+    return robot.payloads_with_id(topic_id)[:count]
+
+
+def make_publisher(topic, message_class, connected=True):
+    """Return a publisher that is connected to the driver."""
+    publisher = rospy.Publisher(topic, message_class, queue_size=200, tcp_nodelay=True)
+    if connected:
+        wait_for(lambda: publisher.get_num_connections() > 0, "a subscriber of " + topic)
+    return publisher
+
+
+def list_publishers(topic):
+    """Return the nodes that publish a topic, by the master."""
+    return dict(rosgraph.Master("/test").getSystemState()[0]).get(topic, [])
+
+
+def list_driver_topics(namespace, node=NODE):
+    """Return the topics and services below namespace that the driver offers, by the master."""
+    state = rosgraph.Master("/test").getSystemState()
+    return sorted(
+        name for part in state for name, nodes in part if name.startswith(namespace + "/") and node in nodes
+    )
+
+
+class Fleet:
+    """The driver's report about its robots, as the newest message on ~robots."""
+
+    def __init__(self, node=NODE):
+        self.newest = None
+        self._subscriber = rospy.Subscriber(node + "/robots", RobotArray, self._receive, tcp_nodelay=True)
+
+    def _receive(self, message):
+        self.newest = message
+
+    def close(self):
+        """End the subscription."""
+        self._subscriber.unregister()
+
+    @property
+    def address(self):
+        """Where robots dial, as (host, port)."""
+        wait_for(lambda: self.newest is not None, "the driver's first report")
+        port = int(self.newest.listening.rsplit(":", 1)[1])
+        return ("127.0.0.1", port)
+
+    def find(self, namespace, state=None):
+        """Return the entry of a robot (in a state), None if there is none."""
+        for robot in self.newest.robots if self.newest else ():
+            if robot.namespace == namespace and (state is None or robot.state == state):
+                return robot
+        return None
+
+    def wait(self, namespace, state, what="", condition=lambda robot: True):
+        """Return the entry of a robot once it is in a state and condition() likes it."""
+
+        def look():
+            robot = self.find(namespace, state)
+            return robot if robot is not None and condition(robot) else None
+
+        return wait_for(look, lambda: "%s in state %d %s, last: %s" % (namespace, state, what, self.newest))
+
+    def wait_ready(self, namespace):
+        """Wait until a robot has joined."""
+        return self.wait(namespace, Robot.READY)
+
+    def wait_gone(self, namespace):
+        """Wait until a robot is forgotten."""
+        wait_for(lambda: self.find(namespace) is None, namespace + " to be forgotten")
+
+
+class DriverCase(unittest.TestCase):
+    """Tests of the driver that the .test file starts."""
+
+    node = NODE
+
+    @classmethod
+    def setUpClass(cls):
+        cls.fleet = Fleet(cls.node)
+        cls.rosout = Recorder("/rosout", RosLog, connected=False)
+        wait_for(
+            lambda: cls.node in dict(rosgraph.Master("/test").getSystemState()[0]).get("/rosout", []),
+            "the driver",
+        )
+        cls.address = cls.fleet.address
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.fleet.close()
+
+    def join(self, number, ready=True, **settings):
+        """Return a robot that has dialled in, and joined with ready; it leaves after the test."""
+        robot = FakeRobot(number, **settings)
+        self.addCleanup(robot.close)
+        robot.connect(self.address)
+        if ready:
+            self.fleet.wait_ready(robot.namespace)
+        return robot
+
+    def find_logs(self, pattern):
+        """Return the driver's log lines that match a pattern."""
+        return [
+            line
+            for line in list(self.rosout.messages)
+            if line.name == self.node and re.search(pattern, line.msg)
+        ]
+
+    def wait_log(self, pattern):
+        """Return the first line of the driver's log that matches a pattern."""
+        return wait_for(
+            lambda: self.find_logs(pattern),
+            lambda: "%r among %s" % (pattern, [line.msg for line in self.rosout.messages]),
+        )[0]
+
+
+class DriverProcess:
+    """A driver with parameters of its own, for tests that end it or start it wrong; use it with `with`."""
+
+    _count = 0
+
+    def __init__(self, parameters=None, arguments=(), name=""):
+        """Start it; parameters: name -> value, any free port unless they say otherwise."""
+        DriverProcess._count += 1
+        self.node = "/" + (name or "driver_%d_%d" % (os.getpid(), DriverProcess._count))
+        for key, value in {"port": 0, **(parameters or {})}.items():
+            rospy.set_param("%s/%s" % (self.node, key), value)
+        executable = roslib.packages.find_node("hero_driver", "hero_driver")[0]
+        self.process = subprocess.Popen(
+            [executable, "__name:=" + self.node[1:], *arguments],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            universal_newlines=True,
+            start_new_session=True,
+        )
+        self.lines = []
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+        self.fleet = Fleet(self.node)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.fleet.close()
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGINT)
+        self.wait_end()
+
+    @property
+    def address(self):
+        """Where robots dial, as (host, port)."""
+        wait_for(
+            lambda: self.fleet.newest is not None or self.process.poll() is not None,
+            "the driver's first report",
+        )
+        if self.fleet.newest is None:
+            raise AssertionError("the driver ended: %s" % self.lines)
+        return self.fleet.address
+
+    def find_lines(self, pattern):
+        """Return what it printed that matches a pattern."""
+        return [line for line in list(self.lines) if re.search(pattern, line)]
+
+    def wait_line(self, pattern):
+        """Return the first line that it prints that matches a pattern."""
+        return wait_for(lambda: self.find_lines(pattern), lambda: "%r among %s" % (pattern, self.lines))[0]
+
+    def wait_end(self):
+        """Return its exit code; what it printed is complete then."""
+        try:
+            code = self.process.wait(DEADLINE_S)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            raise
+        self._reader.join()
+        self.process.stdout.close()
+        return code
+
+    def _read(self):
+        for line in self.process.stdout:
+            self.lines.append(line.rstrip("\n"))

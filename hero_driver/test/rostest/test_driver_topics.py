@@ -1,0 +1,253 @@
+#!/usr/bin/env python
+"""Topics of stock robots through the driver, both ways, and the handshakes that robots get wrong."""
+
+import struct
+import unittest
+from pathlib import Path
+
+import rosgraph
+import rospy
+import rosservice
+import rostest
+import stock_messages
+from driver_case import (
+    DriverCase,
+    Recorder,
+    list_driver_topics,
+    make_publisher,
+    wait_for,
+    wait_frames,
+    wait_payloads,
+)
+from fake_robot import STOCK_DECLARATIONS, SUB, TIME_FRAME, FakeRobot, boot_line, heartbeat_line
+from geometry_msgs.msg import Twist
+from hero_driver.rosserial import frames, payloads
+from nav_msgs.msg import Odometry
+from rosgraph_msgs.msg import Log as RosLog
+from sensor_msgs.msg import Imu
+from std_msgs.msg import Bool, ColorRGBA
+
+from hero_msgs.msg import Encoder, Motor
+
+CAPTURES = Path(__file__).resolve().parents[4] / "shared" / "captures"
+
+PUBLISHED = {
+    "laser": "sensor_msgs/LaserScan",
+    "proximity": "sensor_msgs/LaserScan",
+    "imu": "sensor_msgs/Imu",
+    "encoder": "hero_msgs/Encoder",
+    "odom": "nav_msgs/Odometry",
+    "odom_raw": "nav_msgs/Odometry",
+}
+SUBSCRIBED = {
+    "led": "std_msgs/ColorRGBA",
+    "laser_enable": "std_msgs/Bool",
+    "cmd_motor": "hero_msgs/Motor",
+    "position_controller/cmd_vel": "geometry_msgs/Twist",
+    "velocity_controller/cmd_vel": "geometry_msgs/Twist",
+}
+SERVICES = {
+    "ir_calibration": "hero_msgs/SetIRCalibration",
+    "set_odom": "hero_msgs/SetOdom",
+    "motors_parameters": "hero_msgs/SetMotor",
+    "position_controller/pid_parameters": "hero_msgs/SetPID",
+    "position_controller/pid_calibration": "std_srvs/Trigger",
+    "velocity_controller/pid_parameters": "hero_msgs/SetPID",
+    "velocity_controller/pid_calibration": "std_srvs/Trigger",
+}
+
+
+class TestDriverTopics(DriverCase):
+    def wait_topics(self, namespace):
+        expected = sorted("%s/%s" % (namespace, name) for name in {**PUBLISHED, **SUBSCRIBED, **SERVICES})
+        wait_for(
+            lambda: list_driver_topics(namespace) == expected,
+            lambda: "%s, there are %s" % (expected, list_driver_topics(namespace)),
+        )
+
+    def test_every_stock_topic_and_service_appears_with_its_type(self):
+        self.join(1)
+        self.wait_topics("/hero_1")
+        types = dict(rosgraph.Master("/test").getTopicTypes())
+        for name, ros_type in {**PUBLISHED, **SUBSCRIBED}.items():
+            self.assertEqual(types["/hero_1/" + name], ros_type)
+        self.assertEqual(types["/tf"], "tf2_msgs/TFMessage")
+        for name, ros_type in SERVICES.items():
+            self.assertEqual(rosservice.get_service_type("/hero_1/" + name), ros_type)
+
+    def test_what_a_robot_publishes_arrives_with_its_content(self):
+        robot = self.join(2)
+        encoders, imus = Recorder("/hero_2/encoder", Encoder), Recorder("/hero_2/imu", Imu)
+        stamp = rospy.Time.now()
+        robot.send("encoder", stock_messages.make_encoder("hero_2", stamp, 5.0, -7.0))
+        robot.send("imu", stock_messages.make_imu("hero_2", stamp))
+        encoder, imu = encoders.wait_count(1)[0], imus.wait_count(1)[0]
+        self.assertEqual((encoder.left_ticks, encoder.right_ticks), (5.0, -7.0))
+        self.assertEqual((encoder.header.frame_id, encoder.header.stamp), ("hero_2/encoder", stamp))
+        self.assertEqual(
+            imu.orientation.z,
+            stock_messages.from_bytes(Imu, stock_messages.make_imu("", stamp)).orientation.z,
+        )
+
+    def test_commands_reach_the_robot_byte_for_byte_under_the_ids_it_declared(self):
+        robot = self.join(3)
+        for name, message in (
+            ("led", ColorRGBA(0.25, 0.5, 0.75, 1.0)),
+            ("laser_enable", Bool(True)),
+            ("cmd_motor", Motor(1400, 1600)),
+            ("velocity_controller/cmd_vel", Twist()),
+            ("position_controller/cmd_vel", Twist()),
+        ):
+            message_bytes = stock_messages.to_bytes(message)
+            make_publisher("/hero_3/" + name, type(message)).publish(message)
+            self.assertEqual(wait_payloads(robot, name), [message_bytes])
+
+    def test_two_robots_do_not_mix(self):
+        first, second = self.join(4), self.join(5)
+        odoms = {robot: Recorder(robot.namespace + "/odom_raw", Odometry) for robot in (first, second)}
+        for index, robot in enumerate((first, second, first, second, first)):
+            robot.send("odom", stock_messages.make_odom(robot.name, rospy.Time.now(), float(index)))
+        self.assertEqual([m.pose.pose.position.x for m in odoms[first].wait_count(3)], [0.0, 2.0, 4.0])
+        self.assertEqual([m.pose.pose.position.x for m in odoms[second].wait_count(2)], [1.0, 3.0])
+        lights = {robot: make_publisher(robot.namespace + "/led", ColorRGBA) for robot in (first, second)}
+        for index in range(10):
+            lights[first].publish(ColorRGBA(1.0, float(index), 0.0, 0.0))
+            lights[second].publish(ColorRGBA(2.0, float(index), 0.0, 0.0))
+        for red, robot in ((1.0, first), (2.0, second)):
+            colours = [struct.unpack("<4f", payload)[:2] for payload in wait_payloads(robot, "led", 10)]
+            self.assertEqual(colours, [(red, float(index)) for index in range(10)])
+
+    def test_a_robot_that_returns_with_other_ids_gets_only_those(self):
+        robot = self.join(6)
+        light = make_publisher("/hero_6/led", ColorRGBA)
+        light.publish(ColorRGBA(1.0, 0.0, 0.0, 0.0))
+        wait_frames(robot, 100)
+        robot.close()
+        self.fleet.wait("/hero_6", 2)
+        # An older firmware: without laser_enable and with its slots in another order.
+        older = [
+            entry._replace(topic_id=entry.topic_id + 7) if entry.kind == SUB else entry
+            for entry in STOCK_DECLARATIONS
+            if "laser_enable" not in entry.name
+        ]
+        returned = self.join(6, declarations=older)
+        light.publish(ColorRGBA(2.0, 0.0, 0.0, 0.0))
+        wait_frames(returned, 107)
+        switch = make_publisher("/hero_6/laser_enable", Bool)
+        switch.publish(Bool(True))
+        light.publish(ColorRGBA(3.0, 0.0, 0.0, 0.0))
+        wait_frames(returned, 107, 2)
+        declared = {entry.topic_id for entry in older} | {frames.ID_PUBLISHER, frames.ID_TIME}
+        self.assertEqual({frame.topic_id for frame in returned.received} - declared, set())
+
+    def test_a_command_that_does_not_fit_the_robots_buffer_is_not_sent(self):
+        small = [
+            entry._replace(buffer_length=8) if entry.name.endswith("/led") else entry
+            for entry in STOCK_DECLARATIONS
+        ]
+        robot = self.join(7, declarations=small)
+        make_publisher("/hero_7/led", ColorRGBA).publish(ColorRGBA())
+        self.wait_log("hero_7: .*/hero_7/led.*16 bytes.*8 bytes")
+        make_publisher("/hero_7/laser_enable", Bool).publish(Bool(True))
+        wait_payloads(robot, "laser_enable")
+        self.assertEqual(robot.payloads_on("led"), [])
+
+    def test_each_time_request_is_answered_with_ros_time(self):
+        robot = self.join(8)
+        before = len(robot.payloads_with_id(frames.ID_TIME))
+        earliest = rospy.Time.now()
+        for count in range(1, 4):
+            robot.send_bytes(TIME_FRAME)
+            wait_frames(robot, frames.ID_TIME, before + count)
+        times = [payloads.decode_time(payload) for payload in robot.payloads_with_id(frames.ID_TIME)[before:]]
+        for secs, nsecs in times:
+            self.assertLessEqual(earliest.to_nsec(), secs * 10**9 + nsecs)
+            self.assertLessEqual(secs * 10**9 + nsecs, rospy.Time.now().to_nsec())
+
+    def test_a_robot_that_answers_the_first_request_without_topics_is_asked_again(self):
+        robot = self.join(9, ready=False, declarations=[])
+        wait_for(lambda: robot.requests == 1, "the first request")
+        # Now it advertises, but believes that it is configured and streams ids that it never declared.
+        robot.declarations = FakeRobot(9).declarations
+        robot.send("encoder", stock_messages.make_encoder("hero_9", rospy.Time(2), 0.0, 0.0))
+        self.fleet.wait_ready("/hero_9")
+        self.wait_topics("/hero_9")
+
+    def test_a_robot_that_streams_before_the_handshake_joins(self):
+        robot = FakeRobot(10)
+        self.addCleanup(robot.close)
+        robot.declares = False
+        robot.connect(self.address)
+        robot.send("encoder", stock_messages.make_encoder("hero_10", rospy.Time.now(), 1.0, 1.0))
+        robot.declares = True
+        self.fleet.wait_ready("/hero_10")
+        encoders = Recorder("/hero_10/encoder", Encoder)
+        robot.send("encoder", stock_messages.make_encoder("hero_10", rospy.Time.now(), 2.0, 2.0))
+        self.assertEqual(encoders.wait_count(1)[0].left_ticks, 2.0)
+
+    def test_a_robot_that_declares_the_same_again_changes_nothing(self):
+        robot = self.join(11)
+        encoders = Recorder("/hero_11/encoder", Encoder)
+        for count in range(1, 4):
+            robot.declare()
+            robot.send("encoder", stock_messages.make_encoder("hero_11", rospy.Time.now(), float(count), 0.0))
+        self.assertEqual([message.left_ticks for message in encoders.wait_count(3)], [1.0, 2.0, 3.0])
+        self.assertEqual(encoders.subscriber.get_num_connections(), 1)
+        self.assertEqual(self.fleet.find("/hero_11").reconnects, 0)
+
+    def test_log_lines_reach_rosout_with_level_and_name_and_without_colours(self):
+        robot = self.join(12)
+        robot.log("\x1b[91m[hero_12] IMU is not working\x1b[0m", payloads.LOG_WARN)
+        robot.log("Reseting PID...\n[FATAL] forged\x07line", payloads.LOG_INFO)
+        robot.log("the end", payloads.LOG_ERROR)
+        self.assertEqual(self.wait_log("the end").level, RosLog.ERROR)
+        lines = {line.msg: line.level for line in self.find_logs("^hero_12: ")}
+        self.assertEqual(lines["hero_12: IMU is not working"], RosLog.WARN)
+        self.assertEqual(lines["hero_12: Reseting PID... [FATAL] forged line"], RosLog.INFO)
+        self.assertFalse([text for text in lines if "\x1b" in text or "\n" in text or "\x07" in text])
+
+    def test_the_heartbeat_is_read_but_not_logged(self):
+        robot = self.join(13)
+        robot.log(heartbeat_line("hero_13", 421.5))
+        robot.log("after the heartbeat")
+        self.wait_log("after the heartbeat")
+        self.assertEqual(
+            [line.msg for line in self.find_logs("onected at time") if line.level > RosLog.DEBUG], []
+        )
+        self.fleet.wait("/hero_13", 1, "with uptime", lambda entry: 421 <= entry.uptime.to_sec() < 500)
+
+    def test_the_boot_line_before_the_request_gives_versions_and_reaches_the_log(self):
+        robot = FakeRobot(14)
+        self.addCleanup(robot.close)
+        robot.declares = False
+        robot.connect(self.address)
+        robot.log(boot_line("hero_14"))
+        robot.declares = True
+        entry = self.fleet.wait("/hero_14", 1, "with versions", lambda entry: entry.firmware)
+        self.assertEqual((entry.firmware, entry.hardware, entry.config), ("v3.8", "v2.5", "v2.3"))
+        self.wait_log("^hero_14: Firmware: v3.8")
+
+    @unittest.skipUnless(CAPTURES.is_dir(), "no captures here")
+    def test_the_recorded_bytes_of_a_stock_robot_give_its_topics_and_messages(self):
+        recorded = (CAPTURES / "A.robot_to_server.bin").read_bytes()
+        robot = FakeRobot(0, declarations=[])
+        self.addCleanup(robot.close)
+        robot.connect(self.address)
+        robot.send_bytes(recorded[:8000])
+        self.fleet.wait_ready("/hero_0")
+        self.wait_topics("/hero_0")
+        odoms, encoders = Recorder("/hero_0/odom_raw", Odometry), Recorder("/hero_0/encoder", Encoder)
+        robot.send_bytes(recorded[8000:])
+        sent = frames.FrameReader().receive_bytes(recorded)
+        later = frames.FrameReader().receive_bytes(recorded[8000:])
+        odoms.wait_count(sum(frame.topic_id == 130 for frame in later))
+        encoders.wait_count(sum(frame.topic_id == 128 for frame in later))
+        self.assertEqual(
+            stock_messages.to_bytes(odoms.messages[-1]), [f.payload for f in sent if f.topic_id == 130][-1]
+        )
+        self.assertEqual(self.fleet.find("/hero_0").firmware, "v3.8")
+
+
+if __name__ == "__main__":
+    rospy.init_node("test_driver_topics")
+    rostest.rosrun("hero_driver", "driver_topics", TestDriverTopics)
