@@ -1,0 +1,37 @@
+"""README, YAML file, launch file and code tell the same of every parameter."""
+
+import xml.etree.ElementTree
+from pathlib import Path
+
+import documented_parameters
+import yaml
+
+from hero_driver.config import DriverConfig, read_config
+
+PACKAGE = Path(__file__).resolve().parents[2]
+
+
+def test_the_readme_lists_every_parameter_with_default_unit_and_range():
+    section = (PACKAGE / "README.md").read_text().split("## Parameters")[1].split("\n## ")[0]
+    rows = [line for line in section.splitlines() if line.startswith("| `")]
+    assert rows == documented_parameters.make_rows()
+
+
+def test_the_yaml_file_holds_every_parameter_at_its_default():
+    text = (PACKAGE / "config" / "hero_driver.yaml").read_text()
+    assert text == documented_parameters.make_yaml()
+    assert read_config(yaml.safe_load(text)) == DriverConfig()
+
+
+def test_the_launch_file_has_the_defaults_of_the_code():
+    root = xml.etree.ElementTree.parse(str(PACKAGE / "launch" / "hero_driver.launch")).getroot()
+    arguments = {argument.get("name"): argument.get("default") for argument in root.iter("arg")}
+    defaults = DriverConfig()
+    assert arguments["host"] == defaults.host
+    assert arguments["port"] == str(defaults.port)
+    assert {name for name in arguments if name != "config"} <= set(DriverConfig.__dataclass_fields__)
+
+
+def test_the_launch_file_says_what_each_argument_means():
+    root = xml.etree.ElementTree.parse(str(PACKAGE / "launch" / "hero_driver.launch")).getroot()
+    assert all(argument.get("doc") for argument in root.iter("arg"))
