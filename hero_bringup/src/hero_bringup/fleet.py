@@ -242,7 +242,7 @@ class FleetProgram:
         while self._going():
             time.sleep(max(0.0, min(DRAW_PERIOD_S, self._seconds_left())))
             self._read()
-            if time.monotonic() >= next_print_s:
+            if time.monotonic() >= next_print_s and self._seconds_left() > DRAW_PERIOD_S:
                 next_print_s += self._options.period
                 self.print_fleet()
         self.print_fleet()
