@@ -120,6 +120,7 @@ class Firmware:
         self.commands = CommandTable(self)
         self._declarations = declarations.encode_declarations(self.name)
         self.configured = False
+        self.crash_reason = None
         self.outbox.clear()
         self.wants_connection = False
         self._received = bytearray()

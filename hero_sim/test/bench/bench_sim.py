@@ -1,0 +1,192 @@
+"""What the simulator costs: CPU at real time behind real sockets, and how fast it could run.
+
+    PYTHONPATH=hero_sim/src:hero_driver/src python3 hero_sim/test/bench/bench_sim.py [--robots 1,10]
+    [--seconds 10]
+
+A small server in this process takes the driver's place: it requests topics, answers the time, and drives
+every robot in a circle ten times a second. The simulator runs as a process of its own, whose CPU time is
+counted.
+"""
+
+import argparse
+import os
+import selectors
+import socket
+import struct
+import subprocess
+import sys
+import time
+from typing import Dict, List, NamedTuple, Optional
+
+from hero_driver.rosserial import frames, payloads
+from hero_sim import declarations
+from hero_sim.build import build_swarm
+from hero_sim.main import build_parser
+
+_STOCK_ODOM_HZ = 29.27
+_TWIST = frames.encode_frame(declarations.ID_VELOCITY_CMD_VEL, struct.pack("<6d", 0.08, 0, 0, 0, 0, 0.6))
+_SETTLE_S = 4.0
+
+
+class Measurement(NamedTuple):
+    """One row of the table."""
+
+    robots: int
+    cpu_percent: float  # of one core
+    odom_share: float  # odoms that came, of those due at the stock rate
+    fastest: float  # simulated seconds per second with nothing else to do
+
+
+class _Peer:
+    def __init__(self, sock: socket.socket) -> None:
+        self.socket = sock
+        self.reader = frames.FrameReader()
+        self.odoms = 0
+        self.requested = False
+        self.came_s = time.monotonic()
+
+
+class _Server:
+    """Stands for the driver."""
+
+    def __init__(self) -> None:
+        self._listener = socket.socket()
+        self._listener.bind(("127.0.0.1", 0))
+        self._listener.listen(256)
+        self.port = self._listener.getsockname()[1]
+        self.peers: List[_Peer] = []
+        self._selector = selectors.DefaultSelector()
+        self._selector.register(self._listener, selectors.EVENT_READ, None)
+
+    def run(self, seconds: float) -> None:
+        end_s = time.monotonic() + seconds
+        drive_s = 0.0
+        while time.monotonic() < end_s:
+            for key, _ in self._selector.select(0.02):
+                if key.data is None:
+                    self._accept()
+                else:
+                    self._receive(key.data)
+            now_s = time.monotonic()
+            for peer in self.peers:
+                if not peer.requested and now_s - peer.came_s > 1.3:
+                    peer.requested = True
+                    peer.socket.sendall(frames.encode_frame(frames.ID_PUBLISHER, b""))
+            if now_s - drive_s > 0.1:
+                drive_s = now_s
+                for peer in self.peers:
+                    if peer.odoms:
+                        peer.socket.sendall(_TWIST)
+
+    def _accept(self) -> None:
+        sock, _ = self._listener.accept()
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        peer = _Peer(sock)
+        self.peers.append(peer)
+        self._selector.register(sock, selectors.EVENT_READ, peer)
+
+    def _receive(self, peer: _Peer) -> None:
+        for frame in peer.reader.receive_bytes(peer.socket.recv(65536)):
+            if frame.topic_id == declarations.ID_ODOM:
+                peer.odoms += 1
+            elif frame.topic_id == frames.ID_TIME:
+                now = payloads.split_seconds(time.time())
+                peer.socket.sendall(frames.encode_frame(frames.ID_TIME, payloads.encode_time(now)))
+
+    def close(self) -> None:
+        for peer in self.peers:
+            peer.socket.close()
+        self._listener.close()
+        self._selector.close()
+
+
+def _read_cpu_s(pid: int) -> float:
+    with open("/proc/%d/stat" % pid, encoding="ascii") as file:
+        fields = file.read().rsplit(")", 1)[1].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def measure(robots: int, seconds: float) -> Measurement:
+    """Run so many robots for so long behind a server of ours."""
+    server = _Server()
+    command = [
+        sys.executable,
+        "-m",
+        "hero_sim",
+        "--robots",
+        str(robots),
+        "--port",
+        str(server.port),
+        "--quiet",
+    ]
+    process = subprocess.Popen(command)
+    try:
+        server.run(_SETTLE_S)
+        if len(server.peers) < robots or process.poll() is not None:
+            raise RuntimeError(
+                "only %d of %d robots came within %g s" % (len(server.peers), robots, _SETTLE_S)
+            )
+        before = sum(peer.odoms for peer in server.peers)
+        cpu_s, start_s = _read_cpu_s(process.pid), time.monotonic()
+        server.run(seconds)
+        cpu_s, elapsed_s = _read_cpu_s(process.pid) - cpu_s, time.monotonic() - start_s
+        odoms = sum(peer.odoms for peer in server.peers) - before
+    finally:
+        process.terminate()
+        process.wait(timeout=5.0)
+        server.close()
+    return Measurement(
+        robots,
+        100.0 * cpu_s / elapsed_s,
+        odoms / (robots * _STOCK_ODOM_HZ * elapsed_s),
+        measure_fastest(robots),
+    )
+
+
+def measure_fastest(robots: int, simulated_ms: int = 5000) -> float:
+    """Return how many seconds of a driving swarm are simulated in a second, without sockets."""
+    swarm = build_swarm(build_parser().parse_args(["--robots", str(robots)]), "127.0.0.1", lambda text: None)
+
+    def run(until_ms: int) -> None:
+        while swarm.now_ms < until_ms:
+            for index in swarm.advance(swarm.now_ms + 5):
+                robot = swarm.robots[index]
+                robot.outbox.clear()
+                if robot.wants_connection:
+                    robot.connection_made(swarm.now_ms)
+                    swarm.reschedule(index)
+
+    run(2500)
+    for robot in swarm.robots:
+        robot.receive_bytes(swarm.now_ms, frames.encode_frame(frames.ID_PUBLISHER, b""))
+    run(3000)
+    start_s = time.perf_counter()
+    for step in range(simulated_ms // 100):
+        for robot in swarm.robots:
+            robot.receive_bytes(swarm.now_ms, _TWIST)
+        run(3000 + 100 * (step + 1))
+    return simulated_ms / 1000.0 / (time.perf_counter() - start_s)
+
+
+def main(arguments: Optional[List[str]] = None) -> int:
+    """Print the table."""
+    parser = argparse.ArgumentParser(prog="bench_sim.py", description="What the simulator costs.")
+    parser.add_argument("--robots", default="1,10,50,100", help="numbers of robots (%(default)s)")
+    parser.add_argument(
+        "--seconds", type=float, default=10.0, help="length of each measurement (%(default)s)"
+    )
+    options = parser.parse_args(arguments)
+    rows: Dict[int, Measurement] = {}
+    print("robots  CPU of one core  odoms of the stock rate  fastest (x real time, no sockets)")
+    for text in options.robots.split(","):
+        row = rows[int(text)] = measure(int(text), options.seconds)
+        print(
+            "%6d  %13.1f %%  %21.1f %%  %8.1f"
+            % (row.robots, row.cpu_percent, 100.0 * row.odom_share, row.fastest),
+            flush=True,
+        )
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

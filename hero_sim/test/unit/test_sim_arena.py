@@ -1,0 +1,108 @@
+import math
+
+import numpy as np
+import pytest
+
+from hero_sim import arena as arenas
+from hero_sim.arena_file import SHIPPED, load_arena
+from hero_sim.errors import OptionError
+from hero_sim.kinematics import BODY_RADIUS_M
+
+
+def write(tmp_path, text):
+    path = tmp_path / "arena.yaml"
+    path.write_text(text, encoding="utf-8")
+    return str(path)
+
+
+@pytest.mark.parametrize("robots", [1, 2, 4, 10, 50, 100])
+def test_the_default_field_has_room_to_drive_for_everybody(robots):
+    arena = arenas.build_default(robots)
+    poses = arenas.place_robots(arena, robots, np.random.RandomState(0))
+    assert arenas.measure_clearance(poses[:, :2], arena).min() > 0.15
+    apart = np.hypot(*(poses[:, None, :2] - poses[:, :2]).transpose(2, 0, 1)) + np.eye(robots)
+    assert apart.min() > 0.35
+    ahead_m = poses[:, :2] + 0.15 * np.column_stack((np.cos(poses[:, 2]), np.sin(poses[:, 2])))
+    assert arenas.measure_clearance(ahead_m, arena).min() > BODY_RADIUS_M
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_shipped_arenas_take_ten_robots(name):
+    arena = load_arena(name)
+    poses = arenas.place_robots(arena, 10, np.random.RandomState(3))
+    assert arena.name == name
+    assert arenas.measure_clearance(poses[:, :2], arena).min() >= BODY_RADIUS_M
+
+
+def test_a_file_is_read_with_all_its_parts(tmp_path):
+    arena = load_arena(
+        write(
+            tmp_path,
+            "name: mine\n"
+            "walls_m: [[[0, 0], [1, 0], [1, 1]]]\n"
+            "circles_m: [[0.5, 0.5, 0.1]]\n"
+            "polygons_m: [[[0, 0], [0.2, 0], [0, 0.2]]]\n"
+            "starts_m_deg: [[0.7, 0.7, 90]]\n"
+            "bounds_m: [0, 0, 1, 1]\n",
+        )
+    )
+    assert arena.name == "mine"
+    assert arena.segments_m.shape == (5, 4)
+    assert arena.circles_m.tolist() == [[0.5, 0.5, 0.1]]
+    assert arena.starts == ((0.7, 0.7, math.pi / 2),)
+    assert arena.bounds_m == (0.0, 0.0, 1.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    "text, line, words",
+    [
+        ("walls_m:\n  - [[0, 0], [1, b]]\n", 2, "'b' is not a number"),
+        ("walls_m:\n  - [[0, 0]]\n", 2, "at least 2 points"),
+        ("walls_m:\n  - [[0, 0], [1, 1, 1]]\n", 2, "expected 2 numbers"),
+        ("walls_m: 3\n", 1, "must be a list"),
+        ("wals_m: []\n", 1, "unknown key 'wals_m'"),
+        ("bounds_m: [0, 0, 1, 1]\ncircles_m:\n  - [0, 0, -1]\n", 3, "radius"),
+        ("bounds_m: [1, 0, 1, 1]\n", 1, "minimum"),
+        ("name: x\n", 1, "needs bounds_m"),
+        ("bounds_m: [0, 0, 1, nan]\n", 1, "not between"),
+        ("bounds_m: [0, 0, 1, 1e9]\n", 1, "not between"),
+        ("- 1\n", 1, "a mapping"),
+        ("", 1, "a mapping"),
+        ("a: [1\nb: 2\n", 2, ""),
+        ("bounds_m: [0, 0, 1, 1]\nbounds_m: [0, 0, 1, 1]\n", 2, "twice"),
+    ],
+)
+def test_a_wrong_file_is_refused_with_file_line_and_reason(tmp_path, text, line, words):
+    path = write(tmp_path, text)
+    with pytest.raises(OptionError) as caught:
+        load_arena(path)
+    assert str(caught.value).startswith("%s:%d: " % (path, line))
+    assert words in str(caught.value)
+
+
+def test_a_file_that_is_not_there_is_refused_with_the_shipped_names():
+    with pytest.raises(OptionError, match="empty, obstacles, maze"):
+        load_arena("/nowhere/at/all.yaml")
+
+
+def test_a_start_in_a_wall_is_refused(tmp_path):
+    arena = load_arena(
+        write(
+            tmp_path, "walls_m: [[[0, 0], [1, 0]]]\nbounds_m: [0, 0, 1, 1]\nstarts_m_deg: [[0.5, 0.01, 0]]\n"
+        )
+    )
+    with pytest.raises(arenas.ArenaError, match="start 0"):
+        arenas.place_robots(arena, 1, np.random.RandomState(0))
+
+
+def test_too_many_robots_are_refused(tmp_path):
+    arena = load_arena(write(tmp_path, "bounds_m: [0, 0, 0.3, 0.3]\n"))
+    with pytest.raises(arenas.ArenaError, match="no free place"):
+        arenas.place_robots(arena, 30, np.random.RandomState(0))
+
+
+def test_nobody_is_placed_inside_an_obstacle(tmp_path):
+    square = "[[0.1, 0.1], [0.9, 0.1], [0.9, 0.9], [0.1, 0.9]]"
+    arena = load_arena(write(tmp_path, "bounds_m: [0, 0, 1, 1]\npolygons_m: [%s]\ncircles_m: []\n" % square))
+    inside = arenas.measure_clearance(np.array([[0.5, 0.5], [0.05, 0.5]]), arena)
+    assert inside[0] < 0 < inside[1]

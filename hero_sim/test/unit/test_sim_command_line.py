@@ -1,0 +1,362 @@
+"""The program as users start it: a process of its own, behind real sockets on loopback."""
+
+import os
+import selectors
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import time
+
+import pytest
+from driver_side import read_odom
+
+from hero_driver.rosserial import frames, payloads
+from hero_sim import declarations as ids
+
+LIMIT_S = 20.0
+
+
+def build_environment():
+    environment = dict(os.environ)
+    environment["PYTHONPATH"] = os.pathsep.join(path for path in sys.path if path)
+    return environment
+
+
+def start(*arguments):
+    return subprocess.Popen(
+        [sys.executable, "-m", "hero_sim", *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        universal_newlines=True,
+        env=build_environment(),
+    )
+
+
+@pytest.fixture
+def simulate():
+    processes = []
+
+    def run(*arguments):
+        # Four times real time: these tests wait for robots to boot.
+        processes.append(start("--speed", "4", *arguments))
+        return processes[-1]
+
+    yield run
+    for process in processes:
+        if process.poll() is None:
+            process.kill()
+        process.communicate()
+
+
+class Server:
+    """Takes robots in, or dials them; requests topics, answers the time, keeps every frame."""
+
+    def __init__(self, port=None):
+        self.peers = []
+        self.selector = selectors.DefaultSelector()
+        if port is None:
+            self.listener = socket.socket()
+            self.listener.bind(("127.0.0.1", 0))
+            self.listener.listen(16)
+            self.port = self.listener.getsockname()[1]
+            self.selector.register(self.listener, selectors.EVENT_READ)
+
+    def add(self, sock):
+        peer = Peer(sock)
+        self.peers.append(peer)
+        self.selector.register(sock, selectors.EVENT_READ, peer)
+        return peer
+
+    def run_until(self, condition, limit_s=LIMIT_S):
+        end_s = time.monotonic() + limit_s
+        while not condition():
+            assert time.monotonic() < end_s, "nothing of the kind within %g s" % limit_s
+            for key, _ in self.selector.select(0.05):
+                if key.data is None:
+                    self.add(self.listener.accept()[0])
+                elif not key.data.receive():
+                    self.selector.unregister(key.data.socket)
+
+    def close(self):
+        for peer in self.peers:
+            peer.socket.close()
+        if hasattr(self, "listener"):
+            self.listener.close()
+        self.selector.close()
+
+
+class Peer:
+    def __init__(self, sock):
+        self.socket = sock
+        self.reader = frames.FrameReader()
+        self.frames = []
+        self.closed = False
+
+    def receive(self):
+        try:
+            data = self.socket.recv(65536)
+        except ConnectionError:
+            data = b""
+        if not data:
+            self.closed = True
+            return False
+        for frame in self.reader.receive_bytes(data):
+            self.frames.append(frame)
+            if frame.topic_id == frames.ID_TIME:
+                self.send(frames.ID_TIME, payloads.encode_time(payloads.split_seconds(time.time())))
+        return True
+
+    def send(self, topic_id, payload=b""):
+        self.socket.sendall(frames.encode_frame(topic_id, payload))
+
+    def count(self, topic_id):
+        return sum(frame.topic_id == topic_id for frame in self.frames)
+
+    def logs(self):
+        return [
+            payloads.decode_log(frame.payload).text
+            for frame in self.frames
+            if frame.topic_id == frames.ID_LOG
+        ]
+
+    def last(self, topic_id):
+        return [frame.payload for frame in self.frames if frame.topic_id == topic_id][-1]
+
+
+@pytest.fixture
+def server():
+    server = Server()
+    yield server
+    server.close()
+
+
+def request_when_ready(server, count):
+    """Wait until count robots are past their start, then ask each for its topics and await its odometry."""
+    server.run_until(
+        lambda: len(server.peers) >= count
+        and all(any("Conected" in text for text in peer.logs()) for peer in server.peers)
+    )
+    for peer in server.peers:
+        peer.send(frames.ID_PUBLISHER)
+    server.run_until(lambda: all(peer.count(ids.ID_ODOM) > 3 for peer in server.peers))
+
+
+def test_robots_dial_declare_stream_and_drive(simulate, server):
+    simulate("--robots", "3", "--first-id", "5", "--port", str(server.port))
+    request_when_ready(server, 3)
+    names = {
+        payloads.decode_topic_info(peer.frames[[f.topic_id for f in peer.frames].index(0)].payload).name
+        for peer in server.peers
+    }
+    assert names == {"/hero_5/laser", "/hero_6/laser", "/hero_7/laser"}
+    peer = server.peers[0]
+
+    def moved():
+        if len(peer.frames) % 5 == 0:
+            peer.send(ids.ID_POSITION_CMD_VEL, struct.pack("<6d", 0.1, 0, 0, 0, 0, 0))
+        return read_odom(peer.last(ids.ID_ODOM))[2][0] > 0.05
+
+    server.run_until(moved)
+    assert read_odom(server.peers[1].last(ids.ID_ODOM))[2][0] == 0.0
+    assert all(peer.reader.bad_frames == 0 for peer in server.peers)
+
+
+def test_robots_that_are_servers_are_dialled(simulate):
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    simulate("--robots", "1", "--host", "127.0.0.1", "--serve", str(port))
+    server = Server(port)
+    end_s = time.monotonic() + LIMIT_S
+    while not server.peers:
+        try:
+            server.add(socket.create_connection(("127.0.0.1", port)))
+        except ConnectionRefusedError:
+            assert time.monotonic() < end_s
+            time.sleep(0.05)
+    request_when_ready(server, 1)
+    # The driver goes and comes back: the robot waits for it.
+    server.peers[0].socket.shutdown(socket.SHUT_RDWR)
+    server.run_until(lambda: server.peers[0].closed)
+    again = server.add(socket.create_connection(("127.0.0.1", port)))
+    server.run_until(lambda: again.count(ids.ID_ODOM) > 0)
+    server.close()
+
+
+def test_a_robot_that_vanishes_sends_no_end_and_its_successor_boots(simulate, server):
+    simulate("--port", str(server.port), "--fault", "vanish@8:for=1")
+    request_when_ready(server, 1)
+    server.run_until(lambda: len(server.peers) == 2)
+    old, new = server.peers
+    server.run_until(lambda: len(new.logs()) >= 2)
+    assert not old.closed
+    assert "Firmware" in new.logs()[0]
+
+
+def test_a_robot_that_leaves_closes_and_streams_on_when_it_is_back(simulate, server):
+    simulate("--port", str(server.port), "--fault", "leave@8:for=2")
+    request_when_ready(server, 1)
+    server.run_until(lambda: server.peers[0].closed)
+    server.run_until(lambda: len(server.peers) == 2 and server.peers[1].count(ids.ID_ODOM) > 0)
+    assert server.peers[1].count(frames.ID_PUBLISHER) == 0
+    assert not any("Firmware" in text for text in server.peers[1].logs())
+
+
+def test_a_duplicate_takes_the_id_of_another_robot(simulate, server):
+    simulate("--robots", "2", "--port", str(server.port), "--fault", "duplicate@3:robot=1,of=0")
+    server.run_until(lambda: len(server.peers) == 3 and server.peers[2].logs())
+    assert "[/hero_0] Firmware" in server.peers[2].logs()[0]
+
+
+def test_zero_topics_are_declared_at_the_second_request_only(simulate, server):
+    simulate("--port", str(server.port), "--fault", "zero-topics@0.1")
+    server.run_until(lambda: server.peers and any("Conected" in text for text in server.peers[-1].logs()))
+    peer = server.peers[-1]
+    peer.send(frames.ID_PUBLISHER)
+    server.run_until(lambda: peer.count(ids.ID_ODOM) > 3)
+    assert peer.count(frames.ID_PUBLISHER) == 0
+    peer.send(frames.ID_PUBLISHER)
+    server.run_until(lambda: peer.count(frames.ID_PUBLISHER) == 5)
+
+
+@pytest.mark.parametrize(
+    "fault, bad",
+    [("garbage", 0), ("half-frame", 1), ("bad-checksum", 1), ("bad-length", 1), ("long-frame", 1)],
+)
+def test_wrong_bytes_cost_at_most_the_frame_beside_them(simulate, server, fault, bad):
+    simulate("--port", str(server.port), "--fault", fault + "@8")
+    request_when_ready(server, 1)
+    peer = server.peers[0]
+    server.run_until(lambda: peer.reader.skipped_bytes > 0)
+    assert peer.reader.bad_frames >= bad
+    seen = peer.count(ids.ID_ODOM)
+    server.run_until(lambda: peer.count(ids.ID_ODOM) > seen + 5)
+
+
+def test_a_frozen_robot_is_silent_and_goes_on(simulate, server):
+    simulate("--port", str(server.port), "--fault", "frozen@8:for=6")
+    request_when_ready(server, 1)
+    peer = server.peers[0]
+    stamps = []
+
+    def gap():
+        stamps.append((time.monotonic(), len(peer.frames)))
+        quiet = [at_s for at_s, count in stamps if count == stamps[-1][1]]
+        return quiet[-1] - quiet[0] > 1.0
+
+    server.run_until(gap)
+    seen = peer.count(ids.ID_ODOM)
+    server.run_until(lambda: peer.count(ids.ID_ODOM) > seen + 5)
+    assert not peer.closed
+
+
+def test_a_clock_that_jumps_shows_in_the_stamps(simulate, server):
+    simulate("--port", str(server.port), "--fault", "clock-jump@8:by=-100")
+    request_when_ready(server, 1)
+    peer = server.peers[0]
+    server.run_until(lambda: time.time() - read_odom(peer.last(ids.ID_ODOM))[0][0] > 98)
+
+
+def test_a_slow_service_answers_late(simulate, server):
+    simulate("--port", str(server.port), "--fault", "slow-service@1:by=5")
+    request_when_ready(server, 1)
+    peer = server.peers[0]
+    called_s = time.monotonic()
+    peer.send(ids.ID_SET_ODOM, struct.pack("<3d", 0, 0, 0))
+    server.run_until(lambda: peer.count(ids.ID_SET_ODOM_ANSWER) == 1)
+    assert time.monotonic() - called_s > 1.0
+
+
+def test_a_robot_that_is_sent_a_deadly_id_restarts(simulate, server):
+    process = simulate("--port", str(server.port))
+    request_when_ready(server, 1)
+    server.peers[0].send(130, b"1234")
+    server.run_until(lambda: len(server.peers) == 2 and server.peers[1].logs())
+    assert "Firmware" in server.peers[1].logs()[0]
+    process.terminate()
+    assert "hero_0 crashed: the server sent id 130" in process.communicate(timeout=LIMIT_S)[0]
+
+
+def test_a_server_that_comes_late_finds_the_robots_waiting(simulate):
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    process = simulate("--robots", "2", "--port", str(port))
+    assert "dialling" in process.stdout.readline()
+    assert "no driver answers at 127.0.0.1:%d" % port in process.stdout.readline()
+    server = Server(port)
+    server.listener = socket.socket()
+    server.listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    server.listener.bind(("127.0.0.1", port))
+    server.listener.listen(8)
+    server.selector.register(server.listener, selectors.EVENT_READ)
+    server.run_until(lambda: len(server.peers) == 2)
+    server.close()
+
+
+def test_a_network_with_delays_still_carries_everything(simulate, server):
+    simulate("--robots", "2", "--port", str(server.port), "--wifi", "hotspot")
+    request_when_ready(server, 2)
+    server.run_until(lambda: all(peer.count(ids.ID_ODOM) > 60 for peer in server.peers))
+    assert all(peer.reader.bad_frames == 0 and peer.reader.skipped_bytes == 0 for peer in server.peers)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_quietly(simulate, server, number):
+    process = simulate("--robots", "4", "--port", str(server.port))
+    server.run_until(lambda: len(server.peers) == 4)
+    process.send_signal(number)
+    _, error = process.communicate(timeout=LIMIT_S)
+    assert (process.returncode, error) == (0, "")
+
+
+def test_it_ends_by_itself_after_its_seconds(simulate):
+    process = simulate("--port", "9", "--seconds", "0.5")
+    assert process.wait(timeout=LIMIT_S) == 0
+
+
+@pytest.mark.parametrize(
+    "arguments, named",
+    [
+        (("--robots", "0"), "--robots 0"),
+        (("--port", "0"), "--port 0"),
+        (("--port", "65536"), "--port 65536"),
+        (("--serve", "65530", "--robots", "10"), "--serve 65530"),
+        (("--seconds", "-1"), "--seconds -1"),
+        (("--speed", "0"), "--speed 0"),
+        (("--seed", "-3"), "--seed -3"),
+        (("--first-id", "-1"), "--first-id -1"),
+        (("--host", "no such host"), "no such host"),
+        (("--arena", "/nowhere.yaml"), "/nowhere.yaml"),
+        (("--fault", "explode"), "explode"),
+        (("--fault", "reboot:robot=7"), "robot 7"),
+        (("--robots", "two"), "two"),
+        (("--wifi", "string"), "string"),
+    ],
+)
+def test_a_wrong_option_gets_one_clear_line(arguments, named):
+    result = subprocess.run(
+        [sys.executable, "-m", "hero_sim", *arguments],
+        capture_output=True,
+        text=True,
+        env=build_environment(),
+        timeout=LIMIT_S,
+        check=False,
+    )
+    last_line = result.stderr.strip().splitlines()[-1]
+    assert result.returncode != 0
+    assert named in last_line
+    assert "Traceback" not in result.stderr
+
+
+def test_a_port_that_is_taken_is_named(simulate):
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen(1)
+        port = taken.getsockname()[1]
+        process = simulate("--host", "127.0.0.1", "--serve", str(port))
+        _, error = process.communicate(timeout=LIMIT_S)
+    assert process.returncode == 1
+    assert "127.0.0.1:%d" % port in error and len(error.strip().splitlines()) == 1

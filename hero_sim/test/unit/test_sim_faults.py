@@ -1,0 +1,35 @@
+import pytest
+
+from hero_sim import faults
+from hero_sim.errors import OptionError
+
+
+def test_a_fault_is_read_with_time_robot_and_values():
+    assert faults.parse_fault("vanish@5:robot=1,for=3") == faults.Fault("vanish", 5.0, 1, {"for": 3.0})
+
+
+def test_what_is_left_out_has_its_default():
+    assert faults.parse_fault("garbage") == faults.Fault("garbage", 0.0, None, {"bytes": 200.0})
+
+
+def test_a_clock_may_jump_backwards():
+    assert faults.parse_fault("clock-jump:by=-30").values == {"by": -30.0}
+
+
+@pytest.mark.parametrize(
+    "text, named",
+    [
+        ("explode", "explode"),
+        ("", "''"),
+        ("vanish@soon", "soon"),
+        ("vanish@-1", "-1"),
+        ("vanish@nan", "nan"),
+        ("vanish:robot", "'robot'"),
+        ("vanish:bytes=3", "bytes=3"),
+        ("garbage:bytes=many", "many"),
+    ],
+)
+def test_a_wrong_fault_is_refused_by_name(text, named):
+    with pytest.raises(OptionError, match="fault") as caught:
+        faults.parse_fault(text)
+    assert named in str(caught.value)
