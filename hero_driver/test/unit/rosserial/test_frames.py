@@ -1,11 +1,12 @@
 """Frames: the same ones come out whatever pieces, noise and errors they came with."""
 
 import pytest
-from hero_driver.rosserial.errors import FrameTooLongError, RosserialError, TopicIdError
-from hero_driver.rosserial.frames import Frame, FrameReader, decode_frame, encode_frame, sum_bytes
 from hypothesis import given
 from hypothesis import strategies as st
 from vectors import GOOD, TIME_REQUEST, VECTORS, build_frame
+
+from hero_driver.rosserial.errors import FrameTooLongError, RosserialError, TopicIdError
+from hero_driver.rosserial.frames import Frame, FrameReader, decode_frame, encode_frame, sum_bytes
 
 ALL = b"".join(vector.data for vector in VECTORS)
 ALL_FRAMES = [Frame(vector.topic_id, vector.payload) for vector in VECTORS]
@@ -111,7 +112,7 @@ def test_a_frame_with_any_bit_flipped_is_refused_and_counted_and_the_next_is_rea
 
 @by_vector
 def test_a_frame_with_any_bit_flipped_is_refused_byte_by_byte_too(vector):
-    for bit in range(0, 8 * min(len(vector.data), 80)):
+    for bit in range(8 * min(len(vector.data), 80)):
         broken = bytearray(vector.data)
         broken[bit // 8] ^= 1 << bit % 8
         data = bytes(broken) + GOOD.data

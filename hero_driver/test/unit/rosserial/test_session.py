@@ -1,0 +1,300 @@
+"""One conversation with a robot: when the session asks, what it answers, when it gives up."""
+
+import pytest
+from conversation import T0, list_requests, open_declared_session, open_session, poll_until, receive
+from hypothesis import given
+from hypothesis import strategies as st
+from vectors import (
+    ENCODER_MESSAGE,
+    HANDSHAKE,
+    ODOM_MESSAGE,
+    REQUEST,
+    STOCK_TOPICS,
+    TIME_REQUEST,
+    TX_STOP,
+    VECTORS,
+    build_declaration,
+    build_frame,
+    build_log,
+    build_text,
+)
+
+from hero_driver.rosserial.errors import FrameTooLongError, PayloadError
+from hero_driver.rosserial.session import (
+    LogReceived,
+    MessageReceived,
+    ParameterRequested,
+    Problem,
+    Session,
+    SessionEnded,
+    SessionLimits,
+    TimeRequested,
+    TopicDeclared,
+    TopicKind,
+)
+
+TIME_ANSWER = build_frame(10, (1795240942).to_bytes(4, "little") + (500000000).to_bytes(4, "little"))
+HEARTBEAT = build_log(1, "\x1b[96m[/hero_0] Conected at time 1638\x1b[0m")
+
+
+# Asking for topics.
+
+
+def test_a_new_session_asks_for_topics_at_once_and_only_once():
+    session = Session(SessionLimits(), T0)
+    assert session.take_frames() == []
+    assert session.poll(T0) == []
+    assert session.take_frames() == [REQUEST]
+    assert session.take_frames() == []
+    session.poll(T0 + 1.4)
+    assert session.take_frames() == []
+
+
+def test_the_request_is_repeated_every_one_and_a_half_seconds_while_nothing_is_declared():
+    session = open_session(silence_timeout_s=60.0, declare_timeout_s=60.0)
+    request_times_s, events = poll_until(session, T0 + 0.05, T0 + 6.5)
+    assert request_times_s == pytest.approx([T0 + 1.5, T0 + 3.0, T0 + 4.5, T0 + 6.0])
+    assert events == []
+
+
+def test_nothing_is_asked_any_more_once_a_topic_is_declared():
+    session = open_session()
+    events = receive(session, HANDSHAKE, T0 + 0.06)
+    assert events[0] == TimeRequested()
+    assert [event.topic.info.topic_id for event in events[1:]] == [topic[1] for topic in STOCK_TOPICS]
+    assert all(type(event) is TopicDeclared for event in events[1:])
+    session.take_frames()
+    assert poll_until(session, T0 + 0.1, T0 + 5.0) == ([], [])
+
+
+def test_a_handshake_that_arrives_in_pieces_over_150_ms_is_not_asked_for_again():
+    session = open_session()
+    receive(session, TIME_REQUEST, T0 + 0.05)
+    assert poll_until(session, T0 + 0.05, T0 + 0.2)[0] == []
+    receive(session, HANDSHAKE[len(TIME_REQUEST) :], T0 + 0.2)
+    assert poll_until(session, T0 + 0.2, T0 + 5.0)[0] == []
+
+
+def test_a_time_request_without_topics_is_the_zero_topic_handshake_and_is_asked_again_after_200_ms():
+    session = open_session()
+    receive(session, TIME_REQUEST, T0 + 0.06)
+    request_times_s, _ = poll_until(session, T0 + 0.06, T0 + 1.0, 0.01)
+    assert request_times_s == pytest.approx([T0 + 0.26])
+
+
+def test_data_without_any_declared_topic_makes_the_session_ask_at_most_every_half_second():
+    session = open_session()
+    request_times_s = []
+    for step in range(1, 200):
+        now_s = T0 + step * 0.01
+        assert receive(session, ODOM_MESSAGE + ENCODER_MESSAGE, now_s) == []
+        session.poll(now_s)
+        request_times_s += [now_s] * len(list_requests(session))
+    assert request_times_s == pytest.approx([T0 + 0.5, T0 + 1.0, T0 + 1.5])
+    assert session.undeclared_messages == 2 * 199
+    receive(session, HANDSHAKE, T0 + 2.0)
+    assert type(receive(session, ODOM_MESSAGE, T0 + 2.0)[0]) is MessageReceived
+
+
+def test_a_robot_that_still_streams_on_a_new_connection_is_asked_at_once_if_nobody_asked_yet():
+    session = Session(SessionLimits(), T0)
+    receive(session, ODOM_MESSAGE, T0 + 0.02)
+    session.poll(T0 + 0.02)
+    assert session.take_frames() == [REQUEST]
+
+
+def test_log_lines_before_any_topic_are_events_and_a_reason_to_ask_again():
+    session = open_session()
+    (event,) = receive(session, HEARTBEAT, T0 + 0.9)
+    assert type(event) is LogReceived
+    assert event.log == (1, "\x1b[96m[/hero_0] Conected at time 1638\x1b[0m")
+    session.poll(T0 + 0.9)
+    assert session.take_frames() == [REQUEST]
+
+
+def test_an_undeclared_id_beside_declared_topics_is_reported_and_asked_for_a_few_times_only():
+    session = open_declared_session(silence_timeout_s=600.0)
+    request_times_s, problems = [], []
+    for step in range(2000):
+        now_s = T0 + 1.0 + step * 0.01
+        problems += receive(session, build_frame(124, b""), now_s)
+        session.poll(now_s)
+        request_times_s += [now_s] * len(list_requests(session))
+    assert 1 <= len(request_times_s) <= 5
+    assert all(later - earlier >= 0.5 - 1e-6 for earlier, later in zip(request_times_s, request_times_s[1:]))
+    assert len(problems) == len(request_times_s)
+    assert all(type(problem) is Problem and "id 124" in problem.text for problem in problems)
+    assert session.undeclared_messages == 2000
+
+
+def test_a_robot_that_only_logs_after_it_was_declared_has_lost_its_configuration_and_is_asked_again():
+    # After 11 s without an answer to its time requests (a PC that slept) a robot sends log lines and nothing
+    # else, on the connection that it has; only a new request brings its data back.
+    session = open_declared_session()
+    request_times_s = []
+    for step in range(1, 21):
+        receive(session, HEARTBEAT, T0 + step)
+        request_times_s += poll_until(session, T0 + step, T0 + step + 0.95)[0]
+    assert request_times_s
+
+
+# Time.
+
+
+def test_a_time_request_is_answered_with_the_time_at_which_it_arrived():
+    session = open_declared_session()
+    assert receive(session, TIME_REQUEST) == [TimeRequested()]
+    assert session.take_frames() == [TIME_ANSWER]
+
+
+def test_every_time_request_of_a_read_is_answered():
+    session = open_declared_session()
+    receive(session, TIME_REQUEST * 3)
+    assert session.take_frames() == [TIME_ANSWER] * 3
+
+
+def test_a_time_request_of_another_length_is_a_problem_and_not_answered():
+    session = open_declared_session()
+    (problem,) = receive(session, build_frame(10, bytes(4)))
+    assert problem == Problem("Time: has 4 bytes instead of 8")
+    assert session.take_frames() == []
+
+
+# Giving up.
+
+
+def test_a_session_ends_after_silence_and_not_before():
+    session = open_declared_session(silence_timeout_s=6.0)
+    assert session.poll(T0 + 6.0) == []
+    (ended,) = session.poll(T0 + 6.2)
+    assert type(ended) is SessionEnded
+    assert ended.reason.startswith("silent for 6.1 s")
+
+
+def test_any_bytes_break_the_silence():
+    session = open_declared_session(silence_timeout_s=6.0)
+    receive(session, HEARTBEAT, T0 + 5.0)
+    assert session.poll(T0 + 10.9) == []
+    assert type(session.poll(T0 + 11.1)[0]) is SessionEnded
+
+
+def test_a_session_without_topics_ends_although_the_robot_speaks():
+    session = open_session(declare_timeout_s=20.0, silence_timeout_s=6.0)
+    for second in range(1, 21):
+        receive(session, HEARTBEAT, T0 + second)
+        assert session.poll(T0 + second) == []
+    assert session.poll(T0 + 20.1) == [SessionEnded("declared no topic within 20.0 s")]
+
+
+def test_a_declared_session_does_not_end_while_the_robot_speaks():
+    session = open_declared_session(declare_timeout_s=20.0)
+    for step in range(1, 100):
+        receive(session, ODOM_MESSAGE, T0 + step)
+        assert session.poll(T0 + step) == []
+
+
+# What the robot sends.
+
+
+def test_a_message_comes_with_its_topic_in_the_order_of_the_wire():
+    session = open_declared_session()
+    events = receive(session, ODOM_MESSAGE + HEARTBEAT + ENCODER_MESSAGE)
+    assert [type(event) for event in events] == [MessageReceived, LogReceived, MessageReceived]
+    assert events[0].topic.info.name == "/hero_0/odom"
+    assert events[0].topic.kind is TopicKind.PUBLISHER
+    assert events[0].payload == ODOM_MESSAGE[7:-1]
+    assert events[2].topic.info.name == "/hero_0/encoder"
+
+
+def test_the_answer_of_a_service_is_a_message_of_its_topic():
+    session = open_declared_session()
+    (event,) = receive(session, build_frame(131, b"\x01\x00\x00\x00\x00"))
+    assert event.topic.kind is TopicKind.SERVICE_ANSWERS
+    assert event.topic.info.name == "/hero_0/set_odom"
+
+
+def test_data_on_an_id_that_the_robot_receives_is_not_passed_on():
+    session = open_declared_session()
+    (problem,) = receive(session, build_frame(109, bytes(48)))
+    assert type(problem) is Problem
+    assert session.undeclared_messages == 1
+
+
+def test_a_parameter_request_is_an_event_and_its_answer_a_frame():
+    session = open_declared_session()
+    assert receive(session, build_frame(6, build_text("~gain"))) == [ParameterRequested("~gain")]
+    assert session.encode_parameter_answer([7], [], []) == build_frame(
+        6, bytes.fromhex("01000000 07000000 00000000 00000000")
+    )
+
+
+def test_a_parameter_longer_than_the_robots_buffer_is_never_encoded():
+    session = open_declared_session(max_payload_length=100)
+    assert len(session.encode_parameter_answer([0] * 22, [], [])) == 100 + 8
+    with pytest.raises(FrameTooLongError, match="104 bytes"):
+        session.encode_parameter_answer([0] * 23, [], [])
+    with pytest.raises(PayloadError):
+        session.encode_parameter_answer([2**31], [], [])
+
+
+@pytest.mark.parametrize("frame_id", [0, 1, 2, 3, 4, 5, 6, 7, 10])
+@pytest.mark.parametrize("payload", [b"", b"\x00", b"\xff" * 40], ids=["empty", "one byte", "noise"])
+def test_a_special_frame_with_a_broken_payload_is_a_problem_and_nothing_more(frame_id, payload):
+    session = open_declared_session()
+    (problem,) = receive(session, build_frame(frame_id, payload))
+    assert type(problem) is Problem
+    assert len(session.topics) == len(STOCK_TOPICS)
+    assert type(receive(session, ODOM_MESSAGE)[0]) is MessageReceived
+
+
+@pytest.mark.parametrize("topic_id", [8, 9, 11, 50, 99, 300, 65535])
+def test_an_id_without_a_meaning_is_counted_and_does_no_harm(topic_id):
+    session = open_declared_session()
+    receive(session, build_frame(topic_id, b"abc") + TX_STOP)
+    assert session.undeclared_messages == 2
+    assert type(receive(session, ODOM_MESSAGE)[0]) is MessageReceived
+
+
+def test_bad_frames_are_counted_by_the_reader_and_cost_nothing_else():
+    session = open_declared_session()
+    events = receive(session, ODOM_MESSAGE[:-1] + b"\x00" + ENCODER_MESSAGE)
+    assert [event.topic.info.topic_id for event in events] == [128]
+    assert session.reader.bad_frames == 1
+
+
+@given(chunks=st.lists(st.one_of(st.binary(max_size=100), st.sampled_from([v.data for v in VECTORS]))))
+def test_arbitrary_bytes_never_raise(chunks):
+    session = Session(SessionLimits(), T0)
+    for step, chunk in enumerate(chunks):
+        receive(session, chunk, T0 + step * 0.1)
+        session.poll(T0 + step * 0.1)
+        list_requests(session)
+
+
+special = st.tuples(st.sampled_from([0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 100, 125]), st.binary(max_size=80))
+
+
+@given(frames=st.lists(special, max_size=30))
+def test_good_frames_with_arbitrary_payloads_never_raise(frames):
+    session = open_session()
+    for topic_id, payload in frames:
+        receive(session, build_frame(topic_id, payload), T0)
+    session.poll(T0 + 1.0)
+
+
+@given(cuts=st.lists(st.integers(0, len(HANDSHAKE) + 1000)))
+def test_any_cut_of_a_conversation_gives_the_same_events(cuts):
+    stream = HEARTBEAT + HANDSHAKE + ODOM_MESSAGE + ENCODER_MESSAGE + TIME_REQUEST
+    whole = receive(open_session(), stream)
+    session, events = open_session(), []
+    positions = [0, *sorted(cuts), len(stream)]
+    for start, end in zip(positions, positions[1:]):
+        events += receive(session, stream[start:end])
+    assert events == whole
+
+
+def test_declarations_come_one_by_one_too():
+    session = open_session()
+    for topic in STOCK_TOPICS:
+        (event,) = receive(session, build_declaration(*topic))
+        assert event.topic.info[:4] == topic[1:]

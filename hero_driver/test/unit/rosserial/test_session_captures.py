@@ -1,0 +1,72 @@
+"""Sessions over the bytes of a real robot."""
+
+from collections import Counter
+
+from conversation import T0, list_requests, open_session, receive
+from vectors import FROM_ROBOT, HANDSHAKE, STOCK_TOPICS
+
+from hero_driver.rosserial.session import LogReceived, MessageReceived, TimeRequested, TopicDeclared
+
+SEGMENT_LENGTH = 1460
+
+
+def run(session, data):
+    """Feed data as it comes over a network, 44 kB/s, and poll as the driver does; return events and requests."""
+    events, request_times_s = [], []
+    for start in range(0, len(data), SEGMENT_LENGTH):
+        now_s = T0 + start / 44051.0
+        events += receive(session, data[start : start + SEGMENT_LENGTH], now_s)
+        events += session.poll(now_s)
+        request_times_s += [now_s] * len(list_requests(session))
+    return events, request_times_s
+
+
+def test_a_whole_conversation_has_the_topics_data_and_logs_of_the_robot(read_capture):
+    session = open_session()
+    events, request_times_s = run(session, read_capture("A.robot_to_server.bin"))
+    assert request_times_s == []
+    kinds = Counter(type(event) for event in events)
+    assert kinds == {LogReceived: 20, TimeRequested: 6, TopicDeclared: 24, MessageReceived: 3121}
+    declared = [event.topic.info[:4] for event in events if type(event) is TopicDeclared]
+    assert declared == [topic[1:] for topic in STOCK_TOPICS]
+    counts = Counter(event.topic.info.name for event in events if type(event) is MessageReceived)
+    assert counts == {
+        "/hero_0/laser": 68,
+        "/hero_0/encoder": 436,
+        "/tf": 2180,
+        "/hero_0/odom": 436,
+        "/hero_0/set_odom": 1,
+    }
+    assert session.undeclared_messages == 0
+    assert (session.reader.frames, session.reader.bad_frames) == (3171, 0)
+
+
+def test_the_handshake_by_hand_is_that_of_the_real_robot(read_capture):
+    assert HANDSHAKE in read_capture("A.robot_to_server.bin")
+
+
+def test_a_robot_that_declared_nothing_is_asked_again_and_then_understood(read_capture):
+    session = open_session()
+    capture = read_capture("C_zero_topics.robot_to_server.bin")
+    events, request_times_s = run(session, capture)
+    assert len(request_times_s) == 1
+    assert {type(event) for event in events} == {LogReceived, TimeRequested}
+    assert session.undeclared_messages == 140
+    assert session.topics == {}
+
+    session = open_session()
+    run(session, capture[: len(capture) - 53] + HANDSHAKE)  # 53 bytes of the last frame are missing
+    assert sorted(session.topics) == sorted(topic[1] for topic in STOCK_TOPICS)
+    events, _ = run(session, capture)
+    messages = [event for event in events if type(event) is MessageReceived]
+    assert len(messages) == 140
+    assert {event.topic.info.topic_id for event in messages} <= set(FROM_ROBOT)
+
+
+def test_a_robot_with_the_imu_hat_publishes_it(read_capture):
+    session = open_session()
+    events, request_times_s = run(session, read_capture("E_imu_hat.robot_to_server.bin"))
+    assert request_times_s == []
+    counts = Counter(event.topic.info.name for event in events if type(event) is MessageReceived)
+    assert counts["/hero_12/imu"] == counts["/hero_12/odom"] == 63
+    assert session.undeclared_messages == 0
