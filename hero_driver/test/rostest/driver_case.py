@@ -7,6 +7,7 @@ import subprocess
 import threading
 import time
 import unittest
+import xmlrpc.client
 
 import rosgraph
 import roslib.packages
@@ -32,6 +33,20 @@ def wait_for(condition, what, deadline_s=DEADLINE_S):
         time.sleep(0.005)
 
 
+def list_publishers(topic):
+    """Return the nodes that publish a topic, by the master."""
+    return dict(rosgraph.Master("/test").getSystemState()[0]).get(topic, [])
+
+
+def has_subscriber(node, topic):
+    """Return whether node itself says that it sends topic to this process."""
+    api = xmlrpc.client.ServerProxy(rosgraph.Master("/test").lookupNode(node))
+    _, _, connections = api.getBusInfo("/test")
+    return any(
+        entry[1] == rospy.get_name() and entry[2] == "o" and entry[4] == topic for entry in connections
+    )
+
+
 class Recorder:
     """All messages of one topic, in order of arrival."""
 
@@ -46,8 +61,11 @@ class Recorder:
             self.wait_connected()
 
     def wait_connected(self):
-        """Wait until a publisher sends to this recorder."""
-        wait_for(lambda: self.subscriber.get_num_connections() > 0, "a publisher of " + self.topic)
+        """Wait until a publisher sends to this recorder, and knows it: the two sides learn it one by one."""
+        wait_for(
+            lambda: any(has_subscriber(node, self.topic) for node in list_publishers(self.topic)),
+            "a publisher of " + self.topic,
+        )
 
     def wait_count(self, count):
         """Wait for so many messages; return them."""
@@ -86,11 +104,6 @@ def make_publisher(topic, message_class, connected=True):
     if connected:
         wait_for(lambda: publisher.get_num_connections() > 0, "a subscriber of " + topic)
     return publisher
-
-
-def list_publishers(topic):
-    """Return the nodes that publish a topic, by the master."""
-    return dict(rosgraph.Master("/test").getSystemState()[0]).get(topic, [])
 
 
 def list_driver_topics(namespace, node=NODE):
