@@ -14,6 +14,7 @@ import threading
 from types import FrameType, TracebackType
 from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple, Type
 
+import rosgraph
 import rospy
 
 ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -38,7 +39,10 @@ class Program:
     """
 
     def __init__(self, name: str, anonymous: bool = False) -> None:
-        """Start the node name; anonymous adds a number so that several can run."""
+        """Start the node name; anonymous adds a number so that several can run.
+
+        Raises: ProgramError without a ROS master, or for wrong remappings on the command line.
+        """
         self.end_signal: Optional[int] = None
         self._ending = False
         self._finished = threading.Event()
@@ -46,7 +50,16 @@ class Program:
         os.set_blocking(self._wake_write_fd, False)
         for number in ENDING_SIGNALS:
             signal.signal(number, self._receive_signal)
-        rospy.init_node(name, anonymous=anonymous, disable_signals=True)
+        # init_node would wait for a master for ever, deaf to signals.
+        if not rosgraph.is_master_online():
+            raise ProgramError(
+                "no ROS master at %s: start roslaunch hero_bringup hero_bringup.launch first, or set ROS_MASTER_URI"
+                % rosgraph.get_master_uri()
+            )
+        try:
+            rospy.init_node(name, anonymous=anonymous, disable_signals=True)
+        except rospy.ROSInitException as error:
+            raise ProgramError(" ".join(str(error).split())) from None
         rospy.on_shutdown(self._await_finish)
 
     def _receive_signal(self, number: int, frame: Optional[FrameType]) -> None:

@@ -109,6 +109,10 @@ class Robot:
 
     Data properties hand out the newest message only while it is fresh, else they raise StaleDataError. As a context
     manager it stops the robot at the end, also after an error.
+
+    Attributes:
+        robot_id, name, namespace: 3, "hero_3", "/hero_3".
+        driven: whether a command was sent from here; a robot that was only watched is not stopped at the end.
     """
 
     def __init__(self, robot_id: int, odom: bool = True, proximity: bool = True) -> None:
@@ -122,6 +126,7 @@ class Robot:
         self.robot_id = robot_id
         self.name = "hero_%d" % robot_id
         self.namespace = "/" + self.name
+        self.driven = False
         self._newest: Dict[str, Tuple[float, Any]] = {}
         self._cmd_vel = rospy.Publisher(
             self.namespace + "/velocity_controller/cmd_vel", Twist, queue_size=1
@@ -262,6 +267,7 @@ class Robot:
     def _send_twist(self, linear_m_s: float, turn_rad_s: float) -> None:
         if not (math.isfinite(linear_m_s) and math.isfinite(turn_rad_s)):
             raise ValueError("speeds must be finite, not %r m/s and %r rad/s" % (linear_m_s, turn_rad_s))
+        self.driven = True
         twist = Twist()
         twist.linear.x = max(-MAX_LINEAR_M_S, min(MAX_LINEAR_M_S, linear_m_s))
         twist.angular.z = max(-MAX_TURN_RAD_S, min(MAX_TURN_RAD_S, turn_rad_s))
@@ -327,8 +333,8 @@ class Robot:
     # ------------------------------------------------------------------ end
 
     def close(self) -> None:
-        """Stop the robot and leave its topics; safe twice."""
-        self.stop()
+        """Stop the robot, if it was driven from here, and leave its topics; safe twice."""
+        stop_all([self] if self.driven else [])
         self._disconnect()
 
     def _disconnect(self) -> None:
@@ -404,8 +410,8 @@ class Swarm:
             robot.led(color)
 
     def close(self) -> None:
-        """Stop all robots and leave their topics; safe twice."""
-        self.stop()
+        """Stop all robots that were driven from here, and leave their topics; safe twice."""
+        stop_all([robot for robot in self.robots if robot.driven])
         for robot in self.robots:
             robot._disconnect()
 

@@ -51,5 +51,5 @@ class WaitReport:
         self._next_s = time.monotonic() + REPORT_PERIOD_S
         for name, missing in waiting.items():
             if missing is not None:
-                rospy.logwarn("%s stands still, waiting: %s", name, missing)
+                rospy.logwarn("%s: waiting: %s", name, missing)
                 self._said[name] = missing

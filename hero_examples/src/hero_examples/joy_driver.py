@@ -1,0 +1,19 @@
+"""Node joy_driver: becomes joy/joy_node where that is installed, and else says how to get it, in one line."""
+
+import os
+import sys
+
+import rospkg
+
+
+def main() -> None:
+    """Run joy_node in the place of this program, with the same arguments."""
+    try:
+        rospkg.RosPack().get_path("joy")
+    except rospkg.ResourceNotFound:
+        sys.exit(
+            "joy_driver: no joystick driver: the ROS package joy is not installed. ROS Noetic: sudo apt install"
+            " ros-noetic-joy; elsewhere build it from ros-drivers/joystick_drivers, or start another node that"
+            " publishes sensor_msgs/Joy on /joy and give joy_driver:=false"
+        )
+    os.execvp("rosrun", ["rosrun", "joy", "joy_node", *sys.argv[1:]])

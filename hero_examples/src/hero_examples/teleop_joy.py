@@ -1,0 +1,133 @@
+"""Node teleop_joy: axes and buttons of a joystick (sensor_msgs/Joy) -> commands of one robot, or of all.
+
+A robot moves only while the dead-man button is held and /joy is alive.
+"""
+
+import time
+from typing import List, NamedTuple, Optional
+
+import rospy
+from sensor_msgs.msg import Joy
+
+from .control_laws import STANDSTILL, Command
+from .program import Program, ProgramError, check_number, parse_robot_ids, read_parameters, run
+from .robot import MAX_LINEAR_M_S
+from .swarm_start import REPORT_PERIOD_S, WaitReport, open_swarm
+
+PERIOD_S = 0.1
+
+SILENCE_S = 0.5
+"""No message for so long, and the robot stops: joy_node repeats itself with autorepeat_rate, set in the launch file."""
+
+STOP_REPEAT_S = 0.5
+"""Standstill is sent for so long, then the node is silent: other programs may drive the robot."""
+
+
+class Parameters(NamedTuple):
+    """The checked parameters of the node."""
+
+    robot_ids: Optional[List[int]]
+    linear_m_s: float
+    turn_rad_s: float
+    linear_axis: int
+    turn_axis: int
+    enable_button: int
+
+
+def load_parameters() -> Parameters:
+    """Return the node's private parameters. Raises: ProgramError."""
+    given = read_parameters(
+        {
+            "robots": "0",
+            "linear_m_s": 0.15,
+            "turn_rad_s": 2.0,
+            "linear_axis": 1,
+            "turn_axis": 0,
+            "enable_button": 4,
+        }
+    )
+    return Parameters(
+        parse_robot_ids("robots", given["robots"]),
+        check_number("linear_m_s", given["linear_m_s"], 0.02, MAX_LINEAR_M_S, "m/s"),
+        check_number("turn_rad_s", given["turn_rad_s"], 0.25, 8.0, "rad/s"),
+        check_index("linear_axis", given["linear_axis"]),
+        check_index("turn_axis", given["turn_axis"]),
+        check_index("enable_button", given["enable_button"]),
+    )
+
+
+def check_index(name: str, value: object) -> int:
+    """Return value if it can be the number of an axis or button. Raises: ProgramError."""
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= 63:
+        raise ProgramError("~%s is %r, but must be a whole number from 0 to 63" % (name, value))
+    return value
+
+
+def read_stick(joy: Joy, parameters: Parameters) -> Optional[Command]:
+    """Return what the stick says, a standstill without the dead-man button, None if the joystick lacks a part."""
+    axes, buttons = joy.axes, joy.buttons
+    if max(parameters.linear_axis, parameters.turn_axis) >= len(axes) or parameters.enable_button >= len(buttons):
+        return None
+    if not buttons[parameters.enable_button]:
+        return STANDSTILL
+    return Command(
+        axes[parameters.linear_axis] * parameters.linear_m_s, axes[parameters.turn_axis] * parameters.turn_rad_s
+    )
+
+
+class Stick:
+    """The newest message of the joystick."""
+
+    def __init__(self) -> None:
+        """Listen on /joy."""
+        self.joy: Optional[Joy] = None
+        self.arrival_s = 0.0
+        self._subscriber = rospy.Subscriber("/joy", Joy, self._receive, queue_size=1, tcp_nodelay=True)
+
+    def _receive(self, joy: Joy) -> None:
+        self.joy = joy
+        self.arrival_s = time.monotonic()
+
+    @property
+    def alive(self) -> bool:
+        """Whether the newest message is young enough to act upon."""
+        return self.joy is not None and time.monotonic() - self.arrival_s < SILENCE_S
+
+
+def drive_by_stick(program: Program, parameters: Parameters) -> None:
+    """Drive until the program is to end."""
+    with open_swarm(program, parameters.robot_ids, odom=False, proximity=False) as swarm:
+        stick = Stick()
+        report = WaitReport()
+        next_word_s = time.monotonic() + 2.0
+        last_motion_s = -STOP_REPEAT_S
+        rospy.loginfo("hold button %d and move the stick", parameters.enable_button)
+        while program.sleep(PERIOD_S):
+            now_s = time.monotonic()
+            command: Optional[Command] = STANDSTILL
+            if stick.alive:
+                command = read_stick(stick.joy, parameters)
+            elif now_s >= next_word_s:
+                next_word_s = now_s + REPORT_PERIOD_S
+                rospy.logwarn("nothing on /joy: is a joystick plugged in, and does its driver (package joy) run?")
+            if command is None:
+                raise ProgramError(
+                    "the joystick has %d axes and %d buttons: set ~linear_axis, ~turn_axis, ~enable_button to some of"
+                    " them (counted from 0)" % (len(stick.joy.axes), len(stick.joy.buttons))
+                )
+            if command != STANDSTILL:
+                last_motion_s = now_s
+            if now_s - last_motion_s < STOP_REPEAT_S:
+                for robot in swarm:
+                    robot.drive(*command)
+            report.update({robot.name: robot.missing() for robot in swarm})
+
+
+def _main() -> None:
+    with Program("teleop_joy") as program:
+        drive_by_stick(program, load_parameters())
+
+
+def main() -> None:
+    """Run the node."""
+    run(_main)
