@@ -261,7 +261,7 @@ def test_due_in_s_says_when_take_has_something(script):
         if due_in_s is None:
             assert shaper.take(now_s) is None
             continue
-        assert 0.0 <= due_in_s <= COMMAND_INTERVAL_S
+        assert 0.0 <= due_in_s <= COMMAND_INTERVAL_S + 1e-9
         if due_in_s > 0.0:
             assert shaper.take(now_s) is None
         now_s += due_in_s + 1e-9

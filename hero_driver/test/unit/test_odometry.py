@@ -284,13 +284,13 @@ def test_what_the_wheels_did_during_a_pause_of_the_connection_counts():
 
 @given(
     readings=st.lists(
-        st.tuples(st.floats(width=32), st.floats(width=32), st.floats(0.0, 4e9)), max_size=30
+        st.tuples(st.floats(width=32), st.floats(width=32), st.integers(0, 4 * 10**12)), max_size=30
     )
 )
 def test_any_readings_leave_a_finite_pose_and_velocity(readings):
     odometry = make_odometry()
-    for reading in readings:
-        odometry.integrate(*reading)
+    for left_ticks, right_ticks, stamp_ms in readings:
+        odometry.integrate(left_ticks, right_ticks, stamp_ms / 1000.0)
         assert all(map(math.isfinite, odometry.pose))
         assert all(map(math.isfinite, odometry.twist))
         assert -math.pi <= odometry.pose.yaw_rad <= math.pi
