@@ -6,7 +6,7 @@ socket. Everything that is not named here passes through untouched.
 
 import collections
 from dataclasses import dataclass
-from typing import Callable, Deque, Dict, List, NamedTuple, Optional, Set, Tuple
+from typing import Callable, Deque, Dict, List, Optional, Set, Tuple
 
 from . import wire_messages
 from .odometry import Pose, TickOdometry, Twist, WheelGeometry
@@ -25,12 +25,8 @@ HELD_MAX = 32
 """Messages that may wait for the encoder reading of their own burst; a burst has two."""
 
 
-class Output(NamedTuple):
-    """One message for one topic."""
-
-    name: str
-    payload: bytes
-
+Output = Tuple[str, bytes]
+"""One message: the topic's name and the payload."""
 
 Outputs = List[Output]
 Clean = Callable[[bytes, int], Outputs]
@@ -60,7 +56,14 @@ class MessageCleaner:
         foreign_frames: transforms of frames that are not the robot's own, by name, for the report.
     """
 
-    def __init__(self, namespace: str, settings: CleaningSettings) -> None:
+    def __init__(
+        self,
+        namespace: str,
+        settings: CleaningSettings,
+        is_wanted: Callable[[str], bool] = lambda name: True,
+    ) -> None:
+        """Clean the data of the robot in namespace; topics that are not wanted by anybody are left out."""
+        self._is_wanted = is_wanted
         self._namespace = namespace
         self._frame_prefix = namespace.lstrip("/").encode() + b"/"
         self._stamps = StampFilter(settings.stamps == "arrival", settings.max_future_s, settings.max_age_s)
@@ -126,7 +129,7 @@ class MessageCleaner:
             return lambda payload, arrival_ns: self._clean_laser(name, payload, arrival_ns)
         if name == self._namespace + "/imu" and message_type == "sensor_msgs/Imu":
             return lambda payload, arrival_ns: self._clean_stamped(name, payload, arrival_ns)
-        return lambda payload, arrival_ns: [Output(name, payload)]
+        return lambda payload, arrival_ns: [(name, payload)]
 
     def _count(self, name: str) -> int:
         seq = self._seqs.get(name, -1) + 1
@@ -138,42 +141,44 @@ class MessageCleaner:
         return _NONE
 
     def _clean_stamped(self, name: str, payload: bytes, arrival_ns: int) -> Outputs:
-        header = wire_messages.read_header(payload)
-        if header is None:
+        stamp_ns = wire_messages.read_stamp_ns(payload)
+        if stamp_ns is None:
             return self._refuse()
-        stamp_ns = self._stamps.correct(name, header.stamp_ns, arrival_ns)
-        return [Output(name, wire_messages.restamp(payload, self._count(name), stamp_ns))]
+        stamp_ns = self._stamps.correct(name, stamp_ns, arrival_ns)
+        return [(name, wire_messages.restamp(payload, self._count(name), stamp_ns))]
 
     def _clean_laser(self, name: str, payload: bytes, arrival_ns: int) -> Outputs:
-        header = wire_messages.read_header(payload)
-        if header is None:
+        outputs = [(name, payload)]
+        if not self._is_wanted(self._proximity_name):
+            return outputs
+        stamp_ns = wire_messages.read_stamp_ns(payload)
+        if stamp_ns is None:
             return self._refuse()
-        stamp_ns = self._stamps.correct(self._proximity_name, header.stamp_ns, arrival_ns)
+        stamp_ns = self._stamps.correct(self._proximity_name, stamp_ns, arrival_ns)
         proximity = wire_messages.make_proximity(
             payload, self._count(self._proximity_name), stamp_ns, STOCK_SCAN_TIME_S
         )
-        outputs = [Output(name, payload)]
         if proximity is None:
             self.refused += 1
         else:
-            outputs.append(Output(self._proximity_name, proximity))
+            outputs.append((self._proximity_name, proximity))
         return outputs
 
     # Odometry. In one burst the robot sends odom, tf and then the encoder reading that belongs to them
     # (all with one stamp), so odom and its transform wait for the reading, which follows within the burst.
 
     def _clean_odometry(self, payload: bytes, arrival_ns: int) -> Outputs:
-        header = wire_messages.read_header(payload)
-        if header is None:
+        stamp_ns = wire_messages.read_stamp_ns(payload)
+        if stamp_ns is None:
             return self._refuse()
-        self._offsets_ns.append(header.stamp_ns - arrival_ns)
-        outputs = [Output(self._raw_name, payload)]
+        self._offsets_ns.append(stamp_ns - arrival_ns)
+        outputs = [(self._raw_name, payload)]
         if self._has_encoder:
-            outputs = self._release_stale(header.stamp_ns) + outputs
-            if self._encoder_follows and header.stamp_ns != self._encoder_stamp_ns:
-                self._hold(True, header.stamp_ns, payload, arrival_ns)
+            outputs = self._release_stale(stamp_ns) + outputs
+            if self._encoder_follows and stamp_ns != self._encoder_stamp_ns:
+                self._hold(True, stamp_ns, payload, arrival_ns)
                 return outputs
-        return outputs + self._write_odometry(header.stamp_ns, payload, arrival_ns)
+        return outputs + self._write_odometry(stamp_ns, payload, arrival_ns)
 
     def _hold(self, is_odometry: bool, stamp_ns: int, payload: bytes, arrival_ns: int) -> None:
         if len(self._held) < HELD_MAX:
@@ -188,9 +193,9 @@ class MessageCleaner:
             return self._refuse()
         self._encoder_stamp_ns = header.stamp_ns
         self.odometry.integrate(ticks[0], ticks[1], header.stamp_ns / NS_PER_S)
-        stamp_ns = self._stamps.correct(name, header.stamp_ns, arrival_ns)
-        outputs = [Output(name, wire_messages.restamp(payload, self._count(name), stamp_ns))]
-        return outputs + self._release()
+        if not self._is_wanted(name):
+            return self._release()
+        return self._clean_stamped(name, payload, arrival_ns) + self._release()
 
     def _release_stale(self, stamp_ns: int) -> Outputs:
         """Let go what still waits when a new burst begins: this robot's readings do not follow its odom."""
@@ -213,36 +218,44 @@ class MessageCleaner:
     def _write_odometry(self, stamp_ns: int, payload: bytes, arrival_ns: int) -> Outputs:
         stamp_ns = self._stamps.correct(self._odom_name, stamp_ns, arrival_ns)
         written = self._writer.rewrite(payload, self._count(self._odom_name), stamp_ns, self._find_estimate())
-        return self._refuse() if written is None else [Output(self._odom_name, written)]
+        return self._refuse() if written is None else [(self._odom_name, written)]
 
     def _write_odom_transform(self, stamp_ns: int, tail: bytes, arrival_ns: int) -> Outputs:
         estimate = self._find_estimate()
         if estimate is not None:
             tail = wire_messages.pack_transform_tail(estimate[0])
         stamp_ns = self._stamps.correct("tf base_link", stamp_ns, arrival_ns)
-        return [Output(TRANSFORMS, wire_messages.pack_transform(stamp_ns, self._odom_frames, tail))]
+        return [(TRANSFORMS, wire_messages.pack_transform(stamp_ns, self._odom_frames, tail))]
 
     def _clean_transforms(self, payload: bytes, arrival_ns: int) -> Outputs:
+        # Stock robots send one transform in a message, of frames that were seen before.
+        frames = payload[wire_messages.FRAMES_OFFSET : -wire_messages.TRANSFORM_TAIL_LENGTH]
+        key = self._own_frames.get(frames)
+        if key is not None and payload[: len(wire_messages.ONE_TRANSFORM)] == wire_messages.ONE_TRANSFORM:
+            stamp_ns = wire_messages.read_single_stamp_ns(payload)
+            tail = payload[-wire_messages.TRANSFORM_TAIL_LENGTH :]
+            return self._clean_transform(key, stamp_ns, frames, tail, arrival_ns)
         transforms = wire_messages.read_transforms(payload)
         if transforms is None:
             return self._refuse()
         outputs: Outputs = []
         for stamp_ns, frames, tail in transforms:
-            key = self._own_frames.get(frames)
-            if key is None:
-                key = self._admit_frames(frames)
-                if key is None:
-                    continue
-            if frames == self._odom_frames and self._has_encoder:
-                outputs += self._release_stale(stamp_ns)
-                if self._encoder_follows and stamp_ns != self._encoder_stamp_ns:
-                    self._hold(False, stamp_ns, tail, arrival_ns)
-                else:
-                    outputs += self._write_odom_transform(stamp_ns, tail, arrival_ns)
-                continue
-            stamp_ns = self._stamps.correct(key, stamp_ns, arrival_ns)
-            outputs.append(Output(TRANSFORMS, wire_messages.pack_transform(stamp_ns, frames, tail)))
+            key = self._own_frames.get(frames) or self._admit_frames(frames)
+            if key is not None:
+                outputs += self._clean_transform(key, stamp_ns, frames, tail, arrival_ns)
         return outputs
+
+    def _clean_transform(
+        self, key: str, stamp_ns: int, frames: bytes, tail: bytes, arrival_ns: int
+    ) -> Outputs:
+        if frames == self._odom_frames and self._has_encoder:
+            outputs = self._release_stale(stamp_ns)
+            if self._encoder_follows and stamp_ns != self._encoder_stamp_ns:
+                self._hold(False, stamp_ns, tail, arrival_ns)
+                return outputs
+            return outputs + self._write_odom_transform(stamp_ns, tail, arrival_ns)
+        stamp_ns = self._stamps.correct(key, stamp_ns, arrival_ns)
+        return [(TRANSFORMS, wire_messages.pack_transform(stamp_ns, frames, tail))]
 
     def _admit_frames(self, frames: bytes) -> Optional[str]:
         """Return the key of a pair of frames seen for the first time, None if the robot may not send it."""

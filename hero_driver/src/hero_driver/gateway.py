@@ -7,11 +7,12 @@ Everything here runs on the thread of the sockets, except what says otherwise. I
 """
 
 import time
+import traceback
 from typing import Callable, Dict, List, Optional
 
 from . import log_lines, names
 from .admission import Admission, RateGuard
-from .cleaning import CleaningSettings, MessageCleaner
+from .cleaning import CleaningSettings
 from .command_sender import CommandSender
 from .config import DriverConfig
 from .fleet import Decision, Fleet, RobotRecord, RobotState, Verdict
@@ -199,6 +200,15 @@ class Gateway(LinkHandler):
             peer.bridge.detach(reason)
         self._promote_duplicate(record.identity, now_s)
 
+    def report_fault(self, error: Exception) -> None:
+        """Log a mistake of the driver itself, with the place; only the connection at hand is lost."""
+        place = "".join(traceback.format_tb(error.__traceback__)[-2:]).replace("\n", " ")
+        self._log.log_throttled(
+            "fatal",
+            "fault " + type(error).__name__,
+            "the driver made a mistake, please report it: %s: %s; %s" % (type(error).__name__, error, place),
+        )
+
     def report_trouble(self, text: str) -> None:
         """Log what the network has to say."""
         self._log.log_throttled("warn", "trouble " + text[:40], text)
@@ -280,12 +290,12 @@ class Gateway(LinkHandler):
         identity = record.identity
         if decision.old_link is not None and not decision.old_link.closed:
             # The record belongs to the new connection already, so the old one's end changes nothing.
-            decision.old_link.close("the robot connected again from %s" % peer.link.address)
+            decision.old_link.close("the robot connected again from %s" % (peer.link.address,))
         bridge = self.bridges.get(identity.namespace)
         if bridge is None:
             is_hero = names.identify(identity.namespace + "/x") == identity
-            cleaner = MessageCleaner(identity.namespace, self._cleaning_settings()) if is_hero else None
-            bridge = self.bridges[identity.namespace] = RobotBridge(identity, cleaner, self._context)
+            cleaning = self._cleaning_settings() if is_hero else None
+            bridge = self.bridges[identity.namespace] = RobotBridge(identity, cleaning, self._context)
         peer.bridge = bridge
         rebooted = peer.boot is not None
         if bridge.cleaner is not None:
@@ -414,6 +424,7 @@ class Gateway(LinkHandler):
         return peer.bridge.commands.is_idle and peer.link.read_unacknowledged_length() == 0
 
     def _poll_fleet(self) -> None:
+        self._loop.call_later(FLEET_POLL_S, self._poll_fleet)
         now_s = time.monotonic()
         for record in self.fleet.collect_expired(now_s):
             bridge = self.bridges.pop(record.identity.namespace, None)
@@ -421,4 +432,3 @@ class Gateway(LinkHandler):
                 bridge.close()
                 self._log.log("info", "%s is gone; its topics and services are taken down" % bridge.label)
             self._on_change()
-        self._loop.call_later(FLEET_POLL_S, self._poll_fleet)

@@ -58,18 +58,27 @@ class TickOdometry:
 
     def __init__(self, geometry: WheelGeometry) -> None:
         self.pose = Pose(0.0, 0.0, 0.0)
-        self.twist = Twist(0.0, 0.0)
         self.resets = 0
         self._geometry = geometry
         self._ticks: Optional[Tuple[float, float]] = None
         self._stamp_s = 0.0
         self._window: Deque[Tuple[float, float, float]] = collections.deque(maxlen=TWIST_WINDOW)
 
+    @property
+    def twist(self) -> Twist:
+        """The velocity over the last TWIST_WINDOW readings; zero while there are less than two."""
+        if len(self._window) < 2:
+            return Twist(0.0, 0.0)
+        first_s, first_left, first_right = self._window[0]
+        last_s, last_left, last_right = self._window[-1]
+        speed = self._geometry.tick_m / (last_s - first_s)
+        left_m_s, right_m_s = (last_left - first_left) * speed, (last_right - first_right) * speed
+        return Twist((left_m_s + right_m_s) / 2.0, (right_m_s - left_m_s) / self._geometry.wheel_separation_m)
+
     def expect_reset(self) -> None:
         """The robot rebooted: its counters begin anew, the pose stays where it was."""
         self._ticks = None
         self._window.clear()
-        self.twist = Twist(0.0, 0.0)
 
     def set_pose(self, pose: Pose) -> None:
         """The robot's odometry was set, which zeroes its counters (Odometry.ino:234)."""
@@ -94,13 +103,11 @@ class TickOdometry:
         if abs(left_m) > limit_m or abs(right_m) > limit_m:
             self.resets += 1
             self._window.clear()
-            self.twist = Twist(0.0, 0.0)
-        else:
+        elif left_m or right_m:
             self._move(left_m, right_m)
         if not 0.0 < elapsed_s <= MAX_STEP_S:
             self._window.clear()
         self._window.append((stamp_s, left_ticks, right_ticks))
-        self._measure_twist()
 
     def _move(self, left_m: float, right_m: float) -> None:
         """Follow the arc that two wheels describe which run left_m and right_m at steady speeds."""
@@ -114,15 +121,4 @@ class TickOdometry:
             x_m + chord_m * math.cos(yaw_rad + half_rad),
             y_m + chord_m * math.sin(yaw_rad + half_rad),
             math.remainder(yaw_rad + turn_rad, 2.0 * math.pi),
-        )
-
-    def _measure_twist(self) -> None:
-        first, last = self._window[0], self._window[-1]
-        elapsed_s = last[0] - first[0]
-        if elapsed_s <= 0.0:
-            return
-        left_m_s = (last[1] - first[1]) * self._geometry.tick_m / elapsed_s
-        right_m_s = (last[2] - first[2]) * self._geometry.tick_m / elapsed_s
-        self.twist = Twist(
-            (left_m_s + right_m_s) / 2.0, (right_m_s - left_m_s) / self._geometry.wheel_separation_m
         )

@@ -11,7 +11,7 @@ from typing import Any, Callable, Dict, List, Optional, Tuple
 import rospy
 
 from . import message_types
-from .cleaning import TRANSFORMS, Clean, MessageCleaner, Output
+from .cleaning import TRANSFORMS, Clean, CleaningSettings, MessageCleaner, Output
 from .command_queue import CommandQueue
 from .command_shaping import HALTED_MOTORS, check_twist
 from .message_types import MessageTypeError
@@ -70,6 +70,12 @@ class Outlet:
         self.publisher: Optional[rospy.Publisher] = None
         self.raw_class: Any = None
 
+    @property
+    def is_wanted(self) -> bool:
+        """Whether somebody listens."""
+        publisher = self.publisher
+        return publisher is not None and publisher.get_num_connections() > 0
+
     def publish(self, payload: bytes) -> None:
         """Publish payload if somebody listens."""
         publisher = self.publisher
@@ -85,11 +91,15 @@ class Outlet:
 class RobotBridge:
     """The endpoints of one robot."""
 
-    def __init__(self, identity: Identity, cleaner: Optional[MessageCleaner], context: BridgeContext) -> None:
-        """cleaner is None for devices that are no HeRos: their messages pass through as they are."""
+    def __init__(
+        self, identity: Identity, cleaning: Optional[CleaningSettings], context: BridgeContext
+    ) -> None:
+        """cleaning is None for devices that are no HeRos: their messages pass through as they are."""
         self.identity = identity
         self.label = identity.namespace.lstrip("/")
-        self.cleaner = cleaner
+        self.cleaner = (
+            None if cleaning is None else MessageCleaner(identity.namespace, cleaning, self.is_wanted)
+        )
         self.commands = CommandQueue(context.command_max_age_s)
         self.refused_commands = 0
         self._context = context
@@ -170,7 +180,7 @@ class RobotBridge:
         topic_id = topic.info.topic_id
         derived: Dict[str, str] = {}
         if self.cleaner is None:
-            self._clean[topic_id] = lambda payload, arrival_ns: [Output(name, payload)]
+            self._clean[topic_id] = lambda payload, arrival_ns: [(name, payload)]
         else:
             derived = self.cleaner.find_derived(name, ros_type)
             self._clean[topic_id] = self.cleaner.choose(name, ros_type)
@@ -222,6 +232,11 @@ class RobotBridge:
         return []
 
     # To the robot.
+
+    def is_wanted(self, name: str) -> bool:
+        """Return whether somebody listens to the topic called name."""
+        outlet = self._outlets.get(name)
+        return outlet is not None and outlet.is_wanted
 
     def find_id(self, name: str) -> Optional[int]:
         """Return the id under which the robot receives the topic or service called name."""

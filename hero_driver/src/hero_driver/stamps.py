@@ -12,6 +12,10 @@ STEP_NS = 1000
 """How far a stamp is put behind the one before it when the robot's clock went back: 1 us keeps them distinct."""
 
 
+STEP_SLACK_NS = 1000 * STEP_NS
+"""How far many such steps in a row may lead ahead."""
+
+
 class StampFilter:
     """Corrects the stamps of all topics of one robot."""
 
@@ -37,8 +41,9 @@ class StampFilter:
             self.corrected += 1
         last_ns = self._last_ns.get(topic)
         if last_ns is not None and result_ns <= last_ns:
-            if last_ns - result_ns > self._max_age_ns:
-                # Not the robot's clock went back but ours: ROS time was reset (a bag or simulation restarted).
+            if last_ns - arrival_ns > self._max_future_ns + STEP_SLACK_NS:
+                # No stamp that was let through lies so far ahead of its arrival: ROS time itself went back
+                # (the clock was set, or a bag or simulation began anew).
                 self._last_ns.clear()
             else:
                 result_ns = last_ns + STEP_NS

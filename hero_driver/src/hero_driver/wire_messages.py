@@ -52,9 +52,13 @@ def read_header(payload: bytes) -> Optional[Header]:
     return Header(secs * NS_PER_S + nsecs, payload[_HEADER.size : end], end)
 
 
-def pack_stamp(stamp_ns: int) -> bytes:
-    """Return the eight bytes of a stamp."""
-    return _STAMP.pack(*divmod(stamp_ns, NS_PER_S))
+def read_stamp_ns(payload: bytes) -> Optional[int]:
+    """Return the stamp of a payload that begins with a header, or None if it is too short for one."""
+    if len(payload) < _HEADER.size:
+        return None
+    secs, nsecs = _STAMP.unpack_from(payload, STAMP_OFFSET)
+    stamp_ns: int = secs * NS_PER_S + nsecs
+    return stamp_ns
 
 
 def restamp(payload: bytes, seq: int, stamp_ns: int) -> bytes:
@@ -78,20 +82,22 @@ class OdometryWriter:
         """Take the diagonals of both covariances (x, y, z, roll, pitch, yaw), in m^2 and rad^2, per s^2."""
         self._pose_covariance = _COVARIANCE.pack(*_make_diagonal(pose_covariance))
         self._twist_covariance = _COVARIANCE.pack(*_make_diagonal(twist_covariance))
+        self._frames: Optional[bytes] = None
 
     def rewrite(
         self, payload: bytes, seq: int, stamp_ns: int, estimate: Optional[Tuple[Pose, Twist]]
     ) -> Optional[bytes]:
         """Return the robot's message with stamp and covariances, and with another estimate if one is given.
 
-        None if the length of payload is wrong.
+        None if payload is not a nav_msgs/Odometry.
         """
         tail = len(payload) - ODOMETRY_TAIL_LENGTH
-        header = read_header(payload)
-        if header is None or header.end + _LENGTH.size > tail:
-            return None
-        if header.end + _LENGTH.size + _LENGTH.unpack_from(payload, header.end)[0] != tail:
-            return None
+        # A robot's frames never change, so they are looked at once.
+        frames = payload[_SEQ_AND_STAMP.size : max(0, tail)]
+        if frames != self._frames:
+            if not _holds_two_texts(frames):
+                return None
+            self._frames = frames
         if estimate is None:
             pose = payload[tail : tail + _POSE.size]
             twist_start = tail + _POSE.size + _COVARIANCE.size
@@ -99,8 +105,18 @@ class OdometryWriter:
         else:
             pose = _pack_pose(estimate[0])
             twist = _TWIST.pack(estimate[1].linear_m_s, 0.0, 0.0, 0.0, 0.0, estimate[1].turn_rad_s)
-        head = restamp(payload[:tail], seq, stamp_ns)
-        return b"".join((head, pose, self._pose_covariance, twist, self._twist_covariance))
+        head = _SEQ_AND_STAMP.pack(seq & 0xFFFFFFFF, *divmod(stamp_ns, NS_PER_S))
+        return b"".join((head, frames, pose, self._pose_covariance, twist, self._twist_covariance))
+
+
+def _holds_two_texts(data: bytes) -> bool:
+    """Return whether data is two texts with their lengths in front, and nothing else."""
+    position = 0
+    for _ in range(2):
+        if position + _LENGTH.size > len(data):
+            return False
+        position += _LENGTH.size + _LENGTH.unpack_from(data, position)[0]
+    return position == len(data)
 
 
 class Transform(NamedTuple):
@@ -135,6 +151,20 @@ def read_transforms(payload: bytes) -> Optional[List[Transform]]:
         )
         position = end
     return transforms if position == len(payload) else None
+
+
+ONE_TRANSFORM = _LENGTH.pack(1)
+"""How a message with a single transform begins."""
+
+FRAMES_OFFSET = _LENGTH.size + _SEQ_AND_STAMP.size
+"""Where the frames of a message's first transform begin."""
+
+
+def read_single_stamp_ns(payload: bytes) -> int:
+    """Return the stamp of the transform in a message that is known to hold one."""
+    secs, nsecs = _STAMP.unpack_from(payload, _LENGTH.size + STAMP_OFFSET)
+    stamp_ns: int = secs * NS_PER_S + nsecs
+    return stamp_ns
 
 
 def split_frames(frames: bytes) -> Tuple[bytes, bytes]:

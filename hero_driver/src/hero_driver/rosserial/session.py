@@ -26,14 +26,19 @@ follow in the same burst (node_handle.h:301); alone it is the zero-topic handsha
 REPEAT_INTERVAL_S = 0.5
 """Between two requests for topics when a peer proves that it runs but declared nothing."""
 
+UNCONFIGURED_S = 3.0
+"""A robot that logs but sent neither data nor a time request for so long has lost its configuration (no answer
+for 11 s, node_handle.h:193); it asks for the time every 2.55 s otherwise. Only a new request restores it."""
+
 UNDECLARED_REPEATS = 5
 """Requests that undeclared ids may cause while the robot has declared something else."""
 
 BUFFER_LENGTH_MIN = 1
 
-_MESSAGE_TYPE = re.compile(r"^[a-zA-Z][a-zA-Z0-9_]*/[a-zA-Z][a-zA-Z0-9_]*$")
-_MD5SUM = re.compile(r"^[0-9a-f]{32}$")
-_NAME = re.compile(r"^[/~]?[a-zA-Z][a-zA-Z0-9_/]*$")
+# \Z, because $ would let a line break at the end through.
+_MESSAGE_TYPE = re.compile(r"[a-zA-Z][a-zA-Z0-9_]*/[a-zA-Z][a-zA-Z0-9_]*\Z")
+_MD5SUM = re.compile(r"[0-9a-f]{32}\Z")
+_NAME = re.compile(r"[/~]?[a-zA-Z][a-zA-Z0-9_/]*\Z")
 
 
 class TopicKind(enum.Enum):
@@ -141,6 +146,7 @@ class Session:
         self._last_request_s: Optional[float] = None
         self._request_due_s: Optional[float] = now_s
         self._undeclared_repeats = 0
+        self._last_configured_s = now_s
 
     def receive_bytes(self, data: Bytes, now_s: float, time_of_day_s: float) -> List[Event]:
         """Return the events that data causes, in order. Never raises, whatever data holds."""
@@ -151,6 +157,7 @@ class Session:
             topic = topics.get(topic_id)
             if topic is not None and topic.kind in _FROM_ROBOT:
                 events.append(MessageReceived(topic, payload))
+                self._last_configured_s = now_s
                 continue
             try:
                 event = self._receive_special(topic_id, payload, now_s, time_of_day_s)
@@ -216,6 +223,7 @@ class Session:
             return self._declare(_KIND_BY_FRAME_ID[topic_id], payload)
         if topic_id == frames.ID_TIME:
             payloads.decode_time(payload)
+            self._last_configured_s = now_s
             answer = payloads.encode_time(payloads.split_seconds(time_of_day_s))
             self._outgoing.append(encode_frame(frames.ID_TIME, answer))
             if not self.topics:
@@ -223,7 +231,7 @@ class Session:
             return TimeRequested()
         if topic_id == frames.ID_LOG:
             log = payloads.decode_log(payload)
-            if not self.topics:
+            if not self.topics or now_s - self._last_configured_s > UNCONFIGURED_S:
                 self._expect_topics_by(self._earliest_repeat_s(now_s))
             return LogReceived(log)
         if topic_id == frames.ID_PARAMETER_REQUEST:

@@ -86,10 +86,7 @@ class EventLoop(LinkOwner, DiallerOwner):
                 elif isinstance(link, Dialler):
                     link.finish()
                 else:
-                    if mask & selectors.EVENT_WRITE:
-                        self._serve_write(link)
-                    if mask & selectors.EVENT_READ and not link.closed:
-                        self._serve_read(link)
+                    self._serve_link(link, mask)
             self._run_due()
         self._close_all()
 
@@ -160,13 +157,29 @@ class EventLoop(LinkOwner, DiallerOwner):
             if hasattr(socket, option):
                 sock.setsockopt(socket.IPPROTO_TCP, getattr(socket, option), value)
 
+    def _serve_link(self, link: Link, mask: int) -> None:
+        try:
+            if mask & selectors.EVENT_WRITE:
+                self._serve_write(link)
+            if mask & selectors.EVENT_READ and not link.closed:
+                self._serve_read(link)
+        except Exception as error:  # noqa: BLE001 - one robot's trouble, or our mistake with it, is not the others'
+            self._handler.report_fault(error)
+            self.close_link(link, "a mistake of the driver")
+
+    def _call(self, call: Callable[[], None]) -> None:
+        try:
+            call()
+        except Exception as error:  # noqa: BLE001 - as above; the loop is all that can still stop the robots
+            self._handler.report_fault(error)
+
     def _serve_own(self, fd: int) -> None:
         if fd == self._wake_read:
             with self._wake_lock:
                 os.read(self._wake_read, 1)
                 self._is_awake = False
             for _ in range(len(self._calls)):
-                self._calls.popleft()()
+                self._call(self._calls.popleft())
         else:
             self._accept()
 
@@ -220,14 +233,14 @@ class EventLoop(LinkOwner, DiallerOwner):
     def _run_due(self) -> None:
         now_s = time.monotonic()
         while self._timers and self._timers[0][0] <= now_s:
-            heapq.heappop(self._timers)[2]()
+            self._call(heapq.heappop(self._timers)[2])
 
     def _poll_links(self) -> None:
+        self.call_later(POLL_INTERVAL_S, self._poll_links)
         now_s = time.monotonic()
         for link in list(self._links.values()):
             if not link.closed:
                 self._handler.poll_link(link, now_s)
-        self.call_later(POLL_INTERVAL_S, self._poll_links)
 
     def _end(self) -> None:
         self._running = False

@@ -42,6 +42,10 @@ class LinkHandler:
         """Called every POLL_INTERVAL_S for each connection."""
         raise NotImplementedError
 
+    def report_fault(self, error: Exception) -> None:
+        """One of the calls above, or one made for the loop, raised error; the loop goes on."""
+        raise NotImplementedError
+
     def report_trouble(self, text: str) -> None:
         """Something about the network itself should reach the user's eyes."""
         raise NotImplementedError
