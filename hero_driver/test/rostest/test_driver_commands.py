@@ -1,0 +1,302 @@
+#!/usr/bin/env python
+"""Commands to robots that take them as the firmware does: a stop always arrives, an old command never does."""
+
+import math
+import struct
+
+import rospy
+import rostest
+from driver_case import NODE, DriverCase, Recorder, make_publisher, wait_for, wait_payloads
+from fake_robot import READ_CYCLE_S, VELOCITY_GATE_S
+from geometry_msgs.msg import Twist
+from std_msgs.msg import Bool, ColorRGBA
+from std_srvs.srv import SetBool, Trigger
+
+from hero_msgs.msg import Motor, Robot
+from hero_msgs.srv import SetOdom
+
+VELOCITY = "velocity_controller/cmd_vel"
+POSITION = "position_controller/cmd_vel"
+
+
+def make_command(linear_m_s, turn_rad_s=0.0):
+    twist = Twist()
+    twist.linear.x = linear_m_s
+    twist.angular.z = turn_rad_s
+    return twist
+
+
+class TestDriverCommands(DriverCase):
+    def setUp(self):
+        self.call_stop(False)
+
+    def call_stop(self, held):
+        rospy.wait_for_service(NODE + "/stop", 20.0)
+        self.assertTrue(rospy.ServiceProxy(NODE + "/stop", SetBool)(held).success)
+
+    def join_stock(self, number):
+        """A robot that reads every 51 ms and drops velocities within 50 ms of the last one, as the firmware."""
+        return self.join(number, read_cycle_s=READ_CYCLE_S)
+
+    def burst(self, publisher, count, linear_m_s):
+        """Publish at 50 Hz, faster than the robot can take."""
+        rate = rospy.Rate(50)
+        for _ in range(count):
+            publisher.publish(make_command(linear_m_s))
+            rate.sleep()
+
+    def wait_stopped(self, robot, stops=2):
+        """Wait until a robot has got so many stops after its last motion; the last it took must be one."""
+
+        def look():
+            trailing = 0
+            for velocity in reversed(list(robot.velocities)):
+                if not velocity.is_zero:
+                    break
+                trailing += 1
+            return trailing >= stops
+
+        wait_for(look, lambda: "%d stops at %s, got %s" % (stops, robot.name, robot.velocities[-6:]))
+        self.assertTrue(robot.accepted[-1].is_zero)
+
+    def test_a_stop_right_after_a_burst_is_never_lost(self):
+        robots = [self.join_stock(number) for number in (1, 2, 3)]
+        publishers = [make_publisher("%s/%s" % (robot.namespace, VELOCITY), Twist) for robot in robots]
+        for _ in range(5):
+            rate = rospy.Rate(50)
+            for _ in range(12):
+                for publisher in publishers:
+                    publisher.publish(make_command(0.1))
+                rate.sleep()
+            for publisher in publishers:
+                publisher.publish(make_command(0.0))
+            for robot in robots:
+                self.wait_stopped(robot)
+        for robot in robots:
+            self.assertEqual(robot.accepted, robot.velocities, "the robot dropped a command")
+
+    def test_a_stop_in_the_same_moment_as_a_motion_arrives(self):
+        robot = self.join_stock(4)
+        publisher = make_publisher("/hero_4/" + VELOCITY, Twist)
+        for _ in range(5):
+            publisher.publish(make_command(0.1))
+            publisher.publish(make_command(0.0))
+            self.wait_stopped(robot)
+            del robot.velocities[:]
+
+    def test_a_motion_right_after_a_stop_does_not_swallow_the_stop(self):
+        robot = self.join_stock(5)
+        publisher = make_publisher("/hero_5/" + VELOCITY, Twist)
+        publisher.publish(make_command(0.1))
+        publisher.publish(make_command(0.0))
+        publisher.publish(make_command(0.2))
+        wait_for(lambda: any(v.linear_m_s == 0.2 for v in list(robot.accepted)), "the second motion")
+        speeds = [velocity.linear_m_s for velocity in robot.accepted]
+        self.assertIn(0.0, speeds)
+        self.assertLess(speeds.index(0.0), speeds.index(0.2))
+
+    def test_a_stop_is_repeated_once_and_then_there_is_silence(self):
+        robot = self.join_stock(6)
+        publisher = make_publisher("/hero_6/" + VELOCITY, Twist)
+        publisher.publish(make_command(0.0))
+        self.wait_stopped(robot)
+        publisher.publish(make_command(0.05))
+        wait_for(lambda: not robot.velocities[-1].is_zero, "the motion")
+        self.assertEqual([velocity.linear_m_s for velocity in robot.velocities], [0.0, 0.0, 0.05])
+
+    def test_the_newest_of_many_commands_wins_and_the_robot_takes_all_that_are_sent(self):
+        robot = self.join_stock(7)
+        publisher = make_publisher("/hero_7/" + VELOCITY, Twist)
+        for step in range(1, 51):
+            publisher.publish(make_command(step / 1000.0))
+        wait_for(lambda: robot.accepted and robot.accepted[-1].linear_m_s == 0.05, "the newest command")
+        self.assertLess(len(robot.velocities), 50)
+        self.assertEqual(robot.velocities, robot.accepted)
+
+    def test_commands_are_spaced_by_more_than_the_firmwares_gate(self):
+        robot = self.join(8)  # reads at once, so the times are those at which the driver sent
+        publisher = make_publisher("/hero_8/" + VELOCITY, Twist)
+        self.burst(publisher, 25, 0.1)
+        publisher.publish(make_command(0.0))
+        self.wait_stopped(robot)
+        times_s = [velocity.time_s for velocity in robot.velocities]
+        gaps_s = [later - earlier for earlier, later in zip(times_s, times_s[1:])]
+        self.assertGreaterEqual(min(gaps_s), VELOCITY_GATE_S)
+        self.assertGreater(len(gaps_s), 4)
+
+    def test_velocity_and_position_control_are_shaped_each_on_its_own(self):
+        robot = self.join_stock(9)
+        publishers = [make_publisher("/hero_9/" + name, Twist) for name in (VELOCITY, POSITION)]
+        for publisher in publishers:
+            publisher.publish(make_command(0.0))
+        for name in (VELOCITY, POSITION):
+            self.assertEqual(wait_payloads(robot, name, 2), [bytes(48)] * 2)
+
+    def test_other_commands_are_not_shaped_and_do_not_wait_behind_velocities(self):
+        robot = self.join(10)
+        drive = make_publisher("/hero_10/" + VELOCITY, Twist)
+        light = make_publisher("/hero_10/led", ColorRGBA)
+        motor = make_publisher("/hero_10/cmd_motor", Motor)
+        switch = make_publisher("/hero_10/laser_enable", Bool)
+        rospy.wait_for_service("/hero_10/set_odom", 20.0)
+        for index in range(20):
+            drive.publish(make_command(0.001 * index + 0.001))
+            light.publish(ColorRGBA(float(index), 0.0, 0.0, 0.0))
+            motor.publish(Motor(1500 + index, 1500))
+            switch.publish(Bool(index % 2 == 0))
+        self.assertTrue(rospy.ServiceProxy("/hero_10/set_odom", SetOdom)(0.0, 0.0, 0.0).success)
+        self.assertEqual(
+            [struct.unpack("<4f", payload)[0] for payload in wait_payloads(robot, "led", 20)], list(range(20))
+        )
+        self.assertEqual(
+            [struct.unpack("<2h", payload)[0] for payload in wait_payloads(robot, "cmd_motor", 20)],
+            list(range(1500, 1520)),
+        )
+        self.assertEqual(wait_payloads(robot, "laser_enable", 20), [b"\x01", b"\x00"] * 10)
+
+    def test_velocities_that_are_not_finite_are_refused_counted_and_reported_once(self):
+        robot = self.join(11)
+        publisher = make_publisher("/hero_11/" + VELOCITY, Twist)
+        bad = [make_command(math.nan), make_command(0.1, math.inf), make_command(-math.inf)]
+        unused = make_command(0.1)
+        unused.linear.y = math.nan
+        for command in (*bad, unused, *bad):
+            publisher.publish(command)
+        publisher.publish(make_command(0.05))
+        wait_for(lambda: robot.velocities, "the good command")
+        self.assertEqual([velocity.linear_m_s for velocity in robot.velocities], [0.05])
+        self.fleet.wait("/hero_11", Robot.READY, "with refusals", lambda e: e.dropped_messages == 7)
+        self.wait_log("hero_11: .*not finite")
+        self.assertEqual(len(self.find_logs("hero_11: .*not finite")), 1)
+
+    def test_velocities_over_the_firmwares_limits_pass_as_they_are_unless_a_parameter_says_otherwise(self):
+        robot = self.join(12)
+        make_publisher("/hero_12/" + VELOCITY, Twist).publish(make_command(5.0, -50.0))
+        wait_for(lambda: robot.velocities, "the command")
+        self.assertEqual((robot.velocities[0].linear_m_s, robot.velocities[0].turn_rad_s), (5.0, -50.0))
+
+    def test_the_stop_service_halts_every_robot_and_holds_it_until_released(self):
+        held = Recorder(NODE + "/stopped", Bool)
+        robots = [self.join_stock(number) for number in (13, 14)]
+        publishers = [make_publisher("%s/%s" % (robot.namespace, VELOCITY), Twist) for robot in robots]
+        motor = make_publisher("/hero_13/cmd_motor", Motor)
+        for publisher in publishers:
+            publisher.publish(make_command(0.1))
+        for robot in robots:
+            wait_for(lambda r=robot: r.accepted, "the motion")
+        self.call_stop(True)
+        for robot in robots:
+            self.wait_stopped(robot)
+        wait_for(lambda: held.messages and held.messages[-1].data, "the latched state")
+        wait_for(lambda: self.fleet.newest.stopped, "the report")
+        counts = [len(robot.velocities) for robot in robots]
+        for publisher in publishers:
+            publisher.publish(make_command(0.1))
+        motor.publish(Motor(1400, 1600))
+        calibrate = rospy.ServiceProxy("/hero_13/velocity_controller/pid_calibration", Trigger)
+        with self.assertRaisesRegex(rospy.ServiceException, "~stop holds all motion"):
+            calibrate()
+        # Lights are no motion.
+        make_publisher("/hero_13/led", ColorRGBA).publish(ColorRGBA(1.0, 0.0, 0.0, 0.0))
+        wait_payloads(robots[0], "led")
+        self.fleet.wait("/hero_13", Robot.READY, "refusals", lambda e: e.dropped_messages >= 2)
+        self.fleet.wait("/hero_14", Robot.READY, "refusals", lambda e: e.dropped_messages >= 1)
+        self.assertEqual([len(robot.velocities) for robot in robots], counts)
+        self.assertEqual(robots[0].payloads_on("cmd_motor"), [])
+        # A stop passes while motion is held.
+        publishers[0].publish(make_command(0.0))
+        wait_for(lambda: len(robots[0].velocities) >= counts[0] + 2, "the stop")
+        self.call_stop(False)
+        wait_for(lambda: not held.messages[-1].data, "the latched state")
+        for publisher, robot in zip(publishers, robots):
+            publisher.publish(make_command(0.07))
+            wait_for(lambda r=robot: r.accepted[-1].linear_m_s == 0.07, "the motion")
+
+    def test_the_stop_holds_for_robots_that_join_later(self):
+        self.call_stop(True)
+        robot = self.join_stock(15)
+        publisher = make_publisher("/hero_15/" + VELOCITY, Twist)
+        publisher.publish(make_command(0.1))
+        self.fleet.wait("/hero_15", Robot.READY, "the refusal", lambda e: e.dropped_messages == 1)
+        self.assertEqual([v for v in robot.velocities if not v.is_zero], [])
+        self.call_stop(False)
+        publisher.publish(make_command(0.1))
+        wait_for(lambda: any(not v.is_zero for v in list(robot.accepted)), "the motion")
+
+    def test_the_stop_halts_a_robot_that_returns_while_motion_is_held(self):
+        robot = self.join_stock(16)
+        publisher = make_publisher("/hero_16/" + VELOCITY, Twist)
+        publisher.publish(make_command(0.1))
+        wait_for(lambda: robot.accepted, "the motion")
+        robot.close()  # it drives on until its watchdog ends that
+        self.fleet.wait("/hero_16", Robot.AWAY)
+        self.call_stop(True)
+        returned = self.join_stock(16)
+        self.wait_stopped(returned)
+
+    def test_the_stop_halts_a_robot_that_is_driven_by_motor_commands(self):
+        robot = self.join(17)
+        make_publisher("/hero_17/cmd_motor", Motor).publish(Motor(1400, 1600))
+        wait_payloads(robot, "cmd_motor")
+        self.call_stop(True)
+        self.assertEqual(wait_payloads(robot, "cmd_motor", 2)[1], struct.pack("<2h", 1500, 1500))
+
+    def test_the_stop_halts_a_robot_that_calibrates_itself(self):
+        robot = self.join_stock(18)
+        name = "/hero_18/velocity_controller/pid_calibration"
+        rospy.wait_for_service(name, 20.0)
+        rospy.ServiceProxy(name, Trigger)()
+        self.call_stop(True)
+        self.wait_stopped(robot)
+
+    def test_a_robot_that_does_not_read_gets_the_newest_command_and_no_backlog(self):
+        stalled = self.join(19, receive_buffer_length=4096)
+        other = self.join(20)
+        drive = make_publisher("/hero_19/" + VELOCITY, Twist)
+        light = make_publisher("/hero_19/led", ColorRGBA)
+        other_drive = make_publisher("/hero_20/" + VELOCITY, Twist)
+        other_light = make_publisher("/hero_20/led", ColorRGBA)
+        stalled.is_stalled = True
+        rate = rospy.Rate(100)
+        for step in range(1, 201):
+            drive.publish(make_command(step / 1000.0))
+            for _ in range(3):
+                light.publish(ColorRGBA(float(step), 0.0, 0.0, 0.0))
+            other_light.publish(ColorRGBA(float(step), 0.0, 0.0, 0.0))
+            rate.sleep()
+        # Nobody else is delayed: all that was published has passed before the other one is read again.
+        wait_payloads(other, "led", 200)
+        other_drive.publish(make_command(0.1))
+        wait_for(lambda: other.velocities, "the other robot's command")
+        self.fleet.wait("/hero_19", Robot.READY, "with drops", lambda e: e.dropped_messages > 0)
+        drive.publish(make_command(0.15))
+        stalled.is_stalled = False
+        wait_for(
+            lambda: stalled.velocities and stalled.velocities[-1].linear_m_s == 0.15, "the newest command"
+        )
+        # What its TCP window held may come out, the rest must not.
+        self.assertLess(len(stalled.velocities), 40)
+
+    def test_a_robot_that_returns_gets_no_command_of_before(self):
+        robot = self.join(21)
+        drive = make_publisher("/hero_21/" + VELOCITY, Twist)
+        light = make_publisher("/hero_21/led", ColorRGBA)
+        robot.is_stalled = True
+        drive.publish(make_command(0.1))
+        drive.publish(make_command(0.2))
+        robot.reset()
+        self.fleet.wait("/hero_21", Robot.AWAY)
+        before = self.fleet.find("/hero_21").dropped_messages
+        drive.publish(make_command(0.3))
+        light.publish(ColorRGBA(1.0, 0.0, 0.0, 0.0))
+        self.fleet.wait("/hero_21", Robot.AWAY, "refusals", lambda e: e.dropped_messages >= before + 2)
+        returned = self.join(21)
+        drive.publish(make_command(0.05))
+        wait_for(lambda: returned.velocities, "the new command")
+        self.assertEqual([velocity.linear_m_s for velocity in returned.velocities], [0.05])
+        self.assertEqual(returned.payloads_on("led"), [])
+
+
+if __name__ == "__main__":
+    rospy.init_node("test_driver_commands")
+    rostest.rosrun("hero_driver", "driver_commands", TestDriverCommands)
