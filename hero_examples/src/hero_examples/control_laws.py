@@ -1,4 +1,4 @@
-"""What a robot sees and wants -> how fast it drives and turns: pure functions, no clock, no ROS, no memory of their own.
+"""What a robot sees and wants -> how fast it drives and turns: pure functions, no clock, no ROS, no memory.
 
 Units: metres, radians, seconds. Angles are counter-clockwise, 0 is straight ahead. Ranges are measured from the
 robot's centre, start straight ahead and go round counter-clockwise; inf is nothing in range, 0 too close to
@@ -56,6 +56,9 @@ class WanderLaw(NamedTuple):
     """From here on the robot slows down and bends away."""
 
 
+WANDER = WanderLaw()
+
+
 HALT_STEPS = 2
 """At 10 Hz: the robot takes about 0.5 s to come down to a lower speed, but 0.15 s to stop when told to stand."""
 
@@ -87,7 +90,7 @@ def split_sectors(ranges: Sequence[float]) -> Tuple[float, float, float]:
 
 
 def wander(
-    ranges: Sequence[float], memory: WanderMemory, chance: float, law: WanderLaw = WanderLaw()
+    ranges: Sequence[float], memory: WanderMemory, chance: float, law: WanderLaw = WANDER
 ) -> Tuple[Command, WanderMemory]:
     """Return the next command of a random walk with obstacle avoidance, and what to remember for the next call.
 
@@ -143,8 +146,11 @@ class PotentialLaw(NamedTuple):
     """Largest angle between the pull and straight ahead: makes the walk random."""
 
 
+POTENTIAL = PotentialLaw()
+
+
 def wander_in_potential(
-    ranges: Sequence[float], memory: WanderMemory, chance: float, law: PotentialLaw = PotentialLaw()
+    ranges: Sequence[float], memory: WanderMemory, chance: float, law: PotentialLaw = POTENTIAL
 ) -> Tuple[Command, WanderMemory]:
     """Return the next command of a random walk down a potential field, and what to remember: see wander().
 
@@ -192,11 +198,14 @@ class GoToLaw(NamedTuple):
     """Nearer than this the robot has arrived."""
 
 
+TUTORIAL = GoToLaw()
+
+
 BRISK = GoToLaw(linear_gain=0.8, turn_gain=1.5, max_linear_m_s=0.12, max_turn_rad_s=1.5)
 """As quick as the robot's speed controller (0.5 s to a new speed) follows without swinging."""
 
 
-def go_to_point(pose: Pose, x_m: float, y_m: float, law: GoToLaw = GoToLaw()) -> Command:
+def go_to_point(pose: Pose, x_m: float, y_m: float, law: GoToLaw = TUTORIAL) -> Command:
     """Return the command that brings a robot at pose nearer to the point; a standstill where it has arrived.
 
     Unicycle law: v = kr * distance * cos(a), w = ka * a with a the angle from the heading to the goal. A goal behind
@@ -233,7 +242,10 @@ class GoToPoseLaw(NamedTuple):
     tolerance_rad: float = 0.05
 
 
-def go_to_pose(pose: Pose, goal: Pose, law: GoToPoseLaw = GoToPoseLaw(), at_goal: bool = False) -> Command:
+SMOOTH = GoToPoseLaw()
+
+
+def go_to_pose(pose: Pose, goal: Pose, law: GoToPoseLaw = SMOOTH, at_goal: bool = False) -> Command:
     """Return the command of a smooth curve to goal that ends in its heading; a standstill where it is reached.
 
     at_goal: the place was reached already; only the heading counts, so that a millimetre of drift during the last
@@ -283,8 +295,11 @@ class DetourLaw(NamedTuple):
     max_turn_rad_s: float = 2.0
 
 
+DETOUR = DetourLaw()
+
+
 def bend_around(
-    command: Command, bearing_rad: float, distance_m: float, ranges: Sequence[float], law: DetourLaw = DetourLaw()
+    command: Command, bearing_rad: float, distance_m: float, ranges: Sequence[float], law: DetourLaw = DETOUR
 ) -> Command:
     """Return command, or what goes around an obstacle that is nearer than both the goal and law.influence_m.
 
@@ -325,7 +340,10 @@ class FollowLaw(NamedTuple):
     max_turn_rad_s: float = 2.0
 
 
-def follow(pose: Pose, leader: Pose, law: FollowLaw = FollowLaw()) -> Command:
+FOLLOW = FollowLaw()
+
+
+def follow(pose: Pose, leader: Pose, law: FollowLaw = FOLLOW) -> Command:
     """Return the command that keeps a robot at pose one gap away from leader and turned towards it.
 
     It never drives backwards: a leader that comes nearer is waited for. pose and leader are in the same frame.

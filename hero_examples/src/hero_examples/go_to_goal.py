@@ -130,7 +130,7 @@ class Pilot:
         self.last_state = State.ACTIVE
         self._parameters = parameters
         self._frames = frames
-        self._orders: "queue.Queue[Order]" = queue.Queue(MAX_WAITING_GOALS)
+        self._orders: queue.Queue[Order] = queue.Queue(MAX_WAITING_GOALS)
         self._order: Optional[Order] = None
         self._pursuit: Optional[GoalPursuit] = None
         self._start_s = 0.0
@@ -143,7 +143,7 @@ class Pilot:
         self._server = actionlib.ActionServer(
             robot.namespace + "/go_to", GoToAction, self._receive_action, self._receive_cancel, auto_start=False
         )
-        self._cancelled: "queue.Queue[Any]" = queue.Queue(MAX_WAITING_GOALS)
+        self._cancelled: queue.Queue[Any] = queue.Queue(MAX_WAITING_GOALS)
         self._server.start()
 
     # ---------------------------------------------------------------- callbacks, on ROS's threads

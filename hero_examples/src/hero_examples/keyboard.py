@@ -42,13 +42,13 @@ class Keyboard:
         """Find the terminal. Raises: NoTerminalError."""
         self.file = open_terminal()
         self._settings: List[Any] = []
-        self._guard: Optional["subprocess.Popen[bytes]"] = None
+        self._guard: Optional[subprocess.Popen[bytes]] = None
         self._unfinished = ""
 
     def __enter__(self) -> "Keyboard":
         self._settings = termios.tcgetattr(self.file)
         self._guard = start_guard(self.file)
-        tty.setcbreak(self.file, termios.TCSANOW)
+        tty.setcbreak(self.fileno(), termios.TCSANOW)
         settings = termios.tcgetattr(self.file)
         # Ctrl-Z would leave a program that neither reads keys nor stops the robot, so it is a key like any other.
         settings[6][termios.VSUSP] = b"\0"

@@ -23,10 +23,11 @@ from typing import Any, Callable, Dict, Iterable, Iterator, List, Optional, Sequ
 
 import rospy
 from geometry_msgs.msg import Twist
-from hero_msgs.msg import RobotArray
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import ColorRGBA
+
+from hero_msgs.msg import RobotArray
 
 from .control_laws import Pose
 from .goal_pursuit import DEFAULT_LAW, DEFAULT_TIMEOUT_S, DEFAULT_TOLERANCE_M, Goal, GoalPursuit, State
@@ -297,7 +298,8 @@ class Robot:
         pursuit = GoalPursuit(Goal(x_m, y_m, yaw_rad), time.monotonic(), tolerance_m, timeout_s, law)
         try:
             while pursuit.state is State.ACTIVE:
-                self.drive(*pursuit.step(self.fresh_pose(), self.fresh_proximity() if avoid else None, time.monotonic()))
+                ranges = self.fresh_proximity() if avoid else None
+                self.drive(*pursuit.step(self.fresh_pose(), ranges, time.monotonic()))
                 if not sleep(REPEAT_PERIOD_S):
                     raise GoalError("%s did not reach its goal: the program ends" % self.name)
         finally:
@@ -310,7 +312,7 @@ class Robot:
 
         Several robots at once: start all, then ask each future for its result().
         """
-        future: "Future[None]" = Future()
+        future: Future[None] = Future()
         future.set_running_or_notify_cancel()
         thread = threading.Thread(target=self._finish_go_to, args=(future, x_m, y_m, options), daemon=True)
         thread.start()
@@ -319,7 +321,7 @@ class Robot:
     def _finish_go_to(self, future: "Future[None]", x_m: float, y_m: float, options: Dict[str, Any]) -> None:
         try:
             self.go_to(x_m, y_m, **options)
-        except Exception as error:  # whatever it is, it belongs to whoever asks for the result
+        except (RobotError, ValueError, TypeError, rospy.ROSException) as error:
             future.set_exception(error)
         else:
             future.set_result(None)

@@ -25,7 +25,12 @@ class SwarmSteering:
     """
 
     def __init__(
-        self, goals: Sequence[Tuple[float, float]], law: AvoidanceLaw, step_s: float, seed: int, tolerance_m: float = 0.01
+        self,
+        goals: Sequence[Tuple[float, float]],
+        law: AvoidanceLaw,
+        step_s: float,
+        seed: int,
+        tolerance_m: float = 0.01,
     ) -> None:
         """step_s: time between two calls of step(); seed: of the small random nudges."""
         self.goals = [(float(x), float(y)) for x, y in goals]

@@ -1,7 +1,6 @@
 #!/usr/bin/env python
 """Teleop in a real pseudo-terminal: real key bytes in, Twist messages out, the terminal's settings before and after."""
 
-import fcntl
 import os
 import pty
 import signal
@@ -20,6 +19,7 @@ DEADLINE_S = 30.0
 
 # The shell owns the terminal, as it does for a user, and keeps it open when teleop has ended.
 FOREGROUND_SHELL = 'trap : INT TERM HUP; "$@"; echo "status=$?="; cat >/dev/null'
+
 
 
 def wait_for(condition, what):
@@ -62,19 +62,15 @@ class Terminal:
         self.before = termios.tcgetattr(self.slave_fd)
         program = subprocess.check_output(["catkin_find", "--first-only", "--libexec", "hero_examples", "teleop"])
         self.shell = subprocess.Popen(
-            ["sh", "-c", FOREGROUND_SHELL, "sh", program.decode().strip(), *arguments],
+            # setsid --ctty makes the terminal the shell's own, so that Ctrl-C is a signal there.
+            ["setsid", "--ctty", "sh", "-c", FOREGROUND_SHELL, "sh", program.decode().strip(), *arguments],
             stdin=self.slave_fd,
             stdout=self.slave_fd,
             stderr=self.slave_fd,
-            preexec_fn=self.take_terminal,
         )
         self.text = ""
         self.reader = threading.Thread(target=self.read, daemon=True)
         self.reader.start()
-
-    def take_terminal(self):
-        os.setsid()
-        fcntl.ioctl(0, termios.TIOCSCTTY, 0)
 
     def read(self):
         while True:

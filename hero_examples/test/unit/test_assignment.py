@@ -5,6 +5,7 @@ import math
 import random
 
 import pytest
+
 from hero_examples.assignment import assign, assign_goals, assign_without_scipy
 from hero_examples.formations import FormationError, place_formation
 

@@ -5,6 +5,7 @@ import math
 import random
 
 import pytest
+
 from hero_examples.control_laws import (
     BRISK,
     STANDSTILL,

@@ -4,6 +4,8 @@ import math
 
 import numpy as np
 import pytest
+from test_control_laws import STEP_S, Body
+
 from hero_examples.control_laws import STANDSTILL, Pose
 from hero_examples.reciprocal import (
     AvoidanceLaw,
@@ -14,7 +16,6 @@ from hero_examples.reciprocal import (
     steered_velocity,
 )
 from hero_examples.swarm_steering import SwarmSteering
-from test_control_laws import STEP_S, Body
 
 BODY_M = 0.0369
 
