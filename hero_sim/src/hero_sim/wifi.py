@@ -2,7 +2,7 @@
 
 Pure: time enters in milliseconds. Order is kept, as TCP keeps it; what the air loses comes late, not never.
 Source: published recordings of one HeRo on Wi-Fi: gaps between odoms p95 44-53 ms, p99 48-113 ms, longest
-148-1274 ms; ping 5-30 ms with spikes of 100-280 ms about every 2.5 s.
+148-1274 ms; ping 5-30 ms with spikes of 100-280 ms every few seconds.
 """
 
 from collections import deque
@@ -26,7 +26,7 @@ class WifiProfile(NamedTuple):
 PROFILES: Dict[str, WifiProfile] = {
     "ideal": WifiProfile(0.0, 0.0, 0.0, (0.0, 0.0), 0.0, (0.0, 0.0), 0.0),
     "router": WifiProfile(2.0, 3.0, 10000.0, (30.0, 110.0), 0.0, (0.0, 0.0), 500e3),
-    "hotspot": WifiProfile(3.0, 5.0, 2500.0, (100.0, 280.0), 0.0, (0.0, 0.0), 250e3),
+    "hotspot": WifiProfile(3.0, 5.0, 4500.0, (100.0, 280.0), 60000.0, (400.0, 1200.0), 250e3),
     "bad": WifiProfile(5.0, 15.0, 2500.0, (100.0, 280.0), 20000.0, (500.0, 4000.0), 100e3),
 }
 """ideal adds nothing. router and hotspot are the good and the common end of the recordings, bad is beyond
