@@ -15,8 +15,8 @@ ALIVE_S = 3.0
 """A robot that was heard within this time is alive: stock robots speak at least every 2.5 s."""
 
 FLAP_S = 5.0
-"""Two take-overs within this time, while the loser is alive, are two robots behind one address, not one that
-boots twice (a boot takes 1.6 s, and the connection of a robot without power is not alive)."""
+"""Two take-overs within this time, where the loser still speaks while the winner does, are two robots behind
+one address: a robot that boots or reconnects is silent on its old connection."""
 
 
 class RobotState(enum.Enum):
@@ -85,8 +85,10 @@ class Fleet:
         self.robots: Dict[str, RobotRecord] = {}
         self._grace_s = grace_s
 
-    def identify(self, link: Any, identity: Identity, host: str, address: str, now_s: float) -> Decision:
-        """Decide about a connection (link) from address that says it is identity."""
+    def identify(
+        self, link: Any, identity: Identity, host: str, address: str, opened_s: float, now_s: float
+    ) -> Decision:
+        """Decide about a connection (link) from address, open since opened_s, that says it is identity."""
         record = self.robots.get(identity.namespace)
         if record is None:
             record = RobotRecord(
@@ -97,7 +99,8 @@ class Fleet:
         old_link = record.link
         if old_link is not None:
             is_alive = now_s - record.last_heard_s < ALIVE_S
-            is_flapping = is_alive and record.reconnects > 0 and now_s - record.joined_s < FLAP_S
+            is_second = record.last_heard_s > opened_s and record.reconnects > 0
+            is_flapping = is_second and now_s - record.joined_s < FLAP_S
             if is_alive and (host != record.host or is_flapping):
                 reason = (
                     "two robots call themselves %s: %s is here and stays, %s is refused; give one of them"

@@ -18,7 +18,7 @@ from .config import DriverConfig
 from .fleet import Decision, Fleet, RobotRecord, RobotState, Verdict
 from .log_relay import LogRelay
 from .names import Identity
-from .robot_bridge import BridgeContext, RobotBridge
+from .robot_bridge import VELOCITY_SUFFIX, BridgeContext, RobotBridge
 from .robot_requests import RobotRequests
 from .robot_status import Peer, RobotStatus, describe_robot
 from .rosserial.payloads import LOG_DEBUG, LOG_ERROR, LOG_FATAL, LOG_INFO, LOG_WARN, Log
@@ -94,7 +94,7 @@ class Gateway(LinkHandler):
             log=self._log.log_throttled,
             wake=self._sender.wake,
             add_transform=self._transforms.add,
-            after_publishing=loop.call_soon,
+            call_later=loop.call_later,
             is_stopped=lambda: self.stopped,
             clamp=self._config.clamp,
             service_timeout_s=self._config.service_timeout_s,
@@ -247,6 +247,8 @@ class Gateway(LinkHandler):
             )
             return
         peer.bridge.declare(topic, name)
+        if self.stopped and name.endswith(VELOCITY_SUFFIX):
+            peer.bridge.halt()
         if peer.record.state is not RobotState.READY:
             peer.record.enter(RobotState.READY, now_s)
             self._on_change()
@@ -272,7 +274,9 @@ class Gateway(LinkHandler):
                     )
                 return False
             identity = names.identify_any(topic.info.name, address.host)
-        decision = self.fleet.identify(peer.link, identity, address.host, str(address), now_s)
+        decision = self.fleet.identify(
+            peer.link, identity, address.host, str(address), peer.session.opened_s, now_s
+        )
         self._admission.unidentified -= 1
         peer.record = decision.record
         if decision.verdict is Verdict.REFUSED:

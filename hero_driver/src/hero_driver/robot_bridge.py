@@ -16,13 +16,14 @@ from .command_queue import CommandQueue
 from .command_shaping import HALTED_MOTORS, check_twist
 from .message_types import MessageTypeError
 from .names import Identity
+from .outlet import CallLater, Outlet
 from .rosserial.session import Topic, TopicKind
 from .service_requests import find_request_fault, is_success, read_set_odom_pose
 from .services import RobotService
 from .worker import Worker
 
-PUBLISHER_QUEUE_LENGTH = 50
-"""Messages per subscriber that wait when it is slow: more than a second of odometry; then the oldest goes."""
+QUEUE_LENGTH = 50
+"""Messages that wait for a slow subscriber, or for a slow robot: more than a second of odometry."""
 
 VELOCITY_SUFFIX = "/cmd_vel"
 VELOCITY_CONTROLLER = "/velocity_controller/cmd_vel"
@@ -41,7 +42,7 @@ class BridgeContext:
         log: Callable[[str, str, str], None],
         wake: Callable[["RobotBridge"], None],
         add_transform: Callable[[bytes], None],
-        after_publishing: Callable[[Callable[[], None]], None],
+        call_later: CallLater,
         is_stopped: Callable[[], bool],
         clamp: bool,
         service_timeout_s: float,
@@ -49,43 +50,18 @@ class BridgeContext:
     ) -> None:
         """Take what the rest of the driver does for bridges.
 
-        wake(bridge): commands wait (any thread); log(level, throttle key, text); after_publishing(call): run
-        call on the thread of the sockets, when what it publishes now is out.
+        wake(bridge): commands wait (any thread); log(level, throttle key, text); call_later(delay_s, call)
+        is the loop's.
         """
         self.registrar = registrar
         self.log = log
         self.wake = wake
         self.add_transform = add_transform
-        self.after_publishing = after_publishing
+        self.call_later = call_later
         self.is_stopped = is_stopped
         self.clamp = clamp
         self.service_timeout_s = service_timeout_s
         self.command_max_age_s = command_max_age_s
-
-
-class Outlet:
-    """A publisher that may not be there yet."""
-
-    def __init__(self) -> None:
-        self.publisher: Optional[rospy.Publisher] = None
-        self.raw_class: Any = None
-
-    @property
-    def is_wanted(self) -> bool:
-        """Whether somebody listens."""
-        publisher = self.publisher
-        return publisher is not None and publisher.get_num_connections() > 0
-
-    def publish(self, payload: bytes) -> None:
-        """Publish payload if somebody listens."""
-        publisher = self.publisher
-        if publisher is None or not publisher.get_num_connections():
-            return
-        try:
-            publisher.publish(self.raw_class(payload))
-        except rospy.ROSException:
-            # The publisher was closed by the shutdown of the node in between; nobody listens any more.
-            self.publisher = None
 
 
 class RobotBridge:
@@ -140,9 +116,9 @@ class RobotBridge:
         self._closed = True
         self.detach("the robot left")
         # This thread is the one that publishes: once it has let go of a publisher, that can be unregistered.
-        publishers = [outlet.publisher for outlet in self._outlets.values() if outlet.publisher is not None]
+        unregister = [call for outlet in self._outlets.values() for call in outlet.release()]
         self._outlets.clear()
-        self._context.registrar.submit(lambda: self._unregister(publishers))
+        self._context.registrar.submit(lambda: self._unregister(unregister))
 
     @property
     def last_error(self) -> str:
@@ -186,7 +162,7 @@ class RobotBridge:
             self._clean[topic_id] = self.cleaner.choose(name, ros_type)
         for outlet_name in (name, *derived):
             if outlet_name != TRANSFORMS or self.cleaner is None:
-                self._outlets.setdefault(outlet_name, Outlet())
+                self._outlets.setdefault(outlet_name, Outlet(QUEUE_LENGTH, self._context.call_later))
         return derived
 
     def _declare_service_half(self, topic: Topic, name: str) -> None:
@@ -338,15 +314,12 @@ class RobotBridge:
 
     def _open_outlet(self, outlet: Outlet, name: str, message_class: Any) -> None:
         raw_class = message_types.make_raw_class(message_class)
-        if outlet.publisher is not None:
+        if outlet.is_open:
             if outlet.raw_class is raw_class:
                 return
-            old, outlet.publisher = outlet.publisher, None
-            self._context.after_publishing(lambda: self._submit(old.unregister))
-        outlet.raw_class = raw_class
-        outlet.publisher = rospy.Publisher(
-            name, raw_class, queue_size=PUBLISHER_QUEUE_LENGTH, tcp_nodelay=True
-        )
+            for unregister in outlet.release():
+                unregister()
+        outlet.open(name, raw_class)
 
     def _subscribe(self, name: str, message_type: str, md5sum: str) -> None:
         message_class = self._find_message_class(name, message_type, md5sum)
@@ -365,7 +338,7 @@ class RobotBridge:
                 message_types.make_raw_class(message_class),
                 self._receive_command,
                 callback_args=(name, ros_type),
-                queue_size=PUBLISHER_QUEUE_LENGTH,
+                queue_size=QUEUE_LENGTH,
                 tcp_nodelay=True,
             ),
         )
@@ -388,9 +361,9 @@ class RobotBridge:
 
         self._servers[name] = rospy.Service(name, raw_class, handle)
 
-    def _unregister(self, publishers: List[rospy.Publisher]) -> None:
-        for publisher in publishers:
-            publisher.unregister()
+    def _unregister(self, publishers: List[Callable[[], None]]) -> None:
+        for unregister in publishers:
+            unregister()
         for _, subscriber in self._subscribers.values():
             subscriber.unregister()
         for server in self._servers.values():

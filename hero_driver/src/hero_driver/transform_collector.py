@@ -4,13 +4,13 @@ One message for each transform, as robots send them, would make every listener o
 per robot and second, and a small queue would lose most of them. Runs on the thread of the sockets.
 """
 
-from typing import Callable, List
+from typing import List
 
-import rospy
 from tf2_msgs.msg import TFMessage
 
 from . import wire_messages
 from .message_types import make_raw_class
+from .outlet import CallLater, Outlet
 
 QUEUE_LENGTH = 200
 """Two seconds of messages for a listener that is slow."""
@@ -22,12 +22,12 @@ TRANSFORMS_MAX = 500
 class TransformCollector:
     """The publisher of /tf."""
 
-    def __init__(self, period_s: float, call_later: Callable[[float, Callable[[], None]], None]) -> None:
+    def __init__(self, period_s: float, call_later: CallLater) -> None:
         """Collect for period_s; call_later(delay_s, call) runs call on the same thread."""
         self._period_s = period_s
         self._call_later = call_later
-        self._raw_class = make_raw_class(TFMessage)
-        self._publisher = rospy.Publisher("/tf", self._raw_class, queue_size=QUEUE_LENGTH, tcp_nodelay=True)
+        self._outlet = Outlet(QUEUE_LENGTH, call_later)
+        self._outlet.open("/tf", make_raw_class(TFMessage))
         self._transforms: List[bytes] = []
 
     def add(self, transform: bytes) -> None:
@@ -41,5 +41,5 @@ class TransformCollector:
     def publish(self) -> None:
         """Publish what was collected."""
         transforms, self._transforms = self._transforms, []
-        if transforms and self._publisher.get_num_connections():
-            self._publisher.publish(self._raw_class(wire_messages.pack_transform_message(transforms)))
+        if transforms and self._outlet.is_wanted:
+            self._outlet.publish(wire_messages.pack_transform_message(transforms))
