@@ -1,0 +1,78 @@
+"""One robot whose messages go through a MessageCleaner, for the tests of cleaning."""
+
+from robot_messages import build_burst, read_odometry, read_transform
+
+from hero_driver.cleaning import TRANSFORMS, CleaningSettings, MessageCleaner
+from hero_driver.odometry import WheelGeometry
+
+TYPES = {
+    "/hero_0/odom": "nav_msgs/Odometry",
+    "/hero_0/encoder": "hero_msgs/Encoder",
+    "/hero_0/laser": "sensor_msgs/LaserScan",
+    "/hero_0/imu": "sensor_msgs/Imu",
+    "/tf": "tf2_msgs/TFMessage",
+}
+
+
+def make_settings(**changes):
+    """Return the driver's default settings with changes."""
+    values = {
+        "odometry": "ticks",
+        "geometry": WheelGeometry(),
+        "pose_covariance": (1e-4, 1e-4, 1e-9, 1e-9, 1e-9, 1e-2),
+        "twist_covariance": (1e-4, 1e-9, 1e-9, 1e-9, 1e-9, 1e-2),
+        "stamps": "robot",
+        "max_future_s": 0.05,
+        "max_age_s": 5.0,
+    }
+    return CleaningSettings(**{**values, **changes})
+
+
+class CleanedRobot:
+    """hero_0 with its stock topics, or those in types.
+
+    Attributes:
+        outputs: everything that came out, as (name, payload).
+    """
+
+    def __init__(self, types=None, is_wanted=lambda name: True, **settings):
+        self.cleaner = MessageCleaner("/hero_0", make_settings(**settings), is_wanted)
+        self.outputs = []
+        self.declare(TYPES if types is None else types)
+
+    def declare(self, types):
+        """Declare topics, as at the start of a connection."""
+        self._clean = {name: self.cleaner.choose(name, message_type) for name, message_type in types.items()}
+
+    def reconnect(self, rebooted):
+        """Begin a new connection with the stock topics."""
+        self.cleaner.restart(rebooted)
+        self.declare(TYPES)
+
+    def receive(self, name, payload, arrival_ns):
+        """Give one message; return what came out because of it."""
+        outputs = list(self._clean[name](payload, arrival_ns))
+        self.outputs += outputs
+        return outputs
+
+    def receive_burst(self, stamp_ns, ticks, arrival_ns=None, **changes):
+        """Give one burst of odometry, transforms and encoder; return what came out because of it."""
+        outputs = []
+        for name, _, payload in build_burst(stamp_ns, ticks, **changes):
+            outputs += self.receive(name, payload, stamp_ns if arrival_ns is None else arrival_ns)
+        return outputs
+
+
+def list_odometry(outputs):
+    """Return the read odometry messages among outputs."""
+    return [read_odometry(payload) for name, payload in outputs if name == "/hero_0/odom"]
+
+
+def list_transforms(outputs):
+    """Return the read transforms among outputs."""
+    return [read_transform(payload) for name, payload in outputs if name == TRANSFORMS]
+
+
+def list_payloads(outputs, name):
+    """Return the payloads of one topic among outputs."""
+    return [payload for output_name, payload in outputs if output_name == name]
