@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
+
 from hero_msgs import msg, srv
 
 PACKAGE = Path(__file__).resolve().parents[2]

@@ -1,0 +1,1 @@
+"""The robot's model: its dimensions, and the URDF made of them."""
