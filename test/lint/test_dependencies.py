@@ -29,6 +29,11 @@ def needed_package(module, own_package):
     return None
 
 
+def read_cmake(package):
+    text = (sources.ROOT / package / "CMakeLists.txt").read_text(encoding="utf-8")
+    return text.replace("${PROJECT_NAME}", package)
+
+
 def python_files(package, in_tests):
     for path in sources.list_python_files():
         parts = path.relative_to(sources.ROOT).parts
@@ -100,13 +105,13 @@ def test_only_known_libraries_are_imported(path):
 def test_every_rostest_is_registered(path):
     package = sources.package_of(path)
     name = str(path.relative_to(sources.ROOT / package))
-    text = (sources.ROOT / package / "CMakeLists.txt").read_text(encoding="utf-8")
+    text = read_cmake(package)
     assert re.search(rf"add_rostest\(\s*{re.escape(name)}\b", text), f"{package}: add_rostest({name})"
 
 
 @pytest.mark.parametrize("package", PACKAGES)
 def test_every_node_is_installed_and_can_be_run(package):
-    text = (sources.ROOT / package / "CMakeLists.txt").read_text(encoding="utf-8")
+    text = read_cmake(package)
     for path in sorted((sources.ROOT / package / "nodes").glob("*")):
         assert path.stat().st_mode & 0o111, f"chmod +x {path}"
         assert path.read_text(encoding="utf-8").startswith("#!/usr/bin/env python\n"), path
@@ -115,7 +120,7 @@ def test_every_node_is_installed_and_can_be_run(package):
 
 @pytest.mark.parametrize("package", PACKAGES)
 def test_every_directory_that_nodes_read_is_installed(package):
-    text = (sources.ROOT / package / "CMakeLists.txt").read_text(encoding="utf-8")
+    text = read_cmake(package)
     installed = " ".join(re.findall(r"install\(\s*DIRECTORY([^)]*)\)", text)).split()
     for name in ("config", "launch", "rviz", "urdf", "meshes", "worlds", "arenas"):
         directory = sources.ROOT / package / name
