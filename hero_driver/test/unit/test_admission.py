@@ -1,0 +1,116 @@
+"""Who may connect, how many at once, and how much one of them may send."""
+
+import ipaddress
+
+import pytest
+
+from hero_driver.admission import GARBAGE_LENGTH_MAX, Admission, AdmissionLimits, RateGuard
+
+ROBOT = "10.42.0.17"
+
+
+def make_admission(*networks, **limits):
+    return Admission(AdmissionLimits(allow=tuple(map(ipaddress.ip_network, networks)), **limits))
+
+
+@pytest.mark.parametrize("host", [ROBOT, "127.0.0.1", "::1", "fe80::1%wlan0"])
+def test_every_address_may_come_by_default(host):
+    assert make_admission().admit(host) is None
+
+
+@pytest.mark.parametrize("host", [ROBOT, "10.42.0.255", "::ffff:10.42.0.17", "fe80::1%wlan0", "192.168.4.1"])
+def test_addresses_of_the_allowed_networks_may_come(host):
+    assert make_admission("10.42.0.0/24", "fe80::/10", "192.168.4.1").admit(host) is None
+
+
+@pytest.mark.parametrize("host", ["10.42.1.17", "192.168.4.2", "::ffff:10.42.1.17", "2001:db8::1", "127.0.0.1"])
+def test_other_addresses_are_refused_with_the_name_of_the_parameter(host):
+    admission = make_admission("10.42.0.0/24", "fe80::/10", "192.168.4.1")
+    assert "~allow" in admission.admit(host)
+    assert admission.unidentified == 0
+
+
+def test_connections_beyond_the_total_are_refused_until_one_leaves():
+    admission = make_admission(max_connections=2)
+    assert admission.admit("10.0.0.1") is None
+    assert admission.admit("10.0.0.2") is None
+    assert "more than 2 connections (~max_connections)" in admission.admit("10.0.0.3")
+    admission.release("10.0.0.1")
+    assert admission.admit("10.0.0.3") is None
+
+
+def test_connections_of_one_address_are_limited_each_on_its_own():
+    admission = make_admission(max_connections_per_address=1)
+    assert admission.admit("10.0.0.1") is None
+    assert "~max_connections_per_address" in admission.admit("10.0.0.1")
+    assert admission.admit("10.0.0.2") is None
+    admission.release("10.0.0.1")
+    assert admission.admit("10.0.0.1") is None
+
+
+def test_connections_that_say_nothing_are_limited():
+    admission = make_admission(max_unidentified=1)
+    assert admission.admit("10.0.0.1") is None
+    assert "~max_unidentified" in admission.admit("10.0.0.2")
+    admission.unidentified -= 1
+    assert admission.admit("10.0.0.2") is None
+
+
+def test_a_refused_connection_counts_nowhere():
+    admission = make_admission(max_connections=1)
+    admission.admit("10.0.0.1")
+    for _ in range(10):
+        admission.admit("10.0.0.2")
+    admission.release("10.0.0.1")
+    assert admission.admit("10.0.0.2") is None
+    assert admission.unidentified == 2
+
+
+# Rates.
+
+
+def test_a_stock_robot_stays_far_below_the_limits():
+    guard = RateGuard(5000, 2000000, 0.0)
+    for step in range(1000):
+        assert guard.count(7, 1500, step * 0.034) is None
+
+
+def test_too_many_frames_within_a_second_are_too_much():
+    guard = RateGuard(100, 10**6, 0.0)
+    assert guard.count(100, 800, 0.5) is None
+    assert guard.count(1, 8, 0.9) == "more than 100 frames per second (~max_frames_per_s)"
+
+
+def test_too_many_bytes_within_a_second_are_too_much():
+    guard = RateGuard(100, 10000, 0.0)
+    assert guard.count(1, 10000, 0.5) is None
+    assert guard.count(1, 1, 0.9) == "more than 10000 bytes per second (~max_bytes_per_s)"
+
+
+def test_a_new_second_begins_anew():
+    guard = RateGuard(100, 10000, 0.0)
+    for second in range(5):
+        assert guard.count(100, 10000, float(second)) is None
+
+
+def test_a_pause_is_no_credit():
+    guard = RateGuard(100, 10000, 0.0)
+    assert guard.count(100, 10000, 100.0) is None
+    assert guard.count(1, 8, 100.5) is not None
+
+
+def test_bytes_without_a_good_frame_end_it_however_slowly_they_come():
+    guard = RateGuard(5000, 2000000, 0.0)
+    received = 0
+    while received + 1000 <= GARBAGE_LENGTH_MAX:
+        received += 1000
+        assert guard.count(0, 1000, received * 0.01) is None
+    refusal = guard.count(0, 1000, received * 0.01)
+    assert refusal == "%d bytes without one good frame: this does not speak rosserial" % (received + 1000)
+
+
+def test_a_good_frame_forgives_the_garbage_before_it():
+    guard = RateGuard(5000, 2000000, 0.0)
+    for step in range(100):
+        assert guard.count(0, 60000, step * 2.0) is None
+        assert guard.count(1, 8, step * 2.0 + 1.0) is None
