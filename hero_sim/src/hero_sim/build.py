@@ -47,7 +47,7 @@ def _build_flash(options: argparse.Namespace, world: World, index: int) -> Flash
     return Flash(calibration_counts_m2, path)
 
 
-def build_swarm(options: argparse.Namespace, address: str, report: Callable[[str], None]) -> Swarm:
+def build_swarm(options: argparse.Namespace, addresses: List[str], report: Callable[[str], None]) -> Swarm:
     """Return the swarm that options describe, switched on.
 
     Raises: OptionError for an arena in which the robots find no place.
@@ -60,7 +60,7 @@ def build_swarm(options: argparse.Namespace, address: str, report: Callable[[str
     except arenas.ArenaError as error:
         raise OptionError(str(error)) from error
     world = World(arena, poses, np.random.RandomState(seeds[1]), errors=0.0 if options.perfect else 1.0)
-    firmware_options = FirmwareOptions(options.imu_hat, options.firmware_odometry == "exact", address)
+    exact = options.firmware_odometry == "exact"
     robots: List[Firmware] = []
     for index in range(options.robots):
         flash = _build_flash(options, world, index)
@@ -70,7 +70,7 @@ def build_swarm(options: argparse.Namespace, address: str, report: Callable[[str
                 Body(world, index),
                 flash,
                 np.random.RandomState(seeds[_SEEDS_BEFORE_ROBOTS + _SEEDS_PER_ROBOT * index]),
-                firmware_options,
+                FirmwareOptions(options.imu_hat, exact, addresses[index]),
                 report,
             )
         )
@@ -98,9 +98,9 @@ def build_simulator(options: argparse.Namespace, report: Callable[[str], None]) 
     """
     serve = options.serve is not None
     host = options.host or ("0.0.0.0" if serve else "127.0.0.1")
-    link = TcpLink(options.robots, host, options.serve if serve else options.port, serve)
+    link = TcpLink(options.robots, host, options.serve if serve else options.port, serve, options.first_id)
     try:
-        swarm = build_swarm(options, link.find_own_address(), report)
+        swarm = build_swarm(options, link.own_addresses, report)
     except OptionError:
         link.close_all()
         raise

@@ -45,10 +45,16 @@ class _Connection:
 
 
 class TcpLink:
-    """The connections of all robots."""
+    """The connections of all robots.
 
-    def __init__(self, count: int, host: str, port: int, serve: bool = False) -> None:
+    Attributes:
+        own_addresses: of each robot, as the driver sees it.
+    """
+
+    def __init__(self, count: int, host: str, port: int, serve: bool = False, first_number: int = 0) -> None:
         """Dial host:port for each of count robots, or, with serve, listen on port, port + 1, ...
+
+        first_number tells the robots of several simulators on one machine apart.
 
         Raises: OptionError for a host that cannot be resolved or a port that cannot be listened on.
         """
@@ -61,6 +67,7 @@ class TcpLink:
         self._abandoned: List[socket.socket] = []
         self._events: List[LinkEvent] = []
         self._address = self._resolve(host, port)
+        self.own_addresses = [self._find_own_address(first_number + index) for index in range(count)]
         if serve:
             for index in range(count):
                 self._listen(index, port + index)
@@ -95,17 +102,24 @@ class TcpLink:
         self._listeners[index] = listener
         self._selector.register(listener, selectors.EVENT_READ, index)
 
-    def find_own_address(self) -> str:
-        """Return the address of this machine on the way to the driver, as a robot's boot line would name
-        it."""
+    def _find_own_address(self, number: int) -> str:
+        """Return the address from which robot number dials, as its boot line names it.
+
+        To a driver on this machine each robot dials from an address of its own, as robots on a network do:
+        127.0.1.1, 127.0.1.2, ... Where the system has only 127.0.0.1, all share that.
+        """
         family, address = self._address
         with socket.socket(family, socket.SOCK_DGRAM) as probe:
             try:
+                if family == socket.AF_INET and str(address[0]).startswith("127.") and not self.serve:
+                    own = "127.0.%d.%d" % (1 + number // 250 % 250, 1 + number % 250)
+                    probe.bind((own, 0))
+                    return own
                 probe.connect(address)
                 return str(probe.getsockname()[0])
             except OSError:
-                # No way there yet: robots say so when they dial.
-                return "0.0.0.0"
+                # No way there yet (robots say so when they dial), or a system with a single loopback address.
+                return "127.0.0.1" if str(address[0]).startswith("127.") else "0.0.0.0"
 
     def dial(self, index: int) -> None:
         """Begin to connect a robot; poll() tells how it went."""
@@ -114,6 +128,8 @@ class TcpLink:
         sock = socket.socket(family, socket.SOCK_STREAM)
         sock.setblocking(False)
         connection = _Connection(index, sock, dialling=True)
+        if self.own_addresses[index].startswith("127."):
+            sock.bind((self.own_addresses[index], 0))
         result = sock.connect_ex(address)
         if result not in (0, errno.EINPROGRESS):
             sock.close()

@@ -145,7 +145,9 @@ def measure(robots: int, seconds: float) -> Measurement:
 
 def measure_fastest(robots: int, simulated_ms: int = 5000) -> float:
     """Return how many seconds of a driving swarm are simulated in a second, without sockets."""
-    swarm = build_swarm(build_parser().parse_args(["--robots", str(robots)]), "127.0.0.1", lambda text: None)
+    swarm = build_swarm(
+        build_parser().parse_args(["--robots", str(robots)]), [""] * robots, lambda text: None
+    )
 
     def run(until_ms: int) -> None:
         while swarm.now_ms < until_ms:

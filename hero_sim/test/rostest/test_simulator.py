@@ -135,7 +135,7 @@ class SimulatorTest(unittest.TestCase):
         def is_green(message):
             publisher.publish(ColorRGBA(0.0, 1.0, 0.0, 1.0))
             time.sleep(0.1)
-            body = [marker for marker in message.markers if (marker.ns, marker.id) == ("robots", 3)][0]
+            body = next(marker for marker in message.markers if (marker.ns, marker.id) == ("robots", 3))
             return (body.color.r, body.color.g, body.color.b) == (0.0, 1.0, 0.0)
 
         markers.wait(is_green, "green robot")

@@ -28,7 +28,8 @@ class DriverSide:
 
     def __init__(self, *arguments, answer_time=True, connect=True):
         self.reports = []
-        self.swarm = build_swarm(parse_options(*arguments), "127.0.0.1", self.reports.append)
+        options = parse_options(*arguments)
+        self.swarm = build_swarm(options, ["127.0.0.1"] * options.robots, self.reports.append)
         self.answer_time = answer_time
         self.connect = connect
         count = len(self.swarm.robots)
