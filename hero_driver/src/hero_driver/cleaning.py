@@ -21,8 +21,14 @@ STOCK_SCAN_TIME_S = 0.2
 OFFSET_SAMPLES = 64
 """Stamps over which the clock offset is a median: about two seconds of odometry."""
 
-HELD_MAX = 32
+HELD_MAX = 8
 """Messages that may wait for the encoder reading of their own burst; a burst has two."""
+
+BURST_NS = 10 * 10**6
+"""Stamps of one burst lie closer together than this, those of two bursts are 34 ms apart."""
+
+FRAMES_MAX = 32
+"""Pairs of frames that one robot may use; stock robots have five."""
 
 
 Output = Tuple[str, bytes]
@@ -84,17 +90,22 @@ class MessageCleaner:
         self._proximity_name = namespace + "/proximity"
         self._has_encoder = False
         self._encoder_follows = True
-        self._encoder_stamp_ns = -1
+        self._encoder_stamp_ns = -BURST_NS
+        self._odom_stamp_ns = -BURST_NS
         self._held: List[Tuple[bool, int, bytes, int]] = []  # is odometry, robot's stamp, payload, arrival
 
     def restart(self, rebooted: bool) -> None:
         """A new connection begins; after a reboot the robot's counters begin anew too."""
         self._has_encoder = False
-        self._encoder_stamp_ns = -1
+        self._encoder_stamp_ns = self._odom_stamp_ns = -BURST_NS
         self._encoder_follows = True
         self._held = []
         if rebooted:
-            self.odometry.expect_reset()
+            self.note_reboot()
+
+    def note_reboot(self) -> None:
+        """The robot's counters begin anew; the pose stays."""
+        self.odometry.expect_reset()
 
     @property
     def clock_offset_s(self) -> float:
@@ -164,8 +175,9 @@ class MessageCleaner:
             outputs.append((self._proximity_name, proximity))
         return outputs
 
-    # Odometry. In one burst the robot sends odom, tf and then the encoder reading that belongs to them
-    # (all with one stamp), so odom and its transform wait for the reading, which follows within the burst.
+    # Odometry. In one burst the robot sends odom, tf and then the encoder reading that belongs to them, so
+    # odom and its transform wait for the reading. Where none follows, because it was lost or because another
+    # firmware has another order, nothing waits for longer than until the next odom.
 
     def _clean_odometry(self, payload: bytes, arrival_ns: int) -> Outputs:
         stamp_ns = wire_messages.read_stamp_ns(payload)
@@ -174,8 +186,11 @@ class MessageCleaner:
         self._offsets_ns.append(stamp_ns - arrival_ns)
         outputs = [(self._raw_name, payload)]
         if self._has_encoder:
-            outputs = self._release_stale(stamp_ns) + outputs
-            if self._encoder_follows and stamp_ns != self._encoder_stamp_ns:
+            if self._held:
+                outputs += self._release()
+                self._encoder_follows = False
+            self._odom_stamp_ns = stamp_ns
+            if self._encoder_follows and abs(stamp_ns - self._encoder_stamp_ns) > BURST_NS:
                 self._hold(True, stamp_ns, payload, arrival_ns)
                 return outputs
         return outputs + self._write_odometry(stamp_ns, payload, arrival_ns)
@@ -192,17 +207,11 @@ class MessageCleaner:
         if header is None or ticks is None:
             return self._refuse()
         self._encoder_stamp_ns = header.stamp_ns
+        self._encoder_follows = abs(header.stamp_ns - self._odom_stamp_ns) <= BURST_NS
         self.odometry.integrate(ticks[0], ticks[1], header.stamp_ns / NS_PER_S)
         if not self._is_wanted(name):
             return self._release()
         return self._clean_stamped(name, payload, arrival_ns) + self._release()
-
-    def _release_stale(self, stamp_ns: int) -> Outputs:
-        """Let go what still waits when a new burst begins: this robot's readings do not follow its odom."""
-        if not self._held or self._held[0][1] == stamp_ns:
-            return _NONE
-        self._encoder_follows = False
-        return self._release()
 
     def _release(self) -> Outputs:
         held, self._held = self._held, []
@@ -213,7 +222,9 @@ class MessageCleaner:
         return outputs
 
     def _find_estimate(self) -> Optional[Tuple[Pose, Twist]]:
-        return (self.odometry.pose, self.odometry.twist) if self._has_encoder else None
+        if not self._has_encoder or not self.odometry.has_reading:
+            return None
+        return self.odometry.pose, self.odometry.twist
 
     def _write_odometry(self, stamp_ns: int, payload: bytes, arrival_ns: int) -> Outputs:
         stamp_ns = self._stamps.correct(self._odom_name, stamp_ns, arrival_ns)
@@ -249,11 +260,10 @@ class MessageCleaner:
         self, key: str, stamp_ns: int, frames: bytes, tail: bytes, arrival_ns: int
     ) -> Outputs:
         if frames == self._odom_frames and self._has_encoder:
-            outputs = self._release_stale(stamp_ns)
-            if self._encoder_follows and stamp_ns != self._encoder_stamp_ns:
+            if self._held:
                 self._hold(False, stamp_ns, tail, arrival_ns)
-                return outputs
-            return outputs + self._write_odom_transform(stamp_ns, tail, arrival_ns)
+                return _NONE
+            return self._write_odom_transform(stamp_ns, tail, arrival_ns)
         stamp_ns = self._stamps.correct(key, stamp_ns, arrival_ns)
         return [(TRANSFORMS, wire_messages.pack_transform(stamp_ns, frames, tail))]
 
@@ -264,9 +274,13 @@ class MessageCleaner:
             return None
         parent, child = wire_messages.split_frames(frames)
         prefix = self._frame_prefix
-        if not parent.startswith(prefix) or not child.startswith(prefix) or len(self._own_frames) >= HELD_MAX:
+        if (
+            not parent.startswith(prefix)
+            or not child.startswith(prefix)
+            or len(self._own_frames) >= FRAMES_MAX
+        ):
             self.refused += 1
-            if len(self._known_foreign) < HELD_MAX:
+            if len(self._known_foreign) < FRAMES_MAX:
                 self._known_foreign.add(frames)
                 self.foreign_frames.add(
                     "%s -> %s" % (ascii(parent.decode("latin-1")), ascii(child.decode("latin-1")))

@@ -360,7 +360,7 @@ class Gateway(LinkHandler):
         if record.booted_s is not None and booted_s - record.booted_s > REBOOT_SLACK_S:
             self._log.log("warn", "%s rebooted %.1f s ago" % (peer.label, uptime_s))
             if peer.bridge is not None and peer.bridge.cleaner is not None and peer.boot is None:
-                peer.bridge.cleaner.restart(rebooted=True)
+                peer.bridge.cleaner.note_reboot()
         # Delays of the network only make a boot look later, so the earliest is the best.
         if (
             record.booted_s is None

@@ -59,6 +59,7 @@ class TickOdometry:
     def __init__(self, geometry: WheelGeometry) -> None:
         self.pose = Pose(0.0, 0.0, 0.0)
         self.resets = 0
+        self.has_reading = False
         self._geometry = geometry
         self._ticks: Optional[Tuple[float, float]] = None
         self._stamp_s = 0.0
@@ -90,6 +91,7 @@ class TickOdometry:
         """Take one reading of the counters (ticks since boot or set_odom, forward positive)."""
         if not (math.isfinite(left_ticks) and math.isfinite(right_ticks)):
             return
+        self.has_reading = True
         last, self._ticks = self._ticks, (left_ticks, right_ticks)
         elapsed_s, self._stamp_s = stamp_s - self._stamp_s, stamp_s
         if last is None:
