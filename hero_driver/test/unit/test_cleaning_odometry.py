@@ -196,7 +196,7 @@ def test_the_pose_stays_where_it_was_when_the_robot_reboots():
 def test_a_reboot_that_is_noticed_after_the_topics_were_declared_does_not_lose_the_encoder():
     robot = CleanedRobot()
     robot.receive_burst(NOW_NS, (100.0, 100.0))
-    robot.cleaner.restart(rebooted=True)
+    robot.cleaner.note_reboot()
     robot.receive_burst(NOW_NS + PERIOD_NS, (0.0, 0.0))
     outputs = robot.receive_burst(NOW_NS + 2 * PERIOD_NS, (10.0, 10.0))
     assert list_odometry(outputs)[0][2] == pytest.approx(10.0 * TICK_M)
