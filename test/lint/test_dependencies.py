@@ -126,3 +126,14 @@ def test_every_directory_that_nodes_read_is_installed(package):
         directory = sources.ROOT / package / name
         if directory.is_dir() and any(directory.iterdir()):
             assert name in installed, f"install(DIRECTORY {name} ...) in {package}/CMakeLists.txt"
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_bootstrap_installs_the_debian_packages_that_are_declared(package):
+    listed = (sources.ROOT / "script" / "bootstrap").read_text(encoding="utf-8").split()
+    missing = [
+        name
+        for name in sources.read_dependencies(package)
+        if name.startswith("python3-") and name not in listed
+    ]
+    assert not missing, f"add to DEBIAN_PACKAGES in script/bootstrap: {missing}"
