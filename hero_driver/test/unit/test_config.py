@@ -1,0 +1,207 @@
+"""Private parameters: defaults, what is allowed, and one clear line for everything else."""
+
+import dataclasses
+import ipaddress
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hero_driver.config import ConfigError, DriverConfig, read_config
+from hero_driver.transport import Address
+
+FIELDS = {field.name: field for field in dataclasses.fields(DriverConfig)}
+NUMBERS = [name for name, field in FIELDS.items() if "range" in field.metadata]
+CHOICES = [name for name, field in FIELDS.items() if "options" in field.metadata]
+DIAGONALS = ["pose_covariance", "twist_covariance"]
+
+
+def refuse(name, value):
+    """Return the complaint about a parameter, and check that it is one line with the name and the value."""
+    with pytest.raises(ConfigError) as caught:
+        read_config({name: value})
+    text = str(caught.value)
+    assert "~" + name in text
+    assert "\n" not in text
+    return text
+
+
+def test_no_parameters_are_the_defaults():
+    config = read_config({})
+    assert config == DriverConfig()
+    assert (config.host, config.port, config.robots) == ("0.0.0.0", 11411, ())
+    assert config.namespace_policy == "robot"
+
+
+def test_a_configuration_cannot_be_changed():
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        read_config({}).port = 1
+
+
+@pytest.mark.parametrize("name", FIELDS)
+def test_every_parameter_has_a_text_and_a_default_that_is_allowed(name):
+    default = FIELDS[name].default
+    assert FIELDS[name].metadata["text"]
+    if name in ("robots", "allow"):
+        default = list(default)
+    assert getattr(read_config({name: default}), name) == FIELDS[name].default
+
+
+def test_values_come_where_they_belong():
+    config = read_config(
+        {
+            "host": "10.42.0.1",
+            "port": 0,
+            "max_topics": 10,
+            "silence_timeout_s": 8,
+            "clamp": True,
+            "odometry": "robot",
+            "wheel_separation_m": 0.0635,
+            "allow": ["10.42.0.0/24", "fe80::/10"],
+            "max_unidentified": 7,
+        }
+    )
+    assert (config.host, config.port, config.clamp, config.odometry) == ("10.42.0.1", 0, True, "robot")
+    assert type(config.silence_timeout_s) is float
+    assert config.session_limits.max_topics == 10
+    assert config.session_limits.silence_timeout_s == 8.0
+    assert config.session_limits.max_payload_length == 4096
+    assert config.session_limits.max_name_length == 128
+    assert config.session_limits.declare_timeout_s == 20.0
+    assert config.wheel_geometry.wheel_separation_m == 0.0635
+    assert config.wheel_geometry.wheel_diameter_m == 0.0492
+    assert config.wheel_geometry.ticks_per_turn == 288.0
+    networks = (ipaddress.ip_network("10.42.0.0/24"), ipaddress.ip_network("fe80::/10"))
+    limits = config.admission_limits
+    assert (limits.allow, limits.max_connections, limits.max_unidentified) == (networks, 200, 7)
+    assert limits.max_connections_per_address == 200
+
+
+# Unknown names.
+
+
+def test_an_unknown_parameter_is_refused_with_the_name_that_was_meant():
+    assert "did you mean ~silence_timeout_s?" in refuse("silence_timeout", 5.0)
+    assert "known are: allow, clamp," in refuse("xyzzy", 1)
+    assert "did you mean" not in refuse("xyzzy", 1)
+
+
+# Numbers.
+
+
+@pytest.mark.parametrize("name", NUMBERS)
+def test_the_limits_of_a_number_are_allowed_and_what_lies_beyond_is_not(name):
+    low, high = FIELDS[name].metadata["range"]
+    assert getattr(read_config({name: low}), name) == low
+    assert getattr(read_config({name: high}), name) == high
+    for value in (low - 1, high + 1, -math.inf, math.inf, math.nan):
+        text = refuse(name, value)
+        assert repr(value) in text
+        assert "from %g to %g" % (low, high) in text
+
+
+@pytest.mark.parametrize("name", NUMBERS)
+@pytest.mark.parametrize("value", ["11411", "", True, None, [1], {}])
+def test_what_is_no_number_is_refused(name, value):
+    assert "number from" in refuse(name, value)
+
+
+def test_a_whole_number_may_be_written_with_a_point_and_a_half_may_not():
+    assert read_config({"port": 11412.0}).port == 11412
+    assert type(read_config({"port": 11412.0}).port) is int
+    assert "a whole number" in refuse("port", 11412.5)
+
+
+# Choices, texts, switches.
+
+
+@pytest.mark.parametrize("name", CHOICES)
+def test_only_the_choices_are_allowed(name):
+    for option in FIELDS[name].metadata["options"]:
+        assert getattr(read_config({name: option}), name) == option
+    for value in ("none", "", 1, True, ["robot"], {"a": 1}):
+        assert "one of " + ", ".join(FIELDS[name].metadata["options"]) in refuse(name, value)
+
+
+@pytest.mark.parametrize("name", ["clamp", "parameters_outside"])
+def test_a_switch_is_true_or_false(name):
+    assert getattr(read_config({name: True}), name) is True
+    for value in (1, 0, "true", "yes", None):
+        assert "true or false" in refuse(name, value)
+
+
+@pytest.mark.parametrize("value", [11411, True, None, ["0.0.0.0"]])
+def test_the_host_is_a_text(value):
+    assert "a text" in refuse("host", value)
+
+
+def test_a_driver_that_neither_listens_nor_dials_is_refused():
+    assert "neither listen nor dial" in refuse("host", "")
+    config = read_config({"host": "", "robots": [{"host": "10.0.0.7"}]})
+    assert config.host == ""
+
+
+# Lists.
+
+
+def test_robots_are_addresses_with_the_usual_port_unless_another_is_given():
+    config = read_config({"robots": [{"host": "10.0.0.7"}, {"host": "hero-3.local", "port": 4000}]})
+    assert config.robots == (Address("10.0.0.7", 11411), Address("hero-3.local", 4000))
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        "10.0.0.7",
+        {"host": "10.0.0.7"},
+        ["10.0.0.7"],
+        [{}],
+        [{"port": 11411}],
+        [{"host": ""}],
+        [{"host": 7}],
+        [{"host": "a", "port": 0}],
+        [{"host": "a", "port": 65536}],
+        [{"host": "a", "port": "11411"}],
+        [{"host": "a", "port": True}],
+        [{"host": "a", "prot": 1}],
+        [None],
+    ],
+)
+def test_other_lists_of_robots_are_refused(value):
+    assert "{host" in refuse("robots", value)
+
+
+def test_a_robot_named_twice_is_refused():
+    assert "names no robot twice" in refuse("robots", [{"host": "a"}, {"host": "a", "port": 11411}])
+
+
+@pytest.mark.parametrize("value", ["10.0.0.0/8", [10], ["10.0.0.0/33"], ["10.42.0.1/24"], ["robots"], [None], {}])
+def test_what_is_no_list_of_networks_is_refused(value):
+    assert "networks such as 10.42.0.0/24" in refuse("allow", value)
+
+
+@pytest.mark.parametrize("name", DIAGONALS)
+def test_a_covariance_is_six_numbers_that_are_not_negative(name):
+    assert getattr(read_config({name: [0, 1, 2.5, 3, 4, 5]}), name) == (0.0, 1.0, 2.5, 3.0, 4.0, 5.0)
+    others = ([-1.0] + [0.0] * 5, [math.nan] * 6, [math.inf] * 6, ["1"] * 6, [True] * 6)
+    for value in ([0.0] * 5, [0.0] * 36, 1.0, *others):
+        assert "6 numbers" in refuse(name, value)
+
+
+yaml_values = st.recursive(
+    st.one_of(st.none(), st.booleans(), st.integers(), st.floats(), st.text(max_size=10)),
+    lambda children: st.one_of(
+        st.lists(children, max_size=3), st.dictionaries(st.sampled_from(["host", "port", "x"]), children, max_size=3)
+    ),
+    max_leaves=6,
+)
+
+
+@given(name=st.sampled_from(sorted(FIELDS)), value=yaml_values)
+def test_any_value_is_taken_or_refused_in_one_line(name, value):
+    try:
+        read_config({name: value})
+    except ConfigError as error:
+        assert "~" + name in str(error)
+        assert "\n" not in str(error)
