@@ -10,7 +10,7 @@ from typing import List, Optional
 
 import numpy as np
 
-from .errors import OptionError
+from .errors import CommandError, OptionError
 
 _LENGTHS = {"ir_calibration_counts_m2": 8, "motor_centres_us": 2, "velocity_pid": 6, "position_pid": 6}
 
@@ -31,15 +31,29 @@ class Flash:
     def __init__(self, ir_calibration_counts_m2: List[float], path: Optional[str] = None) -> None:
         """Begin with a calibration, then take over what the file at path holds; None keeps nothing.
 
-        Raises: OptionError if the file is there but cannot be read or is not ours.
+        Raises: OptionError if the folder cannot be used, or the file cannot be read or is not ours.
         """
         self.ir_calibration_counts_m2 = [float(value) for value in np.asarray(ir_calibration_counts_m2)]
         self.motor_centres_us = [1500.0, 1500.0]
         self.velocity_pid = list(DEFAULT_PID)
         self.position_pid = list(DEFAULT_PID)
         self._path = path
-        if path is not None and os.path.exists(path):
-            self._load(path)
+        if path is not None:
+            self._check_folder(path)
+            if os.path.exists(path):
+                self._load(path)
+
+    @staticmethod
+    def _check_folder(path: str) -> None:
+        folder = os.path.dirname(path) or "."
+        try:
+            os.makedirs(folder, exist_ok=True)
+        except OSError as error:
+            raise OptionError(
+                "--flash-dir %s cannot be made: %s; choose another" % (folder, error.strerror)
+            ) from error
+        if not os.access(folder, os.W_OK):
+            raise OptionError("--flash-dir %s is not writable; choose another" % folder)
 
     def _load(self, path: str) -> None:
         try:
@@ -62,13 +76,18 @@ class Flash:
                 raise OptionError("flash file %s: %s: %s" % (path, key, error)) from error
 
     def save(self) -> None:
-        """Write the file, whole or not at all."""
+        """Write the file, whole or not at all.
+
+        Raises: CommandError if the file system refuses.
+        """
         if self._path is None:
             return
-        folder = os.path.dirname(self._path)
-        if folder:
-            os.makedirs(folder, exist_ok=True)
         content = {key: getattr(self, key) for key in _LENGTHS}
-        with open(self._path + ".new", "w", encoding="utf-8") as file:
-            json.dump(content, file, indent=1)
-        os.replace(self._path + ".new", self._path)
+        try:
+            with open(self._path + ".new", "w", encoding="utf-8") as file:
+                json.dump(content, file, indent=1)
+            os.replace(self._path + ".new", self._path)
+        except OSError as error:
+            raise CommandError(
+                "flash file %s cannot be written: %s" % (self._path, error.strerror)
+            ) from error

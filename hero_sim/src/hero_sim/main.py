@@ -1,6 +1,7 @@
 """Command line -> a running swarm. Needs Python and numpy; neither ROS nor a ROS master."""
 
 import argparse
+import importlib.util
 import signal
 import sys
 from typing import TYPE_CHECKING, List, Optional
@@ -134,19 +135,26 @@ def stop_on_signals(simulator: "Simulator") -> None:
     signal.signal(signal.SIGTERM, stop)
 
 
+def find_missing() -> Optional[str]:
+    """Return what has to be installed first, in words; None if nothing is missing."""
+    if importlib.util.find_spec("numpy") is None:
+        return "numpy is missing; install it: apt install python3-numpy, or pip install numpy"
+    if importlib.util.find_spec("hero_driver") is None:
+        return (
+            "the package hero_driver is missing; it lies beside hero_sim: add hero_driver/src to PYTHONPATH"
+        )
+    return None
+
+
 def main(arguments: Optional[List[str]] = None) -> int:
     """Run the simulator; return the exit code."""
     options = build_parser().parse_args(arguments)
     if "help" in options.fault:
         print("\n".join(describe_faults()))
         return 0
-    try:
-        import numpy  # noqa: F401
-    except ImportError:
-        print(
-            "hero_sim: numpy is missing; install it: apt install python3-numpy, or pip install numpy",
-            file=sys.stderr,
-        )
+    missing = find_missing()
+    if missing is not None:
+        print("hero_sim: " + missing, file=sys.stderr)
         return 1
     from .build import build_simulator
 

@@ -19,6 +19,9 @@ _LONGEST_WAIT_S = 0.05
 
 _SHORTEST_WAIT_S = 0.0005
 
+_FLAPPING_MS = 5000
+"""A server that closes every connection at once gets one pair of lines per robot in this time."""
+
 _LATE_S = 1.0
 """More behind the wall clock than this (a machine that slept), and the time is given up, not caught up."""
 
@@ -54,6 +57,7 @@ class Simulator:
         self._report = report
         self._said_unreachable = False
         self._said_connected = [False] * len(swarm.robots)
+        self._quiet_until_ms = [0] * len(swarm.robots)
         self._away_until_ms = [0] * len(swarm.robots)
         self._carrying: Set[int] = set()
 
@@ -69,7 +73,7 @@ class Simulator:
                 anchor_s, anchor_ms = now_s, swarm.now_ms
                 wanted_ms = swarm.now_ms
             elif wanted_ms - swarm.now_ms > _LATE_S * 1000 * self.speed:
-                self.late_s += (wanted_ms - swarm.now_ms) / 1000.0 / self.speed
+                self._give_up((wanted_ms - swarm.now_ms) / 1000.0 / self.speed)
                 anchor_s, anchor_ms = now_s, swarm.now_ms
                 wanted_ms = swarm.now_ms + 1
             if end_ms is not None:
@@ -87,6 +91,14 @@ class Simulator:
                 wait_s = (next_ms - anchor_ms) / 1000.0 / self.speed - (time.monotonic() - anchor_s)
             for event in self.link.poll(min(max(wait_s, _SHORTEST_WAIT_S), _LONGEST_WAIT_S)):
                 self._take_event(event)
+
+    def _give_up(self, late_s: float) -> None:
+        if self.late_s == 0.0:
+            self._report(
+                "this machine was busy or asleep for %.1f s; the robots stood still meanwhile (said once; "
+                "if it is too slow, take fewer robots or a lower --speed)" % late_s
+            )
+        self.late_s += late_s
 
     def serve_robot(self, index: int) -> None:
         """Carry away what a robot wants to send, and dial for it if it wants that."""
@@ -137,6 +149,8 @@ class Simulator:
         elif self.link.serve or now_ms < self._away_until_ms[index]:
             robot.connection_failed(now_ms)
         elif self.link.is_dialling(index):
+            # The firmware gave up after 5 s and tries again; the attempt under way is as good as a new one.
+            self._report_failure("no answer within 5 s")
             return
         else:
             self.link.dial(index)
@@ -190,8 +204,10 @@ class Simulator:
         elif event.kind == tcp_link.LOST:
             self.radios[event.robot_index].clear()
             robot.connection_lost()
-            self._said_connected[event.robot_index] = False
-            self._report("%s lost its connection: %s" % (robot.name, event.data.decode()))
+            if now_ms >= self._quiet_until_ms[event.robot_index]:
+                self._said_connected[event.robot_index] = False
+                self._quiet_until_ms[event.robot_index] = now_ms + _FLAPPING_MS
+                self._report("%s lost its connection: %s" % (robot.name, event.data.decode()))
         elif event.kind == tcp_link.BLOCKED:
             robot.block_writing(now_ms)
         else:

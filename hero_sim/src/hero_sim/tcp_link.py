@@ -124,19 +124,32 @@ class TcpLink:
     def dial(self, index: int) -> None:
         """Begin to connect a robot; poll() tells how it went."""
         self.close(index)
+        try:
+            sock = self._begin_connect(self.own_addresses[index])
+        except OSError as error:
+            self._events.append(LinkEvent(index, FAILED, (error.strerror or str(error)).encode()))
+            return
+        self._connections[index] = _Connection(index, sock, dialling=True)
+        self._selector.register(sock, selectors.EVENT_WRITE, self._connections[index])
+
+    def _begin_connect(self, own_address: str) -> socket.socket:
+        """Return a socket that is being connected.
+
+        Raises: OSError where that fails at once: refused, no route, no more files or ports.
+        """
         family, address = self._address
         sock = socket.socket(family, socket.SOCK_STREAM)
-        sock.setblocking(False)
-        connection = _Connection(index, sock, dialling=True)
-        if self.own_addresses[index].startswith("127."):
-            sock.bind((self.own_addresses[index], 0))
-        result = sock.connect_ex(address)
-        if result not in (0, errno.EINPROGRESS):
+        try:
+            sock.setblocking(False)
+            if own_address.startswith("127."):
+                sock.bind((own_address, 0))
+            result = sock.connect_ex(address)
+            if result not in (0, errno.EINPROGRESS):
+                raise OSError(result, os.strerror(result))
+        except OSError:
             sock.close()
-            self._events.append(LinkEvent(index, FAILED, errno_text(result)))
-            return
-        self._connections[index] = connection
-        self._selector.register(sock, selectors.EVENT_WRITE, connection)
+            raise
+        return sock
 
     def is_dialling(self, index: int) -> bool:
         """Return whether a dial() of this robot is still under way."""

@@ -1,6 +1,7 @@
 """The program as users start it: a process of its own, behind real sockets on loopback."""
 
 import os
+import re
 import selectors
 import signal
 import socket
@@ -360,3 +361,64 @@ def test_a_port_that_is_taken_is_named(simulate):
         _, error = process.communicate(timeout=LIMIT_S)
     assert process.returncode == 1
     assert "127.0.0.1:%d" % port in error and len(error.strip().splitlines()) == 1
+
+
+def test_the_documented_command_copies_all_that_is_needed(tmp_path):
+    root = os.path.abspath(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", ".."))
+    if not os.path.isdir(os.path.join(root, "hero_driver", "src")):
+        pytest.skip("not in a tree of the sources")
+    with open(os.path.join(root, "hero_sim", "README.md"), encoding="utf-8") as file:
+        pack, unpack = re.search(
+            r"(tar -cz .*?)\\\n\s*\| ssh USER@MACHINE '(.*?)'", file.read(), re.DOTALL
+        ).groups()
+    subprocess.run("(cd %s && %s) | (%s)" % (root, pack, unpack), shell=True, check=True, cwd=str(tmp_path))
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    result = subprocess.run(
+        [
+            sys.executable,
+            "-m",
+            "hero_sim",
+            "--robots",
+            "3",
+            "--arena",
+            "maze",
+            "--port",
+            "9",
+            "--seconds",
+            "0.3",
+        ],
+        cwd=str(tmp_path / "hero_sim_robots"),
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=LIMIT_S,
+        check=False,
+    )
+    assert (result.returncode, result.stderr) == (0, "")
+
+
+def test_numpy_that_is_missing_is_named(tmp_path):
+    code = (
+        "import sys, importlib.util; find = importlib.util.find_spec\n"
+        "importlib.util.find_spec = lambda name: None if name == 'numpy' else find(name)\n"
+        "sys.modules['numpy'] = None\n"
+        "from hero_sim.main import main; sys.exit(main([]))"
+    )
+    result = subprocess.run(
+        [sys.executable, "-c", code],
+        env=build_environment(),
+        capture_output=True,
+        text=True,
+        timeout=LIMIT_S,
+        check=False,
+    )
+    assert result.returncode == 1
+    assert result.stderr.startswith("hero_sim: numpy is missing") and len(result.stderr.splitlines()) == 1
+
+
+def test_a_folder_that_cannot_be_used_is_named(tmp_path):
+    (tmp_path / "file").write_text("")
+    process = start("--flash-dir", str(tmp_path / "file" / "flash"))
+    _, error = process.communicate(timeout=LIMIT_S)
+    assert process.returncode == 1
+    assert "--flash-dir" in error and len(error.strip().splitlines()) == 1
