@@ -17,7 +17,8 @@ def run(command, directory):
         cwd=str(directory),
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
-        timeout=TIMEOUT_S, check=False,
+        timeout=TIMEOUT_S,
+        check=False,
     )
     output = result.stdout.decode(errors="replace")
     assert result.returncode == 0, f"{command}\n{output}"
