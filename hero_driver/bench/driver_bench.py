@@ -118,7 +118,12 @@ def stop(process, number=signal.SIGINT):
 def run_once(options, count, environment):
     """Return the figures of one run with count robots."""
     port = find_free_port()
-    server = start(options.server_command.format(port=port).split(), environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    server = start(
+        options.server_command.format(port=port).split(),
+        environment,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
     load = [sys.executable, str(HERE / "ros_load.py")]
     try:
         wait_for_port(port, server)
@@ -136,7 +141,12 @@ def run_once(options, count, environment):
         )
         time.sleep(SETTLE_S + count * 0.03)
         window_start_s = time.time()
-        before = (time.monotonic(), read_cpu_s(server.pid), read_cpu_s(listener.pid), read_stolen_and_busy_s())
+        before = (
+            time.monotonic(),
+            read_cpu_s(server.pid),
+            read_cpu_s(listener.pid),
+            read_stolen_and_busy_s(),
+        )
         time.sleep(options.seconds)
         after = (time.monotonic(), read_cpu_s(server.pid), read_cpu_s(listener.pid), read_stolen_and_busy_s())
         window_end_s = time.time()

@@ -1,7 +1,7 @@
 """The ROS side of the benchmark: raw subscribers on every odom and on /tf, or publishers of cmd_vel.
 
-    ros_load.py listen --robots N     counts messages and their age until SIGINT, then prints one JSON line
-    ros_load.py command --robots N    sends cmd_vel at 10 Hz to every robot, with the time in linear.y
+ros_load.py listen --robots N     counts messages and their age until SIGINT, then prints one JSON line
+ros_load.py command --robots N    sends cmd_vel at 10 Hz to every robot, with the time in linear.y
 """
 
 import argparse

@@ -29,11 +29,15 @@ def identify(topic_name: str) -> Optional[Identity]:
 
 
 def identify_any(topic_name: str, host: str) -> Identity:
-    """Return an identity for a device that is no HeRo: its HeRo-like name, else one made of its address."""
+    """Return an identity for a device that is no HeRo: its namespace if that has a number, else a made-up one.
+
+    The made-up one has the address and the first name that the device declares, so that the same device is
+    known again and two behind one address are told apart.
+    """
     match = _ROBOT_NAME.match(topic_name)
     if match is not None:
         return Identity("/%s_%s" % (match["name"], match["number"]), int(match["number"]))
-    return Identity("/device_" + re.sub(r"[^a-zA-Z0-9]", "_", host), -1)
+    return Identity("/device_" + re.sub(r"[^a-zA-Z0-9]+", "_", "%s_%s" % (host, topic_name)), -1)
 
 
 def resolve(topic_name: str, identity: Identity) -> Optional[str]:

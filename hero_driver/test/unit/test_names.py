@@ -66,8 +66,8 @@ def test_a_hero_may_not_use_other_names(name):
 def test_a_device_is_known_by_a_name_like_a_heros_or_by_its_address():
     assert identify_any("/rover_7/odom", "10.42.0.9") == Identity("/rover_7", 7)
     assert identify_any("/hero_3/odom", "10.42.0.9") == Identity("/hero_3", 3)
-    assert identify_any("chatter", "10.42.0.9") == Identity("/device_10_42_0_9", -1)
-    assert identify_any("chatter", "fe80::1%wlan0") == Identity("/device_fe80__1_wlan0", -1)
+    assert identify_any("chatter", "10.42.0.9") == Identity("/device_10_42_0_9_chatter", -1)
+    assert identify_any("chatter", "fe80::1%wlan0") == Identity("/device_fe80_1_wlan0_chatter", -1)
 
 
 @given(number=st.integers(0, 999999), rest=st.text("abc_/", min_size=1, max_size=10))

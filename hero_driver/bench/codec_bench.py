@@ -1,0 +1,73 @@
+"""Times the pure layers on the bytes of one stock robot: frames, session, cleaning. One core, no sockets."""
+
+import struct
+import time
+import timeit
+
+import emulated_swarm
+from hero_driver.cleaning import CleaningSettings, MessageCleaner
+from hero_driver.message_types import apply_aliases
+from hero_driver.odometry import WheelGeometry
+from hero_driver.rosserial import frames
+from hero_driver.rosserial.session import Session, SessionLimits, TopicDeclared
+
+BURSTS = 3000
+REPEATS = 5
+BURST_NS = 34 * 10**6
+
+
+def best_us(run, count):
+    """Return the best time (us) of one of count things that run() does."""
+    return min(timeit.repeat(run, number=1, repeat=REPEATS)) / count * 1e6
+
+
+def main():
+    """Print the table."""
+    robot = emulated_swarm.Templates(0)
+    start_ns = time.time_ns()
+    stamps = [struct.pack("<II", *divmod(start_ns + index * BURST_NS, 10**9)) for index in range(BURSTS)]
+    bursts = [robot.make_burst(stamp) for stamp in stamps]
+    session = Session(SessionLimits(), 0.0)
+    declared = session.receive_bytes(emulated_swarm.declare(0), 0.0, 0.0)
+    settings = CleaningSettings("ticks", WheelGeometry(), (0.0,) * 6, (0.0,) * 6, "robot", 0.05, 5.0)
+
+    def read():
+        reader = frames.FrameReader()
+        for burst in bursts:
+            reader.receive_bytes(burst)
+
+    def receive():
+        for burst in bursts:
+            session.receive_bytes(burst, 1.0, 1.0)
+
+    messages = [session.receive_bytes(burst, 1.0, 1.0) for burst in bursts]
+
+    def clean():
+        cleaner = MessageCleaner("/hero_0", settings)
+        cleaners = {
+            event.topic.info.topic_id: cleaner.choose(
+                event.topic.info.name, apply_aliases(event.topic.info.message_type)
+            )
+            for event in declared
+            if isinstance(event, TopicDeclared) and event.topic.kind.is_from_robot
+        }
+        for index, events in enumerate(messages):
+            for topic, payload in events:
+                cleaners[topic.info.topic_id](payload, start_ns + index * BURST_NS)
+
+    print(
+        "bytes of a burst: %d (odom, 5 transforms, encoder), 29.4 bursts per robot and second"
+        % len(bursts[0])
+    )
+    print("| layer | us per burst |")
+    print("|---|---|")
+    print(
+        "| frames written | %.1f |" % best_us(lambda: [robot.make_burst(stamp) for stamp in stamps], BURSTS)
+    )
+    print("| frames read | %.1f |" % best_us(read, BURSTS))
+    print("| session (with frames) | %.1f |" % best_us(receive, BURSTS))
+    print("| cleaning, everything wanted | %.1f |" % best_us(clean, BURSTS))
+
+
+if __name__ == "__main__":
+    main()
