@@ -13,6 +13,7 @@ import rosgraph
 import roslib.packages
 import rospy
 from fake_robot import FakeRobot
+from hero_driver.rosserial import frames, payloads
 from rosgraph_msgs.msg import Log as RosLog
 
 from hero_msgs.msg import Robot, RobotArray
@@ -271,3 +272,30 @@ class DriverProcess:
     def _read(self):
         for line in self.process.stdout:
             self.lines.append(line.rstrip("\n"))
+
+
+class OwnDriverCase(unittest.TestCase):
+    """Tests that start drivers with parameters of their own."""
+
+    def start(self, **parameters):
+        """Return a driver, which ends after the test."""
+        driver = DriverProcess(parameters)
+        self.addCleanup(driver.__exit__)
+        return driver
+
+    def dial(self, driver, number=0, ready=True, **settings):
+        """Return a robot that has dialled driver, and joined with ready; it leaves after the test."""
+        robot = FakeRobot(number, **settings)
+        self.addCleanup(robot.close)
+        robot.connect(driver.address)
+        if ready:
+            driver.fleet.wait_ready(robot.namespace)
+        return robot
+
+
+def ask_parameter(robot, name):
+    """Return the answer (ints, floats, strings) to a robot's request for a parameter."""
+    count = len(robot.payloads_with_id(frames.ID_PARAMETER_REQUEST))
+    robot.send_frame(frames.ID_PARAMETER_REQUEST, payloads.encode_parameter_request(name))
+    answers = wait_frames(robot, frames.ID_PARAMETER_REQUEST, count + 1)
+    return payloads.decode_parameter_answer(answers[count])

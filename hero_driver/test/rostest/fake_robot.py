@@ -345,7 +345,8 @@ class FakeRobot:
                 self._take_velocity(entry.name, frame.payload, now_s)
 
     def _serve(self, name: str, request: bytes) -> None:
-        short_name = name[len(self.namespace) + 1 :]
+        prefix = self.namespace + "/"
+        short_name = name[len(prefix) :] if name.startswith(prefix) else name
         make_answer = self.answers.get(short_name, lambda _: encode_answer(True, short_name))
         answer = make_answer(request)
         if answer is not None:

@@ -1,0 +1,202 @@
+#!/usr/bin/env python
+"""Which names, types, services and parameters a robot may use."""
+
+import rospy
+import rostest
+import stock_messages
+from driver_case import (
+    OwnDriverCase,
+    Recorder,
+    ask_parameter,
+    list_driver_topics,
+    list_publishers,
+    make_publisher,
+    wait_for,
+    wait_frames,
+)
+from fake_robot import (
+    ANSWER_MD5,
+    CLIENT_ANSWERS,
+    CLIENT_REQUESTS,
+    PUB,
+    REQUESTS,
+    STOCK_DECLARATIONS,
+    SUB,
+    Declaration,
+)
+from geometry_msgs.msg import Twist
+from std_msgs.msg import String
+from std_srvs.srv import Trigger, TriggerResponse
+
+from hero_msgs.msg import Encoder, Robot
+
+STRING_MD5 = String._md5sum
+TRIGGER_REQUEST_MD5 = "d41d8cd98f00b204e9800998ecf8427e"
+WRONG_MD5 = "0123456789abcdef0123456789abcdef"
+
+
+def make_text(text):
+    return stock_messages.to_bytes(String(text))
+
+
+class TestDriverPolicy(OwnDriverCase):
+    """Parameters as they are by default."""
+
+    def test_names_outside_the_robots_own_are_refused_and_its_others_work(self):
+        foreign = [
+            Declaration(PUB, 140, "/chatter", "std_msgs/String", STRING_MD5),
+            Declaration(PUB, 141, "/hero_2/odom", "nav_msgs/Odometry", STOCK_DECLARATIONS[5].md5sum),
+            Declaration(SUB, 120, "/hero_10/led", "std_msgs/ColorRGBA", STOCK_DECLARATIONS[12].md5sum),
+            Declaration(PUB, 142, "/rosout", "std_msgs/String", STRING_MD5),
+            Declaration(PUB, 143, "chatter", "std_msgs/String", STRING_MD5),
+            Declaration(PUB, 144, "/hero_1", "std_msgs/String", STRING_MD5),
+        ]
+        driver = self.start()
+        robot = self.dial(driver, 1, declarations=[*STOCK_DECLARATIONS, *foreign])
+        for entry in foreign:
+            line = driver.wait_line(r"hero_1: topic '%s' refused: outside /hero_1" % entry.name)
+            self.assertIn("~namespace_policy", line)
+            self.assertEqual(len(driver.find_lines("topic '%s' refused" % entry.name)), 1)
+        encoders = Recorder("/hero_1/encoder", Encoder)
+        robot.send_frame(140, make_text("not heard"))
+        robot.send("encoder", stock_messages.make_encoder("hero_1", rospy.Time.now(), 1.0, 1.0))
+        encoders.wait_count(1)
+        self.assertEqual(list_publishers("/chatter"), [])
+        self.assertEqual(list_driver_topics("/hero_2", driver.node), [])
+        self.assertEqual(list_driver_topics("/hero_10", driver.node), [])
+        self.assertNotEqual(driver.fleet.find("/hero_1").last_error, "")
+
+    def test_names_that_are_no_names_are_refused_and_cannot_forge_log_lines(self):
+        evil = [
+            Declaration(PUB, 140, "/hero_3/\x1b[2Jred\nFATAL forged", "std_msgs/String", STRING_MD5),
+            Declaration(PUB, 141, "/hero_3//odom", "std_msgs/String", STRING_MD5),
+            Declaration(PUB, 142, "/hero_3/" + "x" * 500, "std_msgs/String", STRING_MD5),
+            Declaration(PUB, 143, "/hero_3/type", "../../etc/passwd", STRING_MD5),
+            Declaration(PUB, 144, "/hero_3/md5", "std_msgs/String", "*"),
+            Declaration(PUB, 145, "/hero_3/\xff\xfe", "std_msgs/String", STRING_MD5),
+        ]
+        driver = self.start()
+        self.dial(driver, 3, declarations=[*STOCK_DECLARATIONS, *evil])
+        for text in ("not a ROS name", "more than 128", "package/Type", "hexadecimal"):
+            driver.wait_line("hero_3: topic .* refused: .*" + text)
+        self.assertEqual(driver.find_lines("^FATAL forged|\x1b\\[2J"), [])
+        self.assertEqual(
+            [
+                name
+                for name in list_driver_topics("/hero_3", driver.node)
+                if name.split("/")[2] in ("type", "md5")
+            ],
+            [],
+        )
+
+    def test_a_wrong_md5_and_an_unknown_type_give_one_clear_error_each_and_other_topics_work(self):
+        changed = [
+            entry._replace(md5sum=WRONG_MD5)
+            if entry.name in ("/{}/encoder", "/{}/led")
+            or (entry.kind == REQUESTS and "set_odom" in entry.name)
+            else entry
+            for entry in STOCK_DECLARATIONS
+        ]
+        changed.append(Declaration(PUB, 140, "/{}/battery", "hero_common/Battery", WRONG_MD5))
+        changed.append(Declaration(PUB, 141, "/{}/alien", "alien_msgs/Saucer", WRONG_MD5))
+        driver = self.start()
+        robot = self.dial(driver, 4, declarations=changed)
+        line = driver.wait_line("hero_4: topic /hero_4/encoder refused")
+        for part in (WRONG_MD5, Encoder._md5sum, "package hero_msgs"):
+            self.assertIn(part, line)
+        driver.wait_line("hero_4: topic /hero_4/led refused: .*%s.*std_msgs" % WRONG_MD5)
+        driver.wait_line("hero_4: service /hero_4/set_odom refused: .*%s" % WRONG_MD5)
+        driver.wait_line("hero_4: topic /hero_4/battery refused: type hero_msgs/Battery .*hero_msgs")
+        driver.wait_line("hero_4: topic /hero_4/alien refused: type alien_msgs/Saucer .*alien_msgs")
+        raw = Recorder("/hero_4/odom_raw", rospy.AnyMsg)
+        robot.declare()  # again, and no second complaint
+        robot.send("encoder", stock_messages.make_encoder("hero_4", rospy.Time.now(), 1.0, 1.0))
+        robot.send("odom", stock_messages.make_odom("hero_4", rospy.Time.now()))
+        raw.wait_count(1)
+        self.assertEqual(list_publishers("/hero_4/encoder"), [])
+        for name in (
+            "topic /hero_4/encoder",
+            "topic /hero_4/led",
+            "service /hero_4/set_odom",
+            "topic /hero_4/alien",
+        ):
+            self.assertEqual(len(driver.find_lines(name + " refused")), 1, name)
+        self.assertIn(
+            "refused", driver.fleet.wait("/hero_4", Robot.READY, "error", lambda e: e.last_error).last_error
+        )
+
+    def test_robots_read_parameters_of_their_own_namespace_only(self):
+        rospy.set_param("/hero_5/speed", 0.25)
+        rospy.set_param("/hero_5/count", 7)
+        rospy.set_param("/hero_5/switch", True)
+        rospy.set_param("/hero_5/title", "hero")
+        rospy.set_param("/hero_5/gains", [1.0, 2.5])
+        rospy.set_param("/hero_5/ids", [3, 4])
+        rospy.set_param("/hero_5/names", ["a", "b"])
+        rospy.set_param("/hero_5/nested", {"a": {"b": 1}})
+        rospy.set_param("/hero_55/speed", 9.0)
+        rospy.set_param("/secret", 42)
+        driver = self.start()
+        robot = self.dial(driver, 5)
+        for name, answer in (
+            ("/hero_5/speed", ([], [0.25], [])),
+            ("~speed", ([], [0.25], [])),
+            ("speed", ([], [0.25], [])),
+            ("/hero_5/count", ([7], [], [])),
+            ("~switch", ([1], [], [])),
+            ("~title", ([], [], ["hero"])),
+            ("~gains", ([], [1.0, 2.5], [])),
+            ("~ids", ([3, 4], [], [])),
+            ("~names", ([], [], ["a", "b"])),
+            ("~nested", ([], [], [])),
+            ("~missing", ([], [], [])),
+            ("/secret", ([], [], [])),
+            ("/hero_55/speed", ([], [], [])),
+            ("/hero_5/../secret", ([], [], [])),
+            ("", ([], [], [])),
+        ):
+            self.assertEqual(ask_parameter(robot, name), answer, name)
+        driver.wait_line("hero_5: parameter '/secret' lies outside /hero_5; set ~parameters_outside")
+
+    def test_parameters_outside_may_be_allowed(self):
+        rospy.set_param("/secret", 42)
+        driver = self.start(parameters_outside=True)
+        self.assertEqual(ask_parameter(self.dial(driver, 6), "/secret"), ([42], [], []))
+
+    def test_robots_call_services_within_their_namespace_only(self):
+        called = []
+
+        def serve(name):
+            rospy.Service(name, Trigger, lambda _: called.append(name) or TriggerResponse(True, "from ROS"))
+
+        serve("/hero_7/home")
+        serve("/launch_rocket")
+        clients = [
+            Declaration(CLIENT_REQUESTS, 140, "/hero_7/home", "std_srvs/Trigger", TRIGGER_REQUEST_MD5),
+            Declaration(CLIENT_ANSWERS, 120, "/hero_7/home", "std_srvs/Trigger", ANSWER_MD5),
+            Declaration(CLIENT_REQUESTS, 141, "/launch_rocket", "std_srvs/Trigger", TRIGGER_REQUEST_MD5),
+            Declaration(CLIENT_ANSWERS, 121, "/launch_rocket", "std_srvs/Trigger", ANSWER_MD5),
+        ]
+        driver = self.start()
+        robot = self.dial(driver, 7, declarations=[*STOCK_DECLARATIONS, *clients])
+        driver.wait_line("hero_7: topic '/launch_rocket' refused")
+        robot.send_frame(141, b"")
+        robot.send_frame(140, b"")
+        self.assertEqual(
+            wait_frames(robot, 120), [stock_messages.to_bytes(TriggerResponse(True, "from ROS"))]
+        )
+        self.assertEqual(called, ["/hero_7/home"])
+        self.assertEqual(robot.payloads_with_id(121), [])
+
+    def test_velocities_are_clamped_where_a_parameter_says_so(self):
+        driver = self.start(clamp=True)
+        robot = self.dial(driver, 8)
+        publisher = make_publisher("/hero_8/velocity_controller/cmd_vel", Twist)
+        publisher.publish(stock_messages.from_bytes(Twist, stock_messages.make_twist(5.0, -50.0)))
+        wait_for(lambda: robot.velocities, "the command")
+        self.assertEqual((robot.velocities[0].linear_m_s, robot.velocities[0].turn_rad_s), (0.20, -8.0))
+
+
+if __name__ == "__main__":
+    rospy.init_node("test_driver_policy")
+    rostest.rosrun("hero_driver", "driver_policy", TestDriverPolicy)
