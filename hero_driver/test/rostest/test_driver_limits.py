@@ -1,0 +1,123 @@
+#!/usr/bin/env python
+"""Who is let in, and how much one robot may send."""
+
+import rospy
+import rostest
+import stock_messages
+from driver_case import (
+    OwnDriverCase,
+    Recorder,
+    wait_for,
+)
+from fake_robot import (
+    PUB,
+    STOCK_DECLARATIONS,
+    TIME_FRAME,
+    Declaration,
+)
+from hero_driver.rosserial import frames
+from std_msgs.msg import String
+
+from hero_msgs.msg import Encoder, Robot
+
+STRING_MD5 = String._md5sum
+TRIGGER_REQUEST_MD5 = "d41d8cd98f00b204e9800998ecf8427e"
+WRONG_MD5 = "0123456789abcdef0123456789abcdef"
+
+
+def make_text(text):
+    return stock_messages.to_bytes(String(text))
+
+
+class TestDriverLimits(OwnDriverCase):
+    """Who is let in, and how much of it."""
+
+    def wait_refused(self, driver, robot, pattern):
+        wait_for(lambda: robot.ended, "the connection to be closed")
+        line = driver.wait_line(pattern)
+        self.assertIn("127.0.0.", line)
+        return line
+
+    def test_addresses_that_are_not_allowed_are_refused(self):
+        driver = self.start(allow=["127.0.0.2/32", "10.0.0.0/8"], report_period_s=0.2)
+        refused = self.dial(driver, 1, ready=False)
+        self.wait_refused(driver, refused, "connection of 127.0.0.1.* refused: .*~allow")
+        self.dial(driver, 1, source_host="127.0.0.2")
+
+    def test_more_connections_than_allowed_are_refused_and_those_there_go_on(self):
+        driver = self.start(max_connections=2)
+        first, second = self.dial(driver, 1), self.dial(driver, 2)
+        for _ in range(10):
+            extra = self.dial(driver, 3, ready=False)
+            self.wait_refused(driver, extra, "refused: .*~max_connections")
+        self.assertEqual(len(driver.find_lines("refused: .*~max_connections")), 1)
+        self.assertTrue(first.is_connected and second.is_connected)
+        second.close()
+        driver.fleet.wait("/hero_2", Robot.AWAY)
+        self.dial(driver, 3)
+
+    def test_more_connections_of_one_address_than_allowed_are_refused(self):
+        driver = self.start(max_connections_per_address=1)
+        self.dial(driver, 1)
+        self.wait_refused(driver, self.dial(driver, 2, ready=False), "~max_connections_per_address")
+        self.dial(driver, 2, source_host="127.0.0.2")
+
+    def test_more_unidentified_connections_than_allowed_are_refused(self):
+        driver = self.start(max_unidentified=2)
+        nobodies = [self.dial(driver, ready=False, declarations=[]) for _ in range(2)]
+        for nobody in nobodies:
+            wait_for(lambda r=nobody: r.requests, "a request")
+        self.wait_refused(driver, self.dial(driver, 1, ready=False), "~max_unidentified")
+        nobodies[0].close()
+
+        def look():
+            robot = self.dial(driver, 1, ready=False)
+            wait_for(
+                lambda: robot.ended or driver.fleet.find("/hero_1", Robot.READY), "an end or a beginning"
+            )
+            return not robot.ended
+
+        wait_for(look, "the place to be free")
+
+    def test_more_topics_than_allowed_are_refused_and_the_first_ones_work(self):
+        driver = self.start(max_topics=24)
+        extra = [Declaration(PUB, 150, "/{}/extra", "std_msgs/String", STRING_MD5)]
+        robot = self.dial(driver, 1, declarations=[*STOCK_DECLARATIONS, *extra])
+        driver.wait_line("topic /hero_1/extra refused: more than 24 topics .*max_topics")
+        encoders = Recorder("/hero_1/encoder", Encoder)
+        robot.send("encoder", stock_messages.make_encoder("hero_1", rospy.Time.now(), 1.0, 1.0))
+        encoders.wait_count(1)
+
+    def test_a_robot_that_sends_too_much_is_disconnected_with_the_reason(self):
+        driver = self.start(max_frames_per_s=300, max_bytes_per_s=200000)
+        quiet, flooding, fat = self.dial(driver, 1), self.dial(driver, 2), self.dial(driver, 3)
+        flooding.send_bytes(TIME_FRAME * 400)
+        self.wait_refused(driver, flooding, "hero_2 left .*300 frames per second .*~max_frames_per_s")
+        fat.send_bytes(frames.encode_frame(125, bytes(4000)) * 60)
+        self.wait_refused(driver, fat, "hero_3 left .*200000 bytes per second .*~max_bytes_per_s")
+        self.assertTrue(quiet.is_connected)
+        self.assertEqual(driver.fleet.find("/hero_1").reconnects, 0)
+
+    def test_frames_longer_than_allowed_are_counted_as_bad(self):
+        driver = self.start(max_payload_length=2048)
+        robot = self.dial(driver, 1)
+        encoders = Recorder("/hero_1/encoder", Encoder)
+        robot.send_frame(128, bytes(3000))
+        robot.send("encoder", stock_messages.make_encoder("hero_1", rospy.Time.now(), 1.0, 1.0))
+        encoders.wait_count(1)
+        driver.fleet.wait("/hero_1", Robot.READY, "counted", lambda e: e.bad_frames >= 1)
+
+    def test_a_flood_of_log_lines_is_limited_and_others_are_heard(self):
+        driver = self.start()
+        chatty, quiet = self.dial(driver, 1), self.dial(driver, 2)
+        for index in range(600):
+            chatty.log("line %d" % index)
+        quiet.log("I am here")
+        driver.wait_line("hero_2: I am here")
+        driver.fleet.wait("/hero_1", Robot.READY, "dropped lines", lambda e: e.dropped_messages > 0)
+        self.assertLess(len(driver.find_lines("hero_1: line")), 600)
+
+
+if __name__ == "__main__":
+    rospy.init_node("test_driver_limits")
+    rostest.rosrun("hero_driver", "driver_limits", TestDriverLimits)
