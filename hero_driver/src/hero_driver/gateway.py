@@ -82,6 +82,7 @@ class Gateway(LinkHandler):
         self.bridges: Dict[str, RobotBridge] = {}
         self.stopped = False
         self.refused_connections = 0
+        self.last_refusal = ""
 
     def open(self, loop: EventLoop) -> None:
         """Begin to serve what loop brings."""
@@ -165,6 +166,7 @@ class Gateway(LinkHandler):
         """Note a departure; the robot's endpoints stay up for the grace period."""
         peer: Optional[Peer] = self.peers.pop(link, None)
         if peer is None:
+            self.last_refusal = "%s: %s" % (link.address, reason)
             self._log.log_throttled(
                 "warn",
                 "refused " + link.address.host,
@@ -174,6 +176,7 @@ class Gateway(LinkHandler):
         self._admission.release(link.address.host)
         if peer.record is None:
             self._admission.unidentified -= 1
+            self.last_refusal = "%s: %s" % (link.address, reason)
             self._log.log_throttled(
                 "warn",
                 "nobody " + link.address.host + reason[:12],

@@ -164,6 +164,7 @@ class DriverNode:
             self._gateway.stopped,
             len(self._gateway.peers),
             self._gateway.refused_connections,
+            self._gateway.last_refusal,
             self._gateway.list_robots(now_s),
         )
 

@@ -26,6 +26,7 @@ class FleetStatus(NamedTuple):
     stopped: bool
     connections: int
     refused_connections: int
+    last_refusal: str
     robots: List[RobotStatus]
 
 
@@ -40,7 +41,7 @@ class Reporter:
         self._known: Dict[str, RobotStatus] = {}
         self._rates: Dict[str, Tuple[float, float]] = {}
         self._last_counts: Dict[str, Tuple[float, int, int]] = {}
-        self._status = FleetStatus(0.0, "", False, 0, 0, [])
+        self._status = FleetStatus(0.0, "", False, 0, 0, "", [])
 
     def publish(self, status: FleetStatus) -> None:
         """Publish ~robots."""
@@ -120,6 +121,7 @@ class Reporter:
         stat.add("listening", status.listening)
         stat.add("connections", status.connections)
         stat.add("refused connections", status.refused_connections)
+        stat.add("last refusal", status.last_refusal)
         return stat
 
     def _make_robot_task(self, namespace: str) -> Callable[[Any], Any]:
