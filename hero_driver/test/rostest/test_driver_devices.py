@@ -1,0 +1,143 @@
+#!/usr/bin/env python
+"""Rosserial devices that are no HeRos, with ~namespace_policy any."""
+
+import struct
+
+import rospy
+import rostest
+import stock_messages
+from driver_case import (
+    OwnDriverCase,
+    Recorder,
+    ask_parameter,
+    make_publisher,
+    wait_for,
+    wait_frames,
+)
+from fake_robot import (
+    ANSWER_MD5,
+    CLIENT_ANSWERS,
+    CLIENT_REQUESTS,
+    PUB,
+    STOCK_DECLARATIONS,
+    SUB,
+    Declaration,
+)
+from geometry_msgs.msg import Twist
+from std_msgs.msg import Int32, String
+from std_srvs.srv import Trigger, TriggerResponse
+from tf2_msgs.msg import TFMessage
+
+STRING_MD5 = String._md5sum
+TRIGGER_REQUEST_MD5 = "d41d8cd98f00b204e9800998ecf8427e"
+WRONG_MD5 = "0123456789abcdef0123456789abcdef"
+
+
+def make_text(text):
+    return stock_messages.to_bytes(String(text))
+
+
+class TestDriverDevices(OwnDriverCase):
+    """Devices that are no HeRos, with ~namespace_policy any."""
+
+    def test_a_generic_device_publishes_subscribes_serves_calls_and_reads_parameters(self):
+        rospy.Service("/add_dots", Trigger, lambda _: TriggerResponse(True, "..."))
+        rospy.set_param("/limit", 12)
+        rospy.set_param("/hidden/list", ["x", "y"])
+        device = [
+            Declaration(PUB, 125, "chatter", "std_msgs/String", STRING_MD5),
+            Declaration(SUB, 100, "/numbers", "std_msgs/Int32", Int32._md5sum, 512),
+            Declaration(SUB, 101, "/cmd_vel", "geometry_msgs/Twist", Twist._md5sum),
+            Declaration(2, 126, "/blink", "std_srvs/Trigger", ANSWER_MD5),
+            Declaration(3, 102, "/blink", "std_srvs/Trigger", TRIGGER_REQUEST_MD5),
+            Declaration(CLIENT_REQUESTS, 127, "/add_dots", "std_srvs/Trigger", TRIGGER_REQUEST_MD5),
+            Declaration(CLIENT_ANSWERS, 103, "/add_dots", "std_srvs/Trigger", ANSWER_MD5),
+        ]
+        driver = self.start(namespace_policy="any")
+        robot = self.dial(driver, ready=False, declarations=device)
+        wait_for(lambda: driver.fleet.newest.robots, "the device in the report")
+        self.assertEqual(driver.fleet.newest.robots[0].id, -1)
+        texts = Recorder("/chatter", String)
+        robot.send_frame(125, make_text("hello"))
+        self.assertEqual(texts.wait_count(1)[0].data, "hello")
+        numbers = make_publisher("/numbers", Int32)
+        for number in range(30):
+            numbers.publish(Int32(number))
+        self.assertEqual(wait_frames(robot, 100, 30), [struct.pack("<i", number) for number in range(30)])
+        # A foreign robot's cmd_vel has no gate of 50 ms: what is published is sent, in order, all of it.
+        drive = make_publisher("/cmd_vel", Twist)
+        sent = [stock_messages.make_twist(0.1 * index, 0.0) for index in range(1, 11)]
+        for payload in sent:
+            drive.publish(stock_messages.from_bytes(Twist, payload))
+        self.assertEqual(wait_frames(robot, 101, 10), sent)
+        rospy.wait_for_service("/blink", 20.0)
+        answer = rospy.ServiceProxy("/blink", Trigger)()
+        self.assertEqual((answer.success, answer.message), (True, "/blink"))
+        self.assertEqual(robot.payloads_with_id(102), [b""])
+        robot.send_frame(127, b"")
+        self.assertEqual(wait_frames(robot, 103), [stock_messages.to_bytes(TriggerResponse(True, "..."))])
+        self.assertEqual(ask_parameter(robot, "/limit"), ([12], [], []))
+        self.assertEqual(ask_parameter(robot, "/hidden/list"), ([], [], ["x", "y"]))
+
+    def test_transforms_of_devices_and_of_heros_pass_whole(self):
+        driver = self.start(namespace_policy="any")
+        tf_declaration = STOCK_DECLARATIONS[4]
+        device = self.dial(driver, 50, ready=False, declarations=[tf_declaration])
+        hero = self.dial(driver, 10)
+        transforms = Recorder("/tf", TFMessage)
+        stamp = rospy.Time.now()
+        device.send_frame(tf_declaration.topic_id, stock_messages.make_transform("map", "crane", stamp, 1.5))
+        stock_messages.send_burst(hero, 0.0, 0.0, stamp)
+
+        def list_frames():
+            return {
+                (t.header.frame_id, t.child_frame_id) for m in list(transforms.messages) for t in m.transforms
+            }
+
+        wait_for(lambda: len(list_frames()) == 6, lambda: "six transforms, got %s" % list_frames())
+        self.assertIn(("map", "crane"), list_frames())
+        self.assertIn(("hero_10/base_link", "hero_10/hat_link"), list_frames())
+
+    def test_a_hero_among_devices_is_a_hero(self):
+        driver = self.start(namespace_policy="any")
+        extra = [Declaration(PUB, 140, "/chatter", "std_msgs/String", STRING_MD5)]
+        robot = self.dial(driver, 9, declarations=[*STOCK_DECLARATIONS, *extra], read_cycle_s=0.051)
+        texts = Recorder("/chatter", String)
+        robot.send_frame(140, make_text("free"))
+        texts.wait_count(1)
+        Recorder("/hero_9/proximity", rospy.AnyMsg)
+        drive = make_publisher("/hero_9/velocity_controller/cmd_vel", Twist)
+        drive.publish(stock_messages.from_bytes(Twist, stock_messages.make_twist(0.1, 0.0)))
+        drive.publish(Twist())
+        wait_for(lambda: len([v for v in robot.accepted if v.is_zero]) == 2, "the stop, twice")
+
+    def test_two_devices_of_one_address_do_not_push_each_other_out(self):
+        driver = self.start(namespace_policy="any")
+        devices = []
+        for name in ("left", "right"):
+            declarations = [Declaration(PUB, 125, "/" + name, "std_msgs/String", STRING_MD5)]
+            devices.append(self.dial(driver, ready=False, declarations=declarations))
+        for device, name in zip(devices, ("left", "right")):
+            texts = Recorder("/" + name, String)
+            device.send_frame(125, make_text(name))
+            self.assertEqual(texts.wait_count(1)[0].data, name)
+            self.assertTrue(device.is_connected)
+
+    def test_a_device_with_a_wrong_md5_gets_one_clear_error(self):
+        driver = self.start(namespace_policy="any")
+        declarations = [
+            Declaration(PUB, 125, "/chatter", "std_msgs/String", WRONG_MD5),
+            Declaration(PUB, 126, "/other", "std_msgs/String", STRING_MD5),
+        ]
+        robot = self.dial(driver, ready=False, declarations=declarations)
+        line = driver.wait_line("topic /chatter refused")
+        self.assertIn(WRONG_MD5, line)
+        self.assertIn(STRING_MD5, line)
+        texts = Recorder("/other", String)
+        robot.send_frame(126, make_text("still here"))
+        texts.wait_count(1)
+
+
+if __name__ == "__main__":
+    rospy.init_node("test_driver_devices")
+    rostest.rosrun("hero_driver", "driver_devices", TestDriverDevices)
