@@ -27,6 +27,7 @@ from fake_robot import (
 from geometry_msgs.msg import Twist
 from std_msgs.msg import String
 from std_srvs.srv import Trigger, TriggerResponse
+from tf2_msgs.msg import TFMessage
 
 from hero_msgs.msg import Encoder, Robot
 
@@ -124,6 +125,23 @@ class TestDriverPolicy(OwnDriverCase):
         self.assertIn(
             "refused", driver.fleet.wait("/hero_4", Robot.READY, "error", lambda e: e.last_error).last_error
         )
+
+    def test_a_robot_cannot_put_anything_but_transforms_on_tf(self):
+        wrong = [
+            Declaration(PUB, 129, "/tf", "std_msgs/String", STRING_MD5) if entry.name == "/tf" else entry
+            for entry in STOCK_DECLARATIONS
+        ]
+        driver = self.start()
+        evil, good = self.dial(driver, 20, declarations=wrong), self.dial(driver, 21)
+        transforms = Recorder("/tf", TFMessage)
+        for _ in range(5):
+            evil.send_frame(129, make_text("no transform"))
+            stock_messages.send_burst(good, 0.0, 0.0)
+        wait_for(
+            lambda: sum(len(message.transforms) for message in list(transforms.messages)) == 25,
+            lambda: "25 transforms in %s" % transforms.messages,
+        )
+        driver.wait_line("hero_20: topic '?/tf'? refused")
 
     def test_robots_read_parameters_of_their_own_namespace_only(self):
         rospy.set_param("/hero_5/speed", 0.25)
