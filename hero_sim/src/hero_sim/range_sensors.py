@@ -6,7 +6,7 @@ white wall) and RangeSensor.ino for the way the firmware turns the signal into a
 """
 
 import math
-from typing import Optional, Tuple
+from typing import Tuple
 
 import numpy as np
 
@@ -72,14 +72,11 @@ def cast_at_segments(
 
 
 def cast_at_circles(
-    origins_m: np.ndarray,
-    angles_rad: np.ndarray,
-    circles_m: np.ndarray,
-    own: Optional[np.ndarray] = None,
+    origins_m: np.ndarray, angles_rad: np.ndarray, circles_m: np.ndarray
 ) -> Tuple[np.ndarray, np.ndarray]:
     """Return distance (m) and cosine of incidence of the first circle on each ray, both of shape (R, A).
 
-    circles_m (C, 3) as x y radius; own (R,) is the index of the circle that is the robot itself.
+    circles_m (C, 3) as x y radius. A circle around the origin itself, the robot's own body, is not seen.
     """
     if not len(circles_m):
         return np.full(angles_rad.shape, _FAR_M), np.zeros(angles_rad.shape)
@@ -91,8 +88,6 @@ def cast_at_circles(
     aside_m = ray_x * to_y - ray_y * to_x
     inside_m2 = radius_m**2 - aside_m**2
     hit = (inside_m2 > 0.0) & (ahead_m > 0.0)
-    if own is not None:
-        hit[np.arange(len(own)), :, own] = False
     depth_m = np.sqrt(np.where(hit, inside_m2, 0.0))
     distance_m = np.where(hit, np.maximum(ahead_m - depth_m, 0.0), _FAR_M)
     first = np.argmin(distance_m, axis=-1)[..., None]
@@ -117,9 +112,7 @@ def measure_signals(
     angles_rad = (seen[:, 2, None, None] + rays).reshape(len(which), -1)
     bodies_m = np.column_stack((poses[:, :2], np.full(len(poses), BODY_RADIUS_M)))
     wall_m, wall_cosine = cast_at_segments(seen[:, :2], angles_rad, segments_m)
-    round_m, round_cosine = cast_at_circles(
-        seen[:, :2], angles_rad, np.vstack((bodies_m, circles_m)), own=np.asarray(which)
-    )
+    round_m, round_cosine = cast_at_circles(seen[:, :2], angles_rad, np.vstack((bodies_m, circles_m)))
     nearer = round_m < wall_m
     distance_m = np.where(nearer, round_m, wall_m) - BODY_RADIUS_M
     cosine = np.where(nearer, round_cosine, wall_cosine)

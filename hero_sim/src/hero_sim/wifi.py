@@ -57,8 +57,7 @@ class _Quiet:
 class _Direction:
     def __init__(self) -> None:
         self.queue: Deque[Tuple[float, bytes]] = deque()
-        self.last_ms = 0.0  # arrival of the last bytes
-        self.busy_ms = 0.0  # end of their transmission
+        self.busy_ms = 0.0  # end of the transmission of the last bytes
 
 
 class Radio:
@@ -113,8 +112,8 @@ class Radio:
             at_ms += profile.base_ms + self._rng.exponential(profile.jitter_ms)
             for quiet in self._quiet:
                 at_ms = quiet.find_end(at_ms)
-        direction.last_ms = max(at_ms, direction.last_ms)
-        direction.queue.append((direction.last_ms, data))
+        # What was sent later may be due earlier; it waits in the queue behind the other all the same.
+        direction.queue.append((at_ms, data))
 
     @property
     def is_carrying(self) -> bool:

@@ -175,6 +175,7 @@ def test_a_stop_of_transmission_leaves_log_lines_and_lets_a_moving_robot_run_awa
         (ids.ID_POSITION_CMD_VEL, struct.pack("<6d", 0.1, 0, 0, 0, 0, 0), 4.0),
         (ids.ID_CMD_MOTOR, struct.pack("<2h", 1600, 1600), 1.0),
     ],
+    ids=["velocity", "position", "motor"],
 )
 def test_a_single_command_ends_by_its_watchdog(topic_id, payload, seconds):
     driver = DriverSide("--perfect")
