@@ -1,11 +1,15 @@
 """Byte captures of a real robot, for the tests that use them where they are there."""
 
 import os
+import sys
 from pathlib import Path
 
 import pytest
 
 CAPTURES = Path(__file__).resolve().parents[3].parent / "shared" / "captures"
+
+# The vectors of the rosserial core serve the other tests too.
+sys.path.insert(0, str(Path(__file__).parent / "rosserial"))
 
 
 @pytest.fixture

@@ -1,11 +1,11 @@
 """Who is here: arrivals, returns, take-overs, duplicates, departures."""
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from hero_driver.fleet import ALIVE_S, FLAP_S, Fleet, RobotState, Verdict
 from hero_driver.names import Identity
+from hero_msgs.msg import Robot
 
 HERO = Identity("/hero_0", 0)
 OTHER = Identity("/hero_1", 1)
@@ -188,9 +188,6 @@ def test_a_state_is_entered_once():
 
 
 def test_the_states_have_the_numbers_of_the_message():
-    pytest.importorskip("hero_msgs", reason="hero_msgs is not built")
-    from hero_msgs.msg import Robot
-
     assert {state.name: state.value for state in RobotState} == {
         name: getattr(Robot, name) for name in ("JOINING", "READY", "AWAY", "REFUSED")
     }
