@@ -289,3 +289,9 @@ class MessageCleaner:
         key = "tf " + child[len(prefix) :].decode("latin-1")
         self._own_frames[frames] = key
         return key
+
+
+def split_transforms(payload: bytes, _arrival_ns: int) -> Outputs:
+    """Return the transforms of a device that is no HeRo as they are; none if payload is no TFMessage."""
+    transforms = wire_messages.read_transforms(payload) or []
+    return [(TRANSFORMS, wire_messages.pack_transform(*transform)) for transform in transforms]

@@ -12,7 +12,7 @@ from typing import Callable, Dict, List, Optional
 
 from . import log_lines, names
 from .admission import Admission, RateGuard
-from .cleaning import CleaningSettings
+from .cleaning import TRANSFORMS, CleaningSettings
 from .command_sender import CommandSender
 from .config import DriverConfig
 from .fleet import Decision, Fleet, RobotRecord, RobotState, Verdict
@@ -259,6 +259,8 @@ class Gateway(LinkHandler):
     def _resolve(self, topic_name: str, identity: Identity) -> Optional[str]:
         if self._config.namespace_policy == "robot":
             return names.resolve(topic_name, identity)
+        if topic_name in names.TF_TOPICS:
+            return TRANSFORMS
         if identity.namespace.startswith("/" + names.HERO_PREFIX):
             return names.resolve(topic_name, identity) or topic_name
         return topic_name

@@ -10,8 +10,8 @@ from typing import Any, Callable, Dict, List, Optional, Tuple
 
 import rospy
 
-from . import message_types
-from .cleaning import TRANSFORMS, Clean, CleaningSettings, MessageCleaner, Output
+from . import message_types, wire_messages
+from .cleaning import TRANSFORMS, Clean, CleaningSettings, MessageCleaner, Output, split_transforms
 from .command_queue import CommandQueue
 from .command_shaping import HALTED_MOTORS, check_twist
 from .message_types import MessageTypeError
@@ -28,6 +28,7 @@ QUEUE_LENGTH = 50
 VELOCITY_SUFFIX = "/cmd_vel"
 VELOCITY_CONTROLLER = "/velocity_controller/cmd_vel"
 MOTOR_TYPE = "hero_msgs/Motor"
+TRANSFORM_TYPE = "tf2_msgs/TFMessage"
 TWIST_TYPE = "geometry_msgs/Twist"
 CALIBRATION_SUFFIX = "/pid_calibration"
 SET_ODOM_TYPE = "hero_msgs/SetOdom"
@@ -153,16 +154,28 @@ class RobotBridge:
 
     def _choose_cleaning(self, topic: Topic, name: str, ros_type: str) -> Dict[str, str]:
         """Set up the way of a topic's messages; return the topics (with types) that are made of it besides."""
-        topic_id = topic.info.topic_id
+        info = topic.info
+        if wire_messages.MD5SUMS.get(ros_type, info.md5sum) != info.md5sum:
+            # Another layout than the one that is known here; the registrar will refuse it with both md5s.
+            self._clean.pop(info.topic_id, None)
+            return {}
+        if name == TRANSFORMS:
+            if ros_type != TRANSFORM_TYPE:
+                self._complain(name, "topic /tf refused: its type is %s, not %s" % (ros_type, TRANSFORM_TYPE))
+                self._clean.pop(info.topic_id, None)
+                return {}
+            self._clean[info.topic_id] = (
+                split_transforms if self.cleaner is None else self.cleaner.choose(name, ros_type)
+            )
+            return {}
         derived: Dict[str, str] = {}
         if self.cleaner is None:
-            self._clean[topic_id] = lambda payload, arrival_ns: [(name, payload)]
+            self._clean[info.topic_id] = lambda payload, arrival_ns: [(name, payload)]
         else:
             derived = self.cleaner.find_derived(name, ros_type)
-            self._clean[topic_id] = self.cleaner.choose(name, ros_type)
+            self._clean[info.topic_id] = self.cleaner.choose(name, ros_type)
         for outlet_name in (name, *derived):
-            if outlet_name != TRANSFORMS or self.cleaner is None:
-                self._outlets.setdefault(outlet_name, Outlet(QUEUE_LENGTH, self._context.call_later))
+            self._outlets.setdefault(outlet_name, Outlet(QUEUE_LENGTH, self._context.call_later))
         return derived
 
     def _declare_service_half(self, topic: Topic, name: str) -> None:

@@ -20,6 +20,17 @@ _POSE = struct.Struct("<7d")
 _TWIST = struct.Struct("<6d")
 _COVARIANCE = struct.Struct("<36d")
 
+MD5SUMS = {
+    "nav_msgs/Odometry": "cd5e73d190d741a2f92e81eda573aca7",
+    "hero_msgs/Encoder": "b5586cdbae9b740afc6a1f403a2d7dde",
+    "tf2_msgs/TFMessage": "94810edda583a504dfda3829e70d7eec",
+    "sensor_msgs/LaserScan": "90c7ef2dc6895d81024acba2ac42f369",
+    "sensor_msgs/Imu": "6a62c6daae103f4ff57a132d6f95cec2",
+    "geometry_msgs/Twist": "9f195f881246fdfa2798d1d3eebca84a",
+    "hero_msgs/Motor": "44d4249d207ce6a89de3d72080e4d0b5",
+}
+"""The layouts that are read or written here; another md5 is another layout."""
+
 STAMP_OFFSET = 4  # of a message that begins with a header
 TRANSFORM_TAIL_LENGTH = _POSE.size  # translation and rotation
 ODOMETRY_TAIL_LENGTH = _POSE.size + _COVARIANCE.size + _TWIST.size + _COVARIANCE.size
