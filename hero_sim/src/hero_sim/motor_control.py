@@ -15,8 +15,12 @@ COMMAND_GAP_MS = 50
 CONTROL_MS = 21
 """Between two runs of the velocity PID, 47.6 Hz (VelocityControl.ino:112)."""
 
-VELOCITY_HOLD_MS = 1000
-POSITION_HOLD_MS = 3000
+VELOCITY = "velocity"
+POSITION = "position"
+MOTOR = "motor"
+TUNING = "tuning"
+
+HOLD_MS = {VELOCITY: 1000, POSITION: 3000}
 """So long after a command its PID runs (VelocityControl.ino:110, PositionControl.ino:105)."""
 
 MOTOR_HOLD_MS = 1000
@@ -30,11 +34,8 @@ FULL_PULSE_US = 200.0
 DEAD_ZONE_US = 8.0
 """Pulse beyond the centre at which a servo runs at full speed, and below which it stands (assumptions, after
 continuous-rotation servos of this size)."""
-
-VELOCITY = "velocity"
-POSITION = "position"
-MOTOR = "motor"
-TUNING = "tuning"
+LAG_S = {VELOCITY: VELOCITY_PID_LAG_S, POSITION: POSITION_PID_LAG_S}
+"""How fast each PID leads the servos to its target."""
 
 _TUNING_TURN_M_S = 0.08
 
@@ -54,6 +55,10 @@ class Body:
     def chase(self, wheels_m_s: Tuple[float, float], lag_s: float) -> None:
         """Let a PID with this lag lead the wheels to these speeds."""
         self.world.targets_m_s[self.index] = wheels_m_s
+        self.world.pid_lag_s[self.index] = lag_s
+
+    def resume(self, lag_s: float) -> None:
+        """Let the PID run on towards the last target."""
         self.world.pid_lag_s[self.index] = lag_s
 
     def hold(self) -> None:
@@ -116,15 +121,12 @@ class MotorControl:
         if linear_m_s == 0.0 and turn_rad_s == 0.0:
             self.halt()
             return True
-        hold_ms, lag_s = VELOCITY_HOLD_MS, VELOCITY_PID_LAG_S
-        if mode == POSITION:
-            hold_ms, lag_s = POSITION_HOLD_MS, POSITION_PID_LAG_S
         if self.mode != mode:
             self.due_ms = now_ms + CONTROL_MS
         self.mode = mode
-        self._pid_until_ms = now_ms + hold_ms
+        self._pid_until_ms = now_ms + HOLD_MS[mode]
         self._off_at_ms = self._pid_until_ms + MOTOR_HOLD_MS
-        self._body.chase(split_to_wheels(linear_m_s, turn_rad_s), lag_s)
+        self._body.chase(split_to_wheels(linear_m_s, turn_rad_s), LAG_S[mode])
         self.due_ms = min(self.due_ms or now_ms + CONTROL_MS, now_ms + CONTROL_MS)
         return False
 
@@ -150,6 +152,7 @@ class MotorControl:
         if self.mode in (VELOCITY, POSITION):
             if now_ms <= self._pid_until_ms:
                 self.due_ms = now_ms + CONTROL_MS
+                self._body.resume(LAG_S[self.mode])
                 return self.mode == VELOCITY
             if now_ms <= self._off_at_ms:
                 self._body.hold()

@@ -11,6 +11,7 @@ import numpy as np
 
 from . import messages
 from .flash import Flash
+from .imu_hat import ImuHat
 from .motor_control import Body
 from .range_sensors import convert_to_ranges
 from .wheel_odometry import WheelOdometry
@@ -24,15 +25,6 @@ LASER_GATE_MS = 200
 LASER_READ_MS = 1
 """How long reading the infrared sensors holds the cycle up; with it /laser comes every 205 ms, as
 measured."""
-
-IMU_UNIT_QUATERNION = 16383.0 / 16384.0
-"""The largest part of a quaternion that the hat sends (0.99994, a 14-bit fixed point number)."""
-
-IMU_FULL_TURN_COUNTS_PER_RAD_S = 16.4 * 180.0 / math.pi
-"""Raw turn rate at 2000 deg/s full scale."""
-
-IMU_GRAVITY = 8.192
-"""1 g in the hat's unit: raw counts / 1000 (IMUSensor.ino:182-188)."""
 
 LED_DARK_MS = 15000
 """The light goes out so long after the last command (LEDStatus.ino:76)."""
@@ -69,8 +61,7 @@ class Sensing:
         self._laser_seq = 0
         self._laser_at_ms = 0
         self._imu_heading_rad = 0.0
-        self._imu_at_ms = 0
-        self._imu_start_rad = float(body.world.poses[body.index, 2])
+        self._imu = ImuHat(float(body.world.poses[body.index, 2]))
         self._light = _DARK
         self._light_until_ms = 0
         self.odom_origin = self._find_odom_origin()
@@ -150,17 +141,7 @@ class Sensing:
 
     def _measure_imu(self, millis: int, stamp: Tuple[int, int]) -> bytes:
         world, index = self._body.world, self._body.index
-        self._imu_heading_rad = math.remainder(
-            float(world.poses[index, 2]) - self._imu_start_rad, 2.0 * math.pi
-        )
-        half_rad = self._imu_heading_rad / 2.0
-        quaternion = (
-            0.0,
-            0.0,
-            math.sin(half_rad) * IMU_UNIT_QUATERNION,
-            math.cos(half_rad) * IMU_UNIT_QUATERNION,
-        )
         turn_rad_s = float(world.measure_body_speeds()[index, 1])
-        counts = (0.0, 0.0, float(round(turn_rad_s * IMU_FULL_TURN_COUNTS_PER_RAD_S)))
-        self._imu_at_ms = millis
-        return self._imu_messages.encode(stamp, quaternion, counts, (0.0, 0.0, IMU_GRAVITY))
+        reading = self._imu.read(millis, float(world.poses[index, 2]), turn_rad_s)
+        self._imu_heading_rad = reading.heading_rad
+        return self._imu_messages.encode(stamp, reading.quaternion, reading.turn_counts, reading.acceleration)

@@ -1,10 +1,14 @@
+import math
 import struct
 
 import pytest
 from driver_side import SERVER_START_S, DriverSide, read_encoder, read_laser, read_odom
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from hero_driver.rosserial import frames, payloads
 from hero_sim import declarations as ids
+from hero_sim.imu_hat import ImuHat
 
 
 def test_a_boot_speaks_first_and_at_the_stock_robots_times():
@@ -440,3 +444,69 @@ def test_robots_started_together_do_the_same_for_the_same_seed():
         driver.run(3000)
         runs.append((driver.arrivals, driver.swarm.world.poses.tolist()))
     assert runs[0] == runs[1]
+
+
+def test_a_server_that_does_not_read_stalls_the_whole_robot_and_its_watchdogs():
+    driver = DriverSide("--perfect")
+    driver.start_streaming()
+    driver.drive(0, 0.1, 0.0, 1500)
+    robot = driver.swarm.robots[0]
+    robot.block_writing(driver.swarm.now_ms)
+    driver.swarm.reschedule(0)
+    since_ms = driver.swarm.now_ms
+    driver.run(4900)
+    assert not driver.list_frames(0, ids.ID_ODOM, since_ms + 1)
+    assert driver.measure_speed(0) > 0.05
+    driver.run(4000)
+    assert driver.measure_speed(0) < 0.002
+    assert driver.list_frames(0, ids.ID_ODOM, since_ms + 5000)
+
+
+def test_a_frozen_robot_follows_its_last_command_again_afterwards():
+    driver = DriverSide("--perfect")
+    driver.start_streaming()
+    driver.send_twist(0, 0.1, 0.0, ids.ID_POSITION_CMD_VEL)
+    driver.run(150)
+    slow_m_s = driver.measure_speed(0)
+    driver.swarm.robots[0].freeze(driver.swarm.now_ms, 500)
+    driver.swarm.reschedule(0)
+    driver.run(1500)
+    assert slow_m_s < 0.09 < driver.measure_speed(0)
+
+
+def test_the_yaw_of_a_robot_with_an_imu_comes_from_it_and_a_set_heading_is_lost():
+    driver = DriverSide("--imu-hat", "--perfect")
+    driver.start_streaming()
+    driver.drive(0, 0.0, 1.0, 2000, ids.ID_POSITION_CMD_VEL)
+    driver.send_twist(0, 0.0, 0.0, ids.ID_POSITION_CMD_VEL)
+    driver.send(0, ids.ID_SET_ODOM, struct.pack("<3d", 0.0, 0.0, -2.0))
+    driver.run(1000)
+    _, _, _, turn_w = read_odom(driver.list_frames(0, ids.ID_ODOM)[-1].payload)[2]
+    assert 2.0 * math.acos(turn_w) == pytest.approx(driver.true_pose(0)[2], abs=0.01)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.tuples(st.integers(0, 124), st.binary(max_size=80)), max_size=8), st.binary(max_size=60))
+def test_a_robot_survives_whatever_a_server_sends(sent, noise):
+    driver = DriverSide()
+    driver.start_streaming()
+    driver.send_bytes(0, noise)
+    for topic_id, payload in sent:
+        driver.send(0, topic_id, payload)
+    driver.run(400)
+    driver.send_bytes(0, noise)
+    driver.send(0, frames.ID_PUBLISHER)
+    driver.run(400)
+    if driver.swarm.robots[0].crash_reason is None:
+        assert driver.list_frames(0, frames.ID_PUBLISHER)
+    else:
+        assert any(12 <= topic_id <= 99 or topic_id in (2, 3, 4, 5, 7, 8, 9, 1) for topic_id, _ in sent)
+
+
+def test_what_the_imu_says_is_up_to_a_quarter_of_a_second_old():
+    hat = ImuHat(0.0)
+    ages_s = [
+        now_ms / 1000.0 - hat.read(now_ms, now_ms / 1000.0, 1.0).heading_rad for now_ms in range(0, 3000, 34)
+    ]
+    assert 0.15 < max(ages_s) <= 0.25
+    assert min(ages_s) == pytest.approx(0.0, abs=0.035)
