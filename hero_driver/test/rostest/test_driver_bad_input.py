@@ -1,0 +1,197 @@
+#!/usr/bin/env python
+"""What bad input gets: one clear line and an exit code from the node, a counter and nothing else from a robot."""
+
+import random
+import socket
+import struct
+
+import rospy
+import rostest
+import stock_messages
+from driver_case import DriverProcess, OwnDriverCase, Recorder, make_publisher, wait_for, wait_payloads
+from fake_robot import PUB, STOCK_DECLARATIONS, Declaration, FakeRobot
+from hero_driver.rosserial import frames
+from std_msgs.msg import ColorRGBA
+
+from hero_msgs.msg import Encoder, Robot
+
+USAGE_ERROR = 2
+
+
+class TestDriverBadInput(OwnDriverCase):
+    def assert_start_fails(self, parameters, *parts):
+        """The node must end with an exit code and one line that holds all parts."""
+        driver = DriverProcess(parameters)
+        self.addCleanup(driver.fleet.close)
+        self.assertEqual(driver.wait_end(), USAGE_ERROR, driver.lines)
+        self.assertEqual(len(driver.lines), 1, driver.lines)
+        for part in ("FATAL", "hero_driver cannot start: ", *parts):
+            self.assertIn(part, driver.lines[0])
+
+    # Parameters.
+
+    def test_a_port_in_use_is_named_with_a_remedy(self):
+        with socket.socket() as taken:
+            taken.bind(("127.0.0.1", 0))
+            taken.listen(1)
+            port = taken.getsockname()[1]
+            self.assert_start_fails(
+                {"host": "127.0.0.1", "port": port},
+                "~host 127.0.0.1, ~port %d is in use" % port,
+                "another ~port",
+            )
+
+    def test_an_address_that_is_not_ours_is_named(self):
+        self.assert_start_fails({"host": "192.0.2.1"}, "192.0.2.1", "not an address of this machine")
+
+    def test_a_host_name_that_does_not_exist_is_named(self):
+        self.assert_start_fails({"host": "no-such-host.invalid"}, "no-such-host.invalid")
+
+    def test_an_unknown_parameter_is_named_with_the_one_that_was_meant(self):
+        self.assert_start_fails({"prot": 11411}, "~prot is not known", "did you mean ~port?")
+
+    def test_values_out_of_range_or_of_another_type_are_named_with_what_is_allowed(self):
+        for name, value, allowed in (
+            ("port", 70000, "0 to 65535"),
+            ("grace_s", -1.0, "0 to 3600 (s)"),
+            ("namespace_policy", "all", "one of robot, any"),
+            ("clamp", "yes", "true or false"),
+            ("robots", [{"host": "a", "prot": 1}], "a list of {host"),
+            ("allow", ["10.0.0.0/99"], "networks such as"),
+        ):
+            with self.subTest(name=name, value=value):
+                self.assert_start_fails({name: value}, "parameter ~%s is " % name, allowed)
+
+    def test_neither_listening_nor_dialling_is_refused(self):
+        self.assert_start_fails({"host": ""}, "~host is empty and ~robots too")
+
+    # Bytes.
+
+    def start_pair(self):
+        """A driver, a robot that will misbehave, and one that must not notice."""
+        driver = self.start()
+        bad, good = self.dial(driver, 1), self.dial(driver, 2)
+        return driver, bad, good
+
+    def assert_alive(self, robot, ticks=5.0):
+        """What a robot sends arrives, over the connection that it has."""
+        encoders = Recorder(robot.namespace + "/encoder", Encoder)
+        robot.send("encoder", stock_messages.make_encoder(robot.name, rospy.Time.now(), ticks, ticks))
+        self.assertEqual(encoders.wait_count(1)[0].left_ticks, ticks)
+        self.assertTrue(robot.is_connected)
+
+    def make_encoder_frame(self, robot, ticks=1.0):
+        payload = stock_messages.make_encoder(robot.name, rospy.Time.now(), ticks, ticks)
+        return frames.encode_frame(128, payload)
+
+    def test_garbage_between_frames_is_counted_and_the_next_good_frame_is_read(self):
+        driver, bad, good = self.start_pair()
+        encoders = Recorder("/hero_1/encoder", Encoder)
+        chance = random.Random(7)
+        for count in range(1, 21):
+            garbage = bytes(chance.randrange(256) for _ in range(chance.randrange(1, 200)))
+            bad.send_bytes(garbage.replace(b"\xff\xfe", b"\xff\xff") + b"\xff\xfe\x05\x00\xfa")
+            bad.send_bytes(bytes(20))
+            bad.send_bytes(self.make_encoder_frame(bad, float(count)))
+        self.assertEqual([m.left_ticks for m in encoders.wait_count(20)], [float(n) for n in range(1, 21)])
+        self.assertGreaterEqual(
+            driver.fleet.wait("/hero_1", Robot.READY, "counted", lambda e: e.bad_frames >= 20).bad_frames, 20
+        )
+        self.assert_alive(good)
+
+    def test_a_length_of_65535_swallows_nothing(self):
+        driver, bad, _ = self.start_pair()
+        encoders = Recorder("/hero_1/encoder", Encoder)
+        bad.send_bytes(b"\xff\xfe\xff\xff\x01\x80\x00" + self.make_encoder_frame(bad))
+        encoders.wait_count(1)
+        driver.fleet.wait("/hero_1", Robot.READY, "counted", lambda e: e.bad_frames >= 1)
+
+    def test_wrong_checksums_are_counted_and_what_follows_is_read(self):
+        driver, bad, _ = self.start_pair()
+        encoders = Recorder("/hero_1/encoder", Encoder)
+        good_frame = self.make_encoder_frame(bad, 2.0)
+        flipped = good_frame[:-1] + bytes([good_frame[-1] ^ 0x10])
+        bad.send_bytes(flipped + good_frame + flipped)
+        bad.send_bytes(good_frame)
+        encoders.wait_count(2)
+        driver.fleet.wait("/hero_1", Robot.READY, "counted", lambda e: e.bad_frames >= 2)
+
+    def test_a_frame_that_comes_byte_by_byte_is_read(self):
+        _, bad, _ = self.start_pair()
+        encoders = Recorder("/hero_1/encoder", Encoder)
+        for byte in self.make_encoder_frame(bad, 3.0):
+            bad.send_bytes(bytes([byte]))
+        self.assertEqual(encoders.wait_count(1)[0].left_ticks, 3.0)
+
+    def test_a_robot_that_vanishes_in_the_middle_of_a_frame_harms_nobody_and_may_return(self):
+        driver, bad, good = self.start_pair()
+        bad.send_bytes(self.make_encoder_frame(bad)[:40])
+        bad.close()
+        driver.fleet.wait("/hero_1", Robot.AWAY)
+        self.assert_alive(good)
+        self.assert_alive(self.dial(driver, 1))
+
+    def test_half_a_declaration_and_declarations_of_nonsense_are_reported(self):
+        driver, bad, good = self.start_pair()
+        burst = bad.encode_declarations()
+        first = frames.FrameReader().receive_bytes(burst)[0].payload
+        bad.send_frame(PUB, first[: len(first) // 2])
+        bad.send_frame(PUB, first + b"more")
+        bad.send_frame(PUB, struct.pack("<HI", 140, 0xFFFFFFFF) + b"name")
+        line = driver.wait_line("hero_1: TopicInfo: ")
+        self.assertNotIn("Traceback", line)
+        self.assert_alive(bad)
+        self.assert_alive(good)
+
+    def test_ids_below_100_and_buffers_without_room_are_refused(self):
+        odd = [
+            Declaration(PUB, 40, "/{}/low", "std_msgs/String", "992ce8a1687cec8c8bd883ec73ca41d1"),
+            Declaration(1, 115, "/{}/tight", "std_msgs/String", "992ce8a1687cec8c8bd883ec73ca41d1", 0),
+            Declaration(1, 116, "/{}/negative", "std_msgs/String", "992ce8a1687cec8c8bd883ec73ca41d1", -5),
+        ]
+        driver = self.start()
+        self.dial(driver, 3, declarations=[*STOCK_DECLARATIONS, *odd])
+        for name in ("low", "tight", "negative"):
+            driver.wait_line("topic '?/hero_3/%s'? refused" % name)
+
+    def test_a_program_that_does_not_speak_rosserial_is_shown_the_door(self):
+        driver, _, good = self.start_pair()
+        stranger = FakeRobot(9, declarations=[])
+        self.addCleanup(stranger.close)
+        stranger.is_silent = True
+        stranger.connect(driver.address)
+        stranger.send_bytes(b"GET / HTTP/1.1\r\nHost: robot\r\n\r\n" * 4000)
+        wait_for(lambda: stranger.ended, "the end of the connection")
+        driver.wait_line("127.0.0.1:.*does not speak rosserial")
+        self.assert_alive(good)
+
+    def test_a_hundred_connections_that_end_at_once_leave_nothing_behind(self):
+        driver, _, good = self.start_pair()
+        for _ in range(100):
+            socket.create_connection(driver.address, 20.0).close()
+        self.assert_alive(good)
+        late = self.dial(driver, 4)
+        self.assert_alive(late)
+        self.assertLess(len(driver.find_lines("never said which robot")), 10)
+
+    def test_what_robots_send_by_chance_never_ends_the_driver(self):
+        driver, _, good = self.start_pair()
+        chance = random.Random(11)
+        for number in range(10, 16):
+            robot = self.dial(driver, number)
+            for _ in range(150):
+                topic_id = chance.choice([*range(12), *range(95, 140), 65535])
+                payload = bytes(chance.randrange(256) for _ in range(chance.choice([0, 1, 4, 8, 40, 300])))
+                robot.send_frame(topic_id, payload)
+            robot.close()
+        self.assert_alive(good)
+        self.assertIsNone(driver.process.poll())
+        self.assertEqual(driver.find_lines("Traceback"), [])
+        robot = self.dial(driver, 10)
+        make_publisher("/hero_10/led", ColorRGBA).publish(ColorRGBA(1.0, 1.0, 1.0, 1.0))
+        wait_payloads(robot, "led")
+
+
+if __name__ == "__main__":
+    rospy.init_node("test_driver_bad_input")
+    rostest.rosrun("hero_driver", "driver_bad_input", TestDriverBadInput)
