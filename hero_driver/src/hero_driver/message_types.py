@@ -4,6 +4,8 @@ The firmware speaks of hero_common, the package that this suite's hero_msgs repl
 tf package of old; both have equals with the same md5.
 """
 
+import importlib.util
+import os
 from typing import Any, Dict, Tuple
 
 import genpy
@@ -90,7 +92,7 @@ def find_message_class(type_name: str, md5sum: str) -> Any:
     May read files; not for the thread that owns the sockets. Raises: MessageTypeError.
     """
     ros_type = apply_aliases(type_name)
-    message_class = _load(roslib.message.get_message_class, ros_type)
+    message_class = _load(roslib.message.get_message_class, "msg", ros_type)
     _check_md5sum("type", type_name, ros_type, md5sum, message_class._md5sum)
     return message_class
 
@@ -101,7 +103,7 @@ def find_service_class(type_name: str, request_md5sum: str, response_md5sum: str
     May read files; not for the thread that owns the sockets. Raises: MessageTypeError.
     """
     ros_type = apply_aliases(type_name)
-    service_class = _load(roslib.message.get_service_class, ros_type)
+    service_class = _load(roslib.message.get_service_class, "srv", ros_type)
     halves: Tuple[Tuple[str, str, Any], ...] = (
         ("request of service type", request_md5sum, service_class._request_class),
         ("answer of service type", response_md5sum, service_class._response_class),
@@ -111,21 +113,33 @@ def find_service_class(type_name: str, request_md5sum: str, response_md5sum: str
     return service_class
 
 
-def _load(loader: Any, ros_type: str) -> Any:
-    package = ros_type.partition("/")[0]
+def _load(loader: Any, kind: str, ros_type: str) -> Any:
+    package, _, name = ros_type.partition("/")
+    if not _is_generated(package, kind, name):
+        raise MessageTypeError(
+            "type %s is not known here: install or build the package %s and source its workspace"
+            " before the driver starts" % (ros_type, package)
+        )
     try:
-        found = loader(ros_type)
+        return loader(ros_type)
     except (ImportError, ValueError) as error:
         raise MessageTypeError(
             "type %s cannot be loaded (%s): build the package %s again and source its workspace"
             % (ros_type, error, package)
         ) from error
-    if found is None:
-        raise MessageTypeError(
-            "type %s is not known here: install or build the package %s and source its workspace"
-            " before the driver starts" % (ros_type, package)
-        )
-    return found
+
+
+def _is_generated(package: str, kind: str, name: str) -> bool:
+    """Return whether package has generated code for a type, without importing anything.
+
+    The name comes from the network: it must not decide which Python modules this process runs.
+    """
+    try:
+        spec = importlib.util.find_spec(package)
+    except (ImportError, ValueError):
+        return False
+    places = [] if spec is None else spec.submodule_search_locations or []
+    return any(os.path.isfile(os.path.join(place, kind, "_%s.py" % name)) for place in places)
 
 
 def _check_md5sum(what: str, type_name: str, ros_type: str, theirs: str, ours: str) -> None:
