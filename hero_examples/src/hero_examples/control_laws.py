@@ -228,7 +228,7 @@ class GoToPoseLaw(NamedTuple):
     """How early the robot bends towards the final heading."""
     k2: float = 2.0
     """How fast it comes onto that curve, against how fast it drives."""
-    slowing_m2: float = 0.02
+    slowing_m2: float = 0.003
     """beta: how much it slows down in curves: to half where the curve has a radius of sqrt(beta)."""
     linear_gain: float = 0.8
     """Speed in m/s per metre of distance near the goal, 1/s."""

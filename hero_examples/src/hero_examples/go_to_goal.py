@@ -27,8 +27,8 @@ RATE_HZ = 10.0
 FEEDBACK_PERIOD_S = 0.5
 """Between two feedback messages of an action."""
 
-FRAME_TIMEOUT_S = 3.0
-"""So long the frame of a goal may be unknown: /tf needs a moment after the first goal in a foreign frame."""
+FRAME_TIMEOUT_S = 1.5
+"""So long the frame of a goal may be unknown: /tf needs a moment. Shorter than SILENCE_S, so that the reason is right."""
 
 STOP_REPEAT_S = 0.5
 """Standstill is sent for so long after a goal, then the node is silent and other programs may drive the robot."""
@@ -257,6 +257,8 @@ class Pilot:
         self.robot.drive(*STANDSTILL)
         if state is State.REACHED:
             rospy.loginfo("%s is at its goal after %.1f s, %.3f m off", self.robot.name, elapsed_s, pursuit.distance_m)
+        elif cancelled:
+            rospy.loginfo("%s gives up its goal: %s", self.robot.name, reason)
         else:
             rospy.logwarn("%s did not reach its goal: %s", self.robot.name, reason)
         if order.handle is None:
