@@ -1,0 +1,152 @@
+#!/usr/bin/env python
+"""The end of the driver: every robot gets two stops that it can take, and only then is its connection closed."""
+
+import signal
+import struct
+import time
+
+import rospy
+import rostest
+from driver_case import OwnDriverCase, make_publisher, wait_for, wait_payloads
+from fake_robot import READ_CYCLE_S, VELOCITY_GATE_S
+from geometry_msgs.msg import Twist
+from hero_driver.rosserial import frames
+
+from hero_msgs.msg import Motor, Robot
+
+VELOCITY = "velocity_controller/cmd_vel"
+LIMIT_S = 2.0
+"""What the driver promises for its end with 50 robots, from the signal to its exit."""
+
+
+def make_command(linear_m_s):
+    twist = Twist()
+    twist.linear.x = linear_m_s
+    return twist
+
+
+class TestDriverShutdown(OwnDriverCase):
+    def drive(self, driver, robots):
+        """Let all robots move."""
+        for robot in robots:
+            driver.fleet.wait_ready(robot.namespace)
+        publishers = [make_publisher("%s/%s" % (robot.namespace, VELOCITY), Twist) for robot in robots]
+        for publisher in publishers:
+            publisher.publish(make_command(0.1))
+        for robot in robots:
+            wait_for(lambda r=robot: any(not v.is_zero for v in list(r.accepted)), "motion of " + robot.name)
+        return publishers
+
+    def assert_stopped(self, robots):
+        """The end of each conversation must be two stops, both taken, then the end of the connection."""
+        for robot in robots:
+            wait_for(lambda r=robot: r.ended, "the end of the connection of " + robot.name)
+            last = [velocity for velocity in robot.velocities if velocity.name.endswith("/" + VELOCITY)][-2:]
+            self.assertEqual([velocity.is_zero for velocity in last], [True, True], robot.name)
+            self.assertGreaterEqual(last[1].time_s - last[0].time_s, VELOCITY_GATE_S)
+            taken = [velocity for velocity in robot.accepted if velocity.name.endswith("/" + VELOCITY)]
+            self.assertEqual(taken[-2:], last, "the robot dropped a stop")
+            # While unconfigured the firmware runs no watchdog, so this must never reach a moving robot.
+            self.assertEqual(robot.payloads_with_id(frames.ID_TX_STOP), [])
+
+    def end_by(self, number, count=3):
+        driver = self.start()
+        robots = [self.dial(driver, n, ready=False, read_cycle_s=READ_CYCLE_S) for n in range(1, count + 1)]
+        self.drive(driver, robots)
+        driver.process.send_signal(number)
+        self.assertEqual(driver.wait_end(), 0, driver.lines)
+        self.assert_stopped(robots)
+        self.assertEqual(driver.find_lines("Traceback"), [])
+        return driver
+
+    def test_ctrl_c_stops_every_robot(self):
+        self.end_by(signal.SIGINT)
+
+    def test_sigterm_stops_every_robot(self):
+        self.end_by(signal.SIGTERM)
+
+    def test_a_closed_terminal_stops_every_robot(self):
+        self.end_by(signal.SIGHUP)
+
+    def test_rosnode_kill_stops_every_robot(self):
+        driver = self.start()
+        robots = [self.dial(driver, number, ready=False, read_cycle_s=READ_CYCLE_S) for number in (1, 2)]
+        self.drive(driver, robots)
+        code, _, uri = rospy.get_master().lookupNode(driver.node)
+        self.assertEqual(code, 1)
+        rospy.core.xmlrpcapi(uri).shutdown("/test", "killed by a test")
+        self.assertEqual(driver.wait_end(), 0, driver.lines)
+        self.assert_stopped(robots)
+
+    def test_fifty_robots_are_stopped_within_the_promised_time(self):
+        driver = self.start()
+        robots = [self.dial(driver, n, ready=False, read_cycle_s=READ_CYCLE_S) for n in range(1, 51)]
+        self.drive(driver, robots)
+        began_s = time.monotonic()
+        driver.process.send_signal(signal.SIGTERM)
+        for robot in robots:
+            wait_for(lambda r=robot: r.ended, "the end of " + robot.name)
+        took_s = time.monotonic() - began_s
+        self.assertEqual(driver.wait_end(), 0, driver.lines)
+        self.assert_stopped(robots)
+        self.assertLess(took_s, LIMIT_S)
+
+    def test_commands_that_still_come_do_not_outlast_the_stop(self):
+        driver = self.start()
+        robots = [self.dial(driver, 1, read_cycle_s=READ_CYCLE_S)]
+        publisher = self.drive(driver, robots)[0]
+        driver.process.send_signal(signal.SIGINT)
+        deadline_s = time.monotonic() + 20.0
+        rate = rospy.Rate(50)
+        while not robots[0].ended and time.monotonic() < deadline_s:
+            publisher.publish(make_command(0.2))
+            rate.sleep()
+        driver.wait_end()
+        self.assert_stopped(robots)
+
+    def test_a_robot_that_does_not_read_does_not_keep_others_from_their_stop(self):
+        driver = self.start()
+        stalled = self.dial(driver, 1, receive_buffer_length=4096)
+        others = [self.dial(driver, number, read_cycle_s=READ_CYCLE_S) for number in (2, 3)]
+        self.drive(driver, [stalled, *others])
+        stalled.is_stalled = True
+        driver.process.send_signal(signal.SIGINT)
+        self.assertEqual(driver.wait_end(), 0, driver.lines)
+        self.assert_stopped(others)
+
+    def test_motors_that_are_driven_directly_and_position_control_are_stopped_too(self):
+        driver = self.start()
+        robot = self.dial(driver, 1)
+        make_publisher("/hero_1/cmd_motor", Motor).publish(Motor(1400, 1600))
+        make_publisher("/hero_1/position_controller/cmd_vel", Twist).publish(make_command(0.1))
+        wait_payloads(robot, "cmd_motor")
+        wait_payloads(robot, "position_controller/cmd_vel")
+        driver.process.send_signal(signal.SIGINT)
+        driver.wait_end()
+        wait_for(lambda: robot.ended, "the end of the connection")
+        self.assertEqual(robot.payloads_on("cmd_motor")[-1], struct.pack("<2h", 1500, 1500))
+        self.assertEqual(robot.payloads_on("position_controller/cmd_vel")[-2:], [bytes(48)] * 2)
+        self.assertEqual(robot.payloads_on(VELOCITY)[-2:], [bytes(48)] * 2)
+
+    def test_a_second_driver_can_take_the_port_of_the_first_at_once(self):
+        first = self.start()
+        self.dial(first, 1)
+        port = first.address[1]
+        first.process.send_signal(signal.SIGINT)
+        first.wait_end()
+        second = self.start(port=port)
+        self.assertEqual(second.address[1], port)
+        self.dial(second, 1)
+        self.assertEqual(second.fleet.find("/hero_1", Robot.READY).reconnects, 0)
+
+    def test_a_driver_without_robots_ends_quietly(self):
+        driver = self.start()
+        driver.wait_line("listening on 0.0.0.0:")
+        driver.process.send_signal(signal.SIGINT)
+        self.assertEqual(driver.wait_end(), 0)
+        self.assertEqual(driver.find_lines("ERROR|FATAL|Traceback"), [])
+
+
+if __name__ == "__main__":
+    rospy.init_node("test_driver_shutdown")
+    rostest.rosrun("hero_driver", "driver_shutdown", TestDriverShutdown)
