@@ -234,7 +234,8 @@ class Gateway(LinkHandler):
         if peer.record is not None:
             peer.record.dropped_messages += 1
             peer.record.last_error = text
-        self._log.log_throttled("error", peer.label + text[:80], "%s: %s" % (peer.label, text))
+        group = peer.label if peer.bridge is not None else peer.link.address.host
+        self._log.log_throttled("error", peer.label + text[:80], "%s: %s" % (peer.label, text), group)
 
     def _declare(self, peer: Peer, topic: Topic, now_s: float) -> None:
         if peer.record is None and not self._identify(peer, topic, now_s):

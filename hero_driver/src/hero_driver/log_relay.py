@@ -15,6 +15,9 @@ QUEUE_LENGTH = 2000
 THROTTLE_S = 10.0
 KNOWN_KEYS_MAX = 1000
 
+GROUP_LINES_MAX = 20
+"""Different complaints about one robot in THROTTLE_S; a peer can make up as many as it likes."""
+
 _LOG_FUNCTIONS = {
     "debug": rospy.logdebug,
     "info": rospy.loginfo,
@@ -30,6 +33,7 @@ class LogRelay:
     def __init__(self) -> None:
         self._worker = Worker("log relay", QUEUE_LENGTH, lambda error: None)
         self._last: Dict[str, Tuple[float, int]] = {}
+        self._groups: Dict[str, Tuple[float, int]] = {}
         self._reported_drops = 0
 
     def log(self, level: str, text: str) -> None:
@@ -40,9 +44,14 @@ class LogRelay:
         if self._worker.submit(lambda: _LOG_FUNCTIONS[level]("%s", text)):
             self._reported_drops = dropped
 
-    def log_throttled(self, level: str, key: str, text: str) -> None:
-        """Log one line unless one with the same key was logged in the last THROTTLE_S; say how many were not."""
+    def log_throttled(self, level: str, key: str, text: str, group: str = "") -> None:
+        """Log one line unless one with the same key was logged in the last THROTTLE_S; say how many were not.
+
+        Lines of one group, where one is given, are limited to GROUP_LINES_MAX in that time.
+        """
         now_s = time.monotonic()
+        if group and not self._admit_group(group, now_s):
+            return
         last_s, suppressed = self._last.get(key, (None, 0))
         if last_s is not None and now_s - last_s < THROTTLE_S:
             self._last[key] = (last_s, suppressed + 1)
@@ -51,6 +60,17 @@ class LogRelay:
             self._last.clear()
         self._last[key] = (now_s, 0)
         self.log(level, "%s (and %d times more before)" % (text, suppressed) if suppressed else text)
+
+    def _admit_group(self, group: str, now_s: float) -> bool:
+        start_s, lines = self._groups.get(group, (now_s, 0))
+        if now_s - start_s >= THROTTLE_S:
+            start_s, lines = now_s, 0
+        if len(self._groups) >= KNOWN_KEYS_MAX:
+            self._groups.clear()
+        self._groups[group] = (start_s, lines + 1)
+        if lines == GROUP_LINES_MAX:
+            self.log("warn", "%s: more complaints than %d, the rest is left out for a while" % (group, lines))
+        return lines < GROUP_LINES_MAX
 
     def close(self) -> None:
         """Write what waits and end the thread."""
