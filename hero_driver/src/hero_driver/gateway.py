@@ -311,7 +311,8 @@ class Gateway(LinkHandler):
         if bridge.cleaner is not None:
             bridge.cleaner.restart(rebooted and decision.verdict is not Verdict.ARRIVED)
         bridge.attach()
-        self._log.log("info", "%s %s (%s)" % (bridge.label, decision.verdict.value, peer.link.address))
+        text = "%s %s (%s)" % (bridge.label, decision.verdict.value, peer.link.address)
+        self._log.log_throttled("info", "joined " + bridge.label, text)
         self._on_change()
         early_logs, peer.early_logs = peer.early_logs, []
         for log in early_logs:

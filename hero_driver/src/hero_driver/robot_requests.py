@@ -55,7 +55,8 @@ class RobotRequests:
             try:
                 answer = read_parameter(resolve_parameter(name, namespace, self._may_leave))
             except ParameterRefusedError as error:
-                self._log.log_throttled("warn", namespace + name[:100], "%s: %s" % (peer.label, error))
+                text = "%s: %s" % (peer.label, error)
+                self._log.log_throttled("warn", namespace + name[:100], text, peer.label)
                 answer = EMPTY_ANSWER
             self._call_soon(lambda: self._send_parameter(peer, answer))
 
