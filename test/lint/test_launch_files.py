@@ -25,7 +25,9 @@ def test_every_argument_is_in_the_readme_of_its_package(path):
     readme = (sources.ROOT / sources.package_of(path) / "README.md").read_text(encoding="utf-8")
     assert path.name in readme, f"{path.name} is not in the README of {sources.package_of(path)}"
     for argument in ElementTree.parse(path).getroot().findall("arg"):
-        assert f"`{argument.get('name')}`" in readme, f"{path.name}: `{argument.get('name')}` is missing"
+        name = argument.get("name")
+        # `~name` where the argument is the node's parameter
+        assert f"`{name}`" in readme or f"`~{name}`" in readme, f"{path.name}: `{argument.get('name')}` is missing"
 
 
 @pytest.mark.parametrize("path", LAUNCH_FILES + sources.list_files(".test"), ids=name_of)
