@@ -9,9 +9,7 @@ from typing import List, NamedTuple, Tuple
 
 import numpy as np
 
-from .kinematics import BODY_RADIUS_M
-
-Pose = Tuple[float, float, float]
+from .kinematics import BODY_RADIUS_M, Pose
 
 START_GAP_M = 0.05
 """Free space kept around a robot that is placed by chance."""

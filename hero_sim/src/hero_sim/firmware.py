@@ -77,6 +77,7 @@ class Firmware:
         wants_connection: set while the firmware dials.
         outbox: frames for the radio, in order.
         configured: whether the robot streams.
+        body: its hardware.
     """
 
     def __init__(
@@ -102,7 +103,7 @@ class Firmware:
         self.zero_topics_next = False
         self.answer_delay_ms = 0
         self.crash_reason: Optional[str] = None
-        self._body = body
+        self.body = body
         self._report = report
         self._phase = _PHASE_OFF
         self._booted_at_ms = 0
@@ -112,10 +113,10 @@ class Firmware:
     def _start_programs(self) -> None:
         """Give everything that lives in RAM its first value."""
         self.clock = RobotClock()
-        self.motors = MotorControl(self._body)
+        self.motors = MotorControl(self.body)
         self.motors.centres_us = tuple(self.flash.motor_centres_us)  # type: ignore[assignment]
         self.sensing = Sensing(
-            self.name, self._body, self.options.imu_hat, self.options.exact_odometry, self.flash
+            self.name, self.body, self.options.imu_hat, self.options.exact_odometry, self.flash
         )
         self.commands = CommandTable(self)
         self._declarations = declarations.encode_declarations(self.name)
@@ -143,7 +144,7 @@ class Firmware:
         if robot_id is not None:
             self.robot_id = robot_id
             self.name = "hero_%d" % robot_id
-        self._body.halt()
+        self.body.halt()
         self._start_programs()
         self._booted_at_ms = now_ms
         self._phase = _PHASE_BOOT
@@ -154,7 +155,7 @@ class Firmware:
     def switch_off(self) -> None:
         """Cut the power; the radio has to be told apart."""
         self._phase = _PHASE_OFF
-        self._body.halt()
+        self.body.halt()
         self._start_programs()
         self.sensing.show_dark()
         self.due_ms = _NEVER_MS
@@ -167,7 +168,7 @@ class Firmware:
     def freeze(self, now_ms: int, for_ms: int) -> None:
         """Stand still in the program for for_ms: nothing is read, sent or watched, the motors keep their
         pulses."""
-        self._body.hold()
+        self.body.hold()
         self._blocked_until_ms = now_ms + for_ms
         self.due_ms = now_ms + for_ms
 

@@ -56,7 +56,7 @@ class GroundTruth:
             rospy.Publisher("/%s/ground_truth" % robot.name, Odometry, queue_size=2)
             for robot in simulator.swarm.robots
         ]
-        self._anchors: List[Tuple[int, int]] = []
+        self._anchors: List[Tuple[float, float, float]] = []
         self._arena.publish(MarkerArray(self._draw_arena()))
         simulator.swarm.after_step = self.publish
         self.publish(simulator.swarm.world.time_ms)
@@ -97,9 +97,9 @@ class GroundTruth:
             publisher.publish(message)
 
     def _publish_odom_frames(self, stamp: rospy.Time) -> None:
-        """Place each robot's odom frame in the world, anew whenever its odometry began anew."""
+        """Place each robot's odom frame in the world, anew whenever its odometry was set."""
         robots = self._simulator.swarm.robots
-        anchors = [(id(robot.sensing), robot.sensing.odometry.resets) for robot in robots]
+        anchors = [robot.body.odom_origin for robot in robots]
         if anchors == self._anchors:
             return
         self._anchors = anchors
@@ -107,7 +107,7 @@ class GroundTruth:
 
     @staticmethod
     def _place_odom(robot: Firmware, stamp: rospy.Time) -> TransformStamped:
-        x_m, y_m, theta_rad = robot.sensing.odom_origin
+        x_m, y_m, theta_rad = robot.body.odom_origin
         transform = TransformStamped()
         transform.header.stamp = stamp
         transform.header.frame_id = FRAME

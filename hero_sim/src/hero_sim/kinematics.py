@@ -55,3 +55,22 @@ def move_along_arc(
 def wrap_angle(angle_rad: Number) -> Number:
     """Return angle_rad in [-pi, pi)."""
     return (angle_rad + math.pi) % (2.0 * math.pi) - math.pi
+
+
+Pose = Tuple[float, float, float]
+
+
+def compose(frame: Pose, inner: Pose) -> Pose:
+    """Return the pose inner, which is given in frame, in whatever frame is given in."""
+    cosine, sine = math.cos(frame[2]), math.sin(frame[2])
+    return (
+        frame[0] + cosine * inner[0] - sine * inner[1],
+        frame[1] + sine * inner[0] + cosine * inner[1],
+        frame[2] + inner[2],
+    )
+
+
+def invert(pose: Pose) -> Pose:
+    """Return the pose that undoes pose: compose(pose, invert(pose)) is the origin."""
+    cosine, sine = math.cos(pose[2]), math.sin(pose[2])
+    return (-cosine * pose[0] - sine * pose[1], sine * pose[0] - cosine * pose[1], -pose[2])

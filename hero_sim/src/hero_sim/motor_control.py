@@ -6,7 +6,7 @@ MotorDriver.ino, as measured on the stock robot.
 
 from typing import List, Optional, Tuple
 
-from .kinematics import MAX_LINEAR_M_S, MAX_TURN_RAD_S, split_to_wheels
+from .kinematics import MAX_LINEAR_M_S, MAX_TURN_RAD_S, Pose, compose, invert, split_to_wheels
 from .world import MAX_WHEEL_M_S, POSITION_PID_LAG_S, VELOCITY_PID_LAG_S, World
 
 COMMAND_GAP_MS = 50
@@ -41,12 +41,29 @@ _TUNING_TURN_M_S = 0.08
 
 
 class Body:
-    """The hardware of one robot, as its firmware sees it: a row of the world."""
+    """The hardware of one robot, as its firmware sees it: a row of the world.
+
+    Attributes:
+        odom_origin: where the robot's odom frame truly lies in the world, since its pose was last set. A
+        restart
+            changes nothing: the driver goes on where it was.
+    """
 
     def __init__(self, world: World, index: int) -> None:
         """Be the robot at index of world."""
         self.world = world
         self.index = index
+        self.odom_origin = self.true_pose
+
+    @property
+    def true_pose(self) -> Pose:
+        """Where the robot is in the world."""
+        x_m, y_m, theta_rad = self.world.poses[self.index].tolist()
+        return (x_m, y_m, theta_rad)
+
+    def carry(self, before: Pose) -> None:
+        """Be told that somebody carried the robot here from before: its odom frame came with it."""
+        self.odom_origin = compose(self.true_pose, compose(invert(before), self.odom_origin))
 
     def read_wheels(self, time_ms: int) -> List[float]:
         """Return the travel (m) of the left and right wheel at time_ms of the world."""

@@ -4,7 +4,6 @@ Pure. Order within a cycle and gates as measured on the stock robot: imu, laser,
 encoder.
 """
 
-import math
 from typing import List, Tuple
 
 import numpy as np
@@ -12,6 +11,7 @@ import numpy as np
 from . import messages
 from .flash import Flash
 from .imu_hat import ImuHat
+from .kinematics import compose, invert
 from .motor_control import Body
 from .range_sensors import convert_to_ranges
 from .wheel_odometry import WheelOdometry
@@ -44,7 +44,6 @@ class Sensing:
         due_ms: when run_cycle() has to be called.
         laser_enabled: whether /laser is sent; not kept over a restart.
         odometry: what the robot believes of its wheels.
-        odom_origin: where its odom frame truly lies (x m, y m, theta rad), as of the last time it was set.
     """
 
     def __init__(self, name: str, body: Body, imu_hat: bool, exact_odometry: bool, flash: Flash) -> None:
@@ -64,28 +63,11 @@ class Sensing:
         self._imu = ImuHat(float(body.world.poses[body.index, 2]))
         self._light = _DARK
         self._light_until_ms = 0
-        self.odom_origin = self._find_odom_origin()
 
     def set_odometry(self, x_m: float, y_m: float, theta_rad: float) -> None:
         """Take a pose for the odometry."""
         self.odometry.set_pose(x_m, y_m, theta_rad)
-        self.odom_origin = self._find_odom_origin()
-
-    def anchor_odometry(self) -> None:
-        """Be told that somebody carried the robot: its odometry goes on, so its odom frame moved with it."""
-        self.odometry.resets += 1
-        self.odom_origin = self._find_odom_origin()
-
-    def _find_odom_origin(self) -> Tuple[float, float, float]:
-        x_m, y_m, theta_rad = self._body.world.poses[self._body.index].tolist()
-        odom_x_m, odom_y_m, odom_theta_rad = self.odometry.pose
-        turn_rad = theta_rad - odom_theta_rad
-        cosine, sine = math.cos(turn_rad), math.sin(turn_rad)
-        return (
-            x_m - (cosine * odom_x_m - sine * odom_y_m),
-            y_m - (sine * odom_x_m + cosine * odom_y_m),
-            turn_rad,
-        )
+        self._body.odom_origin = compose(self._body.true_pose, invert((x_m, y_m, theta_rad)))
 
     def begin(self, now_ms: int) -> None:
         """Be told that loop() begins."""

@@ -65,11 +65,12 @@ class Swarm:
 
     def reset(self) -> None:
         """Put every robot back to its start, standing, as if somebody carried it there."""
+        before = [robot.body.true_pose for robot in self.robots]
         for robot in self.robots:
             robot.motors.halt()
         self.world.reset()
-        for robot in self.robots:
-            robot.sensing.anchor_odometry()
+        for robot, pose in zip(self.robots, before):
+            robot.body.carry(pose)
 
     @property
     def next_due_ms(self) -> int:

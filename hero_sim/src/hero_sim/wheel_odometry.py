@@ -37,7 +37,6 @@ class WheelOdometry:
 
     Attributes:
         pose: x m, y m, theta rad, as the robot believes.
-        resets: how often the pose was set.
         ticks: counts of the left and right wheel since the last set_pose(), as last read.
     """
 
@@ -45,7 +44,6 @@ class WheelOdometry:
         """Count from wheel travels left_m and right_m on; with exact, no interval is missed (a robot with the
         firmware's fault repaired)."""
         self.pose = (0.0, 0.0, 0.0)
-        self.resets = 0
         self.ticks = (0, 0)
         self._exact = exact
         self._counted_ticks = (math.floor(left_m / TICK_M), math.floor(right_m / TICK_M))
@@ -98,7 +96,6 @@ class WheelOdometry:
     def set_pose(self, x_m: float, y_m: float, theta_rad: float) -> None:
         """Begin anew at this pose; the tick counters go to zero (Odometry.ino:234)."""
         self.pose = (x_m, y_m, theta_rad)
-        self.resets += 1
         self._base_ticks = self._counted_ticks
         self.ticks = self._diff_ticks = self._integrated_ticks = (0, 0)
 

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from hero_driver.rosserial import frames, payloads
 from hero_sim import declarations as ids
 from hero_sim.imu_hat import ImuHat
+from hero_sim.kinematics import compose
 
 
 def test_a_boot_speaks_first_and_at_the_stock_robots_times():
@@ -510,3 +511,26 @@ def test_what_the_imu_says_is_up_to_a_quarter_of_a_second_old():
     ]
     assert 0.15 < max(ages_s) <= 0.25
     assert min(ages_s) == pytest.approx(0.0, abs=0.035)
+
+
+def test_a_robots_odom_frame_stays_over_a_restart_follows_set_odom_and_is_carried_with_it():
+    driver = DriverSide("--perfect", "--firmware-odometry", "exact")
+    driver.start_streaming()
+    robot = driver.swarm.robots[0]
+    start = driver.true_pose(0)
+    driver.drive(0, 0.1, 0.5, 3000, ids.ID_POSITION_CMD_VEL)
+    driver.send_twist(0, 0.0, 0.0, ids.ID_POSITION_CMD_VEL)
+    driver.run(1000)
+    assert compose(robot.body.odom_origin, robot.sensing.odometry.pose) == pytest.approx(
+        driver.true_pose(0), abs=0.02
+    )
+    robot.switch_on(driver.swarm.now_ms)
+    assert robot.body.odom_origin == pytest.approx(start)
+    driver.swarm.reschedule(0)
+    driver.start_streaming()
+    driver.send(0, ids.ID_SET_ODOM, struct.pack("<3d", 0.5, 0.0, 1.0))
+    driver.run(200)
+    assert compose(robot.body.odom_origin, (0.5, 0.0, 1.0)) == pytest.approx(driver.true_pose(0))
+    driver.swarm.reset()
+    assert driver.true_pose(0) == pytest.approx(start)
+    assert compose(robot.body.odom_origin, (0.5, 0.0, 1.0)) == pytest.approx(driver.true_pose(0))

@@ -42,3 +42,16 @@ def test_arrays_move_like_single_robots():
 def test_wheels_and_body_speeds_are_inverse():
     assert kinematics.join_wheels(*kinematics.split_to_wheels(0.1, 2.5)) == pytest.approx((0.1, 2.5))
     assert pytest.approx(0.000537, abs=1e-6) == kinematics.TICK_M
+
+
+def test_a_pose_and_its_inverse_cancel():
+    pose = (0.3, -0.7, 2.1)
+    assert kinematics.compose(pose, kinematics.invert(pose)) == pytest.approx((0.0, 0.0, 0.0))
+    assert kinematics.compose(kinematics.invert(pose), pose) == pytest.approx((0.0, 0.0, 0.0))
+
+
+def test_poses_are_joined_like_steps_on_a_floor():
+    # One metre ahead, a quarter turn to the left, then one metre ahead again.
+    assert kinematics.compose((1.0, 0.0, math.pi / 2), (1.0, 0.0, 0.0)) == pytest.approx(
+        (1.0, 1.0, math.pi / 2)
+    )
