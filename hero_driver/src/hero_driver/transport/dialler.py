@@ -5,6 +5,7 @@ import errno
 import os
 import socket
 import threading
+import time
 from typing import Any, Callable, Deque, Optional, Tuple
 
 from .link import Address, Link, describe_error
@@ -12,6 +13,9 @@ from .link import Address, Link, describe_error
 BACKOFF_FIRST_S = 0.5
 BACKOFF_MAX_S = 10.0
 CONNECT_TIMEOUT_S = 5.0
+
+STOOD_S = 3.0
+"""A link that stood for so long is worth a quick return; one that hangs up at once is not."""
 
 LINK_CHECK_S = 0.1
 """How often a dialler looks whether its link still stands."""
@@ -54,6 +58,7 @@ class Dialler:
         self._backoff_s = BACKOFF_FIRST_S
         self._socket: Optional[socket.socket] = None
         self._link: Optional[Link] = None
+        self._opened_s = 0.0
         self._attempt = 0
         self._reported = ""
 
@@ -74,7 +79,7 @@ class Dialler:
             self._retry(os.strerror(error_number))
             return
         self._link = self._loop.add_link(sock, self._address, dialled=True)
-        self._backoff_s = BACKOFF_FIRST_S
+        self._opened_s = time.monotonic()
         self._reported = ""
         self._watch_link()
 
@@ -111,13 +116,17 @@ class Dialler:
                 "robot at %s cannot be reached: %s; dialling again, check that it is on and that host and port"
                 " in ~robots are right" % (self._address, error)
             )
+        self._dial_later()
+
+    def _dial_later(self) -> None:
         self._loop.call_later(self._backoff_s, self.dial)
         self._backoff_s = min(2 * self._backoff_s, BACKOFF_MAX_S)
 
     def _watch_link(self) -> None:
         if self._link is None or self._link.closed:
-            self._loop.call_later(self._backoff_s, self.dial)
-            self._backoff_s = min(2 * self._backoff_s, BACKOFF_MAX_S)
+            if time.monotonic() - self._opened_s >= STOOD_S:
+                self._backoff_s = BACKOFF_FIRST_S
+            self._dial_later()
         else:
             self._loop.call_later(LINK_CHECK_S, self._watch_link)
 
