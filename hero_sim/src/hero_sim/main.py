@@ -152,6 +152,8 @@ def main(arguments: Optional[List[str]] = None) -> int:
     if "help" in options.fault:
         print("\n".join(describe_faults()))
         return 0
+    # Loading takes a moment: Ctrl-C in it ends the program like any other, without a stack trace.
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
     missing = find_missing()
     if missing is not None:
         print("hero_sim: " + missing, file=sys.stderr)

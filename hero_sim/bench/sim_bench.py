@@ -1,6 +1,6 @@
 """What the simulator costs: CPU at real time behind real sockets, and how fast it could run.
 
-    PYTHONPATH=hero_sim/src:hero_driver/src python3 hero_sim/test/bench/bench_sim.py [--robots 1,10]
+    PYTHONPATH=hero_sim/src:hero_driver/src python3 hero_sim/bench/sim_bench.py [--robots 1,10]
     [--seconds 10]
 
 A small server in this process takes the driver's place: it requests topics, answers the time, and drives
@@ -172,7 +172,7 @@ def measure_fastest(robots: int, simulated_ms: int = 5000) -> float:
 
 def main(arguments: Optional[List[str]] = None) -> int:
     """Print the table."""
-    parser = argparse.ArgumentParser(prog="bench_sim.py", description="What the simulator costs.")
+    parser = argparse.ArgumentParser(prog="sim_bench.py", description="What the simulator costs.")
     parser.add_argument("--robots", default="1,10,50,100", help="numbers of robots (%(default)s)")
     parser.add_argument(
         "--seconds", type=float, default=10.0, help="length of each measurement (%(default)s)"
