@@ -66,6 +66,16 @@ def test_a_refused_connection_counts_nowhere():
     assert admission.unidentified == 2
 
 
+def test_addresses_that_left_are_forgotten():
+    admission = make_admission()
+    for number in range(256):
+        host = "10.0.0.%d" % number
+        assert admission.admit(host) is None
+        admission.unidentified -= 1
+        admission.release(host)
+    assert len(admission._by_host) == 0
+
+
 # Rates.
 
 

@@ -17,6 +17,8 @@ from robot_messages import (
     read_stamp_ns,
 )
 
+from hero_driver.cleaning import split_transforms
+
 UPTIME_NS = 2 * NS_PER_S
 
 
@@ -105,6 +107,13 @@ def test_a_broken_message_of_transforms_is_refused_whole():
     two = build_transform_message(*[build_transform(NOW_NS, "hero_0/base_link", "hero_0/hat_link")] * 2)
     assert robot.receive("/tf", b"\x01\x00\x00\x00" + two[4:], NOW_NS) == []
     assert robot.cleaner.refused == len(message) + 2
+
+
+def test_transforms_of_devices_that_are_no_heros_pass_one_by_one_whatever_their_frames():
+    transforms = [build_transform(NOW_NS, "map", "rover"), build_transform(UPTIME_NS, "rover", "camera")]
+    message = build_transform_message(*transforms)
+    assert split_transforms(message, NOW_NS) == [("/tf", transform) for transform in transforms]
+    assert split_transforms(message[:-1], NOW_NS) == []
 
 
 # Stamps.

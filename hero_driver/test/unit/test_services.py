@@ -136,6 +136,11 @@ def test_a_robot_that_leaves_ends_the_call_that_waits():
     robot.wait_for_request()
     robot.service.fail("silent for 6.1 s")
     assert call.finish().error == "/hero_0/set_odom was not answered: silent for 6.1 s"
+    # The robot is back.
+    call = Call(robot.service, b"again")
+    robot.wait_for_request()
+    robot.service.receive_answer(b"answer")
+    assert call.finish().answer == b"answer"
 
 
 def test_a_robot_that_leaves_between_calls_does_not_fail_the_next_one():
