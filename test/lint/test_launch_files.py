@@ -27,7 +27,9 @@ def test_every_argument_is_in_the_readme_of_its_package(path):
     for argument in ElementTree.parse(path).getroot().findall("arg"):
         name = argument.get("name")
         # `~name` where the argument is the node's parameter
-        assert f"`{name}`" in readme or f"`~{name}`" in readme, f"{path.name}: `{argument.get('name')}` is missing"
+        assert f"`{name}`" in readme or f"`~{name}`" in readme, (
+            f"{path.name}: `{argument.get('name')}` is missing"
+        )
 
 
 @pytest.mark.parametrize("path", LAUNCH_FILES + sources.list_files(".test"), ids=name_of)

@@ -1,0 +1,105 @@
+"""script/demo as a user meets it: it ends well, names what failed, finds another port, and Ctrl-C ends everything."""
+
+import os
+import signal
+import socket
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+TIMEOUT_S = 120.0
+
+
+@pytest.fixture()
+def demo():
+    """Starts script/demo without a display; what a failed test leaves is ended."""
+    started = []
+
+    def start(*arguments):
+        environment = {name: value for name, value in os.environ.items() if name != "DISPLAY"}
+        process = subprocess.Popen(
+            [str(ROOT / "script" / "demo"), *arguments],
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+        )
+        started.append(process)
+        return process
+
+    yield start
+    for process in started:
+        if process.poll() is None:
+            process.terminate()
+            process.communicate(timeout=TIMEOUT_S)
+
+
+@pytest.fixture()
+def taken_port():
+    """A port on which somebody else listens."""
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        yield other.getsockname()[1]
+
+
+def read_to_end(process):
+    return process.communicate(timeout=TIMEOUT_S)[0].decode()
+
+
+def wait_until_driver_listens(port):
+    deadline_s = time.monotonic() + TIMEOUT_S
+    while time.monotonic() < deadline_s:
+        try:
+            socket.create_connection(("127.0.0.1", port), 1.0).close()
+            return
+        except OSError:
+            time.sleep(0.1)
+    raise AssertionError(f"nobody listens on port {port}")
+
+
+def find_free_port():
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        return free.getsockname()[1]
+
+
+def test_it_ends_by_itself_when_all_robots_joined_and_moved_also_on_another_port(demo, taken_port):
+    process = demo("--seconds", "12", "--robots", "2", "--port", str(taken_port))
+    output = read_to_end(process)
+    assert process.returncode == 0, output
+    assert f"port {taken_port} is taken" in output
+    assert "all 2 robots joined and moved" in output
+
+
+def test_robots_that_had_no_time_to_move_are_named(demo):
+    process = demo("--seconds", "1", "--robots", "2", "--port", str(find_free_port()))
+    output = read_to_end(process)
+    assert process.returncode == 1, output
+    assert "hero_0 " in output
+    assert "hero_1 " in output
+
+
+def test_an_interrupt_ends_everything(demo):
+    port = find_free_port()
+    process = demo("--robots", "2", "--port", str(port))
+    wait_until_driver_listens(port)
+    os.killpg(process.pid, signal.SIGINT)
+    output = read_to_end(process)
+    assert process.returncode == 130, output
+    with socket.socket() as driver:
+        assert driver.connect_ex(("127.0.0.1", port)) != 0, "the driver still listens"
+
+
+@pytest.mark.parametrize(
+    "arguments", [["--seconds", "soon"], ["--robots", "0"], ["--port", "80"], ["--fast"]]
+)
+def test_wrong_arguments_are_refused_in_words(demo, arguments):
+    process = demo(*arguments)
+    output = read_to_end(process)
+    assert process.returncode == 1
+    assert arguments[0] in output
