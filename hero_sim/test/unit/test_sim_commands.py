@@ -1,0 +1,145 @@
+import struct
+
+import pytest
+from driver_side import DriverSide, read_laser
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hero_driver.rosserial import frames
+from hero_sim import declarations as ids
+
+
+def test_self_tuning_answers_without_success_spins_and_floods_the_log_until_a_twist_comes():
+    driver = DriverSide("--perfect")
+    driver.start_streaming()
+    driver.send(0, ids.ID_VELOCITY_PID_CALIBRATION)
+    driver.run(2000)
+    (answer,) = driver.list_frames(0, ids.ID_VELOCITY_PID_CALIBRATION_ANSWER)
+    assert answer.payload == b"\x00\x0f\x00\x00\x00PID Autotuning!"
+    assert abs(driver.true_pose(0)[2]) > 1.0
+    assert (
+        30
+        <= sum("Tunning" in text for at_ms, text in driver.list_logs(0) if at_ms > driver.swarm.now_ms - 1000)
+        <= 48
+    )
+    driver.send_twist(0, 0.0, 0.0)
+    driver.run(500)
+    assert driver.measure_speed(0) < 0.002
+
+
+def test_parameters_are_kept_over_a_restart(tmp_path):
+    driver = DriverSide("--flash-dir", str(tmp_path))
+    driver.start_streaming()
+    driver.send(0, ids.ID_IR_CALIBRATION, struct.pack("<8d", *[0.4 + 0.01 * index for index in range(8)]))
+    driver.run(100)
+    driver.send(0, ids.ID_MOTORS_PARAMETERS, struct.pack("<2h", 1490, 1512))
+    driver.run(100)
+    driver.send(0, ids.ID_VELOCITY_PID_PARAMETERS, struct.pack("<6f", 1, 2, 3, 4, 5, 6))
+    driver.run(200)
+    for topic_id in (126, 132, 135):
+        assert [arrival.payload[0] for arrival in driver.list_frames(0, topic_id)] == [1]
+    flash = DriverSide("--flash-dir", str(tmp_path)).swarm.robots[0].flash
+    assert flash.ir_calibration_counts_m2 == pytest.approx([0.4 + 0.01 * index for index in range(8)])
+    assert flash.motor_centres_us == [1490.0, 1512.0]
+    assert flash.velocity_pid == [1, 2, 3, 4, 5, 6]
+
+
+def test_laser_enable_stops_and_starts_the_laser_and_a_restart_forgets_it():
+    driver = DriverSide()
+    driver.start_streaming()
+    driver.send(0, ids.ID_LASER_ENABLE, b"\x00")
+    driver.run(100)
+    since_ms = driver.swarm.now_ms
+    driver.run(1000)
+    assert not driver.list_frames(0, ids.ID_LASER, since_ms)
+    driver.send(0, ids.ID_LASER_ENABLE, b"\x01")
+    driver.run(1000)
+    assert len(driver.list_frames(0, ids.ID_LASER, since_ms)) >= 4
+
+
+def test_the_laser_sees_the_wall_ahead():
+    driver = DriverSide("--perfect")
+    driver.start_streaming()
+    driver.drive(0, 0.2, 0.0, 8000, ids.ID_POSITION_CMD_VEL)
+    _, ranges, counts = read_laser(driver.list_frames(0, ids.ID_LASER)[-1].payload)
+    assert ranges[8] == pytest.approx(0.0368 + 0.021, abs=0.01)
+    assert counts[8] > 900
+    assert ranges[0] > 0.23
+
+
+def test_the_light_is_blue_after_the_start_then_as_told_and_dark_after_15_s():
+    driver = DriverSide()
+    driver.start_streaming()
+    robot = driver.swarm.robots[0]
+
+    def light():
+        return robot.sensing.show_light(robot.to_millis(driver.swarm.now_ms))
+
+    assert light() == (0.0, 0.0, 1.0, 1.0)
+    driver.send(0, ids.ID_LED, struct.pack("<4f", 1, 0.5, 0, 1))
+    driver.run(14900)
+    assert light() == (1.0, 0.5, 0.0, 1.0)
+    driver.run(300)
+    assert light() == (0.0, 0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("topic_id", [12, 99, 125, 130, 60000])
+def test_an_id_outside_its_table_kills_a_robot(topic_id):
+    driver = DriverSide()
+    driver.start_streaming()
+    driver.send(0, topic_id, b"1234")
+    driver.run(100)
+    assert "id %d" % topic_id in driver.swarm.robots[0].crash_reason
+
+
+def test_an_id_in_an_empty_slot_is_ignored():
+    driver = DriverSide()
+    driver.start_streaming()
+    driver.send(0, 120, b"1234")
+    driver.run(100)
+    assert driver.swarm.robots[0].crash_reason is None
+
+
+def test_a_frame_in_two_pieces_is_lost_unless_both_come_before_the_robot_looks():
+    driver = DriverSide()
+    driver.start_streaming()
+    frame = frames.encode_frame(ids.ID_LASER_ENABLE, b"\x00")
+    driver.send_bytes(0, frame[:5])
+    driver.run(60)
+    driver.send_bytes(0, frame[5:])
+    driver.run(200)
+    assert driver.swarm.robots[0].sensing.laser_enabled
+    driver.send_bytes(0, frame[:5])
+    driver.send_bytes(0, frame[5:])
+    driver.run(200)
+    assert not driver.swarm.robots[0].sensing.laser_enabled
+
+
+def test_garbage_from_the_server_does_no_harm():
+    driver = DriverSide()
+    driver.start_streaming()
+    driver.send_bytes(0, bytes(range(256)) * 4)
+    driver.run(200)
+    driver.send_bytes(0, b"\xff\xfe\xff\xff\x01" + b"x" * 50)
+    driver.run(200)
+    driver.send(0, ids.ID_LASER_ENABLE, b"\x00")
+    driver.run(100)
+    assert not driver.swarm.robots[0].sensing.laser_enabled
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.tuples(st.integers(0, 124), st.binary(max_size=80)), max_size=8), st.binary(max_size=60))
+def test_a_robot_survives_whatever_a_server_sends(sent, noise):
+    driver = DriverSide()
+    driver.start_streaming()
+    driver.send_bytes(0, noise)
+    for topic_id, payload in sent:
+        driver.send(0, topic_id, payload)
+    driver.run(400)
+    driver.send_bytes(0, noise)
+    driver.send(0, frames.ID_PUBLISHER)
+    driver.run(400)
+    if driver.swarm.robots[0].crash_reason is None:
+        assert driver.list_frames(0, frames.ID_PUBLISHER)
+    else:
+        assert any(12 <= topic_id <= 99 or topic_id in (2, 3, 4, 5, 7, 8, 9, 1) for topic_id, _ in sent)

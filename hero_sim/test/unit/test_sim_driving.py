@@ -1,0 +1,220 @@
+import math
+import struct
+
+import pytest
+from driver_side import DriverSide, read_encoder, read_odom
+
+from hero_driver.rosserial import frames
+from hero_sim import declarations as ids
+from hero_sim.imu_hat import ImuHat
+from hero_sim.kinematics import compose
+
+
+def test_a_stop_of_transmission_leaves_log_lines_and_lets_a_moving_robot_run_away():
+    driver = DriverSide("--perfect")
+    driver.start_streaming()
+    driver.drive(0, 0.1, 0.0, 600)
+    driver.send(0, frames.ID_TX_STOP)
+    driver.run(500)
+    since_ms = driver.swarm.now_ms
+    driver.run(1500)
+    assert {arrival.topic_id for arrival in driver.arrivals[0] if arrival.at_ms > since_ms} == {frames.ID_LOG}
+    assert driver.measure_speed(0) == pytest.approx(0.06, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    "topic_id, payload, seconds",
+    [
+        (ids.ID_VELOCITY_CMD_VEL, struct.pack("<6d", 0.1, 0, 0, 0, 0, 0), 2.0),
+        (ids.ID_POSITION_CMD_VEL, struct.pack("<6d", 0.1, 0, 0, 0, 0, 0), 4.0),
+        (ids.ID_CMD_MOTOR, struct.pack("<2h", 1600, 1600), 1.0),
+    ],
+    ids=["velocity", "position", "motor"],
+)
+def test_a_single_command_ends_by_its_watchdog(topic_id, payload, seconds):
+    driver = DriverSide("--perfect")
+    driver.start_streaming()
+    driver.send(0, topic_id, payload)
+    while driver.measure_speed(0) == 0.0:
+        driver.run(1)
+    start_ms = driver.swarm.now_ms
+    driver.run(int(seconds * 1000) - 100)
+    assert driver.measure_speed(0) > 0.05
+    # 51 ms at most from the command to the robot's reading it, then the motor's own lag.
+    driver.run(300)
+    assert driver.measure_speed(0) < 0.02
+    driver.run(1000)
+    assert driver.measure_speed(0) == 0.0
+    assert start_ms < driver.swarm.now_ms
+
+
+def test_one_velocity_command_drives_as_far_as_the_stock_robot():
+    driver = DriverSide("--perfect")
+    driver.start_streaming()
+    start_m = driver.true_pose(0)[0]
+    driver.send_twist(0, 0.1, 0.0)
+    driver.run(4000)
+    assert 0.13 <= driver.true_pose(0)[0] - start_m <= 0.17
+
+
+def test_speeds_are_limited():
+    driver = DriverSide("--perfect", "--firmware-odometry", "exact")
+    driver.start_streaming()
+    driver.drive(0, 5.0, 0.0, 3000, ids.ID_POSITION_CMD_VEL)
+    assert driver.measure_speed(0) == pytest.approx(0.20, abs=0.002)
+    driver.drive(0, 0.0, -100.0, 3000, ids.ID_POSITION_CMD_VEL)
+    assert driver.measure_speed(0) == pytest.approx(8.0 * 0.0315, abs=0.003)
+
+
+def test_a_stop_stops():
+    driver = DriverSide()
+    driver.start_streaming()
+    driver.drive(0, 0.1, 0.0, 1500)
+    driver.send_twist(0, 0.0, 0.0)
+    driver.run(400)
+    assert driver.measure_speed(0) < 0.002
+    assert driver.list_logs(0)[-1][1] == "\x1b[93m[/hero_0] Reseting PID...\x1b[0m"
+
+
+def test_a_stop_within_50_ms_of_the_last_command_is_dropped():
+    driver = DriverSide()
+    driver.start_streaming()
+    driver.drive(0, 0.1, 0.0, 1000)
+    move = frames.encode_frame(ids.ID_VELOCITY_CMD_VEL, struct.pack("<6d", 0.1, 0, 0, 0, 0, 0))
+    driver.run(60)
+    driver.send_bytes(0, move)
+    driver.send_twist(0, 0.0, 0.0)
+    driver.run(600)
+    assert driver.measure_speed(0) > 0.03
+    driver.send_twist(0, 0.0, 0.0)
+    driver.run(400)
+    assert driver.measure_speed(0) < 0.002
+
+
+def test_a_command_that_no_robot_could_compute_with_is_reported_and_changes_nothing():
+    driver = DriverSide()
+    driver.start_streaming()
+    driver.send_twist(0, float("nan"), 0.0)
+    driver.send(0, ids.ID_VELOCITY_CMD_VEL, b"short")
+    driver.run(200)
+    assert driver.measure_speed(0) == 0.0
+    assert len(driver.reports) == 2 and all(report.startswith("hero_0: Twist") for report in driver.reports)
+
+
+@pytest.mark.parametrize(
+    "controller, least, most", [(ids.ID_VELOCITY_CMD_VEL, 0.38, 0.70), (ids.ID_POSITION_CMD_VEL, 0.97, 1.03)]
+)
+def test_odometry_loses_distance_while_the_velocity_controller_drives(controller, least, most):
+    driver = DriverSide("--perfect")
+    driver.start_streaming()
+    start_m = driver.true_pose(0)[0]
+    driver.drive(0, 0.1, 0.0, 5000, controller)
+    driver.send_twist(0, 0.0, 0.0, controller)
+    driver.run(1000)
+    true_m = driver.true_pose(0)[0] - start_m
+    odom_m = read_odom(driver.list_frames(0, ids.ID_ODOM)[-1].payload)[2][0]
+    assert true_m > 0.3
+    assert least <= odom_m / true_m <= most
+
+
+def test_exact_odometry_and_the_ticks_lose_nothing():
+    driver = DriverSide("--perfect", "--firmware-odometry", "exact")
+    driver.start_streaming()
+    start_m = driver.true_pose(0)[0]
+    driver.drive(0, 0.1, 0.0, 5000)
+    driver.send_twist(0, 0.0, 0.0)
+    driver.run(1000)
+    true_m = driver.true_pose(0)[0] - start_m
+    # Without slip and wheel errors only a tick may be missing.
+    assert read_odom(driver.list_frames(0, ids.ID_ODOM)[-1].payload)[2][0] == pytest.approx(true_m, abs=0.002)
+    encoder = read_encoder(driver.list_frames(0, ids.ID_ENCODER)[-1].payload)
+    assert encoder[0] * 0.00053669 == pytest.approx(true_m, abs=0.002)
+
+
+def test_set_odom_sets_the_pose_and_zeroes_the_ticks_and_answers_in_its_time():
+    driver = DriverSide("--perfect")
+    driver.start_streaming()
+    driver.drive(0, 0.1, 0.0, 1000)
+    driver.send_twist(0, 0.0, 0.0)
+    driver.run(1000)
+    called_ms = driver.swarm.now_ms
+    driver.send(0, ids.ID_SET_ODOM, struct.pack("<3d", 1.0, 2.0, 0.5))
+    driver.run(200)
+    (answer,) = driver.list_frames(0, ids.ID_SET_ODOM_ANSWER)
+    assert answer.payload == b"\x01\x15\x00\x00\x00Odometry was changed!"
+    assert 42 <= answer.at_ms - called_ms <= 75 + 1
+    pose = read_odom(driver.list_frames(0, ids.ID_ODOM)[-1].payload)[2]
+    assert pose == pytest.approx((1.0, 2.0, 0.247404, 0.968912), abs=1e-6)
+    assert read_encoder(driver.list_frames(0, ids.ID_ENCODER)[-1].payload)[:2] == (0.0, 0.0)
+    assert "[HERO] Odometry was changed!" in [text for _, text in driver.list_logs(0)]
+
+
+def test_a_server_that_does_not_read_stalls_the_whole_robot_and_its_watchdogs():
+    driver = DriverSide("--perfect")
+    driver.start_streaming()
+    driver.drive(0, 0.1, 0.0, 1500)
+    robot = driver.swarm.robots[0]
+    robot.block_writing(driver.swarm.now_ms)
+    driver.swarm.reschedule(0)
+    since_ms = driver.swarm.now_ms
+    driver.run(4900)
+    assert not driver.list_frames(0, ids.ID_ODOM, since_ms + 1)
+    assert driver.measure_speed(0) > 0.05
+    driver.run(4000)
+    assert driver.measure_speed(0) < 0.002
+    assert driver.list_frames(0, ids.ID_ODOM, since_ms + 5000)
+
+
+def test_a_frozen_robot_follows_its_last_command_again_afterwards():
+    driver = DriverSide("--perfect")
+    driver.start_streaming()
+    driver.send_twist(0, 0.1, 0.0, ids.ID_POSITION_CMD_VEL)
+    driver.run(150)
+    slow_m_s = driver.measure_speed(0)
+    driver.swarm.robots[0].freeze(driver.swarm.now_ms, 500)
+    driver.swarm.reschedule(0)
+    driver.run(1500)
+    assert slow_m_s < 0.09 < driver.measure_speed(0)
+
+
+def test_the_yaw_of_a_robot_with_an_imu_comes_from_it_and_a_set_heading_is_lost():
+    driver = DriverSide("--imu-hat", "--perfect")
+    driver.start_streaming()
+    driver.drive(0, 0.0, 1.0, 2000, ids.ID_POSITION_CMD_VEL)
+    driver.send_twist(0, 0.0, 0.0, ids.ID_POSITION_CMD_VEL)
+    driver.send(0, ids.ID_SET_ODOM, struct.pack("<3d", 0.0, 0.0, -2.0))
+    driver.run(1000)
+    _, _, _, turn_w = read_odom(driver.list_frames(0, ids.ID_ODOM)[-1].payload)[2]
+    assert 2.0 * math.acos(turn_w) == pytest.approx(driver.true_pose(0)[2], abs=0.01)
+
+
+def test_what_the_imu_says_is_up_to_a_quarter_of_a_second_old():
+    hat = ImuHat(0.0)
+    ages_s = [
+        now_ms / 1000.0 - hat.read(now_ms, now_ms / 1000.0, 1.0).heading_rad for now_ms in range(0, 3000, 34)
+    ]
+    assert 0.15 < max(ages_s) <= 0.25
+    assert min(ages_s) == pytest.approx(0.0, abs=0.035)
+
+
+def test_a_robots_odom_frame_stays_over_a_restart_follows_set_odom_and_is_carried_with_it():
+    driver = DriverSide("--perfect", "--firmware-odometry", "exact")
+    driver.start_streaming()
+    robot = driver.swarm.robots[0]
+    start = driver.true_pose(0)
+    driver.drive(0, 0.1, 0.5, 3000, ids.ID_POSITION_CMD_VEL)
+    driver.send_twist(0, 0.0, 0.0, ids.ID_POSITION_CMD_VEL)
+    driver.run(1000)
+    assert compose(robot.body.odom_origin, robot.sensing.odometry.pose) == pytest.approx(
+        driver.true_pose(0), abs=0.02
+    )
+    robot.switch_on(driver.swarm.now_ms)
+    assert robot.body.odom_origin == pytest.approx(start)
+    driver.swarm.reschedule(0)
+    driver.start_streaming()
+    driver.send(0, ids.ID_SET_ODOM, struct.pack("<3d", 0.5, 0.0, 1.0))
+    driver.run(200)
+    assert compose(robot.body.odom_origin, (0.5, 0.0, 1.0)) == pytest.approx(driver.true_pose(0))
+    driver.swarm.reset()
+    assert driver.true_pose(0) == pytest.approx(start)
+    assert compose(robot.body.odom_origin, (0.5, 0.0, 1.0)) == pytest.approx(driver.true_pose(0))
