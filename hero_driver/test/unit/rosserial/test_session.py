@@ -138,6 +138,36 @@ def test_a_robot_that_only_logs_after_it_was_declared_has_lost_its_configuration
     assert request_times_s
 
 
+def test_a_robot_that_lost_its_configuration_is_asked_at_most_every_half_second_until_it_answers():
+    session = open_declared_session()
+    request_times_s = []
+    for step in range(1, 500):
+        now_s = T0 + 0.1 + step * 0.02
+        receive(session, HEARTBEAT, now_s)
+        session.poll(now_s)
+        request_times_s += [now_s] * len(list_requests(session))
+    assert len(request_times_s) > 2
+    assert all(later - earlier >= 0.5 - 1e-6 for earlier, later in zip(request_times_s, request_times_s[1:]))
+    receive(session, HANDSHAKE, T0 + 11.0)
+    session.take_frames()
+    request_times_s = []
+    for step in range(20):
+        receive(session, HEARTBEAT, T0 + 11.0 + step * 0.1)
+        request_times_s += poll_until(session, T0 + 11.0 + step * 0.1, T0 + 11.05 + step * 0.1)[0]
+    # One may have been due already; to answer it again costs the robot nothing.
+    assert len(request_times_s) <= 1
+
+
+def test_a_robot_that_asks_for_the_time_or_sends_data_has_not_lost_its_configuration():
+    for sign_of_life in (TIME_REQUEST, ODOM_MESSAGE):
+        session = open_declared_session()
+        for step in range(1, 200):
+            now_s = T0 + step * 0.1
+            receive(session, HEARTBEAT if step % 25 else sign_of_life, now_s)
+            session.poll(now_s)
+            assert list_requests(session) == []
+
+
 # Time.
 
 
