@@ -39,13 +39,11 @@ def list_publishers(topic):
     return dict(rosgraph.Master("/test").getSystemState()[0]).get(topic, [])
 
 
-def has_subscriber(node, topic):
-    """Return whether node itself says that it sends topic to this process."""
+def has_connection(node, topic, reader):
+    """Return whether node itself says that it sends topic to a node whose name holds reader."""
     api = xmlrpc.client.ServerProxy(rosgraph.Master("/test").lookupNode(node))
     _, _, connections = api.getBusInfo("/test")
-    return any(
-        entry[1] == rospy.get_name() and entry[2] == "o" and entry[4] == topic for entry in connections
-    )
+    return any(entry[2] == "o" and entry[4] == topic and reader in entry[1] for entry in connections)
 
 
 class Recorder:
@@ -64,7 +62,9 @@ class Recorder:
     def wait_connected(self):
         """Wait until a publisher sends to this recorder, and knows it: the two sides learn it one by one."""
         wait_for(
-            lambda: any(has_subscriber(node, self.topic) for node in list_publishers(self.topic)),
+            lambda: any(
+                has_connection(node, self.topic, rospy.get_name()) for node in list_publishers(self.topic)
+            ),
             "a publisher of " + self.topic,
         )
 

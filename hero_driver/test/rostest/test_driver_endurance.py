@@ -1,0 +1,205 @@
+#!/usr/bin/env python
+"""What others do to the driver: a master that does not answer, readers that do not read, services that hang."""
+
+import contextlib
+import os
+import signal
+import subprocess
+import threading
+
+import rosgraph
+import rospy
+import rostest
+import stock_messages
+from driver_case import (
+    OwnDriverCase,
+    Recorder,
+    has_connection,
+    list_driver_topics,
+    make_publisher,
+    wait_for,
+    wait_frames,
+    wait_payloads,
+)
+from fake_robot import (
+    ANSWER_MD5,
+    CLIENT_ANSWERS,
+    CLIENT_REQUESTS,
+    STOCK_DECLARATIONS,
+    TIME_FRAME,
+    Declaration,
+)
+from hero_driver.rosserial import frames
+from std_msgs.msg import ColorRGBA
+from std_srvs.srv import Trigger, TriggerResponse
+
+from hero_msgs.msg import Encoder, Robot
+
+TRIGGER_REQUEST_MD5 = "d41d8cd98f00b204e9800998ecf8427e"
+
+
+@contextlib.contextmanager
+def frozen(pid):
+    """Stop a process for a while; it keeps its sockets but reads and answers nothing."""
+    os.kill(pid, signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        os.kill(pid, signal.SIGCONT)
+
+
+def count_resources(pid):
+    """Return how many sockets and threads a process has; rospy's other files go when Python collects garbage."""
+    kinds = []
+    for entry in os.scandir("/proc/%d/fd" % pid):
+        with contextlib.suppress(FileNotFoundError):
+            kinds.append(os.readlink(entry.path))
+    return sum(kind.startswith("socket:") for kind in kinds), len(os.listdir("/proc/%d/task" % pid))
+
+
+class TestDriverEndurance(OwnDriverCase):
+    def assert_time_is_answered(self, robot):
+        count = len(robot.payloads_with_id(frames.ID_TIME))
+        robot.send_bytes(TIME_FRAME)
+        wait_frames(robot, frames.ID_TIME, count + 1)
+
+    def send_encoder(self, robot, ticks):
+        robot.send("encoder", stock_messages.make_encoder(robot.name, rospy.Time.now(), ticks, ticks))
+
+    def test_a_master_that_does_not_answer_stops_nobody_who_is_there(self):
+        driver = self.start()
+        robot = self.dial(driver, 1)
+        encoders = Recorder("/hero_1/encoder", Encoder)
+        light = make_publisher("/hero_1/led", ColorRGBA)
+        with frozen(rosgraph.Master("/test").getPid()):
+            newcomer = self.dial(driver, 2, ready=False)
+            wait_for(lambda: newcomer.requests, "a request for the newcomer's topics")
+            for count in range(1, 4):
+                self.send_encoder(robot, float(count))
+                self.send_encoder(newcomer, float(count))
+                encoders.wait_count(count)
+                light.publish(ColorRGBA(float(count), 0.0, 0.0, 0.0))
+                wait_payloads(robot, "led", count)
+                for each in (robot, newcomer):
+                    self.assert_time_is_answered(each)
+            driver.fleet.wait("/hero_2", Robot.READY)
+        late = Recorder("/hero_2/encoder", Encoder)
+        self.send_encoder(newcomer, 9.0)
+        self.assertEqual(late.wait_count(1)[0].left_ticks, 9.0)
+
+    def test_a_subscriber_that_does_not_read_keeps_nobody_waiting(self):
+        driver = self.start(max_frames_per_s=1000000, max_bytes_per_s=100000000)
+        loud, other = self.dial(driver, 1), self.dial(driver, 2)
+        scans = Recorder("/hero_1/laser", rospy.AnyMsg)
+        reader = subprocess.Popen(
+            ["rostopic", "echo", "/hero_1/laser"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
+        self.addCleanup(reader.wait)
+        self.addCleanup(reader.kill)
+        wait_for(
+            lambda: has_connection(driver.node, "/hero_1/laser", "rostopic"), "the reader to be connected"
+        )
+        encoders = Recorder("/hero_2/encoder", Encoder)
+        # The socket buffers of the system hold some MB; this is more.
+        payload = stock_messages.make_laser("hero_1", rospy.Time(3), [0.1] * 8) + bytes(3500)
+        with frozen(reader.pid):
+            for count in range(1, 41):
+                for _ in range(100):
+                    loud.send("laser", payload)
+                self.send_encoder(other, float(count))
+                self.assert_time_is_answered(other)
+            self.assertEqual(encoders.wait_count(40)[-1].left_ticks, 40.0)
+            self.assert_time_is_answered(loud)
+            # A reader that does read gets all there is.
+            wait_for(lambda: scans.messages, "scans at the other reader")
+            self.assertTrue(loud.is_connected)
+
+    def test_a_service_that_hangs_keeps_only_its_caller_waiting(self):
+        release = threading.Event()
+        self.addCleanup(release.set)
+
+        def hang(_):
+            release.wait(20.0)
+            return TriggerResponse(True, "at last")
+
+        for number in (1, 2):
+            rospy.Service("/hero_%d/quick" % number, Trigger, lambda _: TriggerResponse(True, "at once"))
+        rospy.Service("/hero_1/slow", Trigger, hang)
+        driver = self.start()
+        robots = []
+        for number in (1, 2):
+            clients = [
+                Declaration(kind, topic_id, "/{}/" + name, "std_srvs/Trigger", md5sum)
+                for name, first in (("slow", 0), ("quick", 1))
+                for kind, topic_id, md5sum in (
+                    (CLIENT_REQUESTS, 140 + first, TRIGGER_REQUEST_MD5),
+                    (CLIENT_ANSWERS, 120 + first, ANSWER_MD5),
+                )
+            ]
+            robots.append(self.dial(driver, number, declarations=[*STOCK_DECLARATIONS, *clients]))
+        robots[0].send_frame(140, b"")
+        robots[1].send_frame(141, b"")
+        self.assertEqual(
+            wait_frames(robots[1], 121), [stock_messages.to_bytes(TriggerResponse(True, "at once"))]
+        )
+        self.assert_time_is_answered(robots[0])
+        make_publisher("/hero_1/led", ColorRGBA).publish(ColorRGBA())
+        wait_payloads(robots[0], "led")
+        self.assertEqual(robots[0].payloads_with_id(120), [])
+        release.set()
+        self.assertEqual(
+            wait_frames(robots[0], 120), [stock_messages.to_bytes(TriggerResponse(True, "at last"))]
+        )
+
+    def test_many_returns_leave_no_threads_sockets_or_topics_behind(self):
+        driver = self.start(grace_s=600.0)
+
+        def come_and_go(rounds):
+            for _ in range(rounds):
+                robot = self.dial(driver, 1, ready=False)
+                wait_for(lambda: driver.fleet.find("/hero_1", Robot.READY), "hero_1")
+                robot.close()
+                driver.fleet.wait("/hero_1", Robot.AWAY)
+
+        come_and_go(3)
+        wait_for(lambda: len(list_driver_topics("/hero_1", driver.node)) == 18, "all topics and services")
+        topics = list_driver_topics("/hero_1", driver.node)
+        before = count_resources(driver.process.pid)
+        come_and_go(30)
+        self.assertEqual(list_driver_topics("/hero_1", driver.node), topics)
+        wait_for(
+            lambda: all(now <= then for now, then in zip(count_resources(driver.process.pid), before)),
+            lambda: (
+                "no more than %s sockets and threads, there are %s"
+                % (before, count_resources(driver.process.pid))
+            ),
+        )
+
+    def test_robots_that_leave_for_good_leave_no_threads_sockets_or_topics_behind(self):
+        driver = self.start(grace_s=0.0)
+
+        def come_and_go(numbers):
+            for number in numbers:
+                robot = self.dial(driver, number)
+                wait_for(
+                    lambda n=robot.namespace: len(list_driver_topics(n, driver.node)) == 18, "its topics"
+                )
+                robot.close()
+                driver.fleet.wait_gone(robot.namespace)
+                wait_for(lambda n=robot.namespace: not list_driver_topics(n, driver.node), "an empty place")
+
+        come_and_go(range(1, 4))
+        before = count_resources(driver.process.pid)
+        come_and_go(range(4, 16))
+        wait_for(
+            lambda: all(now <= then for now, then in zip(count_resources(driver.process.pid), before)),
+            lambda: (
+                "no more than %s sockets and threads, there are %s"
+                % (before, count_resources(driver.process.pid))
+            ),
+        )
+
+
+if __name__ == "__main__":
+    rospy.init_node("test_driver_endurance")
+    rostest.rosrun("hero_driver", "driver_endurance", TestDriverEndurance)
