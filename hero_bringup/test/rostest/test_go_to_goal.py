@@ -124,7 +124,8 @@ class GoToGoalTest(unittest.TestCase):
 
         def is_there():
             pose = self.watch.pose(3)
-            return math.hypot(pose[0] - x_m, pose[1] - y_m) < TRUE_TOLERANCE_M and abs(pose[2] - 1.0) < 0.15
+            turned_rad = abs(math.remainder(pose[2] - 1.0, 2.0 * math.pi))
+            return math.hypot(pose[0] - x_m, pose[1] - y_m) < TRUE_TOLERANCE_M and turned_rad < TURN_TOLERANCE_RAD
 
         wait_for(is_there, 60.0, "the robot at the goal from the topic")
 

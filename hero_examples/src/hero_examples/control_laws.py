@@ -287,8 +287,8 @@ class DetourLaw(NamedTuple):
     """Obstacles nearer than this push."""
     body_m: float = 0.05
     """At this range one beam pushes `push` times as hard as the goal pulls."""
-    push: float = 2.5
-    swirl: float = 0.8
+    push: float = 2.0
+    swirl: float = 0.3
     """Share of the push that acts sideways, so that the robot slides along a wall and does not stop before it."""
     turn_gain: float = 2.0
     max_linear_m_s: float = 0.08
@@ -324,7 +324,7 @@ def bend_around(
     turn_rad_s = clamp(law.turn_gain * towards_rad, law.max_turn_rad_s)
     # Sensors and eyes are ahead: a detour is never driven backwards.
     speed_m_s = law.max_linear_m_s * max(0.0, math.cos(towards_rad)) * min(1.0, math.hypot(force_x, force_y))
-    if min(split_sectors(ranges)) < law.body_m + 0.02:
+    if split_sectors(ranges)[1] < law.body_m + 0.02:
         speed_m_s = 0.0
     return Command(speed_m_s, turn_rad_s)
 

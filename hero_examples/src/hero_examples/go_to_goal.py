@@ -27,8 +27,8 @@ RATE_HZ = 10.0
 FEEDBACK_PERIOD_S = 0.5
 """Between two feedback messages of an action."""
 
-FRAME_TIMEOUT_S = 1.5
-"""So long the frame of a goal may be unknown: /tf needs a moment. Shorter than SILENCE_S, so that the reason is right."""
+FRAME_TIMEOUT_S = 5.0
+"""So long the frame of a goal may be unknown: listening to /tf begins with the goal, and takes a moment."""
 
 STOP_REPEAT_S = 0.5
 """Standstill is sent for so long after a goal, then the node is silent and other programs may drive the robot."""
@@ -208,7 +208,15 @@ class Pilot:
                 self.robot.drive(*STANDSTILL)
             return
         ranges = self.robot.fresh_proximity() if self._parameters.avoid else None
-        pose = self._pose_in_goal_frame(now_s)
+        try:
+            pose = self._pose_in_goal_frame()
+        except FrameError as error:
+            # The robot stands, and the pursuit is not asked: it would take this for a robot without odometry.
+            self.robot.drive(*STANDSTILL)
+            if now_s - self._frame_known_s > FRAME_TIMEOUT_S:
+                self._finish(State.FAILED, str(error), now_s)
+            return
+        self._frame_known_s = now_s
         self.robot.drive(*self._pursuit.step(pose, ranges, now_s))
         if self._pursuit.state is not State.ACTIVE:
             self._finish(self._pursuit.state, self._pursuit.reason, now_s)
@@ -216,20 +224,12 @@ class Pilot:
             self._next_feedback_s = now_s + FEEDBACK_PERIOD_S
             self._order.handle.publish_feedback(self._make_feedback(now_s))
 
-    def _pose_in_goal_frame(self, now_s: float) -> Optional[Pose]:
-        """Return the robot's pose in the goal's frame, None while either is unknown."""
+    def _pose_in_goal_frame(self) -> Optional[Pose]:
+        """Return the robot's pose in the goal's frame, None without odometry. Raises: FrameError without the frame."""
         pose = self.robot.fresh_pose()
         if pose is None or self._order is None or not self._order.frame:
             return pose
-        try:
-            odom_frame = plain_frame(self.robot.odometry.header.frame_id)
-            pose = shift_pose(self._frames.origin_of(odom_frame, self._order.frame), pose)
-        except FrameError as error:
-            if now_s - self._frame_known_s > FRAME_TIMEOUT_S:
-                self._finish(State.FAILED, str(error), now_s)
-            return None
-        self._frame_known_s = now_s
-        return pose
+        return shift_pose(self._frames.origin_of(self.robot.name + "/odom", self._order.frame), pose)
 
     def _begin(self, order: Order, now_s: float) -> None:
         if self._pursuit is not None:
@@ -282,8 +282,9 @@ class Pilot:
         return feedback
 
     def close(self, now_s: float) -> None:
-        """Give up the goal, as the program ends."""
+        """Give up the goal, and end the action's own thread, as the program ends."""
         self._finish(State.FAILED, "the program ends", now_s, cancelled=True)
+        self._server.stop()
 
 
 def read_goal(message: PoseStamped, use_heading: bool) -> Goal:
@@ -294,13 +295,22 @@ def read_goal(message: PoseStamped, use_heading: bool) -> Goal:
 
 
 def pilot_swarm(program: Program, parameters: Parameters, swarm: Swarm) -> bool:
-    """Bring robots to goals until the program is to end, or once all are there; return whether all were reached."""
+    """Bring robots to goals; see run_pilots()."""
     frames = FrameWatch()
     pilots = [Pilot(robot, parameters, frames) for robot in swarm]
     for pilot in pilots:
         if pilot.robot.robot_id in parameters.goals:
             pilot.put_goal(parameters.goals[pilot.robot.robot_id], parameters.frame)
     rospy.loginfo("awaiting goals on %s", ", ".join(pilot.robot.namespace + "/goal" for pilot in pilots))
+    try:
+        return run_pilots(program, parameters, pilots, frames)
+    finally:
+        for pilot in pilots:
+            pilot.close(time.monotonic())
+
+
+def run_pilots(program: Program, parameters: Parameters, pilots: List[Pilot], frames: FrameWatch) -> bool:
+    """Step all pilots until the program is to end, or once all are there; return whether all were reached."""
     report = WaitReport()
     while program.sleep(1.0 / RATE_HZ):
         now_s = time.monotonic()
@@ -311,8 +321,6 @@ def pilot_swarm(program: Program, parameters: Parameters, swarm: Swarm) -> bool:
             frames.close()
         if parameters.once and not any(pilot.busy for pilot in pilots):
             return all(pilot.last_state is State.REACHED for pilot in pilots)
-    for pilot in pilots:
-        pilot.close(time.monotonic())
     return not parameters.once
 
 
