@@ -158,6 +158,8 @@ class Gateway(LinkHandler):
         peer: Peer = link.peer
         for event in peer.session.poll(now_s):
             self._receive_event(peer, event, now_s)
+        if peer.record is None and now_s - peer.session.opened_s > self._config.declare_timeout_s:
+            link.close("did not say within %.1f s which robot it is" % self._config.declare_timeout_s)
         if not link.closed:
             for frame in peer.session.take_frames():
                 link.send_frame(frame)
@@ -272,7 +274,9 @@ class Gateway(LinkHandler):
         address = peer.link.address
         if identity is None:
             if self._config.namespace_policy == "robot":
-                if topic.info.name not in names.TF_TOPICS:
+                if topic.info.name in names.TF_TOPICS:
+                    peer.early_topics.append(topic)
+                else:
                     self._complain(
                         peer,
                         "topic %s refused: not a name below /hero_N; for devices that are no HeRos set"
@@ -314,6 +318,9 @@ class Gateway(LinkHandler):
         text = "%s %s (%s)" % (bridge.label, decision.verdict.value, peer.link.address)
         self._log.log_throttled("info", "joined " + bridge.label, text)
         self._on_change()
+        early_topics, peer.early_topics = peer.early_topics, []
+        for topic in early_topics:
+            self._declare(peer, topic, record.joined_s)
         early_logs, peer.early_logs = peer.early_logs, []
         for log in early_logs:
             self._receive_log(peer, log, record.joined_s)
