@@ -152,6 +152,33 @@ class TestDriverFleet(DriverCase):
         self.assertEqual(old.payloads_on("led"), [])
         self.assertEqual(self.fleet.find("/hero_6", Robot.AWAY), None)
 
+    def test_a_robot_that_loses_its_connection_again_and_again_takes_over_each_time(self):
+        robots = []
+        for count in range(5):
+            if robots:
+                robots[-1].is_silent = True
+            robots.append(self.join(14, ready=False))
+            newest = robots[-1]
+            self.fleet.wait("/hero_14", Robot.READY, "anew", lambda e, r=newest: e.address == r.address)
+            self.assertEqual(self.fleet.find("/hero_14", Robot.READY).reconnects, count)
+        self.assertIsNone(self.fleet.find("/hero_14", Robot.REFUSED))
+        wait_for(lambda: all(robot.ended for robot in robots[:-1]), "the old connections to be closed")
+
+    def test_two_robots_with_one_id_behind_one_address_do_not_push_each_other_out_for_ever(self):
+        robots = [self.join(15, ready=False), self.join(15, ready=False)]
+
+        def look():
+            for robot in robots:
+                if not robot.is_connected:
+                    robot.close()
+                    robot.connect(self.address)
+                robot.log("I am alive")
+            return self.fleet.find("/hero_15", Robot.REFUSED) and self.fleet.find("/hero_15", Robot.READY)
+
+        wait_for(look, "one to stay and one to be refused")
+        self.assertLess(self.fleet.find("/hero_15", Robot.READY).reconnects, 5)
+        self.assertIn("two robots", self.fleet.find("/hero_15", Robot.REFUSED).last_error)
+
     def test_of_two_robots_with_one_id_the_first_stays_and_the_second_is_refused(self):
         first = self.join(7)
         encoders = Recorder("/hero_7/encoder", Encoder)
