@@ -8,9 +8,8 @@ import unittest
 import rosnode
 import rospy
 import rostest
-from swarm_watch import SwarmWatch, wait_for
-
 from hero_sim.arena_file import load_arena
+from swarm_watch import SwarmWatch, wait_for
 
 WALK_S = 120.0
 

@@ -287,8 +287,8 @@ class DetourLaw(NamedTuple):
     """Obstacles nearer than this push."""
     body_m: float = 0.05
     """At this range one beam pushes `push` times as hard as the goal pulls."""
-    push: float = 2.0
-    swirl: float = 0.3
+    push: float = 1.5
+    swirl: float = 1.2
     """Share of the push that acts sideways, so that the robot slides along a wall and does not stop before it."""
     turn_gain: float = 2.0
     max_linear_m_s: float = 0.08
@@ -299,12 +299,18 @@ DETOUR = DetourLaw()
 
 
 def bend_around(
-    command: Command, bearing_rad: float, distance_m: float, ranges: Sequence[float], law: DetourLaw = DETOUR
-) -> Command:
-    """Return command, or what goes around an obstacle that is nearer than both the goal and law.influence_m.
+    command: Command,
+    bearing_rad: float,
+    distance_m: float,
+    ranges: Sequence[float],
+    side: int = 0,
+    law: DetourLaw = DETOUR,
+) -> Tuple[Command, int]:
+    """Return (command, 0), or what goes around an obstacle nearer than both the goal and law.influence_m, and a side.
 
-    bearing_rad, distance_m: of the goal, from the robot. Every obstacle pushes away, and sideways towards the side
-    on which the goal is. A closed pocket holds the robot: going home from there needs a map.
+    bearing_rad, distance_m: of the goal, from the robot. Obstacles push away, and along themselves to one side: +1
+    passes them on their left, -1 on their right, 0 chooses the side on which the goal is. The caller gives the side
+    back until the way is free, or the robot would change its mind in front of the middle of a thing.
     """
     seen = [
         (index * 2.0 * math.pi / len(ranges), 0.0 if math.isnan(range_m) else range_m)
@@ -313,11 +319,12 @@ def bend_around(
     near = [(angle_rad, range_m) for angle_rad, range_m in seen if range_m < min(law.influence_m, distance_m)]
     near = [item for item in near if abs(wrap_angle(item[0] - bearing_rad)) < math.radians(100.0)]
     if not near:
-        return command
+        return command, 0
+    if not side:
+        side = 1 if wrap_angle(bearing_rad - min(near, key=lambda item: item[1])[0]) >= 0.0 else -1
     force_x, force_y = math.cos(bearing_rad), math.sin(bearing_rad)
     for angle_rad, range_m in near:
         strength = law.push * min(1.0, (law.influence_m - range_m) / (law.influence_m - law.body_m)) ** 2
-        side = 1.0 if wrap_angle(bearing_rad - angle_rad) >= 0.0 else -1.0
         force_x -= strength * (math.cos(angle_rad) + side * law.swirl * math.sin(angle_rad))
         force_y -= strength * (math.sin(angle_rad) - side * law.swirl * math.cos(angle_rad))
     towards_rad = math.atan2(force_y, force_x)
@@ -326,7 +333,7 @@ def bend_around(
     speed_m_s = law.max_linear_m_s * max(0.0, math.cos(towards_rad)) * min(1.0, math.hypot(force_x, force_y))
     if split_sectors(ranges)[1] < law.body_m + 0.02:
         speed_m_s = 0.0
-    return Command(speed_m_s, turn_rad_s)
+    return Command(speed_m_s, turn_rad_s), side
 
 
 class FollowLaw(NamedTuple):

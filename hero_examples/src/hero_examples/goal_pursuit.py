@@ -26,6 +26,9 @@ SETTLE_S = 0.5
 AIM_SHARE = 0.7
 """The robot stops at this share of the tolerance, so that it is still within after coming to rest."""
 
+FREE_S = 1.5
+"""So long without an obstacle, and the next one may be passed on the other side."""
+
 SILENCE_S = 2.0
 """So long without a pose, and the goal has failed: the robot has gone."""
 
@@ -108,6 +111,8 @@ class GoalPursuit:
         self._standing_since_s: Optional[float] = None
         self._blocked_m = math.inf
         self._at_goal = False
+        self._side = 0
+        self._last_bent_s = -math.inf
 
     def step(self, pose: Optional[Pose], ranges: Optional[Sequence[float]], now_s: float) -> Command:
         """Return the next command.
@@ -126,7 +131,7 @@ class GoalPursuit:
         self.distance_m = math.hypot(self.goal.x_m - pose.x_m, self.goal.y_m - pose.y_m)
         # Where it stops is inside the tolerance, and it stays until it is outside: no jumping to and fro at the rim.
         self._at_goal = self.distance_m < self._tolerance_m * (1.0 if self._at_goal else AIM_SHARE)
-        command = self._arrive(pose) if self._at_goal else self._approach(pose, ranges)
+        command = self._arrive(pose) if self._at_goal else self._approach(pose, ranges, now_s)
         if not self._at_goal or command != STANDSTILL:
             self._standing_since_s = None
         elif self._standing_since_s is None:
@@ -142,15 +147,19 @@ class GoalPursuit:
         target = Pose(self.goal.x_m, self.goal.y_m, self.goal.yaw_rad)
         return go_to_pose(pose, target, GoToPoseLaw(), at_goal=True)
 
-    def _approach(self, pose: Pose, ranges: Optional[Sequence[float]]) -> Command:
+    def _approach(self, pose: Pose, ranges: Optional[Sequence[float]], now_s: float) -> Command:
         command = self._law(pose, self.goal, AIM_SHARE * self._tolerance_m)
         if ranges is None:
             return command
         bearing_rad = wrap_angle(
             math.atan2(self.goal.y_m - pose.y_m, self.goal.x_m - pose.x_m) - pose.yaw_rad
         )
-        bent = bend_around(command, bearing_rad, self.distance_m, ranges)
-        self._blocked_m = min(ranges) if bent != command else math.inf
+        if now_s - self._last_bent_s > FREE_S:
+            self._side = 0
+        bent, side = bend_around(command, bearing_rad, self.distance_m, ranges, self._side)
+        self._blocked_m = min(ranges) if side else math.inf
+        if side:
+            self._side, self._last_bent_s = side, now_s
         return bent
 
     def _fail(self, reason: str) -> Command:

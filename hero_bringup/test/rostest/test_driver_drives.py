@@ -1,0 +1,219 @@
+#!/usr/bin/env python
+"""The main job with simulated robots: they dial in or are dialled, are driven, calibrated and stopped."""
+
+import math
+import time
+import unittest
+
+import rospy
+import rostest
+from geometry_msgs.msg import Twist
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import LaserScan
+from std_srvs.srv import SetBool
+from tf2_msgs.msg import TFMessage
+
+from hero_msgs.msg import Robot, RobotArray
+from hero_msgs.srv import SetIRCalibration, SetMotor, SetOdom, SetPID
+
+DEADLINE_S = 30.0
+DIALLED_IN = (0, 1, 2)
+DIALLED = 9
+SPEED_M_S = 0.1
+
+
+def wait_for(condition, what):
+    """Return the first true value of condition(); fail with what was waited for."""
+    end_s = time.monotonic() + DEADLINE_S
+    while True:
+        value = condition()
+        if value:
+            return value
+        if time.monotonic() > end_s:
+            raise AssertionError("waited %g s for %s" % (DEADLINE_S, what))
+        time.sleep(0.01)
+
+
+class Watch:
+    """The newest message of a topic, and how many came."""
+
+    def __init__(self, topic, message_class):
+        self.newest = None
+        self.count = 0
+        self._topic = topic
+        self._subscriber = rospy.Subscriber(topic, message_class, self._receive, tcp_nodelay=True)
+
+    def _receive(self, message):
+        self.newest = message
+        self.count += 1
+
+    def wait_more(self, count=1):
+        """Wait for so many messages from now on; return the newest."""
+        seen = self.count
+        wait_for(lambda: self.count >= seen + count, "%d more messages on %s" % (count, self._topic))
+        return self.newest
+
+
+class Driven:
+    """A robot that is told to move at 10 Hz until it is told otherwise."""
+
+    def __init__(self, number):
+        namespace = "/hero_%d" % number
+        self.odom = Watch(namespace + "/odom", Odometry)
+        self.truth = Watch(namespace + "/ground_truth", Odometry)
+        self.publisher = rospy.Publisher(
+            namespace + "/velocity_controller/cmd_vel", Twist, queue_size=1, tcp_nodelay=True
+        )
+        wait_for(lambda: self.publisher.get_num_connections() > 0, "the driver at cmd_vel of " + namespace)
+        self.odom.wait_more()
+        self.truth.wait_more()
+        self._command = Twist()
+        self._timer = rospy.Timer(rospy.Duration(0.1), lambda _: self.publisher.publish(self._command))
+
+    def drive(self, linear_m_s, turn_rad_s=0.0):
+        """Go on with this velocity."""
+        command = Twist()
+        command.linear.x = linear_m_s
+        command.angular.z = turn_rad_s
+        self._command = command
+
+    @property
+    def position(self):
+        """Where the simulator has it."""
+        position = self.truth.newest.pose.pose.position
+        return position.x, position.y
+
+    @property
+    def is_at_rest(self):
+        """Whether the simulator says that it stands, and odom too."""
+        return all(
+            abs(watch.newest.twist.twist.linear.x) < 0.005 and abs(watch.newest.twist.twist.angular.z) < 0.1
+            for watch in (self.truth, self.odom)
+        )
+
+    def close(self):
+        """Say nothing any more."""
+        self._timer.shutdown()
+
+
+class DriverDrivesTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.fleet = Watch("/hero_driver/robots", RobotArray)
+        cls.scans = {number: Watch("/hero_%d/proximity" % number, LaserScan) for number in DIALLED_IN}
+        numbers = {*DIALLED_IN, DIALLED}
+        wait_for(
+            lambda: (
+                cls.fleet.newest
+                and {robot.id for robot in cls.fleet.newest.robots if robot.state == Robot.READY} == numbers
+            ),
+            "four robots",
+        )
+
+    def take(self, number):
+        robot = Driven(number)
+        self.addCleanup(robot.close)
+        self.addCleanup(robot.drive, 0.0)
+        return robot
+
+    def call(self, name, service_class, *arguments):
+        rospy.wait_for_service(name, DEADLINE_S)
+        return rospy.ServiceProxy(name, service_class)(*arguments)
+
+    def drive_a_bit(self, robot, way_m=0.04):
+        """Drive back and forth in the free space before the robot, and return how far odom and truth say."""
+        start, odom_start = robot.position, robot.odom.newest.pose.pose.position
+        robot.drive(SPEED_M_S)
+        wait_for(lambda: math.dist(robot.position, start) > way_m, "the robot to move")
+        robot.drive(0.0)
+        wait_for(lambda: robot.is_at_rest, "the robot to stop")
+        robot.truth.wait_more(2)
+        robot.odom.wait_more(2)
+        odom_end = robot.odom.newest.pose.pose.position
+        return (
+            math.hypot(odom_end.x - odom_start.x, odom_end.y - odom_start.y),
+            math.dist(robot.position, start),
+        )
+
+    def test_a_command_moves_the_robot_odom_says_so_and_a_stop_stops(self):
+        robot = self.take(0)
+        odom_m, truth_m = self.drive_a_bit(robot)
+        self.assertGreater(truth_m, 0.04)
+        self.assertAlmostEqual(odom_m, truth_m, delta=0.1 * truth_m + 0.002)
+        resting = robot.position
+        robot.truth.wait_more(10)
+        self.assertLess(math.dist(robot.position, resting), 0.001)
+
+    def test_only_the_robot_that_is_told_moves(self):
+        first, second = self.take(1), self.take(2)
+        before = second.position
+        self.drive_a_bit(first)
+        second.truth.wait_more(2)
+        self.assertLess(math.dist(second.position, before), 0.001)
+
+    def test_a_robot_that_is_dialled_drives_like_the_others(self):
+        odom_m, truth_m = self.drive_a_bit(self.take(DIALLED))
+        self.assertAlmostEqual(odom_m, truth_m, delta=0.1 * truth_m + 0.002)
+
+    def test_stop_halts_all_robots_although_commands_go_on(self):
+        robots = [self.take(number) for number in (0, 1, DIALLED)]
+        for robot in robots:
+            robot.drive(0.0, 2.0)
+        for robot in robots:
+            wait_for(lambda r=robot: r.truth.newest.twist.twist.angular.z > 1.0, "the robot to turn")
+        self.assertTrue(self.call("/hero_driver/stop", SetBool, True).success)
+        for robot in robots:
+            wait_for(lambda r=robot: r.is_at_rest, "the robot to stop")
+            robot.truth.wait_more(20)
+            self.assertTrue(robot.is_at_rest)
+        self.assertTrue(self.call("/hero_driver/stop", SetBool, False).success)
+        for robot in robots:
+            wait_for(lambda r=robot: r.truth.newest.twist.twist.angular.z > 1.0, "the robot to turn again")
+
+    def test_three_robots_are_calibrated_and_driven_through_one_driver(self):
+        for number in DIALLED_IN:
+            namespace = "/hero_%d" % number
+            calls = (
+                ("/ir_calibration", SetIRCalibration, [0.42] * 8),
+                ("/motors_parameters", SetMotor, (1500, 1500)),
+                ("/set_odom", SetOdom, (1.0, 2.0, 0.0)),
+            )
+            for name, service_class, arguments in calls:
+                answer = self.call(namespace + name, service_class, *arguments)
+                self.assertTrue(answer.success, "%s: %s" % (namespace + name, answer.message))
+        robots = [self.take(number) for number in DIALLED_IN]
+        for robot in robots:
+            wait_for(
+                lambda r=robot: math.hypot(r.odom.newest.pose.pose.position.x - 1.0, 0.0) < 0.01, "x = 1 m"
+            )
+            robot.drive(0.0, 1.5)
+        for robot in robots:
+            wait_for(lambda r=robot: r.truth.newest.twist.twist.angular.z > 0.7, "the robot to turn")
+            self.assertAlmostEqual(robot.odom.newest.pose.pose.position.y, 2.0, delta=0.02)
+
+    def test_absurd_gains_do_not_reach_a_robot(self):
+        with self.assertRaisesRegex(rospy.ServiceException, "gains must be finite"):
+            self.call("/hero_0/velocity_controller/pid_parameters", SetPID, *[float("inf")] * 6)
+
+    def test_every_robot_scans_with_eight_beams_and_sends_all_its_frames(self):
+        for watch in self.scans.values():
+            scan = watch.wait_more()
+            self.assertEqual(len(scan.ranges), 8)
+        frames = set()
+
+        def receive(message):
+            frames.update(transform.child_frame_id for transform in message.transforms)
+
+        subscriber = rospy.Subscriber("/tf", TFMessage, receive)
+        self.addCleanup(subscriber.unregister)
+        expected = {
+            "hero_%d/%s" % (number, link)
+            for number in (*DIALLED_IN, DIALLED)
+            for link in ("base_link", "left_wheel_link", "right_wheel_link", "hat_link", "laser_link")
+        }
+        wait_for(lambda: expected <= frames, "all frames of all robots")
+
+
+if __name__ == "__main__":
+    rospy.init_node("test_driver_drives")
+    rostest.rosrun("hero_bringup", "driver_drives", DriverDrivesTest)
