@@ -49,6 +49,11 @@ TIME_REQUEST_MS = 2500
 TIME_LOST_MS = 11000
 """SYNC_SECONDS 5: * 500 between requests, * 2200 without an answer until unconfigured (node_handle.h)."""
 
+ANSWER_MS = (42, 75)
+"""From the arrival of a service call to its answer (measured)."""
+
+_NEVER_MS = 2**62
+
 _PHASE_OFF = "off"
 _PHASE_BOOT = "boot"  # dialling for the first time
 _PHASE_SETUP = "setup"  # connected or not, the lights of welcome play
@@ -126,7 +131,6 @@ class Firmware:
         self.wants_connection = False
         self._received = bytearray()
         self._pending: List[frames.Frame] = []
-        self._partial_at_ms: Optional[int] = None
         self._answers: List[Tuple[int, bytes]] = []
         self._advertised = False
         self._blocked_until_ms: Optional[int] = None
@@ -226,11 +230,6 @@ class Firmware:
         """Hand frames to the radio; without a connection they are lost."""
         if self.connected:
             self.outbox.append(data)
-
-    @property
-    def is_blocked(self) -> bool:
-        """Whether the program stands still, in a connect, in a write or frozen."""
-        return self._blocked_until_ms is not None
 
     def log(self, text: str) -> None:
         """Send a log line (level info, as all of the firmware's are)."""
@@ -356,16 +355,13 @@ class Firmware:
             self._last_request_ms = millis
 
     def _read_frames(self, millis: int, now_ms: int) -> None:
-        if self._partial_at_ms is not None and now_ms - self._partial_at_ms > PARTIAL_FRAME_MS:
-            # Its beginning was forgotten; what came since is read as if it stood alone.
-            self._partial_at_ms = None
         data = bytes(self._received)
         self._received.clear()
+        # A new reader each time: the firmware forgets a frame that is not complete after 20 ms
+        # (SERIAL_MSG_TIMEOUT, node_handle.h:96), and looks again only after 51 or 101 ms.
         reader = frames.FrameReader(frames.LONGEST_PAYLOAD_LENGTH)
         queue = self._pending + reader.receive_bytes(data)
         self._pending = []
-        if reader.buffered_length:
-            self._partial_at_ms = now_ms
         while queue:
             frame = queue.pop(0)
             if not self._receive_frame(frame, millis, now_ms):
@@ -436,12 +432,3 @@ class Firmware:
         """Stop streaming; loop() no longer calls the controllers, so a moving robot moves on."""
         self.configured = False
         self.motors.freeze()
-
-
-_NEVER_MS = 2**62
-
-ANSWER_MS = (42, 75)
-"""From the arrival of a service call to its answer (measured)."""
-
-PARTIAL_FRAME_MS = 20
-"""SERIAL_MSG_TIMEOUT (node_handle.h:96); less than SPIN_MS, so a frame in two pieces rarely gets through."""

@@ -52,11 +52,6 @@ def move_along_arc(
     return x_m + chord_m * np.cos(heading_rad), y_m + chord_m * np.sin(heading_rad), theta_rad + turn_rad
 
 
-def wrap_angle(angle_rad: Number) -> Number:
-    """Return angle_rad in [-pi, pi)."""
-    return (angle_rad + math.pi) % (2.0 * math.pi) - math.pi
-
-
 Pose = Tuple[float, float, float]
 
 
