@@ -1,0 +1,88 @@
+#!/usr/bin/env python
+"""The simulator drives /clock: everything runs faster than the wall clock, and stamps are simulated time."""
+
+import time
+import unittest
+
+import rospy
+import rostest
+from geometry_msgs.msg import Twist
+from nav_msgs.msg import Odometry
+from rosgraph_msgs.msg import Clock
+from std_srvs.srv import SetBool
+
+LIMIT_S = 40.0
+
+
+def wait_for(condition, what):
+    """Return what condition() returns as soon as that is true; LIMIT_S is wall-clock time."""
+    end_s = time.monotonic() + LIMIT_S
+    while True:
+        result = condition()
+        if result:
+            return result
+        if time.monotonic() > end_s:
+            raise AssertionError("within %g s there was no %s" % (LIMIT_S, what))
+        time.sleep(0.02)
+
+
+class SimulatedTimeTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        rospy.init_node("test_simulated_time")
+        cls.odom = []
+        cls.clock = []
+        cls.subscribers = [
+            rospy.Subscriber("/hero_2/odom", Odometry, cls.odom.append),
+            rospy.Subscriber("/clock", Clock, cls.clock.append),
+        ]
+        wait_for(lambda: len(cls.odom) > 20, "odometry")
+
+    def test_stamps_are_simulated_time_and_go_on_at_the_stock_rate_of_it(self):
+        def is_synchronised():
+            return abs((self.odom[-1].header.stamp - self.clock[-1].clock).to_sec()) < 1.0
+
+        wait_for(is_synchronised, "stamp near the simulated time")
+        first = len(self.odom)
+        wait_for(lambda: len(self.odom) > first + 200, "200 odoms more")
+        stamps = [message.header.stamp.to_sec() for message in self.odom[first:]]
+        self.assertAlmostEqual((len(stamps) - 1) / (stamps[-1] - stamps[0]), 29.27, delta=2.0)
+
+    def test_a_robot_drives_in_simulated_time(self):
+        publisher = rospy.Publisher("/hero_2/velocity_controller/cmd_vel", Twist, queue_size=1)
+        twist = Twist()
+        twist.linear.x = 0.1
+        start_m = self.odom[-1].pose.pose.position.x
+
+        def is_there():
+            publisher.publish(twist)
+            return abs(self.odom[-1].pose.pose.position.x - start_m) > 0.2
+
+        wait_for(is_there, "way of 0.2 m")
+        publisher.publish(Twist())
+        wait_for(lambda: abs(self.odom[-1].twist.twist.linear.x) < 0.01, "stop")
+
+    def test_a_pause_stops_the_clock(self):
+        pause = rospy.ServiceProxy("/hero_sim/pause", SetBool)
+        self.assertTrue(pause(True).success)
+        # What was under way when the pause began arrives; then nothing more does.
+        wait_for(lambda: is_quiet(self.clock), "clock that stands still")
+        self.assertTrue(pause(False).success)
+        before = len(self.clock)
+        wait_for(lambda: len(self.clock) > before + 10, "clock that goes on")
+
+
+def is_quiet(messages):
+    """Return whether no message came for a quarter of a second, in which a running clock ticks a hundred
+    times."""
+    count = len(messages)
+    end_s = time.monotonic() + 0.25
+    while time.monotonic() < end_s:
+        if len(messages) != count:
+            return False
+        time.sleep(0.01)
+    return True
+
+
+if __name__ == "__main__":
+    rostest.rosrun("hero_sim", "simulated_time", SimulatedTimeTest)
