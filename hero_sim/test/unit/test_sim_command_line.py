@@ -15,8 +15,11 @@ from driver_side import read_odom
 
 from hero_driver.rosserial import frames, payloads
 from hero_sim import declarations as ids
+from hero_sim import main
+from hero_sim.faults import KINDS
 
 LIMIT_S = 20.0
+ROOT = os.path.abspath(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", ".."))
 
 
 def build_environment():
@@ -363,15 +366,23 @@ def test_a_port_that_is_taken_is_named(simulate):
     assert "127.0.0.1:%d" % port in error and len(error.strip().splitlines()) == 1
 
 
+def read_readme():
+    with open(os.path.join(ROOT, "hero_sim", "README.md"), encoding="utf-8") as file:
+        return file.read()
+
+
+def test_the_readme_lists_every_option_and_every_fault():
+    text = read_readme()
+    options = [name for action in main.build_parser()._actions for name in action.option_strings]
+    assert [name for name in options if "`%s" % name not in text and name not in ("-h", "--help")] == []
+    assert [kind for kind in KINDS if "`%s`" % kind not in text] == []
+
+
 def test_the_documented_command_copies_all_that_is_needed(tmp_path):
-    root = os.path.abspath(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", ".."))
-    if not os.path.isdir(os.path.join(root, "hero_driver", "src")):
-        pytest.skip("not in a tree of the sources")
-    with open(os.path.join(root, "hero_sim", "README.md"), encoding="utf-8") as file:
-        pack, unpack = re.search(
-            r"(tar -cz .*?)\\\n\s*\| ssh USER@MACHINE '(.*?)'", file.read(), re.DOTALL
-        ).groups()
-    subprocess.run("(cd %s && %s) | (%s)" % (root, pack, unpack), shell=True, check=True, cwd=str(tmp_path))
+    pack, unpack = re.search(
+        r"(tar -cz .*?)\\\n\s*\| ssh USER@MACHINE '(.*?)'", read_readme(), re.DOTALL
+    ).groups()
+    subprocess.run("(cd %s && %s) | (%s)" % (ROOT, pack, unpack), shell=True, check=True, cwd=str(tmp_path))
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
     result = subprocess.run(
         [
