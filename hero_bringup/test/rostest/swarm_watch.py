@@ -6,9 +6,10 @@ import time
 
 import numpy as np
 import rospy
+from nav_msgs.msg import Odometry
+
 from hero_sim.arena import measure_clearance
 from hero_sim.kinematics import BODY_RADIUS_M
-from nav_msgs.msg import Odometry
 
 TOUCH_M = 0.001
 """Nearer than this two bodies touch; the simulator lets nothing overlap."""

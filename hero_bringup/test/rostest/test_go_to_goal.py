@@ -12,8 +12,9 @@ import rospy
 import rostest
 from actionlib_msgs.msg import GoalStatus
 from geometry_msgs.msg import PoseStamped
-from hero_examples.msg import GoToAction, GoToGoal
 from swarm_watch import SwarmWatch, wait_for
+
+from hero_examples.msg import GoToAction, GoToGoal
 
 ROBOTS = 10
 GOALS_EACH = 5

@@ -8,8 +8,9 @@ import unittest
 import rosnode
 import rospy
 import rostest
-from hero_sim.arena_file import load_arena
 from swarm_watch import SwarmWatch, wait_for
+
+from hero_sim.arena_file import load_arena
 
 WALK_S = 120.0
 
