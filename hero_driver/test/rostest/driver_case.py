@@ -13,9 +13,9 @@ import rosgraph
 import roslib.packages
 import rospy
 from fake_robot import FakeRobot
-from hero_driver.rosserial import frames, payloads
 from rosgraph_msgs.msg import Log as RosLog
 
+from hero_driver.rosserial import frames, payloads
 from hero_msgs.msg import Robot, RobotArray
 
 DEADLINE_S = 20.0

@@ -10,9 +10,9 @@ import rostest
 import stock_messages
 from driver_case import DriverProcess, OwnDriverCase, Recorder, make_publisher, wait_for, wait_payloads
 from fake_robot import PUB, STOCK_DECLARATIONS, Declaration, FakeRobot
-from hero_driver.rosserial import frames
 from std_msgs.msg import ColorRGBA
 
+from hero_driver.rosserial import frames
 from hero_msgs.msg import Encoder, Robot
 
 USAGE_ERROR = 2

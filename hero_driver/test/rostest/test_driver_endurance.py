@@ -29,10 +29,10 @@ from fake_robot import (
     TIME_FRAME,
     Declaration,
 )
-from hero_driver.rosserial import frames
 from std_msgs.msg import ColorRGBA
 from std_srvs.srv import Trigger, TriggerResponse
 
+from hero_driver.rosserial import frames
 from hero_msgs.msg import Encoder, Robot
 
 TRIGGER_REQUEST_MD5 = "d41d8cd98f00b204e9800998ecf8427e"

@@ -15,9 +15,9 @@ from fake_robot import (
     TIME_FRAME,
     Declaration,
 )
-from hero_driver.rosserial import frames
 from std_msgs.msg import String
 
+from hero_driver.rosserial import frames
 from hero_msgs.msg import Encoder, Robot
 
 STRING_MD5 = String._md5sum

@@ -10,8 +10,8 @@ import rostest
 from driver_case import OwnDriverCase, make_publisher, wait_for, wait_payloads
 from fake_robot import READ_CYCLE_S, VELOCITY_GATE_S
 from geometry_msgs.msg import Twist
-from hero_driver.rosserial import frames
 
+from hero_driver.rosserial import frames
 from hero_msgs.msg import Motor, Robot
 
 VELOCITY = "velocity_controller/cmd_vel"

@@ -21,12 +21,12 @@ from driver_case import (
 )
 from fake_robot import STOCK_DECLARATIONS, SUB, TIME_FRAME, FakeRobot, boot_line, heartbeat_line
 from geometry_msgs.msg import Twist
-from hero_driver.rosserial import frames, payloads
 from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Log as RosLog
 from sensor_msgs.msg import Imu
 from std_msgs.msg import Bool, ColorRGBA
 
+from hero_driver.rosserial import frames, payloads
 from hero_msgs.msg import Encoder, Motor
 
 CAPTURES = Path(__file__).resolve().parents[4] / "shared" / "captures"
