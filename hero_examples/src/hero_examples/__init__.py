@@ -12,6 +12,6 @@ def __getattr__(name: str) -> Any:
     """Return Robot or Swarm (PEP 562)."""
     if name not in __all__:
         raise AttributeError("hero_examples has no attribute %r" % name)
-    from . import robot
+    from . import robot, swarm
 
-    return getattr(robot, name)
+    return getattr(robot if name == "Robot" else swarm, name)

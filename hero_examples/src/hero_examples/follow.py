@@ -7,7 +7,8 @@ import rospy
 from .common_frame import DEFAULT_FRAME, CommonFrame, parse_starts
 from .control_laws import STANDSTILL, FollowLaw, Pose, follow
 from .program import Program, ProgramError, check_number, parse_robot_ids, read_parameters, run
-from .robot import MAX_LINEAR_M_S, Swarm
+from .robot import MAX_LINEAR_M_S
+from .swarm import Swarm
 from .swarm_start import WaitReport
 
 RATE_HZ = 10.0

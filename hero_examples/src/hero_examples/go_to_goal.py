@@ -19,7 +19,8 @@ from .goal_pursuit import DEFAULT_LAW, DEFAULT_TIMEOUT_S, DEFAULT_TOLERANCE_M, L
 from .msg import GoToAction, GoToFeedback, GoToResult
 from .program import Program, ProgramError, check_flag, check_number, parse_robot_ids, read_parameters, run
 from .readings import yaw_of
-from .robot import Robot, Swarm
+from .robot import Robot
+from .swarm import Swarm
 from .swarm_start import WaitReport, open_swarm
 
 RATE_HZ = 10.0

@@ -7,7 +7,7 @@ from typing import List, NamedTuple, Optional, Tuple
 import rospy
 
 from .program import Program, ProgramError, check_number, parse_robot_ids, read_parameters, run
-from .robot import Swarm
+from .swarm import Swarm
 from .swarm_start import WaitReport, open_swarm
 
 RATE_HZ = 5.0

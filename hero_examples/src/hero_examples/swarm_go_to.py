@@ -13,7 +13,8 @@ from .control_laws import STANDSTILL, Pose
 from .formations import FormationError, Point, place_formation
 from .program import Program, ProgramError, check_flag, check_number, parse_robot_ids, read_parameters, run
 from .reciprocal import AvoidanceLaw
-from .robot import MAX_LINEAR_M_S, Swarm
+from .robot import MAX_LINEAR_M_S
+from .swarm import Swarm
 from .swarm_start import WaitReport, open_swarm
 from .swarm_steering import SwarmSteering
 

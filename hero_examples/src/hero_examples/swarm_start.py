@@ -6,7 +6,8 @@ from typing import Dict, List, Optional
 import rospy
 
 from .program import Program, ProgramError
-from .robot import RobotNotReadyError, Swarm
+from .robot import RobotNotReadyError
+from .swarm import Swarm
 
 REPORT_PERIOD_S = 5.0
 """Between two lines that say what is waited for."""

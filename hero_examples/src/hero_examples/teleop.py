@@ -9,7 +9,8 @@ from typing import List, NamedTuple, Optional
 from .control_laws import STANDSTILL, Command
 from .keyboard import Keyboard, NoTerminalError
 from .program import Program, ProgramError, check_number, parse_robot_ids, read_parameters, run
-from .robot import Robot, StaleDataError, Swarm
+from .robot import Robot, StaleDataError
+from .swarm import Swarm
 from .swarm_start import open_swarm
 from .teleop_keys import HELP, MAX_LINEAR_M_S, MAX_TURN_RAD_S, MIN_LINEAR_M_S, MIN_TURN_RAD_S, KeyDrive
 

@@ -1,0 +1,110 @@
+"""Several robots as one object: see robot. Knows the topics of robots, and the driver's list of them."""
+
+import time
+from types import TracebackType
+from typing import Iterable, Iterator, List, Optional, Type
+
+import rospy
+
+from hero_msgs.msg import RobotArray
+
+from .readings import Color
+from .robot import (
+    POLL_PERIOD_S,
+    Robot,
+    RobotNotReadyError,
+    Sleep,
+    sleep_unless_shutdown,
+    start_node,
+    stop_all,
+)
+
+DISCOVERY_TOPIC = "/hero_driver/robots"
+
+
+class Swarm:
+    """Several robots; iterate it, or take one by its number: swarm[3]."""
+
+    def __init__(self, robot_ids: Iterable[int], odom: bool = True, proximity: bool = True) -> None:
+        """Connect to the robots with these numbers; odom, proximity: see Robot."""
+        self.robots = [Robot(robot_id, odom, proximity) for robot_id in robot_ids]
+        self._by_id = {robot.robot_id: robot for robot in self.robots}
+
+    @classmethod
+    def discover(
+        cls, timeout_s: float = 10.0, odom: bool = True, proximity: bool = True, sleep: Sleep = sleep_unless_shutdown
+    ) -> "Swarm":
+        """Return all robots that the driver reports as ready, as soon as there is at least one.
+
+        Raises: RobotNotReadyError after timeout_s without the driver or without a robot.
+        """
+        start_node()
+        deadline_s = time.monotonic() + timeout_s
+        newest: List[RobotArray] = []
+        subscriber = rospy.Subscriber(DISCOVERY_TOPIC, RobotArray, newest.append, queue_size=1)
+        try:
+            while time.monotonic() < deadline_s and sleep(POLL_PERIOD_S):
+                ids = ready_ids(newest[-1]) if newest else []
+                if ids:
+                    return cls(ids, odom, proximity)
+        finally:
+            subscriber.unregister()
+        if not newest:
+            raise RobotNotReadyError(
+                "nothing on %s within %g s: is the driver running?" % (DISCOVERY_TOPIC, timeout_s)
+            )
+        raise RobotNotReadyError("no robot joined the driver within %g s: are they on?" % timeout_s)
+
+    def wait_until_ready(self, timeout_s: float = 10.0, sleep: Sleep = sleep_unless_shutdown) -> "Swarm":
+        """Wait until every robot is ready; return the swarm itself.
+
+        Raises: RobotNotReadyError after timeout_s, for the first robot that is not.
+        """
+        deadline_s = time.monotonic() + timeout_s
+        for robot in self.robots:
+            robot.wait_until_ready(max(0.0, deadline_s - time.monotonic()), sleep)
+        return self
+
+    def stop(self) -> None:
+        """Stop all robots at once; returns when the stops are sent (about 0.2 s)."""
+        stop_all(self.robots)
+
+    def led(self, color: Color) -> None:
+        """Show a colour on all robots."""
+        for robot in self.robots:
+            robot.led(color)
+
+    def close(self) -> None:
+        """Stop all robots that were driven from here, and leave their topics; safe twice."""
+        self._stop_if_driven()
+        for robot in self.robots:
+            robot._disconnect()
+
+    def _stop_if_driven(self) -> None:
+        stop_all([robot for robot in self.robots if robot.driven])
+
+    def __getitem__(self, robot_id: int) -> Robot:
+        return self._by_id[robot_id]
+
+    def __iter__(self) -> Iterator[Robot]:
+        return iter(self.robots)
+
+    def __len__(self) -> int:
+        return len(self.robots)
+
+    def __enter__(self) -> "Swarm":
+        return self
+
+    def __exit__(
+        self,
+        kind: Optional[Type[BaseException]],
+        error: Optional[BaseException],
+        traceback: Optional[TracebackType],
+    ) -> None:
+        # Topics are left to the end of the program: leaving them one by one takes 20 ms each.
+        self._stop_if_driven()
+
+
+def ready_ids(robots: RobotArray) -> List[int]:
+    """Return the numbers of the robots that can be driven now, sorted."""
+    return sorted(robot.id for robot in robots.robots if robot.state == robot.READY and robot.id >= 0)
