@@ -12,8 +12,8 @@ from .swarm import Swarm
 REPORT_PERIOD_S = 5.0
 """Between two lines that say what is waited for."""
 
-FIRST_REPORT_S = 1.5
-"""Most robots answer within a second: no line about those."""
+FIRST_REPORT_S = 3.0
+"""Most robots answer within a second or two, also when all is started at once: no line about those."""
 
 
 def open_swarm(
