@@ -8,7 +8,7 @@ import rostest
 import stock_messages
 from diagnostic_msgs.msg import DiagnosticArray
 from driver_case import DriverCase, DriverProcess, Recorder, wait_for
-from fake_robot import STOCK_DECLARATIONS, FakeRobot, boot_line, heartbeat_line
+from fake_robot import STOCK_DECLARATIONS, FakeRobot, boot_line, encode_answer, heartbeat_line
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, LaserScan
 from stock_messages import TICK_M, WHEEL_SEPARATION_M, send_burst
@@ -190,6 +190,30 @@ class TestDriverMessages(DriverCase):
         messages = self.drive(rebooted, [(0.0, 0.0), (10.0, 10.0)], odoms=odoms)
         self.assert_pose(messages[0], 100 * TICK_M, 0.0, 0.0)
         self.assert_pose(messages[1], 110 * TICK_M, 0.0, 0.0)
+
+    def test_a_reboot_whose_boot_line_was_lost_leaves_the_pose_where_it_was(self):
+        robot = self.join(26)
+        odoms = Recorder("/hero_26/odom", Odometry)
+        self.drive(robot, [(20.0 * step, 20.0 * step) for step in range(11)], odoms=odoms)
+        robot.close()
+        self.fleet.wait("/hero_26", Robot.AWAY)
+        rebooted = self.join(26)
+        # Before its first time answer a robot that has just started stamps with its uptime.
+        messages = self.drive(rebooted, [(0.0, 0.0), (1.0, 1.0)], start=rospy.Time(2, 10000000), odoms=odoms)
+        self.assert_pose(messages[0], 200 * TICK_M, 0.0, 0.0)
+        messages = self.drive(rebooted, [(2.0, 2.0)], odoms=odoms)
+        self.assert_pose(messages[0], 202 * TICK_M, 0.0, 0.0)
+
+    def test_a_set_odom_that_is_answered_too_late_still_counts(self):
+        robot = self.join(27)
+        odoms = Recorder("/hero_27/odom", Odometry)
+        self.drive(robot, [(0.0, 0.0), (50.0, 50.0)], odoms=odoms)
+        robot.answers["set_odom"] = lambda _: None
+        rospy.wait_for_service("/hero_27/set_odom", 20.0)
+        with self.assertRaisesRegex(rospy.ServiceException, "was not answered within"):
+            rospy.ServiceProxy("/hero_27/set_odom", SetOdom)(3.0, 4.0, 0.0)
+        robot.answer("set_odom", encode_answer(True, "late"))
+        self.assert_pose(self.drive(robot, [(10.0, 10.0)], odoms=odoms)[0], 3.0 + 10 * TICK_M, 4.0, 0.0)
 
     def test_a_reconnect_without_a_reboot_keeps_the_ticks(self):
         robot = self.join(12)

@@ -102,6 +102,16 @@ class TestDriverTopics(DriverCase):
             make_publisher("/hero_3/" + name, type(message)).publish(message)
             self.assertEqual(wait_payloads(robot, name), [message_bytes])
 
+    def test_programs_that_were_there_before_the_robot_are_served(self):
+        encoders = Recorder("/hero_15/encoder", Encoder, connected=False)
+        light = rospy.Publisher("/hero_15/led", ColorRGBA, queue_size=1, latch=True)
+        light.publish(ColorRGBA(1.0, 0.0, 0.0, 0.0))
+        robot = self.join(15)
+        encoders.wait_connected()
+        robot.send("encoder", stock_messages.make_encoder("hero_15", rospy.Time.now(), 1.0, 1.0))
+        encoders.wait_count(1)
+        wait_payloads(robot, "led")
+
     def test_two_robots_do_not_mix(self):
         first, second = self.join(4), self.join(5)
         odoms = {robot: Recorder(robot.namespace + "/odom_raw", Odometry) for robot in (first, second)}
