@@ -10,7 +10,8 @@ from typing import NamedTuple, Optional
 LONGEST_TEXT = 400
 
 _ANSI = re.compile(r"\x1b\[[0-?]*[ -/]*[@-~]|\x1b.")
-_CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029]+")
+# Control characters, line separators and marks that are invisible or turn the direction of writing.
+_CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u061c\u200b-\u200f\u2028-\u202e\u2060-\u2069\ufeff]+")
 _NAME = re.compile(r"^\[/?(hero_\d+|HERO)\]\s*")
 _BOOT = re.compile(
     r"Firmware:\s*(?P<firmware>\S+)\s*\|\s*Hardware:\s*(?P<hardware>\S+)\s*\|"

@@ -262,9 +262,9 @@ class Session:
         if complaint is not None:
             return Problem("topic %s refused: %s" % (_shorten(info.name), complaint))
         topic = Topic(info, kind)
-        if not self.topics:
-            self._request_due_s = None
-        elif self.topics.get(info.topic_id) == topic:
+        # The robot is answering the last request.
+        self._request_due_s = None
+        if self.topics.get(info.topic_id) == topic:
             return None
         elif info.topic_id not in self.topics and len(self.topics) >= self._limits.max_topics:
             return Problem(
