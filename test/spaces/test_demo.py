@@ -1,9 +1,11 @@
 """script/demo as a user meets it: it ends well, names what failed, finds another port, and Ctrl-C ends everything."""
 
 import os
+import pty
 import signal
 import socket
 import subprocess
+import threading
 import time
 from pathlib import Path
 
@@ -93,6 +95,32 @@ def test_an_interrupt_ends_everything(demo):
     assert process.returncode == 130, output
     with socket.socket() as driver:
         assert driver.connect_ex(("127.0.0.1", port)) != 0, "the driver still listens"
+
+
+def test_closing_the_terminal_ends_everything():
+    port = find_free_port()
+    process_id, leader = pty.fork()
+    if process_id == 0:
+        os.execv(str(ROOT / "script" / "demo"), ["demo", "--robots", "2", "--no-rviz", "--port", str(port)])
+    threading.Thread(target=read_terminal, args=(leader,), daemon=True).start()
+    wait_until_driver_listens(port)
+    os.kill(process_id, signal.SIGHUP)
+    os.close(leader)
+    deadline_s = time.monotonic() + TIMEOUT_S
+    while os.waitpid(process_id, os.WNOHANG) == (0, 0):
+        assert time.monotonic() < deadline_s, "the demo goes on"
+        time.sleep(0.1)
+    with socket.socket() as driver:
+        assert driver.connect_ex(("127.0.0.1", port)) != 0, "the driver still listens"
+
+
+def read_terminal(leader):
+    """Read what the demo draws, so that it never waits for us, until the terminal is closed."""
+    try:
+        while os.read(leader, 65536):
+            pass
+    except OSError:
+        return
 
 
 @pytest.mark.parametrize(
