@@ -142,12 +142,17 @@ def test_every_launch_file_can_be_read(space):
 
 
 def test_rosrun_finds_every_node_and_python_has_what_it_imports(space):
+    # As with pyenv or conda: the first python3 on PATH is another one, without rospy.
+    other = space.directory / "other_python"
+    other.mkdir()
+    (other / "python3").write_text("#!/bin/sh\necho No module named rospy\nexit 1\n")
+    (other / "python3").chmod(0o755)
     for path in NODES:
         package = path.parents[1].name
         first_line = space.run(f"head -n 1 $(catkin_find --first-only --libexec {package} {path.name})")
         assert first_line.startswith("#!"), path.name
         # A node that knows no --help waits for a master, in vain, until it is killed.
-        start = f"timeout -s KILL {NODE_START_S} rosrun {package} {path.name} --help"
+        start = f"PATH={other}:$PATH timeout -s KILL {NODE_START_S} rosrun {package} {path.name} --help"
         output = space.run(f"export ROS_MASTER_URI=http://localhost:1\n({start}) 2>&1 || true")
         assert "Traceback" not in output and "No module named" not in output, f"{path.name}:\n{output}"
 
