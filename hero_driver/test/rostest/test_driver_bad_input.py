@@ -159,6 +159,7 @@ class TestDriverBadInput(OwnDriverCase):
         stranger = FakeRobot(9, declarations=[])
         self.addCleanup(stranger.close)
         stranger.is_silent = True
+        stranger.declares = False
         stranger.connect(driver.address)
         stranger.send_bytes(b"GET / HTTP/1.1\r\nHost: robot\r\n\r\n" * 4000)
         wait_for(lambda: stranger.ended, "the end of the connection")
