@@ -1,9 +1,10 @@
-"""Runs every rostest of the suite, each under a ROS master of its own, and shows the log of one that fails.
+"""Runs the rostests of the suite, two at once, each under a ROS master of its own; shows the log of one that fails.
 
 Usage: run_rostests.py RESULTS_DIR [PATTERN]
 The workspace must be sourced. A rostest that leaves no results (it hung, or died) counts as one failure.
 """
 
+import concurrent.futures
 import os
 import signal
 import subprocess
@@ -16,6 +17,7 @@ from results import Counts, count_results, record
 ROOT = Path(__file__).resolve().parents[1]
 TIMEOUT_S = 600.0  # of one .test file; each <test> in it has its own, shorter time-limit
 LOG_LINES_SHOWN = 80
+AT_ONCE = 2  # most of a rostest is waiting for robots that move in real time
 
 
 def find_rostests(pattern):
@@ -71,28 +73,47 @@ def drop_wrappers(results_dir):
             path.unlink()
 
 
-def main(results_dir, pattern=""):
-    """Run the rostests and return 1 if any failed."""
-    failed = False
-    for path in find_rostests(pattern):
-        name = str(path.relative_to(ROOT))
-        own_results = Path(results_dir) / path.parents[2].name / path.stem
-        own_results.mkdir(parents=True)
-        print(f"{name} ... ", end="", flush=True)
-        start_s = time.monotonic()
-        exit_code = run_rostest(path, own_results)
-        drop_wrappers(own_results)
+def make_python_path(results_dir):
+    """Return a PATH on which python is this interpreter: test scripts start with "env python"."""
+    programs = Path(results_dir) / "bin"
+    programs.mkdir(parents=True)
+    for name in ("python", "python3"):
+        (programs / name).symlink_to(sys.executable)
+    return f"{programs.resolve()}:{os.environ['PATH']}"
+
+
+def run_and_judge(path, results_dir):
+    """Run one .test file; return whether it failed, and what to print."""
+    own_results = Path(results_dir) / path.parents[2].name / path.stem
+    own_results.mkdir(parents=True)
+    start_s = time.monotonic()
+    exit_code = run_rostest(path, own_results)
+    drop_wrappers(own_results)
+    counts = count_results(own_results)
+    if not counts.failures and (exit_code != 0 or not counts.passed):
+        record(own_results, f"{path.stem} ends with results", True)
         counts = count_results(own_results)
-        if not counts.failures and (exit_code != 0 or not counts.passed):
-            record(own_results, f"{path.stem} ends with results", True)
-            counts = count_results(own_results)
-        verdict = "FAILED" if counts.failures else "ok"
-        took_s = time.monotonic() - start_s
-        print(f"{verdict}: {counts.passed} passed, {len(counts.failures)} failed, {took_s:.1f} s")
-        if counts.failures:
-            failed = True
-            lines = (own_results / "log.txt").read_text(errors="replace").splitlines()
-            print("\n".join("    " + line for line in lines[-LOG_LINES_SHOWN:]))
+    verdict = "FAILED" if counts.failures else "ok"
+    lines = [
+        f"{path.relative_to(ROOT)} ... {verdict}: {counts.passed} passed, {len(counts.failures)} failed,"
+        f" {time.monotonic() - start_s:.1f} s"
+    ]
+    if counts.failures:
+        log = (own_results / "log.txt").read_text(errors="replace").splitlines()
+        lines += ["    " + line for line in log[-LOG_LINES_SHOWN:]]
+    return bool(counts.failures), "\n".join(lines)
+
+
+def main(results_dir, pattern=""):
+    """Run the rostests, AT_ONCE side by side, and return 1 if any failed."""
+    os.environ["PATH"] = make_python_path(results_dir)
+    failed = False
+    with concurrent.futures.ThreadPoolExecutor(AT_ONCE) as pool:
+        runs = [pool.submit(run_and_judge, path, results_dir) for path in find_rostests(pattern)]
+        for run in concurrent.futures.as_completed(runs):
+            has_failed, text = run.result()
+            failed = failed or has_failed
+            print(text, flush=True)
     return int(failed)
 
 

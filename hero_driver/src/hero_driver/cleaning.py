@@ -89,6 +89,8 @@ class MessageCleaner:
         self._raw_name = namespace + "/odom_raw"
         self._proximity_name = namespace + "/proximity"
         self._has_encoder = False
+        self._is_first_reading = True
+        self._max_age_ns = int(settings.max_age_s * NS_PER_S)
         self._encoder_follows = True
         self._encoder_stamp_ns = -BURST_NS
         self._odom_stamp_ns = -BURST_NS
@@ -97,6 +99,7 @@ class MessageCleaner:
     def restart(self, rebooted: bool) -> None:
         """A new connection begins; after a reboot the robot's counters begin anew too."""
         self._has_encoder = False
+        self._is_first_reading = True
         self._encoder_stamp_ns = self._odom_stamp_ns = -BURST_NS
         self._encoder_follows = True
         self._held = []
@@ -208,6 +211,12 @@ class MessageCleaner:
             return self._refuse()
         self._encoder_stamp_ns = header.stamp_ns
         self._encoder_follows = abs(header.stamp_ns - self._odom_stamp_ns) <= BURST_NS
+        if self._is_first_reading:
+            # The boot line may have gone down another connection, which never said who it was.
+            self._is_first_reading = False
+            counts_from_boot = abs(arrival_ns - header.stamp_ns) > self._max_age_ns
+            if counts_from_boot or self.odometry.looks_reset(*ticks):
+                self.note_reboot()
         self.odometry.integrate(ticks[0], ticks[1], header.stamp_ns / NS_PER_S)
         if not self._is_wanted(name):
             return self._release()

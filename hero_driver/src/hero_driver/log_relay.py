@@ -4,6 +4,7 @@ rospy writes to the terminal and a file when it logs; both can block, so the thr
 lines over here. When too many wait they are dropped and the number is logged.
 """
 
+import sys
 import time
 from typing import Dict, Tuple
 
@@ -31,7 +32,7 @@ class LogRelay:
     """Where every other thread of the driver logs."""
 
     def __init__(self) -> None:
-        self._worker = Worker("log relay", QUEUE_LENGTH, lambda error: None)
+        self._worker = Worker("log relay", QUEUE_LENGTH, _report_to_terminal)
         self._last: Dict[str, Tuple[float, int]] = {}
         self._groups: Dict[str, Tuple[float, int]] = {}
         self._reported_drops = 0
@@ -75,3 +76,8 @@ class LogRelay:
     def close(self) -> None:
         """Write what waits and end the thread."""
         self._worker.close(drain=True)
+
+
+def _report_to_terminal(error: Exception) -> None:
+    """Tell of a log line that could not be logged, where logging cannot."""
+    sys.stderr.write("hero_driver: a log line was lost: %s: %s\n" % (type(error).__name__, error))

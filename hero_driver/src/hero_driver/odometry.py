@@ -17,6 +17,9 @@ TWIST_WINDOW = 6
 MAX_WHEEL_SPEED_M_S = 1.0
 """Faster than any servo of the robot: a larger step is a reset counter or garbage, not motion."""
 
+RESET_TICKS = 5
+"""A robot that has just booted stands: its counters are this close to zero (3 mm) when it is heard again."""
+
 MAX_GAP_S = 10.0
 """Ticks of a pause without readings are believed as if the pause had at most this length."""
 
@@ -86,6 +89,15 @@ class TickOdometry:
         self.pose = pose
         self._ticks = (0.0, 0.0)
         self._window.clear()
+
+    def looks_reset(self, left_ticks: float, right_ticks: float) -> bool:
+        """Return whether counters that were away from zero are back there, as after a reboot."""
+        if self._ticks is None:
+            return False
+        return (
+            max(abs(left_ticks), abs(right_ticks)) <= RESET_TICKS
+            and max(abs(self._ticks[0]), abs(self._ticks[1])) > 4 * RESET_TICKS
+        )
 
     def integrate(self, left_ticks: float, right_ticks: float, stamp_s: float) -> None:
         """Take one reading of the counters (ticks since boot or set_odom, forward positive)."""

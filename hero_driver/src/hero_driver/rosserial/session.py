@@ -146,6 +146,7 @@ class Session:
         self._last_request_s: Optional[float] = None
         self._request_due_s: Optional[float] = now_s
         self._undeclared_repeats = 0
+        self._requests = 0
         self._last_configured_s = now_s
 
     def receive_bytes(self, data: Bytes, now_s: float, time_of_day_s: float) -> List[Event]:
@@ -176,6 +177,7 @@ class Session:
         if self._request_due_s is not None and now_s >= self._request_due_s:
             self._outgoing.append(encode_frame(frames.ID_PUBLISHER, b""))
             self._last_request_s = now_s
+            self._requests += 1
             self._request_due_s = None if self.topics else now_s + REQUEST_INTERVAL_S
         return []
 
@@ -227,7 +229,9 @@ class Session:
             answer = payloads.encode_time(payloads.split_seconds(time_of_day_s))
             self._outgoing.append(encode_frame(frames.ID_TIME, answer))
             if not self.topics:
-                self._expect_topics_by(now_s + TIME_WITHOUT_TOPICS_S)
+                due_s = now_s + TIME_WITHOUT_TOPICS_S
+                # Only the first time is it the handshake of a boot; a peer may answer each request like this.
+                self._expect_topics_by(due_s if self._requests < 2 else max(due_s, self._earliest_repeat_s(now_s)))
             return TimeRequested()
         if topic_id == frames.ID_LOG:
             log = payloads.decode_log(payload)
