@@ -30,6 +30,7 @@ from hero_driver.rosserial import frames, payloads
 from hero_msgs.msg import Encoder, Motor
 
 CAPTURES = Path(__file__).resolve().parents[4] / "shared" / "captures"
+README = Path(__file__).resolve().parents[2] / "README.md"
 
 PUBLISHED = {
     "laser": "sensor_msgs/LaserScan",
@@ -74,6 +75,19 @@ class TestDriverTopics(DriverCase):
         self.assertEqual(types["/tf"], "tf2_msgs/TFMessage")
         for name, ros_type in SERVICES.items():
             self.assertEqual(rosservice.get_service_type("/hero_1/" + name), ros_type)
+
+    def test_the_readme_lists_these_topics_and_services_and_no_others(self):
+        robot = "/hero_N/"
+        rows = [
+            [cell.strip(" `") for cell in line.split("|")[1:-1]]
+            for line in README.read_text().splitlines()
+            if line.startswith("| `" + robot)
+        ]
+        topics = {row[0][len(robot) :]: (row[1], row[2]) for row in rows if len(row) > 3}
+        expected = {name: (kind, "from the robot") for name, kind in PUBLISHED.items()}
+        expected.update({name: (kind, "to the robot") for name, kind in SUBSCRIBED.items()})
+        self.assertEqual(topics, expected)
+        self.assertEqual({row[0][len(robot) :]: row[1] for row in rows if len(row) == 3}, SERVICES)
 
     def test_what_a_robot_publishes_arrives_with_its_content(self):
         robot = self.join(2)
