@@ -5,6 +5,7 @@ import time
 import timeit
 
 import emulated_swarm
+
 from hero_driver.cleaning import CleaningSettings, MessageCleaner
 from hero_driver.message_types import apply_aliases
 from hero_driver.odometry import WheelGeometry

@@ -270,7 +270,7 @@ class Session:
         self._request_due_s = None
         if self.topics.get(info.topic_id) == topic:
             return None
-        elif info.topic_id not in self.topics and len(self.topics) >= self._limits.max_topics:
+        if info.topic_id not in self.topics and len(self.topics) >= self._limits.max_topics:
             return Problem(
                 "topic %s refused: more than %d topics (max_topics)" % (info.name, self._limits.max_topics)
             )
