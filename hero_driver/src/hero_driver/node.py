@@ -1,6 +1,7 @@
 """main(): reads the parameters, wires everything, waits, and stops all robots at the end."""
 
 import errno
+import io
 import os
 import queue
 import signal
@@ -178,6 +179,9 @@ class DriverNode:
 
 def main(argv: Optional[List[str]] = None) -> int:
     """Run the node; return its exit code."""
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        # Into a pipe or file Python writes nothing before it has 8 kB, and rospy does not flush.
+        sys.stdout.reconfigure(line_buffering=True)
     # The driver handles signals itself: robots are stopped before ROS goes down.
     rospy.init_node(NODE_NAME, argv=argv, disable_signals=True)
     try:
