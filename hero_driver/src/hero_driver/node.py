@@ -183,7 +183,11 @@ def main(argv: Optional[List[str]] = None) -> int:
         # Into a pipe or file Python writes nothing before it has 8 kB, and rospy does not flush.
         sys.stdout.reconfigure(line_buffering=True)
     # The driver handles signals itself: robots are stopped before ROS goes down.
-    rospy.init_node(NODE_NAME, argv=argv, disable_signals=True)
+    try:
+        rospy.init_node(NODE_NAME, argv=argv, disable_signals=True)
+    except KeyboardInterrupt:
+        # It waits for a ROS master as long as it takes, and says so.
+        return 130
     try:
         config = read_config(_read_private_parameters())
     except ConfigError as error:

@@ -6,6 +6,7 @@ time as user code runs.) This module knows no robot and no topic.
 """
 
 import math
+import io
 import os
 import select
 import signal
@@ -50,6 +51,9 @@ class Program:
         os.set_blocking(self._wake_write_fd, False)
         for number in ENDING_SIGNALS:
             signal.signal(number, self._receive_signal)
+        if isinstance(sys.stdout, io.TextIOWrapper):
+            # Into a pipe or file Python writes nothing before it has 8 kB, and rospy does not flush.
+            sys.stdout.reconfigure(line_buffering=True)
         # init_node would wait for a master for ever, deaf to signals.
         if not rosgraph.is_master_online():
             raise ProgramError(
