@@ -32,6 +32,8 @@ HALT_LIMIT_S = 1.2
 
 REPORT_CHECK_S = 0.1
 
+MASTER_CHECK_S = 0.5
+
 PORT_WAIT_S = 2.0
 """How long a port may be in use: a node that replaces one of the same name starts while that one still stops."""
 
@@ -184,10 +186,10 @@ def main(argv: Optional[List[str]] = None) -> int:
         sys.stdout.reconfigure(line_buffering=True)
     # The driver handles signals itself: robots are stopped before ROS goes down.
     try:
-        rospy.init_node(NODE_NAME, argv=argv, disable_signals=True)
+        _wait_for_master()
     except KeyboardInterrupt:
-        # It waits for a ROS master as long as it takes, and says so.
         return 130
+    rospy.init_node(NODE_NAME, argv=argv, disable_signals=True)
     try:
         config = read_config(_read_private_parameters())
     except ConfigError as error:
@@ -207,6 +209,18 @@ def main(argv: Optional[List[str]] = None) -> int:
     finally:
         node.close()
         rospy.signal_shutdown("the driver ended")
+
+
+def _wait_for_master() -> None:
+    """Return when a ROS master answers; rospy would wait too, but could not be interrupted."""
+    if rosgraph.is_master_online():
+        return
+    sys.stderr.write(
+        "hero_driver: no ROS master at %s yet, waiting; start one with roscore, or set ROS_MASTER_URI\n"
+        % rosgraph.get_master_uri()
+    )
+    while not rosgraph.is_master_online():
+        time.sleep(MASTER_CHECK_S)
 
 
 def _read_private_parameters() -> Any:

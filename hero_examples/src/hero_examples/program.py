@@ -5,8 +5,8 @@ Signals, `rosnode kill` and a lost terminal become one flag that the program's l
 time as user code runs.) This module knows no robot and no topic.
 """
 
-import math
 import io
+import math
 import os
 import select
 import signal
