@@ -53,6 +53,15 @@ class Recorder:
         )
 
 
+def is_running(pid):
+    """Return whether a process runs; one that has ended may still be listed until its parent looks."""
+    try:
+        with open("/proc/%d/stat" % pid) as stat:
+            return stat.read().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
 class Terminal:
     """A pseudo-terminal with a shell that runs teleop in the foreground."""
 
@@ -103,7 +112,7 @@ class Terminal:
         pid = self.teleop_pid()
         self.shell.kill()
         self.shell.wait()
-        wait_for(lambda: not pid or not os.path.exists("/proc/%d" % pid), "the end of teleop with its terminal")
+        wait_for(lambda: not pid or not is_running(pid), "the end of teleop with its terminal")
         self.hang_up()
 
     def hang_up(self):
