@@ -15,18 +15,10 @@ from fake_robot import (
     TIME_FRAME,
     Declaration,
 )
-from std_msgs.msg import String
+from text_messages import STRING_MD5
 
 from hero_driver.rosserial import frames
 from hero_msgs.msg import Encoder, Robot
-
-STRING_MD5 = String._md5sum
-TRIGGER_REQUEST_MD5 = "d41d8cd98f00b204e9800998ecf8427e"
-WRONG_MD5 = "0123456789abcdef0123456789abcdef"
-
-
-def make_text(text):
-    return stock_messages.to_bytes(String(text))
 
 
 class TestDriverLimits(OwnDriverCase):

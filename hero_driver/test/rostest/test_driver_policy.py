@@ -25,19 +25,11 @@ from fake_robot import (
     Declaration,
 )
 from geometry_msgs.msg import Twist
-from std_msgs.msg import String
 from std_srvs.srv import Trigger, TriggerResponse
+from text_messages import STRING_MD5, TRIGGER_REQUEST_MD5, WRONG_MD5, make_text
 from tf2_msgs.msg import TFMessage
 
 from hero_msgs.msg import Encoder, Robot
-
-STRING_MD5 = String._md5sum
-TRIGGER_REQUEST_MD5 = "d41d8cd98f00b204e9800998ecf8427e"
-WRONG_MD5 = "0123456789abcdef0123456789abcdef"
-
-
-def make_text(text):
-    return stock_messages.to_bytes(String(text))
 
 
 class TestDriverPolicy(OwnDriverCase):

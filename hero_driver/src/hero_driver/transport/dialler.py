@@ -28,7 +28,7 @@ class DiallerOwner:
         """Run call after delay_s."""
         raise NotImplementedError
 
-    def add_link(self, sock: socket.socket, address: Address, dialled: bool) -> Optional[Link]:
+    def add_link(self, sock: socket.socket, address: Address) -> Optional[Link]:
         """Take over a connected socket; return its link, or None if it was refused or broke already."""
         raise NotImplementedError
 
@@ -78,7 +78,7 @@ class Dialler:
             sock.close()
             self._retry(os.strerror(error_number))
             return
-        self._link = self._loop.add_link(sock, self._address, dialled=True)
+        self._link = self._loop.add_link(sock, self._address)
         self._opened_s = time.monotonic()
         self._reported = ""
         self._watch_link()

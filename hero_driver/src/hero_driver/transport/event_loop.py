@@ -121,9 +121,9 @@ class EventLoop(LinkOwner, DiallerOwner):
         link.discard()
         self._handler.close_link(link, reason)
 
-    def add_link(self, sock: socket.socket, address: Address, dialled: bool) -> Optional[Link]:
+    def add_link(self, sock: socket.socket, address: Address) -> Optional[Link]:
         """Take over a connected socket; return its link, or None if it was refused or broke already."""
-        link = Link(self, sock, address, dialled)
+        link = Link(self, sock, address)
         try:
             self._set_options(sock)
         except OSError as error:
@@ -195,7 +195,7 @@ class EventLoop(LinkOwner, DiallerOwner):
             except OSError as error:
                 self._pause_accept(listener, error)
                 return
-            self.add_link(sock, Address(*address[:2]), dialled=False)
+            self.add_link(sock, Address(*address[:2]))
 
     def _pause_accept(self, listener: socket.socket, error: OSError) -> None:
         remedy = ""

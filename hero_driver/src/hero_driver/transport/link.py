@@ -70,9 +70,8 @@ class LinkOwner:
 class Link:
     """One TCP connection to one robot."""
 
-    def __init__(self, loop: LinkOwner, sock: socket.socket, address: Address, dialled: bool) -> None:
+    def __init__(self, loop: LinkOwner, sock: socket.socket, address: Address) -> None:
         self.address = address
-        self.dialled = dialled
         self.closed = False
         self.peer: Any = None  # the handler's own record of who is at the other end
         self.handed_length = 0  # bytes of all frames given to send_frame()

@@ -1,0 +1,13 @@
+"""std_msgs/String and md5s for declarations of topics and services that stock robots do not have."""
+
+import stock_messages
+from std_msgs.msg import String
+
+STRING_MD5 = String._md5sum
+TRIGGER_REQUEST_MD5 = "d41d8cd98f00b204e9800998ecf8427e"
+WRONG_MD5 = "0123456789abcdef0123456789abcdef"
+
+
+def make_text(text):
+    """Return the payload of a std_msgs/String."""
+    return stock_messages.to_bytes(String(text))
