@@ -1,6 +1,6 @@
 """Many robots at stock rates as cheaply as possible, to load a rosserial TCP server; no physics.
 
-Prints one JSON line at the end: what was sent, what commands came, how late. Needs neither ROS nor numpy.
+Prints one JSON line at the end, or at SIGINT: what was sent, what commands came, how late. Needs neither ROS nor numpy.
 Rates and sizes are those of the stock robot: bursts of odom, five transforms and encoder 29.4 times per
 second, laser 4.98, log 0.98, time request every 2.53 s.
 """
@@ -9,8 +9,10 @@ import argparse
 import heapq
 import json
 import selectors
+import signal
 import socket
 import struct
+import threading
 import time
 
 from hero_driver.rosserial import frames, payloads
@@ -82,10 +84,10 @@ class Templates:
         scan = struct.pack("<7f", -3.1416, 3.1416, 0.395, 0, 0, 0.0368, 0.2368)
         self.laser_tail = text(name + "laser_link") + scan + (struct.pack("<I", 16) + bytes(64)) * 2
 
-    def make_burst(self, stamp):
-        """Return one burst with stamp (8 bytes)."""
+    def make_burst(self, number, stamp):
+        """Return one burst with stamp (8 bytes); number is odom's sequence number, by which a loss is noticed."""
         encode = frames.encode_frame
-        parts = [encode(ODOM, b"\xff\xff\xff\xff" + stamp + self.odom_tail)]
+        parts = [encode(ODOM, struct.pack("<I", number) + stamp + self.odom_tail)]
         head = b"\x01\0\0\0\0\0\0\0" + stamp
         parts += [encode(TRANSFORMS, head + tail) for tail in self.transform_tails]
         parts.append(encode(ENCODER, b"\xff\xff\xff\xff" + stamp + self.encoder_tail))
@@ -148,8 +150,8 @@ class EmulatedRobot:
         return is_new
 
 
-def run(address, count, seconds, speed, first=0):
-    """Return the result of count robots for seconds after all have joined."""
+def run(address, count, seconds, speed, first=0, is_ended=lambda: False):
+    """Return the result of count robots for seconds after all have joined, or until is_ended()."""
     started_s = time.monotonic()
     robots = [EmulatedRobot(first + index, address, speed) for index in range(count)]
     selector = selectors.DefaultSelector()
@@ -161,7 +163,7 @@ def run(address, count, seconds, speed, first=0):
     measure_end_s = started_s + seconds + 30.0
     while True:
         now_s = time.monotonic()
-        if now_s >= measure_end_s:
+        if now_s >= measure_end_s or is_ended():
             break
         timeout_s = max(0.0, due[0][0] - now_s) if due else 0.05
         for key, _ in selector.select(min(timeout_s, 0.05)):
@@ -184,7 +186,7 @@ def run(address, count, seconds, speed, first=0):
             time_ns = time.time_ns()
             stamp = struct.pack("<II", *divmod(time_ns, 10**9))
             if kind == "burst":
-                robot.send(robot.templates.make_burst(stamp))
+                robot.send(robot.templates.make_burst(robot.bursts, stamp))
                 robot.bursts += 1
                 robot.stamps_s.append(time_ns / 1e9)
                 period_s = BURST_PERIOD_S
@@ -222,8 +224,13 @@ def main():
     parser.add_argument("--seconds", type=float, default=10.0, help="time after the last robot has joined")
     parser.add_argument("--speed", type=float, default=1.0, help="multiplies all rates")
     options = parser.parse_args()
+    ended = threading.Event()
+    signal.signal(signal.SIGINT, lambda *_: ended.set())
     address = (options.host, options.port)
-    print(json.dumps(run(address, options.robots, options.seconds, options.speed, options.first_id)))
+    result = run(
+        address, options.robots, options.seconds, options.speed, options.first_id, ended.is_set
+    )
+    print(json.dumps(result))
 
 
 if __name__ == "__main__":
