@@ -1,16 +1,17 @@
 """A YAML file -> an Arena, or one line that says where the file is wrong.
 
-Borders: the only file that needs PyYAML, and only when an arena is read. The format is in the README.
+The format is in the README.
 """
 
 import math
 import os
-from typing import Any, Dict, List, Tuple
+from typing import Any, List, Tuple
 
 import numpy as np
 
 from .arena import Arena, outline
 from .errors import OptionError
+from .yaml_file import fail_at, read_mapping, read_nodes
 
 SHIPPED = ("empty", "obstacles", "maze")
 """Arenas that come with the simulator; --arena takes these names too."""
@@ -32,26 +33,7 @@ def load_arena(name: str) -> Arena:
     Raises: OptionError with file, line and reason.
     """
     path = find_arena(name)
-    try:
-        import yaml
-    except ImportError as error:
-        raise OptionError(
-            "--arena %s: PyYAML is missing; install it: apt install python3-yaml, or pip install PyYAML"
-            % name
-        ) from error
-    try:
-        with open(path, encoding="utf-8") as file:
-            root = yaml.compose(file, Loader=yaml.SafeLoader)
-    except OSError as error:
-        raise OptionError(
-            "arena %s cannot be read: %s; shipped are %s" % (path, error.strerror, ", ".join(SHIPPED))
-        ) from error
-    except UnicodeDecodeError as error:
-        raise OptionError("arena %s is not a text file in UTF-8: %s" % (path, error)) from error
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        line = mark.line + 1 if mark is not None else 1
-        raise OptionError("%s:%d: %s" % (path, line, getattr(error, "problem", None) or error)) from error
+    root = read_nodes(path, "arena " + path, "shipped are " + ", ".join(SHIPPED))
     return _Reader(path).read(root)
 
 
@@ -62,21 +44,16 @@ class _Reader:
         self._path = path
 
     def _fail(self, node: Any, reason: str) -> OptionError:
-        line = node.start_mark.line + 1 if node is not None else 1
-        return OptionError("%s:%d: %s" % (self._path, line, reason))
+        return fail_at(self._path, node, reason)
 
     def read(self, root: Any) -> Arena:
-        if root is None or root.id != "mapping":
-            raise self._fail(root, "an arena is a mapping with the keys %s" % ", ".join(_KEYS))
-        nodes: Dict[str, Any] = {}
-        for key_node, value_node in root.value:
-            if key_node.value not in _KEYS:
-                raise self._fail(
-                    key_node, "unknown key %r; known are %s" % (key_node.value, ", ".join(_KEYS))
-                )
-            if key_node.value in nodes:
-                raise self._fail(key_node, "key %r is there twice" % key_node.value)
-            nodes[key_node.value] = value_node
+        entries = read_mapping(
+            self._path, root, "an arena is a mapping with the keys %s" % ", ".join(_KEYS)
+        )
+        for key, (key_node, _) in entries.items():
+            if key not in _KEYS:
+                raise self._fail(key_node, "unknown key %r; known are %s" % (key, ", ".join(_KEYS)))
+        nodes = {key: value_node for key, (_, value_node) in entries.items()}
         segments: List[Tuple[float, float, float, float]] = []
         for node in self._items(nodes.get("walls_m"), "walls_m"):
             points = self._points(node, 2, "a wall")

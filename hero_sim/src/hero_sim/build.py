@@ -8,13 +8,14 @@ import numpy as np
 
 from . import arena as arenas
 from .arena_file import load_arena
+from .body import Body
 from .errors import OptionError
 from .fault_injector import FaultInjector
 from .faults import parse_fault
 from .firmware import Firmware, FirmwareOptions
 from .flash import Flash
-from .motor_control import Body
 from .range_sensors import FACTORY_CALIBRATION_COUNTS_M2, calibrate
+from .robot_errors import SERVO_CENTRE_US, RobotErrors, draw_errors, load_known, set_known
 from .simulator import Simulator
 from .swarm import Swarm
 from .tcp_link import TcpLink
@@ -25,26 +26,45 @@ BOOT_SPREAD_MS = 200
 """Robots that are started together come up within this time of each other."""
 
 
-_SEEDS_BEFORE_ROBOTS = 4
+_SEEDS_BEFORE_ROBOTS = 5
 _SEEDS_PER_ROBOT = 2
 
 
 def draw_seeds(options: argparse.Namespace) -> np.ndarray:
-    """Return the seeds of all streams of chance: places, world, boot times, faults, then two per robot."""
+    """Return the seeds of all streams of chance: places, world, boot times, faults, errors,
+    then two per robot."""
     size = _SEEDS_BEFORE_ROBOTS + _SEEDS_PER_ROBOT * options.robots
     return np.random.RandomState(options.seed).randint(0, 2**31 - 1, size=size)
 
 
-def _build_flash(options: argparse.Namespace, world: World, index: int) -> Flash:
+def _build_flash(options: argparse.Namespace, errors: RobotErrors, index: int) -> Flash:
     calibration_counts_m2 = {
-        "calibrated": calibrate(world.alpha_counts_m2[index]).tolist(),
+        "calibrated": calibrate(errors.alpha_counts_m2[index], errors.beta_counts[index]).tolist(),
         "factory": [FACTORY_CALIBRATION_COUNTS_M2] * 8,
         "erased": [float("nan")] * 8,
     }[options.ir]
+    centres_us = {
+        "calibrated": np.rint(errors.servo_centre_us[index]).tolist(),
+        "factory": [SERVO_CENTRE_US] * 2,
+    }[options.motors]
     path = None
     if options.flash_dir is not None:
         path = os.path.join(options.flash_dir, "hero_%d.json" % (options.first_id + index))
-    return Flash(calibration_counts_m2, path)
+    return Flash(calibration_counts_m2, centres_us, path)
+
+
+def build_errors(options: argparse.Namespace) -> RobotErrors:
+    """Return how the robots that options describe differ: drawn from the seed, then what is known put over it.
+
+    Raises: OptionError for an error that cannot be set.
+    """
+    rng = np.random.RandomState(draw_seeds(options)[4])
+    errors = draw_errors(options.robots, rng, 0.0 if options.perfect else 1.0)
+    if options.errors is not None:
+        load_known(errors, options.first_id, options.errors)
+    for text in options.error:
+        set_known(errors, options.first_id, text)
+    return errors
 
 
 def build_swarm(options: argparse.Namespace, addresses: List[str], report: Callable[[str], None]) -> Swarm:
@@ -59,11 +79,12 @@ def build_swarm(options: argparse.Namespace, addresses: List[str], report: Calla
         poses = arenas.place_robots(arena, options.robots, np.random.RandomState(seeds[0]))
     except arenas.ArenaError as error:
         raise OptionError(str(error)) from error
-    world = World(arena, poses, np.random.RandomState(seeds[1]), errors=0.0 if options.perfect else 1.0)
+    errors = build_errors(options)
+    world = World(arena, poses, np.random.RandomState(seeds[1]), errors)
     exact = options.firmware_odometry == "exact"
     robots: List[Firmware] = []
     for index in range(options.robots):
-        flash = _build_flash(options, world, index)
+        flash = _build_flash(options, errors, index)
         robots.append(
             Firmware(
                 options.first_id + index,

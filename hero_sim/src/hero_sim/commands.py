@@ -3,7 +3,7 @@
 Pure. Texts and behaviour are the firmware's (files named in messages and flash); ids as declared.
 """
 
-from typing import TYPE_CHECKING, Callable, Dict, Optional
+from typing import TYPE_CHECKING, Callable, Dict, List, Optional
 
 from hero_driver.rosserial import frames
 
@@ -20,6 +20,7 @@ class CommandTable:
     def __init__(self, firmware: "Firmware") -> None:
         """Serve firmware."""
         self._firmware = firmware
+        self._now_ms = 0
         self._callbacks: Dict[int, Callable[[bytes, int], Optional[bytes]]] = {
             ids.ID_LED: self._set_light,
             ids.ID_LASER_ENABLE: self._enable_laser,
@@ -40,7 +41,7 @@ class CommandTable:
 
         Raises: CommandError for a payload that is not the declared message.
         """
-        del now_ms
+        self._now_ms = now_ms
         callback = self._callbacks.get(frame.topic_id)
         # The slots without a subscriber are empty: the firmware ignores them.
         return None if callback is None else callback(frame.payload, millis)
@@ -59,7 +60,7 @@ class CommandTable:
 
     def _drive_position(self, payload: bytes, millis: int) -> None:
         twist = messages.decode_twist(payload)
-        if self._firmware.motors.receive_position(millis, twist.linear_m_s, twist.turn_rad_s):
+        if self._firmware.motors.receive_position(millis, self._now_ms, twist.linear_m_s, twist.turn_rad_s):
             self._log_reset()
 
     def _log_reset(self) -> None:
@@ -88,42 +89,50 @@ class CommandTable:
         centres_us = messages.decode_motor(payload)
         self._firmware.flash.motor_centres_us = [float(centre) for centre in centres_us]
         self._firmware.flash.save()
-        self._firmware.motors.centres_us = (float(centres_us[0]), float(centres_us[1]))
+        self._firmware.motors.motors.centres_us = list(centres_us)
         text = "Motor Parameters has been succesfully recorded!"
         self._firmware.log(text)
         return _answer(ids.ID_MOTORS_PARAMETERS_ANSWER, True, text)
 
     def _set_position_pid(self, payload: bytes, millis: int) -> bytes:
         del millis
-        self._firmware.flash.position_pid = list(messages.decode_pid(payload))
-        return self._record_pid(ids.ID_POSITION_PID_PARAMETERS_ANSWER, self._firmware.flash.position_pid)
+        gains = list(messages.decode_pid(payload))
+        self._firmware.flash.position_pid = gains
+        self._firmware.motors.position.set_gains(gains)
+        return self._record_pid(ids.ID_POSITION_PID_PARAMETERS_ANSWER, gains)
 
     def _set_velocity_pid(self, payload: bytes, millis: int) -> bytes:
         del millis
-        self._firmware.flash.velocity_pid = list(messages.decode_pid(payload))
-        return self._record_pid(ids.ID_VELOCITY_PID_PARAMETERS_ANSWER, self._firmware.flash.velocity_pid)
+        gains = list(messages.decode_pid(payload))
+        self._firmware.flash.velocity_pid = gains
+        self._firmware.motors.velocity.set_gains(gains)
+        return self._record_pid(ids.ID_VELOCITY_PID_PARAMETERS_ANSWER, gains)
 
-    def _record_pid(self, answer_id: int, gains: list) -> bytes:
-        firmware = self._firmware
-        firmware.log("[%s] Left  Motor PID = [%.3f, %.3f, %.3f]" % ((firmware.name,) + tuple(gains[:3])))
-        firmware.log("[%s] Right Motor PID = [%.3f, %.3f, %.3f]" % ((firmware.name,) + tuple(gains[3:])))
-        firmware.log("[%s] Recording values in the flash..." % firmware.name)
-        firmware.flash.save()
+    def _record_pid(self, answer_id: int, gains: List[float]) -> bytes:
+        self._log_green("Left  Motor PID = [%f, %f, %f]" % tuple(gains[:3]))
+        self._log_green("Right Motor PID = [%f, %f, %f]" % tuple(gains[3:]))
+        self._log_green("Recording values in the flash... ")
+        self._firmware.flash.save()
         text = "PID Parameters has been succesfully recorded!"
-        firmware.log("[%s] %s" % (firmware.name, text))
+        self._log_green(text + " ")
         return _answer(answer_id, True, text)
+
+    def _log_green(self, text: str) -> None:
+        self._firmware.log("\x1b[92m[/%s] %s\x1b[0m" % (self._firmware.name, text))
 
     def _tune_position(self, payload: bytes, millis: int) -> bytes:
         del payload
-        return self._tune(ids.ID_POSITION_PID_CALIBRATION_ANSWER, millis)
+        return self._tune(ids.ID_POSITION_PID_CALIBRATION_ANSWER, millis, of_velocity=False)
 
     def _tune_velocity(self, payload: bytes, millis: int) -> bytes:
         del payload
-        return self._tune(ids.ID_VELOCITY_PID_CALIBRATION_ANSWER, millis)
+        return self._tune(ids.ID_VELOCITY_PID_CALIBRATION_ANSWER, millis, of_velocity=True)
 
-    def _tune(self, answer_id: int, millis: int) -> bytes:
-        self._firmware.log("[%s] Starting Motors Auto Tuning! Wait..." % self._firmware.name)
-        self._firmware.motors.start_tuning(millis)
+    def _tune(self, answer_id: int, millis: int, of_velocity: bool) -> bytes:
+        self._firmware.log(
+            "\x1b[94m[/%s] Starting Motors Auto Tuning! Wait... \x1b[0m" % self._firmware.name
+        )
+        self._firmware.motors.start_tuning(millis, self._now_ms, of_velocity)
         # The firmware never sets success here (VelocityControl.ino:229-245).
         return _answer(answer_id, False, "PID Autotuning!")
 

@@ -14,10 +14,11 @@ from hero_driver.rosserial import errors as wire_errors
 from hero_driver.rosserial import frames, payloads
 
 from . import declarations
+from .body import Body
 from .commands import CommandTable
 from .errors import CommandError
 from .flash import Flash
-from .motor_control import TUNING, Body, MotorControl
+from .motor_control import MotorControl
 from .robot_clock import RobotClock
 from .sensing import Sensing
 
@@ -118,10 +119,15 @@ class Firmware:
     def _start_programs(self) -> None:
         """Give everything that lives in RAM its first value."""
         self.clock = RobotClock()
-        self.motors = MotorControl(self.body)
-        self.motors.centres_us = tuple(self.flash.motor_centres_us)  # type: ignore[assignment]
         self.sensing = Sensing(
             self.name, self.body, self.options.imu_hat, self.options.exact_odometry, self.flash
+        )
+        self.motors = MotorControl(
+            self.body,
+            self.sensing.odometry,
+            self.flash.motor_centres_us,
+            self.flash.velocity_pid,
+            self.flash.position_pid,
         )
         self.commands = CommandTable(self)
         self._declarations = declarations.encode_declarations(self.name)
@@ -148,7 +154,7 @@ class Firmware:
         if robot_id is not None:
             self.robot_id = robot_id
             self.name = "hero_%d" % robot_id
-        self.body.halt()
+        self.body.release()
         self._start_programs()
         self._booted_at_ms = now_ms
         self._phase = _PHASE_BOOT
@@ -159,7 +165,7 @@ class Firmware:
     def switch_off(self) -> None:
         """Cut the power; the radio has to be told apart."""
         self._phase = _PHASE_OFF
-        self.body.halt()
+        self.body.release()
         self._start_programs()
         self.sensing.show_dark()
         self.due_ms = _NEVER_MS
@@ -172,7 +178,6 @@ class Firmware:
     def freeze(self, now_ms: int, for_ms: int) -> None:
         """Stand still in the program for for_ms: nothing is read, sent or watched, the motors keep their
         pulses."""
-        self.body.hold()
         self._blocked_until_ms = now_ms + for_ms
         self.due_ms = now_ms + for_ms
 
@@ -328,15 +333,17 @@ class Firmware:
 
     def _run_configured(self, millis: int, now_ms: int) -> int:
         """Run controllers and sensors; return when they have to run next (caller's time)."""
-        if self.motors.due_ms is not None and millis >= self.motors.due_ms and self.motors.run(millis):
-            self.sensing.read_encoders(millis, now_ms)
-            if self.motors.mode == TUNING:
-                self.log("[%s] Tunning Motor Set: %d" % (self.name, millis))
+        motors_due_ms = self.motors.due_ms
+        if motors_due_ms is not None and millis >= motors_due_ms:
+            line = self.motors.run(millis, now_ms, self.sensing.read_encoders)
+            if line is not None:
+                self.log("\x1b[93m[/%s] %s\x1b[0m" % (self.name, line))
         if millis >= self.sensing.due_ms:
             self.send(self.sensing.run_cycle(millis, now_ms, self.clock.stamp(millis)))
         next_millis = self.sensing.due_ms
-        if self.motors.due_ms is not None:
-            next_millis = min(next_millis, self.motors.due_ms)
+        motors_due_ms = self.motors.due_ms
+        if motors_due_ms is not None:
+            next_millis = min(next_millis, motors_due_ms)
         return max(self._booted_at_ms + next_millis, now_ms + 1)
 
     # -- conversation --------------------------------------------------------------------------------------
@@ -431,4 +438,3 @@ class Firmware:
     def _unconfigure(self) -> None:
         """Stop streaming; loop() no longer calls the controllers, so a moving robot moves on."""
         self.configured = False
-        self.motors.freeze()

@@ -6,7 +6,7 @@ Borders: the only file of the simulated robot that touches the file system besid
 
 import json
 import os
-from typing import List, Optional
+from typing import List, Optional, Sequence
 
 import numpy as np
 
@@ -14,9 +14,8 @@ from .errors import CommandError, OptionError
 
 _LENGTHS = {"ir_calibration_counts_m2": 8, "motor_centres_us": 2, "velocity_pid": 6, "position_pid": 6}
 
-DEFAULT_PID = [1.0, 0.5, 0.01, 1.0, 0.5, 0.01]
-"""lkp lki lkd rkp rki rkd of a fresh robot. Assumption: they are told on, but the motor model has its own
-lags."""
+_ERASED_PID = [-1.0] * 6
+"""What the firmware takes for "use the gains of the program"."""
 
 
 class Flash:
@@ -25,18 +24,23 @@ class Flash:
     Attributes:
         ir_calibration_counts_m2: one per sensor; NaN for a robot that was never calibrated.
         motor_centres_us: servo pulse at which each wheel stands.
-        velocity_pid, position_pid: lkp lki lkd rkp rki rkd.
+        velocity_pid, position_pid: lkp lki lkd rkp rki rkd; -1 for a robot that was never tuned.
     """
 
-    def __init__(self, ir_calibration_counts_m2: List[float], path: Optional[str] = None) -> None:
+    def __init__(
+        self,
+        ir_calibration_counts_m2: List[float],
+        motor_centres_us: Sequence[float] = (1500.0, 1500.0),
+        path: Optional[str] = None,
+    ) -> None:
         """Begin with a calibration, then take over what the file at path holds; None keeps nothing.
 
         Raises: OptionError if the folder cannot be used, or the file cannot be read or is not ours.
         """
         self.ir_calibration_counts_m2 = [float(value) for value in np.asarray(ir_calibration_counts_m2)]
-        self.motor_centres_us = [1500.0, 1500.0]
-        self.velocity_pid = list(DEFAULT_PID)
-        self.position_pid = list(DEFAULT_PID)
+        self.motor_centres_us = list(motor_centres_us)
+        self.velocity_pid = list(_ERASED_PID)
+        self.position_pid = list(_ERASED_PID)
         self._path = path
         if path is not None:
             self._check_folder(path)

@@ -87,6 +87,26 @@ def build_parser() -> argparse.ArgumentParser:
         action="store_true",
         help="all robots alike: no wheel errors, no slip (sensors stay noisy)",
     )
+    parser.add_argument(
+        "--error",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE,..[,robot=ID]",
+        help="a known error of a robot, or of all, e.g. robot=1,left_centre_us=1530; more than one is possible; "
+        "--error help lists the keys",
+    )
+    parser.add_argument(
+        "--errors", default=None, metavar="FILE", help="the same from a YAML file, as --print-errors writes it"
+    )
+    parser.add_argument(
+        "--print-errors", action="store_true", help="write down how the robots differ, and end"
+    )
+    parser.add_argument(
+        "--motors",
+        choices=("calibrated", "factory"),
+        default="calibrated",
+        help="servo centres in a robot's flash: the true ones, or 1500 (calibrated)",
+    )
     parser.add_argument("--quiet", action="store_true", help="say nothing but errors")
     return parser
 
@@ -119,6 +139,33 @@ def describe_faults() -> List[str]:
     return lines
 
 
+def describe_error_keys() -> List[str]:
+    """Return one line for each key of --error and --errors."""
+    from .robot_errors import KINDS as ERROR_KINDS
+
+    lines = ["KEY=VALUE,...[,robot=ID]; without robot it holds for all robots."]
+    for key, kind in ERROR_KINDS.items():
+        lines.append("  %-16s %s (%g..%g)" % (key, kind.meaning, kind.least, kind.most))
+    return lines
+
+
+def answer_question(options: argparse.Namespace) -> Optional[List[str]]:
+    """Return the lines that options ask for instead of a simulation, None if they ask for none.
+
+    Raises: OptionError for an error that cannot be set.
+    """
+    from .build import build_errors
+    from .robot_errors import describe_errors
+
+    if "help" in options.fault:
+        return describe_faults()
+    if "help" in options.error:
+        return describe_error_keys()
+    if options.print_errors:
+        return describe_errors(build_errors(options), options.first_id)
+    return None
+
+
 def report(text: str) -> None:
     """Write a line for people."""
     print("hero_sim: " + text, flush=True)
@@ -149,9 +196,6 @@ def find_missing() -> Optional[str]:
 def main(arguments: Optional[List[str]] = None) -> int:
     """Run the simulator; return the exit code."""
     options = build_parser().parse_args(arguments)
-    if "help" in options.fault:
-        print("\n".join(describe_faults()))
-        return 0
     # Loading takes a moment: Ctrl-C in it ends the program like any other, without a stack trace.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     missing = find_missing()
@@ -162,6 +206,10 @@ def main(arguments: Optional[List[str]] = None) -> int:
 
     try:
         check_options(options)
+        answer = answer_question(options)
+        if answer is not None:
+            print("\n".join(answer))
+            return 0
         simulator = build_simulator(options, (lambda text: None) if options.quiet else report)
     except SimulatorError as error:
         print("hero_sim: %s" % error, file=sys.stderr)

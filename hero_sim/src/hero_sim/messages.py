@@ -295,7 +295,9 @@ def decode_set_odom(payload: bytes) -> Tuple[float, float, float]:
 
 def decode_pid(payload: bytes) -> Tuple[float, ...]:
     """Return lkp lki lkd rkp rki rkd of a SetPID request. Raises: CommandError."""
-    return _unpack("<6f", payload, "SetPID")
+    gains = _unpack("<6f", payload, "SetPID")
+    _refuse_unusable(gains, "SetPID")
+    return gains
 
 
 def decode_ir_calibration(payload: bytes) -> Tuple[float, ...]:

@@ -1,201 +1,310 @@
-"""Commands of one robot -> what its motors are told, with the firmware's gates, limits and three watchdogs.
+"""Commands of one robot -> servo pulses, with the firmware's PIDs, gates, limits and three watchdogs.
 
 Pure: time enters in the robot's own milliseconds. Source: VelocityControl.ino, PositionControl.ino and
-MotorDriver.ino, as measured on the stock robot.
+MotorDriver.ino, by what they do, and measurements of the stock robot. The two controllers know nothing of each
+other, so two that are commanded at once write pulses in turn, as on the robot.
 """
 
-from typing import List, Optional, Tuple
+import math
+from typing import Callable, List, Optional, Sequence, Tuple
 
-from .kinematics import MAX_LINEAR_M_S, MAX_TURN_RAD_S, Pose, compose, invert, split_to_wheels
-from .world import MAX_WHEEL_M_S, POSITION_PID_LAG_S, VELOCITY_PID_LAG_S, World
+from .body import Body
+from .kinematics import MAX_LINEAR_M_S, MAX_TURN_RAD_S, TICK_M, split_to_wheels
+from .motor_pid import POSITION_GAINS, VELOCITY_GAINS, Gains, MotorPid
+from .wheel_odometry import WheelOdometry
 
 COMMAND_GAP_MS = 50
 """A Twist that comes earlier after the last accepted one is dropped, a stop too (VelocityControl.ino:159)."""
 
 CONTROL_MS = 21
-"""Between two runs of the velocity PID, 47.6 Hz (VelocityControl.ino:112)."""
+"""Between two runs of a controller, 47.6 Hz (VelocityControl.ino:112)."""
 
-VELOCITY = "velocity"
-POSITION = "position"
-MOTOR = "motor"
-TUNING = "tuning"
-
-HOLD_MS = {VELOCITY: 1000, POSITION: 3000}
+VELOCITY_HOLD_MS = 1000
+POSITION_HOLD_MS = 3000
 """So long after a command its PID runs (VelocityControl.ino:110, PositionControl.ino:105)."""
 
 MOTOR_HOLD_MS = 1000
 """So long after the last write the motors keep their pulse (MotorDriver.ino:111)."""
 
-HALT_US = 1500
+VELOCITY_LIMIT_US = 250.0
+POSITION_LIMIT_US = 130.0
+"""How far from the centre each PID goes."""
+
 PULSE_RANGE_US = (1000, 2000)
 """Servo pulses."""
 
-FULL_PULSE_US = 200.0
-DEAD_ZONE_US = 8.0
-"""Pulse beyond the centre at which a servo runs at full speed, and below which it stands (assumptions, after
-continuous-rotation servos of this size)."""
-LAG_S = {VELOCITY: VELOCITY_PID_LAG_S, POSITION: POSITION_PID_LAG_S}
-"""How fast each PID leads the servos to its target."""
+_WHEEL_SIGNS = (-1, 1)
+"""The servos are mounted as mirror images: a pulse below the centre drives the left wheel forward."""
 
-_TUNING_TURN_M_S = 0.08
+_TUNING_START_US = 130
+_TUNING_STEP_US = 80
+_TUNING_BAND_TICKS = 1
 
 
-class Body:
-    """The hardware of one robot, as its firmware sees it: a row of the world.
+class MotorDriver:
+    """The servos' pulses and the watchdog over them.
 
     Attributes:
-        odom_origin: where the robot's odom frame truly lies in the world, since its pose was last set. A
-        restart
-            changes nothing: the driver goes on where it was.
+        centres_us: what the robot takes for the pulses at which its wheels stand, left and right.
+        attached: whether pulses go out.
+        halt_at_ms: when the watchdog ends them.
     """
 
-    def __init__(self, world: World, index: int) -> None:
-        """Be the robot at index of world."""
-        self.world = world
-        self.index = index
-        self.odom_origin = self.true_pose
+    def __init__(self, body: Body, centres_us: Sequence[float]) -> None:
+        """Begin without pulses; centres that no servo has are taken for 1500, as of an erased flash."""
+        self._body = body
+        self.centres_us = [
+            int(centre_us) if PULSE_RANGE_US[0] < centre_us < PULSE_RANGE_US[1] else 1500
+            for centre_us in centres_us
+        ]
+        self.attached = False
+        self.halt_at_ms = 0
 
-    @property
-    def true_pose(self) -> Pose:
-        """Where the robot is in the world."""
-        x_m, y_m, theta_rad = self.world.poses[self.index].tolist()
-        return (x_m, y_m, theta_rad)
+    def write(self, now_ms: int, left_us: int, right_us: int) -> None:
+        """Put out pulses, limited to 1000..2000 us."""
+        self.attached = True
+        self.halt_at_ms = now_ms + MOTOR_HOLD_MS + 1
+        low_us, high_us = PULSE_RANGE_US
+        self._body.write_pulses(min(max(left_us, low_us), high_us), min(max(right_us, low_us), high_us))
 
-    def carry(self, before: Pose) -> None:
-        """Be told that somebody carried the robot here from before: its odom frame came with it."""
-        self.odom_origin = compose(self.true_pose, compose(invert(before), self.odom_origin))
-
-    def read_wheels(self, time_ms: int) -> List[float]:
-        """Return the travel (m) of the left and right wheel at time_ms of the world."""
-        return self.world.read_wheels(self.index, time_ms)
-
-    def chase(self, wheels_m_s: Tuple[float, float], lag_s: float) -> None:
-        """Let a PID with this lag lead the wheels to these speeds."""
-        self.world.targets_m_s[self.index] = wheels_m_s
-        self.world.pid_lag_s[self.index] = lag_s
-
-    def resume(self, lag_s: float) -> None:
-        """Let the PID run on towards the last target."""
-        self.world.pid_lag_s[self.index] = lag_s
-
-    def hold(self) -> None:
-        """Keep the servos' last pulses: no PID runs any more."""
-        self.world.pid_lag_s[self.index] = 0.0
-
-    def push(self, wheels_m_s: Tuple[float, float]) -> None:
-        """Give the servos pulses that stand for these speeds, without a PID."""
-        self.world.pid_lag_s[self.index] = 0.0
-        self.world.commands_m_s[self.index] = wheels_m_s
+    def drive(self, now_ms: int, outputs_us: Sequence[int]) -> None:
+        """Put out what controllers want beyond the centres, forward positive."""
+        left_us, right_us = (
+            centre_us + sign * output_us
+            for centre_us, sign, output_us in zip(self.centres_us, _WHEEL_SIGNS, outputs_us)
+        )
+        self.write(now_ms, left_us, right_us)
 
     def halt(self) -> None:
         """Take the pulses away."""
-        self.push((0.0, 0.0))
-        self.world.targets_m_s[self.index] = 0.0
+        self.attached = False
+        self._body.release()
+
+
+class _Controller:
+    """What velocity and position controller have in common.
+
+    Attributes:
+        gains: of the left and right wheel.
+        tuning: whether it tunes itself.
+        due_ms: when run() has something to do, None while nobody commands.
+        dropped: commands that came too early.
+    """
+
+    def __init__(
+        self, motors: MotorDriver, default: Gains, stored: Sequence[float], limit_us: float, hold_ms: int
+    ) -> None:
+        """Begin without a command; stored are six gains of the flash, limit_us holds for each output."""
+        self._motors = motors
+        self._hold_ms = hold_ms
+        # A proportional gain that is not above zero is one of an erased flash.
+        self.pids = [
+            MotorPid(Gains(*gains) if gains[0] > 0.0 else default, limit_us)
+            for gains in (stored[:3], stored[3:])
+        ]
+        self.targets = [0.0, 0.0]
+        self.tuning = False
+        self.dropped = 0
+        self.commanded_ms: Optional[int] = None
+        self._ran_ms = -CONTROL_MS
+
+    @property
+    def due_ms(self) -> Optional[int]:
+        if self.commanded_ms is None:
+            return None
+        return max(self._ran_ms + CONTROL_MS, self.commanded_ms)
+
+    def set_gains(self, gains: Sequence[float]) -> None:
+        """Take lkp lki lkd rkp rki rkd."""
+        for pid, three in zip(self.pids, (gains[:3], gains[3:])):
+            pid.set_gains(Gains(*three))
+
+    def is_too_early(self, now_ms: int) -> bool:
+        """Return whether a command at now_ms has to be dropped, and count it."""
+        # While it tunes itself, it keeps its watchdog fresh; a Twist ends that all the same, as measured.
+        early = (
+            not self.tuning and self.commanded_ms is not None and now_ms - self.commanded_ms < COMMAND_GAP_MS
+        )
+        self.dropped += early
+        return early
+
+    def command(self, now_ms: int, targets: Sequence[float]) -> None:
+        """Take targets for the wheels; a wheel that has to turn round starts its PID anew."""
+        for pid, target, last in zip(self.pids, targets, self.targets):
+            if target * last < 0.0:
+                pid.reset()
+        self.targets = list(targets)
+        self.commanded_ms = now_ms
+        self.tuning = False
+
+    def stop(self) -> None:
+        """Forget the command; motors are halted by the caller."""
+        for pid in self.pids:
+            pid.reset()
+        self.commanded_ms = None
+        self.tuning = False
+
+    def is_due(self, now_ms: int) -> bool:
+        """Return whether the controller runs at now_ms; its watchdog ends that for good."""
+        if self.commanded_ms is None:
+            return False
+        if now_ms - self.commanded_ms >= self._hold_ms:
+            self.commanded_ms = None
+            return False
+        if now_ms - self._ran_ms < CONTROL_MS:
+            return False
+        self._ran_ms = now_ms
+        return True
+
+    def run_pids(self, now_ms: int, measured: Sequence[float]) -> None:
+        """Write what the PIDs make of the measured wheels."""
+        for pid, target, value in zip(self.pids, self.targets, measured):
+            pid.run(now_ms, target, value)
+        self._motors.drive(now_ms, [pid.output_us for pid in self.pids])
 
 
 class MotorControl:
     """The controllers and the motor driver of one robot.
 
     Attributes:
-        mode: who commands the motors, None for nobody.
-        due_ms: when run() has something to do (robot's time), None while nobody commands.
-        centres_us: middle of each servo's dead zone.
-        dropped: commands that came too early.
+        motors: what puts out the pulses.
+        velocity, position: the controllers, for their gains.
+        due_ms: when run() has something to do, None while nobody commands.
     """
 
-    def __init__(self, body: Body) -> None:
-        """Begin halted."""
-        self.mode: Optional[str] = None
-        self.due_ms: Optional[int] = None
-        self.centres_us: Tuple[float, float] = (float(HALT_US), float(HALT_US))
-        self.dropped = 0
+    def __init__(
+        self,
+        body: Body,
+        odometry: WheelOdometry,
+        centres_us: Sequence[float],
+        velocity_gains: Sequence[float],
+        position_gains: Sequence[float],
+    ) -> None:
+        """Begin halted, with what the flash holds; six gains each, left and right."""
         self._body = body
-        self._velocity_at_ms = -COMMAND_GAP_MS
-        self._position_at_ms = -COMMAND_GAP_MS
-        self._pid_until_ms = 0
-        self._off_at_ms = 0
+        self._odometry = odometry
+        self.motors = MotorDriver(body, centres_us)
+        self.velocity = _Controller(
+            self.motors, VELOCITY_GAINS, velocity_gains, VELOCITY_LIMIT_US, VELOCITY_HOLD_MS
+        )
+        self.position = _Controller(
+            self.motors, POSITION_GAINS, position_gains, POSITION_LIMIT_US, POSITION_HOLD_MS
+        )
+        self._start_ticks = [0, 0]
+        self._relay = [1, 1]
+
+    @property
+    def due_ms(self) -> Optional[int]:
+        """When run() has something to do."""
+        wanted_ms = [self.velocity.due_ms, self.position.due_ms]
+        if self.motors.attached:
+            wanted_ms.append(self.motors.halt_at_ms)
+        return min((due_ms for due_ms in wanted_ms if due_ms is not None), default=None)
 
     def receive_velocity(self, now_ms: int, linear_m_s: float, turn_rad_s: float) -> bool:
         """Take a Twist for the velocity controller; return whether it was a stop that was taken."""
-        if now_ms - self._velocity_at_ms < COMMAND_GAP_MS:
-            self.dropped += 1
+        if self.velocity.is_too_early(now_ms):
             return False
-        self._velocity_at_ms = now_ms
-        return self._take_twist(VELOCITY, now_ms, linear_m_s, turn_rad_s)
-
-    def receive_position(self, now_ms: int, linear_m_s: float, turn_rad_s: float) -> bool:
-        """Take a Twist for the position controller; return whether it was a stop that was taken."""
-        if now_ms - self._position_at_ms < COMMAND_GAP_MS:
-            self.dropped += 1
-            return False
-        self._position_at_ms = now_ms
-        return self._take_twist(POSITION, now_ms, linear_m_s, turn_rad_s)
-
-    def _take_twist(self, mode: str, now_ms: int, linear_m_s: float, turn_rad_s: float) -> bool:
-        # A comparison with NaN is false, so NaN passes constrain() and ends in both terms below as in C.
-        linear_m_s = min(max(linear_m_s, -MAX_LINEAR_M_S), MAX_LINEAR_M_S)
-        turn_rad_s = min(max(turn_rad_s, -MAX_TURN_RAD_S), MAX_TURN_RAD_S)
-        if linear_m_s == 0.0 and turn_rad_s == 0.0:
-            self.halt()
+        wheels_m_s = _limit_to_wheels(linear_m_s, turn_rad_s)
+        if wheels_m_s is None:
+            self.velocity.stop()
+            self.motors.halt()
             return True
-        if self.mode != mode:
-            self.due_ms = now_ms + CONTROL_MS
-        self.mode = mode
-        self._pid_until_ms = now_ms + HOLD_MS[mode]
-        self._off_at_ms = self._pid_until_ms + MOTOR_HOLD_MS
-        self._body.chase(split_to_wheels(linear_m_s, turn_rad_s), LAG_S[mode])
-        self.due_ms = min(self.due_ms or now_ms + CONTROL_MS, now_ms + CONTROL_MS)
+        self.velocity.command(now_ms, wheels_m_s)
+        return False
+
+    def receive_position(self, now_ms: int, world_ms: int, linear_m_s: float, turn_rad_s: float) -> bool:
+        """Take a Twist for the position controller, which goes as far as that speed reaches in a second.
+
+        Return whether it was a stop that was taken; world_ms is the world's time of now_ms.
+        """
+        if self.position.is_too_early(now_ms):
+            return False
+        wheels_m_s = _limit_to_wheels(linear_m_s, turn_rad_s)
+        self._start_ticks = self._count_ticks(world_ms)
+        if wheels_m_s is None:
+            self.position.stop()
+            self.motors.halt()
+            return True
+        self.position.command(now_ms, [wheel_m_s / TICK_M for wheel_m_s in wheels_m_s])
         return False
 
     def receive_pulses(self, now_ms: int, left_us: int, right_us: int) -> None:
-        """Take a Motor command: servo pulses, limited to 1000..2000 us; more than the centre is forward."""
-        self.mode = MOTOR
-        self._off_at_ms = now_ms + MOTOR_HOLD_MS
-        self.due_ms = self._off_at_ms + 1
-        left_m_s, right_m_s = (
-            _convert_pulse(pulse_us, centre_us)
-            for pulse_us, centre_us in zip((left_us, right_us), self.centres_us)
-        )
-        self._body.push((left_m_s, right_m_s))
+        """Take a Motor command; a controller that is commanded too overwrites it."""
+        self.motors.write(now_ms, left_us, right_us)
 
-    def start_tuning(self, now_ms: int) -> None:
-        """Begin the PID's self-tuning: the robot turns on the spot until a Twist comes."""
-        self.mode = TUNING
-        self.due_ms = now_ms + CONTROL_MS
-        self._body.push((-_TUNING_TURN_M_S, _TUNING_TURN_M_S))
+    def start_tuning(self, now_ms: int, world_ms: int, of_velocity: bool) -> None:
+        """Begin a controller's self-tuning, which goes on until it gets a Twist."""
+        controller = self.velocity if of_velocity else self.position
+        controller.tuning = True
+        controller.commanded_ms = now_ms
+        self._start_ticks = self._count_ticks(world_ms)
+        self._relay = [1, 1]
+        start_us = _TUNING_START_US if of_velocity else 0
+        self.motors.drive(now_ms, (start_us, start_us))
 
-    def run(self, now_ms: int) -> bool:
-        """Do what is due; return whether the velocity controller read the encoders."""
-        if self.mode in (VELOCITY, POSITION):
-            if now_ms <= self._pid_until_ms:
-                self.due_ms = now_ms + CONTROL_MS
-                self._body.resume(LAG_S[self.mode])
-                return self.mode == VELOCITY
-            if now_ms <= self._off_at_ms:
-                self._body.hold()
-                self.due_ms = self._off_at_ms + 1
-                return False
-        if self.mode == TUNING:
-            self.due_ms = now_ms + CONTROL_MS
-            return True
-        self.halt()
-        return False
+    def run(self, now_ms: int, world_ms: int, read_encoders: Callable[[int, int], None]) -> Optional[str]:
+        """Do what is due; return what a self-tuning says of it.
+
+        The velocity controller reads the encoders anew with read_encoders(now_ms, world_ms), and so takes a
+        reading away from the odometry.
+        """
+        line = None
+        if self.position.is_due(now_ms):
+            way_ticks = self._count_way(world_ms)
+            if self.position.tuning:
+                line = self._tune_position(now_ms, way_ticks)
+            else:
+                self.position.run_pids(now_ms, way_ticks)
+        if self.velocity.is_due(now_ms):
+            read_encoders(now_ms, world_ms)
+            if self.velocity.tuning:
+                line = self._tune_velocity(now_ms)
+            else:
+                self.velocity.run_pids(now_ms, self._odometry.filtered_m_s)
+        if self.motors.attached and now_ms >= self.motors.halt_at_ms:
+            self.motors.halt()
+        return line
+
+    def _tune_velocity(self, now_ms: int) -> str:
+        # Its relay would switch at 1 m/s, which no wheel reaches: it stays where it starts.
+        outputs_us = (_TUNING_STEP_US - _TUNING_START_US, _TUNING_START_US + _TUNING_STEP_US)
+        self.velocity.commanded_ms = now_ms
+        self.motors.drive(now_ms, outputs_us)
+        return _describe_tuning(self.velocity.targets, self._odometry.filtered_m_s, outputs_us)
+
+    def _tune_position(self, now_ms: int, way_ticks: Sequence[int]) -> str:
+        """Rock each wheel about where it stands."""
+        self.position.commanded_ms = now_ms
+        for wheel, ticks in enumerate(way_ticks):
+            if self._relay[wheel] * ticks > _TUNING_BAND_TICKS:
+                self._relay[wheel] = -self._relay[wheel]
+        outputs_us = [_TUNING_STEP_US * relay for relay in self._relay]
+        self.motors.drive(now_ms, outputs_us)
+        return _describe_tuning(self.position.targets, way_ticks, outputs_us)
+
+    def _count_ticks(self, world_ms: int) -> List[int]:
+        return self._odometry.count_ticks(*self._body.read_wheels(world_ms))
+
+    def _count_way(self, world_ms: int) -> List[int]:
+        return [now - start for now, start in zip(self._count_ticks(world_ms), self._start_ticks)]
 
     def halt(self) -> None:
-        """Switch the motors off."""
-        self.mode = None
-        self.due_ms = None
-        self._body.halt()
-
-    def freeze(self) -> None:
-        """Stand for a loop() that no longer calls the controllers: pulses stay, and so no watchdog works."""
-        self._body.hold()
+        """Switch the motors off and forget all commands."""
+        self.velocity.stop()
+        self.position.stop()
+        self.motors.halt()
 
 
-def _convert_pulse(pulse_us: int, centre_us: float) -> float:
-    """Return the wheel speed (m/s) that a servo pulse stands for."""
-    pulse_us = min(max(pulse_us, PULSE_RANGE_US[0]), PULSE_RANGE_US[1])
-    beyond_us = pulse_us - centre_us
-    if abs(beyond_us) <= DEAD_ZONE_US:
-        return 0.0
-    return min(max(beyond_us / FULL_PULSE_US, -1.0), 1.0) * MAX_WHEEL_M_S
+def _describe_tuning(targets: Sequence[float], measured: Sequence[float], outputs_us: Sequence[int]) -> str:
+    values = (*targets, *measured, *outputs_us)
+    return "Tunning Motor Set: [%f,%f], [%f,%f]->[%d,%d]" % values
+
+
+def _limit_to_wheels(linear_m_s: float, turn_rad_s: float) -> Optional[Tuple[float, float]]:
+    """Return the wheels' speeds (m/s) for a Twist within the firmware's limits, None for a stop."""
+    linear_m_s = math.copysign(min(abs(linear_m_s), MAX_LINEAR_M_S), linear_m_s)
+    turn_rad_s = math.copysign(min(abs(turn_rad_s), MAX_TURN_RAD_S), turn_rad_s)
+    if linear_m_s == 0.0 and turn_rad_s == 0.0:
+        return None
+    return split_to_wheels(linear_m_s, turn_rad_s)

@@ -100,14 +100,18 @@ def main() -> None:
     parser = command_line.build_parser()
     parser.add_argument("--clock", action="store_true", help="publish /clock: nodes with use_sim_time follow")
     options = parser.parse_args(arguments)
-    if "help" in options.fault:
-        print("\n".join(command_line.describe_faults()))
+    try:
+        command_line.check_options(options)
+        lines = command_line.answer_question(options)
+    except SimulatorError as error:
+        sys.exit("hero_sim: %s" % error)
+    if lines is not None:
+        print("\n".join(lines))
         return
     # Until the master answers, init_node() waits in vain for as long as it takes: let a signal end that.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     rospy.init_node("hero_sim", disable_signals=True)
     try:
-        command_line.check_options(options)
         simulator = build_simulator(options, (lambda text: None) if options.quiet else rospy.loginfo)
     except SimulatorError as error:
         rospy.logfatal("hero_sim: %s", error)

@@ -21,6 +21,12 @@ BETA_COUNTS = -0.93
 """signal = alpha * cos(angle of incidence) / distance^2 + beta, fitted to the published table (3 to 18
 cm)."""
 
+FIT_END_M = 0.18
+TABLE_END_M = 0.20
+TABLE_END_EXCESS_COUNTS = 12.0 - ALPHA_COUNTS_M2 / TABLE_END_M**2
+"""The fit ends at 18 cm: the published table still has 12 counts at 20 cm, where the fit would give 9.6. Between
+the two the offset is led from beta to what the table has, and beyond the table it fades like the light."""
+
 SATURATION_COUNTS = 950.0
 """The signal of anything nearer than about 2 cm."""
 
@@ -101,11 +107,12 @@ def measure_signals(
     segments_m: np.ndarray,
     circles_m: np.ndarray,
     alpha_counts_m2: np.ndarray,
+    beta_counts: np.ndarray,
 ) -> np.ndarray:
     """Return the noiseless signal (counts) of the eight sensors of the robots which, shape (R, 8).
 
     poses (N, 3) of all robots, who see each other as round bodies; which (R,) indices into poses;
-    alpha_counts_m2 (R, 8) of each sensor.
+    alpha_counts_m2 (R, 8) of each sensor, beta_counts (R, 1) of each robot.
     """
     seen = poses[which]
     rays = BEAM_ANGLES_RAD[:, None] + _CONE_RAD
@@ -118,13 +125,21 @@ def measure_signals(
     cosine = np.where(nearer, round_cosine, wall_cosine)
     bright = cosine / np.maximum(distance_m, 1e-3) ** 2
     bright = (bright.reshape(len(which), BEAMS, len(_CONE_RAD)) * _CONE_WEIGHT).max(axis=-1)
-    return np.minimum(alpha_counts_m2 * bright + BETA_COUNTS, SATURATION_COUNTS)
+    return np.minimum(alpha_counts_m2 * bright + _offset(bright, beta_counts), SATURATION_COUNTS)
 
 
-def calibrate(alpha_counts_m2: np.ndarray) -> np.ndarray:
+def _offset(bright: np.ndarray, beta_counts: np.ndarray) -> np.ndarray:
+    """Return what the table has beside alpha * bright (counts); bright is cosine / distance^2."""
+    distance_m = 1.0 / np.sqrt(np.maximum(bright, 1e-12))
+    share = np.clip((distance_m - FIT_END_M) / (TABLE_END_M - FIT_END_M), 0.0, 1.0)
+    beyond = np.minimum(bright * TABLE_END_M**2, 1.0) * TABLE_END_EXCESS_COUNTS
+    return beta_counts + share * (beyond - beta_counts)
+
+
+def calibrate(alpha_counts_m2: np.ndarray, beta_counts: np.ndarray) -> np.ndarray:
     """Return the calibration that a robot with these sensors gets from a wall at 10 cm (counts m^2)."""
     square_m2 = CALIBRATION_DISTANCE_M**2
-    return (alpha_counts_m2 / square_m2 + BETA_COUNTS) * square_m2
+    return (alpha_counts_m2 / square_m2 + beta_counts) * square_m2
 
 
 def convert_to_ranges(counts: np.ndarray, calibration_counts_m2: np.ndarray) -> np.ndarray:

@@ -9,10 +9,10 @@ from typing import List, Tuple
 import numpy as np
 
 from . import messages
+from .body import Body
 from .flash import Flash
 from .imu_hat import ImuHat
 from .kinematics import compose, invert
-from .motor_control import Body
 from .range_sensors import convert_to_ranges
 from .wheel_odometry import WheelOdometry
 

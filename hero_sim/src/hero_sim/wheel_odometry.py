@@ -38,6 +38,7 @@ class WheelOdometry:
     Attributes:
         pose: x m, y m, theta rad, as the robot believes.
         ticks: counts of the left and right wheel since the last set_pose(), as last read.
+        filtered_m_s: speeds of the left and right wheel, behind the filter, as last read.
     """
 
     def __init__(self, exact: bool = False, left_m: float = 0.0, right_m: float = 0.0) -> None:
@@ -54,7 +55,7 @@ class WheelOdometry:
         self._timestep_s = 0.0
         self._speeds_m_s = (0.0, 0.0)
         self._filters = (_SpeedFilter(), _SpeedFilter())
-        self._filtered_m_s = (0.0, 0.0)
+        self.filtered_m_s = (0.0, 0.0)
 
     def read_encoders(self, now_us: int, left_m: float, right_m: float) -> None:
         """Take over the wheels' travel (m) at now_us of the robot's own clock; overwrites the last
@@ -71,7 +72,14 @@ class WheelOdometry:
             left_m_s = self._diff_ticks[0] * TICK_M / self._timestep_s
             right_m_s = self._diff_ticks[1] * TICK_M / self._timestep_s
             self._speeds_m_s = (left_m_s, right_m_s)
-            self._filtered_m_s = (self._filters[0].update(left_m_s), self._filters[1].update(right_m_s))
+            self.filtered_m_s = (self._filters[0].update(left_m_s), self._filters[1].update(right_m_s))
+
+    def count_ticks(self, left_m: float, right_m: float) -> List[int]:
+        """Return what the counters show at these travels (m), without reading the encoders for a message."""
+        return [
+            math.floor(left_m / TICK_M) - self._base_ticks[0],
+            math.floor(right_m / TICK_M) - self._base_ticks[1],
+        ]
 
     def integrate(self) -> None:
         """Add the last interval to the pose."""
@@ -106,7 +114,7 @@ class WheelOdometry:
     @property
     def twist(self) -> Tuple[float, float]:
         """Filtered speed (m/s) and turn rate (rad/s)."""
-        left_m_s, right_m_s = self._filtered_m_s
+        left_m_s, right_m_s = self.filtered_m_s
         return (left_m_s + right_m_s) / 2.0, (right_m_s - left_m_s) / WHEEL_SEPARATION_M
 
     def list_encoder_values(self) -> List[float]:
@@ -121,5 +129,5 @@ class WheelOdometry:
             right * TICK_M,
             self._timestep_s,
             *self._speeds_m_s,
-            *self._filtered_m_s,
+            *self.filtered_m_s,
         ]

@@ -2,9 +2,7 @@
 
 Pure: numpy only, no clock, no socket. Everything is an array over robots. The firmware sets the motor
 commands and reads the wheels; nothing here knows about messages.
-Source: continuous-rotation servos behind the firmware's velocity PID, as two first-order lags. The lags are
-fitted to the stock robot: one velocity command of 0.1 m/s drives 0.13 to 0.17 m until the watchdogs end it,
-and a stop takes about 0.15 s.
+What a pulse makes of a wheel, and how robots differ, is in robot_errors.
 """
 
 import math
@@ -15,19 +13,10 @@ import numpy as np
 from . import range_sensors
 from .arena import Arena, distance_to_segments
 from .kinematics import BODY_RADIUS_M, join_wheels, move_along_arc
+from .robot_errors import MAX_WHEEL_M_S, SERVO_GAIN_M_S_US, RobotErrors
 
 STEP_MS = 10
 """Length of a physics step; the fastest robot moves 3 mm in it, far less than its radius."""
-
-MOTOR_LAG_S = 0.05
-"""Time constant of a servo with its wheel."""
-
-VELOCITY_PID_LAG_S = 0.5
-POSITION_PID_LAG_S = 0.12
-"""Time constants with which the firmware's controllers lead the servo's command to the target."""
-
-MAX_WHEEL_M_S = 0.28
-"""What a servo reaches without load; a little over the 0.252 m/s that a turn of 8 rad/s needs."""
 
 _CONTACT_PASSES = 4
 _TOUCH_M = 1e-9
@@ -39,35 +28,24 @@ class World:
     Attributes:
         time_ms: end of the last step.
         poses: true poses (N, 3): x m, y m, theta rad, frame world.
-        targets_m_s: wheel speeds that the controllers aim at (N, 2), left and right.
-        pid_lag_s: time constant of the running controller (N,), 0 where none runs and the command is held.
-        commands_m_s: what the servos are told (N, 2), as the wheel speed it stands for.
+        errors: how each robot differs from the drawing.
+        commands_m_s: what the servos are told (N, 2), as the wheel speed it stands for, left and right.
         speeds_m_s, travels_m: of the wheels (N, 2).
     """
 
     def __init__(
-        self, arena: Arena, poses: np.ndarray, rng: np.random.RandomState, errors: float = 1.0
+        self, arena: Arena, poses: np.ndarray, rng: np.random.RandomState, errors: RobotErrors
     ) -> None:
-        """Place robots at poses; errors scales the seeded differences between robots, 0 makes all alike."""
+        """Place robots at poses; slip, ripple and the noise of sensors are drawn from rng."""
         count = len(poses)
         self.arena = arena
         self.time_ms = 0
         self.poses = np.array(poses, dtype=float).reshape(count, 3)
         self.start_poses = self.poses.copy()
-        self.targets_m_s = np.zeros((count, 2))
-        self.pid_lag_s = np.zeros(count)
         self.commands_m_s = np.zeros((count, 2))
         self.speeds_m_s = np.zeros((count, 2))
         self.travels_m = np.zeros((count, 2))
-        # Wheel diameters differ by a few tenths of a per cent, so a straight command bends a little.
-        self.roll_scale = 1.0 + errors * rng.normal(0.0, 0.003, (count, 2))
-        self.slip_scale = errors * 0.02
-        # Servos of one kind differ by some per cent; the PIDs make up for it, pulses of cmd_motor show it.
-        self.servo_gain = 1.0 + errors * rng.normal(0.0, 0.03, (count, 2))
-        self.ripple_m_s = errors * 0.003
-        self.alpha_counts_m2 = range_sensors.ALPHA_COUNTS_M2 * (
-            1.0 + errors * rng.normal(0.0, 0.02, (count, 8))
-        )
+        self.errors = errors
         self._rng = rng
         self.present = np.ones(count, dtype=bool)
         self.wheel_rows: List[List[float]] = []
@@ -83,21 +61,29 @@ class World:
         ahead_s = (time_ms - self.time_ms) / 1000.0
         return [left_m + left_m_s * ahead_s, right_m + right_m_s * ahead_s]
 
+    def write_pulses(self, index: int, left_us: float, right_us: float) -> None:
+        """Give the servos of a robot pulses; below its centre the left wheel rolls forward."""
+        centre_us = self.errors.servo_centre_us[index].tolist()
+        dead_zone_us = float(self.errors.dead_zone_us[index, 0])
+        gains = self.errors.servo_gain[index].tolist()
+        self.commands_m_s[index] = [
+            _convert_pulse(beyond_us, dead_zone_us, gain)
+            for beyond_us, gain in zip((centre_us[0] - left_us, right_us - centre_us[1]), gains)
+        ]
+
+    def release(self, index: int) -> None:
+        """Take the pulses of a robot away."""
+        self.commands_m_s[index] = 0.0
+
     def step(self) -> None:
         """Move everything on by STEP_MS."""
         step_s = STEP_MS / 1000.0
-        running = self.pid_lag_s > 0.0
-        gain = np.where(running, step_s / np.where(running, self.pid_lag_s, 1.0), 0.0)[:, None]
-        self.commands_m_s += gain * (self.targets_m_s - self.speeds_m_s)
-        np.clip(self.commands_m_s, -MAX_WHEEL_M_S, MAX_WHEEL_M_S, out=self.commands_m_s)
         # Travel is taken with the speed of the step's start, so that reads within the step meet its end.
         rolled_m = self.speeds_m_s * step_s
         self.travels_m += rolled_m
-        reached_m_s = self.commands_m_s * self.servo_gain
-        if self.ripple_m_s:
-            running_m_s = self._rng.normal(0.0, self.ripple_m_s, reached_m_s.shape)
-            reached_m_s = np.where(self.commands_m_s == 0.0, 0.0, reached_m_s + running_m_s)
-        self.speeds_m_s += (reached_m_s - self.speeds_m_s) * -math.expm1(-step_s / MOTOR_LAG_S)
+        ripple_m_s = self._rng.standard_normal(self.speeds_m_s.shape) * self.errors.ripple_m_s
+        reached_m_s = np.where(self.commands_m_s == 0.0, 0.0, self.commands_m_s + ripple_m_s)
+        self.speeds_m_s += (reached_m_s - self.speeds_m_s) * -np.expm1(-step_s / self.errors.servo_lag_s)
         self.speeds_m_s[np.abs(self.speeds_m_s) < 1e-6] = 0.0
         self.time_ms += STEP_MS
         if rolled_m.any():
@@ -105,9 +91,8 @@ class World:
         self._publish_rows()
 
     def _move_bodies(self, rolled_m: np.ndarray) -> None:
-        ground_m = rolled_m * self.roll_scale
-        if self.slip_scale:
-            ground_m = ground_m * (1.0 - np.abs(self._rng.normal(0.0, self.slip_scale, ground_m.shape)))
+        slipped = np.abs(self._rng.standard_normal(rolled_m.shape)) * self.errors.slip
+        ground_m = rolled_m * self.errors.wheel_scale * (1.0 - slipped)
         before = self.poses[:, :2].copy()
         moved = move_along_arc(
             self.poses[:, 0], self.poses[:, 1], self.poses[:, 2], ground_m[:, 0], ground_m[:, 1]
@@ -194,7 +179,12 @@ class World:
         """Return one noisy reading (whole counts, 0..1023) of the eight sensors of the robots which, (R,
         8)."""
         signals = range_sensors.measure_signals(
-            self.poses, which, self.arena.segments_m, self.arena.circles_m, self.alpha_counts_m2[which]
+            self.poses,
+            which,
+            self.arena.segments_m,
+            self.arena.circles_m,
+            self.errors.alpha_counts_m2[which],
+            self.errors.beta_counts[which],
         )
         noisy = signals + self._rng.normal(0.0, range_sensors.NOISE_COUNTS, signals.shape)
         # Adding zero turns -0.0 into 0.0, whose inverse is the right infinity.
@@ -203,6 +193,12 @@ class World:
     def reset(self) -> None:
         """Put every robot back to its start, standing."""
         self.poses[:] = self.start_poses
-        for motion in (self.targets_m_s, self.pid_lag_s, self.commands_m_s, self.speeds_m_s):
+        for motion in (self.commands_m_s, self.speeds_m_s):
             motion[:] = 0.0
         self._publish_rows()
+
+
+def _convert_pulse(beyond_us: float, dead_zone_us: float, gain: float) -> float:
+    """Return the wheel speed (m/s) of a servo whose pulse lies so far beyond its centre, forward positive."""
+    driven_us = max(abs(beyond_us) - dead_zone_us, 0.0)
+    return math.copysign(min(driven_us * SERVO_GAIN_M_S_US * gain, MAX_WHEEL_M_S), beyond_us)

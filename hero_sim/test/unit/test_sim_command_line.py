@@ -17,6 +17,7 @@ from hero_driver.rosserial import frames, payloads
 from hero_sim import declarations as ids
 from hero_sim import main
 from hero_sim.faults import KINDS
+from hero_sim.robot_errors import KINDS as ERROR_KINDS
 
 LIMIT_S = 20.0
 ROOT = os.path.abspath(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", ".."))
@@ -376,6 +377,8 @@ def test_the_readme_lists_every_option_and_every_fault():
     options = [name for action in main.build_parser()._actions for name in action.option_strings]
     assert [name for name in options if "`%s" % name not in text and name not in ("-h", "--help")] == []
     assert [kind for kind in KINDS if "`%s`" % kind not in text] == []
+    keys = [key for key in ERROR_KINDS if not re.match("alpha[1-6]", key)]
+    assert [key for key in keys if "`%s`" % key not in text] == []
 
 
 def test_the_documented_command_copies_all_that_is_needed(tmp_path):

@@ -6,11 +6,13 @@ import pytest
 from hero_sim import range_sensors
 from hero_sim.arena import build_default
 from hero_sim.kinematics import BODY_RADIUS_M
+from hero_sim.robot_errors import draw_errors
 from hero_sim.world import World
 
 NO_WALLS = np.empty((0, 4))
 NO_CIRCLES = np.empty((0, 3))
 ALPHA = np.full((1, 8), range_sensors.ALPHA_COUNTS_M2)
+BETA = np.full((1, 1), range_sensors.BETA_COUNTS)
 
 
 def wall_at(distance_m):
@@ -21,8 +23,7 @@ def wall_at(distance_m):
 
 def measure(segments, circles=NO_CIRCLES, poses=((0.0, 0.0, 0.0),)):
     poses = np.array(poses, dtype=float)
-    alpha = np.repeat(ALPHA, 1, axis=0)
-    return range_sensors.measure_signals(poses, np.array([0]), segments, circles, alpha)[0]
+    return range_sensors.measure_signals(poses, np.array([0]), segments, circles, ALPHA, BETA)[0]
 
 
 @pytest.mark.parametrize("distance_m", [0.03, 0.05, 0.08, 0.10, 0.15, 0.18])
@@ -47,18 +48,22 @@ def test_a_slanted_wall_returns_less_light():
     assert cosine[0, 0] == pytest.approx(0.5)
 
 
-@pytest.mark.parametrize("distance_m", np.arange(0.03, 0.181, 0.01))
-def test_ranges_err_less_than_half_a_centimetre_to_18_cm(distance_m):
-    calibration = range_sensors.calibrate(ALPHA[0])
+def test_the_signal_at_20_cm_is_that_of_the_published_table():
+    assert measure(wall_at(0.20))[4] == pytest.approx(12.0)
+
+
+@pytest.mark.parametrize("distance_m", np.arange(0.03, 0.191, 0.005))
+def test_ranges_err_less_than_half_a_centimetre_to_19_cm(distance_m):
+    calibration = range_sensors.calibrate(ALPHA[0], BETA[0])
     range_m = range_sensors.convert_to_ranges(measure(wall_at(distance_m)), calibration)[4]
     assert range_m - BODY_RADIUS_M == pytest.approx(distance_m, abs=0.005)
 
 
-def test_ranges_err_less_than_6_mm_at_19_cm():
-    # The published offset of -0.93 counts weighs most where the signal is weakest.
-    calibration = range_sensors.calibrate(ALPHA[0])
-    range_m = range_sensors.convert_to_ranges(measure(wall_at(0.19)), calibration)[4]
-    assert range_m - BODY_RADIUS_M == pytest.approx(0.19, abs=0.006)
+def test_farther_things_fade_until_the_firmware_reports_nothing_in_reach():
+    signals = [measure(wall_at(distance_m))[4] for distance_m in np.arange(0.20, 0.40, 0.01)]
+    assert all(np.diff(signals) < 0.0)
+    calibration = range_sensors.calibrate(ALPHA[0], BETA[0])
+    assert range_sensors.convert_to_ranges(signals[-1], calibration)[4] == pytest.approx(0.256835)
 
 
 def test_nothing_in_reach_is_a_finite_range_above_range_max():
@@ -89,7 +94,7 @@ def test_a_robot_sees_another_robot_and_not_itself():
     signals = measure(NO_WALLS, poses=((0.0, 0.0, math.pi / 2), (0.0, 0.2, 0.0)))
     assert int(np.argmax(signals)) == 4
     assert signals[4] == pytest.approx(0.423 / (0.2 - 2 * BODY_RADIUS_M) ** 2 - 0.93)
-    assert np.allclose(np.delete(signals, 4), range_sensors.BETA_COUNTS)
+    assert np.allclose(np.delete(signals, 4), 0.0)
 
 
 def test_the_nearer_thing_hides_the_farther():
@@ -103,17 +108,21 @@ def test_all_robots_at_once_read_what_each_reads_alone():
     poses = np.column_stack((rng.uniform(-0.6, 0.6, (9, 2)), rng.uniform(-3, 3, 9)))
     alpha = rng.normal(0.423, 0.01, (9, 8))
     everybody = np.arange(9)
-    together = range_sensors.measure_signals(poses, everybody, arena.segments_m, NO_CIRCLES, alpha)
+    beta = rng.normal(-0.93, 0.1, (9, 1))
+    together = range_sensors.measure_signals(poses, everybody, arena.segments_m, NO_CIRCLES, alpha, beta)
     for index in everybody:
         which = np.array([index])
-        alone = range_sensors.measure_signals(poses, which, arena.segments_m, NO_CIRCLES, alpha[which])
+        alone = range_sensors.measure_signals(
+            poses, which, arena.segments_m, NO_CIRCLES, alpha[which], beta[which]
+        )
         assert np.allclose(alone[0], together[index])
 
 
 def test_readings_are_whole_counts_with_the_published_noise():
     arena = build_default(1)
     arena = arena._replace(segments_m=wall_at(0.10))
-    world = World(arena, np.zeros((1, 3)), np.random.RandomState(0), errors=0.0)
+    rng = np.random.RandomState(0)
+    world = World(arena, np.zeros((1, 3)), rng, draw_errors(1, rng, 0.0))
     readings = np.array([world.read_infrared(np.array([0]))[0, 4] for _ in range(2000)])
     assert (readings == np.rint(readings)).all()
     assert readings.mean() == pytest.approx(0.423 / 0.01 - 0.93, abs=0.15)

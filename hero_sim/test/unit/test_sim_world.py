@@ -9,13 +9,15 @@ from hero_sim import world as worlds
 from hero_sim.arena import build_default, build_rectangle, place_robots
 from hero_sim.arena_file import SHIPPED, load_arena
 from hero_sim.kinematics import BODY_RADIUS_M, split_to_wheels
+from hero_sim.robot_errors import SERVO_LAG_S, draw_errors
 
 
 def build_world(robots=1, arena=None, errors=0.0, poses=None, seed=0):
     arena = arena or build_default(robots)
     if poses is None:
         poses = place_robots(arena, robots, np.random.RandomState(seed))
-    return worlds.World(arena, np.array(poses, dtype=float), np.random.RandomState(seed), errors)
+    rng = np.random.RandomState(seed)
+    return worlds.World(arena, np.array(poses, dtype=float), rng, draw_errors(robots, rng, errors))
 
 
 def command(world, index, linear_m_s, turn_rad_s):
@@ -33,7 +35,7 @@ def test_a_wheel_answers_a_step_like_a_first_order_lag():
     command(world, 0, 0.1, 0.0)
     for step in range(1, 40):
         world.step()
-        expected_m_s = 0.1 * (1.0 - math.exp(-step * worlds.STEP_MS / 1000.0 / worlds.MOTOR_LAG_S))
+        expected_m_s = 0.1 * (1.0 - math.exp(-step * worlds.STEP_MS / 1000.0 / SERVO_LAG_S))
         assert world.speeds_m_s[0] == pytest.approx([expected_m_s] * 2, rel=1e-6)
 
 
@@ -42,7 +44,7 @@ def test_a_straight_line_is_as_long_as_the_wheels_rolled():
     command(world, 0, 0.1, 0.0)
     run(world, 4.0)
     # The lag costs its time constant times the speed, and a step that starts from rest one step more.
-    assert world.poses[0, 0] == pytest.approx(0.1 * (4.0 - worlds.MOTOR_LAG_S), abs=1.5e-3)
+    assert world.poses[0, 0] == pytest.approx(0.1 * (4.0 - SERVO_LAG_S), abs=1.5e-3)
     assert world.poses[0, 1:] == pytest.approx([0.0, 0.0], abs=1e-12)
     assert world.travels_m[0] == pytest.approx([world.poses[0, 0]] * 2)
 
@@ -63,7 +65,7 @@ def test_a_spin_stays_on_the_spot():
     command(world, 0, 0.0, 3.0)
     run(world, 3.0)
     assert world.poses[0, :2] == pytest.approx([0.0, 0.0], abs=1e-12)
-    assert world.poses[0, 2] == pytest.approx(3.0 * (3.0 - worlds.MOTOR_LAG_S), abs=0.04)
+    assert world.poses[0, 2] == pytest.approx(3.0 * (3.0 - SERVO_LAG_S), abs=0.04)
 
 
 def test_a_robot_stops_at_a_wall_and_its_wheels_turn_on():

@@ -1,0 +1,189 @@
+import struct
+
+import numpy as np
+import pytest
+from driver_side import DriverSide, read_encoder
+
+from hero_sim import declarations as ids
+from hero_sim.kinematics import TICK_M
+
+
+def start(*arguments):
+    driver = DriverSide("--perfect", *arguments)
+    driver.start_streaming()
+    return driver
+
+
+def push(driver, left_us, right_us):
+    """Return the wheels' speeds that these pulses lead to."""
+    driver.send(0, ids.ID_CMD_MOTOR, struct.pack("<2h", left_us, right_us))
+    driver.run(600)
+    return driver.swarm.world.speeds_m_s[0].tolist()
+
+
+def set_velocity_gains(driver, *gains):
+    driver.send(0, ids.ID_VELOCITY_PID_PARAMETERS, struct.pack("<6f", *gains, *gains))
+    driver.run(200)
+
+
+def measure_mean_speed(driver, seconds=2):
+    before = driver.swarm.world.travels_m[0].copy()
+    driver.drive(0, 0.1, 0.0, seconds * 1000)
+    return ((driver.swarm.world.travels_m[0] - before) / seconds).tolist()
+
+
+# The ticks of both wheels that a complete stock firmware, built for a PC, counted on its way from rest under
+# velocity commands of 0.1 m/s, ten a second; the first column is the time since the first tick.
+STOCK_STEP = (
+    (0.10, 5, 5),
+    (0.31, 22, 22),
+    (0.51, 38, 39),
+    (0.71, 58, 61),
+    (0.92, 82, 85),
+    (1.50, 160, 168),
+    (2.03, 234, 241),
+    (2.51, 319, 322),
+    (2.95, 399, 403),
+)
+
+
+def test_the_pids_lead_a_motor_like_that_of_the_measured_build_as_its_firmware_did():
+    driver = start("--error", "left_gain=0.45,right_gain=0.45,lag_s=0.25")
+    counts = {}
+    driver.send_twist(0, 0.1, 0.0)
+    first_ms = None
+    for ms in range(3100):
+        if ms % 100 == 99:
+            driver.send_twist(0, 0.1, 0.0)
+        driver.run(1)
+        ticks = (driver.swarm.world.read_wheels(0, driver.swarm.now_ms)[0]) / TICK_M
+        if first_ms is None and ticks >= 1.0:
+            first_ms = driver.swarm.now_ms
+        if first_ms is not None:
+            counts[driver.swarm.now_ms - first_ms] = ticks
+    for at_s, left, right in STOCK_STEP:
+        assert counts[round(at_s * 1000)] == pytest.approx((left + right) / 2.0, abs=3.0, rel=0.07)
+
+
+def test_a_pulse_below_its_centre_drives_the_left_wheel_forward_and_one_above_the_right():
+    assert push(start(), 1400, 1600) == pytest.approx([70 * 0.25 / 220] * 2, rel=0.01)
+
+
+@pytest.mark.parametrize("beyond_us, stands", [(29, True), (-30, True), (31, False), (-32, False)])
+def test_a_wheel_stands_within_its_dead_zone_around_the_centre_that_was_set(beyond_us, stands):
+    driver = start("--error", "robot=0,left_centre_us=1480,right_centre_us=1530")
+    speeds_m_s = push(driver, 1480 + beyond_us, 1530 + beyond_us)
+    assert [speed_m_s == 0.0 for speed_m_s in speeds_m_s] == [stands, stands]
+
+
+def test_a_robot_that_was_never_told_its_centres_creeps_and_motors_parameters_ends_that():
+    driver = start("--motors", "factory", "--error", "left_centre_us=1440,right_centre_us=1540")
+    world = driver.swarm.world
+    set_velocity_gains(driver, 1e-3, 0.0, 0.0)
+    driver.drive(0, 0.1, 0.0, 1000)
+    # All that the controller gives is what it takes for the middle: 1500 is beyond both dead zones, backward.
+    assert world.speeds_m_s[0] == pytest.approx([-30 * 0.25 / 220, -10 * 0.25 / 220], rel=0.05)
+    driver.send(0, ids.ID_MOTORS_PARAMETERS, struct.pack("<2h", 1440, 1540))
+    driver.run(100)
+    driver.drive(0, 0.1, 0.0, 1000)
+    assert world.speeds_m_s[0] == pytest.approx([0.0, 0.0], abs=1e-3)
+
+
+def test_the_proportional_gain_alone_leaves_the_error_that_control_theory_says():
+    driver = start("--error", "dead_zone_us=0")
+    for gain in (600.0, 1200.0):
+        set_velocity_gains(driver, gain, 0.0, 0.0)
+        measure_mean_speed(driver)
+        loop = gain * 0.25 / 220
+        # The filter and the whole ticks behind which the controller sees the speed cost some per cent.
+        assert measure_mean_speed(driver) == pytest.approx([0.1 * loop / (1.0 + loop)] * 2, rel=0.08)
+
+
+def test_the_integral_gain_closes_the_gap_the_sooner_the_larger_it_is():
+    ways_m = []
+    for integral in (1000.0, 2300.0):
+        driver = start()
+        set_velocity_gains(driver, 1200.0, integral, 0.1)
+        ways_m.append(measure_mean_speed(driver, 1)[0])
+        measure_mean_speed(driver, 6)
+        assert measure_mean_speed(driver)[0] == pytest.approx(0.1, abs=0.006)
+    assert ways_m[1] > 1.15 * ways_m[0]
+
+
+def test_each_wheel_has_gains_of_its_own():
+    driver = start()
+    driver.send(0, ids.ID_VELOCITY_PID_PARAMETERS, struct.pack("<6f", 1200, 2300, 0.1, 1e-3, 0, 0))
+    driver.run(200)
+    left_m_s, right_m_s = measure_mean_speed(driver)
+    assert left_m_s > 0.06
+    assert right_m_s == 0.0
+
+
+def test_a_stop_and_a_turn_back_make_the_controller_forget_its_integral():
+    driver = start()
+    driver.drive(0, 0.1, 0.0, 3000)
+    (pid, _) = driver.swarm.robots[0].motors.velocity.pids
+    assert pid.output_us > 80
+    driver.send_twist(0, -0.1, 0.0)
+    driver.run(60)
+    assert pid.output_us < 0
+    driver.send_twist(0, 0.0, 0.0)
+    driver.run(60)
+    assert pid.output_us == 0
+
+
+def test_a_position_command_goes_as_far_as_its_speed_reaches_in_a_second():
+    driver = start("--firmware-odometry", "exact")
+    driver.send_twist(0, 0.1, 0.0, ids.ID_POSITION_CMD_VEL)
+    ways_m = []
+    for _ in range(290):
+        driver.run(10)
+        ways_m.append(driver.swarm.world.travels_m[0, 0])
+    assert 0.1 < max(ways_m) < 0.15
+    assert np.mean(ways_m[-50:]) == pytest.approx(0.1, abs=0.02)
+
+
+def test_the_gains_of_the_position_controller_matter():
+    ways_m = []
+    for gains in ((5.0, 9.0, 0.1), (1.0, 0.0, 0.0)):
+        driver = start()
+        driver.send(0, ids.ID_POSITION_PID_PARAMETERS, struct.pack("<6f", *gains, *gains))
+        driver.run(200)
+        driver.send_twist(0, 0.1, 0.0, ids.ID_POSITION_CMD_VEL)
+        driver.run(2900)
+        ways_m.append(driver.swarm.world.travels_m[0, 0])
+    # With 1 us per tick the wheel stops where the output meets the dead zone of 30 us.
+    assert ways_m[1] == pytest.approx(0.1 - 30 * TICK_M, abs=0.004)
+    assert abs(ways_m[0] - 0.1) < abs(ways_m[1] - 0.1) + 0.03
+
+
+def test_self_tuning_of_the_position_controller_rocks_the_wheels_and_a_twist_ends_it():
+    driver = start()
+    driver.send(0, ids.ID_POSITION_PID_CALIBRATION)
+    ways_m = []
+    for _ in range(100):
+        driver.run(20)
+        ways_m.append(driver.swarm.world.travels_m[0].tolist())
+    assert np.abs(ways_m).max() < 0.02
+    assert np.ptp(np.array(ways_m)[50:], axis=0).min() > 0.001
+    driver.send_twist(0, 0.0, 0.0, ids.ID_POSITION_CMD_VEL)
+    driver.run(600)
+    assert driver.measure_speed(0) < 0.001
+
+
+def test_two_controllers_that_are_commanded_at_once_both_write_pulses():
+    driver = start()
+    driver.send_twist(0, 0.1, 0.0, ids.ID_POSITION_CMD_VEL)
+    driver.run(60)
+    driver.send_twist(0, 0.0, 0.0)
+    driver.run(100)
+    # The stop of one halts the motors; the other starts them again.
+    assert driver.swarm.robots[0].motors.motors.attached
+
+
+def test_the_encoders_see_what_the_wheels_do_not_what_they_should_do():
+    driver = start("--error", "right_gain=0.5", "--firmware-odometry", "exact")
+    driver.send(0, ids.ID_CMD_MOTOR, struct.pack("<2h", 1400, 1600))
+    driver.run(900)
+    left, right = read_encoder(driver.list_frames(0, ids.ID_ENCODER)[-1].payload)[:2]
+    assert right / left == pytest.approx(0.5, abs=0.05)
