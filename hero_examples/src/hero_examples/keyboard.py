@@ -8,8 +8,7 @@ import subprocess
 import sys
 import termios
 import tty
-from types import TracebackType
-from typing import IO, Any, List, Optional, Tuple, Type
+from typing import IO, Any, List, Optional, Tuple
 
 ARROWS = {
     "\x1b[A": "up",
@@ -55,12 +54,7 @@ class Keyboard:
         termios.tcsetattr(self.file, termios.TCSANOW, settings)
         return self
 
-    def __exit__(
-        self,
-        kind: Optional[Type[BaseException]],
-        error: Optional[BaseException],
-        traceback: Optional[TracebackType],
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         try:
             # FLUSH: keys that are still held down are not for the shell.
             termios.tcsetattr(self.file, termios.TCSAFLUSH, self._settings)

@@ -12,11 +12,13 @@ import select
 import signal
 import sys
 import threading
-from types import FrameType, TracebackType
-from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple, Type
+from types import FrameType
+from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple
 
 import rosgraph
 import rospy
+
+from .node_end import end_without_delay
 
 ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
@@ -65,6 +67,7 @@ class Program:
         except rospy.ROSInitException as error:
             raise ProgramError(" ".join(str(error).split())) from None
         rospy.on_shutdown(self._await_finish)
+        end_without_delay()
 
     def _receive_signal(self, number: int, frame: Optional[FrameType]) -> None:
         self.end_signal = number
@@ -103,12 +106,7 @@ class Program:
     def __enter__(self) -> "Program":
         return self
 
-    def __exit__(
-        self,
-        kind: Optional[Type[BaseException]],
-        error: Optional[BaseException],
-        traceback: Optional[TracebackType],
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self._ending = True
         self._finished.set()
         rospy.signal_shutdown("the program ends")

@@ -18,7 +18,7 @@ import sys
 import threading
 import time
 from concurrent.futures import Future
-from types import FrameType, TracebackType
+from types import FrameType
 from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple, Type
 
 import rospy
@@ -29,6 +29,7 @@ from std_msgs.msg import ColorRGBA
 
 from .control_laws import Pose
 from .goal_pursuit import DEFAULT_LAW, DEFAULT_TIMEOUT_S, DEFAULT_TOLERANCE_M, Goal, GoalPursuit, State
+from .node_end import end_without_delay
 from .readings import Color, Obstacle, Velocity, front_first, nearest_obstacle, parse_color, yaw_of
 
 MAX_LINEAR_M_S = 0.20
@@ -93,6 +94,7 @@ def start_node(name: str = "hero_program") -> None:
         signal.signal(signal.SIGTERM, _raise_exit)
         signal.signal(signal.SIGHUP, _raise_exit)
     rospy.init_node(name, anonymous=True, disable_signals=True)
+    end_without_delay()
 
 
 def _raise_exit(number: int, frame: Optional[FrameType]) -> None:
@@ -346,12 +348,7 @@ class Robot:
     def __enter__(self) -> "Robot":
         return self
 
-    def __exit__(
-        self,
-        kind: Optional[Type[BaseException]],
-        error: Optional[BaseException],
-        traceback: Optional[TracebackType],
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         # Topics are left to the end of the program: leaving them one by one takes 20 ms each.
         self._stop_if_driven()
 

@@ -1,8 +1,7 @@
 """Several robots as one object: see robot. Knows the topics of robots, and the driver's list of them."""
 
 import time
-from types import TracebackType
-from typing import Iterable, Iterator, List, Optional, Type
+from typing import Iterable, Iterator, List
 
 import rospy
 
@@ -95,12 +94,7 @@ class Swarm:
     def __enter__(self) -> "Swarm":
         return self
 
-    def __exit__(
-        self,
-        kind: Optional[Type[BaseException]],
-        error: Optional[BaseException],
-        traceback: Optional[TracebackType],
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         # Topics are left to the end of the program: leaving them one by one takes 20 ms each.
         self._stop_if_driven()
 
