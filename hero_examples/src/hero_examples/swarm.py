@@ -25,8 +25,15 @@ class Swarm:
     """Several robots; iterate it, or take one by its number: swarm[3]."""
 
     def __init__(self, robot_ids: Iterable[int], odom: bool = True, proximity: bool = True) -> None:
-        """Connect to the robots with these numbers; odom, proximity: see Robot."""
-        self.robots = [Robot(robot_id, odom, proximity) for robot_id in robot_ids]
+        """Connect to the robots with these numbers; odom, proximity: see Robot.
+
+        Raises: ValueError for what is no number of a robot, or comes twice.
+        """
+        numbers = list(robot_ids)
+        for number in numbers:
+            if numbers.count(number) > 1:
+                raise ValueError("robot %r is named more than once" % (number,))
+        self.robots = [Robot(number, odom, proximity) for number in numbers]
         self._by_id = {robot.robot_id: robot for robot in self.robots}
 
     @classmethod
@@ -83,6 +90,9 @@ class Swarm:
         stop_all([robot for robot in self.robots if robot.driven])
 
     def __getitem__(self, robot_id: int) -> Robot:
+        if robot_id not in self._by_id:
+            names = ", ".join(robot.name for robot in self.robots)
+            raise KeyError("hero_%s is not in this swarm: %s" % (robot_id, names))
         return self._by_id[robot_id]
 
     def __iter__(self) -> Iterator[Robot]:
