@@ -2,11 +2,20 @@
 
 import math
 import random
-from typing import List, NamedTuple, Optional
+from functools import partial
+from typing import Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 import rospy
 
-from .control_laws import STANDSTILL, WanderLaw, WanderMemory, wander
+from .control_laws import (
+    POTENTIAL,
+    STANDSTILL,
+    WANDER,
+    Command,
+    WanderMemory,
+    wander,
+    wander_in_potential,
+)
 from .program import Program, ProgramError, check_number, parse_robot_ids, read_parameters, run
 from .robot import MAX_LINEAR_M_S, Robot, StaleDataError
 from .swarm_start import WaitReport, open_swarm
@@ -23,37 +32,56 @@ ESCAPING_COLOR = "red"
 WAITING_COLOR = "blue"
 
 
+Rule = Callable[[Sequence[float], WanderMemory, float], Tuple[Command, WanderMemory]]
+"""Ranges, memory, chance -> command, memory: see control_laws.wander."""
+
+
 class Parameters(NamedTuple):
     """The checked parameters of the node."""
 
     robot_ids: Optional[List[int]]
     """None for all that the driver reports."""
-    law: WanderLaw
+    rule: Rule
+    linear_m_s: float
     seed: Optional[int]
+
+
+def make_rule(name: str, linear_m_s: float, turn_rad_s: float) -> Rule:
+    """Return the rule of this name with these speeds. Raises: ProgramError with the names that are known."""
+    rules: Dict[str, Rule] = {
+        "sectors": partial(wander, law=WANDER._replace(cruise_m_s=linear_m_s, turn_rad_s=turn_rad_s)),
+        "potential": partial(
+            wander_in_potential, law=POTENTIAL._replace(cruise_m_s=linear_m_s, turn_rad_s=turn_rad_s)
+        ),
+    }
+    if name not in rules:
+        raise ProgramError("~rule is %r, but must be one of: %s" % (name, ", ".join(rules)))
+    return rules[name]
 
 
 def load_parameters() -> Parameters:
     """Return the node's private parameters. Raises: ProgramError."""
-    given = read_parameters({"robots": "0", "linear_m_s": 0.10, "turn_rad_s": 1.5, "seed": -1})
+    given = read_parameters(
+        {"robots": "0", "rule": "sectors", "linear_m_s": WANDER.cruise_m_s, "turn_rad_s": WANDER.turn_rad_s, "seed": -1}
+    )
     seed = given["seed"]
     if isinstance(seed, bool) or not isinstance(seed, int):
         raise ProgramError("~seed is %r, but must be a whole number; -1 draws one" % (seed,))
-    law = WanderLaw(
-        cruise_m_s=check_number("linear_m_s", given["linear_m_s"], 0.0, MAX_LINEAR_M_S, "m/s"),
-        turn_rad_s=check_number("turn_rad_s", given["turn_rad_s"], 0.1, 4.0, "rad/s"),
-    )
-    return Parameters(parse_robot_ids("robots", given["robots"]), law, None if seed < 0 else seed)
+    linear_m_s = check_number("linear_m_s", given["linear_m_s"], 0.0, MAX_LINEAR_M_S, "m/s")
+    rule = make_rule(given["rule"], linear_m_s, check_number("turn_rad_s", given["turn_rad_s"], 0.1, 4.0, "rad/s"))
+    return Parameters(parse_robot_ids("robots", given["robots"]), rule, linear_m_s, None if seed < 0 else seed)
 
 
 class Walker:
     """The random walk of one robot."""
 
-    def __init__(self, robot: Robot, law: WanderLaw, seed: Optional[int]) -> None:
-        """seed: of this walk, None for a different one each time."""
+    def __init__(self, robot: Robot, parameters: Parameters) -> None:
+        """Begin to walk; every robot draws from a seed of its own."""
         self.robot = robot
         self.waiting_for: Optional[str] = "the first proximity message"
-        self._law = law
-        self._random = random.Random(seed)
+        self._rule = parameters.rule
+        self._cruise_m_s = parameters.linear_m_s
+        self._random = random.Random(None if parameters.seed is None else parameters.seed + robot.robot_id)
         self._memory = WanderMemory()
         self._color = ""
         self._steps_since_color = 0
@@ -74,12 +102,12 @@ class Walker:
             self._show(WAITING_COLOR)
             return
         self.waiting_for = None
-        command, self._memory = wander(ranges, self._memory, self._random.random(), self._law)
+        command, self._memory = self._rule(ranges, self._memory, self._random.random())
         self.robot.drive(*command)
         if self._memory.escape_sign:
             self._show(ESCAPING_COLOR)
         else:
-            self._show(WALKING_COLOR if command.linear_m_s >= self._law.cruise_m_s else BENDING_COLOR)
+            self._show(WALKING_COLOR if command.linear_m_s >= self._cruise_m_s else BENDING_COLOR)
 
     def _show(self, color: str) -> None:
         self._steps_since_color += 1
@@ -92,10 +120,7 @@ class Walker:
 def walk(program: Program, parameters: Parameters) -> None:
     """Let the robots walk until the program is to end."""
     with open_swarm(program, parameters.robot_ids, odom=False) as swarm:
-        walkers = [
-            Walker(robot, parameters.law, None if parameters.seed is None else parameters.seed + robot.robot_id)
-            for robot in swarm
-        ]
+        walkers = [Walker(robot, parameters) for robot in swarm]
         rospy.loginfo("random walk of %s", ", ".join(robot.name for robot in swarm))
         report = WaitReport()
         while program.sleep(1.0 / RATE_HZ):
