@@ -39,6 +39,14 @@ class AvoidanceLaw(NamedTuple):
     """So many of the nearest robots are looked at: more do not fit around one."""
     max_linear_m_s: float = 0.08
     max_turn_rad_s: float = 2.5
+    look_m: float = 0.10
+    """What a proximity sensor sees nearer to the body than this counts, whatever odometry says."""
+    keep_off_m: float = 0.03
+    """So near to it the robot drives no further: as far as it rolls until a stop is measured, sent and obeyed."""
+    closing_gain: float = 1.0
+    """Largest speed towards it in m/s per metre that is left, 1/s."""
+    back_off_m_s: float = 0.02
+    """Largest speed away from what is nearer than keep_off_m."""
 
     @property
     def radius_m(self) -> float:
@@ -156,6 +164,34 @@ def _best_corner(
     return best
 
 
+def keep_off(
+    pose: Pose, ranges: Sequence[float], wanted: np.ndarray, law: AvoidanceLaw
+) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return wanted (2,) turned to the right of what the sensors see near, and half planes that keep away from it.
+
+    Odometry drifts by centimetres over a metre or two, so robots that avoid each other by odometry alone touch now and
+    then. Of two robots that meet where odometry expects none, each would stand before the other for ever: so what is
+    not allowed of the wanted velocity is driven to the right, as on a road. Half planes: normals (K, 2), bounds (K,),
+    as in nearest_allowed(). ranges: as in control_laws; nan (not known) is left out, odometry must do then.
+    """
+    normals, bounds = [], []
+    for index, range_m in enumerate(ranges):
+        gap_m = range_m - law.body_m
+        if not gap_m < law.look_m:
+            continue
+        angle_rad = pose.yaw_rad + index * 2.0 * math.pi / len(ranges)
+        towards = np.array([math.cos(angle_rad), math.sin(angle_rad)])
+        limit_m_s = law.closing_gain * (gap_m - law.keep_off_m)
+        excess_m_s = float(wanted @ towards) - limit_m_s
+        if excess_m_s > 0.0:
+            right = np.array([towards[1], -towards[0]])
+            forward_m_s = max(0.0, min(excess_m_s, excess_m_s + limit_m_s))
+            wanted = wanted - excess_m_s * towards + forward_m_s * right
+        normals.append(-towards)
+        bounds.append(-max(limit_m_s, -law.back_off_m_s))
+    return wanted, np.array(normals).reshape(-1, 2), np.array(bounds)
+
+
 def avoid_others(
     places: np.ndarray,
     velocities: np.ndarray,
@@ -163,11 +199,13 @@ def avoid_others(
     law: AvoidanceLaw,
     step_s: float,
     robots: Sequence[int],
+    seen: Optional[Sequence[Tuple[np.ndarray, np.ndarray]]] = None,
 ) -> np.ndarray:
     """Return the velocities (len(robots), 2) of the steered points of the chosen robots.
 
     places, velocities, wanted: of the steered points of all robots, each (N, 2), in one common frame. step_s: time
-    between two calls. robots: indices of those whose velocity is asked for.
+    between two calls. robots: indices of those whose velocity is asked for. seen: for each of all robots half planes
+    of its own, normals and bounds, as keep_off() gives them.
     """
     answers = np.zeros((len(robots), 2))
     for row, own in enumerate(robots):
@@ -184,5 +222,7 @@ def avoid_others(
             )
             normals[index] = normal
             bounds[index] = float(velocities[own] @ normal) + 0.5 * depth
+        if seen is not None:
+            normals, bounds = np.vstack((normals, seen[own][0])), np.append(bounds, seen[own][1])
         answers[row] = nearest_allowed(wanted[own], normals, bounds, law.max_linear_m_s)
     return answers

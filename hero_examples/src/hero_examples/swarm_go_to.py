@@ -145,7 +145,8 @@ def form(program: Program, parameters: Parameters, swarm: Swarm) -> bool:
         # A robot that is silent may be anywhere: then all stand until it is back.
         complete = all(pose is not None for pose in known)
         poses = [new if new is not None else old for new, old in zip(known, poses)]
-        commands = steering.step(poses) if complete else [STANDSTILL] * len(poses)
+        ranges = [robot.fresh_proximity() for robot in swarm]
+        commands = steering.step(poses, ranges) if complete else [STANDSTILL] * len(poses)
         for robot, command in zip(swarm, commands):
             robot.drive(*command)
         if now_s >= next_led_s:
@@ -166,7 +167,7 @@ def form(program: Program, parameters: Parameters, swarm: Swarm) -> bool:
 def _main() -> None:
     with Program("swarm_go_to") as program:
         parameters = load_parameters()
-        with open_swarm(program, parameters.robot_ids, proximity=False) as swarm:
+        with open_swarm(program, parameters.robot_ids) as swarm:
             reached = form(program, parameters, swarm)
         if parameters.once and not reached:
             sys.exit(1)

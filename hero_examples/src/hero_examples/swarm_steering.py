@@ -6,7 +6,7 @@ from typing import List, Optional, Sequence, Tuple
 import numpy as np
 
 from .control_laws import BRISK, STANDSTILL, Command, GoToLaw, Pose, go_to_point
-from .reciprocal import AvoidanceLaw, avoid_others, steer, steered_point
+from .reciprocal import AvoidanceLaw, avoid_others, keep_off, steer, steered_point
 
 DOCKING_M = 0.05
 """Nearer to its goal than this a robot steers its centre there, no longer the point ahead of the axle."""
@@ -42,8 +42,11 @@ class SwarmSteering:
         self._last_places: Optional[np.ndarray] = None
         self._velocities = np.zeros((len(self.goals), 2))
 
-    def step(self, poses: Sequence[Pose]) -> List[Command]:
-        """Return the next command of every robot."""
+    def step(self, poses: Sequence[Pose], ranges: Optional[Sequence[Sequence[float]]] = None) -> List[Command]:
+        """Return the next command of every robot.
+
+        ranges: what the proximity sensors of each robot see, as in control_laws; None: go by the poses alone.
+        """
         places = np.array([steered_point(pose, self.law.ahead_m) for pose in poses])
         if self._last_places is not None:
             # What robots really do, not what they were told: their motors take half a second to follow.
@@ -55,8 +58,12 @@ class SwarmSteering:
             for done, distance_m in zip(self.arrived, distances_m)
         ]
         wanted = np.array([self._want(*item) for item in zip(self.goals, poses, distances_m)])
+        seen = []
+        for index, pose in enumerate(poses):
+            wanted[index], *planes = keep_off(pose, [] if ranges is None else ranges[index], wanted[index], self.law)
+            seen.append((planes[0], planes[1]))
         moving = [index for index, done in enumerate(self.arrived) if not done]
-        allowed = avoid_others(places, self._velocities, wanted, self.law, self.step_s, moving)
+        allowed = avoid_others(places, self._velocities, wanted, self.law, self.step_s, moving, seen)
         commands = [STANDSTILL] * len(poses)
         for velocity, index in zip(allowed, moving):
             free = float(np.hypot(*(velocity - wanted[index]))) < 0.25 * float(np.hypot(*wanted[index]))
