@@ -6,8 +6,14 @@ import sources
 MODULES = sources.list_source_modules()
 NOT_IN_THE_CORE = {"asyncio", "logging", "rospy", "select", "selectors", "socket", "ssl", "threading", "time"}
 SOCKETS = {"asyncio", "socket", "socketserver", "ssl"}
-# The robots' connections, on each side; and the outlet, which writes to the subscribers that rospy accepted.
-SOCKET_OWNERS = ("hero_driver.transport", "hero_driver.outlet", "hero_sim.tcp_link")
+# The robots' connections, on each side; the outlet, which writes to the subscribers that rospy accepted; and the
+# program check, which asks for the addresses of names.
+SOCKET_OWNERS = (
+    "hero_driver.transport",
+    "hero_driver.outlet",
+    "hero_sim.tcp_link",
+    "hero_bringup.checkup.network",
+)
 
 
 def imports_of(name):
