@@ -1,0 +1,77 @@
+"""A ROS master, the driver and simulated robots as one thing, for programs that measure or record the examples."""
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import rosgraph
+import rospy
+
+from hero_msgs.msg import RobotArray
+
+sys.path.append(str(Path(__file__).resolve().parents[2] / "hero_driver" / "bench"))
+from driver_bench import find_free_port, start, stop  # noqa: E402 (its folder is no package)
+
+READY_TIMEOUT_S = 60.0
+
+
+class Stage:
+    """Robots that are ready, until close(). This process is a ROS node then, so there is one stage in its life."""
+
+    def __init__(self, robots, *arguments):
+        """Start robots simulated robots; arguments: more of hero_bringup.launch, e.g. sim_arena:=obstacles."""
+        self.processes = []
+        master_port = find_free_port()
+        os.environ["ROS_MASTER_URI"] = "http://localhost:%d" % master_port
+        self.launch = self.start(
+            ["roslaunch", "--no-summary", "-p", str(master_port), "hero_bringup", "hero_bringup.launch"]
+            + ["host:=127.0.0.1", "port:=%d" % find_free_port(), "sim:=%d" % robots, *arguments],
+            stdout=subprocess.DEVNULL,
+        )
+        try:
+            self.wait_for(rosgraph.is_master_online, "a ROS master")
+            rospy.init_node("stage", disable_signals=True)
+            newest = []
+            subscriber = rospy.Subscriber("/hero_driver/robots", RobotArray, newest.append, queue_size=1)
+            self.wait_for(
+                lambda: newest and sum(robot.state == robot.READY for robot in newest[-1].robots) == robots,
+                "%d robots that are ready" % robots,
+            )
+            subscriber.unregister()
+        except BaseException:
+            self.close()
+            raise
+
+    def wait_for(self, condition, what, timeout_s=READY_TIMEOUT_S):
+        """Return the first true value of condition()."""
+        deadline_s = time.monotonic() + timeout_s
+        while time.monotonic() < deadline_s and self.launch.poll() is None:
+            value = condition()
+            if value:
+                return value
+            time.sleep(0.02)
+        raise SystemExit("waited in vain for " + what)
+
+    def start(self, command, **options):
+        """Start a program that ends with the stage."""
+        process = start(command, dict(os.environ), **options)
+        self.processes.append(process)
+        return process
+
+    def start_example(self, name, *arguments, **options):
+        """Start a node of hero_examples, itself and not roslaunch or rosrun around it."""
+        found = subprocess.check_output(["catkin_find", "--first-only", "--libexec", "hero_examples", name], text=True)
+        return self.start([found.strip(), *arguments], **options)
+
+    def close(self):
+        """End everything, the last first; safe twice."""
+        while self.processes:
+            stop(self.processes.pop())
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        self.close()
