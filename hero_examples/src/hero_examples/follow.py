@@ -50,7 +50,7 @@ def follow_leader(program: Program, parameters: Parameters, swarm: Swarm) -> Non
     common = CommonFrame(parameters.frame, parameters.starts)
     report = WaitReport()
     rospy.loginfo("%s leads, and %s follow", swarm.robots[0].name, ", ".join(r.name for r in swarm.robots[1:]))
-    while program.sleep(1.0 / RATE_HZ):
+    while program.pace(1.0 / RATE_HZ):
         poses = [common.pose_of(robot) for robot in swarm]
         for robot, pose, leader in zip(swarm.robots[1:], poses[1:], poses):
             known = pose is not None and leader is not None

@@ -313,7 +313,7 @@ def pilot_swarm(program: Program, parameters: Parameters, swarm: Swarm) -> bool:
 def run_pilots(program: Program, parameters: Parameters, pilots: List[Pilot], frames: FrameWatch) -> bool:
     """Step all pilots until the program is to end, or once all are there; return whether all were reached."""
     report = WaitReport()
-    while program.sleep(1.0 / RATE_HZ):
+    while program.pace(1.0 / RATE_HZ):
         now_s = time.monotonic()
         for pilot in pilots:
             pilot.step(now_s)

@@ -56,7 +56,7 @@ def show(program: Program, parameters: Parameters, swarm: Swarm) -> None:
     rospy.loginfo("%s on %s", parameters.pattern, ", ".join(robot.name for robot in swarm))
     report = WaitReport()
     start_s = time.monotonic()
-    while program.sleep(1.0 / RATE_HZ):
+    while program.pace(1.0 / RATE_HZ):
         phase = (time.monotonic() - start_s) / parameters.period_s
         for place, robot in enumerate(swarm):
             robot.led(paint(parameters.pattern, phase, place, len(swarm), parameters.brightness))

@@ -12,6 +12,7 @@ import select
 import signal
 import sys
 import threading
+import time
 from types import FrameType
 from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple
 
@@ -48,6 +49,7 @@ class Program:
         """
         self.end_signal: Optional[int] = None
         self._ending = False
+        self._due_s = -math.inf
         self._finished = threading.Event()
         self._wake_read_fd, self._wake_write_fd = os.pipe()
         os.set_blocking(self._wake_write_fd, False)
@@ -95,6 +97,16 @@ class Program:
         """Wait for duration_s, or less if the program is to end; return `running`."""
         self.wait_readable([], duration_s)
         return self.running
+
+    def pace(self, period_s: float) -> bool:
+        """Wait until period_s after the end of the last such wait was due, or until the program is to end.
+
+        A loop of steps that take time keeps its rate so; a step that took longer than the period is not made up for.
+        Returns `running`.
+        """
+        now_s = time.monotonic()
+        self._due_s = max(now_s, self._due_s + period_s) if now_s - self._due_s < 2.0 * period_s else now_s + period_s
+        return self.sleep(self._due_s - now_s)
 
     def wait_readable(self, fds: Sequence[int], timeout_s: float) -> List[int]:
         """Return those of fds that can be read, after at most timeout_s; none if the program is to end."""

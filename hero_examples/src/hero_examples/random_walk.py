@@ -123,7 +123,7 @@ def walk(program: Program, parameters: Parameters) -> None:
         walkers = [Walker(robot, parameters) for robot in swarm]
         rospy.loginfo("random walk of %s", ", ".join(robot.name for robot in swarm))
         report = WaitReport()
-        while program.sleep(1.0 / RATE_HZ):
+        while program.pace(1.0 / RATE_HZ):
             for walker in walkers:
                 walker.step()
             report.update({walker.robot.name: walker.waiting_for for walker in walkers})

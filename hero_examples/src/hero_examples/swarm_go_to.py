@@ -100,7 +100,7 @@ def wait_for_poses(program: Program, common: CommonFrame, swarm: Swarm) -> List[
     Raises: ProgramError if the program is to end before.
     """
     report = WaitReport()
-    while program.sleep(1.0 / RATE_HZ):
+    while program.pace(1.0 / RATE_HZ):
         poses = [common.pose_of(robot) for robot in swarm]
         known = [pose for pose in poses if pose is not None]
         report.update(common.missing)
@@ -138,7 +138,7 @@ def form(program: Program, parameters: Parameters, swarm: Swarm) -> bool:
     start_s = time.monotonic()
     next_led_s = start_s
     done = False
-    while program.sleep(1.0 / RATE_HZ):
+    while program.pace(1.0 / RATE_HZ):
         now_s = time.monotonic()
         known = [common.pose_of(robot) for robot in swarm]
         report.update(common.missing)

@@ -102,7 +102,7 @@ def drive_by_stick(program: Program, parameters: Parameters) -> None:
         next_word_s = time.monotonic() + 2.0
         last_motion_s = -STOP_REPEAT_S
         rospy.loginfo("hold button %d and move the stick", parameters.enable_button)
-        while program.sleep(PERIOD_S):
+        while program.pace(PERIOD_S):
             now_s = time.monotonic()
             command: Optional[Command] = STANDSTILL
             if stick.alive:
