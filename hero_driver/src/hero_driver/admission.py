@@ -30,8 +30,8 @@ class Admission:
     def __init__(self, limits: AdmissionLimits) -> None:
         self._limits = limits
         self._by_host: Counter[str] = collections.Counter()
+        self._unidentified: Counter[str] = collections.Counter()
         self._total = 0
-        self.unidentified = 0
 
     def admit(self, host: str) -> Optional[str]:
         """Count a connection from host; return why it is refused, None if it may stay."""
@@ -39,8 +39,25 @@ class Admission:
         if refusal is None:
             self._total += 1
             self._by_host[host] += 1
-            self.unidentified += 1
+            self._unidentified[host] += 1
         return refusal
+
+    def find_crowd(self, host: str) -> Optional[str]:
+        """Return the address whose oldest connection that did not say who it is should make room for host's.
+
+        None while there is room, where host may not come anyway, or where no address has more of them than
+        host would have: so one that holds connections which say nothing keeps only itself out.
+        """
+        if self._find_lasting_refusal(host) is not None or self.unidentified < self._limits.max_unidentified:
+            return None
+        crowd, count = self._unidentified.most_common(1)[0]
+        return crowd if count > self._unidentified[host] + 1 else None
+
+    def note_identified(self, host: str) -> None:
+        """A connection of host has said who it is, or ended before that."""
+        self._unidentified[host] -= 1
+        if not self._unidentified[host]:
+            del self._unidentified[host]
 
     def release(self, host: str) -> None:
         """An admitted connection from host is gone."""
@@ -49,7 +66,20 @@ class Admission:
         if not self._by_host[host]:
             del self._by_host[host]
 
+    @property
+    def unidentified(self) -> int:
+        """How many connections have not said who they are."""
+        return sum(self._unidentified.values())
+
     def _find_refusal(self, host: str) -> Optional[str]:
+        refusal = self._find_lasting_refusal(host)
+        if refusal is None and self.unidentified >= self._limits.max_unidentified:
+            return "more than %d connections that did not say who they are (~max_unidentified)" % (
+                self._limits.max_unidentified
+            )
+        return refusal
+
+    def _find_lasting_refusal(self, host: str) -> Optional[str]:
         limits = self._limits
         if limits.allow:
             address = ipaddress.ip_address(host.split("%", maxsplit=1)[0])
@@ -61,10 +91,6 @@ class Admission:
         if self._by_host[host] >= limits.max_connections_per_address:
             return "more than %d connections of one address (~max_connections_per_address)" % (
                 limits.max_connections_per_address
-            )
-        if self.unidentified >= limits.max_unidentified:
-            return "more than %d connections that did not say who they are (~max_unidentified)" % (
-                limits.max_unidentified
             )
         return None
 

@@ -100,6 +100,7 @@ class Gateway(LinkHandler):
             clamp=self._config.clamp,
             service_timeout_s=self._config.service_timeout_s,
             command_max_age_s=self._config.command_max_age_s,
+            max_names=2 * self._config.max_topics,
         )
         loop.call_later(FLEET_POLL_S, self._poll_fleet)
 
@@ -111,6 +112,7 @@ class Gateway(LinkHandler):
 
     def open_link(self, link: Link) -> Optional[str]:
         """Begin a conversation, unless the limits are against it."""
+        self._make_room(link.address.host)
         refusal = self._admission.admit(link.address.host)
         if refusal is not None:
             self.refused_connections += 1
@@ -123,6 +125,14 @@ class Gateway(LinkHandler):
         self.peers[link] = peer
         self.poll_link(link, now_s)
         return None
+
+    def _make_room(self, host: str) -> None:
+        crowd = self._admission.find_crowd(host)
+        if crowd is not None:
+            for link, peer in self.peers.items():
+                if peer.record is None and link.address.host == crowd:
+                    link.close("its address has the most of too many connections (~max_unidentified)")
+                    return
 
     def receive_data(self, link: Link, data: bytes, now_s: float) -> None:
         """Pass bytes to the session and its events on; the hot path of the driver."""
@@ -177,7 +187,7 @@ class Gateway(LinkHandler):
             return
         self._admission.release(link.address.host)
         if peer.record is None:
-            self._admission.unidentified -= 1
+            self._admission.note_identified(link.address.host)
             self.last_refusal = "%s: %s" % (link.address, reason)
             self._log.log_throttled(
                 "warn",
@@ -199,6 +209,7 @@ class Gateway(LinkHandler):
                 "debug" if reason == THE_DRIVER_ENDS else "warn",
                 "left " + record.identity.namespace,
                 "%s left (%s): %s" % (peer.label, link.address, reason),
+                host=link.address.host,
             )
             self._on_change()
         if peer.bridge is not None:
@@ -237,7 +248,8 @@ class Gateway(LinkHandler):
             peer.record.dropped_messages += 1
             peer.record.last_error = text
         group = peer.label if peer.bridge is not None else peer.link.address.host
-        self._log.log_throttled("error", peer.label + text[:80], "%s: %s" % (peer.label, text), group)
+        line = "%s: %s" % (peer.label, text)
+        self._log.log_throttled("error", peer.label + text[:80], line, group, peer.link.address.host)
 
     def _declare(self, peer: Peer, topic: Topic, now_s: float) -> None:
         if peer.record is None and not self._identify(peer, topic, now_s):
@@ -287,7 +299,7 @@ class Gateway(LinkHandler):
         decision = self.fleet.identify(
             peer.link, identity, address.host, str(address), peer.session.opened_s, now_s
         )
-        self._admission.unidentified -= 1
+        self._admission.note_identified(address.host)
         peer.record = decision.record
         if decision.verdict is Verdict.REFUSED:
             peer.refused = True
@@ -316,7 +328,7 @@ class Gateway(LinkHandler):
             bridge.cleaner.restart(rebooted and decision.verdict is not Verdict.ARRIVED)
         bridge.attach()
         text = "%s %s (%s)" % (bridge.label, decision.verdict.value, peer.link.address)
-        self._log.log_throttled("info", "joined " + bridge.label, text)
+        self._log.log_throttled("info", "joined " + bridge.label, text, host=peer.link.address.host)
         self._on_change()
         early_topics, peer.early_topics = peer.early_topics, []
         for topic in early_topics:
@@ -448,5 +460,7 @@ class Gateway(LinkHandler):
             bridge = self.bridges.pop(record.identity.namespace, None)
             if bridge is not None:
                 bridge.close()
-                self._log.log("info", "%s is gone; its topics and services are taken down" % bridge.label)
+                self._requests.forget(bridge.label)
+                text = "%s is gone; its topics and services are taken down" % bridge.label
+                self._log.log_throttled("info", "gone " + bridge.label, text, host=record.host)
             self._on_change()

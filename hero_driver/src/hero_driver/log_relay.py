@@ -19,6 +19,10 @@ KNOWN_KEYS_MAX = 1000
 GROUP_LINES_MAX = 20
 """Different complaints about one robot in THROTTLE_S; a peer can make up as many as it likes."""
 
+HOST_LINES_MAX = 300
+"""Lines about what comes from one address in THROTTLE_S, however many robots it says that it is; a hundred
+simulated robots that join at once are a hundred lines."""
+
 _LOG_FUNCTIONS = {
     "debug": rospy.logdebug,
     "info": rospy.loginfo,
@@ -45,13 +49,16 @@ class LogRelay:
         if self._worker.submit(lambda: _LOG_FUNCTIONS[level]("%s", text)):
             self._reported_drops = dropped
 
-    def log_throttled(self, level: str, key: str, text: str, group: str = "") -> None:
+    def log_throttled(self, level: str, key: str, text: str, group: str = "", host: str = "") -> None:
         """Log one line unless one with the same key was logged in the last THROTTLE_S; say how many were not.
 
-        Lines of one group, where one is given, are limited to GROUP_LINES_MAX in that time.
+        Lines of one group, where one is given, are limited to GROUP_LINES_MAX in that time, those about one
+        host to HOST_LINES_MAX.
         """
         now_s = time.monotonic()
-        if group and not self._admit_group(group, now_s):
+        if group and not self._admit(group, GROUP_LINES_MAX, now_s):
+            return
+        if host and not self._admit("address " + host, HOST_LINES_MAX, now_s):
             return
         last_s, suppressed = self._last.get(key, (None, 0))
         if last_s is not None and now_s - last_s < THROTTLE_S:
@@ -62,22 +69,22 @@ class LogRelay:
         self._last[key] = (now_s, 0)
         self.log(level, "%s (and %d times more before)" % (text, suppressed) if suppressed else text)
 
-    def _admit_group(self, group: str, now_s: float) -> bool:
+    def _admit(self, group: str, most: int, now_s: float) -> bool:
         start_s, lines = self._groups.get(group, (now_s, 0))
         if now_s - start_s >= THROTTLE_S:
             start_s, lines = now_s, 0
         if len(self._groups) >= KNOWN_KEYS_MAX:
             self._groups.clear()
         self._groups[group] = (start_s, lines + 1)
-        if lines == GROUP_LINES_MAX:
+        if lines == most:
             self.log("warn", "%s: more complaints than %d, the rest is left out for a while" % (group, lines))
-        return lines < GROUP_LINES_MAX
+        return lines < most
 
     def close(self) -> None:
         """Write what waits and end the thread."""
         self._worker.close(drain=True)
 
 
-def _report_to_terminal(error: Exception) -> None:
+def _report_to_terminal(error: BaseException) -> None:
     """Tell of a log line that could not be logged, where logging cannot."""
     sys.stderr.write("hero_driver: a log line was lost: %s: %s\n" % (type(error).__name__, error))

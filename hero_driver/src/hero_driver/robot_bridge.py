@@ -5,8 +5,9 @@ what needs the ROS master is a job for the registrar. Endpoints stay up when the
 there again when the robot returns.
 """
 
+import functools
 import time
-from typing import Any, Callable, Dict, List, Optional, Tuple
+from typing import Any, Callable, Dict, List, Optional, Set, Tuple
 
 import rospy
 
@@ -16,7 +17,7 @@ from .command_queue import CommandQueue
 from .command_shaping import HALTED_MOTORS, check_twist
 from .message_types import MessageTypeError
 from .names import Identity
-from .outlet import CallLater, Outlet
+from .outlet import CallLater, Outlet, unregister
 from .rosserial.session import Topic, TopicKind
 from .service_requests import find_request_fault, is_success, read_set_odom_pose
 from .services import RobotService
@@ -48,11 +49,12 @@ class BridgeContext:
         clamp: bool,
         service_timeout_s: float,
         command_max_age_s: float,
+        max_names: int,
     ) -> None:
         """Take what the rest of the driver does for bridges.
 
         wake(bridge): commands wait (any thread); log(level, throttle key, text); call_later(delay_s, call)
-        is the loop's.
+        is the loop's. max_names: topics and services that one robot may have over all its connections.
         """
         self.registrar = registrar
         self.log = log
@@ -63,6 +65,7 @@ class BridgeContext:
         self.clamp = clamp
         self.service_timeout_s = service_timeout_s
         self.command_max_age_s = command_max_age_s
+        self.max_names = max_names
 
 
 class RobotBridge:
@@ -91,6 +94,7 @@ class RobotBridge:
         self._ids: Dict[str, int] = {}
         self._motor_used_s = 0.0
         self._errors: Dict[str, str] = {}
+        self._names: Set[str] = set()
 
     # The connection's life.
 
@@ -117,9 +121,11 @@ class RobotBridge:
         self._closed = True
         self.detach("the robot left")
         # This thread is the one that publishes: once it has let go of a publisher, that can be unregistered.
-        unregister = [call for outlet in self._outlets.values() for call in outlet.release()]
+        # A job of the registrar may be opening another one right now, so it looks again.
+        outlets = list(self._outlets.values())
         self._outlets.clear()
-        self._context.registrar.submit(lambda: self._unregister(unregister))
+        released = [call for outlet in outlets for call in outlet.release()]
+        self._context.registrar.submit(lambda: self._unregister(released, outlets), always=True)
 
     @property
     def last_error(self) -> str:
@@ -131,6 +137,12 @@ class RobotBridge:
     def declare(self, topic: Topic, name: str) -> None:
         """The robot declared topic, which is called name in ROS."""
         info, kind = topic.info, topic.kind
+        if name not in self._names:
+            if len(self._names) >= self._context.max_names:
+                text = "topic %s refused: more than %d names (2 * max_topics)" % (name, len(self._names))
+                self._complain("names", text)
+                return
+            self._names.add(name)
         ros_type = message_types.apply_aliases(info.message_type)
         if kind is TopicKind.PUBLISHER:
             derived = self._choose_cleaning(topic, name, ros_type)
@@ -330,8 +342,8 @@ class RobotBridge:
         if outlet.is_open:
             if outlet.raw_class is raw_class:
                 return
-            for unregister in outlet.release():
-                unregister()
+            for call in outlet.release():
+                call()
         outlet.open(name, raw_class)
 
     def _subscribe(self, name: str, message_type: str, md5sum: str) -> None:
@@ -343,7 +355,7 @@ class RobotBridge:
         if known is not None:
             if known[0] == ros_type:
                 return
-            known[1].unregister()
+            unregister(known[1])
         self._subscribers[name] = (
             ros_type,
             rospy.Subscriber(
@@ -374,12 +386,19 @@ class RobotBridge:
 
         self._servers[name] = rospy.Service(name, raw_class, handle)
 
-    def _unregister(self, publishers: List[Callable[[], None]]) -> None:
-        for unregister in publishers:
-            unregister()
-        for _, subscriber in self._subscribers.values():
-            subscriber.unregister()
-        for server in self._servers.values():
-            server.shutdown("the robot left")
+    def _unregister(self, released: List[Callable[[], None]], outlets: List[Outlet]) -> None:
+        calls = released + [call for outlet in outlets for call in outlet.release()]
+        calls += [functools.partial(unregister, subscriber) for _, subscriber in self._subscribers.values()]
+        calls += [functools.partial(server.shutdown, "the robot left") for server in self._servers.values()]
         self._subscribers.clear()
         self._servers.clear()
+        for call in calls:
+            try:
+                call()
+            except Exception as error:  # noqa: BLE001 - what cannot be taken down must not keep the others up
+                self._context.log(
+                    "error",
+                    "unregister " + type(error).__name__,
+                    "%s: a topic or service could not be taken down: %s: %s"
+                    % (self.label, type(error).__name__, error),
+                )

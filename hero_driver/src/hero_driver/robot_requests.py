@@ -45,6 +45,10 @@ class RobotRequests:
         self._parameters.close()
         self._services.close()
 
+    def forget(self, label: str) -> None:
+        """The robot called label is gone for good."""
+        self._services.forget(label)
+
     def answer_parameter(self, peer: Peer, name: str) -> None:
         """Send a robot the parameter that it calls name, or empty lists with the reason in the log."""
         if peer.bridge is None:

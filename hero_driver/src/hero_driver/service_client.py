@@ -45,22 +45,32 @@ class ServiceClients:
                     "error", label + name, "%s: call of service %s failed: %s" % (label, name, error)
                 ),
             )
-        if not worker.submit(lambda: send(self._call(name, request_info, answer_info, request))):
+        if not worker.submit(lambda: send(self._call(label, name, request_info, answer_info, request))):
             self._log.log_throttled("error", label + "calls", "%s: too many service calls wait" % label)
+
+    def forget(self, label: str) -> None:
+        """End the thread of the robot called label, once its call is over."""
+        worker = self._workers.pop(label, None)
+        if worker is not None:
+            worker.end()
+            for key in [key for key in list(self._proxies) if key[0] == label]:
+                del self._proxies[key]
 
     def close(self) -> None:
         """End all threads."""
         for worker in self._workers.values():
             worker.close()
 
-    def _call(self, name: str, request_info: TopicInfo, answer_info: TopicInfo, request: bytes) -> bytes:
+    def _call(
+        self, label: str, name: str, request_info: TopicInfo, answer_info: TopicInfo, request: bytes
+    ) -> bytes:
         service_class = message_types.find_service_class(
             request_info.message_type, request_info.md5sum, answer_info.md5sum
         )
         raw_class = message_types.make_raw_service(service_class)
-        proxy = self._proxies.get((name, raw_class))
+        proxy = self._proxies.get((label, name, raw_class))
         if proxy is None:
-            proxy = self._proxies[name, raw_class] = rospy.ServiceProxy(name, raw_class)
+            proxy = self._proxies[label, name, raw_class] = rospy.ServiceProxy(name, raw_class)
         try:
             proxy.wait_for_service(self._wait_s)
         except rospy.ROSException as error:

@@ -15,8 +15,11 @@ Job = Callable[[], None]
 class Worker:
     """A queue of jobs and the one thread that does them."""
 
-    def __init__(self, name: str, queue_length: int, on_error: Callable[[Exception], None]) -> None:
-        """Hold at most queue_length jobs; on_error gets what a job raises, and the next job is done."""
+    def __init__(self, name: str, queue_length: int, on_error: Callable[[BaseException], None]) -> None:
+        """Hold at most queue_length jobs; on_error gets what a job raises, and the next job is done.
+
+        What on_error raises is counted in lost_errors: there is nobody left to tell.
+        """
         self._jobs: Deque[Job] = collections.deque()
         self._queue_length = queue_length
         self._on_error = on_error
@@ -25,11 +28,12 @@ class Worker:
         self._thread: Optional[threading.Thread] = None
         self._name = name
         self.refused_jobs = 0
+        self.lost_errors = 0
 
-    def submit(self, job: Job) -> bool:
-        """Queue job; return False, and count it, if too many wait or the worker is closed."""
+    def submit(self, job: Job, always: bool = False) -> bool:
+        """Queue job; return False, and count it, if too many wait (unless always) or the worker is closed."""
         with self._ready:
-            if not self._running or len(self._jobs) >= self._queue_length:
+            if not self._running or (len(self._jobs) >= self._queue_length and not always):
                 self.refused_jobs += 1
                 return False
             if self._thread is None:
@@ -41,13 +45,17 @@ class Worker:
 
     def close(self, drain: bool = False) -> None:
         """End the thread, with drain after the jobs that wait; one that hangs is left behind. Safe twice."""
+        self.end(drain)
+        if self._thread is not None and self._thread is not threading.current_thread():
+            self._thread.join(SHUTDOWN_WAIT_S)
+
+    def end(self, drain: bool = False) -> None:
+        """As close(), but without waiting for it."""
         with self._ready:
             self._running = False
             if not drain:
                 self._jobs.clear()
             self._ready.notify()
-        if self._thread is not None and self._thread is not threading.current_thread():
-            self._thread.join(SHUTDOWN_WAIT_S)
 
     def _run(self) -> None:
         while True:
@@ -59,5 +67,11 @@ class Worker:
                 job = self._jobs.popleft()
             try:
                 job()
-            except Exception as error:  # noqa: BLE001 - one bad job must not end the thread of all
-                self._on_error(error)
+            except BaseException as error:  # noqa: BLE001 - not even SystemExit may end the thread of all
+                self._report(error)
+
+    def _report(self, error: BaseException) -> None:
+        try:
+            self._on_error(error)
+        except Exception:  # noqa: BLE001 - where it would be told (a terminal, a disk) cannot be written to
+            self.lost_errors += 1

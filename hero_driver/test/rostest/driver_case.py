@@ -210,15 +210,19 @@ class DriverProcess:
 
     _count = 0
 
-    def __init__(self, parameters=None, arguments=(), name=""):
-        """Start it; parameters: name -> value, any free port unless they say otherwise."""
+    def __init__(self, parameters=None, arguments=(), name="", prefix=(), environment=None):
+        """Start it; parameters: name -> value, any free port unless they say otherwise.
+
+        prefix: a command that starts it, such as prlimit; environment: variables that it has besides ours.
+        """
         DriverProcess._count += 1
         self.node = "/" + (name or "driver_%d_%d" % (os.getpid(), DriverProcess._count))
         for key, value in {"port": 0, **(parameters or {})}.items():
             rospy.set_param("%s/%s" % (self.node, key), value)
         executable = roslib.packages.find_node("hero_driver", "hero_driver")[0]
         self.process = subprocess.Popen(
-            [executable, "__name:=" + self.node[1:], *arguments],
+            [*prefix, executable, "__name:=" + self.node[1:], *arguments],
+            env={**os.environ, **(environment or {})},
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,

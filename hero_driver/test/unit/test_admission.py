@@ -52,8 +52,27 @@ def test_connections_that_say_nothing_are_limited():
     admission = make_admission(max_unidentified=1)
     assert admission.admit("10.0.0.1") is None
     assert "~max_unidentified" in admission.admit("10.0.0.2")
-    admission.unidentified -= 1
+    admission.note_identified("10.0.0.1")
     assert admission.admit("10.0.0.2") is None
+
+
+def test_where_too_many_say_nothing_the_address_with_the_most_of_them_makes_room():
+    admission = make_admission("10.0.0.0/24", max_unidentified=4)
+    for host in ("10.0.0.1", "10.0.0.2", "10.0.0.2"):
+        admission.admit(host)
+    assert admission.find_crowd("10.0.0.3") is None, "there is room"
+    admission.admit("10.0.0.2")
+    assert admission.find_crowd("10.0.0.3") == "10.0.0.2"
+    assert admission.find_crowd("10.0.0.1") == "10.0.0.2"
+    assert admission.find_crowd("10.0.0.2") is None, "its own newcomer has to wait"
+    assert admission.find_crowd("10.9.9.9") is None, "it may not come at all"
+
+
+def test_an_address_with_one_silent_connection_never_makes_room():
+    admission = make_admission(max_unidentified=3)
+    for number in range(3):
+        admission.admit("10.0.0.%d" % number)
+    assert admission.find_crowd("10.0.0.9") is None
 
 
 def test_a_refused_connection_counts_nowhere():
@@ -71,9 +90,9 @@ def test_addresses_that_left_are_forgotten():
     for number in range(256):
         host = "10.0.0.%d" % number
         assert admission.admit(host) is None
-        admission.unidentified -= 1
+        admission.note_identified(host)
         admission.release(host)
-    assert len(admission._by_host) == 0
+    assert len(admission._by_host) == len(admission._unidentified) == 0
 
 
 # Rates.

@@ -4,11 +4,13 @@ import fcntl
 import socket
 import struct
 import termios
+import threading
 import time
 from types import SimpleNamespace
 
 import pytest
 import rospy
+import rospy.topics
 from rospy.impl.tcpros_base import TCPROSTransport, TCPROSTransportProtocol
 
 from hero_driver.outlet import RETRY_S, Outlet
@@ -24,7 +26,12 @@ class Publisher:
     """What rospy.Publisher is to an outlet, without a ROS master."""
 
     def __init__(self, name, raw_class, queue_size, tcp_nodelay):
-        self.impl = SimpleNamespace(connections=[], set_queue_size=lambda length: None)
+        self.impl = SimpleNamespace(
+            connections=[],
+            set_queue_size=lambda length: None,
+            c_lock=threading.Lock(),
+            connection_poll=rospy.topics.Poller(),
+        )
         self.unregistered = False
 
     def unregister(self):
@@ -252,6 +259,7 @@ def test_a_released_outlet_publishes_no_more_and_says_how_to_unregister(bench):
         bench.outlet.publish(make_message(number))
     before = len(subscriber.read())
     (unregister,) = bench.outlet.release()
+    poller = bench.publisher.impl.connection_poll.poller
     assert not bench.outlet.is_open
     bench.outlet.publish(b"late")
     while bench.timers:
@@ -260,4 +268,5 @@ def test_a_released_outlet_publishes_no_more_and_says_how_to_unregister(bench):
     assert not bench.publisher.unregistered
     unregister()
     assert bench.publisher.unregistered
+    assert poller.closed, "its file must not wait for Python's garbage collection"
     assert bench.outlet.release() == []

@@ -1,5 +1,6 @@
 """Jobs on a thread of their own: in order, bounded, one bad job costs no other."""
 
+import sys
 import threading
 
 from hero_driver.worker import Worker
@@ -72,6 +73,38 @@ def test_a_job_that_raises_is_reported_and_the_next_one_is_done():
     bench.wait()
     assert bench.errors == [error]
     assert bench.done == [1]
+
+
+def test_a_job_that_wants_to_end_the_thread_ends_nothing():
+    bench = Bench()
+    bench.worker.submit(sys.exit)
+    bench.submit(1)
+    bench.wait()
+    assert [type(error) for error in bench.errors] == [SystemExit]
+    assert bench.done == [1]
+
+
+def test_an_error_that_cannot_be_reported_is_counted_and_the_next_job_is_done():
+    def fail(_):
+        raise OSError("no space left on device")
+
+    bench = Bench()
+    bench.worker = Worker("bench", 10, fail)
+    bench.worker.submit(lambda: 1 / 0)
+    bench.submit(1)
+    bench.wait()
+    assert bench.worker.lost_errors == 1
+    assert bench.done == [1]
+
+
+def test_a_job_that_must_be_done_is_taken_although_too_many_wait():
+    bench = Bench(queue_length=1)
+    bench.hold()
+    assert [bench.submit(1), bench.submit(2)] == [True, False]
+    assert bench.worker.submit(lambda: bench.done.append(3), always=True)
+    bench.gate.set()
+    bench.worker.close(drain=True)
+    assert bench.done == [1, 3]
 
 
 def test_submitting_does_not_wait_for_a_job_that_hangs():

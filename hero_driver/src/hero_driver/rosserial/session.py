@@ -146,6 +146,7 @@ class Session:
         self._last_request_s: Optional[float] = None
         self._request_due_s: Optional[float] = now_s
         self._undeclared_repeats = 0
+        self._changes = 0
         self._requests = 0
         self._last_configured_s = now_s
 
@@ -274,6 +275,14 @@ class Session:
             return Problem(
                 "topic %s refused: more than %d topics (max_topics)" % (info.name, self._limits.max_topics)
             )
+        if info.topic_id in self.topics:
+            # A robot with other topics is one that was restarted, and that dials again.
+            self._changes += 1
+            if self._changes > self._limits.max_topics:
+                return Problem(
+                    "topic %s refused: ids were declared as something else more than %d times (max_topics)"
+                    % (info.name, self._limits.max_topics)
+                )
         self.topics[info.topic_id] = topic
         return TopicDeclared(topic)
 

@@ -10,6 +10,10 @@ from typing import Any, Callable, Deque, NamedTuple, Optional
 READ_LENGTH = 65536
 """One read takes all that a robot can have sent: 1 s of stock data has 44 kB."""
 
+UNSENT_MAX = 65536
+"""Bytes that wait for a peer that does not read. A robot gets 6 B/s, and commands only after it has taken the
+last ones, so this is no robot."""
+
 _INT = struct.Struct("i")
 
 
@@ -79,6 +83,7 @@ class Link:
         self._loop = loop
         self._socket = sock
         self._unsent: Deque[bytes] = collections.deque()
+        self._unsent_length = 0
 
     def send_frame(self, frame: bytes) -> None:
         """Write one whole frame with one send, or keep it until the socket takes it."""
@@ -86,11 +91,11 @@ class Link:
             return
         self.handed_length += len(frame)
         if self._unsent:
-            self._unsent.append(frame)
+            self._keep(frame)
             return
         rest = self._write(frame)
         if rest:
-            self._unsent.append(rest)
+            self._keep(rest)
             self._loop.watch(self, writable=True)
 
     def read_unacknowledged_length(self) -> int:
@@ -106,7 +111,7 @@ class Link:
         except OSError:
             answer = _INT.pack(0)
         length: int = _INT.unpack(answer)[0]
-        return length + sum(map(len, self._unsent))
+        return length + self._unsent_length
 
     def close(self, reason: str) -> None:
         """Close the connection; safe to call twice."""
@@ -133,6 +138,7 @@ class Link:
         """
         while self._unsent:
             rest = self._write(self._unsent[0])
+            self._unsent_length -= len(self._unsent[0]) - len(rest)
             if rest:
                 self._unsent[0] = rest
                 return False
@@ -143,7 +149,19 @@ class Link:
         """Close the socket itself; only the loop calls this."""
         self.closed = True
         self._unsent.clear()
+        self._unsent_length = 0
         self._socket.close()
+
+    def _keep(self, data: bytes) -> None:
+        if self._unsent_length + len(data) > UNSENT_MAX:
+            self._close_soon("it does not read: %d bytes wait for it" % self._unsent_length)
+            return
+        self._unsent.append(data)
+        self._unsent_length += len(data)
+
+    def _close_soon(self, reason: str) -> None:
+        """Close, but not at once: the caller is still busy with this link."""
+        self._loop.call_soon(lambda: self.close(reason))
 
     def _write(self, data: bytes) -> bytes:
         """Return what the socket did not take."""
@@ -152,9 +170,7 @@ class Link:
         except (BlockingIOError, InterruptedError):
             return data
         except OSError as error:
-            # Not closed at once: the caller is still busy with this link.
-            reason = "write failed: %s" % describe_error(error)
-            self._loop.call_soon(lambda: self.close(reason))
+            self._close_soon("write failed: %s" % describe_error(error))
             return b""
         return data[sent:]
 

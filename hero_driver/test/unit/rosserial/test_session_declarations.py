@@ -80,6 +80,16 @@ def test_another_declaration_of_an_id_replaces_the_one_before():
     assert message.topic.info.name == "/hero_0/other"
 
 
+def test_ids_that_become_something_else_again_and_again_are_refused_and_keep_their_last_name():
+    session = open_session(max_topics=3)
+    events = []
+    for count in range(10):
+        events += receive(session, declare_twist(106, "/hero_0/name_%d/cmd_vel" % count))
+    assert [type(event) for event in events] == [TopicDeclared] * 4 + [Problem] * 6
+    assert "more than 3 times (max_topics)" in events[4].text
+    assert session.topics[106].info.name == "/hero_0/name_3/cmd_vel"
+
+
 def test_an_id_that_changes_its_direction_changes_what_may_be_sent():
     session = open_declared_session()
     session.encode_message(109, bytes(48))
