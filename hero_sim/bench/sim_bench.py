@@ -118,6 +118,8 @@ def measure(robots: int, seconds: float) -> Measurement:
         "--port",
         str(server.port),
         "--quiet",
+        "--flash-dir",
+        "none",
     ]
     process = subprocess.Popen(command)
     try:
@@ -146,7 +148,7 @@ def measure(robots: int, seconds: float) -> Measurement:
 def measure_fastest(robots: int, simulated_ms: int = 5000) -> float:
     """Return how many seconds of a driving swarm are simulated in a second, without sockets."""
     swarm = build_swarm(
-        build_parser().parse_args(["--robots", str(robots)]), [""] * robots, lambda text: None
+        build_parser().parse_args(["--robots", str(robots), "--flash-dir", "none"]), [""] * robots, lambda text: None
     )
 
     def run(until_ms: int) -> None:

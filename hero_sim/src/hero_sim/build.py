@@ -13,9 +13,16 @@ from .errors import OptionError
 from .fault_injector import FaultInjector
 from .faults import parse_fault
 from .firmware import Firmware, FirmwareOptions
-from .flash import Flash
+from .flash import NO_FLASH_DIR, Flash, check_folder, find_flash_dir, make_fingerprint
 from .range_sensors import FACTORY_CALIBRATION_COUNTS_M2, calibrate
-from .robot_errors import SERVO_CENTRE_US, RobotErrors, draw_errors, load_known, set_known
+from .robot_errors import (
+    SERVO_CENTRE_US,
+    RobotErrors,
+    describe_robot,
+    draw_errors,
+    load_known,
+    set_known,
+)
 from .simulator import Simulator
 from .swarm import Swarm
 from .tcp_link import TcpLink
@@ -26,13 +33,12 @@ BOOT_SPREAD_MS = 200
 """Robots that are started together come up within this time of each other."""
 
 
-_SEEDS_BEFORE_ROBOTS = 5
+_SEEDS_BEFORE_ROBOTS = 4
 _SEEDS_PER_ROBOT = 2
 
 
 def draw_seeds(options: argparse.Namespace) -> np.ndarray:
-    """Return the seeds of all streams of chance: places, world, boot times, faults, errors,
-    then two per robot."""
+    """Return the seeds of all streams of chance: places, world, boot times, faults, then two per robot."""
     size = _SEEDS_BEFORE_ROBOTS + _SEEDS_PER_ROBOT * options.robots
     return np.random.RandomState(options.seed).randint(0, 2**31 - 1, size=size)
 
@@ -47,10 +53,16 @@ def _build_flash(options: argparse.Namespace, errors: RobotErrors, index: int) -
         "calibrated": np.rint(errors.servo_centre_us[index]).tolist(),
         "factory": [SERVO_CENTRE_US] * 2,
     }[options.motors]
-    path = None
-    if options.flash_dir is not None:
-        path = os.path.join(options.flash_dir, "hero_%d.json" % (options.first_id + index))
-    return Flash(calibration_counts_m2, centres_us, path)
+    robot_id = options.first_id + index
+    flash = Flash(calibration_counts_m2, centres_us)
+    if not options.flash_dir:
+        # Another seed or another --error makes another robot, which has a flash of its own.
+        body = describe_robot(errors, index) + [options.ir, options.motors]
+        flash.keep_in(os.path.join(find_flash_dir(), "hero_%d-%s.json" % (robot_id, make_fingerprint(body))))
+    elif options.flash_dir != NO_FLASH_DIR:
+        check_folder(options.flash_dir)
+        flash.keep_in(os.path.join(options.flash_dir, "hero_%d.json" % robot_id))
+    return flash
 
 
 def build_errors(options: argparse.Namespace) -> RobotErrors:
@@ -58,8 +70,10 @@ def build_errors(options: argparse.Namespace) -> RobotErrors:
 
     Raises: OptionError for an error that cannot be set.
     """
-    rng = np.random.RandomState(draw_seeds(options)[4])
-    errors = draw_errors(options.robots, rng, 0.0 if options.perfect else 1.0)
+    # By id, so that a robot is the same one in any swarm.
+    ids = range(options.first_id, options.first_id + options.robots)
+    rngs = [np.random.RandomState([options.seed, robot_id % 2**32]) for robot_id in ids]
+    errors = draw_errors(rngs, 0.0 if options.perfect else 1.0)
     if options.errors is not None:
         load_known(errors, options.first_id, options.errors)
     for text in options.error:
@@ -94,6 +108,11 @@ def build_swarm(options: argparse.Namespace, addresses: List[str], report: Calla
                 FirmwareOptions(options.imu_hat, exact, addresses[index]),
                 report,
             )
+        )
+    remembering = ["hero_%d" % robot.robot_id for robot in robots if robot.flash.is_from_file]
+    if remembering:
+        report(
+            "%s: with the parameters of an earlier run (--flash-dir none begins anew)" % ", ".join(remembering)
         )
     swarm = Swarm(world, robots)
     swarm.switch_on(np.random.RandomState(seeds[2]), BOOT_SPREAD_MS)

@@ -9,6 +9,7 @@ from hero_driver.rosserial import frames
 
 from . import declarations as ids
 from . import messages
+from .errors import CommandError
 
 if TYPE_CHECKING:
     from .firmware import Firmware
@@ -73,7 +74,7 @@ class CommandTable:
         del millis
         flash = self._firmware.flash
         flash.ir_calibration_counts_m2 = list(messages.decode_ir_calibration(payload))
-        flash.save()
+        self._keep()
         text = "IR calibration parameters have been successfully recorded!"
         self._firmware.log(text)
         return _answer(ids.ID_IR_CALIBRATION_ANSWER, True, text)
@@ -88,8 +89,8 @@ class CommandTable:
         del millis
         centres_us = messages.decode_motor(payload)
         self._firmware.flash.motor_centres_us = [float(centre) for centre in centres_us]
-        self._firmware.flash.save()
         self._firmware.motors.motors.centres_us = list(centres_us)
+        self._keep()
         text = "Motor Parameters has been succesfully recorded!"
         self._firmware.log(text)
         return _answer(ids.ID_MOTORS_PARAMETERS_ANSWER, True, text)
@@ -112,10 +113,17 @@ class CommandTable:
         self._log_green("Left  Motor PID = [%f, %f, %f]" % tuple(gains[:3]))
         self._log_green("Right Motor PID = [%f, %f, %f]" % tuple(gains[3:]))
         self._log_green("Recording values in the flash... ")
-        self._firmware.flash.save()
+        self._keep()
         text = "PID Parameters has been succesfully recorded!"
         self._log_green(text + " ")
         return _answer(answer_id, True, text)
+
+    def _keep(self) -> None:
+        """Write the flash; where that fails, the robot goes on with what it was told, and people are told."""
+        try:
+            self._firmware.flash.save()
+        except CommandError as error:
+            self._firmware.complain(str(error))
 
     def _log_green(self, text: str) -> None:
         self._firmware.log("\x1b[92m[/%s] %s\x1b[0m" % (self._firmware.name, text))

@@ -242,6 +242,10 @@ class Firmware:
             frames.encode_frame(frames.ID_LOG, payloads.encode_log(payloads.Log(payloads.LOG_INFO, text)))
         )
 
+    def complain(self, text: str) -> None:
+        """Tell the people who watch, not the server."""
+        self._report("%s: %s" % (self.name, text))
+
     # -- time passes ---------------------------------------------------------------------------------------
 
     def run(self, now_ms: int) -> None:
@@ -401,7 +405,7 @@ class Firmware:
         try:
             answer = self.commands.receive(frame, millis, now_ms)
         except CommandError as error:
-            self._report("%s: %s" % (self.name, error))
+            self.complain(str(error))
             return
         # Without a configured link the callback runs, but its answer is not sent (node_handle.h:478).
         if answer is not None and self.configured:
@@ -430,7 +434,7 @@ class Firmware:
         try:
             answer = payloads.decode_time(payload)
         except wire_errors.PayloadError as error:
-            self._report("%s: %s" % (self.name, error))
+            self.complain(str(error))
             return
         self.clock.take_answer(answer, self._requested_at_ms, millis)
         self._last_answer_ms = millis

@@ -63,7 +63,7 @@ def build_parser() -> argparse.ArgumentParser:
         "--flash-dir",
         default=None,
         metavar="DIR",
-        help="keep the robots' parameters here, a file per robot (nowhere)",
+        help="keep the robots' parameters here, a file per robot; none forgets them (ROS_HOME/hero_sim)",
     )
     parser.add_argument(
         "--wifi",

@@ -4,7 +4,7 @@
 Pure but for the reading of that file. What the robot itself believes is in its flash, not here.
 """
 
-from typing import Any, Dict, List, NamedTuple
+from typing import Any, Dict, List, NamedTuple, Sequence
 
 import numpy as np
 
@@ -85,28 +85,24 @@ class RobotErrors(NamedTuple):
     beta_counts: np.ndarray
 
 
-def draw_errors(count: int, rng: np.random.RandomState, scale: float = 1.0) -> RobotErrors:
-    """Return what is usual: count robots drawn from rng; with scale 0 all are as drawn on paper.
+def draw_errors(rngs: Sequence[np.random.RandomState], scale: float = 1.0) -> RobotErrors:
+    """Return what is usual: one robot drawn from each of rngs; with scale 0 all are as drawn on paper.
 
     Sources: odometry off by 1.4 to 3.0 % of the path and alpha from 0.39 to 0.44 are published; that servos of
     one kind differ by some per cent and some microseconds is an assumption.
     """
-    wheel_scale = 1.0 + scale * rng.normal(0.0, 0.003, (count, 2))
-    servo_gain = 1.0 + scale * rng.normal(0.0, 0.03, (count, 2))
-    alpha = range_sensors.ALPHA_COUNTS_M2 * (
-        1.0 + scale * rng.normal(0.0, 0.02, (count, range_sensors.BEAMS))
-    )
-    centre_us = SERVO_CENTRE_US + np.rint(scale * rng.normal(0.0, 6.0, (count, 2)))
+    drawn = np.array([rng.standard_normal(6 + range_sensors.BEAMS) for rng in rngs]) * scale
+    same = np.ones((len(rngs), 1))
     return RobotErrors(
-        servo_centre_us=centre_us,
-        dead_zone_us=np.full((count, 1), SERVO_DEAD_ZONE_US),
-        servo_gain=servo_gain,
-        servo_lag_s=np.full((count, 1), SERVO_LAG_S),
-        wheel_scale=wheel_scale,
-        slip=np.full((count, 1), 0.02 * scale),
-        ripple_m_s=np.full((count, 1), 0.003 * scale),
-        alpha_counts_m2=alpha,
-        beta_counts=np.full((count, 1), range_sensors.BETA_COUNTS),
+        servo_centre_us=SERVO_CENTRE_US + np.rint(6.0 * drawn[:, 0:2]),
+        dead_zone_us=same * SERVO_DEAD_ZONE_US,
+        servo_gain=1.0 + 0.03 * drawn[:, 2:4],
+        servo_lag_s=same * SERVO_LAG_S,
+        wheel_scale=1.0 + 0.003 * drawn[:, 4:6],
+        slip=same * 0.02 * scale,
+        ripple_m_s=same * 0.003 * scale,
+        alpha_counts_m2=range_sensors.ALPHA_COUNTS_M2 * (1.0 + 0.02 * drawn[:, 6:]),
+        beta_counts=same * range_sensors.BETA_COUNTS,
     )
 
 
@@ -195,8 +191,15 @@ def describe_errors(errors: RobotErrors, first_id: int) -> List[str]:
     lines: List[str] = []
     for row in range(len(errors.slip)):
         lines.append("hero_%d:" % (first_id + row))
-        for key, kind in KINDS.items():
-            columns = getattr(errors, kind.array)[row, kind.columns]
-            if len(columns) == 1:
-                lines.append("  %s: %.6g" % (key, columns[0]))
+        lines.extend("  " + line for line in describe_robot(errors, row))
+    return lines
+
+
+def describe_robot(errors: RobotErrors, row: int) -> List[str]:
+    """Return the differences of one robot, `KEY: VALUE` each."""
+    lines: List[str] = []
+    for key, kind in KINDS.items():
+        columns = getattr(errors, kind.array)[row, kind.columns]
+        if len(columns) == 1:
+            lines.append("%s: %.6g" % (key, columns[0]))
     return lines

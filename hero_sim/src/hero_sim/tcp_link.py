@@ -4,10 +4,13 @@ One selector serves all robots. Robots dial the driver as the firmware does, or,
 port each. Nothing here knows what the bytes mean.
 """
 
+import ctypes
 import errno
 import os
 import selectors
 import socket
+import struct
+import sys
 from typing import Dict, List, NamedTuple, Optional, Tuple
 
 from .errors import OptionError
@@ -24,8 +27,16 @@ _MOST_UNSENT = 1 << 20
 """Bytes kept for a driver that does not read; the robot stands still by then, so more means a fault of
 ours."""
 
+_MOST_ABANDONED = 200
+"""Connections of robots that lost their power; by so many later ones the driver has given the first one up."""
+
 # Like the ESP8266, whose own send buffer is two segments: a server that does not read is felt soon.
 _SEND_BUFFER_LENGTH = 16384
+
+_SO_ATTACH_FILTER = 26
+_DROP_ALL = struct.pack("HBBI", 0x06, 0, 0, 0)
+"""Number of the socket option (asm-generic/socket.h), and the shortest packet filter: keep 0 bytes of each
+(linux/filter.h: BPF_RET | BPF_K). Needs no privileges."""
 
 
 class LinkEvent(NamedTuple):
@@ -286,9 +297,10 @@ class TcpLink:
             connection.socket.close()
 
     def abandon(self, index: int) -> None:
-        """Leave a robot's connection without a word: the driver gets no FIN and no answer any more.
+        """Leave a robot's connection without a word, as one without power does.
 
-        The socket stays open and unread until the program ends.
+        The driver gets no FIN, and on Linux not even acknowledgements: what it sends stays unsent. Elsewhere the
+        system goes on acknowledging until its buffer is full. The socket stays open until the program ends.
         """
         connection = self._connections[index]
         if connection is not None:
@@ -297,7 +309,10 @@ class TcpLink:
             if connection.dialling:
                 connection.socket.close()
             else:
+                _make_deaf(connection.socket)
                 self._abandoned.append(connection.socket)
+                if len(self._abandoned) > _MOST_ABANDONED:
+                    self._abandoned.pop(0).close()
 
     def close_all(self) -> None:
         """End every connection; safe to call twice."""
@@ -308,6 +323,19 @@ class TcpLink:
         self._listeners.clear()
         self._abandoned.clear()
         self._selector.close()
+
+
+def _make_deaf(sock: socket.socket) -> None:
+    """Let the system drop every segment for this socket unseen, so that nothing is acknowledged."""
+    if not sys.platform.startswith("linux"):
+        return
+    drop_all = ctypes.create_string_buffer(_DROP_ALL)
+    program = struct.pack("HP", 1, ctypes.addressof(drop_all))
+    try:
+        sock.setsockopt(socket.SOL_SOCKET, _SO_ATTACH_FILTER, program)
+    except OSError:
+        # A kernel built without socket filters: the peer is acknowledged, as on other systems.
+        return
 
 
 def errno_text(code: int) -> bytes:

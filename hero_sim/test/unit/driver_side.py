@@ -14,7 +14,8 @@ Arrival = collections.namedtuple("Arrival", "at_ms topic_id payload")
 
 
 def parse_options(*arguments):
-    options = main.build_parser().parse_args(list(arguments))
+    """Read a command line; what an earlier run kept on this machine stays out of it."""
+    options = main.build_parser().parse_args(["--flash-dir", "none", *arguments])
     main.check_options(options)
     return options
 

@@ -1,5 +1,6 @@
 """The program as users start it: a process of its own, behind real sockets on loopback."""
 
+import fcntl
 import os
 import re
 import selectors
@@ -8,6 +9,7 @@ import socket
 import struct
 import subprocess
 import sys
+import termios
 import time
 
 import pytest
@@ -45,7 +47,7 @@ def simulate():
 
     def run(*arguments):
         # Four times real time: these tests wait for robots to boot.
-        processes.append(start("--speed", "4", *arguments))
+        processes.append(start("--speed", "4", "--flash-dir", "none", *arguments))
         return processes[-1]
 
     yield run
@@ -137,6 +139,16 @@ def server():
     server.close()
 
 
+def wait_until_acknowledged(sock, limit_s):
+    """Return whether the other side took all that was sent, at least at the level of TCP."""
+    end_s = time.monotonic() + limit_s
+    while time.monotonic() < end_s:
+        if struct.unpack("i", fcntl.ioctl(sock, termios.TIOCOUTQ, bytes(4)))[0] == 0:
+            return True
+        time.sleep(0.01)
+    return False
+
+
 def request_when_ready(server, count):
     """Wait until count robots are past their start, then ask each for its topics and await its odometry."""
     server.run_until(
@@ -198,6 +210,11 @@ def test_a_robot_that_vanishes_sends_no_end_and_its_successor_boots(simulate, se
     server.run_until(lambda: len(new.logs()) >= 2)
     assert not old.closed
     assert "Firmware" in new.logs()[0]
+    # Without power nothing is acknowledged either: what the driver sends stays in its own system.
+    old.send(frames.ID_PUBLISHER)
+    assert not wait_until_acknowledged(old.socket, 0.5)
+    new.send(frames.ID_PUBLISHER)
+    assert wait_until_acknowledged(new.socket, LIMIT_S)
 
 
 def test_a_robot_that_leaves_closes_and_streams_on_when_it_is_back(simulate, server):

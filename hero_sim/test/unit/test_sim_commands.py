@@ -27,23 +27,6 @@ def test_self_tuning_answers_without_success_spins_and_floods_the_log_until_a_tw
     assert driver.measure_speed(0) < 0.002
 
 
-def test_parameters_are_kept_over_a_restart(tmp_path):
-    driver = DriverSide("--flash-dir", str(tmp_path))
-    driver.start_streaming()
-    driver.send(0, ids.ID_IR_CALIBRATION, struct.pack("<8d", *[0.4 + 0.01 * index for index in range(8)]))
-    driver.run(100)
-    driver.send(0, ids.ID_MOTORS_PARAMETERS, struct.pack("<2h", 1490, 1512))
-    driver.run(100)
-    driver.send(0, ids.ID_VELOCITY_PID_PARAMETERS, struct.pack("<6f", 1, 2, 3, 4, 5, 6))
-    driver.run(200)
-    for topic_id in (126, 132, 135):
-        assert [arrival.payload[0] for arrival in driver.list_frames(0, topic_id)] == [1]
-    flash = DriverSide("--flash-dir", str(tmp_path)).swarm.robots[0].flash
-    assert flash.ir_calibration_counts_m2 == pytest.approx([0.4 + 0.01 * index for index in range(8)])
-    assert flash.motor_centres_us == [1490.0, 1512.0]
-    assert flash.velocity_pid == [1, 2, 3, 4, 5, 6]
-
-
 def test_laser_enable_stops_and_starts_the_laser_and_a_restart_forgets_it():
     driver = DriverSide()
     driver.start_streaming()

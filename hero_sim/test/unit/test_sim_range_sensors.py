@@ -122,7 +122,7 @@ def test_readings_are_whole_counts_with_the_published_noise():
     arena = build_default(1)
     arena = arena._replace(segments_m=wall_at(0.10))
     rng = np.random.RandomState(0)
-    world = World(arena, np.zeros((1, 3)), rng, draw_errors(1, rng, 0.0))
+    world = World(arena, np.zeros((1, 3)), rng, draw_errors([rng], 0.0))
     readings = np.array([world.read_infrared(np.array([0]))[0, 4] for _ in range(2000)])
     assert (readings == np.rint(readings)).all()
     assert readings.mean() == pytest.approx(0.423 / 0.01 - 0.93, abs=0.15)

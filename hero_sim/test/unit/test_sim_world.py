@@ -16,8 +16,8 @@ def build_world(robots=1, arena=None, errors=0.0, poses=None, seed=0):
     arena = arena or build_default(robots)
     if poses is None:
         poses = place_robots(arena, robots, np.random.RandomState(seed))
-    rng = np.random.RandomState(seed)
-    return worlds.World(arena, np.array(poses, dtype=float), rng, draw_errors(robots, rng, errors))
+    drawn = draw_errors([np.random.RandomState([seed, index]) for index in range(robots)], errors)
+    return worlds.World(arena, np.array(poses, dtype=float), np.random.RandomState(seed), drawn)
 
 
 def command(world, index, linear_m_s, turn_rad_s):

@@ -1,0 +1,132 @@
+import json
+import os
+import struct
+import subprocess
+import sys
+
+import pytest
+from driver_side import DriverSide
+
+from hero_sim import declarations as ids
+from hero_sim.errors import OptionError
+from hero_sim.flash import Flash
+
+CENTRES = struct.pack("<2h", 1490, 1512)
+
+
+def set_centres(*arguments):
+    driver = DriverSide(*arguments)
+    driver.start_streaming()
+    driver.send(0, ids.ID_MOTORS_PARAMETERS, CENTRES)
+    driver.run(200)
+    return driver
+
+
+def read_centres(*arguments):
+    return DriverSide(*arguments).swarm.robots[0].flash.motor_centres_us
+
+
+@pytest.fixture
+def ros_home(tmp_path, monkeypatch):
+    """A new one; robots without a folder keep their parameters there."""
+    monkeypatch.setenv("ROS_HOME", str(tmp_path))
+    return tmp_path
+
+
+def test_all_parameters_are_kept_over_a_restart_of_the_simulator(tmp_path):
+    driver = set_centres("--flash-dir", str(tmp_path))
+    for topic_id, payload in (
+        (ids.ID_IR_CALIBRATION, struct.pack("<8d", *[0.4 + 0.01 * index for index in range(8)])),
+        (ids.ID_VELOCITY_PID_PARAMETERS, struct.pack("<6f", 1, 2, 3, 4, 5, 6)),
+        (ids.ID_POSITION_PID_PARAMETERS, struct.pack("<6f", 7, 8, 9, 10, 11, 12)),
+    ):
+        driver.send(0, topic_id, payload)
+        driver.run(200)
+    for topic_id in (126, 132, 133, 135):
+        assert [arrival.payload[0] for arrival in driver.list_frames(0, topic_id)] == [1]
+    assert os.listdir(str(tmp_path)) == ["hero_0.json"]
+    robot = DriverSide("--flash-dir", str(tmp_path)).swarm.robots[0]
+    assert robot.flash.ir_calibration_counts_m2 == pytest.approx([0.4 + 0.01 * index for index in range(8)])
+    assert robot.motors.motors.centres_us == [1490, 1512]
+    assert [tuple(pid.gains) for pid in robot.motors.velocity.pids] == [(1, 2, 3), (4, 5, 6)]
+    assert [tuple(pid.gains) for pid in robot.motors.position.pids] == [(7, 8, 9), (10, 11, 12)]
+
+
+def test_a_reboot_of_a_robot_keeps_what_was_set_without_any_folder():
+    driver = set_centres()
+    robot = driver.swarm.robots[0]
+    robot.switch_on(driver.swarm.now_ms)
+    assert robot.motors.motors.centres_us == [1490, 1512]
+
+
+def test_without_a_folder_parameters_are_kept_beside_the_logs_of_ros_and_people_are_told(ros_home):
+    driver = set_centres("--flash-dir", "")
+    assert driver.reports == []
+    assert len(os.listdir(str(ros_home / "hero_sim"))) == 1
+    again = DriverSide("--flash-dir", "")
+    assert again.swarm.robots[0].flash.motor_centres_us == [1490.0, 1512.0]
+    assert len(again.reports) == 1 and again.reports[0].startswith("hero_0: with the parameters of an earlier run")
+
+
+@pytest.mark.parametrize(
+    "arguments", [("--seed", "1"), ("--perfect",), ("--ir", "factory"), ("--error", "slip=0.03"), ("--first-id", "1")]
+)
+def test_a_robot_that_is_another_one_has_a_flash_of_its_own(ros_home, arguments):
+    del ros_home
+    set_centres("--flash-dir", "")
+    assert read_centres("--flash-dir", "", *arguments) != [1490.0, 1512.0]
+
+
+def test_a_robot_is_the_same_one_in_a_larger_swarm(ros_home):
+    del ros_home
+    set_centres("--flash-dir", "")
+    assert read_centres("--flash-dir", "", "--robots", "5", "--arena", "empty") == [1490.0, 1512.0]
+
+
+def test_nothing_is_written_until_something_is_set(ros_home):
+    DriverSide("--flash-dir", "").start_streaming()
+    assert os.listdir(str(ros_home)) == []
+
+
+def test_a_home_that_cannot_be_written_costs_no_robot_but_is_reported(ros_home):
+    (ros_home / "hero_sim").write_text("a file where the folder should be")
+    driver = set_centres("--flash-dir", "")
+    assert any("cannot be written" in report for report in driver.reports)
+    assert driver.swarm.robots[0].motors.motors.centres_us == [1490, 1512]
+
+
+@pytest.mark.parametrize(
+    "content, reason",
+    [
+        ("no JSON", "cannot be read"),
+        ("[]", "ir_calibration_counts_m2 must be a list of 8 numbers"),
+        ('{"ir_calibration_counts_m2": [1, 2]}', "must be a list of 8 numbers"),
+        (json.dumps({"ir_calibration_counts_m2": ["x"] * 8}), "could not convert"),
+    ],
+)
+def test_a_file_that_is_not_a_flash_is_named_with_the_reason(tmp_path, content, reason):
+    path = tmp_path / "hero_0.json"
+    path.write_text(content)
+    with pytest.raises(OptionError) as caught:
+        Flash([0.5] * 8).keep_in(str(path))
+    assert reason in str(caught.value) and str(path) in str(caught.value)
+
+
+def test_a_folder_that_cannot_be_made_is_named(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OptionError, match=r"--flash-dir .*file/flash cannot be made"):
+        DriverSide("--flash-dir", str(tmp_path / "file" / "flash"))
+
+
+def test_the_fingerprint_of_a_robot_does_not_depend_on_the_process():
+    code = "from hero_sim.flash import make_fingerprint; print(make_fingerprint(['a: 1', 'b']))"
+    names = {
+        subprocess.run(
+            [sys.executable, "-c", code],
+            env=dict(os.environ, PYTHONPATH=os.pathsep.join(filter(None, sys.path)), PYTHONHASHSEED=seed),
+            check=True,
+            capture_output=True,
+        ).stdout
+        for seed in ("0", "1")
+    }
+    assert len(names) == 1
