@@ -1,9 +1,11 @@
 """A YAML file -> its nodes, which know their lines, or one line that says what is wrong.
 
-Borders: the only file that needs PyYAML, and only when a file is read.
+Borders: the only file that needs PyYAML, and only when a file is read. Without it, a file that is JSON as well can be
+read all the same, but for comments on lines of their own; the shipped arenas are written that way.
 """
 
-from typing import Any, Dict, Tuple
+import json
+from typing import Any, Dict, NamedTuple, Optional, Tuple
 
 from .errors import OptionError
 
@@ -16,27 +18,56 @@ def read_nodes(path: str, option: str, remedy: str) -> Any:
     Raises: OptionError with file, line and reason.
     """
     try:
-        import yaml
-    except ImportError as error:
-        raise OptionError(
-            "%s: PyYAML is missing; install it: apt install python3-yaml, or pip install PyYAML" % option
-        ) from error
-    try:
         with open(path, encoding="utf-8") as file:
-            return yaml.compose(file, Loader=yaml.SafeLoader)
+            text = file.read()
     except OSError as error:
         raise OptionError("%s cannot be read: %s; %s" % (option, error.strerror, remedy)) from error
     except UnicodeDecodeError as error:
         raise OptionError("%s is not a text file in UTF-8: %s" % (option, error)) from error
+    try:
+        import yaml
+    except ImportError:
+        return _read_json(text, option)
+    try:
+        return yaml.compose(text, Loader=yaml.SafeLoader)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         line = mark.line + 1 if mark is not None else 1
         raise OptionError("%s:%d: %s" % (path, line, getattr(error, "problem", None) or error)) from error
 
 
+class _JsonNode(NamedTuple):
+    """Stands for a node of PyYAML whose line is not known."""
+
+    id: str
+    value: Any
+    start_mark: Optional[Any] = None
+
+
+def _read_json(text: str, option: str) -> Any:
+    lines = ["" if line.lstrip().startswith("#") else line for line in text.splitlines()]
+    try:
+        return _convert_json(json.loads("\n".join(lines)))
+    except ValueError as error:
+        raise OptionError(
+            "%s: PyYAML is missing, and the file is not JSON (%s); install PyYAML: apt install python3-yaml, or "
+            "pip install PyYAML" % (option, error)
+        ) from error
+
+
+def _convert_json(value: Any) -> _JsonNode:
+    if isinstance(value, dict):
+        pairs = [(_convert_json(key), _convert_json(entry)) for key, entry in value.items()]
+        return _JsonNode("mapping", pairs)
+    if isinstance(value, list):
+        return _JsonNode("sequence", [_convert_json(entry) for entry in value])
+    return _JsonNode("scalar", "" if value is None else str(value))
+
+
 def fail_at(path: str, node: Any, reason: str) -> OptionError:
     """Return the error that names file, line and reason."""
-    return OptionError("%s:%d: %s" % (path, node.start_mark.line + 1 if node is not None else 1, reason))
+    mark = node.start_mark if node is not None else None
+    return OptionError("%s:%d: %s" % (path, mark.line + 1 if mark is not None else 1, reason))
 
 
 def read_mapping(path: str, node: Any, what: str) -> Dict[str, Tuple[Any, Any]]:

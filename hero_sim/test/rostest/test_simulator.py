@@ -2,11 +2,17 @@
 """The simulator as a node behind the driver: it drives, its truth is published, and each fault shows at the
 driver."""
 
+import json
 import math
+import os
+import signal
+import subprocess
+import sys
 import threading
 import time
 import unittest
 
+import rospkg
 import rospy
 import rostest
 from geometry_msgs.msg import Twist
@@ -108,6 +114,43 @@ class SimulatorTest(unittest.TestCase):
         true_m = math.hypot(here.x - start.x, here.y - start.y)
         self.assertAlmostEqual(math.hypot(believed.x - before.x, believed.y - before.y), true_m, delta=0.003)
         self.assertEqual(truth.message.header.frame_id, "world")
+
+    def test_robots_from_elsewhere_and_simulated_ones_share_a_driver(self):
+        """A robot that is none of ours stands for a real one: another program, which knows no simulator."""
+        program = os.path.join(rospkg.RosPack().get_path("hero_driver"), "bench", "emulated_swarm.py")
+        command = [sys.executable, program, "--port", "21081", "--first-id", "100", "--robots", "1"]
+        other = subprocess.Popen([*command, "--seconds", "60"], stdout=subprocess.PIPE)
+        try:
+            odoms = [Newest("/hero_%d/odom" % number, Odometry) for number in (100, 0)]
+            for odom in odoms:
+                odom.wait()
+            self.assertTrue(self.is_ready(0) and self.is_ready(100))
+            self.assertNotEqual(self.find(0).address.split(":")[0], self.find(100).address.split(":")[0])
+            truth = Newest("/hero_6/ground_truth", Odometry)
+            start = truth.wait().pose.pose.position
+            drives = [
+                rospy.Publisher("/hero_%d/velocity_controller/cmd_vel" % number, Twist, queue_size=1)
+                for number in (100, 6)
+            ]
+            twist = Twist()
+            twist.linear.x = 0.1
+
+            def driven():
+                # The emulated robot notes what it takes for the time of sending.
+                twist.linear.y = time.time()
+                for drive in drives:
+                    drive.publish(twist)
+                time.sleep(0.1)
+                here = truth.message.pose.pose.position
+                return math.hypot(here.x - start.x, here.y - start.y) > 0.03
+
+            wait_for(driven, "way of the simulated robot")
+            drives[1].publish(Twist())
+        finally:
+            other.send_signal(signal.SIGINT)
+            said, _ = other.communicate(timeout=LIMIT_S)
+        self.assertGreater(len(json.loads(said.decode())["commands_s"]), 0)
+        self.assertTrue(self.is_ready(6))
 
     def test_odom_frames_lie_in_the_world_and_follow_set_odom(self):
         frames = Newest("/tf_static", TFMessage)
