@@ -1,0 +1,1 @@
+"""Robots on topics -> bags, and bags -> plots and tables."""

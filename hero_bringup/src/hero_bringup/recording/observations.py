@@ -1,0 +1,188 @@
+"""Messages of a recording -> what was seen of each robot, as arrays. Pure: messages are taken as they are.
+
+Times are the recorder's, seconds since 1970; stamps are the robot's clock, which the driver keeps in step.
+"""
+
+import math
+from typing import Any, Dict, Iterable, List, NamedTuple, Optional, Protocol, Set, Tuple
+
+from .series import Series
+from .topics import (
+    ENCODER,
+    FLEET_TOPIC,
+    FLEET_TYPE,
+    GROUND_TRUTH,
+    ODOMETRY,
+    POSITION_COMMAND,
+    STATIC_TRANSFORMS_TOPIC,
+    TRANSFORMS_TYPES,
+    VELOCITY_COMMAND,
+    find_robot_topic,
+    is_arena_topic,
+)
+
+CUBE, CYLINDER = 1, 3
+"""Types of visualization_msgs/Marker that walls and round obstacles are drawn with."""
+
+STATE_NAMES = {0: "joining", 1: "ready", 2: "away", 3: "refused"}
+"""Of hero_msgs/Robot."""
+
+
+class Message(Protocol):
+    """What of a recorded message is looked at."""
+
+    topic: str
+    type: str
+    content: Any
+    time_s: float
+
+
+class Origin(NamedTuple):
+    """Where the odom frame of a robot lies from time_s on."""
+
+    time_s: float
+    x_m: float
+    y_m: float
+    yaw_rad: float
+
+
+class StateReport(NamedTuple):
+    """What the driver said of a robot."""
+
+    time_s: float
+    state: str
+    reconnects: int
+
+
+class RobotObservations:
+    """What was seen of one robot.
+
+    Attributes:
+        odometry, ground_truth: rows of arrival s, stamp s, x m, y m, yaw rad, linear m/s, turn rad/s.
+        encoder: rows of arrival s, left ticks, right ticks.
+        commands: rows of arrival s, linear m/s, turn rad/s, of both controllers.
+        origins: where its odom frame lies in the frame that all robots share.
+        states: reports of the driver.
+    """
+
+    def __init__(self) -> None:
+        """Begin empty."""
+        self.odometry = Series(2, 5)
+        self.ground_truth = Series(2, 5)
+        self.encoder = Series(3, 0)  # ticks grow beyond seven digits in some hours
+        self.commands = Series(1, 2)
+        self.origins: List[Origin] = []
+        self.states: List[StateReport] = []
+
+
+class Observations:
+    """What was seen of all robots.
+
+    Attributes:
+        robots: by id.
+        walls_m: segments x1 y1 x2 y2 of the arena.
+        circles_m: round obstacles x y radius.
+        shared_frame: name of the frame in which origins are; empty if the recording holds none.
+        fleet_times_s: when the driver reported.
+    """
+
+    def __init__(self, robot_ids: Optional[Set[int]] = None) -> None:
+        """Begin empty; robot_ids: look at these only, None at all."""
+        self._robot_ids = robot_ids
+        self.robots: Dict[int, RobotObservations] = {}
+        self.walls_m: List[Tuple[float, float, float, float]] = []
+        self.circles_m: List[Tuple[float, float, float]] = []
+        self.shared_frame = ""
+        self.fleet_times_s: List[float] = []
+
+    def wants(self, topic: str, message_type: str) -> bool:
+        """Return whether receive() has a use for a topic."""
+        found = find_robot_topic(topic, message_type)
+        if found is not None:
+            kinds = (ODOMETRY, GROUND_TRUTH, ENCODER, VELOCITY_COMMAND, POSITION_COMMAND)
+            return found.kind in kinds and self._wants_robot(found.robot_id)
+        return (
+            (topic == FLEET_TOPIC and message_type == FLEET_TYPE)
+            or (topic == STATIC_TRANSFORMS_TOPIC and message_type in TRANSFORMS_TYPES)
+            or is_arena_topic(topic, message_type)
+        )
+
+    def _wants_robot(self, robot_id: int) -> bool:
+        return self._robot_ids is None or robot_id in self._robot_ids
+
+    def _robot(self, robot_id: int) -> RobotObservations:
+        return self.robots.setdefault(robot_id, RobotObservations())
+
+    def receive_all(self, messages: Iterable[Message]) -> None:
+        """Take every message."""
+        for message in messages:
+            self.receive(message)
+
+    def receive(self, message: Message) -> None:
+        """Take one message of a topic that wants() takes."""
+        found = find_robot_topic(message.topic, message.type)
+        if found is not None:
+            self._receive_of_robot(self._robot(found.robot_id), found.kind, message)
+        elif message.topic == FLEET_TOPIC:
+            self._receive_fleet(message)
+        elif message.topic == STATIC_TRANSFORMS_TOPIC:
+            self._receive_transforms(message)
+        else:
+            self._receive_arena(message.content.markers)
+
+    def _receive_of_robot(self, robot: RobotObservations, kind: str, message: Message) -> None:
+        content = message.content
+        if kind in (ODOMETRY, GROUND_TRUTH):
+            pose, twist = content.pose.pose, content.twist.twist
+            series = robot.odometry if kind == ODOMETRY else robot.ground_truth
+            series.add(
+                message.time_s,
+                content.header.stamp.to_sec(),
+                pose.position.x,
+                pose.position.y,
+                yaw_of(pose.orientation),
+                twist.linear.x,
+                twist.angular.z,
+            )
+        elif kind == ENCODER:
+            robot.encoder.add(message.time_s, content.left_ticks, content.right_ticks)
+        else:
+            robot.commands.add(message.time_s, content.linear.x, content.angular.z)
+
+    def _receive_fleet(self, message: Message) -> None:
+        self.fleet_times_s.append(message.time_s)
+        for robot in message.content.robots:
+            if robot.id >= 0 and self._wants_robot(robot.id):
+                state = STATE_NAMES.get(robot.state, str(robot.state))
+                self._robot(robot.id).states.append(StateReport(message.time_s, state, robot.reconnects))
+
+    def _receive_transforms(self, message: Message) -> None:
+        for transform in message.content.transforms:
+            name, _, frame = transform.child_frame_id.strip("/").rpartition("/")
+            number = name[len("hero_") :] if name.startswith("hero_") else ""
+            if frame != "odom" or not number.isdecimal() or not self._wants_robot(int(number)):
+                continue
+            self.shared_frame = transform.header.frame_id.strip("/")
+            place = transform.transform.translation
+            origin = Origin(message.time_s, place.x, place.y, yaw_of(transform.transform.rotation))
+            origins = self._robot(int(number)).origins
+            # Latched messages are recorded again at the begin of every file of a split.
+            if not origins or origins[-1][1:] != origin[1:]:
+                origins.append(origin)
+
+    def _receive_arena(self, markers: Iterable[Any]) -> None:
+        self.walls_m, self.circles_m = [], []
+        for marker in markers:
+            x_m, y_m = marker.pose.position.x, marker.pose.position.y
+            if marker.type == CUBE:
+                yaw_rad = yaw_of(marker.pose.orientation)
+                half_x_m = math.cos(yaw_rad) * marker.scale.x / 2.0
+                half_y_m = math.sin(yaw_rad) * marker.scale.x / 2.0
+                self.walls_m.append((x_m - half_x_m, y_m - half_y_m, x_m + half_x_m, y_m + half_y_m))
+            elif marker.type == CYLINDER:
+                self.circles_m.append((x_m, y_m, marker.scale.x / 2.0))
+
+
+def yaw_of(quaternion: Any) -> float:
+    """Return the turn about z of a quaternion that turns about z only (rad, -pi to pi)."""
+    return math.remainder(2.0 * math.atan2(quaternion.z, quaternion.w), 2.0 * math.pi)

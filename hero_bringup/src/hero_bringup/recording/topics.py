@@ -1,0 +1,79 @@
+"""Names of topics -> what a recording keeps and what its readers find in it. Pure.
+
+The patterns are regular expressions, so that robots that join later are recorded too.
+"""
+
+import re
+from typing import List, NamedTuple, Optional, Sequence
+
+ODOMETRY = "odometry"
+GROUND_TRUTH = "ground_truth"
+ENCODER = "encoder"
+PROXIMITY = "proximity"
+VELOCITY_COMMAND = "velocity_command"
+POSITION_COMMAND = "position_command"
+MOTOR_COMMAND = "motor_command"
+LED = "led"
+IMU = "imu"
+
+ROBOT_TOPICS = {
+    "odom": (ODOMETRY, "nav_msgs/Odometry"),
+    "ground_truth": (GROUND_TRUTH, "nav_msgs/Odometry"),
+    "encoder": (ENCODER, "hero_msgs/Encoder"),
+    "proximity": (PROXIMITY, "sensor_msgs/LaserScan"),
+    "velocity_controller/cmd_vel": (VELOCITY_COMMAND, "geometry_msgs/Twist"),
+    "position_controller/cmd_vel": (POSITION_COMMAND, "geometry_msgs/Twist"),
+    "cmd_motor": (MOTOR_COMMAND, "hero_msgs/Motor"),
+    "led": (LED, "std_msgs/ColorRGBA"),
+    "imu": (IMU, "sensor_msgs/Imu"),
+}
+"""Below /hero_N/: what it is, and its type. A topic of another type by that name is somebody else's."""
+
+RAW_ROBOT_TOPICS = ("odom_raw", "laser", "laser_enable")
+"""What the stock robot sends and odom and proximity are made from."""
+
+FLEET_TOPIC = "/hero_driver/robots"
+FLEET_TYPE = "hero_msgs/RobotArray"
+STATIC_TRANSFORMS_TOPIC = "/tf_static"
+TRANSFORMS_TYPES = ("tf2_msgs/TFMessage", "tf/tfMessage")
+MARKERS_TYPE = "visualization_msgs/MarkerArray"
+
+SHARED_PATTERNS = (
+    "/tf",
+    "/tf_static",
+    "/rosout",
+    "/diagnostics",
+    "/hero_driver/(robots|stopped)",
+    "/(.*/)?arena",
+)
+"""Topics of no single robot: where frames are, log lines, the fleet, the simulator's walls."""
+
+_ROBOT_TOPIC = re.compile(r"/hero_(\d+)/(.+)")
+
+
+class RobotTopic(NamedTuple):
+    """A topic of one robot."""
+
+    robot_id: int
+    kind: str
+
+
+def make_patterns(robot_ids: Optional[Sequence[int]], with_raw: bool, extra: Sequence[str]) -> List[str]:
+    """Return the regular expressions of the topics to record; robot_ids None: all robots, also later ones."""
+    robots = r"[0-9]+" if robot_ids is None else "(%s)" % "|".join(map(str, robot_ids))
+    names = [*ROBOT_TOPICS, *(RAW_ROBOT_TOPICS if with_raw else ())]
+    return ["/hero_%s/(%s)" % (robots, "|".join(names)), *SHARED_PATTERNS, *extra]
+
+
+def find_robot_topic(topic: str, message_type: str) -> Optional[RobotTopic]:
+    """Return whose topic it is and what it holds; None if it is no robot's, or of another type."""
+    match = _ROBOT_TOPIC.fullmatch(topic)
+    if match is None:
+        return None
+    kind, expected_type = ROBOT_TOPICS.get(match.group(2), ("", ""))
+    return RobotTopic(int(match.group(1)), kind) if kind and message_type == expected_type else None
+
+
+def is_arena_topic(topic: str, message_type: str) -> bool:
+    """Return whether a topic holds the walls of an arena, as the simulator draws them."""
+    return message_type == MARKERS_TYPE and topic.split("/")[-1] == "arena"
