@@ -18,6 +18,7 @@ from std_srvs.srv import SetBool, SetBoolResponse
 from .config import ConfigError, DriverConfig, read_config
 from .gateway import Gateway
 from .log_relay import LogRelay
+from .outlet import admit_many_subscribers
 from .reports import FleetStatus, Reporter
 from .transport import Address, EventLoop, TransportSettings
 from .worker import Worker
@@ -190,6 +191,7 @@ def main(argv: Optional[List[str]] = None) -> int:
     except KeyboardInterrupt:
         return 130
     rospy.init_node(NODE_NAME, argv=argv, disable_signals=True)
+    admit_many_subscribers()
     try:
         config = read_config(_read_private_parameters())
     except ConfigError as error:

@@ -13,6 +13,12 @@ import struct
 from typing import Any, Callable, Deque, Dict, List
 
 import rospy
+from rospy.impl import tcpros_base
+
+WAITING_CONNECTIONS = 1024
+"""Subscribers that may wait to be accepted. rospy lets 5 wait, while one recorder or RViz comes for all topics of all
+robots at once: the others' connections stall in TCP's back-off, for a minute and more with fifty robots. The system may
+cap it (net.core.somaxconn, 4096 on Linux)."""
 
 RETRY_S = 0.01
 """How soon a subscriber whose socket was full is tried again."""
@@ -20,6 +26,13 @@ RETRY_S = 0.01
 _LENGTH = struct.Struct("<I")
 
 CallLater = Callable[[float, Callable[[], None]], None]
+
+
+def admit_many_subscribers() -> None:
+    """Let many subscribers come at once; call it after rospy.init_node()."""
+    tcpros_base.start_tcpros_server()
+    # A second listen() on a socket that listens changes how many may wait.
+    tcpros_base._tcpros_server.tcp_ros_server.server_sock.listen(WAITING_CONNECTIONS)
 
 
 class Outlet:
