@@ -120,9 +120,7 @@ def find_errors(robot: RobotObservations) -> Optional[PoseErrors]:
         shift_x_m = x_m[0] - (cosine * path.x_m[0] - sine * path.y_m[0])
         shift_y_m = y_m[0] - (sine * path.x_m[0] + cosine * path.y_m[0])
         path = place(path, [Origin(0.0, shift_x_m, shift_y_m, turn)])
-    return PoseErrors(
-        path.times_s, np.hypot(path.x_m - x_m, path.y_m - y_m), wrap(path.yaw_rad - yaw_rad)
-    )
+    return PoseErrors(path.times_s, np.hypot(path.x_m - x_m, path.y_m - y_m), wrap(path.yaw_rad - yaw_rad))
 
 
 def find_message_delays(robot: RobotObservations) -> np.ndarray:
@@ -138,7 +136,9 @@ def find_motion_delays(robot: RobotObservations) -> np.ndarray:
     if not len(command_s) or len(encoder_s) < 2:
         return np.zeros(0)
     moving = (linear_m_s != 0.0) | (turn_rad_s != 0.0)
-    begins = np.flatnonzero(moving & np.concatenate(([True], ~moving[:-1] | (np.diff(command_s) > STARTING_S))))
+    begins = np.flatnonzero(
+        moving & np.concatenate(([True], ~moving[:-1] | (np.diff(command_s) > STARTING_S)))
+    )
     # When the wheels turned, and by how much.
     turned = np.abs(np.diff(left_ticks)) + np.abs(np.diff(right_ticks))
     delays = []

@@ -24,15 +24,26 @@ PART_SUFFIX = ".part"
 
 def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     """Read the command line."""
-    parser = argparse.ArgumentParser(prog="export", description="Write what bags hold of the robots as tables.")
+    parser = argparse.ArgumentParser(
+        prog="export", description="Write what bags hold of the robots as tables."
+    )
     parser.add_argument("bags", nargs="*", metavar="FILE.bag", help="the bags of one recording, in any order")
-    parser.add_argument("--out", metavar="FOLDER", help="where the tables go (the first bag's name); must not exist")
-    parser.add_argument("--format", default=CSV, metavar="LIST", help="csv, parquet, or csv,parquet (%(default)s)")
+    parser.add_argument(
+        "--out", metavar="FOLDER", help="where the tables go (the first bag's name); must not exist"
+    )
+    parser.add_argument(
+        "--format", default=CSV, metavar="LIST", help="csv, parquet, or csv,parquet (%(default)s)"
+    )
     parser.add_argument("--robots", default="all", help="ids, e.g. '0 1 2' or 0-3 (all)")
     parser.add_argument(
-        "--tables", default=",".join(tables.TABLES), metavar="LIST", help="which, with commas between (%(default)s)"
+        "--tables",
+        default=",".join(tables.TABLES),
+        metavar="LIST",
+        help="which, with commas between (%(default)s)",
     )
-    parser.add_argument("--columns", action="store_true", help="list all tables, their columns and units, and end")
+    parser.add_argument(
+        "--columns", action="store_true", help="list all tables, their columns and units, and end"
+    )
     options = parser.parse_args(arguments)
     for name, known in (("format", FORMATS), ("tables", tuple(tables.TABLES))):
         words = [word for word in getattr(options, name).split(",") if word]
@@ -84,10 +95,14 @@ def run(options: argparse.Namespace) -> None:
     try:
         os.makedirs(part)
     except OSError as error:
-        raise RecordingError("%s cannot be made: %s; choose another --out" % (part, error.strerror)) from error
+        raise RecordingError(
+            "%s cannot be made: %s; choose another --out" % (part, error.strerror)
+        ) from error
     try:
         files = TableFiles(part, options.format)
-        write_tables(bags, None if options.robots is None else set(options.robots), set(options.tables), files)
+        write_tables(
+            bags, None if options.robots is None else set(options.robots), set(options.tables), files
+        )
         files.close()
         if not files.rows:
             raise RecordingError(
@@ -99,8 +114,7 @@ def run(options: argparse.Namespace) -> None:
         shutil.rmtree(part, ignore_errors=True)
     robots = {robot_id for robot_id, _ in files.rows}
     print(
-        "%s: %d robots, %d tables, %d rows"
-        % (folder, len(robots), len(files.rows), sum(files.rows.values()))
+        "%s: %d robots, %d tables, %d rows" % (folder, len(robots), len(files.rows), sum(files.rows.values()))
     )
 
 

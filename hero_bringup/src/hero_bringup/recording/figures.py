@@ -41,11 +41,15 @@ class Figures:
 
     # -- what the figures share ----------------------------------------------------------------------------
 
-    def _begin(self, height_in: float, text: str, rows: int = 1, columns: int = 1, **options: Any) -> Tuple[Figure, Any]:
+    def _begin(
+        self, height_in: float, text: str, rows: int = 1, columns: int = 1, **options: Any
+    ) -> Tuple[Figure, Any]:
         figure = Figure(figsize=(WIDTH_IN, height_in), layout="constrained")
         axes = figure.subplots(rows, columns, squeeze=False, **options)
         figure.suptitle("%s\n" % text, fontsize=12, fontweight="bold")
-        figure.text(0.5, 0.995, "\n" + self._title, ha="center", va="top", fontsize=8, color=_GREY, linespacing=2.2)
+        figure.text(
+            0.5, 0.995, "\n" + self._title, ha="center", va="top", fontsize=8, color=_GREY, linespacing=2.2
+        )
         return figure, axes
 
     def _has_legend(self) -> bool:
@@ -55,11 +59,14 @@ class Figures:
         handles: List[Line2D] = []
         if self._has_legend() and len(self._robots) > 1:
             handles = [
-                Line2D([], [], color=self._colours[robot_id], label="hero_%d" % robot_id) for robot_id in self._robots
+                Line2D([], [], color=self._colours[robot_id], label="hero_%d" % robot_id)
+                for robot_id in self._robots
             ]
         handles += others
         if handles:
-            axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=8, frameon=False)
+            axes.legend(
+                handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=8, frameon=False
+            )
 
     def _since_start(self, times_s: np.ndarray) -> np.ndarray:
         return times_s - self._start_s
@@ -77,14 +84,22 @@ class Figures:
 
     def draw_paths(self) -> Optional[Figure]:
         """Draw the ways of all robots in the arena."""
-        drawn = {key: robot for key, robot in self._robots.items() if len(robot.odometry) or len(robot.ground_truth)}
+        drawn = {
+            key: robot
+            for key, robot in self._robots.items()
+            if len(robot.odometry) or len(robot.ground_truth)
+        }
         if not drawn:
             return None
         placed = [key for key, robot in drawn.items() if robot.origins]
         figure, grid = self._begin(8.0, "Paths by odometry")
         axes = grid[0][0]
         axes.add_collection(
-            LineCollection([[(x1, y1), (x2, y2)] for x1, y1, x2, y2 in self._seen.walls_m], colors="black", linewidths=1.5)
+            LineCollection(
+                [[(x1, y1), (x2, y2)] for x1, y1, x2, y2 in self._seen.walls_m],
+                colors="black",
+                linewidths=1.5,
+            )
         )
         for x_m, y_m, radius_m in self._seen.circles_m:
             axes.add_patch(patches.Circle((x_m, y_m), radius_m, color="0.75"))
@@ -99,7 +114,9 @@ class Figures:
             if not len(path.x_m):
                 continue
             axes.plot(path.x_m, path.y_m, color=colour, linewidth=0.9, zorder=3)
-            axes.plot(path.x_m[0], path.y_m[0], "o", color=colour, markerfacecolor="white", markersize=4, zorder=4)
+            axes.plot(
+                path.x_m[0], path.y_m[0], "o", color=colour, markerfacecolor="white", markersize=4, zorder=4
+            )
             self._draw_robot(axes, robot_id, path)
         axes.set_aspect("equal", adjustable="datalim")
         axes.margins(0.05)
@@ -110,12 +127,23 @@ class Figures:
         if len(placed) == len(drawn):
             axes.set_title("frame %s" % self._seen.shared_frame, fontsize=9)
         elif placed:
-            others = ", ".join("hero_%d" % key for key in drawn if key not in placed)
-            axes.set_title("frame %s; %s in a frame of their own" % (self._seen.shared_frame, others), fontsize=9)
+            names = ", ".join("hero_%d" % key for key in drawn if key not in placed)
+            axes.set_title(
+                "frame %s; %s in a frame of their own" % (self._seen.shared_frame, names), fontsize=9
+            )
         elif len(drawn) > 1:
             axes.set_title("each robot in its own frame hero_N/odom: nobody said where it began", fontsize=9)
         others = [
-            Line2D([], [], color=_GREY, marker="o", markerfacecolor="white", markersize=4, linestyle="", label="begin"),
+            Line2D(
+                [],
+                [],
+                color=_GREY,
+                marker="o",
+                markerfacecolor="white",
+                markersize=4,
+                linestyle="",
+                label="begin",
+            ),
             Line2D([], [], color=_GREY, marker="o", markersize=9, linestyle="", label="end"),
         ]
         if with_truth:
@@ -155,7 +183,11 @@ class Figures:
             command_s, *commands = hold_commands(*robot.commands.columns())
             for axes, measured, commanded in zip(row, (linear_m_s, turn_rad_s), commands):
                 axes.plot(
-                    self._since_start(command_s), commanded, color=_GREY, linewidth=0.8, drawstyle="steps-post"
+                    self._since_start(command_s),
+                    commanded,
+                    color=_GREY,
+                    linewidth=0.8,
+                    drawstyle="steps-post",
                 )
                 # A line over a pause would tell of a speed that nobody saw.
                 times_s, values = break_at_gaps(arrival_s, measured)
@@ -182,7 +214,9 @@ class Figures:
             picture = np.full((len(self._robots), bins), np.nan)
             for row, robot in enumerate(self._robots.values()):
                 columns = robot.odometry.columns()
-                picture[row] = mean_in_bins(self._since_start(columns[0]), columns[column], self._duration_s, bins)
+                picture[row] = mean_in_bins(
+                    self._since_start(columns[0]), columns[column], self._duration_s, bins
+                )
             highest = max(least, float(np.nanpercentile(np.abs(picture), 99)))
             image = axes.imshow(
                 picture,
@@ -212,7 +246,12 @@ class Figures:
                 self._draw_delay_bar(message_axes, row, messages[robot_id], colour)
             if len(motions[robot_id]):
                 motion_axes.plot(
-                    motions[robot_id], np.full(len(motions[robot_id]), row), "o", color=colour, markersize=3, alpha=0.5
+                    motions[robot_id],
+                    np.full(len(motions[robot_id]), row),
+                    "o",
+                    color=colour,
+                    markersize=3,
+                    alpha=0.5,
                 )
                 motion_axes.plot(np.median(motions[robot_id]), row, "|", color="black", markersize=9)
         self._label_rows(message_axes)
@@ -224,7 +263,9 @@ class Figures:
         highest = max(float(delays.max()) for delays in messages.values() if len(delays))
         lowest = min(float(delays.min()) for delays in messages.values() if len(delays))
         message_axes.set_xlim(min(-5.0, lowest * 1.1), max(60.0, highest * 1.3))
-        message_axes.set_xticks([tick for tick in ticks if lowest * 1.1 - 5.0 <= tick <= max(60.0, highest * 1.3)])
+        message_axes.set_xticks(
+            [tick for tick in ticks if lowest * 1.1 - 5.0 <= tick <= max(60.0, highest * 1.3)]
+        )
         message_axes.get_xaxis().set_major_formatter("{x:.0f}")
         message_axes.minorticks_off()
         motion_axes.set_xlabel("command to motion: first turn of the wheels after a start from rest (ms)")
@@ -232,7 +273,13 @@ class Figures:
         motion_axes.set_xlim(0.0, None)
         if not any(len(delays) for delays in motions.values()):
             motion_axes.set_xlim(0.0, 1.0)
-            motion_axes.text(0.5, 0.5, "no start from rest\nin this recording", transform=motion_axes.transAxes, ha="center")
+            motion_axes.text(
+                0.5,
+                0.5,
+                "no start from rest\nin this recording",
+                transform=motion_axes.transAxes,
+                ha="center",
+            )
         for axes in grid[0]:
             axes.grid(axis="x", color="0.9", linewidth=0.5)
             axes.set_axisbelow(True)
@@ -268,17 +315,34 @@ class Figures:
                 linewidth=2.5,
             )
             if not robot.states and len(arrival_s):
-                axes.hlines(row, arrival_s[0] - self._start_s, arrival_s[-1] - self._start_s, color=_GREY, linewidth=0.8)
+                axes.hlines(
+                    row,
+                    arrival_s[0] - self._start_s,
+                    arrival_s[-1] - self._start_s,
+                    color=_GREY,
+                    linewidth=0.8,
+                )
         self._label_rows(axes)
         axes.set_xlim(0.0, self._duration_s)
         axes.set_xlabel("time (s)")
         seen = {report.state for robot in self._robots.values() for report in robot.states}
         handles = [
-            patches.Patch(color=colour, label=state) for state, colour in STATE_COLOURS.items() if state in seen
+            patches.Patch(color=colour, label=state)
+            for state, colour in STATE_COLOURS.items()
+            if state in seen
         ]
-        handles.append(patches.Patch(facecolor="white", edgecolor=_GREY, label="no odom for\nmore than %g s" % analysis.ODOMETRY_GAP_S))
+        handles.append(
+            patches.Patch(
+                facecolor="white",
+                edgecolor=_GREY,
+                label="no odom for\nmore than %g s" % analysis.ODOMETRY_GAP_S,
+            )
+        )
         if not self._seen.fleet_times_s:
-            axes.set_title("the driver's reports (/hero_driver/robots) were not recorded: lines show odometry", fontsize=8)
+            axes.set_title(
+                "the driver's reports (/hero_driver/robots) were not recorded: lines show odometry",
+                fontsize=8,
+            )
         axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=8, frameon=False)
         return figure
 
@@ -297,8 +361,12 @@ class Figures:
             position_axes.plot(self._since_start(times_s), position_m * 1e3, color=colour, linewidth=width)
             yaw_axes.plot(self._since_start(times_s), np.degrees(yaw_rad), color=colour, linewidth=width)
         if not self._has_legend():
-            self._name_extremes(position_axes, {key: (error.times_s, error.position_m * 1e3) for key, error in known.items()})
-            self._name_extremes(yaw_axes, {key: (error.times_s, np.degrees(error.yaw_rad)) for key, error in known.items()})
+            self._name_extremes(
+                position_axes, {key: (error.times_s, error.position_m * 1e3) for key, error in known.items()}
+            )
+            self._name_extremes(
+                yaw_axes, {key: (error.times_s, np.degrees(error.yaw_rad)) for key, error in known.items()}
+            )
         position_axes.set_ylabel("position error (mm)")
         position_axes.set_ylim(0.0, None)
         yaw_axes.set_ylabel("heading error (degrees),\npositive: turned too far left")
@@ -330,7 +398,9 @@ class Figures:
             for times_s, values in curves.values()
         ]
         known = np.isfinite(stacked).any(axis=0)
-        axes.plot(grid_s[known], np.nanmedian(np.array(stacked)[:, known], axis=0), color="black", linewidth=1.8)
+        axes.plot(
+            grid_s[known], np.nanmedian(np.array(stacked)[:, known], axis=0), color="black", linewidth=1.8
+        )
 
 
 def hold_commands(

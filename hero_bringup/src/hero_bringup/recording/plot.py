@@ -1,6 +1,6 @@
 """Program plot: bags -> figures of all robots, and a table in words.
 
-    rosrun hero_bringup plot hero_2026-11-21-10-00-00_0.bag
+rosrun hero_bringup plot hero_2026-11-21-10-00-00_0.bag
 """
 
 import argparse
@@ -29,11 +29,18 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("bags", nargs="+", metavar="FILE.bag", help="the bags of one recording, in any order")
     parser.add_argument("--robots", default="all", help="ids, e.g. '0 1 2' or 0-3 (all)")
     parser.add_argument(
-        "--figures", default=",".join(FIGURES), metavar="LIST", help="which, with commas between (%(default)s)"
+        "--figures",
+        default=",".join(FIGURES),
+        metavar="LIST",
+        help="which, with commas between (%(default)s)",
     )
-    parser.add_argument("--format", choices=FORMATS, default="png", help="png: a file each; pdf: one file (png)")
+    parser.add_argument(
+        "--format", choices=FORMATS, default="png", help="png: a file each; pdf: one file (png)"
+    )
     parser.add_argument("--out", metavar="PREFIX", help="begin of the files' names (the first bag's name)")
-    parser.add_argument("--arena", metavar="FILE", help="arena file of hero_sim to draw, for recordings without one")
+    parser.add_argument(
+        "--arena", metavar="FILE", help="arena file of hero_sim to draw, for recordings without one"
+    )
     options = parser.parse_args(arguments)
     options.figures = [name for name in options.figures.split(",") if name]
     for name in options.figures:
@@ -51,7 +58,9 @@ def observe(options: argparse.Namespace, bags: BagSet) -> Observations:
     observations = Observations(None if options.robots is None else set(options.robots))
     observations.receive_all(bags.read(observations.wants))
     if not observations.robots:
-        wanted = "" if options.robots is None else " with these ids (%s)" % ", ".join(map(str, options.robots))
+        wanted = (
+            "" if options.robots is None else " with these ids (%s)" % ", ".join(map(str, options.robots))
+        )
         raise RecordingError(
             "%s: no robot%s in it; its topics: %s"
             % (", ".join(bags.paths), wanted, ", ".join(sorted(bags.topics)[:8]) or "none")
@@ -113,13 +122,25 @@ def draw(options: argparse.Namespace, observations: Observations, bags: BagSet) 
             paths.append(path)
         return paths
     except OSError as error:
-        raise RecordingError("%s cannot be written: %s; choose another --out" % (error.filename or prefix, error.strerror)) from error
+        raise RecordingError(
+            "%s cannot be written: %s; choose another --out" % (error.filename or prefix, error.strerror)
+        ) from error
 
 
 def format_table(observations: Observations) -> List[str]:
     """Return the robots in numbers, a line each."""
     rows = [
-        ["ROBOT", "WAY", "ODOM", "LONGEST GAP", "MESSAGE DELAY", "99 %", "COMMAND TO MOTION", "RECONNECTS", "ERROR AT THE END"]
+        [
+            "ROBOT",
+            "WAY",
+            "ODOM",
+            "LONGEST GAP",
+            "MESSAGE DELAY",
+            "99 %",
+            "COMMAND TO MOTION",
+            "RECONNECTS",
+            "ERROR AT THE END",
+        ]
     ]
     for robot_id, robot in sorted(observations.robots.items()):
         summary = analysis.summarise(robot_id, robot)
@@ -151,7 +172,9 @@ def format_number(text: str, value: Optional[float], factor: float = 1.0) -> str
 def run(options: argparse.Namespace) -> None:
     """Read, draw, print. Raises: RecordingError."""
     if importlib.util.find_spec("matplotlib") is None:
-        raise RecordingError("matplotlib is missing; install it: apt install python3-matplotlib, or pip install matplotlib")
+        raise RecordingError(
+            "matplotlib is missing; install it: apt install python3-matplotlib, or pip install matplotlib"
+        )
     bags = BagSet(options.bags, Progress())
     observations = observe(options, bags)
     print("\n".join(format_table(observations)))

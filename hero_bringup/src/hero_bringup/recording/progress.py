@@ -16,7 +16,7 @@ class Progress:
     def __init__(self, stream: Optional[IO[str]] = None) -> None:
         """Show on stream, stderr if None."""
         self._stream = sys.stderr if stream is None else stream
-        self._bar: Optional["tqdm[None]"] = None
+        self._bar: Optional[tqdm[None]] = None
         self._title = ""
         self._total = 0
         self._next_line_s = 0.0

@@ -88,7 +88,10 @@ class Recording:
         """Record until something ends it; return the exit code."""
         for path in sorted(self._old_files):
             if path.endswith(ACTIVE_SUFFIX):
-                say("%s was cut off, or another recording writes it; to mend it: record --mend %s" % (path, path))
+                say(
+                    "%s was cut off, or another recording writes it; to mend it: record --mend %s"
+                    % (path, path)
+                )
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             signal.signal(number, self._receive_signal)
         start_s = time.monotonic()
@@ -112,7 +115,10 @@ class Recording:
             print("record: ended: " + reason, file=sys.stderr)
             return 1
         if mended or code not in (0, -signal.SIGINT, -signal.SIGTERM):
-            print("record: rosbag's recorder ended badly (exit code %s); its last lines say why" % code, file=sys.stderr)
+            print(
+                "record: rosbag's recorder ended badly (exit code %s); its last lines say why" % code,
+                file=sys.stderr,
+            )
             return 1
         return 0
 
@@ -197,7 +203,9 @@ def make_command(options: argparse.Namespace, recorder_arguments: Sequence[str])
     """Return the command line of rosbag's recorder. Raises: RecordingError if it is not installed."""
     found = roslib.packages.find_node("rosbag", "record")
     if not found:
-        raise RecordingError("rosbag's recorder is missing; install it: apt install python3-rosbag, or ros-noetic-rosbag")
+        raise RecordingError(
+            "rosbag's recorder is missing; install it: apt install python3-rosbag, or ros-noetic-rosbag"
+        )
     command = [found[0], "--quiet", "--regex", "--repeat-latched", "--buffsize", "256", "--tcpnodelay"]
     command += ["-o", os.path.join(options.folder, options.name), "--split", "--size", str(options.split_mb)]
     # The recorder's own guard only stops writing and goes on; it is the second line, should this program be killed.
@@ -217,20 +225,32 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument(
         "--robots", default="all", help="ids, e.g. '0 1 2' or 0-3 (all, also those that join later)"
     )
-    parser.add_argument("--topics", default="", help="more topics to record, regular expressions with spaces between")
+    parser.add_argument(
+        "--topics", default="", help="more topics to record, regular expressions with spaces between"
+    )
     parser.add_argument("--raw", action="store_true", help="record odom_raw, laser and laser_enable too")
-    parser.add_argument("--split-mb", type=int, default=256, metavar="MB", help="begin a new file at this size (256)")
+    parser.add_argument(
+        "--split-mb", type=int, default=256, metavar="MB", help="begin a new file at this size (256)"
+    )
     parser.add_argument(
         "--max-files", type=int, default=0, metavar="N", help="keep the newest N files only (0: keep all)"
     )
     parser.add_argument(
         "--min-free-mb", type=float, default=1000.0, metavar="MB", help="end when less is free (1000)"
     )
-    parser.add_argument("--compression", choices=("lz4", "bz2", "none"), default="lz4", help="of the bags (lz4)")
+    parser.add_argument(
+        "--compression", choices=("lz4", "bz2", "none"), default="lz4", help="of the bags (lz4)"
+    )
     parser.add_argument("--seconds", type=float, metavar="S", help="end by itself after S seconds")
-    parser.add_argument("--mend", nargs="+", metavar="FILE", help="record nothing, but mend recordings that were cut off")
+    parser.add_argument(
+        "--mend", nargs="+", metavar="FILE", help="record nothing, but mend recordings that were cut off"
+    )
     options = parser.parse_args(arguments)
-    for name, lowest, highest in (("split_mb", 1, 100000), ("max_files", 0, 10000), ("min_free_mb", 0.0, 1e9)):
+    for name, lowest, highest in (
+        ("split_mb", 1, 100000),
+        ("max_files", 0, 10000),
+        ("min_free_mb", 0.0, 1e9),
+    ):
         value = getattr(options, name)
         if not lowest <= value <= highest:
             parser.error("--%s %s: must be %g..%g" % (name.replace("_", "-"), value, lowest, highest))

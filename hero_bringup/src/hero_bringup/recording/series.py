@@ -14,7 +14,7 @@ class Series:
 
     def __init__(self, times: int, values: int) -> None:
         """Begin empty; every row is times numbers (s) and then values numbers."""
-        self._columns: List["array[float]"] = [array("d") for _ in range(times)]
+        self._columns: List[array[float]] = [array("d") for _ in range(times)]
         self._columns += [array("f") for _ in range(values)]
 
     def __len__(self) -> int:

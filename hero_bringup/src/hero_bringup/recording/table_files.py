@@ -63,7 +63,9 @@ class ParquetFile:
                 for column in self._columns
             ]
         )
-        self._writer: Any = importlib.import_module("pyarrow.parquet").ParquetWriter(path + ".parquet", self._schema)
+        self._writer: Any = importlib.import_module("pyarrow.parquet").ParquetWriter(
+            path + ".parquet", self._schema
+        )
 
     def write(self, rows: List[Row]) -> None:
         """Add rows."""
@@ -142,4 +144,6 @@ class TableFiles:
                 try:
                     file.close()
                 except OSError as error:
-                    raise RecordingError("%s cannot be written: %s" % (self._folder, error.strerror or error)) from error
+                    raise RecordingError(
+                        "%s cannot be written: %s" % (self._folder, error.strerror or error)
+                    ) from error

@@ -53,7 +53,11 @@ _POSE = (
     _number("linear_m_s", "m/s", "speed ahead"),
     _number("turn_rad_s", "rad/s", "turn to the left"),
 )
-_COMMAND = (TIME, _number("linear_m_s", "m/s", "speed ahead"), _number("turn_rad_s", "rad/s", "turn to the left"))
+_COMMAND = (
+    TIME,
+    _number("linear_m_s", "m/s", "speed ahead"),
+    _number("turn_rad_s", "rad/s", "turn to the left"),
+)
 _ENCODER_FIELDS = (
     ("left_ticks", "", "since boot or the last set_odom, 288 per turn of the wheel"),
     ("right_ticks", "", "as left_ticks"),
@@ -109,7 +113,9 @@ TABLES: Dict[str, Table] = {
             _STAMP,
             *(
                 _number(
-                    beam + "_m", "m", "from the robot's centre; inf: nothing, -inf: too close, nan: not calibrated"
+                    beam + "_m",
+                    "m",
+                    "from the robot's centre; inf: nothing, -inf: too close, nan: not calibrated",
                 )
                 for beam in BEAMS
             ),
@@ -131,7 +137,10 @@ TABLES: Dict[str, Table] = {
             TIME,
             _STAMP,
             *(_number("orientation_" + axis, "1", "quaternion") for axis in "xyzw"),
-            *(_number("turn_raw_%s" % axis, "counts", "as the robot sends it, not calibrated") for axis in "xyz"),
+            *(
+                _number("turn_raw_%s" % axis, "counts", "as the robot sends it, not calibrated")
+                for axis in "xyz"
+            ),
             *(
                 _number("acceleration_raw_%s" % axis, "1000 counts", "as the robot sends it; 8.192 is 1 g")
                 for axis in "xyz"

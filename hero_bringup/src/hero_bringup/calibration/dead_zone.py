@@ -1,0 +1,90 @@
+"""Speeds of a wheel at some servo pulses -> the dead zone of that servo, and its centre. Pure.
+
+A continuous-rotation servo stands within some tens of microseconds around its centre. Its pulses are led up a
+staircase; where the wheel begins to turn on either side is found from the slope beyond, so that the centre is known
+better than a step. Pulses are absolute (cmd_motor): what the robot holds for its centres has no part in it.
+"""
+
+from typing import List, NamedTuple, Sequence, Tuple
+
+import numpy as np
+
+from .errors import CalibrationError
+
+NOMINAL_CENTRE_US = 1500
+REACH_US = 120
+"""How far from the nominal centre the staircase goes either way: far enough for a centre that is off by 60 us with a
+dead zone of 40 us."""
+
+STEP_US = 6
+STANDING_M_S = 0.004
+"""Slower than this a wheel stands: two ticks (1.1 mm) in a step may be the servo that settles."""
+
+FIT_POINTS = 4
+"""So many speeds beyond the dead zone give its edge; nearer ones say more, one alone too little."""
+
+WIDEST_US = 200.0
+
+
+class DeadZone(NamedTuple):
+    """Where a wheel stands.
+
+    Attributes:
+        low_us, high_us: edges.
+        gain_m_s_us: speed per pulse beyond the edges, without sign.
+    """
+
+    low_us: float
+    high_us: float
+    gain_m_s_us: float
+
+    @property
+    def centre_us(self) -> float:
+        """The middle."""
+        return (self.low_us + self.high_us) / 2.0
+
+
+def list_pulses() -> List[int]:
+    """Return the pulses of the staircase (us), rising."""
+    return list(range(NOMINAL_CENTRE_US - REACH_US, NOMINAL_CENTRE_US + REACH_US + 1, STEP_US))
+
+
+def find_dead_zone(pulses_us: Sequence[float], speeds_m_s: Sequence[float]) -> DeadZone:
+    """Return the dead zone of a wheel whose speed was measured at rising pulses.
+
+    Raises: CalibrationError if the wheel does not stand somewhere and turn on both sides of it.
+    """
+    pulses, speeds = np.asarray(pulses_us, dtype=float), np.asarray(speeds_m_s, dtype=float)
+    moving = np.abs(speeds) > STANDING_M_S
+    span = "%.0f to %.0f us" % (pulses[0], pulses[-1])
+    if not moving.any():
+        raise CalibrationError("does not turn at any pulse from %s: is its servo plugged in?" % span)
+    # The signs on both sides of the dead zone differ; which one is positive depends on how the servo is mounted.
+    rising = np.polyfit(pulses, speeds, 1)[0] > 0.0
+    ahead = speeds if rising else -speeds
+    below, above = np.flatnonzero(ahead < -STANDING_M_S), np.flatnonzero(ahead > STANDING_M_S)
+    if len(below) < FIT_POINTS or len(above) < FIT_POINTS or below[-1] >= above[0]:
+        raise CalibrationError(
+            "does not stand between turning one way and the other at pulses from %s: is it blocked, or its servo worn?"
+            % span
+        )
+    low = _find_edge(pulses[below[-FIT_POINTS:]], ahead[below[-FIT_POINTS:]])
+    high = _find_edge(pulses[above[:FIT_POINTS]], ahead[above[:FIT_POINTS]])
+    # The fit may reach a little into the other side's points, but an edge lies where the wheel still stands.
+    low_us = min(max(low[0], pulses[below[-1]]), pulses[above[0]])
+    high_us = min(max(high[0], pulses[below[-1]]), pulses[above[0]])
+    if not 0.0 <= high_us - low_us <= WIDEST_US:
+        raise CalibrationError(
+            "stands from %.0f to %.0f us, which no servo does: measure again" % (low_us, high_us)
+        )
+    return DeadZone(float(low_us), float(high_us), float((low[1] + high[1]) / 2.0))
+
+
+def _find_edge(pulses_us: np.ndarray, speeds_m_s: np.ndarray) -> Tuple[float, float]:
+    """Return where a line through the speeds meets zero (us), and its slope (m/s per us)."""
+    slope, offset = np.polyfit(pulses_us, speeds_m_s, 1)
+    if slope <= 0.0:
+        raise CalibrationError(
+            "does not turn faster with a longer pulse: measure again, on a floor with grip"
+        )
+    return float(-offset / slope), float(slope)

@@ -1,0 +1,151 @@
+"""Ticks of a wheel after a command -> how well it follows; and the search for gains that make it follow better. Pure.
+
+The robots turn on the spot, once to the left and once to the right, so that each wheel starts from rest both ways.
+Each wheel has a PID of its own and so a search of its own. What a robot had before cannot be asked for: the firmware
+has no service for it.
+"""
+
+from typing import Dict, List, NamedTuple, Sequence, Tuple
+
+import numpy as np
+
+from .errors import CalibrationError
+
+TICK_M = 0.0492 * np.pi / 288.0
+"""Way of a wheel's rim for a tick (docs/robot_interface.md)."""
+
+WHEEL_SEPARATION_M = 0.063
+STEP_M_S = 0.08
+"""Speed of the wheels in a test."""
+
+TURN_RAD_S = 2.0 * STEP_M_S / WHEEL_SEPARATION_M
+STEP_S = 1.5
+"""Length of a test: shorter than the 2 s after which the robot forgets a command, longer than it needs."""
+
+LATE_S = 1.0
+"""What a wheel does after this is steady."""
+
+REACHED = 0.9
+"""Share of the wanted speed that counts as reached."""
+
+OVERSHOOT_WEIGHT = 0.3
+"""An overshoot by the whole speed is as bad as 30 % of mean error: it is soon over, but it shakes a robot."""
+
+NOMINAL_GAIN_M_S_US = 0.25 / 220.0
+"""Speed of a servo of the usual kind per pulse beyond its dead zone (assumption of hero_sim)."""
+
+DEFAULT_GAINS = (1200.0, 2300.0, 0.1)
+"""P, I, D of an erased flash: us per m/s, us per m, us per m/s^2 (VelocityControl.ino:31-47)."""
+
+DERIVATIVE = 0.1
+INTEGRALS = (4000.0, 6000.0, 8500.0)
+PROPORTIONALS = (400.0, 900.0, 1400.0)
+FIRST_PROPORTIONAL = 650.0
+HIGHEST_GAIN = 30000.0
+"""The firmware prints gains into a buffer of 100 bytes and checks none."""
+
+Gains = Tuple[float, float, float]
+Curve = Tuple[np.ndarray, np.ndarray]
+
+
+class Response(NamedTuple):
+    """How a wheel followed a test.
+
+    Attributes:
+        mean_error: mean distance from the wanted speed, as a share of it.
+        overshoot: highest speed beyond it, as a share.
+        reached_s: when 90 % were reached; the length of the test if never.
+        steady_error: of the mean speed in the end, as a share; negative: too slow.
+        curves: per direction, times s and speeds m/s, forward positive in the direction of the test.
+    """
+
+    mean_error: float
+    overshoot: float
+    reached_s: float
+    steady_error: float
+    curves: Tuple[Curve, ...]
+
+    @property
+    def score(self) -> float:
+        """What the search makes small."""
+        return self.mean_error + OVERSHOOT_WEIGHT * self.overshoot
+
+
+def measure_speed(stamps_s: np.ndarray, ticks: np.ndarray, start_s: float) -> Curve:
+    """Return times since start_s and the wheel's speed (m/s), each from ticks about 0.1 s apart.
+
+    Raises: CalibrationError if too little was heard of the robot.
+    """
+    seen = (stamps_s >= start_s - 0.1) & (stamps_s <= start_s + STEP_S)
+    times_s, ways_m = stamps_s[seen] - start_s, ticks[seen] * TICK_M
+    apart = 3  # readings come every 34 ms, and a tick is 0.5 mm
+    if len(times_s) < 20 or (np.diff(times_s) <= 0.0).any():
+        raise CalibrationError(
+            "only %d encoder readings came in %.1f s: is the network busy? try again" % (len(times_s), STEP_S)
+        )
+    between_s = times_s[apart:] - times_s[:-apart]
+    return (times_s[apart:] + times_s[:-apart]) / 2.0, (ways_m[apart:] - ways_m[:-apart]) / between_s
+
+
+def judge(curves: Sequence[Curve], wanted_m_s: float = STEP_M_S) -> Response:
+    """Return how well a wheel followed, from its curves in both directions."""
+    errors, overshoots, reached, steady = [], [], [], []
+    for times_s, speeds_m_s in curves:
+        share = speeds_m_s / wanted_m_s
+        within = times_s >= 0.0
+        errors.append(np.abs(share[within] - 1.0).mean())
+        overshoots.append(max(0.0, float(share.max()) - 1.0))
+        fast = np.flatnonzero(within & (share >= REACHED))
+        reached.append(float(times_s[fast[0]]) if len(fast) else STEP_S)
+        steady.append(float(share[times_s >= LATE_S].mean()) - 1.0)
+    return Response(
+        float(np.mean(errors)),
+        float(np.mean(overshoots)),
+        float(np.mean(reached)),
+        float(np.mean(steady)),
+        tuple(curves),
+    )
+
+
+class GainSearch:
+    """Looks for the gains of one wheel: first for the integral, then for the proportional one.
+
+    Ask next_gains(), let the robot try them, tell the response with receive(), until next_gains() is None.
+    """
+
+    def __init__(self, servo_gain_m_s_us: float = NOMINAL_GAIN_M_S_US) -> None:
+        """Begin; gains are scaled to the servo, so that a weak one gets longer pulses."""
+        # A slope far from the usual one is taken for a wrong measurement rather than for a strange servo.
+        self._scale = float(np.clip(NOMINAL_GAIN_M_S_US / servo_gain_m_s_us, 0.5, 2.0))
+        self._waiting: List[Gains] = [DEFAULT_GAINS]
+        self._waiting += [self._make(FIRST_PROPORTIONAL, integral) for integral in INTEGRALS]
+        self._has_second_round = True
+        self.tried: Dict[Gains, Response] = {}
+
+    def _make(self, proportional: float, integral: float) -> Gains:
+        return (
+            round(min(proportional * self._scale, HIGHEST_GAIN), 1),
+            round(min(integral * self._scale, HIGHEST_GAIN), 1),
+            DERIVATIVE,
+        )
+
+    @staticmethod
+    def count_rounds() -> int:
+        """Return how many gains are tried."""
+        return 1 + len(INTEGRALS) + len(PROPORTIONALS)
+
+    def next_gains(self) -> Gains:
+        """Return what is to be tried next. Raises: IndexError after count_rounds()."""
+        if not self._waiting and self._has_second_round:
+            self._has_second_round = False
+            integral = self.best()[0][1] / self._scale
+            self._waiting = [self._make(proportional, integral) for proportional in PROPORTIONALS]
+        return self._waiting[0]
+
+    def receive(self, response: Response) -> None:
+        """Take the response to what next_gains() said."""
+        self.tried[self._waiting.pop(0)] = response
+
+    def best(self) -> Tuple[Gains, Response]:
+        """Return the best gains so far, and how the wheel followed with them."""
+        return min(self.tried.items(), key=lambda item: item[1].score)
