@@ -127,8 +127,7 @@ class RecordTest(unittest.TestCase):
         result = subprocess.run(
             ["rosrun", "hero_bringup", "plot", *bags, "--out", "drawn"],
             cwd=self.folder,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
+            capture_output=True,
             check=False,
         )
         self.assertEqual(result.returncode, 0, result.stderr)
