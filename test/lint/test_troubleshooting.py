@@ -1,0 +1,106 @@
+"""docs/troubleshooting.md names messages that exist, and every message that the driver has."""
+
+import ast
+import re
+
+import pytest
+import sources
+
+PAGE = sources.ROOT / "docs" / "troubleshooting.md"
+WORDS_OF_A_MESSAGE = 3
+# Of the driver, but nothing that somebody has to look up: progress, names of diagnostics, patterns, parts.
+NOT_LOOKED_UP = {
+    "%s %s (%s)",
+    "%s -> %s",
+    "^Conn?ected at time (?P<millis>\\d{1,10})$",
+    "%s (and %d times more before)",
+    "request of service type",
+    "answer of service type",
+    "~host %s, ~port %d",
+    "robots may move",
+    "the driver ended",
+    "the driver ends",
+    "listening on %s, robots must dial this machine at that port",
+    "%d of %d robots ready",
+    "; all motion is held by ~stop",
+    "frames per second",
+    "bytes per second",
+    "clock offset (s)",
+    " is here and stays, ",
+    "; did you mean ~%s?",
+    # Calls of the codec with values that only a mistake in the driver could make.
+    "topic id %r is outside 0..65535",
+    "a payload of %d bytes does not fit a frame (at most 65535)",
+    "Time: %r does not fit two 32-bit numbers (%s)",
+}
+PLACEHOLDER = re.compile(r"%[-+ 0-9.*]*[sdrgfxi]")
+SECTIONS = ("Messages of the driver", "Messages of the tools", "Messages of the simulator", "Messages of the examples")
+SOURCES = [path for path in sources.list_source_modules().values() if "test" not in path.parts]
+
+
+def docstrings_of(tree):
+    for node in ast.walk(tree):
+        body = getattr(node, "body", None)
+        for statement in body if isinstance(body, list) else ():
+            if isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant):
+                yield id(statement.value)
+
+
+def parameter_texts_of(tree):
+    """Texts that describe a field of the driver's configuration, or what it may be: in driver_parameters.md."""
+    makers = ("_number", "_plain", "_choice", "_make_error")
+    for node in ast.walk(tree):
+        names = [getattr(target, "id", "") for target in getattr(node, "targets", ())]
+        if names == ["allowed"] or getattr(getattr(node, "func", None), "id", "") in makers:
+            yield from (id(inner) for inner in ast.walk(node))
+
+
+def read_texts(path):
+    """Yield the text constants of a module that are no docstrings, with their lines."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    left_out = {*docstrings_of(tree), *parameter_texts_of(tree)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in left_out:
+            yield node.lineno, node.value
+
+
+def read_messages():
+    """Return the messages named in the page's tables."""
+    text = PAGE.read_text(encoding="utf-8")
+    found = []
+    for section in SECTIONS:
+        part = text.split("\n## %s\n" % section)[1].split("\n## ")[0]
+        for line in part.splitlines():
+            if line.startswith("| `"):
+                found += re.findall(r"`([^`]+)`", line.split(" | ")[0])
+    return found
+
+
+def make_pattern(message):
+    return re.compile(".*".join(map(re.escape, message.split("..."))), re.DOTALL)
+
+
+MESSAGES = read_messages()
+TEXTS = {PLACEHOLDER.sub("…", text) for path in SOURCES for _, text in read_texts(path)}
+DRIVER_TEXTS = [
+    pytest.param(text, id=f"{path.name}:{line}")
+    for path in SOURCES
+    if sources.package_of(path) == "hero_driver"
+    for line, text in read_texts(path)
+    if len(text.split()) >= WORDS_OF_A_MESSAGE and text not in NOT_LOOKED_UP
+]
+
+
+@pytest.mark.parametrize("message", MESSAGES)
+def test_every_message_in_the_page_exists_in_the_code(message):
+    assert len(message.replace(".", "").strip()) >= 8, "too short to be found by"
+    pattern = make_pattern(message)
+    assert any(pattern.search(text) for text in TEXTS), "nothing prints this any more: %s" % message
+
+
+@pytest.mark.parametrize("text", DRIVER_TEXTS)
+def test_every_message_of_the_driver_is_in_the_page(text):
+    plain = PLACEHOLDER.sub("…", text).strip()
+    assert any(make_pattern(message).match(plain) for message in MESSAGES), (
+        "name it in docs/troubleshooting.md, with what to do: %s" % text
+    )
