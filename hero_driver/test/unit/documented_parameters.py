@@ -1,9 +1,12 @@
 """How the fields of DriverConfig stand in the README and in the YAML file; shared by the test and by people.
 
-    python3 documented_parameters.py     prints the README's table and the YAML file, to be pasted
+    python3 documented_parameters.py             prints the README's table and the YAML file, to be pasted
+    python3 documented_parameters.py --page      prints docs/driver_parameters.md
 """
 
 import dataclasses
+import fnmatch
+import sys
 import textwrap
 
 import yaml
@@ -53,7 +56,54 @@ def make_yaml():
     return "\n".join(lines) + "\n"
 
 
+GROUPS = {
+    "Where robots come from": ("host", "port", "robots", "namespace_policy", "allow"),
+    "How much one robot, and all of them, may do": ("max_*", "parameters_outside"),
+    "How long the driver waits": ("*_timeout_s", "grace_s", "command_max_age_s"),
+    "Commands": ("clamp",),
+    "Odometry": ("odometry", "wheel_*", "ticks_per_turn", "pose_covariance", "twist_covariance"),
+    "Stamps, transforms, reports": ("stamps", "max_future_s", "max_age_s", "*_period_s"),
+    "Others": ("*",),
+}
+PAGE_HEAD = """# Parameters of the driver
+
+All are private parameters of the node `hero_driver`, read once at its start, and optional. One that is unknown or out
+of range ends the node with one line that says which, and what is allowed. Floats in YAML need a point: `1.0e-4`, not
+`1e-4`.
+
+Copy the file, change what you need, and name the copy:
+
+    cp $(rospack find hero_driver)/config/hero_driver.yaml my_driver.yaml
+    roslaunch hero_bringup hero_bringup.launch config:=$PWD/my_driver.yaml
+
+`host` and `port` of the launch file win over the file. This page is made from the driver's own table (and a test
+compares): `python3 hero_driver/test/unit/documented_parameters.py --page > docs/driver_parameters.md`.
+"""
+TABLE_HEAD = ["| parameter | default | unit | range | meaning |", "|---|---|---|---|---|"]
+
+
+def make_page():
+    """Return the text of docs/driver_parameters.md: the rows of the README in groups."""
+    rows = dict(zip((field.name for field in dataclasses.fields(DriverConfig)), make_rows()))
+    lines = [PAGE_HEAD]
+    # The narrow patterns choose first: max_age_s belongs to the stamps, not to the limits.
+    for title, patterns in GROUPS.items():
+        exact = {name for others in GROUPS.values() for name in others}
+        chosen = [
+            name
+            for name in rows
+            if name in patterns
+            or (name not in exact and any(fnmatch.fnmatch(name, pattern) for pattern in patterns))
+        ]
+        if chosen:
+            lines += ["## " + title, "", *TABLE_HEAD, *(rows.pop(name) for name in chosen), ""]
+    return "\n".join(lines[:-1]) + "\n"
+
+
 if __name__ == "__main__":
+    if sys.argv[1:] == ["--page"]:
+        print(make_page(), end="")
+        sys.exit()
     print("\n".join(make_rows()))
     print()
     print(make_yaml(), end="")

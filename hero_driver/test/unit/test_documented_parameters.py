@@ -17,6 +17,12 @@ def test_the_readme_lists_every_parameter_with_default_unit_and_range():
     assert rows == documented_parameters.make_rows()
 
 
+def test_the_page_of_the_documents_is_the_one_that_the_table_makes():
+    page = PACKAGE.parent / "docs" / "driver_parameters.md"
+    assert page.read_text() == documented_parameters.make_page()
+    assert all(row in page.read_text() for row in documented_parameters.make_rows())
+
+
 def test_the_yaml_file_holds_every_parameter_at_its_default():
     text = (PACKAGE / "config" / "hero_driver.yaml").read_text()
     assert text == documented_parameters.make_yaml()
