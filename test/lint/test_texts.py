@@ -101,19 +101,3 @@ def test_every_package_has_a_readme_that_begins_with_its_name(package):
     readme = sources.ROOT / package / "README.md"
     assert readme.is_file()
     assert readme.read_text(encoding="utf-8").splitlines()[0] == f"# {package}"
-
-
-@pytest.mark.parametrize("path", sources.list_files(".md"), ids=name_of)
-def test_links_between_documents_lead_somewhere(path):
-    text = re.sub(r"```.*?```", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)
-    for target in re.findall(r"\]\(([^)\s]+)\)", text):
-        if not re.match(r"[a-z]+:", target) and not target.startswith("#"):
-            file, _, anchor = target.partition("#")
-            assert (path.parent / file).exists(), f"{name_of(path)}: {target}"
-            if anchor:
-                assert anchor in anchors_of(path.parent / file), f"{name_of(path)}: {target}"
-
-
-def anchors_of(path):
-    headings = re.findall(r"^#+ +(.*)$", path.read_text(encoding="utf-8"), flags=re.MULTILINE)
-    return {re.sub(r"[^\w\- ]", "", heading).strip().lower().replace(" ", "-") for heading in headings}

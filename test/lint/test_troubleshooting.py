@@ -34,7 +34,12 @@ NOT_LOOKED_UP = {
     "Time: %r does not fit two 32-bit numbers (%s)",
 }
 PLACEHOLDER = re.compile(r"%[-+ 0-9.*]*[sdrgfxi]")
-SECTIONS = ("Messages of the driver", "Messages of the tools", "Messages of the simulator", "Messages of the examples")
+SECTIONS = (
+    "Messages of the driver",
+    "Messages of the tools",
+    "Messages of the simulator",
+    "Messages of the examples",
+)
 SOURCES = [path for path in sources.list_source_modules().values() if "test" not in path.parts]
 
 

@@ -1,7 +1,7 @@
 """How the fields of DriverConfig stand in the README and in the YAML file; shared by the test and by people.
 
-    python3 documented_parameters.py             prints the README's table and the YAML file, to be pasted
-    python3 documented_parameters.py --page      prints docs/driver_parameters.md
+python3 documented_parameters.py             prints the README's table and the YAML file, to be pasted
+python3 documented_parameters.py --page      prints docs/driver_parameters.md
 """
 
 import dataclasses
@@ -47,10 +47,15 @@ def make_rows():
 
 def make_yaml():
     """Return the text of config/hero_driver.yaml."""
-    lines = ["# All parameters of the driver with their defaults; the README of hero_driver explains them.", ""]
+    lines = [
+        "# All parameters of the driver with their defaults; the README of hero_driver explains them.",
+        "",
+    ]
     for field in dataclasses.fields(DriverConfig):
         unit = " (%s)" % field.metadata["unit"] if field.metadata["unit"] else ""
-        lines += textwrap.wrap(field.metadata["text"] + unit, 100, initial_indent="# ", subsequent_indent="# ")
+        lines += textwrap.wrap(
+            field.metadata["text"] + unit, 100, initial_indent="# ", subsequent_indent="# "
+        )
         value = yaml.safe_dump(as_yaml_value(field.default), default_flow_style=True).split("\n")[0]
         lines.append("%s: %s" % (field.name, value))
     return "\n".join(lines) + "\n"

@@ -39,7 +39,7 @@ def make_rules(tool: str, interface: str, port: int) -> List[str]:
     return [
         "sudo nft add table inet hero_robots",
         "sudo nft add chain inet hero_robots input '{ type filter hook input priority -5; }'",
-        'sudo nft add rule inet hero_robots input iifname != { "lo", "%s" } tcp dport %d drop'
+        'sudo nft add rule inet hero_robots input iifname != \'{ "lo", "%s" }\' tcp dport %d drop'
         % (interface, port),
     ]
 

@@ -245,8 +245,11 @@ class FleetSnapshot:
 
     def __init__(self) -> None:
         self.drivers: Dict[str, RobotArray] = {}
-        types = call(rosgraph.get_master_uri(), "getTopicTypes")
-        self._topics = [topic for topic, kind in types if kind == RobotArray._type]
+        uri = rosgraph.get_master_uri()
+        types = dict(call(uri, "getTopicTypes"))
+        # The master keeps the types of topics whose publishers have ended.
+        published = [topic for topic, _ in call(uri, "getSystemState")[0]]
+        self._topics = [topic for topic in published if types.get(topic) == RobotArray._type]
         self._subscribers = [
             rospy.Subscriber(topic, RobotArray, self._receive, callback_args=topic, queue_size=1)
             for topic in self._topics
