@@ -336,14 +336,15 @@ class Firmware:
         self.due_ms = due_ms
 
     def _run_configured(self, millis: int, now_ms: int) -> int:
-        """Run controllers and sensors; return when they have to run next (caller's time)."""
+        """Run sensors and controllers; return when they have to run next (caller's time)."""
         motors_due_ms = self.motors.due_ms
-        if motors_due_ms is not None and millis >= motors_due_ms:
+        if millis >= self.sensing.due_ms:
+            # Sending a cycle takes about a millisecond; a controller that is due waits for it.
+            self.send(self.sensing.run_cycle(millis, now_ms, self.clock.stamp(millis)))
+        elif motors_due_ms is not None and millis >= motors_due_ms:
             line = self.motors.run(millis, now_ms, self.sensing.read_encoders)
             if line is not None:
                 self.log("\x1b[93m[/%s] %s\x1b[0m" % (self.name, line))
-        if millis >= self.sensing.due_ms:
-            self.send(self.sensing.run_cycle(millis, now_ms, self.clock.stamp(millis)))
         next_millis = self.sensing.due_ms
         motors_due_ms = self.motors.due_ms
         if motors_due_ms is not None:
