@@ -59,11 +59,16 @@ class MotorDriver:
         ]
         self.attached = False
         self.halt_at_ms = 0
+        self._pulses_us = (0, 0)
 
     def write(self, now_ms: int, left_us: int, right_us: int) -> None:
         """Put out pulses, limited to 1000..2000 us."""
-        self.attached = True
         self.halt_at_ms = now_ms + MOTOR_HOLD_MS + 1
+        pulses_us = (left_us, right_us)
+        if self.attached and pulses_us == self._pulses_us:
+            return
+        self.attached = True
+        self._pulses_us = pulses_us
         low_us, high_us = PULSE_RANGE_US
         self._body.write_pulses(min(max(left_us, low_us), high_us), min(max(right_us, low_us), high_us))
 
@@ -192,26 +197,23 @@ class MotorControl:
         )
         self._start_ticks = [0, 0]
         self._relay = [1, 1]
+        self.due_ms: Optional[int] = None
 
-    @property
-    def due_ms(self) -> Optional[int]:
-        """When run() has something to do."""
-        wanted_ms = [self.velocity.due_ms, self.position.due_ms]
-        if self.motors.attached:
-            wanted_ms.append(self.motors.halt_at_ms)
-        return min((due_ms for due_ms in wanted_ms if due_ms is not None), default=None)
+    def _reschedule(self) -> None:
+        wanted_ms = [self.motors.halt_at_ms] if self.motors.attached else []
+        for controller in (self.velocity, self.position):
+            due_ms = controller.due_ms
+            if due_ms is not None:
+                wanted_ms.append(due_ms)
+        self.due_ms = min(wanted_ms) if wanted_ms else None
 
     def receive_velocity(self, now_ms: int, linear_m_s: float, turn_rad_s: float) -> bool:
         """Take a Twist for the velocity controller; return whether it was a stop that was taken."""
         if self.velocity.is_too_early(now_ms):
             return False
         wheels_m_s = _limit_to_wheels(linear_m_s, turn_rad_s)
-        if wheels_m_s is None:
-            self.velocity.stop()
-            self.motors.halt()
-            return True
-        self.velocity.command(now_ms, wheels_m_s)
-        return False
+        self._take(self.velocity, now_ms, wheels_m_s)
+        return wheels_m_s is None
 
     def receive_position(self, now_ms: int, world_ms: int, linear_m_s: float, turn_rad_s: float) -> bool:
         """Take a Twist for the position controller, which goes as far as that speed reaches in a second.
@@ -222,16 +224,22 @@ class MotorControl:
             return False
         wheels_m_s = _limit_to_wheels(linear_m_s, turn_rad_s)
         self._start_ticks = self._count_ticks(world_ms)
-        if wheels_m_s is None:
-            self.position.stop()
+        ways_ticks = None if wheels_m_s is None else [wheel_m_s / TICK_M for wheel_m_s in wheels_m_s]
+        self._take(self.position, now_ms, ways_ticks)
+        return wheels_m_s is None
+
+    def _take(self, controller: _Controller, now_ms: int, targets: Optional[Sequence[float]]) -> None:
+        if targets is None:
+            controller.stop()
             self.motors.halt()
-            return True
-        self.position.command(now_ms, [wheel_m_s / TICK_M for wheel_m_s in wheels_m_s])
-        return False
+        else:
+            controller.command(now_ms, targets)
+        self._reschedule()
 
     def receive_pulses(self, now_ms: int, left_us: int, right_us: int) -> None:
         """Take a Motor command; a controller that is commanded too overwrites it."""
         self.motors.write(now_ms, left_us, right_us)
+        self._reschedule()
 
     def start_tuning(self, now_ms: int, world_ms: int, of_velocity: bool) -> None:
         """Begin a controller's self-tuning, which goes on until it gets a Twist."""
@@ -242,6 +250,7 @@ class MotorControl:
         self._relay = [1, 1]
         start_us = _TUNING_START_US if of_velocity else 0
         self.motors.drive(now_ms, (start_us, start_us))
+        self._reschedule()
 
     def run(self, now_ms: int, world_ms: int, read_encoders: Callable[[int, int], None]) -> Optional[str]:
         """Do what is due; return what a self-tuning says of it.
@@ -264,6 +273,7 @@ class MotorControl:
                 self.velocity.run_pids(now_ms, self._odometry.filtered_m_s)
         if self.motors.attached and now_ms >= self.motors.halt_at_ms:
             self.motors.halt()
+        self._reschedule()
         return line
 
     def _tune_velocity(self, now_ms: int) -> str:
@@ -294,6 +304,7 @@ class MotorControl:
         self.velocity.stop()
         self.position.stop()
         self.motors.halt()
+        self._reschedule()
 
 
 def _describe_tuning(targets: Sequence[float], measured: Sequence[float], outputs_us: Sequence[int]) -> str:
