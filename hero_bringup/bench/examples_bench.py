@@ -19,8 +19,8 @@ from sensor_msgs.msg import Joy
 from stage import Stage
 
 sys.path.append(os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, "test", "rostest"))
-from driver_bench import measure_machine_us, read_cpu_s  # noqa: E402
-from swarm_watch import SwarmWatch  # noqa: E402
+from driver_bench import measure_machine_us, read_cpu_s
+from swarm_watch import SwarmWatch
 
 SETTLE_S = 4.0
 """From the first command: subscriptions of all robots, and the first seconds of listening to /tf."""

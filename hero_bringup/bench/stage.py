@@ -12,7 +12,7 @@ import rospy
 from hero_msgs.msg import RobotArray
 
 sys.path.append(str(Path(__file__).resolve().parents[2] / "hero_driver" / "bench"))
-from driver_bench import find_free_port, start, stop  # noqa: E402 (its folder is no package)
+from driver_bench import find_free_port, start, stop
 
 READY_TIMEOUT_S = 60.0
 
