@@ -124,7 +124,7 @@ class SimulatorTest(unittest.TestCase):
             odoms = [Newest("/hero_%d/odom" % number, Odometry) for number in (100, 0)]
             for odom in odoms:
                 odom.wait()
-            self.assertTrue(self.is_ready(0) and self.is_ready(100))
+            wait_for(lambda: self.is_ready(0) and self.is_ready(100), "two ready robots")
             self.assertNotEqual(self.find(0).address.split(":")[0], self.find(100).address.split(":")[0])
             truth = Newest("/hero_6/ground_truth", Odometry)
             start = truth.wait().pose.pose.position
