@@ -6,11 +6,12 @@ import sources
 MODULES = sources.list_source_modules()
 NOT_IN_THE_CORE = {"asyncio", "logging", "rospy", "select", "selectors", "socket", "ssl", "threading", "time"}
 SOCKETS = {"asyncio", "socket", "socketserver", "ssl"}
-# The robots' connections, on each side; the outlet, which writes to the subscribers that rospy accepted; and the
+# The robots' connections, on each side; the connections to subscribers and publishers that rospy has made; and the
 # program check, which asks for the addresses of names.
 SOCKET_OWNERS = (
     "hero_driver.transport",
     "hero_driver.outlet",
+    "hero_driver.inlet",
     "hero_sim.tcp_link",
     "hero_bringup.checkup.network",
 )

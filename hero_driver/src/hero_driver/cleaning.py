@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Callable, Deque, Dict, List, Optional, Set, Tuple
 
 from . import wire_messages
-from .odometry import Pose, TickOdometry, Twist, WheelGeometry
+from .odometry import TickOdometry, WheelGeometry
 from .stamps import NS_PER_S, StampFilter
 
 TRANSFORMS = "/tf"
@@ -230,20 +230,19 @@ class MessageCleaner:
             outputs += write(stamp_ns, payload, arrival_ns)
         return outputs
 
-    def _find_estimate(self) -> Optional[Tuple[Pose, Twist]]:
-        if not self._has_encoder or not self.odometry.has_reading:
-            return None
-        return self.odometry.pose, self.odometry.twist
+    @property
+    def _uses_estimate(self) -> bool:
+        return self._has_encoder and self.odometry.has_reading
 
     def _write_odometry(self, stamp_ns: int, payload: bytes, arrival_ns: int) -> Outputs:
         stamp_ns = self._stamps.correct(self._odom_name, stamp_ns, arrival_ns)
-        written = self._writer.rewrite(payload, self._count(self._odom_name), stamp_ns, self._find_estimate())
+        estimate = (self.odometry.pose, self.odometry.twist) if self._uses_estimate else None
+        written = self._writer.rewrite(payload, self._count(self._odom_name), stamp_ns, estimate)
         return self._refuse() if written is None else [(self._odom_name, written)]
 
     def _write_odom_transform(self, stamp_ns: int, tail: bytes, arrival_ns: int) -> Outputs:
-        estimate = self._find_estimate()
-        if estimate is not None:
-            tail = wire_messages.pack_transform_tail(estimate[0])
+        if self._uses_estimate:
+            tail = wire_messages.pack_transform_tail(self.odometry.pose)
         stamp_ns = self._stamps.correct("tf base_link", stamp_ns, arrival_ns)
         return [(TRANSFORMS, wire_messages.pack_transform(stamp_ns, self._odom_frames, tail))]
 
@@ -251,10 +250,17 @@ class MessageCleaner:
         # Stock robots send one transform in a message, of frames that were seen before.
         frames = payload[wire_messages.FRAMES_OFFSET : -wire_messages.TRANSFORM_TAIL_LENGTH]
         key = self._own_frames.get(frames)
-        if key is not None and payload[: len(wire_messages.ONE_TRANSFORM)] == wire_messages.ONE_TRANSFORM:
-            stamp_ns = wire_messages.read_single_stamp_ns(payload)
+        if key is not None and payload.startswith(wire_messages.ONE_TRANSFORM):
+            secs, nsecs = wire_messages.read_single_stamp(payload)
+            stamp_ns = secs * NS_PER_S + nsecs
+            if frames == self._odom_frames:
+                tail = payload[-wire_messages.TRANSFORM_TAIL_LENGTH :]
+                return self._clean_transform(key, stamp_ns, frames, tail, arrival_ns)
+            corrected_ns = self._stamps.correct(key, stamp_ns, arrival_ns)
+            if corrected_ns == stamp_ns and nsecs < NS_PER_S:
+                return [(TRANSFORMS, payload[len(wire_messages.ONE_TRANSFORM) :])]
             tail = payload[-wire_messages.TRANSFORM_TAIL_LENGTH :]
-            return self._clean_transform(key, stamp_ns, frames, tail, arrival_ns)
+            return [(TRANSFORMS, wire_messages.pack_transform(corrected_ns, frames, tail))]
         transforms = wire_messages.read_transforms(payload)
         if transforms is None:
             return self._refuse()

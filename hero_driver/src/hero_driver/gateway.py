@@ -23,6 +23,7 @@ from .robot_requests import RobotRequests
 from .robot_status import Peer, RobotStatus, describe_robot
 from .rosserial.payloads import LOG_DEBUG, LOG_ERROR, LOG_FATAL, LOG_INFO, LOG_WARN, Log
 from .rosserial.session import (
+    CallReceived,
     Event,
     LogReceived,
     MessageReceived,
@@ -32,7 +33,6 @@ from .rosserial.session import (
     SessionEnded,
     Topic,
     TopicDeclared,
-    TopicKind,
 )
 from .transform_collector import TransformCollector
 from .transport import THE_DRIVER_ENDS, EventLoop, Link, LinkHandler
@@ -96,6 +96,7 @@ class Gateway(LinkHandler):
             wake=self._sender.wake,
             add_transform=self._transforms.add,
             call_later=loop.call_later,
+            add_reader=loop.add_reader,
             is_stopped=lambda: self.stopped,
             clamp=self._config.clamp,
             service_timeout_s=self._config.service_timeout_s,
@@ -153,10 +154,7 @@ class Gateway(LinkHandler):
         for event in events:
             if type(event) is MessageReceived:
                 if bridge is not None:
-                    if event.topic.kind is TopicKind.CLIENT_REQUESTS:
-                        self._call_service(peer, event.topic, event.payload)
-                    else:
-                        bridge.receive_message(event.topic, event.payload, arrival_ns)
+                    bridge.receive_message(event.topic, event.payload, arrival_ns)
             else:
                 self._receive_event(peer, event, now_s)
                 if link.closed:
@@ -236,6 +234,8 @@ class Gateway(LinkHandler):
             self._declare(peer, event.topic, now_s)
         elif isinstance(event, LogReceived):
             self._receive_log(peer, event.log, now_s)
+        elif isinstance(event, CallReceived):
+            self._call_service(peer, event.topic, event.request)
         elif isinstance(event, ParameterRequested):
             self._requests.answer_parameter(peer, event.name)
         elif isinstance(event, Problem):

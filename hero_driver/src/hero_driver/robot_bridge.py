@@ -15,9 +15,10 @@ from . import message_types, wire_messages
 from .cleaning import TRANSFORMS, Clean, CleaningSettings, MessageCleaner, Output, split_transforms
 from .command_queue import CommandQueue
 from .command_shaping import HALTED_MOTORS, check_twist
+from .inlet import AddReader, Inlet
 from .message_types import MessageTypeError
 from .names import Identity
-from .outlet import CallLater, Outlet, unregister
+from .outlet import CallLater, Outlet
 from .rosserial.session import Topic, TopicKind
 from .service_requests import find_request_fault, is_success, read_set_odom_pose
 from .services import RobotService
@@ -45,6 +46,7 @@ class BridgeContext:
         wake: Callable[["RobotBridge"], None],
         add_transform: Callable[[bytes], None],
         call_later: CallLater,
+        add_reader: AddReader,
         is_stopped: Callable[[], bool],
         clamp: bool,
         service_timeout_s: float,
@@ -54,13 +56,15 @@ class BridgeContext:
         """Take what the rest of the driver does for bridges.
 
         wake(bridge): commands wait (any thread); log(level, throttle key, text); call_later(delay_s, call)
-        is the loop's. max_names: topics and services that one robot may have over all its connections.
+        and add_reader(reader) are the loop's. max_names: topics and services that one robot may have over all
+        its connections.
         """
         self.registrar = registrar
         self.log = log
         self.wake = wake
         self.add_transform = add_transform
         self.call_later = call_later
+        self.add_reader = add_reader
         self.is_stopped = is_stopped
         self.clamp = clamp
         self.service_timeout_s = service_timeout_s
@@ -86,7 +90,7 @@ class RobotBridge:
         self._closed = False
         self._connected = False
         self._outlets: Dict[str, Outlet] = {}
-        self._subscribers: Dict[str, Tuple[str, rospy.Subscriber]] = {}
+        self._inlets: Dict[str, Tuple[str, Inlet]] = {}
         self._services: Dict[str, RobotService] = {}
         self._service_halves: Dict[Tuple[str, TopicKind], Topic] = {}
         self._servers: Dict[str, Any] = {}
@@ -254,13 +258,11 @@ class RobotBridge:
                 self.commands.offer(motors, HALTED_MOTORS)
         self._context.wake(self)
 
-    def _receive_command(self, message: Any, name_and_type: Tuple[str, str]) -> None:
-        """A ROS program sent a message for the robot (a thread of rospy's)."""
-        name, ros_type = name_and_type
+    def _receive_command(self, name: str, ros_type: str, payload: bytes) -> None:
+        """A ROS program sent a message for the robot (any thread)."""
         if not self._connected:
             self.refused_commands += 1
             return
-        payload = message.data
         if ros_type == TWIST_TYPE and name.endswith(VELOCITY_SUFFIX) and self.cleaner is not None:
             if not self._take_velocity(name, payload):
                 return
@@ -351,22 +353,14 @@ class RobotBridge:
         if message_class is None:
             return
         ros_type = message_class._type
-        known = self._subscribers.get(name)
+        known = self._inlets.get(name)
         if known is not None:
             if known[0] == ros_type:
                 return
-            unregister(known[1])
-        self._subscribers[name] = (
-            ros_type,
-            rospy.Subscriber(
-                name,
-                message_types.make_raw_class(message_class),
-                self._receive_command,
-                callback_args=(name, ros_type),
-                queue_size=QUEUE_LENGTH,
-                tcp_nodelay=True,
-            ),
-        )
+            known[1].close()
+        inlet = Inlet(functools.partial(self._receive_command, name, ros_type), self._context.add_reader)
+        self._inlets[name] = (ros_type, inlet)
+        inlet.open(name, message_types.make_raw_class(message_class), QUEUE_LENGTH)
 
     def _serve(self, name: str, message_type: str, request_md5sum: str, answer_md5sum: str) -> None:
         if self._closed or name in self._servers:
@@ -388,9 +382,9 @@ class RobotBridge:
 
     def _unregister(self, released: List[Callable[[], None]], outlets: List[Outlet]) -> None:
         calls = released + [call for outlet in outlets for call in outlet.release()]
-        calls += [functools.partial(unregister, subscriber) for _, subscriber in self._subscribers.values()]
+        calls += [inlet.close for _, inlet in self._inlets.values()]
         calls += [functools.partial(server.shutdown, "the robot left") for server in self._servers.values()]
-        self._subscribers.clear()
+        self._inlets.clear()
         self._servers.clear()
         for call in calls:
             try:

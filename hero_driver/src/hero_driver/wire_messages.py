@@ -171,11 +171,10 @@ FRAMES_OFFSET = _LENGTH.size + _SEQ_AND_STAMP.size
 """Where the frames of a message's first transform begin."""
 
 
-def read_single_stamp_ns(payload: bytes) -> int:
-    """Return the stamp of the transform in a message that is known to hold one."""
+def read_single_stamp(payload: bytes) -> Tuple[int, int]:
+    """Return (secs, nsecs) of the transform in a message that is known to hold one."""
     secs, nsecs = _STAMP.unpack_from(payload, _LENGTH.size + STAMP_OFFSET)
-    stamp_ns: int = secs * NS_PER_S + nsecs
-    return stamp_ns
+    return secs, nsecs
 
 
 def split_frames(frames: bytes) -> Tuple[bytes, bytes]:

@@ -1,5 +1,7 @@
 """A robot's messages as ROS programs get them: own frames only, true stamps, proximity, the rest untouched."""
 
+import struct
+
 import pytest
 from cleaned_robot import TYPES, CleanedRobot, list_payloads, list_transforms
 from robot_messages import (
@@ -43,6 +45,16 @@ def test_transforms_between_the_robots_own_frames_pass_as_they_are(child):
         assert robot.receive("/tf", build_transform_message(stamped), NOW_NS + number * MS) == [("/tf", stamped)]
     assert len(transform) == len(stamped)
     assert (robot.cleaner.refused, robot.cleaner.foreign_frames) == (0, set())
+
+
+def test_a_stamp_of_too_many_nanoseconds_comes_out_in_the_form_that_ros_takes():
+    robot = CleanedRobot()
+    pair = ("hero_0/base_link", "hero_0/hat_link")
+    receive_transforms(robot, pair, stamp_ns=NOW_NS - NS_PER_S)
+    odd = bytearray(build_transform_message(build_transform(NOW_NS, *pair)))
+    secs, nsecs = struct.unpack_from("<II", odd, 8)
+    struct.pack_into("<II", odd, 8, secs - 1, nsecs + NS_PER_S)
+    assert robot.receive("/tf", bytes(odd), NOW_NS) == [("/tf", build_transform(NOW_NS, *pair))]
 
 
 def test_several_transforms_in_one_message_come_out_one_by_one():

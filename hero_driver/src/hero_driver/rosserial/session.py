@@ -58,6 +58,7 @@ class TopicKind(enum.Enum):
 
 
 _FROM_ROBOT = frozenset((TopicKind.PUBLISHER, TopicKind.SERVICE_ANSWERS, TopicKind.CLIENT_REQUESTS))
+_MESSAGES = frozenset((TopicKind.PUBLISHER, TopicKind.SERVICE_ANSWERS))
 _KIND_BY_FRAME_ID = {kind.value: kind for kind in TopicKind}
 
 
@@ -74,6 +75,13 @@ class MessageReceived(NamedTuple):
 
     topic: Topic
     payload: bytes
+
+
+class CallReceived(NamedTuple):
+    """The robot calls a ROS service; topic is the half that carries its requests."""
+
+    topic: Topic
+    request: bytes
 
 
 class TopicDeclared(NamedTuple):
@@ -111,8 +119,18 @@ class SessionEnded(NamedTuple):
 
 
 Event = Union[
-    MessageReceived, TopicDeclared, LogReceived, TimeRequested, ParameterRequested, Problem, SessionEnded
+    MessageReceived,
+    CallReceived,
+    TopicDeclared,
+    LogReceived,
+    TimeRequested,
+    ParameterRequested,
+    Problem,
+    SessionEnded,
 ]
+
+# What MessageReceived(...) comes down to, without the call of a Python function in between.
+_new_tuple = tuple.__new__
 
 
 @dataclass(frozen=True)
@@ -137,6 +155,7 @@ class Session:
 
     def __init__(self, limits: SessionLimits, now_s: float) -> None:
         self.topics: Dict[int, Topic] = {}
+        self._messages: Dict[int, Topic] = {}  # those of the topics that come as MessageReceived
         self.reader = FrameReader(limits.max_payload_length)
         self.undeclared_messages = 0
         self.opened_s = now_s
@@ -153,12 +172,12 @@ class Session:
     def receive_bytes(self, data: Bytes, now_s: float, time_of_day_s: float) -> List[Event]:
         """Return the events that data causes, in order. Never raises, whatever data holds."""
         events: List[Event] = []
-        topics = self.topics
+        messages = self._messages
         self.last_receive_s = now_s
         for topic_id, payload in self.reader.receive_bytes(data):
-            topic = topics.get(topic_id)
-            if topic is not None and topic.kind in _FROM_ROBOT:
-                events.append(MessageReceived(topic, payload))
+            topic = messages.get(topic_id)
+            if topic is not None:
+                events.append(_new_tuple(MessageReceived, (topic, payload)))
                 self._last_configured_s = now_s
                 continue
             try:
@@ -222,6 +241,10 @@ class Session:
     def _receive_special(
         self, topic_id: int, payload: bytes, now_s: float, time_of_day_s: float
     ) -> Optional[Event]:
+        topic = self.topics.get(topic_id)
+        if topic is not None and topic.kind is TopicKind.CLIENT_REQUESTS:
+            self._last_configured_s = now_s
+            return CallReceived(topic, payload)
         if topic_id in _KIND_BY_FRAME_ID:
             return self._declare(_KIND_BY_FRAME_ID[topic_id], payload)
         if topic_id == frames.ID_TIME:
@@ -284,6 +307,10 @@ class Session:
                     % (info.name, self._limits.max_topics)
                 )
         self.topics[info.topic_id] = topic
+        if kind in _MESSAGES:
+            self._messages[info.topic_id] = topic
+        else:
+            self._messages.pop(info.topic_id, None)
         return TopicDeclared(topic)
 
     def _find_fault(self, info: TopicInfo) -> Optional[str]:

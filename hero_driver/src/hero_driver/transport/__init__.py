@@ -4,7 +4,7 @@ One thread runs the loop and calls a LinkHandler with bytes; it knows nothing of
 is written with one send. Other threads hand over work with EventLoop.call_soon(). Nothing here blocks.
 """
 
-from .event_loop import THE_DRIVER_ENDS, EventLoop, TransportSettings
+from .event_loop import THE_DRIVER_ENDS, EventLoop, Reader, TransportSettings
 from .link import Address, Link, LinkHandler
 
-__all__ = ["THE_DRIVER_ENDS", "Address", "EventLoop", "Link", "LinkHandler", "TransportSettings"]
+__all__ = ["THE_DRIVER_ENDS", "Address", "EventLoop", "Link", "LinkHandler", "Reader", "TransportSettings"]

@@ -9,7 +9,7 @@ import selectors
 import socket
 import threading
 import time
-from typing import Any, Callable, Deque, Dict, List, NamedTuple, Optional, Tuple
+from typing import Any, Callable, Deque, Dict, List, NamedTuple, Optional, Set, Tuple
 
 from .dialler import Dialler, DiallerOwner, Resolver
 from .link import Address, Link, LinkHandler, LinkOwner, describe_error
@@ -39,6 +39,22 @@ class TransportSettings(NamedTuple):
     """After this time without acknowledgement the kernel gives a connection up (TCP_USER_TIMEOUT)."""
 
 
+class Reader:
+    """Another socket that the loop reads besides the robots' connections."""
+
+    def fileno(self) -> int:
+        """Return the socket's file descriptor, the same one until close()."""
+        raise NotImplementedError
+
+    def read(self) -> bool:
+        """Read what there is, without waiting; return whether to go on. On the loop's thread."""
+        raise NotImplementedError
+
+    def close(self) -> None:
+        """Let go of the socket: read() returned False or raised, or the loop ends."""
+        raise NotImplementedError
+
+
 class EventLoop(LinkOwner, DiallerOwner):
     """The thread that owns all sockets. open(), then run() on that thread, stop() from any."""
 
@@ -48,6 +64,8 @@ class EventLoop(LinkOwner, DiallerOwner):
         self._selector = selectors.DefaultSelector()
         self._listener: Optional[socket.socket] = None
         self._links: Dict[int, Link] = {}
+        self._readers: Set[Reader] = set()
+        self._thread_id = 0
         self._timers: List[Tuple[float, int, Callable[[], None]]] = []
         self._timer_numbers = itertools.count()
         self._calls: Deque[Callable[[], None]] = collections.deque()
@@ -68,27 +86,34 @@ class EventLoop(LinkOwner, DiallerOwner):
         if self._settings.host:
             self._listener = _listen(self._settings.host, self._settings.port)
             self.listening = Address(*self._listener.getsockname()[:2])
-            self._selector.register(self._listener, selectors.EVENT_READ, None)
-        self._selector.register(self._wake_read, selectors.EVENT_READ, None)
+            self._selector.register(self._listener, selectors.EVENT_READ, self._accept)
+        self._selector.register(self._wake_read, selectors.EVENT_READ, self._take_wake)
         for address in self._settings.dial:
             Dialler(self, address).dial()
         self.call_later(POLL_INTERVAL_S, self._poll_links)
 
     def run(self) -> None:
         """Serve until stop(); then close everything."""
-        select = self._selector.select
-        while self._running:
-            timeout_s = max(0.0, self._timers[0][0] - time.monotonic()) if self._timers else None
-            for key, mask in select(timeout_s):
-                link = key.data
-                if link is None:
-                    self._serve_own(key.fd)
-                elif isinstance(link, Dialler):
-                    link.finish()
-                else:
-                    self._serve_link(link, mask)
-            self._run_due()
-        self._close_all()
+        self._thread_id = threading.get_ident()
+        try:
+            while self._running:
+                self._run_once()
+        finally:
+            self._close_all()
+
+    def _run_once(self) -> None:
+        timeout_s = max(0.0, self._timers[0][0] - time.monotonic()) if self._timers else None
+        for key, mask in self._selector.select(0.0 if self._calls else timeout_s):
+            source = key.data
+            if type(source) is Link:
+                self._serve_link(source, mask)
+            elif isinstance(source, Reader):
+                self._serve_reader(source)
+            else:
+                source()
+        for _ in range(len(self._calls)):
+            self._call(self._calls.popleft())
+        self._run_due()
 
     def stop(self) -> None:
         """Let run() return; from any thread."""
@@ -97,11 +122,18 @@ class EventLoop(LinkOwner, DiallerOwner):
     def call_soon(self, call: Callable[[], None]) -> None:
         """Run call on the loop's thread, soon; from any thread."""
         self._calls.append(call)
+        if threading.get_ident() == self._thread_id:
+            # The loop looks at its calls before it waits again.
+            return
         with self._wake_lock:
             if self._is_awake:
                 return
             self._is_awake = True
         os.write(self._wake_write, b"\0")
+
+    def add_reader(self, reader: Reader) -> None:
+        """Read reader whenever there is something to read, until it ends; from any thread."""
+        self.call_soon(lambda: self._watch_reader(reader))
 
     def call_later(self, delay_s: float, call: Callable[[], None]) -> None:
         """Run call after delay_s; only from the loop's thread."""
@@ -173,15 +205,25 @@ class EventLoop(LinkOwner, DiallerOwner):
         except Exception as error:  # noqa: BLE001 - as above; the loop is all that can still stop the robots
             self._handler.report_fault(error)
 
-    def _serve_own(self, fd: int) -> None:
-        if fd == self._wake_read:
-            with self._wake_lock:
-                os.read(self._wake_read, 1)
-                self._is_awake = False
-            for _ in range(len(self._calls)):
-                self._call(self._calls.popleft())
-        else:
-            self._accept()
+    def _watch_reader(self, reader: Reader) -> None:
+        self._readers.add(reader)
+        self._selector.register(reader, selectors.EVENT_READ, reader)
+
+    def _serve_reader(self, reader: Reader) -> None:
+        goes_on = False
+        try:
+            goes_on = reader.read()
+        except Exception as error:  # noqa: BLE001 - as above
+            self._handler.report_fault(error)
+        if not goes_on:
+            self._selector.unregister(reader)
+            self._readers.discard(reader)
+            reader.close()
+
+    def _take_wake(self) -> None:
+        with self._wake_lock:
+            os.read(self._wake_read, 1)
+            self._is_awake = False
 
     def _accept(self) -> None:
         listener = self._listener
@@ -208,7 +250,7 @@ class EventLoop(LinkOwner, DiallerOwner):
 
         def resume() -> None:
             if self._listener is not None:
-                self._selector.register(listener, selectors.EVENT_READ, None)
+                self._selector.register(listener, selectors.EVENT_READ, self._accept)
 
         self.call_later(ACCEPT_PAUSE_S, resume)
 
@@ -251,6 +293,9 @@ class EventLoop(LinkOwner, DiallerOwner):
             self._listener = None
         for link in list(self._links.values()):
             self.close_link(link, THE_DRIVER_ENDS)
+        for reader in self._readers:
+            reader.close()
+        self._readers.clear()
         self._selector.close()
         self._dial_resolver.close()
 
@@ -262,7 +307,7 @@ class EventLoop(LinkOwner, DiallerOwner):
 
     def watch_dialler(self, dialler: "Dialler", sock: socket.socket) -> None:
         """Call dialler.finish() when sock has connected or failed."""
-        self._selector.register(sock, selectors.EVENT_WRITE, dialler)
+        self._selector.register(sock, selectors.EVENT_WRITE, dialler.finish)
 
     def unwatch_dialler(self, sock: socket.socket) -> None:
         """Undo watch_dialler()."""

@@ -1,0 +1,133 @@
+"""Messages of ROS programs -> payloads, read by the thread of the sockets.
+
+rospy reads each publisher of a topic on a thread of its own; waking it, and then the thread of the sockets,
+for every command costs several times what the command itself costs. Here rospy does the registration and the
+handshake and hands over the first message; then its thread rests, and the publisher's socket is read by the
+loop until it ends. After that rospy goes on by its own rules: it closes, or it connects again.
+Source of the framing: ROS TCPROS, a 32-bit length before each message.
+"""
+
+import functools
+import socket
+import struct
+import threading
+from typing import Any, Callable, Optional
+
+import rospy
+from rospy.exceptions import TransportException, TransportTerminated
+
+from .outlet import unregister
+from .transport import Reader
+
+READ_LENGTH = 4096
+"""Read at once from one publisher: 78 velocities, so that one that floods does not delay the robots."""
+
+MESSAGE_LENGTH_MAX = 1 << 20
+"""A robot takes messages of 4 kB; a publisher that announces more than this does not speak TCPROS."""
+
+_LENGTH = struct.Struct("<I")
+
+AddReader = Callable[[Reader], None]
+
+
+class Inlet:
+    """One topic's way in."""
+
+    def __init__(self, receive: Callable[[bytes], None], add_reader: AddReader) -> None:
+        """receive(payload) is called by any thread, add_reader(reader) is the loop's."""
+        self._receive = receive
+        self._add_reader = add_reader
+        self._subscriber: Any = None
+
+    def open(self, name: str, raw_class: Any, queue_length: int) -> None:
+        """Subscribe to the topic called name; asks the ROS master, so it may block."""
+        self._subscriber = rospy.Subscriber(
+            name, raw_class, self._take, queue_size=queue_length, tcp_nodelay=True
+        )
+
+    def close(self) -> None:
+        """Unsubscribe; asks the ROS master. What the loop still reads ends by itself."""
+        subscriber, self._subscriber = self._subscriber, None
+        if subscriber is not None:
+            unregister(subscriber)
+
+    def _take(self, message: Any) -> None:
+        """A message came through rospy, on the thread of its publisher's connection."""
+        self._receive(message.data)
+        subscriber = self._subscriber
+        impl = None if subscriber is None else subscriber.impl
+        # Where topic statistics are wanted (/enable_statistics), rospy has to see every message.
+        if impl is None or impl.statistics_logger is not None:
+            return
+        for connection in impl.connections:
+            if connection.header is message._connection_header:
+                # rospy's thread calls this instead of reading, once it has passed on all that it has read.
+                connection.receive_once = functools.partial(self._hand_over, connection)
+
+    def _hand_over(self, connection: Any) -> None:
+        """Let the loop read connection; return never, but raise as rospy's own reading does when it ends."""
+        sock, buffer = connection.socket, connection.read_buff
+        if sock is None or buffer is None:
+            raise TransportTerminated("closed")
+        # A socket of its own, because rospy may close its one on another thread at any time; it shuts the
+        # connection down with it, so that this one ends too.
+        stream = MessageStream(
+            connection, sock.dup(), buffer.getvalue()[: buffer.tell()], self._receive
+        )
+        self._add_reader(stream)
+        stream.ended.wait()
+        if stream.error is not None:
+            raise TransportException("read failed: %s" % stream.error)
+        raise TransportTerminated("the publisher closed the connection")
+
+
+class MessageStream(Reader):
+    """The connection of one publisher, while the loop reads it."""
+
+    def __init__(
+        self, connection: Any, sock: socket.socket, rest: bytes, receive: Callable[[bytes], None]
+    ) -> None:
+        """connection is rospy's, for its statistics; rest is the begun message that rospy has read."""
+        self._connection = connection
+        self._socket = sock
+        self._rest = rest
+        self._receive = receive
+        self.ended = threading.Event()
+        self.error: Optional[OSError] = None
+
+    def fileno(self) -> int:
+        """Return the socket's file descriptor, the same one until close()."""
+        return self._socket.fileno()
+
+    def read(self) -> bool:
+        """Pass on the messages that have come; return whether the connection still stands."""
+        try:
+            data = self._socket.recv(READ_LENGTH, socket.MSG_DONTWAIT)
+        except (BlockingIOError, InterruptedError):
+            return True
+        except OSError as error:
+            self.error = error
+            return False
+        if not data:
+            return False
+        self._connection.stat_bytes += len(data)
+        if self._rest:
+            data = self._rest + data
+        position, end = 0, len(data)
+        while end - position >= _LENGTH.size:
+            length: int = _LENGTH.unpack_from(data, position)[0]
+            if length > MESSAGE_LENGTH_MAX:
+                return False
+            start = position + _LENGTH.size
+            if end - start < length:
+                break
+            position = start + length
+            self._connection.stat_num_msg += 1
+            self._receive(data[start:position])
+        self._rest = data[position:]
+        return True
+
+    def close(self) -> None:
+        """Let rospy's thread go on."""
+        self._socket.close()
+        self.ended.set()
