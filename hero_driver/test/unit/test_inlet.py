@@ -10,11 +10,11 @@ import rospy
 from rospy.impl.tcpros_base import TCPROSTransport
 from rospy.impl.tcpros_pubsub import TCPROSSub
 from rospy.topics import _SubscriberImpl
+from std_msgs.msg import String
 
 from hero_driver.inlet import MESSAGE_LENGTH_MAX, Inlet
 from hero_driver.message_types import make_raw_class
 from hero_driver.transport import EventLoop, LinkHandler, TransportSettings
-from std_msgs.msg import String
 
 DEADLINE_S = 20.0
 RAW_CLASS = make_raw_class(String)
