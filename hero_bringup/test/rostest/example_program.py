@@ -23,7 +23,7 @@ class ExampleProgram:
     def __init__(self, name, *arguments, environment=None):
         ExampleProgram.count += 1
         self.name = name
-        self.output = tempfile.TemporaryFile()
+        self.output = tempfile.NamedTemporaryFile()
         self.process = subprocess.Popen(
             [find_program(name), "__name:=%s_%d" % (name, ExampleProgram.count), *arguments],
             stdin=subprocess.DEVNULL,
@@ -35,8 +35,8 @@ class ExampleProgram:
 
     def text(self):
         """Return all that it wrote so far."""
-        self.output.seek(0)
-        return self.output.read().decode()
+        with open(self.output.name, encoding="utf-8") as written:  # a file of its own: seeking would move the program's
+            return written.read()
 
     def wait_for_text(self, text, timeout_s=END_TIMEOUT_S):
         try:

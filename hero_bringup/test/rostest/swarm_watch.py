@@ -73,10 +73,6 @@ class SwarmWatch:
         """Wait until every robot was heard of."""
         wait_for(lambda: all(self.rows.values()), timeout_s, "ground truth of %s" % sorted(self.rows))
 
-    def save(self, path):
-        """Write all paths to an .npz file, for pictures."""
-        np.savez_compressed(path, **{"hero_%d" % robot_id: self.path(robot_id) for robot_id in self.rows})
-
     def lengths_m(self):
         """Return how far each robot drove."""
         return {

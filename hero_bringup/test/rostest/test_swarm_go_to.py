@@ -2,7 +2,6 @@
 """Ten robots swap places across a circle, judged by the simulator's ground truth."""
 
 import math
-import os
 import sys
 import unittest
 
@@ -12,8 +11,8 @@ from swarm_watch import SwarmWatch, wait_for
 
 ROBOTS = 10
 
-DRIFT_M = 0.25
-"""How far odometry may be off after 1.2 m and many turns: wheels differ by some tenths of a per cent, as real ones."""
+TRUE_TOLERANCE_M = 0.03
+"""The node's tolerance of 0.01 m, twice that for a robot that has arrived, and what odometry may be off."""
 
 
 class SwarmGoToTest(unittest.TestCase):
@@ -26,17 +25,14 @@ class SwarmGoToTest(unittest.TestCase):
             goals[robot_id] = (-0.6 * math.cos(angle), -0.6 * math.sin(angle))
 
         def all_rest():
-            moved = all(math.dist(watch.pose(robot_id)[:2], goal) < DRIFT_M for robot_id, goal in goals.items())
+            moved = all(math.dist(watch.pose(robot_id)[:2], goal) < TRUE_TOLERANCE_M for robot_id, goal in goals.items())
             return moved and all(rows[-1][4] == 0.0 for rows in watch.rows.values())
 
         wait_for(all_rest, 100.0, "all robots at rest on the other side")
         watch.close()
-        path = os.environ.get("HERO_RECORD")
-        if path:
-            watch.save(path)
         off_m = {robot_id: round(math.dist(watch.pose(robot_id)[:2], goal), 3) for robot_id, goal in goals.items()}
         sys.stdout.write("least gap %.4f m, off %s\n" % (watch.least_gap_m(), off_m))
-        self.assertGreater(watch.least_gap_m(), 0.0)
+        self.assertGreater(watch.least_gap_m(), 0.005)
 
 
 if __name__ == "__main__":

@@ -31,7 +31,7 @@ class AvoidanceLaw(NamedTuple):
     """Radius of the body."""
     ahead_m: float = 0.03
     """The point that is steered lies so far in front of the axle; small: quick turns, large: wide berth."""
-    margin_m: float = 0.008
+    margin_m: float = 0.012
     """Added to the radius for late and wrong odometry and for wheels that lag."""
     horizon_s: float = 3.0
     """Robots are kept apart for so long ahead."""

@@ -15,7 +15,17 @@ SPEED_GAIN = 0.8
 """Wanted speed in m/s per metre to the goal, 1/s."""
 
 NUDGE = 0.05
-"""Share of the wanted speed that is turned to a random side: breaks the symmetry in which all robots wait."""
+"""Largest random turn of the wanted velocity, rad: breaks the symmetry in which all robots wait."""
+
+
+PATIENCE_S = 4.0
+"""A robot that came no nearer to its goal for so long is in a jam: it goes aside, to the right, by a random angle."""
+
+ASIDE_S = 2.0
+"""For so long, then it tries again."""
+
+PROGRESS_M = 0.01
+"""So much nearer counts as nearer."""
 
 
 class SwarmSteering:
@@ -41,6 +51,7 @@ class SwarmSteering:
         self._random = np.random.RandomState(seed)
         self._last_places: Optional[np.ndarray] = None
         self._velocities = np.zeros((len(self.goals), 2))
+        self._jams = [_Jam() for _ in self.goals]
 
     def step(self, poses: Sequence[Pose], ranges: Optional[Sequence[Sequence[float]]] = None) -> List[Command]:
         """Return the next command of every robot.
@@ -57,7 +68,7 @@ class SwarmSteering:
             done and distance_m < 2.0 * self._dock_law.tolerance_m or distance_m < self._dock_law.tolerance_m
             for done, distance_m in zip(self.arrived, distances_m)
         ]
-        wanted = np.array([self._want(*item) for item in zip(self.goals, poses, distances_m)])
+        wanted = np.array([self._want(*item) for item in zip(self.goals, poses, distances_m, self._jams)])
         seen = []
         for index, pose in enumerate(poses):
             wanted[index], *planes = keep_off(pose, [] if ranges is None else ranges[index], wanted[index], self.law)
@@ -73,11 +84,37 @@ class SwarmSteering:
                 commands[index] = steer(poses[index], velocity, self.law)
         return commands
 
-    def _want(self, goal: Tuple[float, float], pose: Pose, distance_m: float) -> np.ndarray:
-        """Return the velocity (2,) straight to the goal, with a small nudge."""
+    def _want(self, goal: Tuple[float, float], pose: Pose, distance_m: float, jam: "_Jam") -> np.ndarray:
+        """Return the velocity (2,) straight to the goal, with a small nudge; out of a jam, at an angle to that."""
         way = np.array([goal[0] - pose.x_m, goal[1] - pose.y_m])
         speed_m_s = min(self.law.max_linear_m_s, SPEED_GAIN * distance_m)
         straight = way * (speed_m_s / max(distance_m, 1e-9))
         side = np.array([-straight[1], straight[0]])
-        nudged: np.ndarray = straight + side * NUDGE * self._random.uniform(-1.0, 1.0)
-        return nudged
+        if jam.look(distance_m, self.step_s):
+            jam.turn_rad = self._random.uniform(-2.5, -0.5)
+        turn_rad = jam.turn_rad if jam.aside else NUDGE * self._random.uniform(-1.0, 1.0)
+        wanted: np.ndarray = straight * math.cos(turn_rad) + side * math.sin(turn_rad)
+        return wanted
+
+
+class _Jam:
+    """Whether one robot makes way towards its goal."""
+
+    def __init__(self) -> None:
+        self.turn_rad = 0.0
+        self._least_m = math.inf
+        self._waited_s = 0.0
+
+    @property
+    def aside(self) -> bool:
+        """Whether the robot is to go aside now."""
+        return self._waited_s > PATIENCE_S
+
+    def look(self, distance_m: float, step_s: float) -> bool:
+        """Take the distance to the goal; return whether to begin going aside now."""
+        was_aside = self.aside
+        self._waited_s += step_s
+        if self._waited_s > PATIENCE_S + ASIDE_S or (not was_aside and distance_m < self._least_m - PROGRESS_M):
+            self._least_m = distance_m
+            self._waited_s = 0.0
+        return self.aside and not was_aside

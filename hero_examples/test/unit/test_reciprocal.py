@@ -10,6 +10,7 @@ from hero_examples.control_laws import STANDSTILL, Pose
 from hero_examples.reciprocal import (
     AvoidanceLaw,
     half_plane,
+    keep_off,
     nearest_allowed,
     steer,
     steered_point,
@@ -96,6 +97,27 @@ def test_robots_swap_places_across_a_circle_without_touching(count, radius_m):
         assert least_m > 2.0 * BODY_M, (seed, least_m)
         for pose, goal in zip(poses, goals):
             assert math.hypot(pose.x_m - goal[0], pose.y_m - goal[1]) < 0.02, seed
+
+
+def test_what_is_seen_near_is_not_driven_at_but_passed_on_the_right():
+    law = AvoidanceLaw()
+    pose = Pose(0.2, -0.1, math.pi / 2.0)
+    ahead = np.array([0.0, 0.08])
+    for gap_m in (0.09, 0.05, 0.03, 0.01):
+        ranges = [law.body_m + gap_m] + [math.inf] * 7
+        wanted, normals, bounds = keep_off(pose, ranges, ahead, law)
+        found = nearest_allowed(wanted, normals, bounds, law.max_linear_m_s)
+        limit_m_s = max(gap_m - law.keep_off_m, -law.back_off_m_s)
+        assert found[1] <= limit_m_s + 1e-9
+        assert found[0] > 0.0  # the right of a robot that looks along y
+
+
+def test_what_is_far_or_not_known_changes_nothing():
+    law = AvoidanceLaw()
+    ahead = np.array([0.08, 0.0])
+    for range_m in (math.inf, math.nan, law.body_m + law.look_m + 0.01):
+        wanted, normals, bounds = keep_off(Pose(0.0, 0.0, 0.0), [range_m] * 8, ahead, law)
+        assert wanted is ahead and normals.shape == (0, 2) and bounds.shape == (0,)
 
 
 def test_the_steered_point_is_ahead_of_the_axle():
