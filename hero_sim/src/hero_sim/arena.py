@@ -5,7 +5,7 @@ rad.
 """
 
 import math
-from typing import List, NamedTuple, Tuple
+from typing import List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
@@ -28,7 +28,7 @@ class Arena(NamedTuple):
         name: for people.
         segments_m: walls and the edges of polygons, shape (S, 4), x1 y1 x2 y2.
         circles_m: round obstacles, shape (C, 3), x y radius.
-        starts: poses (x m, y m, theta rad) of the first robots; the others are placed by chance.
+        starts: free poses (x m, y m, theta rad) of the first robots; the others are placed by chance.
         bounds_m: x min, y min, x max, y max of the area in which robots are placed.
         polygons_m: the corners of each solid polygon, whose edges are among the segments.
     """
@@ -129,20 +129,12 @@ def distance_to_segments(
 def place_robots(arena: Arena, robots: int, rng: np.random.RandomState) -> np.ndarray:
     """Return start poses, shape (robots, 3): the arena's own first, then free places drawn from rng.
 
-    Raises: ArenaError if a start touches something or if no free place is left.
+    Raises: ArenaError if no free place is left.
     """
     poses: List[Pose] = []
     for index in range(robots):
-        if index < len(arena.starts):
-            pose = arena.starts[index]
-            if not _is_free(pose, poses, arena, BODY_RADIUS_M):
-                raise ArenaError(
-                    "arena %s: start %d at (%.3f, %.3f) touches a wall, an obstacle or another start; robots "
-                    "need %.3f m around their centre" % (arena.name, index, pose[0], pose[1], BODY_RADIUS_M)
-                )
-            poses.append(pose)
-            continue
-        poses.append(_draw_place(arena, poses, rng, robots))
+        own = index < len(arena.starts)
+        poses.append(arena.starts[index] if own else _draw_place(arena, poses, rng, robots))
     return np.array(poses, dtype=float).reshape(-1, 3)
 
 
@@ -150,7 +142,7 @@ def _draw_place(arena: Arena, poses: List[Pose], rng: np.random.RandomState, rob
     x_min, y_min, x_max, y_max = arena.bounds_m
     for _ in range(_MOST_TRIES):
         pose = (rng.uniform(x_min, x_max), rng.uniform(y_min, y_max), rng.uniform(-math.pi, math.pi))
-        if _is_free(pose, poses, arena, BODY_RADIUS_M + START_GAP_M):
+        if is_free(pose, poses, arena, BODY_RADIUS_M + START_GAP_M):
             return pose
     raise ArenaError(
         "arena %s: no free place for robot %d of %d; take fewer robots or a larger arena"
@@ -158,7 +150,8 @@ def _draw_place(arena: Arena, poses: List[Pose], rng: np.random.RandomState, rob
     )
 
 
-def _is_free(pose: Pose, poses: List[Pose], arena: Arena, radius_m: float) -> bool:
+def is_free(pose: Pose, poses: Sequence[Pose], arena: Arena, radius_m: float) -> bool:
+    """Return whether a robot with radius_m fits at pose, beside stock robots at poses."""
     if measure_clearance(np.array([pose[:2]]), arena)[0] < radius_m:
         return False
     return all(math.hypot(pose[0] - x, pose[1] - y) >= radius_m + BODY_RADIUS_M for x, y, _ in poses)

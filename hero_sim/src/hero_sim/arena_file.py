@@ -9,8 +9,9 @@ from typing import Any, List, Tuple
 
 import numpy as np
 
-from .arena import Arena, outline
+from .arena import Arena, is_free, outline
 from .errors import OptionError
+from .kinematics import BODY_RADIUS_M, Pose
 from .yaml_file import fail_at, read_mapping, read_nodes
 
 SHIPPED = ("empty", "obstacles", "maze")
@@ -69,20 +70,31 @@ class _Reader:
             if radius_m <= 0:
                 raise self._fail(node, "a circle's radius must be more than 0, not %g" % radius_m)
             circles.append((x_m, y_m, radius_m))
-        starts = []
-        for node in self._items(nodes.get("starts_m_deg"), "starts_m_deg"):
-            x_m, y_m, heading_deg = self._numbers(node, 3, "a start: x, y, heading in degrees")
-            starts.append((x_m, y_m, math.radians(heading_deg)))
         bounds_m = self._bounds(nodes.get("bounds_m"), root, segments)
         name = str(nodes["name"].value) if "name" in nodes else os.path.basename(self._path)
-        return Arena(
+        arena = Arena(
             name,
             np.array(segments, dtype=float).reshape(-1, 4),
             np.array(circles, dtype=float).reshape(-1, 3),
-            tuple(starts),
+            (),
             bounds_m,
             tuple(polygons),
         )
+        return arena._replace(starts=self._starts(nodes.get("starts_m_deg"), arena))
+
+    def _starts(self, node: Any, arena: Arena) -> Tuple[Pose, ...]:
+        starts: List[Pose] = []
+        for item in self._items(node, "starts_m_deg"):
+            x_m, y_m, heading_deg = self._numbers(item, 3, "a start: x, y, heading in degrees")
+            start = (x_m, y_m, math.radians(heading_deg))
+            if not is_free(start, starts, arena, BODY_RADIUS_M):
+                raise self._fail(
+                    item,
+                    "the start at (%g, %g) touches a wall, an obstacle or another start; robots need %.3f m around "
+                    "their centre" % (x_m, y_m, BODY_RADIUS_M),
+                )
+            starts.append(start)
+        return tuple(starts)
 
     def _bounds(
         self, node: Any, root: Any, segments: List[Tuple[float, float, float, float]]

@@ -86,14 +86,16 @@ def test_a_file_that_is_not_there_is_refused_with_the_shipped_names():
         load_arena("/nowhere/at/all.yaml")
 
 
-def test_a_start_in_a_wall_is_refused(tmp_path):
-    arena = load_arena(
-        write(
-            tmp_path, "walls_m: [[[0, 0], [1, 0]]]\nbounds_m: [0, 0, 1, 1]\nstarts_m_deg: [[0.5, 0.01, 0]]\n"
-        )
+@pytest.mark.parametrize("second", ["[0.5, 0.01, 0]", "[0.53, 0.5, 0]", "[0.2, 0.8, 0]", "[0.8, 0.8, 0]"])
+def test_a_start_that_touches_something_is_refused_with_its_line(tmp_path, second):
+    path = write(
+        tmp_path,
+        "walls_m: [[[0, 0], [1, 0]]]\nbounds_m: [0, 0, 1, 1]\ncircles_m: [[0.2, 0.8, 0.1]]\n"
+        "polygons_m: [[[0.7, 0.7], [0.9, 0.7], [0.9, 0.9], [0.7, 0.9]]]\n"
+        "starts_m_deg:\n  - [0.5, 0.5, 0]\n  - %s\n" % second,
     )
-    with pytest.raises(arenas.ArenaError, match="start 0"):
-        arenas.place_robots(arena, 1, np.random.RandomState(0))
+    with pytest.raises(OptionError, match=r"arena\.yaml:7: the start at"):
+        load_arena(path)
 
 
 def test_too_many_robots_are_refused(tmp_path):
