@@ -243,18 +243,20 @@ def test_zero_topics_are_declared_at_the_second_request_only(simulate, server):
     server.run_until(lambda: peer.count(frames.ID_PUBLISHER) == 5)
 
 
-@pytest.mark.parametrize(
-    "fault, bad",
-    [("garbage", 0), ("half-frame", 1), ("bad-checksum", 1), ("bad-length", 1), ("long-frame", 1)],
-)
-def test_wrong_bytes_cost_at_most_the_frame_beside_them(simulate, server, fault, bad):
-    simulate("--port", str(server.port), "--fault", fault + "@8")
+def test_wrong_bytes_cost_at_most_the_frame_beside_them(simulate, server):
+    kinds = ("garbage", "half-frame", "bad-checksum", "bad-length", "long-frame")
+    faults = ["--fault=%s@%g" % (kind, 8 + 0.2 * index) for index, kind in enumerate(kinds)]
+    process = simulate("--port", str(server.port), *faults)
     request_when_ready(server, 1)
     peer = server.peers[0]
-    server.run_until(lambda: peer.reader.skipped_bytes > 0)
-    assert peer.reader.bad_frames >= bad
+    # All but the garbage begin like a frame.
+    server.run_until(lambda: peer.reader.bad_frames >= 4 and peer.reader.skipped_bytes > 200)
     seen = peer.count(ids.ID_ODOM)
     server.run_until(lambda: peer.count(ids.ID_ODOM) > seen + 5)
+    assert not peer.closed
+    process.terminate()
+    said, _ = process.communicate(timeout=LIMIT_S)
+    assert [kind for kind in kinds if "fault %s for hero_0" % kind not in said] == []
 
 
 def test_a_frozen_robot_is_silent_and_goes_on(simulate, server):
@@ -356,21 +358,34 @@ def test_it_ends_by_itself_after_its_seconds(simulate):
         (("--fault", "reboot:robot=7"), "robot 7"),
         (("--robots", "two"), "two"),
         (("--wifi", "string"), "string"),
+        (("--error", "slip=much"), "slip=much"),
+        (("--print-errors", "--error", "robot=4,slip=0"), "robot 4"),
+        (("--flash-dir", "/proc/flash"), "/proc/flash"),
     ],
 )
-def test_a_wrong_option_gets_one_clear_line(arguments, named):
+def test_a_wrong_option_gets_one_clear_line(arguments, named, capsys):
+    try:
+        code = main.main(list(arguments))
+    except SystemExit as end:
+        code = end.code
+    assert code in (1, 2)
+    assert named in capsys.readouterr().err.strip().splitlines()[-1]
+
+
+def test_a_wrong_option_ends_the_program_without_a_trace():
     result = subprocess.run(
-        [sys.executable, "-m", "hero_sim", *arguments],
+        [sys.executable, "-m", "hero_sim", "--errors", "/nowhere.yaml"],
         capture_output=True,
         text=True,
         env=build_environment(),
         timeout=LIMIT_S,
         check=False,
     )
-    last_line = result.stderr.strip().splitlines()[-1]
-    assert result.returncode != 0
-    assert named in last_line
-    assert "Traceback" not in result.stderr
+    assert result.returncode == 1
+    assert result.stderr == (
+        "hero_sim: --errors /nowhere.yaml cannot be read: No such file or directory; "
+        "--print-errors writes such a file\n"
+    )
 
 
 def test_a_port_that_is_taken_is_named(simulate):
