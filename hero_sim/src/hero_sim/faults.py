@@ -26,7 +26,7 @@ FOREIGN_FRAMES = "foreign-id"
 
 KINDS: Dict[str, Tuple[str, Dict[str, float]]] = {
     REBOOT: ("starts again at once; the old connection gets no FIN", {}),
-    VANISH: ("power cut: no FIN, nothing any more; comes back by booting after for (0: never)", {"for": 0.0}),
+    VANISH: ("power cut: no FIN, no acknowledgement; comes back by booting after for (0: never)", {"for": 0.0}),
     LEAVE: ("closes its connection (FIN) and dials again after for, still streaming", {"for": 3.0}),
     DUPLICATE: ("starts again with the id of another robot (as one whose flash was erased)", {"of": -1.0}),
     ZERO_TOPICS: ("starts again and answers the first request without declaring anything", {}),

@@ -3,6 +3,8 @@ import struct
 import numpy as np
 import pytest
 from driver_side import DriverSide, read_encoder
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from hero_sim import declarations as ids
 from hero_sim.kinematics import TICK_M
@@ -187,3 +189,48 @@ def test_the_encoders_see_what_the_wheels_do_not_what_they_should_do():
     driver.run(900)
     left, right = read_encoder(driver.list_frames(0, ids.ID_ENCODER)[-1].payload)[:2]
     assert right / left == pytest.approx(0.5, abs=0.05)
+
+
+twists = st.tuples(
+    st.sampled_from((ids.ID_VELOCITY_CMD_VEL, ids.ID_POSITION_CMD_VEL)),
+    st.tuples(st.floats(-1.0, 1.0), st.floats(-20.0, 20.0)).map(
+        lambda pair: struct.pack("<6d", pair[0], 0, 0, 0, 0, pair[1])
+    ),
+)
+pulses = st.tuples(
+    st.just(ids.ID_CMD_MOTOR),
+    st.tuples(st.integers(-(2**15), 2**15 - 1), st.integers(-(2**15), 2**15 - 1)).map(
+        lambda pair: struct.pack("<2h", *pair)
+    ),
+)
+gains = st.tuples(
+    st.sampled_from((ids.ID_VELOCITY_PID_PARAMETERS, ids.ID_POSITION_PID_PARAMETERS)),
+    st.lists(st.floats(-1e9, 1e9, width=32), min_size=6, max_size=6).map(lambda six: struct.pack("<6f", *six)),
+)
+tunings = st.tuples(
+    st.sampled_from((ids.ID_VELOCITY_PID_CALIBRATION, ids.ID_POSITION_PID_CALIBRATION)), st.just(b"")
+)
+
+
+@settings(max_examples=15, deadline=None)
+@given(
+    seed=st.integers(0, 1000),
+    sent=st.lists(
+        st.tuples(st.integers(0, 4), st.one_of(twists, pulses, gains, tunings)), min_size=5, max_size=20
+    ),
+)
+def test_whatever_robots_are_sent_they_stay_out_of_walls_and_each_other_and_stop_in_the_end(seed, sent):
+    driver = DriverSide("--robots", "5", "--arena", "obstacles", "--seed", str(seed))
+    driver.start_streaming()
+    world = driver.swarm.world
+    overlaps = []
+    driver.swarm.after_step = lambda now_ms: overlaps.append(world.find_overlaps(1e-6).any())
+    for robot, (topic_id, payload) in sent:
+        driver.send(robot, topic_id, payload)
+        driver.run(100)
+    for robot in range(5):
+        driver.send_twist(robot, 0.0, 0.0)
+        driver.send_twist(robot, 0.0, 0.0, ids.ID_POSITION_CMD_VEL)
+    driver.run(600)
+    assert not any(overlaps)
+    assert abs(world.speeds_m_s).max() < 0.002
