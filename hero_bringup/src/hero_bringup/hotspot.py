@@ -290,6 +290,6 @@ def main() -> None:
         print("hotspot: %s" % error, file=sys.stderr)
         code = 1
     except (KeyboardInterrupt, EOFError):
-        print("hotspot: ended; nothing was changed", file=sys.stderr)
+        print("\nhotspot: ended; nothing was changed", file=sys.stderr)
         code = 130
     sys.exit(code)
