@@ -1,0 +1,81 @@
+"""Starts RViz on a screen that nobody looks at and saves what it shows. Started by script/pictures.
+
+The robots are simulated and walk; every picture has a ROS master, a driver and a simulator of its own.
+"""
+
+import argparse
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import matplotlib.image
+import numpy as np
+
+BRINGUP = Path(__file__).resolve().parents[2]
+sys.path += [str(BRINGUP / "bench"), str(BRINGUP / "test" / "rostest")]
+from stage import Stage  # noqa: E402
+from virtual_screen import MISSING, VirtualScreen  # noqa: E402
+
+PICTURES_FOLDER = BRINGUP.parent / "docs" / "pictures"
+WALK_S = 25.0
+SCREEN = (1200, 800)
+COLOURS_DRAWN = 200  # fewer different colours than this: RViz shows no robots yet
+DRAW_TIMEOUT_S = 60.0
+
+
+def wait_until_drawn(screen, stage):
+    """Return when RViz shows more than its empty window."""
+
+    def drawn():
+        time.sleep(0.1)  # counting colours is work too
+        return len(np.unique(screen.read()[::4, ::4].reshape(-1, 3), axis=0)) > COLOURS_DRAWN
+
+    stage.wait_for(drawn, "a picture in RViz", DRAW_TIMEOUT_S)
+
+
+def photograph_rviz(picture, robots, arena):
+    """Let robots walk in an arena, and save the window of RViz."""
+    screen = VirtualScreen(*SCREEN)
+    os.environ.update(screen.environment())
+    try:
+        with Stage(robots, "sim_arena:=" + arena) as stage:
+            stage.start_example("random_walk", "_robots:=0-%d" % (robots - 1), "_seed:=4")
+            launch = ["roslaunch", "--no-summary", "hero_description", "swarm.launch", "robots:=%d" % robots]
+            stage.start(launch, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            wait_until_drawn(screen, stage)
+            end_s = time.monotonic() + WALK_S
+            stage.wait_for(lambda: time.monotonic() > end_s, "robots that walk", 2.0 * WALK_S)
+            matplotlib.image.imsave(str(picture), screen.read())
+    finally:
+        screen.close()
+
+
+PICTURES = {
+    "rviz_swarm": lambda picture: photograph_rviz(picture, 4, "empty"),
+    "rviz_obstacles": lambda picture: photograph_rviz(picture, 8, "obstacles"),
+}
+
+
+def main():
+    """Make the pictures that are named, or all."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("names", nargs="*", choices=[[], *PICTURES], help="which; without a name: all")
+    parser.add_argument(
+        "--folder", default=str(PICTURES_FOLDER), help="where the pictures go (default: %(default)s)"
+    )
+    options = parser.parse_args()
+    if MISSING:
+        parser.exit(1, "screen_pictures: not installed: %s (apt install xvfb rviz)\n" % ", ".join(MISSING))
+    names = options.names or list(PICTURES)
+    if len(names) == 1:
+        PICTURES[names[0]](Path(options.folder) / (names[0] + ".png"))
+        print("%s/%s.png" % (options.folder, names[0]), flush=True)
+        return
+    for name in names:
+        subprocess.run([sys.executable, __file__, name, "--folder", options.folder], check=True)
+
+
+if __name__ == "__main__":
+    main()
