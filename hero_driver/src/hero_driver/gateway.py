@@ -14,6 +14,7 @@ from . import log_lines, names
 from .admission import Admission, RateGuard
 from .cleaning import TRANSFORMS, CleaningSettings
 from .command_sender import CommandSender
+from .command_shaping import COMMAND_INTERVAL_S
 from .config import DriverConfig
 from .fleet import Decision, Fleet, RobotRecord, RobotState, Verdict
 from .log_relay import LogRelay
@@ -446,6 +447,18 @@ class Gateway(LinkHandler):
                 self._loop.call_later(HALT_SETTLE_S, then)
 
         check()
+
+    def halt_directly(self) -> None:
+        """Write stops to every robot past all queues, because the loop that empties them has broken.
+
+        Twice, as every stop, and once more: the first may come too soon after a motion.
+        """
+        for _ in range(3):
+            for peer in self.peers.values():
+                if peer.bridge is not None:
+                    for topic_id, payload in peer.bridge.encode_stops():
+                        peer.link.send_frame(peer.session.encode_message(topic_id, payload))
+            time.sleep(COMMAND_INTERVAL_S)
 
     @staticmethod
     def _has_halted(peer: Peer) -> bool:

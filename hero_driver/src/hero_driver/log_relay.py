@@ -4,9 +4,10 @@ rospy writes to the terminal and a file when it logs; both can block, so the thr
 lines over here. When too many wait they are dropped and the number is logged.
 """
 
+import logging
 import sys
 import time
-from typing import Dict, Tuple
+from typing import Dict, List, Tuple
 
 import rospy
 
@@ -83,6 +84,37 @@ class LogRelay:
     def close(self) -> None:
         """Write what waits and end the thread."""
         self._worker.close(drain=True)
+
+
+def prepare_logging() -> None:
+    """Before rospy logs anything: let no line that cannot be written become a dozen lines of traceback."""
+    logging.raiseExceptions = False
+
+
+def tell_of_lost_log_lines() -> None:
+    """After rospy has set its logging up: say once, on stderr, what keeps lines out of the log file."""
+    told: List[BaseException] = []
+
+    def tell(record: logging.LogRecord) -> None:
+        error = sys.exc_info()[1]
+        if error is not None and not told:
+            told.append(error)
+            _write_to_terminal(
+                "hero_driver: the log file cannot be written (%s): lines are lost until it can; make space below"
+                " ROS_LOG_DIR or ~/.ros/log\n" % error
+            )
+
+    for name in ("", "rosout", "rospy"):
+        for handler in logging.getLogger(name).handlers:
+            handler.handleError = tell  # type: ignore[method-assign]
+
+
+def _write_to_terminal(text: str) -> None:
+    try:
+        sys.stderr.write(text)
+    except OSError:
+        # The terminal, or the disk that it goes to, is what is gone: nobody is left to be told.
+        return
 
 
 def _report_to_terminal(error: BaseException) -> None:

@@ -14,7 +14,7 @@ import rospy
 from . import message_types, wire_messages
 from .cleaning import TRANSFORMS, Clean, CleaningSettings, MessageCleaner, Output, split_transforms
 from .command_queue import CommandQueue
-from .command_shaping import HALTED_MOTORS, check_twist
+from .command_shaping import HALTED_MOTORS, ZERO_TWIST, check_twist
 from .inlet import AddReader, Inlet
 from .message_types import MessageTypeError
 from .names import Identity
@@ -99,6 +99,7 @@ class RobotBridge:
         self._motor_used_s = 0.0
         self._errors: Dict[str, str] = {}
         self._names: Set[str] = set()
+        self._subscribed_types: Dict[str, str] = {}
 
     # The connection's life.
 
@@ -153,6 +154,7 @@ class RobotBridge:
             self._submit(lambda: self._advertise(name, info.message_type, info.md5sum, derived))
         elif kind is TopicKind.SUBSCRIBER:
             self._ids[name] = info.topic_id
+            self._subscribed_types[name] = ros_type
             self._submit(lambda: self._subscribe(name, info.message_type, info.md5sum))
         elif kind in (TopicKind.SERVICE_ANSWERS, TopicKind.SERVICE_REQUESTS):
             self._declare_service_half(topic, name)
@@ -247,11 +249,20 @@ class RobotBridge:
         """Return the id under which the robot receives the topic or service called name."""
         return self._ids.get(name)
 
+    def encode_stops(self) -> List[Tuple[int, bytes]]:
+        """Return ids and payloads that stop the robot, whatever waits: for when nothing else works any more."""
+        return [
+            (topic_id, ZERO_TWIST)
+            for name, topic_id in self._ids.items()
+            if name.endswith(VELOCITY_SUFFIX) and self._subscribed_types.get(name) == TWIST_TYPE
+        ]
+
     def halt(self) -> None:
         """Stop the robot, on every topic that may drive it."""
         now_s = time.monotonic()
         velocity = self.identity.namespace + VELOCITY_CONTROLLER
-        self.commands.halt(velocity if velocity in self._ids else None, now_s)
+        takes_velocity = velocity in self._ids and self._subscribed_types.get(velocity) == TWIST_TYPE
+        self.commands.halt(velocity if takes_velocity else None, now_s)
         if now_s - self._motor_used_s < 2.0:
             motors = self.identity.namespace + "/cmd_motor"
             if motors in self._ids:

@@ -5,8 +5,10 @@ import errno
 import heapq
 import itertools
 import os
+import resource
 import selectors
 import socket
+import sys
 import threading
 import time
 from typing import Any, Callable, Deque, Dict, List, NamedTuple, Optional, Set, Tuple
@@ -24,6 +26,10 @@ POLL_INTERVAL_S = 0.1
 ACCEPT_PAUSE_S = 0.5
 """Rest of the listener when the process has no file descriptors left; those connected go on."""
 
+
+FILES_RESERVED = 64
+"""Files that robots leave to ROS, at most a quarter of all: rospy takes no subscriber ever again once it could
+not open a file for one."""
 
 THE_DRIVER_ENDS = "the driver ends"
 """Reason with which all links are closed at the end."""
@@ -75,6 +81,7 @@ class EventLoop(LinkOwner, DiallerOwner):
         os.set_blocking(self._wake_read, False)
         os.set_blocking(self._wake_write, False)
         self._running = True
+        self._file_limit = _raise_file_limit()
         self._dial_resolver = Resolver()
         self.listening: Optional[Address] = None
 
@@ -98,6 +105,9 @@ class EventLoop(LinkOwner, DiallerOwner):
         try:
             while self._running:
                 self._run_once()
+        except BaseException:
+            self._handler.halt_directly()
+            raise
         finally:
             self._close_all()
 
@@ -110,7 +120,7 @@ class EventLoop(LinkOwner, DiallerOwner):
             elif isinstance(source, Reader):
                 self._serve_reader(source)
             else:
-                source()
+                self._call(source)
         for _ in range(len(self._calls)):
             self._call(self._calls.popleft())
         self._run_due()
@@ -167,7 +177,11 @@ class EventLoop(LinkOwner, DiallerOwner):
             return None
         self._links[sock.fileno()] = link
         self._selector.register(link, selectors.EVENT_READ, link)
-        refusal = self._handler.open_link(link)
+        try:
+            refusal = self._handler.open_link(link)
+        except Exception as error:  # noqa: BLE001 - our mistake with this one must not keep others out
+            self._handler.report_fault(error)
+            refusal = "a mistake of the driver"
         if refusal is not None:
             link.close(refusal)
             return None
@@ -236,6 +250,11 @@ class EventLoop(LinkOwner, DiallerOwner):
                 return
             except OSError as error:
                 self._pause_accept(listener, error)
+                return
+            # The system gives out the lowest free number, so this is about how many are in use.
+            if sock.fileno() >= self._file_limit - min(FILES_RESERVED, self._file_limit // 4):
+                sock.close()
+                self._pause_accept(listener, OSError(errno.EMFILE, os.strerror(errno.EMFILE)))
                 return
             self.add_link(sock, Address(*address[:2]))
 
@@ -316,6 +335,14 @@ class EventLoop(LinkOwner, DiallerOwner):
     def report_trouble(self, text: str) -> None:
         """Pass text on to the handler."""
         self._handler.report_trouble(text)
+
+
+def _raise_file_limit() -> int:
+    """Let this process open as many files as it may without privileges; return how many."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if soft != hard:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
+    return sys.maxsize if hard == resource.RLIM_INFINITY else hard
 
 
 def _listen(host: str, port: int) -> socket.socket:

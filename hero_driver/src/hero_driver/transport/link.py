@@ -50,6 +50,10 @@ class LinkHandler:
         """One of the calls above, or one made for the loop, raised error; the loop goes on."""
         raise NotImplementedError
 
+    def halt_directly(self) -> None:
+        """The loop itself has broken and ends after this: say the last words to all links, however long it takes."""
+        raise NotImplementedError
+
     def report_trouble(self, text: str) -> None:
         """Something about the network itself should reach the user's eyes."""
         raise NotImplementedError

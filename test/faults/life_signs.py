@@ -1,0 +1,41 @@
+"""What shows that a driver serves a robot, for faults that must not touch it."""
+
+import struct
+
+import rospy
+from driver_case import Recorder, make_publisher, wait_frames, wait_payloads
+from fake_robot import TIME_FRAME
+from std_msgs.msg import ColorRGBA
+from stock_messages import make_encoder
+
+from hero_driver.rosserial import frames
+from hero_msgs.msg import Encoder
+
+
+class Life:
+    """What shows that a driver serves one robot: messages, commands, the time."""
+
+    def __init__(self, driver, robot):
+        """Return when a program is connected to both ways."""
+        self._driver = driver
+        self._robot = robot
+        driver.fleet.wait_ready(robot.namespace)
+        self._encoders = Recorder(robot.namespace + "/encoder", Encoder)
+        self._light = make_publisher(robot.namespace + "/led", ColorRGBA)
+
+    def show(self, count=1):
+        """Pass count messages each way, and let the robot ask for the time."""
+        robot = self._robot
+        messages, lights = len(self._encoders.messages), len(robot.payloads_on("led"))
+        asked = len(robot.payloads_with_id(frames.ID_TIME))
+        for number in range(count):
+            robot.send("encoder", make_encoder(robot.name, rospy.Time.now(), float(number), 0.0))
+            self._light.publish(ColorRGBA(float(number), 0.0, 0.0, 0.0))
+        ticks = [message.left_ticks for message in self._encoders.wait_count(messages + count)[messages:]]
+        wait_payloads(robot, "led", lights + count)
+        colours = [struct.unpack("<f", payload[:4])[0] for payload in robot.payloads_on("led")[lights:]]
+        assert ticks == colours == [float(number) for number in range(count)]
+        robot.send_bytes(TIME_FRAME)
+        wait_frames(robot, frames.ID_TIME, asked + 1)
+        assert robot.is_connected and self._driver.process.poll() is None
+        return True

@@ -1,0 +1,164 @@
+"""The parts of which the faults are made: masters, programs with a pipe, what a process holds, free ports."""
+
+import contextlib
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import NamedTuple
+
+import rosgraph
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+BENCH = ROOT / "hero_driver" / "bench"
+DEADLINE_S = 30.0
+
+
+def wait_until(condition, what, deadline_s=DEADLINE_S):
+    """Return the first true value of condition(), and after how many seconds it came."""
+    start_s = time.monotonic()
+    while True:
+        value = condition()
+        now_s = time.monotonic()
+        if value:
+            return value, now_s - start_s
+        if now_s - start_s > deadline_s:
+            raise AssertionError("waited %g s for %s" % (deadline_s, what() if callable(what) else what))
+        time.sleep(0.02)
+
+
+def find_free_port():
+    """Return a TCP port that nobody uses now."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+class Program:
+    """A program that answers each line that it gets with one line of JSON; it ends with `with`."""
+
+    def __init__(self, *command, prefix=(), environment=None):
+        self.process = subprocess.Popen(
+            [*prefix, *command],
+            env={**os.environ, **(environment or {})},
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            universal_newlines=True,
+            start_new_session=True,
+        )
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        if self.process.poll() is None:
+            os.killpg(self.process.pid, signal.SIGKILL)
+        self.process.communicate()
+
+    def ask(self, line):
+        """Send one line; return the answer."""
+        self.process.stdin.write(line + "\n")
+        self.process.stdin.flush()
+        return self.read()
+
+    def read(self):
+        """Return the next line that it prints, as what its JSON holds."""
+        line = self.process.stdout.readline()
+        if not line:
+            raise AssertionError("%s ended with %s" % (self.process.args, self.process.wait()))
+        return json.loads(line)
+
+    def interrupt(self):
+        """Send SIGINT; return the last line that it prints."""
+        self.process.send_signal(signal.SIGINT)
+        return json.loads(self.process.communicate(timeout=DEADLINE_S)[0].splitlines()[-1])
+
+
+def start_python(script, *arguments, **options):
+    """Return a running script of the fault suite or, by its path, any other one."""
+    return Program(sys.executable, str(HERE / script), *map(str, arguments), **options)
+
+
+class Master:
+    """A ROS master on a port of its own, without rosout."""
+
+    def __init__(self, host="localhost", port=0):
+        self.port = port or find_free_port()
+        self.environment = {"ROS_MASTER_URI": "http://%s:%d" % (host, self.port), "ROS_HOSTNAME": host}
+        self._process = None
+
+    def __enter__(self):
+        self.start()
+        return self
+
+    def __exit__(self, *_):
+        self.kill()
+
+    def start(self):
+        """Start it and return when it answers."""
+        self._process = subprocess.Popen(
+            ["rosmaster", "--core", "-p", str(self.port)],
+            env={**os.environ, **self.environment},
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+        uri = self.environment["ROS_MASTER_URI"]
+        wait_until(lambda: rosgraph.is_master_online(uri), "a ROS master at " + uri)
+
+    @property
+    def pid(self):
+        """Its process."""
+        return self._process.pid
+
+    def kill(self):
+        """End it without a word, as a power cut does."""
+        self._process.kill()
+        self._process.wait()
+
+
+class Holdings(NamedTuple):
+    """What a process holds."""
+
+    memory_kb: int
+    threads: int
+    files: int
+    registrations: int
+
+    def describe_growth(self, before):
+        """Return the changes since before, in words."""
+        return "memory %+.1f MB, threads %+d, files %+d, registrations %+d" % (
+            (self.memory_kb - before.memory_kb) / 1000.0,
+            self.threads - before.threads,
+            self.files - before.files,
+            self.registrations - before.registrations,
+        )
+
+
+def count_holdings(driver):
+    """Return what a driver holds now; its registrations are those that the master knows."""
+    pid = driver.process.pid
+    status = Path("/proc/%d/status" % pid).read_text()
+    values = dict(line.split(":", 1) for line in status.splitlines())
+    state = rosgraph.Master("/faults").getSystemState()
+    return Holdings(
+        int(values["VmRSS"].split()[0]),
+        int(values["Threads"]),
+        len(os.listdir("/proc/%d/fd" % pid)),
+        sum(driver.node in nodes for part in state for _, nodes in part),
+    )
+
+
+@contextlib.contextmanager
+def frozen(pid):
+    """Stop a process for a while: it keeps its sockets, but reads and answers nothing."""
+    os.kill(pid, signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        os.kill(pid, signal.SIGCONT)

@@ -1,0 +1,161 @@
+"""Twenty good robots at stock rates and one bad peer at a time: the good ones lose nothing."""
+
+import sys
+
+import emulated_swarm
+import pytest
+import rospy
+import stock_messages
+from fake_robot import FakeRobot
+from rig import BENCH, Program, count_holdings, start_python, wait_until
+
+from hero_msgs.msg import Encoder
+
+GOOD_ROBOTS = 20
+NEWCOMER = 77
+
+BAD_PEERS = {
+    "garbage": "sends garbage at full speed",
+    "byte_by_byte": "sends one byte per second on 50 connections",
+    "connects": "connects and leaves, as fast as it can",
+    "silent_connections": "holds connections that say nothing",
+    "never_reads": "asks and never reads the answers",
+    "huge_frames": "sends huge frames",
+    "many_topics": "declares 10,000 topics",
+    "renames": "comes under a new name each time",
+    "claims_an_id": "claims another robot's id",
+    "claims_topics": "claims another robot's topics",
+    "foreign_transforms": "sends another robot's transforms",
+    "log_flood": "floods the log",
+    "service_answers": "floods answers of services",
+    "bad_md5": "declares types with a wrong md5",
+}
+
+
+class Scene:
+    """A driver, twenty good robots, a listener to all of them and a commander, each a process of its own."""
+
+    def __init__(self, driver, listener, swarm, commander):
+        self.driver = driver
+        self.listener = listener
+        self.swarm = swarm
+        self.commander = commander
+        self.transforms = 0
+        self.quiet_p99_ms = None
+
+    def hear(self, seconds):
+        """Return when the good robots have been heard for about so long since the last window."""
+        count = int(seconds * 2 * GOOD_ROBOTS / emulated_swarm.BURST_PERIOD_S)
+        wait_until(lambda: self.listener.ask("count") >= count, "%d messages" % count, seconds + 30.0)
+
+    def end_window(self):
+        """Return what the listener got since the last call."""
+        window = self.listener.ask("window")
+        self.transforms += window["transforms"]
+        return window
+
+
+@pytest.fixture(scope="module")
+def scene(master):
+    from driver_case import DriverProcess
+
+    robots = ["--robots", str(GOOD_ROBOTS)]
+    with DriverProcess({"grace_s": 1.0}, name="isolating_driver") as driver:
+        rospy.set_param("/hero_66/long", "x" * 4000)
+        port = str(driver.address[1])
+        with start_python("listener.py", *robots) as listener, Program(
+            sys.executable, str(BENCH / "ros_load.py"), "command", *robots
+        ) as commander:
+            listener.read()
+            with Program(
+                sys.executable,
+                str(BENCH / "emulated_swarm.py"),
+                "--port",
+                port,
+                "--seconds",
+                "100000",
+                *robots,
+            ) as swarm:
+                started = Scene(driver, listener, swarm, commander)
+
+                heard = set()
+
+                def is_complete():
+                    window = started.end_window()
+                    heard.update(set(range(GOOD_ROBOTS)) - set(window["silent"]))
+                    return len(heard) == GOOD_ROBOTS
+
+                wait_until(is_complete, "all robots at the listener")
+                yield started
+
+
+def join_and_leave(driver):
+    """Let one more robot join, until what it sends arrives in ROS; return how long that took."""
+    robot = FakeRobot(NEWCOMER, source_host="127.0.0.77")
+    encoders = []
+    subscriber = rospy.Subscriber(robot.namespace + "/encoder", Encoder, encoders.append, tcp_nodelay=True)
+
+    def is_heard():
+        if not robot.is_connected:
+            robot.close()
+            robot.connect(driver.address)
+        robot.send("encoder", stock_messages.make_encoder(robot.name, rospy.Time.now(), 1.0, 1.0))
+        return encoders
+
+    try:
+        return wait_until(is_heard, lambda: "the newcomer: %s" % (robot.ended or driver.lines[-20:]))[1]
+    finally:
+        robot.close()
+        subscriber.unregister()
+
+
+@pytest.mark.parametrize("kind", BAD_PEERS)
+def test_a_bad_peer_takes_nothing_from_the_good_robots(scene, effort, record, kind):
+    seconds = effort.choose(1.5, 10.0)
+    if effort.is_long:
+        # What these robots' delays are by themselves.
+        scene.end_window()
+        scene.hear(seconds)
+        scene.quiet_p99_ms = scene.end_window()["p99_ms"]
+    before = count_holdings(scene.driver)
+    scene.end_window()
+    with start_python(
+        "bad_peer.py", kind, "--port", scene.driver.address[1], environment={"PYTHONPATH": ":".join(sys.path)}
+    ) as peer:
+        peer.read()
+        scene.hear(seconds)
+        joined_s = join_and_leave(scene.driver)
+        worst = count_holdings(scene.driver).describe_growth(before)
+        did = peer.interrupt()
+    window = scene.end_window()
+    assert did["connects"], did
+    assert (window["silent"], window["lost"], window["disordered"]) == ([], 0, 0), (window, did)
+    wait_until(
+        lambda: count_holdings(scene.driver).registrations <= before.registrations,
+        lambda: "the bad peer's topics to go: %s" % count_holdings(scene.driver).describe_growth(before),
+        60.0,
+    )
+    growth = count_holdings(scene.driver).describe_growth(before)
+    lost = "nothing"
+    if effort.is_long:
+        lost += "; p99 %.1f ms, without it %.1f ms" % (window["p99_ms"], scene.quiet_p99_ms)
+        lost += "; a new robot joined in %.1f s; at worst %s; after it %s" % (joined_s, worst, growth)
+    record("one of 21 peers " + BAD_PEERS[kind], 1, 1, lost)
+
+
+def test_all_robots_stayed_and_every_transform_and_command_arrived(scene, record):
+    scene.end_window()
+    commanded = scene.commander.interrupt()["commands_s"]
+    sent = scene.swarm.interrupt()
+    wait_until(lambda: scene.end_window()["transforms"] == 0, "the last transforms")
+    received = {stamp_s for stamp_s, _ in sent["commands_s"]}
+    missing = [stamp_s for stamp_s in commanded if stamp_s not in received]
+    record(
+        "all of the above: 20 robots stayed, %d transforms and %d commands"
+        % (sent["transforms"], len(commanded)),
+        GOOD_ROBOTS,
+        GOOD_ROBOTS - sent["thrown_out"],
+        "%d transforms, %d commands" % (sent["transforms"] - scene.transforms, len(missing)),
+    )
+    assert sent["transforms"] == scene.transforms
+    assert missing == []

@@ -1,0 +1,308 @@
+"""What ends or starves the driver while robots move: signals, full disks, wrong clocks, no more files, own mistakes."""
+
+import math
+import signal
+import socket
+import sys
+import time
+
+import pytest
+import rospy
+import stock_messages
+from driver_case import Recorder, make_publisher
+from fake_robot import TIME_FRAME, FakeRobot
+from geometry_msgs.msg import Twist
+from life_signs import Life
+from nav_msgs.msg import Odometry
+from rig import HERE, Program, find_free_port, frozen, wait_until
+
+from hero_driver.rosserial import frames, payloads
+from hero_msgs.msg import Encoder
+
+ROBOTS = 3
+SPEED_M_S = 0.1
+FREE_DISTANCE_M = 0.03
+"""How far a robot at 0.1 m/s may go after a driver that ends in order."""
+WATCHDOG_DISTANCE_M = 0.30
+"""A robot without a driver stops by itself: 2 s after its last command."""
+RESPAWN_S = 3.0
+
+
+class Truth:
+    """Where the simulator has one robot, and a program that drives it at 10 Hz."""
+
+    def __init__(self, number):
+        self.name = "hero_%d" % number
+        self.path = []
+        rospy.Subscriber("/%s/ground_truth" % self.name, Odometry, self._receive, tcp_nodelay=True)
+        self.publisher = rospy.Publisher(
+            "/%s/velocity_controller/cmd_vel" % self.name, Twist, queue_size=1, tcp_nodelay=True
+        )
+        self.command = Twist()
+        self._timer = rospy.Timer(rospy.Duration(0.1), lambda _: self.publisher.publish(self.command))
+
+    def _receive(self, message):
+        position = message.pose.pose.position
+        self.path.append((position.x, position.y, message.twist.twist.linear.x))
+
+    @property
+    def is_moving(self):
+        return bool(self.path) and self.path[-1][2] > 0.7 * SPEED_M_S
+
+    @property
+    def is_at_rest(self):
+        return len(self.path) > 5 and all(abs(entry[2]) < 0.003 for entry in self.path[-5:])
+
+    def measure_from(self, index):
+        """Return how far it went since path[index]."""
+        x_m, y_m, _ = self.path[index]
+        return math.hypot(self.path[-1][0] - x_m, self.path[-1][1] - y_m)
+
+
+@pytest.fixture(scope="module")
+def field(master):
+    """Simulated robots that dial one port, whoever listens there; returns the port and where they truly are."""
+    port = find_free_port()
+    with Program(
+        "rosrun",
+        "hero_sim",
+        "hero_sim",
+        "--robots",
+        str(ROBOTS),
+        "--port",
+        str(port),
+        "--arena",
+        "empty",
+        "--quiet",
+    ):
+        truths = [Truth(number) for number in range(ROBOTS)]
+        yield port, truths
+
+
+def drive(truths):
+    """Let all robots drive in circles; return when they do."""
+    for truth in truths:
+        truth.command.linear.x, truth.command.angular.z = SPEED_M_S, 0.5
+    wait_until(lambda: all(truth.is_moving for truth in truths), "all robots to move")
+
+
+def rest(truths):
+    """Tell all robots nothing any more; return when they stand."""
+    wait_until(lambda: all(truth.is_at_rest for truth in truths), "all robots to stand")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL], ids=lambda s: s.name)
+def test_robots_that_move_stop_when_the_driver_ends_and_are_driveable_again(
+    field, start_driver, effort, record, number
+):
+    port, truths = field
+    tries = effort.choose(1, 10)
+    distances_m, back_s = [], []
+    driver = start_driver(parameters={"port": port}, name="ended_driver")
+    for _ in range(tries):
+        drive(truths)
+        marks = [len(truth.path) - 1 for truth in truths]
+        driver.process.send_signal(number)
+        assert driver.wait_end() == (0 if number != signal.SIGKILL else -signal.SIGKILL)
+        rest(truths)
+        distances_m += [truth.measure_from(mark) for truth, mark in zip(truths, marks)]
+        driver.fleet.close()
+        # As roslaunch does with respawn: the same node, while the robots and the programs wait.
+        started_s = time.monotonic()
+        driver = start_driver(parameters={"port": port}, name="ended_driver")
+        wait_until(lambda: all(truth.is_moving for truth in truths), "all robots to move again")
+        back_s.append(time.monotonic() - started_s)
+    limit_m = WATCHDOG_DISTANCE_M if number == signal.SIGKILL else FREE_DISTANCE_M
+    record(
+        "%s while %d robots drive at 0.1 m/s" % (number.name, ROBOTS),
+        len(distances_m),
+        sum(distance_m < limit_m for distance_m in distances_m),
+        "at most %.3f m driven on; driven again %.1f s after the start" % (max(distances_m), max(back_s)),
+    )
+
+
+def test_a_master_that_hangs_does_not_keep_the_driver_from_its_end(master, start_driver, record):
+    driver = start_driver()
+    robot = FakeRobot(1).connect(driver.address)
+    driver.fleet.wait_ready("/hero_1")
+    with frozen(master.pid):
+        driver.process.send_signal(signal.SIGTERM)
+        code = driver.wait_end()
+    robot.close()
+    record("SIGTERM while the ROS master hangs", 1, int(code == 0))
+
+
+# Where its log goes.
+
+
+def make_small_disk(path, script):
+    """Return a command that gives the program after it a full disk at path, which nobody else sees."""
+    mount = 'mount -t tmpfs -o size=32k,mode=777 small %s && %s && exec "$@"' % (path, script)
+    return ["unshare", "--mount", "--propagation", "private", "sh", "-c", mount, "sh"]
+
+
+FILL = "{ dd if=/dev/zero of=%s/filler bs=1k 2>/dev/null || true; }"
+
+
+@pytest.mark.parametrize("when", ["from the start", "while it runs"])
+def test_a_full_disk_for_the_logs_costs_the_logs_alone(start_driver, record, tmp_path, when):
+    script = FILL % tmp_path if when == "from the start" else "true"
+    driver = start_driver(
+        prefix=make_small_disk(tmp_path, script), environment={"ROS_LOG_DIR": str(tmp_path)}
+    )
+    robot = FakeRobot(1).connect(driver.address)
+    life = Life(driver, robot)
+    for count in range(200):
+        # Each robot's own words go into the log: 60 kB, of which half fits.
+        robot.log("line %d %s" % (count, "x" * 300))
+        if count % 50 == 0:
+            life.show()
+    driver.wait_line("hero_driver: the log file cannot be written .*No space left")
+    lines = len(driver.find_lines("log file cannot be written"))
+    assert life.show(20) and lines == 1
+    robot.close()
+    tracebacks = len(driver.find_lines("Traceback"))
+    record("a full disk below the log directory, " + when, 1, int(tracebacks == 0), "log lines")
+
+
+def test_a_log_directory_that_cannot_be_made_costs_the_logs_alone(start_driver, record):
+    driver = start_driver(environment={"ROS_LOG_DIR": "/proc/no/such/place"})
+    robot = FakeRobot(1).connect(driver.address)
+    Life(driver, robot).show(20)
+    robot.close()
+    assert driver.find_lines("/proc/no/such/place") and not driver.find_lines("Traceback")
+    record("no log directory", 1, 1, "the log file")
+
+
+def test_an_output_that_nobody_reads_any_more_costs_the_output_alone(start_driver, record):
+    # As `hero_driver | head -n 1`.
+    deafen = (
+        "import os, sys; end, start = os.pipe(); os.dup2(start, 1); os.dup2(start, 2); os.close(end);"
+        "os.execv(sys.argv[1], sys.argv[1:])"
+    )
+    driver = start_driver(prefix=[sys.executable, "-c", deafen])
+    robot = FakeRobot(1).connect(driver.address)
+    life = Life(driver, robot)
+    for count in range(20):
+        robot.log("line %d" % count)
+    life.show(20)
+    robot.close()
+    record("standard output is closed", 1, 1, "what it would have printed")
+
+
+# Its clock.
+
+
+@pytest.mark.parametrize("step_s", [3600, -3600], ids=["forwards", "backwards"])
+def test_a_clock_that_is_set_by_an_hour_loses_nothing(start_driver, record, tmp_path, step_s):
+    clock = tmp_path / "clock"
+    driver = start_driver(prefix=[sys.executable, str(HERE / "broken_driver.py"), "clock", str(clock)])
+    robot = FakeRobot(1).connect(driver.address)
+    life = Life(driver, robot)
+    encoders = Recorder("/hero_1/encoder", Encoder)
+
+    def ask_time():
+        """Do as the robot: its clock follows the answer."""
+        asked = len(robot.payloads_with_id(frames.ID_TIME))
+        robot.send_bytes(TIME_FRAME)
+        wait_until(lambda: len(robot.payloads_with_id(frames.ID_TIME)) > asked, "the time")
+        return rospy.Time(*payloads.decode_time(robot.payloads_with_id(frames.ID_TIME)[-1]))
+
+    start = ask_time()
+    wait_until(lambda: driver.fleet.newest, "a report")
+    reports = driver.fleet.newest.header.stamp
+    for count in range(1, 101):
+        stamp = start + rospy.Duration(0.03 * count)
+        robot.send("encoder", stock_messages.make_encoder("hero_1", stamp, float(count), float(count)))
+        if count == 50:
+            encoders.wait_count(50)
+            clock.write_text("%d" % step_s)
+            start = ask_time() - rospy.Duration(0.03 * count)
+    ticks = [message.left_ticks for message in encoders.wait_count(100)]
+    stepped = abs((encoders.messages[-1].header.stamp - encoders.messages[49].header.stamp).to_sec() - step_s)
+    # Reports go on too.
+    wait_until(
+        lambda: abs((driver.fleet.newest.header.stamp - reports).to_sec() - step_s) < 60.0,
+        "a report after the step",
+    )
+    life.show()
+    robot.close()
+    assert stepped < 30.0, stepped
+    record(
+        "clock of the PC set by %+d s" % step_s,
+        100,
+        sum(a == b for a, b in zip(ticks, map(float, range(1, 101)))),
+    )
+
+
+# Its files.
+
+
+def test_where_no_more_files_can_be_opened_those_connected_lose_nothing(start_driver, record):
+    driver = start_driver(prefix=["prlimit", "--nofile=96:96"])
+    robot = FakeRobot(1).connect(driver.address)
+    life = Life(driver, robot)
+    life.show()
+    others = [socket.create_connection(driver.address) for _ in range(90)]
+    line = driver.wait_line("cannot take more connections")
+    assert "limit of open files" in line
+    life.show(40)
+    for other in others:
+        other.close()
+    late = FakeRobot(2).connect(driver.address)
+    Life(driver, late).show()
+    life.show(10)
+    for each in (robot, late):
+        each.close()
+    assert not driver.find_lines("Traceback")
+    record(
+        "no more files, 50 messages each way",
+        50,
+        50,
+        "connections beyond the limit, until there are files again",
+    )
+
+
+# Its own mistakes.
+
+
+def test_a_mistake_of_the_driver_with_one_connection_costs_that_connection_alone(
+    start_driver, record, tmp_path
+):
+    trigger = tmp_path / "break"
+    driver = start_driver(prefix=[sys.executable, str(HERE / "broken_driver.py"), "open_link", str(trigger)])
+    robot = FakeRobot(1).connect(driver.address)
+    life = Life(driver, robot)
+    trigger.write_text("")
+    unlucky = FakeRobot(2).connect(driver.address)
+    wait_until(lambda: unlucky.ended, "the unlucky one to be closed")
+    driver.wait_line("the driver made a mistake, please report it: RuntimeError")
+    life.show()
+    trigger.unlink()
+    unlucky.close()
+    unlucky.connect(driver.address)
+    driver.fleet.wait_ready("/hero_2")
+    for each in (robot, unlucky):
+        each.close()
+    record("an exception while a connection is taken", 1, 1, "that connection")
+
+
+def test_a_driver_whose_loop_breaks_stops_the_robots_and_ends(start_driver, record, tmp_path):
+    trigger = tmp_path / "break"
+    driver = start_driver(prefix=[sys.executable, str(HERE / "broken_driver.py"), "loop", str(trigger)])
+    robot = FakeRobot(1).connect(driver.address)
+    driver.fleet.wait_ready("/hero_1")
+    publisher = make_publisher("/hero_1/velocity_controller/cmd_vel", Twist)
+    command = Twist()
+    command.linear.x = SPEED_M_S
+    publisher.publish(command)
+    wait_until(lambda: robot.velocities, "motion")
+    trigger.write_text("")
+    code = driver.wait_end()
+    wait_until(lambda: robot.ended, "the end of the connection")
+    stops = [velocity.is_zero for velocity in robot.accepted if "velocity_controller" in velocity.name][-2:]
+    robot.close()
+    assert driver.find_lines("the driver broke: RuntimeError")
+    record(
+        "an exception in the loop of the sockets", 1, int(code == 1 and stops == [True, True]), "the driver"
+    )
