@@ -123,8 +123,9 @@ def test_robots_that_move_stop_when_the_driver_ends_and_are_driveable_again(
 
 def test_a_master_that_hangs_does_not_keep_the_driver_from_its_end(master, start_driver, record):
     driver = start_driver()
-    robot = FakeRobot(1).connect(driver.address)
-    driver.fleet.wait_ready("/hero_1")
+    # A number of its own: the master may go on to list what this driver could not take down.
+    robot = FakeRobot(90).connect(driver.address)
+    driver.fleet.wait_ready("/hero_90")
     with frozen(master.pid):
         driver.process.send_signal(signal.SIGTERM)
         code = driver.wait_end()
