@@ -27,9 +27,6 @@ SETTLE_S = 4.0
 
 END_TIMEOUT_S = 10.0
 
-REST_M_S = 0.002
-"""Slower than this a robot stands; its wheels take some tenths of a second more to come to exactly zero."""
-
 
 def list_cases(robots):
     """Return {title: (program, arguments)} for this many robots."""
@@ -117,7 +114,7 @@ def measure(stage, case, robots, seconds, commands, truth):
     process.send_signal(signal.SIGINT)
     process.wait(END_TIMEOUT_S)
     ended_s = time.monotonic() - end_s
-    stage.wait_for(lambda: all(abs(rows[-1][4]) < REST_M_S for rows in truth.rows.values()), "robots at rest", 10.0)
+    stage.wait_for(lambda: truth.at_rest(*truth.rows), "robots at rest", 10.0)
     rest_s = time.monotonic() - end_s
     if hands:
         hands.ended.set()

@@ -133,10 +133,10 @@ def follow(picture):
             leader.drive(0.08, 0.35, duration_s=9.0)
             leader.drive(0.08, -0.35, duration_s=9.0)
         recording.wait_until_all_rest("followers that have caught up", 20.0)
-        near = ((-0.7, 1.3), (-0.3, 1.0))
+        near = ((-0.65, 0.65), (-0.15, 1.0))
         draw_paths(
             picture, "follow: hero_0 is driven, the others follow", recording.arena, recording.paths(),
-            only_m=near, size_inch=(7, 4.8),
+            only_m=near, size_inch=(6, 5),
         )
 
 
@@ -148,6 +148,7 @@ def led_show(picture):
         for pattern in ("rainbow", "chase", "blink"):
             program = recording.stage.start_example("led_show", "__name:=" + pattern, "_pattern:=" + pattern)
             recording.stage.wait_for(lambda: lights.colors and max(lights.colors[0]) > 0.5, "light")
+            recording.go_on(2.0)  # until every robot is connected to the program, and its own blue light has ended
             lights.rows.clear()
             recording.go_on(8.0)
             shows["pattern:=" + pattern] = list(lights.rows)

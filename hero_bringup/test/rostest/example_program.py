@@ -39,10 +39,9 @@ class ExampleProgram:
             return written.read()
 
     def wait_for_text(self, text, timeout_s=END_TIMEOUT_S):
-        try:
-            wait_for(lambda: text in self.text(), timeout_s, "%r from %s" % (text, self.name))
-        except AssertionError as error:
-            raise AssertionError("%s, which wrote:\n%s" % (error, self.text())) from None
+        wait_for(
+            lambda: text in self.text(), timeout_s, lambda: "%r from %s, which wrote %s" % (text, self.name, self.text())
+        )
 
     def wait(self, timeout_s=END_TIMEOUT_S):
         """Wait until it has ended by itself; return its exit code."""

@@ -17,19 +17,25 @@ TOUCH_M = 0.001
 SEEN_RAD = math.radians(60.0)
 """Half of the field that a robot sees coming: the front beams and their cones."""
 
+REST_M_S = 0.005
+"""Slower than this a robot has been stopped; its wheels take some tenths of a second more to come to exactly zero."""
+
+STOP_TIMEOUT_S = 1.5
+"""A stop takes about 0.2 s, and the robot's own watchdog, without one, 2 s."""
+
 CREEP_M_S = 0.01
 """Slower than this a robot does not run into anything; things run into it."""
 
 
 def wait_for(condition, timeout_s, what):
-    """Return the first true value of condition()."""
+    """Return the first true value of condition(); what: text, or what gives it when the time is over."""
     deadline_s = time.monotonic() + timeout_s
     while time.monotonic() < deadline_s:
         value = condition()
         if value:
             return value
         time.sleep(0.02)
-    raise AssertionError("waited %g s for %s" % (timeout_s, what))
+    raise AssertionError("waited %g s for %s" % (timeout_s, what() if callable(what) else what))
 
 
 class SwarmWatch:
@@ -63,6 +69,19 @@ class SwarmWatch:
     def pose(self, robot_id):
         """Return the newest x, y, yaw."""
         return self.rows[robot_id][-1][1:4]
+
+    def at_rest(self, *robot_ids):
+        """Return whether these robots stand."""
+        return all(abs(self.rows[robot_id][-1][4]) < REST_M_S for robot_id in robot_ids)
+
+    def wait_until_stopped(self, *robot_ids, act=lambda: None):
+        """Wait until these robots stand, sooner than their watchdogs would have it; act: what to do meanwhile."""
+
+        def stopped():
+            act()
+            return self.at_rest(*robot_ids)
+
+        wait_for(stopped, STOP_TIMEOUT_S, "rest of %s" % (robot_ids,))
 
     def path(self, robot_id):
         """Return all rows as an array (T, 5)."""

@@ -6,28 +6,16 @@ import socket
 import subprocess
 import sys
 import threading
-import time
 import unittest
 
 import rospy
 import rostest
 from nav_msgs.msg import Odometry
+from swarm_watch import wait_for
 
 from hero_msgs.msg import Robot, RobotArray
 
 DEADLINE_S = 40.0
-
-
-def wait_for(condition, what):
-    """Return the first true value of condition(); fail with what was waited for."""
-    end_s = time.monotonic() + DEADLINE_S
-    while True:
-        value = condition()
-        if value:
-            return value
-        if time.monotonic() > end_s:
-            raise AssertionError("waited %g s for %s" % (DEADLINE_S, what() if callable(what) else what))
-        time.sleep(0.01)
 
 
 def find_free_port():
@@ -103,12 +91,12 @@ class DriverRestartTest(unittest.TestCase):
                 self.fleet
                 and {robot.id for robot in self.fleet.robots if robot.state == Robot.READY} == set(numbers)
             ),
-            lambda: "robots %s, last: %s" % (numbers, self.fleet),
+            DEADLINE_S, lambda: "robots %s, last: %s" % (numbers, self.fleet),
         )
 
     def test_without_robots_it_starts_and_says_where_it_listens(self):
         program = self.launch()
-        wait_for(lambda: program.find("listening on 127.0.0.1:%d" % self.port), lambda: program.lines)
+        wait_for(lambda: program.find("listening on 127.0.0.1:%d" % self.port), DEADLINE_S, lambda: program.lines)
         self.wait_ready([])
         self.assertEqual(program.end(), 0)
         self.assertEqual(program.find("Traceback"), [])
@@ -138,7 +126,7 @@ class DriverRestartTest(unittest.TestCase):
             program = self.launch()
             self.wait_ready([4, 5])
             seen = len(odoms)
-            wait_for(lambda s=seen: len(odoms) > s + 20, "odometry")
+            wait_for(lambda s=seen: len(odoms) > s + 20, DEADLINE_S, "odometry")
             self.assertEqual(program.end(), 0)
             self.fleet = None
         stamps = [message.header.stamp for message in odoms]

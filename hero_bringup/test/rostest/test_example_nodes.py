@@ -63,10 +63,6 @@ class ExampleNodesTest(unittest.TestCase):
     def speed(self, robot_id):
         return self.watch.rows[robot_id][-1][4]
 
-    def wait_until_at_rest(self, *robot_ids):
-        """A stop takes about 0.15 s; without one, the robots' own watchdog would take 2 s."""
-        wait_for(lambda: all(self.speed(robot_id) == 0.0 for robot_id in robot_ids), 1.0, "rest of %s" % (robot_ids,))
-
     def count_rows(self):
         return {robot_id: len(rows) for robot_id, rows in self.watch.rows.items()}
 
@@ -90,7 +86,7 @@ class ExampleNodesTest(unittest.TestCase):
             self.assertGreater(gaps_m.min(), 2.0 * BODY_RADIUS_M + 0.01)
             self.assertLess(abs(gaps_m[-1] - 0.15), 0.06)
         self.assertEqual(0, program.end())
-        self.wait_until_at_rest(0, 1, 2)
+        self.watch.wait_until_stopped(0, 1, 2)
 
     def test_2_a_light_runs_over_the_swarm_and_is_put_out_at_the_end(self):
         program = self.start("led_show", "_robots:=0-3", "_pattern:=chase", "_period_s:=2")
@@ -116,7 +112,7 @@ class ExampleNodesTest(unittest.TestCase):
             motion_ms = float(re.search(name + r" command to motion: p50 ([\d.]+) ms.*lost 0", program.text())[1])
             self.assertTrue(10.0 < motion_ms < 1000.0, motion_ms)
             self.assertIn(name + " message delay: p50", program.text())
-        self.wait_until_at_rest(4, 5)
+        self.watch.wait_until_stopped(4, 5)
 
     def test_4_a_joystick_drives_only_while_its_button_is_held_and_it_is_alive(self):
         stick = rospy.Publisher("/joy", Joy, queue_size=1)
@@ -135,21 +131,14 @@ class ExampleNodesTest(unittest.TestCase):
             return all(self.speed(robot_id) < -0.02 for robot_id in (0, 1))
 
         wait_for(lambda: drives(1), 10.0, "both robots going back")
-        self.wait_until_at_rest_while(lambda: push(0))
+        self.watch.wait_until_stopped(0, 1, act=lambda: push(0))
         self.assertGreater(min(row[4] for row in self.watch.rows[0][first[0] :]), -0.12)
         wait_for(lambda: drives(1), 10.0, "both robots going back again")
-        wait_for(lambda: self.speed(0) == self.speed(1) == 0.0, 1.5, "rest after the joystick fell silent")
+        wait_for(lambda: self.watch.at_rest(0, 1), 1.8, "rest after the joystick fell silent")
         stick.publish(Joy(axes=[0.0], buttons=[0]))
         self.assertEqual(1, program.wait())
         self.assertRegex(program.text(), r"teleop_joy: the joystick has 1 axes and 1 buttons: set ~linear_axis")
         stick.unregister()
-
-    def wait_until_at_rest_while(self, act):
-        def at_rest():
-            act()
-            return self.speed(0) == self.speed(1) == 0.0
-
-        wait_for(at_rest, 1.0, "rest")
 
     def test_5_without_a_joystick_driver_one_line_says_how_to_get_it_and_with_one_it_is_run(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -186,7 +175,7 @@ class ExampleNodesTest(unittest.TestCase):
         program = self.start("go_to_goal", "_robots:=2", "_goals:=50 0", "_timeout_s:=1", "_once:=true")
         self.assertEqual(1, program.wait())
         self.assertRegex(program.text(), r"hero_2 did not reach its goal: not there after 1 s, 4\d\.\d+ m are left")
-        self.wait_until_at_rest(2)
+        self.watch.wait_until_stopped(2)
 
     def test_8_a_wrong_parameter_gets_one_line_with_name_value_and_remedy(self):
         programs = {case: self.start(*case) for case in WRONG}

@@ -8,12 +8,12 @@ import pty
 import struct
 import subprocess
 import termios
-import time
 import unittest
 
 import rospy
 import rostest
 from geometry_msgs.msg import Twist
+from swarm_watch import wait_for
 
 FLEET = ["rosrun", "hero_bringup", "fleet"]
 TIMEOUT_S = 60.0
@@ -30,17 +30,6 @@ def run_fleet(*arguments):
     return result.returncode, result.stdout.decode(), result.stderr.decode()
 
 
-def wait_for(find, what):
-    """Return what find returns as soon as it is true."""
-    deadline_s = time.monotonic() + TIMEOUT_S
-    while time.monotonic() < deadline_s:
-        found = find()
-        if found:
-            return found
-        time.sleep(0.1)
-    raise AssertionError("no " + what)
-
-
 class FleetTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
@@ -49,7 +38,7 @@ class FleetTest(unittest.TestCase):
             robots = json.loads(output)["robots"] if code == 0 else []
             return [robot["state"] for robot in robots] == ["READY", "READY"]
 
-        wait_for(both_are_ready, "two robots that are ready")
+        wait_for(both_are_ready, TIMEOUT_S, "two robots that are ready")
 
     def test_json_holds_state_address_rates_pose_and_nearest_obstacle_of_every_robot(self):
         code, output, errors = run_fleet("--once", "--json")
@@ -109,11 +98,11 @@ class FleetTest(unittest.TestCase):
             output += os.read(leader, 65536)
             return text in output
 
-        wait_for(lambda: read_until(b"2 of 2 robots ready"), "table")
-        wait_for(lambda: read_until(b"hero_1"), "row")
+        wait_for(lambda: read_until(b"2 of 2 robots ready"), TIMEOUT_S, "table")
+        wait_for(lambda: read_until(b"hero_1"), TIMEOUT_S, "row")
         self.assertIn(b"\x1b[?1049h", output)
         os.write(leader, b"q")
-        wait_for(lambda: read_until(b"\x1b[?1049l"), "end of the screen")
+        wait_for(lambda: read_until(b"\x1b[?1049l"), TIMEOUT_S, "end of the screen")
         self.assertEqual(process.wait(TIMEOUT_S), 0)
         after = termios.tcgetattr(follower)
         self.assertEqual(after, before)

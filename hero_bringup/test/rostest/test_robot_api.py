@@ -53,10 +53,6 @@ class RobotApiTest(unittest.TestCase):
         """Return the true speed ahead, m/s."""
         return self.watch.rows[robot_id][-1][4]
 
-    def wait_until_at_rest(self, robot_id, timeout_s=1.0):
-        """A stop takes about 0.15 s; without one, the robot's own watchdog would take 2 s."""
-        wait_for(lambda: self.speed(robot_id) == 0.0, timeout_s, "hero_%d at rest" % robot_id)
-
     def test_01_a_swarm_holds_the_robots_that_the_driver_reports(self):
         self.assertEqual(list(range(ROBOTS)), [robot.robot_id for robot in self.swarm])
         self.assertEqual("hero_3", self.swarm[3].name)
@@ -69,7 +65,7 @@ class RobotApiTest(unittest.TestCase):
         robot = self.swarm[0]
         before, true_before = robot.pose, self.watch.pose(0)
         robot.drive(0.1, 0.0, duration_s=2.0)
-        self.wait_until_at_rest(0)
+        self.watch.wait_until_stopped(0)
         true_way_m = math.dist(true_before[:2], self.watch.pose(0)[:2])
         self.assertGreater(true_way_m, 0.1)
         wait_for(
@@ -86,7 +82,7 @@ class RobotApiTest(unittest.TestCase):
         wait_for(drives_back_and_turns, 5.0, "velocity that follows the command")
         self.assertLess(self.speed(0), -0.02)
         robot.stop()
-        self.wait_until_at_rest(0)
+        self.watch.wait_until_stopped(0)
 
     def test_04_speeds_beyond_the_robot_are_cut(self):
         robot = self.swarm[1]
@@ -98,7 +94,7 @@ class RobotApiTest(unittest.TestCase):
         wait_for(is_fast, 5.0, "full speed")
         self.assertLess(max(row[4] for row in self.watch.rows[1]), 0.22)
         robot.stop()
-        self.wait_until_at_rest(1)
+        self.watch.wait_until_stopped(1)
         with self.assertRaisesRegex(ValueError, "finite"):
             robot.drive(math.nan, 0.0)
 
@@ -130,7 +126,7 @@ class RobotApiTest(unittest.TestCase):
         robot = self.swarm[0]
         start, true_start = robot.pose, self.watch.pose(0)
         robot.go_to(start.x_m + 0.15, start.y_m, yaw_rad=start.yaw_rad + 1.5, timeout_s=40.0)
-        self.wait_until_at_rest(0)
+        self.watch.wait_until_stopped(0)
         true_pose = self.watch.pose(0)
         turn_rad = true_start[2] - start.yaw_rad
         goal = (true_start[0] + 0.15 * math.cos(turn_rad), true_start[1] + 0.15 * math.sin(turn_rad))
@@ -153,7 +149,7 @@ class RobotApiTest(unittest.TestCase):
     def test_09_a_goal_that_is_too_far_for_its_time_is_an_error_with_what_is_left(self):
         with self.assertRaisesRegex(GoalError, r"hero_0 did not reach .* not there after 1 s, [0-9.]+ m are left"):
             self.swarm[0].go_to(50.0, 0.0, timeout_s=1.0)
-        self.wait_until_at_rest(0)
+        self.watch.wait_until_stopped(0)
         with self.assertRaisesRegex(GoalError, "not there after 0.5 s"):
             self.swarm[0].start_go_to(50.0, 0.0, timeout_s=0.5).result(timeout=DEADLINE_S)
 
@@ -199,7 +195,7 @@ class RobotApiTest(unittest.TestCase):
 
         with self.assertRaisesRegex(RuntimeError, "mistake"):
             drive_and_fail()
-        self.wait_until_at_rest(1)
+        self.watch.wait_until_stopped(1)
 
     def test_13_a_swarm_that_was_only_watched_is_not_stopped(self):
         driver = self.swarm[0]
@@ -214,7 +210,7 @@ class RobotApiTest(unittest.TestCase):
             wait_for(moves, 5.0, "motion")
         self.assertGreater(self.speed(0), 0.02)
         self.swarm.stop()
-        self.wait_until_at_rest(0)
+        self.watch.wait_until_stopped(0)
 
     def test_14_a_plain_script_that_is_ended_leaves_its_robot_standing(self):
         for number, code in ((signal.SIGINT, -signal.SIGINT), (signal.SIGTERM, 143), (signal.SIGHUP, 129)):
@@ -222,7 +218,7 @@ class RobotApiTest(unittest.TestCase):
             wait_for(lambda: self.speed(2) > 0.05, DEADLINE_S, "motion by the script")
             script.send_signal(number)
             errors = script.communicate(timeout=DEADLINE_S)[1].decode()
-            self.wait_until_at_rest(2)
+            self.watch.wait_until_stopped(2)
             self.assertEqual(code, script.returncode, errors)
 
 

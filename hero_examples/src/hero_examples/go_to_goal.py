@@ -218,6 +218,13 @@ class Pilot:
                 self._finish(State.FAILED, str(error), now_s)
             return
         self._frame_known_s = now_s
+        if pose is None and math.isnan(self._pursuit.distance_m):
+            # A robot that has yet to join is waited for, within the time limit; one that falls silent has failed.
+            self.robot.drive(*STANDSTILL)
+            if now_s - self._start_s > self._order.timeout_s:
+                missing = self.waiting_for or "no odometry"
+                self._finish(State.FAILED, "not begun after %g s: %s" % (self._order.timeout_s, missing), now_s)
+            return
         self.robot.drive(*self._pursuit.step(pose, ranges, now_s))
         if self._pursuit.state is not State.ACTIVE:
             self._finish(self._pursuit.state, self._pursuit.reason, now_s)
