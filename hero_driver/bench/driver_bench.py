@@ -135,7 +135,8 @@ def run_once(options, count, environment):
         time.sleep(SETTLE_S)
         swarm = start(
             [sys.executable, str(HERE / "emulated_swarm.py"), "--port", str(port), *arguments]
-            + ["--seconds", str(options.seconds + 2 * SETTLE_S), "--speed", str(options.speed)],
+            + ["--seconds", str(options.seconds + 2 * SETTLE_S), "--speed", str(options.speed)]
+            + ["--nagle"] * options.nagle,
             environment,
             stdout=subprocess.PIPE,
         )
@@ -227,6 +228,7 @@ def main():
     parser.add_argument("--seconds", type=float, default=10.0, help="measured time of one run")
     parser.add_argument("--repeats", type=int, default=1, help="runs of which the median is printed")
     parser.add_argument("--speed", type=float, default=1.0, help="multiplies the rates of the robots")
+    parser.add_argument("--nagle", action="store_true", help="robots' TCP holds small writes back, as HeRo's does")
     parser.add_argument("--server-command", default=DRIVER_COMMAND, help="{port} stands for the port")
     parser.add_argument("--json", metavar="FILE", help="write the figures there")
     options = parser.parse_args()

@@ -69,45 +69,67 @@ def text(value):
     return struct.pack("<I", len(value)) + value.encode()
 
 
+class Frame:
+    """A frame of which only the first bytes of the payload change: written once, then patched."""
+
+    def __init__(self, topic_id, payload, changing):
+        """changing: the slice of the payload that is different each time."""
+        constant = payload[: changing.start] + payload[changing.stop :]
+        self.data = bytearray(frames.encode_frame(topic_id, payload))
+        self._place = slice(frames.HEADER_LENGTH + changing.start, frames.HEADER_LENGTH + changing.stop)
+        self._sum = (topic_id & 0xFF) + (topic_id >> 8) + frames.sum_bytes(constant)
+
+    def patch(self, changing):
+        """Put other bytes in and mend the checksum."""
+        self.data[self._place] = changing
+        self.data[-1] = 255 - (self._sum + sum(changing)) % 256
+
+
 class Templates:
     """The messages of one robot, to which only stamps are added."""
 
     def __init__(self, number):
         name = "hero_%d/" % number
-        self.odom_tail = text(name + "odom") + text(name + "base_link") + bytes(680)
-        self.encoder_tail = text(name + "encoder") + bytes(88)
         pose = struct.pack("<7d", 0, 0, 0, 0, 0, 0, 1)
-        self.transform_tails = [text(name + "odom") + text(name + "base_link") + pose] + [
+        transform_tails = [text(name + "odom") + text(name + "base_link") + pose] + [
             text(name + "base_link") + text(name + child) + pose
             for child in ("left_wheel_link", "right_wheel_link", "hat_link", "laser_link")
         ]
         scan = struct.pack("<7f", -3.1416, 3.1416, 0.395, 0, 0, 0.0368, 0.2368)
-        self.laser_tail = text(name + "laser_link") + scan + (struct.pack("<I", 16) + bytes(64)) * 2
+        laser_tail = text(name + "laser_link") + scan + (struct.pack("<I", 16) + bytes(64)) * 2
+        odom_tail = text(name + "odom") + text(name + "base_link") + bytes(680)
+        encoder_tail = text(name + "encoder") + bytes(88)
+        no_header = b"\xff\xff\xff\xff" + bytes(8)
+        self._odom = Frame(ODOM, bytes(12) + odom_tail, slice(0, 12))
+        self._rest = [
+            *(Frame(TRANSFORMS, b"\x01" + bytes(15) + tail, slice(8, 16)) for tail in transform_tails),
+            Frame(ENCODER, no_header + encoder_tail, slice(4, 12)),
+        ]
+        self._laser = Frame(LASER, bytes(12) + laser_tail, slice(4, 12))
 
     def make_burst(self, number, stamp):
-        """Return one burst with stamp (8 bytes); number is odom's sequence number, by which a loss is noticed."""
-        encode = frames.encode_frame
-        parts = [encode(ODOM, struct.pack("<I", number) + stamp + self.odom_tail)]
-        head = b"\x01\0\0\0\0\0\0\0" + stamp
-        parts += [encode(TRANSFORMS, head + tail) for tail in self.transform_tails]
-        parts.append(encode(ENCODER, b"\xff\xff\xff\xff" + stamp + self.encoder_tail))
-        return b"".join(parts)
+        """Return the frames of one burst with stamp (8 bytes); number is odom's seq, by which losses are noticed."""
+        self._odom.patch(struct.pack("<I", number) + stamp)
+        for frame in self._rest:
+            frame.patch(stamp)
+        return [self._odom.data, *(frame.data for frame in self._rest)]
 
     def make_laser(self, stamp):
         """Return one laser frame with stamp (8 bytes)."""
-        return frames.encode_frame(LASER, b"\0\0\0\0" + stamp + self.laser_tail)
+        self._laser.patch(stamp)
+        return self._laser.data
 
 
 class EmulatedRobot:
     """One connection."""
 
-    def __init__(self, number, address, speed):
+    def __init__(self, number, address, nagle):
         self.number = number
-        self.speed = speed
+        self._nagle = nagle
         self.templates = Templates(number)
         self.reader = frames.FrameReader()
         self.socket = socket.create_connection(address)
-        self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, not nagle)
         self.socket.setblocking(False)
         self.synchronised_s = None
         self.closed = False
@@ -127,6 +149,11 @@ class EmulatedRobot:
             except OSError:
                 self.closed = True
                 return
+
+    def send_burst(self, parts):
+        """Send the frames of a burst: at once, or one by one as the robot does, whose TCP then has its way."""
+        for data in parts if self._nagle else (b"".join(parts),):
+            self.send(data)
 
     def receive(self, now_s):
         """Take what the server sends; return whether the handshake was completed by it."""
@@ -150,10 +177,10 @@ class EmulatedRobot:
         return is_new
 
 
-def run(address, count, seconds, speed, first=0, is_ended=lambda: False):
+def run(address, count, seconds, speed, first=0, nagle=False, is_ended=lambda: False):
     """Return the result of count robots for seconds after all have joined, or until is_ended()."""
     started_s = time.monotonic()
-    robots = [EmulatedRobot(first + index, address, speed) for index in range(count)]
+    robots = [EmulatedRobot(first + index, address, nagle) for index in range(count)]
     selector = selectors.DefaultSelector()
     for robot in robots:
         selector.register(robot.socket, selectors.EVENT_READ, robot)
@@ -186,7 +213,7 @@ def run(address, count, seconds, speed, first=0, is_ended=lambda: False):
             time_ns = time.time_ns()
             stamp = struct.pack("<II", *divmod(time_ns, 10**9))
             if kind == "burst":
-                robot.send(robot.templates.make_burst(robot.bursts, stamp))
+                robot.send_burst(robot.templates.make_burst(robot.bursts, stamp))
                 robot.bursts += 1
                 robot.stamps_s.append(time_ns / 1e9)
                 period_s = BURST_PERIOD_S
@@ -223,12 +250,19 @@ def main():
     parser.add_argument("--first-id", type=int, default=0)
     parser.add_argument("--seconds", type=float, default=10.0, help="time after the last robot has joined")
     parser.add_argument("--speed", type=float, default=1.0, help="multiplies all rates")
+    parser.add_argument("--nagle", action="store_true", help="frames one by one and TCP without NODELAY")
     options = parser.parse_args()
     ended = threading.Event()
     signal.signal(signal.SIGINT, lambda *_: ended.set())
     address = (options.host, options.port)
     result = run(
-        address, options.robots, options.seconds, options.speed, options.first_id, ended.is_set
+        address,
+        options.robots,
+        options.seconds,
+        options.speed,
+        options.first_id,
+        options.nagle,
+        ended.is_set,
     )
     print(json.dumps(result))
 

@@ -47,9 +47,9 @@ class DriverConfig:
         "robot", ("robot", "any"), "robot: HeRos only, each within /hero_N and /tf; any: every name and type"
     )
     allow: Tuple[Network, ...] = _plain((), "networks (CIDR) that robots may come from; empty: all")
-    max_connections: int = _number(200, 1, 5000, "", "connections in total")
-    max_connections_per_address: int = _number(200, 1, 5000, "", "connections of one address")
-    max_unidentified: int = _number(100, 1, 5000, "", "connections that have not said who they are")
+    max_connections: int = _number(400, 1, 5000, "", "connections in total")
+    max_connections_per_address: int = _number(400, 1, 5000, "", "connections of one address")
+    max_unidentified: int = _number(200, 1, 5000, "", "connections that have not said who they are")
     max_topics: int = _number(64, 1, 1000, "", "ids that one robot may declare")
     max_name_length: int = _number(128, 16, 1024, "characters", "longest name of a topic or type")
     max_payload_length: int = _number(4096, 64, 65535, "bytes", "longest payload of a frame from a robot")
@@ -61,6 +61,9 @@ class DriverConfig:
         20.0, 2.0, 600.0, "s", "time to declare a topic, else it is disconnected"
     )
     silence_timeout_s: float = _number(6.0, 3.0, 600.0, "s", "silence after which a connection is closed")
+    quick_acknowledge: bool = _plain(
+        True, "acknowledge what robots send at once, else their TCP holds the rest of each burst back for 40 ms"
+    )
     grace_s: float = _number(10.0, 0.0, 3600.0, "s", "time that the topics of a robot stay up after it left")
     service_timeout_s: float = _number(5.0, 0.1, 600.0, "s", "time that a robot has to answer a service call")
     parameters_outside: bool = _plain(False, "robots may read parameters outside their own namespace")

@@ -78,7 +78,7 @@ class Inlet:
         stream.ended.wait()
         if stream.error is not None:
             raise TransportException("read failed: %s" % stream.error)
-        raise TransportTerminated("the publisher closed the connection")
+        raise TransportTerminated("closed")
 
 
 class MessageStream(Reader):

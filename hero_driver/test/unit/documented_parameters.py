@@ -62,7 +62,7 @@ def make_yaml():
 
 
 GROUPS = {
-    "Where robots come from": ("host", "port", "robots", "namespace_policy", "allow"),
+    "Where robots come from": ("host", "port", "robots", "namespace_policy", "allow", "quick_acknowledge"),
     "How much one robot, and all of them, may do": ("max_*", "parameters_outside"),
     "How long the driver waits": ("*_timeout_s", "grace_s", "command_max_age_s"),
     "Commands": ("clamp",),

@@ -74,8 +74,8 @@ def test_values_come_where_they_belong():
     assert config.wheel_geometry.ticks_per_turn == 288.0
     networks = (ipaddress.ip_network("10.42.0.0/24"), ipaddress.ip_network("fe80::/10"))
     limits = config.admission_limits
-    assert (limits.allow, limits.max_connections, limits.max_unidentified) == (networks, 200, 7)
-    assert limits.max_connections_per_address == 200
+    assert (limits.allow, limits.max_connections, limits.max_unidentified) == (networks, 400, 7)
+    assert limits.max_connections_per_address == 400
 
 
 # Unknown names.

@@ -44,6 +44,9 @@ class TransportSettings(NamedTuple):
     user_timeout_s: float
     """After this time without acknowledgement the kernel gives a connection up (TCP_USER_TIMEOUT)."""
 
+    acknowledges_at_once: bool
+    """A robot's TCP holds the rest of a burst back until its beginning is acknowledged (Nagle)."""
+
 
 class Reader:
     """Another socket that the loop reads besides the robots' connections."""
@@ -165,7 +168,7 @@ class EventLoop(LinkOwner, DiallerOwner):
 
     def add_link(self, sock: socket.socket, address: Address) -> Optional[Link]:
         """Take over a connected socket; return its link, or None if it was refused or broke already."""
-        link = Link(self, sock, address)
+        link = Link(self, sock, address, self._settings.acknowledges_at_once)
         try:
             self._set_options(sock)
         except OSError as error:
