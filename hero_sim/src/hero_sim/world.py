@@ -46,6 +46,8 @@ class World:
         self.speeds_m_s = np.zeros((count, 2))
         self.travels_m = np.zeros((count, 2))
         self.errors = errors
+        # The share of the way to its target that a servo's speed goes in one step.
+        self._servo_gain = -np.expm1(-STEP_MS / 1000.0 / errors.servo_lag_s)
         self._rng = rng
         self.present = np.ones(count, dtype=bool)
         self.wheel_rows: List[List[float]] = []
@@ -83,7 +85,7 @@ class World:
         self.travels_m += rolled_m
         ripple_m_s = self._rng.standard_normal(self.speeds_m_s.shape) * self.errors.ripple_m_s
         reached_m_s = np.where(self.commands_m_s == 0.0, 0.0, self.commands_m_s + ripple_m_s)
-        self.speeds_m_s += (reached_m_s - self.speeds_m_s) * -np.expm1(-step_s / self.errors.servo_lag_s)
+        self.speeds_m_s += (reached_m_s - self.speeds_m_s) * self._servo_gain
         self.speeds_m_s[np.abs(self.speeds_m_s) < 1e-6] = 0.0
         self.time_ms += STEP_MS
         if rolled_m.any():
