@@ -18,6 +18,7 @@ from std_srvs.srv import SetBool, SetBoolResponse
 from .config import ConfigError, DriverConfig, read_config
 from .gateway import Gateway
 from .log_relay import LogRelay, prepare_logging, tell_of_lost_log_lines
+from .master_watch import MasterWatch
 from .outlet import admit_many_subscribers
 from .reports import FleetStatus, Reporter
 from .transport import Address, EventLoop, TransportSettings
@@ -74,6 +75,7 @@ class DriverNode:
         self._reporter: Reporter
         self._stopped_publisher: rospy.Publisher
         self._services: List[rospy.Service] = []
+        self._master_watch = MasterWatch("~stop", self._log.log)
 
     def open(self) -> None:
         """Listen, dial and serve. Raises: OSError if the port cannot be had."""
@@ -84,6 +86,7 @@ class DriverNode:
         self._stopped_publisher.publish(Bool(False))
         self._services.append(rospy.Service("~stop", SetBool, self._serve_stop))
         self._thread.start()
+        self._master_watch.open()
         self._log.log("info", self._describe_start())
 
     def spin(self) -> int:
@@ -117,6 +120,7 @@ class DriverNode:
             halted.wait(HALT_LIMIT_S + 0.3)
             self._loop.stop()
             self._thread.join(1.0)
+        self._master_watch.close()
         self._registrar.close()
         self._gateway.close()
         self._log.close()
