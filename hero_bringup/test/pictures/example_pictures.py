@@ -64,12 +64,21 @@ class Recording:
         self.stage.wait_for(lambda: rows[-1][0] >= end_s, "%g s of robots" % seconds, 2.0 * seconds + 10.0)
 
     def wait_until_all_rest(self, what, timeout_s):
-        """Wait until nobody has moved for a second."""
+        """Wait until nobody has moved or turned for a second."""
 
         def rest():
-            return all(max(abs(row[4]) for row in rows[-20:]) < 0.001 for rows in self.watch.rows.values())
+            return all(math.dist(rows[-1][1:4], rows[-20][1:4]) < 0.002 for rows in self.watch.rows.values())
 
         self.stage.wait_for(rest, what, timeout_s)
+
+    def wait_until_all_are_at(self, goals, near_m, timeout_s):
+        """Wait until every robot stands near its goal: [(x, y)] in the order of the ids."""
+
+        def there():
+            return all(math.dist(self.watch.pose(robot_id)[:2], goal) < near_m for robot_id, goal in enumerate(goals))
+
+        self.stage.wait_for(there, "robots at their goals", timeout_s)
+        self.wait_until_all_rest("robots at rest at their goals", timeout_s)
 
     def __enter__(self):
         return self
@@ -96,16 +105,15 @@ def go_to_goal(picture):
         starts = [recording.watch.pose(robot_id) for robot_id in range(10)]
         goals = []
         for turn_rad in (0.6, 2.9, 4.7):
-            for publisher, (x_m, y_m, _) in zip(publishers, starts):
+            round_goals = [(x_m + 0.3 * math.cos(turn_rad), y_m + 0.3 * math.sin(turn_rad)) for x_m, y_m, _ in starts]
+            for publisher, goal in zip(publishers, round_goals):
                 target = PoseStamped()
                 target.header.frame_id = "world"
-                target.pose.position.x = x_m + 0.3 * math.cos(turn_rad)
-                target.pose.position.y = y_m + 0.3 * math.sin(turn_rad)
+                target.pose.position.x, target.pose.position.y = goal
                 target.pose.orientation.w = 1.0
-                goals.append((target.pose.position.x, target.pose.position.y))
                 publisher.publish(target)
-            recording.go_on(3.0)
-            recording.wait_until_all_rest("robots at their goals", 60.0)
+            goals += round_goals
+            recording.wait_until_all_are_at(round_goals, 0.12, 60.0)
         draw_paths(
             picture, "go_to_goal: three goals each, all with heading 0", recording.arena, recording.paths(), goals,
             size_inch=(9, 4.2),
@@ -117,8 +125,8 @@ def swarm_go_to(picture):
     with Recording(10, arena_file("circle")) as recording:
         swap = (TESTS / "swap.yaml").read_text()
         recording.stage.start_example("swarm_go_to", "_robots:=0-9", "_formation:=" + swap, "_assign:=false")
-        recording.go_on(10.0)
-        recording.wait_until_all_rest("robots in their places", 100.0)
+        goals = [(-x_m, -y_m) for x_m, y_m, _ in map(recording.watch.pose, range(10))]
+        recording.wait_until_all_are_at(goals, 0.3, 120.0)
         near = ((-0.85, 0.85), (-0.85, 0.85))
         draw_paths(picture, "swarm_go_to: ten robots swap places", recording.arena, recording.paths(), only_m=near)
 
@@ -148,7 +156,7 @@ def led_show(picture):
         for pattern in ("rainbow", "chase", "blink"):
             program = recording.stage.start_example("led_show", "__name:=" + pattern, "_pattern:=" + pattern)
             recording.stage.wait_for(lambda: lights.colors and max(lights.colors[0]) > 0.5, "light")
-            recording.go_on(2.0)  # until every robot is connected to the program, and its own blue light has ended
+            recording.go_on(4.0)  # until every robot is connected to the program, and its own blue light has ended
             lights.rows.clear()
             recording.go_on(8.0)
             shows["pattern:=" + pattern] = list(lights.rows)
