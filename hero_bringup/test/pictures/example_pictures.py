@@ -3,11 +3,9 @@
 Every picture is recorded in a process of its own, with a ROS master, a driver and a simulator of its own.
 """
 
-import argparse
 import math
 import os
 import pty
-import subprocess
 import sys
 import threading
 import time
@@ -16,6 +14,7 @@ from pathlib import Path
 import rospy
 from drawing import draw_lights, draw_paths
 from geometry_msgs.msg import PoseStamped
+from picture_program import make_pictures
 from sensor_msgs.msg import Joy
 
 from hero_examples import Robot
@@ -230,20 +229,5 @@ PICTURES = {
 }
 
 
-def main():
-    """Make the pictures that are named, or all."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("names", nargs="*", choices=[[], *PICTURES], help="which; without a name: all")
-    parser.add_argument("--folder", default=str(DOCS), help="where the pictures go (default: %(default)s)")
-    options = parser.parse_args()
-    names = options.names or list(PICTURES)
-    if len(names) == 1:
-        PICTURES[names[0]](Path(options.folder) / (names[0] + ".png"))
-        print("%s/%s.png" % (options.folder, names[0]), flush=True)
-        return
-    for name in names:
-        subprocess.run([sys.executable, __file__, name, "--folder", options.folder], check=True)
-
-
 if __name__ == "__main__":
-    main()
+    make_pictures(PICTURES, DOCS, __doc__)

@@ -3,7 +3,6 @@
 The robots are simulated and walk; every picture has a ROS master, a driver and a simulator of its own.
 """
 
-import argparse
 import os
 import subprocess
 import sys
@@ -12,6 +11,7 @@ from pathlib import Path
 
 import matplotlib.image
 import numpy as np
+from picture_program import make_pictures
 
 BRINGUP = Path(__file__).resolve().parents[2]
 sys.path += [str(BRINGUP / "bench"), str(BRINGUP / "test" / "rostest")]
@@ -58,24 +58,7 @@ PICTURES = {
 }
 
 
-def main():
-    """Make the pictures that are named, or all."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("names", nargs="*", choices=[[], *PICTURES], help="which; without a name: all")
-    parser.add_argument(
-        "--folder", default=str(PICTURES_FOLDER), help="where the pictures go (default: %(default)s)"
-    )
-    options = parser.parse_args()
-    if MISSING:
-        parser.exit(1, "screen_pictures: not installed: %s (apt install xvfb rviz)\n" % ", ".join(MISSING))
-    names = options.names or list(PICTURES)
-    if len(names) == 1:
-        PICTURES[names[0]](Path(options.folder) / (names[0] + ".png"))
-        print("%s/%s.png" % (options.folder, names[0]), flush=True)
-        return
-    for name in names:
-        subprocess.run([sys.executable, __file__, name, "--folder", options.folder], check=True)
-
-
 if __name__ == "__main__":
-    main()
+    if MISSING:
+        sys.exit("screen_pictures: not installed: %s (apt install xvfb rviz)" % ", ".join(MISSING))
+    make_pictures(PICTURES, PICTURES_FOLDER, __doc__)
