@@ -115,49 +115,76 @@ def stop(process, number=signal.SIGINT):
         return process.communicate()[0]
 
 
+def start_servers(options, environment):
+    """Start the servers; return pairs of process and port once all listen."""
+    servers = []
+    for index in range(options.drivers):
+        port = find_free_port()
+        command = options.server_command.format(port=port).split()
+        if index:
+            # A second node of one name would end the first.
+            command.append("__name:=hero_driver_%d" % index)
+        process = start(command, environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        servers.append((process, port))
+    for process, port in servers:
+        wait_for_port(port, process)
+    return servers
+
+
+def start_swarms(options, count, servers, environment):
+    """Start the emulated robots, spread evenly over the servers."""
+    swarms = []
+    for index, (_, port) in enumerate(servers):
+        first, end = (count * number // len(servers) for number in (index, index + 1))
+        command = [sys.executable, str(HERE / "emulated_swarm.py"), "--port", str(port)]
+        command += ["--first-id", str(first), "--robots", str(end - first), "--speed", str(options.speed)]
+        command += ["--seconds", str(options.seconds + 2 * SETTLE_S)] + ["--nagle"] * options.nagle
+        swarms.append(start(command, environment, stdout=subprocess.PIPE))
+    return swarms
+
+
+def collect(swarms):
+    """Return what the swarms sent and got, together."""
+    reports = [json.loads(swarm.communicate(timeout=120)[0]) for swarm in swarms]
+    joined_s = [report["joined_s"] for report in reports]
+    total = {
+        key: sum((report[key] for report in reports[1:]), reports[0][key])
+        for key in ("thrown_out", "transforms", "odom_stamps_s", "commands_s")
+    }
+    return dict(total, joined_s=None if None in joined_s else max(joined_s))
+
+
 def run_once(options, count, environment):
     """Return the figures of one run with count robots."""
-    port = find_free_port()
-    server = start(
-        options.server_command.format(port=port).split(),
-        environment,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
     load = [sys.executable, str(HERE / "ros_load.py")]
+    servers = start_servers(options, environment)
     try:
-        wait_for_port(port, server)
         # The probe of the port was a connection too: let the server forget it.
         time.sleep(1.0)
         arguments = ["--robots", str(count)]
         listener = start([*load, "listen", *arguments], environment, stdout=subprocess.PIPE)
         commander = start([*load, "command", *arguments], environment, stdout=subprocess.PIPE)
         time.sleep(SETTLE_S)
-        swarm = start(
-            [sys.executable, str(HERE / "emulated_swarm.py"), "--port", str(port), *arguments]
-            + ["--seconds", str(options.seconds + 2 * SETTLE_S), "--speed", str(options.speed)]
-            + ["--nagle"] * options.nagle,
-            environment,
-            stdout=subprocess.PIPE,
-        )
+        swarms = start_swarms(options, count, servers, environment)
         time.sleep(SETTLE_S + count * 0.03)
+
+        def read_figures():
+            server_s = sum(read_cpu_s(process.pid) for process, _ in servers)
+            return time.monotonic(), server_s, read_cpu_s(listener.pid), read_stolen_and_busy_s()
+
         window_start_s = time.time()
-        before = (
-            time.monotonic(),
-            read_cpu_s(server.pid),
-            read_cpu_s(listener.pid),
-            read_stolen_and_busy_s(),
-        )
+        before = read_figures()
         time.sleep(options.seconds)
-        after = (time.monotonic(), read_cpu_s(server.pid), read_cpu_s(listener.pid), read_stolen_and_busy_s())
+        after = read_figures()
         window_end_s = time.time()
-        memory_mb = read_memory_mb(server.pid)
-        sent = json.loads(swarm.communicate(timeout=120)[0])
+        memory_mb = sum(read_memory_mb(process.pid) for process, _ in servers)
+        sent = collect(swarms)
         time.sleep(0.5)
         listened = json.loads(stop(listener))
         commanded = json.loads(stop(commander))
     finally:
-        stop(server)
+        for process, _ in servers:
+            stop(process)
     elapsed_s = after[0] - before[0]
 
     def count_in_window(times_s):
@@ -227,6 +254,7 @@ def main():
     parser.add_argument("--robots", type=int, nargs="+", default=[20, 50, 100])
     parser.add_argument("--seconds", type=float, default=10.0, help="measured time of one run")
     parser.add_argument("--repeats", type=int, default=1, help="runs of which the median is printed")
+    parser.add_argument("--drivers", type=int, default=1, help="servers, each with its share of the robots")
     parser.add_argument("--speed", type=float, default=1.0, help="multiplies the rates of the robots")
     parser.add_argument("--nagle", action="store_true", help="robots' TCP holds small writes back, as HeRo's does")
     parser.add_argument("--server-command", default=DRIVER_COMMAND, help="{port} stands for the port")
