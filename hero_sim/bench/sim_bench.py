@@ -1,4 +1,4 @@
-"""What the simulator costs: CPU at real time behind real sockets, and how fast it could run.
+"""What the simulator costs: CPU at real time behind real sockets, and the real-time factor it could reach.
 
     PYTHONPATH=hero_sim/src:hero_driver/src python3 hero_sim/bench/sim_bench.py [--robots 1,10]
     [--seconds 10]
@@ -34,7 +34,7 @@ class Measurement(NamedTuple):
     robots: int
     cpu_percent: float  # of one core
     odom_share: float  # odoms that came, of those due at the stock rate
-    fastest: float  # simulated seconds per second with nothing else to do
+    fastest: float  # simulated seconds per second of CPU, without sockets
 
 
 class _Peer:
@@ -146,7 +146,10 @@ def measure(robots: int, seconds: float) -> Measurement:
 
 
 def measure_fastest(robots: int, simulated_ms: int = 5000) -> float:
-    """Return how many seconds of a driving swarm are simulated in a second, without sockets."""
+    """Return how many seconds of a driving swarm are simulated in a second of CPU, without sockets.
+
+    CPU time, so that what else runs on the machine matters little.
+    """
     swarm = build_swarm(
         build_parser().parse_args(["--robots", str(robots), "--flash-dir", "none"]), [""] * robots, lambda text: None
     )
@@ -164,12 +167,12 @@ def measure_fastest(robots: int, simulated_ms: int = 5000) -> float:
     for robot in swarm.robots:
         robot.receive_bytes(swarm.now_ms, frames.encode_frame(frames.ID_PUBLISHER, b""))
     run(3000)
-    start_s = time.perf_counter()
+    start_s = time.process_time()
     for step in range(simulated_ms // 100):
         for robot in swarm.robots:
             robot.receive_bytes(swarm.now_ms, _TWIST)
         run(3000 + 100 * (step + 1))
-    return simulated_ms / 1000.0 / (time.perf_counter() - start_s)
+    return simulated_ms / 1000.0 / (time.process_time() - start_s)
 
 
 def main(arguments: Optional[List[str]] = None) -> int:
@@ -181,11 +184,11 @@ def main(arguments: Optional[List[str]] = None) -> int:
     )
     options = parser.parse_args(arguments)
     rows: Dict[int, Measurement] = {}
-    print("robots  CPU of one core  odoms of the stock rate  fastest (x real time, no sockets)")
+    print("robots  CPU of one core  odoms of the stock rate  simulated s per s of CPU, no sockets")
     for text in options.robots.split(","):
         row = rows[int(text)] = measure(int(text), options.seconds)
         print(
-            "%6d  %13.1f %%  %21.1f %%  %8.1f"
+            "%6d  %13.1f %%  %21.1f %%  %20.1f"
             % (row.robots, row.cpu_percent, 100.0 * row.odom_share, row.fastest),
             flush=True,
         )
