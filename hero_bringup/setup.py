@@ -3,4 +3,10 @@
 from catkin_pkg.python_setup import generate_distutils_setup
 from setuptools import setup
 
-setup(**generate_distutils_setup(packages=["hero_bringup", "hero_bringup.checkup"], package_dir={"": "src"}))
+setup(
+    **generate_distutils_setup(
+        packages=["hero_bringup", "hero_bringup.checkup", "hero_bringup.monitor"],
+        package_dir={"": "src"},
+        package_data={"hero_bringup.monitor": ["web/*"]},
+    )
+)

@@ -36,6 +36,7 @@ OTHER_MODULES = {
     "yaml": "python3-yaml",
     "matplotlib": "python3-matplotlib",
     "scipy": "python3-scipy",
+    "tornado": "python3-tornado",
     "tqdm": "python3-tqdm",
 }
 

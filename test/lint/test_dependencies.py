@@ -12,7 +12,7 @@ RUN = ("depend", "exec_depend")
 TEST = (*RUN, "test_depend", "build_depend", "buildtool_depend")
 STANDARD_LIBRARY = getattr(sys, "stdlib_module_names", None)
 # Used in tests only; script/bootstrap installs them, no package needs them to run.
-TEST_TOOLS = {"pytest", "hypothesis"}
+TEST_TOOLS = {"pytest", "hypothesis", "selenium"}
 
 
 def needed_package(module, own_package):

@@ -5,15 +5,17 @@ import sources
 
 MODULES = sources.list_source_modules()
 NOT_IN_THE_CORE = {"asyncio", "logging", "rospy", "select", "selectors", "socket", "ssl", "threading", "time"}
-SOCKETS = {"asyncio", "socket", "socketserver", "ssl"}
-# The robots' connections, on each side; the connections to subscribers and publishers that rospy has made; and the
-# program check, which asks for the addresses of names.
+SOCKETS = {"asyncio", "socket", "socketserver", "ssl", "tornado"}
+# The robots' connections, on each side; the connections to subscribers and publishers that rospy has made; the program
+# check, which asks for the addresses of names; and the pages of the fleet monitor.
 SOCKET_OWNERS = (
     "hero_driver.transport",
     "hero_driver.outlet",
     "hero_driver.inlet",
     "hero_sim.tcp_link",
     "hero_bringup.checkup.network",
+    "hero_bringup.monitor.server",
+    "hero_bringup.monitor.program",
 )
 
 

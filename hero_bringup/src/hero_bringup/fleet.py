@@ -19,17 +19,15 @@ from typing import Dict, List, Optional, Sequence
 
 import rosgraph
 import rospy
-from nav_msgs.msg import Odometry
-from sensor_msgs.msg import LaserScan
 from std_srvs.srv import SetBool
 
 from hero_examples.keyboard import Keyboard, NoTerminalError
 from hero_msgs.msg import Robot, RobotArray
 
-from .fleet_state import Pose, RobotRow, RobotTrack, find_missing, sort_rows, yaw_of_quaternion
+from .fleet_state import RobotRow, RobotTrack, find_missing, sort_rows
 from .fleet_table import format_json, format_table, format_title
+from .robot_listener import STATES, RobotListener
 
-STATES = {Robot.JOINING: "JOINING", Robot.READY: "READY", Robot.AWAY: "AWAY", Robot.REFUSED: "REFUSED"}
 ORDERS = ("id", "state", "nearest")
 DRIVER_TIMEOUT_S = 10.0  # how long --once waits for a driver that is just starting
 DRAW_PERIOD_S = 0.5
@@ -41,44 +39,6 @@ HOME = "\x1b[H"
 CLEAR_LINE_END = "\x1b[K"
 CLEAR_SCREEN_END = "\x1b[J"
 KEYS_HELP = "q ends   s stops all robots, or lets them go   o changes the order"
-
-
-class RobotListener:
-    """Subscriptions to one robot's odometry and proximity."""
-
-    def __init__(self, namespace: str) -> None:
-        self.track = RobotTrack()
-        self._odometry: Optional[bytes] = None
-        self._proximity: Optional[bytes] = None
-        self._subscribers = [
-            rospy.Subscriber(namespace + "/odom", rospy.AnyMsg, self._keep_odometry, queue_size=10),
-            rospy.Subscriber(namespace + "/proximity", rospy.AnyMsg, self._keep_proximity, queue_size=1),
-        ]
-
-    def close(self) -> None:
-        """End the subscriptions."""
-        for subscriber in self._subscribers:
-            subscriber.unregister()
-
-    def _keep_odometry(self, message: rospy.AnyMsg) -> None:
-        self._odometry = message._buff
-        self.track.odometry.count()
-
-    def _keep_proximity(self, message: rospy.AnyMsg) -> None:
-        self._proximity = message._buff
-
-    def read_newest(self) -> None:
-        """Read what was kept since the last call."""
-        odometry, self._odometry = self._odometry, None
-        if odometry is not None:
-            pose = Odometry().deserialize(odometry).pose.pose
-            turn = pose.orientation
-            yaw_rad = yaw_of_quaternion(turn.x, turn.y, turn.z, turn.w)
-            self.track.receive_pose(Pose(pose.position.x, pose.position.y, yaw_rad))
-        proximity, self._proximity = self._proximity, None
-        if proximity is not None:
-            scan = LaserScan().deserialize(proximity)
-            self.track.receive_proximity(scan.ranges, scan.angle_min, scan.angle_increment)
 
 
 class FleetListener:

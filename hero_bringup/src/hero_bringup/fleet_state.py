@@ -70,9 +70,9 @@ class RateMeter:
         self._counts: Deque[Tuple[float, int]] = deque()
         self._total = 0
 
-    def count(self) -> None:
-        """One more has come."""
-        self._total += 1
+    def count(self, more: int = 1) -> None:
+        """More have come."""
+        self._total += more
 
     def rate_hz(self, now_s: float) -> float:
         """Return the rate since about RATE_WINDOW_S ago; to be called more often than that."""

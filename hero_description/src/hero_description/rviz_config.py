@@ -1,4 +1,6 @@
-"""A number of robots -> configuration of RViz that shows them all, as text. Pure.
+"""Robots -> configuration of RViz that shows them all, as text. Pure.
+
+What only simulated robots have (arena, true poses) is in it always: with real robots nothing comes on those topics.
 
 Source of the format: what RViz 1.14 writes itself, cut down to what differs from its defaults. YAML is written by
 yaml, so that no name can break it.
@@ -9,6 +11,9 @@ from typing import Any, Dict, List, Sequence
 import yaml
 
 COLOURS = ("230; 90; 30", "40; 120; 220", "40; 160; 80", "200; 60; 160", "220; 180; 30", "80; 180; 190")
+
+LIGHTS_TOPIC = "/hero_lights"
+ABOVE_PIXELS_PER_M = 400
 
 
 def make_robot_displays(name: str, colour: str) -> List[Dict[str, Any]]:
@@ -56,8 +61,57 @@ def make_robot_displays(name: str, colour: str) -> List[Dict[str, Any]]:
     ]
 
 
-def make_config(names: Sequence[str], fixed_frame: str) -> str:
-    """Return the configuration for robots with these names (hero_0, ...), seen in fixed_frame."""
+def make_truth_display(name: str) -> Dict[str, Any]:
+    """Return what is shown of where a simulated robot truly is: an arrow above the model."""
+    return {
+        "Class": "rviz/Odometry",
+        "Name": name + " truth",
+        "Enabled": True,
+        "Topic": "/%s/ground_truth" % name,
+        "Keep": 1,
+        "Position Tolerance": 0,
+        "Angle Tolerance": 0,
+        "Covariance": {"Value": False},
+        "Shape": {
+            "Value": "Arrow",
+            "Color": "60; 60; 60",
+            "Alpha": 0.8,
+            "Shaft Length": 0.045,
+            "Shaft Radius": 0.002,
+            "Head Length": 0.015,
+            "Head Radius": 0.007,
+        },
+    }
+
+
+def make_marker_display(name: str, topic: str) -> Dict[str, Any]:
+    """Return a display of a visualization_msgs/MarkerArray."""
+    return {"Class": "rviz/MarkerArray", "Name": name, "Enabled": True, "Marker Topic": topic, "Queue Size": 10}
+
+
+def make_view(view: str) -> Dict[str, Any]:
+    """Return from where all is seen: "orbit", or "above", straight down, x to the right and y up."""
+    if view == "above":
+        return {
+            "Class": "rviz/TopDownOrtho",
+            "Scale": ABOVE_PIXELS_PER_M,
+            "X": 0.0,
+            "Y": 0.0,
+            "Angle": 0.0,
+            "Target Frame": "<Fixed Frame>",
+        }
+    return {
+        "Class": "rviz/Orbit",
+        "Distance": 2.6,
+        "Pitch": 1.0,
+        "Yaw": 4.71,
+        "Focal Point": {"X": 0.0, "Y": 0.0, "Z": 0.0},
+        "Target Frame": "<Fixed Frame>",
+    }
+
+
+def make_config(names: Sequence[str], fixed_frame: str, view: str = "orbit") -> str:
+    """Return the configuration for robots with these names (hero_0, ...), seen in fixed_frame; view: see make_view."""
     displays: List[Dict[str, Any]] = [
         {
             "Class": "rviz/Grid",
@@ -67,13 +121,26 @@ def make_config(names: Sequence[str], fixed_frame: str) -> str:
             "Plane Cell Count": 40,
             "Color": "200; 200; 200",
             "Alpha": 0.5,
-        }
+        },
+        make_marker_display("arena (simulated)", "/hero_sim/arena"),
+        make_marker_display("lights", LIGHTS_TOPIC),
     ]
     for index, name in enumerate(names):
         displays += make_robot_displays(name, COLOURS[index % len(COLOURS)])
+    displays.append(
+        {
+            "Class": "rviz/Group",
+            "Name": "true poses (simulated)",
+            "Enabled": True,
+            "Displays": [make_truth_display(name) for name in names],
+        }
+    )
+    # One tool for goals: the button says which robot it is for. go_to_goal of hero_examples takes the goals.
+    goals = [{"Class": "rviz/SetGoal", "Name": "goal %s" % name, "Topic": "/%s/goal" % name} for name in names]
     config = {
         "Panels": [
             {"Class": "rviz/Displays", "Name": "Displays"},
+            {"Class": "rviz/Tool Properties", "Name": "Tool Properties"},
             {"Class": "rviz/Views", "Name": "Views"},
         ],
         "Visualization Manager": {
@@ -89,17 +156,9 @@ def make_config(names: Sequence[str], fixed_frame: str) -> str:
                 {"Class": "rviz/Select"},
                 {"Class": "rviz/FocusCamera"},
                 {"Class": "rviz/Measure"},
+                *goals,
             ],
-            "Views": {
-                "Current": {
-                    "Class": "rviz/Orbit",
-                    "Distance": 2.6,
-                    "Pitch": 1.0,
-                    "Yaw": 4.71,
-                    "Focal Point": {"X": 0.0, "Y": 0.0, "Z": 0.0},
-                    "Target Frame": "<Fixed Frame>",
-                }
-            },
+            "Views": {"Current": make_view(view)},
         },
         "Window Geometry": {"Width": 1200, "Height": 800},
     }

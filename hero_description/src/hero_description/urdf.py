@@ -19,7 +19,7 @@ COLOURS = {
     "rubber": "0.05 0.05 0.05 1",
     "rim": "0.95 0.55 0.10 1",
     "sensor": "0.05 0.05 0.25 1",
-    "light": "0.20 0.60 1.00 0.9",
+    "light": "0.75 0.77 0.80 0.9",
     "steel": "0.75 0.75 0.78 1",
 }
 
@@ -71,27 +71,17 @@ def add_collision(
     add_shape(collision, "cylinder", size_m)
 
 
-def add_inertial(
-    link: ElementTree.Element,
-    mass_kg: float,
-    radius_m: float,
-    length_m: float,
-    axis: str,
-    xyz_m: Vector = (0.0, 0.0, 0.0),
-) -> None:
-    """Add mass and inertia of an even cylinder about an axis: "y" or "z"."""
+def add_inertial(link: ElementTree.Element, inertia: hero.Inertia) -> None:
+    """Add mass and moments of inertia."""
     inertial = ElementTree.SubElement(link, "inertial")
-    add_origin(inertial, xyz_m)
-    ElementTree.SubElement(inertial, "mass", value=format_numbers([mass_kg]))
-    across = mass_kg * (3 * radius_m**2 + length_m**2) / 12
-    along = mass_kg * radius_m**2 / 2
-    moments = {name: along if name == axis else across for name in "xyz"}
+    add_origin(inertial, inertia.middle_m)
+    ElementTree.SubElement(inertial, "mass", value=format_numbers([inertia.mass_kg]))
     ElementTree.SubElement(
         inertial,
         "inertia",
-        ixx="%.6g" % moments["x"],
-        iyy="%.6g" % moments["y"],
-        izz="%.6g" % moments["z"],
+        ixx="%.6g" % inertia.xx_kg_m2,
+        iyy="%.6g" % inertia.yy_kg_m2,
+        izz="%.6g" % inertia.zz_kg_m2,
         ixy="0",
         ixz="0",
         iyz="0",
@@ -137,8 +127,7 @@ def add_base(robot: ElementTree.Element) -> None:
     deck_m = hero.BODY_BOTTOM_M + hero.BODY_HEIGHT_M + hero.DECK_THICKNESS_M
     add_visual(link, "ahead", "box", (0.012, 0.003, 0.001), "rim", (radius_m - 0.006, 0.0, deck_m))
     add_collision(link, (radius_m, hero.BODY_HEIGHT_M), middle_m)
-    body_mass_kg = hero.MASS_KG - 2 * hero.WHEEL_MASS_KG
-    add_inertial(link, body_mass_kg, radius_m, hero.BODY_HEIGHT_M, "z", middle_m)
+    add_inertial(link, hero.BASE_INERTIA)
 
 
 def add_wheel(robot: ElementTree.Element, side: str, y_m: float) -> None:
@@ -151,7 +140,7 @@ def add_wheel(robot: ElementTree.Element, side: str, y_m: float) -> None:
     # A spoke, so that one sees the wheel turn.
     add_visual(link, "spoke", "box", (1.3 * radius_m, hero.WHEEL_WIDTH_M + 0.001, 0.003), "rubber")
     add_collision(link, (radius_m, hero.WHEEL_WIDTH_M), (0.0, 0.0, 0.0), lying)
-    add_inertial(link, hero.WHEEL_MASS_KG, radius_m, hero.WHEEL_WIDTH_M, "y")
+    add_inertial(link, hero.WHEEL_INERTIA)
     xyz_m = (0.0, y_m, hero.WHEEL_AXLE_Z_M)
     add_joint(robot, side + "_wheel_joint", "continuous", side + "_wheel_link", xyz_m, (0.0, 1.0, 0.0))
 
@@ -171,8 +160,10 @@ def make_urdf() -> str:
     add_visual(
         hat, "light", "sphere", [hero.LIGHT_DIAMETER_M / 2], "light", (0.0, 0.0, hero.DECK_THICKNESS_M)
     )
+    add_inertial(hat, hero.HAT_INERTIA)
     add_joint(robot, "hat_joint", "fixed", "hat_link", hero.HAT_XYZ_M)
-    ElementTree.SubElement(robot, "link", name="laser_link")
+    laser = ElementTree.SubElement(robot, "link", name="laser_link")
+    add_inertial(laser, hero.LASER_INERTIA)
     add_joint(robot, "laser_joint", "fixed", "laser_link", hero.LASER_XYZ_M)
     return '<?xml version="1.0"?>\n%s\n%s\n' % (
         "<!-- Made from src/hero_description/dimensions.py by: rosrun hero_description make_urdf. Do not edit. -->",

@@ -38,6 +38,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="view", description="RViz, set up for the robots that are there.")
     parser.add_argument("--robots", default="1", help="a number (4: hero_0 to hero_3) or ids (0,2,5)")
     parser.add_argument("--fixed-frame", default="world", help="frame in which all is shown (world)")
+    parser.add_argument("--view", choices=("orbit", "above"), default="orbit", help="from where to look (orbit)")
     arguments = rospy.myargv()
     options = parser.parse_args(arguments[1:])
     try:
@@ -50,6 +51,6 @@ def main() -> None:
     if not os.environ.get("DISPLAY"):
         sys.exit("view: no display: DISPLAY is not set")
     with tempfile.NamedTemporaryFile("w", prefix="hero_", suffix=".rviz", delete=False) as file:
-        file.write(make_config(names, options.fixed_frame))
+        file.write(make_config(names, options.fixed_frame, options.view))
     remappings = [argument for argument in sys.argv[1:] if argument not in arguments]
     os.execv(rviz, [rviz, "-d", file.name, *remappings])

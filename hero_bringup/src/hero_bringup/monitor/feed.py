@@ -1,0 +1,227 @@
+"""ROS topics -> the fleet as it is now, as pieces for pages.
+
+While nobody looks it listens to the driver's list of robots and to the log alone, and reads neither. Subscriptions to
+robots come and go on a thread of their own, because the ROS master may take its time.
+"""
+
+import re
+import time
+from collections import deque
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any, Deque, Dict, List, Optional, Sequence, Set
+
+import genpy
+import rospy
+from diagnostic_msgs.msg import DiagnosticArray
+from rosgraph_msgs.msg import Log
+from tf2_msgs.msg import TFMessage
+from visualization_msgs.msg import Marker, MarkerArray
+
+from hero_msgs.msg import Robot, RobotArray
+
+from ..fleet_state import Pose, yaw_of_quaternion
+from ..fleet_table import finite, make_printable
+from ..newest_message import NewestMessage
+from ..robot_listener import STATES, read_pose
+from .placement import Placement
+from .robot_feed import RobotFeed
+from .sections import LOG_LINES_KEPT, Sections, encode_pose, encode_ranges
+
+DRIVER_SILENT_S = 5.0
+"""The driver reports once a second; after so long it is gone."""
+
+LOG_LINES_PER_READ = 40
+"""Reading a line costs about 0.05 ms; a swarm that tunes its motors writes thousands a second."""
+
+ROBOT_NAME = re.compile(r"\bhero_\d+\b")
+
+
+class FleetFeed:
+    """All that the page shows, for as long as somebody looks."""
+
+    def __init__(self, map_frame: str) -> None:
+        self.sections = Sections()
+        self.placement = Placement(map_frame)
+        self.robots: Dict[str, Robot] = {}
+        self.stopped = False
+        self._map_frame = map_frame.lstrip("/")
+        self._feeds: Dict[str, RobotFeed] = {}
+        self._scene: Dict[str, NewestMessage] = {}
+        self._fleet_s = 0.0
+        self._listening = ""
+        self._rows: Sequence[Robot] = ()
+        self._health: Dict[str, List[Any]] = {}
+        self._worker = ThreadPoolExecutor(1, "subscriptions")
+        self._change: Optional[Future[None]] = None
+        self._log_bytes: Deque[bytes] = deque()
+        self._fleet = NewestMessage("/hero_driver/robots", RobotArray)
+        # Not NewestMessage: of the log every line counts.
+        self._log = rospy.Subscriber("/rosout", rospy.AnyMsg, self._keep_log_line, queue_size=100)
+
+    def _keep_log_line(self, message: rospy.AnyMsg) -> None:
+        if message._connection_header["md5sum"] == Log._md5sum:
+            self._log_bytes.append(message._buff)
+            if len(self._log_bytes) > LOG_LINES_KEPT:
+                self._log_bytes.popleft()
+
+    # ---------------------------------------------------------------- subscriptions
+
+    def want(self, looking: bool, truth: bool) -> None:
+        """Say whether anybody looks, and whether at the robots' true poses as well; returns at once."""
+        if self._change is not None and not self._change.done():
+            return
+        if self._change is not None:
+            self._change.result()
+        robots = {row.namespace for row in self._rows if row.namespace and row.state != Robot.REFUSED}
+        namespaces = robots if looking else set()
+        scene = {"/tf_static", "/hero_sim/arena", "/diagnostics"} if looking else set()
+        if looking and truth:
+            scene.add("/hero_sim/markers")
+        if namespaces != set(self._feeds) or scene != set(self._scene):
+            self._change = self._worker.submit(self._change_subscriptions, namespaces, scene)
+
+    def _change_subscriptions(self, namespaces: Set[str], scene: Set[str]) -> None:
+        classes = {"/tf_static": TFMessage, "/diagnostics": DiagnosticArray}
+        for topic in scene - set(self._scene):
+            self._scene = {**self._scene, topic: NewestMessage(topic, classes.get(topic, MarkerArray))}
+        for topic in set(self._scene) - scene:
+            self._scene[topic].close()
+            self._scene = {known: kept for known, kept in self._scene.items() if known != topic}
+        for namespace in sorted(namespaces - set(self._feeds)):
+            self._feeds = {**self._feeds, namespace: RobotFeed(namespace)}
+        for namespace in set(self._feeds) - namespaces:
+            self._feeds[namespace].close()
+            self._feeds = {known: kept for known, kept in self._feeds.items() if known != namespace}
+
+    def close(self) -> None:
+        """Listen no more; does not wait for the ROS master."""
+        self._worker.shutdown(wait=False)
+
+    # ---------------------------------------------------------------- reading
+
+    def read(self) -> None:
+        """Bring the pieces up to date."""
+        try:
+            self._read_fleet()
+            self._read_scene()
+            self._read_robots()
+            self._read_log()
+        except genpy.DeserializationError as error:
+            rospy.logwarn_throttle(10.0, "a message on a robot's topic cannot be read: %s" % error)
+
+    def _read_fleet(self) -> None:
+        now_s = time.monotonic()
+        message = self._fleet.take()
+        if message is not None:
+            self._fleet_s = now_s
+            self._listening, self.stopped = message.listening, message.stopped
+            self._rows = message.robots
+            self.robots = {row.namespace.strip("/"): row for row in self._rows if row.state != Robot.REFUSED}
+            self.placement.set_robots(self.robots)
+        elif self._rows and self._fleet_s and now_s - self._fleet_s < DRIVER_SILENT_S:
+            return
+        driver = bool(self._fleet_s) and now_s - self._fleet_s < DRIVER_SILENT_S
+        stamp_s = None if message is None else message.header.stamp.to_sec()
+        fleet = {"driver": driver, "listening": make_printable(self._listening), "stopped": self.stopped}
+        self.sections.put("fleet", {**fleet, "robots": [self._make_row(row, stamp_s) for row in self._rows]})
+
+    def _make_row(self, row: Robot, stamp_s: Optional[float]) -> Dict[str, Any]:
+        name = make_printable(row.namespace.strip("/"))
+        feed = self._feeds.get(row.namespace)
+        track = None if feed is None or row.state == Robot.REFUSED else feed.listener.track
+        since_s = row.since.to_sec()
+        return {
+            "name": name,
+            "id": row.id,
+            "address": make_printable(row.address),
+            "state": STATES.get(row.state, str(row.state)),
+            "firmware": make_printable(row.firmware),
+            "hardware": make_printable(row.hardware),
+            "config": make_printable(row.config),
+            "since": round(stamp_s - since_s) if stamp_s is not None and since_s else None,
+            "uptime": round(row.uptime.to_sec()),
+            "reconnects": row.reconnects,
+            "frames": round(row.frames_per_s, 1),
+            "bytes": round(row.bytes_per_s),
+            "odom": None if track is None else round(track.odometry.rate_hz(time.monotonic()), 1),
+            "way": None if track is None else finite(round(track.way_m, 2)),
+            "dropped": row.dropped_messages,
+            "bad": row.bad_frames,
+            "clock": finite(round(row.clock_offset, 4)),
+            "error": make_printable(row.last_error),
+            "located": self.placement.knows(name),
+            "health": self._health.get(name, [0, ""]),
+        }
+
+    def _read_scene(self) -> None:
+        taken = {topic: newest.take() for topic, newest in self._scene.items()}
+        if taken.get("/tf_static") is not None:
+            for transform in taken["/tf_static"].transforms:
+                place, turn = transform.transform.translation, transform.transform.rotation
+                pose = Pose(place.x, place.y, yaw_of_quaternion(turn.x, turn.y, turn.z, turn.w))
+                self.placement.receive_transform(transform.header.frame_id, transform.child_frame_id, pose)
+            self.placement.set_robots(self.robots)
+        if taken.get("/hero_sim/arena") is not None:
+            self.sections.put("arena", describe_arena(taken["/hero_sim/arena"]))
+        if taken.get("/diagnostics") is not None:
+            for status in taken["/diagnostics"].status:
+                name = status.name.rpartition(": ")[2]
+                self._health[name] = [status.level, make_printable(status.message)]
+        if taken.get("/hero_sim/markers") is not None:
+            self.sections.put("truth", find_true_poses(taken["/hero_sim/markers"]))
+        elif "/hero_sim/markers" not in self._scene:
+            self.sections.put("truth", {})
+
+    def _read_robots(self) -> None:
+        poses, ranges, lights, goals = {}, {}, {}, {}
+        for feed in list(self._feeds.values()):
+            feed.read_newest()
+            track = feed.listener.track
+            if track.pose is not None:
+                poses[feed.name] = encode_pose(self.placement.to_map(feed.name, track.pose))
+                ranges[feed.name] = encode_ranges(feed.listener.ranges_m)
+            if feed.light is not None:
+                lights[feed.name] = feed.light
+            goal = feed.find_goal(self.placement, self._map_frame)
+            if goal is not None:
+                goals[feed.name] = encode_pose(goal)
+        for name, value in (("poses", poses), ("ranges", ranges), ("lights", lights), ("goals", goals)):
+            self.sections.put(name, value)
+
+    def _read_log(self) -> None:
+        log = self.sections.log
+        limit = LOG_LINES_PER_READ if log.count else LOG_LINES_KEPT
+        waiting = len(self._log_bytes)
+        for _ in range(waiting - limit):
+            self._log_bytes.popleft()
+            log.skip(1)
+        for _ in range(min(waiting, limit)):
+            line = Log().deserialize(self._log_bytes.popleft())
+            found = ROBOT_NAME.search(line.msg) or ROBOT_NAME.search(line.name)
+            robot = found.group() if found else ""
+            log.append(line.header.stamp.to_sec(), line.level, line.name.lstrip("/"), robot, line.msg)
+
+
+def describe_arena(message: MarkerArray) -> Dict[str, List[List[int]]]:
+    """Return boxes (x, y, yaw, length, width) and circles (x, y, radius) of the arena, in mm and mrad."""
+    boxes, circles = [], []
+    for marker in message.markers:
+        pose = encode_pose(read_pose(marker.pose))
+        size = encode_pose(Pose(marker.scale.x, marker.scale.y, 0.0))
+        if pose is None or size is None or marker.action != Marker.ADD:
+            continue
+        if marker.type == Marker.CUBE:
+            boxes.append([*pose, size[0], size[1]])
+        elif marker.type == Marker.CYLINDER:
+            circles.append([pose[0], pose[1], size[0] // 2])
+    return {"boxes": boxes, "circles": circles}
+
+
+def find_true_poses(message: MarkerArray) -> Dict[str, Optional[List[int]]]:
+    """Return where the simulator's robots truly are: a marker with the name, one with the heading, for each."""
+    headings = {marker.id: marker for marker in message.markers if marker.ns == "headings"}
+    return {
+        marker.text: encode_pose(read_pose(headings[marker.id].pose))
+        for marker in message.markers
+        if marker.ns == "names" and marker.id in headings
+    }

@@ -1,0 +1,11 @@
+// Every robot has a colour of its own: hues a golden angle apart, so that neighbours in number differ most.
+
+export function isDark() {
+  const theme = document.documentElement.dataset.theme;
+  return theme ? theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
+}
+
+export function colourOf(id, alpha = 1) {
+  const hue = (((id * 137.508 + 24) % 360) + 360) % 360;
+  return `hsl(${hue.toFixed(0)} 70% ${isDark() ? 62 : 42}% / ${alpha})`;
+}

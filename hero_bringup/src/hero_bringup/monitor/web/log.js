@@ -1,0 +1,74 @@
+// The lines of the log: what nodes and robots say, the newest at the bottom.
+
+import { colourOf } from "./colours.js";
+
+const LINES_MAX = 500;
+const LEVELS = { 1: "debug", 2: "info", 4: "warn", 8: "error", 16: "fatal" };
+const AT_END_PX = 30;
+
+function cell(className, text) {
+  const part = document.createElement("span");
+  part.className = className;
+  part.textContent = text;
+  return part;
+}
+
+export class LogView {
+  constructor() {
+    this.list = document.getElementById("lines");
+    this.level = document.getElementById("level");
+    this.mine = document.getElementById("mine");
+    this.words = document.getElementById("words");
+    this.chosen = null;
+    for (const input of [this.level, this.mine, this.words]) {
+      input.addEventListener("input", () => this.filter());
+    }
+  }
+
+  clear() {
+    this.list.replaceChildren();
+  }
+
+  choose(name) {
+    this.chosen = name;
+    if (this.mine.checked) this.filter();
+  }
+
+  append({ missed, lines }) {
+    const atEnd = this.list.scrollHeight - this.list.scrollTop - this.list.clientHeight < AT_END_PX;
+    if (missed > 0) {
+      const gap = document.createElement("li");
+      gap.className = "gap";
+      gap.textContent = `${missed} lines left out`;
+      gap.entry = null;
+      this.list.append(gap);
+    }
+    for (const [, seconds, level, node, robot, text] of lines) {
+      const line = document.createElement("li");
+      line.className = LEVELS[level] || "info";
+      line.entry = { level, robot, words: `${node} ${text}`.toLowerCase() };
+      const time = new Date(seconds * 1000);
+      line.append(cell("time", time.toTimeString().slice(0, 8)), cell("level", LEVELS[level] || "?"));
+      const source = cell("node", robot || node);
+      source.title = node;
+      if (robot) source.style.color = colourOf(Number(robot.slice(robot.indexOf("_") + 1)));
+      line.append(source, cell("text", robot && text.startsWith(`${robot}: `) ? text.slice(robot.length + 2) : text));
+      line.hidden = !this.admits(line.entry);
+      this.list.append(line);
+    }
+    while (this.list.childElementCount > LINES_MAX) this.list.firstElementChild.remove();
+    if (atEnd) this.list.scrollTop = this.list.scrollHeight;
+  }
+
+  admits(entry) {
+    if (entry === null) return true;
+    if (entry.level < Number(this.level.value)) return false;
+    if (this.mine.checked && this.chosen !== null && entry.robot !== this.chosen) return false;
+    return entry.words.includes(this.words.value.trim().toLowerCase());
+  }
+
+  filter() {
+    for (const line of this.list.children) line.hidden = !this.admits(line.entry);
+    this.list.scrollTop = this.list.scrollHeight;
+  }
+}

@@ -1,0 +1,22 @@
+// The token, in exchange for a cookie.
+
+const form = document.getElementById("form");
+const answer = document.getElementById("answer");
+
+form.addEventListener("submit", async (event) => {
+  event.preventDefault();
+  answer.textContent = "...";
+  try {
+    const reply = await fetch("login", {
+      method: "POST",
+      body: JSON.stringify({ token: document.getElementById("token").value.trim() }),
+    });
+    if (reply.ok) {
+      location.reload();
+      return;
+    }
+    answer.textContent = reply.status === 429 ? "Too many tries. Wait a moment." : "That is not the token.";
+  } catch {
+    answer.textContent = "The monitor does not answer.";
+  }
+});

@@ -1,0 +1,188 @@
+// The chosen robot: what is known of it, and, where the monitor allows it, driving it.
+//
+// Dead man's switch: while a button or key is held the page says so every 100 ms. It stops saying so when the button
+// is let go, the page is hidden or loses the keyboard, or the network is stuck; the monitor stops the robot when it
+// hears "release", or hears nothing for 0.4 s, or the socket closes.
+
+import { colourOf } from "./colours.js";
+import { healthOf, spanOf } from "./fleet.js";
+
+const HOLD_MS = 100;
+const KEYS = {
+  ArrowUp: [1, 0], ArrowDown: [-1, 0], ArrowLeft: [0, 1], ArrowRight: [0, -1],
+  KeyW: [1, 0], KeyS: [-1, 0], KeyA: [0, 1], KeyD: [0, -1],
+};
+
+const element = (id) => document.getElementById(id);
+
+export class RobotPanel {
+  constructor({ send, congested, map }) {
+    this.send = send;
+    this.congested = congested;
+    this.map = map;
+    this.name = null;
+    this.driving = null;
+    this.timer = null;
+    this.keys = new Set();
+    this.facts = new Map();
+    const pad = element("pad");
+    for (const button of pad.querySelectorAll("button")) {
+      const way = button.dataset.way.split(" ").map(Number);
+      button.addEventListener("pointerdown", (event) => {
+        event.preventDefault();
+        pad.focus();
+        button.setPointerCapture(event.pointerId);
+        button.classList.add("down");
+        this.hold(way);
+      });
+      for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) {
+        button.addEventListener(end, () => {
+          button.classList.remove("down");
+          this.letGo();
+        });
+      }
+      button.addEventListener("contextmenu", (event) => event.preventDefault());
+      // A button that is reached with Tab is held with the space bar.
+      button.addEventListener("keydown", (event) => {
+        if (event.code === "Space" && !event.repeat) this.hold(way);
+        if (event.code === "Space") event.preventDefault();
+      });
+      button.addEventListener("keyup", (event) => event.code === "Space" && this.letGo());
+    }
+    pad.addEventListener("keydown", (event) => this.pressKey(event));
+    pad.addEventListener("keyup", (event) => this.liftKey(event));
+    pad.addEventListener("focusout", () => this.letGo());
+    addEventListener("blur", () => this.letGo());
+    addEventListener("pagehide", () => this.letGo());
+    document.addEventListener("visibilitychange", () => document.hidden && this.letGo());
+    for (const [id, unit] of [["linear", "m/s"], ["turn", "rad/s"]]) {
+      const show = () => (element(`${id}_value`).textContent = `${Number(element(id).value).toFixed(2)} ${unit}`);
+      element(id).addEventListener("input", show);
+      show();
+    }
+    element("goto").addEventListener("click", () => this.setGoing(!this.map.going));
+    addEventListener("keydown", (event) => event.key === "Escape" && this.setGoing(false));
+  }
+
+  setGoing(going) {
+    this.map.setGoing(going && this.name !== null);
+    element("goto").setAttribute("aria-pressed", String(this.map.going));
+    element("goto").textContent = this.map.going ? "Choosing a place" : "Go to a place";
+  }
+
+  pressKey(event) {
+    if (!(event.code in KEYS) || event.ctrlKey || event.altKey || event.metaKey) return;
+    event.preventDefault();
+    if (event.repeat) return;
+    this.keys.add(event.code);
+    this.holdKeys();
+  }
+
+  liftKey(event) {
+    if (!this.keys.delete(event.code)) return;
+    if (this.keys.size) this.holdKeys();
+    else this.letGo();
+  }
+
+  holdKeys() {
+    const sum = [0, 0];
+    for (const key of this.keys) KEYS[key].forEach((value, index) => (sum[index] += value));
+    this.hold(sum.map(Math.sign));
+  }
+
+  hold(way) {
+    if (this.name === null) return;
+    this.driving = { robot: this.name, way };
+    this.say();
+    if (this.timer === null) this.timer = setInterval(() => this.say(), HOLD_MS);
+  }
+
+  say() {
+    if (document.hidden || !document.hasFocus()) {
+      this.letGo();
+      return;
+    }
+    if (this.congested()) return;
+    const { robot, way } = this.driving;
+    // Backwards the turn is the other way round, as with a car.
+    const turn = way[1] * (way[0] < 0 ? -1 : 1) * Number(element("turn").value);
+    this.send({ do: "drive", robot, linear: way[0] * Number(element("linear").value), turn });
+  }
+
+  letGo() {
+    this.keys.clear();
+    if (this.timer !== null) clearInterval(this.timer);
+    this.timer = null;
+    if (this.driving !== null) this.send({ do: "release", robot: this.driving.robot });
+    this.driving = null;
+  }
+
+  show(state) {
+    const robot = state.fleet.robots.find((one) => one.name === state.chosen && one.state !== "REFUSED") || null;
+    const name = robot === null ? null : robot.name;
+    if (name !== this.name) {
+      this.letGo();
+      this.name = name;
+      this.setGoing(false);
+    }
+    document.querySelector("#robot .chip").style.background = robot ? colourOf(robot.id) : "transparent";
+    element("name").textContent = robot ? robot.name : "No robot is chosen";
+    element("state").textContent = robot ? robot.state : "";
+    element("state").dataset.state = robot ? robot.state : "";
+    element("control").hidden = robot === null || !state.hello.control;
+    element("advice").hidden = robot !== null && state.hello.control;
+    element("advice").textContent =
+      robot === null ? "Click a robot on the map or in the table." : "This monitor only looks. control:=true lets it drive robots.";
+    const trouble = robot ? healthOf(robot) : "";
+    element("trouble").hidden = !trouble;
+    element("trouble").textContent = trouble;
+    this.showFacts(robot === null ? [] : this.listFacts(robot, state));
+  }
+
+  listFacts(robot, state) {
+    const pose = state.poses[robot.name];
+    const ranges = (state.ranges[robot.name] || []).filter((range) => range !== null && range >= 0);
+    const metres = (value) => (value / 1000).toFixed(3);
+    const facts = [
+      ["pose", pose ? `${metres(pose[0])} ${metres(pose[1])} m, ${((pose[2] / 1000) * (180 / Math.PI)).toFixed(0)}°` : "-"],
+      ["frame", robot.located ? "map" : "own odometry: place on the map unknown"],
+      ["way", robot.way === null ? "-" : `${robot.way.toFixed(2)} m since you look`],
+      ["nearest", ranges.length ? `${metres(Math.min(...ranges))} m` : "nothing in range"],
+      ["odometry", robot.odom === null ? "-" : `${robot.odom.toFixed(1)} Hz`],
+      ["from robot", `${robot.frames.toFixed(0)} frames/s, ${(robot.bytes / 1000).toFixed(1)} kB/s`],
+      ["address", robot.address],
+      ["versions", [robot.firmware, robot.hardware, robot.config].filter(Boolean).join(", ") || "not said yet"],
+      ["up for", robot.uptime ? spanOf(robot.uptime) : "-"],
+      ["state since", spanOf(robot.since)],
+      ["returns", String(robot.reconnects)],
+      ["clock ahead", robot.clock === null ? "-" : `${(robot.clock * 1000).toFixed(1)} ms`],
+      ["dropped", `${robot.dropped} messages, ${robot.bad} bad frames`],
+      ["diagnosis", robot.health[1] || "-"],
+    ];
+    const truth = state.truth[robot.name];
+    if (pose && truth) {
+      facts.splice(1, 0, ["odometry is off", `${Math.hypot(pose[0] - truth[0], pose[1] - truth[1]).toFixed(0)} mm`]);
+    }
+    return facts;
+  }
+
+  showFacts(facts) {
+    const titles = new Set(facts.map(([title]) => title));
+    for (const [title, fact] of this.facts) {
+      if (titles.has(title)) continue;
+      fact.term.remove();
+      fact.value.remove();
+      this.facts.delete(title);
+    }
+    facts.forEach(([title, text]) => {
+      let fact = this.facts.get(title);
+      if (!fact) {
+        fact = { term: document.createElement("dt"), value: document.createElement("dd") };
+        fact.term.textContent = title;
+        element("facts").append(fact.term, fact.value);
+        this.facts.set(title, fact);
+      }
+      if (fact.value.textContent !== text) fact.value.textContent = text;
+    });
+  }
+}

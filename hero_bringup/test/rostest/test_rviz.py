@@ -1,0 +1,130 @@
+#!/usr/bin/env python
+"""rviz:=true on a screen that nobody looks at: robots are drawn where the simulator says that they are."""
+
+import os
+import signal
+import subprocess
+import unittest
+from pathlib import Path
+
+import numpy as np
+import rospy
+import rostest
+from geometry_msgs.msg import Twist
+from std_msgs.msg import ColorRGBA
+from swarm_watch import SwarmWatch, wait_for
+from virtual_screen import MISSING, VirtualScreen
+
+from hero_description.rviz_config import ABOVE_PIXELS_PER_M
+
+TIMEOUT_S = 60.0
+NEAR_M = 0.015
+LIGHTS = {0: (1.0, 0.0, 0.0), 1: (0.0, 1.0, 0.0), 2: (0.0, 0.0, 1.0)}
+BRIGHT, DIM = 110, 60
+BLOB_PIXELS_MIN = 8
+WALL_SHARE = 0.6
+
+
+def find_blob(picture, colour):
+    """Return the middle (right, down) of what has a light's colour, None if there is too little of it."""
+    matches = np.ones(picture.shape[:2], dtype=bool)
+    for channel, share in enumerate(colour):
+        matches &= picture[:, :, channel] > BRIGHT if share else picture[:, :, channel] < DIM
+    down, right = np.nonzero(matches)
+    return (float(np.median(right)), float(np.median(down))) if len(right) >= BLOB_PIXELS_MIN else None
+
+
+def find_walls(picture, side_m):
+    """Return the middle (right, down) of a square of grey walls, None if it is not there."""
+    grey = (np.ptp(picture.astype(int), axis=2) < 12) & (picture.mean(axis=2) < 190) & (picture.mean(axis=2) > 60)
+    length = side_m * ABOVE_PIXELS_PER_M
+    columns = np.flatnonzero(grey.sum(axis=0) > WALL_SHARE * length)
+    rows = np.flatnonzero(grey.sum(axis=1) > WALL_SHARE * length)
+    if not len(columns) or not len(rows):
+        return None
+    size = (columns[-1] - columns[0], rows[-1] - rows[0])
+    # Both walls, and not the edge of a panel.
+    if max(abs(size[0] - length), abs(size[1] - length)) > 8:
+        return None
+    return (columns[0] + columns[-1]) / 2.0, (rows[0] + rows[-1]) / 2.0
+
+
+@unittest.skipIf(MISSING, "not installed: %s (script/bootstrap --test)" % ", ".join(MISSING))
+class RvizTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.screen = VirtualScreen(1400, 1000)
+        arena = Path(__file__).with_name("square_arena.yaml")
+        cls.launch = subprocess.Popen(
+            ["roslaunch", "hero_bringup", "hero_bringup.launch", "host:=127.0.0.1", "port:=21341", "sim:=3"]
+            + ["sim_arena:=%s" % arena, "rviz:=true", "rviz_view:=above"],
+            env=cls.screen.environment(),
+            start_new_session=True,
+        )
+        cls.watch = SwarmWatch(LIGHTS)
+        cls.watch.wait_until_complete(TIMEOUT_S)
+        cls.lights = {
+            robot_id: rospy.Publisher("/hero_%d/led" % robot_id, ColorRGBA, queue_size=1) for robot_id in LIGHTS
+        }
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.watch.close()
+        os.killpg(cls.launch.pid, signal.SIGINT)
+        cls.launch.wait(TIMEOUT_S)
+        cls.screen.close()
+
+    def show_lights(self):
+        for robot_id, colour in LIGHTS.items():
+            self.lights[robot_id].publish(ColorRGBA(*colour, 1.0))
+
+    def measure_errors(self):
+        """Return how far (m) each robot is drawn from where it is; None while not all is on the screen."""
+        self.show_lights()
+        self.picture = self.screen.read()
+        middle = find_walls(self.picture, side_m=1.6)
+        blobs = {robot_id: find_blob(self.picture, colour) for robot_id, colour in LIGHTS.items()}
+        if middle is None or None in blobs.values():
+            return None
+        errors = {}
+        for robot_id, (right, down) in blobs.items():
+            x_m = (right - middle[0]) / ABOVE_PIXELS_PER_M
+            y_m = (middle[1] - down) / ABOVE_PIXELS_PER_M
+            errors[robot_id] = float(np.hypot(*(np.array([x_m, y_m]) - self.watch.pose(robot_id)[:2])))
+        return errors
+
+    def wait_until_drawn_in_place(self, name):
+        def are_in_place():
+            self.errors = self.measure_errors()
+            return self.errors is not None and max(self.errors.values()) < NEAR_M
+
+        try:
+            wait_for(are_in_place, TIMEOUT_S, "robots to be drawn where they are")
+        except AssertionError as error:
+            raise AssertionError("%s; off by (m): %s" % (error, self.errors)) from None
+        finally:
+            import matplotlib.image
+
+            folder = Path(os.environ.get("ROS_TEST_RESULTS_DIR", "."))
+            matplotlib.image.imsave(str(folder / name), self.picture)
+
+    def test_robots_are_drawn_in_the_arena_where_they_are_before_and_after_they_drive(self):
+        self.wait_until_drawn_in_place("rviz_start.png")
+        start = self.watch.pose(0)[:2]
+        drive = rospy.Publisher("/hero_0/velocity_controller/cmd_vel", Twist, queue_size=1)
+        command = Twist()
+        command.linear.x = 0.1
+
+        def has_driven():
+            drive.publish(command)
+            rospy.sleep(0.1)
+            return np.hypot(*np.subtract(self.watch.pose(0)[:2], start)) > 0.2
+
+        wait_for(has_driven, TIMEOUT_S, "robot 0 to drive")
+        drive.publish(Twist())
+        self.wait_until_drawn_in_place("rviz_driven.png")
+
+
+if __name__ == "__main__":
+    rospy.init_node("test_rviz")
+    rostest.rosrun("hero_bringup", "test_rviz", RvizTest)
