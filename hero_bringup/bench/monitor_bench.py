@@ -15,7 +15,15 @@ from tornado.httpclient import HTTPRequest
 from tornado.websocket import websocket_connect
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "hero_driver" / "bench"))
-from driver_bench import find_free_port, measure_machine_us, read_cpu_s, read_memory_mb, start, stop, wait_for_port
+from driver_bench import (
+    find_free_port,
+    measure_machine_us,
+    read_cpu_s,
+    read_memory_mb,
+    start,
+    stop,
+    wait_for_port,
+)
 
 SETTLE_S = 5.0
 JOIN_TIMEOUT_S = 60.0

@@ -3,8 +3,8 @@
     rosrun hero_bringup fleet                  a table like top, redrawn in place
     rosrun hero_bringup fleet --once --json    the fleet as one line of JSON, for scripts
 
-Only listens, but for the key s: it calls /hero_driver/stop. Messages of robots are kept as bytes and read when
-the table is drawn, so that fifty robots cost little.
+Only listens, but for the keys s and d: they call /hero_driver/stop and /hero_driver/disconnect. Messages of robots are
+kept as bytes and read when the table is drawn, so that fifty robots cost little.
 """
 
 import argparse
@@ -23,6 +23,7 @@ from std_srvs.srv import SetBool
 
 from hero_examples.keyboard import Keyboard, NoTerminalError
 from hero_msgs.msg import Robot, RobotArray
+from hero_msgs.srv import Disconnect
 
 from .fleet_state import RobotRow, RobotTrack, find_missing, sort_rows
 from .fleet_table import format_json, format_table, format_title
@@ -38,7 +39,7 @@ LEAVE_SCREEN = "\x1b[?25h\x1b[?1049l"
 HOME = "\x1b[H"
 CLEAR_LINE_END = "\x1b[K"
 CLEAR_SCREEN_END = "\x1b[J"
-KEYS_HELP = "q ends   s stops all robots, or lets them go   o changes the order"
+KEYS_HELP = "q ends   s stops all robots, or lets them go   o order   up, down choose   d disconnects the chosen robot"
 
 
 class FleetListener:
@@ -111,6 +112,14 @@ def call_stop(stop: bool) -> None:
         rospy.logerr("the driver did not answer /hero_driver/stop: %s", error)
 
 
+def call_disconnect(robot: str, news: List[str]) -> None:
+    """Call the driver's disconnect service, and add what came of it to the news."""
+    try:
+        news.append(rospy.ServiceProxy("/hero_driver/disconnect", Disconnect)(robot).message)
+    except rospy.ServiceException as error:
+        news.append("%s is not disconnected: %s" % (robot, error))
+
+
 class Screen:
     """A terminal: the table in place, and keys."""
 
@@ -147,6 +156,9 @@ class FleetProgram:
         self._options = options
         self._fleet = FleetListener()
         self._order = options.sort
+        self._chosen: Optional[str] = None
+        self._asks_disconnect = False
+        self._news: List[str] = []
         self._start_s = time.monotonic()
         self._rows: List[RobotRow] = []
 
@@ -169,10 +181,49 @@ class FleetProgram:
                 ]
             ]
         title = format_title(self._rows, self._fleet.listening, self._fleet.stopped)
-        return [title[:width], *format_table(self._rows, width, max(2, height - 1))]
+        return [title[:width], *format_table(self._rows, width, max(2, height - 1), self._find_chosen())]
+
+    def _find_chosen(self) -> Optional[int]:
+        """Return the number of the chosen robot's row."""
+        names = [row.name for row in self._rows]
+        return names.index(self._chosen) if self._chosen in names else None
+
+    def _choose(self, step: int) -> None:
+        """Choose the next robot, or the one before."""
+        chosen = self._find_chosen()
+        if self._rows:
+            number = (0 if step > 0 else -1) if chosen is None else (chosen + step) % len(self._rows)
+            self._chosen = self._rows[number].name
+
+    def _disconnect(self) -> None:
+        """Disconnect the chosen robot at the second key in a row."""
+        if self._find_chosen() is None:
+            self._news = ["choose a robot first: up, down"]
+        elif not self._asks_disconnect:
+            self._asks_disconnect = True
+            self._news = ["d again disconnects %s" % self._chosen]
+            return
+        else:
+            self._news = ["disconnecting %s" % self._chosen]
+            threading.Thread(target=call_disconnect, args=(self._chosen, self._news), daemon=True).start()
+        self._asks_disconnect = False
+
+    def _press(self, key: str) -> None:
+        """Do what a key says."""
+        self._asks_disconnect = self._asks_disconnect and key == "d"
+        if key == "o":
+            self._order = ORDERS[(ORDERS.index(self._order) + 1) % len(ORDERS)]
+            self._news = ["order: %s" % self._order]
+        elif key == "s":
+            self._fleet.toggle_stop()
+        elif key in ("up", "down"):
+            self._choose(1 if key == "down" else -1)
+        elif key == "d":
+            self._disconnect()
 
     def print_fleet(self) -> None:
         """Print the fleet once, as lines or as JSON."""
+        self._chosen = None
         if self._options.json:
             print(format_json(self._rows, self._fleet.listening, self._fleet.stopped), flush=True)
         else:
@@ -216,14 +267,15 @@ class FleetProgram:
                 left_s = self._seconds_left()
                 ending = "" if left_s == float("inf") else "   ends in %.0f s" % left_s
                 table = self._make_lines(size.columns, size.lines - 2)
-                screen.draw([*table, "", (KEYS_HELP + ending)[: size.columns]])
+                last = "".join(self._news[-1:]) or KEYS_HELP + ending
+                screen.draw([*table, "", last[: size.columns]])
                 keys = screen.wait_for_keys(min(DRAW_PERIOD_S, left_s))
                 if keys is None or "q" in keys:
                     return
-                if "o" in keys:
-                    self._order = ORDERS[(ORDERS.index(self._order) + 1) % len(ORDERS)]
-                if "s" in keys:
-                    self._fleet.toggle_stop()
+                if keys:
+                    self._news = []
+                for key in keys:
+                    self._press(key)
 
     def check_expected(self) -> int:
         """Say which of the expected robots did not join or move, and return the exit code."""

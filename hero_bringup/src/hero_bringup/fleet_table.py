@@ -10,6 +10,7 @@ from typing import Any, Dict, List, Optional, Sequence
 from .fleet_state import Obstacle, Pose, RobotRow
 
 HEADINGS = ("ROBOT", "ADDRESS", "STATE", "ODOM", "FROM ROBOT", "POSE x y yaw", "WAY", "NEAREST", "")
+MARK, UNMARK = "\x1b[7m", "\x1b[27m"  # ECMA-48: the chosen row in reverse
 RIGHT_ALIGNED = {"ODOM", "FROM ROBOT", "POSE x y yaw", "WAY"}
 DIRECTIONS = ("ahead", "ahead left", "left", "behind left", "behind", "behind right", "right", "ahead right")
 
@@ -56,20 +57,28 @@ def format_cells(row: RobotRow) -> List[str]:
     ]
 
 
-def format_table(rows: Sequence[RobotRow], width: int, height: int) -> List[str]:
-    """Return heading and rows as lines of at most width characters and at most height lines."""
-    shown = list(rows)
+def format_table(
+    rows: Sequence[RobotRow], width: int, height: int, chosen: Optional[int] = None
+) -> List[str]:
+    """Return heading and rows as lines of at most width characters and at most height lines.
+
+    chosen: the number of the row that is marked, and always among those shown.
+    """
+    shown, first = list(rows), 0
     if len(shown) > height - 1:
-        shown = shown[: max(0, height - 2)]
+        count = max(0, height - 2)
+        first = 0 if chosen is None else min(max(0, chosen - count + 1), len(rows) - count)
+        shown = shown[first : first + count]
     table = [list(HEADINGS)] + [format_cells(row) for row in shown]
     widths = [max(len(cells[column]) for cells in table) for column in range(len(HEADINGS))]
     lines = []
-    for cells in table:
+    for number, cells in enumerate(table, first - 1):
         padded = [
             cell.rjust(size) if heading in RIGHT_ALIGNED else cell.ljust(size)
             for cell, size, heading in zip(cells, widths, HEADINGS)
         ]
-        lines.append("  ".join(padded).rstrip()[:width])
+        line = "  ".join(padded).rstrip()[:width]
+        lines.append(MARK + line.ljust(width) + UNMARK if number == chosen else line)
     if len(shown) < len(rows):
         lines.append(("... and %d more: make the terminal taller" % (len(rows) - len(shown)))[:width])
     return lines

@@ -6,7 +6,16 @@ import unittest
 from pathlib import Path
 
 import rostest
-from monitor_process import HOST, OTHER_HOST, TIMEOUT_S, UPGRADE, ask, end, start_monitor, wait_until_it_answers
+from monitor_process import (
+    HOST,
+    OTHER_HOST,
+    TIMEOUT_S,
+    UPGRADE,
+    ask,
+    end,
+    start_monitor,
+    wait_until_it_answers,
+)
 
 TOKEN = "correct-horse-battery-staple"
 

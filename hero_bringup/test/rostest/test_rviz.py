@@ -10,19 +10,21 @@ from pathlib import Path
 import numpy as np
 import rospy
 import rostest
-from geometry_msgs.msg import Twist
+from geometry_msgs.msg import PointStamped, PoseStamped, Twist
 from std_msgs.msg import ColorRGBA
 from swarm_watch import SwarmWatch, wait_for
 from virtual_screen import MISSING, VirtualScreen
 
-from hero_description.rviz_config import ABOVE_PIXELS_PER_M
+from hero_description.rviz_config import ABOVE_PIXELS_PER_M, GOAL_TOPIC, POINT_TOPIC
 
 TIMEOUT_S = 60.0
 NEAR_M = 0.015
 LIGHTS = {0: (1.0, 0.0, 0.0), 1: (0.0, 1.0, 0.0), 2: (0.0, 0.0, 1.0)}
 BRIGHT, DIM = 110, 60
 BLOB_PIXELS_MIN = 8
+SIDE_M = 1.6  # of the walls in square_arena.yaml
 WALL_SHARE = 0.6
+WALL_PIXELS = 4
 
 
 def find_blob(picture, colour):
@@ -38,15 +40,15 @@ def find_walls(picture, side_m):
     """Return the middle (right, down) of a square of grey walls, None if it is not there."""
     grey = (np.ptp(picture.astype(int), axis=2) < 12) & (picture.mean(axis=2) < 190) & (picture.mean(axis=2) > 60)
     length = side_m * ABOVE_PIXELS_PER_M
-    columns = np.flatnonzero(grey.sum(axis=0) > WALL_SHARE * length)
-    rows = np.flatnonzero(grey.sum(axis=1) > WALL_SHARE * length)
-    if not len(columns) or not len(rows):
-        return None
-    size = (columns[-1] - columns[0], rows[-1] - rows[0])
-    # Both walls, and not the edge of a panel.
-    if max(abs(size[0] - length), abs(size[1] - length)) > 8:
-        return None
-    return (columns[0] + columns[-1]) / 2.0, (rows[0] + rows[-1]) / 2.0
+    middle = []
+    for axis in (0, 1):
+        lines = np.flatnonzero(grey.sum(axis=axis) > WALL_SHARE * length)
+        # Edges of panels are grey lines, too; walls are two lines that are as far apart as they should be.
+        pairs = [(one + other) / 2.0 for one in lines for other in lines if abs(other - one - length) <= WALL_PIXELS]
+        if not pairs:
+            return None
+        middle.append(float(np.mean(pairs)))
+    return middle[0], middle[1]
 
 
 @unittest.skipIf(MISSING, "not installed: %s (script/bootstrap --test)" % ", ".join(MISSING))
@@ -82,14 +84,19 @@ class RvizTest(unittest.TestCase):
         """Return how far (m) each robot is drawn from where it is; None while not all is on the screen."""
         self.show_lights()
         self.picture = self.screen.read()
-        middle = find_walls(self.picture, side_m=1.6)
-        blobs = {robot_id: find_blob(self.picture, colour) for robot_id, colour in LIGHTS.items()}
-        if middle is None or None in blobs.values():
+        middle = find_walls(self.picture, side_m=SIDE_M)
+        if middle is None:
             return None
+        reach = int(SIDE_M / 2 * ABOVE_PIXELS_PER_M)
+        left, top = int(middle[0]) - reach, int(middle[1]) - reach
+        inside = self.picture[top : top + 2 * reach, left : left + 2 * reach]
         errors = {}
-        for robot_id, (right, down) in blobs.items():
-            x_m = (right - middle[0]) / ABOVE_PIXELS_PER_M
-            y_m = (middle[1] - down) / ABOVE_PIXELS_PER_M
+        for robot_id, colour in LIGHTS.items():
+            blob = find_blob(inside, colour)
+            if blob is None:
+                return None
+            x_m = (left + blob[0] - middle[0]) / ABOVE_PIXELS_PER_M
+            y_m = (middle[1] - top - blob[1]) / ABOVE_PIXELS_PER_M
             errors[robot_id] = float(np.hypot(*(np.array([x_m, y_m]) - self.watch.pose(robot_id)[:2])))
         return errors
 
@@ -123,6 +130,32 @@ class RvizTest(unittest.TestCase):
         wait_for(has_driven, TIMEOUT_S, "robot 0 to drive")
         drive.publish(Twist())
         self.wait_until_drawn_in_place("rviz_driven.png")
+
+    def test_a_click_on_a_robot_chooses_it_for_the_next_goal(self):
+        goals = {robot_id: [] for robot_id in LIGHTS}
+        for robot_id in LIGHTS:
+            rospy.Subscriber("/hero_%d/goal" % robot_id, PoseStamped, goals[robot_id].append, queue_size=5)
+        point = rospy.Publisher(POINT_TOPIC, PointStamped, queue_size=1)
+        goal = rospy.Publisher(GOAL_TOPIC, PoseStamped, queue_size=1)
+        clicked = PointStamped()
+        clicked.header.frame_id = "world"
+
+        def goes_to_the_chosen_one():
+            clicked.point.x, clicked.point.y, _ = self.watch.pose(2)
+            point.publish(clicked)
+            goal.publish(PoseStamped())
+            return goals[2]
+
+        wait_for(goes_to_the_chosen_one, TIMEOUT_S, "a goal for robot 2")
+        self.assertEqual(goals[1], [])
+
+        def send_until(count):
+            wait_for(lambda: goal.publish(PoseStamped()) or len(goals[2]) >= count, TIMEOUT_S, "more goals")
+
+        send_until(5)
+        first = len(goals[0])
+        send_until(10)
+        self.assertEqual(len(goals[0]), first)
 
 
 if __name__ == "__main__":

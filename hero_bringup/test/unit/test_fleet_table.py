@@ -25,6 +25,14 @@ def test_rows_that_do_not_fit_are_counted():
     assert lines[-2].startswith("hero_7 ")
 
 
+@pytest.mark.parametrize("chosen", [0, 25, 49])
+def test_the_chosen_row_is_marked_and_always_shown(chosen):
+    lines = format_table([make_row(robot_id) for robot_id in range(50)], 80, 10, chosen)
+    (marked,) = [line for line in lines if line.startswith("\x1b[7m")]
+    assert "hero_%d " % chosen in marked
+    assert len(lines) <= 10
+
+
 def test_columns_stand_below_their_headings():
     heading, *lines = format_table([make_row(0), make_row(100, pose=Pose(-12.0, 3.0, math.pi))], 200, 10)
     for line in lines:

@@ -13,6 +13,10 @@ import yaml
 COLOURS = ("230; 90; 30", "40; 120; 220", "40; 160; 80", "200; 60; 160", "220; 180; 30", "80; 180; 190")
 
 LIGHTS_TOPIC = "/hero_lights"
+# Between RViz and the node goal_choice.
+CHOICE_TOPIC = "/hero_choice/chosen"
+POINT_TOPIC = "/hero_choice/point"
+GOAL_TOPIC = "/hero_choice/goal"
 ABOVE_PIXELS_PER_M = 400
 
 
@@ -124,6 +128,7 @@ def make_config(names: Sequence[str], fixed_frame: str, view: str = "orbit") -> 
         },
         make_marker_display("arena (simulated)", "/hero_sim/arena"),
         make_marker_display("lights", LIGHTS_TOPIC),
+        make_marker_display("robot that goals are for", CHOICE_TOPIC),
     ]
     for index, name in enumerate(names):
         displays += make_robot_displays(name, COLOURS[index % len(COLOURS)])
@@ -135,12 +140,9 @@ def make_config(names: Sequence[str], fixed_frame: str, view: str = "orbit") -> 
             "Displays": [make_truth_display(name) for name in names],
         }
     )
-    # One tool for goals: the button says which robot it is for. go_to_goal of hero_examples takes the goals.
-    goals = [{"Class": "rviz/SetGoal", "Name": "goal %s" % name, "Topic": "/%s/goal" % name} for name in names]
     config = {
         "Panels": [
             {"Class": "rviz/Displays", "Name": "Displays"},
-            {"Class": "rviz/Tool Properties", "Name": "Tool Properties"},
             {"Class": "rviz/Views", "Name": "Views"},
         ],
         "Visualization Manager": {
@@ -156,7 +158,9 @@ def make_config(names: Sequence[str], fixed_frame: str, view: str = "orbit") -> 
                 {"Class": "rviz/Select"},
                 {"Class": "rviz/FocusCamera"},
                 {"Class": "rviz/Measure"},
-                *goals,
+                # A point on a robot chooses it, a goal is for the chosen one: see goal_choice.
+                {"Class": "rviz/PublishPoint", "Single click": True, "Topic": POINT_TOPIC},
+                {"Class": "rviz/SetGoal", "Topic": GOAL_TOPIC},
             ],
             "Views": {"Current": make_view(view)},
         },

@@ -438,10 +438,34 @@ class Gateway(LinkHandler):
         """Stop every robot and call then() when all have got it twice, or at deadline_s (monotonic)."""
         self.stopped = True
         self.halt_all()
+        self._await_halt(lambda: list(self.peers.values()), deadline_s, then)
 
+    def disconnect(self, namespace: str, deadline_s: float, then: Callable[[bool], None]) -> None:
+        """Stop one robot and close its connection, then say whether there was one; on the thread of the sockets.
+
+        The robot dials again by itself; deadline_s (monotonic): until then it may take to be stopped.
+        """
+        bridge = self.bridges.get(namespace)
+        peer = None if bridge is None else self._find_peer(bridge)
+        if bridge is None or peer is None:
+            then(False)
+            return
+        link = peer.link
+        bridge.halt()
+
+        def close() -> None:
+            if not link.closed:
+                link.close("disconnected on request")
+            then(True)
+
+        self._await_halt(lambda: [] if link.closed else [peer], deadline_s, close)
+
+    def _await_halt(
+        self, list_peers: Callable[[], List[Peer]], deadline_s: float, then: Callable[[], None]
+    ) -> None:
         def check() -> None:
             now_s = time.monotonic()
-            if now_s < deadline_s and not all(self._has_halted(peer) for peer in self.peers.values()):
+            if now_s < deadline_s and not all(map(self._has_halted, list_peers())):
                 self._loop.call_later(0.02, check)
             else:
                 self._loop.call_later(HALT_SETTLE_S, then)

@@ -15,6 +15,8 @@ import rospy
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, SetBoolResponse
 
+from hero_msgs.srv import Disconnect, DisconnectResponse
+
 from .config import ConfigError, DriverConfig, read_config
 from .gateway import Gateway
 from .log_relay import LogRelay, prepare_logging, tell_of_lost_log_lines
@@ -85,6 +87,7 @@ class DriverNode:
         self._stopped_publisher = rospy.Publisher("~stopped", Bool, queue_size=1, latch=True)
         self._stopped_publisher.publish(Bool(False))
         self._services.append(rospy.Service("~stop", SetBool, self._serve_stop))
+        self._services.append(rospy.Service("~disconnect", Disconnect, self._serve_disconnect))
         self._thread.start()
         self._master_watch.open()
         self._log.log("info", self._describe_start())
@@ -187,6 +190,19 @@ class DriverNode:
         text = "all robots are stopped and held" if request.data else "robots may move"
         self._log.log("warn", "%s (~stop)" % text)
         return SetBoolResponse(True, text)
+
+    def _serve_disconnect(self, request: Any) -> DisconnectResponse:
+        namespace = "/" + request.robot.strip("/")
+        done: queue.Queue[bool] = queue.Queue()
+        deadline_s = time.monotonic() + HALT_LIMIT_S
+        self._loop.call_soon(lambda: self._gateway.disconnect(namespace, deadline_s, done.put))
+        try:
+            was_there = done.get(timeout=HALT_LIMIT_S + 1.0)
+        except queue.Empty:
+            return DisconnectResponse(False, "the driver did not come to it")
+        if not was_there:
+            return DisconnectResponse(False, "%s is not connected" % namespace)
+        return DisconnectResponse(True, "%s is disconnected; it will dial again" % namespace)
 
 
 def main(argv: Optional[List[str]] = None) -> int:

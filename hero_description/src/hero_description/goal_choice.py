@@ -1,0 +1,108 @@
+"""RViz's tools "Publish Point" and "2D Nav Goal" -> goals for the robot that was clicked.
+
+RViz calls all its goal tools by one name, so one for each robot could not be told apart. Here a point on a robot
+chooses it, a disc below it shows that, and goals go to it, on /hero_N/goal. Who drives there is another program:
+go_to_goal of hero_examples.
+
+    rosrun hero_description goal_choice --robots 4
+"""
+
+import argparse
+import math
+import sys
+from typing import Dict, List, Optional
+
+import rospy
+import tf2_ros
+from geometry_msgs.msg import PointStamped, PoseStamped
+from std_msgs.msg import ColorRGBA
+from visualization_msgs.msg import Marker, MarkerArray
+
+from .dimensions import BODY_DIAMETER_M, GROUND_Z_M
+from .rviz_config import CHOICE_TOPIC, GOAL_TOPIC, POINT_TOPIC
+from .view import read_names
+
+LISTEN_S = 0.5
+"""How long it listens to /tf after a click: a swarm's /tf is too much to be read for nothing."""
+
+REACH_M = 0.15
+"""A click farther from a robot's middle is on none."""
+
+CHOSEN = ColorRGBA(0.05, 0.45, 0.95, 0.7)
+
+
+class GoalChoice:
+    """The chosen robot, and where goals go."""
+
+    def __init__(self, names: List[str]) -> None:
+        self._names = names
+        self._chosen = names[0]
+        self._publishers: Dict[str, rospy.Publisher] = {
+            name: rospy.Publisher("/%s/goal" % name, PoseStamped, queue_size=2) for name in names
+        }
+        self._markers = rospy.Publisher(CHOICE_TOPIC, MarkerArray, queue_size=2, latch=True)
+        rospy.Subscriber(POINT_TOPIC, PointStamped, self._receive_point, queue_size=2)
+        rospy.Subscriber(GOAL_TOPIC, PoseStamped, self._receive_goal, queue_size=2)
+        self._show()
+
+    def _receive_point(self, point: PointStamped) -> None:
+        nearest = self._find_nearest(point)
+        if nearest is None:
+            rospy.logwarn("no robot where you clicked; goals go to %s", self._chosen)
+            return
+        self._chosen = nearest
+        rospy.loginfo("goals go to %s", nearest)
+        self._show()
+
+    def _receive_goal(self, goal: PoseStamped) -> None:
+        publisher = self._publishers[self._chosen]
+        if not publisher.get_num_connections():
+            rospy.logwarn(
+                'nobody takes goals for %s: roslaunch hero_examples go_to_goal.launch robots:="%s"',
+                self._chosen,
+                self._chosen.rpartition("_")[2],
+            )
+        publisher.publish(goal)
+
+    def _find_nearest(self, point: PointStamped) -> Optional[str]:
+        """Return the robot at a point, None if there is none."""
+        buffer = tf2_ros.Buffer(debug=False)
+        listener = tf2_ros.TransformListener(buffer, queue_size=100, tcp_nodelay=True)
+        rospy.sleep(LISTEN_S)
+        listener.unregister()
+        distances_m = {}
+        for name in self._names:
+            try:
+                place = buffer.lookup_transform(point.header.frame_id, name + "/base_link", rospy.Time(0))
+            except tf2_ros.TransformException as error:
+                rospy.logdebug("where %s is, is not known: %s", name, error)
+                continue
+            there = place.transform.translation
+            distances_m[name] = math.hypot(there.x - point.point.x, there.y - point.point.y)
+        nearest = min(distances_m, key=lambda name: distances_m[name], default=None)
+        return nearest if nearest is not None and distances_m[nearest] < REACH_M else None
+
+    def _show(self) -> None:
+        disc = Marker(type=Marker.CYLINDER, ns="chosen", frame_locked=True, color=CHOSEN)
+        disc.header.frame_id = self._chosen + "/base_link"
+        disc.pose.position.z = GROUND_Z_M
+        disc.pose.orientation.w = 1.0
+        disc.scale.x = disc.scale.y = 1.5 * BODY_DIAMETER_M
+        disc.scale.z = 0.001
+        self._markers.publish(MarkerArray([disc]))
+
+
+def main() -> None:
+    """Run the node goal_choice."""
+    parser = argparse.ArgumentParser(
+        prog="goal_choice", description="RViz's goals, for the robot that was clicked."
+    )
+    parser.add_argument("--robots", default="1", help="a number (4: hero_0 to hero_3) or ids (0,2,5)")
+    options = parser.parse_args(rospy.myargv()[1:])
+    try:
+        names = read_names(options.robots)
+    except ValueError as error:
+        sys.exit("goal_choice: --robots %s: %s" % (options.robots, error))
+    rospy.init_node("goal_choice")
+    GoalChoice(names)
+    rospy.spin()
