@@ -38,12 +38,14 @@ class Client:
         self.ready = 0
 
     async def open(self, truth=False):
+        """Connect as a page does."""
         request = HTTPRequest("ws://%s/live" % self.url, headers={"Origin": "http://" + self.url})
         self.socket = await websocket_connect(request)
         await self.socket.write_message(json.dumps({"do": "look", "truth": truth}))
         self.reader = asyncio.ensure_future(self.read())
 
     async def read(self):
+        """Count until the end."""
         while True:
             text = await self.socket.read_message()
             if text is None:
@@ -55,6 +57,7 @@ class Client:
                 self.ready = sum(robot["state"] == "READY" and bool(robot["odom"]) for robot in robots)
 
     def close(self):
+        """Leave."""
         self.socket.close()
 
 

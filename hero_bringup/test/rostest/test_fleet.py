@@ -86,7 +86,7 @@ class FleetTest(unittest.TestCase):
 
     def test_in_a_terminal_it_draws_in_place_and_gives_the_terminal_back(self):
         leader, follower = pty.openpty()
-        fcntl.ioctl(follower, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 100, 0, 0))
+        fcntl.ioctl(follower, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 200, 0, 0))
         before = termios.tcgetattr(follower)
         process = subprocess.Popen(
             FLEET, stdin=follower, stdout=follower, stderr=follower, start_new_session=True
