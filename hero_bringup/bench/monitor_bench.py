@@ -73,8 +73,8 @@ async def measure(title, monitor, clients, seconds):
     frames = [client.frames / elapsed_s for client in clients]
     length = sum(client.length for client in clients) / elapsed_s / max(1, len(clients))
     updates = "%.1f" % min(frames) if frames else "-"
-    print("| %s | %.1f %% | %s | %.1f kB/s | %.0f MB |" % (title, cpu, updates, length / 1e3, read_memory_mb(monitor.pid)))
-    sys.stdout.flush()
+    memory_mb = read_memory_mb(monitor.pid)
+    print("| %s | %.1f %% | %s | %.1f kB/s | %.0f MB |" % (title, cpu, updates, length / 1e3, memory_mb), flush=True)
     return {"title": title, "cpu_percent": cpu, "updates_hz": frames, "bytes_per_s": length}
 
 

@@ -14,9 +14,9 @@ from . import log_lines, names
 from .admission import Admission, RateGuard
 from .cleaning import TRANSFORMS, CleaningSettings
 from .command_sender import CommandSender
-from .command_shaping import COMMAND_INTERVAL_S
 from .config import DriverConfig
 from .fleet import Decision, Fleet, RobotRecord, RobotState, Verdict
+from .halting import await_halt, halt_directly
 from .log_relay import LogRelay
 from .names import Identity
 from .robot_bridge import VELOCITY_SUFFIX, BridgeContext, RobotBridge
@@ -50,9 +50,6 @@ REBOOT_SLACK_S = 2.0
 """An uptime that implies a boot later than the known one by more than this is a reboot."""
 
 FLEET_POLL_S = 0.1
-
-HALT_SETTLE_S = 0.12
-"""After a robot's TCP has acknowledged a stop, its firmware may need two read cycles of 51 ms to take it."""
 
 
 class Gateway(LinkHandler):
@@ -438,7 +435,7 @@ class Gateway(LinkHandler):
         """Stop every robot and call then() when all have got it twice, or at deadline_s (monotonic)."""
         self.stopped = True
         self.halt_all()
-        self._await_halt(lambda: list(self.peers.values()), deadline_s, then)
+        await_halt(self._loop, lambda: list(self.peers.values()), deadline_s, then)
 
     def disconnect(self, namespace: str, deadline_s: float, then: Callable[[bool], None]) -> None:
         """Stop one robot and close its connection, then say whether there was one; on the thread of the sockets.
@@ -458,37 +455,11 @@ class Gateway(LinkHandler):
                 link.close("disconnected on request")
             then(True)
 
-        self._await_halt(lambda: [] if link.closed else [peer], deadline_s, close)
-
-    def _await_halt(
-        self, list_peers: Callable[[], List[Peer]], deadline_s: float, then: Callable[[], None]
-    ) -> None:
-        def check() -> None:
-            now_s = time.monotonic()
-            if now_s < deadline_s and not all(map(self._has_halted, list_peers())):
-                self._loop.call_later(0.02, check)
-            else:
-                self._loop.call_later(HALT_SETTLE_S, then)
-
-        check()
+        await_halt(self._loop, lambda: [] if link.closed else [peer], deadline_s, close)
 
     def halt_directly(self) -> None:
-        """Write stops to every robot past all queues, because the loop that empties them has broken.
-
-        Twice, as every stop, and once more: the first may come too soon after a motion.
-        """
-        for _ in range(3):
-            for peer in self.peers.values():
-                if peer.bridge is not None:
-                    for topic_id, payload in peer.bridge.encode_stops():
-                        peer.link.send_frame(peer.session.encode_message(topic_id, payload))
-            time.sleep(COMMAND_INTERVAL_S)
-
-    @staticmethod
-    def _has_halted(peer: Peer) -> bool:
-        if peer.bridge is None:
-            return True
-        return peer.bridge.commands.is_idle and peer.link.read_unacknowledged_length() == 0
+        """Write stops past all queues, because the loop that empties them has broken."""
+        halt_directly(list(self.peers.values()))
 
     def _poll_fleet(self) -> None:
         self._loop.call_later(FLEET_POLL_S, self._poll_fleet)
