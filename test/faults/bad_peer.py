@@ -34,6 +34,12 @@ def declare_topic(frame_id, topic_id, name, message_type, md5sum):
     return frames.encode_frame(frame_id, payloads.encode_topic_info(info))
 
 
+def make_burst(number):
+    """Return the frames of one burst of robot number, stamped now: odom, five transforms, encoder."""
+    stamp = struct.pack("<II", int(time.time()), 0)
+    return [bytes(frame) for frame in emulated_swarm.Templates(number).make_burst(10**6, stamp)]
+
+
 class Peer:
     """Connections from one address until end()."""
 
@@ -190,7 +196,7 @@ def renames(peer):
 
 def claims_an_id(peer):
     """Says that it is another robot, and sends that robot's messages."""
-    burst = emulated_swarm.Templates(peer.victim).make_burst(10**6, struct.pack("<II", 1, 1))
+    burst = b"".join(make_burst(peer.victim))
     peer.flood(emulated_swarm.declare(peer.victim), repeat_piece(burst), pause_s=0.01)
 
 
@@ -203,19 +209,14 @@ def claims_topics(peer):
     foreign += declare_topic(
         1, 120, victim + "/velocity_controller/cmd_vel", twist, emulated_swarm.MD5[twist]
     )
-    odom = struct.pack("<III", 10**6, 1, 1) + emulated_swarm.Templates(peer.victim).odom_tail
+    odom = make_burst(peer.victim)[0][frames.HEADER_LENGTH : -1]
     pieces = frames.encode_frame(140, odom) + frames.encode_frame(141, odom)
     peer.flood(emulated_swarm.declare(OWN_NUMBER) + foreign, repeat_piece(pieces), pause_s=0.001)
 
 
 def foreign_transforms(peer):
     """Sends transforms of another robot's frames."""
-    # One transform with sequence number 0, stamped now.
-    head = struct.pack("<IIII", 1, 0, int(time.time()), 0)
-    piece = b"".join(
-        frames.encode_frame(emulated_swarm.TRANSFORMS, head + tail)
-        for tail in emulated_swarm.Templates(peer.victim).transform_tails
-    )
+    piece = b"".join(make_burst(peer.victim)[1:6])
     peer.flood(emulated_swarm.declare(OWN_NUMBER), repeat_piece(piece), pause_s=0.002)
 
 

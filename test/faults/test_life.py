@@ -1,0 +1,148 @@
+"""Thousands of reconnects and power cuts: what the driver holds is the same at the end."""
+
+import struct
+
+import emulated_swarm
+import rosgraph
+from driver_case import list_driver_topics
+from fake_robot import FakeRobot
+from life_signs import Life
+from rig import count_holdings, wait_until
+
+from hero_msgs.msg import Robot
+
+SWARM = 10
+MEMORY_GROWTH_KB = 3000
+"""Pages that Python has got and keeps; what leaks with each of hundreds of returns would be more."""
+
+
+class Swarm:
+    """Robots whose connections end as a test likes; they say what emulated robots say."""
+
+    def __init__(self, driver, first=100):
+        self._address = driver.address
+        self._numbers = range(first, first + SWARM)
+        self._links = []
+
+    def join(self):
+        """Dial, declare, wait for the answer to the first time request, and send one burst."""
+        links = [emulated_swarm.EmulatedRobot(number, self._address, nagle=False) for number in self._numbers]
+        for link in links:
+            link.socket.setblocking(True)
+            link.socket.settimeout(20.0)
+            while link.synchronised_s is None and not link.closed:
+                link.receive(1.0)
+            assert not link.closed, link.number
+            link.send_burst(link.templates.make_burst(0, struct.pack("<II", 1, 0)))
+        old, self._links = self._links, links
+        return old
+
+    def leave(self):
+        """Hang up, as robots do that change the network."""
+        for link in self._links:
+            link.socket.close()
+        self._links = []
+
+    def cut_power(self):
+        """Come again without ever having hung up; the driver ends the old connections, of which nothing comes."""
+        for link in self.join():
+            while not link.closed:
+                link.receive(1.0)
+            link.socket.close()
+
+
+def count_states(driver):
+    return sum(robot.state == Robot.READY for robot in driver.fleet.newest.robots)
+
+
+def run_rounds(driver, rounds, act):
+    """Do act() in rounds; return what the driver held after the first ones and after the last."""
+    warm_up = max(3, rounds // 10)
+    for _ in range(warm_up):
+        act()
+    wait_until(lambda: is_settled(driver), "the topics of all robots")
+    before = count_holdings(driver)
+    for _ in range(rounds - warm_up):
+        act()
+    wait_until(lambda: is_settled(driver), "the topics of all robots")
+
+    def is_flat():
+        now = count_holdings(driver)
+        return now.threads <= before.threads and now.files <= before.files + SWARM
+
+    wait_until(is_flat, lambda: count_holdings(driver).describe_growth(before))
+    return before, count_holdings(driver)
+
+
+def is_settled(driver):
+    """Return whether the master knows the topics of each robot of a swarm, and the driver has no more to say."""
+    return sum(name.startswith("/hero_1") for name in list_all(driver)) == 11 * SWARM + 18
+
+
+def judge(record, fault, count, before, after):
+    """Write the row; the figures must be flat."""
+    assert after.registrations == before.registrations, after.describe_growth(before)
+    assert after.memory_kb <= before.memory_kb + MEMORY_GROWTH_KB, after.describe_growth(before)
+    record(
+        fault,
+        count,
+        count,
+        "nothing; from %d MB: %s" % (before.memory_kb / 1000, after.describe_growth(before)),
+    )
+
+
+def test_reconnects_leave_nothing_behind(start_driver, effort, record):
+    driver = start_driver(parameters={"grace_s": 3600.0})
+    witness = FakeRobot(1).connect(driver.address)
+    life = Life(driver, witness)
+    swarm = Swarm(driver)
+    rounds = effort.choose(300, 10000) // SWARM
+
+    def act():
+        swarm.join()
+        swarm.leave()
+
+    before, after = run_rounds(driver, rounds, act)
+    life.show(10)
+    judge(record, "reconnects (FIN), %d robots at a time" % SWARM, rounds * SWARM, before, after)
+    witness.close()
+
+
+def test_power_cuts_leave_nothing_behind(start_driver, effort, record):
+    driver = start_driver(parameters={"grace_s": 3600.0})
+    witness = FakeRobot(1).connect(driver.address)
+    life = Life(driver, witness)
+    swarm = Swarm(driver)
+    rounds = effort.choose(20, 1000)
+    before, after = run_rounds(driver, rounds, swarm.cut_power)
+    wait_until(lambda: count_states(driver) == SWARM + 1, "all robots to be ready")
+    life.show(10)
+    judge(record, "power cuts (no FIN) of a swarm of %d" % SWARM, rounds, before, after)
+    swarm.leave()
+    witness.close()
+
+
+def test_robots_that_leave_for_good_leave_nothing_behind(start_driver, effort, record):
+    driver = start_driver(parameters={"grace_s": 0.0})
+    rounds = effort.choose(3, 100)
+
+    def act():
+        swarm = Swarm(driver)
+        swarm.join()
+        wait_until(lambda: list_driver_topics("/hero_109", driver.node), "topics of the last one")
+        swarm.leave()
+        wait_until(lambda: not any("/hero_" in name for name in list_all(driver)), "all topics to be gone")
+
+    act()
+    before = count_holdings(driver)
+    for _ in range(rounds):
+        act()
+    after = count_holdings(driver)
+    assert after.files <= before.files and after.threads <= before.threads, after.describe_growth(before)
+    judge(record, "robots that leave for good", rounds * SWARM, before, after)
+
+
+def list_all(driver):
+    """Return all topics and services of a driver."""
+    state = rosgraph.Master("/faults").getSystemState()
+    return [name for part in state for name, nodes in part if driver.node in nodes]
