@@ -1,0 +1,167 @@
+"""One robot on its topics and services, as a calibration needs it: raw readings, raw commands. Knows topics only.
+
+Readings are kept with the robot's stamps, which do not suffer from the network.
+"""
+
+import threading
+import time
+from collections import deque
+from typing import Any, Deque, List, NamedTuple, Optional, Tuple
+
+import numpy as np
+import rospy
+from geometry_msgs.msg import Twist
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import LaserScan
+
+from hero_examples.readings import yaw_of
+from hero_msgs.msg import Encoder, Motor
+
+from .errors import CalibrationError
+from .infrared import BEAMS, read_signals
+
+KEPT_READINGS = 4000
+"""Two minutes of encoder readings."""
+
+STALE_S = 1.5
+"""Wall time; encoder readings come 29 times a second, scans 5 times."""
+
+SERVICE_WAIT_S = 5.0
+
+
+class Place(NamedTuple):
+    """Where a robot is by its odometry."""
+
+    x_m: float
+    y_m: float
+    yaw_rad: float
+
+
+class Probe:
+    """One robot.
+
+    Attributes:
+        robot_id, name: 3, "hero_3".
+        failure: why it takes no further part, in words; None while it does.
+    """
+
+    def __init__(self, robot_id: int) -> None:
+        """Connect to the topics of /hero_{robot_id}."""
+        self.robot_id = robot_id
+        self.name = "hero_%d" % robot_id
+        self.failure: Optional[str] = None
+        self._lock = threading.Lock()
+        self._encoder: Deque[Tuple[float, float, float]] = deque(maxlen=KEPT_READINGS)
+        self._scans: Deque[Tuple[List[float], List[float]]] = deque(maxlen=200)
+        self._place: Optional[Place] = None
+        self._heard_s = {"encoder": 0.0, "laser": 0.0, "odom": 0.0}
+        self._velocity = self._advertise("velocity_controller/cmd_vel", Twist)
+        self._position = self._advertise("position_controller/cmd_vel", Twist)
+        self._motors = self._advertise("cmd_motor", Motor)
+        for topic, kind, receive in (
+            ("encoder", Encoder, self._receive_encoder),
+            ("laser", LaserScan, self._receive_scan),
+            ("odom", Odometry, self._receive_odometry),
+        ):
+            rospy.Subscriber("/%s/%s" % (self.name, topic), kind, receive, queue_size=20, tcp_nodelay=True)
+
+    def _advertise(self, topic: str, kind: Any) -> rospy.Publisher:
+        return rospy.Publisher("/%s/%s" % (self.name, topic), kind, queue_size=2, tcp_nodelay=True)
+
+    # -- what comes in (threads of rospy) ------------------------------------------------------------------
+
+    def _receive_encoder(self, message: Encoder) -> None:
+        with self._lock:
+            self._heard_s["encoder"] = time.monotonic()
+            self._encoder.append((message.header.stamp.to_sec(), message.left_ticks, message.right_ticks))
+
+    def _receive_scan(self, message: LaserScan) -> None:
+        with self._lock:
+            self._heard_s["laser"] = time.monotonic()
+            self._scans.append((read_signals(message.intensities), read_signals(message.ranges)))
+
+    def _receive_odometry(self, message: Odometry) -> None:
+        pose = message.pose.pose
+        with self._lock:
+            self._heard_s["odom"] = time.monotonic()
+            self._place = Place(pose.position.x, pose.position.y, yaw_of(pose.orientation))
+
+    # -- what was seen -------------------------------------------------------------------------------------
+
+    def find_silence(self) -> Optional[str]:
+        """Return what is missing of the robot, in words; None if all comes in."""
+        for topic, heard_s in sorted(self._heard_s.items()):
+            if time.monotonic() - heard_s > STALE_S:
+                return "nothing comes on /%s/%s: is the robot on and in reach?" % (self.name, topic)
+        for publisher in (self._motors, self._velocity, self._position):
+            if not publisher.get_num_connections():
+                return "nobody takes %s: does the driver run?" % publisher.name
+        return None
+
+    def read_wheels(self) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return stamps (s) and ticks of the left and right wheel, those of the last minutes."""
+        with self._lock:
+            table = np.array(self._encoder).reshape(-1, 3)
+        # After a restart of the robot or a jump of its clock a stamp may be older than the one before.
+        newest_first = np.maximum.accumulate(table[:, 0])
+        kept = np.concatenate(([True], table[1:, 0] > newest_first[:-1])) if len(table) else slice(None)
+        return table[kept, 0], table[kept, 1], table[kept, 2]
+
+    def forget_scans(self) -> None:
+        """Begin to collect scans anew."""
+        with self._lock:
+            self._scans.clear()
+
+    def count_scans(self) -> int:
+        """Return how many scans came since forget_scans()."""
+        with self._lock:
+            return len(self._scans)
+
+    def read_scans(self) -> Tuple[np.ndarray, np.ndarray]:
+        """Return means of the eight readings (counts) and ranges (m) since forget_scans().
+
+        Raises: CalibrationError if there were none.
+        """
+        with self._lock:
+            scans = list(self._scans)
+        if not scans or any(len(values) != BEAMS for scan in scans for values in scan):
+            raise CalibrationError("no infrared readings came on /%s/laser" % self.name)
+        signals, ranges_m = np.array(scans).transpose(1, 0, 2)
+        return signals.mean(axis=0), ranges_m.mean(axis=0)
+
+    def read_place(self) -> Place:
+        """Return the newest pose. Raises: CalibrationError if none came lately."""
+        with self._lock:
+            place, heard_s = self._place, self._heard_s["odom"]
+        if place is None or time.monotonic() - heard_s > STALE_S:
+            raise CalibrationError("nothing comes on /%s/odom any more: has the robot gone?" % self.name)
+        return place
+
+    # -- what it is told -----------------------------------------------------------------------------------
+
+    def drive(self, turn_rad_s: float) -> None:
+        """Turn on the spot with this speed, 0 stops; under the velocity controller."""
+        twist = Twist()
+        twist.angular.z = turn_rad_s
+        self._velocity.publish(twist)
+
+    def turn(self, angle_rad: float) -> None:
+        """Turn by an angle: the position controller goes as far as the speed reaches in a second."""
+        twist = Twist()
+        twist.angular.z = angle_rad
+        self._position.publish(twist)
+
+    def push(self, pulse_us: int) -> None:
+        """Give both servos a pulse."""
+        self._motors.publish(Motor(pulse_us, pulse_us))
+
+    def call(self, service: str, kind: Any, *values: float) -> None:
+        """Call a service of the robot. Raises: CalibrationError with the reason if it fails."""
+        name = "/%s/%s" % (self.name, service)
+        try:
+            rospy.wait_for_service(name, SERVICE_WAIT_S)
+            answer = rospy.ServiceProxy(name, kind)(*values)
+        except (rospy.ServiceException, rospy.ROSException) as error:
+            raise CalibrationError("%s: %s" % (name, " ".join(str(error).split()))) from error
+        if not answer.success:
+            raise CalibrationError("%s: the robot says: %s" % (name, answer.message))
