@@ -38,8 +38,8 @@ SCANS_TO_LOOK = 5
 
 ROOM = "Place the robots on the floor with 20 cm of room around each: they will turn on the spot."
 WALL = (
-    "Place each robot with its front straight before a flat white wall, 10 cm between wall and body, 40 cm between robots: "
-    "they will turn on the spot, twice."
+    "Place each robot with its front straight before a flat white wall, 10 cm between wall and body, 40 cm between "
+    "robots: they will turn on the spot, twice."
 )
 
 
@@ -212,7 +212,7 @@ class Calibration:
                     for responses in (velocity.before, velocity.after)
                 ]
                 lines.append(
-                    "  velocity  %.0f %% off before, %.0f %% after; 90 %% of the speed after %.2f s before, %.2f s after"
+                    "  velocity  off by %.0f %% before, %.0f %% after; 90 %% reached in %.2f s before, %.2f s after"
                     % (
                         100.0 * VelocityResult.mean_error(velocity.before),
                         100.0 * VelocityResult.mean_error(velocity.after),

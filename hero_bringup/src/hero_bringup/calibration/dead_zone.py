@@ -20,8 +20,9 @@ STEP_US = 6
 STANDING_M_S = 0.004
 """Slower than this a wheel stands: two ticks (1.1 mm) in a step may be the servo that settles."""
 
-FIT_POINTS = 4
-"""So many speeds beyond the dead zone give its edge; nearer ones say more, one alone too little."""
+FIT_POINTS = 6
+LEAST_POINTS = 3
+"""So many speeds beyond the dead zone give its edge; further ones say less of it, fewer are lost in noise."""
 
 WIDEST_US = 200.0
 
@@ -63,7 +64,7 @@ def find_dead_zone(pulses_us: Sequence[float], speeds_m_s: Sequence[float]) -> D
     rising = np.polyfit(pulses, speeds, 1)[0] > 0.0
     ahead = speeds if rising else -speeds
     below, above = np.flatnonzero(ahead < -STANDING_M_S), np.flatnonzero(ahead > STANDING_M_S)
-    if len(below) < FIT_POINTS or len(above) < FIT_POINTS or below[-1] >= above[0]:
+    if min(len(below), len(above)) < LEAST_POINTS or below[-1] >= above[0]:
         raise CalibrationError(
             "does not stand between turning one way and the other at pulses from %s: is it blocked, or its servo worn?"
             % span

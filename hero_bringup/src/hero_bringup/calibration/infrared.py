@@ -29,6 +29,10 @@ NEAR_COUNTS = 16.0
 WALL_COUNTS = (22.0, 110.0)
 """What a sensor may read of a wall at 10 cm: 42 is usual."""
 
+FAINT_COUNTS = 0.5
+NO_WALL_COUNTS = 4.0
+"""A neighbour that looks at the wall from 45 degrees reads 12; of two that see less than this none does."""
+
 LARGEST_TURN_RAD = math.radians(12.0)
 PLAUSIBLE_COUNTS_M2 = (0.15, 1.2)
 
@@ -80,8 +84,9 @@ def estimate_turn_rad(facing: Facing) -> float:
 
     Raises: CalibrationError if they see nothing or it is turned too far.
     """
-    left, right = facing.counts[(facing.sensor + 1) % BEAMS], facing.counts[(facing.sensor - 1) % BEAMS]
-    if min(left, right) < 2.0:
+    neighbours = ((facing.sensor + 1) % BEAMS, (facing.sensor - 1) % BEAMS)
+    left, right = (max(facing.counts[index], FAINT_COUNTS) for index in neighbours)
+    if max(left, right) <= NO_WALL_COUNTS:
         raise CalibrationError(
             "the sensors beside the one that looks %s see no wall: is it wider than 30 cm, and white?"
             % name_beam(facing.sensor)

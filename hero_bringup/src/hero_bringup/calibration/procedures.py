@@ -40,6 +40,8 @@ TURN_REACHED_RAD = math.radians(1.5)
 TURN_TOLERANCE_RAD = math.radians(10.0)
 SCAN_TIMEOUT_S = 15.0
 
+TRIES = 2
+
 Report = Callable[[str], None]
 
 
@@ -115,9 +117,11 @@ class Session:
             if not self._program.sleep(min(left_s, POLL_S)):
                 raise EndedError
 
-    def each(self, step: str, work: Callable[[Probe], None]) -> None:
-        """Do work for every active robot, side by side; a CalibrationError fails that robot alone."""
-        probes = self.active
+    def each(
+        self, step: str, work: Callable[[Probe], None], probes: Optional[Sequence[Probe]] = None
+    ) -> None:
+        """Do work for robots, side by side; a CalibrationError fails that robot alone. None: for all active ones."""
+        probes = self.active if probes is None else probes
         if not probes:
             return
 
@@ -133,6 +137,32 @@ class Session:
             if probe.failure is not None:
                 probe.drive(0.0)
                 self._report("%s failed: %s" % (probe.name, probe.failure))
+
+    def repeat(
+        self, step: str, move: Callable[[Sequence[Probe]], None], judge: Callable[[Probe], None]
+    ) -> None:
+        """Let robots move and judge what was seen; who cannot be judged has other tries, then fails.
+
+        Wi-Fi stands still for a second now and then, and takes readings and commands with it.
+        """
+        waiting = self.active
+        for attempt in range(TRIES):
+            again: List[Probe] = []
+
+            def try_judging(probe: Probe, attempt: int = attempt, again: List[Probe] = again) -> None:
+                try:
+                    judge(probe)
+                except CalibrationError as error:
+                    if attempt + 1 == TRIES or probe.find_silence():
+                        raise
+                    self._report("%s once more: %s: %s" % (probe.name, step, error))
+                    again.append(probe)
+
+            move(waiting)
+            self.each(step, try_judging, waiting)
+            waiting = again
+            if not waiting:
+                return
 
     def stop(self) -> None:
         """Stop all robots, also those that failed; works also while the program ends."""
@@ -153,14 +183,17 @@ class Session:
     def calibrate_motors(self) -> Dict[int, MotorResult]:
         """Find the dead zones of all servos and write their centres; return what was found, by robot."""
         pulses_us = dead_zone.list_pulses()
-        begins_s = []
-        for pulse_us in pulses_us:
-            for probe in self.active:
-                probe.push(pulse_us)
-            begins_s.append(rospy.get_time())
-            self.pause(PULSE_S)
-        self.rest()
+        begins_s: List[float] = []
         results: Dict[int, MotorResult] = {}
+
+        def climb(probes: Sequence[Probe]) -> None:
+            begins_s.clear()
+            for pulse_us in pulses_us:
+                for probe in probes:
+                    probe.push(pulse_us)
+                begins_s.append(rospy.get_time())
+                self.pause(PULSE_S)
+            self.rest()
 
         def judge(probe: Probe) -> None:
             speeds = measure_stairs(probe, begins_s)
@@ -174,7 +207,7 @@ class Session:
             probe.call("motors_parameters", SetMotor, *result.centres_us)
             results[probe.robot_id] = result
 
-        self.each("motors", judge)
+        self.repeat("motors", climb, judge)
         return results
 
     # -- velocity ------------------------------------------------------------------------------------------
@@ -211,31 +244,35 @@ class Session:
 
     def _test_velocity(self) -> Dict[int, List[speed_response.Response]]:
         """Turn all robots to the left and to the right; return the responses of both wheels, by robot."""
-        begins_s = []
-        for side in (1.0, -1.0):
-            self.rest()
-            begins_s.append(rospy.get_time())
-            while rospy.get_time() < begins_s[-1] + speed_response.STEP_S:
-                for probe in self.active:
-                    probe.drive(side * speed_response.TURN_RAD_S)
-                self.pause(COMMAND_PERIOD_S)
-        self.rest()
+        begins_s: List[float] = []
         responses: Dict[int, List[speed_response.Response]] = {}
+
+        def turn(probes: Sequence[Probe]) -> None:
+            begins_s.clear()
+            for side in (1.0, -1.0):
+                self.rest()
+                begins_s.append(rospy.get_time())
+                while rospy.get_time() < begins_s[-1] + speed_response.STEP_S:
+                    for probe in probes:
+                        probe.drive(side * speed_response.TURN_RAD_S)
+                    self.pause(COMMAND_PERIOD_S)
+            self.rest()
 
         def judge(probe: Probe) -> None:
             stamps_s, *ticks = probe.read_wheels()
+            starts_s = [speed_response.find_start(stamps_s, *ticks, begin_s) for begin_s in begins_s]
             # Turning to the left, the left wheel goes back and the right one ahead.
             responses[probe.robot_id] = [
                 speed_response.judge(
                     [
-                        speed_response.measure_speed(stamps_s, ahead * wheel_ticks, begin_s)
-                        for begin_s, ahead in zip(begins_s, signs)
+                        speed_response.measure_speed(stamps_s, ahead * wheel_ticks, start_s)
+                        for start_s, ahead in zip(starts_s, signs)
                     ]
                 )
                 for wheel_ticks, signs in zip(ticks, ((-1.0, 1.0), (1.0, -1.0)))
             ]
 
-        self.each("velocity", judge)
+        self.repeat("velocity", turn, judge)
         return responses
 
     # -- infrared ------------------------------------------------------------------------------------------
@@ -333,7 +370,7 @@ class Session:
             probe.read_place()
             if abs(left_rad) > TURN_TOLERANCE_RAD:
                 raise CalibrationError(
-                    "could not turn on the spot: %.0f degrees are missing; calibrate its motors first, or free its wheels"
+                    "could not turn on the spot: %.0f degrees are missing; calibrate its motors, or free its wheels"
                     % abs(math.degrees(left_rad))
                 )
 

@@ -1,0 +1,228 @@
+"""Dead zones, responses, infrared constants and files of robots whose true values are known."""
+
+import math
+
+import numpy as np
+import pytest
+import yaml
+
+from hero_bringup.calibration import calibrate, dead_zone, infrared, speed_response, store
+from hero_bringup.calibration.errors import CalibrationError
+from hero_bringup.calibration.infrared import BODY_RADIUS_M, Facing
+
+
+def servo_speeds(pulses_us, centre_us, zone_us=30.0, gain=1.0, sign=1.0, noise_m_s=0.0, seed=0):
+    """Speeds of a servo, as ticks in a step of 0.25 s show them."""
+    beyond = np.asarray(pulses_us, dtype=float) - centre_us
+    speeds = np.sign(beyond) * np.maximum(np.abs(beyond) - zone_us, 0.0) * gain * 0.25 / 220.0
+    speeds = speeds + np.random.RandomState(seed).normal(0.0, 1.0, len(speeds)) * noise_m_s * (speeds != 0.0)
+    tick_m_s = speed_response.TICK_M / 0.25
+    return sign * np.round(speeds / tick_m_s) * tick_m_s
+
+
+class TestDeadZone:
+    @pytest.mark.parametrize("sign", [1.0, -1.0])
+    @pytest.mark.parametrize("centre_us", [1440.0, 1478.5, 1500.0, 1533.0, 1560.0])
+    def test_the_centre_is_found_to_3_us_whichever_way_the_servo_is_mounted(self, centre_us, sign):
+        pulses_us = dead_zone.list_pulses()
+        zone = dead_zone.find_dead_zone(
+            pulses_us, servo_speeds(pulses_us, centre_us, sign=sign, noise_m_s=0.001)
+        )
+        assert zone.centre_us == pytest.approx(centre_us, abs=3.0)
+        assert zone.high_us - zone.low_us == pytest.approx(60.0, abs=6.0)
+
+    def test_the_slope_of_the_servo_is_found(self):
+        pulses_us = dead_zone.list_pulses()
+        zone = dead_zone.find_dead_zone(pulses_us, servo_speeds(pulses_us, 1500.0, gain=0.8))
+        assert zone.gain_m_s_us == pytest.approx(0.8 * 0.25 / 220.0, rel=0.15)
+
+    @pytest.mark.parametrize(
+        ("speeds", "words"),
+        [
+            (lambda pulses: servo_speeds(pulses, 1500.0) * 0.0, "does not turn at any pulse.*plugged in"),
+            (lambda pulses: servo_speeds(pulses, 1650.0), "does not stand between"),
+            (lambda pulses: np.maximum(servo_speeds(pulses, 1500.0), 0.0), "does not stand between"),
+        ],
+    )
+    def test_a_wheel_that_cannot_be_judged_is_refused_with_the_reason(self, speeds, words):
+        pulses_us = dead_zone.list_pulses()
+        with pytest.raises(CalibrationError, match=words):
+            dead_zone.find_dead_zone(pulses_us, speeds(pulses_us))
+
+
+def drive_wheel(lag_s, steady=1.0, delay_s=0.05):
+    """Stamps and ticks of a wheel that gets a command at 10 s."""
+    stamps_s = np.arange(9.0, 12.0, 0.034)
+    since_s = np.maximum(stamps_s - 10.0 - delay_s, 0.0)
+    way_m = steady * speed_response.STEP_M_S * (since_s - lag_s * (1.0 - np.exp(-since_s / lag_s)))
+    return stamps_s, np.floor(way_m / speed_response.TICK_M)
+
+
+class TestSpeedResponse:
+    def test_a_quick_wheel_is_better_than_a_slow_one_and_both_are_told_in_numbers(self):
+        quick, slow = (
+            speed_response.judge([speed_response.measure_speed(*drive_wheel(lag_s), 10.05)] * 2)
+            for lag_s in (0.1, 0.4)
+        )
+        assert quick.score < slow.score
+        assert quick.mean_error == pytest.approx(0.1 / 1.4, abs=0.05)
+        assert slow.mean_error == pytest.approx(0.4 / 1.4, abs=0.06)
+        assert quick.reached_s == pytest.approx(0.23, abs=0.1)
+        assert abs(quick.steady_error) < 0.05
+
+    def test_a_wheel_that_stays_too_slow_shows_it(self):
+        response = speed_response.judge([speed_response.measure_speed(*drive_wheel(0.05, steady=0.8), 10.05)])
+        assert response.steady_error == pytest.approx(-0.2, abs=0.04)
+        assert response.reached_s == speed_response.STEP_S
+
+    def test_a_late_command_is_no_fault_of_the_wheel(self):
+        stamps_s, ticks = drive_wheel(0.1, delay_s=0.3)
+        start_s = speed_response.find_start(stamps_s, ticks, ticks, 10.0)
+        assert start_s == pytest.approx(10.3, abs=0.08)
+        standing = np.zeros(len(stamps_s))
+        assert speed_response.find_start(stamps_s, standing, standing, 10.0) == 10.0
+
+    def test_too_few_readings_are_refused(self):
+        stamps_s, ticks = drive_wheel(0.1)
+        with pytest.raises(CalibrationError, match="encoder readings came"):
+            speed_response.measure_speed(stamps_s[::5], ticks[::5], 10.0)
+        with pytest.raises(CalibrationError, match="encoder readings came"):
+            speed_response.measure_speed(stamps_s[:55], ticks[:55], 10.0)
+
+    def test_the_search_ends_with_the_best_gains_and_keeps_them_in_range(self):
+        search = speed_response.GainSearch(servo_gain_m_s_us=1e-9)
+
+        def respond(gains):
+            error = abs(gains[0] - 1300.0) / 5000.0 + abs(gains[1] - 12000.0) / 50000.0
+            return speed_response.Response(error, 0.0, 0.3, 0.0, ())
+
+        tried = []
+        for _ in range(speed_response.GainSearch.count_rounds()):
+            tried.append(search.next_gains())
+            search.receive(respond(tried[-1]))
+        assert tried[0] == speed_response.DEFAULT_GAINS
+        assert search.best()[0] == min(tried, key=lambda gains: respond(gains).score)
+        assert all(0.0 <= gain <= speed_response.HIGHEST_GAIN for gains in tried for gain in gains)
+
+
+def look(alphas, sensor, askew_rad=0.0, moved_m=0.0):
+    """What a robot sees of a wall with one sensor turned to it, by the published model."""
+    wall_m = infrared.WALL_M + BODY_RADIUS_M - moved_m
+    counts = []
+    for index in range(infrared.BEAMS):
+        angle_rad = math.remainder((index - sensor) * infrared.BEAM_STEP_RAD + askew_rad, 2.0 * math.pi)
+        sees = abs(angle_rad) < 1.2
+        counts.append(alphas[index] * infrared.expected_brightness(angle_rad, wall_m) - 0.93 if sees else 0.5)
+    ranges_m = [BODY_RADIUS_M + math.sqrt(0.5 / max(count, 0.1)) for count in counts]
+    return Facing(sensor, counts, ranges_m, moved_m)
+
+
+class TestInfrared:
+    ALPHAS = (0.39, 0.42, 0.44, 0.36, 0.42, 0.46, 0.40, 0.43)
+
+    def test_all_constants_are_found_to_3_percent_even_if_the_robot_is_a_little_askew_and_drifts(self):
+        askew_rad = [math.radians(angle) for angle in (0, 3, -4, 5, -2, 0, 4, -5)]
+        facings = [
+            look(self.ALPHAS, (4 - step) % 8, askew_rad[step], moved_m=0.001 * (step - 3))
+            for step in range(8)
+        ]
+        found = infrared.compute_calibration(facings)
+        # What the firmware needs holds the offset of the signal at 10 cm: 0.93 counts.
+        assert found == pytest.approx([alpha - 0.0093 for alpha in self.ALPHAS], rel=0.03)
+
+    def test_a_robot_that_stands_askew_is_named(self):
+        with pytest.raises(CalibrationError, match="degrees askew to the wall when it looks ahead"):
+            infrared.estimate_turn_rad(look(self.ALPHAS, 4, math.radians(20.0)))
+
+    def test_the_turn_has_the_right_sign_and_size(self):
+        for degrees in (-8.0, 0.0, 8.0):
+            turn_rad = infrared.estimate_turn_rad(look([0.42] * 8, 4, math.radians(degrees)))
+            assert math.degrees(turn_rad) == pytest.approx(degrees, abs=2.0)
+
+    def test_a_sensor_that_sees_no_wall_is_named(self):
+        facings = [look(self.ALPHAS, sensor) for sensor in range(8)]
+        counts = [3.0 if index == 6 else count for index, count in enumerate(facings[6].counts)]
+        facings[6] = facings[6]._replace(counts=counts)
+        with pytest.raises(CalibrationError, match="looks left reads 3 counts; 42 are usual"):
+            infrared.compute_calibration(facings)
+        with pytest.raises(CalibrationError, match="see no wall"):
+            infrared.estimate_turn_rad(Facing(4, [0.5] * 8, [0.2] * 8, 0.0))
+
+    def test_errors_of_ranges_are_told_and_a_sensor_without_calibration_has_none(self):
+        facings = [look(self.ALPHAS, sensor) for sensor in range(8)]
+        errors_m = infrared.range_errors_m(facings)
+        assert errors_m[0] == pytest.approx(math.sqrt(0.5 / facings[0].counts[0]) - 0.1, abs=1e-9)
+        facings[2] = facings[2]._replace(ranges_m=[math.nan] * 8)
+        assert math.isnan(infrared.range_errors_m(facings)[2])
+        assert calibrate.format_worst(infrared.range_errors_m(facings)) == "not known (no calibration)"
+
+
+class TestStore:
+    WHOLE = store.Calibration(3, "today", [1511, 1489], [700.0, 5000.0, 0.1] * 2, [0.42] * 8, {"a": 1})
+
+    def test_a_file_holds_what_was_saved(self, tmp_path):
+        path = store.name_file(str(tmp_path), 3)
+        store.save(path, self.WHOLE)
+        assert store.load(path) == self.WHOLE
+
+    def test_parts_that_were_not_measured_stay_and_the_old_file_is_kept(self, tmp_path):
+        path = store.name_file(str(tmp_path), 3)
+        store.save(path, self.WHOLE)
+        store.save(path, store.Calibration(3, "later", [1520, 1480], results={"b": 2}))
+        kept = store.load(path)
+        assert kept == self.WHOLE._replace(
+            date="later", motor_centres_us=[1520, 1480], results={"a": 1, "b": 2}
+        )
+        assert store.load(str(tmp_path / "hero_3.previous.yaml")) == self.WHOLE
+
+    @pytest.mark.parametrize(
+        ("change", "words"),
+        [
+            (
+                {"motor_centres_us": [1511, 9000]},
+                "motor_centres_us holds 9000, but must be 2 numbers from 1200 to 1800",
+            ),
+            ({"motor_centres_us": [1511]}, r"\[1511\], but must be 2 numbers"),
+            ({"velocity_gains": [1e9] * 6}, "velocity_gains holds 1000000000.0"),
+            ({"velocity_gains": [float("nan")] * 6}, "velocity_gains holds nan"),
+            ({"infrared_counts_m2": ["x"] * 8}, "infrared_counts_m2 holds 'x'"),
+            ({"robot": "wall_e"}, "robot is 'wall_e', but must be hero_N"),
+            ({"colour": "red"}, "unknown key colour"),
+        ],
+    )
+    def test_a_wrong_file_is_refused_with_the_key_and_what_is_allowed(self, change, words, tmp_path):
+        path = tmp_path / "hero_3.yaml"
+        path.write_text(yaml.safe_dump({"robot": "hero_3", "motor_centres_us": [1500, 1500], **change}))
+        with pytest.raises(CalibrationError, match=words) as caught:
+            store.load(str(path))
+        assert str(path) in str(caught.value)
+
+    def test_what_is_no_calibration_is_named(self, tmp_path):
+        for content, words in (("- 1\n", "no calibration"), ("a: [", "no YAML"), ("", "no calibration")):
+            (tmp_path / "x.yaml").write_text(content)
+            with pytest.raises(CalibrationError, match=words):
+                store.load(str(tmp_path / "x.yaml"))
+        with pytest.raises(CalibrationError, match="No such file"):
+            store.load(str(tmp_path / "y.yaml"))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["dance"], "parts are motors, velocity, infrared"),
+        (["--yes"], "name the one or the other"),
+        (["--samples", "0"], "--samples 0"),
+        (["--robots", "x"], "--robots"),
+    ],
+)
+def test_wrong_options_are_named(arguments, words, capsys):
+    with pytest.raises(SystemExit) as caught:
+        calibrate.parse_options(arguments)
+    assert caught.value.code == 2
+    assert words in capsys.readouterr().err
+
+
+def test_files_to_restore_follow_the_word():
+    options = calibrate.parse_options(["restore", "a.yaml", "b.yaml"])
+    assert (options.restore, options.files, options.parts) == (True, ["a.yaml", "b.yaml"], [])
+    assert calibrate.parse_options([]).parts == ["motors", "velocity", "infrared"]
