@@ -108,7 +108,7 @@ class Calibration:
             say("motors: pulses up a staircase, about 20 s")
             self._motors = self._session.calibrate_motors()
         if VELOCITY in parts and self._session.active:
-            say("velocity: gains are tried, about 40 s")
+            say("velocity: gains are tried, about a minute")
             self._velocity = self._session.calibrate_velocity(self._motors)
         if INFRARED in parts and self._session.active:
             self._place(WALL, beside_wall=True)
