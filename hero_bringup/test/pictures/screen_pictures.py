@@ -20,7 +20,8 @@ from virtual_screen import MISSING, VirtualScreen  # noqa: E402
 
 PICTURES_FOLDER = BRINGUP.parent / "docs" / "pictures"
 WALK_S = 25.0
-SCREEN = (1200, 800)
+SCREEN = (1600, 900)
+VIEW = (slice(64, 868), slice(368, 1582))  # rows and columns of RViz's view in a window of that size
 COLOURS_DRAWN = 200  # fewer different colours than this: RViz shows no robots yet
 DRAW_TIMEOUT_S = 60.0
 
@@ -47,7 +48,7 @@ def photograph_rviz(picture, robots, arena):
             wait_until_drawn(screen, stage)
             end_s = time.monotonic() + WALK_S
             stage.wait_for(lambda: time.monotonic() > end_s, "robots that walk", 2.0 * WALK_S)
-            matplotlib.image.imsave(str(picture), screen.read())
+            matplotlib.image.imsave(str(picture), screen.read()[VIEW])
     finally:
         screen.close()
 
