@@ -5,6 +5,7 @@ taken from the operating system's accounting (/proc). Run it with script/bench d
 """
 
 import argparse
+import csv
 import json
 import os
 import signal
@@ -33,7 +34,7 @@ def find_free_port():
 def measure_machine_us():
     """Return the time (us) of summing 768 bytes, by which CPU figures of machines are compared."""
     data = bytes(range(256)) * 3
-    return timeit.timeit(lambda: sum(data), number=100000) * 10.0
+    return min(timeit.repeat(lambda: sum(data), number=20000, repeat=5)) / 20000 * 1e6
 
 
 def read_stolen_and_busy_s():
@@ -231,12 +232,28 @@ ROWS = (
 
 def print_table(results, machine_us):
     """Print medians over the repeats, one column for each number of robots."""
-    print("sum of 768 bytes: %.2f us" % machine_us)
+    print("sum of 768 bytes: %.2f us, load of the last minute: %.2f" % (machine_us, os.getloadavg()[0]))
     print("| | %s |" % " | ".join("%d robots" % result["robots"] for result in results))
     print("|---|%s" % ("---|" * len(results)))
     for title, key, form in ROWS:
         cells = ["-" if result[key] is None else form % result[key] for result in results]
         print("| %s | %s |" % (title, " | ".join(cells)))
+
+
+def append_history(path, results, machine_us):
+    """Add a line for each number of robots to the CSV file that shows what commits cost."""
+    commit = subprocess.run(
+        ["git", "describe", "--always", "--dirty"], cwd=HERE, capture_output=True, text=True, check=True
+    ).stdout.strip()
+    keys = [key for _, key, _ in ROWS]
+    is_new = not path.exists()
+    with path.open("a", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        if is_new:
+            writer.writerow(["commit", "sum_of_768_bytes_us", "robots", *keys])
+        for result in results:
+            cells = ["" if result[key] is None else form % result[key] for _, key, form in ROWS]
+            writer.writerow([commit, "%.2f" % machine_us, result["robots"], *cells])
 
 
 def take_medians(runs):
@@ -259,6 +276,7 @@ def main():
     parser.add_argument("--nagle", action="store_true", help="robots' TCP holds small writes back, as HeRo's does")
     parser.add_argument("--server-command", default=DRIVER_COMMAND, help="{port} stands for the port")
     parser.add_argument("--json", metavar="FILE", help="write the figures there")
+    parser.add_argument("--history", type=Path, metavar="FILE", help="add the figures to this CSV file")
     options = parser.parse_args()
     master_port = find_free_port()
     environment = dict(os.environ, ROS_MASTER_URI="http://localhost:%d" % master_port)
@@ -273,6 +291,8 @@ def main():
     finally:
         stop(master)
     print_table(results, machine_us)
+    if options.history:
+        append_history(options.history, results, machine_us)
     if options.json:
         report = {"sum_of_768_bytes_us": machine_us, "load_average": os.getloadavg(), "results": results}
         Path(options.json).write_text(json.dumps(report, indent=2) + "\n")
