@@ -112,7 +112,7 @@ def go_to_goal(picture):
                 target.pose.orientation.w = 1.0
                 publisher.publish(target)
             goals += round_goals
-            recording.wait_until_all_are_at(round_goals, 0.12, 60.0)
+            recording.wait_until_all_are_at(round_goals, 0.25, 60.0)
         draw_paths(
             picture, "go_to_goal: three goals each, all with heading 0", recording.arena, recording.paths(), goals,
             size_inch=(9, 4.2),

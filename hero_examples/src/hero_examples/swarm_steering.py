@@ -19,7 +19,7 @@ NUDGE = 0.05
 
 
 PATIENCE_S = 4.0
-"""A robot that came no nearer to its goal for so long is in a jam: it goes aside, to the right, by a random angle."""
+"""A robot that came no nearer to its goal for so long is in a jam: it goes aside, to a random side and by a random angle."""
 
 ASIDE_S = 2.0
 """For so long, then it tries again."""
@@ -91,7 +91,7 @@ class SwarmSteering:
         straight = way * (speed_m_s / max(distance_m, 1e-9))
         side = np.array([-straight[1], straight[0]])
         if jam.look(distance_m, self.step_s):
-            jam.turn_rad = self._random.uniform(-2.5, -0.5)
+            jam.turn_rad = self._random.uniform(0.5, 2.5) * self._random.choice((-1.0, 1.0))
         turn_rad = jam.turn_rad if jam.aside else NUDGE * self._random.uniform(-1.0, 1.0)
         wanted: np.ndarray = straight * math.cos(turn_rad) + side * math.sin(turn_rad)
         return wanted
