@@ -1,9 +1,10 @@
-"""Starts RViz on a screen that nobody looks at and saves what it shows. Started by script/pictures.
+"""Saves what RViz and the fleet monitor show, on screens that nobody looks at. Started by script/pictures.
 
 The robots are simulated and walk; every picture has a ROS master, a driver and a simulator of its own.
 """
 
 import os
+import socket
 import subprocess
 import sys
 import time
@@ -14,7 +15,10 @@ import numpy as np
 from picture_program import make_pictures
 
 BRINGUP = Path(__file__).resolve().parents[2]
-sys.path += [str(BRINGUP / "bench"), str(BRINGUP / "test" / "rostest")]
+sys.path += [str(BRINGUP / "bench"), str(BRINGUP / "test" / "rostest"), str(BRINGUP.parent / "hero_driver" / "bench")]
+from driver_bench import find_free_port  # noqa: E402
+from monitor_page import MISSING as NO_BROWSER  # noqa: E402
+from monitor_page import MonitorPage  # noqa: E402
 from stage import Stage  # noqa: E402
 from virtual_screen import MISSING, VirtualScreen  # noqa: E402
 
@@ -53,13 +57,37 @@ def photograph_rviz(picture, robots, arena):
         screen.close()
 
 
+def photograph_monitor(picture, robots, arena):
+    """Let robots walk in an arena, and save the page of the fleet monitor, with one robot chosen."""
+    port = find_free_port()
+    with Stage(robots, "sim_arena:=" + arena) as stage:
+        stage.start_example("random_walk", "_robots:=0-%d" % (robots - 1), "_seed:=4")
+        stage.start(["rosrun", "hero_bringup", "monitor", "_port:=%d" % port, "_control:=true"])
+        stage.wait_for(lambda: is_open(port), "the monitor")
+        page = MonitorPage("http://127.0.0.1:%d/" % port)
+        try:
+            end_s = time.monotonic() + WALK_S
+            stage.wait_for(lambda: time.monotonic() > end_s, "robots that walk", 2.0 * WALK_S)
+            page.choose("hero_0")
+            page.browser.save_screenshot(str(picture))
+        finally:
+            page.close()
+
+
+def is_open(port):
+    """Return whether somebody listens on a port of this machine."""
+    with socket.socket() as sock:
+        return sock.connect_ex(("127.0.0.1", port)) == 0
+
+
 PICTURES = {
+    "monitor": lambda picture: photograph_monitor(picture, 10, "obstacles"),
     "rviz_swarm": lambda picture: photograph_rviz(picture, 4, "empty"),
     "rviz_obstacles": lambda picture: photograph_rviz(picture, 8, "obstacles"),
 }
 
 
 if __name__ == "__main__":
-    if MISSING:
-        sys.exit("screen_pictures: not installed: %s (apt install xvfb rviz)" % ", ".join(MISSING))
+    if MISSING or NO_BROWSER:
+        sys.exit("screen_pictures: not installed: %s (script/bootstrap --test)" % ", ".join([*MISSING, *NO_BROWSER]))
     make_pictures(PICTURES, PICTURES_FOLDER, __doc__)

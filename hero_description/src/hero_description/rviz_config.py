@@ -19,6 +19,9 @@ POINT_TOPIC = "/hero_choice/point"
 GOAL_TOPIC = "/hero_choice/goal"
 ABOVE_PIXELS_PER_M = 400
 
+# From how far, from how high (pitch), from which side (yaw), and at what height above the fixed frame it looks.
+VIEWS = {"orbit": (2.6, 1.0, 4.71, 0.0), "close": (0.27, 0.45, 0.6, 0.02), "above": (0.0, 0.0, 0.0, 0.0)}
+
 
 def make_robot_displays(name: str, colour: str) -> List[Dict[str, Any]]:
     """Return what is shown of one robot: its model, the way it came, what its proximity sensors see."""
@@ -94,7 +97,7 @@ def make_marker_display(name: str, topic: str) -> Dict[str, Any]:
 
 
 def make_view(view: str) -> Dict[str, Any]:
-    """Return from where all is seen: "orbit", or "above", straight down, x to the right and y up."""
+    """Return from where all is seen: one of VIEWS; "above" has x to the right and y up."""
     if view == "above":
         return {
             "Class": "rviz/TopDownOrtho",
@@ -104,12 +107,13 @@ def make_view(view: str) -> Dict[str, Any]:
             "Angle": 0.0,
             "Target Frame": "<Fixed Frame>",
         }
+    distance_m, pitch_rad, yaw_rad, height_m = VIEWS[view]
     return {
         "Class": "rviz/Orbit",
-        "Distance": 2.6,
-        "Pitch": 1.0,
-        "Yaw": 4.71,
-        "Focal Point": {"X": 0.0, "Y": 0.0, "Z": 0.0},
+        "Distance": distance_m,
+        "Pitch": pitch_rad,
+        "Yaw": yaw_rad,
+        "Focal Point": {"X": 0.0, "Y": 0.0, "Z": height_m},
         "Target Frame": "<Fixed Frame>",
     }
 

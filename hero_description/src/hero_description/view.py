@@ -15,7 +15,7 @@ from typing import List
 
 import rospy
 
-from .rviz_config import make_config
+from .rviz_config import VIEWS, make_config
 
 LONGEST_SWARM = 100
 
@@ -38,7 +38,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="view", description="RViz, set up for the robots that are there.")
     parser.add_argument("--robots", default="1", help="a number (4: hero_0 to hero_3) or ids (0,2,5)")
     parser.add_argument("--fixed-frame", default="world", help="frame in which all is shown (world)")
-    parser.add_argument("--view", choices=("orbit", "above"), default="orbit", help="from where to look (orbit)")
+    parser.add_argument("--view", choices=sorted(VIEWS), default="orbit", help="from where to look (orbit)")
     arguments = rospy.myargv()
     options = parser.parse_args(arguments[1:])
     try:
