@@ -14,6 +14,7 @@ ROOT = Path(__file__).resolve().parents[2]
 ROS_MODULES = {
     # module that is imported: package to declare
     "actionlib": "actionlib",
+    "angles": "angles",
     "diagnostic_updater": "diagnostic_updater",
     "genpy": "genpy",
     "rosbag": "rosbag",
@@ -35,6 +36,7 @@ OTHER_MODULES = {
     "numpy": "python3-numpy",
     "yaml": "python3-yaml",
     "matplotlib": "python3-matplotlib",
+    "pexpect": "python3-pexpect",
     "scipy": "python3-scipy",
     "tornado": "python3-tornado",
     "tqdm": "python3-tqdm",

@@ -1,0 +1,21 @@
+#!/usr/bin/env python
+"""Publishes twice each number that comes on publisher_node_example, on the topic publisher_subscriber."""
+
+import rospy
+from std_msgs.msg import Int32
+
+
+def main():
+    rospy.init_node("publisher_subscriber_node")
+    publisher = rospy.Publisher("publisher_subscriber", Int32, queue_size=10)
+
+    def publish_double(message):
+        publisher.publish(2 * message.data)
+
+    # After the publisher: the first number can come before the next line is run.
+    rospy.Subscriber("publisher_node_example", Int32, publish_double, queue_size=10)
+    rospy.spin()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,51 @@
+"""What can be said of the pages of the courses without running them; the rostests run them."""
+
+import re
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from lesson_runner import check_same_as, read_blocks
+
+PACKAGE = Path(__file__).resolve().parents[2]
+TUTORIAL = PACKAGE.parent / "docs" / "tutorial"
+PAGES = sorted(TUTORIAL.glob("*/[0-9]*.md"))
+PARTS = ["Goal", "Do it", "What happens", "Exercise", "Solution"]
+
+
+def name_of(path):
+    return str(path.relative_to(TUTORIAL))
+
+
+def test_both_courses_are_there():
+    assert len([page for page in PAGES if page.parent.name == "ros_basics"]) == 7
+    assert len([page for page in PAGES if page.parent.name == "hero"]) == 14
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_every_page_has_the_same_parts_and_says_what_older_versions_get_wrong(page):
+    outside = re.sub(r"^```.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
+    assert re.findall(r"^## (.*)$", outside, flags=re.MULTILINE) == PARTS
+    assert re.match(r"# %d\. " % int(page.name[:2]), outside)
+    assert "**What older versions of this lesson get wrong.**" in outside
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_every_block_can_be_read_and_shows_the_file_that_it_names(page):
+    for block in read_blocks(page):
+        check_same_as(block, page, PACKAGE)
+        if block.language == "console":
+            block.read_steps(page)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_the_overview_lists_every_page(page):
+    assert f"({name_of(page)})" in (TUTORIAL / "README.md").read_text(encoding="utf-8")
+
+
+def test_every_script_of_the_package_is_shown_in_a_page():
+    shown = {block.same_as for page in PAGES for block in read_blocks(page)}
+    scripts = {f"nodes/{path.name}" for path in (PACKAGE / "nodes").glob("*.py")}
+    assert scripts <= shown
