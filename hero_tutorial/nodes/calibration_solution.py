@@ -4,6 +4,7 @@
 import sys
 
 import rospy
+
 from hero_msgs.srv import SetOdom
 
 

@@ -19,7 +19,7 @@ A comment right before a block tells what a reader needs not be told, apart by "
     <!-- lesson: within 60 s -->           time for each command; without, DEADLINE_S
     <!-- lesson: instead COMMAND -->       the test types this in place of the block's only command
     <!-- lesson: not run, REASON -->       not typed
-    <!-- lesson: file PATH -->             the block is written to this file; only this is done to other than console blocks
+    <!-- lesson: file PATH -->             the block, of whatever language, is written to this file
     <!-- lesson: same as FILE -->          the block shows this file of the package, character by character
 
 This module knows nothing of ROS. Terminals are real ones (pseudo terminals with an interactive bash).
@@ -40,8 +40,8 @@ ENDING_S = 20.0
 """For the end of a program after Ctrl-C."""
 
 QUIET_S = 0.1
-"""Ctrl-C is pressed when nothing has come for so long: rospy hangs if it comes while a line is logged by the main thread
-(its signal handler then waits for a lock that the same thread holds), which only a test is quick enough to hit."""
+"""Ctrl-C is pressed when nothing has come for so long. If it comes while the main thread logs a line, rospy hangs: its
+signal handler waits for a lock that the same thread holds. A test is quick enough to hit that, every time."""
 
 PROMPT_PATTERN = re.compile("\x02([0-9]+)\x03")
 COLUMNS = 400  # so that nothing wraps

@@ -21,7 +21,8 @@ PROBE_TIMEOUT_S = 120.0
 NODE_START_S = 3
 LAUNCH_FILES = sorted(ROOT.glob("*/launch/*.launch"))
 PACKAGES = sorted(path.parent.name for path in ROOT.glob("*/package.xml"))
-NODES = sorted(path for path in ROOT.glob("*/nodes/*") if path.is_file())
+NODES = sorted(path for path in ROOT.glob("*/nodes/*") if path.is_file() and path.suffix != ".py")
+LESSONS = sorted(path.name for path in ROOT.glob("hero_tutorial/nodes/*.py"))
 CMAKE_ARGUMENTS = f"-DPYTHON_EXECUTABLE={sys.executable}"
 
 # Without the variables of a workspace that happens to be sourced.
@@ -155,6 +156,16 @@ def test_rosrun_finds_every_node_and_python_has_what_it_imports(space):
         start = f"PATH={other}:$PATH timeout -s KILL {NODE_START_S} rosrun {package} {path.name} --help"
         output = space.run(f"export ROS_MASTER_URI=http://localhost:1\n({start}) 2>&1 || true")
         assert "Traceback" not in output and "No module named" not in output, f"{path.name}:\n{output}"
+
+
+def test_scripts_of_the_lessons_find_what_they_import_with_the_interpreter_that_they_name(space):
+    """They know no --help, so they are not run but read as modules, which does all but main()."""
+    names = " ".join(LESSONS)
+    enter = "cd $(catkin_find --first-only --libexec hero_tutorial)"
+    (first_line,) = space.run(f"{enter} && head -qn 1 {names} | sort -u").splitlines()
+    assert first_line.startswith("#!/") and "env " not in first_line, first_line
+    program = "import runpy, sys\nfor name in sys.argv[1:]:\n    runpy.run_path(name, run_name='read')"
+    space.run(f"{enter} && {first_line[2:].strip()} - {names} <<'END'\n{program}\nEND")
 
 
 def test_driver_and_simulated_robots_start_and_their_odometry_arrives(space):
