@@ -15,6 +15,7 @@ A comment right before a block tells what a reader needs not be told, apart by "
     <!-- lesson: goes on -->               the last command still runs when the block ends; a later ^C in this terminal
                                            ends it
     <!-- lesson: presses w -->             this key is pressed when the lines have come
+    <!-- lesson: when COMMAND -->          the test waits until this succeeds: a program that says nothing has come up
     <!-- lesson: fails -->                 the last command ends with an exit code other than 0
     <!-- lesson: within 60 s -->           time for each command; without, DEADLINE_S
     <!-- lesson: instead COMMAND -->       the test types this in place of the block's only command
@@ -27,6 +28,7 @@ This module knows nothing of ROS. Terminals are real ones (pseudo terminals with
 
 import os
 import re
+import subprocess
 import time
 from pathlib import Path
 from typing import Dict, List, NamedTuple, Optional
@@ -39,7 +41,7 @@ DEADLINE_S = 30.0
 ENDING_S = 20.0
 """For the end of a program after Ctrl-C."""
 
-QUIET_S = 0.1
+QUIET_S = 0.05
 """Ctrl-C is pressed when nothing has come for so long. If it comes while the main thread logs a line, rospy hangs: its
 signal handler waits for a lock that the same thread holds. A test is quick enough to hit that, every time."""
 
@@ -77,6 +79,7 @@ class Block(NamedTuple):
     presses: Optional[str]
     deadline_s: float
     instead: Optional[str]
+    when: Optional[str]
     not_run: Optional[str]
     file: Optional[str]
     same_as: Optional[str]
@@ -108,7 +111,7 @@ def read_marks(text: str, where: str) -> Dict[str, object]:
     for mark in filter(None, (part.strip() for part in text.split(";"))):
         number = re.match(r"terminal (\d+)$", mark)
         seconds = re.match(r"within (\d+) s$", mark)
-        argument = re.match(r"(presses|instead|not run,|file|same as) +(.+)$", mark, re.DOTALL)
+        argument = re.match(r"(presses|instead|when|not run,|file|same as) +(.+)$", mark, re.DOTALL)
         if number:
             marks["terminal"] = int(number.group(1))
         elif seconds:
@@ -156,6 +159,7 @@ def make_block(line: int, language: str, text: str, marks: Dict[str, object]) ->
         "presses": None,
         "deadline_s": DEADLINE_S,
         "instead": None,
+        "when": None,
         "not_run": None,
         "file": None,
         "same_as": None,
@@ -171,7 +175,9 @@ def make_pattern(expected: List[str]) -> str:
         if line.strip() == "...":
             pattern += r"(?:[^\n]*\n)*?"
         else:
-            pattern += "[^\\n]*".join(re.escape(part) for part in line.rstrip().split("...")) + r"\n"
+            # The last three of four dots are the ellipsis: "0...." is 0. and anything.
+            parts = re.split(r"\.\.\.(?!\.)", line.rstrip())
+            pattern += "[^\\n]*".join(re.escape(part) for part in parts) + r"\n"
     return pattern
 
 
@@ -294,7 +300,8 @@ class Course:
         """Do what the page says. Raises: PageError, LessonError."""
         for block in read_blocks(page):
             check_same_as(block, page, self._package)
-            block = block._replace(text=self._change(block.text))
+            if block.language == "console":
+                block = block._replace(text=self._change(block.text), instead=self._change(block.instead))
             if block.not_run is not None:
                 continue
             if block.file is not None:
@@ -309,6 +316,8 @@ class Course:
             self._terminals[block.terminal] = Terminal(self._environment)
         terminal = self._terminals[block.terminal]
         steps = block.read_steps(page)
+        if block.when is not None:
+            self._wait_until(block.when, block, page)
         for index, step in enumerate(steps):
             last = index == len(steps) - 1
             if step.command is None:
@@ -328,6 +337,22 @@ class Course:
             if not ended or not matches or (terminal.exit_code != 0) != (last and block.fails):
                 self._fail(page, step, terminal)
 
+    def _wait_until(self, command: str, block: Block, page: Path) -> None:
+        deadline_s = time.monotonic() + block.deadline_s
+        while time.monotonic() < deadline_s:
+            result = subprocess.run(
+                ["bash", "-c", command],
+                env=self._environment,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                check=False,
+            )
+            if result.returncode == 0:
+                return
+            time.sleep(0.1)
+        output = result.stdout.decode(errors="replace")
+        raise LessonError("%s:%d: %s: did not succeed in time:\n%s" % (page, block.line, command, output))
+
     def _interrupt(self, terminal: Terminal, step: Step, page: Path) -> None:
         if not terminal.runs:
             raise PageError("%s:%d: ^C, but nothing runs in this terminal" % (page, step.line))
@@ -336,9 +361,9 @@ class Course:
         if not ended or not re.fullmatch(make_pattern(["...", *step.expected]), terminal.output):
             self._fail(page, step, terminal)
 
-    def _change(self, text: str) -> str:
+    def _change(self, text: Optional[str]) -> Optional[str]:
         for written, change in self._changes.items():
-            text = text.replace(written, change)
+            text = text and text.replace(written, change)
         return text
 
     def _fail(self, page: Path, step: Step, terminal: Terminal) -> None:

@@ -30,7 +30,8 @@ def make_changes():
         "/usr/bin/python3": sys.executable,
         "~/hero/.work/ws/devel": os.environ["CMAKE_PREFIX_PATH"].split(":")[0],
         "<the address of this repository>": str(PACKAGE.parent),
-        "hero_bringup.launch": "hero_bringup.launch host:=127.0.0.1 port:=%d" % port,
+        "$ roslaunch hero_bringup hero_bringup.launch": "$ roslaunch hero_bringup hero_bringup.launch"
+        " host:=127.0.0.1 port:=%d" % port,
         "0.0.0.0:11411": "127.0.0.1:%d" % port,
         "sim:=true": "sim:=true port:=%d" % port,
     }
@@ -50,10 +51,12 @@ class LessonsTest(unittest.TestCase):
 
     def run_page(self, page):
         if self.failed:
-            self.skipTest("not tried, because the pages build on each other and %s failed" % self.failed)
-        type(self).failed = page.name
-        self.course.run_page(page)
-        type(self).failed = None
+            self.fail("not tried, because the pages build on each other: " + self.failed)
+        try:
+            self.course.run_page(page)
+        except Exception as error:
+            type(self).failed = str(error).splitlines()[0]
+            raise
 
 
 def add_pages(course):
