@@ -12,7 +12,7 @@ from rig import count_holdings, wait_until
 from hero_msgs.msg import Robot
 
 SWARM = 10
-MEMORY_GROWTH_KB = 3000
+MEMORY_GROWTH_KB = 5000
 """Pages that Python has got and keeps; what leaks with each of hundreds of returns would be more."""
 
 

@@ -1,0 +1,48 @@
+"""Coverage-guided fuzzing of codec, session and cleaning, with atheris; options as libFuzzer's.
+
+fuzz_codec.py [-max_total_time=60] [CORPUS_DIR]
+"""
+
+import sys
+
+import atheris
+
+with atheris.instrument_imports():
+    from hero_driver import log_lines, wire_messages
+    from hero_driver.cleaning import CleaningSettings, MessageCleaner
+    from hero_driver.odometry import WheelGeometry
+    from hero_driver.rosserial.frames import DEFAULT_MAX_PAYLOAD_LENGTH, OVERHEAD_LENGTH
+    from hero_driver.rosserial.session import LogReceived, MessageReceived, Session, SessionLimits
+
+MAX_TOPICS = 64
+ARRIVAL_NS = 1795240942 * 10**9
+SETTINGS = CleaningSettings(
+    "ticks", WheelGeometry(0.0492, 0.063, 288.0), (1e-4,) * 6, (1e-4,) * 6, "robot", 0.05, 5.0
+)
+TYPES = {"hero_common/Encoder": "hero_msgs/Encoder", "tf/tfMessage": "tf2_msgs/TFMessage"}
+
+
+def try_bytes(data):
+    """Let one robot say data, cut where its first byte says, and clean what comes of it."""
+    session = Session(SessionLimits(max_topics=MAX_TOPICS), 0.0)
+    cleaner = MessageCleaner("/hero_0", SETTINGS)
+    step = 1 + (data[0] if data else 0)
+    for index, start in enumerate(range(1, len(data), step)):
+        for event in session.receive_bytes(data[start : start + step], 0.01 * index, 1795240942.0):
+            if type(event) is MessageReceived:
+                info = event.topic.info
+                clean = cleaner.choose(info.name, TYPES.get(info.message_type, info.message_type))
+                for _, payload in clean(event.payload, ARRIVAL_NS):
+                    wire_messages.read_header(payload)
+            elif type(event) is LogReceived:
+                log_lines.read_log_line(event.log.text)
+        session.poll(0.01 * index)
+    if len(session.topics) > MAX_TOPICS:
+        raise AssertionError("more topics than allowed")
+    if session.reader.buffered_length >= DEFAULT_MAX_PAYLOAD_LENGTH + OVERHEAD_LENGTH:
+        raise AssertionError("more bytes kept than one frame")
+
+
+if __name__ == "__main__":
+    atheris.Setup(sys.argv, try_bytes)
+    atheris.Fuzz()
