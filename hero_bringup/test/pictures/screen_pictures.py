@@ -24,8 +24,8 @@ from virtual_screen import MISSING, VirtualScreen  # noqa: E402
 
 PICTURES_FOLDER = BRINGUP.parent / "docs" / "pictures"
 WALK_S = 25.0
-SCREEN = (1600, 900)
-VIEW = (slice(64, 868), slice(368, 1582))  # rows and columns of RViz's view in a window of that size
+SCREEN = (1200, 800)  # the size that the configuration of RViz gives its window
+VIEW = (slice(64, 768), slice(366, 1182))  # rows and columns of the view in that window
 COLOURS_DRAWN = 200  # fewer different colours than this: RViz shows no robots yet
 DRAW_TIMEOUT_S = 60.0
 
@@ -40,6 +40,12 @@ def wait_until_drawn(screen, stage):
     stage.wait_for(drawn, "a picture in RViz", DRAW_TIMEOUT_S)
 
 
+def wait_while_they_walk(stage):
+    """Return after WALK_S."""
+    end_s = time.monotonic() + WALK_S
+    stage.wait_for(lambda: time.monotonic() > end_s, "robots that walk", 2.0 * WALK_S)
+
+
 def photograph_rviz(picture, robots, arena):
     """Let robots walk in an arena, and save the window of RViz."""
     screen = VirtualScreen(*SCREEN)
@@ -50,8 +56,7 @@ def photograph_rviz(picture, robots, arena):
             launch = ["roslaunch", "--no-summary", "hero_description", "swarm.launch", "robots:=%d" % robots]
             stage.start(launch, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
             wait_until_drawn(screen, stage)
-            end_s = time.monotonic() + WALK_S
-            stage.wait_for(lambda: time.monotonic() > end_s, "robots that walk", 2.0 * WALK_S)
+            wait_while_they_walk(stage)
             matplotlib.image.imsave(str(picture), screen.read()[VIEW])
     finally:
         screen.close()
@@ -66,8 +71,7 @@ def photograph_monitor(picture, robots, arena):
         stage.wait_for(lambda: is_open(port), "the monitor")
         page = MonitorPage("http://127.0.0.1:%d/" % port)
         try:
-            end_s = time.monotonic() + WALK_S
-            stage.wait_for(lambda: time.monotonic() > end_s, "robots that walk", 2.0 * WALK_S)
+            wait_while_they_walk(stage)
             page.choose("hero_0")
             page.browser.save_screenshot(str(picture))
         finally:
