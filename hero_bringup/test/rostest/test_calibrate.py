@@ -181,16 +181,23 @@ class CalibrateTest(unittest.TestCase):
         wait_for(lambda: max(watch.speeds.values()) < 1e-3, "standstill")
         self.assertEqual(glob.glob(self.folder + "/*"), [])
 
-    def test_4_in_a_terminal_it_asks_and_q_ends_it_before_anything_moves(self):
-        leader, follower = pty.openpty()
-        self.addCleanup(os.close, leader)
+    def test_4_in_a_terminal_it_asks_and_q_and_ctrl_c_end_it_before_anything_moves(self):
         watch = Watch([3])
-        process = self.start("motors", "--robots", "3", stdin=follower)
-        os.close(follower)
-        os.write(leader, b"q\n")
-        code, output = self.finish(process)
-        self.assertEqual(code, 130, output)
-        self.assertIn("20 cm of room", output)
+        for answer in (b"q\n", signal.SIGINT):
+            leader, follower = pty.openpty()
+            process = self.start("motors", "--robots", "3", stdin=follower)
+            os.close(follower)
+            output = b""
+            while b"q to end" not in output:
+                output += os.read(process.stdout.fileno(), 1000)
+            self.assertIn(b"20 cm of room", output)
+            if answer is signal.SIGINT:
+                os.killpg(process.pid, answer)
+            else:
+                os.write(leader, answer)
+            code, rest = self.finish(process)
+            os.close(leader)
+            self.assertEqual(code, 130, rest)
         self.assertEqual(watch.speeds[3], 0.0)
 
     def test_5_starts_that_cannot_work_are_refused_in_words(self):

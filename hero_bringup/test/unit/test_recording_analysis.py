@@ -150,8 +150,8 @@ def test_few_robots_have_colours_of_their_own_and_many_a_scale():
 @pytest.mark.parametrize("count", [1, 50])
 def test_every_figure_has_titles_units_and_all_robots_for_one_and_for_fifty(count, tmp_path):
     path = tmp_path / "fleet.bag"
-    write_bag(path, robot_ids=range(count), seconds=2.0)
-    drawing = Figures(observe(path), START_S, START_S + 2.0, "fleet.bag")
+    write_bag(path, robot_ids=range(count), seconds=1.5)
+    drawing = Figures(observe(path), START_S, START_S + 1.5, "fleet.bag")
     figures = {
         "speeds": drawing.draw_speeds(),
         "delays": drawing.draw_delays(),
@@ -160,7 +160,7 @@ def test_every_figure_has_titles_units_and_all_robots_for_one_and_for_fifty(coun
         "paths": drawing.draw_paths(),
     }
     for name, figure in figures.items():
-        figure.savefig(str(tmp_path / (name + ".png")))
+        figure.savefig(str(tmp_path / (name + ".png")), dpi=30)
         labels = [
             text for axes in figure.axes for text in (axes.get_xlabel(), axes.get_ylabel(), axes.get_title())
         ]

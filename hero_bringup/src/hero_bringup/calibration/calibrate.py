@@ -117,19 +117,20 @@ class Calibration:
 
     def _place(self, request: str, beside_wall: bool) -> None:
         """Let people place the robots, and look whether they stand well; who does not takes no further part."""
+        question = "Enter when they stand, q to end: "
         if not self._options.yes:
             say("")
             say(request)
         while True:
-            if not self._options.yes and ask("Enter when they stand, q to end: ") == "q":
+            answer = "" if self._options.yes else ask(self._program, question)
+            if answer == "q":
                 raise EndedError
             wrong = self._find_wrong(beside_wall)
             for probe, reason in wrong.items():
                 say("%s: %s" % (probe.name, reason))
-            if self._options.yes or not wrong:
+            if self._options.yes or answer == "s" or not wrong:
                 break
-            if ask("Enter to look again when that is mended, s to go on without these robots: ") == "s":
-                break
+            question = "Enter to look again when that is mended, s to go on without these, q to end: "
         for probe, reason in wrong.items():
             probe.failure = "place: " + reason
 
@@ -235,12 +236,21 @@ def format_worst(errors_m: Sequence[float]) -> str:
     return "%.0f mm" % (1e3 * max(known)) if len(known) == len(errors_m) else "not known (no calibration)"
 
 
-def ask(question: str) -> str:
-    """Ask people; return the answer in small letters. Raises: CalibrationError where nobody can answer."""
-    try:
-        return input(question).strip().lower()
-    except EOFError as error:
-        raise CalibrationError("nobody is there to answer: start it in a terminal, or with --yes") from error
+def ask(program: Program, question: str) -> str:
+    """Ask people; return the answer in small letters.
+
+    Raises: EndedError if the program is to end meanwhile, CalibrationError where nobody can answer.
+    """
+    print(question, end="", flush=True)
+    # input() would wait on, deaf to Ctrl-C: signals only set a flag here.
+    while not program.wait_readable([sys.stdin.fileno()], 1.0):
+        if not program.running:
+            say("")
+            raise EndedError
+    answer = sys.stdin.readline()
+    if not answer:
+        raise CalibrationError("nobody is there to answer: start it in a terminal, or with --yes")
+    return answer.strip().lower()
 
 
 def find_robots(program: Program, robot_ids: Optional[Sequence[int]]) -> Dict[int, Optional[str]]:
