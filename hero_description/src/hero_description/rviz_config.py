@@ -168,6 +168,6 @@ def make_config(names: Sequence[str], fixed_frame: str, view: str = "orbit") -> 
             ],
             "Views": {"Current": make_view(view)},
         },
-        "Window Geometry": {"Width": 1200, "Height": 800},
+        "Window Geometry": {"X": 0, "Y": 0, "Width": 1200, "Height": 800},
     }
     return str(yaml.safe_dump(config, sort_keys=False, default_flow_style=False))
