@@ -26,16 +26,15 @@ PICTURES_FOLDER = BRINGUP.parent / "docs" / "pictures"
 WALK_S = 25.0
 SCREEN = (1200, 800)  # the size that the configuration of RViz gives its window
 VIEW = (slice(64, 768), slice(366, 1182))  # rows and columns of the view in that window
-COLOURS_DRAWN = 200  # fewer different colours than this: RViz shows no robots yet
+GROUND_SHARE = 0.5  # of the view is light ground as soon as RViz draws; its first window is dark
 DRAW_TIMEOUT_S = 60.0
 
 
 def wait_until_drawn(screen, stage):
-    """Return when RViz shows more than its empty window."""
+    """Return when RViz shows the ground."""
 
     def drawn():
-        time.sleep(0.1)  # counting colours is work too
-        return len(np.unique(screen.read()[::4, ::4].reshape(-1, 3), axis=0)) > COLOURS_DRAWN
+        return np.mean(np.all(screen.read()[VIEW][::4, ::4] > 230, axis=2)) > GROUND_SHARE
 
     stage.wait_for(drawn, "a picture in RViz", DRAW_TIMEOUT_S)
 
