@@ -9,6 +9,7 @@ A page is plain Markdown. What is run are its ```console blocks:
                          number of lines
 
 A command that is followed by ^C must show its lines first, and is then interrupted; lines after ^C must come last.
+A block that begins with lines shows what a program that was left running has shown when it ends by itself.
 A comment right before a block tells what a reader needs not be told, apart by ";":
 
     <!-- lesson: terminal 2 -->            typed into this terminal; without, into terminal 1
@@ -63,7 +64,7 @@ class Step(NamedTuple):
 
     line: int
     command: Optional[str]
-    """None: Ctrl-C is pressed."""
+    """None: Ctrl-C is pressed. Empty: the end of what runs is awaited."""
     expected: List[str]
 
 
@@ -85,7 +86,7 @@ class Block(NamedTuple):
     same_as: Optional[str]
 
     def read_steps(self, page: Path) -> List[Step]:
-        """Return what is done in the terminal. Raises: PageError for lines before the first command."""
+        """Return what is done in the terminal. Raises: PageError."""
         steps: List[Step] = []
         for number, line in enumerate(self.text.splitlines(), self.line + 1):
             if line.startswith("$ "):
@@ -93,7 +94,7 @@ class Block(NamedTuple):
             elif line == "^C":
                 steps.append(Step(number, None, []))
             elif not steps:
-                raise PageError("%s:%d: output without a command: %s" % (page, number, line))
+                steps.append(Step(number - 1, "", [line]))
             elif line.startswith("> ") and not steps[-1].expected and steps[-1].command is not None:
                 steps[-1] = steps[-1]._replace(command="%s\n%s" % (steps[-1].command, line[2:]))
             else:
@@ -230,13 +231,15 @@ class Terminal:
         """Press a key."""
         self._bash.send(key)
 
-    def interrupt(self) -> None:
-        """Press Ctrl-C in a moment of silence; what was shown so far is forgotten."""
+    def interrupt(self) -> bool:
+        """Press Ctrl-C in a moment of silence, and forget what was shown; return False if nothing runs any more."""
         deadline_s = time.monotonic() + ENDING_S
         while self._read(QUIET_S) and time.monotonic() < deadline_s:
             continue
-        self._raw = ""
-        self._bash.sendintr()
+        if self.runs:
+            self._raw = ""
+            self._bash.sendintr()
+        return self.runs
 
     @property
     def output(self) -> str:
@@ -323,9 +326,11 @@ class Course:
             if step.command is None:
                 self._interrupt(terminal, step, page)
                 continue
-            if terminal.runs:
-                raise PageError("%s:%d: terminal %d is busy" % (page, step.line, block.terminal))
-            terminal.type_line(step.command)
+            if terminal.runs != (step.command == ""):
+                state = "busy" if terminal.runs else "idle"
+                raise PageError("%s:%d: terminal %d is %s" % (page, step.line, block.terminal, state))
+            if step.command:
+                terminal.type_line(step.command)
             if (last and block.goes_on) or (not last and steps[index + 1].command is None):
                 if not terminal.wait_for_lines(step.expected, block.deadline_s):
                     self._fail(page, step, terminal)
@@ -356,8 +361,7 @@ class Course:
     def _interrupt(self, terminal: Terminal, step: Step, page: Path) -> None:
         if not terminal.runs:
             raise PageError("%s:%d: ^C, but nothing runs in this terminal" % (page, step.line))
-        terminal.interrupt()
-        ended = terminal.wait_for_end(ENDING_S)
+        ended = terminal.interrupt() and terminal.wait_for_end(ENDING_S)
         if not ended or not re.fullmatch(make_pattern(["...", *step.expected]), terminal.output):
             self._fail(page, step, terminal)
 
@@ -382,7 +386,7 @@ class Course:
             % (
                 page,
                 step.line,
-                "^C" if step.command is None else step.command,
+                "^C" if step.command is None else step.command or "(what was left running)",
                 missing,
                 state,
                 "".join("    %s\n" % line for line in output.splitlines()[-60:]),

@@ -91,6 +91,21 @@ def test_a_program_goes_on_while_another_terminal_is_used(try_page):
     try_page(text)
 
 
+def test_a_program_that_was_left_running_is_awaited_and_compared(try_page):
+    waits = "$ until test -e ~/file; do sleep 0.05; done; echo seen"
+    create = console("$ touch ~/file", marks="terminal 2")
+    try_page(console(waits, marks="goes on") + create + console("seen", "$ rm ~/file"))
+    with pytest.raises(LessonError, match="05_page.md:12: heard"):
+        try_page(console(waits, marks="goes on") + create + console("heard"))
+
+
+def test_the_runner_waits_until_a_condition_of_the_page_holds(try_page):
+    create = console("$ sleep 0.5; touch ~/file; cat", marks="goes on")
+    try_page(create + console("$ ls ~/file", marks="terminal 2; when test -e ~/file") + console("^C"))
+    with pytest.raises(LessonError, match="did not succeed in time"):
+        try_page(console("$ true", marks="when echo no >&2 && false; within 1 s"))
+
+
 def test_a_terminal_remembers_directory_and_variables(try_page):
     try_page(console("$ cd /usr; x=5") + console("$ echo $PWD $x", "/usr 5"))
 
@@ -146,7 +161,7 @@ def test_an_ellipsis_stands_for_text_in_a_line_or_for_any_lines():
         ("<!-- lesson: backwards -->\n```console\n$ true\n```\n", "unknown mark 'backwards'"),
         ("<!-- lesson: goes on -->\nwords\n", "a mark without a block"),
         ("```console\n$ true\n", "no end"),
-        ("```console\nwords\n```\n", "output without a command"),
+        ("```console\nwords\n```\n", "idle"),
         ("<!-- lesson: instead true -->\n```console\n$ a\n$ b\n```\n", "one command"),
         ("```console\n^C\n```\n", "nothing runs"),
         ("<!-- lesson: goes on -->\n```console\n$ cat\n```\n```console\n$ true\n```\n", "busy"),
