@@ -91,6 +91,13 @@ class DriverNode:
         self._thread.start()
         self._master_watch.open()
         self._log.log("info", self._describe_start())
+        if self._config.host in ("0.0.0.0", "::") and not self._config.allow:
+            self._log.log(
+                "warn",
+                "robots are awaited on every address of this machine, and whoever reaches the port can say that it"
+                " is a robot: on a PC in another network too, set ~host to its address in the robots' network, or"
+                " ~allow to that network",
+            )
 
     def spin(self) -> int:
         """Report until end() is called; return the exit code."""

@@ -1,0 +1,182 @@
+"""What strangers can and cannot do, tried from outside: other addresses, other names, forged lines, hidden paths."""
+
+import re
+import socket
+
+import emulated_swarm
+import pytest
+import rosgraph
+import rospy
+from bad_peer import declare_topic
+from driver_case import ask_parameter
+from fake_robot import PUB, STOCK_DECLARATIONS, Declaration, FakeRobot
+from life_signs import Life
+from rig import wait_until
+
+from hero_driver.rosserial import payloads
+
+STRING_MD5 = "992ce8a1687cec8c8bd883ec73ca41d1"
+
+EVIL_NAMES = (
+    "/hero_7/../../etc/passwd",
+    "/hero_7/\n[FATAL] [1.0]: all is lost",
+    "/hero_7/\x1b]0;title\x07",
+    "/hero_7/\u202egnp.exe",
+    "/hero_7/%s%n%d",
+    "/hero_7/$(reboot)",
+    "/hero_7/<b>bold</b>",
+    "~/hero_7",
+    "/",
+    "",
+)
+EVIL_TYPES = ("os/system", "../msg/String", "std_msgs/String\n", "subprocess/Popen", "__main__/x")
+
+
+def list_names(node):
+    """Return what a node publishes, subscribes to and serves."""
+    state = rosgraph.Master("/faults").getSystemState()
+    return {name for part in state for name, nodes in part if node in nodes}
+
+
+def test_the_driver_says_that_it_listens_everywhere_and_how_to_keep_strangers_out(start_driver, record):
+    driver = start_driver()
+    line = driver.wait_line("every address of this machine")
+    assert "~host" in line and "~allow" in line
+    quiet = start_driver(parameters={"host": "127.0.0.1"})
+    quiet.wait_line("listening on 127.0.0.1")
+    guarded = start_driver(parameters={"allow": ["127.0.0.0/8"]})
+    guarded.wait_line("listening on 0.0.0.0")
+    assert not quiet.find_lines("every address") and not guarded.find_lines("every address")
+    record("a default bind on all addresses, said with its remedy", 1, 1)
+
+
+def test_addresses_outside_the_allow_list_get_no_word(start_driver, record):
+    driver = start_driver(parameters={"allow": ["127.0.0.7/32"]})
+    robot = FakeRobot(1, source_host="127.0.0.7").connect(driver.address)
+    life = Life(driver, robot)
+    tries = 50
+    heard = 0
+    for number in range(tries):
+        with socket.socket() as stranger:
+            stranger.bind(("127.0.0.%d" % (10 + number), 0))
+            stranger.settimeout(20.0)
+            stranger.connect(driver.address)
+            try:
+                stranger.sendall(emulated_swarm.declare(2))
+                heard += len(stranger.recv(100))
+            except OSError:
+                continue
+    assert not driver.fleet.find("/hero_2")
+    life.show()
+    robot.close()
+    record("connections from addresses that are not in ~allow", tries, tries - bool(heard) * tries)
+
+
+def test_names_and_types_cannot_leave_the_robots_place_or_run_anything(start_driver, record):
+    driver = start_driver()
+    evil = [
+        Declaration(PUB, 150 + n, name, "std_msgs/String", STRING_MD5) for n, name in enumerate(EVIL_NAMES)
+    ]
+    evil += [
+        Declaration(PUB, 180 + n, "/hero_7/t%d" % n, kind, STRING_MD5) for n, kind in enumerate(EVIL_TYPES)
+    ]
+    # FakeRobot puts its own name into names with braces only.
+    robot = FakeRobot(7, declarations=STOCK_DECLARATIONS)
+    robot.declarations += evil
+    robot.connect(driver.address)
+    life = Life(driver, robot)
+    life.show()
+    outside = [
+        name
+        for name in list_names(driver.node)
+        if not re.fullmatch(r"/hero_7/[a-z_/]+|/tf|/rosout|/clock|/diagnostics|%s/\w+" % driver.node, name)
+    ]
+    robot.close()
+    assert not driver.find_lines("Traceback")
+    record(
+        "names and types made to break out", len(evil), len(evil) - len(outside), "nothing; each is refused"
+    )
+
+
+def test_log_lines_of_robots_cannot_look_like_those_of_others(start_driver, record):
+    driver = start_driver()
+    robot = FakeRobot(7).connect(driver.address)
+    life = Life(driver, robot)
+    texts = [
+        "first\n[FATAL] [1.0]: hero_1 left",
+        "\r[ERROR] over it",
+        "\x1b[2J\x1b[1;1Hclean",
+        "\u202edrawkcab",
+        "a\x00b",
+        "\x85next \u2028line",
+        "%s %d %(name)s {0}",
+        "x" * 4000,
+    ]
+    for text in texts:
+        robot.log(text, payloads.LOG_WARN)
+    robot.log("the end")
+    driver.wait_line("hero_7: the end")
+    life.show()
+    robot.close()
+    lines = list(driver.lines)
+    forged = [
+        line
+        for line in lines
+        if not re.match(r"\x1b?\[?\d*m?\[(DEBUG|INFO|WARN|ERROR|FATAL)\] \[\d{9,}", line)
+    ]
+    odd = [line for line in lines if re.search(r"[\x00-\x08\x0b-\x1a\x1c-\x1f\x7f\u2028\u202e\x85]", line)]
+    assert not forged and not odd, (forged, odd)
+    record(
+        "log texts made to forge lines",
+        len(texts),
+        len(texts),
+        "their control characters, and all beyond 400",
+    )
+
+
+def test_robots_cannot_read_what_others_keep_on_the_parameter_server(start_driver, record):
+    rospy.set_param("/hero_1/password", "s3cret")
+    rospy.set_param("/wifi_password", "s3cret")
+    driver = start_driver()
+    robot = FakeRobot(7).connect(driver.address)
+    driver.fleet.wait_ready("/hero_7")
+    names = (
+        "/wifi_password",
+        "/hero_1/password",
+        "~../hero_1/password",
+        "../wifi_password",
+        "/hero_7/../wifi_password",
+    )
+    answers = [ask_parameter(robot, name) for name in names]
+    robot.close()
+    assert not any("s3cret" in line for line in driver.lines)
+    record("parameters of others", len(names), sum(answer == ([], [], []) for answer in answers))
+
+
+@pytest.mark.parametrize("kind", ["a connection", "a robot"])
+def test_nobody_takes_more_than_the_limits_give(start_driver, record, kind):
+    driver = start_driver(parameters={"max_connections_per_address": 5, "max_connections": 50})
+    friend = FakeRobot(1, source_host="127.0.0.7").connect(driver.address)
+    life = Life(driver, friend)
+    socks = []
+    for number in range(20):
+        sock = socket.socket()
+        sock.bind(("127.0.0.66", 0))
+        sock.connect(driver.address)
+        socks.append(sock)
+        if kind == "a robot":
+            sock.sendall(
+                emulated_swarm.declare(100 + number) + declare_topic(0, 150, "/hero_1/x", "a/B", STRING_MD5)
+            )
+    driver.wait_line("~max_connections_per_address")
+    wait_until(lambda: driver.find_lines("refused"), "a refusal")
+    life.show()
+    taken = sum(
+        robot.namespace.startswith("/hero_1") and robot.id >= 100 for robot in driver.fleet.newest.robots
+    )
+    for sock in socks:
+        sock.close()
+    friend.close()
+    record(
+        "20 times %s from one address that may have 5" % kind, 1, int(taken <= 5), "what was beyond the limit"
+    )
