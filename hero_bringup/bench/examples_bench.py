@@ -59,6 +59,7 @@ class CommandCount:
                 rospy.Subscriber(name, rospy.AnyMsg, self.take, name, queue_size=10)
 
     def take(self, message, name):
+        """Count a message on the topic called name."""
         self.counts[name] += 1
 
     def take_out(self, topic):
@@ -78,11 +79,13 @@ class Hands:
             threading.Thread(target=act, daemon=True).start()
 
     def hold(self):
+        """Press the key and hold the stick until ended is set."""
         while not self.ended.wait(0.05):
             self.stick.publish(Joy(axes=[0.2, 0.5], buttons=[0, 0, 0, 0, 1]))
             os.write(self.master_fd, b"q")
 
     def look(self):
+        """Read what the terminal shows, so that it never fills."""
         while os.read(self.master_fd, 65536):
             continue
 

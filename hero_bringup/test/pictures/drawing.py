@@ -35,7 +35,8 @@ def draw_paths(picture, title, arena, paths, goals=None, only_m=None, size_inch=
         color = color_of(index)
         axes.plot(rows[:, 1], rows[:, 2], color=color, linewidth=1.0)
         axes.add_patch(pyplot.Circle(tuple(rows[0, 1:3]), BODY_RADIUS_M, color=color, fill=False, zorder=3))
-        axes.add_patch(pyplot.Circle(tuple(rows[-1, 1:3]), BODY_RADIUS_M, color=color, zorder=3, label="hero_%d" % robot))
+        end = tuple(rows[-1, 1:3])
+        axes.add_patch(pyplot.Circle(end, BODY_RADIUS_M, color=color, zorder=3, label="hero_%d" % robot))
     if goals:
         axes.plot(*zip(*goals), "x", color="black", markersize=5, zorder=4)
     if len(paths) <= 4:

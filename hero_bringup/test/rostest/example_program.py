@@ -23,7 +23,7 @@ class ExampleProgram:
     def __init__(self, name, *arguments, environment=None):
         ExampleProgram.count += 1
         self.name = name
-        self.output = tempfile.NamedTemporaryFile()
+        self.output = tempfile.NamedTemporaryFile()  # noqa: SIM115 - closed with the program
         self.process = subprocess.Popen(
             [find_program(name), "__name:=%s_%d" % (name, ExampleProgram.count), *arguments],
             stdin=subprocess.DEVNULL,
@@ -40,7 +40,9 @@ class ExampleProgram:
 
     def wait_for_text(self, text, timeout_s=END_TIMEOUT_S):
         wait_for(
-            lambda: text in self.text(), timeout_s, lambda: "%r from %s, which wrote %s" % (text, self.name, self.text())
+            lambda: text in self.text(),
+            timeout_s,
+            lambda: "%r from %s, which wrote %s" % (text, self.name, self.text()),
         )
 
     def wait(self, timeout_s=END_TIMEOUT_S):

@@ -158,7 +158,7 @@ class RobotApiTest(unittest.TestCase):
         with self.assertRaisesRegex(RobotNotReadyError, "hero_77 is not ready after 0.5 s: nobody takes /hero_77/vel"):
             absent.wait_until_ready(timeout_s=0.5)
         with self.assertRaisesRegex(StaleDataError, "no message on /hero_77/odom yet"):
-            absent.pose
+            _ = absent.pose
         with self.assertRaisesRegex(StaleDataError, "no message on /hero_77/proximity yet"):
             absent.nearest()
         absent.close()
@@ -173,11 +173,11 @@ class RobotApiTest(unittest.TestCase):
         with self.assertRaisesRegex(GoalError, "no odometry for 2 s"):
             future.result(timeout=DEADLINE_S)
         with self.assertRaisesRegex(StaleDataError, r"/hero_3/odom came [0-9.]+ s ago: has the robot gone"):
-            robot.pose
+            _ = robot.pose
         with self.assertRaises(StaleDataError):
-            robot.velocity
+            _ = robot.velocity
         with self.assertRaises(StaleDataError):
-            robot.proximity
+            _ = robot.proximity
         robot.wait_until_ready(timeout_s=DEADLINE_S)
         self.assertIsNotNone(robot.pose)
 

@@ -25,7 +25,9 @@ class SwarmGoToTest(unittest.TestCase):
             goals[robot_id] = (-0.6 * math.cos(angle), -0.6 * math.sin(angle))
 
         def all_rest():
-            moved = all(math.dist(watch.pose(robot_id)[:2], goal) < TRUE_TOLERANCE_M for robot_id, goal in goals.items())
+            moved = all(
+                math.dist(watch.pose(robot_id)[:2], goal) < TRUE_TOLERANCE_M for robot_id, goal in goals.items()
+            )
             return moved and all(rows[-1][4] == 0.0 for rows in watch.rows.values())
 
         wait_for(all_rest, 100.0, "all robots at rest on the other side")

@@ -19,7 +19,7 @@ NUDGE = 0.05
 
 
 PATIENCE_S = 4.0
-"""A robot that came no nearer to its goal for so long is in a jam: it goes aside, to a random side and by a random angle."""
+"""A robot that came no nearer to its goal for so long is in a jam: it goes aside, to a random side and angle."""
 
 ASIDE_S = 2.0
 """For so long, then it tries again."""
