@@ -369,15 +369,14 @@ class Gateway(LinkHandler):
             record.firmware, record.hardware, record.config = line.boot
         if line.heartbeat is not None:
             self._receive_heartbeat(peer, record, line.heartbeat.uptime_s, now_s)
-            self._log.log("debug", "%s: %s" % (peer.label, line.text))
-            return
         if now_s - peer.log_window_s >= 1.0:
             peer.log_window_s, peer.log_count = now_s, 0
         peer.log_count += 1
         if peer.log_count > LOG_LINES_PER_S:
             record.dropped_messages += 1
             return
-        self._log.log(LOG_LEVELS.get(log.level, "error"), "%s: %s" % (peer.label, line.text))
+        level = "debug" if line.is_routine else LOG_LEVELS.get(log.level, "error")
+        self._log.log(level, "%s: %s" % (peer.label, line.text))
 
     def _receive_heartbeat(self, peer: Peer, record: RobotRecord, uptime_s: float, now_s: float) -> None:
         booted_s = now_s - uptime_s

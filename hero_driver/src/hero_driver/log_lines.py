@@ -17,6 +17,7 @@ _BOOT = re.compile(
     r"Firmware:\s*(?P<firmware>\S+)\s*\|\s*Hardware:\s*(?P<hardware>\S+)\s*\|"
     r"(?:\s*Config:\s*(?P<config>\S+)\s*\|)?"
 )
+_PID_RESET = "Reseting PID..."  # VelocityControl.ino, with each zero velocity: ten times a second while one is sent
 _HEARTBEAT = re.compile(r"^Conn?ected at time (?P<millis>\d{1,10})$")
 
 
@@ -40,6 +41,7 @@ class LogLine(NamedTuple):
     text: str  # without name, colours and control characters, of bounded length
     boot: Optional[BootLine]
     heartbeat: Optional[Heartbeat]
+    is_routine: bool  # said so often, and so independently of what happens, that it is no news to people
 
 
 def clean_text(text: str) -> str:
@@ -61,4 +63,4 @@ def read_log_line(text: str) -> LogLine:
         match = _HEARTBEAT.match(body)
         if match is not None:
             heartbeat = Heartbeat(int(match["millis"]) / 1000.0)
-    return LogLine(body, boot, heartbeat)
+    return LogLine(body, boot, heartbeat, heartbeat is not None or body == _PID_RESET)

@@ -56,12 +56,25 @@ def test_what_only_resembles_a_heartbeat_is_none(text):
             "IMU is not working or not connected! Error: 1",
         ),
         ("[HERO] Odometry was changed!", "Odometry was changed!"),
-        ("Reseting PID...", "Reseting PID..."),
+        ("[/hero_0] Reseting PID... now", "Reseting PID... now"),
         ("Left  Motor PID = [1.00, 2.00, 3.00]", "Left  Motor PID = [1.00, 2.00, 3.00]"),
     ],
 )
 def test_the_firmwares_texts_lose_colours_and_the_name_and_nothing_else(text, clean):
-    assert read_log_line(text) == (clean, None, None)
+    assert read_log_line(text) == (clean, None, None, False)
+
+
+@pytest.mark.parametrize(
+    ("text", "is_routine"),
+    [
+        ("\x1b[93m[/hero_0] Reseting PID...\x1b[0m", True),
+        ("\x1b[96m[/hero_0] Conected at time 1638\x1b[0m", True),
+        ("[/hero_0] Reseting PID... failed", False),
+        ("[/hero_0] IMU is not working", False),
+    ],
+)
+def test_lines_that_come_all_the_time_are_told_from_news(text, is_routine):
+    assert read_log_line(text).is_routine is is_routine
 
 
 def test_a_robot_cannot_forge_a_line_or_move_the_cursor():
