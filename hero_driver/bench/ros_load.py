@@ -77,7 +77,8 @@ def main():
     rospy.init_node("bench_" + options.role, anonymous=True, disable_signals=True)
     ended = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: ended.set())
+        # On a thread of its own: the main thread may be inside the lock of the event.
+        signal.signal(number, lambda *_: threading.Thread(target=ended.set).start())
     role = listen if options.role == "listen" else command
     print(json.dumps(role(options.robots, options.first_id, ended)), flush=True)
 

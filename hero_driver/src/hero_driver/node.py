@@ -1,5 +1,6 @@
 """main(): reads the parameters, wires everything, waits, and stops all robots at the end."""
 
+import contextlib
 import errno
 import io
 import os
@@ -52,12 +53,40 @@ def make_ros_clock() -> Callable[[], int]:
     return time.time_ns
 
 
+class EndFlag:
+    """As threading.Event, but one that a signal handler may set.
+
+    A handler runs on the main thread between any two steps: where that thread is just inside the lock of an
+    Event on which it waits, setting the Event would wait for itself for ever.
+    """
+
+    def __init__(self) -> None:
+        self._is_set = False
+        self._wakes: queue.SimpleQueue[None] = queue.SimpleQueue()
+
+    def set(self) -> None:
+        """Set it; from any thread or signal handler."""
+        self._is_set = True
+        self._wakes.put(None)
+
+    def is_set(self) -> bool:
+        """Return whether it is set."""
+        return self._is_set
+
+    def wait(self, timeout_s: float) -> bool:
+        """Wait until it is set, at most for timeout_s; return whether it is."""
+        if not self._is_set:
+            with contextlib.suppress(queue.Empty):
+                self._wakes.get(timeout=timeout_s)
+        return self._is_set
+
+
 class DriverNode:
     """The whole driver: open() until close()."""
 
     def __init__(self, config: DriverConfig) -> None:
         self._config = config
-        self._ended = threading.Event()
+        self._ended = EndFlag()
         self._changed = threading.Event()
         self._log = LogRelay()
         self._registrar = Worker(
