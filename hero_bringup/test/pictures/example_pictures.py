@@ -154,8 +154,10 @@ def led_show(picture):
         shows = {}
         for pattern in ("rainbow", "chase", "blink"):
             program = recording.stage.start_example("led_show", "__name:=" + pattern, "_pattern:=" + pattern)
-            recording.stage.wait_for(lambda: lights.colors and max(lights.colors[0]) > 0.5, "light")
-            recording.go_on(4.0)  # until every robot is connected to the program, and its own blue light has ended
+            lights.rows.clear()
+            # Every robot has some red within a round of each pattern; dark, or in its own blue, it does not listen yet.
+            recording.stage.wait_for(lambda: count_reddened(lights) == 8, "robots that listen")
+            recording.go_on(1.0)
             lights.rows.clear()
             recording.go_on(8.0)
             shows["pattern:=" + pattern] = list(lights.rows)
@@ -163,6 +165,11 @@ def led_show(picture):
             program.wait()
             recording.stage.wait_for(lambda: max(map(max, lights.colors.values())) < 0.5, "darkness")
         draw_lights(picture, shows)
+
+
+def count_reddened(lights):
+    """Return how many robots have had red in their light in the recorded rows."""
+    return len({robot for _, colors in list(lights.rows) for robot, color in colors.items() if color[0] > 0.5})
 
 
 def measure_delay(picture):
