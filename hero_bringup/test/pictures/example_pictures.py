@@ -3,6 +3,7 @@
 Every picture is recorded in a process of its own, with a ROS master, a driver and a simulator of its own.
 """
 
+import json
 import math
 import os
 import pty
@@ -12,6 +13,7 @@ import time
 from pathlib import Path
 
 import rospy
+import yaml
 from drawing import draw_lights, draw_paths
 from geometry_msgs.msg import PoseStamped
 from picture_program import make_pictures
@@ -122,7 +124,7 @@ def go_to_goal(picture):
 def swarm_go_to(picture):
     """Ten robots that swap places."""
     with Recording(10, arena_file("circle")) as recording:
-        swap = (TESTS / "swap.yaml").read_text()
+        swap = json.dumps(yaml.safe_load((TESTS / "swap.yaml").read_text()))  # rospy ignores values of several lines
         recording.stage.start_example("swarm_go_to", "_robots:=0-9", "_formation:=" + swap, "_assign:=false")
         goals = [(-x_m, -y_m) for x_m, y_m, _ in map(recording.watch.pose, range(10))]
         recording.wait_until_all_are_at(goals, 0.3, 120.0)
