@@ -1,4 +1,4 @@
-"""docs/troubleshooting.md names messages that exist, and every message of the driver and of the tools for experiments."""
+"""docs/troubleshooting.md names messages that exist, and every one of the driver and of the tools for experiments."""
 
 import ast
 import re
