@@ -1,4 +1,4 @@
-"""Runs the rostests of the suite, two at once, each under a ROS master of its own; shows the log of one that fails.
+"""Runs the rostests of the suite, three at once, each under a ROS master of its own; shows the log of one that fails.
 
 Usage: run_rostests.py RESULTS_DIR [PATTERN]
 The workspace must be sourced. A rostest that leaves no results (it hung, or died) counts as one failure.
@@ -6,6 +6,7 @@ The workspace must be sourced. A rostest that leaves no results (it hung, or die
 
 import concurrent.futures
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -17,13 +18,20 @@ from results import Counts, count_results, record
 ROOT = Path(__file__).resolve().parents[1]
 TIMEOUT_S = 600.0  # of one .test file; each <test> in it has its own, shorter time-limit
 LOG_LINES_SHOWN = 80
-AT_ONCE = 2  # most of a rostest is waiting for robots that move in real time
+AT_ONCE = 3  # most of a rostest is waiting for robots that move in real time
+TIME_LIMIT = re.compile(r'time-limit="([0-9.]+)"')
+
+
+def read_time_limit_s(path):
+    """Return how long a .test file may take at most, by its own word."""
+    return max(map(float, TIME_LIMIT.findall(path.read_text())))
 
 
 def find_rostests(pattern):
-    """All .test files of the suite whose path contains the pattern."""
+    """All .test files of the suite whose path contains the pattern, those first that may take longest."""
     paths = sorted(ROOT.glob("*/test/rostest/*.test"))
-    return [path for path in paths if pattern in str(path.relative_to(ROOT))]
+    chosen = [path for path in paths if pattern in str(path.relative_to(ROOT))]
+    return sorted(chosen, key=read_time_limit_s, reverse=True)
 
 
 def run_rostest(path, results_dir):
