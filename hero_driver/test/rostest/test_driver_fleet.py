@@ -176,7 +176,7 @@ class TestDriverFleet(DriverCase):
             return self.fleet.find("/hero_15", Robot.REFUSED) and self.fleet.find("/hero_15", Robot.READY)
 
         wait_for(look, "one to stay and one to be refused")
-        self.assertLess(self.fleet.find("/hero_15", Robot.READY).reconnects, 5)
+        self.assertLess(self.fleet.find("/hero_15", Robot.READY).reconnects, 20)
         self.assertIn("two robots", self.fleet.find("/hero_15", Robot.REFUSED).last_error)
 
     def test_of_two_robots_with_one_id_the_first_stays_and_the_second_is_refused(self):
