@@ -1,8 +1,8 @@
 #!/usr/bin/env python
 """Simulated robots with known errors through the real program: what it finds, what robots do when it ends, restoring.
 
-Robots 0 to 2 stand before a wall, 3 to 6 have room, 7 and 8 stand too near to each other. The simulator runs three
-times as fast as time; two programs run side by side.
+Robots 0 to 2 stand before a wall, 3 to 6 have room, 7 and 8 stand too near to each other. The simulator runs twice
+as fast as time; two programs run side by side.
 """
 
 import glob
