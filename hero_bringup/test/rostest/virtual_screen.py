@@ -24,7 +24,7 @@ class VirtualScreen:
         read_fd, write_fd = os.pipe()
         self._process = subprocess.Popen(
             ["Xvfb", "-displayfd", str(write_fd), "-screen", "0", "%dx%dx24" % (width, height)]
-            + ["-fbdir", self._folder.name, "-nolisten", "tcp"],
+            + ["-fbdir", self._folder.name, "-nolisten", "tcp", "-nocursor"],
             pass_fds=[write_fd],
             stderr=subprocess.DEVNULL,
         )
