@@ -1,4 +1,4 @@
-"""Makes the pictures of the courses as their pages say: RViz with the square, the path of a walk. Started by script/pictures."""
+"""Makes the pictures of the courses as their pages say: RViz with a square, the path of a walk. For script/pictures."""
 
 import os
 import subprocess
