@@ -5,7 +5,13 @@ from setuptools import setup
 
 setup(
     **generate_distutils_setup(
-        packages=["hero_bringup", "hero_bringup.checkup", "hero_bringup.monitor"],
+        packages=[
+            "hero_bringup",
+            "hero_bringup.calibration",
+            "hero_bringup.checkup",
+            "hero_bringup.monitor",
+            "hero_bringup.recording",
+        ],
         package_dir={"": "src"},
         package_data={"hero_bringup.monitor": ["web/*"]},
     )
