@@ -12,7 +12,7 @@ import numpy as np
 from .arena import Arena, is_free, outline
 from .errors import OptionError
 from .kinematics import BODY_RADIUS_M, Pose
-from .yaml_file import fail_at, read_mapping, read_nodes
+from .yaml_file import describe_node, fail_at, read_mapping, read_nodes
 
 SHIPPED = ("empty", "obstacles", "maze")
 """Arenas that come with the simulator; --arena takes these names too."""
@@ -53,7 +53,9 @@ class _Reader:
         )
         for key, (key_node, _) in entries.items():
             if key not in _KEYS:
-                raise self._fail(key_node, "unknown key %r; known are %s" % (key, ", ".join(_KEYS)))
+                raise self._fail(
+                    key_node, "unknown key %s; known are %s" % (describe_node(key_node), ", ".join(_KEYS))
+                )
         nodes = {key: value_node for key, (_, value_node) in entries.items()}
         segments: List[Tuple[float, float, float, float]] = []
         for node in self._items(nodes.get("walls_m"), "walls_m"):
@@ -71,9 +73,8 @@ class _Reader:
                 raise self._fail(node, "a circle's radius must be more than 0, not %g" % radius_m)
             circles.append((x_m, y_m, radius_m))
         bounds_m = self._bounds(nodes.get("bounds_m"), root, segments)
-        name = str(nodes["name"].value) if "name" in nodes else os.path.basename(self._path)
         arena = Arena(
-            name,
+            self._name(nodes.get("name")),
             np.array(segments, dtype=float).reshape(-1, 4),
             np.array(circles, dtype=float).reshape(-1, 3),
             (),
@@ -81,6 +82,14 @@ class _Reader:
             tuple(polygons),
         )
         return arena._replace(starts=self._starts(nodes.get("starts_m_deg"), arena))
+
+    def _name(self, node: Any) -> str:
+        if node is None:
+            return os.path.basename(self._path)
+        # It is printed in terminals.
+        if node.id != "scalar" or not node.value.isprintable():
+            raise self._fail(node, "name must be one line of text, not %s" % describe_node(node))
+        return str(node.value)
 
     def _starts(self, node: Any, arena: Arena) -> Tuple[Pose, ...]:
         starts: List[Pose] = []
@@ -139,8 +148,8 @@ class _Reader:
             try:
                 number = float(item.value)
             except (TypeError, ValueError) as error:
-                raise self._fail(item, "%r is not a number (%s)" % (item.value, what)) from error
+                raise self._fail(item, "%s is not a number (%s)" % (describe_node(item), what)) from error
             if not abs(number) <= _LARGEST_M:
-                raise self._fail(item, "%s is not between -1000 and 1000 (%s)" % (item.value, what))
+                raise self._fail(item, "%s is not between -1000 and 1000 (%s)" % (describe_node(item), what))
             numbers.append(number)
         return numbers

@@ -145,7 +145,7 @@ def load_known(errors: RobotErrors, first_id: int, path: str) -> None:
         entries = read_mapping(path, entries_node, "%s must be a mapping of keys to numbers" % name)
         for key, (_, value_node) in entries.items():
             try:
-                values[key] = _read_value(key, value_node.value)
+                values[key] = _read_value(key, value_node.value if value_node.id == "scalar" else None)
             except ValueError as error:
                 raise fail_at(path, value_node, str(error)) from error
         _put(errors, rows, values)
@@ -162,7 +162,9 @@ def _read_value(key: str, text: Any) -> float:
     try:
         number = float(text)
     except (TypeError, ValueError) as error:
-        raise ValueError("%s must be a number, not %r" % (key, text)) from error
+        raise ValueError(
+            "%s must be a number, not %s" % (key, "a list or a mapping" if text is None else repr(text))
+        ) from error
     if not kind.least <= number <= kind.most:
         raise ValueError("%s %g is not in %g..%g" % (key, number, kind.least, kind.most))
     return number

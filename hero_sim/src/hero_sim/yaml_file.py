@@ -9,6 +9,10 @@ from typing import Any, Dict, NamedTuple, Optional, Tuple
 
 from .errors import OptionError
 
+_TOO_DEEP = "lists within lists, deeper than can be read"
+
+_LONGEST_SHOWN = 60
+
 
 def read_nodes(path: str, option: str, remedy: str) -> Any:
     """Return the root node of the file at path, None if it is empty.
@@ -30,10 +34,18 @@ def read_nodes(path: str, option: str, remedy: str) -> Any:
         return _read_json(text, option)
     try:
         return yaml.compose(text, Loader=yaml.SafeLoader)
+    except yaml.reader.ReaderError as error:
+        line = text.count("\n", 0, error.position) + 1
+        raise OptionError(
+            "%s:%d: the character U+%04X may not stand in a YAML file" % (path, line, error.character)
+        ) from error
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         line = mark.line + 1 if mark is not None else 1
-        raise OptionError("%s:%d: %s" % (path, line, getattr(error, "problem", None) or error)) from error
+        problem = getattr(error, "problem", None) or str(error)
+        raise OptionError("%s:%d: %s" % (path, line, " ".join(problem.split()))) from error
+    except RecursionError as error:
+        raise OptionError("%s:1: %s" % (path, _TOO_DEEP)) from error
 
 
 class _JsonNode(NamedTuple):
@@ -48,6 +60,8 @@ def _read_json(text: str, option: str) -> Any:
     lines = ["" if line.lstrip().startswith("#") else line for line in text.splitlines()]
     try:
         return _convert_json(json.loads("\n".join(lines)))
+    except RecursionError as error:
+        raise OptionError("%s: %s" % (option, _TOO_DEEP)) from error
     except ValueError as error:
         raise OptionError(
             "%s: PyYAML is missing, and the file is not JSON (%s); install PyYAML: apt install python3-yaml, or "
@@ -70,6 +84,14 @@ def fail_at(path: str, node: Any, reason: str) -> OptionError:
     return OptionError("%s:%d: %s" % (path, mark.line + 1 if mark is not None else 1, reason))
 
 
+def describe_node(node: Any) -> str:
+    """Return what a node is, for an error; in a file a list may even contain itself, and have no end."""
+    if node.id != "scalar":
+        return "a " + str(node.id)
+    text = str(node.value)
+    return repr(text if len(text) <= _LONGEST_SHOWN else text[:_LONGEST_SHOWN] + "...")
+
+
 def read_mapping(path: str, node: Any, what: str) -> Dict[str, Tuple[Any, Any]]:
     """Return the keys of a mapping, each with its key node and its value node.
 
@@ -79,7 +101,9 @@ def read_mapping(path: str, node: Any, what: str) -> Dict[str, Tuple[Any, Any]]:
         raise fail_at(path, node, what)
     entries: Dict[str, Tuple[Any, Any]] = {}
     for key_node, value_node in node.value:
+        if key_node.id != "scalar":
+            raise fail_at(path, key_node, "a key must be a word, not a list or a mapping; " + what)
         if key_node.value in entries:
-            raise fail_at(path, key_node, "key %r is there twice" % key_node.value)
+            raise fail_at(path, key_node, "key %s is there twice" % describe_node(key_node))
         entries[key_node.value] = (key_node, value_node)
     return entries

@@ -1,0 +1,141 @@
+"""Any file: it is read, or refused in one line with file, line and reason; nothing else is ever raised."""
+
+import json
+import re
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from hero_sim import robot_errors
+from hero_sim.arena import Arena
+from hero_sim.arena_file import load_arena
+from hero_sim.errors import OptionError
+
+ARENA = """\
+name: mine
+walls_m:
+  - [[0, 0], [1, 0], [1, 1]]
+circles_m: [[0.5, 0.5, 0.1]]
+polygons_m:
+  - &corners [[0, 0], [0.2, 0], [0, 0.2]]
+starts_m_deg: [[0.7, 0.7, 90]]
+bounds_m: [0, 0, 1, 1]
+"""
+
+WORDS = (
+    *("name", "walls_m", "circles_m", "polygons_m", "starts_m_deg", "bounds_m", "left_gain", "all", "hero_0"),
+    *(": ", "- ", "\n", "\n  ", "[", "]", "{", "}", ", ", "? ", "| ", "> ", "# ", "'", '"', "&a ", "*a", "<<", "!!"),
+    *("!!int ", "!!python/name:os.system", "---\n", "...\n", "%YAML 9\n", "\t", "\x00", "\x1b", "\ufeff", "\u2028"),
+    *("1", "0.5", "-3", "1e999", ".nan", "nan", "inf", "1_0", "0x10", "null", "~", "true", "9" * 400, "\u0663"),
+)
+
+numbers = st.one_of(st.integers(-2, 2), st.floats(), st.integers())
+leaves = st.one_of(numbers, st.none(), st.booleans(), st.text(max_size=4))
+structures = st.recursive(leaves, lambda inner: st.lists(inner, max_size=4), max_leaves=20)
+points = st.lists(st.lists(numbers, min_size=1, max_size=3), max_size=5)
+keys = st.sampled_from(("name", "walls_m", "circles_m", "polygons_m", "starts_m_deg", "bounds_m", "left_gain"))
+mappings = st.dictionaries(
+    st.one_of(keys, keys, keys, st.text(max_size=5)),
+    st.one_of(structures, points, st.lists(points, max_size=3), st.dictionaries(keys, leaves, max_size=2)),
+    max_size=6,
+)
+changes = st.lists(
+    st.tuples(st.integers(0, len(ARENA)), st.integers(0, 6), st.sampled_from(WORDS)), min_size=1, max_size=4
+)
+
+
+def change(script):
+    """Return the good file with pieces of it replaced."""
+    text = ARENA
+    for place, length, word in script:
+        text = text[:place] + word + text[place + length :]
+    return text
+
+
+contents = st.one_of(
+    st.binary(max_size=100),
+    st.lists(st.sampled_from(WORDS), max_size=30).map("".join).map(str.encode),
+    changes.map(change).map(str.encode),
+    mappings.map(json.dumps).map(str.encode),
+)
+often = settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    return tmp_path_factory.mktemp("fuzz") / "fuzz.yaml"
+
+
+def read_arena(path):
+    """Return the arena in the file, None if it is refused as it should be."""
+    try:
+        arena = load_arena(str(path))
+    except OptionError as error:
+        assert_tells(error, path)
+        return None
+    assert type(arena) is Arena and arena.name.isprintable()
+    for part in (arena.segments_m, arena.circles_m, *arena.polygons_m, *arena.starts, arena.bounds_m):
+        assert np.isfinite(np.asarray(part, dtype=float)).all()
+    return arena
+
+
+def assert_tells(error, path):
+    """The error is one line that names the file, its line where there is one, and a reason."""
+    text = str(error)
+    assert text.isprintable(), ascii(text)
+    assert len(text) < len(str(path)) + 1200, text
+    assert re.match(r"%s:\d+: ." % re.escape(str(path)), text) or "%s is not a text file" % path in text, text
+
+
+@often
+@given(content=contents)
+def test_any_arena_file_is_read_or_refused_with_file_line_and_reason(path, content):
+    path.write_bytes(content)
+    read_arena(path)
+
+
+@often
+@given(content=contents)
+def test_any_file_of_errors_is_read_or_refused_with_file_line_and_reason(path, content):
+    path.write_bytes(content)
+    errors = robot_errors.draw_errors([np.random.RandomState(0)])
+    try:
+        robot_errors.load_known(errors, 0, str(path))
+    except OptionError as error:
+        assert_tells(error, path)
+    assert all(np.isfinite(array).all() for array in errors)
+
+
+@pytest.mark.parametrize(
+    "text, line, words",
+    [
+        ("bounds_m: [0, 0, 1, 1]\nname: \x00\n", 2, "U+0000 may not stand"),
+        ("name: x\n? [a]\n: 1\n", 2, "a key must be a word"),
+        ("name: x\nbounds_m: [0, 0, 1, [1]]\n", 2, "a sequence is not a number"),
+        ("bounds_m: &a [0, 0, 1, *a]\n", 1, "a sequence is not a number"),
+        ("name: [a]\nbounds_m: [0, 0, 1, 1]\n", 1, "name must be one line of text"),
+        ('name: "\\e[2J"\nbounds_m: [0, 0, 1, 1]\n', 1, "name must be one line of text"),
+        ("[" * 20000, 1, "deeper than can be read"),
+    ],
+)
+def test_what_fuzzing_found_is_refused_with_file_line_and_reason(path, text, line, words):
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(OptionError) as caught:
+        load_arena(str(path))
+    assert str(caught.value).startswith("%s:%d: " % (path, line))
+    assert words in str(caught.value)
+
+
+@given(content=mappings.map(json.dumps))
+@settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_without_pyyaml_any_file_is_read_or_refused_too(path, content):
+    path.write_text(content, encoding="utf-8")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(sys.modules, "yaml", None)
+        read_arena(path)
+        path.write_text("[" * 20000, encoding="utf-8")
+        with pytest.raises(OptionError, match="deeper"):
+            load_arena(str(path))
