@@ -16,9 +16,9 @@ from geometry_msgs.msg import PoseStamped
 from .control_laws import STANDSTILL, Pose
 from .frame_watch import FrameError, FrameWatch, plain_frame, shift_pose
 from .goal_pursuit import DEFAULT_LAW, DEFAULT_TIMEOUT_S, DEFAULT_TOLERANCE_M, LAWS, Goal, GoalPursuit, State
+from .goal_reading import LARGEST_M, GoalError, check_limits, read_goal
 from .msg import GoToAction, GoToFeedback, GoToResult
 from .program import Program, ProgramError, check_flag, check_number, parse_robot_ids, read_parameters, run
-from .readings import yaw_of
 from .robot import Robot
 from .swarm import Swarm
 from .swarm_start import WaitReport, open_swarm
@@ -102,7 +102,7 @@ def parse_goals(text: Any, robot_ids: Optional[List[int]]) -> Dict[int, Goal]:
             numbers = [float(word) for word in part]
         except ValueError:
             numbers = []
-        if len(numbers) not in (2, 3) or not all(math.isfinite(number) for number in numbers):
+        if len(numbers) not in (2, 3) or not all(abs(number) <= LARGEST_M for number in numbers):
             raise ProgramError("~goals holds %r, but must hold %s" % (" ".join(part), remedy))
         yaw_rad = math.radians(numbers[2]) if len(numbers) == 3 else None
         goals[robot_id] = Goal(numbers[0], numbers[1], yaw_rad)
@@ -150,17 +150,24 @@ class Pilot:
     # ---------------------------------------------------------------- callbacks, on ROS's threads
 
     def _receive_goal(self, message: PoseStamped) -> None:
-        self.put_goal(read_goal(message, use_heading=True), message.header.frame_id)
+        try:
+            goal, frame = read_goal(message, use_heading=True)
+        except GoalError as error:
+            self._refuse(str(error), None)
+        else:
+            self.put_goal(goal, frame)
 
     def _receive_action(self, handle: Any) -> None:
         wanted = handle.get_goal()
-        goal = read_goal(wanted.target, wanted.use_heading)
         tolerance_m = wanted.tolerance or self._parameters.tolerance_m
         timeout_s = wanted.timeout or self._parameters.timeout_s
-        if not (tolerance_m > 0.0 and timeout_s > 0.0):
-            handle.set_rejected(GoToResult(reason="tolerance and timeout must not be negative"))
-            return
-        self._put(Order(goal, wanted.target.header.frame_id, tolerance_m, timeout_s, handle))
+        try:
+            goal, frame = read_goal(wanted.target, wanted.use_heading)
+            check_limits(tolerance_m, timeout_s)
+        except GoalError as error:
+            self._refuse(str(error), handle)
+        else:
+            self._put(Order(goal, frame, tolerance_m, timeout_s, handle))
 
     def _receive_cancel(self, handle: Any) -> None:
         self._cancelled.put(handle)
@@ -170,18 +177,15 @@ class Pilot:
         self._put(Order(goal, frame, self._parameters.tolerance_m, self._parameters.timeout_s, None))
 
     def _put(self, order: Order) -> None:
-        problem = None
-        if not all(math.isfinite(value) for value in order.goal if value is not None):
-            problem = "a goal must be finite, not %s" % (order.goal,)
-        else:
-            try:
-                self._orders.put_nowait(order)
-            except queue.Full:
-                problem = "more than %d goals at once" % MAX_WAITING_GOALS
-        if problem is not None:
-            rospy.logerr("%s: goal refused: %s", self.robot.name, problem)
-            if order.handle is not None:
-                order.handle.set_rejected(GoToResult(reason=problem))
+        try:
+            self._orders.put_nowait(order)
+        except queue.Full:
+            self._refuse("more than %d goals at once" % MAX_WAITING_GOALS, order.handle)
+
+    def _refuse(self, problem: str, handle: Any) -> None:
+        rospy.logerr("%s: goal refused: %s", self.robot.name, problem)
+        if handle is not None:
+            handle.set_rejected(GoToResult(reason=problem))
 
     # ---------------------------------------------------------------- the node's loop
 
@@ -293,13 +297,6 @@ class Pilot:
         """Give up the goal, and end the action's own thread, as the program ends."""
         self._finish(State.FAILED, "the program ends", now_s, cancelled=True)
         self._server.stop()
-
-
-def read_goal(message: PoseStamped, use_heading: bool) -> Goal:
-    """Return the goal in message; a quaternion of zeros, as tools send that do not care, means no heading."""
-    turn = message.pose.orientation
-    known = use_heading and abs(turn.w) + abs(turn.x) + abs(turn.y) + abs(turn.z) > 1e-6
-    return Goal(message.pose.position.x, message.pose.position.y, yaw_of(turn) if known else None)
 
 
 def pilot_swarm(program: Program, parameters: Parameters, swarm: Swarm) -> bool:

@@ -117,13 +117,14 @@ class GoalPursuit:
     def step(self, pose: Optional[Pose], ranges: Optional[Sequence[float]], now_s: float) -> Command:
         """Return the next command.
 
-        pose: None while it is not known. ranges: as in control_laws, to go around what they see; None: do not look.
+        pose: None while it is not known, and so is one that is not finite. ranges: as in control_laws, to go around
+        what they see; None: do not look.
         """
         if self.state is not State.ACTIVE:
             return STANDSTILL
         if now_s - self._start_s > self._timeout_s:
             return self._fail(self._tell_time_limit())
-        if pose is None:
+        if pose is None or not all(math.isfinite(value) for value in pose):
             if now_s - self._last_pose_s > SILENCE_S:
                 return self._fail("no odometry for %g s" % SILENCE_S)
             return STANDSTILL

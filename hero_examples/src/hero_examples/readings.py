@@ -55,10 +55,10 @@ def parse_color(color: Color) -> Tuple[float, float, float]:
 
 
 def yaw_of(orientation: Any) -> float:
-    """Return the turn about z, -pi..pi, of a geometry_msgs/Quaternion."""
+    """Return the turn about z, -pi..pi, of a geometry_msgs/Quaternion; nan for what is no quaternion."""
     return math.atan2(
         2.0 * (orientation.w * orientation.z + orientation.x * orientation.y),
-        1.0 - 2.0 * (orientation.y ** 2 + orientation.z ** 2),
+        1.0 - 2.0 * (orientation.y * orientation.y + orientation.z * orientation.z),
     )
 
 
