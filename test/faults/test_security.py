@@ -180,3 +180,31 @@ def test_nobody_takes_more_than_the_limits_give(start_driver, record, kind):
     record(
         "20 times %s from one address that may have 5" % kind, 1, int(taken <= 5), "what was beyond the limit"
     )
+
+
+def test_a_peer_that_calls_itself_differently_each_time_has_to_wait(start_driver, record):
+    driver = start_driver(parameters={"max_connections_per_address": 3})
+    friend = FakeRobot(1, source_host="127.0.0.7").connect(driver.address)
+    life = Life(driver, friend)
+    known = []
+
+    def is_refused():
+        with socket.socket() as sock:
+            sock.bind(("127.0.0.66", 0))
+            sock.settimeout(20.0)
+            sock.connect(driver.address)
+            known.append(sock.sendall(emulated_swarm.declare(100 + len(known))))
+            wait_until(lambda: driver.find_lines("hero_%d" % (99 + len(known))) or found(), "an answer")
+        return found()
+
+    def found():
+        return driver.find_lines("new robots of one address")
+
+    wait_until(is_refused, "a refusal", 60.0)
+    life.show()
+    # Whoever has another address need not wait.
+    other = FakeRobot(2, source_host="127.0.0.8").connect(driver.address)
+    driver.fleet.wait_ready("/hero_2")
+    other.close()
+    friend.close()
+    record("ever new names from one address", 1, int(len(known) > 3), "what was beyond the limit")

@@ -3,7 +3,7 @@
 import collections
 import ipaddress
 from dataclasses import dataclass
-from typing import Counter, Optional, Tuple, Union
+from typing import Counter, Dict, Optional, Tuple, Union
 
 Network = Union[ipaddress.IPv4Network, ipaddress.IPv6Network]
 
@@ -12,6 +12,12 @@ RATE_WINDOW_S = 1.0
 
 GARBAGE_LENGTH_MAX = 65536
 """Bytes without a good frame after which a peer is none of ours; a robot's truncated frame has below 1 kB."""
+
+ARRIVALS_PER_S = 5.0
+"""New robots of one address for which topics are set up, after as many at once as it may have connections: each costs
+20 calls to the ROS master. One hundred simulated robots that are started again every 30 s stay below it."""
+
+_MOST_HOSTS = 1000
 
 
 @dataclass(frozen=True)
@@ -32,6 +38,8 @@ class Admission:
         self._by_host: Counter[str] = collections.Counter()
         self._unidentified: Counter[str] = collections.Counter()
         self._total = 0
+        # Address -> how many more new robots may come, and when that was so.
+        self._arrivals: Dict[str, Tuple[float, float]] = {}
 
     def admit(self, host: str) -> Optional[str]:
         """Count a connection from host; return why it is refused, None if it may stay."""
@@ -58,6 +66,26 @@ class Admission:
         self._unidentified[host] -= 1
         if not self._unidentified[host]:
             del self._unidentified[host]
+
+    def admit_arrival(self, host: str, now_s: float) -> Optional[str]:
+        """Count a robot of host that nobody knows; return why it has to wait, None if it may come.
+
+        A peer that calls itself differently each time would keep the ROS master and the registrar busy.
+        """
+        most = float(self._limits.max_connections_per_address)
+        left, then_s = self._arrivals.get(host, (most, now_s))
+        left = min(most, left + ARRIVALS_PER_S * (now_s - then_s))
+        if left < 1.0:
+            return "more than %d new robots of one address, and %g more per second" % (most, ARRIVALS_PER_S)
+        self._arrivals[host] = (left - 1.0, now_s)
+        if len(self._arrivals) > _MOST_HOSTS:
+            # Those that have all their places again are as good as unknown.
+            self._arrivals = {
+                other: (places, since_s)
+                for other, (places, since_s) in self._arrivals.items()
+                if places + ARRIVALS_PER_S * (now_s - since_s) < most
+            }
+        return None
 
     def release(self, host: str) -> None:
         """An admitted connection from host is gone."""

@@ -294,6 +294,11 @@ class Gateway(LinkHandler):
                     )
                 return False
             identity = names.identify_any(topic.info.name, address.host)
+        if identity.namespace not in self.fleet.robots:
+            refusal = self._admission.admit_arrival(address.host, now_s)
+            if refusal is not None:
+                peer.link.close(refusal)
+                return False
         decision = self.fleet.identify(
             peer.link, identity, address.host, str(address), peer.session.opened_s, now_s
         )

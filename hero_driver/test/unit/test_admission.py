@@ -4,7 +4,7 @@ import ipaddress
 
 import pytest
 
-from hero_driver.admission import GARBAGE_LENGTH_MAX, Admission, AdmissionLimits, RateGuard
+from hero_driver.admission import ARRIVALS_PER_S, GARBAGE_LENGTH_MAX, Admission, AdmissionLimits, RateGuard
 
 ROBOT = "10.42.0.17"
 
@@ -143,3 +143,26 @@ def test_a_good_frame_forgives_the_garbage_before_it():
     for step in range(100):
         assert guard.count(0, 60000, step * 2.0) is None
         assert guard.count(1, 8, step * 2.0 + 1.0) is None
+
+
+def test_an_address_that_comes_under_ever_new_names_has_to_wait():
+    admission = make_admission(max_connections_per_address=10)
+    assert [admission.admit_arrival(ROBOT, 5.0) for _ in range(10)] == [None] * 10
+    assert "more than 10 new robots of one address" in admission.admit_arrival(ROBOT, 5.0)
+    let_in = sum(admission.admit_arrival(ROBOT, 5.0 + 0.02 * step) is None for step in range(1, 501))
+    assert let_in == pytest.approx(10 * ARRIVALS_PER_S, abs=1)
+    assert admission.admit_arrival("10.42.0.18", 15.0) is None
+    assert [admission.admit_arrival(ROBOT, 100.0) for _ in range(10)] == [None] * 10
+
+
+def test_a_hundred_simulated_robots_started_again_and_again_all_join_at_once():
+    admission = make_admission(max_connections_per_address=400)
+    for start in range(100):
+        assert not any(admission.admit_arrival("127.0.0.1", 30.0 * start) for _ in range(100))
+
+
+def test_addresses_that_come_once_are_forgotten():
+    admission = make_admission(max_connections_per_address=4)
+    for number in range(10000):
+        assert admission.admit_arrival("10.%d.%d.1" % divmod(number, 200), 0.01 * number) is None
+    assert len(admission._arrivals) <= 1001
