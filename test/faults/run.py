@@ -107,7 +107,8 @@ def main():
     parser.add_argument("results", type=Path)
     parser.add_argument("--minutes", type=float, default=0.0)
     parser.add_argument("families", nargs="*", metavar="FAMILY", help=", ".join(families))
-    options = parser.parse_args()
+    # parse_args() takes no families after an option.
+    options = parser.parse_intermixed_args()
     unknown = sorted(set(options.families) - set(families))
     if unknown:
         parser.error("no such family: %s; there are: %s" % (", ".join(unknown), ", ".join(families)))
