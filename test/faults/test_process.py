@@ -2,6 +2,7 @@
 
 import math
 import signal
+import subprocess
 import socket
 import sys
 import time
@@ -145,6 +146,13 @@ def make_small_disk(path, script):
 FILL = "{ dd if=/dev/zero of=%s/filler bs=1k 2>/dev/null || true; }"
 
 
+@pytest.mark.skipif(
+    subprocess.run(
+        ["unshare", "--mount", "--propagation", "private", "true"], stderr=subprocess.DEVNULL, check=False
+    ).returncode
+    != 0,
+    reason="this system lets no test have mounts of its own (unshare --mount): run it as root, not in a chroot",
+)
 @pytest.mark.parametrize("when", ["from the start", "while it runs"])
 def test_a_full_disk_for_the_logs_costs_the_logs_alone(start_driver, record, tmp_path, when):
     script = FILL % tmp_path if when == "from the start" else "true"

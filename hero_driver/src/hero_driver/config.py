@@ -137,7 +137,7 @@ def read_config(parameters: Mapping[str, Any]) -> DriverConfig:
             near = difflib.get_close_matches(name, fields, 1)
             raise ConfigError(
                 "parameter ~%s is not known%s; known are: %s"
-                % (name, "; did you mean ~%s?" % near[0] if near else "", ", ".join(sorted(fields)))
+                % (_show_name(name), "; did you mean ~%s?" % near[0] if near else "", ", ".join(sorted(fields)))
             )
         values[name] = _check(fields[name], value)
     config = DriverConfig(**values)
@@ -147,6 +147,11 @@ def read_config(parameters: Mapping[str, Any]) -> DriverConfig:
             " give an address to listen on (0.0.0.0 for all) or robots to dial"
         )
     return config
+
+
+def _show_name(name: str) -> str:
+    """Return name as one line, whatever somebody set as a parameter's name."""
+    return name if name.isprintable() else ascii(name)
 
 
 def _check(field: "dataclasses.Field[Any]", value: Any) -> Any:
