@@ -2,8 +2,8 @@
 
 import math
 import signal
-import subprocess
 import socket
+import subprocess
 import sys
 import time
 
