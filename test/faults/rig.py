@@ -1,6 +1,5 @@
 """The parts of which the faults are made: masters, programs with a pipe, what a process holds, free ports."""
 
-import contextlib
 import json
 import os
 import signal
@@ -152,13 +151,3 @@ def count_holdings(driver):
         len(os.listdir("/proc/%d/fd" % pid)),
         sum(driver.node in nodes for part in state for _, nodes in part),
     )
-
-
-@contextlib.contextmanager
-def frozen(pid):
-    """Stop a process for a while: it keeps its sockets, but reads and answers nothing."""
-    os.kill(pid, signal.SIGSTOP)
-    try:
-        yield
-    finally:
-        os.kill(pid, signal.SIGCONT)

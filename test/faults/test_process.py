@@ -10,12 +10,12 @@ import time
 import pytest
 import rospy
 import stock_messages
-from driver_case import Recorder, make_publisher
+from driver_case import Recorder, frozen, make_publisher
 from fake_robot import TIME_FRAME, FakeRobot
 from geometry_msgs.msg import Twist
 from life_signs import Life
 from nav_msgs.msg import Odometry
-from rig import HERE, Program, find_free_port, frozen, wait_until
+from rig import HERE, Program, find_free_port, wait_until
 
 from hero_driver.rosserial import frames, payloads
 from hero_msgs.msg import Encoder

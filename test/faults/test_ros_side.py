@@ -8,11 +8,11 @@ import time
 
 import pytest
 import rospy
-from driver_case import has_connection, list_driver_topics, make_publisher
+from driver_case import frozen, has_connection, list_driver_topics, make_publisher
 from fake_robot import FakeRobot
 from geometry_msgs.msg import Twist
 from life_signs import Life
-from rig import count_holdings, frozen, start_python, wait_until
+from rig import count_holdings, start_python, wait_until
 from rosgraph_msgs.msg import Clock
 from stock_messages import make_laser
 

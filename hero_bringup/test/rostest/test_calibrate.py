@@ -13,7 +13,6 @@ import signal
 import subprocess
 import tempfile
 import threading
-import time
 import unittest
 
 import rospy
@@ -21,6 +20,7 @@ import rostest
 import yaml
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
+from swarm_watch import wait_for
 
 from hero_sim.srv import InjectFault
 
@@ -30,16 +30,6 @@ CENTRE_BOUND_US = 4
 RANGE_BOUND_M = 0.004
 VELOCITY_BOUND = 0.22
 """Share of the wanted speed; a robot fresh from the factory is off by 30 % (hero_sim)."""
-
-
-def wait_for(find, what):
-    deadline_s = time.monotonic() + TIMEOUT_S
-    while time.monotonic() < deadline_s:
-        found = find()
-        if found:
-            return found
-        time.sleep(0.05)
-    raise AssertionError("no " + what)
 
 
 def list_errors():
@@ -98,7 +88,7 @@ class CalibrateTest(unittest.TestCase):
         open_floor = self.start("motors", "velocity", "--robots", "3-8", "--yes")
         wall = self.start("infrared", "--robots", "0-2,42", "--yes", "--samples", "12")
         watch = Watch(range(9))
-        wait_for(lambda: watch.speeds[6] > 0.02, "motion of hero_6")
+        wait_for(lambda: watch.speeds[6] > 0.02, TIMEOUT_S, "motion of hero_6")
         rospy.ServiceProxy("/hero_sim/fault", InjectFault)("vanish:robot=6")
         output = {}
         readers = [
@@ -111,7 +101,7 @@ class CalibrateTest(unittest.TestCase):
             reader.join()
         self.check_floor(*output["floor"])
         self.check_wall(*output["wall"])
-        wait_for(lambda: max(watch.speeds.values()) < 1e-3, "standstill")
+        wait_for(lambda: max(watch.speeds.values()) < 1e-3, TIMEOUT_S, "standstill")
 
     def check_floor(self, code, output):
         self.assertEqual(code, 1, output)
@@ -173,12 +163,12 @@ class CalibrateTest(unittest.TestCase):
     def test_3_robots_stop_when_it_is_broken_off(self):
         watch = Watch([3, 4])
         process = self.start("motors", "--robots", "3,4", "--yes")
-        wait_for(lambda: min(watch.speeds.values()) > 0.03, "motion")
+        wait_for(lambda: min(watch.speeds.values()) > 0.03, TIMEOUT_S, "motion")
         os.killpg(process.pid, signal.SIGINT)
         code, output = self.finish(process)
         self.assertEqual(code, 130, output)
         self.assertIn("ended before all was done", output)
-        wait_for(lambda: max(watch.speeds.values()) < 1e-3, "standstill")
+        wait_for(lambda: max(watch.speeds.values()) < 1e-3, TIMEOUT_S, "standstill")
         self.assertEqual(glob.glob(self.folder + "/*"), [])
 
     def test_4_in_a_terminal_it_asks_and_q_and_ctrl_c_end_it_before_anything_moves(self):

@@ -15,21 +15,12 @@ import rosbag
 import rospy
 import rostest
 from geometry_msgs.msg import Twist, Vector3
+from swarm_watch import wait_for
 
 RECORD = ["rosrun", "hero_bringup", "record"]
 TIMEOUT_S = 60.0
 DISK_STEP = 400 * 10**6
 """Bytes that are taken from the disk at once; others on this machine take less in the seconds of the test."""
-
-
-def wait_for(find, what):
-    deadline_s = time.monotonic() + TIMEOUT_S
-    while time.monotonic() < deadline_s:
-        found = find()
-        if found:
-            return found
-        time.sleep(0.1)
-    raise AssertionError("no " + what)
 
 
 class RecordTest(unittest.TestCase):
@@ -66,7 +57,7 @@ class RecordTest(unittest.TestCase):
         def has_grown():
             return sum(os.path.getsize(path) for path in glob.glob(self.folder + "/*.bag*")) >= least
 
-        wait_for(has_grown, "recording of %d bytes in %s: %s" % (least, self.folder, self.files()))
+        wait_for(has_grown, TIMEOUT_S, "recording of %d bytes in %s: %s" % (least, self.folder, self.files()))
 
     def test_a_recording_holds_robots_that_join_later_and_can_be_plotted_and_exported(self):
         launch = [
@@ -80,7 +71,7 @@ class RecordTest(unittest.TestCase):
         ]
         # As a shell does it: roslaunch's nodes run elsewhere, and know the folder by PWD.
         recording = self.start(*launch, cwd=self.folder, env=dict(os.environ, PWD=self.folder))
-        wait_for(lambda: self.files("hero_*_0.bag.active"), "recording")
+        wait_for(lambda: self.files("hero_*_0.bag.active"), TIMEOUT_S, "recording")
         late = self.start(
             *(
                 "rosrun",
@@ -95,8 +86,8 @@ class RecordTest(unittest.TestCase):
             )
         )
         publisher = rospy.Publisher("/hero_7/velocity_controller/cmd_vel", Twist, queue_size=1)
-        wait_for(publisher.get_num_connections, "hero_7")
-        wait_for(lambda: self.files("hero_*_1.bag*"), "second file of a split")
+        wait_for(publisher.get_num_connections, TIMEOUT_S, "hero_7")
+        wait_for(lambda: self.files("hero_*_1.bag*"), TIMEOUT_S, "second file of a split")
         for _ in range(15):
             publisher.publish(Twist(angular=Vector3(0.0, 0.0, 2.0)))
             time.sleep(0.1)
@@ -162,7 +153,7 @@ class RecordTest(unittest.TestCase):
         free_mb = shutil.disk_usage(self.folder).free / 1e6
         limit_mb = int(free_mb - DISK_STEP / 1e6 / 2)
         recording = self.start(*RECORD, "--folder", self.folder, "--min-free-mb", str(limit_mb))
-        wait_for(lambda: self.files("hero_*.bag.active"), "recording")
+        wait_for(lambda: self.files("hero_*.bag.active"), TIMEOUT_S, "recording")
         self.assertIsNone(recording.poll())
         with open(os.path.join(self.folder, "filler"), "wb") as filler:
             os.posix_fallocate(filler.fileno(), 0, DISK_STEP)

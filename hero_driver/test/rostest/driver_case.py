@@ -1,5 +1,6 @@
 """What the rostests of the driver share: waiting for conditions, watching topics, and drivers with own parameters."""
 
+import contextlib
 import os
 import re
 import signal
@@ -32,6 +33,16 @@ def wait_for(condition, what, deadline_s=DEADLINE_S):
         if time.monotonic() > end_s:
             raise AssertionError("waited %g s for %s" % (deadline_s, what() if callable(what) else what))
         time.sleep(0.005)
+
+
+@contextlib.contextmanager
+def frozen(pid):
+    """Stop a process for a while; it keeps its sockets but reads and answers nothing."""
+    os.kill(pid, signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        os.kill(pid, signal.SIGCONT)
 
 
 def list_publishers(topic):

@@ -3,7 +3,6 @@
 
 import contextlib
 import os
-import signal
 import subprocess
 import threading
 
@@ -14,6 +13,7 @@ import stock_messages
 from driver_case import (
     OwnDriverCase,
     Recorder,
+    frozen,
     has_connection,
     list_driver_topics,
     make_publisher,
@@ -36,16 +36,6 @@ from hero_driver.rosserial import frames
 from hero_msgs.msg import Encoder, Robot
 
 TRIGGER_REQUEST_MD5 = "d41d8cd98f00b204e9800998ecf8427e"
-
-
-@contextlib.contextmanager
-def frozen(pid):
-    """Stop a process for a while; it keeps its sockets but reads and answers nothing."""
-    os.kill(pid, signal.SIGSTOP)
-    try:
-        yield
-    finally:
-        os.kill(pid, signal.SIGCONT)
 
 
 def count_resources(pid):

@@ -57,8 +57,8 @@ class TopicKind(enum.Enum):
         return self in _FROM_ROBOT
 
 
-_FROM_ROBOT = frozenset((TopicKind.PUBLISHER, TopicKind.SERVICE_ANSWERS, TopicKind.CLIENT_REQUESTS))
 _MESSAGES = frozenset((TopicKind.PUBLISHER, TopicKind.SERVICE_ANSWERS))
+_FROM_ROBOT = _MESSAGES | {TopicKind.CLIENT_REQUESTS}
 _KIND_BY_FRAME_ID = {kind.value: kind for kind in TopicKind}
 
 
