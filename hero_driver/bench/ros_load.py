@@ -43,8 +43,9 @@ def listen(count, first, ended):
     return dict(counts, odoms_s=odoms_s)
 
 
-def command(count, first, ended):
+def command(count, first, keeps_times, ended):
     """Send commands until ended is set; return the result."""
+    commands = 0
     publishers = [
         rospy.Publisher("/hero_%d/velocity_controller/cmd_vel" % n, Twist, queue_size=10, tcp_nodelay=True)
         for n in range(first, first + count)
@@ -62,9 +63,11 @@ def command(count, first, ended):
                 message.linear.x = 0.01
                 message.linear.y = time.time()
                 publisher.publish(message)
-                sent_s.append(message.linear.y)
+                commands += 1
+                if keeps_times:
+                    sent_s.append(message.linear.y)
         round_s += COMMAND_PERIOD_S
-    return {"commands_s": sent_s}
+    return {"commands": commands, "commands_s": sent_s}
 
 
 def main():
@@ -73,14 +76,18 @@ def main():
     parser.add_argument("role", choices=("listen", "command"))
     parser.add_argument("--robots", type=int, default=20)
     parser.add_argument("--first-id", type=int, default=0)
+    parser.add_argument("--counts", action="store_true", help="keep no times of commands, for runs of hours")
     options = parser.parse_args()
     rospy.init_node("bench_" + options.role, anonymous=True, disable_signals=True)
     ended = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         # On a thread of its own: the main thread may be inside the lock of the event.
         signal.signal(number, lambda *_: threading.Thread(target=ended.set).start())
-    role = listen if options.role == "listen" else command
-    print(json.dumps(role(options.robots, options.first_id, ended)), flush=True)
+    if options.role == "listen":
+        result = listen(options.robots, options.first_id, ended)
+    else:
+        result = command(options.robots, options.first_id, not options.counts, ended)
+    print(json.dumps(result), flush=True)
 
 
 if __name__ == "__main__":

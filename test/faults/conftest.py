@@ -18,8 +18,9 @@ from rig import Master  # noqa: E402
 class Effort:
     """How much is tried: the short form that script/test runs, or the long one of script/soak."""
 
-    def __init__(self, is_long):
+    def __init__(self, is_long, minutes):
         self.is_long = is_long
+        self.minutes = minutes  # for what is as long as one likes
 
     def choose(self, short, long):
         """Return one of the two."""
@@ -28,12 +29,13 @@ class Effort:
 
 def pytest_addoption(parser):
     parser.addoption("--long", action="store_true", help="the long form, as script/soak runs it")
+    parser.addoption("--minutes", type=float, default=1.0, help="length of the soak in the long form")
     parser.addoption("--table", default="", help="file to which the rows of the table are added")
 
 
 @pytest.fixture(scope="session")
 def effort(request):
-    return Effort(request.config.getoption("--long"))
+    return Effort(request.config.getoption("--long"), request.config.getoption("--minutes"))
 
 
 @pytest.fixture(scope="session")

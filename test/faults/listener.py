@@ -1,8 +1,8 @@
 """Listens to a swarm of emulated robots in a process of its own, and says what is missing, late or out of order.
 
 listener.py --robots N [--first-id K]
-The line `window` on stdin ends a window and is answered with one line of JSON about it; any other line is
-answered with the number of messages since the window began.
+A line on stdin is answered with one line of JSON: `window` ends a window and tells about it, `silent` gives the
+robots of which no odom came since the window began, `count` the number of messages since then.
 """
 
 import argparse
@@ -71,8 +71,14 @@ class Listener:
         with self._lock:
             return sum(self._window.counts.values())
 
+    def list_silent(self):
+        """Return the robots of which no odom came since the last window ended."""
+        with self._lock:
+            return [number for number in self._numbers if ("odom", number) not in self._window.counts]
+
     def end_window(self):
         """Return what came since the last call; the robots' numbers count, so each message is there or lost."""
+        silent = self.list_silent()
         with self._lock:
             window, self._window = self._window, Window()
         delays_s = sorted(window.delays_s)
@@ -82,7 +88,7 @@ class Listener:
 
         return {
             "messages": sum(window.counts.values()),
-            "silent": [n for n in self._numbers if not window.counts.get(("odom", n))],
+            "silent": silent,
             "lost": sum(gap for gaps in window.gaps.values() for gap in gaps if gap > 0),
             "disordered": sum(gap <= 0 for gaps in window.gaps.values() for gap in gaps),
             "transforms": window.transforms,
@@ -99,9 +105,10 @@ def main():
     options = parser.parse_args()
     rospy.init_node("fault_listener", anonymous=True, disable_signals=True)
     listener = Listener(range(options.first_id, options.first_id + options.robots))
+    answers = {"window": listener.end_window, "silent": listener.list_silent, "count": listener.count}
     print("{}", flush=True)
     for line in sys.stdin:
-        print(json.dumps(listener.end_window() if line == "window\n" else listener.count()), flush=True)
+        print(json.dumps(answers[line.strip()]()), flush=True)
 
 
 if __name__ == "__main__":

@@ -2,7 +2,8 @@
 
 Usage: run.py RESULTS_DIR [--minutes N] [FAMILY ...]
 Without --minutes: the short form, two families at once. With it: the long form, one family after another, in
-rounds until so many minutes are over, at least one. The workspace must be sourced.
+rounds until so many minutes are over, at least one; a round of `endurance` takes these minutes by itself. The
+workspace must be sourced.
 """
 
 import argparse
@@ -114,7 +115,7 @@ def main():
         parser.error("no such family: %s; there are: %s" % (", ".join(unknown), ", ".join(families)))
     chosen = options.families or families
     is_long = options.minutes > 0.0
-    arguments = ["--long"] if is_long else []
+    arguments = ["--long", "--minutes", str(options.minutes)] if is_long else []
     failed = False
     end_s = time.monotonic() + 60.0 * options.minutes
     round_number = 0
@@ -126,7 +127,7 @@ def main():
         round_number += 1
         results_dir = options.results / ("round_%d" % round_number) if is_long else options.results
         with concurrent.futures.ThreadPoolExecutor(1 if is_long else SHORT_AT_ONCE) as pool:
-            timeout_s = LONG_TIMEOUT_S if is_long else SHORT_TIMEOUT_S
+            timeout_s = LONG_TIMEOUT_S + 60.0 * options.minutes if is_long else SHORT_TIMEOUT_S
             runs = {
                 pool.submit(run_family, name, results_dir, table, arguments, timeout_s): name
                 for name in chosen

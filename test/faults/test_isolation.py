@@ -77,15 +77,7 @@ def scene(master):
                 *robots,
             ) as swarm:
                 started = Scene(driver, listener, swarm, commander)
-
-                heard = set()
-
-                def is_complete():
-                    window = started.end_window()
-                    heard.update(set(range(GOOD_ROBOTS)) - set(window["silent"]))
-                    return len(heard) == GOOD_ROBOTS
-
-                wait_until(is_complete, "all robots at the listener")
+                wait_until(lambda: not listener.ask("silent"), "all robots at the listener")
                 yield started
 
 
