@@ -98,21 +98,28 @@ class Templates:
         scan = struct.pack("<7f", -3.1416, 3.1416, 0.395, 0, 0, 0.0368, 0.2368)
         laser_tail = text(name + "laser_link") + scan + (struct.pack("<I", 16) + bytes(64)) * 2
         odom_tail = text(name + "odom") + text(name + "base_link") + bytes(680)
-        encoder_tail = text(name + "encoder") + bytes(88)
+        self._encoder_frame = text(name + "encoder")
+        encoder_tail = self._encoder_frame + bytes(88)
+        encoder_changes = slice(4, 12 + len(self._encoder_frame) + 16)
         no_header = b"\xff\xff\xff\xff" + bytes(8)
         self._odom = Frame(ODOM, bytes(12) + odom_tail, slice(0, 12))
-        self._rest = [
-            *(Frame(TRANSFORMS, b"\x01" + bytes(15) + tail, slice(8, 16)) for tail in transform_tails),
-            Frame(ENCODER, no_header + encoder_tail, slice(4, 12)),
+        self._transforms = [
+            Frame(TRANSFORMS, b"\x01" + bytes(15) + tail, slice(8, 16)) for tail in transform_tails
         ]
+        self._encoder = Frame(ENCODER, no_header + encoder_tail, encoder_changes)
         self._laser = Frame(LASER, bytes(12) + laser_tail, slice(4, 12))
 
     def make_burst(self, number, stamp):
-        """Return the frames of one burst with stamp (8 bytes); number is odom's seq, by which losses are noticed."""
+        """Return the frames of one burst with stamp (8 bytes).
+
+        number is odom's seq, by which losses are noticed; the robot drives on by a few ticks with each burst.
+        """
         self._odom.patch(struct.pack("<I", number) + stamp)
-        for frame in self._rest:
+        for frame in self._transforms:
             frame.patch(stamp)
-        return [self._odom.data, *(frame.data for frame in self._rest)]
+        ticks = struct.pack("<2d", 3.0 * number, 2.0 * number)
+        self._encoder.patch(stamp + self._encoder_frame + ticks)
+        return [self._odom.data, *(frame.data for frame in self._transforms), self._encoder.data]
 
     def make_laser(self, stamp):
         """Return one laser frame with stamp (8 bytes)."""

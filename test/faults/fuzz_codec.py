@@ -22,18 +22,28 @@ SETTINGS = CleaningSettings(
 TYPES = {"hero_common/Encoder": "hero_msgs/Encoder", "tf/tfMessage": "tf2_msgs/TFMessage"}
 
 
+class Sink:
+    """A topic whose messages are looked at as far as every one can be."""
+
+    is_wanted = True
+
+    def publish(self, payload):
+        """Read the header, where there is one."""
+        wire_messages.read_header(payload)
+
+
 def try_bytes(data):
     """Let one robot say data, cut where its first byte says, and clean what comes of it."""
     session = Session(SessionLimits(max_topics=MAX_TOPICS), 0.0)
-    cleaner = MessageCleaner("/hero_0", SETTINGS)
+    sink = Sink()
+    cleaner = MessageCleaner("/hero_0", SETTINGS, lambda name: sink, sink.publish)
     step = 1 + (data[0] if data else 0)
     for index, start in enumerate(range(1, len(data), step)):
         for event in session.receive_bytes(data[start : start + step], 0.01 * index, 1795240942.0):
             if type(event) is MessageReceived:
                 info = event.topic.info
                 clean = cleaner.choose(info.name, TYPES.get(info.message_type, info.message_type))
-                for _, payload in clean(event.payload, ARRIVAL_NS):
-                    wire_messages.read_header(payload)
+                clean(event.payload, ARRIVAL_NS)
             elif type(event) is LogReceived:
                 log_lines.read_log_line(event.log.text)
         session.poll(0.01 * index)

@@ -1,12 +1,13 @@
 """What one robot sends -> what ROS programs should get: corrected odometry, proximity, stamps, own transforms.
 
-Takes payloads and times of arrival, returns payloads with the names of their topics; knows no ROS and no
-socket. Everything that is not named here passes through untouched.
+Takes payloads and times of arrival, gives payloads to the sinks of their topics; knows no ROS and no socket.
+Everything that is not named here passes through untouched.
 """
 
 import collections
+import functools
 from dataclasses import dataclass
-from typing import Callable, Deque, Dict, List, Optional, Set, Tuple
+from typing import Callable, Deque, Dict, List, NamedTuple, Optional, Protocol, Set, Tuple
 
 from . import wire_messages
 from .odometry import TickOdometry, WheelGeometry
@@ -31,13 +32,34 @@ FRAMES_MAX = 32
 """Pairs of frames that one robot may use; stock robots have five."""
 
 
-Output = Tuple[str, bytes]
-"""One message: the topic's name and the payload."""
+class Sink(Protocol):
+    """Where the messages of one topic go."""
 
-Outputs = List[Output]
-Clean = Callable[[bytes, int], Outputs]
+    @property
+    def is_wanted(self) -> bool:
+        """Whether somebody listens."""
 
-_NONE: Outputs = []
+    def publish(self, payload: bytes) -> None:
+        """Send payload to everybody who listens."""
+
+
+FindSink = Callable[[str], Sink]
+AddTransform = Callable[[bytes], None]
+Clean = Callable[[bytes, int], None]
+"""Takes a payload and its arrival (ns)."""
+
+
+class _Held(NamedTuple):
+    """Odometry, or its transform, that waits for the encoder reading of its burst."""
+
+    write: Callable[[int, bytes, int], None]
+    stamp_ns: int  # the robot's
+    data: bytes
+    arrival_ns: int
+
+
+# What _Held(...) comes down to, without the call of a Python function in between.
+_new_tuple = tuple.__new__
 
 
 @dataclass(frozen=True)
@@ -63,13 +85,15 @@ class MessageCleaner:
     """
 
     def __init__(
-        self,
-        namespace: str,
-        settings: CleaningSettings,
-        is_wanted: Callable[[str], bool] = lambda name: True,
+        self, namespace: str, settings: CleaningSettings, find_sink: FindSink, add_transform: AddTransform
     ) -> None:
-        """Clean the data of the robot in namespace; topics that are not wanted by anybody are left out."""
-        self._is_wanted = is_wanted
+        """Clean the data of the robot in namespace.
+
+        find_sink(name) gives the sink of a topic that was chosen or derived; add_transform takes the bytes of
+        one geometry_msgs/TransformStamped, whichever robot's.
+        """
+        self._find_sink = find_sink
+        self._add_transform = add_transform
         self._namespace = namespace
         self._frame_prefix = namespace.lstrip("/").encode() + b"/"
         self._stamps = StampFilter(settings.stamps == "arrival", settings.max_future_s, settings.max_age_s)
@@ -82,19 +106,22 @@ class MessageCleaner:
         self.odometry = TickOdometry(settings.geometry)
         self.refused = 0
         self.foreign_frames: Set[str] = set()
+        self._packed_pose = (self.odometry.pose, wire_messages.pack_pose(self.odometry.pose))
         self._odom_name = namespace + "/odom"
         self._odom_frames = wire_messages.join_frames(
             self._frame_prefix + b"odom", self._frame_prefix + b"base_link"
         )
         self._raw_name = namespace + "/odom_raw"
         self._proximity_name = namespace + "/proximity"
+        self._odom_sink: Sink
+        self._raw_sink: Sink
         self._has_encoder = False
         self._is_first_reading = True
         self._max_age_ns = int(settings.max_age_s * NS_PER_S)
         self._encoder_follows = True
         self._encoder_stamp_ns = -BURST_NS
         self._odom_stamp_ns = -BURST_NS
-        self._held: List[Tuple[bool, int, bytes, int]] = []  # is odometry, robot's stamp, payload, arrival
+        self._held: List[_Held] = []
 
     def restart(self, rebooted: bool) -> None:
         """A new connection begins; after a reboot the robot's counters begin anew too."""
@@ -131,156 +158,168 @@ class MessageCleaner:
         return {}
 
     def choose(self, name: str, message_type: str) -> Clean:
-        """Return what turns a payload of the topic called name, and its arrival (ns), into outputs."""
+        """Return what takes the payloads of the topic called name."""
         if name == TRANSFORMS and message_type == "tf2_msgs/TFMessage":
             return self._clean_transforms
+        sink = self._find_sink(name)
         if name == self._odom_name and message_type == "nav_msgs/Odometry":
+            self._odom_sink, self._raw_sink = sink, self._find_sink(self._raw_name)
             return self._clean_odometry
         if name == self._namespace + "/encoder" and message_type == "hero_msgs/Encoder":
             self._has_encoder = self._uses_ticks
-            return lambda payload, arrival_ns: self._clean_encoder(name, payload, arrival_ns)
+            return functools.partial(self._clean_encoder, name, sink)
         if name == self._namespace + "/laser" and message_type == "sensor_msgs/LaserScan":
-            return lambda payload, arrival_ns: self._clean_laser(name, payload, arrival_ns)
+            return functools.partial(self._clean_laser, sink, self._find_sink(self._proximity_name))
         if name == self._namespace + "/imu" and message_type == "sensor_msgs/Imu":
-            return lambda payload, arrival_ns: self._clean_stamped(name, payload, arrival_ns)
-        return lambda payload, arrival_ns: [(name, payload)]
+            return functools.partial(self._clean_stamped, name, sink)
+        return lambda payload, _: sink.publish(payload)
 
     def _count(self, name: str) -> int:
         seq = self._seqs.get(name, -1) + 1
         self._seqs[name] = seq
         return seq
 
-    def _refuse(self) -> Outputs:
-        self.refused += 1
-        return _NONE
-
-    def _clean_stamped(self, name: str, payload: bytes, arrival_ns: int) -> Outputs:
+    def _clean_stamped(self, name: str, sink: Sink, payload: bytes, arrival_ns: int) -> None:
         stamp_ns = wire_messages.read_stamp_ns(payload)
         if stamp_ns is None:
-            return self._refuse()
+            self.refused += 1
+            return
         stamp_ns = self._stamps.correct(name, stamp_ns, arrival_ns)
-        return [(name, wire_messages.restamp(payload, self._count(name), stamp_ns))]
+        sink.publish(wire_messages.restamp(payload, self._count(name), stamp_ns))
 
-    def _clean_laser(self, name: str, payload: bytes, arrival_ns: int) -> Outputs:
-        outputs = [(name, payload)]
-        if not self._is_wanted(self._proximity_name):
-            return outputs
+    def _clean_laser(self, sink: Sink, proximity_sink: Sink, payload: bytes, arrival_ns: int) -> None:
         stamp_ns = wire_messages.read_stamp_ns(payload)
         if stamp_ns is None:
-            return self._refuse()
-        stamp_ns = self._stamps.correct(self._proximity_name, stamp_ns, arrival_ns)
-        proximity = wire_messages.make_proximity(
-            payload, self._count(self._proximity_name), stamp_ns, STOCK_SCAN_TIME_S
-        )
+            self.refused += 1
+            return
+        sink.publish(payload)
+        if not proximity_sink.is_wanted:
+            return
+        name = self._proximity_name
+        stamp_ns = self._stamps.correct(name, stamp_ns, arrival_ns)
+        proximity = wire_messages.make_proximity(payload, self._count(name), stamp_ns, STOCK_SCAN_TIME_S)
         if proximity is None:
             self.refused += 1
         else:
-            outputs.append((self._proximity_name, proximity))
-        return outputs
+            proximity_sink.publish(proximity)
 
     # Odometry. In one burst the robot sends odom, tf and then the encoder reading that belongs to them, so
     # odom and its transform wait for the reading. Where none follows, because it was lost or because another
     # firmware has another order, nothing waits for longer than until the next odom.
 
-    def _clean_odometry(self, payload: bytes, arrival_ns: int) -> Outputs:
+    def _clean_odometry(self, payload: bytes, arrival_ns: int) -> None:
         stamp_ns = wire_messages.read_stamp_ns(payload)
         if stamp_ns is None:
-            return self._refuse()
+            self.refused += 1
+            return
         self._offsets_ns.append(stamp_ns - arrival_ns)
-        outputs = [(self._raw_name, payload)]
+        self._raw_sink.publish(payload)
         if self._has_encoder:
             if self._held:
-                outputs += self._release()
+                self._release()
                 self._encoder_follows = False
             self._odom_stamp_ns = stamp_ns
             if self._encoder_follows and abs(stamp_ns - self._encoder_stamp_ns) > BURST_NS:
-                self._hold(True, stamp_ns, payload, arrival_ns)
-                return outputs
-        return outputs + self._write_odometry(stamp_ns, payload, arrival_ns)
+                self._held.append(_new_tuple(_Held, (self._write_odometry, stamp_ns, payload, arrival_ns)))
+                return
+        self._write_odometry(stamp_ns, payload, arrival_ns)
 
-    def _hold(self, is_odometry: bool, stamp_ns: int, payload: bytes, arrival_ns: int) -> None:
-        if len(self._held) < HELD_MAX:
-            self._held.append((is_odometry, stamp_ns, payload, arrival_ns))
-        else:
+    def _clean_encoder(self, name: str, sink: Sink, payload: bytes, arrival_ns: int) -> None:
+        reading = wire_messages.read_encoder(payload)
+        if reading is None:
             self.refused += 1
-
-    def _clean_encoder(self, name: str, payload: bytes, arrival_ns: int) -> Outputs:
-        header = wire_messages.read_header(payload)
-        ticks = None if header is None else wire_messages.read_encoder_ticks(payload, header)
-        if header is None or ticks is None:
-            return self._refuse()
-        self._encoder_stamp_ns = header.stamp_ns
-        self._encoder_follows = abs(header.stamp_ns - self._odom_stamp_ns) <= BURST_NS
+            return
+        stamp_ns, left_ticks, right_ticks = reading
+        self._encoder_stamp_ns = stamp_ns
+        self._encoder_follows = abs(stamp_ns - self._odom_stamp_ns) <= BURST_NS
         if self._is_first_reading:
             # The boot line may have gone down another connection, which never said who it was.
             self._is_first_reading = False
-            counts_from_boot = abs(arrival_ns - header.stamp_ns) > self._max_age_ns
-            if counts_from_boot or self.odometry.looks_reset(*ticks):
+            counts_from_boot = abs(arrival_ns - stamp_ns) > self._max_age_ns
+            if counts_from_boot or self.odometry.looks_reset(left_ticks, right_ticks):
                 self.note_reboot()
-        self.odometry.integrate(ticks[0], ticks[1], header.stamp_ns / NS_PER_S)
-        if not self._is_wanted(name):
-            return self._release()
-        return self._clean_stamped(name, payload, arrival_ns) + self._release()
+        self.odometry.integrate(left_ticks, right_ticks, stamp_ns / NS_PER_S)
+        if sink.is_wanted:
+            self._clean_stamped(name, sink, payload, arrival_ns)
+        if self._held:
+            self._release()
 
-    def _release(self) -> Outputs:
+    def _release(self) -> None:
         held, self._held = self._held, []
-        outputs: Outputs = []
-        for is_odometry, stamp_ns, payload, arrival_ns in held:
-            write = self._write_odometry if is_odometry else self._write_odom_transform
-            outputs += write(stamp_ns, payload, arrival_ns)
-        return outputs
+        for write, stamp_ns, data, arrival_ns in held:
+            write(stamp_ns, data, arrival_ns)
 
     @property
     def _uses_estimate(self) -> bool:
         return self._has_encoder and self.odometry.has_reading
 
-    def _write_odometry(self, stamp_ns: int, payload: bytes, arrival_ns: int) -> Outputs:
-        stamp_ns = self._stamps.correct(self._odom_name, stamp_ns, arrival_ns)
-        estimate = (self.odometry.pose, self.odometry.twist) if self._uses_estimate else None
-        written = self._writer.rewrite(payload, self._count(self._odom_name), stamp_ns, estimate)
-        return self._refuse() if written is None else [(self._odom_name, written)]
+    def _pack_pose(self) -> bytes:
+        pose = self.odometry.pose
+        # One pose goes out twice, as odometry and as a transform.
+        if pose is not self._packed_pose[0]:
+            self._packed_pose = (pose, wire_messages.pack_pose(pose))
+        return self._packed_pose[1]
 
-    def _write_odom_transform(self, stamp_ns: int, tail: bytes, arrival_ns: int) -> Outputs:
+    def _write_odometry(self, stamp_ns: int, payload: bytes, arrival_ns: int) -> None:
+        name = self._odom_name
+        stamp_ns = self._stamps.correct(name, stamp_ns, arrival_ns)
+        estimate = (self._pack_pose(), self.odometry.twist) if self._uses_estimate else None
+        written = self._writer.rewrite(payload, self._count(name), stamp_ns, estimate)
+        if written is None:
+            self.refused += 1
+        else:
+            self._odom_sink.publish(written)
+
+    def _write_odom_transform(self, stamp_ns: int, tail: bytes, arrival_ns: int) -> None:
         if self._uses_estimate:
-            tail = wire_messages.pack_transform_tail(self.odometry.pose)
+            tail = self._pack_pose()
         stamp_ns = self._stamps.correct("tf base_link", stamp_ns, arrival_ns)
-        return [(TRANSFORMS, wire_messages.pack_transform(stamp_ns, self._odom_frames, tail))]
+        self._add_transform(wire_messages.pack_transform(stamp_ns, self._odom_frames, tail))
 
-    def _clean_transforms(self, payload: bytes, arrival_ns: int) -> Outputs:
+    def _clean_transforms(self, payload: bytes, arrival_ns: int) -> None:
         # Stock robots send one transform in a message, of frames that were seen before.
         frames = payload[wire_messages.FRAMES_OFFSET : -wire_messages.TRANSFORM_TAIL_LENGTH]
         key = self._own_frames.get(frames)
-        if key is not None and payload.startswith(wire_messages.ONE_TRANSFORM):
-            secs, nsecs = wire_messages.read_single_stamp(payload)
-            stamp_ns = secs * NS_PER_S + nsecs
-            if frames == self._odom_frames:
-                tail = payload[-wire_messages.TRANSFORM_TAIL_LENGTH :]
-                return self._clean_transform(key, stamp_ns, frames, tail, arrival_ns)
-            corrected_ns = self._stamps.correct(key, stamp_ns, arrival_ns)
-            if corrected_ns == stamp_ns and nsecs < NS_PER_S:
-                return [(TRANSFORMS, payload[len(wire_messages.ONE_TRANSFORM) :])]
+        if key is None:
+            self._clean_unknown_transforms(payload, arrival_ns)
+            return
+        count, _, secs, nsecs = wire_messages.read_transforms_start(payload)
+        if count != 1:
+            self._clean_unknown_transforms(payload, arrival_ns)
+            return
+        stamp_ns = secs * NS_PER_S + nsecs
+        if frames == self._odom_frames:
             tail = payload[-wire_messages.TRANSFORM_TAIL_LENGTH :]
-            return [(TRANSFORMS, wire_messages.pack_transform(corrected_ns, frames, tail))]
+            self._clean_transform(key, stamp_ns, frames, tail, arrival_ns)
+            return
+        corrected_ns = self._stamps.correct(key, stamp_ns, arrival_ns)
+        if corrected_ns == stamp_ns and nsecs < NS_PER_S:
+            self._add_transform(payload[wire_messages.FIRST_TRANSFORM_OFFSET :])
+        else:
+            tail = payload[-wire_messages.TRANSFORM_TAIL_LENGTH :]
+            self._add_transform(wire_messages.pack_transform(corrected_ns, frames, tail))
+
+    def _clean_unknown_transforms(self, payload: bytes, arrival_ns: int) -> None:
         transforms = wire_messages.read_transforms(payload)
         if transforms is None:
-            return self._refuse()
-        outputs: Outputs = []
+            self.refused += 1
+            return
         for stamp_ns, frames, tail in transforms:
             key = self._own_frames.get(frames) or self._admit_frames(frames)
             if key is not None:
-                outputs += self._clean_transform(key, stamp_ns, frames, tail, arrival_ns)
-        return outputs
+                self._clean_transform(key, stamp_ns, frames, tail, arrival_ns)
 
-    def _clean_transform(
-        self, key: str, stamp_ns: int, frames: bytes, tail: bytes, arrival_ns: int
-    ) -> Outputs:
+    def _clean_transform(self, key: str, stamp_ns: int, frames: bytes, tail: bytes, arrival_ns: int) -> None:
         if frames == self._odom_frames and self._has_encoder:
-            if self._held:
-                self._hold(False, stamp_ns, tail, arrival_ns)
-                return _NONE
-            return self._write_odom_transform(stamp_ns, tail, arrival_ns)
+            if not self._held:
+                self._write_odom_transform(stamp_ns, tail, arrival_ns)
+            elif len(self._held) < HELD_MAX:
+                self._held.append(_new_tuple(_Held, (self._write_odom_transform, stamp_ns, tail, arrival_ns)))
+            else:
+                self.refused += 1
+            return
         stamp_ns = self._stamps.correct(key, stamp_ns, arrival_ns)
-        return [(TRANSFORMS, wire_messages.pack_transform(stamp_ns, frames, tail))]
+        self._add_transform(wire_messages.pack_transform(stamp_ns, frames, tail))
 
     def _admit_frames(self, frames: bytes) -> Optional[str]:
         """Return the key of a pair of frames seen for the first time, None if the robot may not send it."""
@@ -306,7 +345,7 @@ class MessageCleaner:
         return key
 
 
-def split_transforms(payload: bytes, _arrival_ns: int) -> Outputs:
+def split_transforms(payload: bytes) -> List[bytes]:
     """Return the transforms of a device that is no HeRo as they are; none if payload is no TFMessage."""
     transforms = wire_messages.read_transforms(payload) or []
-    return [(TRANSFORMS, wire_messages.pack_transform(*transform)) for transform in transforms]
+    return [wire_messages.pack_transform(*transform) for transform in transforms]

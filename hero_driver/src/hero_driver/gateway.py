@@ -148,16 +148,14 @@ class Gateway(LinkHandler):
             link.send_frame(frame)
         if peer.record is not None and not peer.refused:
             peer.record.last_heard_s = now_s
-        bridge = peer.bridge
         for event in events:
             if type(event) is MessageReceived:
-                if bridge is not None:
-                    bridge.receive_message(event.topic, event.payload, arrival_ns)
+                topic, payload = event
+                topic.receive(payload, arrival_ns)
             else:
                 self._receive_event(peer, event, now_s)
                 if link.closed:
                     return
-                bridge = peer.bridge
 
     def poll_link(self, link: Link, now_s: float) -> None:
         """Let the session do what is due."""

@@ -63,7 +63,8 @@ class TickOdometry:
         self.pose = Pose(0.0, 0.0, 0.0)
         self.resets = 0
         self.has_reading = False
-        self._geometry = geometry
+        self._tick_m = geometry.tick_m
+        self._separation_m = geometry.wheel_separation_m
         self._ticks: Optional[Tuple[float, float]] = None
         self._stamp_s = 0.0
         self._window: Deque[Tuple[float, float, float]] = collections.deque(maxlen=TWIST_WINDOW)
@@ -75,9 +76,9 @@ class TickOdometry:
             return Twist(0.0, 0.0)
         first_s, first_left, first_right = self._window[0]
         last_s, last_left, last_right = self._window[-1]
-        speed = self._geometry.tick_m / (last_s - first_s)
+        speed = self._tick_m / (last_s - first_s)
         left_m_s, right_m_s = (last_left - first_left) * speed, (last_right - first_right) * speed
-        return Twist((left_m_s + right_m_s) / 2.0, (right_m_s - left_m_s) / self._geometry.wheel_separation_m)
+        return Twist((left_m_s + right_m_s) / 2.0, (right_m_s - left_m_s) / self._separation_m)
 
     def expect_reset(self) -> None:
         """The robot rebooted: its counters begin anew, the pose stays where it was."""
@@ -110,9 +111,8 @@ class TickOdometry:
             self._window.clear()
             self._window.append((stamp_s, left_ticks, right_ticks))
             return
-        tick_m = self._geometry.tick_m
-        left_m = (left_ticks - last[0]) * tick_m
-        right_m = (right_ticks - last[1]) * tick_m
+        left_m = (left_ticks - last[0]) * self._tick_m
+        right_m = (right_ticks - last[1]) * self._tick_m
         limit_m = MAX_WHEEL_SPEED_M_S * min(max(elapsed_s, 0.2), MAX_GAP_S)
         if abs(left_m) > limit_m or abs(right_m) > limit_m:
             self.resets += 1
@@ -126,7 +126,7 @@ class TickOdometry:
     def _move(self, left_m: float, right_m: float) -> None:
         """Follow the arc that two wheels describe which run left_m and right_m at steady speeds."""
         distance_m = (left_m + right_m) / 2.0
-        turn_rad = (right_m - left_m) / self._geometry.wheel_separation_m
+        turn_rad = (right_m - left_m) / self._separation_m
         x_m, y_m, yaw_rad = self.pose
         half_rad = turn_rad / 2.0
         # The chord of the arc: its length is distance * sin(half) / half, its direction yaw + half.

@@ -10,7 +10,7 @@ Source of the framing: ROS TCPROS, a 32-bit length before each message.
 import collections
 import socket
 import struct
-from typing import Any, Callable, Deque, Dict, List
+from typing import Any, Callable, Deque, Dict, List, NamedTuple, Sequence
 
 import rospy
 from rospy.impl import tcpros_base
@@ -35,6 +35,13 @@ def admit_many_subscribers() -> None:
     tcpros_base._tcpros_server.tcp_ros_server.server_sock.listen(WAITING_CONNECTIONS)
 
 
+class _NoConnections(NamedTuple):
+    connections: Sequence[Any] = ()
+
+
+_NOBODY = _NoConnections()
+
+
 class Outlet:
     """One topic's way out; open() may be called by any thread, the rest only by the thread of the sockets."""
 
@@ -43,6 +50,7 @@ class Outlet:
         self._queue_length = queue_length
         self._call_later = call_later
         self._publisher: Any = None
+        self._impl: Any = _NOBODY  # rospy's connections of the topic; it replaces the list, and never changes one
         self._backlogs: Dict[Any, Deque[bytes]] = {}
         self.raw_class: Any = None
         self.dropped = 0
@@ -54,10 +62,12 @@ class Outlet:
         publisher.impl.set_queue_size(None)
         self.raw_class = raw_class
         self._publisher = publisher
+        self._impl = publisher.impl
 
     def release(self) -> List[Callable[[], None]]:
         """Publish no more; return what unregisters the topic, to be called where blocking is allowed."""
         publisher, self._publisher = self._publisher, None
+        self._impl = _NOBODY
         self._backlogs.clear()
         return [] if publisher is None else [lambda: unregister(publisher)]
 
@@ -69,11 +79,11 @@ class Outlet:
     @property
     def is_wanted(self) -> bool:
         """Whether somebody listens."""
-        return bool(self._list_connections())
+        return bool(self._impl.connections)
 
     def publish(self, payload: bytes) -> None:
         """Send payload to everybody who listens."""
-        connections = self._list_connections()
+        connections = self._impl.connections
         if not connections:
             return
         data = _LENGTH.pack(len(payload)) + payload
@@ -88,13 +98,6 @@ class Outlet:
                     self._call_later(RETRY_S, self._retry)
                 self._backlogs[connection] = collections.deque((rest,))
 
-    def _list_connections(self) -> List[Any]:
-        """Return rospy's list of connections, which it never changes but replaces."""
-        publisher = self._publisher
-        # rospy takes the impl away when a topic is unregistered, which another thread may be doing now.
-        impl = None if publisher is None else publisher.impl
-        return [] if impl is None else impl.connections
-
     def _keep(self, backlog: Deque[bytes], data: bytes) -> None:
         if len(backlog) > self._queue_length:
             # The first one is on its way in part and has to be finished; the second is the oldest whole one.
@@ -103,7 +106,7 @@ class Outlet:
         backlog.append(data)
 
     def _retry(self) -> None:
-        connections = self._list_connections()
+        connections = self._impl.connections or ()
         for connection, backlog in list(self._backlogs.items()):
             if connection not in connections:
                 del self._backlogs[connection]

@@ -12,7 +12,7 @@ from typing import Any, Callable, Dict, List, Optional, Set, Tuple
 import rospy
 
 from . import message_types, wire_messages
-from .cleaning import TRANSFORMS, Clean, CleaningSettings, MessageCleaner, Output, split_transforms
+from .cleaning import TRANSFORMS, CleaningSettings, MessageCleaner, split_transforms
 from .command_queue import CommandQueue
 from .command_shaping import HALTED_MOTORS, ZERO_TWIST, check_twist
 from .inlet import AddReader, Inlet
@@ -81,20 +81,21 @@ class RobotBridge:
         """cleaning is None for devices that are no HeRos: their messages pass through as they are."""
         self.identity = identity
         self.label = identity.namespace.lstrip("/")
-        self.cleaner = (
-            None if cleaning is None else MessageCleaner(identity.namespace, cleaning, self.is_wanted)
-        )
         self.commands = CommandQueue(context.command_max_age_s)
         self.refused_commands = 0
         self._context = context
         self._closed = False
         self._connected = False
         self._outlets: Dict[str, Outlet] = {}
+        self.cleaner: Optional[MessageCleaner] = None
+        if cleaning is not None:
+            self.cleaner = MessageCleaner(
+                identity.namespace, cleaning, self._outlets.__getitem__, context.add_transform
+            )
         self._inlets: Dict[str, Tuple[str, Inlet]] = {}
         self._services: Dict[str, RobotService] = {}
         self._service_halves: Dict[Tuple[str, TopicKind], Topic] = {}
         self._servers: Dict[str, Any] = {}
-        self._clean: Dict[int, Clean] = {}
         self._ids: Dict[str, int] = {}
         self._motor_used_s = 0.0
         self._errors: Dict[str, str] = {}
@@ -105,7 +106,6 @@ class RobotBridge:
 
     def attach(self) -> None:
         """A connection stands; its topics are declared next."""
-        self._clean.clear()
         self._ids.clear()
         self._service_halves.clear()
         self._connected = True
@@ -113,7 +113,6 @@ class RobotBridge:
     def detach(self, reason: str) -> None:
         """The connection is gone; endpoints stay, calls that wait fail now, commands that wait are dropped."""
         self._connected = False
-        self._clean.clear()
         self._ids.clear()
         self.commands.clear()
         for service in list(self._services.values()):
@@ -159,42 +158,33 @@ class RobotBridge:
         elif kind in (TopicKind.SERVICE_ANSWERS, TopicKind.SERVICE_REQUESTS):
             self._declare_service_half(topic, name)
 
-    def receive_message(self, topic: Topic, payload: bytes, arrival_ns: int) -> None:
-        """The robot sent a message; arrival_ns is ROS time."""
-        clean = self._clean.get(topic.info.topic_id)
-        if clean is None:
-            return
-        for name, output in clean(payload, arrival_ns):
-            if name == TRANSFORMS:
-                self._context.add_transform(output)
-            else:
-                self._outlets[name].publish(output)
-
     def _choose_cleaning(self, topic: Topic, name: str, ros_type: str) -> Dict[str, str]:
         """Set up the way of a topic's messages; return the topics (with types) that are made of it besides."""
         info = topic.info
         if wire_messages.MD5SUMS.get(ros_type, info.md5sum) != info.md5sum:
             # Another layout than the one that is known here; the registrar will refuse it with both md5s.
-            self._clean.pop(info.topic_id, None)
             return {}
         if name == TRANSFORMS:
             if ros_type != TRANSFORM_TYPE:
                 self._complain(name, "topic /tf refused: its type is %s, not %s" % (ros_type, TRANSFORM_TYPE))
-                self._clean.pop(info.topic_id, None)
-                return {}
-            self._clean[info.topic_id] = (
-                split_transforms if self.cleaner is None else self.cleaner.choose(name, ros_type)
-            )
+            elif self.cleaner is None:
+                topic.receive = self._pass_transforms
+            else:
+                topic.receive = self.cleaner.choose(name, ros_type)
             return {}
-        derived: Dict[str, str] = {}
-        if self.cleaner is None:
-            self._clean[info.topic_id] = lambda payload, arrival_ns: [(name, payload)]
-        else:
-            derived = self.cleaner.find_derived(name, ros_type)
-            self._clean[info.topic_id] = self.cleaner.choose(name, ros_type)
+        derived = {} if self.cleaner is None else self.cleaner.find_derived(name, ros_type)
         for outlet_name in (name, *derived):
             self._outlets.setdefault(outlet_name, Outlet(QUEUE_LENGTH, self._context.call_later))
+        if self.cleaner is None:
+            outlet = self._outlets[name]
+            topic.receive = lambda payload, _: outlet.publish(payload)
+        else:
+            topic.receive = self.cleaner.choose(name, ros_type)
         return derived
+
+    def _pass_transforms(self, payload: bytes, _arrival_ns: int) -> None:
+        for transform in split_transforms(payload):
+            self._context.add_transform(transform)
 
     def _declare_service_half(self, topic: Topic, name: str) -> None:
         self._service_halves[name, topic.kind] = topic
@@ -221,12 +211,12 @@ class RobotBridge:
             self._services[name] = service
         known_service = service
         self._ids[name] = requests.info.topic_id
-        self._clean[answers.info.topic_id] = lambda payload, _: self._receive_answer(known_service, payload)
+        answers.receive = lambda payload, _: self._receive_answer(known_service, payload)
         self._submit(
             lambda: self._serve(name, requests.info.message_type, requests.info.md5sum, answers.info.md5sum)
         )
 
-    def _receive_answer(self, service: RobotService, payload: bytes) -> List[Output]:
+    def _receive_answer(self, service: RobotService, payload: bytes) -> None:
         request = service.receive_answer(payload)
         if (
             request is not None
@@ -236,14 +226,8 @@ class RobotBridge:
         ):
             # The answer comes before the first reading of the counters that the robot has just zeroed.
             self.cleaner.odometry.set_pose(read_set_odom_pose(request))
-        return []
 
     # To the robot.
-
-    def is_wanted(self, name: str) -> bool:
-        """Return whether somebody listens to the topic called name."""
-        outlet = self._outlets.get(name)
-        return outlet is not None and outlet.is_wanted
 
     def find_id(self, name: str) -> Optional[int]:
         """Return the id under which the robot receives the topic or service called name."""

@@ -26,20 +26,24 @@ class StampFilter:
         """
         self._use_arrival = use_arrival
         self._max_future_ns = int(max_future_s * NS_PER_S)
-        self._max_age_ns = int(max_age_s * NS_PER_S)
+        # Where the arrival is taken, no stamp is in the limits.
+        self._lowest_ns = self._max_future_ns + 1 if use_arrival else -int(max_age_s * NS_PER_S)
         self._last_ns: Dict[str, int] = {}
         self.corrected = 0
 
     def correct(self, topic: str, stamp_ns: int, arrival_ns: int) -> int:
         """Return the stamp (ns) to publish on topic for a message stamped stamp_ns that came at arrival_ns."""
+        last_ns = self._last_ns.get(topic)
         ahead_ns = stamp_ns - arrival_ns
+        if self._lowest_ns <= ahead_ns <= self._max_future_ns and (last_ns is None or stamp_ns > last_ns):
+            self._last_ns[topic] = stamp_ns
+            return stamp_ns
         result_ns = stamp_ns
         if self._use_arrival:
             result_ns = arrival_ns
-        elif ahead_ns > self._max_future_ns or -ahead_ns > self._max_age_ns:
+        elif not self._lowest_ns <= ahead_ns <= self._max_future_ns:
             result_ns = arrival_ns
             self.corrected += 1
-        last_ns = self._last_ns.get(topic)
         if last_ns is not None and result_ns <= last_ns:
             if last_ns - arrival_ns > self._max_future_ns + STEP_SLACK_NS:
                 # No stamp that was let through lies so far ahead of its arrival: ROS time itself went back

@@ -6,7 +6,7 @@ transforms, laser scans. Field order is that of the ROS message definitions. Pur
 
 import math
 import struct
-from typing import List, NamedTuple, Optional, Sequence, Tuple
+from typing import Callable, List, NamedTuple, Optional, Sequence, Tuple
 
 from .odometry import Pose, Twist
 from .stamps import NS_PER_S
@@ -78,12 +78,16 @@ def restamp(payload: bytes, seq: int, stamp_ns: int) -> bytes:
     return _SEQ_AND_STAMP.pack(seq & 0xFFFFFFFF, secs, nsecs) + payload[_SEQ_AND_STAMP.size :]
 
 
-def read_encoder_ticks(payload: bytes, header: Header) -> Optional[Tuple[float, float]]:
-    """Return (left_ticks, right_ticks) of a hero_msgs/Encoder, or None if its length is wrong."""
-    if len(payload) - header.end != ENCODER_TAIL_LENGTH:
+def read_encoder(payload: bytes) -> Optional[Tuple[int, float, float]]:
+    """Return (stamp_ns, left_ticks, right_ticks) of a hero_msgs/Encoder, or None if payload is not one."""
+    end = len(payload) - ENCODER_TAIL_LENGTH
+    if end < _HEADER.size:
         return None
-    left, right = _ENCODER_TICKS.unpack_from(payload, header.end)
-    return left, right
+    _, secs, nsecs, length = _HEADER.unpack_from(payload)
+    if _HEADER.size + length != end:
+        return None
+    left, right = _ENCODER_TICKS.unpack_from(payload, end)
+    return secs * NS_PER_S + nsecs, left, right
 
 
 class OdometryWriter:
@@ -96,11 +100,11 @@ class OdometryWriter:
         self._frames: Optional[bytes] = None
 
     def rewrite(
-        self, payload: bytes, seq: int, stamp_ns: int, estimate: Optional[Tuple[Pose, Twist]]
+        self, payload: bytes, seq: int, stamp_ns: int, estimate: Optional[Tuple[bytes, Twist]]
     ) -> Optional[bytes]:
         """Return the robot's message with stamp and covariances, and with another estimate if one is given.
 
-        None if payload is not a nav_msgs/Odometry.
+        estimate: pose, from pack_pose(), and twist. None if payload is not a nav_msgs/Odometry.
         """
         tail = len(payload) - ODOMETRY_TAIL_LENGTH
         # A robot's frames never change, so they are looked at once.
@@ -114,8 +118,8 @@ class OdometryWriter:
             twist_start = tail + _POSE.size + _COVARIANCE.size
             twist = payload[twist_start : twist_start + _TWIST.size]
         else:
-            pose = _pack_pose(estimate[0])
-            twist = _TWIST.pack(estimate[1].linear_m_s, 0.0, 0.0, 0.0, 0.0, estimate[1].turn_rad_s)
+            pose, (linear_m_s, turn_rad_s) = estimate
+            twist = _TWIST.pack(linear_m_s, 0.0, 0.0, 0.0, 0.0, turn_rad_s)
         head = _SEQ_AND_STAMP.pack(seq & 0xFFFFFFFF, *divmod(stamp_ns, NS_PER_S))
         return b"".join((head, frames, pose, self._pose_covariance, twist, self._twist_covariance))
 
@@ -164,17 +168,15 @@ def read_transforms(payload: bytes) -> Optional[List[Transform]]:
     return transforms if position == len(payload) else None
 
 
-ONE_TRANSFORM = _LENGTH.pack(1)
-"""How a message with a single transform begins."""
+FIRST_TRANSFORM_OFFSET = _LENGTH.size
+"""Where a message's first transform begins."""
 
 FRAMES_OFFSET = _LENGTH.size + _SEQ_AND_STAMP.size
 """Where the frames of a message's first transform begin."""
 
 
-def read_single_stamp(payload: bytes) -> Tuple[int, int]:
-    """Return (secs, nsecs) of the transform in a message that is known to hold one."""
-    secs, nsecs = _STAMP.unpack_from(payload, _LENGTH.size + STAMP_OFFSET)
-    return secs, nsecs
+read_transforms_start: Callable[[bytes], Tuple[int, int, int, int]] = struct.Struct("<IIII").unpack_from
+"""Takes the bytes of a TFMessage, at least 16; returns how many transforms it holds, then seq, secs and nsecs of the first."""
 
 
 def split_frames(frames: bytes) -> Tuple[bytes, bytes]:
@@ -193,11 +195,6 @@ def pack_transform(stamp_ns: int, frames: bytes, tail: bytes) -> bytes:
     """Return the bytes of one geometry_msgs/TransformStamped (seq 0)."""
     secs, nsecs = divmod(stamp_ns, NS_PER_S)
     return _SEQ_AND_STAMP.pack(0, secs, nsecs) + frames + tail
-
-
-def pack_transform_tail(pose: Pose) -> bytes:
-    """Return translation and rotation of pose."""
-    return _pack_pose(pose)
 
 
 def pack_transform_message(transforms: Sequence[bytes]) -> bytes:
@@ -250,7 +247,8 @@ def make_proximity(payload: bytes, seq: int, stamp_ns: int, scan_time_s: float) 
     return restamp(payload[: header.end], seq, stamp_ns) + tail
 
 
-def _pack_pose(pose: Pose) -> bytes:
+def pack_pose(pose: Pose) -> bytes:
+    """Return position (or translation) and rotation of pose."""
     half_rad = pose.yaw_rad / 2.0
     return _POSE.pack(pose.x_m, pose.y_m, 0.0, 0.0, 0.0, math.sin(half_rad), math.cos(half_rad))
 

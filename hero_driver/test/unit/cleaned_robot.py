@@ -28,6 +28,33 @@ def make_settings(**changes):
     return CleaningSettings(**{**values, **changes})
 
 
+class ListSink:
+    """A topic of which everything is kept.
+
+    Attributes:
+        is_wanted: whether somebody listens.
+    """
+
+    def __init__(self, name, outputs, is_wanted=True):
+        self.is_wanted = is_wanted
+        self._name = name
+        self._outputs = outputs
+
+    def publish(self, payload):
+        """Keep payload as (name, payload)."""
+        self._outputs.append((self._name, payload))
+
+
+def make_cleaner(namespace, outputs, is_wanted=lambda name: True, **settings):
+    """Return a cleaner of which everything comes to the list outputs, as (name, payload)."""
+    return MessageCleaner(
+        namespace,
+        make_settings(**settings),
+        lambda name: ListSink(name, outputs, is_wanted(name)),
+        ListSink(TRANSFORMS, outputs).publish,
+    )
+
+
 class CleanedRobot:
     """hero_0 with its stock topics, or those in types.
 
@@ -36,8 +63,8 @@ class CleanedRobot:
     """
 
     def __init__(self, types=None, is_wanted=lambda name: True, **settings):
-        self.cleaner = MessageCleaner("/hero_0", make_settings(**settings), is_wanted)
         self.outputs = []
+        self.cleaner = make_cleaner("/hero_0", self.outputs, is_wanted, **settings)
         self.declare(TYPES if types is None else types)
 
     def declare(self, types):
@@ -51,9 +78,9 @@ class CleanedRobot:
 
     def receive(self, name, payload, arrival_ns):
         """Give one message; return what came out because of it."""
-        outputs = list(self._clean[name](payload, arrival_ns))
-        self.outputs += outputs
-        return outputs
+        known = len(self.outputs)
+        self._clean[name](payload, arrival_ns)
+        return self.outputs[known:]
 
     def receive_burst(self, stamp_ns, ticks, arrival_ns=None, **changes):
         """Give one burst of odometry, transforms and encoder; return what came out because of it."""

@@ -5,10 +5,10 @@ import struct
 from collections import Counter
 
 import pytest
-from cleaned_robot import make_settings
+from cleaned_robot import make_cleaner
 from robot_messages import NOW_NS, read_odometry, read_stamp_ns, read_transform
 
-from hero_driver.cleaning import TRANSFORMS, MessageCleaner
+from hero_driver.cleaning import TRANSFORMS
 from hero_driver.message_types import apply_aliases
 from hero_driver.odometry import Pose
 from hero_driver.rosserial.session import MessageReceived, Session, SessionLimits, TopicDeclared
@@ -19,19 +19,19 @@ START_NS = 1795240942 * 10**9 + 831 * 10**6
 
 def clean(data, namespace, start_ns, **settings):
     """Clean what is in a recording, arrivals as the bytes came; return the cleaner and (name, payload) pairs."""
-    cleaner = MessageCleaner(namespace, make_settings(**settings))
+    outputs = []
+    cleaner = make_cleaner(namespace, outputs, **settings)
     session = Session(SessionLimits(), 0.0)
-    cleaned, outputs = {}, []
     for start in range(0, len(data), 1000):
         arrival_ns = start_ns + start * 10**9 // 44051
         for event in session.receive_bytes(data[start : start + 1000], 0.0, 0.0):
             if type(event) is TopicDeclared:
                 info = event.topic.info
-                cleaned[info.topic_id] = cleaner.choose(info.name, apply_aliases(info.message_type))
+                event.topic.receive = cleaner.choose(info.name, apply_aliases(info.message_type))
             elif type(event) is MessageReceived:
                 if event.topic.info.name.endswith("/set_odom"):
                     cleaner.odometry.set_pose(Pose(1.0, 2.0, 0.5))
-                outputs += cleaned[event.topic.info.topic_id](event.payload, arrival_ns)
+                event.topic.receive(event.payload, arrival_ns)
     return cleaner, outputs
 
 

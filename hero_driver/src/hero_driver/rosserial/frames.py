@@ -7,12 +7,14 @@ states of spinOnce()).
 """
 
 import struct
-import zlib
-from typing import List, NamedTuple, Optional, Union
+from typing import Dict, List, NamedTuple, Optional, Tuple, Union
+from zlib import adler32
 
 from .errors import FrameTooLongError, TopicIdError
 
 Bytes = Union[bytes, bytearray, memoryview]
+
+_Start = Tuple[int, int]  # length of a whole frame and its topic id, as its header says
 
 SYNC = b"\xff\xfe"
 """Start of every frame; the second byte is the version of the protocol (0xff was version 1)."""
@@ -22,6 +24,12 @@ HEADER_LENGTH = 7
 
 OVERHEAD_LENGTH = 8
 """Bytes that a frame adds to its payload: the header and the checksum."""
+
+CHECKED_OFFSET = 5
+"""Where the bytes begin that add up to 255 modulo 256, to the end of the frame: id, payload and checksum."""
+
+KNOWN_HEADERS_MAX = 64
+"""Headers that a reader remembers; a stock robot sends about ten different ones, and log lines of any length."""
 
 LONGEST_PAYLOAD_LENGTH = 0xFFFF
 """What the 16-bit length field can say."""
@@ -46,7 +54,7 @@ _HEADER = struct.Struct("<2sHBH")
 _FIELDS = struct.Struct("<HBH")  # the header behind the sync
 _LENGTH = struct.Struct("<H")
 
-# zlib.adler32 & 0xffff is (1 + sum of the bytes) mod 65521. Up to 256 bytes the sum is at most 65280, so
+# adler32 & 0xffff is (1 + sum of the bytes) mod 65521. Up to 256 bytes the sum is at most 65280, so
 # nothing wraps and the sum is exact, at a fraction of the cost of sum() over a bytes object.
 _EXACT_ADLER_LENGTH = 256
 
@@ -66,11 +74,10 @@ def sum_bytes(data: Bytes) -> int:
     """Return the sum of all bytes of data, 0 for none."""
     length = len(data)
     if length <= _EXACT_ADLER_LENGTH:
-        return (zlib.adler32(data) & 0xFFFF) - 1
+        return (adler32(data) & 0xFFFF) - 1
     total = 0
-    view = memoryview(data)
     for start in range(0, length, _EXACT_ADLER_LENGTH):
-        total += (zlib.adler32(view[start : start + _EXACT_ADLER_LENGTH]) & 0xFFFF) - 1
+        total += (adler32(data[start : start + _EXACT_ADLER_LENGTH]) & 0xFFFF) - 1
     return total
 
 
@@ -109,6 +116,7 @@ class FrameReader:
         self.bad_frames = 0
         self.skipped_bytes = 0
         self._rest = b""
+        self._known: Dict[bytes, _Start] = {}
 
     @property
     def buffered_length(self) -> int:
@@ -121,33 +129,54 @@ class FrameReader:
         end = len(buffer)
         frames: List[Frame] = []
         position = 0
+        while position < end:
+            # A robot sends the same few headers all the time; one that was right once is right.
+            start = self._known.get(buffer[position : position + HEADER_LENGTH])
+            if start is None:
+                position, start = self._find_start(buffer, position, end)
+                if start is None:
+                    break
+            frame_length, topic_id = start
+            frame_end = position + frame_length
+            if frame_end > end:
+                break
+            checked = buffer[position + CHECKED_OFFSET : frame_end]
+            if frame_length <= _EXACT_ADLER_LENGTH:
+                # One more than the sum, of which the last byte is 255 where everything is right.
+                is_wrong = adler32(checked) & 0xFF
+            else:
+                is_wrong = sum_bytes(checked) + 1 & 0xFF
+            if is_wrong:
+                position = self._skip_bad_start(position)
+                continue
+            frames.append(_new_tuple(Frame, (topic_id, buffer[position + HEADER_LENGTH : frame_end - 1])))
+            position = frame_end
+        self._rest = buffer[position:]
+        self.frames += len(frames)
+        return frames
+
+    def _find_start(self, buffer: bytes, position: int, end: int) -> Tuple[int, Optional[_Start]]:
+        """Return where the next right header begins, and what it says: None where it is not complete yet."""
         while True:
             if not buffer.startswith(SYNC, position):
                 start = self._find_sync(buffer, position)
                 self.skipped_bytes += start - position
                 position = start
-            if end - position < OVERHEAD_LENGTH:
-                if self._has_bad_length(buffer, position, end):
-                    position = self._skip_bad_start(position)
-                    continue
-                break
-            length, length_checksum, topic_id = _FIELDS.unpack_from(buffer, position + len(SYNC))
-            if (length + (length >> 8) + length_checksum) & 0xFF != 0xFF or length > self.max_payload_length:
-                position = self._skip_bad_start(position)
-                continue
-            frame_end = position + OVERHEAD_LENGTH + length
-            if frame_end > end:
-                break
-            payload = buffer[position + HEADER_LENGTH : frame_end - 1]
-            total = topic_id + (topic_id >> 8) + sum_bytes(payload) + buffer[frame_end - 1]
-            if total & 0xFF != 0xFF:
-                position = self._skip_bad_start(position)
-                continue
-            frames.append(_new_tuple(Frame, (topic_id, payload)))
-            position = frame_end
-        self._rest = buffer[position:]
-        self.frames += len(frames)
-        return frames
+            if end - position < HEADER_LENGTH:
+                if not self._has_bad_length(buffer, position, end):
+                    return position, None
+            else:
+                length, length_checksum, topic_id = _FIELDS.unpack_from(buffer, position + len(SYNC))
+                if self._is_length(length, length_checksum):
+                    if len(self._known) >= KNOWN_HEADERS_MAX:
+                        self._known.clear()
+                    known = (OVERHEAD_LENGTH + length, topic_id)
+                    self._known[buffer[position : position + HEADER_LENGTH]] = known
+                    return position, known
+            position = self._skip_bad_start(position)
+
+    def _is_length(self, length: int, checksum: int) -> bool:
+        return (length + (length >> 8) + checksum) & 0xFF == 0xFF and length <= self.max_payload_length
 
     @staticmethod
     def _find_sync(buffer: bytes, position: int) -> int:
@@ -160,12 +189,9 @@ class FrameReader:
 
     def _has_bad_length(self, buffer: bytes, position: int, end: int) -> bool:
         """Return whether an incomplete header already shows that it is none, so that nothing waits for it."""
-        if end - position < 5:
+        if end - position < CHECKED_OFFSET:
             return False
-        length: int = _LENGTH.unpack_from(buffer, position + 2)[0]
-        return (
-            length + (length >> 8) + buffer[position + 4]
-        ) & 0xFF != 0xFF or length > self.max_payload_length
+        return not self._is_length(_LENGTH.unpack_from(buffer, position + len(SYNC))[0], buffer[position + 4])
 
     def _skip_bad_start(self, position: int) -> int:
         self.bad_frames += 1

@@ -8,8 +8,8 @@ Source: ros_lib node_handle.h (negotiateTopics, requestSyncTime, spinOnce) and t
 
 import enum
 import re
-from dataclasses import dataclass
-from typing import Dict, List, NamedTuple, Optional, Sequence, Union
+from dataclasses import dataclass, field
+from typing import Callable, Dict, List, NamedTuple, Optional, Sequence, Union
 
 from . import frames, payloads
 from .errors import FrameTooLongError, PayloadError, TopicIdError
@@ -62,12 +62,22 @@ _FROM_ROBOT = _MESSAGES | {TopicKind.CLIENT_REQUESTS}
 _KIND_BY_FRAME_ID = {kind.value: kind for kind in TopicKind}
 
 
-@dataclass(frozen=True)
+def _ignore(payload: bytes, arrival_ns: int) -> None:
+    """Take a message that nobody has asked for."""
+
+
+@dataclass
 class Topic:
-    """One declared id of this conversation."""
+    """One declared id of this conversation.
+
+    Attributes:
+        receive: what takes the payloads of this topic, with the time of arrival (ns); for whoever declares it
+            further on, nothing until then.
+    """
 
     info: TopicInfo
     kind: TopicKind
+    receive: Callable[[bytes, int], None] = field(default=_ignore, compare=False, repr=False)
 
 
 class MessageReceived(NamedTuple):
@@ -203,6 +213,8 @@ class Session:
 
     def take_frames(self) -> List[bytes]:
         """Return the frames that the session itself wants to send, and forget them."""
+        if not self._outgoing:
+            return []
         outgoing, self._outgoing = self._outgoing, []
         return outgoing
 
