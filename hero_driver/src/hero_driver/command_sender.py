@@ -17,20 +17,20 @@ class CommandSender:
 
     def __init__(
         self,
-        call_soon: Callable[[Callable[[], None]], None],
+        call_here: Callable[[Callable[[], None]], None],
         call_later: Callable[[float, Callable[[], None]], None],
         find_peer: Callable[[RobotBridge], Optional[Peer]],
         complain: Callable[[Peer, str], None],
     ) -> None:
         """Take the loop's functions; find_peer gives a robot's connection, complain reports its trouble."""
-        self._call_soon = call_soon
+        self._call_here = call_here
         self._call_later = call_later
         self._find_peer = find_peer
         self._complain = complain
 
     def wake(self, bridge: RobotBridge) -> None:
         """Commands for a robot wait; from any thread."""
-        self._call_soon(lambda: self._serve(bridge))
+        self._call_here(lambda: self._serve(bridge))
 
     def send_message(self, peer: Peer, topic_id: int, payload: bytes) -> None:
         """Send one message now, if the connection declared its id and it fits."""

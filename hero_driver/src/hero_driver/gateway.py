@@ -85,7 +85,7 @@ class Gateway(LinkHandler):
     def open(self, loop: EventLoop) -> None:
         """Begin to serve what loop brings."""
         self._loop = loop
-        self._sender = CommandSender(loop.call_soon, loop.call_later, self._find_peer, self._complain)
+        self._sender = CommandSender(loop.call_here, loop.call_later, self._find_peer, self._complain)
         self._requests = RobotRequests(self._config, self._log, loop.call_soon, self._complain)
         self._transforms = TransformCollector(self._config.transform_period_s, loop.call_later)
         self._context = BridgeContext(

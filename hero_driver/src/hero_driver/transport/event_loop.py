@@ -144,6 +144,13 @@ class EventLoop(LinkOwner, DiallerOwner):
             self._is_awake = True
         os.write(self._wake_write, b"\0")
 
+    def call_here(self, call: Callable[[], None]) -> None:
+        """Run call on the loop's thread: now if that is this thread, else soon."""
+        if threading.get_ident() == self._thread_id:
+            call()
+        else:
+            self.call_soon(call)
+
     def add_reader(self, reader: Reader) -> None:
         """Read reader whenever there is something to read, until it ends; from any thread."""
         self.call_soon(lambda: self._watch_reader(reader))
