@@ -103,8 +103,9 @@ class CommandQueue:
         with self._lock:
             if self._waiting:
                 return RETRY_S
-            delays = [shaper.due_in_s(now_s) for shaper in self._shapers.values()]
-            due = [delay for delay in delays if delay is not None]
-        if not due:
-            return None
-        return min(due) if velocity_acknowledged else max(RETRY_S, min(due))
+            due_s: Optional[float] = None
+            for shaper in self._shapers.values():
+                delay_s = shaper.due_in_s(now_s)
+                if delay_s is not None and (due_s is None or delay_s < due_s):
+                    due_s = delay_s
+        return due_s if velocity_acknowledged or due_s is None else max(RETRY_S, due_s)

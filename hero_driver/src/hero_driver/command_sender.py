@@ -49,7 +49,7 @@ class CommandSender:
             return
         if peer.send_due:
             # A timer is set already for what has to wait; the rest need not.
-            self._send_ready(peer)
+            self._send_ready(peer, time.monotonic())
         else:
             self._send_and_come_back(peer)
 
@@ -57,19 +57,20 @@ class CommandSender:
         peer.send_due = False
         if peer.bridge is None or peer.link.closed:
             return
-        delay_s = peer.bridge.commands.due_in_s(self._send_ready(peer), time.monotonic())
+        now_s = time.monotonic()
+        delay_s = peer.bridge.commands.due_in_s(self._send_ready(peer, now_s), now_s)
         if delay_s is not None:
             peer.send_due = True
             self._call_later(delay_s, lambda: self._send_and_come_back(peer))
 
-    def _send_ready(self, peer: Peer) -> bool:
+    def _send_ready(self, peer: Peer, now_s: float) -> bool:
         """Send what may go out; return whether the robot has acknowledged the last velocity."""
         link, bridge = peer.link, peer.bridge
         if bridge is None:
             return True
         in_flight = link.read_unacknowledged_length()
         acknowledged = link.handed_length - in_flight >= peer.velocity_mark
-        for name, payload in bridge.commands.take(in_flight, acknowledged, time.monotonic()):
+        for name, payload in bridge.commands.take(in_flight, acknowledged, now_s):
             topic_id = bridge.find_id(name)
             if topic_id is None:
                 bridge.refused_commands += 1
