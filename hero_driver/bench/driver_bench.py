@@ -37,10 +37,25 @@ def measure_machine_us():
     return min(timeit.repeat(lambda: sum(data), number=20000, repeat=5)) / 20000 * 1e6
 
 
-def read_stolen_and_busy_s():
-    """Return the CPU seconds of the whole machine so far (all but idle and waiting)."""
-    fields = [int(field) for field in Path("/proc/stat").read_text().splitlines()[0].split()[1:9]]
-    return (sum(fields) - fields[3] - fields[4]) / TICKS_PER_S
+def read_all_cpu_s():
+    """Return the CPU seconds by process of everything that runs on this machine.
+
+    /proc/stat would be shorter, but counts whole ticks of the clock: between them it sees nothing of short work.
+    """
+    return {
+        int(entry.name): read_one_cpu_s(entry.name)
+        for entry in Path("/proc").iterdir()
+        if entry.name.isdigit()
+    }
+
+
+def read_one_cpu_s(pid):
+    """Return the CPU seconds that one process has used, 0 if it has ended."""
+    try:
+        fields = Path("/proc/%s/stat" % pid).read_text().rpartition(")")[2].split()
+    except OSError:
+        return 0.0
+    return (int(fields[11]) + int(fields[12])) / TICKS_PER_S
 
 
 def find_tree(pid):
@@ -62,14 +77,7 @@ def find_tree(pid):
 
 def read_cpu_s(pid):
     """Return the CPU seconds that the process tree of pid has used."""
-    total = 0
-    for member in find_tree(pid):
-        try:
-            fields = Path("/proc/%d/stat" % member).read_text().rpartition(")")[2].split()
-        except OSError:
-            continue
-        total += int(fields[11]) + int(fields[12])
-    return total / TICKS_PER_S
+    return sum(read_one_cpu_s(member) for member in find_tree(pid))
 
 
 def read_memory_mb(pid):
@@ -150,7 +158,7 @@ def collect(swarms):
     joined_s = [report["joined_s"] for report in reports]
     total = {
         key: sum((report[key] for report in reports[1:]), reports[0][key])
-        for key in ("thrown_out", "transforms", "odom_stamps_s", "commands_s")
+        for key in ("thrown_out", "transforms", "bursts_sent", "bursts_due", "odom_stamps_s", "commands_s")
     }
     return dict(total, joined_s=None if None in joined_s else max(joined_s))
 
@@ -162,7 +170,7 @@ def run_once(options, count, environment):
     try:
         # The probe of the port was a connection too: let the server forget it.
         time.sleep(1.0)
-        arguments = ["--robots", str(count)]
+        arguments = ["--robots", str(0 if options.unheard else count)]
         listener = start([*load, "listen", *arguments], environment, stdout=subprocess.PIPE)
         commander = start([*load, "command", *arguments], environment, stdout=subprocess.PIPE)
         time.sleep(SETTLE_S)
@@ -171,12 +179,13 @@ def run_once(options, count, environment):
 
         def read_figures():
             server_s = sum(read_cpu_s(process.pid) for process, _ in servers)
-            return time.monotonic(), server_s, read_cpu_s(listener.pid), read_stolen_and_busy_s()
+            return time.monotonic(), server_s, read_cpu_s(listener.pid), read_all_cpu_s()
 
         window_start_s = time.time()
         before = read_figures()
         time.sleep(options.seconds)
         after = read_figures()
+        ours = set(find_tree(os.getpid()))
         window_end_s = time.time()
         memory_mb = sum(read_memory_mb(process.pid) for process, _ in servers)
         sent = collect(swarms)
@@ -187,6 +196,7 @@ def run_once(options, count, environment):
         for process, _ in servers:
             stop(process)
     elapsed_s = after[0] - before[0]
+    busy_s = {pid: total_s - before[3].get(pid, 0.0) for pid, total_s in after[3].items()}
 
     def count_in_window(times_s):
         return sum(window_start_s <= time_s < window_end_s for time_s in times_s)
@@ -199,7 +209,9 @@ def run_once(options, count, environment):
         "robots": count,
         "server_cpu_percent": 100.0 * (after[1] - before[1]) / elapsed_s,
         "subscriber_cpu_percent": 100.0 * (after[2] - before[2]) / elapsed_s,
-        "machine_busy_cores": (after[3] - before[3]) / elapsed_s,
+        "bench_cores": sum(time_s for pid, time_s in busy_s.items() if pid in ours) / elapsed_s,
+        "other_cores": sum(time_s for pid, time_s in busy_s.items() if pid not in ours) / elapsed_s,
+        "bursts_sent_percent": 100.0 * sent["bursts_sent"] / sent["bursts_due"],
         "odom_delivered_percent": 100.0 * len(ages_s) / max(1, count_in_window(sent["odom_stamps_s"])),
         "transforms_delivered_percent": 100.0 * listened["transforms"] / max(1, sent["transforms"]),
         "odom_p50_ms": percentile_ms(ages_s, 0.5),
@@ -226,7 +238,9 @@ ROWS = (
     ("last robot synchronised, s", "joined_s", "%.2f"),
     ("robots thrown out", "thrown_out", "%d"),
     ("server memory, MB", "memory_mb", "%.0f"),
-    ("whole machine busy, cores", "machine_busy_cores", "%.2f"),
+    ("bursts taken of those due, %", "bursts_sent_percent", "%.1f"),
+    ("all of this measurement, cores", "bench_cores", "%.2f"),
+    ("everything else, cores", "other_cores", "%.2f"),
 )
 
 
@@ -273,7 +287,10 @@ def main():
     parser.add_argument("--repeats", type=int, default=1, help="runs of which the median is printed")
     parser.add_argument("--drivers", type=int, default=1, help="servers, each with its share of the robots")
     parser.add_argument("--speed", type=float, default=1.0, help="multiplies the rates of the robots")
-    parser.add_argument("--nagle", action="store_true", help="robots' TCP holds small writes back, as HeRo's does")
+    parser.add_argument("--unheard", action="store_true", help="nobody listens or commands, but for /tf")
+    parser.add_argument(
+        "--nagle", action="store_true", help="robots' TCP holds small writes back, as HeRo's does"
+    )
     parser.add_argument("--server-command", default=DRIVER_COMMAND, help="{port} stands for the port")
     parser.add_argument("--json", metavar="FILE", help="write the figures there")
     parser.add_argument("--history", type=Path, metavar="FILE", help="add the figures to this CSV file")

@@ -147,6 +147,10 @@ class EmulatedRobot:
         self.stamps_s = []  # when bursts were sent
         self.commands_s = []  # pairs: when a command was sent, when it came
 
+    def count_due(self, now_s):
+        """Return how many bursts there should have been at the stock rate."""
+        return 0.0 if self.synchronised_s is None else (now_s - self.synchronised_s) / BURST_PERIOD_S
+
     def send(self, data):
         """Send all of data; a server that does not read is counted and waited for."""
         view = memoryview(data)
@@ -243,8 +247,12 @@ def run(address, count, seconds, speed, first=0, nagle=False, keeps_times=True, 
                 period_s = TIME_PERIOD_S
             order += 1
             heapq.heappush(due, (due_s + period_s / speed, order, kind, robot))
+    now_s = time.monotonic()
     return {
         "joined_s": None if all_joined_s is None else all_joined_s - started_s,
+        "bursts_sent": sum(robot.bursts for robot in robots),
+        # A server that does not keep up does not read, and a robot then waits with the next burst.
+        "bursts_due": sum(robot.count_due(now_s) * speed for robot in robots),
         "thrown_out": sum(robot.closed for robot in robots),
         "transforms": 5 * sum(robot.bursts for robot in robots),
         "lasers": sum(robot.lasers for robot in robots),

@@ -51,6 +51,8 @@ def command(count, first, keeps_times, ended):
         for n in range(first, first + count)
     ]
     sent_s = []
+    if not publishers:
+        ended.wait()
     round_s = time.monotonic()
     while not ended.is_set():
         # Spread over the period, as programs of many robots do.

@@ -50,7 +50,9 @@ class Outlet:
         self._queue_length = queue_length
         self._call_later = call_later
         self._publisher: Any = None
-        self._impl: Any = _NOBODY  # rospy's connections of the topic; it replaces the list, and never changes one
+        self._impl: Any = (
+            _NOBODY  # rospy's connections of the topic; it replaces the list, and never changes one
+        )
         self._backlogs: Dict[Any, Deque[bytes]] = {}
         self.raw_class: Any = None
         self.dropped = 0

@@ -176,7 +176,7 @@ FRAMES_OFFSET = _LENGTH.size + _SEQ_AND_STAMP.size
 
 
 read_transforms_start: Callable[[bytes], Tuple[int, int, int, int]] = struct.Struct("<IIII").unpack_from
-"""Takes the bytes of a TFMessage, at least 16; returns how many transforms it holds, then seq, secs and nsecs of the first."""
+"""TFMessage bytes, at least 16 -> how many transforms it holds, and seq, secs and nsecs of the first."""
 
 
 def split_frames(frames: bytes) -> Tuple[bytes, bytes]:

@@ -42,7 +42,9 @@ def test_transforms_between_the_robots_own_frames_pass_as_they_are(child):
     transform = build_transform(NOW_NS, "hero_0/base_link", "hero_0/" + child)
     for number in range(3):
         stamped = build_transform(NOW_NS + number * MS, "hero_0/base_link", "hero_0/" + child)
-        assert robot.receive("/tf", build_transform_message(stamped), NOW_NS + number * MS) == [("/tf", stamped)]
+        assert robot.receive("/tf", build_transform_message(stamped), NOW_NS + number * MS) == [
+            ("/tf", stamped)
+        ]
     assert len(transform) == len(stamped)
     assert (robot.cleaner.refused, robot.cleaner.foreign_frames) == (0, set())
 
@@ -147,7 +149,9 @@ def test_odometry_and_its_transform_have_one_stamp_before_and_after_the_robot_le
         stamp_ns = UPTIME_NS + number * 34 * MS if number < 4 else arrival_ns - 3 * MS
         outputs = robot.receive_burst(stamp_ns, (number, number), arrival_ns)
         stamps_ns = {read_stamp_ns(list_payloads(outputs, "/hero_0/odom")[0])}
-        stamps_ns |= {stamp_ns for stamp_ns, _, child, *_ in list_transforms(outputs) if child == "hero_0/base_link"}
+        stamps_ns |= {
+            stamp_ns for stamp_ns, _, child, *_ in list_transforms(outputs) if child == "hero_0/base_link"
+        }
         assert stamps_ns == {arrival_ns if number < 4 else stamp_ns}
 
 
@@ -212,7 +216,9 @@ def test_imu_messages_get_stamps_and_numbers_and_keep_their_data():
 
 def test_topics_that_nothing_is_known_of_pass_untouched():
     robot = CleanedRobot({"/hero_0/battery": "std_msgs/Float32"})
-    assert robot.receive("/hero_0/battery", b"\x00\x00\x80\x3f", NOW_NS) == [("/hero_0/battery", b"\x00\x00\x80\x3f")]
+    assert robot.receive("/hero_0/battery", b"\x00\x00\x80\x3f", NOW_NS) == [
+        ("/hero_0/battery", b"\x00\x00\x80\x3f")
+    ]
     assert robot.cleaner.find_derived("/hero_0/battery", "std_msgs/Float32") == {}
 
 

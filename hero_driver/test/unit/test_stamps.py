@@ -116,7 +116,10 @@ def test_messages_that_arrive_in_one_read_have_stamps_of_their_own(script):
         last_ns[topic] = stamp_ns
 
 
-@given(stamps_ns=st.lists(st.integers(0, 2**32 * NS_PER_S)), arrivals_ns=st.lists(st.integers(0, 2**32 * NS_PER_S)))
+@given(
+    stamps_ns=st.lists(st.integers(0, 2**32 * NS_PER_S)),
+    arrivals_ns=st.lists(st.integers(0, 2**32 * NS_PER_S)),
+)
 def test_any_stamp_and_any_clock_give_a_stamp(stamps_ns, arrivals_ns):
     stamps = make_filter()
     for stamp_ns, arrival_ns in zip(stamps_ns, arrivals_ns):

@@ -140,7 +140,9 @@ def test_any_bytes_are_odometry_or_none(payload):
 def test_transforms_are_read_one_by_one():
     tails = [struct.pack("<7d", *(float(number + index) for index in range(7))) for number in range(3)]
     transforms = [
-        build_transform(NOW_NS + number, "hero_0/base_link", "hero_0/link_%d" % number, struct.unpack("<7d", tail))
+        build_transform(
+            NOW_NS + number, "hero_0/base_link", "hero_0/link_%d" % number, struct.unpack("<7d", tail)
+        )
         for number, tail in enumerate(tails)
     ]
     read = wire_messages.read_transforms(build_transform_message(*transforms))
@@ -165,7 +167,14 @@ def test_a_tail_is_the_pose():
     assert frames == build_text("hero_0/odom") + build_text("hero_0/base_link")
     tail = wire_messages.pack_pose(Pose(1.0, -2.0, 3.0))
     transform = wire_messages.pack_transform(NOW_NS, frames, tail)
-    assert read_transform(transform) == (NOW_NS, "hero_0/odom", "hero_0/base_link", 1.0, -2.0, pytest.approx(3.0))
+    assert read_transform(transform) == (
+        NOW_NS,
+        "hero_0/odom",
+        "hero_0/base_link",
+        1.0,
+        -2.0,
+        pytest.approx(3.0),
+    )
 
 
 def test_no_transforms_are_an_empty_message():
@@ -209,7 +218,9 @@ def test_proximity_has_eight_beams_at_the_true_angles():
     frame_id, numbers, ranges_m, intensities = read_scan(scan)
     assert frame_id == "hero_0/laser_link"
     assert (read_seq(scan), read_stamp_ns(scan)) == (3, NOW_NS + MS)
-    angle_min_rad, angle_max_rad, increment_rad, time_increment_s, scan_time_s, range_min_m, range_max_m = numbers
+    angle_min_rad, angle_max_rad, increment_rad, time_increment_s, scan_time_s, range_min_m, range_max_m = (
+        numbers
+    )
     assert angle_min_rad == pytest.approx(-math.pi)
     assert increment_rad == pytest.approx(math.pi / 4.0)
     assert angle_max_rad == pytest.approx(angle_min_rad + 7.0 * increment_rad, abs=1e-6)

@@ -267,7 +267,9 @@ class Session:
             if not self.topics:
                 due_s = now_s + TIME_WITHOUT_TOPICS_S
                 # Only the first time is it the handshake of a boot; a peer may answer each request like this.
-                self._expect_topics_by(due_s if self._requests < 2 else max(due_s, self._earliest_repeat_s(now_s)))
+                self._expect_topics_by(
+                    due_s if self._requests < 2 else max(due_s, self._earliest_repeat_s(now_s))
+                )
             return TimeRequested()
         if topic_id == frames.ID_LOG:
             log = payloads.decode_log(payload)

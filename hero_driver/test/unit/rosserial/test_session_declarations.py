@@ -118,22 +118,29 @@ BAD_DECLARATIONS = {
     "name that leaves its place": (declare_twist(120, "/hero_0/../hero_1/x"), "not a ROS name"),
     "long name": (declare_twist(120, "/hero_0/" + "x" * 121), "129 characters, more than 128"),
     "type without a package": (
-        build_declaration(1, 120, "/hero_0/x", "Twist", TWIST_MD5), "not of the form package/Type"
+        build_declaration(1, 120, "/hero_0/x", "Twist", TWIST_MD5),
+        "not of the form package/Type",
     ),
     "type in two packages": (
-        build_declaration(1, 120, "/hero_0/x", "a/b/Twist", TWIST_MD5), "not of the form package/Type"
+        build_declaration(1, 120, "/hero_0/x", "a/b/Twist", TWIST_MD5),
+        "not of the form package/Type",
     ),
     "type that ends in a line break": (
-        build_declaration(1, 120, "/hero_0/x", "geometry_msgs/Twist\n", TWIST_MD5), "not of the form package/Type"
+        build_declaration(1, 120, "/hero_0/x", "geometry_msgs/Twist\n", TWIST_MD5),
+        "not of the form package/Type",
     ),
     "long type": (
         build_declaration(1, 120, "/hero_0/x", "geometry_msgs/T" + "x" * 200, TWIST_MD5),
         "not of the form package/Type",
     ),
     "short md5": (build_declaration(1, 120, "/hero_0/x", "a/B", "9f195f88"), "not 32 hexadecimal digits"),
-    "md5 of other letters": (build_declaration(1, 120, "/hero_0/x", "a/B", "g" * 32), "not 32 hexadecimal digits"),
+    "md5 of other letters": (
+        build_declaration(1, 120, "/hero_0/x", "a/B", "g" * 32),
+        "not 32 hexadecimal digits",
+    ),
     "md5 that ends in a line break": (
-        build_declaration(1, 120, "/hero_0/x", "a/B", TWIST_MD5 + "\n"), "not 32 hexadecimal digits"
+        build_declaration(1, 120, "/hero_0/x", "a/B", TWIST_MD5 + "\n"),
+        "not 32 hexadecimal digits",
     ),
     "any type": (build_declaration(1, 120, "/hero_0/x", "*", "*"), "not of the form package/Type"),
     "no buffer": (declare_twist(120, "/hero_0/x", buffer_length=0), "its buffer_size is 0"),
@@ -145,7 +152,9 @@ BAD_DECLARATIONS = {
 def test_a_bad_declaration_is_a_problem_in_one_line_while_the_others_work(name):
     declaration, words = BAD_DECLARATIONS[name]
     session = open_session()
-    events = receive(session, build_declaration(*ODOM) + declaration + build_declaration(*CMD_VEL) + ODOM_MESSAGE)
+    events = receive(
+        session, build_declaration(*ODOM) + declaration + build_declaration(*CMD_VEL) + ODOM_MESSAGE
+    )
     assert [type(event) for event in events] == [TopicDeclared, Problem, TopicDeclared, MessageReceived]
     assert words in events[1].text
     assert "refused" in events[1].text
@@ -225,7 +234,9 @@ def test_a_robot_that_claims_a_huge_buffer_does_not_break_the_frames():
 
 
 @given(
-    declared=st.dictionaries(st.integers(0, 300), st.tuples(st.integers(0, 5), st.integers(-10, 60)), max_size=8),
+    declared=st.dictionaries(
+        st.integers(0, 300), st.tuples(st.integers(0, 5), st.integers(-10, 60)), max_size=8
+    ),
     topic_id=st.integers(-5, 400),
     length=st.integers(0, 80),
 )
@@ -248,7 +259,9 @@ def test_only_declared_ids_of_the_right_direction_and_length_ever_leave(declared
     message_type=st.text(max_size=40),
     md5sum=st.text(max_size=40),
 )
-def test_arbitrary_declarations_are_taken_or_refused_in_one_line(frame_id, topic_id, name, message_type, md5sum):
+def test_arbitrary_declarations_are_taken_or_refused_in_one_line(
+    frame_id, topic_id, name, message_type, md5sum
+):
     session = open_session()
     texts = [text.encode("utf-8", "replace").decode() for text in (name, message_type, md5sum)]
     (event,) = receive(session, build_declaration(frame_id, topic_id, *texts))
