@@ -16,6 +16,9 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 BENCH = ROOT / "hero_driver" / "bench"
 DEADLINE_S = 30.0
+EMULATED_NAMES = 11
+STOCK_NAMES = 18
+"""Topics and services of an emulated robot and of one with the complete stock firmware, odom_raw included."""
 
 
 def wait_until(condition, what, deadline_s=DEADLINE_S):
@@ -137,6 +140,14 @@ class Holdings(NamedTuple):
             self.files - before.files,
             self.registrations - before.registrations,
         )
+
+
+def count_robots_names(driver):
+    """Return how many topics and services of robots a driver has registered, by the master."""
+    state = rosgraph.Master("/faults").getSystemState()
+    return sum(
+        driver.node in nodes and name.startswith("/hero_") for part in state for name, nodes in part
+    )
 
 
 def count_holdings(driver):

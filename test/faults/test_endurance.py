@@ -15,13 +15,24 @@ import numpy as np
 import rospy
 from driver_case import Recorder
 from fake_robot import FakeRobot
-from rig import BENCH, Holdings, Program, count_holdings, start_python, wait_until
+from rig import (
+    BENCH,
+    EMULATED_NAMES,
+    STOCK_NAMES,
+    Holdings,
+    Program,
+    count_holdings,
+    count_robots_names,
+    start_python,
+    wait_until,
+)
 
 from hero_driver.rosserial import frames
 from hero_msgs.msg import Encoder
 from hero_msgs.srv import SetPID
 
 ROBOTS = 20
+BESIDES = 3
 CALLED, RETURNING, CUT = 60, 61, 62
 SERVICE = "/hero_%d/velocity_controller/pid_parameters" % CALLED
 
@@ -247,6 +258,8 @@ def test_a_swarm_at_work_loses_nothing_and_the_driver_stays_as_it_is(start_drive
         watch = Watch(driver, listener)
         wait_until(lambda: not listener.ask("silent"), "all robots at the listener")
         bustle.act()
+        names = EMULATED_NAMES * ROBOTS + STOCK_NAMES * BESIDES
+        wait_until(lambda: count_robots_names(driver) == names, "all topics of all robots")
         watch.skip()
         if effort.is_long:
             work(watch, bustle, max(SAMPLES_MIN, round(effort.minutes)), SAMPLE_S, ROUND_S)

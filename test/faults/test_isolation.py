@@ -7,7 +7,7 @@ import pytest
 import rospy
 import stock_messages
 from fake_robot import FakeRobot
-from rig import BENCH, Program, count_holdings, start_python, wait_until
+from rig import BENCH, EMULATED_NAMES, Program, count_holdings, count_robots_names, start_python, wait_until
 
 from hero_msgs.msg import Encoder
 
@@ -78,6 +78,9 @@ def scene(master):
             ) as swarm:
                 started = Scene(driver, listener, swarm, commander)
                 wait_until(lambda: not listener.ask("silent"), "all robots at the listener")
+                wait_until(
+                    lambda: count_robots_names(driver) == EMULATED_NAMES * GOOD_ROBOTS, "all topics of all robots"
+                )
                 yield started
 
 

@@ -12,13 +12,12 @@ from driver_case import frozen, has_connection, list_driver_topics, make_publish
 from fake_robot import FakeRobot
 from geometry_msgs.msg import Twist
 from life_signs import Life
-from rig import count_holdings, start_python, wait_until
+from rig import STOCK_NAMES, count_holdings, start_python, wait_until
 from rosgraph_msgs.msg import Clock
 from stock_messages import make_laser
 
 from hero_msgs.srv import SetPID
 
-STOCK_NAMES = 18
 BACK_WITHIN_S = 10.0
 
 

@@ -17,7 +17,42 @@ ARRIVALS_PER_S = 5.0
 """New robots of one address for which topics are set up, after as many at once as it may have connections: each costs
 20 calls to the ROS master. One hundred simulated robots that are started again every 30 s stay below it."""
 
+STAY_S = 2.0
+"""A robot that leaves sooner is a passer: more of them than PASSERS_MAX, and the next robots of that address get no
+topics before they have stayed for HOLD_S, so that a program that comes under ever new names costs the others little."""
+
+PASSERS_MAX = 5
+PASSERS_PER_S = 0.5
+HOLD_S = 1.0
+
 _MOST_HOSTS = 1000
+
+
+class Allowance:
+    """How often something may happen at each address: so often at once, and so often per second after that."""
+
+    def __init__(self, most: float, per_s: float) -> None:
+        self._most = most
+        self._per_s = per_s
+        # Address -> how often it may happen still, and when that was so.
+        self._left: Dict[str, Tuple[float, float]] = {}
+
+    def has_some(self, host: str, now_s: float) -> bool:
+        """Return whether it may happen once more."""
+        return self._count_left(host, now_s) >= 1.0
+
+    def use(self, host: str, now_s: float) -> None:
+        """It happened."""
+        self._left[host] = (max(0.0, self._count_left(host, now_s) - 1.0), now_s)
+        if len(self._left) > _MOST_HOSTS:
+            # Those that have everything again are as good as unknown.
+            self._left = {
+                other: left for other, left in self._left.items() if self._count_left(other, now_s) < self._most
+            }
+
+    def _count_left(self, host: str, now_s: float) -> float:
+        left, then_s = self._left.get(host, (self._most, now_s))
+        return min(self._most, left + self._per_s * (now_s - then_s))
 
 
 @dataclass(frozen=True)
@@ -38,8 +73,8 @@ class Admission:
         self._by_host: Counter[str] = collections.Counter()
         self._unidentified: Counter[str] = collections.Counter()
         self._total = 0
-        # Address -> how many more new robots may come, and when that was so.
-        self._arrivals: Dict[str, Tuple[float, float]] = {}
+        self._arrivals = Allowance(limits.max_connections_per_address, ARRIVALS_PER_S)
+        self._passers = Allowance(PASSERS_MAX, PASSERS_PER_S)
 
     def admit(self, host: str) -> Optional[str]:
         """Count a connection from host; return why it is refused, None if it may stay."""
@@ -72,20 +107,22 @@ class Admission:
 
         A peer that calls itself differently each time would keep the ROS master and the registrar busy.
         """
-        most = float(self._limits.max_connections_per_address)
-        left, then_s = self._arrivals.get(host, (most, now_s))
-        left = min(most, left + ARRIVALS_PER_S * (now_s - then_s))
-        if left < 1.0:
-            return "more than %d new robots of one address, and %g more per second" % (most, ARRIVALS_PER_S)
-        self._arrivals[host] = (left - 1.0, now_s)
-        if len(self._arrivals) > _MOST_HOSTS:
-            # Those that have all their places again are as good as unknown.
-            self._arrivals = {
-                other: (places, since_s)
-                for other, (places, since_s) in self._arrivals.items()
-                if places + ARRIVALS_PER_S * (now_s - since_s) < most
-            }
+        if not self._arrivals.has_some(host, now_s):
+            return "more than %d new robots of one address, and %g more per second" % (
+                self._limits.max_connections_per_address,
+                ARRIVALS_PER_S,
+            )
+        self._arrivals.use(host, now_s)
         return None
+
+    def note_departure(self, host: str, stayed_s: float, now_s: float) -> None:
+        """A robot of host has left after stayed_s."""
+        if stayed_s < STAY_S:
+            self._passers.use(host, now_s)
+
+    def find_hold_s(self, host: str, now_s: float) -> float:
+        """Return how long a robot of host has to stay before its topics are set up."""
+        return 0.0 if self._passers.has_some(host, now_s) else HOLD_S
 
     def release(self, host: str) -> None:
         """An admitted connection from host is gone."""

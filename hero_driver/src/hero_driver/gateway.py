@@ -19,6 +19,7 @@ from .fleet import Decision, Fleet, RobotRecord, RobotState, Verdict
 from .halting import await_halt, halt_directly
 from .log_relay import LogRelay
 from .names import Identity
+from .registrar import RobotRegistrar
 from .robot_bridge import VELOCITY_SUFFIX, BridgeContext, RobotBridge
 from .robot_requests import RobotRequests
 from .robot_status import Peer, RobotStatus, describe_robot
@@ -89,7 +90,6 @@ class Gateway(LinkHandler):
         self._requests = RobotRequests(self._config, self._log, loop.call_soon, self._complain)
         self._transforms = TransformCollector(self._config.transform_period_s, loop.call_later)
         self._context = BridgeContext(
-            registrar=self._registrar,
             log=self._log.log_throttled,
             wake=self._sender.wake,
             add_transform=self._transforms.add,
@@ -207,7 +207,9 @@ class Gateway(LinkHandler):
             )
             self._on_change()
         if peer.bridge is not None:
+            peer.bridge.registrar.end()
             peer.bridge.detach(reason)
+            self._admission.note_departure(link.address.host, now_s - peer.session.opened_s, now_s)
         self._promote_duplicate(record.identity, now_s)
 
     def report_fault(self, error: Exception) -> None:
@@ -322,11 +324,22 @@ class Gateway(LinkHandler):
         if bridge is None:
             is_hero = names.identify(identity.namespace + "/x") == identity
             cleaning = self._cleaning_settings() if is_hero else None
-            bridge = self.bridges[identity.namespace] = RobotBridge(identity, cleaning, self._context)
+            registrar = RobotRegistrar(self._registrar, self._loop.call_later)
+            bridge = RobotBridge(identity, cleaning, self._context, registrar)
+            self.bridges[identity.namespace] = bridge
         peer.bridge = bridge
         rebooted = peer.boot is not None
         if bridge.cleaner is not None:
             bridge.cleaner.restart(rebooted and decision.verdict is not Verdict.ARRIVED)
+        host = peer.link.address.host
+        hold_s = self._admission.find_hold_s(host, record.joined_s)
+        if hold_s > 0.0:
+            text = "robots of %s leave as soon as they have come: new topics of its robots wait for %g s" % (
+                host,
+                hold_s,
+            )
+            self._log.log_throttled("warn", "held " + host, text, host=host)
+        bridge.registrar.begin(hold_s)
         bridge.attach()
         text = "%s %s (%s)" % (bridge.label, decision.verdict.value, peer.link.address)
         self._log.log_throttled("info", "joined " + bridge.label, text, host=peer.link.address.host)

@@ -32,6 +32,10 @@ NODE_NAME = "hero_driver"
 REGISTRAR_QUEUE_LENGTH = 20000
 """Topics that may wait for the ROS master: 200 robots of 24 topics that come, leave and come again."""
 
+SWITCH_INTERVAL_S = 0.001
+"""How long another thread may keep Python's one lock while the thread of the sockets waits for it; Python's own 5 ms
+are what robots were delayed by while the driver logged a lot, or spoke with the ROS master."""
+
 HALT_LIMIT_S = 1.2
 """At the end robots get this long to take their stop twice; 0.2 s is usual."""
 
@@ -260,6 +264,7 @@ def main(argv: Optional[List[str]] = None) -> int:
     except ConfigError as error:
         rospy.logfatal("hero_driver cannot start: %s", error)
         return 2
+    sys.setswitchinterval(SWITCH_INTERVAL_S)
     node = DriverNode(config)
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, lambda *_: node.end())

@@ -19,10 +19,10 @@ from .inlet import AddReader, Inlet
 from .message_types import MessageTypeError
 from .names import Identity
 from .outlet import CallLater, Outlet
+from .registrar import RobotRegistrar
 from .rosserial.session import Topic, TopicKind
 from .service_requests import find_request_fault, is_success, read_set_odom_pose
 from .services import RobotService
-from .worker import Worker
 
 QUEUE_LENGTH = 50
 """Messages that wait for a slow subscriber, or for a slow robot: more than a second of odometry."""
@@ -41,7 +41,6 @@ class BridgeContext:
 
     def __init__(
         self,
-        registrar: Worker,
         log: Callable[[str, str, str], None],
         wake: Callable[["RobotBridge"], None],
         add_transform: Callable[[bytes], None],
@@ -59,7 +58,6 @@ class BridgeContext:
         and add_reader(reader) are the loop's. max_names: topics and services that one robot may have over all
         its connections.
         """
-        self.registrar = registrar
         self.log = log
         self.wake = wake
         self.add_transform = add_transform
@@ -76,7 +74,11 @@ class RobotBridge:
     """The endpoints of one robot."""
 
     def __init__(
-        self, identity: Identity, cleaning: Optional[CleaningSettings], context: BridgeContext
+        self,
+        identity: Identity,
+        cleaning: Optional[CleaningSettings],
+        context: BridgeContext,
+        registrar: RobotRegistrar,
     ) -> None:
         """cleaning is None for devices that are no HeRos: their messages pass through as they are."""
         self.identity = identity
@@ -84,6 +86,7 @@ class RobotBridge:
         self.commands = CommandQueue(context.command_max_age_s)
         self.refused_commands = 0
         self._context = context
+        self.registrar = registrar
         self._closed = False
         self._connected = False
         self._outlets: Dict[str, Outlet] = {}
@@ -129,7 +132,7 @@ class RobotBridge:
         outlets = list(self._outlets.values())
         self._outlets.clear()
         released = [call for outlet in outlets for call in outlet.release()]
-        self._context.registrar.submit(lambda: self._unregister(released, outlets), always=True)
+        self.registrar.submit(lambda: self._unregister(released, outlets), always=True)
 
     @property
     def last_error(self) -> str:
@@ -304,7 +307,7 @@ class RobotBridge:
     # Jobs of the registrar; these may block.
 
     def _submit(self, job: Callable[[], None]) -> None:
-        if not self._context.registrar.submit(job):
+        if not self.registrar.submit(job):
             self._complain("registrar", "too many topics wait for the ROS master; is it reachable?")
 
     def _complain(self, name: str, text: str) -> None:

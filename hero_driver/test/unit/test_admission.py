@@ -4,7 +4,17 @@ import ipaddress
 
 import pytest
 
-from hero_driver.admission import ARRIVALS_PER_S, GARBAGE_LENGTH_MAX, Admission, AdmissionLimits, RateGuard
+from hero_driver.admission import (
+    ARRIVALS_PER_S,
+    GARBAGE_LENGTH_MAX,
+    HOLD_S,
+    PASSERS_MAX,
+    PASSERS_PER_S,
+    STAY_S,
+    Admission,
+    AdmissionLimits,
+    RateGuard,
+)
 
 ROBOT = "10.42.0.17"
 
@@ -167,4 +177,26 @@ def test_addresses_that_come_once_are_forgotten():
     admission = make_admission(max_connections_per_address=4)
     for number in range(10000):
         assert admission.admit_arrival("10.%d.%d.1" % divmod(number, 200), 0.01 * number) is None
-    assert len(admission._arrivals) <= 1001
+        admission.note_departure("10.%d.%d.1" % divmod(number, 200), 0.1, 0.01 * number)
+    assert len(admission._arrivals._left) <= 1001
+    assert len(admission._passers._left) <= 1001
+
+
+def test_after_some_that_left_at_once_the_robots_of_an_address_have_to_stay_before_they_get_topics():
+    admission = make_admission()
+    for _ in range(PASSERS_MAX):
+        assert admission.find_hold_s(ROBOT, 5.0) == 0.0
+        admission.note_departure(ROBOT, 0.02, 5.0)
+    assert admission.find_hold_s(ROBOT, 5.0) == HOLD_S
+    assert admission.find_hold_s("10.42.0.18", 5.0) == 0.0
+    for second in range(100):
+        admission.note_departure(ROBOT, 0.02, 5.0 + second)
+    assert admission.find_hold_s(ROBOT, 105.0) == HOLD_S
+    assert admission.find_hold_s(ROBOT, 105.0 + 2.0 / PASSERS_PER_S) == 0.0
+
+
+def test_robots_that_stayed_and_leave_together_are_not_held():
+    admission = make_admission()
+    for _ in range(200):
+        admission.note_departure(ROBOT, STAY_S, 5.0)
+    assert admission.find_hold_s(ROBOT, 5.0) == 0.0

@@ -253,20 +253,20 @@ class EventLoop(LinkOwner, DiallerOwner):
         listener = self._listener
         if listener is None:
             return
-        for _ in range(LISTEN_BACKLOG):
-            try:
-                sock, address = listener.accept()
-            except (BlockingIOError, InterruptedError, ConnectionAbortedError):
-                return
-            except OSError as error:
-                self._pause_accept(listener, error)
-                return
-            # The system gives out the lowest free number, so this is about how many are in use.
-            if sock.fileno() >= self._file_limit - min(FILES_RESERVED, self._file_limit // 4):
-                sock.close()
-                self._pause_accept(listener, OSError(errno.EMFILE, os.strerror(errno.EMFILE)))
-                return
-            self.add_link(sock, Address(*address[:2]))
+        # One in a turn of the loop: of a program that connects as fast as it can, many would wait each time.
+        try:
+            sock, address = listener.accept()
+        except (BlockingIOError, InterruptedError, ConnectionAbortedError):
+            return
+        except OSError as error:
+            self._pause_accept(listener, error)
+            return
+        # The system gives out the lowest free number, so this is about how many are in use.
+        if sock.fileno() >= self._file_limit - min(FILES_RESERVED, self._file_limit // 4):
+            sock.close()
+            self._pause_accept(listener, OSError(errno.EMFILE, os.strerror(errno.EMFILE)))
+            return
+        self.add_link(sock, Address(*address[:2]))
 
     def _pause_accept(self, listener: socket.socket, error: OSError) -> None:
         remedy = ""
