@@ -194,6 +194,21 @@ def renames(peer):
     peer.repeat(talk)
 
 
+def stays(peer):
+    """A new id with each connection, of which each stays for a few seconds."""
+    socks = []
+    for number in itertools.count(1000):
+        if peer.is_over:
+            return
+        with contextlib.suppress(OSError):
+            sock = peer.dial()
+            peer.send(sock, emulated_swarm.declare(number))
+            socks.append(sock)
+        if len(socks) > 120:
+            socks.pop(0).close()
+        time.sleep(0.025)
+
+
 def claims_an_id(peer):
     """Says that it is another robot, and sends that robot's messages."""
     burst = b"".join(make_burst(peer.victim))
@@ -262,6 +277,7 @@ KINDS = {
         huge_frames,
         many_topics,
         renames,
+        stays,
         claims_an_id,
         claims_topics,
         foreign_transforms,
