@@ -12,7 +12,7 @@ with atheris.instrument_imports():
     from hero_driver.cleaning import CleaningSettings, MessageCleaner
     from hero_driver.odometry import WheelGeometry
     from hero_driver.rosserial.frames import DEFAULT_MAX_PAYLOAD_LENGTH, OVERHEAD_LENGTH
-    from hero_driver.rosserial.session import LogReceived, MessageReceived, Session, SessionLimits
+    from hero_driver.rosserial.session import LogReceived, Session, SessionLimits
 
 MAX_TOPICS = 64
 ARRIVAL_NS = 1795240942 * 10**9
@@ -40,10 +40,10 @@ def try_bytes(data):
     step = 1 + (data[0] if data else 0)
     for index, start in enumerate(range(1, len(data), step)):
         for event in session.receive_bytes(data[start : start + step], 0.01 * index, 1795240942.0):
-            if type(event) is MessageReceived:
-                info = event.topic.info
-                clean = cleaner.choose(info.name, TYPES.get(info.message_type, info.message_type))
-                clean(event.payload, ARRIVAL_NS)
+            if type(event) is tuple:
+                topic, payload = event
+                message_type = TYPES.get(topic.info.message_type, topic.info.message_type)
+                cleaner.choose(topic.info.name, message_type)(payload, ARRIVAL_NS)
             elif type(event) is LogReceived:
                 log_lines.read_log_line(event.log.text)
         session.poll(0.01 * index)

@@ -145,9 +145,7 @@ class Holdings(NamedTuple):
 def count_robots_names(driver):
     """Return how many topics and services of robots a driver has registered, by the master."""
     state = rosgraph.Master("/faults").getSystemState()
-    return sum(
-        driver.node in nodes and name.startswith("/hero_") for part in state for name, nodes in part
-    )
+    return sum(driver.node in nodes and name.startswith("/hero_") for part in state for name, nodes in part)
 
 
 def count_holdings(driver):

@@ -272,8 +272,7 @@ def test_a_swarm_at_work_loses_nothing_and_the_driver_stays_as_it_is(start_drive
     samples = watch.samples
     missing = sent - robots["commands"]
     record(
-        "%.3g minutes of %d robots at stock rates with %d commands"
-        % (samples[-1].at_s / 60.0, ROBOTS, sent),
+        "%.3g minutes of %d robots at stock rates with %d commands" % (samples[-1].at_s / 60.0, ROBOTS, sent),
         ROBOTS,
         ROBOTS - robots["thrown_out"],
         "%d of %d messages, %d of %d transforms; %d commands whose place a newer one took"

@@ -80,7 +80,8 @@ def scene(master):
                 started = Scene(driver, listener, swarm, commander)
                 wait_until(lambda: not listener.ask("silent"), "all robots at the listener")
                 wait_until(
-                    lambda: count_robots_names(driver) == EMULATED_NAMES * GOOD_ROBOTS, "all topics of all robots"
+                    lambda: count_robots_names(driver) == EMULATED_NAMES * GOOD_ROBOTS,
+                    "all topics of all robots",
                 )
                 yield started
 

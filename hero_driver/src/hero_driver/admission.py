@@ -47,7 +47,9 @@ class Allowance:
         if len(self._left) > _MOST_HOSTS:
             # Those that have everything again are as good as unknown.
             self._left = {
-                other: left for other, left in self._left.items() if self._count_left(other, now_s) < self._most
+                other: left
+                for other, left in self._left.items()
+                if self._count_left(other, now_s) < self._most
             }
 
     def _count_left(self, host: str, now_s: float) -> float:

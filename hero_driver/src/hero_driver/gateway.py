@@ -28,7 +28,6 @@ from .rosserial.session import (
     CallReceived,
     Event,
     LogReceived,
-    MessageReceived,
     ParameterRequested,
     Problem,
     Session,
@@ -149,7 +148,7 @@ class Gateway(LinkHandler):
         if peer.record is not None and not peer.refused:
             peer.record.last_heard_s = now_s
         for event in events:
-            if type(event) is MessageReceived:
+            if type(event) is tuple:
                 topic, payload = event
                 topic.receive(payload, arrival_ns)
             else:

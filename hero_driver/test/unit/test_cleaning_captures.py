@@ -11,7 +11,7 @@ from robot_messages import NOW_NS, read_odometry, read_stamp_ns, read_transform
 from hero_driver.cleaning import TRANSFORMS
 from hero_driver.message_types import apply_aliases
 from hero_driver.odometry import Pose
-from hero_driver.rosserial.session import MessageReceived, Session, SessionLimits, TopicDeclared
+from hero_driver.rosserial.session import Session, SessionLimits, TopicDeclared
 
 START_NS = 1795240942 * 10**9 + 831 * 10**6
 """When recording A was made; its server gave the robot this time."""
@@ -28,10 +28,11 @@ def clean(data, namespace, start_ns, **settings):
             if type(event) is TopicDeclared:
                 info = event.topic.info
                 event.topic.receive = cleaner.choose(info.name, apply_aliases(info.message_type))
-            elif type(event) is MessageReceived:
-                if event.topic.info.name.endswith("/set_odom"):
+            elif type(event) is tuple:
+                topic, payload = event
+                if topic.info.name.endswith("/set_odom"):
                     cleaner.odometry.set_pose(Pose(1.0, 2.0, 0.5))
-                event.topic.receive(event.payload, arrival_ns)
+                topic.receive(payload, arrival_ns)
     return cleaner, outputs
 
 

@@ -16,7 +16,9 @@ class Bench:
         self.done = []
         self.timers = []
         self.worker = Worker("bench", 10000, self.errors.append)
-        self.registrar = RobotRegistrar(self.worker, lambda delay_s, call: self.timers.append((delay_s, call)))
+        self.registrar = RobotRegistrar(
+            self.worker, lambda delay_s, call: self.timers.append((delay_s, call))
+        )
 
     def submit(self, number, always=False):
         return self.registrar.submit(lambda: self.done.append(number), always)

@@ -66,10 +66,6 @@ class Frame(NamedTuple):
     payload: bytes
 
 
-# What Frame(...) comes down to, without the call of a Python function in between: three times as fast.
-_new_tuple = tuple.__new__
-
-
 def sum_bytes(data: Bytes) -> int:
     """Return the sum of all bytes of data, 0 for none."""
     length = len(data)
@@ -125,9 +121,13 @@ class FrameReader:
 
     def receive_bytes(self, data: Bytes) -> List[Frame]:
         """Return the frames that data completes, in order. Never raises, whatever data holds."""
+        return [Frame(*pair) for pair in self.receive_pairs(data)]
+
+    def receive_pairs(self, data: Bytes) -> List[Tuple[int, bytes]]:
+        """As receive_bytes(), but plain pairs of topic id and payload, which cost a fifth of a Frame."""
         buffer = self._rest + bytes(data) if self._rest else bytes(data)
         end = len(buffer)
-        frames: List[Frame] = []
+        frames: List[Tuple[int, bytes]] = []
         position = 0
         while position < end:
             # A robot sends the same few headers all the time; one that was right once is right.
@@ -149,7 +149,7 @@ class FrameReader:
             if is_wrong:
                 position = self._skip_bad_start(position)
                 continue
-            frames.append(_new_tuple(Frame, (topic_id, buffer[position + HEADER_LENGTH : frame_end - 1])))
+            frames.append((topic_id, buffer[position + HEADER_LENGTH : frame_end - 1]))
             position = frame_end
         self._rest = buffer[position:]
         self.frames += len(frames)

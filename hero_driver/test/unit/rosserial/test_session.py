@@ -22,7 +22,6 @@ from vectors import (
 from hero_driver.rosserial.errors import FrameTooLongError, PayloadError
 from hero_driver.rosserial.session import (
     LogReceived,
-    MessageReceived,
     ParameterRequested,
     Problem,
     Session,
@@ -93,7 +92,7 @@ def test_data_without_any_declared_topic_makes_the_session_ask_at_most_every_hal
     assert request_times_s == pytest.approx([T0 + 0.5, T0 + 1.0, T0 + 1.5])
     assert session.undeclared_messages == 2 * 199
     receive(session, HANDSHAKE, T0 + 2.0)
-    assert type(receive(session, ODOM_MESSAGE, T0 + 2.0)[0]) is MessageReceived
+    assert type(receive(session, ODOM_MESSAGE, T0 + 2.0)[0]) is tuple
 
 
 def test_a_robot_that_still_streams_on_a_new_connection_is_asked_at_once_if_nobody_asked_yet():
@@ -229,18 +228,20 @@ def test_a_declared_session_does_not_end_while_the_robot_speaks():
 def test_a_message_comes_with_its_topic_in_the_order_of_the_wire():
     session = open_declared_session()
     events = receive(session, ODOM_MESSAGE + HEARTBEAT + ENCODER_MESSAGE)
-    assert [type(event) for event in events] == [MessageReceived, LogReceived, MessageReceived]
-    assert events[0].topic.info.name == "/hero_0/odom"
-    assert events[0].topic.kind is TopicKind.PUBLISHER
-    assert events[0].payload == ODOM_MESSAGE[7:-1]
-    assert events[2].topic.info.name == "/hero_0/encoder"
+    assert [type(event) for event in events] == [tuple, LogReceived, tuple]
+    topic, payload = events[0]
+    assert topic.info.name == "/hero_0/odom"
+    assert topic.kind is TopicKind.PUBLISHER
+    assert payload == ODOM_MESSAGE[7:-1]
+    assert events[2][0].info.name == "/hero_0/encoder"
 
 
 def test_the_answer_of_a_service_is_a_message_of_its_topic():
     session = open_declared_session()
-    (event,) = receive(session, build_frame(131, b"\x01\x00\x00\x00\x00"))
-    assert event.topic.kind is TopicKind.SERVICE_ANSWERS
-    assert event.topic.info.name == "/hero_0/set_odom"
+    ((topic, payload),) = receive(session, build_frame(131, b"\x01\x00\x00\x00\x00"))
+    assert topic.kind is TopicKind.SERVICE_ANSWERS
+    assert topic.info.name == "/hero_0/set_odom"
+    assert payload == b"\x01\x00\x00\x00\x00"
 
 
 def test_data_on_an_id_that_the_robot_receives_is_not_passed_on():
@@ -274,7 +275,7 @@ def test_a_special_frame_with_a_broken_payload_is_a_problem_and_nothing_more(fra
     (problem,) = receive(session, build_frame(frame_id, payload))
     assert type(problem) is Problem
     assert len(session.topics) == len(STOCK_TOPICS)
-    assert type(receive(session, ODOM_MESSAGE)[0]) is MessageReceived
+    assert type(receive(session, ODOM_MESSAGE)[0]) is tuple
 
 
 @pytest.mark.parametrize("topic_id", [8, 9, 11, 50, 99, 300, 65535])
@@ -282,13 +283,13 @@ def test_an_id_without_a_meaning_is_counted_and_does_no_harm(topic_id):
     session = open_declared_session()
     receive(session, build_frame(topic_id, b"abc") + TX_STOP)
     assert session.undeclared_messages == 2
-    assert type(receive(session, ODOM_MESSAGE)[0]) is MessageReceived
+    assert type(receive(session, ODOM_MESSAGE)[0]) is tuple
 
 
 def test_bad_frames_are_counted_by_the_reader_and_cost_nothing_else():
     session = open_declared_session()
     events = receive(session, ODOM_MESSAGE[:-1] + b"\x00" + ENCODER_MESSAGE)
-    assert [event.topic.info.topic_id for event in events] == [128]
+    assert [topic.info.topic_id for topic, _ in events] == [128]
     assert session.reader.bad_frames == 1
 
 
