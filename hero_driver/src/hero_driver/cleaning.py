@@ -7,7 +7,7 @@ Everything that is not named here passes through untouched.
 import collections
 import functools
 from dataclasses import dataclass
-from typing import Callable, Deque, Dict, List, NamedTuple, Optional, Protocol, Set, Tuple
+from typing import Callable, Deque, Dict, List, Optional, Protocol, Set, Tuple
 
 from . import wire_messages
 from .odometry import TickOdometry, WheelGeometry
@@ -49,17 +49,9 @@ Clean = Callable[[bytes, int], None]
 """Takes a payload and its arrival (ns)."""
 
 
-class _Held(NamedTuple):
-    """Odometry, or its transform, that waits for the encoder reading of its burst."""
-
-    write: Callable[[int, bytes, int], None]
-    stamp_ns: int  # the robot's
-    data: bytes
-    arrival_ns: int
-
-
-# What _Held(...) comes down to, without the call of a Python function in between.
-_new_tuple = tuple.__new__
+_Held = Tuple[Callable[[int, bytes, int], None], int, bytes, int]
+"""Odometry, or its transform, that waits for the encoder reading of its burst: what writes it, and for that the robot's
+stamp (ns), the bytes and the arrival (ns)."""
 
 
 @dataclass(frozen=True)
@@ -103,6 +95,9 @@ class MessageCleaner:
         self._seqs: Dict[str, int] = {}
         self._own_frames: Dict[bytes, str] = {}
         self._known_foreign: Set[bytes] = set()
+        self._passed_start = b""  # of the last transform whose stamp passed, in this burst
+        self._passed_ns = 0
+        self._passed_frames: Dict[bytes, str] = {}  # those of own_frames whose transforms pass as they are
         self.odometry = TickOdometry(settings.geometry)
         self.refused = 0
         self.foreign_frames: Set[str] = set()
@@ -213,6 +208,7 @@ class MessageCleaner:
             self.refused += 1
             return
         self._offsets_ns.append(stamp_ns - arrival_ns)
+        self._passed_start = b""  # another burst
         self._raw_sink.publish(payload)
         if self._has_encoder:
             if self._held:
@@ -220,7 +216,7 @@ class MessageCleaner:
                 self._encoder_follows = False
             self._odom_stamp_ns = stamp_ns
             if self._encoder_follows and abs(stamp_ns - self._encoder_stamp_ns) > BURST_NS:
-                self._held.append(_new_tuple(_Held, (self._write_odometry, stamp_ns, payload, arrival_ns)))
+                self._held.append((self._write_odometry, stamp_ns, payload, arrival_ns))
                 return
         self._write_odometry(stamp_ns, payload, arrival_ns)
 
@@ -277,8 +273,14 @@ class MessageCleaner:
         self._add_transform(wire_messages.pack_transform(stamp_ns, self._odom_frames, tail))
 
     def _clean_transforms(self, payload: bytes, arrival_ns: int) -> None:
+        # All transforms of a burst have one stamp: what passes for the first passes for the others too.
+        if payload[wire_messages.TRANSFORM_START] == self._passed_start:
+            key = self._passed_frames.get(payload[wire_messages.TRANSFORM_FRAMES])
+            if key is not None and self._stamps.repeat(key, self._passed_ns):
+                self._add_transform(payload[wire_messages.TRANSFORM])
+                return
         # Stock robots send one transform in a message, of frames that were seen before.
-        frames = payload[wire_messages.FRAMES_OFFSET : -wire_messages.TRANSFORM_TAIL_LENGTH]
+        frames = payload[wire_messages.TRANSFORM_FRAMES]
         key = self._own_frames.get(frames)
         if key is None:
             self._clean_unknown_transforms(payload, arrival_ns)
@@ -289,14 +291,16 @@ class MessageCleaner:
             return
         stamp_ns = secs * NS_PER_S + nsecs
         if frames == self._odom_frames:
-            tail = payload[-wire_messages.TRANSFORM_TAIL_LENGTH :]
+            tail = payload[wire_messages.TRANSFORM_TAIL]
             self._clean_transform(key, stamp_ns, frames, tail, arrival_ns)
             return
         corrected_ns = self._stamps.correct(key, stamp_ns, arrival_ns)
         if corrected_ns == stamp_ns and nsecs < NS_PER_S:
-            self._add_transform(payload[wire_messages.FIRST_TRANSFORM_OFFSET :])
+            self._passed_frames[frames] = key
+            self._passed_start, self._passed_ns = payload[wire_messages.TRANSFORM_START], stamp_ns
+            self._add_transform(payload[wire_messages.TRANSFORM])
         else:
-            tail = payload[-wire_messages.TRANSFORM_TAIL_LENGTH :]
+            tail = payload[wire_messages.TRANSFORM_TAIL]
             self._add_transform(wire_messages.pack_transform(corrected_ns, frames, tail))
 
     def _clean_unknown_transforms(self, payload: bytes, arrival_ns: int) -> None:
@@ -314,7 +318,7 @@ class MessageCleaner:
             if not self._held:
                 self._write_odom_transform(stamp_ns, tail, arrival_ns)
             elif len(self._held) < HELD_MAX:
-                self._held.append(_new_tuple(_Held, (self._write_odom_transform, stamp_ns, tail, arrival_ns)))
+                self._held.append((self._write_odom_transform, stamp_ns, tail, arrival_ns))
             else:
                 self.refused += 1
             return

@@ -31,6 +31,16 @@ class StampFilter:
         self._last_ns: Dict[str, int] = {}
         self.corrected = 0
 
+    def repeat(self, topic: str, stamp_ns: int) -> bool:
+        """Let stamp_ns through, which correct() let through as it was for another topic at the same time.
+
+        Returns False, and does nothing, if topic had a stamp that is not older.
+        """
+        if self._last_ns.get(topic, 0) >= stamp_ns:
+            return False
+        self._last_ns[topic] = stamp_ns
+        return True
+
     def correct(self, topic: str, stamp_ns: int, arrival_ns: int) -> int:
         """Return the stamp (ns) to publish on topic for a message stamped stamp_ns that came at arrival_ns."""
         last_ns = self._last_ns.get(topic)

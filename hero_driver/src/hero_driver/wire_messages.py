@@ -90,6 +90,11 @@ def read_encoder(payload: bytes) -> Optional[Tuple[int, float, float]]:
     return secs * NS_PER_S + nsecs, left, right
 
 
+_ODOMETRY_FRAMES = slice(_SEQ_AND_STAMP.size, -ODOMETRY_TAIL_LENGTH)
+_ODOMETRY_POSE = slice(-ODOMETRY_TAIL_LENGTH, _POSE.size - ODOMETRY_TAIL_LENGTH)
+_ODOMETRY_TWIST = slice(-_TWIST.size - _COVARIANCE.size, -_COVARIANCE.size)
+
+
 class OdometryWriter:
     """Writes nav_msgs/Odometry of one robot; covariances and frames are put in once."""
 
@@ -106,17 +111,14 @@ class OdometryWriter:
 
         estimate: pose, from pack_pose(), and twist. None if payload is not a nav_msgs/Odometry.
         """
-        tail = len(payload) - ODOMETRY_TAIL_LENGTH
         # A robot's frames never change, so they are looked at once.
-        frames = payload[_SEQ_AND_STAMP.size : max(0, tail)]
+        frames = payload[_ODOMETRY_FRAMES]
         if frames != self._frames:
             if not _holds_two_texts(frames):
                 return None
             self._frames = frames
         if estimate is None:
-            pose = payload[tail : tail + _POSE.size]
-            twist_start = tail + _POSE.size + _COVARIANCE.size
-            twist = payload[twist_start : twist_start + _TWIST.size]
+            pose, twist = payload[_ODOMETRY_POSE], payload[_ODOMETRY_TWIST]
         else:
             pose, (linear_m_s, turn_rad_s) = estimate
             twist = _TWIST.pack(linear_m_s, 0.0, 0.0, 0.0, 0.0, turn_rad_s)
@@ -168,12 +170,11 @@ def read_transforms(payload: bytes) -> Optional[List[Transform]]:
     return transforms if position == len(payload) else None
 
 
-FIRST_TRANSFORM_OFFSET = _LENGTH.size
-"""Where a message's first transform begins."""
-
-FRAMES_OFFSET = _LENGTH.size + _SEQ_AND_STAMP.size
-"""Where the frames of a message's first transform begin."""
-
+# What a TFMessage with one transform holds where. Slices that exist already cost half of those made on the way.
+TRANSFORM_START = slice(0, _LENGTH.size + _SEQ_AND_STAMP.size)  # the number of transforms, seq and stamp
+TRANSFORM = slice(_LENGTH.size, None)
+TRANSFORM_FRAMES = slice(TRANSFORM_START.stop, -TRANSFORM_TAIL_LENGTH)
+TRANSFORM_TAIL = slice(-TRANSFORM_TAIL_LENGTH, None)
 
 read_transforms_start: Callable[[bytes], Tuple[int, int, int, int]] = struct.Struct("<IIII").unpack_from
 """TFMessage bytes, at least 16 -> how many transforms it holds, and seq, secs and nsecs of the first."""

@@ -49,6 +49,25 @@ def test_transforms_between_the_robots_own_frames_pass_as_they_are(child):
     assert (robot.cleaner.refused, robot.cleaner.foreign_frames) == (0, set())
 
 
+def test_a_transform_that_comes_twice_with_one_stamp_gets_a_later_one_the_second_time():
+    robot = CleanedRobot()
+    hat, laser = ("hero_0/base_link", "hero_0/hat_link"), ("hero_0/base_link", "hero_0/laser_link")
+    receive_transforms(robot, hat, stamp_ns=NOW_NS - NS_PER_S)
+    receive_transforms(robot, laser, stamp_ns=NOW_NS - NS_PER_S)
+    outputs = [receive_transforms(robot, pair)[0] for pair in (hat, laser, laser, hat)]
+    stamps_ns = [stamp_ns - NOW_NS for stamp_ns, *_ in list_transforms(outputs)]
+    assert stamps_ns == [0, 0, 1000, 1000]
+    assert list_pairs(outputs) == [hat, laser, laser, hat]
+
+
+def test_a_stamp_that_passed_passes_for_nobody_elses_frames():
+    robot = CleanedRobot()
+    hat = ("hero_0/base_link", "hero_0/hat_link")
+    for stamp_ns in (NOW_NS - MS, NOW_NS):
+        assert list_pairs(receive_transforms(robot, hat, stamp_ns=stamp_ns)) == [hat]
+        assert receive_transforms(robot, ("map", "hero_0/odom"), stamp_ns=stamp_ns) == []
+
+
 def test_a_stamp_of_too_many_nanoseconds_comes_out_in_the_form_that_ros_takes():
     robot = CleanedRobot()
     pair = ("hero_0/base_link", "hero_0/hat_link")
