@@ -259,12 +259,15 @@ def append_history(path, results, machine_us):
     commit = subprocess.run(
         ["git", "describe", "--always", "--dirty"], cwd=HERE, capture_output=True, text=True, check=True
     ).stdout.strip()
-    keys = [key for _, key, _ in ROWS]
-    is_new = not path.exists()
-    with path.open("a", newline="") as file:
+    columns = ["commit", "sum_of_768_bytes_us", "robots", *(key for _, key, _ in ROWS)]
+    with path.open("a+", newline="") as file:
+        file.seek(0)
+        known = next(csv.reader(file), None)
+        if known not in (None, columns):
+            raise SystemExit("bench: %s has other columns (%s); give another file" % (path, ", ".join(known)))
         writer = csv.writer(file, lineterminator="\n")
-        if is_new:
-            writer.writerow(["commit", "sum_of_768_bytes_us", "robots", *keys])
+        if known is None:
+            writer.writerow(columns)
         for result in results:
             cells = ["" if result[key] is None else form % result[key] for _, key, form in ROWS]
             writer.writerow([commit, "%.2f" % machine_us, result["robots"], *cells])
