@@ -154,7 +154,8 @@ class Gateway(LinkHandler):
             else:
                 self._receive_event(peer, event, now_s)
                 if link.closed:
-                    return
+                    break
+        self._transforms.schedule()
 
     def poll_link(self, link: Link, now_s: float) -> None:
         """Let the session do what is due."""

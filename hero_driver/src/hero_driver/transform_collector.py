@@ -4,7 +4,7 @@ One message for each transform, as robots send them, would make every listener o
 per robot and second, and a small queue would lose most of them. Runs on the thread of the sockets.
 """
 
-from typing import List
+from typing import Callable, List
 
 from tf2_msgs.msg import TFMessage
 
@@ -16,11 +16,17 @@ QUEUE_LENGTH = 200
 """Two seconds of messages for a listener that is slow."""
 
 TRANSFORMS_MAX = 500
-"""A message is sent early when it holds so many: 50 kB, about 3 s of one robot, 30 ms of a hundred."""
+"""A message is sent early when it holds so many: 50 kB, about 3 s of one robot, 30 ms of a hundred. One read of a robot
+adds at most 40."""
 
 
 class TransformCollector:
-    """The publisher of /tf."""
+    """The publisher of /tf.
+
+    Attributes:
+        add: takes the bytes of one geometry_msgs/TransformStamped. It is the list's own method, because it is
+            called 150 times per robot and second; schedule() has to follow.
+    """
 
     def __init__(self, period_s: float, call_later: CallLater) -> None:
         """Collect for period_s; call_later(delay_s, call) runs call on the same thread."""
@@ -29,17 +35,22 @@ class TransformCollector:
         self._outlet = Outlet(QUEUE_LENGTH, call_later)
         self._outlet.open("/tf", make_raw_class(TFMessage))
         self._transforms: List[bytes] = []
+        self.add: Callable[[bytes], None] = self._transforms.append
+        self._is_scheduled = False
 
-    def add(self, transform: bytes) -> None:
-        """Take the bytes of one geometry_msgs/TransformStamped."""
-        if not self._transforms:
-            self._call_later(self._period_s, self.publish)
-        self._transforms.append(transform)
+    def schedule(self) -> None:
+        """See to it that what was added is published; for after each read."""
         if len(self._transforms) >= TRANSFORMS_MAX:
-            self.publish()
+            self._publish()
+        elif self._transforms and not self._is_scheduled:
+            self._is_scheduled = True
+            self._call_later(self._period_s, self._publish_due)
 
-    def publish(self) -> None:
-        """Publish what was collected."""
-        transforms, self._transforms = self._transforms, []
-        if transforms and self._outlet.is_wanted:
-            self._outlet.publish(wire_messages.pack_transform_message(transforms))
+    def _publish_due(self) -> None:
+        self._is_scheduled = False
+        self._publish()
+
+    def _publish(self) -> None:
+        if self._transforms and self._outlet.is_wanted:
+            self._outlet.publish(wire_messages.pack_transform_message(self._transforms))
+        self._transforms.clear()
