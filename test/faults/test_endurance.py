@@ -179,12 +179,13 @@ class Trend(NamedTuple):
     def describe(self, unit, is_long):
         """Return it in words; minutes tell of an hour, seconds do not."""
         if not is_long:
-            return "%.1f%s, %+.1f" % (self.start, unit, self.growth)
+            return "%.1f%s, %+.1f" % (self.start, unit, round(self.growth, 1) + 0.0)
         return "%.1f%s, %+.2f per hour (extrapolated to 24 h: %+.1f)" % (
             self.start,
             unit,
-            self.per_hour,
-            self.per_hour * HOURS_OF_A_DAY,
+            # No minus in front of a nought.
+            round(self.per_hour, 2) + 0.0,
+            round(self.per_hour * HOURS_OF_A_DAY, 1) + 0.0,
         )
 
 
