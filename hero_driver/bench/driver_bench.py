@@ -124,6 +124,11 @@ def stop(process, number=signal.SIGINT):
         return process.communicate()[0]
 
 
+def find_settling_s(count):
+    """Return the time that count robots, and all programs, need until everything is registered and connected."""
+    return SETTLE_S + 0.05 * count
+
+
 def start_servers(options, environment):
     """Start the servers; return pairs of process and port once all listen."""
     servers = []
@@ -147,7 +152,8 @@ def start_swarms(options, count, servers, environment):
         first, end = (count * number // len(servers) for number in (index, index + 1))
         command = [sys.executable, str(HERE / "emulated_swarm.py"), "--port", str(port)]
         command += ["--first-id", str(first), "--robots", str(end - first), "--speed", str(options.speed)]
-        command += ["--seconds", str(options.seconds + 2 * SETTLE_S)] + ["--nagle"] * options.nagle
+        seconds = find_settling_s(count) + options.seconds + SETTLE_S
+        command += ["--seconds", str(seconds)] + ["--nagle"] * options.nagle
         swarms.append(start(command, environment, stdout=subprocess.PIPE))
     return swarms
 
@@ -175,7 +181,7 @@ def run_once(options, count, environment):
         commander = start([*load, "command", *arguments], environment, stdout=subprocess.PIPE)
         time.sleep(SETTLE_S)
         swarms = start_swarms(options, count, servers, environment)
-        time.sleep(SETTLE_S + count * 0.03)
+        time.sleep(find_settling_s(count))
 
         def read_figures():
             server_s = sum(read_cpu_s(process.pid) for process, _ in servers)
