@@ -82,10 +82,7 @@ def read_complaints(path):
     for node in ast.walk(tree):
         if isinstance(node, ast.Raise):
             called = node.exc
-        elif (
-            isinstance(node, ast.Call)
-            and getattr(node.func, "attr", getattr(node.func, "id", "")) in COMPLAINERS
-        ):
+        elif isinstance(node, ast.Call) and getattr(node.func, "attr", getattr(node.func, "id", "")) in COMPLAINERS:
             called = node
         else:
             continue

@@ -62,8 +62,7 @@ class DriverConfig:
     )
     silence_timeout_s: float = _number(6.0, 3.0, 600.0, "s", "silence after which a connection is closed")
     quick_acknowledge: bool = _plain(
-        True,
-        "acknowledge what robots send at once, else their TCP holds the rest of each burst back for 40 ms",
+        True, "acknowledge what robots send at once, else their TCP holds the rest of each burst back for 40 ms"
     )
     grace_s: float = _number(10.0, 0.0, 3600.0, "s", "time that the topics of a robot stay up after it left")
     service_timeout_s: float = _number(5.0, 0.1, 600.0, "s", "time that a robot has to answer a service call")
@@ -138,11 +137,7 @@ def read_config(parameters: Mapping[str, Any]) -> DriverConfig:
             near = difflib.get_close_matches(name, fields, 1)
             raise ConfigError(
                 "parameter ~%s is not known%s; known are: %s"
-                % (
-                    _show_name(name),
-                    "; did you mean ~%s?" % near[0] if near else "",
-                    ", ".join(sorted(fields)),
-                )
+                % (_show_name(name), "; did you mean ~%s?" % near[0] if near else "", ", ".join(sorted(fields)))
             )
         values[name] = _check(fields[name], value)
     config = DriverConfig(**values)

@@ -71,7 +71,9 @@ class Inlet:
             raise TransportTerminated("closed")
         # A socket of its own, because rospy may close its one on another thread at any time; it shuts the
         # connection down with it, so that this one ends too.
-        stream = MessageStream(connection, sock.dup(), buffer.getvalue()[: buffer.tell()], self._receive)
+        stream = MessageStream(
+            connection, sock.dup(), buffer.getvalue()[: buffer.tell()], self._receive
+        )
         self._add_reader(stream)
         stream.ended.wait()
         if stream.error is not None:

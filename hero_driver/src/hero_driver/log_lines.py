@@ -17,9 +17,7 @@ _BOOT = re.compile(
     r"Firmware:\s*(?P<firmware>\S+)\s*\|\s*Hardware:\s*(?P<hardware>\S+)\s*\|"
     r"(?:\s*Config:\s*(?P<config>\S+)\s*\|)?"
 )
-_PID_RESET = (
-    "Reseting PID..."  # VelocityControl.ino, with each zero velocity: ten times a second while one is sent
-)
+_PID_RESET = "Reseting PID..."  # VelocityControl.ino, with each zero velocity: ten times a second while one is sent
 _HEARTBEAT = re.compile(r"^Conn?ected at time (?P<millis>\d{1,10})$")
 
 

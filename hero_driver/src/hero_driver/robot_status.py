@@ -26,9 +26,7 @@ class Peer:
     )
     boot: Optional[log_lines.BootLine] = None
     early_logs: List[Log] = field(default_factory=list)
-    early_topics: List[Topic] = field(
-        default_factory=list
-    )  # /tf, declared before a name that tells who it is
+    early_topics: List[Topic] = field(default_factory=list)  # /tf, declared before a name that tells who it is
     log_window_s: float = 0.0
     log_count: int = 0
     velocity_mark: int = 0  # how much was written when the last velocity was

@@ -122,16 +122,7 @@ def read_odometry(payload):
     assert offset + 85 * 8 == len(payload)
     yaw_rad = 2.0 * math.atan2(numbers[5], numbers[6])
     pose_covariance, twist, twist_covariance = numbers[7:43], numbers[43:49], numbers[49:]
-    return (
-        frame_id,
-        child_frame_id,
-        *numbers[:2],
-        yaw_rad,
-        twist[0],
-        twist[5],
-        pose_covariance,
-        twist_covariance,
-    )
+    return (frame_id, child_frame_id, *numbers[:2], yaw_rad, twist[0], twist[5], pose_covariance, twist_covariance)
 
 
 def read_transform(transform):
@@ -139,14 +130,7 @@ def read_transform(transform):
     (parent, child), offset = read_texts(transform, 12, 2)
     numbers = struct.unpack_from("<7d", transform, offset)
     assert offset + 56 == len(transform)
-    return (
-        read_stamp_ns(transform),
-        parent,
-        child,
-        numbers[0],
-        numbers[1],
-        2.0 * math.atan2(numbers[5], numbers[6]),
-    )
+    return read_stamp_ns(transform), parent, child, numbers[0], numbers[1], 2.0 * math.atan2(numbers[5], numbers[6])
 
 
 def read_scan(payload):

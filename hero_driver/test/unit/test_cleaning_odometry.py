@@ -37,9 +37,7 @@ def test_odometry_and_its_transform_wait_for_the_reading_of_their_own_burst():
     robot = CleanedRobot()
     robot.receive_burst(NOW_NS, (0.0, 0.0))
     *first, (encoder_name, _, encoder) = build_burst(NOW_NS + PERIOD_NS, (10.0, 10.0))
-    before = [
-        output for name, _, payload in first for output in robot.receive(name, payload, NOW_NS + PERIOD_NS)
-    ]
+    before = [output for name, _, payload in first for output in robot.receive(name, payload, NOW_NS + PERIOD_NS)]
     assert [name for name, _ in before] == ["/hero_0/odom_raw"] + ["/tf"] * 4
     after = robot.receive(encoder_name, encoder, NOW_NS + PERIOD_NS)
     assert [name for name, _ in after] == ["/hero_0/encoder", "/hero_0/odom", "/tf"]
@@ -59,9 +57,7 @@ def test_every_burst_gives_each_message_once_with_the_pose_of_its_reading():
         assert list_children(outputs) == dict.fromkeys(CHILDREN, 1)
         assert {stamp_ns for stamp_ns, *_ in list_transforms(outputs)} == {NOW_NS + number * PERIOD_NS}
     assert [read_seq(payload) for payload in list_payloads(robot.outputs, "/hero_0/odom")] == list(range(50))
-    assert [read_seq(payload) for payload in list_payloads(robot.outputs, "/hero_0/encoder")] == list(
-        range(50)
-    )
+    assert [read_seq(payload) for payload in list_payloads(robot.outputs, "/hero_0/encoder")] == list(range(50))
     assert robot.cleaner.refused == 0
 
 
@@ -101,9 +97,7 @@ def test_a_transform_stamped_a_millisecond_after_its_odometry_belongs_to_the_sam
         transform = build_transform_message(build_transform(stamp_ns + MS, "hero_0/odom", "hero_0/base_link"))
         robot.receive("/hero_0/odom", build_odometry(stamp_ns), stamp_ns)
         robot.receive("/tf", transform, stamp_ns)
-        outputs = robot.receive(
-            "/hero_0/encoder", build_encoder(stamp_ns, 5.0 * number, 5.0 * number), stamp_ns
-        )
+        outputs = robot.receive("/hero_0/encoder", build_encoder(stamp_ns, 5.0 * number, 5.0 * number), stamp_ns)
         assert list_odometry(outputs)[0][2] == pytest.approx(5.0 * number * TICK_M)
         assert list_transforms(outputs)[0][3] == pytest.approx(5.0 * number * TICK_M)
 
@@ -155,9 +149,7 @@ def test_a_robot_without_an_encoder_keeps_its_own_estimate_and_nothing_waits():
     robot = CleanedRobot({name: TYPES[name] for name in ("/hero_0/odom", "/tf")})
     outputs = robot.receive("/hero_0/odom", build_odometry(NOW_NS, 1.0, 2.0, 0.5, 0.1, 0.2), NOW_NS)
     assert list_odometry(outputs)[0][2:7] == pytest.approx((1.0, 2.0, 0.5, 0.1, 0.2))
-    transform = build_transform(
-        NOW_NS, "hero_0/odom", "hero_0/base_link", (3.0, 4.0, 0.0, 0.0, 0.0, 0.0, 1.0)
-    )
+    transform = build_transform(NOW_NS, "hero_0/odom", "hero_0/base_link", (3.0, 4.0, 0.0, 0.0, 0.0, 0.0, 1.0))
     outputs = robot.receive("/tf", build_transform_message(transform), NOW_NS)
     assert list_transforms(outputs) == [(NOW_NS, "hero_0/odom", "hero_0/base_link", 3.0, 4.0, 0.0)]
 

@@ -62,10 +62,7 @@ def test_infinities_of_both_signs_do_not_hide_each_other():
 
 
 def test_huge_finite_numbers_are_finite():
-    assert check_twist(make_twist(1e308, 1e308, (1e308,) * 4), True) == (
-        make_twist(0.2, 8.0, (1e308,) * 4),
-        False,
-    )
+    assert check_twist(make_twist(1e308, 1e308, (1e308,) * 4), True) == (make_twist(0.2, 8.0, (1e308,) * 4), False)
 
 
 @pytest.mark.parametrize("length", [0, 1, 47, 49, 96])
@@ -229,9 +226,7 @@ def test_every_stop_is_sent_and_sent_again_unless_a_later_command_came(script):
 def test_nothing_is_sent_that_was_not_offered_before(script):
     offered, sent = run(script)
     for position, (_, number) in enumerate(sent):
-        assert any(
-            sent_before <= position and number == offered_number for sent_before, offered_number in offered
-        )
+        assert any(sent_before <= position and number == offered_number for sent_before, offered_number in offered)
 
 
 @given(script=steps)

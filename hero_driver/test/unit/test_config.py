@@ -176,9 +176,7 @@ def test_a_robot_named_twice_is_refused():
     assert "names no robot twice" in refuse("robots", [{"host": "a"}, {"host": "a", "port": 11411}])
 
 
-@pytest.mark.parametrize(
-    "value", ["10.0.0.0/8", [10], ["10.0.0.0/33"], ["10.42.0.1/24"], ["robots"], [None], {}]
-)
+@pytest.mark.parametrize("value", ["10.0.0.0/8", [10], ["10.0.0.0/33"], ["10.42.0.1/24"], ["robots"], [None], {}])
 def test_what_is_no_list_of_networks_is_refused(value):
     assert "networks such as 10.42.0.0/24" in refuse("allow", value)
 
@@ -194,8 +192,7 @@ def test_a_covariance_is_six_numbers_that_are_not_negative(name):
 yaml_values = st.recursive(
     st.one_of(st.none(), st.booleans(), st.integers(), st.floats(), st.text(max_size=10)),
     lambda children: st.one_of(
-        st.lists(children, max_size=3),
-        st.dictionaries(st.sampled_from(["host", "port", "x"]), children, max_size=3),
+        st.lists(children, max_size=3), st.dictionaries(st.sampled_from(["host", "port", "x"]), children, max_size=3)
     ),
     max_leaves=6,
 )

@@ -99,9 +99,7 @@ def test_any_text_becomes_one_short_line_without_control_characters(text):
 
 @given(versions=st.lists(st.text("v0123456789.", min_size=1, max_size=80), min_size=3, max_size=3))
 def test_versions_of_any_length_are_kept_short(versions):
-    boot = read_log_line(
-        "[/hero_3] Firmware: %s | Hardware: %s | Config: %s | IP: 1.2.3.4" % tuple(versions)
-    ).boot
+    boot = read_log_line("[/hero_3] Firmware: %s | Hardware: %s | Config: %s | IP: 1.2.3.4" % tuple(versions)).boot
     assert boot == tuple(version[:32] for version in versions)
 
 

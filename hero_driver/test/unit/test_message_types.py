@@ -27,12 +27,7 @@ STOCK_SERVICES = [
         ANSWER_MD5,
         "fc55fd34ad2ef676815ba2e14521ac73",
     ),
-    (
-        "hero_common/SetOdom",
-        "938fa65709584ad8e77d238529be13b8",
-        ANSWER_MD5,
-        "4ed90569b1afd039b963e42a12637d2b",
-    ),
+    ("hero_common/SetOdom", "938fa65709584ad8e77d238529be13b8", ANSWER_MD5, "4ed90569b1afd039b963e42a12637d2b"),
     ("hero_common/SetMotor", MOTOR_MD5, ANSWER_MD5, "07e32bced0fc14456815cdd097819b89"),
     ("hero_common/SetPID", SET_PID_MD5, ANSWER_MD5, "69c16eccc66fd6b477afb5e5500b4b47"),
     ("std_srvs/Trigger", EMPTY_MD5, ANSWER_MD5, "937c9679a518e3a18d831e57125ea522"),

@@ -57,17 +57,7 @@ def test_a_hero_may_use_its_own_namespace_with_or_without_a_slash_and_tf():
 
 @pytest.mark.parametrize(
     "name",
-    [
-        "/hero_2/odom",
-        "/hero_10/odom",
-        "/hero_1",
-        "/hero_1x/odom",
-        "/tf_static",
-        "/tf/x",
-        "/clock",
-        "~odom",
-        "odom",
-    ],
+    ["/hero_2/odom", "/hero_10/odom", "/hero_1", "/hero_1x/odom", "/tf_static", "/tf/x", "/clock", "~odom", "odom"],
 )
 def test_a_hero_may_not_use_other_names(name):
     assert resolve(name, Identity("/hero_1", 1)) is None

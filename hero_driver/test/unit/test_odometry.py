@@ -167,9 +167,7 @@ def test_yaw_stays_within_half_a_turn_either_way():
 
 
 def test_the_geometry_of_the_wheels_is_that_of_the_parameters():
-    odometry = make_odometry(
-        WheelGeometry(wheel_diameter_m=0.1, wheel_separation_m=0.2, ticks_per_turn=100.0)
-    )
+    odometry = make_odometry(WheelGeometry(wheel_diameter_m=0.1, wheel_separation_m=0.2, ticks_per_turn=100.0))
     odometry.integrate(0.0, 0.0, START_S)
     odometry.integrate(0.0, 100.0, START_S + 1.0)
     turn_rad = math.pi * 0.1 / 0.2

@@ -59,9 +59,7 @@ class Subscriber:
     def leave(self, connection=None):
         if self._publisher.impl is not None:
             connections = self._publisher.impl.connections
-            self._publisher.impl.connections = [
-                other for other in connections if other is not self.connection
-            ]
+            self._publisher.impl.connections = [other for other in connections if other is not self.connection]
 
     def read(self):
         """Return all that was sent so far."""

@@ -33,9 +33,7 @@ def test_a_request_of_another_length_is_refused(service_type, change):
     assert "not a " + service_type in find_request_fault(service_type, request)
 
 
-@pytest.mark.parametrize(
-    "service_type", ["hero_msgs/SetOdom", "hero_msgs/SetPID", "hero_msgs/SetIRCalibration"]
-)
+@pytest.mark.parametrize("service_type", ["hero_msgs/SetOdom", "hero_msgs/SetPID", "hero_msgs/SetIRCalibration"])
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, 1e30, -1e30])
 def test_an_absurd_number_anywhere_is_refused(service_type, value):
     layout, values = GOOD[service_type]
@@ -65,9 +63,7 @@ def test_services_without_a_rule_take_every_request():
 
 def test_the_pose_of_set_odom_has_its_angle_within_half_a_turn():
     assert read_set_odom_pose(struct.pack("<3d", 1.0, -2.0, 0.5)) == Pose(1.0, -2.0, 0.5)
-    assert read_set_odom_pose(struct.pack("<3d", 0.0, 0.0, 3.5 * math.pi)).yaw_rad == pytest.approx(
-        -math.pi / 2.0
-    )
+    assert read_set_odom_pose(struct.pack("<3d", 0.0, 0.0, 3.5 * math.pi)).yaw_rad == pytest.approx(-math.pi / 2.0)
 
 
 def test_the_first_byte_of_an_answer_tells_success():

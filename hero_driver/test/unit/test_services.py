@@ -67,9 +67,7 @@ def test_a_call_returns_the_robots_answer():
 
 
 def test_an_answer_may_come_before_the_caller_waits_for_it():
-    service = RobotService(
-        NAME, "hero_msgs/SetOdom", LONG_S, lambda request: service.receive_answer(b"quick") and None
-    )
+    service = RobotService(NAME, "hero_msgs/SetOdom", LONG_S, lambda request: service.receive_answer(b"quick") and None)
     assert service.call(b"request") == b"quick"
 
 
@@ -110,9 +108,7 @@ def test_many_callers_all_get_the_answer_to_their_own_request():
 
 def test_a_call_that_cannot_be_sent_fails_with_the_reason():
     robot = Robot(LONG_S, refusal="the robot is not connected")
-    with pytest.raises(
-        rospy.ServiceException, match="/hero_0/set_odom cannot be called: the robot is not connected"
-    ):
+    with pytest.raises(rospy.ServiceException, match="/hero_0/set_odom cannot be called: the robot is not connected"):
         robot.service.call(b"request")
     robot.refusal = None
     call = Call(robot.service, b"again")
@@ -169,9 +165,7 @@ def test_a_late_answer_is_not_taken_for_that_of_the_next_call():
     # The answer of the first call is still on its way; the service is closed for as long again.
     robot.service._timeout_s = LONG_S
     robot.service._late_until_s += LONG_S
-    with pytest.raises(
-        rospy.ServiceException, match="has not answered the call before this one yet; try again in"
-    ):
+    with pytest.raises(rospy.ServiceException, match="has not answered the call before this one yet; try again in"):
         robot.service.call(b"second")
     assert robot.requests == [b"first"]
     assert robot.service.receive_answer(b"late") == b"first"

@@ -33,9 +33,7 @@ def build_text(text):
 
 def build_declaration(frame_id, topic_id, name, message_type, md5sum, buffer_length=4096):
     """Return the frame with which the robot declares one topic."""
-    payload = (
-        topic_id.to_bytes(2, "little") + build_text(name) + build_text(message_type) + build_text(md5sum)
-    )
+    payload = topic_id.to_bytes(2, "little") + build_text(name) + build_text(message_type) + build_text(md5sum)
     return build_frame(frame_id, payload + buffer_length.to_bytes(4, "little", signed=True))
 
 
@@ -77,13 +75,8 @@ VECTORS = [
         + b"94810edda583a504dfda3829e70d7eec"
         + bytes.fromhex("00100000 67"),
         0,
-        bytes.fromhex("8100 03000000")
-        + b"/tf"
-        + bytes.fromhex("0c000000")
-        + b"tf/tfMessage"
-        + bytes.fromhex("20000000")
-        + b"94810edda583a504dfda3829e70d7eec"
-        + bytes.fromhex("00100000"),
+        bytes.fromhex("8100 03000000") + b"/tf" + bytes.fromhex("0c000000") + b"tf/tfMessage"
+        + bytes.fromhex("20000000") + b"94810edda583a504dfda3829e70d7eec" + bytes.fromhex("00100000"),
     ),
     Vector(
         "log line",
@@ -91,24 +84,12 @@ VECTORS = [
         7,
         bytes.fromhex("01 0f000000") + b"Reseting PID...",
     ),
-    Vector(
-        "727 bytes of zeros, as long as odometry",
-        bytes.fromhex("ff fe d7 02 26 82 00") + bytes(727) + b"\x7d",
-        130,
-        bytes(727),
-    ),
-    Vector(
-        "300 times ff", bytes.fromhex("ff fe 2c 01 d2 82 00") + b"\xff" * 300 + b"\xa9", 130, b"\xff" * 300
-    ),
-    Vector(
-        "starts of frames inside",
-        bytes.fromhex("ff fe 06 00 f9 80 00 fffe fffe fffe 88"),
-        128,
-        bytes.fromhex("fffefffefffe"),
-    ),
-    Vector(
-        "length checksum of 00", bytes.fromhex("ff fe ff 00 00 80 00") + bytes(255) + b"\x7f", 128, bytes(255)
-    ),
+    Vector("727 bytes of zeros, as long as odometry", bytes.fromhex("ff fe d7 02 26 82 00") + bytes(727) + b"\x7d",
+           130, bytes(727)),
+    Vector("300 times ff", bytes.fromhex("ff fe 2c 01 d2 82 00") + b"\xff" * 300 + b"\xa9", 130, b"\xff" * 300),
+    Vector("starts of frames inside", bytes.fromhex("ff fe 06 00 f9 80 00 fffe fffe fffe 88"), 128,
+           bytes.fromhex("fffefffefffe")),
+    Vector("length checksum of 00", bytes.fromhex("ff fe ff 00 00 80 00") + bytes(255) + b"\x7f", 128, bytes(255)),
     Vector("id above 255", bytes.fromhex("ff fe 01 00 fe 02 01 07 f5"), 258, b"\x07"),
 ]
 GOOD = VECTORS[4]
