@@ -97,7 +97,6 @@ class MessageCleaner:
         self._known_foreign: Set[bytes] = set()
         self._passed_start = b""  # of the last transform whose stamp passed, in this burst
         self._passed_ns = 0
-        self._passed_frames: Dict[bytes, str] = {}  # those of own_frames whose transforms pass as they are
         self.odometry = TickOdometry(settings.geometry)
         self.refused = 0
         self.foreign_frames: Set[str] = set()
@@ -273,17 +272,19 @@ class MessageCleaner:
         self._add_transform(wire_messages.pack_transform(stamp_ns, self._odom_frames, tail))
 
     def _clean_transforms(self, payload: bytes, arrival_ns: int) -> None:
-        # All transforms of a burst have one stamp: what passes for the first passes for the others too.
-        if payload[wire_messages.TRANSFORM_START] == self._passed_start:
-            key = self._passed_frames.get(payload[wire_messages.TRANSFORM_FRAMES])
-            if key is not None and self._stamps.repeat(key, self._passed_ns):
-                self._add_transform(payload[wire_messages.TRANSFORM])
-                return
         # Stock robots send one transform in a message, of frames that were seen before.
         frames = payload[wire_messages.TRANSFORM_FRAMES]
         key = self._own_frames.get(frames)
         if key is None:
             self._clean_unknown_transforms(payload, arrival_ns)
+            return
+        # All transforms of a burst have one stamp: what passes for the first passes for the others too.
+        if (
+            payload[wire_messages.TRANSFORM_START] == self._passed_start
+            and frames != self._odom_frames
+            and self._stamps.repeat(key, self._passed_ns)
+        ):
+            self._add_transform(payload[wire_messages.TRANSFORM])
             return
         count, _, secs, nsecs = wire_messages.read_transforms_start(payload)
         if count != 1:
@@ -296,7 +297,6 @@ class MessageCleaner:
             return
         corrected_ns = self._stamps.correct(key, stamp_ns, arrival_ns)
         if corrected_ns == stamp_ns and nsecs < NS_PER_S:
-            self._passed_frames[frames] = key
             self._passed_start, self._passed_ns = payload[wire_messages.TRANSFORM_START], stamp_ns
             self._add_transform(payload[wire_messages.TRANSFORM])
         else:
