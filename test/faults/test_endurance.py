@@ -5,14 +5,13 @@ a subscriber comes and goes, a robot connects again, another one's power is cut,
 """
 
 import contextlib
-import os
 import sys
 import time
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import rospy
+from driver_bench import read_one_cpu_s
 from driver_case import Recorder
 from fake_robot import FakeRobot
 from rig import (
@@ -122,8 +121,7 @@ class Watch:
         print(sample.describe(), flush=True)
 
     def _read_cpu_s(self):
-        fields = Path("/proc/%d/stat" % self._driver.process.pid).read_text().rsplit(")", 1)[1].split()
-        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+        return read_one_cpu_s(self._driver.process.pid)
 
 
 class Bustle:
