@@ -6,11 +6,12 @@ Everything that is not named here passes through untouched.
 
 import collections
 import functools
+import itertools
 from dataclasses import dataclass
-from typing import Callable, Deque, Dict, List, Optional, Protocol, Set, Tuple
+from typing import Callable, DefaultDict, Deque, Dict, Iterator, List, Protocol, Set, Tuple
 
 from . import wire_messages
-from .odometry import TickOdometry, WheelGeometry
+from .odometry import Pose, TickOdometry, WheelGeometry
 from .stamps import NS_PER_S, StampFilter
 
 TRANSFORMS = "/tf"
@@ -92,16 +93,19 @@ class MessageCleaner:
         self._writer = wire_messages.OdometryWriter(settings.pose_covariance, settings.twist_covariance)
         self._uses_ticks = settings.odometry == "ticks"
         self._offsets_ns: Deque[int] = collections.deque(maxlen=OFFSET_SAMPLES)
-        self._seqs: Dict[str, int] = {}
-        self._own_frames: Dict[bytes, str] = {}
+        self._last_ns = self._stamps.last_ns
+        self._seqs: DefaultDict[str, Iterator[int]] = collections.defaultdict(itertools.count)
+        self._own_frames: Set[bytes] = set()
         self._known_foreign: Set[bytes] = set()
-        self._passed_start = b""  # of the last transform whose stamp passed, in this burst
-        self._passed_ns = 0
+        self._passed_start = b""  # of the last transform whose stamp passed
+        self._passed_ns = 0  # that stamp, 0 if none of this burst has passed yet
         self.odometry = TickOdometry(settings.geometry)
         self.refused = 0
         self.foreign_frames: Set[str] = set()
-        self._packed_pose = (self.odometry.pose, wire_messages.pack_pose(self.odometry.pose))
+        self._packed_pose = self._pack_pose()
+        self._uses_estimate = False
         self._odom_name = namespace + "/odom"
+        self._odom_seqs = self._seqs[self._odom_name]
         self._odom_frames = wire_messages.join_frames(
             self._frame_prefix + b"odom", self._frame_prefix + b"base_link"
         )
@@ -119,7 +123,7 @@ class MessageCleaner:
 
     def restart(self, rebooted: bool) -> None:
         """A new connection begins; after a reboot the robot's counters begin anew too."""
-        self._has_encoder = False
+        self._has_encoder = self._uses_estimate = False
         self._is_first_reading = True
         self._encoder_stamp_ns = self._odom_stamp_ns = -BURST_NS
         self._encoder_follows = True
@@ -130,6 +134,11 @@ class MessageCleaner:
     def note_reboot(self) -> None:
         """The robot's counters begin anew; the pose stays."""
         self.odometry.expect_reset()
+
+    def set_pose(self, pose: Pose) -> None:
+        """The robot's odometry was set, which zeroes its counters."""
+        self.odometry.set_pose(pose)
+        self._packed_pose = self._pack_pose()
 
     @property
     def clock_offset_s(self) -> float:
@@ -161,6 +170,7 @@ class MessageCleaner:
             return self._clean_odometry
         if name == self._namespace + "/encoder" and message_type == "hero_msgs/Encoder":
             self._has_encoder = self._uses_ticks
+            self._uses_estimate = self._has_encoder and self.odometry.has_reading
             return functools.partial(self._clean_encoder, name, sink)
         if name == self._namespace + "/laser" and message_type == "sensor_msgs/LaserScan":
             return functools.partial(self._clean_laser, sink, self._find_sink(self._proximity_name))
@@ -168,18 +178,13 @@ class MessageCleaner:
             return functools.partial(self._clean_stamped, name, sink)
         return lambda payload, _: sink.publish(payload)
 
-    def _count(self, name: str) -> int:
-        seq = self._seqs.get(name, -1) + 1
-        self._seqs[name] = seq
-        return seq
-
     def _clean_stamped(self, name: str, sink: Sink, payload: bytes, arrival_ns: int) -> None:
         stamp_ns = wire_messages.read_stamp_ns(payload)
         if stamp_ns is None:
             self.refused += 1
             return
         stamp_ns = self._stamps.correct(name, stamp_ns, arrival_ns)
-        sink.publish(wire_messages.restamp(payload, self._count(name), stamp_ns))
+        sink.publish(wire_messages.restamp(payload, next(self._seqs[name]), stamp_ns))
 
     def _clean_laser(self, sink: Sink, proximity_sink: Sink, payload: bytes, arrival_ns: int) -> None:
         stamp_ns = wire_messages.read_stamp_ns(payload)
@@ -191,7 +196,7 @@ class MessageCleaner:
             return
         name = self._proximity_name
         stamp_ns = self._stamps.correct(name, stamp_ns, arrival_ns)
-        proximity = wire_messages.make_proximity(payload, self._count(name), stamp_ns, STOCK_SCAN_TIME_S)
+        proximity = wire_messages.make_proximity(payload, next(self._seqs[name]), stamp_ns, STOCK_SCAN_TIME_S)
         if proximity is None:
             self.refused += 1
         else:
@@ -207,7 +212,7 @@ class MessageCleaner:
             self.refused += 1
             return
         self._offsets_ns.append(stamp_ns - arrival_ns)
-        self._passed_start = b""  # another burst
+        self._passed_ns = 0  # another burst
         self._raw_sink.publish(payload)
         if self._has_encoder:
             if self._held:
@@ -233,7 +238,10 @@ class MessageCleaner:
             counts_from_boot = abs(arrival_ns - stamp_ns) > self._max_age_ns
             if counts_from_boot or self.odometry.looks_reset(left_ticks, right_ticks):
                 self.note_reboot()
-        self.odometry.integrate(left_ticks, right_ticks, stamp_ns / NS_PER_S)
+        if self.odometry.integrate(left_ticks, right_ticks, stamp_ns / NS_PER_S):
+            # One pose goes out twice, as odometry and as a transform.
+            self._packed_pose = self._pack_pose()
+        self._uses_estimate = self._has_encoder and self.odometry.has_reading
         if sink.is_wanted:
             self._clean_stamped(name, sink, payload, arrival_ns)
         if self._held:
@@ -244,22 +252,16 @@ class MessageCleaner:
         for write, stamp_ns, data, arrival_ns in held:
             write(stamp_ns, data, arrival_ns)
 
-    @property
-    def _uses_estimate(self) -> bool:
-        return self._has_encoder and self.odometry.has_reading
-
     def _pack_pose(self) -> bytes:
-        pose = self.odometry.pose
-        # One pose goes out twice, as odometry and as a transform.
-        if pose is not self._packed_pose[0]:
-            self._packed_pose = (pose, wire_messages.pack_pose(pose))
-        return self._packed_pose[1]
+        return wire_messages.pack_pose(self.odometry.x_m, self.odometry.y_m, self.odometry.yaw_rad)
 
     def _write_odometry(self, stamp_ns: int, payload: bytes, arrival_ns: int) -> None:
-        name = self._odom_name
-        stamp_ns = self._stamps.correct(name, stamp_ns, arrival_ns)
-        estimate = (self._pack_pose(), self.odometry.twist) if self._uses_estimate else None
-        written = self._writer.rewrite(payload, self._count(name), stamp_ns, estimate)
+        stamp_ns = self._stamps.correct(self._odom_name, stamp_ns, arrival_ns)
+        odometry = self.odometry
+        estimate = (
+            (self._packed_pose, odometry.linear_m_s, odometry.turn_rad_s) if self._uses_estimate else None
+        )
+        written = self._writer.rewrite(payload, next(self._odom_seqs), stamp_ns, estimate)
         if written is None:
             self.refused += 1
         else:
@@ -267,23 +269,24 @@ class MessageCleaner:
 
     def _write_odom_transform(self, stamp_ns: int, tail: bytes, arrival_ns: int) -> None:
         if self._uses_estimate:
-            tail = self._pack_pose()
-        stamp_ns = self._stamps.correct("tf base_link", stamp_ns, arrival_ns)
+            tail = self._packed_pose
+        stamp_ns = self._stamps.correct(self._odom_frames, stamp_ns, arrival_ns)
         self._add_transform(wire_messages.pack_transform(stamp_ns, self._odom_frames, tail))
 
     def _clean_transforms(self, payload: bytes, arrival_ns: int) -> None:
         # Stock robots send one transform in a message, of frames that were seen before.
         frames = payload[wire_messages.TRANSFORM_FRAMES]
-        key = self._own_frames.get(frames)
-        if key is None:
+        last_ns = self._last_ns.get(frames)
+        if last_ns is None:
             self._clean_unknown_transforms(payload, arrival_ns)
             return
         # All transforms of a burst have one stamp: what passes for the first passes for the others too.
         if (
-            payload[wire_messages.TRANSFORM_START] == self._passed_start
+            last_ns < self._passed_ns
+            and payload[wire_messages.TRANSFORM_START] == self._passed_start
             and frames != self._odom_frames
-            and self._stamps.repeat(key, self._passed_ns)
         ):
+            self._last_ns[frames] = self._passed_ns
             self._add_transform(payload[wire_messages.TRANSFORM])
             return
         count, _, secs, nsecs = wire_messages.read_transforms_start(payload)
@@ -293,9 +296,9 @@ class MessageCleaner:
         stamp_ns = secs * NS_PER_S + nsecs
         if frames == self._odom_frames:
             tail = payload[wire_messages.TRANSFORM_TAIL]
-            self._clean_transform(key, stamp_ns, frames, tail, arrival_ns)
+            self._clean_transform(stamp_ns, frames, tail, arrival_ns)
             return
-        corrected_ns = self._stamps.correct(key, stamp_ns, arrival_ns)
+        corrected_ns = self._stamps.correct(frames, stamp_ns, arrival_ns)
         if corrected_ns == stamp_ns and nsecs < NS_PER_S:
             self._passed_start, self._passed_ns = payload[wire_messages.TRANSFORM_START], stamp_ns
             self._add_transform(payload[wire_messages.TRANSFORM])
@@ -309,11 +312,10 @@ class MessageCleaner:
             self.refused += 1
             return
         for stamp_ns, frames, tail in transforms:
-            key = self._own_frames.get(frames) or self._admit_frames(frames)
-            if key is not None:
-                self._clean_transform(key, stamp_ns, frames, tail, arrival_ns)
+            if frames in self._own_frames or self._admit_frames(frames):
+                self._clean_transform(stamp_ns, frames, tail, arrival_ns)
 
-    def _clean_transform(self, key: str, stamp_ns: int, frames: bytes, tail: bytes, arrival_ns: int) -> None:
+    def _clean_transform(self, stamp_ns: int, frames: bytes, tail: bytes, arrival_ns: int) -> None:
         if frames == self._odom_frames and self._has_encoder:
             if not self._held:
                 self._write_odom_transform(stamp_ns, tail, arrival_ns)
@@ -322,14 +324,14 @@ class MessageCleaner:
             else:
                 self.refused += 1
             return
-        stamp_ns = self._stamps.correct(key, stamp_ns, arrival_ns)
+        stamp_ns = self._stamps.correct(frames, stamp_ns, arrival_ns)
         self._add_transform(wire_messages.pack_transform(stamp_ns, frames, tail))
 
-    def _admit_frames(self, frames: bytes) -> Optional[str]:
-        """Return the key of a pair of frames seen for the first time, None if the robot may not send it."""
+    def _admit_frames(self, frames: bytes) -> bool:
+        """Return whether the robot may send a pair of frames that is not known as its own."""
         if frames in self._known_foreign:
             self.refused += 1
-            return None
+            return False
         parent, child = wire_messages.split_frames(frames)
         prefix = self._frame_prefix
         if (
@@ -343,10 +345,9 @@ class MessageCleaner:
                 self.foreign_frames.add(
                     "%s -> %s" % (ascii(parent.decode("latin-1")), ascii(child.decode("latin-1")))
                 )
-            return None
-        key = "tf " + child[len(prefix) :].decode("latin-1")
-        self._own_frames[frames] = key
-        return key
+            return False
+        self._own_frames.add(frames)
+        return True
 
 
 def split_transforms(payload: bytes) -> List[bytes]:

@@ -20,6 +20,9 @@ MAX_WHEEL_SPEED_M_S = 1.0
 RESET_TICKS = 5
 """A robot that has just booted stands: its counters are this close to zero (3 mm) when it is heard again."""
 
+MIN_GAP_S = 0.2
+"""Ticks of so long are believed however close two stamps are: the robot's clock may be set back between them."""
+
 MAX_GAP_S = 10.0
 """Ticks of a pause without readings are believed as if the pause had at most this length."""
 
@@ -49,18 +52,20 @@ class Pose(NamedTuple):
     yaw_rad: float
 
 
-class Twist(NamedTuple):
-    """A velocity in frame hero_N/base_link."""
-
-    linear_m_s: float
-    turn_rad_s: float
-
-
 class TickOdometry:
-    """The odometry of one robot; one per robot, kept over its reconnects."""
+    """The odometry of one robot; one per robot, kept over its reconnects.
+
+    Attributes:
+        x_m, y_m, yaw_rad: the pose in frame hero_N/odom.
+        linear_m_s, turn_rad_s: the velocity over the last TWIST_WINDOW readings, in frame hero_N/base_link; zero while
+            there are less than two.
+        has_reading: whether there was one ever.
+        resets: steps that were too large for a robot's motion.
+    """
 
     def __init__(self, geometry: WheelGeometry) -> None:
-        self.pose = Pose(0.0, 0.0, 0.0)
+        self.x_m = self.y_m = self.yaw_rad = 0.0
+        self.linear_m_s = self.turn_rad_s = 0.0
         self.resets = 0
         self.has_reading = False
         self._tick_m = geometry.tick_m
@@ -69,27 +74,16 @@ class TickOdometry:
         self._stamp_s = 0.0
         self._window: Deque[Tuple[float, float, float]] = collections.deque(maxlen=TWIST_WINDOW)
 
-    @property
-    def twist(self) -> Twist:
-        """The velocity over the last TWIST_WINDOW readings; zero while there are less than two."""
-        if len(self._window) < 2:
-            return Twist(0.0, 0.0)
-        first_s, first_left, first_right = self._window[0]
-        last_s, last_left, last_right = self._window[-1]
-        speed = self._tick_m / (last_s - first_s)
-        left_m_s, right_m_s = (last_left - first_left) * speed, (last_right - first_right) * speed
-        return Twist((left_m_s + right_m_s) / 2.0, (right_m_s - left_m_s) / self._separation_m)
-
     def expect_reset(self) -> None:
         """The robot rebooted: its counters begin anew, the pose stays where it was."""
         self._ticks = None
-        self._window.clear()
+        self._forget_velocity()
 
     def set_pose(self, pose: Pose) -> None:
         """The robot's odometry was set, which zeroes its counters (Odometry.ino:234)."""
-        self.pose = pose
+        self.x_m, self.y_m, self.yaw_rad = pose
         self._ticks = (0.0, 0.0)
-        self._window.clear()
+        self._forget_velocity()
 
     def looks_reset(self, left_ticks: float, right_ticks: float) -> bool:
         """Return whether counters that were away from zero are back there, as after a reboot."""
@@ -100,39 +94,56 @@ class TickOdometry:
             and max(abs(self._ticks[0]), abs(self._ticks[1])) > 4 * RESET_TICKS
         )
 
-    def integrate(self, left_ticks: float, right_ticks: float, stamp_s: float) -> None:
-        """Take one reading of the counters (ticks since boot or set_odom, forward positive)."""
-        if not (math.isfinite(left_ticks) and math.isfinite(right_ticks)):
-            return
+    def integrate(self, left_ticks: float, right_ticks: float, stamp_s: float) -> bool:
+        """Take one reading of the counters (ticks since boot or set_odom, forward positive).
+
+        Returns whether the pose is another one now.
+        """
+        # A sum of the two is finite only if both are.
+        if not math.isfinite(left_ticks + right_ticks):
+            return False
         self.has_reading = True
         last, self._ticks = self._ticks, (left_ticks, right_ticks)
-        elapsed_s, self._stamp_s = stamp_s - self._stamp_s, stamp_s
+        elapsed_s = stamp_s - self._stamp_s
+        self._stamp_s = stamp_s
         if last is None:
-            self._window.clear()
             self._window.append((stamp_s, left_ticks, right_ticks))
-            return
+            return False
         left_m = (left_ticks - last[0]) * self._tick_m
         right_m = (right_ticks - last[1]) * self._tick_m
-        limit_m = MAX_WHEEL_SPEED_M_S * min(max(elapsed_s, 0.2), MAX_GAP_S)
-        if abs(left_m) > limit_m or abs(right_m) > limit_m:
-            self.resets += 1
-            self._window.clear()
-        elif left_m or right_m:
-            self._move(left_m, right_m)
+        is_moving = left_m != 0.0 or right_m != 0.0
+        if is_moving:
+            gap_s = MIN_GAP_S if elapsed_s <= MIN_GAP_S else min(elapsed_s, MAX_GAP_S)
+            limit_m = MAX_WHEEL_SPEED_M_S * gap_s
+            if -limit_m <= left_m <= limit_m and -limit_m <= right_m <= limit_m:
+                self._move(left_m, right_m)
+            else:
+                self.resets += 1
+                self._forget_velocity()
+                is_moving = False
         if not 0.0 < elapsed_s <= MAX_STEP_S:
-            self._window.clear()
+            self._forget_velocity()
         self._window.append((stamp_s, left_ticks, right_ticks))
+        first_s, first_left, first_right = self._window[0]
+        if first_s != stamp_s:
+            speed = self._tick_m / (stamp_s - first_s)
+            left_m_s, right_m_s = (left_ticks - first_left) * speed, (right_ticks - first_right) * speed
+            self.linear_m_s = (left_m_s + right_m_s) / 2.0
+            self.turn_rad_s = (right_m_s - left_m_s) / self._separation_m
+        return is_moving
+
+    def _forget_velocity(self) -> None:
+        self._window.clear()
+        self.linear_m_s = self.turn_rad_s = 0.0
 
     def _move(self, left_m: float, right_m: float) -> None:
         """Follow the arc that two wheels describe which run left_m and right_m at steady speeds."""
         distance_m = (left_m + right_m) / 2.0
         turn_rad = (right_m - left_m) / self._separation_m
-        x_m, y_m, yaw_rad = self.pose
         half_rad = turn_rad / 2.0
         # The chord of the arc: its length is distance * sin(half) / half, its direction yaw + half.
-        chord_m = distance_m if abs(half_rad) < 1e-9 else distance_m * math.sin(half_rad) / half_rad
-        self.pose = Pose(
-            x_m + chord_m * math.cos(yaw_rad + half_rad),
-            y_m + chord_m * math.sin(yaw_rad + half_rad),
-            math.remainder(yaw_rad + turn_rad, 2.0 * math.pi),
-        )
+        chord_m = distance_m if -1e-9 < half_rad < 1e-9 else distance_m * math.sin(half_rad) / half_rad
+        direction_rad = self.yaw_rad + half_rad
+        self.x_m += chord_m * math.cos(direction_rad)
+        self.y_m += chord_m * math.sin(direction_rad)
+        self.yaw_rad = math.remainder(self.yaw_rad + turn_rad, 2.0 * math.pi)

@@ -228,7 +228,7 @@ class RobotBridge:
             and is_success(payload)
         ):
             # The answer comes before the first reading of the counters that the robot has just zeroed.
-            self.cleaner.odometry.set_pose(read_set_odom_pose(request))
+            self.cleaner.set_pose(read_set_odom_pose(request))
 
     # To the robot.
 

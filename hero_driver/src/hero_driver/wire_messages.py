@@ -8,7 +8,6 @@ import math
 import struct
 from typing import Callable, List, NamedTuple, Optional, Sequence, Tuple
 
-from .odometry import Pose, Twist
 from .stamps import NS_PER_S
 
 _HEADER = struct.Struct("<IIII")  # seq, secs, nsecs, length of frame_id
@@ -105,11 +104,12 @@ class OdometryWriter:
         self._frames: Optional[bytes] = None
 
     def rewrite(
-        self, payload: bytes, seq: int, stamp_ns: int, estimate: Optional[Tuple[bytes, Twist]]
+        self, payload: bytes, seq: int, stamp_ns: int, estimate: Optional[Tuple[bytes, float, float]]
     ) -> Optional[bytes]:
         """Return the robot's message with stamp and covariances, and with another estimate if one is given.
 
-        estimate: pose, from pack_pose(), and twist. None if payload is not a nav_msgs/Odometry.
+        estimate: pose, from pack_pose(), and velocities ahead (m/s) and around z (rad/s). None if payload is not a
+        nav_msgs/Odometry.
         """
         # A robot's frames never change, so they are looked at once.
         frames = payload[_ODOMETRY_FRAMES]
@@ -120,7 +120,7 @@ class OdometryWriter:
         if estimate is None:
             pose, twist = payload[_ODOMETRY_POSE], payload[_ODOMETRY_TWIST]
         else:
-            pose, (linear_m_s, turn_rad_s) = estimate
+            pose, linear_m_s, turn_rad_s = estimate
             twist = _TWIST.pack(linear_m_s, 0.0, 0.0, 0.0, 0.0, turn_rad_s)
         head = _SEQ_AND_STAMP.pack(seq & 0xFFFFFFFF, *divmod(stamp_ns, NS_PER_S))
         return b"".join((head, frames, pose, self._pose_covariance, twist, self._twist_covariance))
@@ -248,10 +248,10 @@ def make_proximity(payload: bytes, seq: int, stamp_ns: int, scan_time_s: float) 
     return restamp(payload[: header.end], seq, stamp_ns) + tail
 
 
-def pack_pose(pose: Pose) -> bytes:
-    """Return position (or translation) and rotation of pose."""
-    half_rad = pose.yaw_rad / 2.0
-    return _POSE.pack(pose.x_m, pose.y_m, 0.0, 0.0, 0.0, math.sin(half_rad), math.cos(half_rad))
+def pack_pose(x_m: float, y_m: float, yaw_rad: float) -> bytes:
+    """Return position (or translation) and rotation of a pose in the plane."""
+    half_rad = yaw_rad / 2.0
+    return _POSE.pack(x_m, y_m, 0.0, 0.0, 0.0, math.sin(half_rad), math.cos(half_rad))
 
 
 def _make_diagonal(values: Sequence[float]) -> List[float]:

@@ -213,7 +213,7 @@ def test_messages_that_waited_when_the_connection_broke_are_not_sent_on_the_next
 def test_a_set_pose_is_where_the_odometry_goes_on_from():
     robot = CleanedRobot()
     robot.receive_burst(NOW_NS, (100.0, 100.0))
-    robot.cleaner.odometry.set_pose(Pose(1.0, 2.0, math.pi / 2.0))
+    robot.cleaner.set_pose(Pose(1.0, 2.0, math.pi / 2.0))
     outputs = robot.receive_burst(NOW_NS + PERIOD_NS, (10.0, 10.0))
     assert list_odometry(outputs)[0][2:5] == pytest.approx((1.0, 2.0 + 10.0 * TICK_M, math.pi / 2.0))
 

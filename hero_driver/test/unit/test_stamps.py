@@ -126,17 +126,9 @@ def test_any_stamp_and_any_clock_give_a_stamp(stamps_ns, arrivals_ns):
         assert stamps.correct(TOPIC, stamp_ns, arrival_ns) >= 0
 
 
-def test_a_stamp_that_passed_on_one_topic_passes_on_another_once():
+def test_the_newest_stamp_of_each_topic_is_known_and_may_be_written():
     stamps = make_filter()
-    assert stamps.correct("/a", NOW_NS, NOW_NS) == NOW_NS
-    assert stamps.repeat("/b", NOW_NS)
-    assert not stamps.repeat("/b", NOW_NS)
-    assert not stamps.repeat("/a", NOW_NS)
+    stamps.correct("/a", NOW_NS, NOW_NS)
+    assert stamps.last_ns == {"/a": NOW_NS}
+    stamps.last_ns["/b"] = NOW_NS
     assert stamps.correct("/b", NOW_NS, NOW_NS) == NOW_NS + STEP_NS
-
-
-def test_a_stamp_that_passed_on_one_topic_does_not_pass_where_a_later_one_was():
-    stamps = make_filter()
-    stamps.correct("/b", NOW_NS + MS, NOW_NS)
-    assert stamps.correct("/a", NOW_NS, NOW_NS) == NOW_NS
-    assert not stamps.repeat("/b", NOW_NS)

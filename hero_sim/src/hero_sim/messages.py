@@ -78,7 +78,7 @@ class _Template:
         """Return the burst with right checksums."""
         view = memoryview(self.data)
         for first, last, _ in self._frames:
-            self.data[last] = 255 - frames.sum_bytes(view[first:last]) % 256
+            self.data[last] = 255 - frames.sum_bytes(view[first:last])
         return bytes(self.data)
 
 

@@ -6,8 +6,9 @@
 states of spinOnce()).
 """
 
+import functools
 import struct
-from typing import Dict, List, NamedTuple, Optional, Tuple, Union
+from typing import Callable, Dict, List, NamedTuple, Optional, Tuple, Union
 from zlib import adler32
 
 from .errors import FrameTooLongError, TopicIdError
@@ -27,6 +28,9 @@ OVERHEAD_LENGTH = 8
 
 CHECKED_OFFSET = 5
 """Where the bytes begin that add up to 255 modulo 256, to the end of the frame: id, payload and checksum."""
+
+_PAYLOAD = slice(HEADER_LENGTH - CHECKED_OFFSET, -1)
+"""Where the payload lies in the bytes that are checked."""
 
 KNOWN_HEADERS_MAX = 64
 """Headers that a reader remembers; a stock robot sends about ten different ones, and log lines of any length."""
@@ -67,14 +71,20 @@ class Frame(NamedTuple):
 
 
 def sum_bytes(data: Bytes) -> int:
-    """Return the sum of all bytes of data, 0 for none."""
+    """Return the sum of all bytes of data modulo 256."""
     length = len(data)
     if length <= _EXACT_ADLER_LENGTH:
-        return (adler32(data) & 0xFFFF) - 1
-    total = 0
-    for start in range(0, length, _EXACT_ADLER_LENGTH):
-        total += (adler32(data[start : start + _EXACT_ADLER_LENGTH]) & 0xFFFF) - 1
-    return total
+        return adler32(data) - 1 & 0xFF
+    pieces = _make_splitter(length)(data)
+    # The upper half of each adler32 adds nothing to the lowest byte.
+    return sum(map(adler32, pieces)) - len(pieces) & 0xFF
+
+
+@functools.lru_cache(maxsize=64)
+def _make_splitter(length: int) -> Callable[[Bytes], Tuple[bytes, ...]]:
+    """Return what cuts length bytes into pieces of which adler32 gives an exact sum."""
+    whole, rest = divmod(length, _EXACT_ADLER_LENGTH)
+    return struct.Struct(("%ds" % _EXACT_ADLER_LENGTH) * whole + "%ds" % rest).unpack
 
 
 def encode_frame(topic_id: int, payload: Bytes) -> bytes:
@@ -145,11 +155,11 @@ class FrameReader:
                 # One more than the sum, of which the last byte is 255 where everything is right.
                 is_wrong = adler32(checked) & 0xFF
             else:
-                is_wrong = sum_bytes(checked) + 1 & 0xFF
+                is_wrong = sum_bytes(checked) != 0xFF
             if is_wrong:
                 position = self._skip_bad_start(position)
                 continue
-            frames.append((topic_id, buffer[position + HEADER_LENGTH : frame_end - 1]))
+            frames.append((topic_id, checked[_PAYLOAD]))
             position = frame_end
         self._rest = buffer[position:]
         self.frames += len(frames)
