@@ -167,24 +167,31 @@ class RateGuard:
 
     def __init__(self, max_frames_per_s: float, max_bytes_per_s: float, now_s: float) -> None:
         self._max_frames = max_frames_per_s * RATE_WINDOW_S
-        self._max_bytes = max_bytes_per_s * RATE_WINDOW_S
+        self._max_length = max_bytes_per_s * RATE_WINDOW_S
         self._window_end_s = now_s + RATE_WINDOW_S
         self._frames = 0
-        self._bytes = 0
-        self._garbage_length = 0
+        self._length = 0
+        self._frames_limit = self._max_frames
+        self._length_limit = self._max_length
+        self._good_length = 0  # what had come when the last good frame had
 
-    def count(self, frames: int, length: int, now_s: float) -> Optional[str]:
-        """Count a read of length bytes that completed frames; return why it is too much, else None."""
+    def judge(self, frames: int, length: int, now_s: float) -> Optional[str]:
+        """Take the good frames and the bytes that have come since the beginning; return why it is too much, else None.
+
+        For after each read.
+        """
         if now_s >= self._window_end_s:
             self._window_end_s = now_s + RATE_WINDOW_S
-            self._frames = self._bytes = 0
-        self._frames += frames
-        self._bytes += length
-        self._garbage_length = 0 if frames else self._garbage_length + length
-        if self._frames > self._max_frames:
+            self._frames_limit = self._frames + self._max_frames
+            self._length_limit = self._length + self._max_length
+        if frames > self._frames:
+            self._frames = frames
+            self._good_length = length
+        self._length = length
+        if frames > self._frames_limit:
             return "more than %d frames per second (~max_frames_per_s)" % self._max_frames
-        if self._bytes > self._max_bytes:
-            return "more than %d bytes per second (~max_bytes_per_s)" % self._max_bytes
-        if self._garbage_length > GARBAGE_LENGTH_MAX:
-            return "%d bytes without one good frame: this does not speak rosserial" % self._garbage_length
+        if length > self._length_limit:
+            return "more than %d bytes per second (~max_bytes_per_s)" % self._max_length
+        if length - self._good_length > GARBAGE_LENGTH_MAX:
+            return "%d bytes without one good frame: this does not speak rosserial" % (length - self._good_length)
         return None

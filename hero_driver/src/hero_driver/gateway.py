@@ -136,17 +136,14 @@ class Gateway(LinkHandler):
         """Pass bytes to the session and its events on; the hot path of the driver."""
         peer: Peer = link.peer
         session = peer.session
-        frames_before = session.reader.frames
         arrival_ns = self._clock_ns()
         events = session.receive_bytes(data, now_s, arrival_ns / NS_PER_S)
-        refusal = peer.guard.count(session.reader.frames - frames_before, len(data), now_s)
+        refusal = peer.guard.judge(session.reader.frames, link.received_length, now_s)
         if refusal is not None:
             link.close(refusal)
             return
-        for frame in session.take_frames():
-            link.send_frame(frame)
-        if peer.record is not None and not peer.refused:
-            peer.record.last_heard_s = now_s
+        if session.outgoing:
+            self._send_outgoing(peer)
         for event in events:
             if type(event) is tuple:
                 topic, payload = event
@@ -155,7 +152,8 @@ class Gateway(LinkHandler):
                 self._receive_event(peer, event, now_s)
                 if link.closed:
                     break
-        self._transforms.schedule()
+        if not self._transforms.is_scheduled:
+            self._transforms.schedule()
 
     def poll_link(self, link: Link, now_s: float) -> None:
         """Let the session do what is due."""
@@ -165,8 +163,12 @@ class Gateway(LinkHandler):
         if peer.record is None and now_s - peer.session.opened_s > self._config.declare_timeout_s:
             link.close("did not say within %.1f s which robot it is" % self._config.declare_timeout_s)
         if not link.closed:
-            for frame in peer.session.take_frames():
-                link.send_frame(frame)
+            self._send_outgoing(peer)
+
+    @staticmethod
+    def _send_outgoing(peer: Peer) -> None:
+        for frame in peer.session.take_frames():
+            peer.link.send_frame(frame)
 
     def close_link(self, link: Link, reason: str) -> None:
         """Note a departure; the robot's endpoints stay up for the grace period."""
@@ -294,7 +296,10 @@ class Gateway(LinkHandler):
                     )
                 return False
             identity = names.identify_any(topic.info.name, address.host)
-        if identity.namespace not in self.fleet.robots:
+        known = self.fleet.robots.get(identity.namespace)
+        if known is not None and known.link is not None:
+            known.last_heard_s = known.link.peer.session.last_receive_s
+        if known is None:
             refusal = self._admission.admit_arrival(address.host, now_s)
             if refusal is not None:
                 peer.link.close(refusal)

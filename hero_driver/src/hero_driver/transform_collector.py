@@ -16,8 +16,7 @@ QUEUE_LENGTH = 200
 """Two seconds of messages for a listener that is slow."""
 
 TRANSFORMS_MAX = 500
-"""A message is sent early when it holds so many: 50 kB, about 3 s of one robot, 30 ms of a hundred. One read of a robot
-adds at most 40."""
+"""A message holds at most so many: 50 kB, about 3 s of one robot, 30 ms of a hundred."""
 
 
 class TransformCollector:
@@ -26,6 +25,7 @@ class TransformCollector:
     Attributes:
         add: takes the bytes of one geometry_msgs/TransformStamped. It is the list's own method, because it is
             called 150 times per robot and second; schedule() has to follow.
+        is_scheduled: whether what was added is going to be published already.
     """
 
     def __init__(self, period_s: float, call_later: CallLater) -> None:
@@ -36,21 +36,18 @@ class TransformCollector:
         self._outlet.open("/tf", make_raw_class(TFMessage))
         self._transforms: List[bytes] = []
         self.add: Callable[[bytes], None] = self._transforms.append
-        self._is_scheduled = False
+        self.is_scheduled = False
 
     def schedule(self) -> None:
-        """See to it that what was added is published; for after each read."""
-        if len(self._transforms) >= TRANSFORMS_MAX:
-            self._publish()
-        elif self._transforms and not self._is_scheduled:
-            self._is_scheduled = True
-            self._call_later(self._period_s, self._publish_due)
-
-    def _publish_due(self) -> None:
-        self._is_scheduled = False
-        self._publish()
+        """See to it that what was added is published; for after each read, unless is_scheduled."""
+        if self._transforms:
+            self.is_scheduled = True
+            self._call_later(self._period_s, self._publish)
 
     def _publish(self) -> None:
-        if self._transforms and self._outlet.is_wanted:
-            self._outlet.publish(wire_messages.pack_transform_message(self._transforms))
+        self.is_scheduled = False
+        if self._outlet.is_wanted:
+            for start in range(0, len(self._transforms), TRANSFORMS_MAX):
+                part = self._transforms[start : start + TRANSFORMS_MAX]
+                self._outlet.publish(wire_messages.pack_transform_message(part))
         self._transforms.clear()

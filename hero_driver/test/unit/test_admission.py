@@ -113,31 +113,31 @@ def test_addresses_that_left_are_forgotten():
 def test_a_stock_robot_stays_far_below_the_limits():
     guard = RateGuard(5000, 2000000, 0.0)
     for step in range(1000):
-        assert guard.count(7, 1500, step * 0.034) is None
+        assert guard.judge(7 * step, 1500 * step, step * 0.034) is None
 
 
 def test_too_many_frames_within_a_second_are_too_much():
     guard = RateGuard(100, 10**6, 0.0)
-    assert guard.count(100, 800, 0.5) is None
-    assert guard.count(1, 8, 0.9) == "more than 100 frames per second (~max_frames_per_s)"
+    assert guard.judge(100, 800, 0.5) is None
+    assert guard.judge(101, 808, 0.9) == "more than 100 frames per second (~max_frames_per_s)"
 
 
 def test_too_many_bytes_within_a_second_are_too_much():
     guard = RateGuard(100, 10000, 0.0)
-    assert guard.count(1, 10000, 0.5) is None
-    assert guard.count(1, 1, 0.9) == "more than 10000 bytes per second (~max_bytes_per_s)"
+    assert guard.judge(1, 10000, 0.5) is None
+    assert guard.judge(2, 10001, 0.9) == "more than 10000 bytes per second (~max_bytes_per_s)"
 
 
 def test_a_new_second_begins_anew():
     guard = RateGuard(100, 10000, 0.0)
     for second in range(5):
-        assert guard.count(100, 10000, float(second)) is None
+        assert guard.judge(100 * (second + 1), 10000 * (second + 1), float(second)) is None
 
 
 def test_a_pause_is_no_credit():
     guard = RateGuard(100, 10000, 0.0)
-    assert guard.count(100, 10000, 100.0) is None
-    assert guard.count(1, 8, 100.5) is not None
+    assert guard.judge(100, 10000, 100.0) is None
+    assert guard.judge(101, 10008, 100.5) is not None
 
 
 def test_bytes_without_a_good_frame_end_it_however_slowly_they_come():
@@ -145,16 +145,17 @@ def test_bytes_without_a_good_frame_end_it_however_slowly_they_come():
     received = 0
     while received + 1000 <= GARBAGE_LENGTH_MAX:
         received += 1000
-        assert guard.count(0, 1000, received * 0.01) is None
-    refusal = guard.count(0, 1000, received * 0.01)
+        assert guard.judge(0, received, received * 0.01) is None
+    refusal = guard.judge(0, received + 1000, received * 0.01)
     assert refusal == "%d bytes without one good frame: this does not speak rosserial" % (received + 1000)
 
 
 def test_a_good_frame_forgives_the_garbage_before_it():
     guard = RateGuard(5000, 2000000, 0.0)
     for step in range(100):
-        assert guard.count(0, 60000, step * 2.0) is None
-        assert guard.count(1, 8, step * 2.0 + 1.0) is None
+        received = 60008 * step
+        assert guard.judge(step, received + 60000, step * 2.0) is None
+        assert guard.judge(step + 1, received + 60008, step * 2.0 + 1.0) is None
 
 
 def test_an_address_that_comes_under_ever_new_names_has_to_wait():

@@ -156,6 +156,8 @@ class Session:
         topics: declared topics by id.
         reader: the frame reader, for its counters.
         undeclared_messages: messages on ids that were not declared.
+        outgoing: frames that the session itself wants to send; take_frames() takes them.
+        last_receive_s: when bytes came last, or the conversation began.
     """
 
     def __init__(self, limits: SessionLimits, now_s: float) -> None:
@@ -166,7 +168,7 @@ class Session:
         self.opened_s = now_s
         self.last_receive_s = now_s
         self._limits = limits
-        self._outgoing: List[bytes] = []
+        self.outgoing: List[bytes] = []
         self._last_request_s: Optional[float] = None
         self._request_due_s: Optional[float] = now_s
         self._undeclared_repeats = 0
@@ -178,12 +180,13 @@ class Session:
         """Return the events that data causes, in order. Never raises, whatever data holds."""
         events: List[Event] = []
         messages = self._messages
+        has_message = False
         self.last_receive_s = now_s
         for topic_id, payload in self.reader.receive_pairs(data):
             topic = messages.get(topic_id)
             if topic is not None:
                 events.append((topic, payload))
-                self._last_configured_s = now_s
+                has_message = True
                 continue
             try:
                 event = self._receive_special(topic_id, payload, now_s, time_of_day_s)
@@ -191,6 +194,8 @@ class Session:
                 event = Problem(str(error))
             if event is not None:
                 events.append(event)
+        if has_message:
+            self._last_configured_s = now_s
         return events
 
     def poll(self, now_s: float) -> List[Event]:
@@ -200,7 +205,7 @@ class Session:
         if not self.topics and now_s - self.opened_s > self._limits.declare_timeout_s:
             return [SessionEnded("declared no topic within %.1f s" % self._limits.declare_timeout_s)]
         if self._request_due_s is not None and now_s >= self._request_due_s:
-            self._outgoing.append(encode_frame(frames.ID_PUBLISHER, b""))
+            self.outgoing.append(encode_frame(frames.ID_PUBLISHER, b""))
             self._last_request_s = now_s
             self._requests += 1
             self._request_due_s = None if self.topics else now_s + REQUEST_INTERVAL_S
@@ -208,9 +213,7 @@ class Session:
 
     def take_frames(self) -> List[bytes]:
         """Return the frames that the session itself wants to send, and forget them."""
-        if not self._outgoing:
-            return []
-        outgoing, self._outgoing = self._outgoing, []
+        outgoing, self.outgoing = self.outgoing, []
         return outgoing
 
     def encode_message(self, topic_id: int, payload: Bytes) -> bytes:
@@ -258,7 +261,7 @@ class Session:
             payloads.decode_time(payload)
             self._last_configured_s = now_s
             answer = payloads.encode_time(payloads.split_seconds(time_of_day_s))
-            self._outgoing.append(encode_frame(frames.ID_TIME, answer))
+            self.outgoing.append(encode_frame(frames.ID_TIME, answer))
             if not self.topics:
                 due_s = now_s + TIME_WITHOUT_TOPICS_S
                 # Only the first time is it the handshake of a boot; a peer may answer each request like this.

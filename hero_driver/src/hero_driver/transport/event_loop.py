@@ -215,10 +215,12 @@ class EventLoop(LinkOwner, DiallerOwner):
 
     def _serve_link(self, link: Link, mask: int) -> None:
         try:
-            if mask & selectors.EVENT_WRITE:
+            if mask != selectors.EVENT_READ:
                 self._serve_write(link)
             if mask & selectors.EVENT_READ and not link.closed:
-                self._serve_read(link)
+                data = link.read()
+                if data:
+                    self._handler.receive_data(link, data, time.monotonic())
         except Exception as error:  # noqa: BLE001 - one robot's trouble, or our mistake with it, is not the others'
             self._handler.report_fault(error)
             self.close_link(link, "a mistake of the driver")
@@ -282,20 +284,6 @@ class EventLoop(LinkOwner, DiallerOwner):
                 self._selector.register(listener, selectors.EVENT_READ, self._accept)
 
         self.call_later(ACCEPT_PAUSE_S, resume)
-
-    def _serve_read(self, link: Link) -> None:
-        try:
-            data = link.read()
-        except OSError as error:
-            self.close_link(link, "read failed: %s" % describe_error(error))
-            return
-        if data is None:
-            return
-        if not data:
-            self.close_link(link, "closed by the robot")
-            return
-        link.received_length += len(data)
-        self._handler.receive_data(link, data, time.monotonic())
 
     def _serve_write(self, link: Link) -> None:
         if link.flush() and not link.closed:

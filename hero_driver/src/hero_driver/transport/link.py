@@ -87,7 +87,7 @@ class Link:
         self.closed = False
         self.peer: Any = None  # the handler's own record of who is at the other end
         self.handed_length = 0  # bytes of all frames given to send_frame()
-        self.received_length = 0
+        self.received_length = 0  # bytes of all that read() has returned
         self._loop = loop
         self._socket = sock
         self._acknowledges_at_once = acknowledges_at_once and hasattr(socket, "TCP_QUICKACK")
@@ -114,11 +114,13 @@ class Link:
         """
         if self.closed:
             return 0
+        # What can be written to is answered in a third of the time.
+        answer = bytearray(_INT.size)
         try:
             # SIOCOUTQ has the number of TIOCOUTQ (tcp(7)).
-            answer = fcntl.ioctl(self._socket.fileno(), termios.TIOCOUTQ, b"\0\0\0\0")
+            fcntl.ioctl(self._socket.fileno(), termios.TIOCOUTQ, answer)
         except OSError:
-            answer = _INT.pack(0)
+            return self._unsent_length
         length: int = _INT.unpack(answer)[0]
         return length + self._unsent_length
 
@@ -130,25 +132,25 @@ class Link:
         """Return the socket's file descriptor."""
         return self._socket.fileno()
 
-    def read(self) -> Optional[bytes]:
-        """Return bytes, b"" at the end of the stream, None if there is nothing to read now.
-
-        Raises: OSError when the connection broke.
-        """
+    def read(self) -> bytes:
+        """Return what has come, nothing if there is nothing; close at the end of the stream and where it broke."""
         try:
             data = self._socket.recv(READ_LENGTH)
+            if self._acknowledges_at_once and data:
+                # Holds for this acknowledgement only; the kernel falls back by itself (tcp(7)).
+                self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_QUICKACK, 1)
         except (BlockingIOError, InterruptedError):
-            return None
-        if self._acknowledges_at_once and data:
-            # Holds for this acknowledgement only; the kernel falls back by itself (tcp(7)).
-            self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_QUICKACK, 1)
+            return b""
+        except OSError as error:
+            self.close("read failed: %s" % describe_error(error))
+            return b""
+        if not data:
+            self.close("closed by the robot")
+        self.received_length += len(data)
         return data
 
     def flush(self) -> bool:
-        """Write what is left over; return whether nothing is left.
-
-        Raises: OSError when the connection broke.
-        """
+        """Write what is left over; return whether nothing is left."""
         while self._unsent:
             rest = self._write(self._unsent[0])
             self._unsent_length -= len(self._unsent[0]) - len(rest)
