@@ -8,7 +8,7 @@ import collections
 import functools
 import itertools
 from dataclasses import dataclass
-from typing import Callable, DefaultDict, Deque, Dict, Iterator, List, Protocol, Set, Tuple
+from typing import Any, Callable, DefaultDict, Deque, Dict, Iterator, List, Protocol, Set, Tuple
 
 from . import wire_messages
 from .odometry import Pose, TickOdometry, WheelGeometry
@@ -50,9 +50,9 @@ Clean = Callable[[bytes, int], None]
 """Takes a payload and its arrival (ns)."""
 
 
-_Held = Tuple[Callable[[int, bytes, int], None], int, bytes, int]
-"""Odometry, or its transform, that waits for the encoder reading of its burst: what writes it, and for that the robot's
-stamp (ns), the bytes and the arrival (ns)."""
+_Held = Tuple[Callable[[Any, bytes], None], Any, bytes]
+"""Odometry, or its transform, that waits for the encoder reading of its burst: what writes it, and the two arguments for
+that."""
 
 
 @dataclass(frozen=True)
@@ -220,9 +220,10 @@ class MessageCleaner:
                 self._encoder_follows = False
             self._odom_stamp_ns = stamp_ns
             if self._encoder_follows and abs(stamp_ns - self._encoder_stamp_ns) > BURST_NS:
-                self._held.append((self._write_odometry, stamp_ns, payload, arrival_ns))
+                corrected_ns = self._stamps.correct(self._odom_name, stamp_ns, arrival_ns)
+                self._held.append((self._write_odometry, corrected_ns, payload))
                 return
-        self._write_odometry(stamp_ns, payload, arrival_ns)
+        self._write_odometry(self._stamps.correct(self._odom_name, stamp_ns, arrival_ns), payload)
 
     def _clean_encoder(self, name: str, sink: Sink, payload: bytes, arrival_ns: int) -> None:
         reading = wire_messages.read_encoder(payload)
@@ -249,14 +250,13 @@ class MessageCleaner:
 
     def _release(self) -> None:
         held, self._held = self._held, []
-        for write, stamp_ns, data, arrival_ns in held:
-            write(stamp_ns, data, arrival_ns)
+        for write, start, data in held:
+            write(start, data)
 
     def _pack_pose(self) -> bytes:
         return wire_messages.pack_pose(self.odometry.x_m, self.odometry.y_m, self.odometry.yaw_rad)
 
-    def _write_odometry(self, stamp_ns: int, payload: bytes, arrival_ns: int) -> None:
-        stamp_ns = self._stamps.correct(self._odom_name, stamp_ns, arrival_ns)
+    def _write_odometry(self, stamp_ns: int, payload: bytes) -> None:
         odometry = self.odometry
         estimate = (
             (self._packed_pose, odometry.linear_m_s, odometry.turn_rad_s) if self._uses_estimate else None
@@ -267,11 +267,8 @@ class MessageCleaner:
         else:
             self._odom_sink.publish(written)
 
-    def _write_odom_transform(self, stamp_ns: int, tail: bytes, arrival_ns: int) -> None:
-        if self._uses_estimate:
-            tail = self._packed_pose
-        stamp_ns = self._stamps.correct(self._odom_frames, stamp_ns, arrival_ns)
-        self._add_transform(wire_messages.pack_transform(stamp_ns, self._odom_frames, tail))
+    def _write_odom_transform(self, head: bytes, tail: bytes) -> None:
+        self._add_transform(head + (self._packed_pose if self._uses_estimate else tail))
 
     def _clean_transforms(self, payload: bytes, arrival_ns: int) -> None:
         # Stock robots send one transform in a message, of frames that were seen before.
@@ -294,17 +291,13 @@ class MessageCleaner:
             self._clean_unknown_transforms(payload, arrival_ns)
             return
         stamp_ns = secs * NS_PER_S + nsecs
-        if frames == self._odom_frames:
-            tail = payload[wire_messages.TRANSFORM_TAIL]
-            self._clean_transform(stamp_ns, frames, tail, arrival_ns)
-            return
         corrected_ns = self._stamps.correct(frames, stamp_ns, arrival_ns)
         if corrected_ns == stamp_ns and nsecs < NS_PER_S:
             self._passed_start, self._passed_ns = payload[wire_messages.TRANSFORM_START], stamp_ns
-            self._add_transform(payload[wire_messages.TRANSFORM])
+            head = payload[wire_messages.TRANSFORM_HEAD]
         else:
-            tail = payload[wire_messages.TRANSFORM_TAIL]
-            self._add_transform(wire_messages.pack_transform(corrected_ns, frames, tail))
+            head = wire_messages.pack_transform_head(corrected_ns, frames)
+        self._pass_transform(frames, head, payload[wire_messages.TRANSFORM_TAIL])
 
     def _clean_unknown_transforms(self, payload: bytes, arrival_ns: int) -> None:
         transforms = wire_messages.read_transforms(payload)
@@ -313,19 +306,18 @@ class MessageCleaner:
             return
         for stamp_ns, frames, tail in transforms:
             if frames in self._own_frames or self._admit_frames(frames):
-                self._clean_transform(stamp_ns, frames, tail, arrival_ns)
+                corrected_ns = self._stamps.correct(frames, stamp_ns, arrival_ns)
+                self._pass_transform(frames, wire_messages.pack_transform_head(corrected_ns, frames), tail)
 
-    def _clean_transform(self, stamp_ns: int, frames: bytes, tail: bytes, arrival_ns: int) -> None:
-        if frames == self._odom_frames and self._has_encoder:
-            if not self._held:
-                self._write_odom_transform(stamp_ns, tail, arrival_ns)
-            elif len(self._held) < HELD_MAX:
-                self._held.append((self._write_odom_transform, stamp_ns, tail, arrival_ns))
-            else:
-                self.refused += 1
-            return
-        stamp_ns = self._stamps.correct(frames, stamp_ns, arrival_ns)
-        self._add_transform(wire_messages.pack_transform(stamp_ns, frames, tail))
+    def _pass_transform(self, frames: bytes, head: bytes, tail: bytes) -> None:
+        if frames != self._odom_frames or not self._has_encoder:
+            self._add_transform(head + tail)
+        elif not self._held:
+            self._write_odom_transform(head, tail)
+        elif len(self._held) < HELD_MAX:
+            self._held.append((self._write_odom_transform, head, tail))
+        else:
+            self.refused += 1
 
     def _admit_frames(self, frames: bytes) -> bool:
         """Return whether the robot may send a pair of frames that is not known as its own."""
@@ -353,4 +345,6 @@ class MessageCleaner:
 def split_transforms(payload: bytes) -> List[bytes]:
     """Return the transforms of a device that is no HeRo as they are; none if payload is no TFMessage."""
     transforms = wire_messages.read_transforms(payload) or []
-    return [wire_messages.pack_transform(*transform) for transform in transforms]
+    return [
+        wire_messages.pack_transform_head(stamp_ns, frames) + tail for stamp_ns, frames, tail in transforms
+    ]

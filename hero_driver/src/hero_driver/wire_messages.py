@@ -173,6 +173,7 @@ def read_transforms(payload: bytes) -> Optional[List[Transform]]:
 # What a TFMessage with one transform holds where. Slices that exist already cost half of those made on the way.
 TRANSFORM_START = slice(0, _LENGTH.size + _SEQ_AND_STAMP.size)  # the number of transforms, seq and stamp
 TRANSFORM = slice(_LENGTH.size, None)
+TRANSFORM_HEAD = slice(TRANSFORM.start, -TRANSFORM_TAIL_LENGTH)  # of the transform: seq, stamp and frames
 TRANSFORM_FRAMES = slice(TRANSFORM_START.stop, -TRANSFORM_TAIL_LENGTH)
 TRANSFORM_TAIL = slice(-TRANSFORM_TAIL_LENGTH, None)
 
@@ -192,14 +193,14 @@ def join_frames(frame_id: bytes, child_frame_id: bytes) -> bytes:
     return b"".join(_LENGTH.pack(len(name)) + name for name in (frame_id, child_frame_id))
 
 
-def pack_transform(stamp_ns: int, frames: bytes, tail: bytes) -> bytes:
-    """Return the bytes of one geometry_msgs/TransformStamped (seq 0)."""
+def pack_transform_head(stamp_ns: int, frames: bytes) -> bytes:
+    """Return the bytes of one geometry_msgs/TransformStamped up to its tail (seq 0)."""
     secs, nsecs = divmod(stamp_ns, NS_PER_S)
-    return _SEQ_AND_STAMP.pack(0, secs, nsecs) + frames + tail
+    return _SEQ_AND_STAMP.pack(0, secs, nsecs) + frames
 
 
 def pack_transform_message(transforms: Sequence[bytes]) -> bytes:
-    """Return the tf2_msgs/TFMessage of transforms, each from pack_transform()."""
+    """Return the tf2_msgs/TFMessage of transforms, each the bytes of one geometry_msgs/TransformStamped."""
     return _LENGTH.pack(len(transforms)) + b"".join(transforms)
 
 

@@ -155,7 +155,10 @@ def test_transforms_are_read_one_by_one():
 def test_a_transform_that_was_read_is_packed_as_the_same_bytes():
     transform = build_transform(NOW_NS + 5, "hero_0/odom", "hero_0/base_link")
     message = build_transform_message(transform, transform)
-    packed = [wire_messages.pack_transform(*parts) for parts in wire_messages.read_transforms(message)]
+    packed = [
+        wire_messages.pack_transform_head(stamp_ns, frames) + tail
+        for stamp_ns, frames, tail in wire_messages.read_transforms(message)
+    ]
     assert packed == [transform, transform]
     assert wire_messages.pack_transform_message(packed) == message
     assert wire_messages.pack_transform_message([]) == bytes(4)
@@ -165,7 +168,7 @@ def test_a_tail_is_the_pose():
     frames = wire_messages.join_frames(b"hero_0/odom", b"hero_0/base_link")
     assert frames == build_text("hero_0/odom") + build_text("hero_0/base_link")
     tail = wire_messages.pack_pose(1.0, -2.0, 3.0)
-    transform = wire_messages.pack_transform(NOW_NS, frames, tail)
+    transform = wire_messages.pack_transform_head(NOW_NS, frames) + tail
     assert read_transform(transform) == (
         NOW_NS,
         "hero_0/odom",
