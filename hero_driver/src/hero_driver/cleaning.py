@@ -51,8 +51,7 @@ Clean = Callable[[bytes, int], None]
 
 
 _Held = Tuple[Callable[[Any, bytes], None], Any, bytes]
-"""Odometry, or its transform, that waits for the encoder reading of its burst: what writes it, and the two arguments for
-that."""
+"""Odometry, or its transform, that waits for the encoder reading of its burst: what writes it, and its arguments."""
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import collections
 import threading
 from typing import Deque, Dict, List, Optional, Tuple
 
-from .command_shaping import ZERO_TWIST, CheckedTwist, VelocityShaper
+from .command_shaping import ZERO_TWIST, VelocityShaper
 
 QUEUE_LENGTH = 50
 """Commands other than velocities that may wait for one robot."""
@@ -36,13 +36,13 @@ class CommandQueue:
         self._waiting: Deque[Command] = collections.deque()
         self.dropped = 0
 
-    def offer_velocity(self, name: str, command: CheckedTwist, now_s: float) -> None:
-        """Take a velocity for the topic called name."""
+    def offer_velocity(self, name: str, payload: bytes, now_s: float) -> None:
+        """Take a velocity, from check_twist(), for the topic called name."""
         with self._lock:
             shaper = self._shapers.get(name)
             if shaper is None:
                 shaper = self._shapers[name] = VelocityShaper()
-            shaper.offer(command)
+            shaper.offer(payload)
             self._offered_s[name] = now_s
 
     def offer(self, name: str, payload: bytes) -> None:
@@ -60,7 +60,7 @@ class CommandQueue:
                 self._shapers[always] = VelocityShaper()
             for name, shaper in self._shapers.items():
                 if name == always or now_s - self._offered_s.get(name, -RECENTLY_S) < RECENTLY_S:
-                    shaper.offer(CheckedTwist(ZERO_TWIST, True))
+                    shaper.offer(ZERO_TWIST)
                 shaper.discard_motion()
 
     def clear(self) -> None:

@@ -7,7 +7,7 @@ sent and sent once more. Pure: payloads and time go in, payloads come out.
 
 import math
 import struct
-from typing import NamedTuple, Optional
+from typing import Optional
 
 COMMAND_INTERVAL_S = 0.06
 """Time between two velocities to one robot: the firmware's 50 ms and some room for its 51 ms read cycle."""
@@ -30,32 +30,27 @@ MOTOR_HALT_US = 1500
 HALTED_MOTORS = struct.pack("<hh", MOTOR_HALT_US, MOTOR_HALT_US)
 
 
-class CheckedTwist(NamedTuple):
-    """A velocity command that may be sent."""
+def check_twist(payload: bytes, clamp: bool) -> Optional[bytes]:
+    """Return what to send for payload (geometry_msgs/Twist), or None if a component is not finite.
 
-    payload: bytes
-    is_zero: bool  # the robot is told to stand still
-
-
-def check_twist(payload: bytes, clamp: bool) -> Optional[CheckedTwist]:
-    """Return the command in payload (geometry_msgs/Twist), or None if a component is not finite.
-
-    With clamp, linear.x and angular.z are brought into the firmware's limits; the robot uses only these two.
+    What tells the robot to stand still becomes ZERO_TWIST: it uses only linear.x and angular.z. With clamp, these
+    two are brought into the firmware's limits.
     """
     if len(payload) != TWIST_LENGTH:
         return None
     components = _TWIST.unpack(payload)
+    # A sum of finite numbers may overflow; only then are the six looked at one by one.
+    if not math.isfinite(sum(components)) and not all(map(math.isfinite, components)):
+        return None
     linear_m_s, turn_rad_s = components[0], components[5]
-    if not math.isfinite(sum(map(abs, components))):
-        # A sum of finite numbers may overflow; only then are the six looked at one by one.
-        if not all(map(math.isfinite, components)):
-            return None
+    if linear_m_s == 0.0 and turn_rad_s == 0.0:
+        return ZERO_TWIST
     if clamp:
         clamped_m_s = max(-LINEAR_LIMIT_M_S, min(LINEAR_LIMIT_M_S, linear_m_s))
         clamped_rad_s = max(-TURN_LIMIT_RAD_S, min(TURN_LIMIT_RAD_S, turn_rad_s))
         if clamped_m_s != linear_m_s or clamped_rad_s != turn_rad_s:
-            payload = _TWIST.pack(clamped_m_s, *components[1:5], clamped_rad_s)
-    return CheckedTwist(payload, linear_m_s == 0.0 and turn_rad_s == 0.0)
+            return _TWIST.pack(clamped_m_s, *components[1:5], clamped_rad_s)
+    return payload
 
 
 class VelocityShaper:
@@ -67,7 +62,7 @@ class VelocityShaper:
     def __init__(self, interval_s: float = COMMAND_INTERVAL_S) -> None:
         self._interval_s = interval_s
         self._zero_pending = False
-        self._newest: Optional[CheckedTwist] = None
+        self._newest: Optional[bytes] = None
         self._repeats_left = 0
         self._next_s = -math.inf
 
@@ -76,13 +71,13 @@ class VelocityShaper:
         """Whether nothing waits to be sent."""
         return not self._zero_pending and self._newest is None and self._repeats_left == 0
 
-    def offer(self, command: CheckedTwist) -> None:
-        """Take a command; it replaces one that waits, except a zero."""
-        if command.is_zero:
+    def offer(self, payload: bytes) -> None:
+        """Take a command, from check_twist(); it replaces one that waits, except a zero."""
+        if payload == ZERO_TWIST:
             self._zero_pending = True
             self._newest = None
         else:
-            self._newest = command
+            self._newest = payload
 
     def discard_motion(self) -> None:
         """Forget what waits except stops; used when motion is held or the robot went away."""
@@ -96,17 +91,20 @@ class VelocityShaper:
 
     def take(self, now_s: float) -> Optional[bytes]:
         """Return the payload to send now, if any."""
-        if now_s < self._next_s or self.is_idle:
+        if now_s < self._next_s:
             return None
-        self._next_s = now_s + self._interval_s
         if self._zero_pending:
+            payload = ZERO_TWIST
             self._zero_pending = False
             self._repeats_left = ZERO_REPEATS
-            return ZERO_TWIST
-        if self._newest is not None:
-            payload = self._newest.payload
+        elif self._newest is not None:
+            payload = self._newest
             self._newest = None
             self._repeats_left = 0
-            return payload
-        self._repeats_left -= 1
-        return ZERO_TWIST
+        elif self._repeats_left:
+            payload = ZERO_TWIST
+            self._repeats_left -= 1
+        else:
+            return None
+        self._next_s = now_s + self._interval_s
+        return payload

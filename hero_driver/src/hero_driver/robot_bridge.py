@@ -256,25 +256,17 @@ class RobotBridge:
                 self.commands.offer(motors, HALTED_MOTORS)
         self._context.wake(self)
 
-    def _receive_command(self, name: str, ros_type: str, payload: bytes) -> None:
-        """A ROS program sent a message for the robot (any thread)."""
-        if not self._connected:
-            self.refused_commands += 1
-            return
-        if ros_type == TWIST_TYPE and name.endswith(VELOCITY_SUFFIX) and self.cleaner is not None:
-            if not self._take_velocity(name, payload):
-                return
-        elif ros_type == MOTOR_TYPE and self.cleaner is not None:
-            if self._context.is_stopped() and payload != HALTED_MOTORS:
-                self.refused_commands += 1
-                return
-            self._motor_used_s = time.monotonic()
-            self.commands.offer(name, payload)
-        else:
-            self.commands.offer(name, payload)
-        self._context.wake(self)
+    # A ROS program sent a message for the robot (any thread).
 
-    def _take_velocity(self, name: str, payload: bytes) -> bool:
+    def _choose_receiver(self, name: str, ros_type: str) -> Callable[[bytes], None]:
+        """Return what takes the messages of a topic that the robot subscribes to."""
+        if self.cleaner is not None and ros_type == TWIST_TYPE and name.endswith(VELOCITY_SUFFIX):
+            return functools.partial(self._receive_velocity, name)
+        if self.cleaner is not None and ros_type == MOTOR_TYPE:
+            return functools.partial(self._receive_motors, name)
+        return functools.partial(self._receive_command, name)
+
+    def _receive_velocity(self, name: str, payload: bytes) -> None:
         command = check_twist(payload, self._context.clamp)
         if command is None:
             self.refused_commands += 1
@@ -284,12 +276,25 @@ class RobotBridge:
                 "%s: a velocity on %s is not finite and was refused; mend the program that sends it"
                 % (self.label, name),
             )
-            return False
-        if self._context.is_stopped() and not command.is_zero:
+        elif not self._connected or (self._context.is_stopped() and command != ZERO_TWIST):
             self.refused_commands += 1
-            return False
-        self.commands.offer_velocity(name, command, time.monotonic())
-        return True
+        else:
+            self.commands.offer_velocity(name, command, time.monotonic())
+            self._context.wake(self)
+
+    def _receive_motors(self, name: str, payload: bytes) -> None:
+        if self._context.is_stopped() and payload != HALTED_MOTORS:
+            self.refused_commands += 1
+            return
+        self._motor_used_s = time.monotonic()
+        self._receive_command(name, payload)
+
+    def _receive_command(self, name: str, payload: bytes) -> None:
+        if not self._connected:
+            self.refused_commands += 1
+            return
+        self.commands.offer(name, payload)
+        self._context.wake(self)
 
     def _send_request(self, name: str, service_type: str, request: bytes) -> Optional[str]:
         """Send a service request (a thread of rospy's); return why not, if so."""
@@ -356,7 +361,7 @@ class RobotBridge:
             if known[0] == ros_type:
                 return
             known[1].close()
-        inlet = Inlet(functools.partial(self._receive_command, name, ros_type), self._context.add_reader)
+        inlet = Inlet(self._choose_receiver(name, ros_type), self._context.add_reader)
         self._inlets[name] = (ros_type, inlet)
         inlet.open(name, message_types.make_raw_class(message_class), QUEUE_LENGTH)
 

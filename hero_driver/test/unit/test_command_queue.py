@@ -6,17 +6,15 @@ import threading
 import pytest
 
 from hero_driver.command_queue import IN_FLIGHT_MAX, QUEUE_LENGTH, RETRY_S, CommandQueue
-from hero_driver.command_shaping import ZERO_TWIST, CheckedTwist
+from hero_driver.command_shaping import ZERO_TWIST
 
 VELOCITY = "/hero_0/velocity_controller/cmd_vel"
 POSITION = "/hero_0/position_controller/cmd_vel"
 LED = "/hero_0/led"
 
-ZERO = CheckedTwist(ZERO_TWIST, True)
-
 
 def make_motion(linear_m_s):
-    return CheckedTwist(struct.pack("<6d", linear_m_s, 0.0, 0.0, 0.0, 0.0, 0.0), False)
+    return struct.pack("<6d", linear_m_s, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 FAST, SLOW = make_motion(0.2), make_motion(0.1)
@@ -59,25 +57,25 @@ def test_velocities_of_two_controllers_are_shaped_each_on_its_own():
     queue = make_queue()
     queue.offer_velocity(VELOCITY, FAST, 0.0)
     queue.offer_velocity(POSITION, SLOW, 0.0)
-    assert take(queue, 0.0) == [(VELOCITY, FAST.payload), (POSITION, SLOW.payload)]
+    assert take(queue, 0.0) == [(VELOCITY, FAST), (POSITION, SLOW)]
     queue.offer_velocity(VELOCITY, SLOW, 0.01)
     assert take(queue, 0.01) == []
     assert queue.due_in_s(True, 0.01) == pytest.approx(0.05)
-    assert take(queue, 0.06) == [(VELOCITY, SLOW.payload)]
+    assert take(queue, 0.06) == [(VELOCITY, SLOW)]
 
 
 def test_a_full_queue_of_other_commands_does_not_hold_up_a_stop():
     queue = make_queue()
     for _ in range(QUEUE_LENGTH):
         queue.offer(LED, bytes(16))
-    queue.offer_velocity(VELOCITY, ZERO, 0.0)
+    queue.offer_velocity(VELOCITY, ZERO_TWIST, 0.0)
     assert take(queue, 0.0)[0] == (VELOCITY, ZERO_TWIST)
 
 
 def test_other_commands_wait_while_the_robot_has_not_acknowledged_its_window_and_a_stop_does_not():
     queue = make_queue()
     queue.offer(LED, bytes(16))
-    queue.offer_velocity(VELOCITY, ZERO, 0.0)
+    queue.offer_velocity(VELOCITY, ZERO_TWIST, 0.0)
     assert take(queue, 0.0, in_flight_length=IN_FLIGHT_MAX) == [(VELOCITY, ZERO_TWIST)]
     assert queue.due_in_s(True, 0.0) == RETRY_S
     assert take(queue, 0.01, in_flight_length=IN_FLIGHT_MAX - 1) == [(LED, bytes(16))]
@@ -96,7 +94,7 @@ def test_a_velocity_waits_until_the_one_before_it_is_acknowledged():
     queue = make_queue()
     queue.offer_velocity(VELOCITY, FAST, 0.0)
     take(queue, 0.0)
-    queue.offer_velocity(VELOCITY, ZERO, 0.01)
+    queue.offer_velocity(VELOCITY, ZERO_TWIST, 0.01)
     assert take(queue, 0.1, velocity_acknowledged=False) == []
     assert queue.due_in_s(False, 0.1) >= RETRY_S
     assert not queue.is_idle
@@ -112,7 +110,7 @@ def test_a_motion_that_could_not_be_sent_in_time_is_dropped():
 
 def test_a_stop_that_could_not_be_sent_in_time_is_sent_nevertheless():
     queue = make_queue()
-    queue.offer_velocity(VELOCITY, ZERO, 0.0)
+    queue.offer_velocity(VELOCITY, ZERO_TWIST, 0.0)
     assert take(queue, 100.0) == [(VELOCITY, ZERO_TWIST)]
     assert take(queue, 100.06) == [(VELOCITY, ZERO_TWIST)]
 

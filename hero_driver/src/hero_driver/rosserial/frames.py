@@ -92,14 +92,20 @@ def encode_frame(topic_id: int, payload: Bytes) -> bytes:
 
     Raises: TopicIdError for an id outside 0..65535, FrameTooLongError for more than 65535 bytes of payload.
     """
+    header, id_sum = _encode_header(topic_id, len(payload))
+    checksum = 255 - (id_sum + sum_bytes(payload) & 0xFF)
+    return b"".join((header, payload, bytes((checksum,))))
+
+
+@functools.lru_cache(maxsize=256)
+def _encode_header(topic_id: int, length: int) -> Tuple[bytes, int]:
+    """Return what comes before a payload of length bytes, and the sum of the bytes of topic_id."""
     if not 0 <= topic_id <= 0xFFFF:
         raise TopicIdError("topic id %r is outside 0..65535" % (topic_id,))
-    length = len(payload)
     if length > LONGEST_PAYLOAD_LENGTH:
         raise FrameTooLongError("a payload of %d bytes does not fit a frame (at most 65535)" % length)
     length_checksum = 255 - ((length & 0xFF) + (length >> 8)) % 256
-    checksum = 255 - ((topic_id & 0xFF) + (topic_id >> 8) + sum_bytes(payload)) % 256
-    return b"".join((_HEADER.pack(SYNC, length, length_checksum, topic_id), payload, bytes((checksum,))))
+    return _HEADER.pack(SYNC, length, length_checksum, topic_id), (topic_id & 0xFF) + (topic_id >> 8)
 
 
 class FrameReader:

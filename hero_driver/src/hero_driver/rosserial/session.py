@@ -163,6 +163,7 @@ class Session:
     def __init__(self, limits: SessionLimits, now_s: float) -> None:
         self.topics: Dict[int, Topic] = {}
         self._messages: Dict[int, Topic] = {}  # those of the topics that come as Message
+        self._receivers: Dict[int, Topic] = {}  # those that the robot receives
         self.reader = FrameReader(limits.max_payload_length)
         self.undeclared_messages = 0
         self.opened_s = now_s
@@ -223,8 +224,8 @@ class Session:
         (the robot indexes an array with the id unchecked, node_handle.h:326), FrameTooLongError for more
         than the robot's buffer (unchecked too, node_handle.h:232).
         """
-        topic = self.topics.get(topic_id)
-        if topic is None or topic.kind in _FROM_ROBOT:
+        topic = self._receivers.get(topic_id)
+        if topic is None:
             raise TopicIdError("id %d was not declared as something that this robot receives" % topic_id)
         if len(payload) > topic.info.buffer_length:
             raise FrameTooLongError(
@@ -318,11 +319,14 @@ class Session:
                     "topic %s refused: ids were declared as something else more than %d times (max_topics)"
                     % (info.name, self._limits.max_topics)
                 )
-        self.topics[info.topic_id] = topic
-        if kind in _MESSAGES:
-            self._messages[info.topic_id] = topic
-        else:
-            self._messages.pop(info.topic_id, None)
+        for topics, holds in (
+            (self.topics, True),
+            (self._messages, kind in _MESSAGES),
+            (self._receivers, not kind.is_from_robot),
+        ):
+            topics.pop(info.topic_id, None)
+            if holds:
+                topics[info.topic_id] = topic
         return TopicDeclared(topic)
 
     def _find_fault(self, info: TopicInfo) -> Optional[str]:
