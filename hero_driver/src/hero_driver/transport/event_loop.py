@@ -2,11 +2,11 @@
 
 import collections
 import errno
+import functools
 import heapq
 import itertools
 import os
 import resource
-import selectors
 import socket
 import sys
 import threading
@@ -15,6 +15,7 @@ from typing import Any, Callable, Deque, Dict, List, NamedTuple, Optional, Set, 
 
 from .dialler import Dialler, DiallerOwner, Resolver
 from .link import Address, Link, LinkHandler, LinkOwner, describe_error
+from .poller import READ, WRITE, Poller
 
 LISTEN_BACKLOG = 256
 """A whole swarm reconnects within 51 ms when the driver comes back (ArduinoTcpHardware.h:99)."""
@@ -70,7 +71,7 @@ class EventLoop(LinkOwner, DiallerOwner):
     def __init__(self, settings: TransportSettings, handler: LinkHandler) -> None:
         self._settings = settings
         self._handler = handler
-        self._selector = selectors.DefaultSelector()
+        self._poller = Poller()
         self._listener: Optional[socket.socket] = None
         self._links: Dict[int, Link] = {}
         self._readers: Set[Reader] = set()
@@ -96,8 +97,8 @@ class EventLoop(LinkOwner, DiallerOwner):
         if self._settings.host:
             self._listener = _listen(self._settings.host, self._settings.port)
             self.listening = Address(*self._listener.getsockname()[:2])
-            self._selector.register(self._listener, selectors.EVENT_READ, self._accept)
-        self._selector.register(self._wake_read, selectors.EVENT_READ, self._take_wake)
+            self._listen_on(self._listener)
+        self._poller.register(self._wake_read, READ, lambda _: self._call(self._take_wake))
         for address in self._settings.dial:
             Dialler(self, address).dial()
         self.call_later(POLL_INTERVAL_S, self._poll_links)
@@ -116,14 +117,13 @@ class EventLoop(LinkOwner, DiallerOwner):
 
     def _run_once(self) -> None:
         timeout_s = max(0.0, self._timers[0][0] - time.monotonic()) if self._timers else None
-        for key, mask in self._selector.select(0.0 if self._calls else timeout_s):
-            source = key.data
-            if type(source) is Link:
-                self._serve_link(source, mask)
-            elif isinstance(source, Reader):
-                self._serve_reader(source)
-            else:
-                self._call(source)
+        serves = self._poller.serves
+        for descriptor, mask in self._poller.wait(0.0 if self._calls else timeout_s):
+            # What was closed in this turn is not there. Where its number has gone to, there is a connection that was
+            # accepted since, and reading it for nothing does no harm.
+            serve = serves.get(descriptor)
+            if serve is not None:
+                serve(mask)
         for _ in range(len(self._calls)):
             self._call(self._calls.popleft())
         self._run_due()
@@ -161,15 +161,14 @@ class EventLoop(LinkOwner, DiallerOwner):
 
     def watch(self, link: Link, writable: bool) -> None:
         """Choose whether the loop waits until link can be written."""
-        mask = selectors.EVENT_READ | (selectors.EVENT_WRITE if writable else 0)
-        self._selector.modify(link, mask, link)
+        self._poller.modify(link.fileno(), READ | WRITE if writable else READ)
 
     def close_link(self, link: Link, reason: str) -> None:
         """Close link and tell the handler; safe to call twice."""
         if link.closed:
             return
         del self._links[link.fileno()]
-        self._selector.unregister(link)
+        self._poller.unregister(link.fileno())
         link.discard()
         self._handler.close_link(link, reason)
 
@@ -186,7 +185,7 @@ class EventLoop(LinkOwner, DiallerOwner):
             )
             return None
         self._links[sock.fileno()] = link
-        self._selector.register(link, selectors.EVENT_READ, link)
+        self._poller.register(sock.fileno(), READ, functools.partial(self._serve_link, link))
         try:
             refusal = self._handler.open_link(link)
         except Exception as error:  # noqa: BLE001 - our mistake with this one must not keep others out
@@ -215,9 +214,10 @@ class EventLoop(LinkOwner, DiallerOwner):
 
     def _serve_link(self, link: Link, mask: int) -> None:
         try:
-            if mask != selectors.EVENT_READ:
+            if mask & WRITE:
                 self._serve_write(link)
-            if mask & selectors.EVENT_READ and not link.closed:
+            # What is neither is a broken connection, of which reading says why.
+            if mask != WRITE and not link.closed:
                 data = link.read()
                 if data:
                     self._handler.receive_data(link, data, time.monotonic())
@@ -233,18 +233,21 @@ class EventLoop(LinkOwner, DiallerOwner):
 
     def _watch_reader(self, reader: Reader) -> None:
         self._readers.add(reader)
-        self._selector.register(reader, selectors.EVENT_READ, reader)
+        self._poller.register(reader.fileno(), READ, functools.partial(self._serve_reader, reader))
 
-    def _serve_reader(self, reader: Reader) -> None:
+    def _serve_reader(self, reader: Reader, _mask: int) -> None:
         goes_on = False
         try:
             goes_on = reader.read()
         except Exception as error:  # noqa: BLE001 - as above
             self._handler.report_fault(error)
         if not goes_on:
-            self._selector.unregister(reader)
+            self._poller.unregister(reader.fileno())
             self._readers.discard(reader)
             reader.close()
+
+    def _listen_on(self, listener: socket.socket) -> None:
+        self._poller.register(listener.fileno(), READ, lambda _: self._call(self._accept))
 
     def _take_wake(self) -> None:
         with self._wake_lock:
@@ -277,11 +280,11 @@ class EventLoop(LinkOwner, DiallerOwner):
         self._handler.report_trouble(
             "cannot take more connections (%s)%s; those connected go on" % (describe_error(error), remedy)
         )
-        self._selector.unregister(listener)
+        self._poller.unregister(listener.fileno())
 
         def resume() -> None:
             if self._listener is not None:
-                self._selector.register(listener, selectors.EVENT_READ, self._accept)
+                self._listen_on(listener)
 
         self.call_later(ACCEPT_PAUSE_S, resume)
 
@@ -313,7 +316,7 @@ class EventLoop(LinkOwner, DiallerOwner):
         for reader in self._readers:
             reader.close()
         self._readers.clear()
-        self._selector.close()
+        self._poller.close()
         self._dial_resolver.close()
 
     # What the diallers use.
@@ -324,11 +327,11 @@ class EventLoop(LinkOwner, DiallerOwner):
 
     def watch_dialler(self, dialler: "Dialler", sock: socket.socket) -> None:
         """Call dialler.finish() when sock has connected or failed."""
-        self._selector.register(sock, selectors.EVENT_WRITE, dialler.finish)
+        self._poller.register(sock.fileno(), WRITE, lambda _: self._call(dialler.finish))
 
     def unwatch_dialler(self, sock: socket.socket) -> None:
         """Undo watch_dialler()."""
-        self._selector.unregister(sock)
+        self._poller.unregister(sock.fileno())
 
     def report_trouble(self, text: str) -> None:
         """Pass text on to the handler."""
