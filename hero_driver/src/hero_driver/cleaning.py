@@ -8,11 +8,12 @@ import collections
 import functools
 import itertools
 from dataclasses import dataclass
-from typing import Any, Callable, DefaultDict, Deque, Dict, Iterator, List, Protocol, Set, Tuple
+from typing import Any, Callable, DefaultDict, Deque, Dict, Iterator, List, Protocol, Tuple
 
 from . import wire_messages
 from .odometry import Pose, TickOdometry, WheelGeometry
 from .stamps import NS_PER_S, StampFilter
+from .transform_cleaning import AddTransform, TransformCleaner
 
 TRANSFORMS = "/tf"
 """Name under which single transforms are returned; they are collected over all robots."""
@@ -29,9 +30,6 @@ HELD_MAX = 8
 BURST_NS = 10 * 10**6
 """Stamps of one burst lie closer together than this, those of two bursts are 34 ms apart."""
 
-FRAMES_MAX = 32
-"""Pairs of frames that one robot may use; stock robots have five."""
-
 
 class Sink(Protocol):
     """Where the messages of one topic go."""
@@ -45,7 +43,6 @@ class Sink(Protocol):
 
 
 FindSink = Callable[[str], Sink]
-AddTransform = Callable[[bytes], None]
 Clean = Callable[[bytes, int], None]
 """Takes a payload and its arrival (ns)."""
 
@@ -72,8 +69,7 @@ class MessageCleaner:
 
     Attributes:
         odometry: the robot's tick odometry.
-        refused: messages that could not be used.
-        foreign_frames: transforms of frames that are not the robot's own, by name, for the report.
+        transforms: the robot's transforms.
     """
 
     def __init__(
@@ -81,33 +77,26 @@ class MessageCleaner:
     ) -> None:
         """Clean the data of the robot in namespace.
 
-        find_sink(name) gives the sink of a topic that was chosen or derived; add_transform takes the bytes of
-        one geometry_msgs/TransformStamped, whichever robot's.
+        find_sink(name) gives the sink of a topic that was chosen or derived; add_transform takes transforms of all
+        robots.
         """
         self._find_sink = find_sink
         self._add_transform = add_transform
         self._namespace = namespace
-        self._frame_prefix = namespace.lstrip("/").encode() + b"/"
         self._stamps = StampFilter(settings.stamps == "arrival", settings.max_future_s, settings.max_age_s)
         self._writer = wire_messages.OdometryWriter(settings.pose_covariance, settings.twist_covariance)
         self._uses_ticks = settings.odometry == "ticks"
         self._offsets_ns: Deque[int] = collections.deque(maxlen=OFFSET_SAMPLES)
-        self._last_ns = self._stamps.last_ns
         self._seqs: DefaultDict[str, Iterator[int]] = collections.defaultdict(itertools.count)
-        self._own_frames: Set[bytes] = set()
-        self._known_foreign: Set[bytes] = set()
-        self._passed_start = b""  # of the last transform whose stamp passed
-        self._passed_ns = 0  # that stamp, 0 if none of this burst has passed yet
         self.odometry = TickOdometry(settings.geometry)
-        self.refused = 0
-        self.foreign_frames: Set[str] = set()
+        self.transforms = TransformCleaner(
+            namespace, self._stamps, add_transform, self._take_odom_transform
+        )
+        self._refused = 0
         self._packed_pose = self._pack_pose()
         self._uses_estimate = False
         self._odom_name = namespace + "/odom"
         self._odom_seqs = self._seqs[self._odom_name]
-        self._odom_frames = wire_messages.join_frames(
-            self._frame_prefix + b"odom", self._frame_prefix + b"base_link"
-        )
         self._raw_name = namespace + "/odom_raw"
         self._proximity_name = namespace + "/proximity"
         self._odom_sink: Sink
@@ -147,6 +136,11 @@ class MessageCleaner:
         return sorted(self._offsets_ns)[len(self._offsets_ns) // 2] / NS_PER_S
 
     @property
+    def refused(self) -> int:
+        """Messages and transforms that could not be used."""
+        return self._refused + self.transforms.refused
+
+    @property
     def corrected_stamps(self) -> int:
         """Stamps that were replaced so far."""
         return self._stamps.corrected
@@ -162,7 +156,7 @@ class MessageCleaner:
     def choose(self, name: str, message_type: str) -> Clean:
         """Return what takes the payloads of the topic called name."""
         if name == TRANSFORMS and message_type == "tf2_msgs/TFMessage":
-            return self._clean_transforms
+            return self.transforms.clean
         sink = self._find_sink(name)
         if name == self._odom_name and message_type == "nav_msgs/Odometry":
             self._odom_sink, self._raw_sink = sink, self._find_sink(self._raw_name)
@@ -180,7 +174,7 @@ class MessageCleaner:
     def _clean_stamped(self, name: str, sink: Sink, payload: bytes, arrival_ns: int) -> None:
         stamp_ns = wire_messages.read_stamp_ns(payload)
         if stamp_ns is None:
-            self.refused += 1
+            self._refused += 1
             return
         stamp_ns = self._stamps.correct(name, stamp_ns, arrival_ns)
         sink.publish(wire_messages.restamp(payload, next(self._seqs[name]), stamp_ns))
@@ -188,7 +182,7 @@ class MessageCleaner:
     def _clean_laser(self, sink: Sink, proximity_sink: Sink, payload: bytes, arrival_ns: int) -> None:
         stamp_ns = wire_messages.read_stamp_ns(payload)
         if stamp_ns is None:
-            self.refused += 1
+            self._refused += 1
             return
         sink.publish(payload)
         if not proximity_sink.is_wanted:
@@ -197,7 +191,7 @@ class MessageCleaner:
         stamp_ns = self._stamps.correct(name, stamp_ns, arrival_ns)
         proximity = wire_messages.make_proximity(payload, next(self._seqs[name]), stamp_ns, STOCK_SCAN_TIME_S)
         if proximity is None:
-            self.refused += 1
+            self._refused += 1
         else:
             proximity_sink.publish(proximity)
 
@@ -208,10 +202,10 @@ class MessageCleaner:
     def _clean_odometry(self, payload: bytes, arrival_ns: int) -> None:
         stamp_ns = wire_messages.read_stamp_ns(payload)
         if stamp_ns is None:
-            self.refused += 1
+            self._refused += 1
             return
         self._offsets_ns.append(stamp_ns - arrival_ns)
-        self._passed_ns = 0  # another burst
+        self.transforms.passed_ns = 0  # another burst
         self._raw_sink.publish(payload)
         if self._has_encoder:
             if self._held:
@@ -227,7 +221,7 @@ class MessageCleaner:
     def _clean_encoder(self, name: str, sink: Sink, payload: bytes, arrival_ns: int) -> None:
         reading = wire_messages.read_encoder(payload)
         if reading is None:
-            self.refused += 1
+            self._refused += 1
             return
         stamp_ns, left_ticks, right_ticks = reading
         self._encoder_stamp_ns = stamp_ns
@@ -262,88 +256,17 @@ class MessageCleaner:
         )
         written = self._writer.rewrite(payload, next(self._odom_seqs), stamp_ns, estimate)
         if written is None:
-            self.refused += 1
+            self._refused += 1
         else:
             self._odom_sink.publish(written)
 
-    def _write_odom_transform(self, head: bytes, tail: bytes) -> None:
-        self._add_transform(head + (self._packed_pose if self._uses_estimate else tail))
-
-    def _clean_transforms(self, payload: bytes, arrival_ns: int) -> None:
-        # Stock robots send one transform in a message, of frames that were seen before.
-        frames = payload[wire_messages.TRANSFORM_FRAMES]
-        last_ns = self._last_ns.get(frames)
-        if last_ns is None:
-            self._clean_unknown_transforms(payload, arrival_ns)
-            return
-        # All transforms of a burst have one stamp: what passes for the first passes for the others too.
-        if (
-            last_ns < self._passed_ns
-            and payload[wire_messages.TRANSFORM_START] == self._passed_start
-            and frames != self._odom_frames
-        ):
-            self._last_ns[frames] = self._passed_ns
-            self._add_transform(payload[wire_messages.TRANSFORM])
-            return
-        count, _, secs, nsecs = wire_messages.read_transforms_start(payload)
-        if count != 1:
-            self._clean_unknown_transforms(payload, arrival_ns)
-            return
-        stamp_ns = secs * NS_PER_S + nsecs
-        corrected_ns = self._stamps.correct(frames, stamp_ns, arrival_ns)
-        if corrected_ns == stamp_ns and nsecs < NS_PER_S:
-            self._passed_start, self._passed_ns = payload[wire_messages.TRANSFORM_START], stamp_ns
-            head = payload[wire_messages.TRANSFORM_HEAD]
-        else:
-            head = wire_messages.pack_transform_head(corrected_ns, frames)
-        self._pass_transform(frames, head, payload[wire_messages.TRANSFORM_TAIL])
-
-    def _clean_unknown_transforms(self, payload: bytes, arrival_ns: int) -> None:
-        transforms = wire_messages.read_transforms(payload)
-        if transforms is None:
-            self.refused += 1
-            return
-        for stamp_ns, frames, tail in transforms:
-            if frames in self._own_frames or self._admit_frames(frames):
-                corrected_ns = self._stamps.correct(frames, stamp_ns, arrival_ns)
-                self._pass_transform(frames, wire_messages.pack_transform_head(corrected_ns, frames), tail)
-
-    def _pass_transform(self, frames: bytes, head: bytes, tail: bytes) -> None:
-        if frames != self._odom_frames or not self._has_encoder:
-            self._add_transform(head + tail)
-        elif not self._held:
+    def _take_odom_transform(self, head: bytes, tail: bytes) -> None:
+        if not self._held:
             self._write_odom_transform(head, tail)
         elif len(self._held) < HELD_MAX:
             self._held.append((self._write_odom_transform, head, tail))
         else:
-            self.refused += 1
+            self._refused += 1
 
-    def _admit_frames(self, frames: bytes) -> bool:
-        """Return whether the robot may send a pair of frames that is not known as its own."""
-        if frames in self._known_foreign:
-            self.refused += 1
-            return False
-        parent, child = wire_messages.split_frames(frames)
-        prefix = self._frame_prefix
-        if (
-            not parent.startswith(prefix)
-            or not child.startswith(prefix)
-            or len(self._own_frames) >= FRAMES_MAX
-        ):
-            self.refused += 1
-            if len(self._known_foreign) < FRAMES_MAX:
-                self._known_foreign.add(frames)
-                self.foreign_frames.add(
-                    "%s -> %s" % (ascii(parent.decode("latin-1")), ascii(child.decode("latin-1")))
-                )
-            return False
-        self._own_frames.add(frames)
-        return True
-
-
-def split_transforms(payload: bytes) -> List[bytes]:
-    """Return the transforms of a device that is no HeRo as they are; none if payload is no TFMessage."""
-    transforms = wire_messages.read_transforms(payload) or []
-    return [
-        wire_messages.pack_transform_head(stamp_ns, frames) + tail for stamp_ns, frames, tail in transforms
-    ]
+    def _write_odom_transform(self, head: bytes, tail: bytes) -> None:
+        self._add_transform(head + (self._packed_pose if self._uses_estimate else tail))

@@ -12,7 +12,7 @@ from typing import Any, Callable, Dict, List, Optional, Set, Tuple
 import rospy
 
 from . import message_types, wire_messages
-from .cleaning import TRANSFORMS, CleaningSettings, MessageCleaner, split_transforms
+from .cleaning import TRANSFORMS, CleaningSettings, MessageCleaner
 from .command_queue import CommandQueue
 from .command_shaping import HALTED_MOTORS, ZERO_TWIST, check_twist
 from .inlet import AddReader, Inlet
@@ -23,6 +23,7 @@ from .registrar import RobotRegistrar
 from .rosserial.session import Topic, TopicKind
 from .service_requests import find_request_fault, is_success, read_set_odom_pose
 from .services import RobotService
+from .transform_cleaning import split_transforms
 
 QUEUE_LENGTH = 50
 """Messages that wait for a slow subscriber, or for a slow robot: more than a second of odometry."""

@@ -105,6 +105,6 @@ def describe_robot(
         odometry_resets=0 if cleaner is None else cleaner.odometry.resets,
         last_error=complaint or record.last_error,
         complaint=complaint,
-        foreign_frames=[] if cleaner is None else sorted(cleaner.foreign_frames),
+        foreign_frames=[] if cleaner is None else sorted(cleaner.transforms.foreign_frames),
         refused=sorted(record.refused.values()),
     )

@@ -47,7 +47,7 @@ def test_nothing_of_a_recording_is_lost_or_doubled(read_capture):
         "/hero_0/proximity": 68,
         "/hero_0/set_odom": 1,
     }
-    assert (cleaner.refused, cleaner.foreign_frames) == (0, set())
+    assert (cleaner.refused, cleaner.transforms.foreign_frames) == (0, set())
     children = Counter(read_transform(payload)[2] for name, payload in outputs if name == TRANSFORMS)
     assert set(children.values()) == {436}
     assert len(children) == 5
