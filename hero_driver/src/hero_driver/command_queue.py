@@ -34,6 +34,7 @@ class CommandQueue:
         self._shapers: Dict[str, VelocityShaper] = {}
         self._offered_s: Dict[str, float] = {}
         self._waiting: Deque[Command] = collections.deque()
+        self._is_idle = True  # after the last take(), and nothing was offered since
         self.dropped = 0
 
     def offer_velocity(self, name: str, payload: bytes, now_s: float) -> None:
@@ -44,6 +45,7 @@ class CommandQueue:
                 shaper = self._shapers[name] = VelocityShaper()
             shaper.offer(payload)
             self._offered_s[name] = now_s
+            self._is_idle = False
 
     def offer(self, name: str, payload: bytes) -> None:
         """Take anything else."""
@@ -52,6 +54,7 @@ class CommandQueue:
                 self._waiting.popleft()
                 self.dropped += 1
             self._waiting.append((name, payload))
+            self._is_idle = False
 
     def halt(self, always: Optional[str], now_s: float) -> None:
         """Forget all velocities and stop every velocity topic used recently, and the one called always."""
@@ -62,6 +65,7 @@ class CommandQueue:
                 if name == always or now_s - self._offered_s.get(name, -RECENTLY_S) < RECENTLY_S:
                     shaper.offer(ZERO_TWIST)
                 shaper.discard_motion()
+            self._is_idle = False
 
     def clear(self) -> None:
         """Forget everything: the connection is gone."""
@@ -85,6 +89,7 @@ class CommandQueue:
         take the older one.
         """
         commands: List[Command] = []
+        is_idle = velocity_acknowledged
         with self._lock:
             if velocity_acknowledged:
                 for name, shaper in self._shapers.items():
@@ -93,13 +98,17 @@ class CommandQueue:
                     payload = shaper.take(now_s)
                     if payload is not None:
                         commands.append((name, payload))
+                    is_idle = is_idle and shaper.is_idle
             while self._waiting and in_flight_length < IN_FLIGHT_MAX:
                 in_flight_length += len(self._waiting[0][1])
                 commands.append(self._waiting.popleft())
+            self._is_idle = is_idle and not self._waiting
         return commands
 
     def due_in_s(self, velocity_acknowledged: bool, now_s: float) -> Optional[float]:
         """Return in how many seconds to call take() again, None if nothing waits."""
+        if self._is_idle:
+            return None
         with self._lock:
             if self._waiting:
                 return RETRY_S

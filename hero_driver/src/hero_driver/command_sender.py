@@ -17,7 +17,7 @@ class CommandSender:
 
     def __init__(
         self,
-        call_here: Callable[[Callable[[], None]], None],
+        call_here: Callable[[Callable[[RobotBridge], None], RobotBridge], None],
         call_later: Callable[[float, Callable[[], None]], None],
         find_peer: Callable[[RobotBridge], Optional[Peer]],
         complain: Callable[[Peer, str], None],
@@ -30,7 +30,7 @@ class CommandSender:
 
     def wake(self, bridge: RobotBridge) -> None:
         """Commands for a robot wait; from any thread."""
-        self._call_here(lambda: self._serve(bridge))
+        self._call_here(self._serve, bridge)
 
     def send_message(self, peer: Peer, topic_id: int, payload: bytes) -> None:
         """Send one message now, if the connection declared its id and it fits."""

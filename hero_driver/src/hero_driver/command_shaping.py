@@ -45,12 +45,12 @@ def check_twist(payload: bytes, clamp: bool) -> Optional[bytes]:
     linear_m_s, turn_rad_s = components[0], components[5]
     if linear_m_s == 0.0 and turn_rad_s == 0.0:
         return ZERO_TWIST
-    if clamp:
-        clamped_m_s = max(-LINEAR_LIMIT_M_S, min(LINEAR_LIMIT_M_S, linear_m_s))
-        clamped_rad_s = max(-TURN_LIMIT_RAD_S, min(TURN_LIMIT_RAD_S, turn_rad_s))
-        if clamped_m_s != linear_m_s or clamped_rad_s != turn_rad_s:
-            return _TWIST.pack(clamped_m_s, *components[1:5], clamped_rad_s)
-    return payload
+    is_within = abs(linear_m_s) <= LINEAR_LIMIT_M_S and abs(turn_rad_s) <= TURN_LIMIT_RAD_S
+    if is_within or not clamp:
+        return payload
+    clamped_m_s = max(-LINEAR_LIMIT_M_S, min(LINEAR_LIMIT_M_S, linear_m_s))
+    clamped_rad_s = max(-TURN_LIMIT_RAD_S, min(TURN_LIMIT_RAD_S, turn_rad_s))
+    return _TWIST.pack(clamped_m_s, *components[1:5], clamped_rad_s)
 
 
 class VelocityShaper:

@@ -122,7 +122,8 @@ class OdometryWriter:
         else:
             pose, linear_m_s, turn_rad_s = estimate
             twist = _TWIST.pack(linear_m_s, 0.0, 0.0, 0.0, 0.0, turn_rad_s)
-        head = _SEQ_AND_STAMP.pack(seq & 0xFFFFFFFF, *divmod(stamp_ns, NS_PER_S))
+        secs, nsecs = divmod(stamp_ns, NS_PER_S)
+        head = _SEQ_AND_STAMP.pack(seq & 0xFFFFFFFF, secs, nsecs)
         return b"".join((head, frames, pose, self._pose_covariance, twist, self._twist_covariance))
 
 

@@ -11,11 +11,13 @@ import socket
 import sys
 import threading
 import time
-from typing import Any, Callable, Deque, Dict, List, NamedTuple, Optional, Set, Tuple
+from typing import Any, Callable, Deque, Dict, List, NamedTuple, Optional, Set, Tuple, TypeVar
 
 from .dialler import Dialler, DiallerOwner, Resolver
 from .link import Address, Link, LinkHandler, LinkOwner, describe_error
 from .poller import READ, WRITE, Poller
+
+T = TypeVar("T")
 
 LISTEN_BACKLOG = 256
 """A whole swarm reconnects within 51 ms when the driver comes back (ArduinoTcpHardware.h:99)."""
@@ -76,6 +78,7 @@ class EventLoop(LinkOwner, DiallerOwner):
         self._links: Dict[int, Link] = {}
         self._readers: Set[Reader] = set()
         self._thread_id = 0
+        self._turned_s = 0.0  # when the last turn ended
         self._timers: List[Tuple[float, int, Callable[[], None]]] = []
         self._timer_numbers = itertools.count()
         self._calls: Deque[Callable[[], None]] = collections.deque()
@@ -106,6 +109,7 @@ class EventLoop(LinkOwner, DiallerOwner):
     def run(self) -> None:
         """Serve until stop(); then close everything."""
         self._thread_id = threading.get_ident()
+        self._turned_s = time.monotonic()
         try:
             while self._running:
                 self._run_once()
@@ -116,17 +120,26 @@ class EventLoop(LinkOwner, DiallerOwner):
             self._close_all()
 
     def _run_once(self) -> None:
-        timeout_s = max(0.0, self._timers[0][0] - time.monotonic()) if self._timers else None
+        timeout_s = None
+        if self._calls:
+            timeout_s = 0.0
+        elif self._timers:
+            timeout_s = self._timers[0][0] - self._turned_s
+            if timeout_s < 0.0:
+                timeout_s = 0.0
         serves = self._poller.serves
-        for descriptor, mask in self._poller.wait(0.0 if self._calls else timeout_s):
+        for descriptor, mask in self._poller.wait(timeout_s):
             # What was closed in this turn is not there. Where its number has gone to, there is a connection that was
             # accepted since, and reading it for nothing does no harm.
             serve = serves.get(descriptor)
             if serve is not None:
                 serve(mask)
-        for _ in range(len(self._calls)):
-            self._call(self._calls.popleft())
-        self._run_due()
+        if self._calls:
+            for _ in range(len(self._calls)):
+                self._call(self._calls.popleft())
+        now_s = self._turned_s = time.monotonic()
+        while self._timers and self._timers[0][0] <= now_s:
+            self._call(heapq.heappop(self._timers)[2])
 
     def stop(self) -> None:
         """Let run() return; from any thread."""
@@ -144,12 +157,12 @@ class EventLoop(LinkOwner, DiallerOwner):
             self._is_awake = True
         os.write(self._wake_write, b"\0")
 
-    def call_here(self, call: Callable[[], None]) -> None:
-        """Run call on the loop's thread: now if that is this thread, else soon."""
+    def call_here(self, call: Callable[[T], None], argument: T) -> None:
+        """Run call(argument) on the loop's thread: now if that is this thread, else soon."""
         if threading.get_ident() == self._thread_id:
-            call()
+            call(argument)
         else:
-            self.call_soon(call)
+            self.call_soon(lambda: call(argument))
 
     def add_reader(self, reader: Reader) -> None:
         """Read reader whenever there is something to read, until it ends; from any thread."""
@@ -291,11 +304,6 @@ class EventLoop(LinkOwner, DiallerOwner):
     def _serve_write(self, link: Link) -> None:
         if link.flush() and not link.closed:
             self.watch(link, writable=False)
-
-    def _run_due(self) -> None:
-        now_s = time.monotonic()
-        while self._timers and self._timers[0][0] <= now_s:
-            self._call(heapq.heappop(self._timers)[2])
 
     def _poll_links(self) -> None:
         self.call_later(POLL_INTERVAL_S, self._poll_links)

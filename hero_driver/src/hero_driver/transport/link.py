@@ -2,6 +2,7 @@
 
 import collections
 import fcntl
+import functools
 import socket
 import struct
 import termios
@@ -90,7 +91,9 @@ class Link:
         self.received_length = 0  # bytes of all that read() has returned
         self._loop = loop
         self._socket = sock
-        self._acknowledges_at_once = acknowledges_at_once and hasattr(socket, "TCP_QUICKACK")
+        self._acknowledge: Optional[Callable[[], None]] = None
+        if acknowledges_at_once and hasattr(socket, "TCP_QUICKACK"):
+            self._acknowledge = functools.partial(sock.setsockopt, socket.IPPROTO_TCP, socket.TCP_QUICKACK, 1)
         self._unsent: Deque[bytes] = collections.deque()
         self._unsent_length = 0
 
@@ -136,9 +139,9 @@ class Link:
         """Return what has come, nothing if there is nothing; close at the end of the stream and where it broke."""
         try:
             data = self._socket.recv(READ_LENGTH)
-            if self._acknowledges_at_once and data:
+            if data and self._acknowledge is not None:
                 # Holds for this acknowledgement only; the kernel falls back by itself (tcp(7)).
-                self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_QUICKACK, 1)
+                self._acknowledge()
         except (BlockingIOError, InterruptedError):
             return b""
         except OSError as error:
