@@ -298,6 +298,7 @@ class Gateway(LinkHandler):
             identity = names.identify_any(topic.info.name, address.host)
         known = self.fleet.robots.get(identity.namespace)
         if known is not None and known.link is not None:
+            # Only needed here, and every read would cost more.
             known.last_heard_s = known.link.peer.session.last_receive_s
         if known is None:
             refusal = self._admission.admit_arrival(address.host, now_s)

@@ -181,13 +181,12 @@ class Session:
         """Return the events that data causes, in order. Never raises, whatever data holds."""
         events: List[Event] = []
         messages = self._messages
-        has_message = False
         self.last_receive_s = now_s
         for topic_id, payload in self.reader.receive_pairs(data):
             topic = messages.get(topic_id)
             if topic is not None:
                 events.append((topic, payload))
-                has_message = True
+                self._last_configured_s = now_s
                 continue
             try:
                 event = self._receive_special(topic_id, payload, now_s, time_of_day_s)
@@ -195,8 +194,6 @@ class Session:
                 event = Problem(str(error))
             if event is not None:
                 events.append(event)
-        if has_message:
-            self._last_configured_s = now_s
         return events
 
     def poll(self, now_s: float) -> List[Event]:
