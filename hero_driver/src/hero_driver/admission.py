@@ -13,6 +13,13 @@ RATE_WINDOW_S = 1.0
 GARBAGE_LENGTH_MAX = 65536
 """Bytes without a good frame after which a peer is none of ours; a robot's truncated frame has below 1 kB."""
 
+GARBAGE_REST_LENGTH = 4096
+"""So much without a good frame is no robot's leftover of an earlier connection; it comes with one read."""
+
+GARBAGE_REST_S = 0.2
+"""Between two reads of a stranger that sends garbage: to search one read takes up to 1 ms, so that it delays fewer than
+one message of a hundred."""
+
 ARRIVALS_PER_S = 5.0
 """New robots of one address for which topics are set up, after as many at once as it may have connections: each costs
 20 calls to the ROS master. One hundred simulated robots that are started again every 30 s stay below it."""
@@ -195,3 +202,7 @@ class RateGuard:
         if length - self._good_length > GARBAGE_LENGTH_MAX:
             return "%d bytes without one good frame: this does not speak rosserial" % (length - self._good_length)
         return None
+
+    def hears_garbage(self, length: int) -> bool:
+        """Return whether so much without a good frame is among the last bytes that have come, length in all."""
+        return length - self._good_length >= GARBAGE_REST_LENGTH

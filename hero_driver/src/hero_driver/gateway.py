@@ -11,7 +11,7 @@ import traceback
 from typing import Callable, Dict, List, Optional
 
 from . import log_lines, names
-from .admission import Admission, RateGuard
+from .admission import GARBAGE_REST_S, Admission, RateGuard
 from .cleaning import TRANSFORMS, CleaningSettings
 from .command_sender import CommandSender
 from .config import DriverConfig
@@ -144,6 +144,8 @@ class Gateway(LinkHandler):
             return
         if session.outgoing:
             self._send_outgoing(peer)
+        if not events and peer.record is None and peer.guard.hears_garbage(link.received_length):
+            self._loop.rest(link, GARBAGE_REST_S)
         for event in events:
             if type(event) is tuple:
                 topic, payload = event

@@ -7,6 +7,7 @@ import pytest
 from hero_driver.admission import (
     ARRIVALS_PER_S,
     GARBAGE_LENGTH_MAX,
+    GARBAGE_REST_LENGTH,
     HOLD_S,
     PASSERS_MAX,
     PASSERS_PER_S,
@@ -156,6 +157,16 @@ def test_a_good_frame_forgives_the_garbage_before_it():
         received = 60008 * step
         assert guard.judge(step, received + 60000, step * 2.0) is None
         assert guard.judge(step + 1, received + 60008, step * 2.0 + 1.0) is None
+
+
+def test_a_read_without_a_good_frame_is_garbage_and_what_is_left_of_a_frame_is_not():
+    guard = RateGuard(5000, 2000000, 0.0)
+    guard.judge(1, 10000, 0.1)
+    guard.judge(1, 10000 + GARBAGE_REST_LENGTH - 1, 0.2)
+    assert not guard.hears_garbage(10000 + GARBAGE_REST_LENGTH - 1)
+    assert guard.hears_garbage(10000 + GARBAGE_REST_LENGTH)
+    guard.judge(2, 10000 + GARBAGE_REST_LENGTH, 0.3)
+    assert not guard.hears_garbage(10000 + GARBAGE_REST_LENGTH)
 
 
 def test_an_address_that_comes_under_ever_new_names_has_to_wait():

@@ -172,9 +172,21 @@ class EventLoop(LinkOwner, DiallerOwner):
         """Run call after delay_s; only from the loop's thread."""
         heapq.heappush(self._timers, (time.monotonic() + delay_s, next(self._timer_numbers), call))
 
-    def watch(self, link: Link, writable: bool) -> None:
-        """Choose whether the loop waits until link can be written."""
-        self._poller.modify(link.fileno(), READ | WRITE if writable else READ)
+    def watch(self, link: Link) -> None:
+        """Wait for what link is for now: to be read unless it rests, to be written where something waits."""
+        self._poller.modify(link.fileno(), (0 if link.rests else READ) | (WRITE if link.is_full else 0))
+
+    def rest(self, link: Link, delay_s: float) -> None:
+        """Read link again only after delay_s, or when its end comes; only from the loop's thread."""
+        link.rests = True
+        self.watch(link)
+
+        def resume() -> None:
+            link.rests = False
+            if not link.closed:
+                self.watch(link)
+
+        self.call_later(delay_s, resume)
 
     def close_link(self, link: Link, reason: str) -> None:
         """Close link and tell the handler; safe to call twice."""
@@ -303,7 +315,7 @@ class EventLoop(LinkOwner, DiallerOwner):
 
     def _serve_write(self, link: Link) -> None:
         if link.flush() and not link.closed:
-            self.watch(link, writable=False)
+            self.watch(link)
 
     def _poll_links(self) -> None:
         self.call_later(POLL_INTERVAL_S, self._poll_links)

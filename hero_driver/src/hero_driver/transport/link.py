@@ -68,8 +68,8 @@ class LinkOwner:
         """Run call on the loop's thread, soon; from any thread."""
         raise NotImplementedError
 
-    def watch(self, link: "Link", writable: bool) -> None:
-        """Choose whether the loop waits until link can be written."""
+    def watch(self, link: "Link") -> None:
+        """What link is to be waited for has changed."""
         raise NotImplementedError
 
     def close_link(self, link: "Link", reason: str) -> None:
@@ -86,6 +86,7 @@ class Link:
         """acknowledges_at_once: what is read is acknowledged now, not within 40 ms as Linux would."""
         self.address = address
         self.closed = False
+        self.rests = False  # it is not read for a while
         self.peer: Any = None  # the handler's own record of who is at the other end
         self.handed_length = 0  # bytes of all frames given to send_frame()
         self.received_length = 0  # bytes of all that read() has returned
@@ -108,7 +109,7 @@ class Link:
         rest = self._write(frame)
         if rest:
             self._keep(rest)
-            self._loop.watch(self, writable=True)
+            self._loop.watch(self)
 
     def read_unacknowledged_length(self) -> int:
         """Return how many bytes of frames the peer's TCP has not acknowledged.
@@ -134,6 +135,11 @@ class Link:
     def fileno(self) -> int:
         """Return the socket's file descriptor."""
         return self._socket.fileno()
+
+    @property
+    def is_full(self) -> bool:
+        """Whether frames wait until the socket takes them."""
+        return bool(self._unsent)
 
     def read(self) -> bytes:
         """Return what has come, nothing if there is nothing; close at the end of the stream and where it broke."""

@@ -1,0 +1,96 @@
+"""A real loop with real connections: when a link is read, and when not."""
+
+import socket
+import struct
+import threading
+
+import pytest
+
+from hero_driver.transport import EventLoop, LinkHandler, TransportSettings
+
+DEADLINE_S = 20.0
+REST_S = 0.2
+
+
+class Handler(LinkHandler):
+    """Lets a link rest after each read, and notes what comes when."""
+
+    def __init__(self, rest_s):
+        self.changed = threading.Condition()
+        self.reads = []  # pairs: bytes, when they were read
+        self.endings = []
+        self.loop = None
+        self._rest_s = rest_s
+
+    def open_link(self, link):
+        """Take everybody."""
+
+    def receive_data(self, link, data, now_s):
+        with self.changed:
+            self.reads.append((data, now_s))
+            self.changed.notify_all()
+        self.loop.rest(link, self._rest_s)
+
+    def poll_link(self, link, now_s):
+        """Have nothing to do."""
+
+    def close_link(self, link, reason):
+        with self.changed:
+            self.endings.append(reason)
+            self.changed.notify_all()
+
+    def wait(self, condition):
+        with self.changed:
+            assert self.changed.wait_for(condition, DEADLINE_S)
+
+
+@pytest.fixture
+def start():
+    loops = []
+
+    def start_loop(rest_s):
+        handler = Handler(rest_s)
+        handler.loop = EventLoop(TransportSettings("127.0.0.1", 0, (), 1.0, True), handler)
+        handler.loop.open()
+        thread = threading.Thread(target=handler.loop.run, daemon=True)
+        thread.start()
+        loops.append((handler.loop, thread))
+        return handler, socket.create_connection(handler.loop.listening)
+
+    yield start_loop
+    for loop, thread in loops:
+        loop.stop()
+        thread.join(DEADLINE_S)
+
+
+def test_a_link_that_rests_is_read_when_the_time_is_over_and_loses_nothing(start):
+    handler, far = start(REST_S)
+    with far:
+        far.sendall(b"first")
+        handler.wait(lambda: len(handler.reads) == 1)
+        far.sendall(b"second")
+        handler.wait(lambda: len(handler.reads) == 2)
+    (first, first_s), (second, second_s) = handler.reads
+    assert (first, second) == (b"first", b"second")
+    assert second_s - first_s >= REST_S
+
+
+def test_a_link_that_rests_does_not_hold_up_another(start):
+    handler, far = start(DEADLINE_S)
+    with far, socket.create_connection(handler.loop.listening) as other:
+        far.sendall(b"first")
+        handler.wait(lambda: len(handler.reads) == 1)
+        far.sendall(b"second")
+        other.sendall(b"other")
+        handler.wait(lambda: len(handler.reads) == 2)
+        assert handler.reads[1][0] == b"other"
+
+
+def test_a_link_that_breaks_while_it_rests_is_closed_at_once(start):
+    handler, far = start(10 * DEADLINE_S)
+    far.sendall(b"first")
+    handler.wait(lambda: len(handler.reads) == 1)
+    far.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    far.close()
+    handler.wait(lambda: handler.endings)
+    assert handler.endings == ["read failed: Connection reset by peer"]
