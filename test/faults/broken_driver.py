@@ -14,7 +14,7 @@ from hero_driver import node
 from hero_driver.gateway import Gateway
 from hero_driver.transport import EventLoop
 
-PARTS = {"loop": (EventLoop, "_run_due"), "open_link": (Gateway, "open_link")}
+PARTS = {"loop": (EventLoop, "_run_once"), "open_link": (Gateway, "open_link")}
 
 
 def break_part(part, trigger):
