@@ -203,6 +203,7 @@ class RateGuard:
             return "%d bytes without one good frame: this does not speak rosserial" % (length - self._good_length)
         return None
 
-    def hears_garbage(self, length: int) -> bool:
-        """Return whether so much without a good frame is among the last bytes that have come, length in all."""
-        return length - self._good_length >= GARBAGE_REST_LENGTH
+    @property
+    def hears_garbage(self) -> bool:
+        """Whether GARBAGE_REST_LENGTH bytes or more have come since the last good frame."""
+        return self._length - self._good_length >= GARBAGE_REST_LENGTH

@@ -207,16 +207,16 @@ class MessageCleaner:
         self._offsets_ns.append(stamp_ns - arrival_ns)
         self.transforms.passed_ns = 0  # another burst
         self._raw_sink.publish(payload)
+        corrected_ns = self._stamps.correct(self._odom_name, stamp_ns, arrival_ns)
         if self._has_encoder:
             if self._held:
                 self._release()
                 self._encoder_follows = False
             self._odom_stamp_ns = stamp_ns
             if self._encoder_follows and abs(stamp_ns - self._encoder_stamp_ns) > BURST_NS:
-                corrected_ns = self._stamps.correct(self._odom_name, stamp_ns, arrival_ns)
                 self._held.append((self._write_odometry, corrected_ns, payload))
                 return
-        self._write_odometry(self._stamps.correct(self._odom_name, stamp_ns, arrival_ns), payload)
+        self._write_odometry(corrected_ns, payload)
 
     def _clean_encoder(self, name: str, sink: Sink, payload: bytes, arrival_ns: int) -> None:
         reading = wire_messages.read_encoder(payload)

@@ -144,7 +144,7 @@ class Gateway(LinkHandler):
             return
         if session.outgoing:
             self._send_outgoing(peer)
-        if not events and peer.record is None and peer.guard.hears_garbage(link.received_length):
+        if not events and peer.record is None and peer.guard.hears_garbage:
             self._loop.rest(link, GARBAGE_REST_S)
         for event in events:
             if type(event) is tuple:

@@ -163,10 +163,11 @@ def test_a_read_without_a_good_frame_is_garbage_and_what_is_left_of_a_frame_is_n
     guard = RateGuard(5000, 2000000, 0.0)
     guard.judge(1, 10000, 0.1)
     guard.judge(1, 10000 + GARBAGE_REST_LENGTH - 1, 0.2)
-    assert not guard.hears_garbage(10000 + GARBAGE_REST_LENGTH - 1)
-    assert guard.hears_garbage(10000 + GARBAGE_REST_LENGTH)
+    assert not guard.hears_garbage
+    guard.judge(1, 10000 + GARBAGE_REST_LENGTH, 0.2)
+    assert guard.hears_garbage
     guard.judge(2, 10000 + GARBAGE_REST_LENGTH, 0.3)
-    assert not guard.hears_garbage(10000 + GARBAGE_REST_LENGTH)
+    assert not guard.hears_garbage
 
 
 def test_an_address_that_comes_under_ever_new_names_has_to_wait():

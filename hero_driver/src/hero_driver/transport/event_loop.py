@@ -134,9 +134,8 @@ class EventLoop(LinkOwner, DiallerOwner):
             serve = serves.get(descriptor)
             if serve is not None:
                 serve(mask)
-        if self._calls:
-            for _ in range(len(self._calls)):
-                self._call(self._calls.popleft())
+        for _ in range(len(self._calls)):
+            self._call(self._calls.popleft())
         now_s = self._turned_s = time.monotonic()
         while self._timers and self._timers[0][0] <= now_s:
             self._call(heapq.heappop(self._timers)[2])
