@@ -24,12 +24,12 @@ HOST_LINES_MAX = 300
 """Lines about what comes from one address in THROTTLE_S, however many robots it says that it is; a hundred
 simulated robots that join at once are a hundred lines."""
 
-_LOG_FUNCTIONS = {
-    "debug": rospy.logdebug,
-    "info": rospy.loginfo,
-    "warn": rospy.logwarn,
-    "error": rospy.logerr,
-    "fatal": rospy.logfatal,
+_LEVELS = {
+    "debug": (logging.DEBUG, rospy.logdebug),
+    "info": (logging.INFO, rospy.loginfo),
+    "warn": (logging.WARNING, rospy.logwarn),
+    "error": (logging.ERROR, rospy.logerr),
+    "fatal": (logging.CRITICAL, rospy.logfatal),
 }
 
 
@@ -41,13 +41,18 @@ class LogRelay:
         self._last: Dict[str, Tuple[float, int]] = {}
         self._groups: Dict[str, Tuple[float, int]] = {}
         self._reported_drops = 0
+        self._logger = logging.getLogger("rosout")  # the one of rospy's functions
 
     def log(self, level: str, text: str) -> None:
         """Log one line at level debug, info, warn, error or fatal."""
+        # Robots send a routine line per second each; to hand one over costs more than a burst of their data.
+        number, write = _LEVELS[level]
+        if not self._logger.isEnabledFor(number):
+            return
         dropped = self._worker.refused_jobs
         if dropped != self._reported_drops:
             text = "%s (%d log lines before it were dropped)" % (text, dropped - self._reported_drops)
-        if self._worker.submit(lambda: _LOG_FUNCTIONS[level]("%s", text)):
+        if self._worker.submit(lambda: write("%s", text)):
             self._reported_drops = dropped
 
     def log_throttled(self, level: str, key: str, text: str, group: str = "", host: str = "") -> None:

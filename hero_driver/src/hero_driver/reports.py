@@ -79,14 +79,15 @@ class Reporter:
             self._rates.pop(namespace, None)
 
     def diagnose(self) -> None:
-        """Publish /diagnostics."""
+        """Publish /diagnostics, where somebody listens."""
         robots = {robot.namespace: robot for robot in self._status.robots}
         for namespace in set(self._known) - set(robots):
             self._updater.removeByName(namespace.lstrip("/"))
         for namespace in sorted(set(robots) - set(self._known)):
             self._updater.add(namespace.lstrip("/"), self._make_robot_task(namespace))
         self._known = robots
-        self._updater.force_update()
+        if self._updater.publisher.get_num_connections():
+            self._updater.force_update()
 
     def _describe(self, robot: RobotStatus, now_s: float, ros_now: rospy.Time) -> Robot:
         frames_per_s, bytes_per_s = self._rates.get(robot.namespace, (0.0, 0.0))

@@ -1,0 +1,62 @@
+"""LogRelay: which lines reach rospy's logger."""
+
+import logging
+
+import pytest
+
+from hero_driver.log_relay import LogRelay
+
+
+class Lines(logging.Handler):
+    """Keeps what is logged."""
+
+    def __init__(self):
+        super().__init__()
+        self.texts = []
+
+    def emit(self, record):
+        """Take a line."""
+        self.texts.append((record.levelname, record.getMessage()))
+
+
+@pytest.fixture(name="rosout")
+def make_rosout():
+    """Give rospy's logger with a handler that keeps lines; what it was before comes back."""
+    logger = logging.getLogger("rosout")
+    level, lines = logger.level, Lines()
+    logger.addHandler(lines)
+    yield logger, lines.texts
+    logger.removeHandler(lines)
+    logger.setLevel(level)
+
+
+@pytest.mark.parametrize(
+    ("level", "first"),
+    [(logging.DEBUG, 0), (logging.INFO, 1), (logging.WARNING, 2), (logging.ERROR, 3), (logging.CRITICAL, 4)],
+)
+def test_logs_what_the_level_lets_through(rosout, level, first):
+    logger, texts = rosout
+    relay = LogRelay()
+    logger.setLevel(level)
+    for name in ("debug", "info", "warn", "error", "fatal"):
+        relay.log(name, "a %s line, 100 %%" % name)
+    relay.close()
+    expected = [
+        ("DEBUG", "a debug line, 100 %"),
+        ("INFO", "a info line, 100 %"),
+        ("WARNING", "a warn line, 100 %"),
+        ("ERROR", "a error line, 100 %"),
+        ("CRITICAL", "a fatal line, 100 %"),
+    ]
+    assert texts == expected[first:]
+
+
+def test_a_level_that_is_set_later_counts(rosout):
+    logger, texts = rosout
+    relay = LogRelay()
+    logger.setLevel(logging.INFO)
+    relay.log("debug", "before")
+    logger.setLevel(logging.DEBUG)
+    relay.log("debug", "after")
+    relay.close()
+    assert texts == [("DEBUG", "after")]
