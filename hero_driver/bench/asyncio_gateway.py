@@ -42,7 +42,7 @@ class Robot(asyncio.Protocol):
 
     def data_received(self, data):
         """Pass on what came."""
-        for topic_id, payload in self._reader.receive_pairs(data):
+        for topic_id, payload in zip(*self._reader.receive_columns(data)):
             publish = self._publishers.get(topic_id)
             if publish is not None:
                 publish(payload)

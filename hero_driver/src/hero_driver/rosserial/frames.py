@@ -7,15 +7,17 @@ states of spinOnce()).
 """
 
 import functools
+import operator
 import struct
-from typing import Callable, Dict, List, NamedTuple, Optional, Tuple, Union
+from typing import Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple, Union
 from zlib import adler32
 
 from .errors import FrameTooLongError, TopicIdError
 
 Bytes = Union[bytes, bytearray, memoryview]
 
-_Start = Tuple[int, int]  # length of a whole frame and its topic id, as its header says
+Columns = Tuple[Sequence[int], Sequence[bytes]]  # topic ids and payloads of frames, in order
+_Shape = Tuple[Tuple[int, int], ...]  # topic ids and lengths of payloads of frames in a row
 
 SYNC = b"\xff\xfe"
 """Start of every frame; the second byte is the version of the protocol (0xff was version 1)."""
@@ -32,8 +34,11 @@ CHECKED_OFFSET = 5
 _PAYLOAD = slice(HEADER_LENGTH - CHECKED_OFFSET, -1)
 """Where the payload lies in the bytes that are checked."""
 
-KNOWN_HEADERS_MAX = 64
-"""Headers that a reader remembers; a stock robot sends about ten different ones, and log lines of any length."""
+PATTERNS_MAX = 16
+"""Patterns of frames that a reader remembers; a stock robot's bursts have about six."""
+
+PATTERN_FRAMES_MAX = 16
+"""Frames of a pattern; a burst has seven, and at times laser, IMU and log."""
 
 LONGEST_PAYLOAD_LENGTH = 0xFFFF
 """What the 16-bit length field can say."""
@@ -108,6 +113,49 @@ def _encode_header(topic_id: int, length: int) -> Tuple[bytes, int]:
     return _HEADER.pack(SYNC, length, length_checksum, topic_id), (topic_id & 0xFF) + (topic_id >> 8)
 
 
+class _Pattern:
+    """Frames in a row that have come together before: cut and checked by a few calls, not one by one.
+
+    Attributes:
+        end: offset of the first byte behind them.
+    """
+
+    def __init__(self, shape: _Shape) -> None:
+        self._ids = tuple(topic_id for topic_id, _ in shape)
+        self._headers = tuple(_encode_header(topic_id, length)[0] for topic_id, length in shape)
+        self._cut = struct.Struct(
+            "<" + "".join("%ds%dsx" % (HEADER_LENGTH, length) for _, length in shape)
+        ).unpack_from
+        self._long: List[slice] = []  # what adler32 cannot check by itself
+        short = "<"
+        self.end = 0
+        for _, length in shape:
+            start, self.end = self.end + CHECKED_OFFSET, self.end + OVERHEAD_LENGTH + length
+            checked_length = self.end - start
+            if checked_length <= _EXACT_ADLER_LENGTH:
+                short += "%dx%ds" % (CHECKED_OFFSET, checked_length)
+            else:
+                short += "%dx" % (CHECKED_OFFSET + checked_length)
+                self._long.append(slice(start, self.end))
+        self._cut_short = struct.Struct(short).unpack_from
+
+    def read(self, buffer: bytes) -> Optional[Columns]:
+        """Return the frames at the start of buffer, which is long enough; None where one is another or wrong."""
+        fields = self._cut(buffer)
+        if fields[::2] != self._headers:
+            return None
+        # Each is one more than a sum, of which the last byte is 255 where everything is right.
+        if functools.reduce(operator.or_, map(adler32, self._cut_short(buffer)), 0) & 0xFF:
+            return None
+        for checked in self._long:
+            if sum_bytes(buffer[checked]) != 0xFF:
+                return None
+        return self._ids, fields[1::2]
+
+
+_make_pattern = functools.lru_cache(maxsize=256)(_Pattern)  # robots have patterns in common
+
+
 class FrameReader:
     """Cuts a stream of bytes into frames, whatever arrives.
 
@@ -128,7 +176,9 @@ class FrameReader:
         self.bad_frames = 0
         self.skipped_bytes = 0
         self._rest = b""
-        self._known: Dict[bytes, _Start] = {}
+        # By the length of the bytes at hand: what they held last, and if twice the same, the pattern of it.
+        self._shapes: Dict[int, _Shape] = {}
+        self._patterns: Dict[int, _Pattern] = {}
 
     @property
     def buffered_length(self) -> int:
@@ -137,42 +187,65 @@ class FrameReader:
 
     def receive_bytes(self, data: Bytes) -> List[Frame]:
         """Return the frames that data completes, in order. Never raises, whatever data holds."""
-        return [Frame(*pair) for pair in self.receive_pairs(data)]
+        return list(map(Frame, *self.receive_columns(data)))
 
-    def receive_pairs(self, data: Bytes) -> List[Tuple[int, bytes]]:
-        """As receive_bytes(), but plain pairs of topic id and payload, which cost a fifth of a Frame."""
+    def receive_columns(self, data: Bytes) -> Columns:
+        """As receive_bytes(), but topic ids and payloads apart, which costs less than a Frame for each."""
         buffer = self._rest + bytes(data) if self._rest else bytes(data)
         end = len(buffer)
-        frames: List[Tuple[int, bytes]] = []
-        position = 0
+        # A robot sends the same few frames all the time.
+        pattern = self._patterns.get(end)
+        columns = None if pattern is None else pattern.read(buffer)
+        if pattern is None or columns is None:
+            skipped_bytes = self.skipped_bytes
+            columns = self._read_one_by_one(buffer, 0)
+            if columns[0] and self.skipped_bytes == skipped_bytes:
+                self._learn_pattern(end, columns)
+        elif pattern.end < end:
+            ids, payloads = self._read_one_by_one(buffer, pattern.end)
+            columns = (*columns[0], *ids), (*columns[1], *payloads)
+        else:
+            self._rest = b""
+        self.frames += len(columns[0])
+        return columns
+
+    def _read_one_by_one(self, buffer: bytes, position: int) -> Columns:
+        """Return the frames from position on, and keep what is not complete yet."""
+        end = len(buffer)
+        ids: List[int] = []
+        payloads: List[bytes] = []
         while position < end:
-            # A robot sends the same few headers all the time; one that was right once is right.
-            start = self._known.get(buffer[position : position + HEADER_LENGTH])
-            if start is None:
-                position, start = self._find_start(buffer, position, end)
-                if start is None:
-                    break
-            frame_length, topic_id = start
+            position, frame_length, topic_id = self._find_start(buffer, position, end)
             frame_end = position + frame_length
-            if frame_end > end:
+            if frame_length == 0 or frame_end > end:
                 break
             checked = buffer[position + CHECKED_OFFSET : frame_end]
-            if frame_length <= _EXACT_ADLER_LENGTH:
-                # One more than the sum, of which the last byte is 255 where everything is right.
-                is_wrong = adler32(checked) & 0xFF
-            else:
-                is_wrong = sum_bytes(checked) != 0xFF
-            if is_wrong:
+            if sum_bytes(checked) != 0xFF:
                 position = self._skip_bad_start(position)
                 continue
-            frames.append((topic_id, checked[_PAYLOAD]))
+            ids.append(topic_id)
+            payloads.append(checked[_PAYLOAD])
             position = frame_end
         self._rest = buffer[position:]
-        self.frames += len(frames)
-        return frames
+        return ids, payloads
 
-    def _find_start(self, buffer: bytes, position: int, end: int) -> Tuple[int, Optional[_Start]]:
-        """Return where the next right header begins, and what it says: None where it is not complete yet."""
+    def _learn_pattern(self, length: int, columns: Columns) -> None:
+        """Note that length bytes began with these frames, nothing between them."""
+        ids, payloads = columns
+        if len(ids) > PATTERN_FRAMES_MAX:
+            return
+        shape = tuple(zip(ids, map(len, payloads)))
+        if self._shapes.get(length) == shape:
+            if len(self._patterns) >= PATTERNS_MAX:
+                self._patterns.clear()
+            self._patterns[length] = _make_pattern(shape)
+        else:
+            if len(self._shapes) >= PATTERNS_MAX:
+                self._shapes.clear()
+            self._shapes[length] = shape
+
+    def _find_start(self, buffer: bytes, position: int, end: int) -> Tuple[int, int, int]:
+        """Return where the next right header begins, how long its frame is, 0 if that is not there yet, and its id."""
         while True:
             if not buffer.startswith(SYNC, position):
                 start = self._find_sync(buffer, position)
@@ -180,15 +253,11 @@ class FrameReader:
                 position = start
             if end - position < HEADER_LENGTH:
                 if not self._has_bad_length(buffer, position, end):
-                    return position, None
+                    return position, 0, 0
             else:
                 length, length_checksum, topic_id = _FIELDS.unpack_from(buffer, position + len(SYNC))
                 if self._is_length(length, length_checksum):
-                    if len(self._known) >= KNOWN_HEADERS_MAX:
-                        self._known.clear()
-                    known = (OVERHEAD_LENGTH + length, topic_id)
-                    self._known[buffer[position : position + HEADER_LENGTH]] = known
-                    return position, known
+                    return position, OVERHEAD_LENGTH + length, topic_id
             position = self._skip_bad_start(position)
 
     def _is_length(self, length: int, checksum: int) -> bool:

@@ -179,11 +179,24 @@ class Session:
 
     def receive_bytes(self, data: Bytes, now_s: float, time_of_day_s: float) -> List[Event]:
         """Return the events that data causes, in order. Never raises, whatever data holds."""
-        events: List[Event] = []
-        messages = self._messages
         self.last_receive_s = now_s
-        for topic_id, payload in self.reader.receive_pairs(data):
-            topic = messages.get(topic_id)
+        ids, contents = self.reader.receive_columns(data)
+        try:
+            # Most reads hold messages only.
+            topics = list(map(self._messages.__getitem__, ids))
+        except KeyError:
+            return self._receive_each(ids, contents, now_s, time_of_day_s)
+        if topics:
+            self._last_configured_s = now_s
+        return list(zip(topics, contents))
+
+    def _receive_each(
+        self, ids: Sequence[int], contents: Sequence[bytes], now_s: float, time_of_day_s: float
+    ) -> List[Event]:
+        events: List[Event] = []
+        for topic_id, payload in zip(ids, contents):
+            # What came before in this read may have declared it.
+            topic = self._messages.get(topic_id)
             if topic is not None:
                 events.append((topic, payload))
                 self._last_configured_s = now_s

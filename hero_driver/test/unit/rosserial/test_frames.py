@@ -45,6 +45,10 @@ def read_in_pieces(data, cuts):
     return frames, reader
 
 
+def count(reader):
+    return reader.frames, reader.bad_frames, reader.skipped_bytes, reader.buffered_length
+
+
 @by_vector
 def test_a_frame_is_encoded_as_written_by_hand(vector):
     assert encode_frame(vector.topic_id, vector.payload) == vector.data
@@ -156,12 +160,61 @@ def test_any_cut_of_a_stream_gives_the_same_frames_and_counters(before, sent, be
     cuts = data.draw(st.lists(st.integers(0, len(stream)), max_size=20))
     pieces, reader = read_in_pieces(stream, cuts)
     assert pieces == whole
-    assert (reader.frames, reader.bad_frames, reader.skipped_bytes, reader.buffered_length) == (
-        whole_reader.frames,
-        whole_reader.bad_frames,
-        whole_reader.skipped_bytes,
-        whole_reader.buffered_length,
+    assert count(reader) == count(whole_reader)
+
+
+def make_experienced_reader(data):
+    """Return a reader that has read data often enough to know what it looks like."""
+    reader = FrameReader()
+    for _ in range(3):
+        assert reader.receive_bytes(data)
+    return reader
+
+
+@pytest.mark.parametrize("flip", [0x01, 0x80, 0xFF])
+def test_a_burst_that_came_before_is_read_as_one_that_did_not_whichever_byte_is_wrong(flip):
+    long, just_short, just_long = bytes(range(256)) * 2 + b"longer", bytes(253), b"x" * 254
+    frames = [(125, long), (130, b"short"), (131, b""), (132, just_short), (133, just_long)]
+    data = b"".join(build_frame(*frame) for frame in frames)
+    reader = make_experienced_reader(data)
+    assert reader.receive_bytes(data) == frames
+    assert count(reader) == (4 * len(frames), 0, 0, 0)
+    for position in range(len(data)):
+        broken = bytearray(data)
+        broken[position] ^= flip
+        fresh, experienced = FrameReader(), make_experienced_reader(data)
+        assert experienced.receive_bytes(bytes(broken)) == fresh.receive_bytes(bytes(broken)), position
+        assert count(experienced)[1:] == count(fresh)[1:], position
+        assert experienced.receive_bytes(GOOD.data) == fresh.receive_bytes(GOOD.data), position
+
+
+def test_a_burst_that_came_before_is_not_taken_for_one_of_the_same_length():
+    one = build_frame(125, b"abc") + build_frame(126, b"defgh")
+    other = build_frame(125, b"abcd") + build_frame(127, b"efgh")
+    reader = make_experienced_reader(one)
+    for _ in range(4):
+        assert reader.receive_bytes(other) == [(125, b"abcd"), (127, b"efgh")]
+    assert reader.receive_bytes(one) == [(125, b"abc"), (126, b"defgh")]
+
+
+@given(
+    sent=st.lists(st.tuples(topic_ids, st.binary(max_size=300)), min_size=1, max_size=4),
+    between=noise,
+    wrong=st.lists(st.tuples(st.integers(0, 10**6), st.integers(1, 255)), max_size=3),
+    data=st.data(),
+)
+def test_bursts_cut_again_and_again_at_the_same_places_give_the_same_frames_and_counters(sent, between, wrong, data):
+    burst = b"".join(build_frame(*frame) for frame in sent) + between
+    stream = bytearray(burst * 6)
+    for position, flip in wrong:
+        stream[position % len(stream)] ^= flip
+    cuts = data.draw(st.lists(st.integers(0, len(burst) - 1), max_size=3))
+    whole, whole_reader = read_in_pieces(bytes(stream), [])
+    pieces, reader = read_in_pieces(
+        bytes(stream), [len(burst) * number + cut for number in range(6) for cut in [0, *cuts]]
     )
+    assert pieces == whole
+    assert count(reader) == count(whole_reader)
 
 
 @given(chunks=st.lists(st.one_of(noise, st.binary(max_size=2000)), max_size=20), limit=st.integers(0, 300))
