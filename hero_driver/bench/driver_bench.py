@@ -5,6 +5,7 @@ taken from the operating system's accounting (/proc). Run it with script/bench d
 """
 
 import argparse
+import contextlib
 import csv
 import json
 import os
@@ -17,6 +18,9 @@ import time
 import timeit
 from pathlib import Path
 
+import rosgraph
+
+LISTENING = "0A"  # state of a socket in /proc/net/tcp, TCP_LISTEN of the kernel
 HERE = Path(__file__).resolve().parent
 TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 SETTLE_S = 3.0
@@ -105,12 +109,17 @@ def wait_for_port(port, process):
             if sock.connect_ex(("127.0.0.1", port)) == 0:
                 return
         time.sleep(0.05)
-    raise SystemExit("bench: the server does not listen on port %d; see what it printed above" % port)
+    raise SystemExit(
+        "bench: %s does not listen on port %d; start it by hand to see why" % (" ".join(process.args), port)
+    )
 
 
 def start(command, environment, **options):
     """Start a program in a process group of its own."""
-    return subprocess.Popen(command, env=environment, start_new_session=True, text=True, **options)
+    try:
+        return subprocess.Popen(command, env=environment, start_new_session=True, text=True, **options)
+    except OSError as error:
+        raise SystemExit("bench: %s cannot be started: %s" % (command[0], error.strerror)) from error
 
 
 def stop(process, number=signal.SIGINT):
@@ -129,20 +138,45 @@ def find_settling_s(count):
     return SETTLE_S + 0.05 * count
 
 
-def start_servers(options, environment):
-    """Start the servers; return pairs of process and port once all listen."""
+def find_listener(port):
+    """Return the process that listens on a TCP port of this machine."""
+    sockets = set()
+    for table in ("/proc/net/tcp", "/proc/net/tcp6"):
+        with contextlib.suppress(FileNotFoundError):
+            for line in Path(table).read_text().splitlines()[1:]:
+                fields = line.split()
+                if fields[3] == LISTENING and int(fields[1].rpartition(":")[2], 16) == port:
+                    sockets.add("socket:[%s]" % fields[9])
+    for entry in Path("/proc").iterdir():
+        # A process that ends, or somebody else's, shows no files.
+        with contextlib.suppress(OSError):
+            if entry.name.isdigit() and any(os.readlink(file) in sockets for file in (entry / "fd").iterdir()):
+                return int(entry.name)
+    raise SystemExit("bench: no process that may be looked at listens on port %d; start it, as the same user" % port)
+
+
+@contextlib.contextmanager
+def serve(options, environment):
+    """Give pairs of process id and port of the servers, which listen; those started here end afterwards."""
+    if options.port:
+        yield [(find_listener(options.port), options.port)]
+        return
     servers = []
-    for index in range(options.drivers):
-        port = find_free_port()
-        command = options.server_command.format(port=port).split()
-        if index:
-            # A second node of one name would end the first.
-            command.append("__name:=hero_driver_%d" % index)
-        process = start(command, environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        servers.append((process, port))
-    for process, port in servers:
-        wait_for_port(port, process)
-    return servers
+    try:
+        for index in range(options.drivers):
+            port = find_free_port()
+            command = options.server_command.format(port=port).split()
+            if index:
+                # A second node of one name would end the first.
+                command.append("__name:=hero_driver_%d" % index)
+            process = start(command, environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            servers.append((process, port))
+        for process, port in servers:
+            wait_for_port(port, process)
+        yield [(process.pid, port) for process, port in servers]
+    finally:
+        for process, _ in servers:
+            stop(process)
 
 
 def start_swarms(options, count, servers, environment):
@@ -172,8 +206,7 @@ def collect(swarms):
 def run_once(options, count, environment):
     """Return the figures of one run with count robots."""
     load = [sys.executable, str(HERE / "ros_load.py")]
-    servers = start_servers(options, environment)
-    try:
+    with serve(options, environment) as servers:
         # The probe of the port was a connection too: let the server forget it.
         time.sleep(1.0)
         arguments = ["--robots", str(0 if options.unheard else count)]
@@ -184,23 +217,20 @@ def run_once(options, count, environment):
         time.sleep(find_settling_s(count))
 
         def read_figures():
-            server_s = sum(read_cpu_s(process.pid) for process, _ in servers)
+            server_s = sum(read_cpu_s(pid) for pid, _ in servers)
             return time.monotonic(), server_s, read_cpu_s(listener.pid), read_all_cpu_s()
 
         window_start_s = time.time()
         before = read_figures()
         time.sleep(options.seconds)
         after = read_figures()
-        ours = set(find_tree(os.getpid()))
+        ours = {pid for root in (os.getpid(), *(pid for pid, _ in servers)) for pid in find_tree(root)}
         window_end_s = time.time()
-        memory_mb = sum(read_memory_mb(process.pid) for process, _ in servers)
+        memory_mb = sum(read_memory_mb(pid) for pid, _ in servers)
         sent = collect(swarms)
         time.sleep(0.5)
         listened = json.loads(stop(listener))
         commanded = json.loads(stop(commander))
-    finally:
-        for process, _ in servers:
-            stop(process)
     elapsed_s = after[0] - before[0]
     busy_s = {pid: total_s - before[3].get(pid, 0.0) for pid, total_s in after[3].items()}
 
@@ -288,6 +318,38 @@ def take_medians(runs):
     return result
 
 
+@contextlib.contextmanager
+def use_master(options):
+    """Give the environment in which the ROS master is found: with --port the one that runs, else one for this only."""
+    if options.port:
+        refuse_robots()
+        yield dict(os.environ)
+        return
+    port = find_free_port()
+    environment = dict(os.environ, ROS_MASTER_URI="http://localhost:%d" % port)
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    master = start(["roscore", "-p", str(port)], environment, **quiet)
+    try:
+        wait_for_port(port, master)
+        yield environment
+    finally:
+        stop(master)
+
+
+def refuse_robots():
+    """End where robots are there already: the commands of the benchmark would drive them."""
+    try:
+        topics = rosgraph.Master("/driver_bench").getPublishedTopics("/")
+    except OSError as error:
+        raise SystemExit("bench: no ROS master at %s (%s)" % (rosgraph.get_master_uri(), error)) from error
+    robots = [name for name, _ in topics if name.endswith("/odom")]
+    if robots:
+        raise SystemExit(
+            "bench: there are robots already (%s), which the commands of the benchmark would drive; switch them off,"
+            " wait until the server has taken their topics down, or start it again" % ", ".join(sorted(robots)[:5])
+        )
+
+
 def main():
     """Run from the command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -300,22 +362,22 @@ def main():
     parser.add_argument(
         "--nagle", action="store_true", help="robots' TCP holds small writes back, as HeRo's does"
     )
-    parser.add_argument("--server-command", default=DRIVER_COMMAND, help="{port} stands for the port")
+    server = parser.add_mutually_exclusive_group()
+    server.add_argument("--server-command", default=DRIVER_COMMAND, help="{port} stands for the port")
+    server.add_argument(
+        "--port",
+        type=int,
+        help="a server that runs on this machine, under the ROS master of ROS_MASTER_URI, and has no robots yet",
+    )
     parser.add_argument("--json", metavar="FILE", help="write the figures there")
     parser.add_argument("--history", type=Path, metavar="FILE", help="add the figures to this CSV file")
     options = parser.parse_args()
-    master_port = find_free_port()
-    environment = dict(os.environ, ROS_MASTER_URI="http://localhost:%d" % master_port)
-    master = start(["roscore", "-p", str(master_port)], environment, stdout=subprocess.DEVNULL)
     machine_us = measure_machine_us()
-    try:
-        wait_for_port(master_port, master)
-        results = []
+    results = []
+    with use_master(options) as environment:
         for count in options.robots:
             runs = [run_once(options, count, environment) for _ in range(options.repeats)]
             results.append(take_medians(runs))
-    finally:
-        stop(master)
     print_table(results, machine_us)
     if options.history:
         append_history(options.history, results, machine_us)
