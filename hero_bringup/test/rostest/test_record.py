@@ -12,6 +12,7 @@ import time
 import unittest
 
 import rosbag
+import rosgraph
 import rospy
 import rostest
 from geometry_msgs.msg import Twist, Vector3
@@ -19,8 +20,15 @@ from swarm_watch import wait_for
 
 RECORD = ["rosrun", "hero_bringup", "record"]
 TIMEOUT_S = 60.0
+ROBOT_TOPICS = ("odom", "encoder", "proximity", "ground_truth")
 DISK_STEP = 400 * 10**6
 """Bytes that are taken from the disk at once; others on this machine take less in the seconds of the test."""
+
+
+def hears_all_of(namespace):
+    """Return whether there is a subscriber of each topic of a robot that is recorded."""
+    subscribed = dict(rosgraph.Master("/test").getSystemState()[1])
+    return all(namespace + topic in subscribed for topic in ROBOT_TOPICS)
 
 
 class RecordTest(unittest.TestCase):
@@ -87,6 +95,8 @@ class RecordTest(unittest.TestCase):
         )
         publisher = rospy.Publisher("/hero_7/velocity_controller/cmd_vel", Twist, queue_size=1)
         wait_for(publisher.get_num_connections, TIMEOUT_S, "hero_7")
+        # The recorder asks the ROS master for new topics once in a while; nobody else listens to these.
+        wait_for(lambda: hears_all_of("/hero_7/"), TIMEOUT_S, "the recorder listening to hero_7")
         wait_for(lambda: self.files("hero_*_1.bag*"), TIMEOUT_S, "second file of a split")
         for _ in range(15):
             publisher.publish(Twist(angular=Vector3(0.0, 0.0, 2.0)))
@@ -104,7 +114,7 @@ class RecordTest(unittest.TestCase):
         for name in bags:
             with rosbag.Bag(os.path.join(self.folder, name)) as bag:
                 topics |= set(bag.get_type_and_topic_info().topics)
-        for topic in ("odom", "encoder", "proximity", "ground_truth"):
+        for topic in ROBOT_TOPICS:
             self.assertIn("/hero_0/" + topic, topics)
             self.assertIn("/hero_7/" + topic, topics)
         expected = {"/tf", "/tf_static", "/rosout", "/diagnostics", "/hero_driver/robots", "/hero_sim/arena"}
