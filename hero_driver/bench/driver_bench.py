@@ -1,7 +1,7 @@
 """Loads a rosserial TCP server with an emulated swarm and prints one table, and JSON with --json.
 
-Starts its own ROS master, the server, listeners and commanders, each in a process of its own; CPU time is
-taken from the operating system's accounting (/proc). Run it with script/bench driver.
+Starts its own ROS master and the server (with --port it takes those that run), listeners and commanders, each in
+a process of its own; CPU time is taken from the operating system's accounting (/proc). Run it with script/bench driver.
 """
 
 import argparse
