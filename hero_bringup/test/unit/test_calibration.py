@@ -7,6 +7,7 @@ import pytest
 import yaml
 
 from hero_bringup.calibration import calibrate, dead_zone, infrared, speed_response, store
+from hero_bringup.calibration.encoder_steps import TICK_M
 from hero_bringup.calibration.errors import CalibrationError
 from hero_bringup.calibration.infrared import BODY_RADIUS_M, Facing
 
@@ -16,8 +17,17 @@ def servo_speeds(pulses_us, centre_us, zone_us=30.0, gain=1.0, sign=1.0, noise_m
     beyond = np.asarray(pulses_us, dtype=float) - centre_us
     speeds = np.sign(beyond) * np.maximum(np.abs(beyond) - zone_us, 0.0) * gain * 0.25 / 220.0
     speeds = speeds + np.random.RandomState(seed).normal(0.0, 1.0, len(speeds)) * noise_m_s * (speeds != 0.0)
-    tick_m_s = speed_response.TICK_M / 0.25
+    tick_m_s = TICK_M / 0.25
     return sign * np.round(speeds / tick_m_s) * tick_m_s
+
+
+def set_clock(stamps_s, at_s, by_s):
+    """Return stamps as the driver passes them on when the robot's clock is set at at_s: never backwards."""
+    truth_s = stamps_s + np.where(stamps_s >= at_s, by_s, 0.0)
+    passed_s = [truth_s[0]]
+    for stamp_s in truth_s[1:]:
+        passed_s.append(max(stamp_s, passed_s[-1] + 1e-6))
+    return np.array(passed_s)
 
 
 class TestDeadZone:
@@ -35,6 +45,22 @@ class TestDeadZone:
         pulses_us = dead_zone.list_pulses()
         zone = dead_zone.find_dead_zone(pulses_us, servo_speeds(pulses_us, 1500.0, gain=0.8))
         assert zone.gain_m_s_us == pytest.approx(0.8 * 0.25 / 220.0, rel=0.15)
+
+    @pytest.mark.parametrize("set_by_s", [0.0, -0.07, -0.3, 0.07])
+    def test_the_speed_at_each_stair_is_right_also_where_the_clock_of_the_robot_is_set(self, set_by_s):
+        begins_s = 10.0 + np.arange(8) * dead_zone.PULSE_S
+        stamps_s = np.arange(9.0, 14.0, 0.034)
+        speeds_m_s = 0.02 * np.clip(np.floor((stamps_s - 10.1) / dead_zone.PULSE_S), -1, 7)
+        ticks = np.cumsum(speeds_m_s * 0.034) / TICK_M
+        passed_s = set_clock(stamps_s, 11.62, set_by_s)
+        left, right = dead_zone.measure_stairs(passed_s, ticks, -ticks, begins_s)
+        assert left == pytest.approx(0.02 * np.arange(8), abs=0.02)
+        assert right == pytest.approx(-left)
+
+    def test_a_stair_of_which_nothing_was_heard_is_refused(self):
+        stamps_s = np.arange(9.0, 10.6, 0.034)
+        with pytest.raises(CalibrationError, match="too few encoder readings came"):
+            dead_zone.measure_stairs(stamps_s, stamps_s, stamps_s, [10.0, 10.45])
 
     @pytest.mark.parametrize(
         ("speeds", "words"),
@@ -55,7 +81,7 @@ def drive_wheel(lag_s, steady=1.0, delay_s=0.05):
     stamps_s = np.arange(9.0, 12.0, 0.034)
     since_s = np.maximum(stamps_s - 10.0 - delay_s, 0.0)
     way_m = steady * speed_response.STEP_M_S * (since_s - lag_s * (1.0 - np.exp(-since_s / lag_s)))
-    return stamps_s, np.floor(way_m / speed_response.TICK_M)
+    return stamps_s, np.floor(way_m / TICK_M)
 
 
 class TestSpeedResponse:
@@ -69,6 +95,16 @@ class TestSpeedResponse:
         assert slow.mean_error == pytest.approx(0.4 / 1.4, abs=0.06)
         assert quick.reached_s == pytest.approx(0.23, abs=0.1)
         assert abs(quick.steady_error) < 0.05
+
+    @pytest.mark.parametrize("set_by_s", [-0.3, -0.07, -0.04, 0.07, 0.3])
+    def test_a_robot_whose_clock_is_set_meanwhile_is_judged_like_any_other(self, set_by_s):
+        stamps_s, ticks = drive_wheel(0.1)
+        steady, disturbed = (
+            speed_response.judge([speed_response.measure_speed(stamps, ticks, 10.05)])
+            for stamps in (stamps_s, set_clock(stamps_s, 10.5, set_by_s))
+        )
+        assert disturbed.mean_error == pytest.approx(steady.mean_error, abs=0.05)
+        assert disturbed.overshoot == pytest.approx(steady.overshoot, abs=0.1)
 
     def test_a_wheel_that_stays_too_slow_shows_it(self):
         response = speed_response.judge([speed_response.measure_speed(*drive_wheel(0.05, steady=0.8), 10.05)])
@@ -84,9 +120,9 @@ class TestSpeedResponse:
 
     def test_too_few_readings_are_refused(self):
         stamps_s, ticks = drive_wheel(0.1)
-        with pytest.raises(CalibrationError, match="encoder readings came"):
+        with pytest.raises(CalibrationError, match="speeds could be measured"):
             speed_response.measure_speed(stamps_s[::5], ticks[::5], 10.0)
-        with pytest.raises(CalibrationError, match="encoder readings came"):
+        with pytest.raises(CalibrationError, match="speeds could be measured"):
             speed_response.measure_speed(stamps_s[:55], ticks[:55], 10.0)
 
     def test_the_search_ends_with_the_best_gains_and_keeps_them_in_range(self):

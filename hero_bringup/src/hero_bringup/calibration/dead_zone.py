@@ -9,6 +9,7 @@ from typing import List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
+from .encoder_steps import TICK_M, find_true_steps
 from .errors import CalibrationError
 
 NOMINAL_CENTRE_US = 1500
@@ -17,6 +18,16 @@ REACH_US = 120
 dead zone of 40 us."""
 
 STEP_US = 6
+PULSE_S = 0.45
+"""Of each pulse of the staircase; the robot holds one for 1 s."""
+
+SETTLE_S = 0.2
+"""Way of a command to the robot (up to 51 ms and the network) and the lag of its servos."""
+
+LATE_S = 0.03
+"""How long after a pulse a reading is still one of it: the next command is on its way so long."""
+
+LEAST_STEPS = 2
 STANDING_M_S = 0.004
 """Slower than this a wheel stands: two ticks (1.1 mm) in a step may be the servo that settles."""
 
@@ -48,6 +59,25 @@ class DeadZone(NamedTuple):
 def list_pulses() -> List[int]:
     """Return the pulses of the staircase (us), rising."""
     return list(range(NOMINAL_CENTRE_US - REACH_US, NOMINAL_CENTRE_US + REACH_US + 1, STEP_US))
+
+
+def measure_stairs(
+    stamps_s: np.ndarray, left_ticks: np.ndarray, right_ticks: np.ndarray, begins_s: Sequence[float]
+) -> np.ndarray:
+    """Return the speeds (m/s) of both wheels (2, stairs) at each stair of the staircase, which began at begins_s.
+
+    Raises: CalibrationError if too little was heard of the robot.
+    """
+    is_true = find_true_steps(stamps_s, 1)
+    steps = np.diff([stamps_s, left_ticks, right_ticks])
+    speeds = np.zeros((2, len(begins_s)))
+    for stair, begin_s in enumerate(begins_s):
+        seen = (stamps_s[:-1] >= begin_s + SETTLE_S) & (stamps_s[1:] <= begin_s + PULSE_S + LATE_S)
+        duration_s, *ways_ticks = steps[:, seen & is_true].sum(axis=1)
+        if np.count_nonzero(seen & is_true) < LEAST_STEPS:
+            raise CalibrationError("too few encoder readings came: is the network busy? try again")
+        speeds[:, stair] = np.array(ways_ticks) * TICK_M / duration_s
+    return speeds
 
 
 def find_dead_zone(pulses_us: Sequence[float], speeds_m_s: Sequence[float]) -> DeadZone:

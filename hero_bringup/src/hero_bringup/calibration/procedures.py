@@ -22,12 +22,6 @@ from .probe import Place, Probe
 LEFT, RIGHT = 0, 1
 POLL_S = 0.02
 
-PULSE_S = 0.45
-"""Of each pulse of the staircase; the robot holds one for 1 s."""
-
-SETTLE_S = 0.2
-"""Way of a command to the robot (up to 51 ms and the network) and the lag of its servos."""
-
 REST_S = 0.6
 COMMAND_PERIOD_S = 0.1
 STOP_GAP_S = 0.15
@@ -192,11 +186,11 @@ class Session:
                 for probe in probes:
                     probe.push(pulse_us)
                 begins_s.append(rospy.get_time())
-                self.pause(PULSE_S)
+                self.pause(dead_zone.PULSE_S)
             self.rest()
 
         def judge(probe: Probe) -> None:
-            speeds = measure_stairs(probe, begins_s)
+            speeds = dead_zone.measure_stairs(*probe.read_wheels(), begins_s)
             zones = []
             for wheel, name in ((LEFT, "left"), (RIGHT, "right")):
                 try:
@@ -383,24 +377,6 @@ class Session:
             return math.remainder(wanted_rad[probe.robot_id] - probe.read_place().yaw_rad, 2.0 * math.pi)
         except CalibrationError:
             return 0.0
-
-
-def measure_stairs(probe: Probe, begins_s: Sequence[float]) -> np.ndarray:
-    """Return the speeds (m/s) of both wheels (2, steps) at each step of the staircase.
-
-    Raises: CalibrationError if too little was heard of the robot.
-    """
-    stamps_s, *ticks = probe.read_wheels()
-    speeds = np.zeros((2, len(begins_s)))
-    for step, begin_s in enumerate(begins_s):
-        seen = np.flatnonzero((stamps_s >= begin_s + SETTLE_S) & (stamps_s <= begin_s + PULSE_S + 0.03))
-        if len(seen) < 3:
-            raise CalibrationError("too few encoder readings came: is the network busy? try again")
-        duration_s = stamps_s[seen[-1]] - stamps_s[seen[0]]
-        for wheel in (LEFT, RIGHT):
-            way_ticks = ticks[wheel][seen[-1]] - ticks[wheel][seen[0]]
-            speeds[wheel, step] = way_ticks * speed_response.TICK_M / duration_s
-    return speeds
 
 
 def set_gains(probe: Probe, gains: Sequence[speed_response.Gains]) -> None:

@@ -9,10 +9,8 @@ from typing import Dict, List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
+from .encoder_steps import TICK_M, find_true_steps
 from .errors import CalibrationError
-
-TICK_M = 0.0492 * np.pi / 288.0
-"""Way of a wheel's rim for a tick (docs/robot_interface.md)."""
 
 WHEEL_SEPARATION_M = 0.063
 STEP_M_S = 0.08
@@ -43,6 +41,8 @@ PROPORTIONALS = (400.0, 900.0, 1400.0)
 FIRST_PROPORTIONAL = 650.0
 HIGHEST_GAIN = 30000.0
 """The firmware prints gains into a buffer of 100 bytes and checks none."""
+
+LEAST_SPEEDS = 20
 
 Gains = Tuple[float, float, float]
 Curve = Tuple[np.ndarray, np.ndarray]
@@ -93,15 +93,16 @@ def measure_speed(stamps_s: np.ndarray, ticks: np.ndarray, start_s: float) -> Cu
 
     Raises: CalibrationError if too little was heard of the robot.
     """
-    seen = (stamps_s >= start_s - 0.1) & (stamps_s <= start_s + STEP_S - 0.1)
-    times_s, ways_m = stamps_s[seen] - start_s, ticks[seen] * TICK_M
     apart = 3  # readings come every 34 ms, and a tick is 0.5 mm
-    if len(times_s) < 20 or times_s[-1] < LATE_S + 0.2:
+    seen = (stamps_s[:-apart] >= start_s - 0.1) & (stamps_s[apart:] <= start_s + STEP_S - 0.1)
+    kept = np.flatnonzero(seen & find_true_steps(stamps_s, apart))
+    if len(kept) < LEAST_SPEEDS or stamps_s[kept[-1] + apart] < start_s + LATE_S + 0.2:
         raise CalibrationError(
-            "only %d encoder readings came in %.1f s: is the network busy? try again" % (len(times_s), STEP_S)
+            "only %d speeds could be measured in %.1f s: is the network busy? try again" % (len(kept), STEP_S)
         )
-    between_s = times_s[apart:] - times_s[:-apart]
-    return (times_s[apart:] + times_s[:-apart]) / 2.0, (ways_m[apart:] - ways_m[:-apart]) / between_s
+    first_s, last_s = stamps_s[kept], stamps_s[kept + apart]
+    ways_m = (ticks[kept + apart] - ticks[kept]) * TICK_M
+    return (first_s + last_s) / 2.0 - start_s, ways_m / (last_s - first_s)
 
 
 def judge(curves: Sequence[Curve], wanted_m_s: float = STEP_M_S) -> Response:
