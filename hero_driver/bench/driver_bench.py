@@ -372,6 +372,8 @@ def main():
     parser.add_argument("--json", metavar="FILE", help="write the figures there")
     parser.add_argument("--history", type=Path, metavar="FILE", help="add the figures to this CSV file")
     options = parser.parse_args()
+    if options.port and options.drivers != 1:
+        parser.error("--drivers %d: --port measures the one server that runs there" % options.drivers)
     machine_us = measure_machine_us()
     results = []
     with use_master(options) as environment:

@@ -117,7 +117,8 @@ def test_a_publisher_at_1_khz_delays_nobody_and_its_stop_arrives(served, effort,
         if number % 500 == 0:
             life.show()
     publisher.publish(stop)
-    wait_until(lambda: [v.is_zero for v in robot.accepted[-2:]] == [True, True], "two stops that are taken")
+    wait_until(lambda: [v.is_zero for v in robot.velocities[-2:]] == [True, True], "two stops")
+    assert robot.accepted[-1].is_zero
     taken = len(robot.accepted)
     record(
         "%d velocities at 1 kHz, then a stop" % count,

@@ -11,6 +11,7 @@ from fake_robot import READ_CYCLE_S, VELOCITY_GATE_S
 from geometry_msgs.msg import Twist
 from std_msgs.msg import Bool, ColorRGBA
 from std_srvs.srv import SetBool, Trigger
+from steady_time import in_steady_time
 
 from hero_msgs.msg import Motor, Robot
 from hero_msgs.srv import SetOdom
@@ -26,6 +27,7 @@ def make_command(linear_m_s, turn_rad_s=0.0):
     return twist
 
 
+@in_steady_time
 class TestDriverCommands(DriverCase):
     def setUp(self):
         self.call_stop(False)

@@ -102,7 +102,8 @@ class TestDriverDevices(OwnDriverCase):
         drive = make_publisher("/hero_9/velocity_controller/cmd_vel", Twist)
         drive.publish(stock_messages.from_bytes(Twist, stock_messages.make_twist(0.1, 0.0)))
         drive.publish(Twist())
-        wait_for(lambda: len([v for v in robot.accepted if v.is_zero]) == 2, "the stop, twice")
+        wait_for(lambda: len([v for v in list(robot.velocities) if v.is_zero]) == 2, "the stop, twice")
+        self.assertTrue(robot.accepted[-1].is_zero)
 
     def test_two_devices_of_one_address_do_not_push_each_other_out(self):
         driver = self.start(namespace_policy="any")

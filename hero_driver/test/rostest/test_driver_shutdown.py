@@ -10,6 +10,7 @@ import rostest
 from driver_case import OwnDriverCase, make_publisher, wait_for, wait_payloads
 from fake_robot import READ_CYCLE_S, VELOCITY_GATE_S
 from geometry_msgs.msg import Twist
+from steady_time import in_steady_time
 
 from hero_driver.rosserial import frames
 from hero_msgs.msg import Motor, Robot
@@ -25,6 +26,7 @@ def make_command(linear_m_s):
     return twist
 
 
+@in_steady_time
 class TestDriverShutdown(OwnDriverCase):
     def drive(self, driver, robots):
         """Let all robots move."""

@@ -1,6 +1,7 @@
 #!/usr/bin/env python
 """The simulator drives /clock: everything runs faster than the wall clock, and stamps are simulated time."""
 
+import statistics
 import time
 import unittest
 
@@ -46,7 +47,9 @@ class SimulatedTimeTest(unittest.TestCase):
         first = len(self.odom)
         wait_for(lambda: len(self.odom) > first + 200, "200 odoms more")
         stamps = [message.header.stamp.to_sec() for message in self.odom[first:]]
-        self.assertAlmostEqual((len(stamps) - 1) / (stamps[-1] - stamps[0]), 29.27, delta=2.0)
+        # The middle one of the steps: where the machine is busy, robots get their time late and set their clocks.
+        step_s = statistics.median(later - earlier for earlier, later in zip(stamps, stamps[1:]))
+        self.assertAlmostEqual(1.0 / step_s, 29.27, delta=2.0)
 
     def test_a_robot_drives_in_simulated_time(self):
         publisher = rospy.Publisher("/hero_2/velocity_controller/cmd_vel", Twist, queue_size=1)
