@@ -30,8 +30,8 @@ NOT_LOOKED_UP = {
     "; did you mean ~%s?",
     "the %s wheel %s",
     "%s has a new goal",
-    "all robots are stopped",
-    "robots may move again",
+    "all robots%s are stopped",
+    "robots%s may move again",
     # Calls of the codec with values that only a mistake in the driver could make.
     "topic id %r is outside 0..65535",
     "a payload of %d bytes does not fit a frame (at most 65535)",

@@ -3,8 +3,8 @@
     rosrun hero_bringup fleet                  a table like top, redrawn in place
     rosrun hero_bringup fleet --once --json    the fleet as one line of JSON, for scripts
 
-Only listens, but for the keys s and d: they call /hero_driver/stop and /hero_driver/disconnect. Messages of robots are
-kept as bytes and read when the table is drawn, so that fifty robots cost little.
+Shows the robots of all drivers. Only listens, but for the keys s and d: they call the services stop and disconnect of
+the drivers. Messages of robots are kept as bytes and read when the table is drawn, so that fifty robots cost little.
 """
 
 import argparse
@@ -19,10 +19,10 @@ from typing import Dict, List, Optional, Sequence
 
 import rosgraph
 import rospy
-from std_srvs.srv import SetBool
 
+from hero_examples.drivers import Drivers
 from hero_examples.keyboard import Keyboard, NoTerminalError
-from hero_msgs.msg import Robot, RobotArray
+from hero_msgs.msg import Robot
 from hero_msgs.srv import Disconnect
 
 from .fleet_state import RobotRow, RobotTrack, find_missing, sort_rows
@@ -43,30 +43,29 @@ KEYS_HELP = "q ends   s stops all robots, or lets them go   o order   up, down c
 
 
 class FleetListener:
-    """The driver's list of robots, and a listener for each of them."""
+    """The drivers' lists of robots, and a listener for each robot."""
 
     def __init__(self) -> None:
-        self.heard = threading.Event()
+        self.heard = False
         self.listening = ""
         self.stopped = False
-        self._robots: Sequence[Robot] = []
+        self._drivers = Drivers()
         self._listeners: Dict[str, RobotListener] = {}
-        self._lock = threading.Lock()
-        self._subscriber = rospy.Subscriber(
-            "/hero_driver/robots", RobotArray, self._receive_robots, queue_size=2
-        )
 
-    def _receive_robots(self, message: RobotArray) -> None:
-        with self._lock:
-            self.listening = message.listening
-            self.stopped = message.stopped
-            self._robots = message.robots
-        self.heard.set()
+    def wait_for_driver(self, timeout_s: float) -> bool:
+        """Return as soon as every driver was heard, and whether one was heard in that time."""
+        end_s = time.monotonic() + timeout_s
+        while not (self._drivers.read() and self._drivers.is_settled) and time.monotonic() < end_s:
+            time.sleep(0.02)
+        return self._drivers.read() is not None
 
     def read_rows(self, now_s: float) -> List[RobotRow]:
         """Return the fleet as it is; listens from now on to robots that are new."""
-        with self._lock:
-            robots = list(self._robots)
+        report = self._drivers.read()
+        if report is None:
+            return []
+        self.heard, self.listening, self.stopped = True, report.listening, report.stopped
+        robots = report.robots
         present = {robot.namespace for robot in robots if robot.namespace}
         for namespace in present - set(self._listeners):
             self._listeners[namespace] = RobotListener(namespace)
@@ -99,23 +98,25 @@ class FleetListener:
         )
 
     def toggle_stop(self) -> None:
-        """Ask the driver to stop all robots, or to let them go again, without waiting for its answer."""
-        wanted = not self.stopped
-        threading.Thread(target=call_stop, args=(wanted,), daemon=True).start()
+        """Ask the drivers to stop all robots, or to let them go again, without waiting for their answers."""
+        self._drivers.stop(not self.stopped, log_failure)
+
+    def disconnect(self, robot: str, news: List[str]) -> None:
+        """Ask the robot's driver to close its connection; what came of it is added to the news later."""
+        driver = self._drivers.find("/" + robot)
+        threading.Thread(target=call_disconnect, args=(driver, robot, news), daemon=True).start()
 
 
-def call_stop(stop: bool) -> None:
-    """Call the driver's stop service."""
+def log_failure(driver: str, failure: Optional[str]) -> None:
+    """Say why a driver did not do what it was asked for."""
+    if failure is not None:
+        rospy.logerr(failure)
+
+
+def call_disconnect(driver: str, robot: str, news: List[str]) -> None:
+    """Call a driver's disconnect service, and add what came of it to the news."""
     try:
-        rospy.ServiceProxy("/hero_driver/stop", SetBool)(stop)
-    except rospy.ServiceException as error:
-        rospy.logerr("the driver did not answer /hero_driver/stop: %s", error)
-
-
-def call_disconnect(robot: str, news: List[str]) -> None:
-    """Call the driver's disconnect service, and add what came of it to the news."""
-    try:
-        news.append(rospy.ServiceProxy("/hero_driver/disconnect", Disconnect)(robot).message)
+        news.append(rospy.ServiceProxy(driver + "/disconnect", Disconnect)(robot).message)
     except rospy.ServiceException as error:
         news.append("%s is not disconnected: %s" % (robot, error))
 
@@ -174,7 +175,7 @@ class FleetProgram:
         self._rows = sort_rows(self._fleet.read_rows(time.monotonic()), self._order)
 
     def _make_lines(self, width: int, height: int) -> List[str]:
-        if not self._fleet.heard.is_set():
+        if not self._fleet.heard:
             return [
                 "no driver yet: nothing on /hero_driver/robots (roslaunch hero_bringup hero_bringup.launch)"[
                     :width
@@ -205,7 +206,7 @@ class FleetProgram:
             return
         else:
             self._news = ["disconnecting %s" % self._chosen]
-            threading.Thread(target=call_disconnect, args=(self._chosen, self._news), daemon=True).start()
+            self._fleet.disconnect(str(self._chosen), self._news)
         self._asks_disconnect = False
 
     def _press(self, key: str) -> None:
@@ -231,7 +232,7 @@ class FleetProgram:
 
     def run_once(self) -> int:
         """Wait for the driver, listen for a moment, print."""
-        if not self._fleet.heard.wait(DRIVER_TIMEOUT_S):
+        if not self._fleet.wait_for_driver(DRIVER_TIMEOUT_S):
             print(
                 "fleet: no driver: nothing on /hero_driver/robots after %.0f s" % DRIVER_TIMEOUT_S,
                 file=sys.stderr,
@@ -291,7 +292,7 @@ class FleetProgram:
 
 def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     """Read the command line."""
-    parser = argparse.ArgumentParser(prog="fleet", description="The robots of the driver, as a live table.")
+    parser = argparse.ArgumentParser(prog="fleet", description="The robots of all drivers, as a live table.")
     parser.add_argument("--once", action="store_true", help="print the fleet once and end")
     parser.add_argument(
         "--json", action="store_true", help="print JSON, one line each time, instead of a table"

@@ -88,10 +88,10 @@ def format_title(rows: Sequence[RobotRow], listening: str, stopped: bool) -> str
     """Return the line above the table: how many robots there are, and where the driver awaits them."""
     ready = sum(row.state == "READY" for row in rows)
     title = "%d of %d robots ready" % (ready, len(rows))
+    if stopped:
+        title += ", ALL STOPPED"  # not last: a narrow terminal cuts the end off
     if listening:
         title += ", driver listens on %s" % make_printable(listening)
-    if stopped:
-        title += ", ALL STOPPED"
     return title
 
 

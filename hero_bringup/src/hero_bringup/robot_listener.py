@@ -5,10 +5,10 @@ from typing import Any, Sequence
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 
+from hero_examples.newest_message import NewestMessage
 from hero_msgs.msg import Robot
 
 from .fleet_state import Pose, RobotTrack, yaw_of_quaternion
-from .newest_message import NewestMessage
 
 STATES = {Robot.JOINING: "JOINING", Robot.READY: "READY", Robot.AWAY: "AWAY", Robot.REFUSED: "REFUSED"}
 

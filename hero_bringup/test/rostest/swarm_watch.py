@@ -23,6 +23,10 @@ REST_M_S = 0.005
 STOP_TIMEOUT_S = 1.5
 """A stop takes about 0.2 s, and the robot's own watchdog, without one, 2 s."""
 
+STALL_S = 0.4
+RECOVERY_S = 1.0
+"""While this machine stands still for so long no program can steer, and for a moment after it robots touch things."""
+
 CREEP_M_S = 0.01
 """Slower than this a robot does not run into anything; things run into it."""
 
@@ -43,6 +47,8 @@ class SwarmWatch:
 
     def __init__(self, robot_ids):
         self.rows = {robot_id: [] for robot_id in robot_ids}
+        self.stalls_s = []  # begin and end, as stamps, of each time in which nothing came of any robot
+        self.heard_s = (time.monotonic(), 0.0)
         self.lock = threading.Lock()
         self.subscribers = [
             rospy.Subscriber("/hero_%d/ground_truth" % robot_id, Odometry, self.receive, robot_id, queue_size=50)
@@ -60,6 +66,10 @@ class SwarmWatch:
             message.twist.twist.linear.x,
         )
         with self.lock:
+            arrival_s = time.monotonic()
+            if arrival_s - self.heard_s[0] > STALL_S and self.heard_s[1]:
+                self.stalls_s.append((self.heard_s[1], row[0]))
+            self.heard_s = (arrival_s, row[0])
             self.rows[robot_id].append(row)
 
     def close(self):
@@ -112,9 +122,11 @@ class SwarmWatch:
     def seen_touches(self, arena):
         """Return (robot, other or "wall", time) of each touch that the robot drove into with open eyes.
 
-        A touch counts for a robot if it moved ahead and what it touched was within its front field as it began.
+        A touch counts for a robot if it moved ahead and what it touched was within its front field as it began, unless
+        this machine stood still then.
         """
         touches = []
+        first_s = min(rows[0][0] for rows in self.rows.values())
         paths = {robot_id: self.path(robot_id) for robot_id in self.rows}
         for robot_id, path in paths.items():
             times_s, places, yaws, speeds = path[:, 0], path[:, 1:3], path[:, 3], path[:, 4]
@@ -128,7 +140,11 @@ class SwarmWatch:
                     bearings = np.arctan2(way[:, 1], way[:, 0])
                     gaps_m = np.hypot(*way.T) - 2.0 * BODY_RADIUS_M
                     touches += begin_of(robot_id, other, times_s, gaps_m, bearings - yaws, speeds)
-        return touches
+        return [
+            (robot_id, other, time_s - first_s)
+            for robot_id, other, time_s in touches
+            if not any(begin_s <= time_s <= end_s + RECOVERY_S for begin_s, end_s in self.stalls_s)
+        ]
 
     def visited_share(self, arena, cell_m):
         """Return the share of the cells a robot could stand in that any robot was in."""
@@ -157,7 +173,7 @@ def begin_of(robot_id, other, times_s, gaps_m, bearings, speeds):
     begins = np.flatnonzero(touching[1:] & ~touching[:-1]) + 1
     ahead = np.abs(np.angle(np.exp(1j * bearings))) < SEEN_RAD
     return [
-        (robot_id, other, float(times_s[index] - times_s[0]))
+        (robot_id, other, float(times_s[index]))
         for index in begins
         if ahead[index - 1] and speeds[index - 1] > CREEP_M_S
     ]

@@ -35,7 +35,10 @@ class RandomWalkTest(unittest.TestCase):
         touches = watch.seen_touches(arena)
         share = watch.visited_share(arena, CELL_M)
         lengths_m = watch.lengths_m()
-        sys.stdout.write("touches %s\nvisited %.2f\nlengths %s\n" % (touches, share, lengths_m))
+        sys.stdout.write(
+            "touches %s\nvisited %.2f\nlengths %s\nthis machine stood still %d times\n"
+            % (touches, share, lengths_m, len(watch.stalls_s))
+        )
         self.assertEqual([], touches)
         self.assertGreaterEqual(share, 0.8)
         self.assertGreater(min(lengths_m.values()), 2.0)

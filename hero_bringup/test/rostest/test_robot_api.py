@@ -77,10 +77,11 @@ class RobotApiTest(unittest.TestCase):
 
         def drives_back_and_turns():
             robot.drive(-0.05, 1.0)
-            return robot.velocity.linear_m_s < -0.03 and robot.velocity.turn_rad_s > 0.7
+            is_told = robot.velocity.linear_m_s < -0.03 and robot.velocity.turn_rad_s > 0.7
+            # The truth of one moment: the wheels' controller lets it swing.
+            return is_told and self.speed(0) < -0.02
 
-        wait_for(drives_back_and_turns, 5.0, "velocity that follows the command")
-        self.assertLess(self.speed(0), -0.02)
+        wait_for(drives_back_and_turns, 5.0, "velocity that follows the command, and is true")
         robot.stop()
         self.watch.wait_until_stopped(0)
 

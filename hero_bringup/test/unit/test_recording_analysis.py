@@ -14,7 +14,7 @@ from hero_bringup.recording.errors import RecordingError
 from hero_bringup.recording.figures import Figures, hold_commands
 from hero_bringup.recording.observations import Observations, RobotObservations, StateReport
 from hero_bringup.recording.progress import Progress
-from hero_bringup.recording.topics import find_robot_topic, make_patterns
+from hero_bringup.recording.topics import find_robot_topic, is_fleet_topic, make_patterns
 
 
 def observe(path, robot_ids=None):
@@ -51,6 +51,7 @@ def test_patterns_take_robots_that_join_later_and_leave_other_topics_alone():
             "/rosout",
             "/diagnostics",
             "/hero_driver/robots",
+            "/hero_driver_b/robots",
             "/hero_sim/arena",
             "/arena",
             "/mine",
@@ -66,6 +67,13 @@ def test_patterns_take_robots_that_join_later_and_leave_other_topics_alone():
         "/minefield",
     ):
         assert not is_recorded(topic), topic
+
+
+def test_the_lists_of_all_drivers_are_read_and_other_topics_of_that_name_are_not():
+    assert is_fleet_topic("/hero_driver/robots", "hero_msgs/RobotArray")
+    assert is_fleet_topic("/hero_driver_b/robots", "hero_msgs/RobotArray")
+    assert not is_fleet_topic("/hero_driver/robots", "std_msgs/String")
+    assert not is_fleet_topic("/hero_driver/b/robots", "hero_msgs/RobotArray")
 
 
 def test_patterns_for_some_robots_take_no_others():

@@ -1,12 +1,11 @@
-"""Several robots as one object: see robot. Knows the topics of robots, and the driver's list of them."""
+"""Several robots as one object: see robot. Knows the topics of robots, and the drivers' lists of them."""
 
 import time
 from typing import Iterable, Iterator, List
 
-import rospy
-
 from hero_msgs.msg import RobotArray
 
+from .drivers import USUAL_TOPIC, Drivers
 from .readings import Color
 from .robot import (
     POLL_PERIOD_S,
@@ -17,8 +16,6 @@ from .robot import (
     start_node,
     stop_all,
 )
-
-DISCOVERY_TOPIC = "/hero_driver/robots"
 
 
 class Swarm:
@@ -40,24 +37,25 @@ class Swarm:
     def discover(
         cls, timeout_s: float = 10.0, odom: bool = True, proximity: bool = True, sleep: Sleep = sleep_unless_shutdown
     ) -> "Swarm":
-        """Return all robots that the driver reports as ready, as soon as there is at least one.
+        """Return all robots that the drivers report as ready, as soon as there is at least one.
 
         Raises: RobotNotReadyError after timeout_s without the driver or without a robot.
         """
         start_node()
         deadline_s = time.monotonic() + timeout_s
-        newest: List[RobotArray] = []
-        subscriber = rospy.Subscriber(DISCOVERY_TOPIC, RobotArray, newest.append, queue_size=1)
+        report = None
+        drivers = Drivers()
         try:
             while time.monotonic() < deadline_s and sleep(POLL_PERIOD_S):
-                ids = ready_ids(newest[-1]) if newest else []
-                if ids:
+                report = drivers.read()
+                ids = ready_ids(report) if report else []
+                if ids and drivers.is_settled:
                     return cls(ids, odom, proximity)
         finally:
-            subscriber.unregister()
-        if not newest:
+            drivers.close()
+        if report is None:
             raise RobotNotReadyError(
-                "nothing on %s within %g s: is the driver running?" % (DISCOVERY_TOPIC, timeout_s)
+                "nothing on %s within %g s: is the driver running?" % (USUAL_TOPIC, timeout_s)
             )
         raise RobotNotReadyError("no robot joined the driver within %g s: are they on?" % timeout_s)
 

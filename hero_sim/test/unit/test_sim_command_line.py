@@ -203,7 +203,7 @@ def test_robots_that_are_servers_are_dialled(simulate):
 
 
 def test_a_robot_that_vanishes_sends_no_end_and_its_successor_boots(simulate, server):
-    simulate("--port", str(server.port), "--fault", "vanish@8:for=1")
+    simulate("--port", str(server.port), "--fault", "vanish@16:for=1")
     request_when_ready(server, 1)
     server.run_until(lambda: len(server.peers) == 2)
     old, new = server.peers
@@ -218,7 +218,7 @@ def test_a_robot_that_vanishes_sends_no_end_and_its_successor_boots(simulate, se
 
 
 def test_a_robot_that_leaves_closes_and_streams_on_when_it_is_back(simulate, server):
-    simulate("--port", str(server.port), "--fault", "leave@8:for=2")
+    simulate("--port", str(server.port), "--fault", "leave@16:for=2")
     request_when_ready(server, 1)
     server.run_until(lambda: server.peers[0].closed)
     server.run_until(lambda: len(server.peers) == 2 and server.peers[1].count(ids.ID_ODOM) > 0)
@@ -245,7 +245,7 @@ def test_zero_topics_are_declared_at_the_second_request_only(simulate, server):
 
 def test_wrong_bytes_cost_at_most_the_frame_beside_them(simulate, server):
     kinds = ("garbage", "half-frame", "bad-checksum", "bad-length", "long-frame")
-    faults = ["--fault=%s@%g" % (kind, 8 + 0.2 * index) for index, kind in enumerate(kinds)]
+    faults = ["--fault=%s@%g" % (kind, 16 + 0.2 * index) for index, kind in enumerate(kinds)]
     process = simulate("--port", str(server.port), *faults)
     request_when_ready(server, 1)
     peer = server.peers[0]
@@ -260,7 +260,7 @@ def test_wrong_bytes_cost_at_most_the_frame_beside_them(simulate, server):
 
 
 def test_a_frozen_robot_is_silent_and_goes_on(simulate, server):
-    simulate("--port", str(server.port), "--fault", "frozen@8:for=6")
+    simulate("--port", str(server.port), "--fault", "frozen@16:for=6")
     request_when_ready(server, 1)
     peer = server.peers[0]
     stamps = []
@@ -277,7 +277,7 @@ def test_a_frozen_robot_is_silent_and_goes_on(simulate, server):
 
 
 def test_a_clock_that_jumps_shows_in_the_stamps(simulate, server):
-    simulate("--port", str(server.port), "--fault", "clock-jump@8:by=-100")
+    simulate("--port", str(server.port), "--fault", "clock-jump@16:by=-100")
     request_when_ready(server, 1)
     peer = server.peers[0]
     server.run_until(lambda: time.time() - read_odom(peer.last(ids.ID_ODOM))[0][0] > 98)

@@ -15,8 +15,9 @@ from typing import Dict, List, Optional, Sequence
 
 import rospy
 
+from hero_examples.drivers import Drivers
 from hero_examples.program import Program, ProgramError, parse_robot_ids
-from hero_msgs.msg import Robot, RobotArray
+from hero_msgs.msg import Robot
 from hero_msgs.srv import SetIRCalibration, SetMotor, SetPID
 
 from . import store
@@ -258,29 +259,31 @@ def find_robots(program: Program, robot_ids: Optional[Sequence[int]]) -> Dict[in
 
     Raises: CalibrationError without a driver, without a robot, or while the driver holds all of them.
     """
-    newest: List[RobotArray] = []
-    subscriber = rospy.Subscriber("/hero_driver/robots", RobotArray, newest.append, queue_size=1)
+    report = None
     deadline_s = time.monotonic() + READY_TIMEOUT_S
     found: Dict[int, Robot] = {}
+    drivers = Drivers()
     try:
         while time.monotonic() < deadline_s:
             if not program.sleep(0.05):
                 raise CalibrationError("ended before a robot was found")
-            found = {robot.id: robot for robot in newest[-1].robots if robot.id >= 0} if newest else {}
+            report = drivers.read()
+            found = {robot.id: robot for robot in report.robots if robot.id >= 0} if report else {}
             ready = {robot_id for robot_id, robot in found.items() if robot.state == Robot.READY}
-            if ready and (robot_ids is None or set(robot_ids) <= ready):
+            if ready and (drivers.is_settled if robot_ids is None else set(robot_ids) <= ready):
                 break
     finally:
-        subscriber.unregister()
-    if not newest:
+        drivers.close()
+    if report is None:
         raise CalibrationError(
             "no driver: nothing on /hero_driver/robots; start roslaunch hero_bringup hero_bringup.launch"
         )
-    if newest[-1].stopped:
-        raise CalibrationError(
-            "the driver holds all robots; let them go: rosservice call /hero_driver/stop false"
-        )
     wanted = sorted(found if robot_ids is None else robot_ids)
+    for driver in sorted({drivers.find("/hero_%d" % robot_id) for robot_id in wanted}):
+        if drivers.holds(driver):
+            raise CalibrationError(
+                "the driver holds all robots; let them go: rosservice call %s/stop false" % driver
+            )
     robots: Dict[int, Optional[str]] = {}
     for robot_id in wanted:
         state = found[robot_id].state if robot_id in found else None

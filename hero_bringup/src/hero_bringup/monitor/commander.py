@@ -1,4 +1,4 @@
-"""Requests of pages -> velocities, goals and the driver's stop service.
+"""Requests of pages -> velocities, goals and the drivers' stop services.
 
 Nothing here waits on the caller's thread: topics are opened, goals handed over and services called on threads of
 their own, and what came of it is told later in words. Stopping all robots has a thread for each call, so that no
@@ -14,7 +14,8 @@ from typing import Callable, Dict, Optional, Set
 import rosgraph
 import rospy
 from geometry_msgs.msg import PoseStamped, Twist
-from std_srvs.srv import SetBool
+
+from hero_examples.drivers import Drivers
 
 from ..fleet_state import Pose
 from .dead_man import STOPS, DeadMan, Velocity
@@ -33,7 +34,8 @@ Tell = Callable[[str, str], None]
 class Commander:
     """What pages make robots do. Times are monotonic."""
 
-    def __init__(self) -> None:
+    def __init__(self, drivers: Drivers) -> None:
+        self._drivers = drivers
         self._dead_man = DeadMan()
         self._worker = ThreadPoolExecutor(1, "commands")
         self._velocities: Dict[str, Optional[rospy.Publisher]] = {}
@@ -131,16 +133,25 @@ class Commander:
     # ---------------------------------------------------------------- stop
 
     def stop_all(self, stop: bool, tell: Tell) -> None:
-        """Ask the driver to stop all robots, or to let them go again."""
+        """Ask all drivers to stop all robots, or to let them go again."""
         if stop:
             self._dead_man.drop_all()
         self._stoppers = {thread for thread in self._stoppers if thread.is_alive()}
         if len(self._stoppers) >= STOPPERS_AT_ONCE:
             tell("error", "the driver does not answer /hero_driver/stop: %d calls wait" % len(self._stoppers))
             return
-        thread = threading.Thread(target=call_stop, args=(stop, tell), daemon=True, name="stop")
-        self._stoppers.add(thread)
-        thread.start()
+        many = len(self._drivers.names()) > 1
+
+        def report(driver: str, failure: Optional[str]) -> None:
+            whose = " of %s" % driver.strip("/") if many else ""
+            if failure is not None:
+                tell("error", "NOT STOPPED: %s" % failure if stop else failure)
+            elif stop:
+                tell("warn", "all robots%s are stopped" % whose)
+            else:
+                tell("info", "robots%s may move again" % whose)
+
+        self._stoppers.update(self._drivers.stop(stop, report))
 
     def close(self) -> None:
         """Stop all that was driven by hand, more than once; takes about 0.2 s."""
@@ -149,18 +160,3 @@ class Commander:
             self.step()
             time.sleep(STOP_PERIOD_S)
         self._worker.shutdown(wait=False)
-
-
-def call_stop(stop: bool, tell: Tell) -> None:
-    """Call the driver's stop service and tell what came of it."""
-    try:
-        answer = rospy.ServiceProxy("/hero_driver/stop", SetBool)(stop)
-    except (rospy.ServiceException, rospy.ROSException, OSError) as error:
-        tell("error", "NOT STOPPED: the driver did not answer: %s" % error if stop else "no answer: %s" % error)
-        return
-    if not answer.success:
-        tell("error", "the driver refused: %s" % answer.message)
-    elif stop:
-        tell("warn", "all robots are stopped")
-    else:
-        tell("info", "robots may move again")

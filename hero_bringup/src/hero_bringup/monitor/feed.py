@@ -17,11 +17,12 @@ from rosgraph_msgs.msg import Log
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
-from hero_msgs.msg import Robot, RobotArray
+from hero_examples.drivers import Drivers
+from hero_examples.newest_message import NewestMessage
+from hero_msgs.msg import Robot
 
 from ..fleet_state import Pose, yaw_of_quaternion
 from ..fleet_table import finite, make_printable
-from ..newest_message import NewestMessage
 from ..robot_listener import STATES, read_pose
 from .placement import Placement
 from .robot_feed import RobotFeed
@@ -54,7 +55,8 @@ class FleetFeed:
         self._worker = ThreadPoolExecutor(1, "subscriptions")
         self._change: Optional[Future[None]] = None
         self._log_bytes: Deque[bytes] = deque()
-        self._fleet = NewestMessage("/hero_driver/robots", RobotArray)
+        self.drivers = Drivers()
+        self._reports = 0
         # Not NewestMessage: of the log every line counts.
         self._log = rospy.Subscriber("/rosout", rospy.AnyMsg, self._keep_log_line, queue_size=100)
 
@@ -111,7 +113,9 @@ class FleetFeed:
 
     def _read_fleet(self) -> None:
         now_s = time.monotonic()
-        message = self._fleet.take()
+        reports = self.drivers.count()
+        message = self.drivers.read() if reports != self._reports else None
+        self._reports = reports
         if message is not None:
             self._fleet_s = now_s
             self._listening, self.stopped = message.listening, message.stopped

@@ -118,7 +118,7 @@ class Monitor:
         self._parameters = parameters
         self._program = program
         self._feed = FleetFeed(parameters.map_frame)
-        self._commander = Commander()
+        self._commander = Commander(self._feed.drivers)
         self._loop = tornado.ioloop.IOLoop.current()
         actions = Actions(self._open_page, self._receive, self._close_page)
         self._server = Server(Access(parameters.token, parameters.host_names), actions)

@@ -6,8 +6,9 @@ from typing import Optional, Tuple
 from geometry_msgs.msg import PoseStamped
 from std_msgs.msg import ColorRGBA
 
+from hero_examples.newest_message import NewestMessage
+
 from ..fleet_state import Pose
-from ..newest_message import NewestMessage
 from ..robot_listener import RobotListener, read_pose
 from .placement import Placement
 from .sections import encode_colour

@@ -9,8 +9,6 @@ from typing import Any, Dict, Iterable, List, NamedTuple, Optional, Protocol, Se
 from .series import Series
 from .topics import (
     ENCODER,
-    FLEET_TOPIC,
-    FLEET_TYPE,
     GROUND_TRUTH,
     ODOMETRY,
     POSITION_COMMAND,
@@ -19,6 +17,7 @@ from .topics import (
     VELOCITY_COMMAND,
     find_robot_topic,
     is_arena_topic,
+    is_fleet_topic,
 )
 
 CUBE, CYLINDER = 1, 3
@@ -102,7 +101,7 @@ class Observations:
             kinds = (ODOMETRY, GROUND_TRUTH, ENCODER, VELOCITY_COMMAND, POSITION_COMMAND)
             return found.kind in kinds and self._wants_robot(found.robot_id)
         return (
-            (topic == FLEET_TOPIC and message_type == FLEET_TYPE)
+            is_fleet_topic(topic, message_type)
             or (topic == STATIC_TRANSFORMS_TOPIC and message_type in TRANSFORMS_TYPES)
             or is_arena_topic(topic, message_type)
         )
@@ -123,7 +122,7 @@ class Observations:
         found = find_robot_topic(message.topic, message.type)
         if found is not None:
             self._receive_of_robot(self._robot(found.robot_id), found.kind, message)
-        elif message.topic == FLEET_TOPIC:
+        elif is_fleet_topic(message.topic, message.type):
             self._receive_fleet(message)
         elif message.topic == STATIC_TRANSFORMS_TOPIC:
             self._receive_transforms(message)

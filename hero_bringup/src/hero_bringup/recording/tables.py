@@ -187,8 +187,8 @@ class RobotRow(NamedTuple):
 
 def wants(topic: str, message_type: str) -> bool:
     """Return whether read_rows() makes rows of a topic."""
-    return topics.find_robot_topic(topic, message_type) is not None or (
-        topic == topics.FLEET_TOPIC and message_type == topics.FLEET_TYPE
+    return topics.find_robot_topic(topic, message_type) is not None or topics.is_fleet_topic(
+        topic, message_type
     )
 
 

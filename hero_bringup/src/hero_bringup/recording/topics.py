@@ -32,7 +32,6 @@ ROBOT_TOPICS = {
 RAW_ROBOT_TOPICS = ("odom_raw", "laser", "laser_enable")
 """What the stock robot sends and odom and proximity are made from."""
 
-FLEET_TOPIC = "/hero_driver/robots"
 FLEET_TYPE = "hero_msgs/RobotArray"
 STATIC_TRANSFORMS_TOPIC = "/tf_static"
 TRANSFORMS_TYPES = ("tf2_msgs/TFMessage", "tf/tfMessage")
@@ -43,11 +42,13 @@ SHARED_PATTERNS = (
     "/tf_static",
     "/rosout",
     "/diagnostics",
-    "/hero_driver/(robots|stopped)",
+    "/hero_driver[^/]*/(robots|stopped)",
     "/(.*/)?arena",
 )
-"""Topics of no single robot: where frames are, log lines, the fleet, the simulator's walls."""
+"""Topics of no single robot: where frames are, log lines, the fleets of all drivers (docs/several_machines.md), the
+simulator's walls."""
 
+_FLEET_TOPIC = re.compile(r"/hero_driver[^/]*/robots")
 _ROBOT_TOPIC = re.compile(r"/hero_(\d+)/(.+)")
 
 
@@ -72,6 +73,11 @@ def find_robot_topic(topic: str, message_type: str) -> Optional[RobotTopic]:
         return None
     kind, expected_type = ROBOT_TOPICS.get(match.group(2), ("", ""))
     return RobotTopic(int(match.group(1)), kind) if kind and message_type == expected_type else None
+
+
+def is_fleet_topic(topic: str, message_type: str) -> bool:
+    """Return whether a topic holds the robots of a driver."""
+    return message_type == FLEET_TYPE and _FLEET_TOPIC.fullmatch(topic) is not None
 
 
 def is_arena_topic(topic: str, message_type: str) -> bool:

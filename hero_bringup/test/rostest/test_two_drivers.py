@@ -1,0 +1,182 @@
+#!/usr/bin/env python
+"""Two drivers under one ROS master: programs find the robots of both, and a stop reaches both."""
+
+import contextlib
+import json
+import os
+import pty
+import signal
+import subprocess
+import threading
+import unittest
+import xmlrpc.client
+
+import rosgraph
+import rospy
+import rostest
+from geometry_msgs.msg import Twist
+from swarm_watch import SwarmWatch, wait_for
+
+from hero_bringup.monitor.commander import Commander
+from hero_examples.drivers import Drivers
+from hero_examples.swarm import Swarm
+
+FLEET = ["rosrun", "hero_bringup", "fleet"]
+IDS = [0, 1, 100, 101]
+TIMEOUT_S = 20.0
+
+
+def run_fleet(*arguments):
+    return json.loads(subprocess.check_output([*FLEET, "--once", "--json", *arguments], timeout=TIMEOUT_S).decode())
+
+
+def find_pid(node):
+    """Return the process of a node."""
+    return xmlrpc.client.ServerProxy(rosgraph.Master("/test").lookupNode(node)).getPid("/test")[2]
+
+
+class Table:
+    """The program fleet in a terminal, which is read all the time: a program that nobody reads stands still."""
+
+    def __init__(self):
+        self._leader, follower = pty.openpty()
+        self.process = subprocess.Popen(FLEET, stdin=follower, stdout=follower, stderr=follower, start_new_session=True)
+        os.close(follower)
+        self._output = bytearray()
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def _read(self):
+        # The end of the terminal of a program that has ended is an error (EIO).
+        with contextlib.suppress(OSError):
+            while True:
+                self._output += os.read(self._leader, 65536)
+
+    def press(self, key):
+        os.write(self._leader, key)
+
+    def wait_for(self, text):
+        wait_for(lambda: text in self._output, TIMEOUT_S, lambda: "%r in %r" % (text, bytes(self._output[-2000:])))
+
+    def close(self):
+        if self.process.poll() is None:
+            os.killpg(self.process.pid, signal.SIGKILL)
+            self.process.wait()
+        self._reader.join()
+        os.close(self._leader)
+
+
+class TwoDriversTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.watch = SwarmWatch(IDS)
+        cls.watch.wait_until_complete(TIMEOUT_S)
+        cls.publishers = [
+            rospy.Publisher("/hero_%d/velocity_controller/cmd_vel" % number, Twist, queue_size=1) for number in IDS
+        ]
+        cls.drivers = Drivers()
+
+        def all_are_ready():
+            report = cls.drivers.read()
+            return report and [robot.id for robot in report.robots if robot.state == robot.READY] == IDS
+
+        wait_for(all_are_ready, TIMEOUT_S, "four robots that are ready")
+
+    def drive(self, speed_m_s=0.05):
+        """Tell all robots to drive, once."""
+        command = Twist()
+        command.linear.x, command.angular.z = speed_m_s, 0.5
+        for publisher in self.publishers:
+            publisher.publish(command)
+
+    def is_moving(self, robot_id):
+        return self.watch.rows[robot_id][-1][4] > 0.02
+
+    def wait_until_all_move(self):
+        def all_move():
+            self.drive()
+            return all(map(self.is_moving, IDS))
+
+        wait_for(all_move, TIMEOUT_S, "motion of all")
+
+    def release(self):
+        for thread in self.drivers.stop(False, lambda driver, failure: self.assertIsNone(failure, driver)):
+            thread.join()
+        wait_for(lambda: not any(map(self.drivers.holds, self.read_names())), TIMEOUT_S, "drivers that hold nothing")
+
+    def read_names(self):
+        self.drivers.read()
+        return self.drivers.names()
+
+    def test_1_programs_find_the_robots_of_both(self):
+        fleet = run_fleet()
+        self.assertEqual([robot["id"] for robot in fleet["robots"]], IDS)
+        self.assertEqual(fleet["listening"], "127.0.0.1:21340, 127.0.0.1:21341")
+        swarm = Swarm.discover(TIMEOUT_S)
+        self.assertEqual([robot.robot_id for robot in swarm], IDS)
+        swarm.close()
+        self.assertEqual(self.read_names(), ["/hero_driver", "/hero_driver_b"])
+        self.assertEqual(self.drivers.find("/hero_101"), "/hero_driver_b")
+        self.assertEqual(self.drivers.find("/hero_0"), "/hero_driver")
+
+    def test_2_a_remapped_list_is_that_of_one_driver_alone(self):
+        fleet = run_fleet("/hero_driver/robots:=/hero_driver_b/robots")
+        self.assertEqual([robot["id"] for robot in fleet["robots"]], [100, 101])
+
+    def test_3_the_key_s_of_the_table_stops_the_robots_of_both_and_lets_them_go(self):
+        table = Table()
+        self.addCleanup(table.close)
+        table.wait_for(b"4 of 4 robots ready")
+        self.wait_until_all_move()
+        table.press(b"s")
+        # They are told to drive on, and stay.
+        self.watch.wait_until_stopped(*IDS, act=self.drive)
+        table.wait_for(b"ALL STOPPED")
+        table.press(b"s")
+        self.wait_until_all_move()
+        table.press(b"q")
+        table.wait_for(b"\x1b[?1049l")
+        self.assertEqual(table.process.wait(TIMEOUT_S), 0)
+
+    def test_4_the_stop_of_the_page_reaches_both_and_names_them(self):
+        told = []
+        commander = Commander(self.drivers)
+        self.wait_until_all_move()
+        commander.stop_all(True, lambda level, text: told.append((level, text)))
+        self.watch.wait_until_stopped(*IDS, act=self.drive)
+        wait_for(lambda: len(told) == 2, TIMEOUT_S, "word of both drivers")
+        self.assertEqual(
+            sorted(told),
+            [("warn", "all robots of %s are stopped" % name) for name in ("hero_driver", "hero_driver_b")],
+        )
+        commander.close()
+        self.release()
+
+    def test_5_a_driver_that_hangs_keeps_no_other_from_its_stop(self):
+        answers = []
+        self.wait_until_all_move()
+        pid = find_pid("/hero_driver_b")
+        os.kill(pid, signal.SIGSTOP)
+        try:
+            self.drivers.stop(True, lambda driver, failure: answers.append((driver, failure)))
+            self.watch.wait_until_stopped(0, 1, act=self.drive)
+            self.assertEqual(answers, [("/hero_driver", None)])
+        finally:
+            os.kill(pid, signal.SIGCONT)
+        wait_for(lambda: ("/hero_driver_b", None) in answers, TIMEOUT_S, "answer of the driver that hung")
+        self.release()
+
+    def test_6_a_driver_that_died_without_a_word_is_not_waited_for(self):
+        os.kill(find_pid("/hero_driver_b"), signal.SIGKILL)
+        self.assertEqual([robot["id"] for robot in run_fleet()["robots"]], [0, 1])
+        # Who listened before forgets its robots.
+        wait_for(lambda: len(self.drivers.read().robots) == 2, TIMEOUT_S, "robots of the other driver alone")
+        answers = []
+        for thread in self.drivers.stop(True, lambda driver, failure: answers.append((driver, failure is None))):
+            thread.join(TIMEOUT_S)
+        self.assertEqual(sorted(answers), [("/hero_driver", True), ("/hero_driver_b", False)])
+
+
+if __name__ == "__main__":
+    rospy.init_node("test_two_drivers")
+    rostest.rosrun("hero_bringup", "test_two_drivers", TwoDriversTest)
