@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from hero_bringup.calibration import calibrate, dead_zone, infrared, speed_response, store
-from hero_bringup.calibration.encoder_steps import TICK_M
+from hero_bringup.calibration.encoder_steps import TICK_M, count_steps
 from hero_bringup.calibration.errors import CalibrationError
 from hero_bringup.calibration.infrared import BODY_RADIUS_M, Facing
 
@@ -21,13 +21,77 @@ def servo_speeds(pulses_us, centre_us, zone_us=30.0, gain=1.0, sign=1.0, noise_m
     return sign * np.round(speeds / tick_m_s) * tick_m_s
 
 
-def set_clock(stamps_s, at_s, by_s):
-    """Return stamps as the driver passes them on when the robot's clock is set at at_s: never backwards."""
-    truth_s = stamps_s + np.where(stamps_s >= at_s, by_s, 0.0)
-    passed_s = [truth_s[0]]
-    for stamp_s in truth_s[1:]:
+def pass_on(times_s, setting=None, late=None):
+    """Return stamps of readings as the driver passes them on: never backwards.
+
+    setting: (when, by how much) the robot sets its clock; late: (from, to) the network stands still, and stamps are
+    times of arrival.
+    """
+    stamps_s = np.array(times_s)
+    if setting is not None:
+        stamps_s += np.where(times_s >= setting[0], setting[1], 0.0)
+    if late is not None:
+        stamps_s = np.where((times_s >= late[0]) & (times_s < late[1]), late[1], stamps_s)
+    passed_s = [stamps_s[0]]
+    for stamp_s in stamps_s[1:]:
         passed_s.append(max(stamp_s, passed_s[-1] + 1e-6))
     return np.array(passed_s)
+
+
+DISTURBED = [
+    {"setting": (10.5, -0.3)},
+    {"setting": (10.5, -0.07)},
+    {"setting": (10.5, -0.04)},
+    {"setting": (10.5, 0.07)},
+    {"setting": (10.5, 0.3)},
+    {"late": (10.3, 10.4)},
+    {"late": (10.3, 10.65)},
+]
+
+
+def make_readings(stamps_s, left_ticks, right_ticks=None, counts=None):
+    """Return readings of which none was lost, unless counts say so."""
+    right_ticks = left_ticks if right_ticks is None else right_ticks
+    return count_steps(stamps_s, np.arange(len(stamps_s)) if counts is None else counts, left_ticks, right_ticks)
+
+
+class TestReadings:
+    def test_steps_are_even_and_times_are_those_of_the_stamps_on_a_good_network(self):
+        times_s = 1.6e9 + np.arange(100) * 0.034
+        readings = make_readings(times_s, np.arange(100.0))
+        assert readings.step_s == pytest.approx(0.034)
+        assert readings.times_s == pytest.approx(times_s, abs=0.001)
+        assert readings.is_even.all()
+        assert readings.find_even(3).shape == (97,)
+
+    @pytest.mark.parametrize("disturbance", DISTURBED)
+    def test_steps_stay_even_where_the_clock_is_set_or_the_network_stands_still(self, disturbance):
+        times_s = np.arange(9.0, 13.0, 0.034)
+        readings = make_readings(pass_on(times_s, **disturbance), times_s)
+        assert readings.step_s == pytest.approx(0.034, rel=0.01)
+        # A clock that is set ahead looks like a pause.
+        assert np.count_nonzero(~readings.is_even) <= 1
+        is_far = np.abs(times_s - 10.5) > 0.5
+        before_and_after = pass_on(times_s, disturbance.get("setting"))
+        assert readings.times_s[is_far] == pytest.approx(before_and_after[is_far], abs=0.02)
+
+    @pytest.mark.parametrize("pause_s", [0.02, 0.1, 1.0])
+    def test_a_pause_of_the_robot_is_no_step(self, pause_s):
+        times_s = np.arange(9.0, 12.0, 0.034)
+        times_s += np.where(times_s > 10.5, pause_s, 0.0)
+        readings = make_readings(times_s, times_s)
+        assert np.flatnonzero(~readings.is_even).tolist() == [int(np.count_nonzero(times_s <= 10.5)) - 1]
+
+    def test_readings_that_were_lost_on_the_way_are_no_pause(self):
+        counts = np.delete(np.arange(100), [40, 41, 60])
+        readings = make_readings(9.0 + counts * 0.034, counts * 2.0, counts=counts)
+        assert readings.is_even.all()
+        assert readings.step_s == pytest.approx(0.034)
+
+    def test_one_reading_or_none_has_no_steps(self):
+        for count in (0, 1):
+            readings = make_readings(np.arange(count) * 0.034, np.zeros(count))
+            assert len(readings.is_even) == len(readings.find_even(3)) == 0
 
 
 class TestDeadZone:
@@ -46,21 +110,23 @@ class TestDeadZone:
         zone = dead_zone.find_dead_zone(pulses_us, servo_speeds(pulses_us, 1500.0, gain=0.8))
         assert zone.gain_m_s_us == pytest.approx(0.8 * 0.25 / 220.0, rel=0.15)
 
-    @pytest.mark.parametrize("set_by_s", [0.0, -0.07, -0.3, 0.07])
-    def test_the_speed_at_each_stair_is_right_also_where_the_clock_of_the_robot_is_set(self, set_by_s):
+    @pytest.mark.parametrize("disturbance", [{}, *DISTURBED])
+    def test_the_speed_at_each_stair_is_right_also_where_stamps_are_doubtful(self, disturbance):
         begins_s = 10.0 + np.arange(8) * dead_zone.PULSE_S
         stamps_s = np.arange(9.0, 14.0, 0.034)
         speeds_m_s = 0.02 * np.clip(np.floor((stamps_s - 10.1) / dead_zone.PULSE_S), -1, 7)
         ticks = np.cumsum(speeds_m_s * 0.034) / TICK_M
-        passed_s = set_clock(stamps_s, 11.62, set_by_s)
-        left, right = dead_zone.measure_stairs(passed_s, ticks, -ticks, begins_s)
-        assert left == pytest.approx(0.02 * np.arange(8), abs=0.02)
+        readings = make_readings(pass_on(stamps_s, **disturbance), ticks, -ticks)
+        left, right = dead_zone.measure_stairs(readings, begins_s)
+        # A clock that is off by 0.3 s takes readings of the stair before.
+        is_far = abs(disturbance.get("setting", (0.0, 0.0))[1]) > 0.2
+        assert left == pytest.approx(0.02 * np.arange(8), abs=0.021 if is_far else 0.006)
         assert right == pytest.approx(-left)
 
     def test_a_stair_of_which_nothing_was_heard_is_refused(self):
         stamps_s = np.arange(9.0, 10.6, 0.034)
         with pytest.raises(CalibrationError, match="too few encoder readings came"):
-            dead_zone.measure_stairs(stamps_s, stamps_s, stamps_s, [10.0, 10.45])
+            dead_zone.measure_stairs(make_readings(stamps_s, stamps_s), [10.0, 10.45])
 
     @pytest.mark.parametrize(
         ("speeds", "words"),
@@ -77,53 +143,63 @@ class TestDeadZone:
 
 
 def drive_wheel(lag_s, steady=1.0, delay_s=0.05):
-    """Stamps and ticks of a wheel that gets a command at 10 s."""
+    """Times of readings and ticks of a wheel that gets a command at 10 s."""
     stamps_s = np.arange(9.0, 12.0, 0.034)
     since_s = np.maximum(stamps_s - 10.0 - delay_s, 0.0)
     way_m = steady * speed_response.STEP_M_S * (since_s - lag_s * (1.0 - np.exp(-since_s / lag_s)))
     return stamps_s, np.floor(way_m / TICK_M)
 
 
+def measure(times_s, ticks, **disturbance):
+    """Return the response of a wheel that was told at 10 s."""
+    readings = make_readings(pass_on(times_s, **disturbance), ticks)
+    start = speed_response.find_start(readings, 10.0)
+    return speed_response.judge([speed_response.measure_speed(readings, ticks, start)])
+
+
 class TestSpeedResponse:
     def test_a_quick_wheel_is_better_than_a_slow_one_and_both_are_told_in_numbers(self):
-        quick, slow = (
-            speed_response.judge([speed_response.measure_speed(*drive_wheel(lag_s), 10.05)] * 2)
-            for lag_s in (0.1, 0.4)
-        )
+        quick, slow = (measure(*drive_wheel(lag_s)) for lag_s in (0.1, 0.4))
         assert quick.score < slow.score
         assert quick.mean_error == pytest.approx(0.1 / 1.4, abs=0.05)
         assert slow.mean_error == pytest.approx(0.4 / 1.4, abs=0.06)
         assert quick.reached_s == pytest.approx(0.23, abs=0.1)
         assert abs(quick.steady_error) < 0.05
 
-    @pytest.mark.parametrize("set_by_s", [-0.3, -0.07, -0.04, 0.07, 0.3])
-    def test_a_robot_whose_clock_is_set_meanwhile_is_judged_like_any_other(self, set_by_s):
-        stamps_s, ticks = drive_wheel(0.1)
-        steady, disturbed = (
-            speed_response.judge([speed_response.measure_speed(stamps, ticks, 10.05)])
-            for stamps in (stamps_s, set_clock(stamps_s, 10.5, set_by_s))
-        )
-        assert disturbed.mean_error == pytest.approx(steady.mean_error, abs=0.05)
-        assert disturbed.overshoot == pytest.approx(steady.overshoot, abs=0.1)
+    @pytest.mark.parametrize("disturbance", DISTURBED)
+    def test_a_robot_whose_stamps_are_doubtful_is_judged_like_any_other(self, disturbance):
+        steady, disturbed = measure(*drive_wheel(0.1)), measure(*drive_wheel(0.1), **disturbance)
+        assert disturbed.mean_error == pytest.approx(steady.mean_error, abs=0.02)
+        assert disturbed.overshoot == pytest.approx(steady.overshoot, abs=0.02)
+        assert disturbed.reached_s == pytest.approx(steady.reached_s, abs=0.04)
+
+    def test_a_robot_that_pauses_meanwhile_is_not_taken_for_a_fast_one(self):
+        times_s, ticks = drive_wheel(0.1)
+        kept = (times_s < 10.6) | (times_s > 10.75)
+        paused = measure(times_s[kept], ticks[kept])
+        assert paused.overshoot < 0.1
 
     def test_a_wheel_that_stays_too_slow_shows_it(self):
-        response = speed_response.judge([speed_response.measure_speed(*drive_wheel(0.05, steady=0.8), 10.05)])
+        response = measure(*drive_wheel(0.05, steady=0.8))
         assert response.steady_error == pytest.approx(-0.2, abs=0.04)
         assert response.reached_s == speed_response.STEP_S
 
     def test_a_late_command_is_no_fault_of_the_wheel(self):
         stamps_s, ticks = drive_wheel(0.1, delay_s=0.3)
-        start_s = speed_response.find_start(stamps_s, ticks, ticks, 10.0)
-        assert start_s == pytest.approx(10.3, abs=0.08)
-        standing = np.zeros(len(stamps_s))
-        assert speed_response.find_start(stamps_s, standing, standing, 10.0) == 10.0
+        readings = make_readings(stamps_s, ticks)
+        start = speed_response.find_start(readings, 10.0)
+        assert readings.times_s[start] == pytest.approx(10.3, abs=0.08)
+        standing = make_readings(stamps_s, np.zeros(len(stamps_s)))
+        assert standing.times_s[speed_response.find_start(standing, 10.0)] == pytest.approx(10.0, abs=0.035)
 
     def test_too_few_readings_are_refused(self):
         stamps_s, ticks = drive_wheel(0.1)
         with pytest.raises(CalibrationError, match="speeds could be measured"):
-            speed_response.measure_speed(stamps_s[::5], ticks[::5], 10.0)
+            measure(stamps_s[::5], ticks[::5])
         with pytest.raises(CalibrationError, match="speeds could be measured"):
-            speed_response.measure_speed(stamps_s[:55], ticks[:55], 10.0)
+            measure(stamps_s[:55], ticks[:55])
+        with pytest.raises(CalibrationError, match="no encoder readings came"):
+            speed_response.find_start(make_readings(stamps_s[:0], ticks[:0]), 10.0)
 
     def test_the_search_ends_with_the_best_gains_and_keeps_them_in_range(self):
         search = speed_response.GainSearch(servo_gain_m_s_us=1e-9)

@@ -9,7 +9,7 @@ from typing import List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
-from .encoder_steps import TICK_M, find_true_steps
+from .encoder_steps import TICK_M, Readings
 from .errors import CalibrationError
 
 NOMINAL_CENTRE_US = 1500
@@ -61,22 +61,23 @@ def list_pulses() -> List[int]:
     return list(range(NOMINAL_CENTRE_US - REACH_US, NOMINAL_CENTRE_US + REACH_US + 1, STEP_US))
 
 
-def measure_stairs(
-    stamps_s: np.ndarray, left_ticks: np.ndarray, right_ticks: np.ndarray, begins_s: Sequence[float]
-) -> np.ndarray:
+def measure_stairs(readings: Readings, begins_s: Sequence[float]) -> np.ndarray:
     """Return the speeds (m/s) of both wheels (2, stairs) at each stair of the staircase, which began at begins_s.
 
     Raises: CalibrationError if too little was heard of the robot.
     """
-    is_true = find_true_steps(stamps_s, 1)
-    steps = np.diff([stamps_s, left_ticks, right_ticks])
+    is_even = readings.find_even(1)
+    steps = np.diff([readings.counts, readings.left_ticks, readings.right_ticks])
     speeds = np.zeros((2, len(begins_s)))
     for stair, begin_s in enumerate(begins_s):
-        seen = (stamps_s[:-1] >= begin_s + SETTLE_S) & (stamps_s[1:] <= begin_s + PULSE_S + LATE_S)
-        duration_s, *ways_ticks = steps[:, seen & is_true].sum(axis=1)
-        if np.count_nonzero(seen & is_true) < LEAST_STEPS:
+        is_seen = (readings.times_s[:-1] >= begin_s + SETTLE_S) & (
+            readings.times_s[1:] <= begin_s + PULSE_S + LATE_S
+        )
+        kept = steps[:, is_seen & is_even]
+        if kept.shape[1] < LEAST_STEPS:
             raise CalibrationError("too few encoder readings came: is the network busy? try again")
-        speeds[:, stair] = np.array(ways_ticks) * TICK_M / duration_s
+        count, *ways_ticks = kept.sum(axis=1)
+        speeds[:, stair] = np.array(ways_ticks) * TICK_M / (count * readings.step_s)
     return speeds
 
 

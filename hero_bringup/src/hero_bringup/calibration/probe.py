@@ -1,6 +1,6 @@
 """One robot on its topics and services, as a calibration needs it: raw readings, raw commands. Knows topics only.
 
-Readings are kept with the robot's stamps, which do not suffer from the network.
+Encoder readings are kept with their stamps and numbers: see encoder_steps.
 """
 
 import threading
@@ -17,6 +17,7 @@ from sensor_msgs.msg import LaserScan
 from hero_examples.readings import yaw_of
 from hero_msgs.msg import Encoder, Motor
 
+from .encoder_steps import Readings, count_steps
 from .errors import CalibrationError
 from .infrared import BEAMS, read_signals
 
@@ -51,7 +52,9 @@ class Probe:
         self.name = "hero_%d" % robot_id
         self.failure: Optional[str] = None
         self._lock = threading.Lock()
-        self._encoder: Deque[Tuple[float, float, float]] = deque(maxlen=KEPT_READINGS)
+        self._encoder: Deque[Tuple[float, int, float, float]] = deque(maxlen=KEPT_READINGS)
+        self._last_seq = 0
+        self._count = 0
         self._scans: Deque[Tuple[List[float], List[float]]] = deque(maxlen=200)
         self._place: Optional[Place] = None
         self._heard_s = {"encoder": 0.0, "laser": 0.0, "odom": 0.0}
@@ -73,7 +76,12 @@ class Probe:
     def _receive_encoder(self, message: Encoder) -> None:
         with self._lock:
             self._heard_s["encoder"] = time.monotonic()
-            self._encoder.append((message.header.stamp.to_sec(), message.left_ticks, message.right_ticks))
+            # The driver numbers readings; a number is missing where this program was too slow.
+            lost = message.header.seq - self._last_seq - 1
+            self._count += 1 + (lost if 0 < lost < KEPT_READINGS else 0)
+            self._last_seq = message.header.seq
+            stamp_s = message.header.stamp.to_sec()
+            self._encoder.append((stamp_s, self._count, message.left_ticks, message.right_ticks))
 
     def _receive_scan(self, message: LaserScan) -> None:
         with self._lock:
@@ -98,14 +106,11 @@ class Probe:
                 return "nobody takes %s: does the driver run?" % publisher.name
         return None
 
-    def read_wheels(self) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return stamps (s) and ticks of the left and right wheel, those of the last minutes."""
+    def read_wheels(self) -> Readings:
+        """Return the readings of the encoders of the last two minutes."""
         with self._lock:
-            table = np.array(self._encoder).reshape(-1, 3)
-        # After a restart of the robot or a jump of its clock a stamp may be older than the one before.
-        newest_first = np.maximum.accumulate(table[:, 0])
-        kept = np.concatenate(([True], table[1:, 0] > newest_first[:-1])) if len(table) else slice(None)
-        return table[kept, 0], table[kept, 1], table[kept, 2]
+            table = np.array(self._encoder).reshape(-1, 4)
+        return count_steps(*table.T)
 
     def forget_scans(self) -> None:
         """Begin to collect scans anew."""

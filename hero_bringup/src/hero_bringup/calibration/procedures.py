@@ -190,7 +190,7 @@ class Session:
             self.rest()
 
         def judge(probe: Probe) -> None:
-            speeds = dead_zone.measure_stairs(*probe.read_wheels(), begins_s)
+            speeds = dead_zone.measure_stairs(probe.read_wheels(), begins_s)
             zones = []
             for wheel, name in ((LEFT, "left"), (RIGHT, "right")):
                 try:
@@ -253,17 +253,20 @@ class Session:
             self.rest()
 
         def judge(probe: Probe) -> None:
-            stamps_s, *ticks = probe.read_wheels()
-            starts_s = [speed_response.find_start(stamps_s, *ticks, begin_s) for begin_s in begins_s]
+            readings = probe.read_wheels()
+            starts = [speed_response.find_start(readings, begin_s) for begin_s in begins_s]
             # Turning to the left, the left wheel goes back and the right one ahead.
             responses[probe.robot_id] = [
                 speed_response.judge(
                     [
-                        speed_response.measure_speed(stamps_s, ahead * wheel_ticks, start_s)
-                        for start_s, ahead in zip(starts_s, signs)
+                        speed_response.measure_speed(readings, ahead * ticks, start)
+                        for start, ahead in zip(starts, signs)
                     ]
                 )
-                for wheel_ticks, signs in zip(ticks, ((-1.0, 1.0), (1.0, -1.0)))
+                for ticks, signs in (
+                    (readings.left_ticks, (-1.0, 1.0)),
+                    (readings.right_ticks, (1.0, -1.0)),
+                )
             ]
 
         self.repeat("velocity", turn, judge)

@@ -9,7 +9,7 @@ from typing import Dict, List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
-from .encoder_steps import TICK_M, find_true_steps
+from .encoder_steps import TICK_M, Readings
 from .errors import CalibrationError
 
 WHEEL_SEPARATION_M = 0.063
@@ -71,38 +71,39 @@ class Response(NamedTuple):
         return self.mean_error + OVERSHOOT_WEIGHT * self.overshoot
 
 
-def find_start(
-    stamps_s: np.ndarray, left_ticks: np.ndarray, right_ticks: np.ndarray, command_s: float
-) -> float:
-    """Return when a robot that stood got a command: the last reading before either wheel turned.
+def find_start(readings: Readings, command_s: float) -> int:
+    """Return at which reading a robot that stood got a command: the last one before either wheel turned.
 
     The way of the command over the network, 0.03 to 0.3 s, is no fault of the controller.
+
+    Raises: CalibrationError if nothing was heard of the robot.
     """
-    before = int(np.searchsorted(stamps_s, command_s, side="right")) - 1
-    if before < 0:
-        return command_s
-    moved = np.abs(left_ticks[before:] - left_ticks[before]) + np.abs(
-        right_ticks[before:] - right_ticks[before]
-    )
-    first = np.flatnonzero((moved >= 2.0) & (stamps_s[before:] <= command_s + STEP_S / 2.0))
-    return float(stamps_s[before + first[0] - 1]) if len(first) else command_s
+    if not len(readings.times_s):
+        raise CalibrationError("no encoder readings came: is the network busy? try again")
+    since_s = readings.times_s - command_s
+    before = max(0, int(np.count_nonzero(since_s <= 0.0)) - 1)
+    left, right = readings.left_ticks[before:], readings.right_ticks[before:]
+    moved = np.abs(left - left[0]) + np.abs(right - right[0])
+    first = np.flatnonzero((moved >= 2.0) & (since_s[before:] <= STEP_S / 2.0))
+    return before + (int(first[0]) - 1 if len(first) else 0)
 
 
-def measure_speed(stamps_s: np.ndarray, ticks: np.ndarray, start_s: float) -> Curve:
-    """Return times since start_s and the wheel's speed (m/s), each from ticks about 0.1 s apart.
+def measure_speed(readings: Readings, ticks: np.ndarray, start: int) -> Curve:
+    """Return times since the reading start and a wheel's speed (m/s), each from ticks about 0.1 s apart.
 
     Raises: CalibrationError if too little was heard of the robot.
     """
     apart = 3  # readings come every 34 ms, and a tick is 0.5 mm
-    seen = (stamps_s[:-apart] >= start_s - 0.1) & (stamps_s[apart:] <= start_s + STEP_S - 0.1)
-    kept = np.flatnonzero(seen & find_true_steps(stamps_s, apart))
-    if len(kept) < LEAST_SPEEDS or stamps_s[kept[-1] + apart] < start_s + LATE_S + 0.2:
+    times_s = (readings.counts - readings.counts[start]) * readings.step_s
+    seen = (times_s[:-apart] >= -0.1) & (times_s[apart:] <= STEP_S - 0.1)
+    kept = np.flatnonzero(seen & readings.find_even(apart))
+    if len(kept) < LEAST_SPEEDS or times_s[kept[-1] + apart] < LATE_S + 0.2:
         raise CalibrationError(
             "only %d speeds could be measured in %.1f s: is the network busy? try again" % (len(kept), STEP_S)
         )
-    first_s, last_s = stamps_s[kept], stamps_s[kept + apart]
     ways_m = (ticks[kept + apart] - ticks[kept]) * TICK_M
-    return (first_s + last_s) / 2.0 - start_s, ways_m / (last_s - first_s)
+    between_s = times_s[kept + apart] - times_s[kept]
+    return times_s[kept] + between_s / 2.0, ways_m / between_s
 
 
 def judge(curves: Sequence[Curve], wanted_m_s: float = STEP_M_S) -> Response:
