@@ -3,8 +3,8 @@
 A robot reads its encoders every 34 ms by its own timer (docs/robot_interface.md); its stamps are not as good. It sets
 its clock every 2.5 s, back or ahead by 70 ms and more after the network stood still; set back, stamps are microseconds
 apart until they have caught up, and those of a clock that is too far ahead are times of arrival, many at once. So the
-steps are counted. What the stamps are asked for is when it was, and whether the robot paused: a Wi-Fi that does not take
-what it sends stops it altogether.
+steps are counted. Stamps are asked when it was, and whether the robot paused: a Wi-Fi that does not take what it sends
+stops it altogether.
 """
 
 from typing import NamedTuple
