@@ -123,10 +123,22 @@ class TestDeadZone:
         assert left == pytest.approx(0.02 * np.arange(8), abs=0.021 if is_far else 0.006)
         assert right == pytest.approx(-left)
 
-    def test_a_stair_of_which_nothing_was_heard_is_refused(self):
-        stamps_s = np.arange(9.0, 10.6, 0.034)
+    def test_a_stair_of_which_nothing_was_heard_is_left_out_and_many_are_refused(self):
+        begins_s = 10.0 + np.arange(8) * dead_zone.PULSE_S
+        times_s = np.arange(9.0, 14.0, 0.034)
+        kept = (times_s < begins_s[2]) | (times_s > begins_s[4])
+        left, right = dead_zone.measure_stairs(make_readings(times_s[kept], times_s[kept]), begins_s)
+        for speeds in (left, right):
+            assert np.flatnonzero(np.isnan(speeds)).tolist() == [2, 3]
+        kept = (times_s < begins_s[2]) | (times_s > begins_s[5])
         with pytest.raises(CalibrationError, match="too few encoder readings came"):
-            dead_zone.measure_stairs(make_readings(stamps_s, stamps_s), [10.0, 10.45])
+            dead_zone.measure_stairs(make_readings(times_s[kept], times_s[kept]), begins_s)
+
+    def test_the_centre_is_found_also_where_a_fifth_of_the_stairs_is_missing(self):
+        pulses_us = np.array(dead_zone.list_pulses())
+        kept = np.random.RandomState(1).permutation(len(pulses_us)) >= len(pulses_us) // 5
+        zone = dead_zone.find_dead_zone(pulses_us[kept], servo_speeds(pulses_us[kept], 1533.0))
+        assert zone.centre_us == pytest.approx(1533.0, abs=4.0)
 
     @pytest.mark.parametrize(
         ("speeds", "words"),

@@ -34,7 +34,7 @@ TURN_REACHED_RAD = math.radians(1.5)
 TURN_TOLERANCE_RAD = math.radians(10.0)
 SCAN_TIMEOUT_S = 15.0
 
-TRIES = 2
+TRIES = 3
 
 Report = Callable[[str], None]
 
@@ -191,13 +191,15 @@ class Session:
 
         def judge(probe: Probe) -> None:
             speeds = dead_zone.measure_stairs(probe.read_wheels(), begins_s)
+            was_heard = ~np.isnan(speeds[0])
+            heard_us, speeds = np.array(pulses_us)[was_heard], speeds[:, was_heard]
             zones = []
             for wheel, name in ((LEFT, "left"), (RIGHT, "right")):
                 try:
-                    zones.append(dead_zone.find_dead_zone(pulses_us, speeds[wheel]))
+                    zones.append(dead_zone.find_dead_zone(heard_us, speeds[wheel]))
                 except CalibrationError as error:
                     raise CalibrationError("the %s wheel %s" % (name, error)) from error
-            result = MotorResult(pulses_us, speeds, zones)
+            result = MotorResult(heard_us.tolist(), speeds, zones)
             probe.call("motors_parameters", SetMotor, *result.centres_us)
             results[probe.robot_id] = result
 
