@@ -23,9 +23,10 @@ REST_M_S = 0.005
 STOP_TIMEOUT_S = 1.5
 """A stop takes about 0.2 s, and the robot's own watchdog, without one, 2 s."""
 
-STALL_S = 0.4
-RECOVERY_S = 1.0
-"""While this machine stands still for so long no program can steer, and for a moment after it robots touch things."""
+STALL_S = 0.25
+RECOVERY_S = 1.5
+"""While this machine stands still for so long no program can steer, and for a moment after it robots touch things: two
+of them that face each other are 0.5 s apart when they see each other."""
 
 CREEP_M_S = 0.01
 """Slower than this a robot does not run into anything; things run into it."""
