@@ -16,7 +16,7 @@ from geometry_msgs.msg import Twist
 from life_signs import Life
 from nav_msgs.msg import Odometry
 from rig import HERE, Program, find_free_port, wait_until
-from steady_time import StallWatch
+from steady_time import MARGIN_S, StallWatch
 
 from hero_driver.rosserial import frames, payloads
 from hero_msgs.msg import Encoder
@@ -320,18 +320,21 @@ def test_a_driver_whose_loop_breaks_stops_the_robots_and_ends(start_driver, reco
     command.linear.x = SPEED_M_S
     publisher.publish(command)
     wait_until(lambda: robot.velocities, "motion")
-    trigger.write_text("")
-    code = driver.wait_end()
-    wait_until(lambda: robot.ended, "the end of the connection")
+    with StallWatch() as watch:
+        trigger.write_text("")
+        code = driver.wait_end()
+        wait_until(lambda: robot.ended, "the end of the connection")
     stops, taken = (
         [velocity.is_zero for velocity in velocities if "velocity_controller" in velocity.name]
         for velocities in (robot.velocities, robot.accepted)
     )
     robot.close()
+    # It reads at once: only a machine that stood still lets it drop the second.
+    least = 1 if watch.longest_s >= MARGIN_S else 2
     assert driver.find_lines("the driver broke: RuntimeError")
     record(
         "an exception in the loop of the sockets",
         1,
-        int(code == 1 and stops[-2:] == [True, True] and taken[-1]),
+        int(code == 1 and stops[-2:] == [True, True] and taken[-least:] == [True] * least),
         "the driver",
     )

@@ -14,6 +14,7 @@ from geometry_msgs.msg import Twist
 from life_signs import Life
 from rig import STOCK_NAMES, count_holdings, start_python, wait_until
 from rosgraph_msgs.msg import Clock
+from steady_time import MARGIN_S, StallWatch
 from stock_messages import make_laser
 
 from hero_msgs.srv import SetPID
@@ -116,9 +117,12 @@ def test_a_publisher_at_1_khz_delays_nobody_and_its_stop_arrives(served, effort,
         time.sleep(max(0.0, start_s + 0.001 * number - time.monotonic()))
         if number % 500 == 0:
             life.show()
-    publisher.publish(stop)
-    wait_until(lambda: [v.is_zero for v in robot.velocities[-2:]] == [True, True], "two stops")
-    assert robot.accepted[-1].is_zero
+    with StallWatch() as watch:
+        publisher.publish(stop)
+        wait_until(lambda: [v.is_zero for v in robot.velocities[-2:]] == [True, True], "two stops")
+    # It reads at once: only a machine that stood still lets it drop the second.
+    least = 1 if watch.longest_s >= MARGIN_S else 2
+    assert [v.is_zero for v in robot.accepted[-least:]] == [True] * least, "stops that are taken"
     taken = len(robot.accepted)
     record(
         "%d velocities at 1 kHz, then a stop" % count,

@@ -30,6 +30,7 @@ LATE_S = 0.03
 LEAST_STEPS = 2
 MISSING_SHARE = 0.25
 """So many stairs may be missed, where the network stands still: the edges follow from six speeds on either side."""
+
 STANDING_M_S = 0.004
 """Slower than this a wheel stands: two ticks (1.1 mm) in a step may be the servo that settles."""
 
