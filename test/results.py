@@ -6,9 +6,14 @@ Usage:
     results.py summary DIR                  print all results under DIR; exit 1 if anything failed
 """
 
+import re
 import sys
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
+
+ERROR_LINE = re.compile(r"^(?:\w+\.)*\w*(?:Error|Exception|Expired|Failed)\b.*", re.MULTILINE)
+PLACE = re.compile(r"(\w+\.py)(?:\", line |:)(\d+)")
+SHOWN = 240  # characters of a reason
 
 
 class Counts:
@@ -27,12 +32,25 @@ class Counts:
             self.failures.append(f"{path}: not a JUnit file: {error}")
             return
         for case in root.iter("testcase"):
-            if case.find("failure") is not None or case.find("error") is not None:
-                self.failures.append(f"{case.get('classname') or path.stem}: {case.get('name')}")
+            faults = [*case.findall("failure"), *case.findall("error")]
+            if faults:
+                title = f"{case.get('classname') or path.stem}: {case.get('name')}"
+                self.failures.append(title + find_reason(faults[0]))
             elif case.find("skipped") is not None:
                 self.skipped += 1
             else:
                 self.passed += 1
+
+
+def find_reason(fault):
+    """Where a test failed and what it said, in a line that fits beside its name; empty if it said nothing."""
+    text = "\n".join(filter(None, [fault.get("message"), fault.text])).strip()
+    if not text:
+        return ""
+    places = [":".join(place) for place in PLACE.findall(text) if place[0].startswith("test_")]
+    found = ERROR_LINE.search(text)
+    reason = found.group() if found else text.splitlines()[0]
+    return "\n    " + ": ".join([*places[-1:], reason])[:SHOWN]
 
 
 def count_results(directory):

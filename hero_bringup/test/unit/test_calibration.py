@@ -49,10 +49,11 @@ DISTURBED = [
 ]
 
 
-def make_readings(stamps_s, left_ticks, right_ticks=None, counts=None):
-    """Return readings of which none was lost, unless counts say so."""
+def make_readings(stamps_s, left_ticks, right_ticks=None, counts=None, heard_s=None):
+    """Return readings; unless told otherwise none was lost, and all were heard when they are stamped."""
     right_ticks = left_ticks if right_ticks is None else right_ticks
-    return count_steps(stamps_s, np.arange(len(stamps_s)) if counts is None else counts, left_ticks, right_ticks)
+    counts = np.arange(len(stamps_s)) if counts is None else counts
+    return count_steps(stamps_s, counts, left_ticks, right_ticks, stamps_s if heard_s is None else heard_s)
 
 
 class TestReadings:
@@ -116,17 +117,21 @@ class TestDeadZone:
         stamps_s = np.arange(9.0, 14.0, 0.034)
         speeds_m_s = 0.02 * np.clip(np.floor((stamps_s - 10.1) / dead_zone.PULSE_S), -1, 7)
         ticks = np.cumsum(speeds_m_s * 0.034) / TICK_M
-        readings = make_readings(pass_on(stamps_s, **disturbance), ticks, -ticks)
+        heard_s = pass_on(stamps_s, late=disturbance.get("late"))
+        readings = make_readings(pass_on(stamps_s, **disturbance), ticks, -ticks, heard_s=heard_s)
         left, right = dead_zone.measure_stairs(readings, begins_s)
         # A clock that is off by 0.3 s takes readings of the stair before.
         is_far = abs(disturbance.get("setting", (0.0, 0.0))[1]) > 0.2
-        assert left == pytest.approx(0.02 * np.arange(8), abs=0.021 if is_far else 0.006)
-        assert right == pytest.approx(-left)
+        expected = 0.02 * np.arange(8)
+        if disturbance.get("late") == (10.3, 10.65):
+            expected[1] = np.nan  # sent in a silence
+        assert left == pytest.approx(expected, abs=0.021 if is_far else 0.006, nan_ok=True)
+        assert right == pytest.approx(-left, nan_ok=True)
 
     def test_a_stair_of_which_nothing_was_heard_is_left_out_and_many_are_refused(self):
         begins_s = 10.0 + np.arange(8) * dead_zone.PULSE_S
         times_s = np.arange(9.0, 14.0, 0.034)
-        kept = (times_s < begins_s[2]) | (times_s > begins_s[4])
+        kept = (times_s < begins_s[2] + 0.22) | (times_s > begins_s[3] + 0.3)
         left, right = dead_zone.measure_stairs(make_readings(times_s[kept], times_s[kept]), begins_s)
         for speeds in (left, right):
             assert np.flatnonzero(np.isnan(speeds)).tolist() == [2, 3]
@@ -134,11 +139,42 @@ class TestDeadZone:
         with pytest.raises(CalibrationError, match="too few encoder readings came"):
             dead_zone.measure_stairs(make_readings(times_s[kept], times_s[kept]), begins_s)
 
+    @pytest.mark.parametrize(
+        ("silent_s", "missing"), [((0.85, 1.15), [2]), ((1.0, 1.2), []), ((0.55, 0.82), [1, 2]), ((1.15, 1.32), [])]
+    )
+    def test_a_stair_whose_command_was_sent_in_a_silence_is_left_out(self, silent_s, missing):
+        begins_s = 10.0 + np.arange(10) * dead_zone.PULSE_S
+        times_s = np.arange(9.0, 15.0, 0.034)
+        heard_s = np.where(
+            (times_s >= 10.0 + silent_s[0]) & (times_s < 10.0 + silent_s[1]), 10.0 + silent_s[1], times_s
+        )
+        left, _ = dead_zone.measure_stairs(make_readings(times_s, times_s, heard_s=heard_s), begins_s)
+        assert np.flatnonzero(np.isnan(left)).tolist() == missing
+
     def test_the_centre_is_found_also_where_a_fifth_of_the_stairs_is_missing(self):
         pulses_us = np.array(dead_zone.list_pulses())
-        kept = np.random.RandomState(1).permutation(len(pulses_us)) >= len(pulses_us) // 5
-        zone = dead_zone.find_dead_zone(pulses_us[kept], servo_speeds(pulses_us[kept], 1533.0))
-        assert zone.centre_us == pytest.approx(1533.0, abs=4.0)
+        speeds = servo_speeds(pulses_us, 1533.0)
+        speeds[np.random.RandomState(1).permutation(len(pulses_us)) < len(pulses_us) // 5] = np.nan
+        assert dead_zone.find_dead_zone(pulses_us, speeds).centre_us == pytest.approx(1533.0, abs=4.0)
+
+    def test_a_servo_that_lags_errs_in_opposite_ways_and_its_centre_is_found(self):
+        pulses_us = np.array(dead_zone.list_pulses())
+        lagging_us = pulses_us - 3.0 * np.sign(np.diff(pulses_us, append=pulses_us[-1] - 1))
+        zone = dead_zone.find_dead_zone(pulses_us, servo_speeds(lagging_us, 1490.0))
+        assert zone.centre_us == pytest.approx(1490.0, abs=2.0)
+
+    @pytest.mark.parametrize("first", range(0, 82, 3))
+    @pytest.mark.parametrize("late", [1, 2, 3])
+    def test_stairs_with_the_pulse_of_one_before_are_noticed_or_do_no_harm(self, first, late):
+        pulses_us = np.array(dead_zone.list_pulses())
+        got_us = pulses_us.copy()
+        got_us[first + 1 : first + 1 + late] = pulses_us[first]
+        try:
+            zone = dead_zone.find_dead_zone(pulses_us, servo_speeds(got_us, 1478.0))
+        except CalibrationError as error:
+            assert "try again" in str(error)
+        else:
+            assert zone.centre_us == pytest.approx(1478.0, abs=1.0 + dead_zone.AGREE_US / 2.0)
 
     @pytest.mark.parametrize(
         ("speeds", "words"),
@@ -154,10 +190,10 @@ class TestDeadZone:
             dead_zone.find_dead_zone(pulses_us, speeds(pulses_us))
 
 
-def drive_wheel(lag_s, steady=1.0, delay_s=0.05):
-    """Times of readings and ticks of a wheel that gets a command at 10 s."""
+def drive_wheel(lag_s, steady=1.0, delay_s=0.05, stop_s=math.inf):
+    """Times of readings and ticks of a wheel that gets a command at 10 s, and another to stop so much later."""
     stamps_s = np.arange(9.0, 12.0, 0.034)
-    since_s = np.maximum(stamps_s - 10.0 - delay_s, 0.0)
+    since_s = np.maximum(np.minimum(stamps_s - 10.0, stop_s) - delay_s, 0.0)
     way_m = steady * speed_response.STEP_M_S * (since_s - lag_s * (1.0 - np.exp(-since_s / lag_s)))
     return stamps_s, np.floor(way_m / TICK_M)
 
@@ -166,7 +202,7 @@ def measure(times_s, ticks, **disturbance):
     """Return the response of a wheel that was told at 10 s."""
     readings = make_readings(pass_on(times_s, **disturbance), ticks)
     start = speed_response.find_start(readings, 10.0)
-    return speed_response.judge([speed_response.measure_speed(readings, ticks, start)])
+    return speed_response.judge([speed_response.measure_speed(readings, ticks, start, 10.0 + speed_response.STEP_S)])
 
 
 class TestSpeedResponse:
@@ -203,6 +239,26 @@ class TestSpeedResponse:
         assert readings.times_s[start] == pytest.approx(10.3, abs=0.08)
         standing = make_readings(stamps_s, np.zeros(len(stamps_s)))
         assert standing.times_s[speed_response.find_start(standing, 10.0)] == pytest.approx(10.0, abs=0.035)
+
+    def test_a_robot_that_stops_earlier_because_it_began_late_is_judged_while_it_was_driven(self):
+        prompt, late = (measure(*drive_wheel(0.1, delay_s=delay_s, stop_s=1.5)) for delay_s in (0.0, 0.2))
+        assert late.mean_error == pytest.approx(prompt.mean_error, abs=0.02)
+        with pytest.raises(CalibrationError, match="speeds could be measured"):
+            measure(*drive_wheel(0.1, delay_s=0.5, stop_s=1.5))
+
+    def test_a_robot_that_turned_only_late_is_refused_unless_it_is_like_that(self):
+        stamps_s, ticks = drive_wheel(0.1, delay_s=0.9)
+        readings = make_readings(stamps_s, ticks)
+        with pytest.raises(CalibrationError, match=r"turned only (0.9|1.0) s after its command"):
+            speed_response.find_start(readings, 10.0)
+        start = speed_response.find_start(readings, 10.0, may_be_late=True)
+        assert readings.times_s[start] == pytest.approx(10.0, abs=0.035)
+
+    def test_a_wheel_that_turns_from_what_was_before_is_refused(self):
+        stamps_s, ticks = drive_wheel(0.1)
+        turning = -0.1 / TICK_M * np.minimum(stamps_s - 10.1, 0.0)
+        with pytest.raises(CalibrationError, match="still turned when a test began"):
+            measure(stamps_s, ticks + np.floor(turning))
 
     def test_too_few_readings_are_refused(self):
         stamps_s, ticks = drive_wheel(0.1)

@@ -46,7 +46,9 @@ WALL = (
 
 def say(text: str) -> None:
     """Write a line for people."""
-    print(text, flush=True)
+    # In one piece: threads of a procedure report side by side.
+    sys.stdout.write(text + "\n")
+    sys.stdout.flush()
 
 
 class Calibration:
@@ -106,7 +108,7 @@ class Calibration:
         if MOTORS in parts or VELOCITY in parts:
             self._place(ROOM, beside_wall=False)
         if MOTORS in parts and self._session.active:
-            say("motors: pulses up a staircase, about 20 s")
+            say("motors: pulses up a staircase and down again, about 40 s")
             self._motors = self._session.calibrate_motors()
         if VELOCITY in parts and self._session.active:
             say("velocity: gains are tried, about a minute")

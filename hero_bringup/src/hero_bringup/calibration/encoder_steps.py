@@ -33,6 +33,7 @@ class Readings(NamedTuple):
         counts: which reading it is; counts of readings that were lost are left out (N).
         left_ticks, right_ticks: as the robot counts them (N).
         step_s: from one count to the next.
+        heard_s: when it came, in ROS time (N).
         is_even: whether the robot went on reading from this one to the next, without a pause (N - 1).
     """
 
@@ -41,6 +42,7 @@ class Readings(NamedTuple):
     left_ticks: np.ndarray
     right_ticks: np.ndarray
     step_s: float
+    heard_s: np.ndarray
     is_even: np.ndarray
 
     def find_even(self, apart: int) -> np.ndarray:
@@ -51,11 +53,15 @@ class Readings(NamedTuple):
 
 
 def count_steps(
-    stamps_s: np.ndarray, counts: np.ndarray, left_ticks: np.ndarray, right_ticks: np.ndarray
+    stamps_s: np.ndarray,
+    counts: np.ndarray,
+    left_ticks: np.ndarray,
+    right_ticks: np.ndarray,
+    heard_s: np.ndarray,
 ) -> Readings:
     """Return readings with even steps; stamps_s and counts rise."""
     if len(stamps_s) < 2:
-        return Readings(stamps_s, counts, left_ticks, right_ticks, np.nan, np.zeros(0, dtype=bool))
+        return Readings(stamps_s, counts, left_ticks, right_ticks, np.nan, heard_s, np.zeros(0, dtype=bool))
     span = min(SPAN, len(stamps_s) - 1)
     step_s = float(np.median((stamps_s[span:] - stamps_s[:-span]) / (counts[span:] - counts[:-span])))
     behind_s = stamps_s - counts * step_s
@@ -64,4 +70,4 @@ def count_steps(
     for later in range(1, min(LATE_READINGS, len(behind_s))):
         in_time_s[:-later] = np.minimum(in_time_s[:-later], behind_s[later:])
     is_even = np.diff(in_time_s) <= PAUSE_STEPS * step_s
-    return Readings(counts * step_s + in_time_s, counts, left_ticks, right_ticks, step_s, is_even)
+    return Readings(counts * step_s + in_time_s, counts, left_ticks, right_ticks, step_s, heard_s, is_even)

@@ -24,8 +24,8 @@ from .infrared import BEAMS, read_signals
 KEPT_READINGS = 4000
 """Two minutes of encoder readings."""
 
-STALE_S = 1.5
-"""Wall time; encoder readings come 29 times a second, scans 5 times."""
+STALE_S = 3.0
+"""Wall time; encoder readings come 29 times a second, scans 5 times. Wi-Fi may stand still for a second or two."""
 
 SERVICE_WAIT_S = 5.0
 
@@ -52,7 +52,7 @@ class Probe:
         self.name = "hero_%d" % robot_id
         self.failure: Optional[str] = None
         self._lock = threading.Lock()
-        self._encoder: Deque[Tuple[float, int, float, float]] = deque(maxlen=KEPT_READINGS)
+        self._encoder: Deque[Tuple[float, int, float, float, float]] = deque(maxlen=KEPT_READINGS)
         self._last_seq = 0
         self._count = 0
         self._scans: Deque[Tuple[List[float], List[float]]] = deque(maxlen=200)
@@ -81,7 +81,9 @@ class Probe:
             self._count += 1 + (lost if 0 < lost < KEPT_READINGS else 0)
             self._last_seq = message.header.seq
             stamp_s = message.header.stamp.to_sec()
-            self._encoder.append((stamp_s, self._count, message.left_ticks, message.right_ticks))
+            self._encoder.append(
+                (stamp_s, self._count, message.left_ticks, message.right_ticks, rospy.get_time())
+            )
 
     def _receive_scan(self, message: LaserScan) -> None:
         with self._lock:
@@ -109,7 +111,7 @@ class Probe:
     def read_wheels(self) -> Readings:
         """Return the readings of the encoders of the last two minutes."""
         with self._lock:
-            table = np.array(self._encoder).reshape(-1, 4)
+            table = np.array(self._encoder).reshape(-1, 5)
         return count_steps(*table.T)
 
     def forget_scans(self) -> None:

@@ -34,7 +34,10 @@ TURN_REACHED_RAD = math.radians(1.5)
 TURN_TOLERANCE_RAD = math.radians(10.0)
 SCAN_TIMEOUT_S = 15.0
 
-TRIES = 3
+CLIMBS = 3
+TURN_TRIES = 3
+TEST_TRIES = 6
+"""A staircase takes 40 s, a test of velocity 4 s."""
 
 Report = Callable[[str], None]
 
@@ -44,7 +47,7 @@ class EndedError(Exception):
 
 
 class MotorResult:
-    """Staircase of one robot: pulses us, speeds m/s of both wheels, dead zones."""
+    """Staircase of one robot: pulses us, speeds m/s of both wheels (NaN: not heard), dead zones."""
 
     def __init__(
         self, pulses_us: Sequence[int], speeds_m_s: np.ndarray, zones: Sequence[dead_zone.DeadZone]
@@ -133,21 +136,27 @@ class Session:
                 self._report("%s failed: %s" % (probe.name, probe.failure))
 
     def repeat(
-        self, step: str, move: Callable[[Sequence[Probe]], None], judge: Callable[[Probe], None]
+        self,
+        step: str,
+        tries: int,
+        move: Callable[[Sequence[Probe]], None],
+        judge: Callable[[Probe, bool], None],
     ) -> None:
         """Let robots move and judge what was seen; who cannot be judged has other tries, then fails.
 
-        Wi-Fi stands still for a second now and then, and takes readings and commands with it.
+        Wi-Fi stands still for a second now and then, and takes readings and commands with it. judge is told whether
+        this try is the last.
         """
         waiting = self.active
-        for attempt in range(TRIES):
+        for attempt in range(tries):
             again: List[Probe] = []
 
             def try_judging(probe: Probe, attempt: int = attempt, again: List[Probe] = again) -> None:
+                is_last = attempt + 1 == tries
                 try:
-                    judge(probe)
+                    judge(probe, is_last)
                 except CalibrationError as error:
-                    if attempt + 1 == TRIES or probe.find_silence():
+                    if is_last or probe.find_silence():
                         raise
                     self._report("%s once more: %s: %s" % (probe.name, step, error))
                     again.append(probe)
@@ -189,21 +198,19 @@ class Session:
                 self.pause(dead_zone.PULSE_S)
             self.rest()
 
-        def judge(probe: Probe) -> None:
+        def judge(probe: Probe, _is_last: bool) -> None:
             speeds = dead_zone.measure_stairs(probe.read_wheels(), begins_s)
-            was_heard = ~np.isnan(speeds[0])
-            heard_us, speeds = np.array(pulses_us)[was_heard], speeds[:, was_heard]
             zones = []
             for wheel, name in ((LEFT, "left"), (RIGHT, "right")):
                 try:
-                    zones.append(dead_zone.find_dead_zone(heard_us, speeds[wheel]))
+                    zones.append(dead_zone.find_dead_zone(pulses_us, speeds[wheel]))
                 except CalibrationError as error:
                     raise CalibrationError("the %s wheel %s" % (name, error)) from error
-            result = MotorResult(heard_us.tolist(), speeds, zones)
+            result = MotorResult(pulses_us, speeds, zones)
             probe.call("motors_parameters", SetMotor, *result.centres_us)
             results[probe.robot_id] = result
 
-        self.repeat("motors", climb, judge)
+        self.repeat("motors", CLIMBS, climb, judge)
         return results
 
     # -- velocity ------------------------------------------------------------------------------------------
@@ -254,15 +261,16 @@ class Session:
                     self.pause(COMMAND_PERIOD_S)
             self.rest()
 
-        def judge(probe: Probe) -> None:
+        def judge(probe: Probe, is_last: bool) -> None:
             readings = probe.read_wheels()
-            starts = [speed_response.find_start(readings, begin_s) for begin_s in begins_s]
+            starts = [speed_response.find_start(readings, begin_s, is_last) for begin_s in begins_s]
+            ends_s = [begin_s + speed_response.STEP_S for begin_s in begins_s]
             # Turning to the left, the left wheel goes back and the right one ahead.
             responses[probe.robot_id] = [
                 speed_response.judge(
                     [
-                        speed_response.measure_speed(readings, ahead * ticks, start)
-                        for start, ahead in zip(starts, signs)
+                        speed_response.measure_speed(readings, ahead * ticks, start, end_s)
+                        for start, end_s, ahead in zip(starts, ends_s, signs)
                     ]
                 )
                 for ticks, signs in (
@@ -271,7 +279,7 @@ class Session:
                 )
             ]
 
-        self.repeat("velocity", turn, judge)
+        self.repeat("velocity", TEST_TRIES, turn, judge)
         return responses
 
     # -- infrared ------------------------------------------------------------------------------------------
@@ -341,14 +349,14 @@ class Session:
             self.pause(POLL_S)
 
     def _turn(self, step: str, angles_rad: Dict[int, float]) -> None:
-        """Turn every active robot to the left by its angle, on the spot; a second try for what is left of it."""
+        """Turn every active robot to the left by its angle, on the spot; other tries for what is left of it."""
         wanted_rad: Dict[int, float] = {}
 
         def plan(probe: Probe) -> None:
             wanted_rad[probe.robot_id] = probe.read_place().yaw_rad + angles_rad[probe.robot_id]
 
         self.each(step, plan)
-        for tolerance_rad in (0.0, TURN_TOLERANCE_RAD / 2.0):
+        for tolerance_rad in (0.0, *[TURN_TOLERANCE_RAD / 2.0] * (TURN_TRIES - 1)):
             turning = [
                 probe for probe in self.active if abs(self._left_rad(probe, wanted_rad)) > tolerance_rad
             ]

@@ -43,6 +43,9 @@ HIGHEST_GAIN = 30000.0
 """The firmware prints gains into a buffer of 100 bytes and checks none."""
 
 LEAST_SPEEDS = 20
+STANDING_STEPS = 4
+STANDING_TICKS = 3
+"""A wheel that made more ticks in so many readings before a test began was still turning from what was before."""
 
 Gains = Tuple[float, float, float]
 Curve = Tuple[np.ndarray, np.ndarray]
@@ -71,12 +74,15 @@ class Response(NamedTuple):
         return self.mean_error + OVERSHOOT_WEIGHT * self.overshoot
 
 
-def find_start(readings: Readings, command_s: float) -> int:
+def find_start(readings: Readings, command_s: float, may_be_late: bool = False) -> int:
     """Return at which reading a robot that stood got a command: the last one before either wheel turned.
 
-    The way of the command over the network, 0.03 to 0.3 s, is no fault of the controller.
+    The way of the command over the network, 0.03 to 0.3 s, is no fault of the controller. Of one that did not turn
+    soon, that is the reading at the command: a blocked wheel has no other.
 
-    Raises: CalibrationError if nothing was heard of the robot.
+    may_be_late: whether a robot that turned, but not soon, is one with a sluggish controller.
+
+    Raises: CalibrationError if nothing was heard of the robot, or it turned late.
     """
     if not len(readings.times_s):
         raise CalibrationError("no encoder readings came: is the network busy? try again")
@@ -84,18 +90,29 @@ def find_start(readings: Readings, command_s: float) -> int:
     before = max(0, int(np.count_nonzero(since_s <= 0.0)) - 1)
     left, right = readings.left_ticks[before:], readings.right_ticks[before:]
     moved = np.abs(left - left[0]) + np.abs(right - right[0])
-    first = np.flatnonzero((moved >= 2.0) & (since_s[before:] <= STEP_S / 2.0))
-    return before + (int(first[0]) - 1 if len(first) else 0)
+    turned_s = since_s[before:][moved >= 2.0]
+    if not len(turned_s) or turned_s[0] > STEP_S:
+        return before
+    if turned_s[0] > STEP_S / 2.0:
+        if may_be_late:
+            return before
+        raise CalibrationError("turned only %.1f s after its command: is the network busy? try again" % turned_s[0])
+    return before + int(np.argmax(moved >= 2.0)) - 1
 
 
-def measure_speed(readings: Readings, ticks: np.ndarray, start: int) -> Curve:
+def measure_speed(readings: Readings, ticks: np.ndarray, start: int, end_s: float) -> Curve:
     """Return times since the reading start and a wheel's speed (m/s), each from ticks about 0.1 s apart.
 
-    Raises: CalibrationError if too little was heard of the robot.
+    end_s: when the robot was told to stop, in ROS time; where its start came late, that is soon after.
+
+    Raises: CalibrationError if the wheel did not stand before, or too little was heard of the robot.
     """
+    if abs(ticks[start] - ticks[max(0, start - STANDING_STEPS)]) > STANDING_TICKS:
+        raise CalibrationError("still turned when a test began: is the network busy? try again")
     apart = 3  # readings come every 34 ms, and a tick is 0.5 mm
     times_s = (readings.counts - readings.counts[start]) * readings.step_s
-    seen = (times_s[:-apart] >= -0.1) & (times_s[apart:] <= STEP_S - 0.1)
+    driven_s = min(STEP_S - 0.1, end_s - readings.times_s[start])
+    seen = (times_s[:-apart] >= -0.1) & (times_s[apart:] <= driven_s)
     kept = np.flatnonzero(seen & readings.find_even(apart))
     if len(kept) < LEAST_SPEEDS or times_s[kept[-1] + apart] < LATE_S + 0.2:
         raise CalibrationError(
