@@ -163,6 +163,19 @@ class TestDeadZone:
         zone = dead_zone.find_dead_zone(pulses_us, servo_speeds(lagging_us, 1490.0))
         assert zone.centre_us == pytest.approx(1490.0, abs=2.0)
 
+    def test_ways_that_do_not_agree_are_refused(self):
+        pulses_us = np.array(dead_zone.list_pulses())
+        got_us = np.where(np.arange(len(pulses_us)) < 41, pulses_us - 12, pulses_us)
+        with pytest.raises(CalibrationError, match="us with rising pulses and around 149[01] us with falling"):
+            dead_zone.find_dead_zone(pulses_us, servo_speeds(got_us, 1490.0))
+
+    @pytest.mark.parametrize("apart", [40, 46, 52])
+    def test_a_wrong_speed_beside_the_dead_zone_does_not_move_it(self, apart):
+        pulses_us = np.array(dead_zone.list_pulses())
+        speeds = servo_speeds(pulses_us, 1490.0)
+        speeds[np.flatnonzero(pulses_us == 1490 + apart)[0]] = 0.13
+        assert dead_zone.find_dead_zone(pulses_us, speeds).centre_us == pytest.approx(1490.0, abs=1.5)
+
     @pytest.mark.parametrize("first", range(0, 82, 3))
     @pytest.mark.parametrize("late", [1, 2, 3])
     def test_stairs_with_the_pulse_of_one_before_are_noticed_or_do_no_harm(self, first, late):
