@@ -323,6 +323,18 @@ class TestInfrared:
         # What the firmware needs holds the offset of the signal at 10 cm: 0.93 counts.
         assert found == pytest.approx([alpha - 0.0093 for alpha in self.ALPHAS], rel=0.03)
 
+    def test_scans_of_a_robot_that_still_turned_do_not_count(self):
+        scans = np.full((10, 8), 42.0)
+        scans[:2] = 4.0
+        assert infrared.average(scans) == pytest.approx([42.0] * 8)
+        scans[:, 0] = np.nan
+        assert np.isnan(infrared.average(scans)).tolist() == [True] + [False] * 7
+        assert infrared.average(np.array([[1.0] * 8, [3.0] * 8, [5.0] * 8])) == pytest.approx([3.0] * 8)
+
+    @pytest.mark.parametrize(("samples", "check"), [(3, 10), (25, 10), (150, 50)])
+    def test_the_check_takes_a_third_of_the_scans_but_enough_of_them(self, samples, check):
+        assert infrared.count_check_samples(samples) == check
+
     def test_a_robot_that_stands_askew_is_named(self):
         with pytest.raises(CalibrationError, match="degrees askew to the wall when it looks ahead"):
             infrared.estimate_turn_rad(look(self.ALPHAS, 4, math.radians(20.0)))

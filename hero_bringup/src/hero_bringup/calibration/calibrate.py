@@ -22,6 +22,7 @@ from hero_msgs.srv import SetIRCalibration, SetMotor, SetPID
 
 from . import store
 from .errors import CalibrationError
+from .infrared import BEAMS, count_check_samples
 from .probe import Probe
 from .procedures import (
     EndedError,
@@ -115,7 +116,8 @@ class Calibration:
             self._velocity = self._session.calibrate_velocity(self._motors)
         if INFRARED in parts and self._session.active:
             self._place(WALL, beside_wall=True)
-            say("infrared: about %.0f s" % (16 * 2.5 + 8 * self._options.samples / 5.0 * 4.0 / 3.0))
+            scans = self._options.samples + count_check_samples(self._options.samples)
+            say("infrared: about %.0f s" % (BEAMS * (2 * 2.5 + scans / 5.0)))
             self._infrared = self._session.calibrate_infrared(self._options.samples)
 
     def _place(self, request: str, beside_wall: bool) -> None:

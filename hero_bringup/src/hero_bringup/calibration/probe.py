@@ -19,7 +19,7 @@ from hero_msgs.msg import Encoder, Motor
 
 from .encoder_steps import Readings, count_steps
 from .errors import CalibrationError
-from .infrared import BEAMS, read_signals
+from .infrared import BEAMS, average, read_signals
 
 KEPT_READINGS = 4000
 """Two minutes of encoder readings."""
@@ -125,7 +125,7 @@ class Probe:
             return len(self._scans)
 
     def read_scans(self) -> Tuple[np.ndarray, np.ndarray]:
-        """Return means of the eight readings (counts) and ranges (m) since forget_scans().
+        """Return the eight readings (counts) and ranges (m), averages since forget_scans().
 
         Raises: CalibrationError if there were none.
         """
@@ -134,7 +134,7 @@ class Probe:
         if not scans or any(len(values) != BEAMS for scan in scans for values in scan):
             raise CalibrationError("no infrared readings came on /%s/laser" % self.name)
         signals, ranges_m = np.array(scans).transpose(1, 0, 2)
-        return signals.mean(axis=0), ranges_m.mean(axis=0)
+        return average(signals), average(ranges_m)
 
     def read_place(self) -> Place:
         """Return the newest pose. Raises: CalibrationError if none came lately."""

@@ -287,7 +287,7 @@ class Session:
     def calibrate_infrared(self, samples: int) -> Dict[int, InfraredResult]:
         """Measure all sensors of robots that face a wall, write their constants, and measure again.
 
-        samples: scans for each sensor; a third of them for the second turn.
+        samples: scans for each sensor; for the second turn as infrared.count_check_samples() says.
         """
         places: Dict[int, Place] = {}
         directions: Dict[int, float] = {}
@@ -299,7 +299,7 @@ class Session:
             probe.call("ir_calibration", SetIRCalibration, *counts_m2[probe.robot_id])
 
         self.each("infrared", write)
-        second = self._go_round("check of infrared", max(3, samples // 3), places, directions)
+        second = self._go_round("check of infrared", infrared.count_check_samples(samples), places, directions)
         results = {}
         for probe in self.active:
             robot_id = probe.robot_id
