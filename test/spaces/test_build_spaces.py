@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import textwrap
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -49,6 +50,12 @@ def run(script, directory, timeout_s=PROBE_TIMEOUT_S):
         output = process.communicate()[0].decode(errors="replace") + f"\nno end after {timeout_s:.0f} s"
     assert process.returncode == 0, f"{script}\n{output[-6000:]}"
     return output
+
+
+def side_by_side(check, items):
+    """Run a check for each of the items, as many at once as there are cores."""
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        list(pool.map(check, items))
 
 
 def copy_sources(destination):
@@ -135,11 +142,13 @@ def test_every_module_can_be_imported(space):
 
 
 def test_every_launch_file_can_be_read(space):
-    for path in LAUNCH_FILES:
+    def read(path):
         package = path.parents[1].name
         listed = space.run(f"roslaunch --files {package} {path.name}")
         assert path.name in listed
         space.run(f"roslaunch --nodes {package} {path.name}")
+
+    side_by_side(read, LAUNCH_FILES)
 
 
 def test_rosrun_finds_every_node_and_python_has_what_it_imports(space):
@@ -148,14 +157,17 @@ def test_rosrun_finds_every_node_and_python_has_what_it_imports(space):
     other.mkdir()
     (other / "python3").write_text("#!/bin/sh\necho No module named rospy\nexit 1\n")
     (other / "python3").chmod(0o755)
-    for path in NODES:
+
+    def start(path):
         package = path.parents[1].name
         first_line = space.run(f"head -n 1 $(catkin_find --first-only --libexec {package} {path.name})")
         assert first_line.startswith("#!"), path.name
         # A node that knows no --help waits for a master, in vain, until it is killed.
-        start = f"PATH={other}:$PATH timeout -s KILL {NODE_START_S} rosrun {package} {path.name} --help"
-        output = space.run(f"export ROS_MASTER_URI=http://localhost:1\n({start}) 2>&1 || true")
+        command = f"PATH={other}:$PATH timeout -s KILL {NODE_START_S} rosrun {package} {path.name} --help"
+        output = space.run(f"export ROS_MASTER_URI=http://localhost:1\n({command}) 2>&1 || true")
         assert "Traceback" not in output and "No module named" not in output, f"{path.name}:\n{output}"
+
+    side_by_side(start, NODES)
 
 
 def test_scripts_of_the_lessons_find_what_they_import_with_the_interpreter_that_they_name(space):
