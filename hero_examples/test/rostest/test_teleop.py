@@ -109,7 +109,8 @@ class Terminal:
 
     def close(self):
         """End everything; a teleop that still ran would be taken for the next test's."""
-        pid = self.teleop_pid()
+        # Once the status is shown, the shell's child is what keeps the terminal open; that ends with it.
+        pid = self.teleop_pid() if self.status() is None else 0
         self.shell.kill()
         self.shell.wait()
         wait_for(lambda: not pid or not is_running(pid), "the end of teleop with its terminal")
