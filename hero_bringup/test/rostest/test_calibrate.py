@@ -27,7 +27,7 @@ from hero_sim.srv import InjectFault
 CALIBRATE = ["rosrun", "hero_bringup", "calibrate"]
 TIMEOUT_S = 120.0
 CENTRE_BOUND_US = 4
-RANGE_BOUND_M = 0.005
+RANGE_BOUND_M = 0.004
 VELOCITY_BOUND = 0.22
 """Share of the wanted speed; a robot fresh from the factory is off by 30 % (hero_sim)."""
 

@@ -84,7 +84,6 @@ def measure_stairs(readings: Readings, begins_s: Sequence[float]) -> np.ndarray:
     NaN for a stair of which too little was heard, or whose command may have come late. Raises: CalibrationError if
     there are too many of those.
     """
-    is_even = readings.find_even(1)
     is_silent = np.diff(readings.heard_s) > SILENCE_S
     silences_s = np.stack([readings.heard_s[:-1][is_silent], readings.heard_s[1:][is_silent]])
     steps = np.diff([readings.counts, readings.left_ticks, readings.right_ticks])
@@ -96,7 +95,7 @@ def measure_stairs(readings: Readings, begins_s: Sequence[float]) -> np.ndarray:
         is_late = (silences_s[0] < begin_s + SETTLE_S) & (silences_s[1] > begin_s - DROPPED_S)
         if is_late.any():
             continue
-        kept = steps[:, is_seen & is_even]
+        kept = steps[:, is_seen & readings.is_even]
         if kept.shape[1] >= LEAST_STEPS:
             count, *ways_ticks = kept.sum(axis=1)
             speeds[:, stair] = np.array(ways_ticks) * TICK_M / (count * readings.step_s)

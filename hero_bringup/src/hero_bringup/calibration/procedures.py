@@ -150,9 +150,9 @@ class Session:
         waiting = self.active
         for attempt in range(tries):
             again: List[Probe] = []
+            is_last = attempt + 1 == tries
 
-            def try_judging(probe: Probe, attempt: int = attempt, again: List[Probe] = again) -> None:
-                is_last = attempt + 1 == tries
+            def try_judging(probe: Probe, is_last: bool = is_last, again: List[Probe] = again) -> None:
                 try:
                     judge(probe, is_last)
                 except CalibrationError as error:
