@@ -10,7 +10,8 @@ SOCKETS = {"asyncio", "socket", "socketserver", "ssl", "tornado"}
 # check, which asks for the addresses of names; and the pages of the fleet monitor.
 SOCKET_OWNERS = (
     "hero_driver.transport",
-    "hero_driver.outlet",
+    "hero_driver.handshakes",
+    "hero_driver.rospy_internals",
     "hero_driver.inlet",
     "hero_sim.tcp_link",
     "hero_bringup.checkup.network",

@@ -16,7 +16,7 @@ from typing import Any, Callable, Optional
 import rospy
 from rospy.exceptions import TransportException, TransportTerminated
 
-from .outlet import unregister
+from .rospy_internals import find_connection, replace_reading, take_socket, unregister
 from .transport import Reader
 
 READ_LENGTH = 4096
@@ -54,26 +54,16 @@ class Inlet:
     def _take(self, message: Any) -> None:
         """A message came through rospy, on the thread of its publisher's connection."""
         self._receive(message.data)
-        subscriber = self._subscriber
-        impl = None if subscriber is None else subscriber.impl
-        # Where topic statistics are wanted (/enable_statistics), rospy has to see every message.
-        if impl is None or impl.statistics_logger is not None:
-            return
-        for connection in impl.connections:
-            if connection.header is message._connection_header:
-                # rospy's thread calls this instead of reading, once it has passed on all that it has read.
-                connection.receive_once = functools.partial(self._hand_over, connection)
+        connection = find_connection(self._subscriber, message)
+        if connection is not None:
+            replace_reading(connection, functools.partial(self._hand_over, connection))
 
     def _hand_over(self, connection: Any) -> None:
         """Let the loop read connection; return never, but raise as rospy's own reading does when it ends."""
-        sock, buffer = connection.socket, connection.read_buff
-        if sock is None or buffer is None:
+        sock, rest = take_socket(connection)
+        if sock is None:
             raise TransportTerminated("closed")
-        # A socket of its own, because rospy may close its one on another thread at any time; it shuts the
-        # connection down with it, so that this one ends too.
-        stream = MessageStream(
-            connection, sock.dup(), buffer.getvalue()[: buffer.tell()], self._receive
-        )
+        stream = MessageStream(connection, sock, rest, self._receive)
         self._add_reader(stream)
         stream.ended.wait()
         if stream.error is not None:

@@ -11,6 +11,7 @@ from typing import Dict, List, Tuple
 
 import rospy
 
+from .rospy_internals import ROSOUT_LOGGER, list_log_handlers
 from .worker import Worker
 
 QUEUE_LENGTH = 2000
@@ -41,7 +42,7 @@ class LogRelay:
         self._last: Dict[str, Tuple[float, int]] = {}
         self._groups: Dict[str, Tuple[float, int]] = {}
         self._reported_drops = 0
-        self._logger = logging.getLogger("rosout")  # the one of rospy's functions
+        self._logger = logging.getLogger(ROSOUT_LOGGER)
 
     def log(self, level: str, text: str) -> None:
         """Log one line at level debug, info, warn, error or fatal."""
@@ -109,9 +110,8 @@ def tell_of_lost_log_lines() -> None:
                 " ROS_LOG_DIR or ~/.ros/log\n" % error
             )
 
-    for name in ("", "rosout", "rospy"):
-        for handler in logging.getLogger(name).handlers:
-            handler.handleError = tell  # type: ignore[method-assign]
+    for handler in list_log_handlers():
+        handler.handleError = tell  # type: ignore[method-assign]
 
 
 def _write_to_terminal(text: str) -> None:

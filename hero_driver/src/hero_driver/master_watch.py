@@ -11,7 +11,8 @@ from typing import Any, Callable, Tuple
 
 import rosgraph
 import rospy
-from rospy.impl.registration import get_service_manager, get_topic_manager
+
+from .rospy_internals import list_registrations
 
 CHECK_INTERVAL_S = 2.0
 MASTER_TIMEOUT_S = 5.0
@@ -75,8 +76,7 @@ class MasterWatch:
 
     def _register(self, master: Any) -> Tuple[int, int]:
         name, uri = rospy.get_name(), rospy.get_node_uri()
-        topics, services = get_topic_manager(), get_service_manager()
-        publications, subscriptions = topics.get_publications(), topics.get_subscriptions()
+        publications, subscriptions, services = list_registrations()
         for topic, ros_type in publications:
             master.registerPublisher(name, topic, ros_type, uri)
         with xmlrpc.client.ServerProxy(uri, transport=_PatientTransport()) as own:
@@ -85,8 +85,7 @@ class MasterWatch:
                 if code == SUCCESS:
                     # What the master tells a node when publishers come; rospy connects to those it lacks.
                     own.publisherUpdate("/master", topic, publishers)
-        offered = services.get_services()
         # The sentinel comes last of all: what fails on the way is tried again.
-        for service, service_uri in sorted(offered, key=lambda entry: entry[0] == self._sentinel):
+        for service, service_uri in sorted(services, key=lambda entry: entry[0] == self._sentinel):
             master.registerService(name, service, service_uri, uri)
-        return len(publications) + len(subscriptions), len(offered)
+        return len(publications) + len(subscriptions), len(services)

@@ -22,8 +22,8 @@ from .config import ConfigError, DriverConfig, read_config
 from .gateway import Gateway
 from .log_relay import LogRelay, prepare_logging, tell_of_lost_log_lines
 from .master_watch import MasterWatch
-from .outlet import admit_many_subscribers
 from .reports import FleetStatus, Reporter
+from .rospy_internals import call_before_shutdown, leave_topics_out_of_rosout, open_tcpros_server
 from .transport import Address, EventLoop, TransportSettings
 from .worker import Worker
 
@@ -88,11 +88,11 @@ class EndFlag:
 class DriverNode:
     """The whole driver: open() until close()."""
 
-    def __init__(self, config: DriverConfig) -> None:
+    def __init__(self, config: DriverConfig, log: LogRelay) -> None:
         self._config = config
         self._ended = EndFlag()
         self._changed = threading.Event()
-        self._log = LogRelay()
+        self._log = log
         self._registrar = Worker(
             "registrar",
             REGISTRAR_QUEUE_LENGTH,
@@ -256,19 +256,21 @@ def main(argv: Optional[List[str]] = None) -> int:
     except KeyboardInterrupt:
         return 130
     prepare_logging()
+    log = LogRelay()
+    open_tcpros_server(lambda host, text: log.log_throttled("warn", "handshake " + host, text, host=host))
     rospy.init_node(NODE_NAME, argv=argv, disable_signals=True)
+    leave_topics_out_of_rosout()
     tell_of_lost_log_lines()
-    admit_many_subscribers()
     try:
         config = read_config(_read_private_parameters())
     except ConfigError as error:
         rospy.logfatal("hero_driver cannot start: %s", error)
         return 2
     sys.setswitchinterval(SWITCH_INTERVAL_S)
-    node = DriverNode(config)
+    node = DriverNode(config, log)
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, lambda *_: node.end())
-    rospy.core.add_preshutdown_hook(lambda reason: node.end())
+    call_before_shutdown(node.end)
     try:
         node.open()
     except OSError as error:

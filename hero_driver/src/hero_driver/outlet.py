@@ -8,17 +8,10 @@ Source of the framing: ROS TCPROS, a 32-bit length before each message.
 """
 
 import collections
-import socket
 import struct
-from typing import Any, Callable, Deque, Dict, List, NamedTuple, Sequence
+from typing import Any, Callable, Deque, Dict, List
 
-import rospy
-from rospy.impl import tcpros_base
-
-WAITING_CONNECTIONS = 1024
-"""Subscribers that may wait to be accepted. rospy lets 5 wait, while one recorder or RViz comes for all topics of all
-robots at once: the others' connections stall in TCP's back-off, for a minute and more with fifty robots. The system may
-cap it (net.core.somaxconn, 4096 on Linux)."""
+from .rospy_internals import NO_CONNECTIONS, open_publisher, send, unregister
 
 RETRY_S = 0.01
 """How soon a subscriber whose socket was full is tried again."""
@@ -26,20 +19,6 @@ RETRY_S = 0.01
 _LENGTH = struct.Struct("<I")
 
 CallLater = Callable[[float, Callable[[], None]], None]
-
-
-def admit_many_subscribers() -> None:
-    """Let many subscribers come at once; call it after rospy.init_node()."""
-    tcpros_base.start_tcpros_server()
-    # A second listen() on a socket that listens changes how many may wait.
-    tcpros_base._tcpros_server.tcp_ros_server.server_sock.listen(WAITING_CONNECTIONS)
-
-
-class _NoConnections(NamedTuple):
-    connections: Sequence[Any] = ()
-
-
-_NOBODY = _NoConnections()
 
 
 class Outlet:
@@ -50,26 +29,20 @@ class Outlet:
         self._queue_length = queue_length
         self._call_later = call_later
         self._publisher: Any = None
-        self._impl: Any = (
-            _NOBODY  # rospy's connections of the topic; it replaces the list, and never changes one
-        )
+        self._impl: Any = NO_CONNECTIONS  # rospy's, of the topic
         self._backlogs: Dict[Any, Deque[bytes]] = {}
         self.raw_class: Any = None
         self.dropped = 0
 
     def open(self, name: str, raw_class: Any) -> None:
         """Register the topic called name; asks the ROS master, so it may block."""
-        publisher = rospy.Publisher(name, raw_class, queue_size=1, tcp_nodelay=True)
-        # Without a queue rospy starts no thread for a subscriber.
-        publisher.impl.set_queue_size(None)
         self.raw_class = raw_class
-        self._publisher = publisher
-        self._impl = publisher.impl
+        self._publisher, self._impl = open_publisher(name, raw_class)
 
     def release(self) -> List[Callable[[], None]]:
         """Publish no more; return what unregisters the topic, to be called where blocking is allowed."""
         publisher, self._publisher = self._publisher, None
-        self._impl = _NOBODY
+        self._impl = NO_CONNECTIONS
         self._backlogs.clear()
         return [] if publisher is None else [lambda: unregister(publisher)]
 
@@ -94,7 +67,7 @@ class Outlet:
             if backlog is not None:
                 self._keep(backlog, data)
                 continue
-            rest = _send(connection, data)
+            rest = send(connection, data)
             if rest:
                 if not self._backlogs:
                     self._call_later(RETRY_S, self._retry)
@@ -114,7 +87,7 @@ class Outlet:
                 del self._backlogs[connection]
                 continue
             while backlog:
-                rest = _send(connection, backlog[0])
+                rest = send(connection, backlog[0])
                 if rest:
                     backlog[0] = rest
                     break
@@ -123,36 +96,3 @@ class Outlet:
                 del self._backlogs[connection]
         if self._backlogs:
             self._call_later(RETRY_S, self._retry)
-
-
-def unregister(topic: Any) -> None:
-    """Unregister a publisher or subscriber of rospy and give back its file; asks the ROS master, so it may block.
-
-    rospy's poller of a topic refers to itself, so its file would stay open until Python collects garbage: a
-    dozen files for each robot that left, until there are no more files.
-    """
-    impl = topic.impl
-    topic.unregister()
-    if impl is not None:
-        # From here on rospy lets no connection in: it looks at impl.closed under the same lock.
-        with impl.c_lock:
-            close = getattr(impl.connection_poll.poller, "close", None)  # not every system's poller is a file
-            if close is not None:
-                close()
-
-
-def _send(connection: Any, data: bytes) -> bytes:
-    """Return what the subscriber's socket did not take; a broken connection takes everything and is closed."""
-    sock = connection.socket
-    if sock is None:
-        return b""
-    try:
-        sent = sock.send(data, socket.MSG_DONTWAIT)
-    except (BlockingIOError, InterruptedError):
-        return data
-    except OSError:
-        connection.close()
-        return b""
-    connection.stat_bytes += sent
-    connection.stat_num_msg += 1
-    return data[sent:]

@@ -4,13 +4,16 @@
 import random
 import socket
 import struct
+from pathlib import Path
 
+import rosgraph
 import rospy
 import rostest
 import stock_messages
 from driver_case import DriverProcess, OwnDriverCase, Recorder, make_publisher, wait_for, wait_payloads
 from fake_robot import PUB, STOCK_DECLARATIONS, Declaration, FakeRobot
 from std_msgs.msg import ColorRGBA
+from std_srvs.srv import SetBool
 
 from hero_driver.rosserial import frames
 from hero_msgs.msg import Encoder, Robot
@@ -191,6 +194,29 @@ class TestDriverBadInput(OwnDriverCase):
         robot = self.dial(driver, 10)
         make_publisher("/hero_10/led", ColorRGBA).publish(ColorRGBA(1.0, 1.0, 1.0, 1.0))
         wait_payloads(robot, "led")
+
+    # Programs that connect.
+
+    def test_half_open_connections_keep_no_program_out_and_cost_nothing_in_the_end(self):
+        driver = self.start()
+        robot = self.dial(driver, 1)
+        stop = rospy.ServiceProxy(driver.node + "/stop", SetBool)
+        stop(False)
+        files = Path("/proc/%d/fd" % driver.process.pid)
+        before = len(list(files.iterdir()))
+        uri = rosgraph.Master("/test").lookupService(driver.node + "/stop")
+        port = rospy.core.parse_rosrpc_uri(uri)[1]
+        waiting = [socket.create_connection(("127.0.0.1", port), 20.0) for _ in range(100)]
+        for connection in waiting:
+            connection.sendall(b"\x10\x00")
+        # Answered, and heard, while all of them still wait.
+        self.assertTrue(stop(False).success)
+        self.assert_alive(robot)
+        self.assertGreaterEqual(len(list(files.iterdir())), before + len(waiting))
+        wait_for(lambda: len(list(files.iterdir())) <= before + 10, "the driver to close what waits")
+        for connection in waiting:
+            self.assertEqual(connection.recv(1), b"")
+            connection.close()
 
 
 if __name__ == "__main__":

@@ -1,0 +1,247 @@
+"""Every access to rospy's internals, each with its reason; no other module of the driver looks behind rospy's API.
+
+Sources: rospy 1.15 to 1.17 (impl/tcpros_base.py, impl/rosout.py, topics.py), and the TCPROS protocol: a 32-bit
+length before each connection header and each message.
+"""
+
+import logging
+import socket
+import threading
+import traceback
+from typing import Any, Callable, List, NamedTuple, Sequence, Tuple
+
+import rospy
+from rosgraph.network import decode_ros_handshake_header, write_ros_handshake_header
+from rosgraph_msgs.msg import Log
+from rospy.impl import rosout, tcpros_base
+from rospy.impl.registration import get_service_manager, get_topic_manager
+
+from .handshakes import HandshakeReader
+
+WAITING_CONNECTIONS = 1024
+"""Subscribers that may wait to be accepted. rospy lets 5 wait, while one recorder or RViz comes for all topics of all
+robots at once: the others' connections stall in TCP's back-off, for a minute and more with fifty robots. The system may
+cap it (net.core.somaxconn, 4096 on Linux)."""
+
+REASON_LENGTH_MAX = 300
+"""rospy's reason to refuse a connection may list every topic of the node: 200 kB with 100 robots."""
+
+ROSOUT_LOGGER = "rosout"
+"""The logger of rospy.loginfo() and the like."""
+
+
+# Programs that connect: subscribers and service clients.
+
+
+def open_tcpros_server(warn: Callable[[str, str], None]) -> HandshakeReader:
+    """Serve programs that connect, none of which can hold up another; call it before rospy.init_node().
+
+    rospy reads connection headers on the thread that accepts connections, one after another and without a time
+    limit: one connection that sends two bytes and waits would keep every other subscriber and service client out.
+    warn(address, text) is called from any thread.
+    """
+    server = tcpros_base.init_tcpros_server()
+
+    def serve(sock: socket.socket, address: Any, data: bytes) -> None:
+        reason = _serve_connection(server, sock, address, data)
+        if reason:
+            warn(address[0], "connection of %s to a topic or service refused: %s" % (address[0], reason))
+
+    handshakes = HandshakeReader(serve)
+    handshakes.open()
+    server._tcp_server_callback = handshakes.add
+    tcpros_base.start_tcpros_server()
+    # A second listen() on a socket that listens changes how many may wait.
+    server.tcp_ros_server.server_sock.listen(WAITING_CONNECTIONS)
+    return handshakes
+
+
+def _serve_connection(server: Any, sock: socket.socket, address: Any, data: bytes) -> str:
+    """Hand a connection with its header (data) to rospy, as TCPROSServer does; return why not, empty if served."""
+    try:
+        header = decode_ros_handshake_header(data)
+        if "topic" in header:
+            refusal = server.topic_connection_handler(sock, address, header)
+        elif "service" in header:
+            refusal = server.service_connection_handler(sock, address, header)
+        else:
+            refusal = "topic missing"
+        if not refusal:
+            return ""
+        reason = str(refusal)[:REASON_LENGTH_MAX]
+        write_ros_handshake_header(sock, {"error": reason})
+    except Exception as error:  # noqa: BLE001 - whatever the header does to rospy, only this connection is lost
+        reason = "%s: %s" % (type(error).__name__, str(error)[:REASON_LENGTH_MAX])
+    sock.close()
+    return "" if rospy.is_shutdown() else ascii(reason)[1:-1]
+
+
+# Publishers and subscribers.
+
+
+class NoConnections(NamedTuple):
+    """Stands for the connections of a topic that is not registered."""
+
+    connections: Sequence[Any] = ()
+
+
+NO_CONNECTIONS = NoConnections()
+
+
+def open_publisher(name: str, raw_class: Any) -> Tuple[Any, Any]:
+    """Register a topic; return its publisher, and what holds the `connections` of its subscribers.
+
+    rospy replaces the list of connections and never changes one, so that any thread may read it. With a queue rospy
+    would start a thread for each subscriber, which costs as much as the rest of the driver. Asks the ROS master, so
+    it may block.
+    """
+    publisher = rospy.Publisher(name, raw_class, queue_size=1, tcp_nodelay=True)
+    publisher.impl.set_queue_size(None)
+    return publisher, publisher.impl
+
+
+def send(connection: Any, data: bytes) -> bytes:
+    """Return what the subscriber's socket did not take; a broken connection takes everything and is closed.
+
+    rospy's own write_data() waits for a slow subscriber.
+    """
+    sock = connection.socket
+    if sock is None:
+        return b""
+    try:
+        sent = sock.send(data, socket.MSG_DONTWAIT)
+    except (BlockingIOError, InterruptedError):
+        return data
+    except OSError:
+        connection.close()
+        return b""
+    connection.stat_bytes += sent
+    connection.stat_num_msg += 1
+    return data[sent:]
+
+
+def find_connection(subscriber: Any, message: Any) -> Any:
+    """Return the connection on which a message came to a subscriber; None where rospy has to read it on.
+
+    Where topic statistics are wanted (/enable_statistics), rospy has to see every message.
+    """
+    impl = None if subscriber is None else subscriber.impl
+    if impl is None or impl.statistics_logger is not None:
+        return None
+    for connection in impl.connections:
+        if connection.header is message._connection_header:
+            return connection
+    return None
+
+
+def replace_reading(connection: Any, read: Callable[[], List[Any]]) -> None:
+    """Let rospy's thread call read() instead of its own, once it has passed on all that it has read.
+
+    Waking that thread, and then the thread of the sockets, for every command costs several times what the command
+    itself costs. read() raises as rospy's own reading does when the connection ends.
+    """
+    connection.receive_once = read
+
+
+def take_socket(connection: Any) -> Tuple[Any, bytes]:
+    """Return a socket of one's own for a connection, None if it is closed, and the begun message that rospy has read.
+
+    rospy may close its socket on another thread at any time; it shuts the connection down with it, so that this one
+    ends too.
+    """
+    sock, buffer = connection.socket, connection.read_buff
+    if sock is None or buffer is None:
+        return None, b""
+    return sock.dup(), buffer.getvalue()[: buffer.tell()]
+
+
+def unregister(topic: Any) -> None:
+    """Unregister a publisher or subscriber of rospy and give back its file; asks the ROS master, so it may block.
+
+    rospy's poller of a topic refers to itself, so its file would stay open until Python collects garbage: a
+    dozen files for each robot that left, until there are no more files.
+    """
+    impl = topic.impl
+    topic.unregister()
+    if impl is not None:
+        # From here on rospy lets no connection in: it looks at impl.closed under the same lock.
+        with impl.c_lock:
+            close = getattr(impl.connection_poll.poller, "close", None)  # not every system's poller is a file
+            if close is not None:
+                close()
+
+
+class Registrations(NamedTuple):
+    """What this node has registered with the ROS master: pairs of a name, and a type or a service's URI."""
+
+    publications: List[Tuple[str, str]]
+    subscriptions: List[Tuple[str, str]]
+    services: List[Tuple[str, str]]
+
+
+def list_registrations() -> Registrations:
+    """Return what this node has registered: rospy registers a topic once, and not again with a new master."""
+    topics, services = get_topic_manager(), get_service_manager()
+    return Registrations(
+        list(topics.get_publications()), list(topics.get_subscriptions()), list(services.get_services())
+    )
+
+
+# Log lines.
+
+
+class RosoutHandler(logging.Handler):
+    """Publishes log lines on /rosout without the names of this node's topics.
+
+    rospy puts all of them into each message, 2,400 with 100 robots: to list and write them keeps Python's one lock for
+    milliseconds, in which no robot is served.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._of_this_thread = threading.local()
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Publish one log line."""
+        publisher = rosout._rosout_pub
+        if publisher is None or getattr(self._of_this_thread, "is_publishing", False):
+            # To publish may log in turn.
+            return
+        self._of_this_thread.is_publishing = True
+        try:
+            line = Log(
+                level=rosout._logging_to_rospy_levels.get(record.levelno, Log.INFO),
+                name=rospy.get_name(),
+                msg=self.format(record),
+                file=record.filename,
+                line=record.lineno,
+                function=record.funcName,
+            )
+            line.header.stamp = rospy.Time.now()
+            publisher.publish(line)
+        except Exception:  # noqa: BLE001 - as rospy: a line that cannot be published stands in the log file
+            logging.getLogger("rospy.rosout").error("/rosout: %s", traceback.format_exc())
+        finally:
+            self._of_this_thread.is_publishing = False
+
+
+def leave_topics_out_of_rosout() -> None:
+    """Publish log lines by RosoutHandler; call it after rospy.init_node()."""
+    logger = logging.getLogger(ROSOUT_LOGGER)
+    for handler in list(logger.handlers):
+        if isinstance(handler, rosout.RosOutHandler):
+            logger.removeHandler(handler)
+            logger.addHandler(RosoutHandler())
+
+
+def list_log_handlers() -> List[logging.Handler]:
+    """Return what rospy writes log lines with: to /rosout, the terminal and the log file."""
+    return [handler for name in ("", ROSOUT_LOGGER, "rospy") for handler in logging.getLogger(name).handlers]
+
+
+# The end.
+
+
+def call_before_shutdown(call: Callable[[], None]) -> None:
+    """Call when ROS wants this node to end, before its topics are closed: rospy.on_shutdown() comes after that."""
+    rospy.core.add_preshutdown_hook(lambda reason: call())

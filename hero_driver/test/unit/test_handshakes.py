@@ -1,0 +1,141 @@
+"""Connection headers over real sockets: nobody waits for one that is late, and what is late is closed."""
+
+import queue
+import socket
+import struct
+
+import pytest
+
+from hero_driver.handshakes import HEADER_LENGTH_MAX, HandshakeReader
+
+DEADLINE_S = 20.0
+HEADER = struct.pack("<I", 9) + b"some text"
+
+
+class Server:
+    """A reader behind a real listening socket; what it serves comes out of a queue."""
+
+    def __init__(self):
+        self.served = queue.Queue()
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self._clients = []
+        self.reader = None
+
+    def open(self, **settings):
+        self.reader = HandshakeReader(lambda *served: self.served.put(served), **settings)
+        self.reader.open()
+
+    def connect(self, data=b"", host="127.0.0.1"):
+        """Return a client that has sent data and is in the reader's hands."""
+        client = socket.create_connection(self._listener.getsockname(), DEADLINE_S, (host, 0))
+        self._clients.append(client)
+        self.reader.add(*self._listener.accept())
+        client.sendall(data)
+        return client
+
+    def take(self):
+        """Return (socket, address, header) of the next connection that is served."""
+        served = self.served.get(timeout=DEADLINE_S)
+        self._clients.append(served[0])
+        return served
+
+    def close(self):
+        self.reader.close()
+        for sock in (self._listener, *self._clients):
+            sock.close()
+
+
+def is_closed(client):
+    """Wait until a client gets something; return whether that is the end."""
+    try:
+        return client.recv(1) == b""
+    except ConnectionResetError:
+        return True
+
+
+@pytest.fixture(name="server")
+def make_server():
+    server = Server()
+    yield server
+    server.close()
+
+
+def test_a_whole_header_is_served_and_what_follows_is_left_on_the_socket(server):
+    server.open()
+    client = server.connect(HEADER + b"a request")
+    sock, address, header = server.take()
+    assert (address, header) == (client.getsockname(), HEADER)
+    assert sock.getblocking()
+    assert sock.recv(100) == b"a request"
+
+
+@pytest.mark.parametrize("length", [1, 3, 4, 5, len(HEADER) - 1])
+def test_a_header_in_two_pieces_is_served_once_it_is_whole(server, length):
+    server.open()
+    client = server.connect(HEADER[:length])
+    server.connect(HEADER)
+    server.take()
+    assert server.served.empty(), "half a header was served"
+    client.sendall(HEADER[length:])
+    assert server.take()[2] == HEADER
+
+
+def test_a_hundred_that_wait_in_the_middle_hold_up_nobody(server):
+    server.open()
+    for _ in range(100):
+        server.connect(b"\x10\x00")
+    client = server.connect(HEADER)
+    assert server.take()[1] == client.getsockname()
+
+
+def test_a_connection_that_is_served_slowly_holds_up_nobody(server):
+    released = queue.Queue()
+
+    def serve(sock, address, header):
+        if not server.served.qsize():
+            server.served.put(None)
+            released.get(timeout=DEADLINE_S)
+        server.served.put((sock, address, header))
+
+    server.reader = HandshakeReader(serve)
+    server.reader.open()
+    server.connect(HEADER)
+    second = server.connect(HEADER)
+    first_sign, (_, address, _) = server.served.get(timeout=DEADLINE_S), server.take()
+    released.put(None)
+    assert (first_sign, address) == (None, second.getsockname())
+
+
+def test_a_header_that_does_not_come_in_time_ends_the_connection(server):
+    server.open(timeout_s=0.1)
+    client = server.connect(b"\x10\x00")
+    assert is_closed(client)
+
+
+@pytest.mark.parametrize("length", [0, HEADER_LENGTH_MAX + 1, 0xFFFFFFFF])
+def test_a_length_that_no_header_has_ends_the_connection_at_once(server, length):
+    server.open(timeout_s=10 * DEADLINE_S)
+    client = server.connect(struct.pack("<I", length))
+    assert is_closed(client)
+    assert server.served.empty()
+
+
+def test_one_too_many_closes_the_oldest_of_the_address_with_the_most(server):
+    server.open(timeout_s=10 * DEADLINE_S, pending_max=4)
+    other = server.connect(host="127.0.0.2")
+    many = [server.connect() for _ in range(3)]
+    newest = server.connect(host="127.0.0.3")
+    assert is_closed(many[0])
+    for client in (other, many[1], many[2], newest):
+        client.sendall(HEADER)
+    addresses = {server.take()[1] for _ in range(4)}
+    assert addresses == {client.getsockname() for client in (other, many[1], many[2], newest)}
+
+
+def test_those_that_wait_are_closed_at_the_end_and_so_is_what_comes_after_it(server):
+    server.open()
+    client = server.connect(b"\x10\x00")
+    server.reader.close()
+    late = server.connect()
+    assert is_closed(client)
+    assert is_closed(late)

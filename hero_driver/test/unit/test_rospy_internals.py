@@ -1,0 +1,132 @@
+"""What the driver changes in rospy: who may connect at once, and what a log line holds."""
+
+import logging
+import socket
+import struct
+
+import pytest
+from rosgraph.network import decode_ros_handshake_header, encode_ros_handshake_header
+from rospy.impl import rosout, tcpros_base
+
+from hero_driver import rospy_internals
+from hero_driver.rospy_internals import RosoutHandler, leave_topics_out_of_rosout, open_tcpros_server
+
+DEADLINE_S = 20.0
+
+
+class TcprosServer:
+    """rospy's own server with the driver's changes."""
+
+    def __init__(self):
+        self.warnings = []
+        self.headers = []
+        self._handshakes = open_tcpros_server(lambda host, text: self.warnings.append((host, text)))
+        self._server = tcpros_base._tcpros_server
+        self._server.topic_connection_handler = self._serve
+        self._clients = []
+
+    def _serve(self, sock, _address, header):
+        self.headers.append(header)
+        if header["topic"] == "/broken":
+            raise ValueError("a bug of rospy's\n")
+        if header["topic"] != "/odom":
+            return "no such topic: %s; there are %s" % (header["topic"], "/topic " * 10000)
+        sock.sendall(b"served")
+        return None
+
+    def connect(self, data=b""):
+        client = socket.create_connection(("127.0.0.1", self._server.get_address()[1]), DEADLINE_S)
+        self._clients.append(client)
+        client.sendall(data)
+        return client
+
+    def close(self):
+        self._server.shutdown()
+        self._handshakes.close()
+        for client in self._clients:
+            client.close()
+
+
+@pytest.fixture(name="server")
+def make_server(monkeypatch):
+    monkeypatch.setattr(tcpros_base, "_tcpros_server", tcpros_base.TCPROSServer())
+    server = TcprosServer()
+    yield server
+    server.close()
+
+
+def read_refusal(client):
+    """Return the reason in the header that refuses a connection, which is closed after it."""
+    data = b""
+    while True:
+        piece = client.recv(65536)
+        if not piece:
+            return decode_ros_handshake_header(data)["error"]
+        data += piece
+
+
+def test_a_subscriber_is_served_while_a_hundred_others_have_sent_two_bytes(server):
+    for _ in range(100):
+        server.connect(b"\x10\x00")
+    client = server.connect(encode_ros_handshake_header({"topic": "/odom"}))
+    assert client.recv(6, socket.MSG_WAITALL) == b"served"
+    assert server.warnings == []
+
+
+def test_a_refused_subscriber_learns_why_in_few_words(server):
+    client = server.connect(encode_ros_handshake_header({"topic": "/other"}))
+    reason = read_refusal(client)
+    assert reason.startswith("no such topic: /other")
+    assert len(reason) <= rospy_internals.REASON_LENGTH_MAX
+
+
+def test_a_connection_that_rospy_cannot_serve_is_closed_with_one_line(server):
+    client = server.connect(encode_ros_handshake_header({"topic": "/broken"}))
+    assert client.recv(1) == b"", "closed"
+    [(host, text)] = server.warnings
+    assert host == "127.0.0.1"
+    assert "ValueError: a bug of rospy's\\n" in text
+
+
+def test_bytes_that_are_no_header_close_the_connection(server):
+    client = server.connect(struct.pack("<I", 8) + b"\xff" * 8)
+    assert client.recv(1) == b"", "closed"
+    assert server.headers == []
+
+
+class Publisher:
+    """What rospy's publisher of /rosout is to the handler."""
+
+    def __init__(self):
+        self.lines = []
+
+    def publish(self, line):
+        self.lines.append(line)
+        logging.getLogger("rosout").warning("to publish logs in turn")
+
+
+@pytest.fixture(name="rosout_publisher")
+def make_rosout_publisher(monkeypatch):
+    """Give what publishes /rosout, with rospy's own handler for log lines; what was before comes back."""
+    logger, publisher = logging.getLogger("rosout"), Publisher()
+    handlers, logger.handlers = logger.handlers, [rosout.RosOutHandler()]
+    monkeypatch.setattr(rosout, "_rosout_pub", publisher)
+    monkeypatch.setattr(rospy_internals.rospy.Time, "now", staticmethod(rospy_internals.rospy.Time))
+    yield publisher
+    logger.handlers = handlers
+
+
+def test_a_log_line_holds_no_names_of_topics_and_is_published_once(rosout_publisher):
+    leave_topics_out_of_rosout()
+    logging.getLogger("rosout").error("a line about %s", "hero_3")
+    [line] = rosout_publisher.lines
+    assert (line.msg, line.level, line.topics) == ("a line about hero_3", line.ERROR, [])
+
+
+def test_only_rospys_own_handler_of_log_lines_is_replaced(rosout_publisher):
+    logger, other = logging.getLogger("rosout"), logging.NullHandler()
+    logger.addHandler(other)
+    leave_topics_out_of_rosout()
+    assert other in logger.handlers
+    assert sum(isinstance(handler, RosoutHandler) for handler in logger.handlers) == 1
+    assert not any(isinstance(handler, rosout.RosOutHandler) for handler in logger.handlers)
