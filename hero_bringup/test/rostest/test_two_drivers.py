@@ -102,7 +102,7 @@ class TwoDriversTest(unittest.TestCase):
     def release(self):
         for thread in self.drivers.stop(False, lambda driver, failure: self.assertIsNone(failure, driver)):
             thread.join()
-        wait_for(lambda: not any(map(self.drivers.holds, self.read_names())), TIMEOUT_S, "drivers that hold nothing")
+        wait_for(lambda: not any(map(self.drivers.is_stopped, self.read_names())), TIMEOUT_S, "the release")
 
     def read_names(self):
         self.drivers.read()

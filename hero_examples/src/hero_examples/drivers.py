@@ -1,130 +1,196 @@
-"""All drivers under this ROS master as one: their robots in one list, their stops at once.
+"""All drivers under this ROS master as one: their robots in one list, a stop for all of them at once.
 
-Several PCs may have a driver each (docs/several_machines.md). A driver is who publishes a hero_msgs/RobotArray on
-NAME/robots. That of the usual name is listened to at once; for others the master is asked now and then, on a thread of
-its own, because it may take its time. Where the usual topic is remapped, that one driver is meant and no other.
+Several PCs may have a driver each (docs/several_machines.md). That of the usual name is connected to at once; for
+others the master is asked every few seconds. Where the usual topic is remapped, that one driver is meant and no other.
+
+Threads: only the finder waits for the ROS master; only the asker sends requests. Neither a master nor a driver that
+hangs delays a stop, because the topics to drivers are open before it is needed.
 """
 
 import threading
 import time
 from typing import Callable, Dict, List, Optional, Set
 
-import rosgraph
 import rospy
 from std_srvs.srv import SetBool
 
-from hero_msgs.msg import Robot, RobotArray
+from hero_msgs.msg import RobotArray
 
-from .newest_message import NewestMessage
+from .driver_link import DriverLink
+from .driver_reports import PREFERENCE, SUFFIX, driver_of, find_drivers, merge
+from .ros_node import NodeError, ask_master
+from .stop_status import TIME_LIMIT_S, DriverReply, StopRequest, StopStatus
 
 USUAL_TOPIC = "/hero_driver/robots"
-SUFFIX = "/robots"
 LOOK_PERIOD_S = 3.0
+ASK_PERIOD_S = 0.1
 SETTLE_S = 1.5
-"""A driver that the master knows has said something by then, unless it died without a word."""
+"""A driver that the master knows has reported by then, unless it died without a word."""
 
-SILENT_S = 5.0
-"""Reports come once a second. Who is silent for longer than the others is taken for dead."""
+FORGET_S = 5.0
+"""Reports come once per second. Robots of a driver that is silent for longer than the others are no longer listed."""
 
-PREFERENCE = (Robot.READY, Robot.JOINING, Robot.AWAY)
-"""Of a robot that went from one driver to another, the entry that counts."""
+SILENT_S = 2.5
+"""A driver whose last report is older does not answer."""
+
+POLL_PERIOD_S = 0.02
 
 Tell = Callable[[str, Optional[str]], None]
 """Takes the name of a driver and why it did not do what it was asked for, None if it did; on any thread."""
 
 
 class Drivers:
-    """Listens to all drivers from now on.
-
-    read(), find() and names() are for one thread; close() ends the listening.
-    """
+    """Connects to all drivers from now on; needs a node. All methods may be called on any thread, and none waits
+    for the ROS master."""
 
     def __init__(self) -> None:
         self._usual = rospy.resolve_name(USUAL_TOPIC)
-        self._lock = threading.Lock()
-        self._topics: Dict[str, NewestMessage] = {self._usual: NewestMessage(self._usual, RobotArray)}
+        self._links: Dict[str, DriverLink] = {}  # replaced, never changed: read on all threads
         self._listed: Set[str] = set()
-        self._reports: Dict[str, RobotArray] = {}
-        self._heard_s: Dict[str, float] = {}
+        self._request: Optional[StopRequest] = None
         self._start_s = time.monotonic()
         self._has_looked = threading.Event()
         self._end = threading.Event()
-        if self._usual == USUAL_TOPIC:
-            threading.Thread(target=self._look_now_and_then, name="drivers", daemon=True).start()
-        else:
-            self._has_looked.set()
+        self._wake = threading.Event()
+        threading.Thread(target=self._find, name="drivers", daemon=True).start()
+        threading.Thread(target=self._ask, name="stop requests", daemon=True).start()
 
     # -- finding them (a thread of its own) -----------------------------------------------------------------
 
-    def _look_now_and_then(self) -> None:
+    def _find(self) -> None:
+        self._links = {self._usual: DriverLink(driver_of(self._usual), self._usual)}
         while not self._end.is_set():
-            self._look()
+            if self._usual != USUAL_TOPIC:
+                self._listed = {self._usual}
+            else:
+                self._look()
             self._has_looked.set()
             self._end.wait(LOOK_PERIOD_S)
+        for link in self._links.values():
+            link.close()
 
     def _look(self) -> None:
         try:
-            published = rosgraph.Master(rospy.get_name()).getPublishedTopics("/")
-        except (rosgraph.MasterException, OSError):
+            published = ask_master("getPublishedTopics", "/")
+            listed = {topic for topic, kind in published if kind == RobotArray._type and topic.endswith(SUFFIX)}
+            if not listed <= self._listed:
+                listed = (listed & self._listed) | find_drivers(ask_master("getSystemState"), listed - self._listed)
+        except NodeError:
             return  # it may come back; what is known stays
-        listed = {topic for topic, kind in published if kind == RobotArray._type and topic.endswith(SUFFIX)}
-        new = {topic: NewestMessage(topic, RobotArray) for topic in listed - set(self._topics)}
-        with self._lock:
-            self._listed = listed
-            # The usual driver may be started again at any time. Others come under any name, and are forgotten.
-            gone = [self._topics.pop(topic) for topic in set(self._topics) - listed - {self._usual}]
-            self._topics.update(new)
-        for topic in gone:
-            topic.close()
+        new = {topic: DriverLink(driver_of(topic), topic) for topic in listed - set(self._links)}
+        # The usual driver may be started again at any time. Others come under any name, and are forgotten.
+        gone = {
+            topic: link
+            for topic, link in self._links.items()
+            if topic not in listed and topic != self._usual and not link.is_connected
+        }
+        self._listed = listed
+        self._links = {**{topic: link for topic, link in self._links.items() if topic not in gone}, **new}
+        for link in gone.values():
+            link.close()
 
-    # -- what they say --------------------------------------------------------------------------------------
+    # -- what they report -----------------------------------------------------------------------------------
+
+    def _find_known(self) -> List[DriverLink]:
+        """Return the drivers that the master knows or that are connected."""
+        return [link for topic, link in self._links.items() if topic in self._listed or link.is_connected]
 
     @property
     def is_settled(self) -> bool:
-        """Whether every driver that the master knows was heard, or had the time to speak; to be asked after read()."""
+        """Whether every driver that the master knows has reported, or had the time to."""
         if time.monotonic() > self._start_s + SETTLE_S:
             return True
-        return self._has_looked.is_set() and self._listed <= set(self._reports)
+        return self._has_looked.is_set() and all(link.report is not None for link in self._find_known())
+
+    def _read_fresh(self) -> Dict[str, RobotArray]:
+        """Return the reports by driver, without those of drivers that are silent for longer than the others."""
+        links = self._links.values()
+        limit_s = max((link.arrival_s for link in links), default=0.0) - FORGET_S
+        newest = {link.driver: link.newest(limit_s) for link in links}
+        return {driver: report for driver, report in newest.items() if report is not None}
 
     def read(self) -> Optional[RobotArray]:
-        """Return the newest reports of all drivers in one; None until there is one."""
-        with self._lock:
-            topics = dict(self._topics)
-        for topic, newest in topics.items():
-            message = newest.take()
-            if message is not None:
-                self._reports[topic], self._heard_s[topic] = message, time.monotonic()
-        freshest_s = max(self._heard_s.values(), default=0.0)
-        for topic in list(self._reports):
-            if topic not in topics or freshest_s - self._heard_s[topic] > SILENT_S:
-                del self._reports[topic], self._heard_s[topic]
-        return merge(list(self._reports.values())) if self._reports else None
+        """Return the newest reports of all drivers in one; None until there is one.
+
+        It says stopped only if every driver says so, and none is silent.
+        """
+        reports = self._read_fresh()
+        if not reports:
+            return None
+        merged = merge(list(reports.values()))
+        merged.stopped = merged.stopped and not self.find_silent()
+        return merged
 
     def count(self) -> int:
         """Return how many reports came so far, to see whether there are new ones."""
-        with self._lock:
-            return sum(newest.count for newest in self._topics.values())
+        return sum(link.count for link in self._links.values())
+
+    def find_silent(self) -> List[str]:
+        """Return the names of the drivers that have reported before and do not now, or that the master knows."""
+        limit_s = time.monotonic() - SILENT_S
+        if limit_s < self._start_s:
+            return []
+        return [link.driver for link in self._find_known() if link.newest(limit_s) is None]
 
     def names(self) -> List[str]:
-        """Return the drivers that were heard or that the master knows; without one, the usual one."""
-        return [topic[: -len(SUFFIX)] for topic in sorted(self._listed | set(self._reports) or {self._usual})]
+        """Return the drivers that are known; without one, the usual one."""
+        return sorted(link.driver for link in self._find_known()) or [driver_of(self._usual)]
 
     def find(self, namespace: str) -> str:
         """Return the driver of a robot; the usual one if none has it."""
         having = [
-            (PREFERENCE.index(robot.state), topic)
-            for topic, report in self._reports.items()
+            (PREFERENCE.index(robot.state), driver)
+            for driver, report in self._read_fresh().items()
             for robot in report.robots
             if robot.namespace == namespace and robot.state in PREFERENCE
         ]
-        return min(having, default=(0, self._usual))[1][: -len(SUFFIX)]
+        return min(having, default=(0, driver_of(self._usual)))[1]
 
-    def holds(self, driver: str) -> bool:
-        """Return whether a driver holds all its robots (~stop)."""
-        report = self._reports.get(driver + SUFFIX)
+    def is_stopped(self, driver: str) -> bool:
+        """Return whether a driver has stopped all its robots."""
+        report = self._read_fresh().get(driver)
         return report is not None and bool(report.stopped)
 
-    # -- what they are asked for ----------------------------------------------------------------------------
+    # -- stop requests --------------------------------------------------------------------------------------
+
+    def request_stop(self, stopped: bool) -> None:
+        """Ask all drivers to stop all their robots, or to release them; returns at once.
+
+        Each is asked again until it reports that it did.
+        """
+        self._request = StopRequest(stopped, time.monotonic())
+        self._wake.set()
+
+    def stop_status(self) -> Optional[StopStatus]:
+        """Return what people must see of the last request; None before the first one."""
+        request, now_s = self._request, time.monotonic()
+        return None if request is None else request.describe(self._read_replies(request, now_s), now_s)
+
+    def wait_for_stop(self, timeout_s: float = TIME_LIMIT_S) -> Optional[StopStatus]:
+        """Return the status as soon as the outcome is known, or what is known after timeout_s."""
+        deadline_s = time.monotonic() + timeout_s
+        while True:
+            status = self.stop_status()
+            if status is None or status.is_final or time.monotonic() > deadline_s:
+                return status
+            time.sleep(POLL_PERIOD_S)
+
+    def _read_replies(self, request: StopRequest, now_s: float) -> List[DriverReply]:
+        since_s = max(request.made_s, now_s - SILENT_S)
+        replies = [DriverReply(link.driver, link.newest(since_s)) for link in self._find_known()]
+        return replies or [DriverReply(driver_of(self._usual), None)]
+
+    def _ask(self) -> None:
+        """Send what was requested at once, and again while a driver has not taken it (a thread of its own)."""
+        while not self._end.is_set():
+            request, now_s = self._request, time.monotonic()
+            if request is not None:
+                request.update(self._read_replies(request, now_s), self._has_looked.is_set(), now_s)
+                for link in self._links.values():
+                    if request.is_open_to(link.driver):
+                        link.request_stop(request.stopped)
+            self._wake.wait(None if request is None or request.is_over else ASK_PERIOD_S)
+            self._wake.clear()
 
     def stop(self, held: bool, tell: Tell) -> List[threading.Thread]:
         """Let every driver stop and hold its robots, or let them go; returns at once.
@@ -140,12 +206,9 @@ class Drivers:
         return threads
 
     def close(self) -> None:
-        """Listen no more; safe twice."""
+        """Disconnect; the topics are closed later. Safe twice."""
         self._end.set()
-        with self._lock:
-            topics = list(self._topics.values())
-        for topic in topics:
-            topic.close()
+        self._wake.set()
 
 
 def call_stop(driver: str, held: bool, tell: Tell) -> None:
@@ -156,21 +219,3 @@ def call_stop(driver: str, held: bool, tell: Tell) -> None:
         tell(driver, "no answer from %s/stop: %s" % (driver, error))
         return
     tell(driver, None if answer.success else "%s/stop refused: %s" % (driver, answer.message))
-
-
-def merge(reports: List[RobotArray]) -> RobotArray:
-    """Return one report for several drivers: stopped if all of them are, and each robot once, by namespace."""
-    merged = RobotArray()
-    merged.header.stamp = max(report.header.stamp for report in reports)
-    merged.listening = ", ".join(sorted(report.listening for report in reports if report.listening))
-    merged.stopped = all(report.stopped for report in reports)
-    by_name: Dict[str, Robot] = {}
-    for robot in (robot for report in reports for robot in report.robots):
-        # Who was refused, or has not said its name, is not the robot of that name.
-        own = robot.namespace if robot.namespace and robot.state in PREFERENCE else None
-        key = own or "%s at %s" % (robot.namespace, robot.address)
-        known = by_name.get(key)
-        if known is None or own is None or PREFERENCE.index(robot.state) < PREFERENCE.index(known.state):
-            by_name[key] = robot
-    merged.robots = sorted(by_name.values(), key=lambda robot: (robot.namespace, robot.address))
-    return merged

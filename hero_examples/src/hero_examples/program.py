@@ -16,10 +16,9 @@ import time
 from types import FrameType
 from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple
 
-import rosgraph
 import rospy
 
-from .node_end import end_without_delay
+from .ros_node import NodeError, start_ros_node
 
 ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
@@ -58,18 +57,11 @@ class Program:
         if isinstance(sys.stdout, io.TextIOWrapper):
             # Into a pipe or file Python writes nothing before it has 8 kB, and rospy does not flush.
             sys.stdout.reconfigure(line_buffering=True)
-        # init_node would wait for a master for ever, deaf to signals.
-        if not rosgraph.is_master_online():
-            raise ProgramError(
-                "no ROS master at %s: start roslaunch hero_bringup hero_bringup.launch first, or set ROS_MASTER_URI"
-                % rosgraph.get_master_uri()
-            )
         try:
-            rospy.init_node(name, anonymous=anonymous, disable_signals=True)
-        except rospy.ROSInitException as error:
-            raise ProgramError(" ".join(str(error).split())) from None
+            start_ros_node(name, anonymous)
+        except NodeError as error:
+            raise ProgramError(str(error)) from None
         rospy.on_shutdown(self._await_finish)
-        end_without_delay()
 
     def _receive_signal(self, number: int, frame: Optional[FrameType]) -> None:
         self.end_signal = number

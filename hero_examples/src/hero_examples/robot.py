@@ -13,6 +13,7 @@ the left, angles counter-clockwise from straight ahead.
 """
 
 import math
+import os
 import signal
 import sys
 import threading
@@ -29,8 +30,8 @@ from std_msgs.msg import ColorRGBA
 
 from .control_laws import Pose
 from .goal_pursuit import DEFAULT_LAW, DEFAULT_TIMEOUT_S, DEFAULT_TOLERANCE_M, Goal, GoalPursuit, State
-from .node_end import end_without_delay
 from .readings import Color, Obstacle, Velocity, front_first, nearest_obstacle, parse_color, yaw_of
+from .ros_node import NodeError, start_ros_node
 
 MAX_LINEAR_M_S = 0.20
 """The firmware clamps linear.x to this (config.h)."""
@@ -86,15 +87,17 @@ def start_node(name: str = "hero_program") -> None:
     """Start a ROS node for a plain script, unless one runs already.
 
     Ctrl-C raises KeyboardInterrupt as in every Python program, SIGTERM and SIGHUP raise SystemExit, so that `with`
-    blocks stop their robots before ROS goes down.
+    blocks stop their robots before ROS goes down. Without a ROS master the script ends with one line and exit code 1.
     """
     if rospy.core.is_initialized():
         return
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, _raise_exit)
         signal.signal(signal.SIGHUP, _raise_exit)
-    rospy.init_node(name, anonymous=True, disable_signals=True)
-    end_without_delay()
+    try:
+        start_ros_node(name, anonymous=True)
+    except NodeError as error:
+        sys.exit("%s: %s" % (os.path.basename(sys.argv[0]), error))
 
 
 def _raise_exit(number: int, frame: Optional[FrameType]) -> None:

@@ -284,7 +284,7 @@ def find_robots(program: Program, robot_ids: Optional[Sequence[int]]) -> Dict[in
         )
     wanted = sorted(found if robot_ids is None else robot_ids)
     for driver in sorted({drivers.find("/hero_%d" % robot_id) for robot_id in wanted}):
-        if drivers.holds(driver):
+        if drivers.is_stopped(driver):
             raise CalibrationError(
                 "the driver holds all robots; let them go: rosservice call %s/stop false" % driver
             )

@@ -1,6 +1,10 @@
-"""Reports of several drivers become one: each robot once, stopped only if all are."""
+"""Reports of several drivers become one: each robot once, stopped only if all are; only drivers are believed."""
 
-from hero_examples.drivers import merge
+import math
+
+import pytest
+
+from hero_examples.driver_reports import clean, find_drivers, merge
 from hero_msgs.msg import Robot, RobotArray
 
 
@@ -54,3 +58,36 @@ def test_the_fleet_is_stopped_only_if_every_driver_is():
     stopped, free = make_report(1, [], stopped=True), make_report(2, [])
     assert merge([stopped, stopped]).stopped
     assert not merge([stopped, free]).stopped
+
+
+def make_system_state(publishers, services):
+    return [list(map(list, publishers.items())), [], list(map(list, services.items()))]
+
+
+def test_a_node_with_reports_and_a_stop_service_is_a_driver():
+    state = make_system_state(
+        {"/lab/driver/robots": ["/lab/driver"], "/other/robots": ["/other"]}, {"/lab/driver/stop": ["/lab/driver"]}
+    )
+    assert find_drivers(state, ["/lab/driver/robots", "/other/robots"]) == {"/lab/driver/robots"}
+
+
+def test_reports_that_a_robot_declares_are_not_those_of_a_driver():
+    state = make_system_state({"/hero_0/robots": ["/hero_driver"]}, {"/hero_0/stop": ["/hero_driver"]})
+    assert find_drivers(state, ["/hero_0/robots"]) == set()
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf, 1e306, -1.0])
+def test_rates_that_cannot_be_shown_become_zero(number):
+    (robot,) = clean(RobotArray(robots=[Robot(frames_per_s=number, bytes_per_s=number)])).robots
+    assert (robot.frames_per_s, robot.bytes_per_s) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf, 1e306])
+def test_a_clock_offset_that_cannot_be_shown_is_unknown(number):
+    (robot,) = clean(RobotArray(robots=[Robot(clock_offset=number)])).robots
+    assert math.isnan(robot.clock_offset)
+
+
+def test_usual_numbers_stay_what_they_are():
+    (robot,) = clean(RobotArray(robots=[Robot(frames_per_s=211.0, bytes_per_s=4e4, clock_offset=-0.02)])).robots
+    assert (robot.frames_per_s, robot.bytes_per_s, robot.clock_offset) == (211.0, 4e4, -0.02)

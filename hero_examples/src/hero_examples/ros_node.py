@@ -1,0 +1,100 @@
+"""Starts a ROS node or says in one line why not, and keeps every call to the ROS master short.
+
+rospy waits for a master without a time limit, and a call that hangs holds a lock that other threads and the end of the
+node wait for. rospy has no setting for either, so this file, and no other here, uses its internals.
+"""
+
+import errno
+import http.client
+import xmlrpc.client
+from typing import Any
+from xml.parsers.expat import ExpatError
+
+import rosgraph
+import rosgraph.roslogging
+import rospy
+from rospy.impl.registration import RegManager, get_registration_listeners
+
+MASTER_TIMEOUT_S = 3.0
+"""A master answers within milliseconds, under load within a second."""
+
+SUCCESS = 1
+"""First part of an answer of the master (ROS Master API)."""
+
+
+class NodeError(Exception):
+    """The node cannot start, or the ROS master does not answer; the text is one line that says why and what to do."""
+
+
+class LimitedTransport(xmlrpc.client.Transport):
+    """XML-RPC over HTTP with a time limit."""
+
+    def make_connection(self, host: Any) -> Any:
+        """Return a connection that gives up after MASTER_TIMEOUT_S."""
+        connection = super().make_connection(host)
+        connection.timeout = MASTER_TIMEOUT_S
+        return connection
+
+    def single_request(self, *arguments: Any, **options: Any) -> Any:
+        """Send a request; a timeout gets an error number, because rospy's shutdown fails on an error without one."""
+        try:
+            return super().single_request(*arguments, **options)
+        except OSError as error:
+            if error.errno is not None:
+                raise
+            raise OSError(errno.ETIMEDOUT, "no answer within %g s" % MASTER_TIMEOUT_S) from None
+
+
+def ask_master(method: str, *arguments: Any) -> Any:
+    """Call a method of the ROS master (Master API) and return its value.
+
+    Raises: NodeError if the master does not answer in time or refuses.
+    """
+    uri = rosgraph.get_master_uri()
+    try:
+        with xmlrpc.client.ServerProxy(uri, transport=LimitedTransport()) as master:
+            code, text, value = getattr(master, method)(rospy.get_name(), *arguments)
+    except (OSError, OverflowError, ValueError, http.client.HTTPException, xmlrpc.client.Error, ExpatError) as error:
+        raise NodeError("no ROS master at %r (%s)" % (uri, error)) from None
+    if code != SUCCESS:
+        raise NodeError("the ROS master refuses %s: %s" % (method, text))
+    return value
+
+
+def start_ros_node(name: str, anonymous: bool = False) -> None:
+    """Start the node of this process; signals stay with the caller.
+
+    Raises: NodeError without a ROS master, without a directory for logs, or for wrong remappings.
+    """
+    try:
+        ask_master("getPid")
+    except NodeError as error:
+        raise NodeError(
+            "%s: start roslaunch hero_bringup hero_bringup.launch first, or set ROS_MASTER_URI, for example to"
+            " http://localhost:11311" % error
+        ) from None
+    uri = rosgraph.get_master_uri()
+    rospy.core._xmlrpc_cache[uri] = rospy.core._LockedServerProxy(uri, transport=LimitedTransport())
+    try:
+        rospy.init_node(name, anonymous=anonymous, disable_signals=True)
+    except rosgraph.roslogging.LoggingException as error:
+        raise NodeError("%s: set ROS_LOG_DIR to a directory" % error) from None
+    except (rospy.ROSInitException, OSError, ValueError) as error:
+        raise NodeError(" ".join(str(error).split())) from None
+    end_without_delay()
+
+
+def end_without_delay() -> None:
+    """Let this node end as soon as its topics are closed.
+
+    rospy's registration thread, for which the interpreter waits, looks for the end only every 0.5 s: it is woken as
+    the shutdown begins, too early, and sleeps again before rospy says that the node is down. Here it is woken after.
+    """
+    managers = [listener for listener in get_registration_listeners().listeners if isinstance(listener, RegManager)]
+
+    def wake(reason: str) -> None:
+        for manager in managers:
+            with manager.cond:
+                manager.cond.notify_all()
+
+    rospy.core.add_shutdown_hook(wake)

@@ -1,0 +1,144 @@
+"""A request to stop all robots, or to release them: whom to ask again, and what people must see.
+
+Pure: knows neither topics nor a clock; times are monotonic.
+"""
+
+from typing import List, NamedTuple, Optional, Sequence, Set
+
+from hero_msgs.msg import Robot, RobotArray
+
+from .driver_reports import merge
+
+TIME_LIMIT_S = 1.5
+"""After so long people are told who did not stop. A driver reports once per second, and each change within 0.1 s."""
+
+CROSSING_S = 0.15
+"""A report may cross the request on its way; by then a newer one has come."""
+
+NAMES_SHOWN = 20
+
+
+class StopStatus(NamedTuple):
+    """What people must see of a request."""
+
+    level: str
+    """info, warn or error."""
+    text: str
+    is_final: bool
+    """Whether the outcome is known; until then it is asked for again and again."""
+
+
+class DriverReply(NamedTuple):
+    """What a driver has reported since the request."""
+
+    name: str
+    report: Optional[RobotArray]
+    """The newest report; None while there is none since the request, or none any more."""
+
+
+class StopRequest:
+    """One request to all drivers, and which of them have taken it."""
+
+    def __init__(self, stopped: bool, made_s: float) -> None:
+        """stopped: whether to stop or to release."""
+        self.stopped = stopped
+        self.made_s = made_s
+        self.is_over = False
+        self._taken: Set[str] = set()
+
+    def update(self, replies: Sequence[DriverReply], all_found: bool, now_s: float) -> None:
+        """Take the replies of the drivers that are known.
+
+        The request is over once all have taken it: a driver that starts later is not asked. A release is asked for
+        no longer than TIME_LIMIT_S, because a driver that hung must not let its robots go by surprise.
+
+        all_found: whether these drivers are all that the ROS master knows.
+        """
+        if now_s - self.made_s < CROSSING_S:
+            return
+        self._taken.update(
+            reply.name for reply in replies if reply.report is not None and reply.report.stopped == self.stopped
+        )
+        all_taken = all_found and all(reply.name in self._taken for reply in replies)
+        self.is_over = self.is_over or all_taken or (not self.stopped and self._is_late(now_s))
+
+    def is_open_to(self, driver: str) -> bool:
+        """Return whether a driver is to be asked, for the first time or again."""
+        return not self.is_over and driver not in self._taken
+
+    def _is_late(self, now_s: float) -> bool:
+        return now_s - self.made_s >= TIME_LIMIT_S
+
+    def describe(self, replies: Sequence[DriverReply], now_s: float) -> StopStatus:
+        """Return what people must see now."""
+        if now_s - self.made_s < CROSSING_S:
+            return StopStatus("warn", "stopping" if self.stopped else "releasing", False)
+        failures = ["driver %s does not answer" % _show(reply.name) for reply in replies if reply.report is None]
+        refusing: List[str] = []
+        changed: List[str] = []
+        for reply in replies:
+            if reply.report is not None and bool(reply.report.stopped) != self.stopped:
+                (changed if reply.name in self._taken else refusing).append(_show(reply.name))
+        if changed:
+            how = "released" if self.stopped else "stopped"
+            return StopStatus("warn", "another program has %s the robots of %s" % (how, ", ".join(changed)), True)
+        if not self.stopped:
+            return self._describe_release(failures, refusing, now_s)
+        return self._describe_stop(failures, refusing, find_robots(replies), now_s)
+
+    def _describe_release(self, failures: List[str], refusing: List[str], now_s: float) -> StopStatus:
+        failures = failures + ["driver %s is still stopped" % name for name in refusing]
+        if not failures:
+            return StopStatus("info", "released: robots may move again", True)
+        if not self._is_late(now_s):
+            return StopStatus("warn", "releasing", False)
+        return StopStatus("error", "NOT RELEASED: " + "; ".join(failures), True)
+
+    def _describe_stop(
+        self, failures: List[str], refusing: List[str], robots: Sequence[Robot], now_s: float
+    ) -> StopStatus:
+        connected = [robot for robot in robots if robot.state != Robot.AWAY]
+        moving = [robot for robot in connected if robot.stop_state == Robot.MOVING]
+        unread = [robot for robot in connected if robot.stop_state == Robot.UNCONFIRMED]
+        stopping = [robot for robot in connected if robot.stop_state in (Robot.NOT_STOPPED, Robot.STOPPING)]
+        away = [robot for robot in robots if robot.state == Robot.AWAY]
+        failures = [
+            *_tell(moving, "moves", "move"),
+            *failures,
+            *("driver %s is not stopped" % name for name in refusing),
+            *_tell(stopping, "is not at rest yet", "are not at rest yet"),
+        ]
+        notes = [
+            *_tell(unread, "sends no wheel readings", "send no wheel readings"),
+            *_tell(away, "is away", "are away"),
+        ]
+        if failures:
+            if not self._is_late(now_s):
+                return StopStatus("warn", "stopping", False)
+            return StopStatus("error", "NOT STOPPED: " + "; ".join(failures + notes), False)
+        if notes:
+            return StopStatus("warn", "stopped, but " + "; ".join(notes), True)
+        text = "stopped, all wheels at rest" if connected else "stopped, no robot is connected"
+        return StopStatus("info", text, True)
+
+
+def find_robots(replies: Sequence[DriverReply]) -> List[Robot]:
+    """Return the robots of all drivers that are connected or away, each once."""
+    reports = [reply.report for reply in replies if reply.report is not None]
+    if not reports:
+        return []
+    return [robot for robot in merge(reports).robots if robot.state != Robot.REFUSED]
+
+
+def _show(driver: str) -> str:
+    return driver.strip("/")
+
+
+def _tell(robots: Sequence[Robot], one: str, many: str) -> List[str]:
+    """Return what is to be said of robots, with their names; nothing if there are none."""
+    if not robots:
+        return []
+    names = [robot.namespace.strip("/") or robot.address for robot in robots]
+    more = len(names) - NAMES_SHOWN
+    shown = ", ".join(names[:NAMES_SHOWN]) + (" and %d more" % more if more > 0 else "")
+    return ["%s %s" % (shown, one if len(names) == 1 else many)]
