@@ -187,7 +187,7 @@ def start_swarms(options, count, servers, environment):
         command = [sys.executable, str(HERE / "emulated_swarm.py"), "--port", str(port)]
         command += ["--first-id", str(first), "--robots", str(end - first), "--speed", str(options.speed)]
         seconds = find_settling_s(count) + options.seconds + SETTLE_S
-        command += ["--seconds", str(seconds)] + ["--nagle"] * options.nagle
+        command += ["--seconds", str(seconds)] + ["--nagle"] * options.nagle + ["--warn"] * options.warn
         swarms.append(start(command, environment, stdout=subprocess.PIPE))
     return swarms
 
@@ -362,6 +362,7 @@ def main():
     parser.add_argument(
         "--nagle", action="store_true", help="robots' TCP holds small writes back, as HeRo's does"
     )
+    parser.add_argument("--warn", action="store_true", help="each robot sends one warning per second")
     server = parser.add_mutually_exclusive_group()
     server.add_argument("--server-command", default=DRIVER_COMMAND, help="{port} stands for the port")
     server.add_argument(

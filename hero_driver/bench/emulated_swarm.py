@@ -193,8 +193,13 @@ class EmulatedRobot:
         return is_new
 
 
-def run(address, count, seconds, speed, first=0, nagle=False, keeps_times=True, is_ended=lambda: False):
-    """Return the result of count robots for seconds after all have joined, or until is_ended()."""
+def run(
+    address, count, seconds, speed, first=0, nagle=False, keeps_times=True, is_ended=lambda: False, warns=False
+):
+    """Return the result of count robots for seconds after all have joined, or until is_ended().
+
+    warns: the log line that each robot sends every second is a warning.
+    """
     started_s = time.monotonic()
     robots = [EmulatedRobot(first + index, address, nagle, keeps_times) for index in range(count)]
     selector = selectors.DefaultSelector()
@@ -240,7 +245,10 @@ def run(address, count, seconds, speed, first=0, nagle=False, keeps_times=True, 
                 period_s = LASER_PERIOD_S
             elif kind == "log":
                 line = "\x1b[96m[/hero_%d] Conected at time %d\x1b[0m" % (robot.number, now_s * 1000 % 10**9)
-                robot.send(frames.encode_frame(frames.ID_LOG, payloads.encode_log(payloads.Log(1, line))))
+                log = payloads.Log(payloads.LOG_INFO, line)
+                if warns:
+                    log = payloads.Log(payloads.LOG_WARN, "warning %d" % now_s)
+                robot.send(frames.encode_frame(frames.ID_LOG, payloads.encode_log(log)))
                 period_s = LOG_PERIOD_S
             else:
                 robot.send(frames.encode_frame(frames.ID_TIME, bytes(8)))
@@ -274,6 +282,7 @@ def main():
     parser.add_argument("--speed", type=float, default=1.0, help="multiplies all rates")
     parser.add_argument("--nagle", action="store_true", help="frames one by one and TCP without NODELAY")
     parser.add_argument("--counts", action="store_true", help="keep no times, for runs of hours")
+    parser.add_argument("--warn", action="store_true", help="each robot sends one warning per second")
     options = parser.parse_args()
     ended = threading.Event()
     signal.signal(signal.SIGINT, lambda *_: ended.set())
@@ -287,6 +296,7 @@ def main():
         options.nagle,
         not options.counts,
         ended.is_set,
+        options.warn,
     )
     print(json.dumps(result))
 
