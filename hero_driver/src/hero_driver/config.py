@@ -44,7 +44,9 @@ class DriverConfig:
         (), "robots that are TCP servers, to be dialled: a list of {host, port}"
     )
     namespace_policy: str = _choice(
-        "robot", ("robot", "any"), "robot: HeRos only, each within /hero_N and /tf; any: every name and type"
+        "robot",
+        ("robot", "any"),
+        "robot: HeRos only, each within /hero_N and /tf; any: all names and types but those of drivers and of ROS itself",
     )
     allow: Tuple[Network, ...] = _plain((), "networks (CIDR) that robots may come from; empty: all")
     max_connections: int = _number(400, 1, 5000, "", "connections in total")

@@ -12,13 +12,13 @@ from typing import Callable, Dict, List, Optional
 
 from . import log_lines, names
 from .admission import GARBAGE_REST_S, Admission, RateGuard
-from .cleaning import TRANSFORMS, CleaningSettings
+from .cleaning import CleaningSettings
 from .command_sender import CommandSender
 from .config import DriverConfig
 from .fleet import Decision, Fleet, RobotRecord, RobotState, Verdict
 from .halting import await_halt, halt_directly
 from .log_relay import LogRelay
-from .names import Identity
+from .names import Identity, NameRules
 from .registrar import RobotRegistrar
 from .robot_bridge import VELOCITY_SUFFIX, BridgeContext, RobotBridge
 from .robot_requests import RobotRequests
@@ -34,6 +34,7 @@ from .rosserial.session import (
     SessionEnded,
     Topic,
     TopicDeclared,
+    TopicKind,
 )
 from .transform_collector import TransformCollector
 from .transport import THE_DRIVER_ENDS, EventLoop, Link, LinkHandler
@@ -60,15 +61,17 @@ class Gateway(LinkHandler):
         config: DriverConfig,
         log: LogRelay,
         registrar: Worker,
+        node: str,
         clock_ns: Callable[[], int],
         on_change: Callable[[], None],
     ) -> None:
-        """clock_ns gives ROS time; on_change() is called when a robot's state changes (it must not block)."""
+        """node: the driver's name in ROS; clock_ns gives ROS time; on_change() is called when a robot's state changes (it must not block)."""
         self._config = config
         self._log = log
         self._registrar = registrar
         self._clock_ns = clock_ns
         self._on_change = on_change
+        self._names = NameRules(config.namespace_policy, node)
         self._admission = Admission(config.admission_limits)
         self._loop: EventLoop
         self._sender: CommandSender
@@ -258,13 +261,8 @@ class Gateway(LinkHandler):
             return
         if peer.refused or peer.bridge is None or peer.record is None:
             return
-        name = self._resolve(topic.info.name, peer.bridge.identity)
+        name = self._resolve(peer, topic, peer.bridge.identity)
         if name is None:
-            self._complain(
-                peer,
-                "topic %s refused: outside %s (~namespace_policy is robot)"
-                % (ascii(topic.info.name), peer.bridge.identity.namespace),
-            )
             return
         peer.bridge.declare(topic, name)
         if self.stopped and name.endswith(VELOCITY_SUFFIX):
@@ -273,14 +271,15 @@ class Gateway(LinkHandler):
             peer.record.enter(RobotState.READY, now_s)
             self._on_change()
 
-    def _resolve(self, topic_name: str, identity: Identity) -> Optional[str]:
-        if self._config.namespace_policy == "robot":
-            return names.resolve(topic_name, identity)
-        if topic_name in names.TF_TOPICS:
-            return TRANSFORMS
-        if identity.namespace.startswith("/" + names.HERO_PREFIX):
-            return names.resolve(topic_name, identity) or topic_name
-        return topic_name
+    def _resolve(self, peer: Peer, topic: Topic, identity: Identity) -> Optional[str]:
+        """Return the ROS name of what a robot declared, None if it may not use it, which is logged."""
+        info = topic.info
+        is_published = topic.kind is TopicKind.PUBLISHER
+        refusal = self._names.find_refusal(info.name, info.message_type, is_published, identity)
+        if refusal is not None:
+            self._complain(peer, "topic %s refused: %s" % (ascii(info.name), refusal))
+            return None
+        return self._names.resolve(info.name, identity)
 
     def _identify(self, peer: Peer, topic: Topic, now_s: float) -> bool:
         """Find out which robot a peer is from the first name that tells; return whether it is settled."""
@@ -298,6 +297,8 @@ class Gateway(LinkHandler):
                     )
                 return False
             identity = names.identify_any(topic.info.name, address.host)
+        if self._resolve(peer, topic, identity) is None:
+            return False
         known = self.fleet.robots.get(identity.namespace)
         if known is not None and known.link is not None:
             # Only needed here, and every read would cost more.
@@ -330,8 +331,7 @@ class Gateway(LinkHandler):
             decision.old_link.close("the robot connected again from %s" % (peer.link.address,))
         bridge = self.bridges.get(identity.namespace)
         if bridge is None:
-            is_hero = names.identify(identity.namespace + "/x") == identity
-            cleaning = self._cleaning_settings() if is_hero else None
+            cleaning = self._cleaning_settings() if names.is_hero(identity) else None
             registrar = RobotRegistrar(self._registrar, self._loop.call_later)
             bridge = RobotBridge(identity, cleaning, self._context, registrar)
             self.bridges[identity.namespace] = bridge
@@ -417,7 +417,7 @@ class Gateway(LinkHandler):
             record.booted_s = booted_s
 
     def _call_service(self, peer: Peer, topic: Topic, request: bytes) -> None:
-        name = None if peer.bridge is None else self._resolve(topic.info.name, peer.bridge.identity)
+        name = None if peer.bridge is None else self._resolve(peer, topic, peer.bridge.identity)
         if name is not None:
             self._requests.call_service(peer, topic, name, request, self._sender.send_message)
 

@@ -100,7 +100,9 @@ class DriverNode:
                 "error", "a topic or service could not be set up: %s: %s" % (type(error).__name__, error)
             ),
         )
-        self._gateway = Gateway(config, self._log, self._registrar, make_ros_clock(), self._changed.set)
+        self._gateway = Gateway(
+            config, self._log, self._registrar, rospy.get_name(), make_ros_clock(), self._changed.set
+        )
         settings = TransportSettings(
             config.host, config.port, config.robots, config.silence_timeout_s, config.quick_acknowledge
         )

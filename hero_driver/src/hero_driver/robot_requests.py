@@ -31,7 +31,7 @@ class RobotRequests:
         complain: Callable[[Peer, str], None],
     ) -> None:
         """Take the loop's call_soon(); complain reports a robot's trouble."""
-        self._may_leave = config.parameters_outside or config.namespace_policy == "any"
+        self._may_leave = config.parameters_outside
         self._log = log
         self._call_soon = call_soon
         self._complain = complain

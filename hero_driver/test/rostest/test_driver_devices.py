@@ -10,6 +10,7 @@ from driver_case import (
     OwnDriverCase,
     Recorder,
     ask_parameter,
+    list_publishers,
     make_publisher,
     wait_for,
     wait_frames,
@@ -24,11 +25,14 @@ from fake_robot import (
     Declaration,
 )
 from geometry_msgs.msg import Twist
-from std_msgs.msg import Int32, String
-from std_srvs.srv import Trigger, TriggerResponse
+from rosgraph_msgs.msg import Clock
+from std_msgs.msg import Bool, Int32, String
+from std_srvs.srv import SetBool, SetBoolRequest, Trigger, TriggerResponse
 from steady_time import in_steady_time
 from text_messages import STRING_MD5, TRIGGER_REQUEST_MD5, WRONG_MD5, make_text
 from tf2_msgs.msg import TFMessage
+
+from hero_msgs.msg import RobotArray
 
 
 @in_steady_time
@@ -48,7 +52,7 @@ class TestDriverDevices(OwnDriverCase):
             Declaration(CLIENT_REQUESTS, 127, "/add_dots", "std_srvs/Trigger", TRIGGER_REQUEST_MD5),
             Declaration(CLIENT_ANSWERS, 103, "/add_dots", "std_srvs/Trigger", ANSWER_MD5),
         ]
-        driver = self.start(namespace_policy="any")
+        driver = self.start(namespace_policy="any", parameters_outside=True)
         robot = self.dial(driver, ready=False, declarations=device)
         wait_for(lambda: driver.fleet.newest.robots, "the device in the report")
         self.assertEqual(driver.fleet.newest.robots[0].id, -1)
@@ -131,6 +135,46 @@ class TestDriverDevices(OwnDriverCase):
         texts = Recorder("/other", String)
         robot.send_frame(126, make_text("still here"))
         texts.wait_count(1)
+
+    def test_a_device_can_neither_call_nor_publish_nor_serve_what_drivers_serve(self):
+        driver = self.start(namespace_policy="any")
+        own = driver.node
+        device = [
+            Declaration(PUB, 125, "/chatter", "std_msgs/String", STRING_MD5),
+            Declaration(CLIENT_REQUESTS, 126, own + "/stop", "std_srvs/SetBool", SetBoolRequest._md5sum),
+            Declaration(CLIENT_ANSWERS, 100, own + "/stop", "std_srvs/SetBool", ANSWER_MD5),
+            Declaration(PUB, 127, own + "/stop_request", "std_msgs/Bool", Bool._md5sum),
+            Declaration(2, 128, "/other/disconnect", "std_srvs/Trigger", ANSWER_MD5),
+            Declaration(3, 101, "/other/disconnect", "std_srvs/Trigger", TRIGGER_REQUEST_MD5),
+            Declaration(PUB, 129, "/fleet", "hero_common/RobotArray", RobotArray._md5sum),
+            Declaration(PUB, 130, "/clock", "rosgraph_msgs/Clock", Clock._md5sum),
+        ]
+        refused = [entry for entry in device if entry.name != "/chatter"]
+        rospy.wait_for_service(own + "/stop", 20.0)
+        rospy.ServiceProxy(own + "/stop", SetBool)(True)
+        robot = self.dial(driver, ready=False, declarations=device)
+        for entry in refused:
+            driver.wait_line("topic '%s' refused: only drivers and ROS itself" % entry.name)
+        for name in {entry.name for entry in refused}:
+            self.assertEqual(len(driver.find_lines("topic '%s' refused" % name)), 1, name)
+        robot.send_frame(126, b"\x00")
+        robot.send_frame(127, b"\x00")
+        texts = Recorder("/chatter", String)
+        robot.send_frame(125, make_text("still here"))
+        texts.wait_count(1)
+        self.assertTrue(driver.fleet.newest.stopped)
+        self.assertEqual(list_publishers("/fleet") + list_publishers("/clock"), [])
+
+    def test_a_device_reads_parameters_outside_only_where_that_is_allowed(self):
+        rospy.set_param("/limit", 12)
+        rospy.set_param("/arm_3/limit", 13)
+        driver = self.start(namespace_policy="any")
+        device = [Declaration(PUB, 125, "/arm_3/state", "std_msgs/String", STRING_MD5)]
+        robot = self.dial(driver, declarations=device, ready=False)
+        driver.fleet.wait_ready("/arm_3")
+        self.assertEqual(ask_parameter(robot, "limit"), ([13], [], []))
+        self.assertEqual(ask_parameter(robot, "/limit"), ([], [], []))
+        driver.wait_line("arm_3: parameter '/limit' lies outside /arm_3; set ~parameters_outside")
 
 
 if __name__ == "__main__":

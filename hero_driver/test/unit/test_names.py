@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hero_driver.names import Identity, identify, identify_any, resolve
+from hero_driver.names import RESERVED, Identity, NameRules, identify, identify_any, resolve
 
 
 @pytest.mark.parametrize(
@@ -85,3 +85,65 @@ def test_any_name_gives_a_namespace_that_ros_can_use(name, host):
     namespace = identify_any(name, host).namespace
     assert namespace[0] == "/"
     assert namespace[1:].replace("_", "").isalnum()
+
+
+HERO = Identity("/hero_1", 1)
+DEVICE = Identity("/arm_2", 2)
+ANY = NameRules("any", "/lab/hero_driver")
+
+
+@pytest.mark.parametrize(
+    "name, resolved",
+    [("/chatter", "/chatter"), ("chatter", "/lab/chatter"), ("/tf", "/tf"), ("tf", "/tf"), ("/hero_1/odom", "/hero_1/odom")],
+)
+def test_where_any_name_goes_a_device_uses_it_as_ros_resolves_it(name, resolved):
+    assert ANY.find_refusal(name, "std_msgs/String", True, DEVICE) is None
+    assert ANY.resolve(name, DEVICE) == resolved
+
+
+def test_a_hero_among_devices_keeps_its_own_names():
+    assert ANY.resolve("hero_1/laser_enable", HERO) == "/hero_1/laser_enable"
+    assert ANY.find_refusal("/hero_1/stop", "std_msgs/Bool", False, HERO) is None
+
+
+@pytest.mark.parametrize("identity", [HERO, DEVICE, Identity("/hero_driver_2", 2)])
+@pytest.mark.parametrize("is_published", [True, False])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "/lab/hero_driver/stop",
+        "/lab/hero_driver/set_logger_level",
+        "/lab/hero_driver",
+        "hero_driver/stop",
+        "~stop",
+        "~anything",
+        "/other/stop",
+        "/hero_driver_2/robots",
+        "/hero_driver_2/stop_request",
+        "stopped",
+        "/x/y/disconnect",
+    ],
+)
+def test_what_drivers_serve_is_refused_under_any_name(name, is_published, identity):
+    assert ANY.find_refusal(name, "std_msgs/Bool", is_published, identity) == RESERVED
+
+
+@pytest.mark.parametrize(
+    "name", ["/rosout", "/rosout_agg", "/diagnostics", "/diagnostics_agg", "/clock", "/tf_static"]
+)
+def test_devices_may_listen_to_what_all_of_ros_reads_but_not_speak_there(name):
+    assert ANY.find_refusal(name, "std_msgs/String", True, DEVICE) == RESERVED
+    assert ANY.find_refusal(name, "std_msgs/String", False, DEVICE) is None
+
+
+@pytest.mark.parametrize("policy", ["robot", "any"])
+@pytest.mark.parametrize("message_type", ["hero_msgs/RobotArray", "hero_common/RobotArray"])
+def test_no_robot_may_declare_the_type_by_which_drivers_are_found(policy, message_type):
+    rules = NameRules(policy, "/hero_driver")
+    assert rules.find_refusal("/hero_1/friends", message_type, True, HERO) == RESERVED
+
+
+def test_a_hero_stays_within_its_namespace_where_the_policy_says_so():
+    rules = NameRules("robot", "/hero_driver")
+    assert rules.find_refusal("/hero_1/odom", "nav_msgs/Odometry", True, HERO) is None
+    assert "outside /hero_1" in rules.find_refusal("/hero_10/odom", "nav_msgs/Odometry", True, HERO)
