@@ -1,7 +1,7 @@
 """A scripted robot behind a real TCP socket: says what the stock robot says, and whatever else a test wants.
 
-It takes frames as the firmware does (read cycle, 50 ms between velocities) and keeps them for the test. It
-stands on the codec alone, never on the driver's session or on ROS. Source: firmware v3.8 as measured: ids in
+It takes frames as the firmware does (read cycle, receive window, the motion rules of fake_motors) and keeps them for
+the test. It stands on the codec alone, never on the driver's session or on ROS. Source: firmware v3.8 as measured: ids in
 call order, publishers from 125, subscribers from 100; one burst of declarations for each request.
 """
 
@@ -13,6 +13,8 @@ import threading
 import time
 from typing import Callable, Dict, List, NamedTuple, Optional
 
+from fake_motors import FakeMotors
+
 from hero_driver.rosserial import frames, payloads
 
 BUFFER_LENGTH = 4096
@@ -21,8 +23,12 @@ TWIST_MD5 = "9f195f881246fdfa2798d1d3eebca84a"
 
 TIME_REQUEST_INTERVAL_S = 2.5
 READ_CYCLE_S = 0.051
-VELOCITY_GATE_S = 0.050
-"""The firmware drops a velocity that it reads within this time after the last one it took."""
+WINDOW_LENGTH = 2144
+"""Bytes that the robot's TCP takes before the firmware reads them, all in one read."""
+
+ENCODER_INTERVAL_S = 0.034
+TUNING_INTERVAL_S = 1.0 / 47.0
+"""Between two log lines of a robot that tunes itself."""
 
 REQUEST_FRAME = frames.encode_frame(frames.ID_PUBLISHER, b"")
 TIME_FRAME = frames.encode_frame(frames.ID_TIME, bytes(8))
@@ -149,7 +155,7 @@ class FakeRobot:
 
     Attributes (read by tests, all in order of arrival):
         received: frames from the driver; velocities: those with a Twist, whether the firmware took them or not;
-        accepted: those that it took; requests: how often topics were asked for; ended: why the connection is
+        accepted: those that it took; motors: what they make of its wheels; requests: how often topics were asked for; ended: why the connection is
         over, empty while it stands.
         answers: service name -> function of the request that returns the answer, or None for no answer.
         is_silent: says nothing of its own; is_stalled: does not read; declares: whether requests are answered.
@@ -162,8 +168,12 @@ class FakeRobot:
         source_host: str = "127.0.0.1",
         read_cycle_s: float = 0.0,
         receive_buffer_length: int = 0,
+        has_motors: bool = False,
     ) -> None:
-        """read_cycle_s: 0 reads at once, READ_CYCLE_S as the firmware; receive_buffer_length: of TCP, 0: usual."""
+        """read_cycle_s: 0 reads at once, READ_CYCLE_S as the firmware; receive_buffer_length: of TCP, 0: usual.
+
+        has_motors: publishes its encoders, and pid_calibration makes it tune itself.
+        """
         self.name = "hero_%d" % number
         self.namespace = "/" + self.name
         chosen = STOCK_DECLARATIONS if declarations is None else declarations
@@ -171,6 +181,7 @@ class FakeRobot:
         self.received: List[ReceivedFrame] = []
         self.velocities: List[Velocity] = []
         self.accepted: List[Velocity] = []
+        self.motors = FakeMotors()
         self.requests = 0
         self.ended = ""
         self.answers: Dict[str, Callable[[bytes], Optional[bytes]]] = {}
@@ -181,8 +192,9 @@ class FakeRobot:
         self._source_host = source_host
         self._read_cycle_s = read_cycle_s
         self._receive_buffer_length = receive_buffer_length
+        self._has_motors = has_motors
         self._socket: Optional[socket.socket] = None
-        self._thread: Optional[threading.Thread] = None
+        self._threads: List[threading.Thread] = []
         self._write_lock = threading.Lock()
         self._closing = threading.Event()
 
@@ -212,9 +224,7 @@ class FakeRobot:
         if sock is not None:
             with contextlib.suppress(OSError):
                 sock.shutdown(socket.SHUT_RDWR)
-        if self._thread is not None:
-            self._thread.join()
-            self._thread = None
+        self._join_threads()
         if sock is not None:
             sock.close()
             self._socket = None
@@ -223,10 +233,13 @@ class FakeRobot:
         """Leave with a RST."""
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
         self._closing.set()
-        self._thread.join()
-        self._thread = None
+        self._join_threads()
         self._socket.close()
         self._socket = None
+
+    def _join_threads(self) -> None:
+        while self._threads:
+            self._threads.pop().join()
 
     @property
     def is_connected(self) -> bool:
@@ -300,8 +313,30 @@ class FakeRobot:
         self.ended = ""
         self._closing.clear()
         self._socket = sock
-        self._thread = threading.Thread(target=self._run, args=(sock,), name=self.name, daemon=True)
-        self._thread.start()
+        targets = [lambda: self._run(sock)] + [self._run_motors] * self._has_motors
+        self._threads = [threading.Thread(target=target, name=self.name, daemon=True) for target in targets]
+        for thread in self._threads:
+            thread.start()
+
+    def start_tuning(self, controller: str = "velocity_controller") -> None:
+        """Tune one of its controllers, as after a call of its pid_calibration."""
+        self.log("\x1b[94m[/%s] Starting Motors Auto Tuning! Wait... \x1b[0m" % self.name)
+        self.motors.start_tuning(controller)
+
+    def _run_motors(self) -> None:
+        """Send encoder readings and, while it tunes itself, the lines that the firmware logs."""
+        encoder_s = tuning_s = time.monotonic()
+        while not self._closing.wait(max(min(encoder_s, tuning_s) - time.monotonic(), 0.0)):
+            now_s = time.monotonic()
+            if now_s >= encoder_s:
+                encoder_s += ENCODER_INTERVAL_S
+                if self.requests and not self.is_silent:
+                    self.send("encoder", self.motors.encode_encoder(self.name, now_s, time.time()))
+            if now_s >= tuning_s:
+                tuning_s += TUNING_INTERVAL_S
+                if self.motors.is_tuning and not self.is_silent:
+                    text = "Tunning Motor Set: [0.000000,0.000000], [0.050000,0.050000]->[-50,210]"
+                    self.log("\x1b[93m[/%s] %s\x1b[0m" % (self.name, text))
 
     def _run(self, sock: socket.socket) -> None:
         reader = frames.FrameReader()
@@ -318,13 +353,14 @@ class FakeRobot:
             if not ready or self.is_stalled:
                 continue
             try:
-                data = sock.recv(65536)
+                data = sock.recv(WINDOW_LENGTH)
             except OSError as error:
                 self.ended = self.ended or str(error)
                 return
             if not data:
                 self.ended = "closed by the driver"
                 return
+            self.motors.begin_read(time.monotonic())
             for frame in reader.receive_bytes(data):
                 self._take(frame)
 
@@ -343,11 +379,18 @@ class FakeRobot:
                 self._serve(entry.name, frame.payload)
             elif entry.name.endswith("/cmd_vel") and len(frame.payload) == 48:
                 self._take_velocity(entry.name, frame.payload, now_s)
+            elif entry.name.endswith("/cmd_motor"):
+                self.motors.take_pulses(frame.payload)
+            elif entry.name.endswith("/led"):
+                self.motors.take_led()
 
     def _serve(self, name: str, request: bytes) -> None:
         prefix = self.namespace + "/"
         short_name = name[len(prefix) :] if name.startswith(prefix) else name
         make_answer = self.answers.get(short_name, lambda _: encode_answer(True, short_name))
+        if self._has_motors and short_name.endswith("/pid_calibration"):
+            self.start_tuning(short_name.split("/")[0])
+            make_answer = self.answers.get(short_name, lambda _: encode_answer(False, "PID Autotuning!"))
         answer = make_answer(request)
         if answer is not None:
             self.answer(short_name, answer)
@@ -356,6 +399,5 @@ class FakeRobot:
         parts = struct.unpack("<6d", payload)
         velocity = Velocity(now_s, name, parts[0], parts[5])
         self.velocities.append(velocity)
-        earlier_s = [other.time_s for other in self.accepted if other.name == name]
-        if not earlier_s or now_s - earlier_s[-1] >= VELOCITY_GATE_S:
+        if self.motors.take_velocity(name, velocity.is_zero):
             self.accepted.append(velocity)

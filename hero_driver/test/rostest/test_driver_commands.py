@@ -7,7 +7,8 @@ import struct
 import rospy
 import rostest
 from driver_case import NODE, DriverCase, Recorder, make_publisher, wait_for, wait_payloads
-from fake_robot import READ_CYCLE_S, VELOCITY_GATE_S
+from fake_motors import VELOCITY_GATE_S
+from fake_robot import READ_CYCLE_S
 from geometry_msgs.msg import Twist
 from std_msgs.msg import Bool, ColorRGBA
 from std_srvs.srv import SetBool, Trigger

@@ -8,7 +8,8 @@ import time
 import rospy
 import rostest
 from driver_case import OwnDriverCase, make_publisher, wait_for, wait_payloads
-from fake_robot import READ_CYCLE_S, VELOCITY_GATE_S
+from fake_motors import VELOCITY_GATE_S
+from fake_robot import READ_CYCLE_S
 from geometry_msgs.msg import Twist
 from steady_time import in_steady_time
 

@@ -1,4 +1,4 @@
-"""Frames from the server -> what the robot does, and the answers of its services.
+"""Does what packets from the server ask of a robot, and answers for its services.
 
 Pure. Texts and behaviour are the firmware's (files named in messages and flash); ids as declared.
 """
@@ -14,14 +14,26 @@ from .errors import CommandError
 if TYPE_CHECKING:
     from .firmware import Firmware
 
+PULSES_US = 500
+"""Writing pulses holds the loop so long (MotorDriver.ino: measured as 500 us per cmd_motor)."""
+
+HALT_US = 1000
+LIGHT_US = 1000
+"""So do switching the motors off, and setting the light."""
+
 
 class CommandTable:
-    """The callbacks of one robot, by topic id."""
+    """The callbacks of one robot, by topic id.
+
+    Attributes:
+        held_us: how long the last callback held the robot's loop.
+    """
 
     def __init__(self, firmware: "Firmware") -> None:
         """Serve firmware."""
         self._firmware = firmware
         self._now_ms = 0
+        self.held_us = 0
         self._callbacks: Dict[int, Callable[[bytes, int], Optional[bytes]]] = {
             ids.ID_LED: self._set_light,
             ids.ID_LASER_ENABLE: self._enable_laser,
@@ -43,12 +55,14 @@ class CommandTable:
         Raises: CommandError for a payload that is not the declared message.
         """
         self._now_ms = now_ms
+        self.held_us = 0
         callback = self._callbacks.get(frame.topic_id)
         # The slots without a subscriber are empty: the firmware ignores them.
         return None if callback is None else callback(frame.payload, millis)
 
     def _set_light(self, payload: bytes, millis: int) -> None:
         self._firmware.sensing.set_light(millis, messages.decode_color(payload))
+        self.held_us = LIGHT_US
 
     def _enable_laser(self, payload: bytes, millis: int) -> None:
         del millis
@@ -57,18 +71,16 @@ class CommandTable:
     def _drive_velocity(self, payload: bytes, millis: int) -> None:
         twist = messages.decode_twist(payload)
         if self._firmware.motors.receive_velocity(millis, twist.linear_m_s, twist.turn_rad_s):
-            self._log_reset()
+            self.held_us = HALT_US
 
     def _drive_position(self, payload: bytes, millis: int) -> None:
         twist = messages.decode_twist(payload)
         if self._firmware.motors.receive_position(millis, self._now_ms, twist.linear_m_s, twist.turn_rad_s):
-            self._log_reset()
-
-    def _log_reset(self) -> None:
-        self._firmware.log("\x1b[93m[/%s] Reseting PID...\x1b[0m" % self._firmware.name)
+            self.held_us = HALT_US
 
     def _drive_motors(self, payload: bytes, millis: int) -> None:
         self._firmware.motors.receive_pulses(millis, *messages.decode_motor(payload))
+        self.held_us = PULSES_US
 
     def _calibrate_ir(self, payload: bytes, millis: int) -> bytes:
         del millis
@@ -137,10 +149,8 @@ class CommandTable:
         return self._tune(ids.ID_VELOCITY_PID_CALIBRATION_ANSWER, millis, of_velocity=True)
 
     def _tune(self, answer_id: int, millis: int, of_velocity: bool) -> bytes:
-        self._firmware.log(
-            "\x1b[94m[/%s] Starting Motors Auto Tuning! Wait... \x1b[0m" % self._firmware.name
-        )
         self._firmware.motors.start_tuning(millis, self._now_ms, of_velocity)
+        self.held_us = PULSES_US
         # The firmware never sets success here (VelocityControl.ino:229-245).
         return _answer(answer_id, False, "PID Autotuning!")
 

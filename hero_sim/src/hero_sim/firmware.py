@@ -6,7 +6,8 @@ motors) and a radio, which looks at wants_connection, connects and carries outbo
 Source: the firmware's files named at the constants, and measurements of the complete stock firmware.
 """
 
-from typing import Callable, List, NamedTuple, Optional, Tuple
+from collections import deque
+from typing import Callable, Deque, List, NamedTuple, Optional, Tuple
 
 import numpy as np
 
@@ -45,6 +46,9 @@ UNCONFIGURED_SPIN_MS = 101
 LOG_MS = 1001
 UNCONFIGURED_LOG_MS = 1019
 """Between two lines "Conected at time" (ROSHandle.ino:116)."""
+
+WINDOW_LENGTH = 2144
+"""Bytes that the ESP8266's TCP takes before the program reads them; the rest waits at the sender."""
 
 TIME_REQUEST_MS = 2500
 TIME_LOST_MS = 11000
@@ -123,11 +127,7 @@ class Firmware:
             self.name, self.body, self.options.imu_hat, self.options.exact_odometry, self.flash
         )
         self.motors = MotorControl(
-            self.body,
-            self.sensing.odometry,
-            self.flash.motor_centres_us,
-            self.flash.velocity_pid,
-            self.flash.position_pid,
+            self.name, self.body, self.sensing.odometry, self.flash, self.rng, self.log
         )
         self.commands = CommandTable(self)
         self._declarations = declarations.encode_declarations(self.name)
@@ -136,7 +136,9 @@ class Firmware:
         self.outbox.clear()
         self.wants_connection = False
         self._received = bytearray()
-        self._pending: List[frames.Frame] = []
+        self._pending: Deque[frames.Frame] = deque()
+        self._spinning = False
+        self._held_us = 0
         self._answers: List[Tuple[int, bytes]] = []
         self._advertised = False
         self._blocked_until_ms: Optional[int] = None
@@ -296,7 +298,8 @@ class Firmware:
 
     def _spin_before_advertising(self, now_ms: int) -> None:
         if self.connected:
-            self._read_frames(self.to_millis(now_ms), now_ms)
+            self._begin_reading()
+            self._read_packets(now_ms)
 
     def _log_imu(self, now_ms: int) -> None:
         del now_ms
@@ -317,69 +320,82 @@ class Firmware:
         return now_ms - self._booted_at_ms
 
     def _run_loop(self, now_ms: int) -> None:
-        """Be one pass of loop() (firmware.ino:160-190)."""
+        """Be one pass of loop() (firmware.ino:160-190), or go on with a spin that holds it."""
         millis = self.to_millis(now_ms)
-        if now_ms >= self._next_log_ms:
-            self.log("\x1b[96m[/%s] Conected at time %d\x1b[0m" % (self.name, millis))
-            self._next_log_ms = now_ms + (LOG_MS if self.configured else UNCONFIGURED_LOG_MS)
-        if now_ms >= self._next_spin_ms:
-            self._spin(millis, now_ms)
-            self._next_spin_ms = now_ms + (SPIN_MS if self.configured else UNCONFIGURED_SPIN_MS)
-            if self._phase != _PHASE_LOOP or self._blocked_until_ms is not None:
-                return
+        if not self._spinning:
+            if now_ms >= self._next_log_ms:
+                self.log("\x1b[96m[/%s] Conected at time %d\x1b[0m" % (self.name, millis))
+                self._next_log_ms = now_ms + (LOG_MS if self.configured else UNCONFIGURED_LOG_MS)
+            if self.configured:
+                self._run_configured(millis, now_ms)
+            # A controller that is due comes first, also after the loop stood still.
+            if now_ms >= self._next_spin_ms and not self._is_controller_due(millis):
+                self._begin_spin(now_ms)
+        if self._spinning:
+            self._read_packets(now_ms)
+        if self._spinning or self._blocked_until_ms is not None:
+            return
         self._send_answers(now_ms)
         due_ms = min(self._next_log_ms, self._next_spin_ms)
         if self.configured:
-            due_ms = min(due_ms, self._run_configured(millis, now_ms))
+            due_ms = min(due_ms, self._booted_at_ms + self._find_due_millis())
         if self._answers:
-            due_ms = min(due_ms, max(self._answers[0][0], now_ms + 1))
-        self.due_ms = due_ms
+            due_ms = min(due_ms, self._answers[0][0])
+        self.due_ms = max(due_ms, now_ms + 1)
 
-    def _run_configured(self, millis: int, now_ms: int) -> int:
-        """Run sensors and controllers; return when they have to run next (caller's time)."""
+    def _is_controller_due(self, millis: int) -> bool:
         motors_due_ms = self.motors.due_ms
+        return self.configured and motors_due_ms is not None and millis >= motors_due_ms
+
+    def _run_configured(self, millis: int, now_ms: int) -> None:
+        """Run sensors and controllers."""
         if millis >= self.sensing.due_ms:
             # Sending a cycle takes about a millisecond; a controller that is due waits for it.
             self.send(self.sensing.run_cycle(millis, now_ms, self.clock.stamp(millis)))
-        elif motors_due_ms is not None and millis >= motors_due_ms:
-            line = self.motors.run(millis, now_ms, self.sensing.read_encoders)
-            if line is not None:
-                self.log("\x1b[93m[/%s] %s\x1b[0m" % (self.name, line))
-        next_millis = self.sensing.due_ms
+        elif self._is_controller_due(millis):
+            self.motors.run(millis, now_ms, self.sensing.read_encoders)
+
+    def _find_due_millis(self) -> int:
         motors_due_ms = self.motors.due_ms
-        if motors_due_ms is not None:
-            next_millis = min(next_millis, motors_due_ms)
-        return max(self._booted_at_ms + next_millis, now_ms + 1)
+        due_ms = self.sensing.due_ms
+        return due_ms if motors_due_ms is None else min(due_ms, motors_due_ms)
 
     # -- conversation --------------------------------------------------------------------------------------
 
-    def _spin(self, millis: int, now_ms: int) -> None:
-        """Be NodeHandle::spinOnce()."""
+    def _begin_spin(self, now_ms: int) -> None:
+        """Begin NodeHandle::spinOnce(), which lasts until all packets of the window are handled."""
         if not self.connected:
             # Each attempt to read connects anew (ArduinoTcpHardware.h:99-108).
             self._dial(now_ms)
-        if self.configured and millis - self._last_answer_ms > TIME_LOST_MS:
+        if self.configured and self.to_millis(now_ms) - self._last_answer_ms > TIME_LOST_MS:
             self._unconfigure()
-        if self.connected:
-            self._read_frames(millis, now_ms)
-        if self.configured and millis - self._last_request_ms > TIME_REQUEST_MS:
-            self._request_time(millis)
-            self._last_request_ms = millis
+        self._begin_reading()
 
-    def _read_frames(self, millis: int, now_ms: int) -> None:
-        data = bytes(self._received)
-        self._received.clear()
-        # A new reader each time: the firmware forgets a frame that is not complete after 20 ms
-        # (SERIAL_MSG_TIMEOUT, node_handle.h:96), and looks again only after 51 or 101 ms.
-        reader = frames.FrameReader(frames.LONGEST_PAYLOAD_LENGTH)
-        queue = self._pending + reader.receive_bytes(data)
-        self._pending = []
-        while queue:
-            frame = queue.pop(0)
-            if not self._receive_frame(frame, millis, now_ms):
-                # After a request of topics spinOnce() returns; the rest waits for the next one.
-                self._pending = queue
+    def _begin_reading(self) -> None:
+        """Take what is in the receive window."""
+        if self._received:
+            # A new reader each time: the firmware forgets a packet that is not complete after 20 ms
+            # (SERIAL_MSG_TIMEOUT, node_handle.h:96), and looks again only after 51 or 101 ms.
+            reader = frames.FrameReader(frames.LONGEST_PAYLOAD_LENGTH)
+            self._pending.extend(reader.receive_bytes(bytes(self._received[:WINDOW_LENGTH])))
+            del self._received[:WINDOW_LENGTH]
+        self._spinning = True
+
+    def _read_packets(self, now_ms: int) -> None:
+        """Handle packets until they have held the loop for a millisecond; the spin goes on after that time."""
+        while self._pending:
+            if not self._receive_frame(self._pending.popleft(), self.to_millis(now_ms), now_ms):
+                # After a request of topics spinOnce() returns; the others wait for the next one.
+                break
+            if self._held_us >= 1000:
+                self.due_ms = now_ms + self._held_us // 1000
+                self._held_us %= 1000
                 return
+        self._spinning = False
+        self._next_spin_ms = now_ms + (SPIN_MS if self.configured else UNCONFIGURED_SPIN_MS)
+        if self.configured and self.to_millis(now_ms) - self._last_request_ms > TIME_REQUEST_MS:
+            self._last_request_ms = self.to_millis(now_ms)
+            self._request_time(self._last_request_ms)
 
     def _receive_frame(self, frame: frames.Frame, millis: int, now_ms: int) -> bool:
         """Take one frame; return whether the firmware goes on reading."""
@@ -405,6 +421,7 @@ class Firmware:
     def _receive_command(self, frame: frames.Frame, millis: int, now_ms: int) -> None:
         try:
             answer = self.commands.receive(frame, millis, now_ms)
+            self._held_us += self.commands.held_us
         except CommandError as error:
             self.complain(str(error))
             return

@@ -1,27 +1,35 @@
-"""Commands of one robot -> servo pulses, with the firmware's PIDs, gates, limits and three watchdogs.
+"""Turns the commands of one robot into servo pulses, with the firmware's PIDs, gates, limits and watchdogs.
 
 Pure: time enters in the robot's own milliseconds. Source: VelocityControl.ino, PositionControl.ino and
 MotorDriver.ino, by what they do, and measurements of the stock robot. The two controllers know nothing of each
-other, so two that are commanded at once write pulses in turn, as on the robot.
+other: two that are commanded at once write pulses in turn, and a zero for one leaves the other driving.
 """
 
 import math
 from typing import Callable, List, Optional, Sequence, Tuple
 
+import numpy as np
+
 from .body import Body
+from .flash import Flash
 from .kinematics import MAX_LINEAR_M_S, MAX_TURN_RAD_S, TICK_M, split_to_wheels
 from .motor_pid import POSITION_GAINS, VELOCITY_GAINS, Gains, MotorPid
 from .wheel_odometry import WheelOdometry
 
 COMMAND_GAP_MS = 50
-"""A Twist that comes earlier after the last accepted one is dropped, a stop too (VelocityControl.ino:159)."""
+"""A Twist that comes earlier after its controller's watchdog was set is dropped, a zero too
+(VelocityControl.ino:159). An accepted motion sets the watchdog, and self-tuning sets it in every run."""
 
 CONTROL_MS = 21
 """Between two runs of a controller, 47.6 Hz (VelocityControl.ino:112)."""
 
 VELOCITY_HOLD_MS = 1000
 POSITION_HOLD_MS = 3000
-"""So long after a command its PID runs (VelocityControl.ino:110, PositionControl.ino:105)."""
+"""A controller runs until this long after its watchdog was set (VelocityControl.ino:110, PositionControl.ino:105).
+
+The watchdog is 0 at boot and after a zero: in its first 3 s of uptime a robot's position controller runs whatever
+it is told.
+"""
 
 MOTOR_HOLD_MS = 1000
 """So long after the last write the motors keep their pulse (MotorDriver.ino:111)."""
@@ -35,6 +43,10 @@ PULSE_RANGE_US = (1000, 2000)
 
 _WHEEL_SIGNS = (-1, 1)
 """The servos are mounted as mirror images: a pulse below the centre drives the left wheel forward."""
+
+VELOCITY_TUNING_MS = (41000, 65000)
+POSITION_TUNING_MS = (11000, 49000)
+"""Self-tuning ends by itself, without a result, after between these times (measured)."""
 
 _TUNING_START_US = 130
 _TUNING_STEP_US = 80
@@ -92,7 +104,6 @@ class _Controller:
     Attributes:
         gains: of the left and right wheel.
         tuning: whether it tunes itself.
-        due_ms: when run() has something to do, None while nobody commands.
         dropped: commands that came too early.
     """
 
@@ -110,14 +121,14 @@ class _Controller:
         self.targets = [0.0, 0.0]
         self.tuning = False
         self.dropped = 0
-        self.commanded_ms: Optional[int] = None
-        self._ran_ms = -CONTROL_MS
+        self._tuning_end_ms = 0
+        self._watchdog_ms = 0
+        self._ran_ms = 0
 
-    @property
-    def due_ms(self) -> Optional[int]:
-        if self.commanded_ms is None:
-            return None
-        return max(self._ran_ms + CONTROL_MS, self.commanded_ms)
+    def find_due(self, now_ms: int) -> Optional[int]:
+        """Return when the controller runs next, None if its watchdog forbids that."""
+        due_ms = max(self._ran_ms + CONTROL_MS, now_ms)
+        return due_ms if due_ms - self._watchdog_ms < self._hold_ms else None
 
     def set_gains(self, gains: Sequence[float]) -> None:
         """Take lkp lki lkd rkp rki rkd."""
@@ -125,38 +136,42 @@ class _Controller:
             pid.set_gains(Gains(*three))
 
     def is_too_early(self, now_ms: int) -> bool:
-        """Return whether a command at now_ms has to be dropped, and count it."""
-        # While it tunes itself, it keeps its watchdog fresh; a Twist ends that all the same, as measured.
-        early = (
-            not self.tuning and self.commanded_ms is not None and now_ms - self.commanded_ms < COMMAND_GAP_MS
-        )
+        """Return whether a command at now_ms is dropped, and count it."""
+        early = now_ms - self._watchdog_ms < COMMAND_GAP_MS
         self.dropped += early
         return early
 
     def command(self, now_ms: int, targets: Sequence[float]) -> None:
-        """Take targets for the wheels; a wheel that has to turn round starts its PID anew."""
+        """Take targets for the wheels; a wheel that has to reverse starts its PID anew."""
         for pid, target, last in zip(self.pids, targets, self.targets):
             if target * last < 0.0:
                 pid.reset()
         self.targets = list(targets)
-        self.commanded_ms = now_ms
+        self._watchdog_ms = now_ms
         self.tuning = False
 
     def stop(self) -> None:
-        """Forget the command; motors are halted by the caller."""
+        """Idle from now on; the next command is taken at once, and the caller halts the motors."""
         for pid in self.pids:
             pid.reset()
-        self.commanded_ms = None
+        self._watchdog_ms = 0
         self.tuning = False
 
+    def start_tuning(self, now_ms: int, for_ms: int) -> None:
+        """Tune for for_ms; the last targets stay."""
+        self.tuning = True
+        self._watchdog_ms = now_ms
+        self._tuning_end_ms = now_ms + for_ms
+
+    def continue_tuning(self, now_ms: int) -> bool:
+        """Keep the watchdog fresh; return whether this was the last run of the tuning."""
+        self._watchdog_ms = now_ms
+        self.tuning = now_ms < self._tuning_end_ms
+        return not self.tuning
+
     def is_due(self, now_ms: int) -> bool:
-        """Return whether the controller runs at now_ms; its watchdog ends that for good."""
-        if self.commanded_ms is None:
-            return False
-        if now_ms - self.commanded_ms >= self._hold_ms:
-            self.commanded_ms = None
-            return False
-        if now_ms - self._ran_ms < CONTROL_MS:
+        """Return whether the controller runs at now_ms, which counts as a run."""
+        if now_ms - self._ran_ms < CONTROL_MS or now_ms - self._watchdog_ms >= self._hold_ms:
             return False
         self._ran_ms = now_ms
         return True
@@ -174,41 +189,47 @@ class MotorControl:
     Attributes:
         motors: what puts out the pulses.
         velocity, position: the controllers, for their gains.
-        due_ms: when run() has something to do, None while nobody commands.
+        due_ms: when run() has something to do, None while nothing drives.
     """
 
     def __init__(
         self,
+        name: str,
         body: Body,
         odometry: WheelOdometry,
-        centres_us: Sequence[float],
-        velocity_gains: Sequence[float],
-        position_gains: Sequence[float],
+        flash: Flash,
+        rng: np.random.RandomState,
+        log: Callable[[str], None],
     ) -> None:
-        """Begin halted, with what the flash holds; six gains each, left and right."""
+        """Begin as after power-on, with what the flash holds; log takes lines, rng draws how long tuning lasts."""
+        self._name = name
         self._body = body
         self._odometry = odometry
-        self.motors = MotorDriver(body, centres_us)
+        self._rng = rng
+        self._log = log
+        self.motors = MotorDriver(body, flash.motor_centres_us)
         self.velocity = _Controller(
-            self.motors, VELOCITY_GAINS, velocity_gains, VELOCITY_LIMIT_US, VELOCITY_HOLD_MS
+            self.motors, VELOCITY_GAINS, flash.velocity_pid, VELOCITY_LIMIT_US, VELOCITY_HOLD_MS
         )
         self.position = _Controller(
-            self.motors, POSITION_GAINS, position_gains, POSITION_LIMIT_US, POSITION_HOLD_MS
+            self.motors, POSITION_GAINS, flash.position_pid, POSITION_LIMIT_US, POSITION_HOLD_MS
         )
         self._start_ticks = [0, 0]
+        self._tuning_start_ticks = [0, 0]
         self._relay = [1, 1]
         self.due_ms: Optional[int] = None
+        self._reschedule(0)
 
-    def _reschedule(self) -> None:
+    def _reschedule(self, now_ms: int) -> None:
         wanted_ms = [self.motors.halt_at_ms] if self.motors.attached else []
         for controller in (self.velocity, self.position):
-            due_ms = controller.due_ms
+            due_ms = controller.find_due(now_ms)
             if due_ms is not None:
                 wanted_ms.append(due_ms)
         self.due_ms = min(wanted_ms) if wanted_ms else None
 
     def receive_velocity(self, now_ms: int, linear_m_s: float, turn_rad_s: float) -> bool:
-        """Take a Twist for the velocity controller; return whether it was a stop that was taken."""
+        """Take a Twist for the velocity controller; return whether it was a zero that was accepted."""
         if self.velocity.is_too_early(now_ms):
             return False
         wheels_m_s = _limit_to_wheels(linear_m_s, turn_rad_s)
@@ -218,7 +239,7 @@ class MotorControl:
     def receive_position(self, now_ms: int, world_ms: int, linear_m_s: float, turn_rad_s: float) -> bool:
         """Take a Twist for the position controller, which goes as far as that speed reaches in a second.
 
-        Return whether it was a stop that was taken; world_ms is the world's time of now_ms.
+        Return whether it was a zero that was accepted; world_ms is the world's time of now_ms.
         """
         if self.position.is_too_early(now_ms):
             return False
@@ -230,90 +251,91 @@ class MotorControl:
 
     def _take(self, controller: _Controller, now_ms: int, targets: Optional[Sequence[float]]) -> None:
         if targets is None:
+            self._log("\x1b[93m[/%s] Reseting PID...\x1b[0m" % self._name)
             controller.stop()
             self.motors.halt()
         else:
             controller.command(now_ms, targets)
-        self._reschedule()
+        self._reschedule(now_ms)
 
     def receive_pulses(self, now_ms: int, left_us: int, right_us: int) -> None:
         """Take a Motor command; a controller that is commanded too overwrites it."""
         self.motors.write(now_ms, left_us, right_us)
-        self._reschedule()
+        self._reschedule(now_ms)
 
     def start_tuning(self, now_ms: int, world_ms: int, of_velocity: bool) -> None:
-        """Begin a controller's self-tuning, which goes on until it gets a Twist."""
+        """Begin a controller's self-tuning; what ends it is its own failure or a Twist that is not dropped."""
+        self._log("\x1b[94m[/%s] Starting Motors Auto Tuning! Wait... \x1b[0m" % self._name)
         controller = self.velocity if of_velocity else self.position
-        controller.tuning = True
-        controller.commanded_ms = now_ms
-        self._start_ticks = self._count_ticks(world_ms)
+        controller.start_tuning(
+            now_ms, int(self._rng.randint(*(VELOCITY_TUNING_MS if of_velocity else POSITION_TUNING_MS)))
+        )
+        self._tuning_start_ticks = self._count_ticks(world_ms)
         self._relay = [1, 1]
         start_us = _TUNING_START_US if of_velocity else 0
         self.motors.drive(now_ms, (start_us, start_us))
-        self._reschedule()
+        self._reschedule(now_ms)
 
-    def run(self, now_ms: int, world_ms: int, read_encoders: Callable[[int, int], None]) -> Optional[str]:
-        """Do what is due; return what a self-tuning says of it.
+    def run(self, now_ms: int, world_ms: int, read_encoders: Callable[[int, int], None]) -> None:
+        """Do what is due.
 
         The velocity controller reads the encoders anew with read_encoders(now_ms, world_ms), and so takes a
         reading away from the odometry.
         """
-        line = None
         if self.position.is_due(now_ms):
-            way_ticks = self._count_way(world_ms)
             if self.position.tuning:
-                line = self._tune_position(now_ms, way_ticks)
+                self._tune_position(now_ms, self._count_way(world_ms, self._tuning_start_ticks))
             else:
-                self.position.run_pids(now_ms, way_ticks)
+                self.position.run_pids(now_ms, self._count_way(world_ms, self._start_ticks))
         if self.velocity.is_due(now_ms):
             read_encoders(now_ms, world_ms)
             if self.velocity.tuning:
-                line = self._tune_velocity(now_ms)
+                self._tune_velocity(now_ms)
             else:
                 self.velocity.run_pids(now_ms, self._odometry.filtered_m_s)
         if self.motors.attached and now_ms >= self.motors.halt_at_ms:
             self.motors.halt()
-        self._reschedule()
-        return line
+        self._reschedule(now_ms)
 
-    def _tune_velocity(self, now_ms: int) -> str:
+    def _tune_velocity(self, now_ms: int) -> None:
         # Its relay would switch at 1 m/s, which no wheel reaches: it stays where it starts.
         outputs_us = (_TUNING_STEP_US - _TUNING_START_US, _TUNING_START_US + _TUNING_STEP_US)
-        self.velocity.commanded_ms = now_ms
-        self.motors.drive(now_ms, outputs_us)
-        return _describe_tuning(self.velocity.targets, self._odometry.filtered_m_s, outputs_us)
+        self._tune(self.velocity, now_ms, self._odometry.filtered_m_s, outputs_us)
 
-    def _tune_position(self, now_ms: int, way_ticks: Sequence[int]) -> str:
+    def _tune_position(self, now_ms: int, way_ticks: Sequence[int]) -> None:
         """Rock each wheel about where it stands."""
-        self.position.commanded_ms = now_ms
         for wheel, ticks in enumerate(way_ticks):
             if self._relay[wheel] * ticks > _TUNING_BAND_TICKS:
                 self._relay[wheel] = -self._relay[wheel]
-        outputs_us = [_TUNING_STEP_US * relay for relay in self._relay]
+        self._tune(self.position, now_ms, way_ticks, [_TUNING_STEP_US * relay for relay in self._relay])
+
+    def _tune(
+        self, controller: _Controller, now_ms: int, measured: Sequence[float], outputs_us: Sequence[int]
+    ) -> None:
+        if controller.continue_tuning(now_ms):
+            for side in ("Left", "Right"):
+                self._log("\x1b[92m %s Motor Tuning Failure! Using default values.\x1b[0m" % side)
+                self._log("\x1b[94m %s Motor Best PID params (0.000000, 0.000000, 0.000000) \x1b[0m" % side)
         self.motors.drive(now_ms, outputs_us)
-        return _describe_tuning(self.position.targets, way_ticks, outputs_us)
+        values = (self._name, *controller.targets, *measured, *outputs_us)
+        self._log("\x1b[93m[/%s] Tunning Motor Set: [%f,%f], [%f,%f]->[%d,%d]\x1b[0m" % values)
 
     def _count_ticks(self, world_ms: int) -> List[int]:
         return self._odometry.count_ticks(*self._body.read_wheels(world_ms))
 
-    def _count_way(self, world_ms: int) -> List[int]:
-        return [now - start for now, start in zip(self._count_ticks(world_ms), self._start_ticks)]
+    def _count_way(self, world_ms: int, start_ticks: Sequence[int]) -> List[int]:
+        return [now - start for now, start in zip(self._count_ticks(world_ms), start_ticks)]
 
-    def halt(self) -> None:
+    def halt(self, now_ms: int) -> None:
         """Switch the motors off and forget all commands."""
         self.velocity.stop()
         self.position.stop()
         self.motors.halt()
-        self._reschedule()
-
-
-def _describe_tuning(targets: Sequence[float], measured: Sequence[float], outputs_us: Sequence[int]) -> str:
-    values = (*targets, *measured, *outputs_us)
-    return "Tunning Motor Set: [%f,%f], [%f,%f]->[%d,%d]" % values
+        self._reschedule(now_ms)
 
 
 def _limit_to_wheels(linear_m_s: float, turn_rad_s: float) -> Optional[Tuple[float, float]]:
-    """Return the wheels' speeds (m/s) for a Twist within the firmware's limits, None for a stop."""
+    """Return the wheels' speeds (m/s) for a Twist within the firmware's limits, None for a zero."""
     linear_m_s = math.copysign(min(abs(linear_m_s), MAX_LINEAR_M_S), linear_m_s)
     turn_rad_s = math.copysign(min(abs(turn_rad_s), MAX_TURN_RAD_S), turn_rad_s)
     if linear_m_s == 0.0 and turn_rad_s == 0.0:

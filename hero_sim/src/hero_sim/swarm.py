@@ -67,7 +67,7 @@ class Swarm:
         """Put every robot back to its start, standing, as if somebody carried it there."""
         before = [robot.body.true_pose for robot in self.robots]
         for robot in self.robots:
-            robot.motors.halt()
+            robot.motors.halt(robot.to_millis(self.now_ms))
         self.world.reset()
         for robot, pose in zip(self.robots, before):
             robot.body.carry(pose)

@@ -77,12 +77,15 @@ class DriverSide:
         self.send(index, topic_id, struct.pack("<6d", linear_m_s, 0, 0, 0, 0, turn_rad_s))
 
     def start_streaming(self):
-        """Boot, request topics from everybody and wait until they stream."""
+        """Boot, request topics from everybody, wait until they stream and have finished booting.
+
+        Until 3 s of uptime the position controller holds a robot where it is, whatever else it is told.
+        """
         self.run(2500)
         for index in range(len(self.swarm.robots)):
             self.send(index, frames.ID_PUBLISHER)
-        self.run(300)
-        assert all(robot.configured for robot in self.swarm.robots)
+        self.run(1700)
+        assert all(robot.configured and not robot.motors.motors.attached for robot in self.swarm.robots)
 
     def drive(self, index, linear_m_s, turn_rad_s, ms, topic_id=ids.ID_VELOCITY_CMD_VEL):
         """Repeat a Twist every 100 ms for so long."""

@@ -6,8 +6,13 @@ from driver_side import DriverSide, read_encoder, read_odom
 
 from hero_driver.rosserial import frames
 from hero_sim import declarations as ids
+from hero_sim.firmware import WINDOW_LENGTH
 from hero_sim.imu_hat import ImuHat
 from hero_sim.kinematics import compose
+
+both_controllers = pytest.mark.parametrize(
+    "controller", [ids.ID_VELOCITY_CMD_VEL, ids.ID_POSITION_CMD_VEL], ids=["velocity", "position"]
+)
 
 
 def test_a_stop_of_transmission_leaves_log_lines_and_lets_a_moving_robot_run_away():
@@ -76,7 +81,7 @@ def test_a_stop_stops():
     driver.send_twist(0, 0.0, 0.0)
     driver.run(400)
     assert driver.measure_speed(0) < 0.002
-    assert driver.list_logs(0)[-1][1] == "\x1b[93m[/hero_0] Reseting PID...\x1b[0m"
+    assert "\x1b[93m[/hero_0] Reseting PID...\x1b[0m" in [text for _, text in driver.list_logs(0)]
 
 
 def test_a_stop_within_50_ms_of_the_last_command_is_dropped():
@@ -92,6 +97,46 @@ def test_a_stop_within_50_ms_of_the_last_command_is_dropped():
     driver.send_twist(0, 0.0, 0.0)
     driver.run(400)
     assert driver.measure_speed(0) < 0.002
+
+
+def test_a_motion_right_behind_an_accepted_zero_is_accepted():
+    driver = DriverSide()
+    driver.start_streaming()
+    driver.drive(0, 0.1, 0.0, 1000)
+    driver.run(60)
+    driver.send_twist(0, 0.0, 0.0)
+    driver.send_twist(0, 0.1, 0.0)
+    driver.run(600)
+    assert driver.measure_speed(0) > 0.03
+
+
+@both_controllers
+def test_a_frozen_robot_reads_all_that_waited_and_drops_zeros_behind_a_motion(controller):
+    driver = DriverSide("--perfect")
+    driver.start_streaming()
+    driver.swarm.robots[0].freeze(driver.swarm.now_ms, 500)
+    driver.swarm.reschedule(0)
+    for linear_m_s in (0.1, 0.0, 0.0):
+        driver.send_twist(0, linear_m_s, 0.0, controller)
+        driver.run(150)
+    driver.run(600)
+    assert driver.measure_speed(0) > 0.03
+    assert not [text for _, text in driver.list_logs(0) if "Reseting" in text]
+
+
+def test_what_waited_beyond_the_receive_window_is_read_in_the_next_spin():
+    driver = DriverSide("--perfect")
+    driver.start_streaming()
+    driver.swarm.robots[0].freeze(driver.swarm.now_ms, 500)
+    driver.swarm.reschedule(0)
+    move = struct.pack("<6d", 0.1, 0, 0, 0, 0, 0)
+    for _ in range(WINDOW_LENGTH // 56 + 1):
+        driver.send(0, ids.ID_VELOCITY_CMD_VEL, move)
+    driver.send_twist(0, 0.0, 0.0)
+    driver.run(540)
+    assert driver.swarm.robots[0].motors.velocity.dropped == WINDOW_LENGTH // 56 - 1
+    driver.run(600)
+    assert driver.measure_speed(0) < 0.001
 
 
 def test_a_command_that_no_robot_could_compute_with_is_reported_and_changes_nothing():

@@ -1,0 +1,122 @@
+"""Which motion commands a fake robot accepts, and whether its wheels turn: the stock firmware's rules.
+
+Pure: time enters in seconds. It stands on the codec alone. Source: firmware v3.8 as measured: a controller drops
+each Twist that comes within 50 ms after its watchdog was set; an accepted motion sets the watchdog, self-tuning
+keeps setting it, and an accepted zero resets it. Of the motion watchdogs (2, 4 and 1 s) nothing is modelled.
+"""
+
+import collections
+import struct
+from typing import DefaultDict
+
+VELOCITY_GATE_S = 0.050
+"""The firmware drops a velocity that it reads within this time after its controller's watchdog was set."""
+
+PULSES_HOLD_S = 0.0005
+LED_HOLD_S = 0.001
+"""So long each cmd_motor and each led holds the robot's program, and so delays what comes behind it."""
+
+NEUTRAL_PULSES = struct.pack("<2h", 1500, 1500)
+
+TICKS_PER_S = 200.0
+"""How fast the wheels turn when they do, about 0.1 m/s."""
+
+TICK_M = 0.000537
+
+_NEVER_S = float("-inf")
+
+
+class Controller:
+    """What one controller was told last."""
+
+    def __init__(self) -> None:
+        self.is_tuning = False
+        self.is_driving = False
+        self.watchdog_s = _NEVER_S
+
+
+class FakeMotors:
+    """The controllers, by the part of their topics' names in front of cmd_vel, and the wheels.
+
+    Attributes:
+        is_pushed: whether somebody turns the wheels by hand.
+    """
+
+    def __init__(self) -> None:
+        self.is_pushed = False
+        self._controllers: DefaultDict[str, Controller] = collections.defaultdict(Controller)
+        self._has_pulses = False
+        self._read_s = 0.0
+        self._ticks = 0.0
+        self._turned_s = 0.0
+
+    def start_tuning(self, controller: str) -> None:
+        """Let a controller (velocity_controller, position_controller) tune itself until an accepted Twist."""
+        self._controllers[controller].is_tuning = True
+
+    @property
+    def is_tuning(self) -> bool:
+        """Whether a controller tunes itself."""
+        return any(controller.is_tuning for controller in list(self._controllers.values()))
+
+    @property
+    def is_turning(self) -> bool:
+        """Whether the wheels turn."""
+        return self.is_pushed or self._has_pulses or any(
+            controller.is_tuning or controller.is_driving for controller in list(self._controllers.values())
+        )
+
+    def begin_read(self, now_s: float) -> None:
+        """Be told that the robot reads what has come; until now its controllers ran."""
+        self._read_s = now_s
+        for controller in list(self._controllers.values()):
+            if controller.is_tuning:
+                controller.watchdog_s = now_s
+
+    def take_led(self) -> None:
+        """Take a colour."""
+        self._read_s += LED_HOLD_S
+
+    def take_pulses(self, payload: bytes) -> None:
+        """Take a Motor command."""
+        self._read_s += PULSES_HOLD_S
+        self._has_pulses = payload != NEUTRAL_PULSES
+
+    def take_velocity(self, name: str, is_zero: bool) -> bool:
+        """Take a Twist for the controller in a topic's name; return whether it is accepted."""
+        controller = self._controllers[name.split("/")[-2]]
+        if self._read_s - controller.watchdog_s < VELOCITY_GATE_S:
+            return False
+        controller.is_tuning = False
+        controller.is_driving = not is_zero
+        controller.watchdog_s = _NEVER_S if is_zero else self._read_s
+        if is_zero:
+            self._has_pulses = False
+        return True
+
+    def count_ticks(self, now_s: float) -> int:
+        """Return the ticks of each wheel at now_s."""
+        if self.is_turning:
+            self._ticks += TICKS_PER_S * (now_s - self._turned_s)
+        self._turned_s = now_s
+        return int(self._ticks)
+
+    def encode_encoder(self, name: str, now_s: float, stamp_s: float) -> bytes:
+        """Return the payload of hero_common/Encoder that a robot called name sends at now_s."""
+        before = int(self._ticks)
+        ticks = self.count_ticks(now_s)
+        speed_m_s = TICKS_PER_S * TICK_M if self.is_turning else 0.0
+        frame_id = (name + "/encoder").encode()
+        seconds = int(stamp_s)
+        return struct.pack(
+            "<4I%ds11d" % len(frame_id),
+            0xFFFFFFFF,
+            seconds,
+            int((stamp_s - seconds) * 1e9),
+            len(frame_id),
+            frame_id,
+            *(ticks, ticks, ticks - before, ticks - before),
+            *((ticks - before) * TICK_M,) * 2,
+            0.034,
+            *(speed_m_s,) * 4,
+        )
