@@ -1,8 +1,8 @@
 """A scripted robot behind a real TCP socket: says what the stock robot says, and whatever else a test wants.
 
-It takes frames as the firmware does (read cycle, receive window, the motion rules of fake_motors) and keeps them for
-the test. It stands on the codec alone, never on the driver's session or on ROS. Source: firmware v3.8 as measured: ids in
-call order, publishers from 125, subscribers from 100; one burst of declarations for each request.
+It takes frames as the firmware does (read cycle, receive window, the motion rules of fake_motors) and keeps them
+for the test. It stands on the codec alone, never on the driver's session or on ROS. Source: firmware v3.8 as
+measured: ids in call order, publishers from 125, subscribers from 100; one burst of declarations for each request.
 """
 
 import contextlib
@@ -155,8 +155,8 @@ class FakeRobot:
 
     Attributes (read by tests, all in order of arrival):
         received: frames from the driver; velocities: those with a Twist, whether the firmware took them or not;
-        accepted: those that it took; motors: what they make of its wheels; requests: how often topics were asked for; ended: why the connection is
-        over, empty while it stands.
+        accepted: those that it took; motors: what they make of its wheels; requests: how often topics were
+        asked for; ended: why the connection is over, empty while it stands.
         answers: service name -> function of the request that returns the answer, or None for no answer.
         is_silent: says nothing of its own; is_stalled: does not read; declares: whether requests are answered.
     """

@@ -317,8 +317,8 @@ class MotorControl:
                 self._log("\x1b[92m %s Motor Tuning Failure! Using default values.\x1b[0m" % side)
                 self._log("\x1b[94m %s Motor Best PID params (0.000000, 0.000000, 0.000000) \x1b[0m" % side)
         self.motors.drive(now_ms, outputs_us)
-        values = (self._name, *controller.targets, *measured, *outputs_us)
-        self._log("\x1b[93m[/%s] Tunning Motor Set: [%f,%f], [%f,%f]->[%d,%d]\x1b[0m" % values)
+        text = "[%f,%f], [%f,%f]->[%d,%d]" % (*controller.targets, *measured, *outputs_us)
+        self._log("\x1b[93m[/%s] Tunning Motor Set: %s\x1b[0m" % (self._name, text))
 
     def _count_ticks(self, world_ms: int) -> List[int]:
         return self._odometry.count_ticks(*self._body.read_wheels(world_ms))
