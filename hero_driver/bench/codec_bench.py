@@ -11,6 +11,7 @@ from hero_driver.message_types import apply_aliases
 from hero_driver.odometry import WheelGeometry
 from hero_driver.rosserial import frames
 from hero_driver.rosserial.session import Session, SessionLimits, TopicDeclared
+from hero_driver.wheel_motion import WheelMotion
 
 BURSTS = 3000
 REPEATS = 5
@@ -59,7 +60,7 @@ def main():
     messages = [session.receive_bytes(burst, 1.0, 1.0) for burst in bursts]
 
     def clean():
-        cleaner = MessageCleaner("/hero_0", settings, lambda name: NoSink(), NoSink().publish)
+        cleaner = MessageCleaner("/hero_0", settings, lambda name: NoSink(), NoSink().publish, WheelMotion())
         for event in declared:
             if isinstance(event, TopicDeclared) and event.topic.kind.is_from_robot:
                 info = event.topic.info

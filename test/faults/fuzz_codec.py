@@ -13,6 +13,7 @@ with atheris.instrument_imports():
     from hero_driver.odometry import WheelGeometry
     from hero_driver.rosserial.frames import DEFAULT_MAX_PAYLOAD_LENGTH, OVERHEAD_LENGTH
     from hero_driver.rosserial.session import LogReceived, Session, SessionLimits
+    from hero_driver.wheel_motion import WheelMotion
 
 MAX_TOPICS = 64
 ARRIVAL_NS = 1795240942 * 10**9
@@ -36,7 +37,7 @@ def try_bytes(data):
     """Let one robot say data, cut where its first byte says, and clean what comes of it."""
     session = Session(SessionLimits(max_topics=MAX_TOPICS), 0.0)
     sink = Sink()
-    cleaner = MessageCleaner("/hero_0", SETTINGS, lambda name: sink, sink.publish)
+    cleaner = MessageCleaner("/hero_0", SETTINGS, lambda name: sink, sink.publish, WheelMotion())
     step = 1 + (data[0] if data else 0)
     for index, start in enumerate(range(1, len(data), step)):
         for event in session.receive_bytes(data[start : start + step], 0.01 * index, 1795240942.0):

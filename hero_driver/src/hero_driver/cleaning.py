@@ -14,6 +14,7 @@ from . import wire_messages
 from .odometry import Pose, TickOdometry, WheelGeometry
 from .stamps import NS_PER_S, StampFilter
 from .transform_cleaning import AddTransform, TransformCleaner
+from .wheel_motion import WheelMotion
 
 TRANSFORMS = "/tf"
 """Name under which single transforms are returned; they are collected over all robots."""
@@ -73,13 +74,19 @@ class MessageCleaner:
     """
 
     def __init__(
-        self, namespace: str, settings: CleaningSettings, find_sink: FindSink, add_transform: AddTransform
+        self,
+        namespace: str,
+        settings: CleaningSettings,
+        find_sink: FindSink,
+        add_transform: AddTransform,
+        wheels: WheelMotion,
     ) -> None:
         """Clean the data of the robot in namespace.
 
         find_sink(name) gives the sink of a topic that was chosen or derived; add_transform takes transforms of all
-        robots.
+        robots; wheels is told of the encoder's readings, or of odometry where there is no encoder.
         """
+        self._wheels = wheels
         self._find_sink = find_sink
         self._add_transform = add_transform
         self._namespace = namespace
@@ -102,6 +109,7 @@ class MessageCleaner:
         self._odom_sink: Sink
         self._raw_sink: Sink
         self._has_encoder = False
+        self._hears_encoder = False
         self._is_first_reading = True
         self._max_age_ns = int(settings.max_age_s * NS_PER_S)
         self._encoder_follows = True
@@ -111,7 +119,7 @@ class MessageCleaner:
 
     def restart(self, rebooted: bool) -> None:
         """A new connection begins; after a reboot the robot's counters begin anew too."""
-        self._has_encoder = self._uses_estimate = False
+        self._has_encoder = self._uses_estimate = self._hears_encoder = False
         self._is_first_reading = True
         self._encoder_stamp_ns = self._odom_stamp_ns = -BURST_NS
         self._encoder_follows = True
@@ -122,10 +130,12 @@ class MessageCleaner:
     def note_reboot(self) -> None:
         """The robot's counters begin anew; the pose stays."""
         self.odometry.expect_reset()
+        self._wheels.forget_ticks()
 
     def set_pose(self, pose: Pose) -> None:
         """The robot's odometry was set, which zeroes its counters."""
         self.odometry.set_pose(pose)
+        self._wheels.forget_ticks()
         self._packed_pose = self._pack_pose()
 
     @property
@@ -162,6 +172,7 @@ class MessageCleaner:
             self._odom_sink, self._raw_sink = sink, self._find_sink(self._raw_name)
             return self._clean_odometry
         if name == self._namespace + "/encoder" and message_type == "hero_msgs/Encoder":
+            self._hears_encoder = True
             self._has_encoder = self._uses_ticks
             self._uses_estimate = self._has_encoder and self.odometry.has_reading
             return functools.partial(self._clean_encoder, name, sink)
@@ -207,6 +218,10 @@ class MessageCleaner:
         self._offsets_ns.append(stamp_ns - arrival_ns)
         self.transforms.passed_ns = 0  # another burst
         self._raw_sink.publish(payload)
+        if not self._hears_encoder:
+            velocity = wire_messages.read_odometry_velocity(payload)
+            if velocity is not None:
+                self._wheels.read_velocity(*velocity)
         corrected_ns = self._stamps.correct(self._odom_name, stamp_ns, arrival_ns)
         if self._has_encoder:
             if self._held:
@@ -224,6 +239,7 @@ class MessageCleaner:
             self._refused += 1
             return
         stamp_ns, left_ticks, right_ticks = reading
+        self._wheels.read_ticks(left_ticks, right_ticks)
         self._encoder_stamp_ns = stamp_ns
         self._encoder_follows = abs(stamp_ns - self._odom_stamp_ns) <= BURST_NS
         if self._is_first_reading:

@@ -1,26 +1,23 @@
 """Commands to one robot, from ROS threads to the thread of the sockets.
 
-Velocities are shaped (command_shaping), everything else goes in order and never waits behind them. Queues
-are bounded: a velocity that waits is replaced by a newer one, of the rest the oldest is dropped and counted.
+Motion commands are shaped (command_shaping), everything else goes in order and never waits behind them. Queues
+are bounded: a motion command that waits is replaced by a newer one, of the rest the oldest is dropped and counted.
 """
 
 import collections
 import threading
-from typing import Deque, Dict, List, Optional, Tuple
+from typing import Deque, Dict, List, Optional, Set, Tuple
 
-from .command_shaping import ZERO_TWIST, VelocityShaper
+from .command_shaping import MotionShaper
 
 QUEUE_LENGTH = 50
-"""Commands other than velocities that may wait for one robot."""
+"""Commands other than motion that may wait for one robot."""
 
 IN_FLIGHT_MAX = 2048
 """Bytes that the robot has not acknowledged beyond which nothing is written: about its TCP window (2144 B)."""
 
 RETRY_S = 0.01
 """How soon to look again whether the robot has acknowledged."""
-
-RECENTLY_S = 5.0
-"""A motion topic used within this time may still drive the robot: its longest watchdog is 4.0 s."""
 
 Command = Tuple[str, bytes]
 
@@ -29,43 +26,47 @@ class CommandQueue:
     """What waits to be sent to one robot; every method may be called from any thread."""
 
     def __init__(self, max_age_s: float) -> None:
+        """max_age_s: shaped motion commands older than this are dropped."""
         self._lock = threading.Lock()
         self._max_age_s = max_age_s
-        self._shapers: Dict[str, VelocityShaper] = {}
+        self._shapers: Dict[str, MotionShaper] = {}
         self._offered_s: Dict[str, float] = {}
         self._waiting: Deque[Command] = collections.deque()
+        self._unshaped: Set[str] = set()  # motion topics among the names that wait
         self._is_idle = True  # after the last take(), and nothing was offered since
         self.dropped = 0
 
-    def offer_velocity(self, name: str, payload: bytes, now_s: float) -> None:
-        """Take a velocity, from check_twist(), for the topic called name."""
+    def offer_motion(self, name: str, payload: bytes, stop_payload: bytes, now_s: float) -> None:
+        """Take a checked motion command for the topic called name, which stop_payload stops."""
         with self._lock:
             shaper = self._shapers.get(name)
             if shaper is None:
-                shaper = self._shapers[name] = VelocityShaper()
+                shaper = self._shapers[name] = MotionShaper(stop_payload)
             shaper.offer(payload)
             self._offered_s[name] = now_s
             self._is_idle = False
 
-    def offer(self, name: str, payload: bytes) -> None:
-        """Take anything else."""
+    def offer(self, name: str, payload: bytes, is_motion: bool = False) -> None:
+        """Take anything else; is_motion: it moves a device that takes all commands as they come."""
         with self._lock:
+            if is_motion:
+                self._unshaped.add(name)
             if len(self._waiting) >= QUEUE_LENGTH:
                 self._waiting.popleft()
                 self.dropped += 1
             self._waiting.append((name, payload))
             self._is_idle = False
 
-    def halt(self, always: Optional[str], now_s: float) -> None:
-        """Forget all velocities and stop every velocity topic used recently, and the one called always."""
+    def discard_motion(self, resume_s: float) -> None:
+        """Forget the motion commands that wait, and send none before resume_s; stops that wait are kept."""
         with self._lock:
-            if always is not None and always not in self._shapers:
-                self._shapers[always] = VelocityShaper()
-            for name, shaper in self._shapers.items():
-                if name == always or now_s - self._offered_s.get(name, -RECENTLY_S) < RECENTLY_S:
-                    shaper.offer(ZERO_TWIST)
+            for shaper in self._shapers.values():
                 shaper.discard_motion()
-            self._is_idle = False
+                shaper.delay_until(resume_s)
+            if self._unshaped:
+                self._waiting = collections.deque(
+                    command for command in self._waiting if command[0] not in self._unshaped
+                )
 
     def clear(self) -> None:
         """Forget everything: the connection is gone."""
@@ -81,21 +82,23 @@ class CommandQueue:
         with self._lock:
             return not self._waiting and all(shaper.is_idle for shaper in self._shapers.values())
 
-    def take(self, in_flight_length: int, velocity_acknowledged: bool, now_s: float) -> List[Command]:
+    def take(
+        self, in_flight_length: int, motion_acknowledged: bool, holds_motion: bool, now_s: float
+    ) -> List[Command]:
         """Return what may be sent now.
 
-        in_flight_length: bytes that the robot has not acknowledged; velocity_acknowledged: whether the last
-        velocity is not among them. Two velocities in flight could reach the robot together, and it would
-        take the older one.
+        in_flight_length: bytes that the robot has not acknowledged; motion_acknowledged: whether the last
+        motion command is not among them. Two velocities in flight could reach the robot together, and it would
+        take the older one. holds_motion: send stops only, motion waits.
         """
         commands: List[Command] = []
-        is_idle = velocity_acknowledged
+        is_idle = motion_acknowledged
         with self._lock:
-            if velocity_acknowledged:
+            if motion_acknowledged:
                 for name, shaper in self._shapers.items():
                     if now_s - self._offered_s.get(name, now_s) > self._max_age_s:
                         shaper.discard_motion()
-                    payload = shaper.take(now_s)
+                    payload = shaper.take(now_s, holds_motion)
                     if payload is not None:
                         commands.append((name, payload))
                     is_idle = is_idle and shaper.is_idle
@@ -105,8 +108,11 @@ class CommandQueue:
             self._is_idle = is_idle and not self._waiting
         return commands
 
-    def due_in_s(self, velocity_acknowledged: bool, now_s: float) -> Optional[float]:
-        """Return in how many seconds to call take() again, None if nothing waits."""
+    def due_in_s(self, motion_may_go: bool, now_s: float) -> Optional[float]:
+        """Return in how many seconds to call take() again, None if nothing waits.
+
+        motion_may_go: whether the next motion command waits for nothing but its time.
+        """
         if self._is_idle:
             return None
         with self._lock:
@@ -117,4 +123,4 @@ class CommandQueue:
                 delay_s = shaper.due_in_s(now_s)
                 if delay_s is not None and (due_s is None or delay_s < due_s):
                     due_s = delay_s
-        return due_s if velocity_acknowledged or due_s is None else max(RETRY_S, due_s)
+        return due_s if motion_may_go or due_s is None else max(RETRY_S, due_s)

@@ -7,9 +7,13 @@ delays no other.
 import time
 from typing import Callable, Optional
 
-from .robot_bridge import VELOCITY_SUFFIX, RobotBridge
-from .robot_status import Peer
+from .peer import Peer
+from .robot_bridge import RobotBridge
 from .rosserial.errors import RosserialError
+
+HEARD_S = 0.5
+"""A robot that has stopped sending for so long gets no motion commands: it would take them late, all at once. Pauses of
+0.1 s are common on Wi-Fi; motion that waits is sent when the robot is heard again."""
 
 
 class CommandSender:
@@ -20,12 +24,17 @@ class CommandSender:
         call_here: Callable[[Callable[[RobotBridge], None], RobotBridge], None],
         call_later: Callable[[float, Callable[[], None]], None],
         find_peer: Callable[[RobotBridge], Optional[Peer]],
+        is_stopped: Callable[[], bool],
         complain: Callable[[Peer, str], None],
     ) -> None:
-        """Take the loop's functions; find_peer gives a robot's connection, complain reports its trouble."""
+        """Take the loop's functions; find_peer gives a robot's connection, complain reports its trouble.
+
+        is_stopped(): whether no robot may get anything but stops.
+        """
         self._call_here = call_here
         self._call_later = call_later
         self._find_peer = find_peer
+        self._is_stopped = is_stopped
         self._complain = complain
 
     def wake(self, bridge: RobotBridge) -> None:
@@ -64,19 +73,23 @@ class CommandSender:
             self._call_later(delay_s, lambda: self._send_and_come_back(peer))
 
     def _send_ready(self, peer: Peer, now_s: float) -> bool:
-        """Send what may go out; return whether the robot has acknowledged the last velocity."""
+        """Send what may go out; return whether the next motion command may, as far as the robot is concerned."""
         link, bridge = peer.link, peer.bridge
         if bridge is None:
             return True
+        if self._is_stopped():
+            # What a thread of rospy's offered just before the stop.
+            bridge.commands.discard_motion(now_s)
+        holds_motion = bridge.wheels.readings > 0 and now_s - peer.session.last_receive_s > HEARD_S
         in_flight = link.read_unacknowledged_length()
-        acknowledged = link.handed_length - in_flight >= peer.velocity_mark
-        for name, payload in bridge.commands.take(in_flight, acknowledged, now_s):
+        acknowledged = link.handed_length - in_flight >= peer.motion_mark
+        for name, payload in bridge.commands.take(in_flight, acknowledged, holds_motion, now_s):
             topic_id = bridge.find_id(name)
             if topic_id is None:
                 bridge.refused_commands += 1
                 continue
             self.send_message(peer, topic_id, payload)
-            if name.endswith(VELOCITY_SUFFIX):
-                peer.velocity_mark = link.handed_length
+            if bridge.is_motion(name):
+                peer.motion_mark = link.handed_length
                 acknowledged = False
-        return acknowledged
+        return acknowledged and not holds_motion

@@ -1,8 +1,9 @@
-"""Turns a stream of velocity commands into one that the robot accepts whole, so that a stop is never lost.
+"""Shapes a stream of motion commands so that the robot accepts all of them and a stop is never lost.
 
 The firmware drops a velocity that arrives within 50 ms of the last accepted one, stops included
-(VelocityControl.ino:159, PositionControl.ino:160). So: newest wins, commands are spaced, a zero is always
-sent and sent once more. Pure: payloads and time go in, payloads come out.
+(VelocityControl.ino:159, PositionControl.ino:160). So: the newest command wins, commands are spaced, and a
+stop is always sent, twice. Servo pulses (cmd_motor) are shaped alike: the robot reads every 51 ms, so only the
+newest matters, and none may pile up in front of a stop. Pure: payloads and time go in, payloads come out.
 """
 
 import math
@@ -10,15 +11,15 @@ import struct
 from typing import Optional
 
 COMMAND_INTERVAL_S = 0.06
-"""Time between two velocities to one robot: the firmware's 50 ms and some room for its 51 ms read cycle."""
+"""Time between two commands to one controller: the firmware's 50 ms and some room for its 51 ms read cycle."""
 
-ZERO_REPEATS = 1
-"""How often a zero is sent again."""
+STOP_REPEATS = 1
+"""How often a stop is sent again."""
 
 LINEAR_LIMIT_M_S = 0.20
 """The firmware's own limit (config.h:60)."""
 
-TURN_LIMIT_RAD_S = 8.0
+ANGULAR_LIMIT_RAD_S = 8.0
 """The firmware's own limit (config.h:61)."""
 
 TWIST_LENGTH = 48
@@ -26,14 +27,17 @@ _TWIST = struct.Struct("<6d")
 
 ZERO_TWIST = bytes(TWIST_LENGTH)
 
-MOTOR_HALT_US = 1500
-HALTED_MOTORS = struct.pack("<hh", MOTOR_HALT_US, MOTOR_HALT_US)
+MOTOR_CENTRE_US = 1500
+STOPPED_MOTORS = struct.pack("<hh", MOTOR_CENTRE_US, MOTOR_CENTRE_US)
+
+STOP_PAYLOADS = {"geometry_msgs/Twist": ZERO_TWIST, "hero_msgs/Motor": STOPPED_MOTORS}
+"""Message types that move a robot, and the payload of each that stops it."""
 
 
 def check_twist(payload: bytes, clamp: bool) -> Optional[bytes]:
     """Return what to send for payload (geometry_msgs/Twist), or None if a component is not finite.
 
-    What tells the robot to stand still becomes ZERO_TWIST: it uses only linear.x and angular.z. With clamp, these
+    What stops the robot becomes ZERO_TWIST: it uses only linear.x and angular.z. With clamp, these
     two are brought into the firmware's limits.
     """
     if len(payload) != TWIST_LENGTH:
@@ -42,26 +46,43 @@ def check_twist(payload: bytes, clamp: bool) -> Optional[bytes]:
     # A sum of finite numbers may overflow; only then are the six looked at one by one.
     if not math.isfinite(sum(components)) and not all(map(math.isfinite, components)):
         return None
-    linear_m_s, turn_rad_s = components[0], components[5]
-    if linear_m_s == 0.0 and turn_rad_s == 0.0:
+    linear_m_s, angular_rad_s = components[0], components[5]
+    if linear_m_s == 0.0 and angular_rad_s == 0.0:
         return ZERO_TWIST
-    is_within = abs(linear_m_s) <= LINEAR_LIMIT_M_S and abs(turn_rad_s) <= TURN_LIMIT_RAD_S
+    is_within = abs(linear_m_s) <= LINEAR_LIMIT_M_S and abs(angular_rad_s) <= ANGULAR_LIMIT_RAD_S
     if is_within or not clamp:
         return payload
     clamped_m_s = max(-LINEAR_LIMIT_M_S, min(LINEAR_LIMIT_M_S, linear_m_s))
-    clamped_rad_s = max(-TURN_LIMIT_RAD_S, min(TURN_LIMIT_RAD_S, turn_rad_s))
+    clamped_rad_s = max(-ANGULAR_LIMIT_RAD_S, min(ANGULAR_LIMIT_RAD_S, angular_rad_s))
     return _TWIST.pack(clamped_m_s, *components[1:5], clamped_rad_s)
 
 
-class VelocityShaper:
-    """The pending velocity commands of one topic of one robot.
+def check_device_twist(payload: bytes) -> Optional[bytes]:
+    """Return payload (geometry_msgs/Twist) unchanged, or None if a component is not finite.
 
-    At most one zero and one later command wait; a zero that waits is never replaced by what comes after it.
+    Devices other than HeRos may use all six components and have limits of their own.
+    """
+    if len(payload) != TWIST_LENGTH or not all(map(math.isfinite, _TWIST.unpack(payload))):
+        return None
+    return payload if any(_TWIST.unpack(payload)) else ZERO_TWIST
+
+
+def check_motor_pulses(payload: bytes) -> Optional[bytes]:
+    """Return payload (hero_msgs/Motor) unchanged, or None if it has another length."""
+    return payload if len(payload) == len(STOPPED_MOTORS) else None
+
+
+class MotionShaper:
+    """The pending commands of one motion topic of one robot.
+
+    At most one stop and one later command wait; a stop that waits is never replaced by what comes after it.
     """
 
-    def __init__(self, interval_s: float = COMMAND_INTERVAL_S) -> None:
+    def __init__(self, stop_payload: bytes = ZERO_TWIST, interval_s: float = COMMAND_INTERVAL_S) -> None:
+        """stop_payload: the command that stops the robot; interval_s: least time between two commands."""
+        self._stop_payload = stop_payload
         self._interval_s = interval_s
-        self._zero_pending = False
+        self._stop_pending = False
         self._newest: Optional[bytes] = None
         self._repeats_left = 0
         self._next_s = -math.inf
@@ -69,19 +90,23 @@ class VelocityShaper:
     @property
     def is_idle(self) -> bool:
         """Whether nothing waits to be sent."""
-        return not self._zero_pending and self._newest is None and self._repeats_left == 0
+        return not self._stop_pending and self._newest is None and self._repeats_left == 0
 
     def offer(self, payload: bytes) -> None:
-        """Take a command, from check_twist(); it replaces one that waits, except a zero."""
-        if payload == ZERO_TWIST:
-            self._zero_pending = True
+        """Take a checked command; it replaces one that waits, except a stop."""
+        if payload == self._stop_payload:
+            self._stop_pending = True
             self._newest = None
         else:
             self._newest = payload
 
     def discard_motion(self) -> None:
-        """Forget what waits except stops; used when motion is held or the robot went away."""
+        """Forget what waits except stops."""
         self._newest = None
+
+    def delay_until(self, next_s: float) -> None:
+        """Send nothing before next_s: another command went to the same controller."""
+        self._next_s = max(self._next_s, next_s)
 
     def due_in_s(self, now_s: float) -> Optional[float]:
         """Return in how many seconds take() has something, None if nothing waits."""
@@ -89,20 +114,20 @@ class VelocityShaper:
             return None
         return max(0.0, self._next_s - now_s)
 
-    def take(self, now_s: float) -> Optional[bytes]:
-        """Return the payload to send now, if any."""
+    def take(self, now_s: float, holds_motion: bool = False) -> Optional[bytes]:
+        """Return the payload to send now, if any; with holds_motion only a stop."""
         if now_s < self._next_s:
             return None
-        if self._zero_pending:
-            payload = ZERO_TWIST
-            self._zero_pending = False
-            self._repeats_left = ZERO_REPEATS
-        elif self._newest is not None:
+        if self._stop_pending:
+            payload = self._stop_payload
+            self._stop_pending = False
+            self._repeats_left = STOP_REPEATS
+        elif self._newest is not None and not holds_motion:
             payload = self._newest
             self._newest = None
             self._repeats_left = 0
         elif self._repeats_left:
-            payload = ZERO_TWIST
+            payload = self._stop_payload
             self._repeats_left -= 1
         else:
             return None

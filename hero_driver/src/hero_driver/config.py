@@ -73,6 +73,17 @@ class DriverConfig:
     command_max_age_s: float = _number(
         2.0, 0.1, 60.0, "s", "a motion command that could not be sent for so long is dropped; stops are not"
     )
+    orphan_stop_s: float = _number(
+        0.25, 0.0, 10.0, "s", "a robot is stopped so long after the program that drove it has gone"
+    )
+    allow_self_tuning: bool = _plain(
+        False, "pid_calibration may be called: the robot spins for up to a minute, and keeps no gains"
+    )
+    start_stopped: str = _choice(
+        "as_before",
+        ("as_before", "always", "never"),
+        "robots are stopped when the driver starts: as when the last driver of this name ended, always, or never",
+    )
     odometry: str = _choice(
         "ticks", ("ticks", "robot"), "ticks: odom from the encoder ticks; robot: the robot's own estimate"
     )

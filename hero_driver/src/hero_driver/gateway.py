@@ -10,20 +10,20 @@ import time
 import traceback
 from typing import Callable, Dict, List, Optional
 
-from . import log_lines, names
+from . import names
 from .admission import GARBAGE_REST_S, Admission, RateGuard
 from .cleaning import CleaningSettings
 from .command_sender import CommandSender
 from .config import DriverConfig
-from .fleet import Decision, Fleet, RobotRecord, RobotState, Verdict
-from .halting import await_halt, halt_directly
+from .fleet import Decision, Fleet, RobotState, Verdict
 from .log_relay import LogRelay
 from .names import Identity, NameRules
+from .peer import Peer
 from .registrar import RobotRegistrar
-from .robot_bridge import VELOCITY_SUFFIX, BridgeContext, RobotBridge
+from .robot_bridge import BridgeContext, RobotBridge
+from .robot_log import RobotLog
 from .robot_requests import RobotRequests
-from .robot_status import Peer, RobotStatus, describe_robot
-from .rosserial.payloads import LOG_DEBUG, LOG_ERROR, LOG_FATAL, LOG_INFO, LOG_WARN, Log
+from .robot_status import RobotStatus, describe_robot
 from .rosserial.session import (
     CallReceived,
     Event,
@@ -36,21 +36,17 @@ from .rosserial.session import (
     TopicDeclared,
     TopicKind,
 )
+from .stop_delivery import StopDelivery, describe_doubt
 from .transform_collector import TransformCollector
 from .transport import THE_DRIVER_ENDS, EventLoop, Link, LinkHandler
 from .worker import Worker
 
 NS_PER_S = 10**9
 
-LOG_LEVELS = {LOG_DEBUG: "debug", LOG_INFO: "info", LOG_WARN: "warn", LOG_ERROR: "error", LOG_FATAL: "fatal"}
-
-LOG_LINES_PER_S = 100
-"""Log lines of one robot that reach /rosout; a robot that tunes its motors sends 47 per second."""
-
-REBOOT_SLACK_S = 2.0
-"""An uptime that implies a boot later than the known one by more than this is a reboot."""
-
 FLEET_POLL_S = 0.1
+
+STOP_LIMIT_S = 2.0
+"""At the end of the driver, and of a connection, robots get this long to come to rest; 0.4 s is usual."""
 
 
 class Gateway(LinkHandler):
@@ -72,6 +68,7 @@ class Gateway(LinkHandler):
         self._clock_ns = clock_ns
         self._on_change = on_change
         self._names = NameRules(config.namespace_policy, node)
+        self._robot_log = RobotLog(log)
         self._admission = Admission(config.admission_limits)
         self._loop: EventLoop
         self._sender: CommandSender
@@ -81,6 +78,7 @@ class Gateway(LinkHandler):
         self.peers: Dict[Link, Peer] = {}
         self.fleet = Fleet(config.grace_s)
         self.bridges: Dict[str, RobotBridge] = {}
+        self._stops: StopDelivery
         self.stopped = False
         self.refused_connections = 0
         self.last_refusal = ""
@@ -88,17 +86,23 @@ class Gateway(LinkHandler):
     def open(self, loop: EventLoop) -> None:
         """Begin to serve what loop brings."""
         self._loop = loop
-        self._sender = CommandSender(loop.call_here, loop.call_later, self._find_peer, self._complain)
+        self._sender = CommandSender(
+            loop.call_here, loop.call_later, self._find_peer, lambda: self.stopped, self._complain
+        )
+        self._stops = StopDelivery(loop.call_later, lambda: self.stopped, self._on_change, self._complain)
         self._requests = RobotRequests(self._config, self._log, loop.call_soon, self._complain)
         self._transforms = TransformCollector(self._config.transform_period_s, loop.call_later)
         self._context = BridgeContext(
             log=self._log.log_throttled,
             wake=self._sender.wake,
+            stop=lambda bridge: loop.call_here(self._stop_robot, bridge),
             add_transform=self._transforms.add,
             call_later=loop.call_later,
             add_reader=loop.add_reader,
             is_stopped=lambda: self.stopped,
             clamp=self._config.clamp,
+            allow_self_tuning=self._config.allow_self_tuning,
+            orphan_stop_s=self._config.orphan_stop_s,
             service_timeout_s=self._config.service_timeout_s,
             command_max_age_s=self._config.command_max_age_s,
             max_names=2 * self._config.max_topics,
@@ -238,7 +242,7 @@ class Gateway(LinkHandler):
         if isinstance(event, TopicDeclared):
             self._declare(peer, event.topic, now_s)
         elif isinstance(event, LogReceived):
-            self._receive_log(peer, event.log, now_s)
+            self._robot_log.receive(peer, event.log, now_s)
         elif isinstance(event, CallReceived):
             self._call_service(peer, event.topic, event.request)
         elif isinstance(event, ParameterRequested):
@@ -265,8 +269,9 @@ class Gateway(LinkHandler):
         if name is None:
             return
         peer.bridge.declare(topic, name)
-        if self.stopped and name.endswith(VELOCITY_SUFFIX):
-            peer.bridge.halt()
+        if self.stopped and peer.stop is None and peer.bridge.is_motion(name):
+            # After the whole burst of declarations: every motion topic is to get its zero.
+            self._loop.call_soon(lambda: self._stops.begin(peer))
         if peer.record.state is not RobotState.READY:
             peer.record.enter(RobotState.READY, now_s)
             self._on_change()
@@ -357,7 +362,7 @@ class Gateway(LinkHandler):
             self._declare(peer, topic, record.joined_s)
         early_logs, peer.early_logs = peer.early_logs, []
         for log in early_logs:
-            self._receive_log(peer, log, record.joined_s)
+            self._robot_log.receive(peer, log, record.joined_s)
 
     def _cleaning_settings(self) -> CleaningSettings:
         config = self._config
@@ -377,44 +382,6 @@ class Gateway(LinkHandler):
             if peer.refused and peer.record is not None and peer.record.identity == identity:
                 peer.link.close("the robot with the same id left; this one may try again")
                 return
-
-    def _receive_log(self, peer: Peer, log: Log, now_s: float) -> None:
-        line = log_lines.read_log_line(log.text)
-        if line.boot is not None:
-            peer.boot = line.boot
-        if peer.bridge is None or peer.record is None:
-            if len(peer.early_logs) < 10:
-                peer.early_logs.append(log)
-            return
-        if peer.refused:
-            return
-        record = peer.record
-        if line.boot is not None:
-            record.firmware, record.hardware, record.config = line.boot
-        if line.heartbeat is not None:
-            self._receive_heartbeat(peer, record, line.heartbeat.uptime_s, now_s)
-        if now_s - peer.log_window_s >= 1.0:
-            peer.log_window_s, peer.log_count = now_s, 0
-        peer.log_count += 1
-        if peer.log_count > LOG_LINES_PER_S:
-            record.dropped_messages += 1
-            return
-        level = "debug" if line.is_routine else LOG_LEVELS.get(log.level, "error")
-        self._log.log(level, "%s: %s" % (peer.label, line.text))
-
-    def _receive_heartbeat(self, peer: Peer, record: RobotRecord, uptime_s: float, now_s: float) -> None:
-        booted_s = now_s - uptime_s
-        if record.booted_s is not None and booted_s - record.booted_s > REBOOT_SLACK_S:
-            self._log.log("warn", "%s rebooted %.1f s ago" % (peer.label, uptime_s))
-            if peer.bridge is not None and peer.bridge.cleaner is not None and peer.boot is None:
-                peer.bridge.cleaner.note_reboot()
-        # Delays of the network only make a boot look later, so the earliest is the best.
-        if (
-            record.booted_s is None
-            or booted_s < record.booted_s
-            or booted_s - record.booted_s > REBOOT_SLACK_S
-        ):
-            record.booted_s = booted_s
 
     def _call_service(self, peer: Peer, topic: Topic, request: bytes) -> None:
         name = None if peer.bridge is None else self._resolve(peer, topic, peer.bridge.identity)
@@ -437,52 +404,76 @@ class Gateway(LinkHandler):
         for record in self.fleet.robots.values():
             bridge = self.bridges.get(record.identity.namespace)
             peer: Optional[Peer] = record.link.peer if record.link is not None else None
-            statuses.append(describe_robot(record, bridge, peer, now_s))
+            stop_state = self._stops.find_state(peer)
+            statuses.append(describe_robot(record, bridge, peer, stop_state, now_s))
         return sorted(statuses, key=lambda status: (status.number, status.namespace))
 
     # Stop.
 
     def set_stopped(self, stopped: bool) -> None:
-        """Hold all motion, or let it go on; from any thread."""
+        """Stop all robots until they are released, or release them; on the thread of the sockets, or before it runs."""
         self.stopped = stopped
         if stopped:
-            self._loop.call_soon(self.halt_all)
+            for peer in self._list_stoppable():
+                self._stops.begin(peer)
+        else:
+            self._stops.release()
         self._on_change()
 
-    def halt_all(self) -> None:
-        """Stop every robot."""
-        for bridge in self.bridges.values():
-            bridge.halt()
-
-    def halt_and_wait(self, deadline_s: float, then: Callable[[], None]) -> None:
-        """Stop every robot and call then() when all have got it twice, or at deadline_s (monotonic)."""
-        self.stopped = True
-        self.halt_all()
-        await_halt(self._loop, lambda: list(self.peers.values()), deadline_s, then)
+    def stop_and_wait(self, deadline_s: float, then: Callable[[List[Peer]], None]) -> None:
+        """Stop every robot; call then(robots not known to be at rest) when all rest, or at deadline_s (monotonic)."""
+        self.set_stopped(True)
+        self._stops.await_rest(self._list_stoppable(), deadline_s, then)
 
     def disconnect(self, namespace: str, deadline_s: float, then: Callable[[bool], None]) -> None:
         """Stop one robot and close its connection, then say whether there was one; on the thread of the sockets.
 
-        The robot dials again by itself; deadline_s (monotonic): until then it may take to be stopped.
+        The robot dials again by itself; deadline_s (monotonic): until then it may take to come to rest.
         """
         bridge = self.bridges.get(namespace)
         peer = None if bridge is None else self._find_peer(bridge)
-        if bridge is None or peer is None:
+        if peer is None:
             then(False)
             return
         link = peer.link
-        bridge.halt()
+        self._stops.begin(peer)
 
-        def close() -> None:
+        def close(_: List[Peer]) -> None:
             if not link.closed:
                 link.close("disconnected on request")
             then(True)
 
-        await_halt(self._loop, lambda: [] if link.closed else [peer], deadline_s, close)
+        self._stops.await_rest([peer], deadline_s, close)
 
-    def halt_directly(self) -> None:
-        """Write stops past all queues, because the loop that empties them has broken."""
-        halt_directly(list(self.peers.values()))
+    def stop_without_loop(self) -> None:
+        """Stop every robot although the loop that serves them has broken; blocks."""
+        self.stopped = True
+        doubtful = self._stops.stop_without_loop(
+            self._list_stoppable(), time.monotonic() + STOP_LIMIT_S, self._read_without_loop
+        )
+        self.report_doubtful(doubtful)
+
+    def report_doubtful(self, peers: List[Peer]) -> None:
+        """Say which robots may still move when the driver ends."""
+        if peers:
+            names = ", ".join("%s (%s)" % (peer.label, describe_doubt(peer)) for peer in peers)
+            self._log.log("error", "the driver ends, and these robots are not known to be at rest: %s" % names)
+
+    def _list_stoppable(self) -> List[Peer]:
+        return [peer for peer in self.peers.values() if peer.bridge is not None and not peer.refused]
+
+    def _stop_robot(self, bridge: RobotBridge) -> None:
+        peer = self._find_peer(bridge)
+        if peer is not None:
+            self._stops.begin(peer)
+
+    def _read_without_loop(self, peer: Peer) -> None:
+        try:
+            data = peer.link.read()
+            if data:
+                self.receive_data(peer.link, data, time.monotonic())
+        except Exception as error:  # noqa: BLE001 - one robot's trouble must not keep the others moving
+            self.report_fault(error)
 
     def _poll_fleet(self) -> None:
         self._loop.call_later(FLEET_POLL_S, self._poll_fleet)

@@ -33,9 +33,19 @@ AddReader = Callable[[Reader], None]
 class Inlet:
     """One topic's way in."""
 
-    def __init__(self, receive: Callable[[bytes], None], add_reader: AddReader) -> None:
-        """receive(payload) is called by any thread, add_reader(reader) is the loop's."""
-        self._receive = receive
+    def __init__(
+        self,
+        receive: Callable[[bytes], None],
+        add_reader: AddReader,
+        on_sender_lost: Callable[[], None] = lambda: None,
+    ) -> None:
+        """receive(payload) is called by any thread, add_reader(reader) is the loop's.
+
+        on_sender_lost() is called on the loop's thread when the publisher of the newest message has gone.
+        """
+        self.receive = receive
+        self.on_sender_lost = on_sender_lost
+        self.last_sender: Any = None  # connection of the newest message, where this module reads it
         self._add_reader = add_reader
         self._subscriber: Any = None
 
@@ -53,8 +63,9 @@ class Inlet:
 
     def _take(self, message: Any) -> None:
         """A message came through rospy, on the thread of its publisher's connection."""
-        self._receive(message.data)
         connection = find_connection(self._subscriber, message)
+        self.last_sender = connection
+        self.receive(message.data)
         if connection is not None:
             replace_reading(connection, functools.partial(self._hand_over, connection))
 
@@ -63,7 +74,7 @@ class Inlet:
         sock, rest = take_socket(connection)
         if sock is None:
             raise TransportTerminated("closed")
-        stream = MessageStream(connection, sock, rest, self._receive)
+        stream = MessageStream(self, connection, sock, rest)
         self._add_reader(stream)
         stream.ended.wait()
         if stream.error is not None:
@@ -74,14 +85,12 @@ class Inlet:
 class MessageStream(Reader):
     """The connection of one publisher, while the loop reads it."""
 
-    def __init__(
-        self, connection: Any, sock: socket.socket, rest: bytes, receive: Callable[[bytes], None]
-    ) -> None:
+    def __init__(self, inlet: Inlet, connection: Any, sock: socket.socket, rest: bytes) -> None:
         """connection is rospy's, for its statistics; rest is the begun message that rospy has read."""
+        self._inlet = inlet
         self._connection = connection
         self._socket = sock
         self._rest = rest
-        self._receive = receive
         self.ended = threading.Event()
         self.error: Optional[OSError] = None
 
@@ -103,6 +112,7 @@ class MessageStream(Reader):
         self._connection.stat_bytes += len(data)
         if self._rest:
             data = self._rest + data
+        inlet = self._inlet
         position, end = 0, len(data)
         while end - position >= _LENGTH.size:
             length: int = _LENGTH.unpack_from(data, position)[0]
@@ -113,7 +123,8 @@ class MessageStream(Reader):
                 break
             position = start + length
             self._connection.stat_num_msg += 1
-            self._receive(data[start:position])
+            inlet.last_sender = self._connection
+            inlet.receive(data[start:position])
         self._rest = data[position:]
         return True
 
@@ -121,3 +132,5 @@ class MessageStream(Reader):
         """Let rospy's thread go on."""
         self._socket.close()
         self.ended.set()
+        if self._inlet.last_sender is self._connection:
+            self._inlet.on_sender_lost()

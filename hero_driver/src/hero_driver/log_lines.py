@@ -18,6 +18,8 @@ _BOOT = re.compile(
     r"(?:\s*Config:\s*(?P<config>\S+)\s*\|)?"
 )
 _PID_RESET = "Reseting PID..."  # VelocityControl.ino, with each zero velocity: ten times a second while one is sent
+_TUNES = re.compile(r"^(Starting Motors Auto Tuning|Tunning Motor Set)")  # VelocityControl.ino:230, 118
+_TUNING_ENDED = re.compile(r"Tuning Failure|Best PID params")  # VelocityControl.ino:261-276
 _HEARTBEAT = re.compile(r"^Conn?ected at time (?P<millis>\d{1,10})$")
 
 
@@ -41,6 +43,7 @@ class LogLine(NamedTuple):
     text: str  # without name, colours and control characters, of bounded length
     boot: Optional[BootLine]
     heartbeat: Optional[Heartbeat]
+    tunes: Optional[bool]  # True: a controller tunes itself; False: it has ended that; None: nothing of that
     is_routine: bool  # said so often, and so independently of what happens, that it is no news to people
 
 
@@ -63,4 +66,9 @@ def read_log_line(text: str) -> LogLine:
         match = _HEARTBEAT.match(body)
         if match is not None:
             heartbeat = Heartbeat(int(match["millis"]) / 1000.0)
-    return LogLine(body, boot, heartbeat, heartbeat is not None or body == _PID_RESET)
+    tunes: Optional[bool] = None
+    if _TUNES.match(body) is not None:
+        tunes = True
+    elif _TUNING_ENDED.search(body) is not None:
+        tunes = False
+    return LogLine(body, boot, heartbeat, tunes, heartbeat is not None or body == _PID_RESET)

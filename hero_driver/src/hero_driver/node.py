@@ -13,17 +13,17 @@ from typing import Any, Callable, List, Optional
 
 import rosgraph
 import rospy
-from std_msgs.msg import Bool
-from std_srvs.srv import SetBool, SetBoolResponse
 
 from hero_msgs.srv import Disconnect, DisconnectResponse
 
 from .config import ConfigError, DriverConfig, read_config
-from .gateway import Gateway
+from .gateway import STOP_LIMIT_S, Gateway
 from .log_relay import LogRelay, prepare_logging, tell_of_lost_log_lines
 from .master_watch import MasterWatch
+from .peer import Peer
 from .reports import FleetStatus, Reporter
 from .rospy_internals import call_before_shutdown, leave_topics_out_of_rosout, open_tcpros_server
+from .stop_interface import PARAMETER, StopInterface
 from .transport import Address, EventLoop, TransportSettings
 from .worker import Worker
 
@@ -35,9 +35,6 @@ REGISTRAR_QUEUE_LENGTH = 20000
 SWITCH_INTERVAL_S = 0.001
 """How long another thread may keep Python's one lock while the thread of the sockets waits for it; Python's own 5 ms
 are what robots were delayed by while the driver logged a lot, or spoke with the ROS master."""
-
-HALT_LIMIT_S = 1.2
-"""At the end robots get this long to take their stop twice; 0.2 s is usual."""
 
 REPORT_CHECK_S = 0.1
 
@@ -88,8 +85,10 @@ class EndFlag:
 class DriverNode:
     """The whole driver: open() until close()."""
 
-    def __init__(self, config: DriverConfig, log: LogRelay) -> None:
+    def __init__(self, config: DriverConfig, log: LogRelay, was_stopped: bool) -> None:
+        """was_stopped: whether the robots were stopped when a driver of this name ended."""
         self._config = config
+        self._starts_stopped = {"as_before": was_stopped, "always": True, "never": False}[config.start_stopped]
         self._ended = EndFlag()
         self._changed = threading.Event()
         self._log = log
@@ -110,18 +109,22 @@ class DriverNode:
         self._thread = threading.Thread(target=self._run_loop, name="sockets", daemon=True)
         self._crash: Optional[BaseException] = None
         self._reporter: Reporter
-        self._stopped_publisher: rospy.Publisher
+        self._stop_interface = StopInterface(
+            self._gateway,
+            self._loop.call_soon,
+            lambda: self._gateway.list_robots(time.monotonic()),
+            self._log,
+        )
         self._services: List[rospy.Service] = []
-        self._master_watch = MasterWatch("~stop", self._log.log)
+        self._master_watch = MasterWatch("~stop", self._stop_interface.keep, self._log.log)
 
     def open(self) -> None:
         """Listen, dial and serve. Raises: OSError if the port cannot be had."""
         self._open_loop()
         self._gateway.open(self._loop)
         self._reporter = Reporter()
-        self._stopped_publisher = rospy.Publisher("~stopped", Bool, queue_size=1, latch=True)
-        self._stopped_publisher.publish(Bool(False))
-        self._services.append(rospy.Service("~stop", SetBool, self._serve_stop))
+        self._stop_interface.open(self._starts_stopped)
+        self._stop_interface.keep()
         self._services.append(rospy.Service("~disconnect", Disconnect, self._serve_disconnect))
         self._thread.start()
         self._master_watch.open()
@@ -159,12 +162,19 @@ class DriverNode:
     def close(self) -> None:
         """Stop all robots, then close their connections; safe to call twice."""
         if self._thread.is_alive():
-            halted = threading.Event()
-            deadline_s = time.monotonic() + HALT_LIMIT_S
-            self._loop.call_soon(lambda: self._gateway.halt_and_wait(deadline_s, halted.set))
-            halted.wait(HALT_LIMIT_S + 0.3)
+            stopped = threading.Event()
+
+            def finish(doubtful: List[Peer]) -> None:
+                self._gateway.report_doubtful(doubtful)
+                stopped.set()
+
+            deadline_s = time.monotonic() + STOP_LIMIT_S
+            self._loop.call_soon(lambda: self._gateway.stop_and_wait(deadline_s, finish))
+            if not stopped.wait(STOP_LIMIT_S + 0.3):
+                self._log.log("error", "the driver ends, and could not stop the robots: its loop hangs")
             self._loop.stop()
             self._thread.join(1.0)
+        self._stop_interface.close()
         self._master_watch.close()
         self._registrar.close()
         self._gateway.close()
@@ -226,20 +236,13 @@ class DriverNode:
             self._gateway.list_robots(now_s),
         )
 
-    def _serve_stop(self, request: Any) -> SetBoolResponse:
-        self._gateway.set_stopped(bool(request.data))
-        self._stopped_publisher.publish(Bool(bool(request.data)))
-        text = "all robots are stopped and held" if request.data else "robots may move"
-        self._log.log("warn", "%s (~stop)" % text)
-        return SetBoolResponse(True, text)
-
     def _serve_disconnect(self, request: Any) -> DisconnectResponse:
         namespace = "/" + request.robot.strip("/")
         done: queue.Queue[bool] = queue.Queue()
-        deadline_s = time.monotonic() + HALT_LIMIT_S
+        deadline_s = time.monotonic() + STOP_LIMIT_S
         self._loop.call_soon(lambda: self._gateway.disconnect(namespace, deadline_s, done.put))
         try:
-            was_there = done.get(timeout=HALT_LIMIT_S + 1.0)
+            was_there = done.get(timeout=STOP_LIMIT_S + 1.0)
         except queue.Empty:
             return DisconnectResponse(False, "the driver did not come to it")
         if not was_there:
@@ -264,12 +267,15 @@ def main(argv: Optional[List[str]] = None) -> int:
     leave_topics_out_of_rosout()
     tell_of_lost_log_lines()
     try:
-        config = read_config(_read_private_parameters())
+        parameters = _read_private_parameters()
+        # The driver's own note of its last run, not a setting.
+        was_stopped = parameters.pop(PARAMETER.lstrip("~"), False) is True
+        config = read_config(parameters)
     except ConfigError as error:
         rospy.logfatal("hero_driver cannot start: %s", error)
         return 2
     sys.setswitchinterval(SWITCH_INTERVAL_S)
-    node = DriverNode(config, log)
+    node = DriverNode(config, log, was_stopped)
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, lambda *_: node.end())
     call_before_shutdown(node.end)

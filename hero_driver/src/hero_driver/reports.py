@@ -13,6 +13,7 @@ from hero_msgs.msg import Robot, RobotArray
 
 from .fleet import RobotState
 from .robot_status import RobotStatus
+from .stop_progress import StopState
 
 LARGE_CLOCK_OFFSET_S = 0.5
 """Beyond it stamps of the robot are of little use; the figures that were published stay below 0.1 s."""
@@ -97,6 +98,7 @@ class Reporter:
             namespace=robot.namespace,
             address=robot.address,
             state=robot.state.value,
+            stop_state=robot.stop_state.value,
             firmware=robot.firmware,
             hardware=robot.hardware,
             config=robot.config,
@@ -115,8 +117,11 @@ class Reporter:
         status = self._status
         ready = sum(robot.state is RobotState.READY for robot in status.robots)
         text = "%d of %d robots ready" % (ready, len(status.robots))
-        if status.stopped:
-            stat.summary(DiagnosticStatus.WARN, text + "; all motion is held by ~stop")
+        moving = [robot.namespace.lstrip("/") for robot in status.robots if robot.stop_state is StopState.MOVING]
+        if moving:
+            stat.summary(DiagnosticStatus.ERROR, "%s; moving though stopped: %s" % (text, ", ".join(moving)))
+        elif status.stopped:
+            stat.summary(DiagnosticStatus.WARN, text + "; all robots are stopped (~stop)")
         else:
             stat.summary(DiagnosticStatus.OK, text)
         stat.add("listening", status.listening)
@@ -133,6 +138,7 @@ class Reporter:
             for key, value in (
                 ("address", robot.address),
                 ("state", robot.state.name),
+                ("stop", robot.stop_state.name),
                 ("firmware", robot.firmware),
                 ("hardware", robot.hardware),
                 ("config", robot.config),
@@ -157,6 +163,8 @@ class Reporter:
 
 def _judge(robot: RobotStatus) -> Tuple[int, str]:
     """Return level and text of a robot's diagnostic status."""
+    if robot.stop_state is StopState.MOVING:
+        return DiagnosticStatus.ERROR, "its wheels turn although it was stopped"
     if robot.refused:
         return DiagnosticStatus.ERROR, robot.refused[0]
     if robot.complaint:
@@ -165,6 +173,8 @@ def _judge(robot: RobotStatus) -> Tuple[int, str]:
         return DiagnosticStatus.ERROR, "away: %s" % robot.last_error
     if robot.state is RobotState.JOINING:
         return DiagnosticStatus.WARN, "joining"
+    if robot.tunes:
+        return DiagnosticStatus.WARN, "tunes itself (pid_calibration) and spins; ~stop ends that"
     if robot.foreign_frames:
         return DiagnosticStatus.WARN, "sends transforms that are not its own: %s" % ", ".join(
             robot.foreign_frames

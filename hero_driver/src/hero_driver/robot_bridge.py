@@ -6,6 +6,7 @@ there again when the robot returns.
 """
 
 import functools
+import math
 import time
 from typing import Any, Callable, Dict, List, Optional, Set, Tuple
 
@@ -14,7 +15,13 @@ import rospy
 from . import message_types, wire_messages
 from .cleaning import TRANSFORMS, CleaningSettings, MessageCleaner
 from .command_queue import CommandQueue
-from .command_shaping import HALTED_MOTORS, ZERO_TWIST, check_twist
+from .command_shaping import (
+    STOP_PAYLOADS,
+    STOPPED_MOTORS,
+    check_device_twist,
+    check_motor_pulses,
+    check_twist,
+)
 from .inlet import AddReader, Inlet
 from .message_types import MessageTypeError
 from .names import Identity
@@ -24,17 +31,24 @@ from .rosserial.session import Topic, TopicKind
 from .service_requests import find_request_fault, is_success, read_set_odom_pose
 from .services import RobotService
 from .transform_cleaning import split_transforms
+from .wheel_motion import WheelMotion
 
 QUEUE_LENGTH = 50
 """Messages that wait for a slow subscriber, or for a slow robot: more than a second of odometry."""
 
-VELOCITY_SUFFIX = "/cmd_vel"
 VELOCITY_CONTROLLER = "/velocity_controller/cmd_vel"
 MOTOR_TYPE = "hero_msgs/Motor"
+ODOMETRY_TYPE = "nav_msgs/Odometry"
 TRANSFORM_TYPE = "tf2_msgs/TFMessage"
 TWIST_TYPE = "geometry_msgs/Twist"
 CALIBRATION_SUFFIX = "/pid_calibration"
 SET_ODOM_TYPE = "hero_msgs/SetOdom"
+
+LONGEST_WATCHDOG_S = 4.0
+"""After this time without a command the robot stops by itself (PositionControl.ino:105, MotorDriver.ino:111)."""
+
+TUNING_HEARD_S = 1.0
+"""A robot that tunes itself logs up to 47 lines per second (VelocityControl.ino:118)."""
 
 
 class BridgeContext:
@@ -44,28 +58,34 @@ class BridgeContext:
         self,
         log: Callable[[str, str, str], None],
         wake: Callable[["RobotBridge"], None],
+        stop: Callable[["RobotBridge"], None],
         add_transform: Callable[[bytes], None],
         call_later: CallLater,
         add_reader: AddReader,
         is_stopped: Callable[[], bool],
         clamp: bool,
+        allow_self_tuning: bool,
+        orphan_stop_s: float,
         service_timeout_s: float,
         command_max_age_s: float,
         max_names: int,
     ) -> None:
         """Take what the rest of the driver does for bridges.
 
-        wake(bridge): commands wait (any thread); log(level, throttle key, text); call_later(delay_s, call)
-        and add_reader(reader) are the loop's. max_names: topics and services that one robot may have over all
-        its connections.
+        wake(bridge): commands wait, stop(bridge): the robot has to stop (any thread); log(level, throttle key,
+        text); call_later(delay_s, call) and add_reader(reader) are the loop's. max_names: topics and services that one
+        robot may have over all its connections.
         """
         self.log = log
         self.wake = wake
+        self.stop = stop
         self.add_transform = add_transform
         self.call_later = call_later
         self.add_reader = add_reader
         self.is_stopped = is_stopped
         self.clamp = clamp
+        self.allow_self_tuning = allow_self_tuning
+        self.orphan_stop_s = orphan_stop_s
         self.service_timeout_s = service_timeout_s
         self.command_max_age_s = command_max_age_s
         self.max_names = max_names
@@ -85,6 +105,7 @@ class RobotBridge:
         self.identity = identity
         self.label = identity.namespace.lstrip("/")
         self.commands = CommandQueue(context.command_max_age_s)
+        self.wheels = WheelMotion()
         self.refused_commands = 0
         self._context = context
         self.registrar = registrar
@@ -94,14 +115,15 @@ class RobotBridge:
         self.cleaner: Optional[MessageCleaner] = None
         if cleaning is not None:
             self.cleaner = MessageCleaner(
-                identity.namespace, cleaning, self._outlets.__getitem__, context.add_transform
+                identity.namespace, cleaning, self._outlets.__getitem__, context.add_transform, self.wheels
             )
         self._inlets: Dict[str, Tuple[str, Inlet]] = {}
         self._services: Dict[str, RobotService] = {}
         self._service_halves: Dict[Tuple[str, TopicKind], Topic] = {}
         self._servers: Dict[str, Any] = {}
         self._ids: Dict[str, int] = {}
-        self._motor_used_s = 0.0
+        self._commanded_s: Dict[str, float] = {}  # motion topic -> when motion, not a stop, was last offered
+        self._tuning_heard_s = -math.inf
         self._errors: Dict[str, str] = {}
         self._names: Set[str] = set()
         self._subscribed_types: Dict[str, str] = {}
@@ -112,6 +134,7 @@ class RobotBridge:
         """A connection stands; its topics are declared next."""
         self._ids.clear()
         self._service_halves.clear()
+        self.wheels.restart()
         self._connected = True
 
     def detach(self, reason: str) -> None:
@@ -181,10 +204,21 @@ class RobotBridge:
             self._outlets.setdefault(outlet_name, Outlet(QUEUE_LENGTH, self._context.call_later))
         if self.cleaner is None:
             outlet = self._outlets[name]
-            topic.receive = lambda payload, _: outlet.publish(payload)
+            receive = self._pass_odometry if ros_type == ODOMETRY_TYPE else self._pass_message
+            topic.receive = functools.partial(receive, outlet)
         else:
             topic.receive = self.cleaner.choose(name, ros_type)
         return derived
+
+    @staticmethod
+    def _pass_message(outlet: Outlet, payload: bytes, _arrival_ns: int) -> None:
+        outlet.publish(payload)
+
+    def _pass_odometry(self, outlet: Outlet, payload: bytes, _arrival_ns: int) -> None:
+        outlet.publish(payload)
+        velocity = wire_messages.read_odometry_velocity(payload)
+        if velocity is not None:
+            self.wheels.read_velocity(*velocity)
 
     def _pass_transforms(self, payload: bytes, _arrival_ns: int) -> None:
         for transform in split_transforms(payload):
@@ -237,58 +271,96 @@ class RobotBridge:
         """Return the id under which the robot receives the topic or service called name."""
         return self._ids.get(name)
 
-    def encode_stops(self) -> List[Tuple[int, bytes]]:
-        """Return ids and payloads that stop the robot, whatever waits: for when nothing else works any more."""
-        return [
-            (topic_id, ZERO_TWIST)
-            for name, topic_id in self._ids.items()
-            if name.endswith(VELOCITY_SUFFIX) and self._subscribed_types.get(name) == TWIST_TYPE
-        ]
+    def is_motion(self, name: str) -> bool:
+        """Return whether messages on the topic called name move the robot."""
+        return self._subscribed_types.get(name) in STOP_PAYLOADS
 
-    def halt(self) -> None:
-        """Stop the robot, on every topic that may drive it."""
-        now_s = time.monotonic()
-        velocity = self.identity.namespace + VELOCITY_CONTROLLER
-        takes_velocity = velocity in self._ids and self._subscribed_types.get(velocity) == TWIST_TYPE
-        self.commands.halt(velocity if takes_velocity else None, now_s)
-        if now_s - self._motor_used_s < 2.0:
-            motors = self.identity.namespace + "/cmd_motor"
-            if motors in self._ids:
-                self.commands.offer(motors, HALTED_MOTORS)
-        self._context.wake(self)
+    def list_stops(self, fillers: int) -> List[Tuple[int, bytes]]:
+        """Return ids and payloads that stop the robot, in the order in which it has to get them.
+
+        fillers: servo pulses to put in front, each of which takes 0.5 ms of a HeRo's reading cycle.
+        """
+        names = [name for name in self._ids if self.is_motion(name)]
+        # Servo pulses first, for a zero Twist takes them away; the velocity controller last.
+        names.sort(key=lambda name: (self._subscribed_types[name] != MOTOR_TYPE, name.endswith(VELOCITY_CONTROLLER)))
+        stops = [(self._ids[name], STOP_PAYLOADS[self._subscribed_types[name]]) for name in names]
+        if names and self.cleaner is not None and self._subscribed_types[names[0]] == MOTOR_TYPE:
+            stops = [(self._ids[names[0]], STOPPED_MOTORS)] * fillers + stops
+        return stops
+
+    def forget_motion(self) -> None:
+        """Drop the motion commands that wait: the robot is being stopped."""
+        self._commanded_s.clear()
+        self.commands.discard_motion(time.monotonic())
+
+    @property
+    def is_commanded(self) -> bool:
+        """Whether a program has asked for motion, and not for a stop, since the last forget_motion()."""
+        return bool(self._commanded_s)
+
+    # Self-tuning.
+
+    def note_tuning(self, tunes: bool) -> None:
+        """The robot said that it tunes itself, or that it has ended that."""
+        self._tuning_heard_s = time.monotonic() if tunes else -math.inf
+
+    def tunes(self, now_s: float) -> bool:
+        """Return whether the robot tunes itself, as far as its log tells."""
+        return now_s - self._tuning_heard_s < TUNING_HEARD_S
 
     # A ROS program sent a message for the robot (any thread).
 
     def _choose_receiver(self, name: str, ros_type: str) -> Callable[[bytes], None]:
         """Return what takes the messages of a topic that the robot subscribes to."""
-        if self.cleaner is not None and ros_type == TWIST_TYPE and name.endswith(VELOCITY_SUFFIX):
-            return functools.partial(self._receive_velocity, name)
-        if self.cleaner is not None and ros_type == MOTOR_TYPE:
-            return functools.partial(self._receive_motors, name)
-        return functools.partial(self._receive_command, name)
+        stop_payload = STOP_PAYLOADS.get(ros_type)
+        if stop_payload is None:
+            return functools.partial(self._receive_command, name)
+        check: Callable[[bytes], Optional[bytes]] = check_motor_pulses
+        if ros_type != MOTOR_TYPE:
+            is_hero = self.cleaner is not None
+            check = functools.partial(check_twist, clamp=self._context.clamp) if is_hero else check_device_twist
+        return functools.partial(self._receive_motion, name, check, stop_payload)
 
-    def _receive_velocity(self, name: str, payload: bytes) -> None:
-        command = check_twist(payload, self._context.clamp)
+    def _receive_motion(
+        self, name: str, check: Callable[[bytes], Optional[bytes]], stop_payload: bytes, payload: bytes
+    ) -> None:
+        command = check(payload)
         if command is None:
             self.refused_commands += 1
             self._context.log(
                 "warn",
                 name,
-                "%s: a velocity on %s is not finite and was refused; mend the program that sends it"
+                "%s: a command on %s is not finite and was refused; correct the program that sends it"
                 % (self.label, name),
             )
-        elif not self._connected or (self._context.is_stopped() and command != ZERO_TWIST):
+            if name in self._commanded_s:
+                # It must not go on with what it was told before.
+                self._context.stop(self)
+        elif not self._connected or (self._context.is_stopped() and command != stop_payload):
             self.refused_commands += 1
         else:
-            self.commands.offer_velocity(name, command, time.monotonic())
+            now_s = time.monotonic()
+            if command != stop_payload:
+                self._commanded_s[name] = now_s
+            elif name in self._commanded_s:
+                self._commanded_s.pop(name, None)
+            if self.cleaner is not None:
+                self.commands.offer_motion(name, command, stop_payload, now_s)
+            else:
+                self.commands.offer(name, command, is_motion=True)
             self._context.wake(self)
 
-    def _receive_motors(self, name: str, payload: bytes) -> None:
-        if self._context.is_stopped() and payload != HALTED_MOTORS:
-            self.refused_commands += 1
+    def _lose_sender(self, name: str) -> None:
+        """The program that sent the newest command of a motion topic has gone (thread of the sockets)."""
+        commanded_s = self._commanded_s.get(name)
+        if commanded_s is None or time.monotonic() - commanded_s > LONGEST_WATCHDOG_S:
             return
-        self._motor_used_s = time.monotonic()
-        self._receive_command(name, payload)
+
+        def stop_orphan() -> None:
+            if self._commanded_s.get(name) == commanded_s:
+                self._context.stop(self)
+
+        self._context.call_later(self._context.orphan_stop_s, stop_orphan)
 
     def _receive_command(self, name: str, payload: bytes) -> None:
         if not self._connected:
@@ -304,8 +376,15 @@ class RobotBridge:
             return fault
         if not self._connected or name not in self._ids:
             return "the robot is not connected"
-        if name.endswith(CALIBRATION_SUFFIX) and self._context.is_stopped():
-            return "it moves the robot, and ~stop holds all motion"
+        if name.endswith(CALIBRATION_SUFFIX):
+            if not self._context.allow_self_tuning:
+                return (
+                    "self-tuning spins the robot for up to a minute and finds no gains that the firmware keeps; measure"
+                    " them with hero_bringup calibrate, or set ~allow_self_tuning"
+                )
+            if self._context.is_stopped():
+                return "it moves the robot, and all robots are stopped (~stop)"
+            self.note_tuning(True)
         self.commands.offer(name, request)
         self._context.wake(self)
         return None
@@ -362,7 +441,11 @@ class RobotBridge:
             if known[0] == ros_type:
                 return
             known[1].close()
-        inlet = Inlet(self._choose_receiver(name, ros_type), self._context.add_reader)
+        inlet = Inlet(
+            self._choose_receiver(name, ros_type),
+            self._context.add_reader,
+            functools.partial(self._lose_sender, name),
+        )
         self._inlets[name] = (ros_type, inlet)
         inlet.open(name, message_types.make_raw_class(message_class), QUEUE_LENGTH)
 

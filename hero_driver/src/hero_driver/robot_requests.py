@@ -11,7 +11,7 @@ from .parameter_server import (
     read_parameter,
     resolve_parameter,
 )
-from .robot_status import Peer
+from .peer import Peer
 from .rosserial.errors import RosserialError
 from .rosserial.session import Topic, TopicKind
 from .service_client import ServiceClients

@@ -1,43 +1,12 @@
-"""What is known of one connection and of one robot, put together for reports. Thread of the sockets."""
+"""What is known of one robot, put together for reports. Thread of the sockets."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import List, Optional
 
-from . import log_lines
-from .admission import RateGuard
 from .fleet import RobotRecord, RobotState
+from .peer import Peer
 from .robot_bridge import RobotBridge
-from .rosserial.payloads import Log
-from .rosserial.session import Session, Topic
-from .transport import Link
-
-
-@dataclass
-class Peer:
-    """One connection and what is known of who is at its other end."""
-
-    link: Link
-    session: Session
-    guard: RateGuard
-    record: Optional[RobotRecord] = None
-    bridge: Optional[RobotBridge] = None
-    refused: bool = (
-        False  # a duplicate: kept open and ignored, so that it does not dial in 20 times per second
-    )
-    boot: Optional[log_lines.BootLine] = None
-    early_logs: List[Log] = field(default_factory=list)
-    early_topics: List[Topic] = field(default_factory=list)  # /tf, declared before a name that tells who it is
-    log_window_s: float = 0.0
-    log_count: int = 0
-    velocity_mark: int = 0  # how much was written when the last velocity was
-    send_due: bool = False
-
-    @property
-    def label(self) -> str:
-        """How log lines call this peer."""
-        if self.bridge is not None:
-            return self.bridge.label
-        return str(self.link.address)
+from .stop_progress import StopState
 
 
 @dataclass(frozen=True)
@@ -48,6 +17,8 @@ class RobotStatus:
     number: int
     address: str
     state: RobotState
+    stop_state: StopState
+    tunes: bool  # whether a controller of the robot tunes itself
     firmware: str
     hardware: str
     config: str
@@ -68,7 +39,11 @@ class RobotStatus:
 
 
 def describe_robot(
-    record: RobotRecord, bridge: Optional[RobotBridge], peer: Optional[Peer], now_s: float
+    record: RobotRecord,
+    bridge: Optional[RobotBridge],
+    peer: Optional[Peer],
+    stop_state: StopState,
+    now_s: float,
 ) -> RobotStatus:
     """Return the state of the robot that record tells of; bridge and peer are its own, where it has them."""
     cleaner = None if bridge is None else bridge.cleaner
@@ -90,6 +65,8 @@ def describe_robot(
         number=record.identity.number,
         address=record.address,
         state=record.state,
+        stop_state=stop_state,
+        tunes=bridge is not None and bridge.tunes(now_s),
         firmware=record.firmware,
         hardware=record.hardware,
         config=record.config,

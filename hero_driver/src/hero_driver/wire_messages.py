@@ -94,6 +94,16 @@ _ODOMETRY_POSE = slice(-ODOMETRY_TAIL_LENGTH, _POSE.size - ODOMETRY_TAIL_LENGTH)
 _ODOMETRY_TWIST = slice(-_TWIST.size - _COVARIANCE.size, -_COVARIANCE.size)
 
 
+def read_odometry_velocity(payload: bytes) -> Optional[Tuple[float, float]]:
+    """Return the linear (m/s) and angular (rad/s) speed in a nav_msgs/Odometry, or None if payload is too short."""
+    if len(payload) < ODOMETRY_TAIL_LENGTH:
+        return None
+    components = _TWIST.unpack(payload[_ODOMETRY_TWIST])
+    return math.hypot(components[0], math.hypot(*components[1:3])), math.hypot(
+        components[5], math.hypot(*components[3:5])
+    )
+
+
 class OdometryWriter:
     """Writes nav_msgs/Odometry of one robot; covariances and frames are put in once."""
 

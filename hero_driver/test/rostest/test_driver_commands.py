@@ -11,9 +11,10 @@ from fake_motors import VELOCITY_GATE_S
 from fake_robot import READ_CYCLE_S
 from geometry_msgs.msg import Twist
 from std_msgs.msg import Bool, ColorRGBA
-from std_srvs.srv import SetBool, Trigger
+from std_srvs.srv import SetBool
 from steady_time import in_steady_time
 
+from hero_driver.command_shaping import STOPPED_MOTORS
 from hero_msgs.msg import Motor, Robot
 from hero_msgs.srv import SetOdom
 
@@ -135,27 +136,30 @@ class TestDriverCommands(DriverCase):
         for name in (VELOCITY, POSITION):
             self.assertEqual(wait_payloads(robot, name, 2), [bytes(48)] * 2)
 
-    def test_other_commands_are_not_shaped_and_do_not_wait_behind_velocities(self):
+    def test_other_commands_are_not_shaped_and_do_not_wait_for_motion(self):
         robot = self.join(10)
         drive = make_publisher("/hero_10/" + VELOCITY, Twist)
         light = make_publisher("/hero_10/led", ColorRGBA)
-        motor = make_publisher("/hero_10/cmd_motor", Motor)
         switch = make_publisher("/hero_10/laser_enable", Bool)
         rospy.wait_for_service("/hero_10/set_odom", 20.0)
         for index in range(20):
             drive.publish(make_command(0.001 * index + 0.001))
             light.publish(ColorRGBA(float(index), 0.0, 0.0, 0.0))
-            motor.publish(Motor(1500 + index, 1500))
             switch.publish(Bool(index % 2 == 0))
         self.assertTrue(rospy.ServiceProxy("/hero_10/set_odom", SetOdom)(0.0, 0.0, 0.0).success)
         self.assertEqual(
             [struct.unpack("<4f", payload)[0] for payload in wait_payloads(robot, "led", 20)], list(range(20))
         )
-        self.assertEqual(
-            [struct.unpack("<2h", payload)[0] for payload in wait_payloads(robot, "cmd_motor", 20)],
-            list(range(1500, 1520)),
-        )
         self.assertEqual(wait_payloads(robot, "laser_enable", 20), [b"\x01", b"\x00"] * 10)
+
+    def test_of_servo_pulses_the_newest_wins_and_the_stop_arrives(self):
+        robot = self.join_stock(22)
+        motor = make_publisher("/hero_22/cmd_motor", Motor)
+        for pulse_us in range(1400, 1450):
+            motor.publish(Motor(pulse_us, 1500))
+        motor.publish(Motor(1500, 1500))
+        wait_for(lambda: robot.payloads_on("cmd_motor")[-2:] == [STOPPED_MOTORS] * 2, "the stop, twice")
+        self.assertLess(len(robot.payloads_on("cmd_motor")), 10)
 
     def test_velocities_that_are_not_finite_are_refused_counted_and_reported_once(self):
         robot = self.join(11)
@@ -192,23 +196,18 @@ class TestDriverCommands(DriverCase):
             self.wait_stopped(robot)
         wait_for(lambda: held.messages and held.messages[-1].data, "the latched state")
         wait_for(lambda: self.fleet.newest.stopped, "the report")
-        counts = [len(robot.velocities) for robot in robots]
         for publisher in publishers:
             publisher.publish(make_command(0.1))
         motor.publish(Motor(1400, 1600))
-        calibrate = rospy.ServiceProxy("/hero_13/velocity_controller/pid_calibration", Trigger)
-        with self.assertRaisesRegex(rospy.ServiceException, "~stop holds all motion"):
-            calibrate()
         # Lights are no motion.
         make_publisher("/hero_13/led", ColorRGBA).publish(ColorRGBA(1.0, 0.0, 0.0, 0.0))
         wait_payloads(robots[0], "led")
         self.fleet.wait("/hero_13", Robot.READY, "refusals", lambda e: e.dropped_messages >= 2)
         self.fleet.wait("/hero_14", Robot.READY, "refusals", lambda e: e.dropped_messages >= 1)
-        self.assertEqual([len(robot.velocities) for robot in robots], counts)
-        self.assertEqual(robots[0].payloads_on("cmd_motor"), [])
-        # A stop passes while motion is held.
-        publishers[0].publish(make_command(0.0))
-        wait_for(lambda: len(robots[0].velocities) >= counts[0] + 2, "the stop")
+        for robot in robots:
+            motions = [velocity for velocity in robot.velocities if not velocity.is_zero]
+            self.assertEqual([velocity.linear_m_s for velocity in motions], [0.1])
+        self.assertEqual(set(robots[0].payloads_on("cmd_motor")), {STOPPED_MOTORS})
         self.call_stop(False)
         wait_for(lambda: not held.messages[-1].data, "the latched state")
         for publisher, robot in zip(publishers, robots):
@@ -243,14 +242,6 @@ class TestDriverCommands(DriverCase):
         wait_payloads(robot, "cmd_motor")
         self.call_stop(True)
         self.assertEqual(wait_payloads(robot, "cmd_motor", 2)[1], struct.pack("<2h", 1500, 1500))
-
-    def test_the_stop_halts_a_robot_that_calibrates_itself(self):
-        robot = self.join_stock(18)
-        name = "/hero_18/velocity_controller/pid_calibration"
-        rospy.wait_for_service(name, 20.0)
-        rospy.ServiceProxy(name, Trigger)()
-        self.call_stop(True)
-        self.wait_stopped(robot)
 
     def test_a_robot_that_does_not_read_gets_the_newest_command_and_no_backlog(self):
         stalled = self.join(19, receive_buffer_length=4096)

@@ -4,6 +4,7 @@ from robot_messages import build_burst, read_odometry, read_transform
 
 from hero_driver.cleaning import TRANSFORMS, CleaningSettings, MessageCleaner
 from hero_driver.odometry import WheelGeometry
+from hero_driver.wheel_motion import WheelMotion
 
 TYPES = {
     "/hero_0/odom": "nav_msgs/Odometry",
@@ -52,6 +53,7 @@ def make_cleaner(namespace, outputs, is_wanted=lambda name: True, **settings):
         make_settings(**settings),
         lambda name: ListSink(name, outputs, is_wanted(name)),
         ListSink(TRANSFORMS, outputs).publish,
+        WheelMotion(),
     )
 
 

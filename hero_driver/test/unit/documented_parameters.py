@@ -65,7 +65,7 @@ GROUPS = {
     "Where robots come from": ("host", "port", "robots", "namespace_policy", "allow", "quick_acknowledge"),
     "How much one robot, and all of them, may do": ("max_*", "parameters_outside"),
     "How long the driver waits": ("*_timeout_s", "grace_s", "command_max_age_s"),
-    "Commands": ("clamp",),
+    "Commands": ("clamp", "orphan_stop_s", "start_stopped", "allow_self_tuning"),
     "Odometry": ("odometry", "wheel_*", "ticks_per_turn", "pose_covariance", "twist_covariance"),
     "Stamps, transforms, reports": ("stamps", "max_future_s", "max_age_s", "*_period_s"),
     "Others": ("*",),

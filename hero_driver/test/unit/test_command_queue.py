@@ -6,11 +6,13 @@ import threading
 import pytest
 
 from hero_driver.command_queue import IN_FLIGHT_MAX, QUEUE_LENGTH, RETRY_S, CommandQueue
-from hero_driver.command_shaping import ZERO_TWIST
+from hero_driver.command_shaping import STOPPED_MOTORS, ZERO_TWIST
 
 VELOCITY = "/hero_0/velocity_controller/cmd_vel"
 POSITION = "/hero_0/position_controller/cmd_vel"
+MOTORS = "/hero_0/cmd_motor"
 LED = "/hero_0/led"
+PULSES = struct.pack("<hh", 1400, 1600)
 
 
 def make_motion(linear_m_s):
@@ -24,8 +26,12 @@ def make_queue():
     return CommandQueue(max_age_s=2.0)
 
 
-def take(queue, now_s, in_flight_length=0, velocity_acknowledged=True):
-    return queue.take(in_flight_length, velocity_acknowledged, now_s)
+def offer(queue, name, twist, now_s):
+    queue.offer_motion(name, twist, ZERO_TWIST, now_s)
+
+
+def take(queue, now_s, in_flight_length=0, motion_acknowledged=True, holds_motion=False):
+    return queue.take(in_flight_length, motion_acknowledged, holds_motion, now_s)
 
 
 def test_an_empty_queue_is_idle_and_has_nothing_to_send():
@@ -55,10 +61,10 @@ def test_a_full_queue_drops_the_oldest_and_counts_it():
 
 def test_velocities_of_two_controllers_are_shaped_each_on_its_own():
     queue = make_queue()
-    queue.offer_velocity(VELOCITY, FAST, 0.0)
-    queue.offer_velocity(POSITION, SLOW, 0.0)
+    offer(queue, VELOCITY, FAST, 0.0)
+    offer(queue, POSITION, SLOW, 0.0)
     assert take(queue, 0.0) == [(VELOCITY, FAST), (POSITION, SLOW)]
-    queue.offer_velocity(VELOCITY, SLOW, 0.01)
+    offer(queue, VELOCITY, SLOW, 0.01)
     assert take(queue, 0.01) == []
     assert queue.due_in_s(True, 0.01) == pytest.approx(0.05)
     assert take(queue, 0.06) == [(VELOCITY, SLOW)]
@@ -68,14 +74,14 @@ def test_a_full_queue_of_other_commands_does_not_hold_up_a_stop():
     queue = make_queue()
     for _ in range(QUEUE_LENGTH):
         queue.offer(LED, bytes(16))
-    queue.offer_velocity(VELOCITY, ZERO_TWIST, 0.0)
+    offer(queue, VELOCITY, ZERO_TWIST, 0.0)
     assert take(queue, 0.0)[0] == (VELOCITY, ZERO_TWIST)
 
 
 def test_other_commands_wait_while_the_robot_has_not_acknowledged_its_window_and_a_stop_does_not():
     queue = make_queue()
     queue.offer(LED, bytes(16))
-    queue.offer_velocity(VELOCITY, ZERO_TWIST, 0.0)
+    offer(queue, VELOCITY, ZERO_TWIST, 0.0)
     assert take(queue, 0.0, in_flight_length=IN_FLIGHT_MAX) == [(VELOCITY, ZERO_TWIST)]
     assert queue.due_in_s(True, 0.0) == RETRY_S
     assert take(queue, 0.01, in_flight_length=IN_FLIGHT_MAX - 1) == [(LED, bytes(16))]
@@ -92,10 +98,10 @@ def test_other_commands_fill_the_window_and_not_much_more():
 
 def test_a_velocity_waits_until_the_one_before_it_is_acknowledged():
     queue = make_queue()
-    queue.offer_velocity(VELOCITY, FAST, 0.0)
+    offer(queue, VELOCITY, FAST, 0.0)
     take(queue, 0.0)
-    queue.offer_velocity(VELOCITY, ZERO_TWIST, 0.01)
-    assert take(queue, 0.1, velocity_acknowledged=False) == []
+    offer(queue, VELOCITY, ZERO_TWIST, 0.01)
+    assert take(queue, 0.1, motion_acknowledged=False) == []
     assert queue.due_in_s(False, 0.1) >= RETRY_S
     assert not queue.is_idle
     assert take(queue, 0.3) == [(VELOCITY, ZERO_TWIST)]
@@ -103,57 +109,73 @@ def test_a_velocity_waits_until_the_one_before_it_is_acknowledged():
 
 def test_a_motion_that_could_not_be_sent_in_time_is_dropped():
     queue = make_queue()
-    queue.offer_velocity(VELOCITY, FAST, 0.0)
+    offer(queue, VELOCITY, FAST, 0.0)
     assert take(queue, 2.1) == []
     assert queue.is_idle
 
 
 def test_a_stop_that_could_not_be_sent_in_time_is_sent_nevertheless():
     queue = make_queue()
-    queue.offer_velocity(VELOCITY, ZERO_TWIST, 0.0)
+    offer(queue, VELOCITY, ZERO_TWIST, 0.0)
     assert take(queue, 100.0) == [(VELOCITY, ZERO_TWIST)]
     assert take(queue, 100.06) == [(VELOCITY, ZERO_TWIST)]
 
 
-def test_halting_stops_the_topics_used_of_late_and_the_one_that_always_is_and_no_other():
+def test_discarding_motion_drops_what_waits_on_every_topic_and_keeps_stops():
     queue = make_queue()
-    queue.offer_velocity(POSITION, FAST, 0.0)
-    queue.offer_velocity("/hero_0/old/cmd_vel", FAST, -10.0)
-    take(queue, 0.0)
-    queue.halt(VELOCITY, 1.0)
-    for now_s in (1.0, 1.06):
-        assert sorted(take(queue, now_s)) == [(POSITION, ZERO_TWIST), (VELOCITY, ZERO_TWIST)]
+    offer(queue, VELOCITY, FAST, 0.0)
+    offer(queue, POSITION, ZERO_TWIST, 0.0)
+    queue.offer_motion(MOTORS, PULSES, STOPPED_MOTORS, 0.0)
+    queue.discard_motion(0.0)
+    assert take(queue, 0.0) == [(POSITION, ZERO_TWIST)]
+
+
+def test_discarding_motion_drops_the_waiting_commands_of_a_device():
+    queue = make_queue()
+    queue.offer("/crane/cmd_vel", FAST, is_motion=True)
+    queue.offer(LED, b"1")
+    queue.discard_motion(0.0)
+    assert take(queue, 0.0) == [(LED, b"1")]
+
+
+def test_after_motion_was_discarded_the_next_one_waits_until_it_may_go():
+    queue = make_queue()
+    offer(queue, VELOCITY, FAST, 0.0)
+    queue.discard_motion(0.1)
+    offer(queue, VELOCITY, SLOW, 0.01)
+    assert take(queue, 0.09) == []
+    assert queue.due_in_s(True, 0.09) == pytest.approx(0.01)
+    assert take(queue, 0.1) == [(VELOCITY, SLOW)]
+
+
+def test_of_servo_pulses_only_the_newest_goes_out():
+    queue = make_queue()
+    for pulse_us in range(1400, 1410):
+        queue.offer_motion(MOTORS, struct.pack("<hh", pulse_us, 1500), STOPPED_MOTORS, 0.0)
+    assert take(queue, 0.0) == [(MOTORS, struct.pack("<hh", 1409, 1500))]
     assert queue.is_idle
 
 
-def test_halting_forgets_motion_that_waits_on_every_topic():
+def test_servo_pulses_that_could_not_be_sent_in_time_are_dropped():
     queue = make_queue()
-    queue.offer_velocity(VELOCITY, SLOW, 0.0)
-    take(queue, 0.0)
-    queue.offer_velocity(VELOCITY, FAST, 0.01)
-    queue.halt(None, 0.02)
-    sent = [take(queue, 0.06 * step) for step in range(1, 5)]
-    assert sent == [[(VELOCITY, ZERO_TWIST)], [(VELOCITY, ZERO_TWIST)], [], []]
+    queue.offer_motion(MOTORS, PULSES, STOPPED_MOTORS, 0.0)
+    assert take(queue, 2.1) == []
 
 
-def test_halting_a_robot_that_nobody_drives_and_that_has_no_velocity_topic_sends_nothing():
+def test_motion_is_held_for_a_robot_that_is_not_heard_and_stops_are_not():
     queue = make_queue()
-    queue.halt(None, 0.0)
-    assert queue.is_idle
-
-
-def test_a_halt_is_not_dropped_as_too_old():
-    queue = make_queue()
-    queue.offer_velocity(VELOCITY, FAST, 0.0)
-    queue.halt(VELOCITY, 4.0)
-    assert take(queue, 10.0) == [(VELOCITY, ZERO_TWIST)]
+    offer(queue, VELOCITY, FAST, 0.0)
+    offer(queue, POSITION, ZERO_TWIST, 0.0)
+    assert take(queue, 0.0, holds_motion=True) == [(POSITION, ZERO_TWIST)]
+    assert queue.due_in_s(False, 0.0) >= RETRY_S
+    assert take(queue, 1.0)[0] == (VELOCITY, FAST)
 
 
 def test_clearing_forgets_everything_and_counts_what_waited():
     queue = make_queue()
     queue.offer(LED, b"")
     queue.offer(LED, b"")
-    queue.offer_velocity(VELOCITY, FAST, 0.0)
+    offer(queue, VELOCITY, FAST, 0.0)
     queue.clear()
     assert queue.is_idle
     assert queue.dropped == 2
@@ -165,13 +187,13 @@ def test_many_threads_may_offer_at_once_and_nothing_is_lost_uncounted():
     barrier = threading.Barrier(5)
     taken = []
 
-    def offer(number):
+    def offer_many(number):
         barrier.wait()
         for step in range(500):
             queue.offer(LED, bytes([number]))
-            queue.offer_velocity(VELOCITY, FAST, step * 0.001)
+            offer(queue, VELOCITY, FAST, step * 0.001)
 
-    threads = [threading.Thread(target=offer, args=(number,)) for number in range(4)]
+    threads = [threading.Thread(target=offer_many, args=(number,)) for number in range(4)]
     for thread in threads:
         thread.start()
     barrier.wait()

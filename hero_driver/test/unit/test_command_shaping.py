@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from hero_driver.command_shaping import (
     COMMAND_INTERVAL_S,
-    HALTED_MOTORS,
+    STOPPED_MOTORS,
     ZERO_TWIST,
-    VelocityShaper,
+    MotionShaper,
     check_twist,
 )
 
@@ -74,15 +74,15 @@ def test_only_the_two_components_that_the_robot_uses_make_a_stop():
     assert check_twist(make_twist(0.0, -0.1), False) == make_twist(0.0, -0.1)
 
 
-def test_halted_motors_are_two_pulses_of_1500_us():
-    assert bytes.fromhex("dc05 dc05") == HALTED_MOTORS
+def test_stopped_motors_are_two_pulses_of_1500_us():
+    assert bytes.fromhex("dc05 dc05") == STOPPED_MOTORS
 
 
 # Shaping.
 
 
 def test_a_first_command_goes_out_at_once_and_unchanged():
-    shaper = VelocityShaper()
+    shaper = MotionShaper()
     shaper.offer(make_motion(1))
     assert shaper.due_in_s(5.0) == 0.0
     assert shaper.take(5.0) == make_twist(1)
@@ -92,7 +92,7 @@ def test_a_first_command_goes_out_at_once_and_unchanged():
 
 
 def test_the_newest_of_several_commands_goes_out_when_the_interval_has_passed():
-    shaper = VelocityShaper()
+    shaper = MotionShaper()
     shaper.offer(make_motion(1))
     assert shaper.take(0.0) == make_twist(1)
     for number in (2, 3, 4):
@@ -104,7 +104,7 @@ def test_the_newest_of_several_commands_goes_out_when_the_interval_has_passed():
 
 
 def test_a_stop_goes_out_twice():
-    shaper = VelocityShaper()
+    shaper = MotionShaper()
     shaper.offer(ZERO_TWIST)
     assert shaper.take(0.0) == ZERO_TWIST
     assert not shaper.is_idle
@@ -115,7 +115,7 @@ def test_a_stop_goes_out_twice():
 
 
 def test_a_stop_right_after_a_command_waits_for_the_interval_and_is_sent():
-    shaper = VelocityShaper()
+    shaper = MotionShaper()
     shaper.offer(make_motion(1))
     shaper.take(0.0)
     shaper.offer(ZERO_TWIST)
@@ -124,21 +124,21 @@ def test_a_stop_right_after_a_command_waits_for_the_interval_and_is_sent():
 
 
 def test_a_stop_replaces_a_motion_that_waits():
-    shaper = VelocityShaper()
+    shaper = MotionShaper()
     shaper.offer(make_motion(1))
     shaper.offer(ZERO_TWIST)
     assert [shaper.take(step * 0.06) for step in range(3)] == [ZERO_TWIST, ZERO_TWIST, None]
 
 
 def test_a_motion_does_not_replace_a_stop_that_waits():
-    shaper = VelocityShaper()
+    shaper = MotionShaper()
     shaper.offer(ZERO_TWIST)
     shaper.offer(make_motion(1))
     assert [shaper.take(step * 0.06) for step in range(3)] == [ZERO_TWIST, make_twist(1), None]
 
 
 def test_a_motion_takes_the_place_of_the_second_stop():
-    shaper = VelocityShaper()
+    shaper = MotionShaper()
     shaper.offer(ZERO_TWIST)
     assert shaper.take(0.0) == ZERO_TWIST
     shaper.offer(make_motion(1))
@@ -146,20 +146,20 @@ def test_a_motion_takes_the_place_of_the_second_stop():
 
 
 def test_stops_in_a_row_are_not_queued_up():
-    shaper = VelocityShaper()
+    shaper = MotionShaper()
     for _ in range(100):
         shaper.offer(ZERO_TWIST)
     assert [shaper.take(step * 0.06) for step in range(3)] == [ZERO_TWIST, ZERO_TWIST, None]
 
 
 def test_a_stop_with_other_components_goes_out_as_plain_zero():
-    shaper = VelocityShaper()
+    shaper = MotionShaper()
     shaper.offer(check_twist(make_twist(0.0, 0.0, (1.0, 1.0, 1.0, 1.0)), False))
     assert shaper.take(0.0) == ZERO_TWIST
 
 
 def test_discarding_motion_keeps_stops():
-    shaper = VelocityShaper()
+    shaper = MotionShaper()
     shaper.offer(ZERO_TWIST)
     shaper.offer(make_motion(1))
     shaper.discard_motion()
@@ -178,7 +178,7 @@ def run(script):
 
     Return what was offered, as (how many were sent before, number), and what was sent, as (ms, number).
     """
-    shaper = VelocityShaper()
+    shaper = MotionShaper()
     offered, sent = [], []
     now_ms = 0
     for pause_ms, number in [*script, (60, None), (60, None), (60, None)]:
@@ -247,7 +247,7 @@ def test_a_robot_that_drops_commands_within_its_gate_ends_up_as_last_commanded(s
 
 @given(script=steps)
 def test_due_in_s_says_when_take_has_something(script):
-    shaper = VelocityShaper()
+    shaper = MotionShaper()
     now_s = 0.0
     for pause_ms, number in script:
         now_s += pause_ms / 1000.0

@@ -83,7 +83,7 @@ def test_values_come_where_they_belong():
 
 def test_an_unknown_parameter_is_refused_with_the_name_that_was_meant():
     assert "did you mean ~silence_timeout_s?" in refuse("silence_timeout", 5.0)
-    assert "known are: allow, clamp," in refuse("xyzzy", 1)
+    assert "known are: allow, allow_self_tuning, clamp," in refuse("xyzzy", 1)
     assert "did you mean" not in refuse("xyzzy", 1)
 
 

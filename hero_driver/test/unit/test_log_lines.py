@@ -61,7 +61,7 @@ def test_what_only_resembles_a_heartbeat_is_none(text):
     ],
 )
 def test_the_firmwares_texts_lose_colours_and_the_name_and_nothing_else(text, clean):
-    assert read_log_line(text) == (clean, None, None, False)
+    assert read_log_line(text) == (clean, None, None, None, False)
 
 
 @pytest.mark.parametrize(

@@ -114,7 +114,7 @@ class EventLoop(LinkOwner, DiallerOwner):
             while self._running:
                 self._run_once()
         except BaseException:
-            self._handler.halt_directly()
+            self._handler.stop_without_loop()
             raise
         finally:
             self._close_all()

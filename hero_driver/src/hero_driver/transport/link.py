@@ -52,8 +52,8 @@ class LinkHandler:
         """One of the calls above, or one made for the loop, raised error; the loop goes on."""
         raise NotImplementedError
 
-    def halt_directly(self) -> None:
-        """The loop itself has broken and ends after this: say the last words to all links, however long it takes."""
+    def stop_without_loop(self) -> None:
+        """The loop itself has broken and ends after this: stop what moves at the other ends; this may block."""
         raise NotImplementedError
 
     def report_trouble(self, text: str) -> None:

@@ -1,0 +1,46 @@
+"""One connection and what is known of it. Thread of the sockets."""
+
+from dataclasses import dataclass, field
+from typing import List, Optional
+
+from . import log_lines
+from .admission import RateGuard
+from .fleet import RobotRecord
+from .robot_bridge import RobotBridge
+from .rosserial.payloads import Log
+from .rosserial.session import Session, Topic
+from .stop_progress import StopProgress
+from .transport import Link
+
+
+@dataclass
+class Peer:
+    """One connection and what is known of who is at its other end."""
+
+    link: Link
+    session: Session
+    guard: RateGuard
+    record: Optional[RobotRecord] = None
+    bridge: Optional[RobotBridge] = None
+    refused: bool = (
+        False  # a duplicate: kept open and ignored, so that it does not dial in 20 times per second
+    )
+    boot: Optional[log_lines.BootLine] = None
+    early_logs: List[Log] = field(default_factory=list)
+    early_topics: List[Topic] = field(default_factory=list)  # /tf, declared before a name that tells who it is
+    log_window_s: float = 0.0
+    log_count: int = 0
+    motion_mark: int = 0  # how much was written when the last motion command was
+    send_due: bool = False
+    stop: Optional[StopProgress] = None  # while the robot is stopped
+
+    @property
+    def label(self) -> str:
+        """How log lines call this peer."""
+        if self.bridge is not None:
+            return self.bridge.label
+        return str(self.link.address)
+
+    def has_acknowledged_motion(self) -> bool:
+        """Return whether the robot's TCP has acknowledged the last motion command."""
+        return self.link.handed_length - self.link.read_unacknowledged_length() >= self.motion_mark

@@ -1,0 +1,66 @@
+"""What robots log: versions at boot, uptime, self-tuning, and lines for /rosout. Thread of the sockets."""
+
+from . import log_lines
+from .fleet import RobotRecord
+from .log_relay import LogRelay
+from .peer import Peer
+from .rosserial.payloads import LOG_DEBUG, LOG_ERROR, LOG_FATAL, LOG_INFO, LOG_WARN, Log
+
+LEVELS = {LOG_DEBUG: "debug", LOG_INFO: "info", LOG_WARN: "warn", LOG_ERROR: "error", LOG_FATAL: "fatal"}
+
+LINES_PER_S = 100
+"""Log lines of one robot that reach /rosout; a robot that tunes its motors sends 47 per second."""
+
+EARLY_LINES_MAX = 10
+"""Lines that are kept until a robot has said who it is."""
+
+REBOOT_SLACK_S = 2.0
+"""Delays of the network move the time of boot as seen from here by less than this."""
+
+
+class RobotLog:
+    """Where the log lines of all robots go."""
+
+    def __init__(self, log: LogRelay) -> None:
+        self._log = log
+
+    def receive(self, peer: Peer, log: Log, now_s: float) -> None:
+        """Take a line of a robot: note what it tells, and pass it on."""
+        line = log_lines.read_log_line(log.text)
+        if line.boot is not None:
+            peer.boot = line.boot
+        if peer.bridge is None or peer.record is None:
+            if len(peer.early_logs) < EARLY_LINES_MAX:
+                peer.early_logs.append(log)
+            return
+        if peer.refused:
+            return
+        record = peer.record
+        if line.boot is not None:
+            record.firmware, record.hardware, record.config = line.boot
+        if line.tunes is not None:
+            peer.bridge.note_tuning(line.tunes)
+        if line.heartbeat is not None:
+            self._receive_heartbeat(peer, record, line.heartbeat.uptime_s, now_s)
+        if now_s - peer.log_window_s >= 1.0:
+            peer.log_window_s, peer.log_count = now_s, 0
+        peer.log_count += 1
+        if peer.log_count > LINES_PER_S:
+            record.dropped_messages += 1
+            return
+        level = "debug" if line.is_routine else LEVELS.get(log.level, "error")
+        self._log.log(level, "%s: %s" % (peer.label, line.text))
+
+    def _receive_heartbeat(self, peer: Peer, record: RobotRecord, uptime_s: float, now_s: float) -> None:
+        booted_s = now_s - uptime_s
+        if record.booted_s is not None and booted_s - record.booted_s > REBOOT_SLACK_S:
+            self._log.log("warn", "%s rebooted %.1f s ago" % (peer.label, uptime_s))
+            if peer.bridge is not None and peer.bridge.cleaner is not None and peer.boot is None:
+                peer.bridge.cleaner.note_reboot()
+        # Delays of the network only make a boot look later, so the earliest is the best.
+        if (
+            record.booted_s is None
+            or booted_s < record.booted_s
+            or booted_s - record.booted_s > REBOOT_SLACK_S
+        ):
+            record.booted_s = booted_s

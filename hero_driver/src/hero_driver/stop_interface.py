@@ -1,0 +1,121 @@
+"""How ROS programs stop all robots of the driver: the service ~stop, the topic ~stop_request, and what is kept.
+
+Programs connect to ~stop_request at their start, so that it works while the ROS master is dead, hung or slow, and ask
+until ~robots says that the robots are stopped. Whether they are is kept on the parameter server (~stopped) for a driver
+that is started again under the same name.
+"""
+
+import queue
+from typing import Any, Callable, List
+
+import rospy
+from std_msgs.msg import Bool
+from std_srvs.srv import SetBool, SetBoolResponse
+
+from .fleet import RobotState
+from .gateway import Gateway
+from .log_relay import LogRelay
+from .robot_status import RobotStatus
+from .stop_progress import StopState
+from .worker import Worker
+
+PARAMETER = "~stopped"
+
+ANSWER_WAIT_S = 0.5
+"""The thread of the sockets answers within milliseconds; a service call must not hang where it does not."""
+
+
+class StopInterface:
+    """The stop of all robots, as ROS sees it."""
+
+    def __init__(
+        self,
+        gateway: Gateway,
+        call_soon: Callable[[Callable[[], None]], None],
+        list_robots: Callable[[], List[RobotStatus]],
+        log: LogRelay,
+    ) -> None:
+        """call_soon() is the loop's; list_robots() is called on the thread of the sockets."""
+        self._gateway = gateway
+        self._call_soon = call_soon
+        self._list_robots = list_robots
+        self._log = log
+        self._publisher: rospy.Publisher
+        self._service: rospy.Service
+        self._keeper = Worker("stop parameter", 100, self._report_lost_parameter)
+
+    def open(self, stopped: bool) -> None:
+        """Serve; begin as stopped says. The loop does not run yet."""
+        self._gateway.set_stopped(stopped)
+        if stopped:
+            self._log.log("warn", "all robots are stopped from the start, until ~stop releases them")
+        self._publisher = rospy.Publisher("~stopped", Bool, queue_size=1, latch=True)
+        self._publisher.publish(Bool(stopped))
+        rospy.Subscriber("~stop_request", Bool, self._take_request, queue_size=10, tcp_nodelay=True)
+        self._service = rospy.Service("~stop", SetBool, self._serve)
+
+    def keep(self) -> None:
+        """Write down whether robots are stopped, after each change and for a ROS master that was started again."""
+        self._keeper.submit(lambda: rospy.set_param(PARAMETER, self._gateway.stopped))
+
+    def close(self) -> None:
+        """Keep nothing any more; safe to call twice."""
+        self._keeper.close()
+
+    def _serve(self, request: Any) -> SetBoolResponse:
+        stopped = bool(request.data)
+        answers: queue.Queue[List[RobotStatus]] = queue.Queue()
+
+        def set_and_answer() -> None:
+            self._set(stopped)
+            answers.put(self._list_robots())
+
+        self._call_soon(set_and_answer)
+        try:
+            robots = answers.get(timeout=ANSWER_WAIT_S)
+        except queue.Empty:
+            return SetBoolResponse(False, "NOT STOPPED: the driver hangs" if stopped else "the driver hangs")
+        return SetBoolResponse(True, describe_stop(robots) if stopped else "robots may move")
+
+    def _take_request(self, message: Bool) -> None:
+        stopped = bool(message.data)
+        self._call_soon(lambda: self._set(stopped))
+
+    def _set(self, stopped: bool) -> None:
+        """Runs on the thread of the sockets."""
+        changed = stopped is not self._gateway.stopped
+        if not changed and not stopped:
+            return
+        self._gateway.set_stopped(stopped)
+        if changed:
+            # Published and written elsewhere: both may block.
+            self._keeper.submit(lambda: self._publisher.publish(Bool(stopped)))
+            self.keep()
+            self._log.log("warn", "stopping all robots" if stopped else "robots may move")
+
+    def _report_lost_parameter(self, error: BaseException) -> None:
+        self._log.log(
+            "warn",
+            "whether robots are stopped cannot be kept on the parameter server (%s): a driver that is started again"
+            " begins without it" % error,
+        )
+
+
+def describe_stop(robots: List[RobotStatus]) -> str:
+    """Return how far the stop of all robots has come, for people."""
+    groups = (
+        ("still moving", (StopState.MOVING,)),
+        ("being stopped", (StopState.STOPPING,)),
+        ("not confirmed, they send no readings of their wheels", (StopState.UNCONFIRMED,)),
+    )
+    connected = [robot for robot in robots if robot.state is not RobotState.AWAY]
+    resting = sum(robot.stop_state is StopState.AT_REST for robot in connected)
+    parts = ["%d at rest" % resting]
+    for text, states in groups:
+        names = [robot.namespace.lstrip("/") for robot in connected if robot.stop_state in states]
+        if names:
+            parts.append("%d %s: %s" % (len(names), text, ", ".join(names)))
+    away = [robot.namespace.lstrip("/") for robot in robots if robot.state is RobotState.AWAY]
+    if away:
+        parts.append("%d away, stopped when they return: %s" % (len(away), ", ".join(away)))
+    return "; ".join(parts)

@@ -1,0 +1,61 @@
+"""Whether the wheels of one robot turn, from its encoder readings, or from odometry where it has no encoder. Pure.
+
+Rest is counted in readings (29 per second of the robot's own time), not in time of arrival: readings that a
+network held back arrive all at once.
+"""
+
+REST_TICKS = 1.0
+"""A wheel at rest on the edge of a tick (0.54 mm) counts it back and forth."""
+
+REST_READINGS = 5
+"""Readings without a turn after which wheels are at rest: 0.17 s; 6 mm/s and more would show."""
+
+LINEAR_REST_M_S = 0.002
+ANGULAR_REST_RAD_S = 0.05
+"""Odometry's twist of a robot at rest stays within these."""
+
+
+class WheelMotion:
+    """What the readings of one connection tell.
+
+    Attributes:
+        readings: how many came.
+        still_readings: how many came since a wheel was last seen to turn.
+    """
+
+    def __init__(self) -> None:
+        self.readings = 0
+        self.still_readings = 0
+        self._has_anchor = False
+        self._left_ticks = self._right_ticks = 0.0
+
+    def restart(self) -> None:
+        """A new connection begins."""
+        self.readings = self.still_readings = 0
+        self._has_anchor = False
+
+    def forget_ticks(self) -> None:
+        """The robot sets its counters to zero, which is no turn of a wheel."""
+        self._has_anchor = False
+
+    def read_ticks(self, left_ticks: float, right_ticks: float) -> None:
+        """Take a reading of the wheels' counters."""
+        self.readings += 1
+        if (
+            -REST_TICKS <= left_ticks - self._left_ticks <= REST_TICKS
+            and -REST_TICKS <= right_ticks - self._right_ticks <= REST_TICKS
+            and self._has_anchor
+        ):
+            self.still_readings += 1
+            return
+        # Of the first reading nobody can tell.
+        if self._has_anchor:
+            self.still_readings = 0
+        self._has_anchor = True
+        self._left_ticks, self._right_ticks = left_ticks, right_ticks
+
+    def read_velocity(self, linear_m_s: float, angular_rad_s: float) -> None:
+        """Take a velocity from odometry."""
+        self.readings += 1
+        is_still = abs(linear_m_s) <= LINEAR_REST_M_S and abs(angular_rad_s) <= ANGULAR_REST_RAD_S
+        self.still_readings = self.still_readings + 1 if is_still else 0

@@ -1,0 +1,141 @@
+"""The stop of one robot: how often it is sent, and when its wheels confirm it. Time and readings are the test's."""
+
+import pytest
+
+from hero_driver.stop_progress import (
+    REPORT_AFTER_S,
+    TIRED_AFTER_S,
+    StopProgress,
+    StopState,
+)
+from hero_driver.wheel_motion import WheelMotion
+
+READING_S = 0.034
+STEP_S = 0.002
+
+
+class Robot:
+    """A robot whose wheels turn at the speed that turns(now_s) gives (ticks per second), read 29 times a second."""
+
+    def __init__(self, turns, reads=True, is_acknowledged=lambda now_s: True, warm_up=0):
+        self.wheels = WheelMotion()
+        self.turns = turns
+        self.reads = reads
+        self.is_acknowledged = is_acknowledged
+        self.ticks = 0.0
+        self.now_s = 100.0
+        self.next_reading_s = 100.0
+        self.sent_s = []
+        self.bursts = []
+        for _ in range(warm_up):
+            self.wheels.read_ticks(0.0, 0.0)
+        self.stop = StopProgress(self.now_s, self.wheels)
+
+    def run(self, until_s, tunes=False):
+        """Run to until_s after the beginning; return the states in order, each once."""
+        states = []
+        while self.now_s < 100.0 + until_s:
+            if self.now_s >= self.next_reading_s:
+                self.next_reading_s += READING_S
+                self.ticks += self.turns(self.now_s - 100.0) * READING_S
+                if self.reads:
+                    self.wheels.read_ticks(self.ticks, self.ticks)
+            if self.stop.is_due(self.is_acknowledged(self.now_s - 100.0), self.now_s):
+                burst = self.stop.needs_burst(tunes, self.now_s)
+                self.stop.note_sent(burst, self.now_s)
+                self.sent_s.append(self.now_s - 100.0)
+                self.bursts.append(burst)
+            if not states or states[-1] is not self.stop.state:
+                states.append(self.stop.state)
+            self.now_s += STEP_S
+        return states
+
+
+def test_the_first_stop_goes_at_once_and_the_next_beyond_the_firmwares_gate():
+    robot = Robot(lambda now_s: 0.0)
+    robot.run(0.2)
+    assert robot.sent_s[0] == 0.0
+    assert all(later - earlier > 0.05 for earlier, later in zip(robot.sent_s, robot.sent_s[1:]))
+
+
+def test_a_robot_at_rest_is_confirmed_and_gets_no_more():
+    robot = Robot(lambda now_s: 0.0, warm_up=20)
+    assert robot.run(1.0) == [StopState.STOPPING, StopState.AT_REST]
+    sent = len(robot.sent_s)
+    robot.run(10.0)
+    assert len(robot.sent_s) == sent <= 5
+
+
+def test_readings_of_before_the_stop_confirm_nothing():
+    robot = Robot(lambda now_s: 0.0, reads=False, warm_up=20)
+    assert StopState.AT_REST not in robot.run(3.0)
+
+
+def test_a_robot_that_moves_is_told_until_its_wheels_rest():
+    robot = Robot(lambda now_s: 186.0 if now_s < 0.3 else 0.0)
+    assert robot.run(0.7) == [StopState.STOPPING, StopState.AT_REST]
+    assert robot.sent_s[-1] >= 0.3
+
+
+def test_a_robot_that_goes_on_is_reported_and_told_less_often_for_ever():
+    robot = Robot(lambda now_s: 186.0)
+    assert robot.run(20.0) == [StopState.STOPPING, StopState.MOVING]
+    late = [sent_s for sent_s in robot.sent_s if sent_s > TIRED_AFTER_S + 1.0]
+    assert all(later - earlier >= 1.0 for earlier, later in zip(late, late[1:]))
+    assert late[-1] > 18.0
+
+
+def test_wheels_that_are_pushed_after_rest_are_seen_and_stopped_again():
+    robot = Robot(lambda now_s: 186.0 if 1.0 < now_s < 1.5 else 0.0)
+    assert robot.run(5.0) == [StopState.STOPPING, StopState.AT_REST, StopState.MOVING, StopState.AT_REST]
+    assert any(sent_s > 1.0 for sent_s in robot.sent_s)
+
+
+def test_a_robot_without_readings_is_told_three_times_and_unconfirmed():
+    robot = Robot(lambda now_s: 0.0, reads=False)
+    assert robot.run(20.0) == [StopState.STOPPING, StopState.UNCONFIRMED]
+    assert len(robot.sent_s) == 3
+
+
+def test_a_robot_whose_readings_stopped_is_unconfirmed_until_they_come_again():
+    robot = Robot(lambda now_s: 0.0, reads=False, warm_up=20)
+    assert robot.run(REPORT_AFTER_S + 0.5) == [StopState.STOPPING, StopState.UNCONFIRMED]
+    robot.reads = True
+    assert robot.run(REPORT_AFTER_S + 1.0)[-1] is StopState.AT_REST
+
+
+def test_no_stops_pile_up_in_front_of_a_robot_that_acknowledges_nothing():
+    robot = Robot(lambda now_s: 186.0, reads=False, is_acknowledged=lambda now_s: now_s > 3.0, warm_up=20)
+    assert robot.run(3.0) == [StopState.STOPPING]
+    assert robot.sent_s == [0.0]
+    robot.run(3.5)
+    assert len(robot.sent_s) > 1
+
+
+def test_a_robot_that_tunes_itself_gets_bursts_from_the_first_stop_on():
+    robot = Robot(lambda now_s: 186.0)
+    robot.run(0.5, tunes=True)
+    assert all(robot.bursts)
+    assert all(later - earlier >= 0.15 for earlier, later in zip(robot.sent_s, robot.sent_s[1:]))
+
+
+def test_wheels_that_zeros_do_not_stop_get_bursts_too():
+    robot = Robot(lambda now_s: 186.0)
+    robot.run(1.0)
+    assert not robot.bursts[0]
+    assert all(robot.bursts[-2:])
+
+
+def test_asking_again_brings_the_next_stop_forward():
+    robot = Robot(lambda now_s: 186.0)
+    robot.run(8.2)
+    sent = len(robot.sent_s)
+    robot.stop.renew(robot.now_s)
+    robot.run(8.21)
+    assert len(robot.sent_s) == sent + 1
+
+
+@pytest.mark.parametrize("ticks_per_s", [12.0, 50.0, 400.0])
+def test_no_speed_above_a_tick_per_rest_window_passes_for_rest(ticks_per_s):
+    robot = Robot(lambda now_s: ticks_per_s)
+    assert StopState.AT_REST not in robot.run(3.0)

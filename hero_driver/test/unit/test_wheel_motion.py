@@ -1,0 +1,65 @@
+"""When wheels are at rest, from ticks and from odometry."""
+
+import math
+
+import pytest
+
+from hero_driver.wheel_motion import REST_READINGS, WheelMotion
+
+
+def read_all(wheels, ticks):
+    for left, right in ticks:
+        wheels.read_ticks(left, right)
+
+
+def test_the_first_reading_tells_of_no_turn_and_counts():
+    wheels = WheelMotion()
+    wheels.read_ticks(1000.0, -1000.0)
+    assert (wheels.readings, wheels.still_readings) == (1, 0)
+
+
+def test_a_wheel_on_the_edge_of_a_tick_is_at_rest():
+    wheels = WheelMotion()
+    read_all(wheels, [(5.0 + step % 2, 7.0) for step in range(10)])
+    assert wheels.still_readings == 9
+
+
+@pytest.mark.parametrize("turned", [(7.0, 7.0), (5.0, 9.0), (3.0, 7.0)])
+def test_a_turn_of_either_wheel_starts_the_count_anew(turned):
+    wheels = WheelMotion()
+    read_all(wheels, [(5.0, 7.0)] * 4 + [turned])
+    assert wheels.still_readings == 0
+    wheels.read_ticks(*turned)
+    assert wheels.still_readings == 1
+
+
+def test_slow_creep_adds_up_to_a_turn():
+    wheels = WheelMotion()
+    read_all(wheels, [(0.2 * step, 0.0) for step in range(6)])
+    assert wheels.still_readings == 5
+    wheels.read_ticks(1.2, 0.0)
+    assert wheels.still_readings == 0
+
+
+def test_counters_that_are_set_to_zero_are_no_turn():
+    wheels = WheelMotion()
+    read_all(wheels, [(500.0, 600.0)] * REST_READINGS)
+    wheels.forget_ticks()
+    read_all(wheels, [(0.0, 0.0)] * 2)
+    assert wheels.still_readings == REST_READINGS
+
+
+def test_a_new_connection_knows_nothing_of_the_last_one():
+    wheels = WheelMotion()
+    read_all(wheels, [(1.0, 1.0)] * 9)
+    wheels.restart()
+    assert (wheels.readings, wheels.still_readings) == (0, 0)
+
+
+@pytest.mark.parametrize("velocity", [(0.01, 0.0), (0.0, 0.2), (math.nan, 0.0)])
+def test_a_velocity_of_odometry_that_is_not_zero_is_a_turn(velocity):
+    wheels = WheelMotion()
+    wheels.read_velocity(0.0, 0.0)
+    assert wheels.still_readings == 1
+    wheels.read_velocity(*velocity)
+    assert (wheels.readings, wheels.still_readings) == (2, 0)
