@@ -3,6 +3,7 @@
 import queue
 import socket
 import struct
+import threading
 
 import pytest
 
@@ -89,21 +90,23 @@ def test_a_hundred_that_wait_in_the_middle_hold_up_nobody(server):
 
 
 def test_a_connection_that_is_served_slowly_holds_up_nobody(server):
-    released = queue.Queue()
+    first_is_served, released = threading.Event(), threading.Event()
 
     def serve(sock, address, header):
-        if not server.served.qsize():
-            server.served.put(None)
-            released.get(timeout=DEADLINE_S)
+        if address == first.getsockname():
+            first_is_served.set()
+            released.wait(DEADLINE_S)
         server.served.put((sock, address, header))
 
     server.reader = HandshakeReader(serve)
     server.reader.open()
-    server.connect(HEADER)
+    first = server.connect()
+    first.sendall(HEADER)
+    assert first_is_served.wait(DEADLINE_S)
     second = server.connect(HEADER)
-    first_sign, (_, address, _) = server.served.get(timeout=DEADLINE_S), server.take()
-    released.put(None)
-    assert (first_sign, address) == (None, second.getsockname())
+    address = server.take()[1]
+    released.set()
+    assert address == second.getsockname()
 
 
 def test_a_header_that_does_not_come_in_time_ends_the_connection(server):
