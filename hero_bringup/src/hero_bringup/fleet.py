@@ -3,35 +3,38 @@
     rosrun hero_bringup fleet                  a table like top, redrawn in place
     rosrun hero_bringup fleet --once --json    the fleet as one line of JSON, for scripts
 
-Shows the robots of all drivers. Only listens, but for the keys s and d: they call the services stop and disconnect of
-the drivers. Messages of robots are kept as bytes and read when the table is drawn, so that fifty robots cost little.
+Shows the robots of all drivers. Only listens, except for the keys: s and r ask all drivers to stop all robots and to
+release them, d calls the service disconnect. Messages of robots are kept as bytes and read when the table is drawn, so
+that fifty robots cost little. Only threads of their own wait for the ROS master.
 """
 
 import argparse
-import select
+import contextlib
 import shutil
-import signal
 import sys
 import threading
 import time
-from types import FrameType
-from typing import Dict, List, Optional, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Dict, List, Optional, Sequence, Set
 
-import rosgraph
 import rospy
 
 from hero_examples.drivers import Drivers
 from hero_examples.keyboard import Keyboard, NoTerminalError
+from hero_examples.program import Program
+from hero_examples.program import run as run_program
+from hero_examples.stop_status import StopStatus
 from hero_msgs.msg import Robot
 from hero_msgs.srv import Disconnect
 
 from .fleet_state import RobotRow, RobotTrack, find_missing, sort_rows
 from .fleet_table import format_json, format_table, format_title
-from .robot_listener import STATES, RobotListener
+from .robot_listener import STATES, STOP_STATES, RobotListener
 
 ORDERS = ("id", "state", "nearest")
 DRIVER_TIMEOUT_S = 10.0  # how long --once waits for a driver that is just starting
 DRAW_PERIOD_S = 0.5
+ASKING_DRAW_PERIOD_S = 0.1  # while people wait for a stop
 ENTER_SCREEN = (
     "\x1b[?1049h\x1b[?25l"  # xterm: the alternate screen, so that what was there comes back; no cursor
 )
@@ -39,7 +42,10 @@ LEAVE_SCREEN = "\x1b[?25h\x1b[?1049l"
 HOME = "\x1b[H"
 CLEAR_LINE_END = "\x1b[K"
 CLEAR_SCREEN_END = "\x1b[J"
-KEYS_HELP = "q ends   s stops all robots, or lets them go   o order   up, down choose   d disconnects the chosen robot"
+COLOURS = {"info": "", "warn": "\x1b[33m", "error": "\x1b[1;31m"}  # yellow, bold red
+END_COLOUR = "\x1b[0m"
+KEYS_HELP = "q ends   s STOPS ALL ROBOTS   r releases them   o order   up, down choose   d disconnects the chosen robot"
+MAX_OPTION = 1e6
 
 
 class FleetListener:
@@ -49,32 +55,42 @@ class FleetListener:
         self.heard = False
         self.listening = ""
         self.stopped = False
-        self._drivers = Drivers()
+        self.drivers = Drivers()
         self._listeners: Dict[str, RobotListener] = {}
+        self._asked: Set[str] = set()
+        self._worker = ThreadPoolExecutor(1, "subscriptions")
 
-    def wait_for_driver(self, timeout_s: float) -> bool:
+    def wait_for_driver(self, program: Program, timeout_s: float) -> bool:
         """Return as soon as every driver was heard, and whether one was heard in that time."""
         end_s = time.monotonic() + timeout_s
-        while not (self._drivers.read() and self._drivers.is_settled) and time.monotonic() < end_s:
-            time.sleep(0.02)
-        return self._drivers.read() is not None
+        while not (self.drivers.read() and self.drivers.is_settled) and time.monotonic() < end_s:
+            if not program.sleep(0.02):
+                break
+        return self.drivers.read() is not None
 
     def read_rows(self, now_s: float) -> List[RobotRow]:
         """Return the fleet as it is; listens from now on to robots that are new."""
-        report = self._drivers.read()
+        report = self.drivers.read()
         if report is None:
             return []
         self.heard, self.listening, self.stopped = True, report.listening, report.stopped
-        robots = report.robots
-        present = {robot.namespace for robot in robots if robot.namespace}
-        for namespace in present - set(self._listeners):
-            self._listeners[namespace] = RobotListener(namespace)
-        for namespace in set(self._listeners) - present:
-            self._listeners.pop(namespace).close()
-        return [self._make_row(robot, now_s) for robot in robots]
+        present = {robot.namespace for robot in report.robots if robot.namespace and robot.state != Robot.REFUSED}
+        for namespace in present - self._asked:
+            self._worker.submit(self._open_listener, namespace)
+        for namespace in self._asked - present:
+            self._worker.submit(self._close_listener, namespace)
+        self._asked = present
+        return [self._make_row(robot, now_s) for robot in report.robots]
+
+    def _open_listener(self, namespace: str) -> None:
+        self._listeners[namespace] = RobotListener(namespace)
+
+    def _close_listener(self, namespace: str) -> None:
+        self._listeners.pop(namespace).close()
 
     def _make_row(self, robot: Robot, now_s: float) -> RobotRow:
-        listener = self._listeners.get(robot.namespace)
+        # What comes under the name of a robot that was refused is not its own.
+        listener = None if robot.state == Robot.REFUSED else self._listeners.get(robot.namespace)
         if listener is not None:
             listener.read_newest()
         track = listener.track if listener is not None else RobotTrack()
@@ -83,6 +99,7 @@ class FleetListener:
             namespace=robot.namespace,
             address=robot.address,
             state=STATES.get(robot.state, str(robot.state)),
+            stop_state=STOP_STATES.get(robot.stop_state, str(robot.stop_state)),
             odom_hz=track.odometry.rate_hz(now_s),
             frames_per_s=robot.frames_per_s,
             bytes_per_s=robot.bytes_per_s,
@@ -97,27 +114,17 @@ class FleetListener:
             last_error=robot.last_error,
         )
 
-    def toggle_stop(self) -> None:
-        """Ask the drivers to stop all robots, or to let them go again, without waiting for their answers."""
-        self._drivers.stop(not self.stopped, log_failure)
-
     def disconnect(self, robot: str, news: List[str]) -> None:
         """Ask the robot's driver to close its connection; what came of it is added to the news later."""
-        driver = self._drivers.find("/" + robot)
+        driver = self.drivers.find("/" + robot)
         threading.Thread(target=call_disconnect, args=(driver, robot, news), daemon=True).start()
-
-
-def log_failure(driver: str, failure: Optional[str]) -> None:
-    """Say why a driver did not do what it was asked for."""
-    if failure is not None:
-        rospy.logerr(failure)
 
 
 def call_disconnect(driver: str, robot: str, news: List[str]) -> None:
     """Call a driver's disconnect service, and add what came of it to the news."""
     try:
         news.append(rospy.ServiceProxy(driver + "/disconnect", Disconnect)(robot).message)
-    except rospy.ServiceException as error:
+    except (rospy.ServiceException, rospy.ROSException, OSError) as error:
         news.append("%s is not disconnected: %s" % (robot, error))
 
 
@@ -133,8 +140,9 @@ class Screen:
         return self
 
     def __exit__(self, kind, error, traceback) -> None:  # type: ignore[no-untyped-def]
-        sys.stdout.write(LEAVE_SCREEN)
-        sys.stdout.flush()
+        with contextlib.suppress(OSError):  # the terminal may be closed
+            sys.stdout.write(LEAVE_SCREEN)
+            sys.stdout.flush()
         self._keyboard.__exit__(kind, error, traceback)
 
     def draw(self, lines: Sequence[str]) -> None:
@@ -143,9 +151,9 @@ class Screen:
         sys.stdout.write(HOME + text + CLEAR_SCREEN_END)
         sys.stdout.flush()
 
-    def wait_for_keys(self, timeout_s: float) -> Optional[List[str]]:
+    def wait_for_keys(self, program: Program, timeout_s: float) -> Optional[List[str]]:
         """Return the keys pressed within the time; None if the terminal is gone."""
-        if select.select([self._keyboard], [], [], max(0.0, timeout_s))[0]:
+        if program.wait_readable([self._keyboard.fileno()], timeout_s):
             return self._keyboard.read_keys()
         return []
 
@@ -153,7 +161,8 @@ class Screen:
 class FleetProgram:
     """The program: listens, shows, and says at the end whether the robots that were expected came and moved."""
 
-    def __init__(self, options: argparse.Namespace) -> None:
+    def __init__(self, program: Program, options: argparse.Namespace) -> None:
+        self._program = program
         self._options = options
         self._fleet = FleetListener()
         self._order = options.sort
@@ -169,7 +178,7 @@ class FleetProgram:
         return float(self._start_s + self._options.seconds - time.monotonic())
 
     def _going(self) -> bool:
-        return self._seconds_left() > 0.0 and not rospy.is_shutdown()
+        return self._seconds_left() > 0.0 and self._program.running
 
     def _read(self) -> None:
         self._rows = sort_rows(self._fleet.read_rows(time.monotonic()), self._order)
@@ -181,7 +190,8 @@ class FleetProgram:
                     :width
                 ]
             ]
-        title = format_title(self._rows, self._fleet.listening, self._fleet.stopped)
+        silent = self._fleet.drivers.find_silent()
+        title = format_title(self._rows, self._fleet.listening, self._fleet.stopped, silent)
         return [title[:width], *format_table(self._rows, width, max(2, height - 1), self._find_chosen())]
 
     def _find_chosen(self) -> Optional[int]:
@@ -215,8 +225,8 @@ class FleetProgram:
         if key == "o":
             self._order = ORDERS[(ORDERS.index(self._order) + 1) % len(ORDERS)]
             self._news = ["order: %s" % self._order]
-        elif key == "s":
-            self._fleet.toggle_stop()
+        elif key in ("s", "r"):
+            self._fleet.drivers.request_stop(key == "s")
         elif key in ("up", "down"):
             self._choose(1 if key == "down" else -1)
         elif key == "d":
@@ -232,51 +242,68 @@ class FleetProgram:
 
     def run_once(self) -> int:
         """Wait for the driver, listen for a moment, print."""
-        if not self._fleet.wait_for_driver(DRIVER_TIMEOUT_S):
-            print(
-                "fleet: no driver: nothing on /hero_driver/robots after %.0f s" % DRIVER_TIMEOUT_S,
-                file=sys.stderr,
-            )
+        if not self._fleet.wait_for_driver(self._program, DRIVER_TIMEOUT_S):
+            if self._program.running:
+                print(
+                    "fleet: no driver: nothing on /hero_driver/robots after %.0f s" % DRIVER_TIMEOUT_S,
+                    file=sys.stderr,
+                )
             return 1
         end_s = (
             time.monotonic() + 1.5
         )  # laser scans come 5 times a second, new subscriptions take a few 0.1 s
-        while time.monotonic() < end_s:
+        while time.monotonic() < end_s and self._program.sleep(0.1):
             self._read()
-            time.sleep(0.1)
-        self._read()
         self.print_fleet()
         return 0
 
-    def run_lines(self) -> None:
+    def run_lines(self) -> int:
         """Print the fleet every few seconds until the time is over, and once more then."""
         next_print_s = time.monotonic() + self._options.period
         while self._going():
-            time.sleep(max(0.0, min(DRAW_PERIOD_S, self._seconds_left())))
+            self._program.sleep(max(0.0, min(DRAW_PERIOD_S, self._seconds_left())))
             self._read()
             if time.monotonic() >= next_print_s and self._seconds_left() > DRAW_PERIOD_S:
                 next_print_s += self._options.period
                 self.print_fleet()
         self.print_fleet()
+        return self.check_expected()
 
-    def run_screen(self, keyboard: Keyboard) -> None:
+    def run_screen(self, keyboard: Keyboard) -> int:
         """Show the table in place until the time is over or a key ends it."""
         with Screen(keyboard) as screen:
             while self._going():
                 self._read()
-                size = shutil.get_terminal_size()
-                left_s = self._seconds_left()
-                ending = "" if left_s == float("inf") else "   ends in %.0f s" % left_s
-                table = self._make_lines(size.columns, size.lines - 2)
-                last = "".join(self._news[-1:]) or KEYS_HELP + ending
-                screen.draw([*table, "", last[: size.columns]])
-                keys = screen.wait_for_keys(min(DRAW_PERIOD_S, left_s))
-                if keys is None or "q" in keys:
-                    return
+                status = self._fleet.drivers.stop_status()
+                screen.draw(self._make_screen(status))
+                period_s = DRAW_PERIOD_S if status is None or status.is_final else ASKING_DRAW_PERIOD_S
+                keys = screen.wait_for_keys(self._program, min(period_s, self._seconds_left()))
                 if keys:
                     self._news = []
-                for key in keys:
+                for key in keys or ():
                     self._press(key)
+                if keys is None or "q" in keys:
+                    break
+        if self._program.end_signal is None:
+            self.print_fleet()
+        return self.check_stop() or self.check_expected()
+
+    def _make_screen(self, status: Optional[StopStatus]) -> List[str]:
+        """Return all lines: the table, the state of a stop, and the keys or what they did."""
+        size = shutil.get_terminal_size()
+        left_s = self._seconds_left()
+        ending = "" if left_s == float("inf") else "   ends in %.0f s" % left_s
+        last = "".join(self._news[-1:]) or KEYS_HELP + ending
+        stop = "" if status is None else COLOURS[status.level] + status.text[: size.columns] + END_COLOUR
+        return [*self._make_lines(size.columns, size.lines - 2), stop, last[: size.columns]]
+
+    def check_stop(self) -> int:
+        """Wait for the outcome of a stop that was asked for last, and return the exit code."""
+        status = self._fleet.drivers.wait_for_stop()
+        if status is None or status.level != "error":
+            return 0
+        print("fleet: %s" % status.text, file=sys.stderr)
+        return 1
 
     def check_expected(self) -> int:
         """Say which of the expected robots did not join or move, and return the exit code."""
@@ -315,45 +342,29 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     options = parser.parse_args(arguments)
     for name, lowest in (("seconds", 0.0), ("period", 0.1), ("expect", 0)):
         value = getattr(options, name)
-        if value is not None and not value >= lowest:
-            parser.error("--%s %s: must be at least %s" % (name, value, lowest))
+        if value is not None and not lowest <= value <= MAX_OPTION:
+            parser.exit(2, "fleet: --%s %s: must be from %g to %g\n" % (name, value, lowest, MAX_OPTION))
     return options
 
 
-def raise_interrupt(number: int, frame: Optional[FrameType]) -> None:
-    """End on SIGTERM as on Ctrl-C, so that the terminal is given back."""
-    raise KeyboardInterrupt
-
-
-def run(options: argparse.Namespace) -> int:
-    """Run until the end and return the exit code."""
-    if not rosgraph.is_master_online():
-        uri = rosgraph.get_master_uri()
-        print("fleet: no ROS master at %s: start one with roslaunch or roscore" % uri, file=sys.stderr)
-        return 1
-    rospy.init_node("fleet", anonymous=True, disable_signals=True)
-    program = FleetProgram(options)
-    if options.once:
-        return program.run_once()
-    try:
-        keyboard = None if options.json or not sys.stdout.isatty() else Keyboard()
-    except NoTerminalError:
-        keyboard = None
-    if keyboard is None:
-        program.run_lines()
-    else:
-        program.run_screen(keyboard)
-        program.print_fleet()
-    return program.check_expected()
+def show(options: argparse.Namespace) -> int:
+    """Show the fleet until the end and return the exit code."""
+    with Program("fleet", anonymous=True) as program:
+        fleet = FleetProgram(program, options)
+        try:
+            keyboard = None if options.once or options.json or not sys.stdout.isatty() else Keyboard()
+        except NoTerminalError:
+            keyboard = None
+        if options.once:
+            exit_code = fleet.run_once()
+        elif keyboard is None:
+            exit_code = fleet.run_lines()
+        else:
+            exit_code = fleet.run_screen(keyboard)
+        return exit_code if program.end_signal is None else 128 + program.end_signal
 
 
 def main() -> None:
     """Run the program fleet."""
     options = parse_options(rospy.myargv()[1:])
-    signal.signal(signal.SIGTERM, raise_interrupt)
-    try:
-        exit_code = run(options)
-    except KeyboardInterrupt:
-        exit_code = 130
-    rospy.signal_shutdown("done")
-    sys.exit(exit_code)
+    run_program(lambda: sys.exit(show(options)))

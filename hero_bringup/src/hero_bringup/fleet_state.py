@@ -16,6 +16,9 @@ MOVED_M = 0.05
 
 MOVED_RAD = 1.0
 
+MAX_DISTANCE_M = 1e4
+"""Whatever a robot sends beyond this is a mistake."""
+
 
 class Pose(NamedTuple):
     """Where a robot is by its own odometry: m, m, rad."""
@@ -39,6 +42,7 @@ class RobotRow(NamedTuple):
     namespace: str
     address: str
     state: str
+    stop_state: str
     odom_hz: float
     frames_per_s: float
     bytes_per_s: float
@@ -95,7 +99,13 @@ class RobotTrack:
         self.nearest: Optional[Obstacle] = None
 
     def receive_pose(self, pose: Pose) -> None:
-        """Take the newest pose and add to the way what lies between it and the one before."""
+        """Take the newest pose and add to the way what lies between it and the one before.
+
+        A pose that is not finite or farther than MAX_DISTANCE_M counts as none.
+        """
+        if not (abs(pose.x_m) <= MAX_DISTANCE_M and abs(pose.y_m) <= MAX_DISTANCE_M and math.isfinite(pose.yaw_rad)):
+            self.pose = None
+            return
         if self.pose is not None:
             self.way_m += math.hypot(pose.x_m - self.pose.x_m, pose.y_m - self.pose.y_m)
             self.turned_rad += abs(math.remainder(pose.yaw_rad - self.pose.yaw_rad, math.tau))
@@ -104,14 +114,21 @@ class RobotTrack:
     def receive_proximity(
         self, ranges_m: Sequence[float], angle_min_rad: float, increment_rad: float
     ) -> None:
-        """Take the newest proximity message."""
-        self.proximity_seen = True
+        """Take the newest proximity message; one without finite angles counts as none."""
+        self.proximity_seen = math.isfinite(angle_min_rad) and math.isfinite(increment_rad)
+        if not self.proximity_seen:
+            self.nearest = None
+            return
         self.nearest = find_nearest(ranges_m, angle_min_rad, increment_rad)
 
 
 def find_nearest(ranges_m: Sequence[float], angle_min_rad: float, increment_rad: float) -> Optional[Obstacle]:
     """Return the nearest obstacle; None if none is in range. -Inf is nearer than any number (REP 117)."""
-    seen = [(range_m, index) for index, range_m in enumerate(ranges_m) if range_m < math.inf]
+    seen = [
+        (range_m, index)
+        for index, range_m in enumerate(ranges_m)
+        if 0.0 <= range_m <= MAX_DISTANCE_M or range_m == -math.inf
+    ]
     if not seen:
         return None
     range_m, index = min(seen)

@@ -47,7 +47,7 @@ def format_cells(row: RobotRow) -> List[str]:
     return [
         make_printable(row.name),
         make_printable(row.address),
-        row.state,
+        ", ".join(filter(None, (row.state, row.stop_state))),
         "%.1f Hz" % row.odom_hz,
         "%.1f kB/s" % (row.bytes_per_s / 1e3),
         format_pose(row.pose),
@@ -84,12 +84,17 @@ def format_table(
     return lines
 
 
-def format_title(rows: Sequence[RobotRow], listening: str, stopped: bool) -> str:
-    """Return the line above the table: how many robots there are, and where the driver awaits them."""
+def format_title(rows: Sequence[RobotRow], listening: str, stopped: bool, silent: Sequence[str] = ()) -> str:
+    """Return the line above the table: how many robots there are, and where the driver awaits them.
+
+    silent: names of drivers that do not answer.
+    """
     ready = sum(row.state == "READY" for row in rows)
     title = "%d of %d robots ready" % (ready, len(rows))
     if stopped:
         title += ", ALL STOPPED"  # not last: a narrow terminal cuts the end off
+    for driver in silent:
+        title += ", driver %s does not answer" % driver.strip("/")
     if listening:
         title += ", driver listens on %s" % make_printable(listening)
     return title
@@ -107,6 +112,7 @@ def make_row_dict(row: RobotRow) -> Dict[str, Any]:
         "namespace": row.namespace,
         "address": row.address,
         "state": row.state,
+        "stop_state": row.stop_state,
         "odom_hz": round(row.odom_hz, 2),
         "frames_per_s": round(row.frames_per_s, 2),
         "bytes_per_s": round(row.bytes_per_s, 1),

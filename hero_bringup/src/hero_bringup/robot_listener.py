@@ -11,6 +11,14 @@ from hero_msgs.msg import Robot
 from .fleet_state import Pose, RobotTrack, yaw_of_quaternion
 
 STATES = {Robot.JOINING: "JOINING", Robot.READY: "READY", Robot.AWAY: "AWAY", Robot.REFUSED: "REFUSED"}
+STOP_STATES = {
+    Robot.NOT_STOPPED: "",
+    Robot.STOPPING: "stopping",
+    Robot.AT_REST: "at rest",
+    Robot.MOVING: "MOVING",
+    Robot.UNCONFIRMED: "unconfirmed",
+}
+"""As the table shows them beside the state."""
 
 
 class RobotListener:

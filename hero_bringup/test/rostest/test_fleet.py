@@ -1,33 +1,17 @@
 #!/usr/bin/env python
 """The program fleet beside two simulated robots: as JSON, as lines, and in a terminal."""
 
-import fcntl
 import json
 import os
-import pty
-import struct
+import signal
 import subprocess
-import termios
 import unittest
 
 import rospy
 import rostest
+from fleet_terminal import FLEET, TIMEOUT_S, FleetTerminal, run_fleet
 from geometry_msgs.msg import Twist
 from swarm_watch import wait_for
-
-FLEET = ["rosrun", "hero_bringup", "fleet"]
-TIMEOUT_S = 60.0
-
-
-def run_fleet(*arguments):
-    result = subprocess.run(
-        [*FLEET, *arguments],
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        timeout=TIMEOUT_S,
-        check=False,
-    )
-    return result.returncode, result.stdout.decode(), result.stderr.decode()
 
 
 class FleetTest(unittest.TestCase):
@@ -85,47 +69,71 @@ class FleetTest(unittest.TestCase):
         self.assertIn("all 2 robots joined and moved", output)
 
     def test_in_a_terminal_it_draws_in_place_and_gives_the_terminal_back(self):
-        leader, follower = pty.openpty()
-        fcntl.ioctl(follower, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 200, 0, 0))
-        before = termios.tcgetattr(follower)
-        process = subprocess.Popen(
-            FLEET, stdin=follower, stdout=follower, stderr=follower, start_new_session=True
-        )
-        output = b""
-
-        def read_until(text):
-            nonlocal output
-            output += os.read(leader, 65536)
-            return text in output
-
-        wait_for(lambda: read_until(b"2 of 2 robots ready"), TIMEOUT_S, "table")
-        wait_for(lambda: read_until(b"hero_1"), TIMEOUT_S, "row")
-        self.assertIn(b"\x1b[?1049h", output)
-        os.write(leader, b"d")
-        wait_for(lambda: read_until(b"choose a robot first"), TIMEOUT_S, "request to choose a robot")
-        os.write(leader, b"\x1b[B\x1b[B")
-        wait_for(lambda: read_until(b"\x1b[7mhero_1"), TIMEOUT_S, "robot that is chosen")
-        os.write(leader, b"d")
-        wait_for(lambda: read_until(b"d again disconnects hero_1"), TIMEOUT_S, "question")
-        os.write(leader, b"d")
-        wait_for(lambda: read_until(b"disconnected; it will dial again"), TIMEOUT_S, "answer of the driver")
-        wait_for(lambda: read_until(b"reconnected 1x"), TIMEOUT_S, "robot that has come back")
-        os.write(leader, b"o")
-        wait_for(lambda: read_until(b"order: state"), TIMEOUT_S, "another order")
-        os.write(leader, b"q")
-        wait_for(lambda: read_until(b"\x1b[?1049l"), TIMEOUT_S, "end of the screen")
-        self.assertEqual(process.wait(TIMEOUT_S), 0)
-        after = termios.tcgetattr(follower)
-        self.assertEqual(after, before)
-        os.close(leader)
-        os.close(follower)
+        table = FleetTerminal()
+        self.addCleanup(table.close)
+        table.wait_for(b"2 of 2 robots ready")
+        table.wait_for(b"hero_1")
+        table.wait_for(b"\x1b[?1049h")
+        for keys, answer in (
+            (b"d", b"choose a robot first"),
+            (b"\x1b[B\x1b[B", b"\x1b[7mhero_1"),
+            (b"d", b"d again disconnects hero_1"),
+            (b"d", b"disconnected; it will dial again"),
+            (b"", b"reconnected 1x"),
+            (b"o", b"order: state"),
+        ):
+            table.press(keys)
+            table.wait_for(answer)
+        table.press(b"q")
+        self.assertEqual(table.wait_for_end(), 0)
+        table.wait_for(b"\x1b[?1049l")
+        self.assertEqual(table.settings(), table.settings_before)
 
     def test_wrong_options_are_refused_in_one_line(self):
-        for arguments in (["--seconds", "-1"], ["--period", "0"], ["--expect", "many"], ["--colour"]):
+        for name, value in (
+            ("--seconds", "-1"),
+            ("--seconds", "inf"),
+            ("--seconds", "nan"),
+            ("--period", "0"),
+            ("--period", "inf"),
+            ("--expect", "2000000"),
+        ):
+            code, _, errors = run_fleet(name, value)
+            self.assertEqual(code, 2, name)
+            self.assert_one_line(errors, name)
+        for arguments in (["--expect", "many"], ["--colour"]):
             code, _, errors = run_fleet(*arguments)
             self.assertEqual(code, 2, arguments)
             self.assertNotIn("Traceback", errors)
             self.assertIn(arguments[0], errors)
+
+    def assert_one_line(self, text, part):
+        self.assertIn(part, text)
+        self.assertEqual(len(text.splitlines()), 1, text)
+
+    def test_a_ros_master_that_cannot_be_reached_is_told_in_one_line(self):
+        for uri in ("http://", "localhost", "http://localhost:99999", "http://localhost:port", ""):
+            code, _, errors = run_fleet("--once", env={**os.environ, "ROS_MASTER_URI": uri})
+            self.assertEqual(code, 1, uri)
+            self.assert_one_line(errors, "no ROS master at %r" % uri)
+
+    def test_a_log_directory_that_is_a_file_is_told_in_one_line(self):
+        code, _, errors = run_fleet("--once", env={**os.environ, "ROS_LOG_DIR": __file__})
+        self.assertEqual(code, 1)
+        self.assert_one_line(errors, "ROS_LOG_DIR")
+
+    def test_an_output_that_is_full_is_told_in_one_line(self):
+        with open("/dev/full", "wb") as full:
+            code, _, errors = run_fleet("--once", stdout=full)
+        self.assertEqual(code, 1)
+        self.assert_one_line(errors, "the output cannot be written: No space left on device")
+
+    def test_a_pipe_that_is_closed_ends_fleet_without_a_word(self):
+        read_fd, write_fd = os.pipe()
+        os.close(read_fd)
+        code, _, errors = run_fleet("--once", stdout=write_fd)
+        os.close(write_fd)
+        self.assertEqual((code, errors), (128 + signal.SIGPIPE, ""))
 
 
 if __name__ == "__main__":

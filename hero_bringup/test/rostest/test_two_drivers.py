@@ -1,19 +1,16 @@
 #!/usr/bin/env python
 """Two drivers under one ROS master: programs find the robots of both, and a stop reaches both."""
 
-import contextlib
 import json
 import os
-import pty
 import signal
-import subprocess
-import threading
 import unittest
 import xmlrpc.client
 
 import rosgraph
 import rospy
 import rostest
+from fleet_terminal import FleetTerminal, run_fleet
 from geometry_msgs.msg import Twist
 from swarm_watch import SwarmWatch, wait_for
 
@@ -21,49 +18,20 @@ from hero_bringup.monitor.commander import Commander
 from hero_examples.drivers import Drivers
 from hero_examples.swarm import Swarm
 
-FLEET = ["rosrun", "hero_bringup", "fleet"]
 IDS = [0, 1, 100, 101]
 TIMEOUT_S = 20.0
 
 
-def run_fleet(*arguments):
-    return json.loads(subprocess.check_output([*FLEET, "--once", "--json", *arguments], timeout=TIMEOUT_S).decode())
+def read_fleet(*arguments):
+    """Return the fleet as JSON."""
+    code, output, errors = run_fleet("--once", "--json", *arguments)
+    assert code == 0, errors
+    return json.loads(output)
 
 
 def find_pid(node):
     """Return the process of a node."""
     return xmlrpc.client.ServerProxy(rosgraph.Master("/test").lookupNode(node)).getPid("/test")[2]
-
-
-class Table:
-    """The program fleet in a terminal, which is read all the time: a program that nobody reads stands still."""
-
-    def __init__(self):
-        self._leader, follower = pty.openpty()
-        self.process = subprocess.Popen(FLEET, stdin=follower, stdout=follower, stderr=follower, start_new_session=True)
-        os.close(follower)
-        self._output = bytearray()
-        self._reader = threading.Thread(target=self._read, daemon=True)
-        self._reader.start()
-
-    def _read(self):
-        # The end of the terminal of a program that has ended is an error (EIO).
-        with contextlib.suppress(OSError):
-            while True:
-                self._output += os.read(self._leader, 65536)
-
-    def press(self, key):
-        os.write(self._leader, key)
-
-    def wait_for(self, text):
-        wait_for(lambda: text in self._output, TIMEOUT_S, lambda: "%r in %r" % (text, bytes(self._output[-2000:])))
-
-    def close(self):
-        if self.process.poll() is None:
-            os.killpg(self.process.pid, signal.SIGKILL)
-            self.process.wait()
-        self._reader.join()
-        os.close(self._leader)
 
 
 class TwoDriversTest(unittest.TestCase):
@@ -109,7 +77,7 @@ class TwoDriversTest(unittest.TestCase):
         return self.drivers.names()
 
     def test_1_programs_find_the_robots_of_both(self):
-        fleet = run_fleet()
+        fleet = read_fleet()
         self.assertEqual([robot["id"] for robot in fleet["robots"]], IDS)
         self.assertEqual(fleet["listening"], "127.0.0.1:21340, 127.0.0.1:21341")
         swarm = Swarm.discover(TIMEOUT_S)
@@ -120,23 +88,22 @@ class TwoDriversTest(unittest.TestCase):
         self.assertEqual(self.drivers.find("/hero_0"), "/hero_driver")
 
     def test_2_a_remapped_list_is_that_of_one_driver_alone(self):
-        fleet = run_fleet("/hero_driver/robots:=/hero_driver_b/robots")
+        fleet = read_fleet("/hero_driver/robots:=/hero_driver_b/robots")
         self.assertEqual([robot["id"] for robot in fleet["robots"]], [100, 101])
 
-    def test_3_the_key_s_of_the_table_stops_the_robots_of_both_and_lets_them_go(self):
-        table = Table()
+    def test_3_the_keys_of_the_table_stop_the_robots_of_both_and_release_them(self):
+        table = FleetTerminal()
         self.addCleanup(table.close)
         table.wait_for(b"4 of 4 robots ready")
         self.wait_until_all_move()
         table.press(b"s")
         # They are told to drive on, and stay.
         self.watch.wait_until_stopped(*IDS, act=self.drive)
-        table.wait_for(b"ALL STOPPED")
-        table.press(b"s")
+        table.wait_for(b"stopped, all wheels at rest")
+        table.press(b"r")
         self.wait_until_all_move()
         table.press(b"q")
-        table.wait_for(b"\x1b[?1049l")
-        self.assertEqual(table.process.wait(TIMEOUT_S), 0)
+        self.assertEqual(table.wait_for_end(), 0)
 
     def test_4_the_stop_of_the_page_reaches_both_and_names_them(self):
         told = []
@@ -168,7 +135,7 @@ class TwoDriversTest(unittest.TestCase):
 
     def test_6_a_driver_that_died_without_a_word_is_not_waited_for(self):
         os.kill(find_pid("/hero_driver_b"), signal.SIGKILL)
-        self.assertEqual([robot["id"] for robot in run_fleet()["robots"]], [0, 1])
+        self.assertEqual([robot["id"] for robot in read_fleet()["robots"]], [0, 1])
         # Who listened before forgets its robots.
         wait_for(lambda: len(self.drivers.read().robots) == 2, TIMEOUT_S, "robots of the other driver alone")
         answers = []

@@ -25,6 +25,7 @@ def make_row(robot_id, **changes):
         namespace="/hero_%d" % robot_id,
         address="10.42.0.%d:4000" % (robot_id + 10),
         state="READY",
+        stop_state="",
         odom_hz=29.3,
         frames_per_s=211.0,
         bytes_per_s=44051.0,
@@ -123,3 +124,25 @@ def test_rows_are_sorted_by_id_state_or_nearness():
     assert [row.id for row in sort_rows(rows, "id")] == [2, 3, 10, -1]
     assert next(row.id for row in sort_rows(rows, "state")) == 3
     assert [row.id for row in sort_rows(rows, "nearest")][:2] == [10, 2]
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf, 1e306])
+def test_a_pose_that_cannot_be_shown_is_none_and_adds_no_way(number):
+    track = RobotTrack()
+    for pose in (Pose(0.0, 0.0, 0.0), Pose(number, 0.0, 0.0), Pose(0.0, number, 0.0), Pose(0.0, 0.0, number)):
+        track.receive_pose(pose)
+        assert track.way_m == 0.0
+    track.receive_pose(Pose(math.nan, 0.0, 0.0))
+    assert track.pose is None
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf])
+def test_ranges_at_angles_that_cannot_be_shown_are_not_seen(number):
+    track = RobotTrack()
+    for angle_min_rad, increment_rad in ((number, 0.8), (0.0, number)):
+        track.receive_proximity([0.1], angle_min_rad, increment_rad)
+        assert (track.proximity_seen, track.nearest) == (False, None)
+
+
+def test_ranges_that_no_sensor_measures_are_no_obstacle():
+    assert find_nearest([math.nan, 1e306, -1e306, math.inf], 0.0, 0.8) is None

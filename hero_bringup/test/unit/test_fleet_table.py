@@ -82,3 +82,14 @@ def test_json_has_no_infinity():
     assert robot["pose"] == {"x_m": None, "y_m": 1.0, "yaw_rad": 0.0}
     assert robot["clock_offset_s"] is None
     assert robot["id"] == 0
+
+
+def test_the_state_of_a_stop_stands_beside_the_robots_state():
+    row = make_row(3, stop_state="MOVING")
+    assert "READY, MOVING " in format_table([row], 200, 10)[1]
+    assert json.loads(format_json([row], "", True))["robots"][0]["stop_state"] == "MOVING"
+
+
+def test_the_title_names_drivers_that_do_not_answer():
+    title = format_title([], "", False, ["/hero_driver_b", "/lab/driver"])
+    assert "driver hero_driver_b does not answer, driver lab/driver does not answer" in title

@@ -30,16 +30,14 @@ class DriverLink:
         self._is_closed = False
         # Not latched: a driver that starts later must not find an old request.
         self._requests = rospy.Publisher(driver + "/stop_request", Bool, queue_size=1, tcp_nodelay=True)
-        self._reports = rospy.Subscriber(reports_topic, rospy.AnyMsg, self._receive, queue_size=10, tcp_nodelay=True)
+        self._reports = rospy.Subscriber(reports_topic, RobotArray, self._receive, queue_size=1, tcp_nodelay=True)
 
-    def _receive(self, message: rospy.AnyMsg) -> None:
-        header = message._connection_header
-        if header.get("callerid") != self.driver or header.get("md5sum") != RobotArray._md5sum:
-            return
-        report = clean(RobotArray().deserialize(message._buff))
-        with self._lock:
-            self.report, self.arrival_s = report, time.monotonic()
-            self.count += 1
+    def _receive(self, report: RobotArray) -> None:
+        if report._connection_header.get("callerid") == self.driver:
+            clean(report)
+            with self._lock:
+                self.report, self.arrival_s = report, time.monotonic()
+                self.count += 1
 
     def newest(self, since_s: float = -math.inf) -> Optional[RobotArray]:
         """Return the newest report if it came after since_s."""

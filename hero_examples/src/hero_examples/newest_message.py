@@ -5,6 +5,7 @@ Messages are kept as bytes: a swarm sends far more of them than anybody looks at
 
 from typing import Any, Optional
 
+import genpy
 import rospy
 
 
@@ -24,9 +25,14 @@ class NewestMessage:
             self.count += 1
 
     def take(self) -> Any:
-        """Return the newest message, None if none has come since the last call."""
+        """Return the newest message, None if none that can be read has come since the last call."""
         kept, self._bytes = self._bytes, None
-        return None if kept is None else self._message_class().deserialize(kept)
+        if kept is None:
+            return None
+        try:
+            return self._message_class().deserialize(kept)
+        except genpy.DeserializationError:
+            return None
 
     def close(self) -> None:
         """End the subscription; safe twice."""

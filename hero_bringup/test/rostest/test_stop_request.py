@@ -1,0 +1,166 @@
+#!/usr/bin/env python
+"""A stop of all robots while a driver hangs, while the ROS master hangs, and what people see of it."""
+
+import contextlib
+import json
+import os
+import signal
+import unittest
+import xmlrpc.client
+
+import rosgraph
+import rospy
+import rostest
+from fleet_terminal import TIMEOUT_S, FleetTerminal, run_fleet
+from swarm_watch import wait_for
+
+from hero_examples.drivers import Drivers
+from hero_msgs.msg import Robot, RobotArray
+
+AT_REST = ("info", "stopped, all wheels at rest", True)
+HUNG = ("error", "NOT STOPPED: driver hero_driver_b does not answer", False)
+
+
+class Reports:
+    """The newest report of a driver, over a connection of the test's own."""
+
+    def __init__(self, driver):
+        self.newest = None
+        self._subscriber = rospy.Subscriber(driver + "/robots", RobotArray, self._receive, tcp_nodelay=True)
+
+    def _receive(self, report):
+        if report._connection_header["callerid"] != rospy.get_name():
+            self.newest = report
+
+    @property
+    def requests(self):
+        return int(self.newest.listening.split()[0])
+
+
+def find_pid(node):
+    """Return the process of a node, or of the ROS master."""
+    uri = rosgraph.get_master_uri() if node is None else rosgraph.Master("/test").lookupNode(node)
+    return xmlrpc.client.ServerProxy(uri).getPid("/test")[2]
+
+
+@contextlib.contextmanager
+def hanging(*pids):
+    """Let processes hang for as long as the context lasts."""
+    for pid in pids:
+        os.kill(pid, signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        for pid in pids:
+            os.kill(pid, signal.SIGCONT)
+
+
+def refuse_constant(name):
+    raise AssertionError("%s is not JSON" % name)
+
+
+class StopRequestTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.reports = {driver: Reports(driver) for driver in ("/hero_driver", "/hero_driver_b")}
+        wait_for(lambda: all(reports.newest for reports in cls.reports.values()), TIMEOUT_S, "both drivers")
+        cls.healthy = cls.reports["/hero_driver"]
+        cls.drivers = Drivers()
+        wait_for(lambda: len(cls.drivers.names()) == 2, TIMEOUT_S, "drivers that are found")
+        cls.master_pid, cls.hung_pid = find_pid(None), find_pid("/hero_driver_b")
+
+    def setUp(self):
+        self.drivers.request_stop(False)
+        wait_for(lambda: self.drivers.wait_for_stop().text.startswith("released"), TIMEOUT_S, "a release of all")
+
+    def open_table(self):
+        table = FleetTerminal()
+        self.addCleanup(table.close)
+        table.wait_for(b"2 of 2 robots ready")
+        return table
+
+    def test_a_stop_of_all_is_told_as_stopping_and_then_at_rest(self):
+        self.drivers.request_stop(True)
+        self.assertEqual(self.drivers.stop_status(), ("warn", "stopping", False))
+        self.assertEqual(self.drivers.wait_for_stop(), AT_REST)
+        self.assertTrue(self.drivers.read().stopped)
+
+    def test_a_hung_driver_is_named_and_stopped_when_it_goes_on(self):
+        with hanging(self.hung_pid):
+            self.drivers.request_stop(True)
+            self.assertEqual(self.drivers.wait_for_stop(), HUNG)
+            self.assertTrue(self.healthy.newest.stopped)
+            wait_for(self.drivers.find_silent, TIMEOUT_S, "the silence of the hung driver")
+            self.assertFalse(self.drivers.read().stopped, "stopped, though a driver does not answer")
+        wait_for(lambda: self.drivers.stop_status() == AT_REST, TIMEOUT_S, "the stop of the driver that hung")
+
+    def test_every_one_of_ten_presses_reaches_the_healthy_driver(self):
+        with hanging(self.hung_pid, self.master_pid):
+            for _ in range(10):
+                before = self.healthy.requests
+                self.drivers.request_stop(True)
+                wait_for(lambda before=before: self.healthy.requests > before, TIMEOUT_S, "a request")
+            self.assertEqual(self.drivers.wait_for_stop(), HUNG)
+
+    def test_the_key_s_stops_though_the_master_and_a_driver_hang(self):
+        table = self.open_table()
+        with hanging(self.hung_pid, self.master_pid):
+            table.press(b"s")
+            wait_for(lambda: self.healthy.newest.stopped, TIMEOUT_S, "the stop of the healthy driver")
+            table.wait_for(b"stopping")
+            table.wait_for(b"\x1b[1;31mNOT STOPPED: driver hero_driver_b does not answer")
+            table.wait_for_next(b"hero_driver_b does not answer, driver listens")
+        table.wait_for_next(b"stopped, all wheels at rest")
+        table.wait_for_next(b"READY, at rest")
+        table.wait_for_next(b"ALL STOPPED")
+        table.press(b"r")
+        table.wait_for_next(b"released: robots may move again")
+        self.assertFalse(self.healthy.newest.stopped)
+        table.press(b"q")
+        self.assertEqual(table.wait_for_end(), 0)
+
+    def test_fleet_ends_while_the_master_hangs_and_names_who_is_not_stopped(self):
+        table = self.open_table()
+        with hanging(self.hung_pid, self.master_pid):
+            table.press(b"sq")
+            self.assertEqual(table.wait_for_end(), 1)
+            table.wait_for(b"fleet: NOT STOPPED: driver hero_driver_b does not answer")
+        self.assertEqual(table.settings(), table.settings_before)
+
+    def test_signals_end_fleet_and_give_the_terminal_back(self):
+        for number in (signal.SIGHUP, signal.SIGTERM, signal.SIGINT):
+            table = self.open_table()
+            self.assertNotEqual(table.settings(), table.settings_before)
+            table.process.send_signal(number)
+            self.assertEqual(table.wait_for_end(), 128 + number)
+            self.assertEqual(table.settings(), table.settings_before)
+            table.wait_for(b"\x1b[?1049l")
+
+    def test_lists_that_are_not_published_by_a_driver_are_ignored(self):
+        forged = RobotArray(robots=[Robot(id=9, namespace="/hero_9", state=Robot.READY)])
+        publishers = [
+            rospy.Publisher(topic, RobotArray, queue_size=1, latch=True)
+            for topic in ("/hero_driver/robots", "/hero_9/robots")
+        ]
+        listener = Drivers()
+        self.addCleanup(listener.close)
+        for publisher in publishers:
+            publisher.publish(forged)
+        # The forger sends to three that listen: the test itself, and two that look for drivers, over one connection.
+        wait_for(lambda: publishers[0].get_num_connections() > 0, TIMEOUT_S, "a connection to the forger")
+        wait_for(lambda: listener.read() and listener.is_settled, TIMEOUT_S, "the drivers")
+        self.assertEqual([robot.id for robot in listener.read().robots], [0, 1])
+        self.assertEqual(listener.names(), ["/hero_driver", "/hero_driver_b"])
+        for publisher in publishers:
+            publisher.unregister()
+
+    def test_numbers_that_are_none_leave_the_json_valid(self):
+        code, output, errors = run_fleet("--once", "--json")
+        self.assertEqual(code, 0, errors)
+        robots = json.loads(output, parse_constant=refuse_constant)["robots"]
+        self.assertEqual([(robot["bytes_per_s"], robot["clock_offset_s"]) for robot in robots], [(0.0, None)] * 2)
+
+
+if __name__ == "__main__":
+    rospy.init_node("test_stop_request")
+    rostest.rosrun("hero_bringup", "test_stop_request", StopRequestTest)
