@@ -116,11 +116,13 @@ class StopDelivery:
         for peer in self._peers:
             if peer.stop is None or peer.link.closed or peer.bridge is None:
                 continue
-            self._advance(peer, now_s)
-            # A stop of this robot alone is over when it is at rest, or driven again.
-            if not is_stopped and (peer.bridge.is_commanded or not _is_pending(peer)):
-                peer.stop = None
-                self._on_change()
+            # A stop of this robot alone is over when it is driven again, or at rest.
+            if is_stopped or not peer.bridge.is_commanded:
+                self._advance(peer, now_s)
+                if is_stopped or _is_pending(peer):
+                    continue
+            peer.stop = None
+            self._on_change()
         self._peers = [peer for peer in self._peers if peer.stop is not None and not peer.link.closed]
         self._is_scheduled = bool(self._peers)
         if self._is_scheduled:

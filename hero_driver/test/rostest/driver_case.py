@@ -50,11 +50,20 @@ def list_publishers(topic):
     return dict(rosgraph.Master("/test").getSystemState()[0]).get(topic, [])
 
 
+def list_connections(node):
+    """Return what node itself says of its connections: (id, peer, "i" or "o", transport, topic, ...) each."""
+    api = xmlrpc.client.ServerProxy(rosgraph.Master("/test").lookupNode(node))
+    return api.getBusInfo("/test")[2]
+
+
 def has_connection(node, topic, reader):
     """Return whether node itself says that it sends topic to a node whose name holds reader."""
-    api = xmlrpc.client.ServerProxy(rosgraph.Master("/test").lookupNode(node))
-    _, _, connections = api.getBusInfo("/test")
-    return any(entry[2] == "o" and entry[4] == topic and reader in entry[1] for entry in connections)
+    return any(entry[2] == "o" and entry[4] == topic and reader in entry[1] for entry in list_connections(node))
+
+
+def reads_from_somebody(node, topic):
+    """Return whether node itself says that it receives topic from somebody."""
+    return any(entry[2] == "i" and entry[4] == topic for entry in list_connections(node))
 
 
 class Recorder:

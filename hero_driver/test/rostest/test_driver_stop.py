@@ -1,0 +1,363 @@
+#!/usr/bin/env python
+"""Stops that the robot's wheels confirm: robots that tune themselves, that stall, that return, and new drivers."""
+
+import math
+import signal
+import struct
+import subprocess
+import sys
+
+import rospy
+import rostest
+import stock_messages
+from driver_case import DriverProcess, OwnDriverCase, Recorder, make_publisher, reads_from_somebody, wait_for
+from fake_robot import READ_CYCLE_S, SUB, TWIST_MD5, Declaration
+from geometry_msgs.msg import Twist
+from std_msgs.msg import Bool, ColorRGBA
+from std_srvs.srv import SetBool, Trigger
+
+from hero_driver.command_shaping import STOPPED_MOTORS
+from hero_msgs.msg import Motor, Robot
+from hero_msgs.srv import Disconnect
+
+VELOCITY = "velocity_controller"
+POSITION = "position_controller"
+BURST_LENGTH_MAX = 2144
+"""The robot's TCP window."""
+
+
+def make_command(linear_m_s):
+    twist = Twist()
+    twist.linear.x = linear_m_s
+    return twist
+
+
+def call_stop(driver, stopped):
+    """Call ~stop; return its answer."""
+    rospy.wait_for_service(driver.node + "/stop", 20.0)
+    answer = rospy.ServiceProxy(driver.node + "/stop", SetBool)(stopped)
+    assert answer.success, answer.message
+    return answer.message
+
+
+class TestDriverStop(OwnDriverCase):
+    def dial_stock(self, driver, number=0, **settings):
+        """Return a robot with wheels that takes commands as the firmware does."""
+        robot = self.dial(driver, number, read_cycle_s=READ_CYCLE_S, has_motors=True, **settings)
+        return robot
+
+    def drive(self, robot, controller=VELOCITY):
+        """Let a robot move; return the publisher of its commands."""
+        publisher = make_publisher("%s/%s/cmd_vel" % (robot.namespace, controller), Twist)
+        publisher.publish(make_command(0.1))
+        wait_for(lambda: robot.motors.is_turning, "the wheels to turn")
+        return publisher
+
+    def wait_at_rest(self, driver, robot):
+        """Wait until the driver says that a robot is at rest, which must be true."""
+        driver.fleet.wait(
+            robot.namespace, Robot.READY, "at rest", lambda entry: entry.stop_state == Robot.AT_REST
+        )
+        self.assertFalse(robot.motors.is_turning)
+
+    def start_tuning(self, driver, robot, controller):
+        """Call pid_calibration of a controller."""
+        name = "%s/%s/pid_calibration" % (robot.namespace, controller)
+        rospy.wait_for_service(name, 20.0)
+        self.assertEqual(rospy.ServiceProxy(name, Trigger)().message, "PID Autotuning!")
+        self.assertTrue(robot.motors.is_tuning)
+
+    # What moves a robot.
+
+    def test_a_stop_ends_whatever_moves_the_robot(self):
+        driver = self.start()
+        moved = [self.dial_stock(driver, number) for number in (1, 2, 3)]
+        self.drive(moved[0])
+        self.drive(moved[1], POSITION)
+        make_publisher("/hero_3/cmd_motor", Motor).publish(Motor(1400, 1600))
+        wait_for(lambda: moved[2].motors.is_turning, "the wheels to turn")
+        call_stop(driver, True)
+        for robot in moved:
+            self.wait_at_rest(driver, robot)
+
+    def test_a_new_driver_stops_what_an_earlier_one_set_in_motion(self):
+        driver = self.start()
+        robot = self.dial_stock(driver)
+        robot.motors.take_velocity("/hero_0/position_controller/cmd_vel", False)
+        call_stop(driver, True)
+        self.wait_at_rest(driver, robot)
+
+    def test_pid_calibration_is_refused_unless_it_is_allowed(self):
+        driver = self.start()
+        robot = self.dial_stock(driver)
+        for controller in (VELOCITY, POSITION):
+            name = "/hero_0/%s/pid_calibration" % controller
+            rospy.wait_for_service(name, 20.0)
+            with self.assertRaisesRegex(rospy.ServiceException, "allow_self_tuning"):
+                rospy.ServiceProxy(name, Trigger)()
+            self.assertEqual(robot.payloads_on(controller + "/pid_calibration"), [])
+
+    def test_pid_calibration_is_refused_while_robots_are_stopped(self):
+        driver = self.start(allow_self_tuning=True)
+        robot = self.dial_stock(driver)
+        call_stop(driver, True)
+        rospy.wait_for_service("/hero_0/velocity_controller/pid_calibration", 20.0)
+        with self.assertRaisesRegex(rospy.ServiceException, "all robots are stopped"):
+            rospy.ServiceProxy("/hero_0/velocity_controller/pid_calibration", Trigger)()
+        self.assertEqual(robot.payloads_on(VELOCITY + "/pid_calibration"), [])
+
+    def test_a_stop_ends_the_self_tuning_of_either_controller(self):
+        driver = self.start(allow_self_tuning=True)
+        for number, controller in ((1, VELOCITY), (2, POSITION)):
+            robot = self.dial_stock(driver, number)
+            self.start_tuning(driver, robot, controller)
+            call_stop(driver, True)
+            self.wait_at_rest(driver, robot)
+            call_stop(driver, False)
+
+    def test_a_self_tuning_that_nobody_announced_is_seen_by_the_wheels(self):
+        driver = self.start()
+        robot = self.dial_stock(driver)
+        robot.is_silent = True
+        robot.motors.start_tuning(VELOCITY)
+        robot.is_silent = False
+        call_stop(driver, True)
+        self.wait_at_rest(driver, robot)
+
+    def test_a_stop_of_a_tuning_robot_fits_its_window(self):
+        driver = self.start(allow_self_tuning=True)
+        robot = self.dial_stock(driver)
+        self.start_tuning(driver, robot, VELOCITY)
+        del robot.received[:]
+        call_stop(driver, True)
+        self.wait_at_rest(driver, robot)
+        by_read = {}
+        for frame in list(robot.received):
+            by_read[frame.time_s] = by_read.get(frame.time_s, 0) + len(frame.payload) + 8
+        motors = [payload for payload in robot.payloads_on("cmd_motor")]
+        self.assertEqual(set(motors), {STOPPED_MOTORS})
+        self.assertGreater(len(motors), 110)
+        self.assertLessEqual(max(by_read.values()), BURST_LENGTH_MAX)
+
+    def test_disconnecting_a_tuning_robot_ends_the_tuning_first(self):
+        driver = self.start(allow_self_tuning=True)
+        robot = self.dial_stock(driver)
+        self.start_tuning(driver, robot, POSITION)
+        answer = rospy.ServiceProxy(driver.node + "/disconnect", Disconnect)("hero_0")
+        self.assertTrue(answer.success, answer.message)
+        wait_for(lambda: robot.ended, "the end of the connection")
+        self.assertFalse(robot.motors.is_turning)
+
+    def test_the_end_of_the_driver_ends_the_tuning_of_a_robot(self):
+        driver = self.start(allow_self_tuning=True)
+        robots = [self.dial_stock(driver, number) for number in (1, 2)]
+        self.start_tuning(driver, robots[0], VELOCITY)
+        self.drive(robots[1])
+        driver.process.send_signal(signal.SIGINT)
+        self.assertEqual(driver.wait_end(), 0, driver.lines)
+        self.assertFalse(any(robot.motors.is_turning for robot in robots))
+        self.assertEqual(driver.find_lines("not known to be at rest"), [])
+
+    def test_the_end_of_the_driver_names_a_robot_whose_wheels_turn(self):
+        driver = self.start()
+        robots = [self.dial_stock(driver, number) for number in (1, 2)]
+        robots[0].motors.is_pushed = True
+        driver.process.send_signal(signal.SIGINT)
+        self.assertEqual(driver.wait_end(), 0, driver.lines)
+        self.assertRegex(driver.lines[-1], r"not known to be at rest: hero_1 \(its wheels turn\)")
+
+    # What is known of it.
+
+    def test_a_robot_that_is_pushed_is_reported_and_at_rest_afterwards(self):
+        driver = self.start()
+        robot = self.dial_stock(driver)
+        call_stop(driver, True)
+        self.wait_at_rest(driver, robot)
+        robot.motors.is_pushed = True
+        driver.fleet.wait("/hero_0", Robot.READY, "moving", lambda entry: entry.stop_state == Robot.MOVING)
+        driver.wait_line("hero_0: its wheels turn although it was stopped")
+        self.assertIn("1 still moving: hero_0", call_stop(driver, True))
+        robot.motors.is_pushed = False
+        self.wait_at_rest(driver, robot)
+        self.assertIn("1 at rest", call_stop(driver, True))
+
+    def test_a_robot_without_readings_is_stopped_and_not_confirmed(self):
+        driver = self.start()
+        robot = self.dial(driver, read_cycle_s=READ_CYCLE_S)
+        call_stop(driver, True)
+        driver.fleet.wait(
+            "/hero_0", Robot.READY, "unconfirmed", lambda entry: entry.stop_state == Robot.UNCONFIRMED
+        )
+        self.assertTrue(all(velocity.is_zero for velocity in robot.accepted))
+        self.assertGreaterEqual(len(robot.accepted), 2)
+
+    def test_a_robot_that_is_away_is_stopped_when_it_returns(self):
+        driver = self.start()
+        robot = self.dial_stock(driver)
+        robot.close()
+        driver.fleet.wait("/hero_0", Robot.AWAY)
+        call_stop(driver, True)
+        driver.fleet.wait("/hero_0", Robot.AWAY, "stopping", lambda entry: entry.stop_state == Robot.STOPPING)
+        robot.motors.take_velocity("/hero_0/position_controller/cmd_vel", False)
+        robot.connect(driver.address)
+        self.wait_at_rest(driver, robot)
+
+    def test_released_robots_are_not_stopped_any_more(self):
+        driver = self.start()
+        robot = self.dial_stock(driver)
+        call_stop(driver, True)
+        self.wait_at_rest(driver, robot)
+        self.assertEqual(call_stop(driver, False), "robots may move")
+        driver.fleet.wait(
+            "/hero_0", Robot.READY, "free", lambda entry: entry.stop_state == Robot.NOT_STOPPED
+        )
+        self.drive(robot)
+
+    # Who asks for it.
+
+    def test_a_request_on_the_topic_stops_and_releases(self):
+        driver = self.start()
+        robot = self.dial_stock(driver)
+        requests = make_publisher(driver.node + "/stop_request", Bool)
+        self.drive(robot)
+        requests.publish(Bool(True))
+        self.wait_at_rest(driver, robot)
+        wait_for(lambda: driver.fleet.newest.stopped, "the report")
+        requests.publish(Bool(False))
+        wait_for(lambda: not driver.fleet.newest.stopped, "the report")
+        self.drive(robot)
+
+    def test_a_driver_that_is_started_again_stays_stopped(self):
+        first = self.start()
+        call_stop(first, True)
+        wait_for(lambda: rospy.get_param(first.node + "/stopped", None), "the parameter")
+        first.process.send_signal(signal.SIGINT)
+        first.wait_end()
+        second = DriverProcess(name=first.node[1:])
+        self.addCleanup(second.__exit__)
+        stopped = Recorder(second.node + "/stopped", Bool)
+        wait_for(lambda: stopped.messages and stopped.messages[-1].data, "the second driver to begin stopped")
+        robot = self.dial_stock(second)
+        publisher = make_publisher("/hero_0/velocity_controller/cmd_vel", Twist)
+        publisher.publish(make_command(0.1))
+        self.wait_at_rest(second, robot)
+        self.assertTrue(all(velocity.is_zero for velocity in robot.velocities))
+        call_stop(second, False)
+        self.drive(robot)
+
+    def test_start_stopped_says_otherwise(self):
+        driver = self.start(stopped=True, start_stopped="never")
+        self.drive(self.dial_stock(driver))
+        driver = self.start(start_stopped="always")
+        self.wait_at_rest(driver, self.dial_stock(driver, 2))
+
+    # Programs that go, or go wrong.
+
+    def test_a_robot_stops_when_its_commander_has_gone(self):
+        driver = self.start()
+        robot = self.dial_stock(driver)
+        # Another program is connected, and has nothing to say.
+        make_publisher("/hero_0/velocity_controller/cmd_vel", Twist)
+        code = (
+            "import rospy; from geometry_msgs.msg import Twist; rospy.init_node('commander');"
+            "t = Twist(); t.linear.x = 0.1;"
+            "p = rospy.Publisher('/hero_0/velocity_controller/cmd_vel', Twist, queue_size=1)\n"
+            "while not rospy.is_shutdown(): p.publish(t); rospy.sleep(0.05)"
+        )
+        commander = subprocess.Popen([sys.executable, "-c", code])
+        self.addCleanup(commander.wait)
+        wait_for(lambda: robot.motors.is_turning, "the wheels to turn")
+        commander.kill()
+        wait_for(lambda: not robot.motors.is_turning, "the wheels to rest")
+        self.assertFalse(driver.fleet.newest.stopped)
+
+    def test_the_end_of_a_program_that_moves_nothing_stops_nobody(self):
+        driver = self.start(orphan_stop_s=0.0)
+        robot = self.dial_stock(driver, 41)
+        idle = make_publisher("/hero_41/velocity_controller/cmd_vel", Twist)
+        idle.publish(make_command(0.0))
+        wait_for(lambda: robot.velocities, "the zero")
+        self.drive(robot, POSITION)
+        idle.unregister()
+        # Both are handled in order: a stop would be there before what comes now.
+        wait_for(lambda: not reads_from_somebody(driver.node, "/hero_41/velocity_controller/cmd_vel"), "its end")
+        make_publisher("/hero_41/led", ColorRGBA).publish(ColorRGBA())
+        wait_for(lambda: robot.payloads_on("led"), "the next command")
+        self.assertTrue(robot.motors.is_turning)
+
+    def test_a_robot_that_was_orphaned_may_be_driven_again_at_once(self):
+        driver = self.start(orphan_stop_s=0.0)
+        robot = self.dial_stock(driver, 42)
+        self.drive(robot).unregister()
+        wait_for(lambda: not robot.motors.is_turning, "the wheels to rest")
+        self.drive(robot)
+        driver.fleet.wait("/hero_42", Robot.READY, "free", lambda entry: entry.stop_state == Robot.NOT_STOPPED)
+        self.assertTrue(robot.motors.is_turning)
+
+    def test_a_velocity_that_is_not_finite_stops_a_robot_that_moves(self):
+        driver = self.start()
+        robot = self.dial_stock(driver)
+        self.drive(robot).publish(make_command(math.nan))
+        wait_for(lambda: not robot.motors.is_turning, "the wheels to rest")
+        driver.wait_line("hero_0: a command on .* is not finite")
+
+    def test_servo_pulses_do_not_pile_up_in_front_of_a_stop(self):
+        driver = self.start()
+        robot = self.dial_stock(driver)
+        motors = make_publisher("/hero_0/cmd_motor", Motor)
+        motors.publish(Motor(1400, 1600))
+        wait_for(lambda: robot.motors.is_turning, "the wheels to turn")
+        robot.is_stalled = robot.is_silent = True
+        rate = rospy.Rate(50)
+        for pulse_us in range(1300, 1400):
+            motors.publish(Motor(pulse_us, 1600))
+            rate.sleep()
+        call_stop(driver, True)
+        before = len(robot.received)
+        robot.is_stalled = robot.is_silent = False
+        self.wait_at_rest(driver, robot)
+        late = [
+            frame.payload
+            for frame in robot.received[before:]
+            if frame.topic_id == robot.find_id("cmd_motor", (SUB,)) and frame.payload != STOPPED_MOTORS
+        ]
+        # What was on its way before the driver could notice, at most one in 0.06 s of half a second.
+        self.assertLess(len(late), 15)
+
+    # Devices that are no HeRos.
+
+    def test_devices_are_stopped_on_every_twist_and_get_nothing_but_zeros(self):
+        driver = self.start(namespace_policy="any")
+        declarations = [
+            Declaration(SUB, 100, "/crane/hook", "geometry_msgs/Twist", TWIST_MD5),
+            Declaration(SUB, 101, "/crane/cmd_vel", "geometry_msgs/Twist", TWIST_MD5),
+        ]
+        device = self.dial(driver, ready=False, declarations=declarations)
+        hook = make_publisher("/crane/hook", Twist)
+        sideways = stock_messages.from_bytes(Twist, struct.pack("<6d", 0.0, 0.3, 0.0, 0.0, 0.0, 0.0))
+        hook.publish(sideways)
+        wait_for(lambda: device.payloads_with_id(100), "the command")
+        self.assertEqual(device.payloads_with_id(100), [stock_messages.to_bytes(sideways)])
+        hook.publish(make_command(math.inf))
+        driver.wait_line("a command on /crane/hook is not finite")
+        call_stop(driver, True)
+        wait_for(lambda: device.payloads_with_id(101)[-1:] == [bytes(48)], "the stop of the other topic")
+        hook.publish(sideways)
+        hook.publish(Twist())
+        wait_for(lambda: any(entry.dropped_messages >= 2 for entry in driver.fleet.newest.robots), "the refusals")
+        self.assertEqual(set(device.payloads_with_id(100)[1:]), {bytes(48)})
+
+    def test_devices_are_stopped_at_the_end_of_the_driver(self):
+        driver = self.start(namespace_policy="any")
+        declarations = [Declaration(SUB, 100, "/crane/hook", "geometry_msgs/Twist", TWIST_MD5)]
+        device = self.dial(driver, ready=False, declarations=declarations)
+        make_publisher("/crane/hook", Twist).publish(make_command(0.3))
+        wait_for(lambda: device.payloads_with_id(100), "the command")
+        driver.process.send_signal(signal.SIGTERM)
+        self.assertEqual(driver.wait_end(), 0, driver.lines)
+        self.assertEqual(device.payloads_with_id(100)[-1], bytes(48))
+
+
+if __name__ == "__main__":
+    rospy.init_node("test_driver_stop")
+    rostest.rosrun("hero_driver", "driver_stop", TestDriverStop)
