@@ -46,7 +46,7 @@ class DriverConfig:
     namespace_policy: str = _choice(
         "robot",
         ("robot", "any"),
-        "robot: HeRos only, each within /hero_N and /tf; any: all names and types but those of drivers and of ROS itself",
+        "robot: HeRos only, each within /hero_N and /tf; any: all but those of drivers and of ROS",
     )
     allow: Tuple[Network, ...] = _plain((), "networks (CIDR) that robots may come from; empty: all")
     max_connections: int = _number(400, 1, 5000, "", "connections in total")

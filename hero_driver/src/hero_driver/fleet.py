@@ -2,7 +2,9 @@
 
 A robot is known by its namespace. It has at most one connection that counts; a second one from the same
 address is the robot after a power cycle and takes over, one from another address is a second robot with the
-same id and has to wait.
+same id and has to wait: until the first one has been away for the grace period, so that it does not get the id
+of a robot that loses its connection for a moment. A robot that was never there at the same time as the known one is
+the known one at a new address.
 """
 
 import enum
@@ -17,6 +19,10 @@ ALIVE_S = 3.0
 FLAP_S = 5.0
 """Two take-overs within this time, where the loser still speaks while the winner does, are two robots behind
 one address: a robot that boots or reconnects is silent on its old connection."""
+
+
+RIVALS_MAX = 16
+"""Addresses that are remembered because a second robot with the id of the known one came from them."""
 
 
 class RobotState(enum.Enum):
@@ -59,7 +65,8 @@ class RobotRecord:
     bad_frames: int = 0  # of earlier connections
     frames: int = 0  # of earlier connections
     received_length: int = 0
-    refused: Dict[str, str] = field(default_factory=dict)  # address -> reason, of duplicates
+    refused: Dict[str, str] = field(default_factory=dict)  # address -> reason, of duplicates that are connected
+    rivals: Dict[str, float] = field(default_factory=dict)  # host -> when a duplicate from there was first refused
 
     def enter(self, state: RobotState, now_s: float) -> None:
         """Change the state and note since when."""
@@ -96,18 +103,17 @@ class Fleet:
             )
             self.robots[identity.namespace] = record
             return Decision(Verdict.ARRIVED, record)
+        if self._is_duplicate(record, host, opened_s, now_s):
+            reason = (
+                "two robots call themselves %s: %s was first and keeps the id, %s is refused; give one of them"
+                " another id on its configuration page" % (identity.namespace, record.address, address)
+            )
+            record.refused[address] = reason
+            if len(record.rivals) < RIVALS_MAX:
+                record.rivals.setdefault(host, now_s)
+            return Decision(Verdict.REFUSED, record, reason=reason)
         old_link = record.link
-        if old_link is not None:
-            is_alive = now_s - record.last_heard_s < ALIVE_S
-            is_second = record.last_heard_s > opened_s and record.reconnects > 0
-            is_flapping = is_second and now_s - record.joined_s < FLAP_S
-            if is_alive and (host != record.host or is_flapping):
-                reason = (
-                    "two robots call themselves %s: %s is here and stays, %s is refused; give one of them"
-                    " another id on its configuration page" % (identity.namespace, record.address, address)
-                )
-                record.refused[address] = reason
-                return Decision(Verdict.REFUSED, record, reason=reason)
+        record.rivals.pop(host, None)
         record.host, record.address, record.link = host, address, link
         record.joined_s = record.last_heard_s = now_s
         record.reconnects += 1
@@ -115,6 +121,24 @@ class Fleet:
         record.enter(RobotState.JOINING, now_s)
         verdict = Verdict.RETURNED if old_link is None else Verdict.TOOK_OVER
         return Decision(verdict, record, old_link)
+
+    @staticmethod
+    def _is_duplicate(record: RobotRecord, host: str, opened_s: float, now_s: float) -> bool:
+        if host != record.host and Fleet.is_reserved(record, host):
+            return True
+        if record.link is None or now_s - record.last_heard_s >= ALIVE_S:
+            return False
+        is_second = record.last_heard_s > opened_s and record.reconnects > 0
+        return host != record.host or (is_second and now_s - record.joined_s < FLAP_S)
+
+    @staticmethod
+    def is_reserved(record: RobotRecord, host: str) -> bool:
+        """Return whether the id is kept for the known robot when one from host wants it.
+
+        So it is where the known one was heard after another from host was refused: there are two of them.
+        """
+        refused_s = record.rivals.get(host)
+        return refused_s is not None and record.last_heard_s > refused_s
 
     def leave(self, link: Any, reason: str, now_s: float) -> Optional[RobotRecord]:
         """A connection is gone; return the robot that is away now, None if it was nobody's."""

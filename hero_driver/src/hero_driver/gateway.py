@@ -15,7 +15,7 @@ from .admission import GARBAGE_REST_S, Admission, RateGuard
 from .cleaning import CleaningSettings
 from .command_sender import CommandSender
 from .config import DriverConfig
-from .fleet import Decision, Fleet, RobotState, Verdict
+from .fleet import Decision, Fleet, RobotRecord, RobotState, Verdict
 from .log_relay import LogRelay
 from .names import Identity, NameRules
 from .peer import Peer
@@ -61,7 +61,10 @@ class Gateway(LinkHandler):
         clock_ns: Callable[[], int],
         on_change: Callable[[], None],
     ) -> None:
-        """node: the driver's name in ROS; clock_ns gives ROS time; on_change() is called when a robot's state changes (it must not block)."""
+        """node is the driver's name in ROS; clock_ns gives ROS time.
+
+        on_change() is called when a robot's state changes; it must not block.
+        """
         self._config = config
         self._log = log
         self._registrar = registrar
@@ -209,6 +212,8 @@ class Gateway(LinkHandler):
         record.bad_frames += peer.session.reader.bad_frames
         record.received_length += link.received_length
         now_s = time.monotonic()
+        if record.link is link:
+            record.last_heard_s = peer.session.last_receive_s
         if self.fleet.leave(link, reason, now_s) is not None:
             self._log.log_throttled(
                 "debug" if reason == THE_DRIVER_ENDS else "warn",
@@ -221,7 +226,7 @@ class Gateway(LinkHandler):
             peer.bridge.registrar.end()
             peer.bridge.detach(reason)
             self._admission.note_departure(link.address.host, now_s - peer.session.opened_s, now_s)
-        self._promote_duplicate(record.identity, now_s)
+        self._admit_duplicates(record, lambda host: not self.fleet.is_reserved(record, host))
 
     def report_fault(self, error: Exception) -> None:
         """Log a mistake of the driver itself, with the place; only the connection at hand is lost."""
@@ -376,12 +381,11 @@ class Gateway(LinkHandler):
             config.max_age_s,
         )
 
-    def _promote_duplicate(self, identity: Identity, now_s: float) -> None:
-        """Let a robot in that waited because another one had its id, by asking for its topics again."""
+    def _admit_duplicates(self, record: RobotRecord, may_come: Callable[[str], bool]) -> None:
+        """Let robots in that wait because another one has their id, by having them dial again."""
         for peer in list(self.peers.values()):
-            if peer.refused and peer.record is not None and peer.record.identity == identity:
+            if peer.refused and peer.record is record and may_come(peer.link.address.host):
                 peer.link.close("the robot with the same id left; this one may try again")
-                return
 
     def _call_service(self, peer: Peer, topic: Topic, request: bytes) -> None:
         name = None if peer.bridge is None else self._resolve(peer, topic, peer.bridge.identity)
@@ -485,4 +489,5 @@ class Gateway(LinkHandler):
                 self._requests.forget(bridge.label)
                 text = "%s is gone; its topics and services are taken down" % bridge.label
                 self._log.log_throttled("info", "gone " + bridge.label, text, host=record.host)
+            self._admit_duplicates(record, lambda host: True)
             self._on_change()

@@ -52,12 +52,12 @@ class Reporter:
         message.header.stamp = ros_now
         for robot in status.robots:
             message.robots.append(self._describe(robot, status.now_s, ros_now))
-            for reason in robot.refused:
+            for address, reason in robot.refused:
                 message.robots.append(
                     Robot(
                         id=robot.number,
                         namespace=robot.namespace,
-                        address=reason.split(" is here and stays, ")[-1].split(" ")[0],
+                        address=address,
                         state=Robot.REFUSED,
                         last_error=reason,
                     )
@@ -152,7 +152,7 @@ class Reporter:
                 ("corrected stamps", robot.corrected_stamps),
                 ("odometry resets", robot.odometry_resets),
                 ("refused transforms", ", ".join(robot.foreign_frames)),
-                ("refused duplicates", "; ".join(robot.refused)),
+                ("refused duplicates", "; ".join(reason for _, reason in robot.refused)),
                 ("last error", robot.last_error),
             ):
                 stat.add(key, value)
@@ -166,7 +166,7 @@ def _judge(robot: RobotStatus) -> Tuple[int, str]:
     if robot.stop_state is StopState.MOVING:
         return DiagnosticStatus.ERROR, "its wheels turn although it was stopped"
     if robot.refused:
-        return DiagnosticStatus.ERROR, robot.refused[0]
+        return DiagnosticStatus.ERROR, robot.refused[0][1]
     if robot.complaint:
         return DiagnosticStatus.ERROR, robot.complaint
     if robot.state is RobotState.AWAY:

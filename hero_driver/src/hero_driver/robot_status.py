@@ -1,12 +1,15 @@
 """What is known of one robot, put together for reports. Thread of the sockets."""
 
 from dataclasses import dataclass
-from typing import List, Optional
+from typing import List, Optional, Tuple
 
 from .fleet import RobotRecord, RobotState
 from .peer import Peer
 from .robot_bridge import RobotBridge
 from .stop_progress import StopState
+
+DUPLICATES_SHOWN = 8
+"""Of one robot, in reports: one address could fill them with hundreds."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +38,7 @@ class RobotStatus:
     last_error: str
     complaint: str  # what is wrong now; empty if nothing is
     foreign_frames: List[str]
-    refused: List[str]  # one text for each duplicate that waits
+    refused: List[Tuple[str, str]]  # address and reason of each duplicate that waits
 
 
 def describe_robot(
@@ -83,5 +86,5 @@ def describe_robot(
         last_error=complaint or record.last_error,
         complaint=complaint,
         foreign_frames=[] if cleaner is None else sorted(cleaner.transforms.foreign_frames),
-        refused=sorted(record.refused.values()),
+        refused=sorted(record.refused.items())[:DUPLICATES_SHOWN],
     )

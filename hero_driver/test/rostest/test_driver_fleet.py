@@ -198,7 +198,16 @@ class TestDriverFleet(DriverCase):
         light.publish(ColorRGBA(1.0, 1.0, 1.0, 1.0))
         wait_payloads(first, "led")
         self.assertEqual(second.payloads_on("led"), [])
-        # When the first one leaves, the second may have the name, as soon as it dials again.
+        # The first one loses its connection, and gets its id back, although the second dials in at once.
+        first.close()
+        self.fleet.wait("/hero_7", Robot.AWAY)
+        second.close()
+        second.connect(self.address)
+        self.fleet.wait("/hero_7", Robot.REFUSED, "", lambda e: e.address == second.address)
+        first.connect(self.address)
+        self.fleet.wait("/hero_7", Robot.READY, "", lambda e: e.address == first.address)
+        self.assertTrue(second.is_connected)
+        # When it stays away for the grace period, the second may have the id, as soon as it dials again.
         first.close()
 
         def look():
@@ -209,6 +218,7 @@ class TestDriverFleet(DriverCase):
             return entry is not None and entry.address == second.address
 
         wait_for(look, "the second robot to join")
+        self.wait_log("hero_7 is gone")
         self.assertIsNone(self.fleet.find("/hero_7", Robot.REFUSED))
 
     def test_a_refused_robot_that_dials_in_again_and_again_does_not_fill_the_log(self):

@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hero_driver.fleet import ALIVE_S, FLAP_S, Fleet, RobotState, Verdict
+from hero_driver.fleet import ALIVE_S, FLAP_S, RIVALS_MAX, Fleet, RobotState, Verdict
 from hero_driver.names import Identity
 from hero_msgs.msg import Robot
 
@@ -123,7 +123,7 @@ def test_a_second_robot_with_the_same_id_is_refused_and_both_are_named():
     decision = identify(fleet, 2, T0 + 1.0, host="10.0.0.2")
     assert decision.verdict is Verdict.REFUSED
     assert decision.old_link is None
-    assert "10.0.0.1:1 is here and stays, 10.0.0.2:2 is refused" in decision.reason
+    assert "10.0.0.1:1 was first and keeps the id, 10.0.0.2:2 is refused" in decision.reason
     assert "/hero_0" in decision.reason
     assert "configuration page" in decision.reason
     record = fleet.robots["/hero_0"]
@@ -137,14 +137,80 @@ def test_a_robot_at_a_new_address_takes_over_when_the_old_one_is_silent():
     assert identify(fleet, 2, T0 + ALIVE_S, host="10.0.0.2").verdict is Verdict.TOOK_OVER
 
 
-def test_a_refused_robot_may_come_when_the_first_one_left_and_is_no_duplicate_any_more():
-    fleet = make_fleet()
+def refuse_second(fleet, heard_s=None):
+    """Let a robot arrive and a second one be refused at T0 + 1.0; the first one was heard last at heard_s."""
     identify(fleet, 1, T0)
-    identify(fleet, 2, T0 + 1.0, host="10.0.0.2")
+    assert identify(fleet, 2, T0 + 1.0, host="10.0.0.2").verdict is Verdict.REFUSED
+    if heard_s is not None:
+        fleet.robots["/hero_0"].last_heard_s = heard_s
+
+
+def test_the_id_of_a_robot_that_is_away_is_kept_from_the_second_one_with_it():
+    fleet = make_fleet()
+    refuse_second(fleet, heard_s=T0 + 1.1)
     fleet.leave(1, "closed", T0 + 2.0)
-    decision = identify(fleet, 2, T0 + 3.0, host="10.0.0.2")
+    assert identify(fleet, 3, T0 + 2.1, host="10.0.0.2").verdict is Verdict.REFUSED
+    assert identify(fleet, 4, T0 + 11.9, host="10.0.0.2").verdict is Verdict.REFUSED
+    assert fleet.robots["/hero_0"].state is RobotState.AWAY
+    assert identify(fleet, 5, T0 + 11.9).verdict is Verdict.RETURNED
+
+
+def test_after_the_grace_period_the_second_robot_with_an_id_gets_it():
+    fleet = make_fleet()
+    refuse_second(fleet, heard_s=T0 + 1.1)
+    fleet.leave(1, "closed", T0 + 2.0)
+    fleet.collect_expired(T0 + 2.0 + GRACE_S)
+    assert identify(fleet, 3, T0 + 2.1 + GRACE_S, host="10.0.0.2").verdict is Verdict.ARRIVED
+
+
+def test_a_known_robot_may_be_away_and_come_from_a_third_address():
+    fleet = make_fleet()
+    refuse_second(fleet, heard_s=T0 + 1.1)
+    fleet.leave(1, "closed", T0 + 2.0)
+    decision = identify(fleet, 3, T0 + 3.0, host="10.0.0.3")
+    assert decision.verdict is Verdict.RETURNED
+    # The second one's address has not become the robot's by that.
+    fleet.leave(3, "closed", T0 + 4.0)
+    assert identify(fleet, 4, T0 + 4.1, host="10.0.0.2").verdict is Verdict.REFUSED
+
+
+def test_a_connection_that_dies_does_not_give_the_id_to_the_second_robot():
+    fleet = make_fleet()
+    refuse_second(fleet, heard_s=T0 + 1.1)
+    assert identify(fleet, 3, T0 + 1.1 + 2 * ALIVE_S, host="10.0.0.2").verdict is Verdict.REFUSED
+
+
+def test_a_robot_that_moved_to_another_address_is_let_in_when_its_old_connection_ends():
+    fleet = make_fleet()
+    refuse_second(fleet)  # nothing came over the old connection any more
+    assert not fleet.is_reserved(fleet.robots["/hero_0"], "10.0.0.2")
+    fleet.leave(1, "silent", T0 + 6.0)
+    decision = identify(fleet, 2, T0 + 6.1, host="10.0.0.2")
     assert decision.verdict is Verdict.RETURNED
     assert decision.record.refused == {}
+    assert decision.record.host == "10.0.0.2"
+
+
+def test_a_second_robot_behind_the_same_address_waits_for_the_grace_period_too():
+    fleet = make_fleet()
+    identify(fleet, 1, T0)
+    identify(fleet, 2, T0 + 1.0)
+    record = fleet.robots["/hero_0"]
+    record.last_heard_s = T0 + 1.5
+    assert identify(fleet, 3, T0 + 1.6, opened_s=T0 + 1.4).verdict is Verdict.REFUSED
+    record.last_heard_s = T0 + 2.0
+    assert fleet.is_reserved(record, "10.0.0.1")
+    fleet.leave(2, "closed", T0 + 2.0)
+    # What connects now may be the one that was here: its address tells nothing.
+    assert identify(fleet, 4, T0 + 2.5).verdict is Verdict.RETURNED
+
+
+def test_the_addresses_of_duplicates_that_are_remembered_are_limited():
+    fleet = make_fleet()
+    identify(fleet, 1, T0)
+    for number in range(2 * RIVALS_MAX):
+        identify(fleet, number + 2, T0 + 1.0, host="10.0.1.%d" % number)
+    assert len(fleet.robots["/hero_0"].rivals) == RIVALS_MAX
 
 
 def test_two_robots_behind_one_address_do_not_take_each_others_place_for_ever():
@@ -216,7 +282,7 @@ def test_a_robot_has_at_most_one_connection_and_each_belongs_to_at_most_one_robo
             before = None if known is None else known.link
             decision = identify(fleet, link, now_s, host, (HERO, OTHER)[number % 2])
             if decision.verdict is Verdict.REFUSED:
-                assert decision.record.link == before is not None
+                assert decision.record.link == before
             else:
                 assert decision.record.link == link
                 assert decision.old_link == before

@@ -1,6 +1,7 @@
 """What the driver changes in rospy: who may connect at once, and what a log line holds."""
 
 import logging
+import queue
 import socket
 import struct
 
@@ -18,9 +19,9 @@ class TcprosServer:
     """rospy's own server with the driver's changes."""
 
     def __init__(self):
-        self.warnings = []
+        self.warnings = queue.Queue()
         self.headers = []
-        self._handshakes = open_tcpros_server(lambda host, text: self.warnings.append((host, text)))
+        self._handshakes = open_tcpros_server(lambda host, text: self.warnings.put((host, text)))
         self._server = tcpros_base._tcpros_server
         self._server.topic_connection_handler = self._serve
         self._clients = []
@@ -70,7 +71,7 @@ def test_a_subscriber_is_served_while_a_hundred_others_have_sent_two_bytes(serve
         server.connect(b"\x10\x00")
     client = server.connect(encode_ros_handshake_header({"topic": "/odom"}))
     assert client.recv(6, socket.MSG_WAITALL) == b"served"
-    assert server.warnings == []
+    assert server.warnings.empty()
 
 
 def test_a_refused_subscriber_learns_why_in_few_words(server):
@@ -83,7 +84,7 @@ def test_a_refused_subscriber_learns_why_in_few_words(server):
 def test_a_connection_that_rospy_cannot_serve_is_closed_with_one_line(server):
     client = server.connect(encode_ros_handshake_header({"topic": "/broken"}))
     assert client.recv(1) == b"", "closed"
-    [(host, text)] = server.warnings
+    host, text = server.warnings.get(timeout=DEADLINE_S)
     assert host == "127.0.0.1"
     assert "ValueError: a bug of rospy's\\n" in text
 
