@@ -41,6 +41,10 @@ class Body:
         """Give the servos pulses, which they follow until the next ones."""
         self.world.write_pulses(self.index, left_us, right_us)
 
+    def push(self, speed_m_s: float, for_ms: int) -> None:
+        """Be pushed forward by hand for so long, whatever the servos do."""
+        self.world.push(self.index, speed_m_s, for_ms)
+
     def release(self) -> None:
         """Take the pulses away: the wheels come to rest."""
         self.world.release(self.index)

@@ -98,6 +98,11 @@ class FaultInjector:
             robot.clock.jump(fault.values["by"])
         elif fault.kind == faults.SLOW_SERVICE:
             robot.answer_delay_ms = int(fault.values["by"] * 1000)
+        elif fault.kind in (faults.TUNE_VELOCITY, faults.TUNE_POSITION):
+            robot.start_tuning(now_ms, of_velocity=fault.kind == faults.TUNE_VELOCITY)
+            simulator.serve_robot(index)
+        elif fault.kind == faults.PUSH:
+            robot.body.push(fault.values["speed"], int(fault.values["for"] * 1000))
         else:
             robot.send(self._spoil(fault))
             simulator.serve_robot(index)

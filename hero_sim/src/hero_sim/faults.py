@@ -23,6 +23,9 @@ LONG_FRAME = "long-frame"
 CLOCK_JUMP = "clock-jump"
 SLOW_SERVICE = "slow-service"
 FOREIGN_FRAMES = "foreign-id"
+TUNE_VELOCITY = "tune-velocity"
+TUNE_POSITION = "tune-position"
+PUSH = "push"
 
 KINDS: Dict[str, Tuple[str, Dict[str, float]]] = {
     REBOOT: ("starts again at once; the old connection gets no FIN", {}),
@@ -43,8 +46,11 @@ KINDS: Dict[str, Tuple[str, Dict[str, float]]] = {
     CLOCK_JUMP: ("its clock is wrong by so much until the next time answer", {"by": 60.0}),
     SLOW_SERVICE: ("answers service calls so much later, from now on", {"by": 5.0}),
     FOREIGN_FRAMES: ("sends a frame with an id that it did not declare", {"id": 199.0}),
+    TUNE_VELOCITY: ("its velocity controller tunes itself, as after a call of pid_calibration", {}),
+    TUNE_POSITION: ("its position controller tunes itself", {}),
+    PUSH: ("somebody pushes it forward by hand for so long, at speed; its wheels turn", {"for": 3.0, "speed": 0.1}),
 }
-"""What each fault does, and its keys with their defaults (s, bytes, ids)."""
+"""What each fault does, and its keys with their defaults (s, m/s, bytes, ids)."""
 
 
 class Fault(NamedTuple):

@@ -183,6 +183,11 @@ class Firmware:
         self._blocked_until_ms = now_ms + for_ms
         self.due_ms = now_ms + for_ms
 
+    def start_tuning(self, now_ms: int, of_velocity: bool) -> None:
+        """Let a controller tune itself, as its pid_calibration does."""
+        if self.is_on:
+            self.motors.start_tuning(self.to_millis(now_ms), now_ms, of_velocity)
+
     # -- radio ---------------------------------------------------------------------------------------------
 
     def connection_made(self, now_ms: int) -> None:

@@ -6,7 +6,7 @@ What a pulse makes of a wheel, and how robots differ, is in robot_errors.
 """
 
 import math
-from typing import List
+from typing import Dict, List, Tuple
 
 import numpy as np
 
@@ -50,6 +50,7 @@ class World:
         self._servo_gain = -np.expm1(-STEP_MS / 1000.0 / errors.servo_lag_s)
         self._rng = rng
         self.present = np.ones(count, dtype=bool)
+        self._pushes: Dict[int, Tuple[float, int]] = {}
         self.wheel_rows: List[List[float]] = []
         self._publish_rows()
 
@@ -73,6 +74,10 @@ class World:
             for beyond_us, gain in zip((centre_us[0] - left_us, right_us - centre_us[1]), gains)
         ]
 
+    def push(self, index: int, speed_m_s: float, for_ms: int) -> None:
+        """Push a robot forward for so long; its wheels turn with it."""
+        self._pushes[index] = (speed_m_s, self.time_ms + for_ms)
+
     def release(self, index: int) -> None:
         """Take the pulses of a robot away."""
         self.commands_m_s[index] = 0.0
@@ -87,6 +92,10 @@ class World:
         reached_m_s = np.where(self.commands_m_s == 0.0, 0.0, self.commands_m_s + ripple_m_s)
         self.speeds_m_s += (reached_m_s - self.speeds_m_s) * self._servo_gain
         self.speeds_m_s[np.abs(self.speeds_m_s) < 1e-6] = 0.0
+        for index, (speed_m_s, until_ms) in list(self._pushes.items()):
+            self.speeds_m_s[index] = speed_m_s
+            if self.time_ms >= until_ms:
+                del self._pushes[index]
         self.time_ms += STEP_MS
         if rolled_m.any():
             self._move_bodies(rolled_m)

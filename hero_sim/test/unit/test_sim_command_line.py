@@ -13,7 +13,7 @@ import termios
 import time
 
 import pytest
-from driver_side import read_odom
+from driver_side import read_encoder, read_odom
 
 from hero_driver.rosserial import frames, payloads
 from hero_sim import declarations as ids
@@ -281,6 +281,19 @@ def test_a_clock_that_jumps_shows_in_the_stamps(simulate, server):
     request_when_ready(server, 1)
     peer = server.peers[0]
     server.run_until(lambda: time.time() - read_odom(peer.last(ids.ID_ODOM))[0][0] > 98)
+
+
+@pytest.mark.parametrize("controller", ["velocity", "position"])
+def test_a_robot_can_be_made_to_tune_itself(simulate, server, controller):
+    simulate("--port", str(server.port), "--fault", "tune-%s@16" % controller)
+    request_when_ready(server, 1)
+    server.run_until(lambda: sum("Tunning Motor Set" in text for text in server.peers[0].logs()) > 40)
+
+
+def test_a_robot_that_is_pushed_counts_ticks_without_a_command(simulate, server):
+    simulate("--port", str(server.port), "--fault", "push@16:for=1,speed=0.2")
+    request_when_ready(server, 1)
+    server.run_until(lambda: min(read_encoder(server.peers[0].last(ids.ID_ENCODER))[:2]) > 300)
 
 
 def test_a_slow_service_answers_late(simulate, server):
