@@ -15,6 +15,8 @@ from typing import Dict, List, Optional, Sequence
 
 import rospy
 
+from hero_examples import command_line
+
 from .checkup import environment, graph, network
 from .checkup.finding import FAIL, OK, WARN, Finding, Point, run_points
 from .checkup.firewall import check_firewall
@@ -58,7 +60,9 @@ def run_check(port: int, interface: Optional[str]) -> List[Finding]:
             "own_name": lambda: graph.check_own_name(own),
             "master": lambda: graph.check_master(own),
             "port": lambda: network.check_port(port),
-            "addresses": lambda: network.check_addresses(addresses, interface, port),
+            "addresses": lambda: network.check_addresses(
+                addresses, interface, port, list(network.find_listeners(port))
+            ),
             "firewall": lambda: check_firewall(robots_on, others, port),
             "clock": environment.check_clock,
             "disk": environment.check_disk,
@@ -114,21 +118,22 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     return options
 
 
-def main() -> None:
-    """Run the program check."""
-    options = parse_options(rospy.myargv()[1:])
-    try:
-        findings = run_check(options.port, options.interface)
-    except KeyboardInterrupt:
-        sys.exit(130)
+def run(options: argparse.Namespace) -> int:
+    """Look, print what was found, and return the exit status."""
+    findings = run_check(options.port, options.interface)
     failed = any(finding.state == FAIL for finding in findings)
     if options.json:
         print(json.dumps({"ok": not failed, "points": [finding._asdict() for finding in findings]}))
     else:
         print("\n".join(format_findings(findings)))
-    sys.stdout.flush()
+    return int(failed)
+
+
+def main() -> None:
+    """Run the program check."""
+    status = command_line.call(lambda: run(parse_options(rospy.myargv()[1:])))
     # Taking leave of a master that hangs would take for ever, as would threads that wait for a name server.
     leaving = threading.Thread(target=rospy.signal_shutdown, args=("done",), daemon=True)
     leaving.start()
     leaving.join(LEAVE_TIMEOUT_S)
-    os._exit(int(failed))
+    os._exit(status)

@@ -14,6 +14,8 @@ import subprocess
 import sys
 from typing import List, Optional, Sequence
 
+from hero_examples import command_line
+
 from . import nmcli
 from .nmcli import NetworkManagerError, NmcliCall, WifiDevice
 
@@ -35,15 +37,18 @@ def read_password(options: argparse.Namespace) -> str:
     """
     if options.factory:
         return FACTORY_PASSWORD
-    if options.password_stdin:
-        return check_password(sys.stdin.readline().rstrip("\n"))
-    if not sys.stdin.isatty():
-        raise HotspotError(
-            "no terminal to ask for the password: --password-stdin reads it from standard input"
-        )
-    password = check_password(getpass.getpass("password of the new network (8 to 63 characters): "))
-    if getpass.getpass("once more: ") != password:
-        raise HotspotError("the two passwords differ: start again")
+    try:
+        if options.password_stdin:
+            return check_password(sys.stdin.readline().rstrip("\n"))
+        if not sys.stdin.isatty():
+            raise HotspotError(
+                "no terminal to ask for the password: --password-stdin reads it from standard input"
+            )
+        password = check_password(getpass.getpass("password of the new network (8 to 63 characters): "))
+        if getpass.getpass("once more: ") != password:
+            raise HotspotError("the two passwords differ: start again")
+    except UnicodeDecodeError:
+        raise HotspotError("the password is not text: choose letters, digits and signs of ASCII") from None
     return password
 
 
@@ -73,7 +78,7 @@ def check_ssid(ssid: str) -> str:
 
     Raises: HotspotError.
     """
-    if not 1 <= len(ssid.encode()) <= SSID_BYTES_MAX or not ssid.isprintable():
+    if not ssid.isprintable() or not 1 <= len(ssid.encode()) <= SSID_BYTES_MAX:
         raise HotspotError(
             "--ssid %s: must be 1 to %d bytes of printable text" % (ascii(ssid), SSID_BYTES_MAX)
         )
@@ -220,9 +225,9 @@ def list_neighbours(interface: str) -> List[str]:
             stderr=subprocess.DEVNULL,
             check=False,
         )
-    except FileNotFoundError:
+    except OSError:  # the command ip is missing
         return []
-    rows = [line.split() for line in result.stdout.decode().splitlines()]
+    rows = [line.split() for line in result.stdout.decode(errors="replace").splitlines()]
     return sorted(row[0] for row in rows if row and row[-1] in ("REACHABLE", "STALE", "DELAY", "PROBE"))
 
 
@@ -275,21 +280,22 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     return options
 
 
-def main() -> None:
-    """Run the program hotspot."""
-    options = parse_options(sys.argv[1:])
-    code = 0
+def run(arguments: Sequence[str]) -> int:
+    """Do what the command line says; return the exit status. Raises: HotspotError, NetworkManagerError."""
+    options = parse_options(arguments)
     try:
         if options.command == "create":
             create(options)
         elif options.command == "show":
-            code = show()
+            return show()
         else:
             stop(options)
-    except (HotspotError, NetworkManagerError) as error:
-        print("hotspot: %s" % error, file=sys.stderr)
-        code = 1
     except (KeyboardInterrupt, EOFError):
         print("\nhotspot: ended; nothing was changed", file=sys.stderr)
-        code = 130
-    sys.exit(code)
+        return command_line.INTERRUPTED
+    return 0
+
+
+def main() -> None:
+    """Run the program hotspot."""
+    command_line.run(lambda: run(sys.argv[1:]), HotspotError, NetworkManagerError)

@@ -100,7 +100,7 @@ def run_nmcli(call: NmcliCall, password: str = "") -> str:
             timeout=TIMEOUT_S,
             check=False,
         )
-    except FileNotFoundError:
+    except OSError:
         raise NetworkManagerError(
             "nmcli is not installed: sudo apt install network-manager; without it, make an access point by other means"
             " (2.4 GHz, WPA2, address %s), see docs/network.md" % ADDRESS

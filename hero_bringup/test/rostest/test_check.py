@@ -52,6 +52,7 @@ class CheckTest(unittest.TestCase):
         self.assert_point(points, "way_back", "OK", "can connect")
         self.assert_point(points, "nodes", "OK", "all answer")
         self.assert_point(points, "port", "OK", "the driver listens on 127.0.0.1:21310")
+        self.assert_point(points, "addresses", "WARN", "open on 127.0.0.1 only")
         self.assert_point(points, "packages", "OK", "all 7 packages")
         self.assert_point(points, "messages", "OK", "equal")
 
@@ -80,6 +81,13 @@ class CheckTest(unittest.TestCase):
         code, points = run_check(ROS_MASTER_URI="localhost:11311")
         self.assertEqual(code, 1)
         self.assert_point(points, "ros_environment", "FAIL", "must be like http://")
+
+    def test_a_log_folder_that_is_a_file_is_found_and_the_rest_is_looked_at(self):
+        code, points = run_check(ROS_LOG_DIR=__file__)
+        self.assertEqual(code, 1)
+        self.assert_point(points, "disk", "FAIL", "is a file")
+        self.assertIn("point disk", points["way_back"]["says"] + points["robots"]["says"])
+        self.assert_point(points, "nodes", "OK", "all answer")
 
     def test_no_master_at_all_is_no_failure_on_the_pc_that_would_start_it(self):
         with socket.socket() as free:

@@ -36,17 +36,18 @@ class RecordTest(unittest.TestCase):
         self.folder = tempfile.mkdtemp()
         self.addCleanup(shutil.rmtree, self.folder)
 
-    def start(self, *command, **options):
+    def start(self, *command, stdout=subprocess.PIPE, **options):
         # A session of its own, as a terminal or roslaunch gives it.
         process = subprocess.Popen(
             command,
             stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
+            stdout=stdout,
             stderr=subprocess.STDOUT,
             start_new_session=True,
             **options,
         )
-        self.addCleanup(process.stdout.close)
+        if process.stdout is not None:
+            self.addCleanup(process.stdout.close)
         self.addCleanup(lambda: process.poll() is None and os.killpg(process.pid, signal.SIGKILL))
         return process
 
@@ -159,19 +160,54 @@ class RecordTest(unittest.TestCase):
         with rosbag.Bag(glob.glob(self.folder + "/*.bag")[0]) as bag:
             self.assertGreater(bag.get_message_count("/hero_0/odom"), 10)
 
-    def test_a_recording_ends_cleanly_when_the_disk_gets_full(self):
+    def fill_the_disk_while_recording(self, stdout=subprocess.PIPE):
+        """Record until the disk gets full; return the recording and the limit (MB) at which it had to end."""
         free_mb = shutil.disk_usage(self.folder).free / 1e6
         limit_mb = int(free_mb - DISK_STEP / 1e6 / 2)
-        recording = self.start(*RECORD, "--folder", self.folder, "--min-free-mb", str(limit_mb))
+        recording = self.start(*RECORD, "--folder", self.folder, "--min-free-mb", str(limit_mb), stdout=stdout)
         wait_for(lambda: self.files("hero_*.bag.active"), TIMEOUT_S, "recording")
         self.assertIsNone(recording.poll())
         with open(os.path.join(self.folder, "filler"), "wb") as filler:
             os.posix_fallocate(filler.fileno(), 0, DISK_STEP)
+        return recording, limit_mb
+
+    def assert_one_closed_bag(self):
+        self.assertEqual(self.files("*.active"), [])
+        (name,) = self.files("*.bag")
+        rosbag.Bag(os.path.join(self.folder, name)).close()
+
+    def test_a_recording_ends_cleanly_when_the_disk_gets_full(self):
+        recording, limit_mb = self.fill_the_disk_while_recording()
         output = recording.communicate(timeout=TIMEOUT_S)[0].decode()
         self.assertEqual(recording.returncode, 1, output)
         self.assertRegex(output, r"ended: only \d+ MB are left in .* less than the limit of %d MB" % limit_mb)
-        self.assertEqual(self.files("*.active"), [])
-        self.assertEqual(len(self.files("*.bag")), 1)
+        self.assert_one_closed_bag()
+
+    def test_the_disk_is_guarded_though_nobody_reads_what_record_prints(self):
+        read_end, write_end = os.pipe()
+        os.close(read_end)
+        with os.fdopen(write_end, "wb") as closed_pipe:
+            recording, _ = self.fill_the_disk_while_recording(closed_pipe)
+        self.assertEqual(recording.wait(TIMEOUT_S), 1)
+        self.assert_one_closed_bag()
+
+    def test_the_disk_is_guarded_though_the_output_of_record_is_full(self):
+        with open("/dev/full", "wb") as full:
+            recording, _ = self.fill_the_disk_while_recording(full)
+        self.assertEqual(recording.wait(TIMEOUT_S), 1)
+        self.assert_one_closed_bag()
+
+    def test_each_signal_ends_a_recording_that_nobody_reads_with_closed_bags(self):
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            with self.subTest(number):
+                recording = self.start(*RECORD, "--folder", self.folder)
+                recording.stdout.close()
+                wait_for(lambda: self.files("hero_*.bag.active"), TIMEOUT_S, "recording")
+                # To record alone: roslaunch and service managers signal one process, and its recorder is its own.
+                os.kill(recording.pid, number)
+                self.assertEqual(recording.wait(TIMEOUT_S), 0)
+                self.assert_one_closed_bag()
+                os.remove(os.path.join(self.folder, self.files("*.bag")[0]))
 
     def test_wrong_starts_are_refused_in_one_line_and_record_nothing(self):
         environment = dict(os.environ, ROS_MASTER_URI="http://127.0.0.1:9")
@@ -181,6 +217,8 @@ class RecordTest(unittest.TestCase):
             (["--name", "../x"], 2, "--name", None),
             (["--topics", "("], 2, "not a regular expression", None),
             (["--robots", "one"], 2, "--robots", None),
+            (["--seconds", "inf"], 2, "--seconds inf", None),
+            (["--seconds", "nan"], 2, "--seconds nan", None),
             ([], 1, "no ROS master at", environment),
         ):
             result = subprocess.run(

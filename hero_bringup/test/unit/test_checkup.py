@@ -5,7 +5,7 @@ import threading
 
 import pytest
 
-from hero_bringup.checkup import environment, network
+from hero_bringup.checkup import environment, graph, network
 from hero_bringup.checkup.finding import FAIL, OK, WARN, Finding, run_points
 from hero_bringup.checkup.network import Address
 from hero_bringup.checkup.system_command import NOT_THERE, Answer, ask_system
@@ -83,20 +83,37 @@ def test_the_robots_network_is_the_hotspot_or_the_only_one(addresses, wanted, in
 
 
 @pytest.mark.parametrize(
-    ("addresses", "wanted", "state", "says"),
+    ("addresses", "wanted", "listening", "state", "says"),
     [
-        ([LAN, WIFI], None, OK, "10.42.0.1:11411"),
-        ([LAN], None, WARN, "192.168.7.2 (eth0)"),
-        ([], None, WARN, "no network"),
-        ([LAN], "wlan0", FAIL, "wlan0 has no IPv4 address"),
-        (None, None, WARN, "ip is missing"),
+        ([LAN, WIFI], None, [], OK, "10.42.0.1:11411"),
+        ([LAN, WIFI], None, ["0.0.0.0"], OK, "10.42.0.1:11411"),
+        ([LAN, WIFI], None, ["127.0.0.1"], WARN, "open on 127.0.0.1 only"),
+        ([LAN], None, [], WARN, "192.168.7.2 (eth0)"),
+        ([], None, [], WARN, "no network"),
+        ([LAN], "wlan0", [], FAIL, "wlan0 has no IPv4 address"),
+        (None, None, [], WARN, "ip is missing"),
     ],
 )
-def test_addresses_that_robots_can_dial_are_listed(addresses, wanted, state, says):
-    (finding,) = network.check_addresses(addresses, wanted, 11411)
+def test_addresses_that_robots_can_dial_are_listed(addresses, wanted, listening, state, says):
+    (finding,) = network.check_addresses(addresses, wanted, 11411, listening)
     assert finding.state == state
     assert says in finding.says
     assert bool(finding.remedy) == (state != OK)
+
+
+def test_no_address_is_named_where_the_driver_does_not_listen():
+    (finding,) = network.check_addresses([LAN, WIFI], None, 11411, ["127.0.0.1"])
+    assert not any(entry.address in finding.says + " ".join(finding.remedy) for entry in (LAN, WIFI))
+    assert "host:=0.0.0.0" in finding.remedy[0]
+
+
+@pytest.mark.parametrize("uri", ["localhost", "http://", "http://pc:99999", "http://[::1", "ftp://pc:1", "http://pc:0"])
+def test_a_bad_master_uri_is_named_with_its_value(monkeypatch, uri):
+    monkeypatch.setenv("ROS_MASTER_URI", uri)
+    for finding in (*graph.check_variables([]), *graph.check_master([])):
+        assert finding.state == FAIL
+        assert repr(uri) in finding.says
+        assert "http://ADDRESS:11311" in finding.says
 
 
 def test_only_addresses_of_this_pc_are_its_own():
@@ -143,6 +160,15 @@ def test_a_disk_that_is_nearly_full_and_a_folder_that_cannot_be_written_are_foun
     monkeypatch.setenv("ROS_LOG_DIR", "/proc/nowhere")
     monkeypatch.setattr(environment.os, "access", lambda path, mode: False)
     assert "cannot be written" in environment.check_disk()[0].says
+
+
+def test_a_log_folder_that_is_a_file_or_below_one_is_found(monkeypatch, tmp_path):
+    (tmp_path / "file").write_text("")
+    for path in ("file", "file/log"):
+        monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path / path))
+        (finding,) = environment.check_disk()
+        assert finding.state == FAIL
+        assert "%s is a file" % (tmp_path / "file") in finding.says
 
 
 def test_messages_of_another_layout_are_found(monkeypatch):

@@ -5,7 +5,6 @@ Signals, `rosnode kill` and a lost terminal become one flag that the program's l
 time as user code runs.) This module knows no robot and no topic.
 """
 
-import errno
 import io
 import math
 import os
@@ -19,15 +18,13 @@ from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple
 
 import rospy
 
+from . import command_line
 from .ros_node import NodeError, start_ros_node
 
 ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 SHUTDOWN_WAIT_S = 1.0
 """How long `rosnode kill` is held up while the loop ends and stops its robots; stopping takes about 0.2 s."""
-
-OUTPUT_ERRORS = (errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
-"""A pipe without a reader, a full disk, a terminal that is closed."""
 
 ALL_ROBOTS = "all"
 """What a user writes instead of ids for every robot that the driver reports."""
@@ -120,26 +117,8 @@ class Program:
 
 
 def run(main: Callable[[], None]) -> None:
-    """Run main; a ProgramError becomes its one line and exit code 1, and so does an output that cannot be written.
-
-    A reader that has closed its pipe, such as head, needs no line.
-    """
-    try:
-        main()
-    except ProgramError as error:
-        _fail(str(error))
-    except OSError as error:
-        if error.errno not in OUTPUT_ERRORS or error.filename is not None:
-            raise
-        # What Python still holds back must not fail once more at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-        if error.errno == errno.EPIPE:
-            sys.exit(128 + signal.SIGPIPE)
-        _fail("the output cannot be written: %s" % error.strerror)
-
-
-def _fail(reason: str) -> None:
-    sys.exit("%s: %s" % (os.path.basename(sys.argv[0]), reason))
+    """Run main and end the process; a ProgramError becomes its one line and exit status 1."""
+    command_line.run(main, ProgramError)
 
 
 def read_parameters(defaults: Dict[str, Any]) -> Dict[str, Any]:

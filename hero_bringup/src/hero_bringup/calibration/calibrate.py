@@ -15,6 +15,8 @@ from typing import Dict, List, Optional, Sequence
 
 import rospy
 
+from hero_examples import command_line
+from hero_examples.command_line import say
 from hero_examples.drivers import Drivers
 from hero_examples.program import Program, ProgramError, parse_robot_ids
 from hero_msgs.msg import Robot
@@ -43,13 +45,6 @@ WALL = (
     "Place each robot with its front straight before a flat white wall, 10 cm between wall and body, 40 cm between "
     "robots: they will turn on the spot, twice."
 )
-
-
-def say(text: str) -> None:
-    """Write a line for people."""
-    # In one piece: threads of a procedure report side by side.
-    sys.stdout.write(text + "\n")
-    sys.stdout.flush()
 
 
 class Calibration:
@@ -246,7 +241,7 @@ def ask(program: Program, question: str) -> str:
 
     Raises: EndedError if the program is to end meanwhile, CalibrationError where nobody can answer.
     """
-    print(question, end="", flush=True)
+    say(question)
     # input() would wait on, deaf to Ctrl-C: signals only set a flag here.
     while not program.wait_readable([sys.stdin.fileno()], 1.0):
         if not program.running:
@@ -386,11 +381,13 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     return options
 
 
+def run(arguments: Sequence[str]) -> int:
+    """Do what the command line says; return the exit code. Raises: CalibrationError, ProgramError."""
+    options = parse_options(arguments)
+    with Program("hero_calibrate", anonymous=True) as program:
+        return restore(options, program) if options.restore else Calibration(options, program).run()
+
+
 def main() -> None:
     """Run the program calibrate."""
-    options = parse_options(rospy.myargv(sys.argv)[1:])
-    try:
-        with Program("hero_calibrate", anonymous=True) as program:
-            sys.exit(restore(options, program) if options.restore else Calibration(options, program).run())
-    except (CalibrationError, ProgramError) as error:
-        sys.exit("calibrate: %s" % error)
+    command_line.run(lambda: run(rospy.myargv(sys.argv)[1:]), CalibrationError, ProgramError)

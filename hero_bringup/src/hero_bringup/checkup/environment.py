@@ -198,12 +198,13 @@ def check_disk() -> List[Finding]:
     existing = directory
     while not existing.exists() and existing != existing.parent:
         existing = existing.parent
-    if not os.access(existing, os.W_OK):
+    if not existing.is_dir() or not os.access(existing, os.W_OK):
+        reason = "cannot be written" if existing.is_dir() else "cannot be made: %s is a file" % existing
         return [
             Finding(
                 point,
                 FAIL,
-                "log folder %s cannot be written" % directory,
+                "log folder %s %s" % (directory, reason),
                 ["export ROS_LOG_DIR=/a/folder/of/yours"],
             )
         ]

@@ -13,13 +13,14 @@ import xmlrpc.client
 from typing import Any, Dict, List, Optional, Sequence, Set, Tuple
 
 import rosgraph
+import rosgraph.roslogging
 import rospy
 from rosgraph_msgs.msg import Log
 
 from hero_msgs.msg import Robot, RobotArray
 
 from .finding import FAIL, OK, WARN, Finding
-from .network import Address, find_source_address, is_own, resolve
+from .network import HOST_REMEDY, Address, find_source_address, is_loopback, is_own, resolve
 
 CALL_TIMEOUT_S = 0.6
 BACK_TIMEOUT_S = 0.8
@@ -27,6 +28,8 @@ ROBOTS_TIMEOUT_S = 0.8
 NODES_ASKED = 30
 CALLER = "/hero_check"
 STATES = {Robot.JOINING: "joining", Robot.READY: "ready", Robot.AWAY: "away", Robot.REFUSED: "refused"}
+
+NO_LOGS = Finding("", WARN, "not looked at: without a folder for logs no node starts (point disk)")
 
 
 class BoundedTransport(xmlrpc.client.Transport):
@@ -58,10 +61,13 @@ def read_master_uri() -> Tuple[str, int]:
     Raises: ValueError with what is wrong.
     """
     uri = rosgraph.get_master_uri()
-    parts = urllib.parse.urlsplit(uri)
-    if parts.scheme != "http" or not parts.hostname or parts.port is None:
-        raise ValueError("ROS_MASTER_URI is %s, but must be like http://ADDRESS:11311" % ascii(uri))
-    return parts.hostname, parts.port
+    try:
+        parts = urllib.parse.urlsplit(uri)
+        if parts.scheme == "http" and parts.hostname and parts.port:
+            return parts.hostname, parts.port
+    except ValueError:
+        pass  # a port beyond 65535, half an IPv6 address
+    raise ValueError("ROS_MASTER_URI is %s, but must be like http://ADDRESS:11311" % ascii(uri))
 
 
 def check_variables(own: Optional[Sequence[Address]]) -> List[Finding]:
@@ -315,7 +321,9 @@ def check_robots(fleet: FleetSnapshot) -> List[Finding]:
             )
         if not robots:
             troubled = [
-                "robots must be on, in this network, and dial this PC (point addresses): docs/troubleshooting.md"
+                HOST_REMEDY
+                if is_loopback(message.listening.rpartition(":")[0])
+                else "robots must be on, in this network, and dial this PC (point addresses): docs/troubleshooting.md"
             ]
         findings.append(Finding(point, WARN if troubled else OK, says, troubled[:10]))
     return findings
@@ -338,8 +346,14 @@ class OwnNode:
 
     def check_way_back(self) -> List[Finding]:
         """See check_way_back."""
-        return check_way_back(self.enter()[0])
+        try:
+            return check_way_back(self.enter()[0])
+        except rosgraph.roslogging.LoggingException:
+            return [NO_LOGS._replace(point="way_back")]
 
     def check_robots(self) -> List[Finding]:
         """See check_robots."""
-        return check_robots(self.enter()[1])
+        try:
+            return check_robots(self.enter()[1])
+        except rosgraph.roslogging.LoggingException:
+            return [NO_LOGS._replace(point="robots")]

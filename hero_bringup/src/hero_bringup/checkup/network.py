@@ -16,6 +16,8 @@ from .system_command import NOT_THERE, ask_system
 HOTSPOT_ADDRESS = "10.42.0.1"
 """What robots dial that nobody configured, and what NetworkManager gives a PC that shares a hotspot."""
 
+HOST_REMEDY = "roslaunch hero_bringup hero_bringup.launch without host:=, or with host:=0.0.0.0, lets robots in"
+
 LISTENING = "0A"  # TCP_LISTEN in /proc/net/tcp
 DRIVER = "hero_driver"
 VIRTUAL = ("docker", "veth", "virbr", "br-", "lxc", "tun", "tap", "podman", "vnet")
@@ -52,10 +54,18 @@ def find_robot_interface(addresses: Sequence[Address], wanted: Optional[str]) ->
     return real.pop() if len(real) == 1 else None
 
 
+def is_loopback(address: str) -> bool:
+    """Whether an address is one of those that only programs on this PC reach; False for text that is no address."""
+    try:
+        return ipaddress.ip_address(address.strip("[]")).is_loopback
+    except ValueError:
+        return False
+
+
 def check_addresses(
-    addresses: Optional[Sequence[Address]], wanted: Optional[str], port: int
+    addresses: Optional[Sequence[Address]], wanted: Optional[str], port: int, listening: Sequence[str]
 ) -> List[Finding]:
-    """Say which addresses robots can be told to dial."""
+    """Say which addresses robots can be told to dial; listening: where somebody listens on the port already."""
     point = "addresses"
     if addresses is None:
         return [
@@ -75,6 +85,12 @@ def check_addresses(
                 ["ip -4 address shows which have one"],
             )
         ]
+    if listening and all(map(is_loopback, listening)):
+        says = "port %d is open on %s only: simulated robots on this PC reach it, robots in the network do not" % (
+            port,
+            ", ".join(listening),
+        )
+        return [Finding(point, WARN, says, [HOST_REMEDY])]
     if not addresses:
         return [
             Finding(

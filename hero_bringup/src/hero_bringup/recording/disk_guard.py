@@ -43,7 +43,10 @@ class DiskGuard:
             ) from error
         if not os.access(self.folder, os.W_OK | os.X_OK):
             raise RecordingError("%s is not writable; choose another folder" % self.folder)
-        free_mb = self._read_free(self.folder)
+        try:
+            free_mb = self._read_free(self.folder)
+        except OSError as error:
+            raise RecordingError("%s cannot be read: %s; choose another folder" % (self.folder, error.strerror)) from error
         if free_mb < self.limit_mb:
             raise RecordingError(
                 "only %.0f MB are free in %s and the limit is %.0f MB, so nothing is recorded; "
@@ -52,9 +55,12 @@ class DiskGuard:
             )
         return free_mb
 
-    def read_free_above_limit_mb(self) -> float:
-        """Return what may still be recorded (MB). Raises: OSError."""
-        return max(0.0, self._read_free(self.folder) - self.limit_mb)
+    def read_free_above_limit_mb(self) -> Optional[float]:
+        """Return what may still be recorded (MB), None if the folder is gone."""
+        try:
+            return max(0.0, self._read_free(self.folder) - self.limit_mb)
+        except OSError:
+            return None
 
     def find_reason_to_end(self) -> Optional[str]:
         """Return why the recording has to end now, in words; None if it may go on."""

@@ -11,6 +11,7 @@ import shutil
 import sys
 from typing import List, Optional, Sequence, Set
 
+from hero_examples import command_line
 from hero_examples.program import ProgramError, parse_robot_ids
 
 from . import tables
@@ -120,9 +121,4 @@ def run(options: argparse.Namespace) -> None:
 
 def main() -> None:
     """Run the program export."""
-    try:
-        run(parse_options(sys.argv[1:]))
-    except RecordingError as error:
-        sys.exit("export: %s" % error)
-    except KeyboardInterrupt:
-        sys.exit(130)
+    command_line.run(lambda: run(parse_options(sys.argv[1:])), RecordingError)

@@ -9,6 +9,7 @@ import os
 import sys
 from typing import Callable, Dict, List, Optional, Sequence
 
+from hero_examples import command_line
 from hero_examples.program import ProgramError, parse_robot_ids
 
 from . import analysis
@@ -184,9 +185,4 @@ def run(options: argparse.Namespace) -> None:
 
 def main() -> None:
     """Run the program plot."""
-    try:
-        run(parse_options(sys.argv[1:]))
-    except RecordingError as error:
-        sys.exit("plot: %s" % error)
-    except KeyboardInterrupt:
-        sys.exit(130)
+    command_line.run(lambda: run(parse_options(sys.argv[1:])), RecordingError)

@@ -6,6 +6,8 @@ from typing import IO, Optional
 
 from tqdm import tqdm
 
+from hero_examples.command_line import say
+
 LINE_PERIOD_S = 10.0
 """Between two lines where nobody looks at a bar: a log."""
 
@@ -41,7 +43,7 @@ class Progress:
             self._bar.update(done - self._bar.n)
         elif time.monotonic() >= self._next_line_s:
             self._next_line_s = time.monotonic() + LINE_PERIOD_S
-            print("%s: %.0f %%" % (self._title, 100.0 * done / self._total), file=self._stream, flush=True)
+            say("%s: %.0f %%" % (self._title, 100.0 * done / self._total), self._stream)
 
     def end(self) -> None:
         """Take the bar away; safe twice."""

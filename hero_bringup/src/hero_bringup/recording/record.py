@@ -6,17 +6,20 @@ file is closed when it ends.
 
 import argparse
 import glob
+import math
 import os
 import re
 import signal
 import subprocess
 import sys
 import time
-from typing import List, Optional, Sequence, Set
+from contextlib import suppress
+from typing import Dict, List, Optional, Sequence, Set
 
 import rosgraph
 import roslib.packages
 
+from hero_examples import command_line
 from hero_examples.program import ProgramError, parse_robot_ids
 
 from .disk_guard import MB, DiskGuard
@@ -81,8 +84,15 @@ class Recording:
     def _receive_signal(self, number: int, frame: object) -> None:
         self._end_signal = number
 
-    def _find_files(self) -> List[str]:
-        return sorted(set(glob.glob(self._pattern)) - self._old_files, key=os.path.getctime)
+    def _find_files(self) -> Dict[str, int]:
+        """Return the files of this recording with their sizes, oldest first."""
+        found = []
+        for path in set(glob.glob(self._pattern)) - self._old_files:
+            # Gone since glob saw it: the recorder renames what it has closed, and disks are pulled out.
+            with suppress(OSError):
+                status = os.stat(path)
+                found.append((status.st_ctime_ns, path, status.st_size))
+        return {path: size for _, path, size in sorted(found)}
 
     def run(self) -> int:
         """Record until something ends it; return the exit code."""
@@ -94,8 +104,6 @@ class Recording:
                 )
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             signal.signal(number, self._receive_signal)
-        start_s = time.monotonic()
-        recorder = Recorder(self._command)
         say(
             "recording to %s, %s are free there, ends by itself when less than %s are; Ctrl-C ends it"
             % (
@@ -104,6 +112,8 @@ class Recording:
                 format_size(self._options.min_free_mb * MB),
             )
         )
+        start_s = time.monotonic()
+        recorder = Recorder(self._command)
         reason, code = None, None
         try:
             reason = self._watch(recorder, start_s)
@@ -112,13 +122,10 @@ class Recording:
             mended = self._mend_leftovers()
         self._summarise(time.monotonic() - start_s)
         if reason is not None:
-            print("record: ended: " + reason, file=sys.stderr)
+            command_line.complain("ended: " + reason)
             return 1
         if mended or code not in (0, -signal.SIGINT, -signal.SIGTERM):
-            print(
-                "record: rosbag's recorder ended badly (exit code %s); its last lines say why" % code,
-                file=sys.stderr,
-            )
+            command_line.complain("rosbag's recorder ended badly (exit code %s); its last lines say why" % code)
             return 1
         return 0
 
@@ -141,7 +148,7 @@ class Recording:
 
     def _report(self, elapsed_s: float) -> None:
         files = self._find_files()
-        sizes = measure_sizes(files)
+        sizes = sum(files.values())
         if sizes <= EMPTY_BAG_BYTES:
             say("nothing came in %.0f s: does the driver run, has a robot joined?" % elapsed_s)
             return
@@ -151,9 +158,9 @@ class Recording:
             "" if len(files) == 1 else "s",
             format_time(elapsed_s),
         )
-        if not self._options.max_files:
-            left_s = (self._guard.read_free_above_limit_mb() * MB) / (sizes / elapsed_s)
-            text += ", space for about %s more" % format_time(left_s)
+        free_mb = self._guard.read_free_above_limit_mb()
+        if not self._options.max_files and free_mb is not None:
+            text += ", space for about %s more" % format_time(free_mb * MB / (sizes / elapsed_s))
         say(text)
 
     def _mend_leftovers(self) -> bool:
@@ -163,21 +170,16 @@ class Recording:
             try:
                 say("mended " + mend_bag(path, Progress()))
             except RecordingError as error:
-                print("record: %s" % error, file=sys.stderr)
+                command_line.complain(str(error))
         return bool(leftovers)
 
     def _summarise(self, elapsed_s: float) -> None:
         files = self._find_files()
-        if measure_sizes(files) <= EMPTY_BAG_BYTES:
+        if sum(files.values()) <= EMPTY_BAG_BYTES:
             say("nothing was recorded: no robot, no driver was heard")
-        for path in files:
-            say("%s  %s" % (path, format_size(os.path.getsize(path))))
-        say("%s in %s" % (format_size(measure_sizes(files)), format_time(elapsed_s)))
-
-
-def measure_sizes(paths: Sequence[str]) -> int:
-    """Return the bytes of all files together; one that was just renamed counts as nothing."""
-    return sum(os.path.getsize(path) for path in paths if os.path.exists(path))
+        for path, size in files.items():
+            say("%s  %s" % (path, format_size(size)))
+        say("%s in %s" % (format_size(sum(files.values())), format_time(elapsed_s)))
 
 
 def format_size(size: float) -> str:
@@ -195,8 +197,8 @@ def format_time(duration_s: float) -> str:
 
 
 def say(text: str) -> None:
-    """Write a line for people, at once also into a pipe."""
-    print("record: " + text, flush=True)
+    """Write a line for people; the recording goes on where nobody reads it."""
+    command_line.say("record: " + text)
 
 
 def make_command(options: argparse.Namespace, recorder_arguments: Sequence[str]) -> List[str]:
@@ -254,8 +256,8 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
         value = getattr(options, name)
         if not lowest <= value <= highest:
             parser.error("--%s %s: must be %g..%g" % (name.replace("_", "-"), value, lowest, highest))
-    if options.seconds is not None and not options.seconds > 0.0:
-        parser.error("--seconds %g: must be more than 0" % options.seconds)
+    if options.seconds is not None and not 0.0 < options.seconds < math.inf:
+        parser.error("--seconds %g: must be more than 0, and finite" % options.seconds)
     if not re.fullmatch(r"[\w][\w.-]*", options.name):
         parser.error("--name %r: must be letters, digits, _ . and -" % options.name)
     try:
@@ -272,8 +274,10 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     return options
 
 
-def run(options: argparse.Namespace, recorder_arguments: Sequence[str]) -> int:
-    """Do what the options say; return the exit code. Raises: RecordingError."""
+def run(arguments: Sequence[str]) -> int:
+    """Do what the command line says; return the exit code. Raises: RecordingError."""
+    ros_arguments = [word for word in arguments if rosgraph.names.REMAP in word]
+    options = parse_options([word for word in arguments if rosgraph.names.REMAP not in word])
     if options.mend:
         for path in options.mend:
             say("mended " + mend_bag(path, Progress()))
@@ -283,16 +287,9 @@ def run(options: argparse.Namespace, recorder_arguments: Sequence[str]) -> int:
             "no ROS master at %s: start roslaunch hero_bringup hero_bringup.launch first, or set ROS_MASTER_URI"
             % rosgraph.get_master_uri()
         )
-    return Recording(options, recorder_arguments).run()
+    return Recording(options, ros_arguments).run()
 
 
 def main() -> None:
     """Run the program record."""
-    ros_arguments = [word for word in sys.argv[1:] if rosgraph.names.REMAP in word]
-    options = parse_options([word for word in sys.argv[1:] if rosgraph.names.REMAP not in word])
-    try:
-        sys.exit(run(options, ros_arguments))
-    except RecordingError as error:
-        sys.exit("record: %s" % error)
-    except KeyboardInterrupt:
-        sys.exit(130)
+    command_line.run(lambda: run(sys.argv[1:]), RecordingError)

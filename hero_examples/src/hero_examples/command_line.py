@@ -1,0 +1,95 @@
+"""Runs the main function of a command: an error becomes one line and an exit status, whatever happens to the output.
+
+Exit status: 0 done, 1 failed (the line on stderr says why), 2 wrong arguments (argparse), 130 Ctrl-C, 141 nobody reads
+the output any more (what a shell reports of any program that a closed pipe ends). Knows neither ROS nor robots.
+"""
+
+import errno
+import io
+import os
+import signal
+import sys
+from contextlib import suppress
+from typing import IO, Callable, NoReturn, Optional, Type
+
+FAILED = 1
+INTERRUPTED = 128 + signal.SIGINT
+PIPE_CLOSED = 128 + signal.SIGPIPE
+
+OUTPUT_ERRORS = (errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+
+
+def run(main: Callable[[], Optional[int]], *errors: Type[Exception]) -> NoReturn:
+    """Call main and end the process with its exit status; None is 0. errors: those whose text is one line for people."""
+    sys.exit(call(main, *errors))
+
+
+def call(main: Callable[[], Optional[int]], *errors: Type[Exception]) -> int:
+    """As run(), but return the exit status. The output is written by then, or given up."""
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        # Names of files need not be text of the terminal's encoding.
+        sys.stdout.reconfigure(errors="backslashreplace")
+    status = 0
+    try:
+        status = main() or 0
+    except errors as error:
+        complain(str(error))
+        status = FAILED
+    except KeyboardInterrupt:
+        status = INTERRUPTED
+    except SystemExit as end:  # argparse: wrong arguments, or --help
+        status = end.code if isinstance(end.code, int) else FAILED if end.code else 0
+        if isinstance(end.code, str):
+            complain(end.code)
+    except OSError as error:
+        if error.filename is not None or error.errno not in OUTPUT_ERRORS:
+            complain("%s%s" % ("%s: " % error.filename if error.filename else "", error.strerror or error))
+            return FAILED
+        _drop(sys.stdout)
+        return _tell(error)
+    for stream in (sys.stderr, sys.stdout):
+        try:
+            if stream is not None:
+                stream.flush()
+        except OSError as error:
+            _drop(stream)
+            status = status or _tell(error)
+    return status
+
+
+def say(text: str, stream: Optional[IO[str]] = None) -> None:
+    """Write a line at once, to stdout unless stream is given; the program goes on where nobody reads it.
+
+    For work that must not end because of its output: a recording, robots that are being measured.
+    """
+    stream = stream or sys.stdout
+    if stream is None:  # the program was started without
+        return
+    try:
+        # In one piece: threads write side by side.
+        stream.write(text + "\n")
+        stream.flush()
+    except OSError as error:
+        _drop(stream)
+        _tell(error)
+
+
+def complain(text: str) -> None:
+    """Write a line with the program's name to stderr."""
+    with suppress(OSError):
+        print("%s: %s" % (os.path.basename(sys.argv[0]), text), file=sys.stderr, flush=True)
+
+
+def _tell(failure: OSError) -> int:
+    """Say why the output is lost, unless it is a pipe whose reader went; return the exit status."""
+    if isinstance(failure, BrokenPipeError):
+        return PIPE_CLOSED
+    complain("the output cannot be written: %s" % failure.strerror)
+    return FAILED
+
+
+def _drop(stream: IO[str]) -> None:
+    """Let a stream lead nowhere from now on: what it holds would fail again, in the end with a traceback."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, stream.fileno())
+    os.close(nowhere)

@@ -1,0 +1,86 @@
+"""A command's end: its output, one line on stderr, its exit status; each in a process of its own."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+HEADER = "import sys; from hero_examples import command_line\n"
+FEW, MANY = "print('text')", "print('text' * 100000)"
+TO_ITS_END = "def main():\n    for _ in range(100): command_line.say('text')\n    print('end', file=sys.stderr)\n"
+
+
+def run_python(code, stdout=subprocess.PIPE, stderr=subprocess.PIPE):
+    """Return exit status and what came on stderr."""
+    # PYTHONUNBUFFERED: empty is off, so that a text stays in the buffer until the end.
+    environment = dict(os.environ, PYTHONUNBUFFERED="", PYTHONPATH=os.pathsep.join(filter(None, sys.path)))
+    process = subprocess.Popen(
+        [sys.executable, "-c", HEADER + code], stdout=stdout, stderr=stderr, env=environment
+    )
+    errors = process.communicate(timeout=60.0)[1]
+    return process.returncode, (errors or b"").decode()
+
+
+@pytest.fixture
+def closed_pipe():
+    read_end, write_end = os.pipe()
+    os.close(read_end)
+    yield write_end
+    os.close(write_end)
+
+
+@pytest.fixture
+def full_disk():
+    with open("/dev/full", "wb") as file:
+        yield file
+
+
+@pytest.mark.parametrize("printing", [FEW, MANY])
+def test_a_pipe_that_nobody_reads_ends_a_command_silently(closed_pipe, printing):
+    assert run_python("command_line.run(lambda: %s)" % printing, closed_pipe) == (141, "")
+
+
+@pytest.mark.parametrize("printing", [FEW, MANY])
+def test_a_full_disk_as_output_is_told_in_one_line(full_disk, printing):
+    status, errors = run_python("command_line.run(lambda: %s)" % printing, full_disk)
+    assert (status, errors) == (1, "-c: the output cannot be written: No space left on device\n")
+
+
+def test_help_to_a_pipe_that_nobody_reads_ends_silently(closed_pipe):
+    code = "import argparse; command_line.run(lambda: argparse.ArgumentParser().parse_args(['--help']))"
+    assert run_python(code, closed_pipe) == (141, "")
+
+
+def test_work_goes_on_to_its_end_though_nobody_reads_its_lines(closed_pipe):
+    assert run_python(TO_ITS_END + "command_line.run(main)", closed_pipe) == (0, "end\n")
+
+
+def test_work_goes_on_to_its_end_though_its_output_is_full(full_disk):
+    status, errors = run_python(TO_ITS_END + "command_line.run(main)", full_disk)
+    assert (status, errors) == (0, "-c: the output cannot be written: No space left on device\nend\n")
+
+
+def test_an_expected_error_is_one_line_and_status_1_also_without_output(closed_pipe):
+    code = "def main(): print('text'); raise ValueError('a reason')\ncommand_line.run(main, ValueError)"
+    assert run_python(code, closed_pipe) == (1, "-c: a reason\n")
+    assert run_python(code, closed_pipe, closed_pipe)[0] == 1
+
+
+def test_a_file_that_cannot_be_opened_is_named_without_a_traceback():
+    assert run_python("command_line.run(lambda: open('/no/file'))") == (1, "-c: /no/file: No such file or directory\n")
+
+
+def test_an_unexpected_error_keeps_its_traceback():
+    status, errors = run_python("command_line.run(lambda: [][0])")
+    assert status == 1
+    assert errors.startswith("Traceback")
+
+
+@pytest.mark.parametrize(("end", "status"), [("sys.exit(3)", 3), ("sys.exit()", 0), ("exec('raise KeyboardInterrupt')", 130)])
+def test_an_end_in_between_keeps_its_exit_status(end, status):
+    assert run_python("command_line.run(lambda: %s)" % end) == (status, "")
+
+
+def test_names_that_are_no_text_are_printed_all_the_same():
+    assert run_python(r"command_line.run(lambda: print('\udcff'))") == (0, "")
