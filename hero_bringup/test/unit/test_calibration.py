@@ -1,12 +1,11 @@
-"""Dead zones, responses, infrared constants and files of robots whose true values are known."""
+"""Dead zones, responses, infrared constants of robots whose true values are known."""
 
 import math
 
 import numpy as np
 import pytest
-import yaml
 
-from hero_bringup.calibration import calibrate, dead_zone, infrared, speed_response, store
+from hero_bringup.calibration import calibrate, dead_zone, infrared, speed_response
 from hero_bringup.calibration.encoder_steps import TICK_M, count_steps
 from hero_bringup.calibration.errors import CalibrationError
 from hero_bringup.calibration.infrared import BODY_RADIUS_M, Facing
@@ -361,55 +360,6 @@ class TestInfrared:
         facings[2] = facings[2]._replace(ranges_m=[math.nan] * 8)
         assert math.isnan(infrared.range_errors_m(facings)[2])
         assert calibrate.format_worst(infrared.range_errors_m(facings)) == "not known (no calibration)"
-
-
-class TestStore:
-    WHOLE = store.Calibration(3, "today", [1511, 1489], [700.0, 5000.0, 0.1] * 2, [0.42] * 8, {"a": 1})
-
-    def test_a_file_holds_what_was_saved(self, tmp_path):
-        path = store.name_file(str(tmp_path), 3)
-        store.save(path, self.WHOLE)
-        assert store.load(path) == self.WHOLE
-
-    def test_parts_that_were_not_measured_stay_and_the_old_file_is_kept(self, tmp_path):
-        path = store.name_file(str(tmp_path), 3)
-        store.save(path, self.WHOLE)
-        store.save(path, store.Calibration(3, "later", [1520, 1480], results={"b": 2}))
-        kept = store.load(path)
-        assert kept == self.WHOLE._replace(
-            date="later", motor_centres_us=[1520, 1480], results={"a": 1, "b": 2}
-        )
-        assert store.load(str(tmp_path / "hero_3.previous.yaml")) == self.WHOLE
-
-    @pytest.mark.parametrize(
-        ("change", "words"),
-        [
-            (
-                {"motor_centres_us": [1511, 9000]},
-                "motor_centres_us holds 9000, but must be 2 numbers from 1200 to 1800",
-            ),
-            ({"motor_centres_us": [1511]}, r"\[1511\], but must be 2 numbers"),
-            ({"velocity_gains": [1e9] * 6}, "velocity_gains holds 1000000000.0"),
-            ({"velocity_gains": [float("nan")] * 6}, "velocity_gains holds nan"),
-            ({"infrared_counts_m2": ["x"] * 8}, "infrared_counts_m2 holds 'x'"),
-            ({"robot": "wall_e"}, "robot is 'wall_e', but must be hero_N"),
-            ({"colour": "red"}, "unknown key colour"),
-        ],
-    )
-    def test_a_wrong_file_is_refused_with_the_key_and_what_is_allowed(self, change, words, tmp_path):
-        path = tmp_path / "hero_3.yaml"
-        path.write_text(yaml.safe_dump({"robot": "hero_3", "motor_centres_us": [1500, 1500], **change}))
-        with pytest.raises(CalibrationError, match=words) as caught:
-            store.load(str(path))
-        assert str(path) in str(caught.value)
-
-    def test_what_is_no_calibration_is_named(self, tmp_path):
-        for content, words in (("- 1\n", "no calibration"), ("a: [", "no YAML"), ("", "no calibration")):
-            (tmp_path / "x.yaml").write_text(content)
-            with pytest.raises(CalibrationError, match=words):
-                store.load(str(tmp_path / "x.yaml"))
-        with pytest.raises(CalibrationError, match="No such file"):
-            store.load(str(tmp_path / "y.yaml"))
 
 
 @pytest.mark.parametrize(

@@ -6,17 +6,37 @@ Borders: the only file of the simulated robot that touches the file system besid
 import hashlib
 import json
 import os
-from typing import Optional, Sequence
+from contextlib import suppress
+from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 from .errors import CommandError, OptionError
 
 _LENGTHS = {"ir_calibration_counts_m2": 8, "motor_centres_us": 2, "velocity_pid": 6, "position_pid": 6}
+
+_LARGEST = 3.4e38  # a float of 32 bits
 
 NO_FLASH_DIR = "none"
 """What people say instead of a folder if nothing shall be kept over a restart of the simulator."""
 
 _ERASED_PID = [-1.0] * 6
 """What the firmware takes for "use the gains of the program"."""
+
+_REMEDY = "delete it to begin anew, or start with --flash-dir none"
+
+
+def _make_mapping(pairs: List[Tuple[str, Any]]) -> Dict[str, Any]:
+    """Return pairs as a dict. Raises: ValueError if a key is there twice."""
+    content = dict(pairs)
+    if len(content) < len(pairs):
+        raise ValueError("a key is there twice")
+    return content
+
+
+def _is_kept(key: str, value: Any) -> bool:
+    """Whether a value is a number that a robot may keep; only a sensor without a calibration holds NaN."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return False
+    return abs(value) <= _LARGEST or (value != value and key == "ir_calibration_counts_m2")
 
 
 class Flash:
@@ -46,29 +66,24 @@ class Flash:
         Raises: OptionError if the file cannot be read or is not ours.
         """
         self._path = path
-        if os.path.exists(path):
-            self._load(path)
-            self.is_from_file = True
-
-    def _load(self, path: str) -> None:
         try:
             with open(path, encoding="utf-8") as file:
-                content = json.load(file)
-        except (OSError, ValueError) as error:
-            raise OptionError(
-                "flash file %s cannot be read: %s; delete it to begin anew" % (path, error)
-            ) from error
+                content = json.load(file, object_pairs_hook=_make_mapping)
+        except (FileNotFoundError, NotADirectoryError):  # the latter: told when something has to be kept
+            return
+        except (OSError, RecursionError, ValueError) as error:
+            reason = error.strerror if isinstance(error, OSError) else error
+            raise OptionError("flash file %s cannot be read: %s; %s" % (path, reason, _REMEDY)) from error
         for key, length in _LENGTHS.items():
             values = content.get(key) if isinstance(content, dict) else None
-            if not isinstance(values, list) or len(values) != length:
+            if not (
+                isinstance(values, list) and len(values) == length and all(_is_kept(key, value) for value in values)
+            ):
                 raise OptionError(
-                    "flash file %s: %s must be a list of %d numbers; delete the file to begin anew"
-                    % (path, key, length)
+                    "flash file %s: %s must be a list of %d finite numbers; %s" % (path, key, length, _REMEDY)
                 )
-            try:
-                setattr(self, key, [float(value) for value in values])
-            except (TypeError, ValueError) as error:
-                raise OptionError("flash file %s: %s: %s" % (path, key, error)) from error
+            setattr(self, key, [float(value) for value in values])
+        self.is_from_file = True
 
     def save(self) -> None:
         """Write the file, whole or not at all.
@@ -86,6 +101,8 @@ class Flash:
                 json.dump(content, file, indent=1)
             os.replace(written, self._path)
         except OSError as error:
+            with suppress(OSError):
+                os.remove(written)
             raise CommandError(
                 "flash file %s cannot be written: %s" % (self._path, error.strerror)
             ) from error

@@ -1,4 +1,5 @@
 import json
+import math
 import os
 import struct
 import subprocess
@@ -95,13 +96,44 @@ def test_a_home_that_cannot_be_written_costs_no_robot_but_is_reported(ros_home):
     assert driver.swarm.robots[0].motors.motors.centres_us == [1490, 1512]
 
 
+def write_flash(**changes):
+    """Return the text of a good file but for the changes."""
+    content = {
+        "ir_calibration_counts_m2": [0.5] * 7 + [math.nan],
+        "motor_centres_us": [1500, 1510],
+        "velocity_pid": [-1.0] * 6,
+        "position_pid": [-1.0] * 6,
+    }
+    return json.dumps({**content, **changes})
+
+
+def test_a_sensor_that_was_never_calibrated_is_read_as_nan(tmp_path):
+    path = tmp_path / "hero_0.json"
+    path.write_text(write_flash())
+    flash = Flash([0.1] * 8)
+    flash.keep_in(str(path))
+    assert flash.ir_calibration_counts_m2[:7] == [0.5] * 7 and math.isnan(flash.ir_calibration_counts_m2[7])
+
+
+def test_a_directory_in_place_of_a_flash_file_is_named(tmp_path):
+    with pytest.raises(OptionError, match="cannot be read: Is a directory; delete it"):
+        Flash([0.5] * 8).keep_in(str(tmp_path))
+
+
 @pytest.mark.parametrize(
     "content, reason",
     [
         ("no JSON", "cannot be read"),
-        ("[]", "ir_calibration_counts_m2 must be a list of 8 numbers"),
-        ('{"ir_calibration_counts_m2": [1, 2]}', "must be a list of 8 numbers"),
-        (json.dumps({"ir_calibration_counts_m2": ["x"] * 8}), "could not convert"),
+        ("", "cannot be read"),
+        ("[" * 20000, "cannot be read"),
+        ('{"a": 1, "a": 2}', "a key is there twice"),
+        ("[]", "ir_calibration_counts_m2 must be a list of 8 finite numbers"),
+        ('{"ir_calibration_counts_m2": [1, 2]}', "must be a list of 8 finite numbers"),
+        (write_flash(ir_calibration_counts_m2=["x"] * 8), "must be a list of 8 finite numbers"),
+        (write_flash(ir_calibration_counts_m2=[math.inf] * 8), "must be a list of 8 finite numbers"),
+        (write_flash(motor_centres_us=[10**400, 1500]), "must be a list of 2 finite numbers"),
+        (write_flash(motor_centres_us=[math.nan, 1500]), "must be a list of 2 finite numbers"),
+        (write_flash(velocity_pid=[True] * 6), "must be a list of 6 finite numbers"),
     ],
 )
 def test_a_file_that_is_not_a_flash_is_named_with_the_reason(tmp_path, content, reason):

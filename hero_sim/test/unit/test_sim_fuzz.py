@@ -1,6 +1,7 @@
 """Any file: it is read, or refused in one line with file, line and reason; nothing else is ever raised."""
 
 import json
+import math
 import re
 import sys
 
@@ -13,6 +14,7 @@ from hero_sim import robot_errors
 from hero_sim.arena import Arena
 from hero_sim.arena_file import load_arena
 from hero_sim.errors import OptionError
+from hero_sim.flash import Flash
 
 ARENA = """\
 name: mine
@@ -107,6 +109,35 @@ def test_any_file_of_errors_is_read_or_refused_with_file_line_and_reason(path, c
     except OptionError as error:
         assert_tells(error, path)
     assert all(np.isfinite(array).all() for array in errors)
+
+
+FLASH = json.dumps(
+    {
+        "ir_calibration_counts_m2": [0.5] * 8,
+        "motor_centres_us": [1500, 1500],
+        "velocity_pid": [-1.0] * 6,
+        "position_pid": [-1.0] * 6,
+    }
+).encode()
+pieces = st.one_of(
+    st.binary(max_size=4), st.sampled_from((b"NaN", b"Infinity", b"1e999", b"9" * 400, b"9" * 5000, b"[" * 9999, b"true"))
+)
+
+
+@often
+@given(st.lists(st.tuples(st.integers(0, len(FLASH)), st.integers(0, 4), pieces), min_size=1, max_size=4))
+def test_any_flash_file_is_read_or_refused_with_file_and_remedy(path, script):
+    content = FLASH
+    for place, length, piece in script:
+        content = content[:place] + piece + content[place + length :]
+    path.write_bytes(content)
+    flash = Flash([0.5] * 8)
+    try:
+        flash.keep_in(str(path))
+    except OptionError as error:
+        assert re.fullmatch(r"flash file %s.*; delete it to begin anew.*" % re.escape(str(path)), str(error))
+    kept = (*flash.motor_centres_us, *flash.velocity_pid, *flash.position_pid)
+    assert all(map(math.isfinite, kept)) and not any(map(math.isinf, flash.ir_calibration_counts_m2))
 
 
 @pytest.mark.parametrize(

@@ -81,9 +81,9 @@ class Calibration:
             ended = True
         finally:
             self._session.stop()
-        # Also what was written before the end is kept in files.
-        for probe in self._session.probes:
-            self._save(probe)
+            # Robots hold what was measured before the end, whatever that was: the files do, too.
+            for probe in self._session.probes:
+                self._save(probe)
         say("")
         say("\n".join(self._format_table()))
         if ended:
@@ -162,7 +162,7 @@ class Calibration:
             results["range_error_after_m"] = [round(float(error), 4) for error in ranges.after_m]
         path = store.name_file(self._options.folder, probe.robot_id)
         try:
-            store.save(
+            damaged = store.save(
                 path,
                 store.Calibration(
                     probe.robot_id,
@@ -174,6 +174,8 @@ class Calibration:
                 ),
             )
             self._files[probe.robot_id] = [path]
+            if damaged is not None:
+                say("%s: the file that was there is damaged, and kept as %s" % (probe.name, damaged))
             self._draw(probe, motors, velocity, ranges)
         except CalibrationError as error:
             probe.failure = probe.failure or str(error)
@@ -299,7 +301,7 @@ def restore(options: argparse.Namespace, program: Program) -> int:
     paths = options.files or sorted(
         os.path.join(options.folder, name)
         for name in (os.listdir(options.folder) if os.path.isdir(options.folder) else [])
-        if name.endswith(".yaml") and store.PREVIOUS not in name
+        if name.endswith(".yaml") and store.PREVIOUS not in name and store.DAMAGED not in name
     )
     wanted = None if options.robots is None else set(options.robots)
     kept = [store.load(path) for path in paths]
