@@ -1,5 +1,6 @@
 """What a recording says of robots whose ways, delays, errors and pauses are known."""
 
+import math
 import re
 
 import made_up_bag
@@ -8,7 +9,7 @@ import pytest
 from made_up_bag import DELAY_S, ERROR_M, MOTION_DELAY_S, PERIOD_S, RADIUS_M, START_S, TURN_RAD_S, write_bag
 
 from hero_bringup.recording import analysis, plot
-from hero_bringup.recording.bags import BagSet
+from hero_bringup.recording.bags import BagSet, Message
 from hero_bringup.recording.colours import MOST_NAMED, choose_colours
 from hero_bringup.recording.errors import RecordingError
 from hero_bringup.recording.figures import Figures, hold_commands
@@ -20,7 +21,7 @@ from hero_bringup.recording.topics import find_robot_topic, is_fleet_topic, make
 def observe(path, robot_ids=None):
     bags = BagSet([str(path)], Progress())
     observations = Observations(robot_ids)
-    observations.receive_all(bags.read(observations.wants))
+    bags.read(observations.wants, observations.receive)
     return observations
 
 
@@ -129,6 +130,15 @@ def test_commands_to_a_robot_that_moves_already_say_nothing_of_its_delay():
         robot.encoder.add(reading * PERIOD_S, float(reading), float(reading))
     robot.commands.add(5.0, 0.1, 0.0)
     assert len(analysis.find_motion_delays(robot)) == 0
+
+
+def test_a_message_with_numbers_that_make_no_sense_is_left_out_and_counted():
+    observations = Observations()
+    for x_m in (0.0, math.nan, math.inf, 1e30, 0.1):
+        pose = made_up_bag.make_pose(1.0, x_m, 0.0, 0.0)
+        observations.receive(Message("/hero_0/odom", "nav_msgs/Odometry", pose, 1.0))
+    assert analysis.read_path(observations.robots[0]).length_m == pytest.approx(0.1)
+    assert plot.format_table(observations)[-1].startswith("hero_0: 3 messages left out")
 
 
 def test_states_become_spans_with_holes_where_the_driver_said_nothing():

@@ -4,13 +4,16 @@ import os
 
 import pytest
 import rosbag
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from made_up_bag import START_S, write_bag
 from std_msgs.msg import String
 
+from hero_bringup.recording import plot
 from hero_bringup.recording.bags import BagSet
 from hero_bringup.recording.disk_guard import DiskGuard
 from hero_bringup.recording.errors import RecordingError
-from hero_bringup.recording.mending import mend_bag
+from hero_bringup.recording.mending import CHUNK_MARK, mend_bag
 from hero_bringup.recording.progress import Progress
 
 
@@ -46,6 +49,12 @@ def open_set(*paths):
     return BagSet([str(path) for path in paths], Progress())
 
 
+def read_all(bags, choose=lambda topic, kind: True):
+    messages = []
+    bags.read(choose, messages.append)
+    return messages
+
+
 def test_files_of_a_split_are_read_in_the_order_of_time(tmp_path):
     write_bag(tmp_path / "a.bag", start_s=START_S + 100.0, seconds=1.0)
     write_bag(tmp_path / "b.bag", seconds=1.0)
@@ -53,7 +62,7 @@ def test_files_of_a_split_are_read_in_the_order_of_time(tmp_path):
     assert bags.paths == [str(tmp_path / "b.bag"), str(tmp_path / "a.bag")]
     assert bags.start_s == START_S
     assert bags.end_s == pytest.approx(START_S + 101.0, abs=0.1)
-    times = [message.time_s for message in bags.read(lambda topic, kind: topic == "/hero_0/odom")]
+    times = [message.time_s for message in read_all(bags, lambda topic, kind: topic == "/hero_0/odom")]
     assert len(times) == 58
     assert times == sorted(times)
 
@@ -87,13 +96,13 @@ def test_a_bag_that_was_cut_off_is_refused_with_the_remedy_and_can_be_mended(tmp
     path = tmp_path / "cut.bag"
     write_bag(path, seconds=20.0)
     whole = open_set(path)
-    count = len(list(whole.read(lambda topic, kind: True)))
+    count = len(read_all(whole))
     cut_off(path, 0.6)
     with pytest.raises(RecordingError, match="has no index.*record --mend"):
         open_set(path)
     path.rename(str(path) + ".active")
-    assert mend_bag(str(path) + ".active", Progress()) == str(path)
-    left = len(list(open_set(path).read(lambda topic, kind: True)))
+    assert mend_bag(str(path) + ".active", Progress()) == (str(path), None)
+    left = len(read_all(open_set(path)))
     assert 0.3 * count < left < count
 
 
@@ -104,7 +113,7 @@ def test_a_bag_with_damage_in_the_middle_is_named_and_not_a_stack_trace(tmp_path
     data[len(data) // 3 : len(data) // 3 + 5000] = b"\xff" * 5000
     path.write_bytes(data)
     with pytest.raises(RecordingError, match=r"damaged\.bag"):
-        list(open_set(path).read(lambda topic, kind: True))
+        read_all(open_set(path))
 
 
 def test_what_cannot_be_mended_stays_as_it_is(tmp_path):
@@ -120,14 +129,68 @@ def test_what_cannot_be_mended_stays_as_it_is(tmp_path):
     assert (tmp_path / "text.bag.active").read_text() == "not a bag\n"
 
 
+def damage(path, share):
+    """Change bytes of a bag in a chunk, as a bad disk does."""
+    data = bytearray(path.read_bytes())
+    start = data.index(CHUNK_MARK, int(len(data) * share))
+    data[start : start + 40] = b"\xff" * 40
+    path.write_bytes(data)
+    return bytes(data)
+
+
+def test_what_follows_damage_in_the_middle_is_kept_beside_the_mended_bag(tmp_path):
+    path = tmp_path / "damaged.bag"
+    write_bag(path, seconds=20.0)
+    content = damage(path, 0.5)
+    assert mend_bag(str(path), Progress()) == (str(path), str(path) + ".damaged")
+    assert (tmp_path / "damaged.bag.damaged").read_bytes() == content
+    assert len(read_all(open_set(path))) > 0
+
+
+def test_a_bag_of_which_nothing_can_be_read_is_left_as_it_is(tmp_path):
+    path = tmp_path / "damaged.bag.active"
+    write_bag(path, seconds=20.0)
+    content = damage(path, 0.0)
+    with pytest.raises(RecordingError, match="is left as it is"):
+        mend_bag(str(path), Progress())
+    assert path.read_bytes() == content
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    places=st.lists(st.floats(0.0, 1.0, exclude_max=True), min_size=1, max_size=20),
+    bit=st.integers(0, 7),
+    length=st.one_of(st.just(1.0), st.floats(0.0, 1.0)),
+)
+def test_any_bag_is_read_and_mended_or_refused_in_one_line(tmp_path, places, bit, length):
+    good = tmp_path / "good.bag"
+    if not good.exists():
+        write_bag(good, seconds=1.0)
+    content = bytearray(good.read_bytes())
+    # Most of the structure lies at both ends.
+    for place in places:
+        content[int((len(content) - 1) * (3.0 * place**2 - 2.0 * place**3))] ^= 1 << bit
+    path = tmp_path / "flipped.bag"
+    path.write_bytes(content[: int(len(content) * length)])
+    for use in (
+        lambda: plot.observe(plot.parse_options([str(path)]), open_set(path)),
+        lambda: read_all(open_set(path)),
+        lambda: mend_bag(str(path), Progress()),
+    ):
+        try:
+            use()
+        except RecordingError as error:
+            assert str(path) in str(error) and str(error).isprintable()
+
+
 def test_a_terminal_gets_a_bar_and_a_log_nothing_for_short_work(tmp_path, capsys):
     path = tmp_path / "a.bag"
     write_bag(path, seconds=30.0)
     terminal = Terminal()
-    list(BagSet([str(path)], Progress(terminal)).read(lambda topic, kind: True))
+    read_all(BagSet([str(path)], Progress(terminal)))
     assert "a.bag" in terminal.text
     assert "%" in terminal.text
-    list(open_set(path).read(lambda topic, kind: True))
+    read_all(open_set(path))
     assert capsys.readouterr().err == ""
 
 
@@ -148,7 +211,7 @@ def test_bags_with_types_that_are_not_installed_are_read_all_the_same(tmp_path):
             connection_header=header,
         )
         bag.write("/more", message)
-    words = [message.content.data for message in open_set(path).read(lambda topic, kind: topic == "/words")]
+    words = [message.content.data for message in read_all(open_set(path), lambda topic, kind: topic == "/words")]
     assert words == ["hi"]
 
 
@@ -183,4 +246,6 @@ class TestDiskGuard:
         def read_free(folder):
             raise FileNotFoundError(2, "No such file or directory")
 
-        assert "is gone" in DiskGuard(str(tmp_path), 1.0, read_free).find_reason_to_end()
+        guard = DiskGuard(str(tmp_path), 1.0, read_free)
+        assert "is gone" in guard.find_reason_to_end()
+        assert guard.read_free_above_limit_mb() is None

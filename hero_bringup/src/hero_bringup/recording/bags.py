@@ -1,12 +1,12 @@
 """Bag files -> their messages in the order of time, or one line that says why a file cannot be read."""
 
 import os
-from typing import Any, Callable, Dict, Iterator, List, NamedTuple, Sequence, Tuple
+from typing import Any, Callable, Dict, List, NamedTuple, Sequence, Tuple
 
 import rosbag
-from rosbag.bag import ROSBagException, ROSBagUnindexedException
+from rosbag.bag import ROSBagUnindexedException
 
-from .errors import RecordingError
+from .errors import RecordingError, name_damage
 from .mending import ACTIVE_SUFFIX
 from .progress import Progress
 
@@ -44,7 +44,7 @@ class BagSet:
         self._counts: Dict[str, Dict[str, int]] = {}
         spans: List[Tuple[float, float, str]] = []
         for path in {os.path.realpath(path): path for path in paths}.values():
-            with open_bag(path, skip_index=True) as bag:
+            with open_bag(path, skip_index=True) as bag, name_damage("%s cannot be read" % path):
                 topics = bag.get_type_and_topic_info().topics
                 self._counts[path] = {topic: info.message_count for topic, info in topics.items()}
                 if not any(self._counts[path].values()):
@@ -57,8 +57,8 @@ class BagSet:
         self.start_s = min(start_s for start_s, _, _ in spans)
         self.end_s = max(end_s for _, end_s, _ in spans)
 
-    def read(self, choose: Choose) -> Iterator[Message]:
-        """Yield the messages whose topic and type choose takes. Raises: RecordingError."""
+    def read(self, choose: Choose, receive: Callable[[Message], None]) -> None:
+        """Give receive the messages whose topic and type choose takes. Raises: RecordingError."""
         wanted = [topic for topic, message_type in self.topics.items() if choose(topic, message_type)]
         if not wanted:
             return
@@ -70,12 +70,12 @@ class BagSet:
                 counts = self._counts[path]
                 self._progress.begin(title, sum(counts.get(topic, 0) for topic in wanted))
                 try:
-                    for count, (topic, content, time) in enumerate(bag.read_messages(wanted)):
-                        if count % PROGRESS_STEP == 0:
-                            self._progress.reach(count)
-                        yield Message(topic, content._type, content, time.to_sec())
-                except (ROSBagException, OSError, ValueError) as error:
-                    raise RecordingError("%s is damaged: %s" % (path, error)) from error
+                    # What receives the messages fails as well where a definition in the bag is damaged.
+                    with name_damage("%s cannot be read" % path):
+                        for count, (topic, content, time) in enumerate(bag.read_messages(wanted)):
+                            if count % PROGRESS_STEP == 0:
+                                self._progress.reach(count)
+                            receive(Message(topic, content._type, content, time.to_sec()))
                 finally:
                     self._progress.end()
 
@@ -88,10 +88,9 @@ def open_bag(path: str, skip_index: bool = False) -> rosbag.Bag:
     if os.path.isdir(path):
         raise RecordingError("%s is a folder; name the bags in it: %s" % (path, os.path.join(path, "*.bag")))
     try:
-        return rosbag.Bag(path, "r", skip_index=skip_index)
-    except ROSBagUnindexedException as error:
-        raise RecordingError("%s has no index, or a damaged one; %s" % (path, mend)) from error
-    except OSError as error:
-        raise RecordingError("%s cannot be read: %s" % (path, error.strerror or error)) from error
-    except (ROSBagException, ValueError) as error:
-        raise RecordingError("%s is no bag of ROS 1: %s" % (path, error)) from error
+        with name_damage("%s cannot be read" % path):
+            return rosbag.Bag(path, "r", skip_index=skip_index)
+    except RecordingError as error:
+        if isinstance(error.__cause__, ROSBagUnindexedException):
+            raise RecordingError("%s has no index, or a damaged one; %s" % (path, mend)) from error
+        raise

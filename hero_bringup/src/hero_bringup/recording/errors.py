@@ -1,5 +1,22 @@
 """What the programs of this package end with: one line with the thing, the value and the remedy."""
 
+from contextlib import contextmanager
+from typing import Iterator
+
 
 class RecordingError(Exception):
     """A recording cannot be made or read; the text says why and what to do."""
+
+
+@contextmanager
+def name_damage(what: str) -> Iterator[None]:
+    """Turn whatever rosbag raises in the block into one line that begins with what. Raises: RecordingError."""
+    try:
+        yield
+    except RecordingError:
+        raise
+    except OSError as error:
+        raise RecordingError("%s: %s" % (what, error.strerror or error)) from error
+    except Exception as error:  # noqa: BLE001  rosbag checks little: a wrong byte may raise anything
+        reason = "".join(letter if letter.isprintable() else " " for letter in str(error))[:200]
+        raise RecordingError("%s: it is damaged, or no bag (%s: %s)" % (what, type(error).__name__, reason)) from error

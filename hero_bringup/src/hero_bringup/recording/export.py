@@ -15,7 +15,7 @@ from hero_examples import command_line
 from hero_examples.program import ProgramError, parse_robot_ids
 
 from . import tables
-from .bags import BagSet
+from .bags import BagSet, Message
 from .errors import RecordingError
 from .progress import Progress
 from .table_files import CSV, FORMATS, TableFiles, find_missing
@@ -74,10 +74,13 @@ def describe_columns() -> List[str]:
 
 def write_tables(bags: BagSet, robot_ids: Optional[Set[int]], kinds: Set[str], files: TableFiles) -> None:
     """Write all rows of the robots and kinds that are wanted. Raises: RecordingError."""
-    for topic, message_type, content, time_s in bags.read(tables.wants):
-        for robot_id, kind, row in tables.read_rows(topic, message_type, content, time_s):
+
+    def receive(message: Message) -> None:
+        for robot_id, kind, row in tables.read_rows(*message):
             if kind in kinds and (robot_ids is None or robot_id in robot_ids):
                 files.add(robot_id, kind, row)
+
+    bags.read(tables.wants, receive)
 
 
 def run(options: argparse.Namespace) -> None:

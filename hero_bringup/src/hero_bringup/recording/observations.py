@@ -73,6 +73,11 @@ class RobotObservations:
         self.origins: List[Origin] = []
         self.states: List[StateReport] = []
 
+    @property
+    def left_out(self) -> int:
+        """How many messages hold numbers that make no sense."""
+        return sum(series.left_out for series in (self.odometry, self.ground_truth, self.commands))
+
 
 class Observations:
     """What was seen of all robots.
@@ -111,11 +116,6 @@ class Observations:
 
     def _robot(self, robot_id: int) -> RobotObservations:
         return self.robots.setdefault(robot_id, RobotObservations())
-
-    def receive_all(self, messages: Iterable[Message]) -> None:
-        """Take every message."""
-        for message in messages:
-            self.receive(message)
 
     def receive(self, message: Message) -> None:
         """Take one message of a topic that wants() takes."""
@@ -164,6 +164,8 @@ class Observations:
             self.shared_frame = transform.header.frame_id.strip("/")
             place = transform.transform.translation
             origin = Origin(message.time_s, place.x, place.y, yaw_of(transform.transform.rotation))
+            if not all(map(math.isfinite, origin)):
+                continue
             origins = self._robot(int(number)).origins
             # Latched messages are recorded again at the begin of every file of a split.
             if not origins or origins[-1][1:] != origin[1:]:

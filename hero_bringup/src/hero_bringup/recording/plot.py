@@ -57,7 +57,7 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
 def observe(options: argparse.Namespace, bags: BagSet) -> Observations:
     """Read the bags. Raises: RecordingError if there is no robot in them."""
     observations = Observations(None if options.robots is None else set(options.robots))
-    observations.receive_all(bags.read(observations.wants))
+    bags.read(observations.wants, observations.receive)
     if not observations.robots:
         wanted = (
             "" if options.robots is None else " with these ids (%s)" % ", ".join(map(str, options.robots))
@@ -162,7 +162,11 @@ def format_table(observations: Observations) -> List[str]:
             ]
         )
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
-    return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths)).rstrip() for row in rows]
+    lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths)).rstrip() for row in rows]
+    for robot_id, robot in sorted(observations.robots.items()):
+        if robot.left_out:
+            lines.append("hero_%d: %d messages left out: they hold nan, inf or absurd numbers" % (robot_id, robot.left_out))
+    return lines
 
 
 def format_number(text: str, value: Optional[float], factor: float = 1.0) -> str:

@@ -168,7 +168,7 @@ class Recording:
         leftovers = [path for path in self._find_files() if path.endswith(ACTIVE_SUFFIX)]
         for path in leftovers:
             try:
-                say("mended " + mend_bag(path, Progress()))
+                say("mended %s" % mend_bag(path, Progress()))
             except RecordingError as error:
                 command_line.complain(str(error))
         return bool(leftovers)
@@ -280,7 +280,7 @@ def run(arguments: Sequence[str]) -> int:
     options = parse_options([word for word in arguments if rosgraph.names.REMAP not in word])
     if options.mend:
         for path in options.mend:
-            say("mended " + mend_bag(path, Progress()))
+            say("mended %s" % mend_bag(path, Progress()))
         return 0
     if not rosgraph.is_master_online():
         raise RecordingError(

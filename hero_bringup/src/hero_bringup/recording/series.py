@@ -5,15 +5,22 @@ from typing import List, Tuple
 
 import numpy as np
 
+LARGEST_VALUE = 1e6
+
 
 class Series:
     """Rows of numbers; times in the first columns are kept exactly, the rest to seven digits.
 
     A row of a time and six values takes 32 bytes: ten minutes of a robot's odometry, 560 kB.
+
+    Attributes:
+        left_out: rows that were not taken because a value is not finite, or beyond what a robot can measure.
     """
 
     def __init__(self, times: int, values: int) -> None:
         """Begin empty; every row is times numbers (s) and then values numbers."""
+        self.left_out = 0
+        self._times = times
         self._columns: List[array[float]] = [array("d") for _ in range(times)]
         self._columns += [array("f") for _ in range(values)]
 
@@ -21,7 +28,10 @@ class Series:
         return len(self._columns[0])
 
     def add(self, *row: float) -> None:
-        """Add a row."""
+        """Add a row, unless a value of it makes no sense: one such would decide the scale of a whole figure."""
+        if not all(abs(value) <= LARGEST_VALUE for value in row[self._times :]):
+            self.left_out += 1
+            return
         for column, number in zip(self._columns, row):
             column.append(number)
 

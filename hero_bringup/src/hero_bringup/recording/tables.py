@@ -5,6 +5,7 @@ clock, which the driver keeps in step. Both are seconds since 1970. Frames and u
 docs/robot_interface.md.
 """
 
+import math
 from typing import Any, Callable, Dict, List, NamedTuple, Tuple
 
 from . import topics
@@ -120,7 +121,7 @@ TABLES: Dict[str, Table] = {
                 for beam in BEAMS
             ),
         ),
-        lambda content: (_stamp_of(content), *content.ranges[: len(BEAMS)]),
+        lambda content: (_stamp_of(content), *(*content.ranges, *[math.nan] * len(BEAMS))[: len(BEAMS)]),
     ),
     topics.VELOCITY_COMMAND: Table(_COMMAND, _read_command),
     topics.POSITION_COMMAND: Table(_COMMAND, _read_command),

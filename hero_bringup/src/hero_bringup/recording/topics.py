@@ -49,7 +49,7 @@ SHARED_PATTERNS = (
 simulator's walls."""
 
 _FLEET_TOPIC = re.compile(r"/hero_driver[^/]*/robots")
-_ROBOT_TOPIC = re.compile(r"/hero_(\d+)/(.+)")
+_ROBOT_TOPIC = re.compile(r"/hero_([0-9]{1,9})/(.+)")
 
 
 class RobotTopic(NamedTuple):
