@@ -61,11 +61,8 @@ def ask_master(method: str, *arguments: Any) -> Any:
     return value
 
 
-def start_ros_node(name: str, anonymous: bool = False) -> None:
-    """Start the node of this process; signals stay with the caller.
-
-    Raises: NodeError without a ROS master, without a directory for logs, or for wrong remappings.
-    """
+def check_master() -> None:
+    """Raise NodeError with what to do if no ROS master answers."""
     try:
         ask_master("getPid")
     except NodeError as error:
@@ -73,6 +70,14 @@ def start_ros_node(name: str, anonymous: bool = False) -> None:
             "%s: start roslaunch hero_bringup hero_bringup.launch first, or set ROS_MASTER_URI, for example to"
             " http://localhost:11311" % error
         ) from None
+
+
+def start_ros_node(name: str, anonymous: bool = False) -> None:
+    """Start the node of this process; signals stay with the caller.
+
+    Raises: NodeError without a ROS master, without a directory for logs, or for wrong remappings.
+    """
+    check_master()
     uri = rosgraph.get_master_uri()
     rospy.core._xmlrpc_cache[uri] = rospy.core._LockedServerProxy(uri, transport=LimitedTransport())
     try:

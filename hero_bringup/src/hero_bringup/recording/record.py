@@ -21,6 +21,7 @@ import roslib.packages
 
 from hero_examples import command_line
 from hero_examples.program import ProgramError, parse_robot_ids
+from hero_examples.ros_node import NodeError, check_master
 
 from .disk_guard import MB, DiskGuard
 from .errors import RecordingError
@@ -275,21 +276,17 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
 
 
 def run(arguments: Sequence[str]) -> int:
-    """Do what the command line says; return the exit code. Raises: RecordingError."""
+    """Do what the command line says; return the exit code. Raises: RecordingError, NodeError."""
     ros_arguments = [word for word in arguments if rosgraph.names.REMAP in word]
     options = parse_options([word for word in arguments if rosgraph.names.REMAP not in word])
     if options.mend:
         for path in options.mend:
             say("mended %s" % mend_bag(path, Progress()))
         return 0
-    if not rosgraph.is_master_online():
-        raise RecordingError(
-            "no ROS master at %s: start roslaunch hero_bringup hero_bringup.launch first, or set ROS_MASTER_URI"
-            % rosgraph.get_master_uri()
-        )
+    check_master()
     return Recording(options, ros_arguments).run()
 
 
 def main() -> None:
     """Run the program record."""
-    command_line.run(lambda: run(sys.argv[1:]), RecordingError)
+    command_line.run(lambda: run(sys.argv[1:]), RecordingError, NodeError)
