@@ -9,7 +9,6 @@ Changes nothing. Ends within about 3 s whatever hangs; the exit code is 1 if a p
 import argparse
 import json
 import os
-import sys
 import threading
 from typing import Dict, List, Optional, Sequence
 

@@ -49,7 +49,10 @@ def test_parts_that_were_not_measured_stay_and_the_old_file_is_kept(tmp_path):
     assert len(os.listdir(str(tmp_path))) == 2
 
 
-@pytest.mark.parametrize("content", [b"", b"\xff\x00\x01", b"[" * 20000, b"robot: hero_3\nvelocity_gains: 2020-13-45\n", b"robot: hero_4"])
+@pytest.mark.parametrize(
+    "content",
+    [b"", b"\xff\x00\x01", b"[" * 20000, b"robot: hero_3\nvelocity_gains: 2020-13-45\n", b"robot: hero_4"],
+)
 def test_a_damaged_old_file_is_kept_and_costs_no_measurement(tmp_path, content):
     path = tmp_path / "hero_3.yaml"
     path.write_bytes(content)
@@ -148,9 +151,8 @@ def test_what_is_no_calibration_is_named(tmp_path):
 
 PIECES = st.one_of(
     st.binary(max_size=3),
-    st.sampled_from(
-        (b"2026-13-45", b".nan", b"-.inf", b"9" * 400, b"9" * 5000, b"[" * 5000, b"*a", b"&a ", b": ", b"\n", b"!!int ", b"{")
-    ),
+    st.sampled_from((b"2026-13-45", b".nan", b"-.inf", b"9" * 400, b"9" * 5000, b"[" * 5000, b"{", b"!!int ")),
+    st.sampled_from((b"*a", b"&a ", b": ", b"\n")),
 )
 
 

@@ -20,7 +20,7 @@ OUTPUT_ERRORS = (errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO
 
 
 def run(main: Callable[[], Optional[int]], *errors: Type[Exception]) -> NoReturn:
-    """Call main and end the process with its exit status; None is 0. errors: those whose text is one line for people."""
+    """Call main and end the process with its exit status (None: 0); the text of errors is one line for people."""
     sys.exit(call(main, *errors))
 
 

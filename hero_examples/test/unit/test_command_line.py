@@ -77,7 +77,9 @@ def test_an_unexpected_error_keeps_its_traceback():
     assert errors.startswith("Traceback")
 
 
-@pytest.mark.parametrize(("end", "status"), [("sys.exit(3)", 3), ("sys.exit()", 0), ("exec('raise KeyboardInterrupt')", 130)])
+@pytest.mark.parametrize(
+    ("end", "status"), [("sys.exit(3)", 3), ("sys.exit()", 0), ("exec('raise KeyboardInterrupt')", 130)]
+)
 def test_an_end_in_between_keeps_its_exit_status(end, status):
     assert run_python("command_line.run(lambda: %s)" % end) == (status, "")
 

@@ -120,7 +120,8 @@ FLASH = json.dumps(
     }
 ).encode()
 pieces = st.one_of(
-    st.binary(max_size=4), st.sampled_from((b"NaN", b"Infinity", b"1e999", b"9" * 400, b"9" * 5000, b"[" * 9999, b"true"))
+    st.binary(max_size=4),
+    st.sampled_from((b"NaN", b"Infinity", b"1e999", b"9" * 400, b"9" * 5000, b"[" * 9999, b"true")),
 )
 
 

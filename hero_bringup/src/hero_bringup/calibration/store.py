@@ -111,7 +111,7 @@ def _merge(old: Calibration, new: Calibration) -> Calibration:
 
 
 def _write_whole(path: str, content: bytes) -> None:
-    """Write a file so that path leads to the old or to the new one, whole, whenever the power fails. Raises: OSError."""
+    """Write a file so that path leads to the old one or the new one, whole, whenever power fails. Raises: OSError."""
     written = "%s.%d.new" % (path, os.getpid())
     try:
         with open(written, "wb") as file:

@@ -46,7 +46,9 @@ class DiskGuard:
         try:
             free_mb = self._read_free(self.folder)
         except OSError as error:
-            raise RecordingError("%s cannot be read: %s; choose another folder" % (self.folder, error.strerror)) from error
+            raise RecordingError(
+                "%s cannot be read: %s; choose another folder" % (self.folder, error.strerror)
+            ) from error
         if free_mb < self.limit_mb:
             raise RecordingError(
                 "only %.0f MB are free in %s and the limit is %.0f MB, so nothing is recorded; "

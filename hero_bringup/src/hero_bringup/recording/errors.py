@@ -17,6 +17,6 @@ def name_damage(what: str) -> Iterator[None]:
         raise
     except OSError as error:
         raise RecordingError("%s: %s" % (what, error.strerror or error)) from error
-    except Exception as error:  # noqa: BLE001  rosbag checks little: a wrong byte may raise anything
+    except Exception as error:  # rosbag checks little: a wrong byte may raise anything
         reason = "".join(letter if letter.isprintable() else " " for letter in str(error))[:200]
         raise RecordingError("%s: it is damaged, or no bag (%s: %s)" % (what, type(error).__name__, reason)) from error

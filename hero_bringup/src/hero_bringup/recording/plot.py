@@ -165,7 +165,9 @@ def format_table(observations: Observations) -> List[str]:
     lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths)).rstrip() for row in rows]
     for robot_id, robot in sorted(observations.robots.items()):
         if robot.left_out:
-            lines.append("hero_%d: %d messages left out: they hold nan, inf or absurd numbers" % (robot_id, robot.left_out))
+            lines.append(
+                "hero_%d: %d messages left out: they hold nan, inf or absurd numbers" % (robot_id, robot.left_out)
+            )
     return lines
 
 
