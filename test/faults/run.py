@@ -30,7 +30,7 @@ from results import count_results, record  # noqa: E402
 
 def find_families():
     """Return the names of all families, the longest first."""
-    order = ("process", "network", "isolation", "ros_side")
+    order = ("process", "network", "stop", "isolation", "ros_side")
     names = sorted(path.stem[len("test_") :] for path in HERE.glob("test_*.py"))
     return [name for name in order if name in names] + [name for name in names if name not in order]
 

@@ -1,6 +1,5 @@
 """What ends or starves the driver while robots move: signals, full disks, wrong clocks, no more files, own mistakes."""
 
-import math
 import signal
 import socket
 import subprocess
@@ -14,15 +13,14 @@ from driver_case import Recorder, frozen, make_publisher
 from fake_robot import TIME_FRAME, FakeRobot
 from geometry_msgs.msg import Twist
 from life_signs import Life
-from nav_msgs.msg import Odometry
-from rig import HERE, Program, find_free_port, wait_until
+from rig import HERE, find_free_port, wait_until
+from simulated_field import SPEED_M_S, Truth, drive, rest, start_simulator
 from steady_time import StallWatch
 
 from hero_driver.rosserial import frames, payloads
 from hero_msgs.msg import Encoder
 
 ROBOTS = 3
-SPEED_M_S = 0.1
 FREE_DISTANCE_M = 0.03
 """How far a robot at 0.1 m/s may go after a driver that ends in order."""
 WATCHDOG_DISTANCE_M = 0.30
@@ -32,67 +30,12 @@ VOID_MAX = 4
 """A machine that stands still for longer keeps the driver from its end: so many such tries say nothing."""
 
 
-class Truth:
-    """Where the simulator has one robot, and a program that drives it at 10 Hz."""
-
-    def __init__(self, number):
-        self.name = "hero_%d" % number
-        self.path = []
-        rospy.Subscriber("/%s/ground_truth" % self.name, Odometry, self._receive, tcp_nodelay=True)
-        self.publisher = rospy.Publisher(
-            "/%s/velocity_controller/cmd_vel" % self.name, Twist, queue_size=1, tcp_nodelay=True
-        )
-        self.command = Twist()
-        self._timer = rospy.Timer(rospy.Duration(0.1), lambda _: self.publisher.publish(self.command))
-
-    def _receive(self, message):
-        position = message.pose.pose.position
-        self.path.append((position.x, position.y, message.twist.twist.linear.x))
-
-    @property
-    def is_moving(self):
-        return bool(self.path) and self.path[-1][2] > 0.7 * SPEED_M_S
-
-    @property
-    def is_at_rest(self):
-        return len(self.path) > 5 and all(abs(entry[2]) < 0.003 for entry in self.path[-5:])
-
-    def measure_from(self, index):
-        """Return how far it went since path[index]."""
-        x_m, y_m, _ = self.path[index]
-        return math.hypot(self.path[-1][0] - x_m, self.path[-1][1] - y_m)
-
-
 @pytest.fixture(scope="module")
 def field(master):
     """Simulated robots that dial one port, whoever listens there; returns the port and where they truly are."""
     port = find_free_port()
-    with Program(
-        "rosrun",
-        "hero_sim",
-        "hero_sim",
-        "--robots",
-        str(ROBOTS),
-        "--port",
-        str(port),
-        "--arena",
-        "empty",
-        "--quiet",
-    ):
-        truths = [Truth(number) for number in range(ROBOTS)]
-        yield port, truths
-
-
-def drive(truths):
-    """Let all robots drive in circles; return when they do."""
-    for truth in truths:
-        truth.command.linear.x, truth.command.angular.z = SPEED_M_S, 0.5
-    wait_until(lambda: all(truth.is_moving for truth in truths), "all robots to move")
-
-
-def rest(truths):
-    """Tell all robots nothing any more; return when they stand."""
-    wait_until(lambda: all(truth.is_at_rest for truth in truths), "all robots to stand")
+    with start_simulator(ROBOTS, port):
+        yield port, [Truth(number) for number in range(ROBOTS)]
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL], ids=lambda s: s.name)

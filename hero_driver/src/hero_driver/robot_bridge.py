@@ -18,6 +18,7 @@ from .command_queue import CommandQueue
 from .command_shaping import (
     STOP_PAYLOADS,
     STOPPED_MOTORS,
+    ZERO_TWIST,
     check_device_twist,
     check_motor_pulses,
     check_twist,
@@ -275,18 +276,19 @@ class RobotBridge:
         """Return whether messages on the topic called name move the robot."""
         return self._subscribed_types.get(name) in STOP_PAYLOADS
 
-    def list_stops(self, fillers: int) -> List[Tuple[int, bytes]]:
+    def list_stops(self, pulses: int) -> List[Tuple[int, bytes]]:
         """Return ids and payloads that stop the robot, in the order in which it has to get them.
 
-        fillers: servo pulses to put in front, each of which takes 0.5 ms of a HeRo's reading cycle.
+        pulses: how many servo pulses of 1500 us to put in front; a robot that takes no Twist gets one at least.
         """
-        names = [name for name in self._ids if self.is_motion(name)]
-        # Servo pulses first, for a zero Twist takes them away; the velocity controller last.
-        names.sort(key=lambda name: (self._subscribed_types[name] != MOTOR_TYPE, name.endswith(VELOCITY_CONTROLLER)))
-        stops = [(self._ids[name], STOP_PAYLOADS[self._subscribed_types[name]]) for name in names]
-        if names and self.cleaner is not None and self._subscribed_types[names[0]] == MOTOR_TYPE:
-            stops = [(self._ids[names[0]], STOPPED_MOTORS)] * fillers + stops
-        return stops
+        twists, motors = [], []
+        for name, topic_id in self._ids.items():
+            ros_type = self._subscribed_types.get(name)
+            if ros_type == TWIST_TYPE:
+                twists.append((topic_id, ZERO_TWIST))
+            elif ros_type == MOTOR_TYPE:
+                motors.append((topic_id, STOPPED_MOTORS))
+        return motors * (pulses if twists else max(1, pulses)) + twists
 
     def forget_motion(self) -> None:
         """Drop the motion commands that wait: the robot is being stopped."""

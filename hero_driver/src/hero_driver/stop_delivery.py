@@ -2,12 +2,12 @@
 
 One stop is one write with a zero for every motion topic that the robot declared, whatever was used before. It is
 repeated until the robot's wheels are at rest, because the firmware drops a Twist that comes within 50 ms of the last
-one (VelocityControl.ino:159), and because only the wheels show what a robot has taken. The order matters: servo pulses
-come first, for 1500 us lets a wheel creep whose servo has another centre, and a zero Twist takes the pulses away. The
-two controllers know nothing of each other, so each gets its zero.
+one (VelocityControl.ino:159), and because only the wheels show what a robot has taken. The two controllers know nothing
+of each other, so each gets its zero. Servo pulses of 1500 us come in front of the first zeros only: they let a wheel
+creep whose servo has another centre, until a zero Twist takes the pulses away.
 
 A robot that tunes itself (pid_calibration) drops every zero within 50 ms of its controller's last run, and that runs
-every 21 ms. Only a read that takes longer lets a zero through: TUNING_FILLERS servo pulses (0.5 ms each) and the zeros
+every 21 ms. Only a read that takes longer lets a zero through: TUNING_PULSES servo pulses (0.5 ms each) and the zeros
 in one write, small enough for the robot's TCP window of 2144 bytes. Measured with the stock firmware: 110 pulses ended
 the tuning in 9 of 9 tries, 60 in 1 of 6.
 
@@ -22,7 +22,7 @@ from .peer import Peer
 from .rosserial.errors import RosserialError
 from .stop_progress import StopProgress, StopState
 
-TUNING_FILLERS = 140
+TUNING_PULSES = 140
 """Servo pulses in front of the zeros: 70 ms of the robot's reading cycle, 1680 of its window's 2144 bytes."""
 
 POLL_S = 0.02
@@ -136,7 +136,7 @@ class StopDelivery:
         before = stop.state
         if stop.is_due(peer.has_acknowledged_motion(), now_s):
             burst = stop.needs_burst(peer.bridge.tunes(now_s), now_s)
-            self._send(peer, TUNING_FILLERS if burst else 0, now_s)
+            self._send(peer, TUNING_PULSES if burst else int(stop.is_first), now_s)
             stop.note_sent(burst, now_s)
         if stop.state is not before:
             if stop.state is StopState.MOVING:
@@ -144,11 +144,11 @@ class StopDelivery:
             self._on_change()
 
     @staticmethod
-    def _send(peer: Peer, fillers: int, now_s: float) -> None:
-        """Write one stop in one piece."""
+    def _send(peer: Peer, pulses: int, now_s: float) -> None:
+        """Write one stop in one piece, with servo pulses of 1500 us in front."""
         assert peer.bridge is not None
         frames = []
-        for topic_id, payload in peer.bridge.list_stops(fillers):
+        for topic_id, payload in peer.bridge.list_stops(pulses):
             try:
                 frames.append(peer.session.encode_message(topic_id, payload))
             except RosserialError:

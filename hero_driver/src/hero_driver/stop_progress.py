@@ -60,6 +60,11 @@ class StopProgress:
         self._mark = wheels.readings
         self._rest_readings = REST_READINGS
 
+    @property
+    def is_first(self) -> bool:
+        """Whether no stop was sent yet."""
+        return self._stops == 0
+
     def renew(self, now_s: float) -> None:
         """Somebody asked once more: send the next stop at once, unless the wheels are at rest."""
         if self.state is not StopState.AT_REST:
@@ -117,6 +122,7 @@ class StopProgress:
             and wheels.still_readings >= self._rest_readings
         ):
             self.state = StopState.AT_REST
+            wheels.settle()
             self._rest_readings = REST_READINGS
         elif wheels.readings == 0:
             if self._stops >= STOPS_UNREAD and is_acknowledged:

@@ -7,6 +7,9 @@ network held back arrive all at once.
 REST_TICKS = 1.0
 """A wheel at rest on the edge of a tick (0.54 mm) counts it back and forth."""
 
+SETTLED_TICKS = 2.0
+"""Wheels that came to rest may still settle by a tick; what creeps passes this sooner or later."""
+
 REST_READINGS = 5
 """Readings without a turn after which wheels are at rest: 0.17 s; 6 mm/s and more would show."""
 
@@ -27,12 +30,19 @@ class WheelMotion:
         self.readings = 0
         self.still_readings = 0
         self._has_anchor = False
+        self._tolerance_ticks = REST_TICKS
         self._left_ticks = self._right_ticks = 0.0
+
+    def settle(self) -> None:
+        """The wheels are at rest: from here on only a turn by more than SETTLED_TICKS counts."""
+        self._has_anchor = False
+        self._tolerance_ticks = SETTLED_TICKS
 
     def restart(self) -> None:
         """A new connection begins."""
         self.readings = self.still_readings = 0
         self._has_anchor = False
+        self._tolerance_ticks = REST_TICKS
 
     def forget_ticks(self) -> None:
         """The robot sets its counters to zero, which is no turn of a wheel."""
@@ -41,9 +51,10 @@ class WheelMotion:
     def read_ticks(self, left_ticks: float, right_ticks: float) -> None:
         """Take a reading of the wheels' counters."""
         self.readings += 1
+        tolerance_ticks = self._tolerance_ticks
         if (
-            -REST_TICKS <= left_ticks - self._left_ticks <= REST_TICKS
-            and -REST_TICKS <= right_ticks - self._right_ticks <= REST_TICKS
+            -tolerance_ticks <= left_ticks - self._left_ticks <= tolerance_ticks
+            and -tolerance_ticks <= right_ticks - self._right_ticks <= tolerance_ticks
             and self._has_anchor
         ):
             self.still_readings += 1
@@ -51,6 +62,7 @@ class WheelMotion:
         # Of the first reading nobody can tell.
         if self._has_anchor:
             self.still_readings = 0
+            self._tolerance_ticks = REST_TICKS
         self._has_anchor = True
         self._left_ticks, self._right_ticks = left_ticks, right_ticks
 

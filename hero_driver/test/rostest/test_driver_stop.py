@@ -134,7 +134,7 @@ class TestDriverStop(OwnDriverCase):
         by_read = {}
         for frame in list(robot.received):
             by_read[frame.time_s] = by_read.get(frame.time_s, 0) + len(frame.payload) + 8
-        motors = [payload for payload in robot.payloads_on("cmd_motor")]
+        motors = robot.payloads_on("cmd_motor")
         self.assertEqual(set(motors), {STOPPED_MOTORS})
         self.assertGreater(len(motors), 110)
         self.assertLessEqual(max(by_read.values()), BURST_LENGTH_MAX)

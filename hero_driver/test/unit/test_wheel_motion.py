@@ -41,6 +41,16 @@ def test_slow_creep_adds_up_to_a_turn():
     assert wheels.still_readings == 0
 
 
+def test_settled_wheels_may_move_by_two_ticks_and_not_by_three():
+    wheels = WheelMotion()
+    read_all(wheels, [(5.0, 7.0)] * REST_READINGS)
+    wheels.settle()
+    read_all(wheels, [(5.0, 7.0), (6.0, 8.0), (7.0, 5.0)])
+    assert wheels.still_readings == REST_READINGS + 1
+    wheels.read_ticks(8.0, 7.0)
+    assert wheels.still_readings == 0
+
+
 def test_counters_that_are_set_to_zero_are_no_turn():
     wheels = WheelMotion()
     read_all(wheels, [(500.0, 600.0)] * REST_READINGS)

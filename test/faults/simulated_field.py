@@ -1,0 +1,71 @@
+"""Simulated robots for the faults, where they truly are, and programs that drive them."""
+
+import math
+
+import rospy
+from geometry_msgs.msg import Twist
+from nav_msgs.msg import Odometry
+from rig import Program, wait_until
+
+SPEED_M_S = 0.1
+REST_M_S = 0.003
+
+
+class Truth:
+    """Where the simulator has one robot, and a program that drives it at 10 Hz."""
+
+    def __init__(self, number, controller="velocity_controller"):
+        self.name = "hero_%d" % number
+        self.path = []
+        self._subscriber = rospy.Subscriber(
+            "/%s/ground_truth" % self.name, Odometry, self._receive, tcp_nodelay=True
+        )
+        self.publisher = rospy.Publisher(
+            "/%s/%s/cmd_vel" % (self.name, controller), Twist, queue_size=1, tcp_nodelay=True
+        )
+        self.command = Twist()
+        self._timer = rospy.Timer(rospy.Duration(0.1), lambda _: self.publisher.publish(self.command))
+
+    def _receive(self, message):
+        position, twist = message.pose.pose.position, message.twist.twist
+        self.path.append((position.x, position.y, math.hypot(twist.linear.x, 0.03 * twist.angular.z)))
+
+    def close(self):
+        """Command nothing any more."""
+        self._timer.shutdown()
+        self._subscriber.unregister()
+        self.publisher.unregister()
+
+    @property
+    def is_moving(self):
+        """Whether it drives at about the speed of drive()."""
+        return bool(self.path) and self.path[-1][2] > 0.7 * SPEED_M_S
+
+    @property
+    def is_at_rest(self):
+        """Whether it stood in the last five readings."""
+        return len(self.path) > 5 and all(entry[2] < REST_M_S for entry in self.path[-5:])
+
+    def measure_from(self, index):
+        """Return how far it went since path[index]."""
+        x_m, y_m, _ = self.path[index]
+        return math.hypot(self.path[-1][0] - x_m, self.path[-1][1] - y_m)
+
+
+def start_simulator(robots, port, *arguments, first_id=0):
+    """Return a simulator whose robots dial a port of this machine; it ends with `with`."""
+    command = ["rosrun", "hero_sim", "hero_sim", "--robots", robots, "--first-id", first_id, "--port", port]
+    command += ["--arena", "empty", "--flash-dir", "none", "--quiet", *arguments]
+    return Program(*map(str, command))
+
+
+def drive(truths):
+    """Let all robots drive in circles; return when they do."""
+    for truth in truths:
+        truth.command.linear.x, truth.command.angular.z = SPEED_M_S, 0.5
+    wait_until(lambda: all(truth.is_moving for truth in truths), "all robots to move")
+
+
+def rest(truths):
+    """Return when all robots stand, whatever they are told."""
+    wait_until(lambda: all(truth.is_at_rest for truth in truths), "all robots to stand")

@@ -1,0 +1,216 @@
+"""Stops while something hangs or has gone: the ROS master, another driver, connections, the program that commands."""
+
+import contextlib
+import signal
+import socket
+import subprocess
+import sys
+
+import pytest
+import rosgraph
+import rospy
+from driver_case import frozen, make_publisher
+from fake_robot import READ_CYCLE_S, FakeRobot
+from geometry_msgs.msg import Twist
+from rig import HERE, Master, find_free_port, start_python, wait_until
+from simulated_field import SPEED_M_S, Truth, drive, rest, start_simulator
+from std_msgs.msg import Bool
+from std_srvs.srv import SetBool
+
+from hero_examples.drivers import Drivers
+from hero_msgs.msg import Robot
+from hero_sim.srv import InjectFault
+
+ROBOTS = 3
+HALF_OPEN = 100
+WATCHDOG_M = 0.20
+"""What a robot drives on at 0.1 m/s when its commander has gone and nobody stops it: 2.1 s."""
+
+COMMANDER = """
+import rospy
+from geometry_msgs.msg import Twist
+rospy.init_node("commander", anonymous=True)
+twist = Twist()
+twist.linear.x = %g
+publisher = rospy.Publisher("%s", Twist, queue_size=1)
+while not rospy.is_shutdown():
+    publisher.publish(twist)
+    rospy.sleep(0.1)
+"""
+
+
+@pytest.fixture
+def field(start_driver):
+    """A driver with robots of its own in motion, and where they truly are."""
+    port = find_free_port()
+    driver = start_driver(parameters={"port": port})
+    with start_simulator(ROBOTS, port):
+        truths = [Truth(number) for number in range(ROBOTS)]
+        for truth in truths:
+            driver.fleet.wait_ready("/" + truth.name)
+        yield driver, truths
+        for truth in truths:
+            truth.close()
+
+
+def is_confirmed(driver):
+    """Return whether a driver says that all its robots are stopped and at rest."""
+    report = driver.fleet.newest
+    return report.stopped and all(robot.stop_state == Robot.AT_REST for robot in report.robots)
+
+
+@contextlib.contextmanager
+def asking(drivers_known):
+    """Yield the Drivers of a program that has just started, once it has found so many."""
+    drivers = Drivers()
+    wait_until(lambda: len(drivers.names()) == drivers_known and drivers.read(), lambda: "%s" % drivers.names())
+    yield drivers
+    drivers.close()
+
+
+def test_a_stop_needs_no_master(field, master, record):
+    driver, truths = field
+    requests = make_publisher(driver.node + "/stop_request", Bool)
+    drive(truths)
+    with frozen(master.pid):
+        requests.publish(Bool(True))
+        rest(truths)
+        wait_until(lambda: is_confirmed(driver), "the driver's confirmation")
+        requests.publish(Bool(False))
+        wait_until(lambda: all(truth.is_moving for truth in truths), "all robots to move")
+        requests.publish(Bool(True))
+        rest(truths)
+    record("a stop, a release and a stop while the ROS master hangs", 3, 3)
+
+
+def test_a_stop_works_after_the_master_was_killed(record):
+    with Master() as own, start_python("stop_without_master.py", own.pid, environment=own.environment) as program:
+        at_rest = program.read()["at_rest"]
+    record("a stop after the ROS master was killed", 1, int(at_rest))
+
+
+def test_half_open_connections_keep_nobody_from_a_stop(field, record):
+    driver, truths = field
+    drive(truths)
+    uri = rosgraph.Master("/faults").lookupService(driver.node + "/stop")
+    host, port = uri[len("rosrpc://") :].rstrip("/").rsplit(":", 1)
+    with contextlib.ExitStack() as stack:
+        for _ in range(HALF_OPEN):
+            sock = stack.enter_context(socket.create_connection((host, int(port))))
+            sock.sendall(b"\x10\x00")
+        answer = rospy.ServiceProxy(driver.node + "/stop", SetBool)(True)
+        assert answer.success, answer.message
+        rest(truths)
+        requests = make_publisher(driver.node + "/stop_request", Bool)
+        requests.publish(Bool(False))
+        wait_until(lambda: not driver.fleet.newest.stopped, "the release")
+    record("%d connections to the driver that send 2 bytes and wait" % HALF_OPEN, 2, 2)
+
+
+def test_a_hung_driver_keeps_nobody_else_from_a_stop(field, start_driver, record):
+    driver, truths = field
+    hung = start_driver()
+    robot = FakeRobot(90, has_motors=True).connect(hung.address)
+    hung.fleet.wait_ready("/hero_90")
+    with asking(2) as drivers:
+        with frozen(hung.process.pid):
+            for presses in (1, 10):
+                drive(truths)
+                for _ in range(presses):
+                    drivers.request_stop(True)
+                rest(truths)
+                wait_until(lambda: is_confirmed(driver), "the driver's confirmation")
+                wait_until(lambda: drivers.stop_status().level == "error", "a verdict")
+                assert drivers.stop_status().text == "NOT STOPPED: driver %s does not answer" % hung.node[1:]
+                drivers.request_stop(False)
+                wait_until(lambda: not driver.fleet.newest.stopped, "the release")
+            drive(truths)
+            drivers.request_stop(True)
+            rest(truths)
+        wait_until(lambda: is_confirmed(hung), "the stop, once it goes on")
+    robot.close()
+    record("twelve stops of two drivers, one of which hangs", 12, 12)
+
+
+@pytest.mark.parametrize("controller", ["velocity_controller", "position_controller"])
+def test_robots_stop_when_their_commander_is_killed(field, record, controller):
+    _, truths = field
+    truth = truths[0]
+    topic = "/%s/%s/cmd_vel" % (truth.name, controller)
+    truth.close()
+    watcher = Truth(0)
+    watcher.publisher.unregister()
+    commander = subprocess.Popen([sys.executable, "-c", COMMANDER % (SPEED_M_S, topic)])
+    wait_until(lambda: watcher.is_moving, "the robot to move")
+    mark = len(watcher.path) - 1
+    commander.kill()
+    commander.wait()
+    rest([watcher])
+    went_m = watcher.measure_from(mark)
+    watcher.close()
+    lost = "%.3f m driven on" % went_m
+    record("the program that commands the %s is killed" % controller, 1, int(went_m < WATCHDOG_M), lost)
+
+
+def test_a_stop_in_a_pause_of_the_radio_arrives(field, record):
+    driver, truths = field
+    for truth in truths:
+        truth.close()
+    positions = [Truth(number, "position_controller") for number in range(ROBOTS)]
+    for truth in positions:
+        truth.command.linear.x = SPEED_M_S
+    wait_until(lambda: all(truth.is_moving for truth in positions), "all robots to move")
+    inject = rospy.ServiceProxy("/hero_sim/fault", InjectFault)
+    assert inject("stall:for=0.3").success
+    assert rospy.ServiceProxy(driver.node + "/stop", SetBool)(True).success
+    rest(positions)
+    wait_until(lambda: is_confirmed(driver), "the driver's confirmation")
+    for truth in positions:
+        truth.close()
+    record("a radio that carries nothing for 0.3 s with the stop in it, position control", ROBOTS, ROBOTS)
+
+
+def test_a_robot_whose_program_stood_still_stops_when_it_goes_on(field, record):
+    driver, truths = field
+    drive(truths)
+    inject = rospy.ServiceProxy("/hero_sim/fault", InjectFault)
+    assert inject("frozen:for=2,robot=0").success
+    assert rospy.ServiceProxy(driver.node + "/stop", SetBool)(True).success
+    rest(truths)
+    wait_until(lambda: is_confirmed(driver), "the driver's confirmation")
+    record("a robot whose program stands still for 2 s with the stop in it", 1, 1)
+
+
+def test_a_driver_whose_loop_breaks_ends_a_self_tuning(start_driver, record, tmp_path):
+    trigger = tmp_path / "break"
+    driver = start_driver(prefix=[sys.executable, str(HERE / "broken_driver.py"), "loop", str(trigger)])
+    robots = [FakeRobot(number, read_cycle_s=READ_CYCLE_S, has_motors=True) for number in (1, 2)]
+    for robot in robots:
+        robot.connect(driver.address)
+        driver.fleet.wait_ready(robot.namespace)
+    robots[0].start_tuning()
+    twist = Twist()
+    twist.linear.x = SPEED_M_S
+    make_publisher("/hero_2/velocity_controller/cmd_vel", Twist).publish(twist)
+    wait_until(lambda: robots[1].motors.is_turning, "motion")
+    trigger.write_text("")
+    assert driver.wait_end() == 1
+    resting = sum(not robot.motors.is_turning for robot in robots)
+    for robot in robots:
+        robot.close()
+    record("an exception in the loop of the sockets, a robot that tunes itself and one that drives", 2, resting)
+
+
+def test_robots_that_tune_themselves_stop_when_the_driver_ends(start_driver, record):
+    driver = start_driver()
+    robots = [FakeRobot(number, read_cycle_s=READ_CYCLE_S, has_motors=True) for number in (1, 2)]
+    for robot, controller in zip(robots, ("velocity_controller", "position_controller")):
+        robot.connect(driver.address)
+        driver.fleet.wait_ready(robot.namespace)
+        robot.start_tuning(controller)
+    driver.process.send_signal(signal.SIGTERM)
+    assert driver.wait_end() == 0
+    resting = sum(not robot.motors.is_turning for robot in robots)
+    for robot in robots:
+        robot.close()
+    record("SIGTERM while two robots tune themselves", 2, resting)
