@@ -23,7 +23,8 @@ from hero_examples.drivers import Drivers
 from hero_examples.keyboard import Keyboard, NoTerminalError
 from hero_examples.program import Program
 from hero_examples.program import run as run_program
-from hero_examples.stop_status import StopStatus
+from hero_examples.stop_status import StopStatus, paint
+from hero_examples.swarm_start import check_stop
 from hero_msgs.msg import Robot
 from hero_msgs.srv import Disconnect
 
@@ -42,8 +43,6 @@ LEAVE_SCREEN = "\x1b[?25h\x1b[?1049l"
 HOME = "\x1b[H"
 CLEAR_LINE_END = "\x1b[K"
 CLEAR_SCREEN_END = "\x1b[J"
-COLOURS = {"info": "", "warn": "\x1b[33m", "error": "\x1b[1;31m"}  # yellow, bold red
-END_COLOUR = "\x1b[0m"
 KEYS_HELP = "q ends   s STOPS ALL ROBOTS   r releases them   o order   up, down choose   d disconnects the chosen robot"
 MAX_OPTION = 1e6
 
@@ -286,7 +285,8 @@ class FleetProgram:
                     break
         if self._program.end_signal is None:
             self.print_fleet()
-        return self.check_stop() or self.check_expected()
+        check_stop(self._fleet.drivers)
+        return self.check_expected()
 
     def _make_screen(self, status: Optional[StopStatus]) -> List[str]:
         """Return all lines: the table, the state of a stop, and the keys or what they did."""
@@ -294,16 +294,8 @@ class FleetProgram:
         left_s = self._seconds_left()
         ending = "" if left_s == float("inf") else "   ends in %.0f s" % left_s
         last = "".join(self._news[-1:]) or KEYS_HELP + ending
-        stop = "" if status is None else COLOURS[status.level] + status.text[: size.columns] + END_COLOUR
+        stop = "" if status is None else paint(status.level, status.text[: size.columns])
         return [*self._make_lines(size.columns, size.lines - 2), stop, last[: size.columns]]
-
-    def check_stop(self) -> int:
-        """Wait for the outcome of a stop that was asked for last, and return the exit code."""
-        status = self._fleet.drivers.wait_for_stop()
-        if status is None or status.level != "error":
-            return 0
-        print("fleet: %s" % status.text, file=sys.stderr)
-        return 1
 
     def check_expected(self) -> int:
         """Say which of the expected robots did not join or move, and return the exit code."""

@@ -9,8 +9,8 @@ import unittest
 
 import rospy
 import rostest
-from fleet_terminal import FLEET, TIMEOUT_S, FleetTerminal, run_fleet
 from geometry_msgs.msg import Twist
+from program_terminal import FLEET, TIMEOUT_S, ProgramTerminal, run_fleet
 from swarm_watch import wait_for
 
 
@@ -69,7 +69,7 @@ class FleetTest(unittest.TestCase):
         self.assertIn("all 2 robots joined and moved", output)
 
     def test_in_a_terminal_it_draws_in_place_and_gives_the_terminal_back(self):
-        table = FleetTerminal()
+        table = ProgramTerminal("hero_bringup", "fleet")
         self.addCleanup(table.close)
         table.wait_for(b"2 of 2 robots ready")
         table.wait_for(b"hero_1")

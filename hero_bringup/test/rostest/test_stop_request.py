@@ -3,6 +3,7 @@
 
 import contextlib
 import json
+import math
 import os
 import signal
 import unittest
@@ -11,10 +12,13 @@ import xmlrpc.client
 import rosgraph
 import rospy
 import rostest
-from fleet_terminal import TIMEOUT_S, FleetTerminal, run_fleet
+from example_program import ExampleProgram
+from program_terminal import TIMEOUT_S, ProgramTerminal, run_fleet
+from sensor_msgs.msg import Joy
 from swarm_watch import wait_for
 
 from hero_examples.drivers import Drivers
+from hero_examples.swarm import Swarm
 from hero_msgs.msg import Robot, RobotArray
 
 AT_REST = ("info", "stopped, all wheels at rest", True)
@@ -74,7 +78,7 @@ class StopRequestTest(unittest.TestCase):
         wait_for(lambda: self.drivers.wait_for_stop().text.startswith("released"), TIMEOUT_S, "a release of all")
 
     def open_table(self):
-        table = FleetTerminal()
+        table = ProgramTerminal("hero_bringup", "fleet")
         self.addCleanup(table.close)
         table.wait_for(b"2 of 2 robots ready")
         return table
@@ -135,6 +139,46 @@ class StopRequestTest(unittest.TestCase):
             self.assertEqual(table.wait_for_end(), 128 + number)
             self.assertEqual(table.settings(), table.settings_before)
             table.wait_for(b"\x1b[?1049l")
+
+    def test_teleop_stops_all_robots_and_says_why_its_own_does_not_move(self):
+        teleop = ProgramTerminal("hero_examples", "teleop", "_robots:=0")
+        self.addCleanup(teleop.close)
+        teleop.wait_for(b"Enter: STOP ALL ROBOTS")
+        teleop.press(b"\r")
+        teleop.wait_for(b"stopped, all wheels at rest: r releases them")
+        self.assertTrue(self.drivers.read().stopped)
+        teleop.press(b"w")
+        teleop.wait_for(b"all robots are stopped, so hero_0 cannot move: r releases them\r\n")
+        with hanging(self.hung_pid, self.master_pid):
+            teleop.press(b"\r")
+            teleop.wait_for(b"\x1b[1;31mhero_0 | NOT STOPPED: driver hero_driver_b does not answer")
+        teleop.press(b"r")
+        wait_for(lambda: not self.healthy.newest.stopped, TIMEOUT_S, "the release")
+        teleop.press(b"\x04")
+        self.assertEqual(teleop.wait_for_end(), 0)
+
+    def test_a_button_of_the_joystick_stops_all_robots(self):
+        joystick = rospy.Publisher("/joy", Joy, queue_size=10)
+        teleop = ExampleProgram("teleop_joy", "_robots:=0")
+        self.addCleanup(teleop.close)
+        wait_for(lambda: joystick.get_num_connections() > 0, TIMEOUT_S, "teleop_joy")
+        joystick.publish(Joy(axes=[math.nan, 1.0], buttons=[0, 0, 0, 0, 1]))
+        teleop.wait_for_text("not finite")
+        for is_pressed in (0, 1, 0):  # so short a press must not be missed
+            joystick.publish(Joy(axes=[math.nan, 1.0], buttons=[0, is_pressed, 0, 0, 1]))
+        teleop.wait_for_text("stopped, all wheels at rest")
+        self.assertTrue(self.drivers.read().stopped)
+        joystick.publish(Joy(axes=[0.0, 1.0], buttons=[0, 0, 0, 0, 1]))
+        teleop.wait_for_text("all robots are stopped, so hero_0 cannot move")
+        self.assertEqual(teleop.end(), 0)
+        self.assertEqual(teleop.text().count("not finite"), 1, teleop.text())
+
+    def test_a_swarm_stops_and_releases_all_robots(self):
+        with Swarm([0], odom=False, proximity=False) as swarm:
+            self.assertEqual(swarm.emergency_stop(), AT_REST)
+            self.assertTrue(self.drivers.read().stopped)
+            self.assertEqual(swarm.release_stop(), ("info", "released: robots may move again", True))
+            self.assertFalse(self.drivers.read().stopped)
 
     def test_lists_that_are_not_published_by_a_driver_are_ignored(self):
         forged = RobotArray(robots=[Robot(id=9, namespace="/hero_9", state=Robot.READY)])

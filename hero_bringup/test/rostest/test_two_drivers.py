@@ -10,8 +10,8 @@ import xmlrpc.client
 import rosgraph
 import rospy
 import rostest
-from fleet_terminal import FleetTerminal, run_fleet
 from geometry_msgs.msg import Twist
+from program_terminal import ProgramTerminal, run_fleet
 from swarm_watch import SwarmWatch, wait_for
 
 from hero_bringup.monitor.commander import Commander
@@ -92,7 +92,7 @@ class TwoDriversTest(unittest.TestCase):
         self.assertEqual([robot["id"] for robot in fleet["robots"]], [100, 101])
 
     def test_3_the_keys_of_the_table_stop_the_robots_of_both_and_release_them(self):
-        table = FleetTerminal()
+        table = ProgramTerminal("hero_bringup", "fleet")
         self.addCleanup(table.close)
         table.wait_for(b"4 of 4 robots ready")
         self.wait_until_all_move()

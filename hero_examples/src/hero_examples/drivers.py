@@ -52,6 +52,7 @@ class Drivers:
         self._has_looked = threading.Event()
         self._end = threading.Event()
         self._wake = threading.Event()
+        rospy.on_shutdown(self.close)
         threading.Thread(target=self._find, name="drivers", daemon=True).start()
         threading.Thread(target=self._ask, name="stop requests", daemon=True).start()
 
@@ -66,8 +67,9 @@ class Drivers:
                 self._look()
             self._has_looked.set()
             self._end.wait(LOOK_PERIOD_S)
-        for link in self._links.values():
-            link.close()
+        if not rospy.core.is_shutdown_requested():  # else rospy closes all topics at once
+            for link in self._links.values():
+                link.close()
 
     def _look(self) -> None:
         try:
@@ -150,6 +152,10 @@ class Drivers:
         """Return whether a driver has stopped all its robots."""
         report = self._read_fresh().get(driver)
         return report is not None and bool(report.stopped)
+
+    def is_robot_stopped(self, namespace: str) -> bool:
+        """Return whether a robot takes no motion because all robots of its driver are stopped."""
+        return self.is_stopped(self.find(namespace))
 
     # -- stop requests --------------------------------------------------------------------------------------
 

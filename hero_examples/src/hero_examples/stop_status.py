@@ -17,6 +17,11 @@ CROSSING_S = 0.15
 
 NAMES_SHOWN = 20
 
+COLOURS = {"info": "", "warn": "\x1b[33m", "error": "\x1b[1;31m"}
+"""Of terminals (ECMA-48): as usual, yellow, bold red."""
+
+END_COLOUR = "\x1b[0m"
+
 
 class StopStatus(NamedTuple):
     """What people must see of a request."""
@@ -142,3 +147,8 @@ def _tell(robots: Sequence[Robot], one: str, many: str) -> List[str]:
     more = len(names) - NAMES_SHOWN
     shown = ", ".join(names[:NAMES_SHOWN]) + (" and %d more" % more if more > 0 else "")
     return ["%s %s" % (shown, one if len(names) == 1 else many)]
+
+
+def paint(level: str, text: str) -> str:
+    """Return a line for a terminal in the colour of its level."""
+    return COLOURS[level] + text + (END_COLOUR if COLOURS[level] else "")

@@ -1,7 +1,7 @@
 """Several robots as one object: see robot. Knows the topics of robots, and the drivers' lists of them."""
 
 import time
-from typing import Iterable, Iterator, List
+from typing import Iterable, Iterator, List, Optional
 
 from hero_msgs.msg import RobotArray
 
@@ -16,13 +16,20 @@ from .robot import (
     start_node,
     stop_all,
 )
+from .stop_status import StopStatus
 
 
 class Swarm:
-    """Several robots; iterate it, or take one by its number: swarm[3]."""
+    """Several robots; iterate it, or take one by its number: swarm[3].
 
-    def __init__(self, robot_ids: Iterable[int], odom: bool = True, proximity: bool = True) -> None:
-        """Connect to the robots with these numbers; odom, proximity: see Robot.
+    Attributes:
+        drivers: all drivers, connected so that a stop of all robots needs no ROS master.
+    """
+
+    def __init__(
+        self, robot_ids: Iterable[int], odom: bool = True, proximity: bool = True, drivers: Optional[Drivers] = None
+    ) -> None:
+        """Connect to the robots with these numbers; odom, proximity: see Robot; drivers: None makes new ones.
 
         Raises: ValueError for what is no number of a robot, or comes twice.
         """
@@ -31,6 +38,8 @@ class Swarm:
             if numbers.count(number) > 1:
                 raise ValueError("robot %r is named more than once" % (number,))
         self.robots = [Robot(number, odom, proximity) for number in numbers]
+        start_node()
+        self.drivers = drivers or Drivers()
         self._by_id = {robot.robot_id: robot for robot in self.robots}
 
     @classmethod
@@ -45,14 +54,12 @@ class Swarm:
         deadline_s = time.monotonic() + timeout_s
         report = None
         drivers = Drivers()
-        try:
-            while time.monotonic() < deadline_s and sleep(POLL_PERIOD_S):
-                report = drivers.read()
-                ids = ready_ids(report) if report else []
-                if ids and drivers.is_settled:
-                    return cls(ids, odom, proximity)
-        finally:
-            drivers.close()
+        while time.monotonic() < deadline_s and sleep(POLL_PERIOD_S):
+            report = drivers.read()
+            ids = ready_ids(report) if report else []
+            if ids and drivers.is_settled:
+                return cls(ids, odom, proximity, drivers)
+        drivers.close()
         if report is None:
             raise RobotNotReadyError(
                 "nothing on %s within %g s: is the driver running?" % (USUAL_TOPIC, timeout_s)
@@ -73,6 +80,20 @@ class Swarm:
         """Stop all robots at once; returns when the stops are sent (about 0.2 s)."""
         stop_all(self.robots)
 
+    def emergency_stop(self) -> StopStatus:
+        """Stop all robots of all drivers, not only those of this swarm, until release_stop().
+
+        Returns what came of it as soon as that is known, after 1.5 s at most: status.level is "info" if all wheels are
+        at rest, "error" if status.text names who did not stop. These are asked again while the program runs.
+        """
+        self.drivers.request_stop(True)
+        return self.drivers.wait_for_stop()
+
+    def release_stop(self) -> StopStatus:
+        """Let all robots of all drivers move again; returns what came of it, after 1.5 s at most."""
+        self.drivers.request_stop(False)
+        return self.drivers.wait_for_stop()
+
     def led(self, color: Color) -> None:
         """Show a colour on all robots."""
         for robot in self.robots:
@@ -81,6 +102,7 @@ class Swarm:
     def close(self) -> None:
         """Stop all robots that were driven from here, and leave their topics; safe twice."""
         self._stop_if_driven()
+        self.drivers.close()
         for robot in self.robots:
             robot._disconnect()
 

@@ -5,6 +5,7 @@ from typing import Dict, List, Optional
 
 import rospy
 
+from .drivers import Drivers
 from .program import Program, ProgramError
 from .robot import RobotNotReadyError
 from .swarm import Swarm
@@ -32,6 +33,16 @@ def open_swarm(
             if program.running:
                 rospy.logwarn("waiting: %s", error)
     raise ProgramError("ended before any robot was there")
+
+
+def check_stop(drivers: Drivers) -> None:
+    """Wait until the outcome of the last stop or release is known, for 1.5 s at most; for the end of a program.
+
+    Raises: ProgramError with who did not do it.
+    """
+    status = drivers.wait_for_stop()
+    if status is not None and status.level == "error":
+        raise ProgramError(status.text)
 
 
 class WaitReport:

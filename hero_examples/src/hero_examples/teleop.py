@@ -4,15 +4,25 @@ import math
 import os
 import sys
 import time
-from typing import List, NamedTuple, Optional
+from typing import List, NamedTuple, Optional, Tuple
 
 from .control_laws import STANDSTILL, Command
 from .keyboard import Keyboard, NoTerminalError
 from .program import Program, ProgramError, check_number, parse_robot_ids, read_parameters, run
 from .robot import Robot, StaleDataError
+from .stop_status import paint
 from .swarm import Swarm
-from .swarm_start import open_swarm
-from .teleop_keys import HELP, MAX_LINEAR_M_S, MAX_TURN_RAD_S, MIN_LINEAR_M_S, MIN_TURN_RAD_S, KeyDrive
+from .swarm_start import check_stop, open_swarm
+from .teleop_keys import (
+    HELP,
+    MAX_LINEAR_M_S,
+    MAX_TURN_RAD_S,
+    MIN_LINEAR_M_S,
+    MIN_TURN_RAD_S,
+    RELEASE_KEY,
+    STOP_ALL_KEYS,
+    KeyDrive,
+)
 
 PERIOD_S = 0.1
 """Between two commands; the robot takes one each 50 ms at most."""
@@ -50,11 +60,17 @@ class Teleop:
         self._last_motion_s = -math.inf
         self._next_send_s = 0.0
         self._sent = STANDSTILL
+        self._has_told_stopped = False
 
     def press(self, key: str, now_s: float) -> None:
         """Do what the key says."""
         if key == "?":
             show_text(HELP)
+        elif key in STOP_ALL_KEYS:
+            self._swarm.drivers.request_stop(True)
+            self._drive.stop()
+        elif key == RELEASE_KEY:
+            self._swarm.drivers.request_stop(False)
         elif key == "\t":
             position = self._swarm.robots.index(self._chosen[0]) if len(self._chosen) == 1 else -1
             self._choose([self._swarm.robots[(position + 1) % len(self._swarm)]])
@@ -92,28 +108,49 @@ class Teleop:
         for robot in self._chosen:
             robot.drive(*command)
         self._sent = command
+        if not self._find_stopped():
+            self._has_told_stopped = False
+        elif command != STANDSTILL and not self._has_told_stopped:
+            self._has_told_stopped = True
+            show_text("%s\n" % self._find_stopped())
 
-    def describe(self) -> str:
-        """Return the live line: who, how fast, where, and what is near."""
+    def _find_stopped(self) -> str:
+        """Return which of the chosen robots cannot move because all robots are stopped, in words; empty if none."""
+        drivers = self._swarm.drivers
+        stopped = [robot.name for robot in self._chosen if drivers.is_robot_stopped(robot.namespace)]
+        return "all robots are stopped, so %s cannot move: r releases them" % ", ".join(stopped) if stopped else ""
+
+    def _describe_stop(self) -> Tuple[str, str]:
+        """Return level and text of what there is to say about a stop of all robots; no text if nothing."""
+        status, stopped = self._swarm.drivers.stop_status(), self._find_stopped()
+        if status is None or (status.is_final and status.level != "error" and not stopped):
+            return "warn", stopped
+        return status.level, status.text + (": r releases them" if status.is_final and stopped else "")
+
+    def describe(self) -> Tuple[str, str]:
+        """Return level and text of the live line: who, how fast, where, and what is near, or what a stop came to."""
         who = "all %d robots" % len(self._swarm) if len(self._chosen) > 1 else self._chosen[0].name
         speeds = "%+.2f m/s %+.2f rad/s (keys: %.2f, %.2f)" % (
             *self._sent,
             self._drive.linear_m_s,
             self._drive.turn_rad_s,
         )
+        level, stop = self._describe_stop()
+        if stop:
+            return level, "%s | %s" % (who, stop)
         robot = self._chosen[0]
         missing = robot.missing()
         if missing is not None:
-            return "%s | waiting: %s" % (who, missing)
+            return "info", "%s | waiting: %s" % (who, missing)
         try:
             pose, nearest = robot.pose, robot.nearest()
         except StaleDataError as error:
-            return "%s | waiting: %s" % (who, error)
+            return "info", "%s | waiting: %s" % (who, error)
         near = "free"
         if nearest is not None:
             near = "%.2f m at %+.0f deg" % (nearest.range_m, math.degrees(nearest.bearing_rad))
         where = "x %.2f y %.2f m %.0f deg" % (pose.x_m, pose.y_m, math.degrees(pose.yaw_rad))
-        return "%s | %s | %s | near: %s" % (who, speeds, where, near)
+        return "info", "%s | %s | %s | near: %s" % (who, speeds, where, near)
 
 
 def show_text(text: str) -> None:
@@ -122,12 +159,12 @@ def show_text(text: str) -> None:
     sys.stdout.flush()
 
 
-def show_live_line(text: str) -> None:
+def show_live_line(level: str, text: str) -> None:
     """Write text over the last one, cut to the terminal: a line that wraps could not be written over."""
     if not sys.stdout.isatty():
         return
     width = os.get_terminal_size(sys.stdout.fileno()).columns or 80
-    sys.stdout.write("\r\x1b[K" + text[: width - 1])
+    sys.stdout.write("\r\x1b[K" + paint(level, text[: width - 1]))
     sys.stdout.flush()
 
 
@@ -144,7 +181,7 @@ def drive_by_keys(program: Program, keyboard: Keyboard, teleop: Teleop) -> None:
         now_s = time.monotonic()
         teleop.step(now_s)
         if now_s >= next_line_s:
-            show_live_line(teleop.describe())
+            show_live_line(*teleop.describe())
             next_line_s = now_s + 2.0 * PERIOD_S
 
 
@@ -159,6 +196,7 @@ def _main() -> None:
             show_text(HELP)
             drive_by_keys(program, keyboard, Teleop(swarm, parameters))
             show_text("")
+            check_stop(swarm.drivers)
 
 
 def main() -> None:

@@ -38,6 +38,9 @@ MOTIONS: Dict[str, Tuple[int, int]] = {
 STOP_KEYS = ("s", " ", "\x1a")
 """s, space, and Ctrl-Z, which looks like a wish to hold on."""
 
+STOP_ALL_KEYS = ("\r", "\n")
+RELEASE_KEY = "r"
+
 HELP = """\
 Hold a key to drive; let go, and the robot stops.
 
@@ -46,6 +49,8 @@ Hold a key to drive; let go, and the robot stops.
       z   x   c        q e    forward in a curve     0..9  this robot    Tab  next robot
                        z c    backward in a curve    g     all robots
   s or space: stop     arrows work too               ?     this text     Ctrl-C  end
+
+  Enter: STOP ALL ROBOTS of all drivers     r: release them
 """
 
 

@@ -1,4 +1,4 @@
-"""The program fleet, as a process, or in a terminal of its own."""
+"""Programs in terminals of their own, and the program fleet without one."""
 
 import contextlib
 import fcntl
@@ -16,12 +16,6 @@ FLEET = ["rosrun", "hero_bringup", "fleet"]
 TIMEOUT_S = 60.0
 
 
-def find_fleet():
-    """Return the program itself: rosrun is a shell, and a signal for it would not reach fleet."""
-    found = subprocess.check_output(["catkin_find", "--first-only", "--libexec", "hero_bringup", "fleet"])
-    return found.decode().strip()
-
-
 def run_fleet(*arguments, **options):
     """Run fleet; return its exit code, output and errors."""
     streams = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
@@ -29,15 +23,17 @@ def run_fleet(*arguments, **options):
     return result.returncode, (result.stdout or b"").decode(), result.stderr.decode()
 
 
-class FleetTerminal:
-    """A terminal with fleet, which is read all the time: a program that nobody reads stands still."""
+class ProgramTerminal:
+    """A terminal with a program, which is read all the time: a program that nobody reads stands still."""
 
-    def __init__(self):
+    def __init__(self, package, program, *arguments):
+        # The program itself: rosrun is a shell, and a signal for it would not reach the program.
+        found = subprocess.check_output(["catkin_find", "--first-only", "--libexec", package, program])
         self._leader, self._follower = pty.openpty()
         fcntl.ioctl(self._follower, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 200, 0, 0))
         self.settings_before = self.settings()
         streams = {"stdin": self._follower, "stdout": self._follower, "stderr": self._follower}
-        self.process = subprocess.Popen([find_fleet()], **streams, start_new_session=True)
+        self.process = subprocess.Popen([found.decode().strip(), *arguments], **streams, start_new_session=True)
         self.output = bytearray()
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
@@ -67,7 +63,7 @@ class FleetTerminal:
         self.wait_for(text, len(self.output))
 
     def wait_for_end(self):
-        """Wait until fleet has ended; return its exit code."""
+        """Wait until the program has ended; return its exit code."""
         return self.process.wait(TIMEOUT_S)
 
     def close(self):
