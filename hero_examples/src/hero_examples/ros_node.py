@@ -45,6 +45,16 @@ class LimitedTransport(xmlrpc.client.Transport):
             raise OSError(errno.ETIMEDOUT, "no answer within %g s" % MASTER_TIMEOUT_S) from None
 
 
+class NodeMaster(rospy.core._LockedServerProxy):
+    """The ROS master, as rospy calls it for all topics and services of the node."""
+
+    def _ServerProxy__request(self, methodname: str, params: Any) -> Any:
+        # rospy repeats a registration until it succeeds or the node has ended, holding a lock that the end waits for.
+        if methodname.startswith("register") and rospy.core.is_shutdown_requested():
+            return SUCCESS, "the node ends", []
+        return super()._ServerProxy__request(methodname, params)
+
+
 def ask_master(method: str, *arguments: Any) -> Any:
     """Call a method of the ROS master (Master API) and return its value.
 
@@ -79,7 +89,7 @@ def start_ros_node(name: str, anonymous: bool = False) -> None:
     """
     check_master()
     uri = rosgraph.get_master_uri()
-    rospy.core._xmlrpc_cache[uri] = rospy.core._LockedServerProxy(uri, transport=LimitedTransport())
+    rospy.core._xmlrpc_cache[uri] = NodeMaster(uri, transport=LimitedTransport())
     try:
         rospy.init_node(name, anonymous=anonymous, disable_signals=True)
     except rosgraph.roslogging.LoggingException as error:
