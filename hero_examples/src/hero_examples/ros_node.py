@@ -49,7 +49,7 @@ class NodeMaster(rospy.core._LockedServerProxy):
     """The ROS master, as rospy calls it for all topics and services of the node."""
 
     def _ServerProxy__request(self, methodname: str, params: Any) -> Any:
-        # rospy repeats a registration until it succeeds or the node has ended, holding a lock that the end waits for.
+        # rospy repeats a registration until it succeeds or the node has ended, with a lock that the end waits for.
         if methodname.startswith("register") and rospy.core.is_shutdown_requested():
             return SUCCESS, "the node ends", []
         return super()._ServerProxy__request(methodname, params)
