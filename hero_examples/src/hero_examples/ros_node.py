@@ -48,7 +48,7 @@ class LimitedTransport(xmlrpc.client.Transport):
 class NodeMaster(rospy.core._LockedServerProxy):
     """The ROS master, as rospy calls it for all topics and services of the node."""
 
-    def _ServerProxy__request(self, methodname: str, params: Any) -> Any:
+    def _ServerProxy__request(self, methodname: str, params: Any) -> Any:  # noqa: N802 - the name that xmlrpc calls
         # rospy repeats a registration until it succeeds or the node has ended, with a lock that the end waits for.
         if methodname.startswith("register") and rospy.core.is_shutdown_requested():
             return SUCCESS, "the node ends", []
