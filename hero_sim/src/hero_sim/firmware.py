@@ -219,6 +219,11 @@ class Firmware:
             self._arrived_at_ms = now_ms
         self._received += data
 
+    @property
+    def received_length(self) -> int:
+        """How many bytes wait in the radio's buffer."""
+        return len(self._received)
+
     def block_writing(self, now_ms: int) -> None:
         """Be told that the radio cannot take more: the whole loop stands until it can, or 5 s."""
         if self._blocked_until_ms is None and self._phase == _PHASE_LOOP:
@@ -262,6 +267,7 @@ class Firmware:
             return
         if self._blocked_until_ms is not None:
             if now_ms < self._blocked_until_ms:
+                self.due_ms = self._blocked_until_ms
                 return
             self._blocked_until_ms = None
             self.wants_connection = False
@@ -303,6 +309,7 @@ class Firmware:
 
     def _spin_before_advertising(self, now_ms: int) -> None:
         if self.connected:
+            self._spinning = True
             self._begin_reading()
             self._read_packets(now_ms)
 
@@ -369,12 +376,15 @@ class Firmware:
 
     def _begin_spin(self, now_ms: int) -> None:
         """Begin NodeHandle::spinOnce(), which lasts until all packets of the window are handled."""
-        if not self.connected:
-            # Each attempt to read connects anew (ArduinoTcpHardware.h:99-108).
-            self._dial(now_ms)
+        self._spinning = True
         if self.configured and self.to_millis(now_ms) - self._last_answer_ms > TIME_LOST_MS:
             self._unconfigure()
-        self._begin_reading()
+        if self.connected:
+            self._begin_reading()
+        else:
+            # Each attempt to read connects anew (ArduinoTcpHardware.h:99-108).
+            self._pending.clear()
+            self._dial(now_ms)
 
     def _begin_reading(self) -> None:
         """Take what is in the receive window."""
@@ -384,7 +394,6 @@ class Firmware:
             reader = frames.FrameReader(frames.LONGEST_PAYLOAD_LENGTH)
             self._pending.extend(reader.receive_bytes(bytes(self._received[:WINDOW_LENGTH])))
             del self._received[:WINDOW_LENGTH]
-        self._spinning = True
 
     def _read_packets(self, now_ms: int) -> None:
         """Handle packets until they have held the loop for a millisecond; the spin goes on after that time."""

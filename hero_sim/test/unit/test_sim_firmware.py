@@ -2,6 +2,8 @@ import struct
 
 import pytest
 from driver_side import SERVER_START_S, DriverSide, read_odom
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from hero_driver.rosserial import frames, payloads
 from hero_sim import declarations as ids
@@ -171,6 +173,64 @@ def test_a_robot_that_lost_its_connection_dials_at_every_look_and_streams_on_at_
     driver.run(60)
     assert driver.list_frames(0, ids.ID_ODOM, back_ms)[0].at_ms - back_ms <= 35
     assert not driver.list_frames(0, frames.ID_PUBLISHER, back_ms)
+
+
+def test_a_zero_that_came_with_the_end_of_a_connection_is_lost_and_the_robot_dials():
+    driver = DriverSide()
+    driver.start_streaming()
+    driver.connect = False
+    driver.drive(0, 0.1, 0.0, 500)
+    driver.send_twist(0, 0.0, 0.0)
+    driver.swarm.robots[0].connection_lost()
+    since_ms = driver.swarm.now_ms
+    driver.run(500)
+    assert [at_ms for at_ms in driver.connects[0] if at_ms > since_ms]
+    assert driver.measure_speed(0) > 0.03
+
+
+packets = st.sampled_from(
+    [
+        frames.encode_frame(frames.ID_PUBLISHER, b""),
+        frames.encode_frame(ids.ID_LED, bytes(16)) * 5,
+        frames.encode_frame(ids.ID_CMD_MOTOR, bytes(4)) * 5,
+        frames.encode_frame(ids.ID_VELOCITY_CMD_VEL, bytes(48)),
+        frames.encode_frame(ids.ID_VELOCITY_PID_CALIBRATION, b""),
+    ]
+)
+happenings = st.sampled_from(["lost", "made", "failed", "frozen", "blocked", "unblocked", "restarted"])
+
+
+@given(script=st.lists(st.tuples(st.integers(0, 120), st.one_of(packets, happenings)), max_size=25))
+@settings(max_examples=100, deadline=None)
+def test_whatever_happens_to_its_link_a_robot_runs_again_later_and_never_at_once(script):
+    driver = DriverSide()
+    driver.start_streaming()
+    robot = driver.swarm.robots[0]
+    now_ms = driver.swarm.now_ms
+    robot.due_ms = now_ms
+    for after_ms, what in script:
+        until_ms = now_ms + after_ms
+        while robot.due_ms <= until_ms:
+            now_ms = max(now_ms, robot.due_ms)
+            robot.run(now_ms)
+            assert robot.due_ms > now_ms
+        now_ms = until_ms
+        if isinstance(what, bytes):
+            robot.receive_bytes(now_ms, what)
+        elif what == "lost":
+            robot.connection_lost()
+        elif what == "made":
+            robot.connection_made(now_ms)
+        elif what == "failed":
+            robot.connection_failed(now_ms)
+        elif what == "frozen":
+            robot.freeze(now_ms, 70)
+        elif what == "blocked":
+            robot.block_writing(now_ms)
+        elif what == "unblocked":
+            robot.unblock_writing(now_ms)
+        else:
+            robot.switch_on(now_ms)
 
 
 def test_robots_started_together_do_the_same_for_the_same_seed():
