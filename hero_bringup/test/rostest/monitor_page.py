@@ -56,6 +56,12 @@ class MonitorPage:
             ".map(row => [...row.children].map(cell => cell.textContent))"
         )
 
+    def banner(self):
+        """Return level and text of what is shown about stopping."""
+        return tuple(
+            self.run("const banner = document.getElementById('stopping'); return [banner.dataset.level, banner.textContent]")
+        )
+
     def choose(self, robot):
         """Choose a robot in the table."""
         for row in self.browser.find_elements("css selector", "#fleet tbody tr"):

@@ -1,14 +1,18 @@
 """The fleet monitor beside the tests: asked without a browser, and a second one of one's own."""
 
 import http.client
+import json
 import os
 import signal
+import socket
 import subprocess
+import sys
 import uuid
+from pathlib import Path
 
 from swarm_watch import wait_for
 
-TIMEOUT_S = 30.0
+TIMEOUT_S = 8.0
 HOST = "127.0.0.1:21331"
 OTHER_HOST = "127.0.0.1:21332"
 UPGRADE = {
@@ -19,9 +23,9 @@ UPGRADE = {
 }
 
 
-def ask(host, path="/", headers=(), method="GET", body=None):
-    """Return status, headers and body of the answer to one request."""
-    connection = http.client.HTTPConnection(host, timeout=TIMEOUT_S)
+def ask(host, path="/", headers=(), method="GET", body=None, source="127.0.0.1"):
+    """Return status, headers and body of the answer to one request; source: the client's address."""
+    connection = http.client.HTTPConnection(host, timeout=TIMEOUT_S, source_address=(source, 0))
     connection.request(method, path, body, dict(headers))
     answer = connection.getresponse()
     text = b"" if answer.status == 101 else answer.read()
@@ -29,12 +33,51 @@ def ask(host, path="/", headers=(), method="GET", body=None):
     return answer.status, answer.headers, text.decode("utf-8", "replace")
 
 
-def start_monitor(*arguments):
+def log_in(host, token, source="127.0.0.1"):
+    """Return the status of a login and the cookie that it gives."""
+    body = json.dumps({"token": token})
+    status, headers, _ = ask(host, "/login", {"Origin": "http://" + host}, "POST", body, source)
+    return status, (headers["Set-Cookie"] or "").partition(";")[0]
+
+
+class PageClient:
+    """The socket of a page, without a browser: sends requests, and reads nothing."""
+
+    def __init__(self, host, cookie=""):
+        address, _, port = host.rpartition(":")
+        self.socket = socket.create_connection((address, int(port)), TIMEOUT_S)
+        lines = ["GET /live HTTP/1.1", "Host: " + host, "Origin: http://" + host, "Cookie: " + cookie]
+        lines += ["%s: %s" % item for item in UPGRADE.items()]
+        self.socket.sendall("\r\n".join([*lines, "", ""]).encode())
+        assert b"101" in self.socket.recv(12), "no socket for this page"
+
+    def send(self, **request):
+        text = json.dumps(request).encode()
+        # RFC 6455, section 5.2: one text frame, with a mask of zeros.
+        self.socket.sendall(bytes([0x81, 0x80 | len(text), 0, 0, 0, 0]) + text)
+
+    def close(self):
+        self.socket.close()
+
+
+def start_monitor(*arguments, prefix=()):
     """Start a second monitor. Its name is new: private parameters outlive a node."""
     name = "__name:=monitor_" + uuid.uuid4().hex
     port = "_port:=" + OTHER_HOST.rpartition(":")[2]
     return subprocess.Popen(
-        ["rosrun", "hero_bringup", "monitor", name, port, *arguments],
+        [*prefix, "rosrun", "hero_bringup", "monitor", name, port, *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        start_new_session=True,
+    )
+
+
+def start_scripted_driver(name, ids, **parameters):
+    """Start a driver that reports robots with these ids."""
+    private = ["_%s:=%s" % item for item in parameters.items()]
+    script = Path(__file__).with_name("scripted_driver.py")
+    return subprocess.Popen(
+        [sys.executable, str(script), "__name:=" + name, "_ids:='%s'" % json.dumps(ids), *private],
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         start_new_session=True,

@@ -2,14 +2,13 @@
 """The fleet monitor beside three simulated robots, looked at and clicked in a real browser."""
 
 import math
-import socket
 import unittest
 
 import rospy
 import rostest
 from geometry_msgs.msg import Twist
 from monitor_page import MISSING, MonitorPage
-from monitor_process import HOST, OTHER_HOST, TIMEOUT_S, UPGRADE, end, start_monitor, wait_until_it_answers
+from monitor_process import HOST, OTHER_HOST, TIMEOUT_S, PageClient, end, start_monitor, wait_until_it_answers
 from rosgraph_msgs.msg import Log
 from swarm_watch import SwarmWatch, wait_for
 
@@ -24,10 +23,7 @@ class PageTest(unittest.TestCase):
         cls.watch = SwarmWatch(range(3))
         cls.watch.wait_until_complete(TIMEOUT_S)
         # A page that never reads must not hold up the other one.
-        cls.stuck = socket.create_connection(("127.0.0.1", 21331), TIMEOUT_S)
-        lines = ["GET /live HTTP/1.1", "Host: " + HOST, "Origin: http://" + HOST]
-        lines += ["%s: %s" % item for item in UPGRADE.items()]
-        cls.stuck.sendall("\r\n".join([*lines, "", ""]).encode())
+        cls.stuck = PageClient(HOST)
         cls.page = MonitorPage("http://%s/" % HOST)
 
         def all_are_ready():

@@ -80,6 +80,16 @@ def test_numbers_are_whole_and_what_is_not_finite_has_a_meaning():
     assert encode_colour(math.nan, 1.0, 0.0) is None
 
 
+@pytest.mark.parametrize("pose", [(1e306, 0.0, 0.0), (0.0, -2e4, 0.0), (math.inf, 0.0, 0.0), (0.0, 0.0, math.nan)])
+def test_a_pose_that_cannot_be_drawn_is_none(pose):
+    assert encode_pose(Pose(*pose)) is None
+    assert encode_pose(None) is None
+
+
+def test_a_range_that_no_sensor_measures_says_nothing():
+    assert encode_ranges([3e38, -3e38, 1e306]) == [-1, -1, -1]
+
+
 @pytest.fixture()
 def placement():
     placement = Placement("world")

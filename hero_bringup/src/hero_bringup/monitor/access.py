@@ -1,4 +1,4 @@
-"""Who may see the page: headers, tokens and cookies -> yes or no. Pure; time enters as now_s.
+"""Who may see the page: decides by headers and tokens. Pure. Sessions are signed cookies (server).
 
 Three dangers: somebody on the network who does not know the token; a web page of somebody else, open in the same
 browser, that opens a WebSocket to this server (browsers allow that, RFC 6455 section 10.2: the server must look at
@@ -7,15 +7,8 @@ Origin); and a foreign name that is made to resolve to this machine (DNS rebindi
 
 import hmac
 import ipaddress
-import secrets
-from typing import Dict, FrozenSet, Iterable, Optional, Tuple
+from typing import FrozenSet, Iterable, Optional, Tuple
 from urllib.parse import urlsplit
-
-SESSION_S = 12 * 3600.0
-"""How long a browser that gave the token is let in."""
-
-SESSIONS_MAX = 200
-"""Browsers that are let in at once; the oldest is forgotten."""
 
 TOKEN_LENGTH_MIN = 16
 """Short of this a token can be guessed."""
@@ -41,13 +34,12 @@ def split_host(header: str) -> Optional[Tuple[str, int]]:
 
 
 class Access:
-    """The rules of one server, and the browsers that gave its token."""
+    """The rules of one server."""
 
     def __init__(self, token: Optional[str], host_names: Iterable[str]) -> None:
         """token: None where none is needed; host_names: names by which this machine may be called."""
         self._token = token
         self._host_names: FrozenSet[str] = frozenset(name.lower().rstrip(".") for name in host_names)
-        self._sessions: Dict[str, float] = {}
 
     @property
     def needs_token(self) -> bool:
@@ -78,21 +70,9 @@ class Access:
         scheme, _, netloc = origin.partition("://")
         return scheme in ("http", "https") and netloc.lower() == host_header.lower()
 
-    def log_in(self, token: str, now_s: float) -> Optional[str]:
-        """Return the secret of a new session, None if the token is wrong."""
-        if self._token is None or not hmac.compare_digest(token.encode("utf-8"), self._token.encode("utf-8")):
-            return None
-        while len(self._sessions) >= SESSIONS_MAX:
-            del self._sessions[min(self._sessions, key=lambda known: self._sessions[known])]
-        session = secrets.token_urlsafe(32)
-        self._sessions[session] = now_s + SESSION_S
-        return session
-
-    def admits_session(self, session: Optional[str], now_s: float) -> bool:
-        """Return whether a cookie is one that log_in gave out, and not too old."""
+    def admits_token(self, token: str) -> bool:
+        """Return whether this is the token."""
         if self._token is None:
-            return True
-        found = False
-        for known, end_s in self._sessions.items():
-            found |= hmac.compare_digest(known.encode(), (session or "").encode("utf-8")) and now_s < end_s
-        return found
+            return False
+        # JSON may hold halves of surrogate pairs, which strict UTF-8 refuses.
+        return hmac.compare_digest(token.encode("utf-8", "surrogatepass"), self._token.encode("utf-8"))

@@ -1,15 +1,13 @@
-"""Requests of pages -> velocities, goals and the drivers' stop services.
+"""Carries out what pages ask for: stops, velocities and goals.
 
-Nothing here waits on the caller's thread: topics are opened, goals handed over and services called on threads of
-their own, and what came of it is told later in words. Stopping all robots has a thread for each call, so that no
-goal can hold it up.
+Nothing here waits on the caller's thread: topics are opened and goals handed over on a thread of their own, and the
+outcome is told later in words. A stop is published at once, on topics that are open since the driver was found.
 """
 
 import math
-import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
-from typing import Callable, Dict, Optional, Set
+from typing import Callable, Dict, Optional
 
 import rosgraph
 import rospy
@@ -25,7 +23,6 @@ GOAL_LISTENER_TIMEOUT_S = 2.0
 """To reach a program that listens to goals; connections are there after about 0.1 s."""
 
 STOP_PERIOD_S = 0.06
-STOPPERS_AT_ONCE = 8
 
 Tell = Callable[[str, str], None]
 """Takes a level (info, warn, error) and a text for people, on any thread."""
@@ -41,7 +38,6 @@ class Commander:
         self._velocities: Dict[str, Optional[rospy.Publisher]] = {}
         self._goals: Dict[str, rospy.Publisher] = {}
         self._waiting_goals = 0
-        self._stoppers: Set[threading.Thread] = set()
 
     # ---------------------------------------------------------------- driving by hand
 
@@ -132,26 +128,17 @@ class Commander:
 
     # ---------------------------------------------------------------- stop
 
-    def stop_all(self, stop: bool, tell: Tell) -> None:
-        """Ask all drivers to stop all robots, or to let them go again."""
+    def request_stop(self, stop: bool) -> None:
+        """Ask all drivers to stop all robots, or to release them."""
+        self._drivers.request_stop(stop)
         if stop:
             self._dead_man.drop_all()
-        self._stoppers = {thread for thread in self._stoppers if thread.is_alive()}
-        if len(self._stoppers) >= STOPPERS_AT_ONCE:
-            tell("error", "the driver does not answer /hero_driver/stop: %d calls wait" % len(self._stoppers))
-            return
-        many = len(self._drivers.names()) > 1
+            self.step()
 
-        def report(driver: str, failure: Optional[str]) -> None:
-            whose = " of %s" % driver.strip("/") if many else ""
-            if failure is not None:
-                tell("error", "NOT STOPPED: %s" % failure if stop else failure)
-            elif stop:
-                tell("warn", "all robots%s are stopped" % whose)
-            else:
-                tell("info", "robots%s may move again" % whose)
-
-        self._stoppers.update(self._drivers.stop(stop, report))
+    def may_drive(self) -> bool:
+        """Return whether pages may drive robots: not while they are being stopped, or released."""
+        status = self._drivers.stop_status()
+        return status is None or status.is_final
 
     def close(self) -> None:
         """Stop all that was driven by hand, more than once; takes about 0.2 s."""

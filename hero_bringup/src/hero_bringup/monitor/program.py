@@ -2,8 +2,8 @@
 
     roslaunch hero_bringup monitor.launch
 
-Parameters: the README of this package. Everything runs on one thread, tornado's, but for what may have to wait for
-ROS: see feed and commander.
+Parameters: the README of this package. Everything runs on one thread, tornado's, except what may have to wait: for
+ROS (feed, commander) or for the terminal (log_thread).
 """
 
 import functools
@@ -22,12 +22,14 @@ from ..fleet_state import Pose
 from . import requests
 from .access import TOKEN_LENGTH_MIN, Access, is_loopback
 from .commander import STOP_PERIOD_S, Commander
+from .connection_limits import ConnectionLimits
 from .dead_man import Velocity
 from .feed import FleetFeed
+from .log_thread import LogThread
 from .sections import encode
 
 if TYPE_CHECKING:
-    from .server import LivePage
+    from .server import PageSocket
 
 LINGER_S = 10.0
 """Subscriptions stay so long after the last page is gone: it may be a reload."""
@@ -51,6 +53,8 @@ class Parameters(NamedTuple):
     control: bool
     rate_hz: float
     map_frame: str
+    max_connections: int
+    max_connections_per_address: int
 
 
 def read_token(host: str, file: str) -> Optional[str]:
@@ -88,22 +92,34 @@ def load_parameters() -> Parameters:
             "control": False,
             "rate_hz": 10.0,
             "map_frame": "world",
+            "max_connections": 400,
+            "max_connections_per_address": 50,
         }
     )
-    host, port = str(given["host"]), check_number("port", given["port"], 0, 65535)
-    if port != int(port) or not host:
-        raise ProgramError("~host %r, ~port %r: needs an address and a whole number" % (host, port))
+    host = str(given["host"])
+    if not host:
+        raise ProgramError("~host is empty, but must be an address of this PC, such as 127.0.0.1")
     names = re.split(r"[\s,]+", str(given["host_names"]).strip())
     own_name = socket.gethostname()
     return Parameters(
         host,
-        int(port),
+        check_whole_number("port", given["port"], 0, 65535),
         read_token(host, str(given["token_file"])),
         [name for name in [*names, own_name, own_name.partition(".")[0] + ".local", host] if name],
         check_flag("control", given["control"]),
         check_number("rate_hz", given["rate_hz"], 1.0, 30.0, "Hz"),
         str(given["map_frame"]).lstrip("/"),
+        check_whole_number("max_connections", given["max_connections"], 10, 10000),
+        check_whole_number("max_connections_per_address", given["max_connections_per_address"], 5, 10000),
     )
+
+
+def check_whole_number(name: str, value: Any, low: int, high: int) -> int:
+    """Return value if it is a whole number in low..high. Raises: ProgramError."""
+    number = check_number(name, value, low, high)
+    if number != int(number):
+        raise ProgramError("~%s is %r, but must be a whole number" % (name, value))
+    return int(number)
 
 
 class Monitor:
@@ -113,17 +129,21 @@ class Monitor:
         # Here, so that a machine without tornado gets a line that says what to do.
         import tornado.ioloop
 
-        from .server import Actions, Server
+        from .server import Actions, Server, raise_file_limit
 
         self._parameters = parameters
         self._program = program
-        self._feed = FleetFeed(parameters.map_frame)
+        self._log = LogThread()
+        self._feed = FleetFeed(parameters.map_frame, self._log)
         self._commander = Commander(self._feed.drivers)
         self._loop = tornado.ioloop.IOLoop.current()
         actions = Actions(self._open_page, self._receive, self._close_page)
-        self._server = Server(Access(parameters.token, parameters.host_names), actions)
-        self._tick = tornado.ioloop.PeriodicCallback(self._send_news, 1000.0 / parameters.rate_hz)
-        self._stops = tornado.ioloop.PeriodicCallback(self._commander.step, 1000.0 * STOP_PERIOD_S)
+        # The other half of the files is for ROS: some per robot.
+        connections_max = min(parameters.max_connections, raise_file_limit() // 2)
+        limits = ConnectionLimits(connections_max, parameters.max_connections_per_address)
+        self._server = Server(Access(parameters.token, parameters.host_names), limits, actions)
+        self._tick = tornado.ioloop.PeriodicCallback(self._update_pages, 1000.0 / parameters.rate_hz)
+        self._stops = tornado.ioloop.PeriodicCallback(self._step, 1000.0 * STOP_PERIOD_S)
         self._look = tornado.ioloop.PeriodicCallback(self._look_for_end, 1000.0 * LOOK_PERIOD_S)
         self._leaving: Any = None
 
@@ -132,10 +152,10 @@ class Monitor:
         wanted = self._parameters
         try:
             port = self._server.listen(wanted.host, wanted.port)
-        except OSError as error:
+        except (OSError, ValueError) as error:
             raise ProgramError(
-                "cannot listen on %s port %d: %s; choose another with port:=PORT"
-                % (wanted.host, wanted.port, os.strerror(error.errno) if error.errno else error)
+                "cannot listen on %s port %d: %s; choose others with host:=ADDRESS port:=PORT"
+                % (wanted.host, wanted.port, getattr(error, "strerror", None) or error)
             ) from None
         host = "[%s]" % wanted.host if ":" in wanted.host else wanted.host
         if wanted.host in ("0.0.0.0", "::"):
@@ -157,7 +177,7 @@ class Monitor:
 
     # ---------------------------------------------------------------- pages come and go
 
-    def _open_page(self, page: "LivePage") -> None:
+    def _open_page(self, page: "PageSocket") -> None:
         if self._leaving is not None:
             self._loop.remove_timeout(self._leaving)
             self._leaving = None
@@ -167,7 +187,7 @@ class Monitor:
             self._tick.start()
             self._stops.start()
 
-    def _close_page(self, page: "LivePage") -> None:
+    def _close_page(self, page: "PageSocket") -> None:
         self._commander.drop_page(page.number)
         if not self._server.pages and self._leaving is None:
             self._leaving = self._loop.call_later(LINGER_S, self._leave)
@@ -179,12 +199,22 @@ class Monitor:
         self._stops.stop()
         self._feed.want(looking=False, truth=False)
 
-    def _send_news(self) -> None:
+    def _update_pages(self) -> None:
         pages = self._server.pages
         self._feed.want(True, any(page.truth for page in pages))
         self._feed.read()
-        for page in pages:
-            page.send_notices()
+        self._broadcast_updates()
+
+    def _step(self) -> None:
+        """What must not wait for the next update of the pages."""
+        self._commander.step()
+        if self._feed.read_stop():
+            self._broadcast_updates()
+
+    def _broadcast_updates(self) -> None:
+        """Send all pages what is new; a page that is still busy with the last update gets it later."""
+        for page in self._server.pages:
+            page.send_waiting()
             if page.ready:
                 news = self._feed.sections.take_news(page.seen)
                 if news is not None:
@@ -192,7 +222,7 @@ class Monitor:
 
     # ---------------------------------------------------------------- what pages want
 
-    def _receive(self, page: "LivePage", text: Union[str, bytes]) -> None:
+    def _receive(self, page: "PageSocket", text: Union[str, bytes]) -> None:
         try:
             request = requests.read_request(text, MAX_LINEAR_M_S, MAX_TURN_RAD_S)
         except requests.RequestError as error:
@@ -201,14 +231,21 @@ class Monitor:
         if isinstance(request, requests.Look):
             page.truth = request.truth
         elif isinstance(request, requests.Stop):
-            rospy.logwarn("all robots are %s from a page", "stopped" if request.stop else "let go")
-            self._commander.stop_all(request.stop, functools.partial(self._tell_later, page))
+            self._commander.request_stop(request.stop)
+            self._feed.read_stop()
+            verb = "stop" if request.stop else "release"
+            page.acknowledge(verb)
+            # After the acknowledgement has left.
+            self._loop.add_callback(self._broadcast_updates)
+            self._log.warn("a page asks to %s all robots" % verb)
         elif isinstance(request, requests.Release):
             self._commander.release(page.number, "/" + request.robot)
         elif not self._parameters.control:
             page.tell("error", "this monitor only looks: start it with control:=true to drive robots")
         elif request.robot not in self._feed.robots:
             page.tell("error", "%s is not there" % request.robot)
+        elif self._feed.stopped or not self._commander.may_drive():
+            page.tell("error", "all robots are stopped: release them first")
         elif isinstance(request, requests.Drive):
             velocity = Velocity("/" + request.robot, request.linear_m_s, request.turn_rad_s)
             if not self._commander.drive(page.number, velocity):
@@ -222,7 +259,7 @@ class Monitor:
                 functools.partial(self._tell_later, page),
             )
 
-    def _tell_later(self, page: "LivePage", level: str, text: str) -> None:
+    def _tell_later(self, page: "PageSocket", level: str, text: str) -> None:
         """Tell a page something from another thread."""
         self._loop.add_callback(page.tell, level, text)
 

@@ -1,4 +1,4 @@
-"""Topics of one robot -> what the page shows of it."""
+"""Topics of one robot, and what the page shows of it."""
 
 import time
 from typing import Optional, Tuple
@@ -44,7 +44,8 @@ class RobotFeed:
             self.light = None
         goal = self._goals.take()
         if goal is not None:
-            self._goal = (goal.header.frame_id.lstrip("/"), read_pose(goal.pose))
+            pose = read_pose(goal.pose)
+            self._goal = None if pose is None else (goal.header.frame_id.lstrip("/"), pose)
 
     def find_goal(self, placement: Placement, map_frame: str) -> Optional[Pose]:
         """Return the robot's goal on the map, None if it has none, is there, or nobody knows the goal's frame."""

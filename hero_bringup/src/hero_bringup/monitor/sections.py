@@ -1,4 +1,4 @@
-"""The fleet as it is now -> numbered pieces of JSON, so that each page gets what is new to it and no more. Pure.
+"""The fleet as numbered pieces of JSON, so that each page gets what is new to it and no more. Pure.
 
 Every piece is whole in itself: a page that was too slow for some of them needs none of those to understand the next.
 Lengths travel in mm and angles in mrad, as whole numbers: short, and finer than anybody can see.
@@ -20,6 +20,12 @@ LOG_LINES_AT_ONCE = 100
 """The most lines in one message: a slow page gets the newest, and is told how many it missed."""
 
 
+FARTHEST_M = 10000.0
+"""Coordinates and sizes beyond this are not drawn: a map of them would show nothing, and its grid would never end."""
+
+FARTHEST_RANGE_M = 100.0
+
+
 class LogLine(NamedTuple):
     """One line of /rosout."""
 
@@ -36,9 +42,14 @@ def encode(value: Any) -> str:
     return json.dumps(value, separators=(",", ":"), allow_nan=False)
 
 
-def encode_pose(pose: Pose) -> Optional[List[int]]:
-    """Return a pose as mm, mm, mrad; None for one that is not finite."""
-    if not all(map(math.isfinite, pose)):
+def shorten(text: str) -> str:
+    """Return a text of at most LONGEST_LINE characters, without what cannot be printed."""
+    return make_printable(text if len(text) <= LONGEST_LINE else text[: LONGEST_LINE - 3] + "...")
+
+
+def encode_pose(pose: Optional[Pose]) -> Optional[List[int]]:
+    """Return a pose as mm, mm, mrad; None for none, and for one that cannot be drawn."""
+    if pose is None or not all(abs(value) <= FARTHEST_M for value in pose):
         return None
     return [round(value * 1000.0) for value in pose]
 
@@ -50,11 +61,11 @@ def encode_ranges(ranges_m: Sequence[float]) -> List[Optional[int]]:
 
 def encode_range(range_m: float) -> Optional[int]:
     """Return one range; see encode_ranges. -Inf, +Inf and NaN are those of REP 117."""
-    if math.isfinite(range_m):
+    if abs(range_m) <= FARTHEST_RANGE_M:
         return max(0, round(range_m * 1000.0))
-    if math.isnan(range_m):
-        return -1
-    return None if range_m > 0 else 0
+    if math.isinf(range_m):
+        return None if range_m > 0 else 0
+    return -1
 
 
 def encode_colour(red: float, green: float, blue: float) -> Optional[str]:
@@ -76,8 +87,7 @@ class LogRing:
     def append(self, time_s: float, level: int, node: str, robot: str, text: str) -> None:
         """Take a line, without what cannot be printed."""
         self.count += 1
-        line = make_printable(text if len(text) <= LONGEST_LINE else text[: LONGEST_LINE - 3] + "...")
-        self._lines.append(LogLine(self.count, round(time_s, 3), level, make_printable(node), robot, line))
+        self._lines.append(LogLine(self.count, round(time_s, 3), level, shorten(node), robot, shorten(text)))
 
     def skip(self, count: int) -> None:
         """Count lines that nobody had the time to read."""
@@ -106,12 +116,14 @@ class Sections:
         self._texts: Dict[str, str] = {}
         self._versions: Dict[str, int] = {}
 
-    def put(self, name: str, value: Any) -> None:
-        """Replace a piece; what is equal to the one before is not new."""
+    def put(self, name: str, value: Any) -> bool:
+        """Replace a piece; return whether it differs from the one before: only then is it new."""
         text = encode(value)
-        if self._texts.get(name) != text:
-            self._texts[name] = text
-            self._versions[name] = self._versions.get(name, 0) + 1
+        if self._texts.get(name) == text:
+            return False
+        self._texts[name] = text
+        self._versions[name] = self._versions.get(name, 0) + 1
+        return True
 
     def take_news(self, page: Page) -> Optional[str]:
         """Return all that is new to a page as one JSON object, None if nothing is; it counts as got."""

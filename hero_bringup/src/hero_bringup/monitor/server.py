@@ -1,58 +1,70 @@
-"""Pieces of JSON and requests -> HTTP and one WebSocket per page, with tornado. Knows nothing of ROS.
+"""HTTP and one WebSocket per page, with tornado: sends pieces of JSON, receives requests. Knows nothing of ROS.
 
-One thread owns all connections. Nothing that a page does can hold up another: a page that is slow misses frames
-instead of making them wait (every piece is whole in itself), and what cannot be sent at once takes 64 kB at most.
+One thread owns all connections. Nothing that a page does can hold up another: a slow page misses updates instead of
+making them wait (every piece is whole in itself), and what cannot be sent at once takes 64 kB at most.
 """
 
 import itertools
 import json
+import logging
 import mimetypes
+import resource
+import secrets
 import socket
+import sys
 import time
 from collections import deque
 from pathlib import Path
-from typing import Any, Awaitable, Callable, Deque, Dict, List, NamedTuple, Optional, Union
+from typing import Any, Awaitable, Callable, Deque, Dict, List, NamedTuple, Optional, Tuple, Union
 
-import tornado.gen
 import tornado.httpserver
 import tornado.ioloop
+import tornado.iostream
 import tornado.netutil
 import tornado.web
 import tornado.websocket
 
 from .access import Access
+from .connection_limits import TOKEN_PERIOD_S, ConnectionLimits, TokenAttempts
 from .sections import Page, encode
 
 WEB = Path(__file__).resolve().parent / "web"
 COOKIE = "hero_monitor"
+SESSION_DAYS = 0.5
+"""How long a browser that gave the token is let in."""
+
 PAGES_MAX = 30
 SEND_BUFFER = 65536
 """Bytes that the system may hold back for one page: about a second of a large swarm."""
 
-NOTICES_KEPT = 5
-WRONG_TOKEN_PAUSE_S = 1.0
-LOGINS_AT_ONCE = 5
+WAITING_MAX = 5
+"""Notices and acknowledgements kept for a page that is slow."""
+
 PING_INTERVAL_S = 3.0
 PING_TIMEOUT_S = 9.0
 LONGEST_REQUEST = 4096
+LISTEN_BACKLOG = 1024
+EXPIRE_PERIOD_S = 1.0
 
 
 class Actions(NamedTuple):
     """What the server asks of the rest; all return at once."""
 
-    open_page: Callable[["LivePage"], None]
-    receive: Callable[["LivePage", Union[str, bytes]], None]
-    close_page: Callable[["LivePage"], None]
+    open_page: Callable[["PageSocket"], None]
+    receive: Callable[["PageSocket", Union[str, bytes]], None]
+    close_page: Callable[["PageSocket"], None]
 
 
-class Checked(tornado.web.RequestHandler):
+class BaseHandler(tornado.web.RequestHandler):
     """A request whose Host names this machine; everything carries headers that keep foreign content out."""
 
     access: Access
+    limits: ConnectionLimits
 
-    def initialize(self, access: Access, **others: Any) -> None:
+    def initialize(self, access: Access, limits: ConnectionLimits, **others: Any) -> None:
         """Take what all handlers share."""
         self.access = access
+        self.limits = limits
         for name, value in others.items():
             setattr(self, name, value)
 
@@ -82,16 +94,19 @@ class Checked(tornado.web.RequestHandler):
         return access is not None and access.admits_host(host)
 
     def prepare(self) -> Optional[Awaitable[None]]:
-        """Refuse names that are not this machine's."""
+        """Refuse names that are not this machine's; trust the connection of a browser that is logged in."""
         self.set_default_headers()
         if not self.access.admits_host(self.request.headers.get("Host", "")):
             raise tornado.web.HTTPError(421)
+        stream = getattr(self.request.connection, "stream", None)
+        if self.is_logged_in and stream is not None:
+            self.limits.trust(stream)
         return None
 
     @property
-    def known(self) -> bool:
+    def is_logged_in(self) -> bool:
         """Whether the browser has given the token, or needs none."""
-        return self.access.admits_session(self.get_cookie(COOKIE), time.monotonic())
+        return not self.access.needs_token or self.get_secure_cookie(COOKIE, max_age_days=SESSION_DAYS) is not None
 
     def write_error(self, status_code: int, **others: Any) -> None:
         """Say in one line what is wrong."""
@@ -99,20 +114,20 @@ class Checked(tornado.web.RequestHandler):
             403: "not allowed",
             404: "there is no such page",
             421: "this name is not one of this machine's; see host_names in docs/monitor.md",
-            429: "too many tries; wait a moment",
+            429: "too many wrong tokens from this address; wait %d s" % TOKEN_PERIOD_S,
             503: "too many pages are open",
         }
         self.set_header("Content-Type", "text/plain; charset=utf-8")
         self.finish(reasons.get(status_code, "error %d" % status_code) + "\n")
 
 
-class FileHandler(Checked):
+class FileHandler(BaseHandler):
     """The page's own files, which hold nothing secret; the page itself only for those that may see it."""
 
     def get(self, name: str) -> None:
         """Send a file."""
         if not name:
-            name = "index.html" if self.known else "login.html"
+            name = "index.html" if self.is_logged_in else "login.html"
         path = WEB / name
         if "/" in name or not path.is_file():
             raise tornado.web.HTTPError(404)
@@ -122,44 +137,40 @@ class FileHandler(Checked):
         self.finish(path.read_bytes())
 
 
-class LoginHandler(Checked):
-    """The token, in exchange for a cookie."""
+class LoginHandler(BaseHandler):
+    """Exchanges the token for a signed cookie."""
 
-    waiting = 0
+    attempts: TokenAttempts
 
-    async def post(self) -> None:
-        """Check the token; a wrong one costs a second."""
+    def post(self) -> None:
+        """Check the token; addresses that sent too many wrong ones have to wait."""
         if not self.access.admits_origin(self.request.headers.get("Origin"), self.request.host):
             raise tornado.web.HTTPError(403)
-        if LoginHandler.waiting >= LOGINS_AT_ONCE:
+        address, now_s = self.request.remote_ip or "", time.monotonic()
+        if not self.attempts.admits(address, now_s):
             raise tornado.web.HTTPError(429)
         try:
             token = json.loads(self.request.body)["token"]
         except (ValueError, TypeError, KeyError, RecursionError):
             token = None
-        session = self.access.log_in(token, time.monotonic()) if isinstance(token, str) else None
-        if session is None:
-            LoginHandler.waiting += 1
-            try:
-                await tornado.gen.sleep(WRONG_TOKEN_PAUSE_S)
-            finally:
-                LoginHandler.waiting -= 1
+        if not (isinstance(token, str) and self.access.admits_token(token)):
+            self.attempts.count_wrong(address, now_s)
             raise tornado.web.HTTPError(403)
-        self.set_cookie(COOKIE, session, httponly=True, samesite="Strict", path="/")
+        self.set_secure_cookie(COOKIE, "in", expires_days=None, httponly=True, samesite="Strict", path="/")
         self.set_status(204)
 
 
-class LivePage(tornado.websocket.WebSocketHandler, Checked):
+class PageSocket(tornado.websocket.WebSocketHandler, BaseHandler):
     """The socket of one page."""
 
     numbers = itertools.count(1)
     actions: Actions
-    pages: List["LivePage"]
+    pages: List["PageSocket"]
 
     def prepare(self) -> Optional[Awaitable[None]]:
         """Refuse who may not see the fleet, and one page too many."""
-        Checked.prepare(self)
-        if not self.known:
+        BaseHandler.prepare(self)
+        if not self.is_logged_in:
             raise tornado.web.HTTPError(403)
         if len(self.pages) >= PAGES_MAX:
             raise tornado.web.HTTPError(503)
@@ -177,11 +188,11 @@ class LivePage(tornado.websocket.WebSocketHandler, Checked):
 
     def open(self, *arguments: str, **others: str) -> None:
         """A page is there."""
-        self.number = next(LivePage.numbers)
+        self.number = next(PageSocket.numbers)
         self.seen = Page()
         self.truth = False
         self._sending: Optional[Awaitable[None]] = None
-        self._notices: Deque[str] = deque(maxlen=NOTICES_KEPT)
+        self._waiting: Deque[str] = deque(maxlen=WAITING_MAX)
         self.set_nodelay(True)
         if self.ws_connection is not None:
             stream = getattr(self.ws_connection, "stream", None)
@@ -214,55 +225,84 @@ class LivePage(tornado.websocket.WebSocketHandler, Checked):
 
     def tell(self, level: str, text: str) -> None:
         """Show a line to the people at this page."""
-        self._notices.append(encode({"notice": {"level": level, "text": text}}))
-        self.send_notices()
+        self._send_when_ready({"notice": {"level": level, "text": text}})
 
-    def send_notices(self) -> None:
-        """Send the lines that wait, where the page is quick enough; of those that are too many the oldest are lost."""
-        while self._notices and self.ready:
-            self.send(self._notices.popleft())
+    def acknowledge(self, request: str) -> None:
+        """Tell the page that its request has arrived."""
+        self._send_when_ready({"received": request})
+
+    def _send_when_ready(self, value: Dict[str, Any]) -> None:
+        self._waiting.append(encode(value))
+        self.send_waiting()
+
+    def send_waiting(self) -> None:
+        """Send what waits, if the page is quick enough; of too many the oldest are lost."""
+        while self._waiting and self.ready:
+            self.send(self._waiting.popleft())
+
+
+class LimitedServer(tornado.httpserver.HTTPServer):
+    """An HTTP server that asks the limits about every new connection."""
+
+    limits: ConnectionLimits
+
+    def handle_stream(self, stream: tornado.iostream.IOStream, address: Tuple[Any, ...]) -> None:
+        """Serve a new connection, or close it."""
+        if self.limits.admit(stream, str(address[0]), time.monotonic()):
+            super().handle_stream(stream, address)
+        else:
+            stream.close()
 
 
 class Server:
     """The server, from its start to its end."""
 
-    def __init__(self, access: Access, actions: Actions) -> None:
-        self.pages: List[LivePage] = []
-        shared: Dict[str, Any] = {"access": access}
+    def __init__(self, access: Access, limits: ConnectionLimits, actions: Actions) -> None:
+        # Of requests that are no HTTP and cookies that are no sessions tornado logs each: anybody could fill the disk.
+        logging.getLogger("tornado.general").setLevel(logging.ERROR)
+        self.pages: List[PageSocket] = []
+        shared: Dict[str, Any] = {"access": access, "limits": limits}
         self._application = tornado.web.Application(
             [
-                (r"/live", LivePage, {**shared, "actions": actions, "pages": self.pages}),
-                (r"/login", LoginHandler, shared),
+                (r"/live", PageSocket, {**shared, "actions": actions, "pages": self.pages}),
+                (r"/login", LoginHandler, {**shared, "attempts": TokenAttempts()}),
                 (r"/([a-z_.]*)", FileHandler, shared),
             ],
             default_handler_class=NotFoundHandler,
             default_handler_args=shared,
             log_function=ignore_request,
+            cookie_secret=secrets.token_urlsafe(32),
             websocket_ping_interval=PING_INTERVAL_S,
             websocket_ping_timeout=PING_TIMEOUT_S,
             websocket_max_message_size=LONGEST_REQUEST,
         )
-        self._http = tornado.httpserver.HTTPServer(
+        self._http = LimitedServer(
             self._application,
             max_body_size=LONGEST_REQUEST,
             max_header_size=16384,
             idle_connection_timeout=60.0,
         )
+        self._http.limits = limits
+        self._expiry = tornado.ioloop.PeriodicCallback(
+            lambda: limits.expire(time.monotonic()), 1000.0 * EXPIRE_PERIOD_S
+        )
 
     def listen(self, host: str, port: int) -> int:
         """Await pages; return the port. Raises: OSError."""
-        sockets = tornado.netutil.bind_sockets(port, host)
+        sockets = tornado.netutil.bind_sockets(port, host, backlog=LISTEN_BACKLOG)
         self._http.add_sockets(sockets)
+        self._expiry.start()
         return int(sockets[0].getsockname()[1])
 
     def close(self) -> None:
         """Send all pages away."""
+        self._expiry.stop()
         self._http.stop()
         for page in list(self.pages):
             page.close(1001, "the monitor ends")
 
 
-class NotFoundHandler(Checked):
+class NotFoundHandler(BaseHandler):
     """Every other path."""
 
     def get(self) -> None:
@@ -272,3 +312,10 @@ class NotFoundHandler(Checked):
 
 def ignore_request(handler: tornado.web.RequestHandler) -> None:
     """Requests are not logged: an address may be typed with a secret in it."""
+
+
+def raise_file_limit() -> int:
+    """Let this process open as many files as the system allows it; return how many."""
+    _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
+    return sys.maxsize if hard == resource.RLIM_INFINITY else hard

@@ -17,6 +17,7 @@ export const healthOf = (robot) => robot.error || (robot.health[0] > 0 ? robot.h
 const COLUMNS = [
   ["Robot", (robot) => robot.name || robot.address, (robot) => robot.id, false],
   ["State", (robot) => robot.state, (robot) => robot.state, false],
+  ["Stop", (robot) => robot.stop, (robot) => robot.stop, false],
   ["Address", (robot) => robot.address, (robot) => robot.address, false],
   ["Odom", (robot) => number(robot.odom, 1, " Hz"), (robot) => robot.odom ?? -1, true],
   ["From robot", (robot) => number(robot.bytes / 1000, 1, " kB/s"), (robot) => robot.bytes, true],
@@ -83,7 +84,7 @@ export class FleetTable {
 
   addRow(id) {
     const line = document.createElement("tr");
-    const row = { line, cells: [], texts: [], robot: null };
+    const row = { line, cells: [], tags: [], texts: [], robot: null };
     COLUMNS.forEach(([, , , isNumber], index) => {
       const cell = document.createElement(index === 0 ? "th" : "td");
       if (index === 0) {
@@ -96,10 +97,11 @@ export class FleetTable {
         row.label = document.createElement("span");
         button.append(chip, row.label);
         cell.append(button);
-      } else if (index === 1) {
-        row.tag = document.createElement("span");
-        row.tag.className = "tag";
-        cell.append(row.tag);
+      } else if (index <= 2) {
+        const tag = document.createElement("span");
+        tag.className = "tag";
+        cell.append(tag);
+        row.tags.push(tag);
       }
       if (isNumber) cell.className = "number";
       if (index === COLUMNS.length - 1) cell.className = "error";
@@ -117,11 +119,12 @@ export class FleetTable {
       const now = text(robot);
       if (row.texts[index] === now) return;
       row.texts[index] = now;
-      const target = index === 0 ? row.label : index === 1 ? row.tag : row.cells[index];
+      const target = index === 0 ? row.label : row.tags[index - 1] || row.cells[index];
       target.textContent = now;
       if (index === COLUMNS.length - 1) target.title = now;
     });
-    row.tag.dataset.state = robot.state;
+    row.tags[0].dataset.state = robot.state;
+    row.tags[1].dataset.stop = robot.stop;
     row.chip.style.background = colourOf(robot.id);
     row.line.classList.toggle("chosen", robot.name === chosen && robot.state !== "REFUSED");
   }

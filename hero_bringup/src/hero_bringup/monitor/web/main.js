@@ -6,11 +6,11 @@ import { FleetTable } from "./fleet.js";
 import { FleetMap } from "./map.js";
 import { LogView } from "./log.js";
 import { RobotPanel } from "./robot.js";
+import { StopPanel } from "./stop.js";
 
 const RETRY_MS = 1000;
 const SILENT_MS = 5000; // the driver reports once a second, so something new comes at least so often
 const NOTICE_MS = 6000;
-const ASK_MS = 4000;
 
 const element = (id) => document.getElementById(id);
 
@@ -30,9 +30,11 @@ const state = {
 let socket = null;
 let lastMs = 0;
 
+const isOpen = () => socket !== null && socket.readyState === WebSocket.OPEN;
+
 /** Send a request; false where there is nobody to send it to. */
 function send(request) {
-  if (socket === null || socket.readyState !== WebSocket.OPEN) return false;
+  if (!isOpen()) return false;
   socket.send(JSON.stringify(request));
   return true;
 }
@@ -66,20 +68,17 @@ const map = new FleetMap(state, { choose, send, notice });
 const table = new FleetTable(choose);
 const log = new LogView();
 const panel = new RobotPanel({ send, congested, map });
+const stop = new StopPanel({ send, isOpen, letGo: () => panel.letGo(), notice });
 
 function showHead() {
-  const open = socket !== null && socket.readyState === WebSocket.OPEN;
+  const open = isOpen();
   const link = element("link");
-  const { driver, robots, stopped, listening } = state.fleet;
+  const { driver, robots, listening } = state.fleet;
   link.textContent = !open ? "no connection to the monitor" : driver ? "live" : "no driver";
   link.className = "pill " + (open && driver ? "good" : "bad");
   const ready = robots.filter((robot) => robot.state === "READY").length;
   element("ready").textContent = `${ready} of ${robots.length} ready`;
   element("listening").textContent = driver && listening ? `driver on ${listening}` : "";
-  element("held").hidden = !stopped;
-  element("letgo").hidden = !stopped;
-  element("stop").classList.toggle("held", stopped);
-  element("stop").textContent = stopped ? "STOPPED" : "STOP ALL";
   document.body.classList.toggle("stale", !open);
   const empty = element("empty");
   empty.hidden = open && robots.length > 0;
@@ -94,6 +93,7 @@ function receive(news) {
   for (const name of ["hello", "fleet", "poses", "ranges", "lights", "goals", "truth", "arena"]) {
     if (name in news) state[name] = news[name];
   }
+  stop.receive(news);
   if ("notice" in news) notice(news.notice.level, news.notice.text);
   if ("log" in news) log.append(news.log);
   if ("fleet" in news || "hello" in news) {
@@ -113,6 +113,7 @@ function connect() {
     opened = true;
     lastMs = Date.now();
     log.clear();
+    stop.open();
     send({ do: "look", truth: map.shows.truth });
     showHead();
   });
@@ -124,6 +125,7 @@ function connect() {
     panel.letGo();
     socket = null;
     showHead();
+    stop.show();
     if (!opened) {
       // The monitor may have been started anew, with another token: then this page is the login page.
       try {
@@ -138,27 +140,8 @@ function connect() {
 }
 
 setInterval(() => {
-  if (socket !== null && socket.readyState === WebSocket.OPEN && Date.now() - lastMs > SILENT_MS) socket.close();
+  if (isOpen() && Date.now() - lastMs > SILENT_MS) socket.close();
 }, 1000);
-
-element("stop").addEventListener("click", () => {
-  panel.letGo();
-  if (!send({ do: "stop", stop: true })) notice("error", "NOT STOPPED: there is no connection to the monitor");
-});
-
-let askedMs = 0;
-element("letgo").addEventListener("click", (event) => {
-  const button = event.currentTarget;
-  if (Date.now() - askedMs < ASK_MS) {
-    askedMs = 0;
-    button.textContent = "Let robots move";
-    send({ do: "stop", stop: false });
-    return;
-  }
-  askedMs = Date.now();
-  button.textContent = "Click again to let go";
-  setTimeout(() => (button.textContent = "Let robots move"), ASK_MS);
-});
 
 // Small screens show one panel at a time.
 for (const button of document.querySelectorAll("#tabs button")) {

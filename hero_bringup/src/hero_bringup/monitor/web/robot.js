@@ -145,6 +145,7 @@ export class RobotPanel {
     const metres = (value) => (value / 1000).toFixed(3);
     const facts = [
       ["pose", pose ? `${metres(pose[0])} ${metres(pose[1])} m, ${((pose[2] / 1000) * (180 / Math.PI)).toFixed(0)}°` : "-"],
+      ["stop", robot.stop || "-"],
       ["frame", robot.located ? "map" : "own odometry: place on the map unknown"],
       ["way", robot.way === null ? "-" : `${robot.way.toFixed(2)} m since you look`],
       ["nearest", ranges.length ? `${metres(Math.min(...ranges))} m` : "nothing in range"],

@@ -1,0 +1,111 @@
+"""Limits for connections and token attempts, so that untrusted clients cannot lock out those who are logged in. Pure.
+
+A connection is trusted once a request of somebody logged in has arrived on it. A new connection always gets in while
+an untrusted one can be evicted for it: one of its own address when that address has too many, else one of the address
+with the most. Times enter as now_s, any clock that never steps.
+"""
+
+import ipaddress
+from collections import Counter
+from typing import Dict, NamedTuple, Protocol, Set
+
+UNTRUSTED_S = 10.0
+"""An untrusted connection is closed after this time: a login takes one request, and the request one second."""
+
+TOKEN_BURST = 5
+TOKEN_PERIOD_S = 5.0
+"""An address may try TOKEN_BURST wrong tokens at once, then one in TOKEN_PERIOD_S."""
+
+ADDRESSES_MAX = 1000
+"""Addresses whose wrong tokens are remembered."""
+
+
+class Connection(Protocol):
+    """What is needed of tornado's IOStream."""
+
+    def close(self) -> None:
+        """Close the connection."""
+
+    def closed(self) -> bool:
+        """Whether either end has closed it."""
+
+
+class Arrival(NamedTuple):
+    """Where an untrusted connection came from, and when."""
+
+    address: str
+    time_s: float
+
+
+def group_address(address: str) -> str:
+    """Return what limits count as one address: an IPv4 address, or the /64 network that an IPv6 host has to itself."""
+    try:
+        parsed = ipaddress.ip_address(address.partition("%")[0])
+    except ValueError:
+        return address
+    if isinstance(parsed, ipaddress.IPv4Address):
+        return str(parsed)
+    if parsed.ipv4_mapped is not None:
+        return str(parsed.ipv4_mapped)
+    return str(ipaddress.ip_network((parsed, 64), strict=False))
+
+
+class ConnectionLimits:
+    """The open connections of one server."""
+
+    def __init__(self, connections_max: int, per_address_max: int) -> None:
+        """per_address_max: of untrusted connections."""
+        self._connections_max = connections_max
+        self._per_address_max = per_address_max
+        self._untrusted: Dict[Connection, Arrival] = {}  # oldest first
+        self._trusted: Set[Connection] = set()
+
+    def admit(self, connection: Connection, address: str, now_s: float) -> bool:
+        """Take a new connection, evicting another if need be; return False if all others are trusted."""
+        self._untrusted = {known: arrival for known, arrival in self._untrusted.items() if not known.closed()}
+        self._trusted = {known for known in self._trusted if not known.closed()}
+        address = group_address(address)
+        counts = Counter(arrival.address for arrival in self._untrusted.values())
+        if counts[address] >= self._per_address_max:
+            self._evict_oldest_of(address)
+        elif len(self._untrusted) + len(self._trusted) >= self._connections_max:
+            if not counts:
+                return False
+            self._evict_oldest_of(counts.most_common(1)[0][0])
+        self._untrusted[connection] = Arrival(address, now_s)
+        return True
+
+    def _evict_oldest_of(self, address: str) -> None:
+        oldest = next(known for known, arrival in self._untrusted.items() if arrival.address == address)
+        del self._untrusted[oldest]
+        oldest.close()
+
+    def trust(self, connection: Connection) -> None:
+        """A request of somebody who is logged in has arrived on this connection."""
+        if self._untrusted.pop(connection, None) is not None:
+            self._trusted.add(connection)
+
+    def expire(self, now_s: float) -> None:
+        """Close untrusted connections that are too old; to be called about once a second."""
+        for connection, arrival in self._untrusted.items():
+            if now_s - arrival.time_s > UNTRUSTED_S:
+                connection.close()
+
+
+class TokenAttempts:
+    """Wrong tokens, limited by a token bucket per address."""
+
+    def __init__(self) -> None:
+        self._full_again_s: Dict[str, float] = {}
+
+    def admits(self, address: str, now_s: float) -> bool:
+        """Return whether this address may try a token."""
+        full_s = self._full_again_s.get(group_address(address), now_s)
+        return full_s - now_s <= (TOKEN_BURST - 1) * TOKEN_PERIOD_S
+
+    def count_wrong(self, address: str, now_s: float) -> None:
+        """A token from this address was wrong."""
+        address = group_address(address)
+        if len(self._full_again_s) >= ADDRESSES_MAX and address not in self._full_again_s:
+            del self._full_again_s[min(self._full_again_s, key=lambda known: self._full_again_s[known])]
+        self._full_again_s[address] = max(now_s, self._full_again_s.get(address, now_s)) + TOKEN_PERIOD_S

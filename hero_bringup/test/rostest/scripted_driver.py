@@ -1,0 +1,84 @@
+"""A driver without connections: takes stop requests, and reports of its robots what a test tells it to.
+
+~ids lists the robots, as JSON; ~behave (std_msgs/String) takes JSON: which robots move though stopped, and whether the others come
+to rest at all.
+"""
+
+import json
+import threading
+from functools import partial
+
+import rospy
+from std_msgs.msg import Bool, String
+from std_srvs.srv import SetBool, SetBoolResponse
+
+from hero_msgs.msg import Robot, RobotArray
+
+REST_AFTER_S = 0.3
+REPORT_PERIOD_S = 1.0
+
+
+class ScriptedDriver:
+    def __init__(self):
+        self.ids = json.loads(rospy.get_param("~ids"))
+        self.twin_of = rospy.get_param("~twin_of", None)
+        self.lock = threading.Lock()
+        self.behaviour = {"moving": [], "rest": True}
+        self.stop_time_s = None
+        self.publisher = rospy.Publisher("~robots", RobotArray, queue_size=5, latch=True)
+        rospy.Service("~stop", SetBool, self.serve_stop)
+        rospy.Subscriber("~stop_request", Bool, self.receive_stop, queue_size=10, tcp_nodelay=True)
+        rospy.Subscriber("~behave", String, self.receive_behaviour, queue_size=10)
+        rospy.Timer(rospy.Duration(REPORT_PERIOD_S), lambda event: self.report())
+        self.report()
+
+    def receive_stop(self, message):
+        with self.lock:
+            if message.data == (self.stop_time_s is not None):
+                return
+            self.stop_time_s = rospy.get_time() if message.data else None
+        self.report()
+        rospy.Timer(rospy.Duration(REST_AFTER_S), lambda event: self.report(), oneshot=True)
+
+    def serve_stop(self, request):
+        self.receive_stop(request)
+        return SetBoolResponse(True, "")
+
+    def receive_behaviour(self, message):
+        self.behaviour = json.loads(message.data)
+        self.report()
+
+    def find_stop_state(self, robot_id):
+        if self.stop_time_s is None:
+            return Robot.NOT_STOPPED
+        if rospy.get_time() < self.stop_time_s + REST_AFTER_S or not self.behaviour["rest"]:
+            return Robot.STOPPING
+        return Robot.MOVING if robot_id in self.behaviour["moving"] else Robot.AT_REST
+
+    def report(self):
+        with self.lock:
+            make = partial(Robot, since=rospy.Time.now(), firmware="v3.8", frames_per_s=88.0, bytes_per_s=12000.0)
+            report = RobotArray(listening="127.0.0.1:0", stopped=self.stop_time_s is not None)
+            report.header.stamp = rospy.Time.now()
+            for robot_id in self.ids:
+                row = make(id=robot_id, namespace="/hero_%d" % robot_id, state=Robot.READY)
+                row.address, row.stop_state = "127.0.1.%d:40000" % robot_id, self.find_stop_state(robot_id)
+                report.robots.append(row)
+            if self.twin_of is not None:
+                reason = "hero_%d is here and stays, 127.0.9.9:5 is refused" % self.twin_of
+                report.robots.append(
+                    Robot(
+                        id=self.twin_of,
+                        namespace="/hero_%d" % self.twin_of,
+                        address="127.0.9.9:5",
+                        state=Robot.REFUSED,
+                        last_error=reason,
+                    )
+                )
+            self.publisher.publish(report)
+
+
+if __name__ == "__main__":
+    rospy.init_node("scripted_driver")
+    driver = ScriptedDriver()
+    rospy.spin()
