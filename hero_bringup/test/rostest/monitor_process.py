@@ -12,7 +12,7 @@ from pathlib import Path
 
 from swarm_watch import wait_for
 
-TIMEOUT_S = 8.0
+TIMEOUT_S = 30.0
 HOST = "127.0.0.1:21331"
 OTHER_HOST = "127.0.0.1:21332"
 UPGRADE = {

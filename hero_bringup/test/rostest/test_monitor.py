@@ -54,8 +54,8 @@ class PageTest(unittest.TestCase):
         rows = self.page.rows()
         self.assertEqual([row[0] for row in rows], ["hero_0", "hero_1", "hero_2"])
         for row in rows:
-            self.assertIn("127.0.1.", row[2])
-        wait_for(lambda: all(float(row[3].split()[0]) > 15 for row in self.page.rows()), TIMEOUT_S, "rates")
+            self.assertIn("127.0.1.", row[3])
+        wait_for(lambda: all(float(row[4].split()[0]) > 15 for row in self.page.rows()), TIMEOUT_S, "rates")
         self.assertEqual(self.page.text("#ready"), "3 of 3 ready")
         self.page.save("monitor_desktop.png")
         self.page.resize(820, 1180)
@@ -132,7 +132,7 @@ class PageTest(unittest.TestCase):
         self.click_on_map(30, 30)
         self.page.wait_for_text("#notices", "go_to_goal.launch")
 
-    def test_stop_all_stops_robots_that_a_program_drives_and_two_clicks_let_them_go(self):
+    def test_stop_all_stops_robots_that_a_program_drives_and_two_clicks_release_them(self):
         publisher = rospy.Publisher("/hero_2/velocity_controller/cmd_vel", Twist, queue_size=1)
         command = Twist()
         command.linear.x = 0.03
@@ -142,11 +142,11 @@ class PageTest(unittest.TestCase):
             self.wait_until_moving(2)
             self.page.click("#stop")
             self.wait_until_standing(2)
-            self.page.wait_for_text("#stop", "STOPPED")
+            self.page.wait_for_text("#stopping", "stopped, all wheels at rest")
             self.page.save("monitor_stopped.png")
-            self.page.click("#letgo")
-            self.page.wait_for_text("#letgo", "again")
-            self.page.click("#letgo")
+            self.page.click("#release")
+            self.page.wait_for_text("#release", "again")
+            self.page.click("#release")
             self.wait_until_moving(2)
         finally:
             timer.shutdown()

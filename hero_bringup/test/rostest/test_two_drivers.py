@@ -67,10 +67,12 @@ class TwoDriversTest(unittest.TestCase):
 
         wait_for(all_move, TIMEOUT_S, "motion of all")
 
+    def wait_for_status(self, *expected):
+        wait_for(lambda: self.drivers.stop_status() == expected, TIMEOUT_S, self.drivers.stop_status)
+
     def release(self):
-        for thread in self.drivers.stop(False, lambda driver, failure: self.assertIsNone(failure, driver)):
-            thread.join()
-        wait_for(lambda: not any(map(self.drivers.is_stopped, self.read_names())), TIMEOUT_S, "the release")
+        self.drivers.request_stop(False)
+        self.wait_for_status("info", "released: robots may move again", True)
 
     def read_names(self):
         self.drivers.read()
@@ -105,32 +107,27 @@ class TwoDriversTest(unittest.TestCase):
         table.press(b"q")
         self.assertEqual(table.wait_for_end(), 0)
 
-    def test_4_the_stop_of_the_page_reaches_both_and_names_them(self):
-        told = []
+    def test_4_the_stop_of_the_page_reaches_both(self):
         commander = Commander(self.drivers)
         self.wait_until_all_move()
-        commander.stop_all(True, lambda level, text: told.append((level, text)))
+        commander.request_stop(True)
+        self.assertFalse(commander.may_drive())
         self.watch.wait_until_stopped(*IDS, act=self.drive)
-        wait_for(lambda: len(told) == 2, TIMEOUT_S, "word of both drivers")
-        self.assertEqual(
-            sorted(told),
-            [("warn", "all robots of %s are stopped" % name) for name in ("hero_driver", "hero_driver_b")],
-        )
+        self.wait_for_status("info", "stopped, all wheels at rest", True)
         commander.close()
         self.release()
 
     def test_5_a_driver_that_hangs_keeps_no_other_from_its_stop(self):
-        answers = []
         self.wait_until_all_move()
         pid = find_pid("/hero_driver_b")
         os.kill(pid, signal.SIGSTOP)
         try:
-            self.drivers.stop(True, lambda driver, failure: answers.append((driver, failure)))
+            self.drivers.request_stop(True)
             self.watch.wait_until_stopped(0, 1, act=self.drive)
-            self.assertEqual(answers, [("/hero_driver", None)])
+            self.wait_for_status("error", "NOT STOPPED: driver hero_driver_b does not answer", False)
         finally:
             os.kill(pid, signal.SIGCONT)
-        wait_for(lambda: ("/hero_driver_b", None) in answers, TIMEOUT_S, "answer of the driver that hung")
+        self.wait_for_status("info", "stopped, all wheels at rest", True)
         self.release()
 
     def test_6_a_driver_that_died_without_a_word_is_not_waited_for(self):
@@ -138,10 +135,9 @@ class TwoDriversTest(unittest.TestCase):
         self.assertEqual([robot["id"] for robot in read_fleet()["robots"]], [0, 1])
         # Who listened before forgets its robots.
         wait_for(lambda: len(self.drivers.read().robots) == 2, TIMEOUT_S, "robots of the other driver alone")
-        answers = []
-        for thread in self.drivers.stop(True, lambda driver, failure: answers.append((driver, failure is None))):
-            thread.join(TIMEOUT_S)
-        self.assertEqual(sorted(answers), [("/hero_driver", True), ("/hero_driver_b", False)])
+        self.drivers.request_stop(True)
+        self.wait_for_status("error", "NOT STOPPED: driver hero_driver_b does not answer", False)
+        self.assertTrue(self.drivers.is_stopped("/hero_driver"))
 
 
 if __name__ == "__main__":

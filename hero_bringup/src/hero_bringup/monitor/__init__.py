@@ -1,14 +1,16 @@
-"""The fleet in a browser: what ROS says of the robots -> one web page, and back to a few commands.
+"""The fleet in a browser: one web page that shows the robots, stops them, and on request drives them.
 
-| Module | Turns | Into |
-|---|---|---|
-| access | tokens, cookies, Host and Origin headers | yes or no |
-| feed, robot_feed | topics | the fleet as it is now |
-| sections | the fleet as it is now | numbered pieces of JSON, so that a page gets what is new to it |
-| requests | what a page sends | checked requests |
-| dead_man | held and released buttons, the time | velocities, and stops |
-| commander | requests | topics and the driver's stop service |
-| server | pieces of JSON, requests | HTTP and WebSocket (tornado) |
-| program | parameters | all of these, as one node |
-| web/ | pieces of JSON | what people see |
+| Module | What it does |
+|---|---|
+| access | decides by token, Host and Origin who may see the page |
+| connection_limits | keeps room for those that are logged in |
+| feed, robot_feed | keep the fleet as it is now, from topics |
+| sections | splits it into numbered pieces of JSON, so that a page gets what is new to it |
+| requests | checks what a page sends |
+| dead_man | drives a robot only while its button is held |
+| commander | publishes stops, velocities and goals |
+| log_thread | logs without waiting for the terminal |
+| server | speaks HTTP and WebSocket (tornado) |
+| program | reads parameters and wires all of these to one node |
+| web/ | what people see |
 """

@@ -22,7 +22,6 @@ const COLUMNS = [
   ["Odom", (robot) => number(robot.odom, 1, " Hz"), (robot) => robot.odom ?? -1, true],
   ["From robot", (robot) => number(robot.bytes / 1000, 1, " kB/s"), (robot) => robot.bytes, true],
   ["Clock", (robot) => number(robot.clock === null ? null : robot.clock * 1000, 1, " ms"), (robot) => Math.abs(robot.clock ?? 0), true],
-  ["Up for", (robot) => (robot.uptime ? spanOf(robot.uptime) : "-"), (robot) => robot.uptime, true],
   ["Firmware", (robot) => robot.firmware || "-", (robot) => robot.firmware, false],
   ["Returns", (robot) => String(robot.reconnects), (robot) => robot.reconnects, true],
   ["Last error", (robot) => healthOf(robot), (robot) => healthOf(robot), false],
