@@ -58,9 +58,8 @@ class MonitorPage:
 
     def banner(self):
         """Return level and text of what is shown about stopping."""
-        return tuple(
-            self.run("const banner = document.getElementById('stopping'); return [banner.dataset.level, banner.textContent]")
-        )
+        script = "const banner = document.getElementById('stopping'); return [banner.dataset.level, banner.textContent]"
+        return tuple(self.run(script))
 
     def choose(self, robot):
         """Choose a robot in the table."""

@@ -1,7 +1,7 @@
 """A driver without connections: takes stop requests, and reports of its robots what a test tells it to.
 
-~ids lists the robots, as JSON; ~behave (std_msgs/String) takes JSON: which robots move though stopped, and whether the others come
-to rest at all.
+~ids lists the robots, as JSON; ~twin_of is an id that a second robot wants. ~behave (std_msgs/String) takes JSON: which
+robots move though stopped, and whether the others come to rest at all.
 """
 
 import json

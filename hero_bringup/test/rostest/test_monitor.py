@@ -132,7 +132,7 @@ class PageTest(unittest.TestCase):
         self.click_on_map(30, 30)
         self.page.wait_for_text("#notices", "go_to_goal.launch")
 
-    def test_stop_all_stops_robots_that_a_program_drives_and_two_clicks_release_them(self):
+    def test_stop_all_stops_driven_robots_and_two_clicks_release_them(self):
         publisher = rospy.Publisher("/hero_2/velocity_controller/cmd_vel", Twist, queue_size=1)
         command = Twist()
         command.linear.x = 0.03

@@ -53,7 +53,7 @@ class AccessTest(unittest.TestCase):
         for path in ("/../program.py", "/%2e%2e/program.py", "/web/main.js", "/..", "/.", "/etc/passwd"):
             self.assertEqual(ask(HOST, path)[0], 404, path)
 
-    def test_it_does_not_start_for_other_machines_without_a_token_that_is_secret(self):
+    def test_it_does_not_start_for_other_machines_without_a_secret_token(self):
         with tempfile.TemporaryDirectory() as folder:
             short, open_to_all = Path(folder) / "short", Path(folder) / "open"
             short.write_text("1234")

@@ -16,8 +16,8 @@ from monitor_process import (
     ask,
     end,
     log_in,
-    start_scripted_driver,
     start_monitor,
+    start_scripted_driver,
     wait_until_it_answers,
 )
 from swarm_watch import wait_for

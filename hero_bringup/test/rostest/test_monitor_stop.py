@@ -11,7 +11,14 @@ import rosgraph
 import rospy
 import rostest
 from monitor_page import MISSING, MonitorPage
-from monitor_process import OTHER_HOST, TIMEOUT_S, end, start_scripted_driver, start_monitor, wait_until_it_answers
+from monitor_process import (
+    OTHER_HOST,
+    TIMEOUT_S,
+    end,
+    start_monitor,
+    start_scripted_driver,
+    wait_until_it_answers,
+)
 from std_msgs.msg import Bool, String
 from swarm_watch import wait_for
 

@@ -26,7 +26,7 @@ def test_nothing_is_stopped_while_a_button_is_held(held):
         assert held.take_stops(now_s) == []
 
 
-def test_a_button_let_go_stops_the_robot_more_than_once_and_then_leaves_it_alone(held):
+def test_a_released_button_stops_the_robot_and_then_leaves_it_alone(held):
     held.release(1, "/hero_0")
     assert take_all(held, 10.05) == [STAND] * STOPS
     assert held.take_stops(99.0) == []

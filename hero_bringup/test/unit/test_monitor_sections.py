@@ -39,7 +39,7 @@ def test_a_page_that_missed_pieces_gets_the_newest_whole():
     assert json.loads(sections.take_news(slow)) == {"poses": {"hero_0": [9]}}
 
 
-def test_a_new_page_gets_the_newest_lines_and_a_slow_one_hears_how_many_it_missed():
+def test_a_new_page_gets_the_newest_lines_and_a_slow_one_a_count():
     sections, early = Sections(), Page()
     sections.log.append(1.0, 2, "node", "", "first")
     sections.take_news(early)

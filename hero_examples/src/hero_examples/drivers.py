@@ -9,10 +9,9 @@ hangs delays a stop, because the topics to drivers are open before it is needed.
 
 import threading
 import time
-from typing import Callable, Dict, List, Optional, Set
+from typing import Dict, List, Optional, Set
 
 import rospy
-from std_srvs.srv import SetBool
 
 from hero_msgs.msg import RobotArray
 
@@ -34,9 +33,6 @@ SILENT_S = 2.5
 """A driver whose last report is older does not answer."""
 
 POLL_PERIOD_S = 0.02
-
-Tell = Callable[[str, Optional[str]], None]
-"""Takes the name of a driver and why it did not do what it was asked for, None if it did; on any thread."""
 
 
 class Drivers:
@@ -198,30 +194,7 @@ class Drivers:
             self._wake.wait(None if request is None or request.is_over else ASK_PERIOD_S)
             self._wake.clear()
 
-    def stop(self, held: bool, tell: Tell) -> List[threading.Thread]:
-        """Let every driver stop and hold its robots, or let them go; returns at once.
-
-        Each is called on a thread of its own, which is returned: one that hangs keeps no other from its stop.
-        """
-        threads = [
-            threading.Thread(target=call_stop, args=(name, held, tell), daemon=True, name="stop")
-            for name in self.names()
-        ]
-        for thread in threads:
-            thread.start()
-        return threads
-
     def close(self) -> None:
         """Disconnect; the topics are closed later. Safe twice."""
         self._end.set()
         self._wake.set()
-
-
-def call_stop(driver: str, held: bool, tell: Tell) -> None:
-    """Call the stop service of one driver and tell what came of it."""
-    try:
-        answer = rospy.ServiceProxy(driver + "/stop", SetBool)(held)
-    except (rospy.ServiceException, rospy.ROSException, OSError) as error:
-        tell(driver, "no answer from %s/stop: %s" % (driver, error))
-        return
-    tell(driver, None if answer.success else "%s/stop refused: %s" % (driver, answer.message))
