@@ -100,6 +100,7 @@ class Gateway(LinkHandler):
             wake=self._sender.wake,
             stop=lambda bridge: loop.call_here(self._stop_robot, bridge),
             add_transform=self._transforms.add,
+            call_soon=loop.call_soon,
             call_later=loop.call_later,
             add_reader=loop.add_reader,
             is_stopped=lambda: self.stopped,

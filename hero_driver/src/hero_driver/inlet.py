@@ -30,6 +30,10 @@ _LENGTH = struct.Struct("<I")
 AddReader = Callable[[Reader], None]
 
 
+def _drop(payload: bytes) -> None:
+    """Take a message for which it is too late."""
+
+
 class Inlet:
     """One topic's way in."""
 
@@ -56,7 +60,8 @@ class Inlet:
         )
 
     def close(self) -> None:
-        """Unsubscribe; asks the ROS master. What the loop still reads ends by itself."""
+        """Unsubscribe; asks the ROS master. What the loop still reads is dropped, and ends by itself."""
+        self.receive = _drop
         subscriber, self._subscriber = self._subscriber, None
         if subscriber is not None:
             unregister(subscriber)

@@ -8,9 +8,7 @@ there again when the robot returns.
 import functools
 import math
 import time
-from typing import Any, Callable, Dict, List, Optional, Set, Tuple
-
-import rospy
+from typing import Callable, Dict, List, Optional, Set, Tuple
 
 from . import message_types, wire_messages
 from .cleaning import TRANSFORMS, CleaningSettings, MessageCleaner
@@ -23,8 +21,8 @@ from .command_shaping import (
     check_motor_pulses,
     check_twist,
 )
+from .endpoints import QUEUE_LENGTH, Endpoints, Layout
 from .inlet import AddReader, Inlet
-from .message_types import MessageTypeError
 from .names import Identity
 from .outlet import CallLater, Outlet
 from .registrar import RobotRegistrar
@@ -33,9 +31,6 @@ from .service_requests import find_request_fault, is_success, read_set_odom_pose
 from .services import RobotService
 from .transform_cleaning import split_transforms
 from .wheel_motion import WheelMotion
-
-QUEUE_LENGTH = 50
-"""Messages that wait for a slow subscriber, or for a slow robot: more than a second of odometry."""
 
 VELOCITY_CONTROLLER = "/velocity_controller/cmd_vel"
 MOTOR_TYPE = "hero_msgs/Motor"
@@ -61,6 +56,7 @@ class BridgeContext:
         wake: Callable[["RobotBridge"], None],
         stop: Callable[["RobotBridge"], None],
         add_transform: Callable[[bytes], None],
+        call_soon: Callable[[Callable[[], None]], None],
         call_later: CallLater,
         add_reader: AddReader,
         is_stopped: Callable[[], bool],
@@ -74,13 +70,14 @@ class BridgeContext:
         """Take what the rest of the driver does for bridges.
 
         wake(bridge): commands wait, stop(bridge): the robot has to stop (any thread); log(level, throttle key,
-        text); call_later(delay_s, call) and add_reader(reader) are the loop's. max_names: topics and services that one
-        robot may have over all its connections.
+        text); call_soon(call), call_later(delay_s, call) and add_reader(reader) are the loop's. max_names: topics and
+        services that one robot may have over all its connections.
         """
         self.log = log
         self.wake = wake
         self.stop = stop
         self.add_transform = add_transform
+        self.call_soon = call_soon
         self.call_later = call_later
         self.add_reader = add_reader
         self.is_stopped = is_stopped
@@ -110,22 +107,23 @@ class RobotBridge:
         self.refused_commands = 0
         self._context = context
         self.registrar = registrar
+        self._endpoints = Endpoints(self.label, context.log)
         self._closed = False
         self._connected = False
+        self._connection = 0
         self._outlets: Dict[str, Outlet] = {}
         self.cleaner: Optional[MessageCleaner] = None
         if cleaning is not None:
             self.cleaner = MessageCleaner(
                 identity.namespace, cleaning, self._outlets.__getitem__, context.add_transform, self.wheels
             )
-        self._inlets: Dict[str, Tuple[str, Inlet]] = {}
         self._services: Dict[str, RobotService] = {}
         self._service_halves: Dict[Tuple[str, TopicKind], Topic] = {}
-        self._servers: Dict[str, Any] = {}
         self._ids: Dict[str, int] = {}
+        self._layouts: Dict[str, Layout] = {}  # as declared last, of what the robot takes
+        self._outlet_layouts: Dict[str, Layout] = {}  # and of what it sends
         self._commanded_s: Dict[str, float] = {}  # motion topic -> when motion, not a stop, was last offered
         self._tuning_heard_s = -math.inf
-        self._errors: Dict[str, str] = {}
         self._names: Set[str] = set()
         self._subscribed_types: Dict[str, str] = {}
 
@@ -133,6 +131,7 @@ class RobotBridge:
 
     def attach(self) -> None:
         """A connection stands; its topics are declared next."""
+        self._connection += 1
         self._ids.clear()
         self._service_halves.clear()
         self.wheels.restart()
@@ -157,12 +156,13 @@ class RobotBridge:
         outlets = list(self._outlets.values())
         self._outlets.clear()
         released = [call for outlet in outlets for call in outlet.release()]
-        self.registrar.submit(lambda: self._unregister(released, outlets), always=True)
+        self._endpoints.end()
+        self.registrar.submit(lambda: self._endpoints.close(released, outlets), always=True)
 
     @property
     def last_error(self) -> str:
         """The newest complaint about a declared topic that still holds, empty if there is none."""
-        return next(reversed(list(self._errors.values())), "")
+        return self._endpoints.last_error
 
     # From the robot.
 
@@ -172,34 +172,68 @@ class RobotBridge:
         if name not in self._names:
             if len(self._names) >= self._context.max_names:
                 text = "topic %s refused: more than %d names (2 * max_topics)" % (name, len(self._names))
-                self._complain("names", text)
+                self._endpoints.complain("names", text)
                 return
             self._names.add(name)
         ros_type = message_types.apply_aliases(info.message_type)
+        layout = Layout(ros_type, (info.md5sum,))
         if kind is TopicKind.PUBLISHER:
-            derived = self._choose_cleaning(topic, name, ros_type)
-            self._submit(lambda: self._advertise(name, info.message_type, info.md5sum, derived))
+            replaced = self._replace_outlet(name, layout)
+            outlets = self._choose_outlets(topic, name, layout)
+            self._submit(lambda: self._endpoints.advertise(name, layout, outlets, replaced))
         elif kind is TopicKind.SUBSCRIBER:
-            self._ids[name] = info.topic_id
             self._subscribed_types[name] = ros_type
-            self._submit(lambda: self._subscribe(name, info.message_type, info.md5sum))
+            make_inlet = functools.partial(self._make_inlet, name)
+            self._take_input(topic, name, layout, lambda: self._endpoints.subscribe(name, layout, make_inlet))
         elif kind in (TopicKind.SERVICE_ANSWERS, TopicKind.SERVICE_REQUESTS):
             self._declare_service_half(topic, name)
 
-    def _choose_cleaning(self, topic: Topic, name: str, ros_type: str) -> Dict[str, str]:
-        """Set up the way of a topic's messages; return the topics (with types) that are made of it besides."""
-        info = topic.info
-        if wire_messages.MD5SUMS.get(ros_type, info.md5sum) != info.md5sum:
-            # Another layout than the one that is known here; the registrar will refuse it with both md5s.
-            return {}
+    def _take_input(self, topic: Topic, name: str, layout: Layout, register: Callable[[], bool]) -> None:
+        """The robot takes what is sent to name; register() is a job that tells whether that can be used.
+
+        It gets nothing before that where programs may still send what was declared under this name before.
+        """
+        connection, known = self._connection, self._layouts.get(name)
+        self._layouts[name] = layout
+        self._ids.pop(name, None)
+        if known in (None, layout) and _has_known_layout(layout):
+            self._ids[name] = topic.info.topic_id
+
+        def settle(is_usable: bool) -> None:
+            if connection != self._connection or self._layouts.get(name) != layout:
+                return
+            if not is_usable:
+                self._ids.pop(name, None)
+            elif name not in self._ids:
+                self._ids[name] = topic.info.topic_id
+                if self._context.is_stopped() and self.is_motion(name):
+                    self._context.stop(self)
+
+        def do() -> None:
+            is_usable = register()
+            self._context.call_soon(lambda: settle(is_usable))
+
+        self._submit(do)
+
+    def _replace_outlet(self, name: str, layout: Layout) -> List[Outlet]:
+        """Return the outlet of a topic that is declared with another layout than before; it is used no more."""
+        known, self._outlet_layouts[name] = self._outlet_layouts.get(name, layout), layout
+        return [self._outlets.pop(name)] if known != layout and name in self._outlets else []
+
+    def _choose_outlets(self, topic: Topic, name: str, layout: Layout) -> List[Tuple[str, Outlet]]:
+        """Set up the way of a topic's messages; return the topics that they become, with their outlets."""
+        ros_type = layout.message_type
+        if not _has_known_layout(layout):
+            # The registrar will refuse it with both md5s.
+            return []
         if name == TRANSFORMS:
             if ros_type != TRANSFORM_TYPE:
-                self._complain(name, "topic /tf refused: its type is %s, not %s" % (ros_type, TRANSFORM_TYPE))
+                self._endpoints.complain(name, "topic /tf refused: its type is %s, not %s" % (ros_type, TRANSFORM_TYPE))
             elif self.cleaner is None:
                 topic.receive = self._pass_transforms
             else:
                 topic.receive = self.cleaner.choose(name, ros_type)
-            return {}
+            return []
         derived = {} if self.cleaner is None else self.cleaner.find_derived(name, ros_type)
         for outlet_name in (name, *derived):
             self._outlets.setdefault(outlet_name, Outlet(QUEUE_LENGTH, self._context.call_later))
@@ -209,7 +243,7 @@ class RobotBridge:
             topic.receive = functools.partial(receive, outlet)
         else:
             topic.receive = self.cleaner.choose(name, ros_type)
-        return derived
+        return [(outlet_name, self._outlets[outlet_name]) for outlet_name in (name, *derived)]
 
     @staticmethod
     def _pass_message(outlet: Outlet, payload: bytes, _arrival_ns: int) -> None:
@@ -232,28 +266,29 @@ class RobotBridge:
         if requests is None or answers is None:
             return
         if requests.info.message_type != answers.info.message_type:
-            self._complain(
+            self._endpoints.complain(
                 name,
                 "service %s refused: its halves are %s and %s"
                 % (name, requests.info.message_type, answers.info.message_type),
             )
             return
+        ros_type = message_types.apply_aliases(requests.info.message_type)
+        layout = Layout(ros_type, (requests.info.md5sum, answers.info.md5sum))
         service = self._services.get(name)
-        if service is None:
-            ros_type = message_types.apply_aliases(requests.info.message_type)
-            service = RobotService(
-                name,
-                ros_type,
-                self._context.service_timeout_s,
-                lambda request: self._send_request(name, ros_type, request),
-            )
-            self._services[name] = service
+        if service is None or self._layouts.get(name) != layout:
+            service = self._make_service(name, ros_type)
         known_service = service
-        self._ids[name] = requests.info.topic_id
         answers.receive = lambda payload, _: self._receive_answer(known_service, payload)
-        self._submit(
-            lambda: self._serve(name, requests.info.message_type, requests.info.md5sum, answers.info.md5sum)
-        )
+        self._take_input(requests, name, layout, lambda: self._endpoints.serve(name, layout, known_service.call))
+
+    def _make_service(self, name: str, ros_type: str) -> RobotService:
+        def send(request: bytes) -> Optional[str]:
+            if self._services.get(name) is not service:
+                return "the robot declared it with another type"
+            return self._send_request(name, ros_type, request)
+
+        service = self._services[name] = RobotService(name, ros_type, self._context.service_timeout_s, send)
+        return service
 
     def _receive_answer(self, service: RobotService, payload: bytes) -> None:
         request = service.receive_answer(payload)
@@ -311,6 +346,10 @@ class RobotBridge:
         return now_s - self._tuning_heard_s < TUNING_HEARD_S
 
     # A ROS program sent a message for the robot (any thread).
+
+    def _make_inlet(self, name: str, ros_type: str) -> Inlet:
+        receive = self._choose_receiver(name, ros_type)
+        return Inlet(receive, self._context.add_reader, functools.partial(self._lose_sender, name))
 
     def _choose_receiver(self, name: str, ros_type: str) -> Callable[[bytes], None]:
         """Return what takes the messages of a topic that the robot subscribes to."""
@@ -395,93 +434,9 @@ class RobotBridge:
 
     def _submit(self, job: Callable[[], None]) -> None:
         if not self.registrar.submit(job):
-            self._complain("registrar", "too many topics wait for the ROS master; is it reachable?")
+            self._endpoints.complain("registrar", "too many topics wait for the ROS master; is it reachable?")
 
-    def _complain(self, name: str, text: str) -> None:
-        if self._errors.get(name) != text:
-            self._errors.pop(name, None)
-            self._errors[name] = text
-            self._context.log("error", self.identity.namespace + name + text, "%s: %s" % (self.label, text))
 
-    def _advertise(self, name: str, message_type: str, md5sum: str, derived: Dict[str, str]) -> None:
-        message_class = self._find_message_class(name, message_type, md5sum)
-        if message_class is None:
-            return
-        for outlet_name in (name, *derived):
-            outlet = self._outlets.get(outlet_name)
-            if outlet is not None:
-                self._open_outlet(outlet, outlet_name, message_class)
-
-    def _find_message_class(self, name: str, message_type: str, md5sum: str) -> Optional[Any]:
-        """Return the class of a topic; None, after one clear complaint, if it cannot be used."""
-        if self._closed:
-            return None
-        try:
-            message_class = message_types.find_message_class(message_type, md5sum)
-        except MessageTypeError as error:
-            self._complain(name, "topic %s refused: %s" % (name, error))
-            return None
-        self._errors.pop(name, None)
-        return message_class
-
-    def _open_outlet(self, outlet: Outlet, name: str, message_class: Any) -> None:
-        raw_class = message_types.make_raw_class(message_class)
-        if outlet.is_open:
-            if outlet.raw_class is raw_class:
-                return
-            for call in outlet.release():
-                call()
-        outlet.open(name, raw_class)
-
-    def _subscribe(self, name: str, message_type: str, md5sum: str) -> None:
-        message_class = self._find_message_class(name, message_type, md5sum)
-        if message_class is None:
-            return
-        ros_type = message_class._type
-        known = self._inlets.get(name)
-        if known is not None:
-            if known[0] == ros_type:
-                return
-            known[1].close()
-        inlet = Inlet(
-            self._choose_receiver(name, ros_type),
-            self._context.add_reader,
-            functools.partial(self._lose_sender, name),
-        )
-        self._inlets[name] = (ros_type, inlet)
-        inlet.open(name, message_types.make_raw_class(message_class), QUEUE_LENGTH)
-
-    def _serve(self, name: str, message_type: str, request_md5sum: str, answer_md5sum: str) -> None:
-        if self._closed or name in self._servers:
-            return
-        try:
-            service_class = message_types.find_service_class(message_type, request_md5sum, answer_md5sum)
-        except MessageTypeError as error:
-            self._ids.pop(name, None)
-            self._complain(name, "service %s refused: %s" % (name, error))
-            return
-        self._errors.pop(name, None)
-        raw_class = message_types.make_raw_service(service_class)
-        service = self._services[name]
-
-        def handle(request: Any) -> Any:
-            return raw_class._response_class(service.call(request.data))
-
-        self._servers[name] = rospy.Service(name, raw_class, handle)
-
-    def _unregister(self, released: List[Callable[[], None]], outlets: List[Outlet]) -> None:
-        calls = released + [call for outlet in outlets for call in outlet.release()]
-        calls += [inlet.close for _, inlet in self._inlets.values()]
-        calls += [functools.partial(server.shutdown, "the robot left") for server in self._servers.values()]
-        self._inlets.clear()
-        self._servers.clear()
-        for call in calls:
-            try:
-                call()
-            except Exception as error:  # noqa: BLE001 - what cannot be taken down must not keep the others up
-                self._context.log(
-                    "error",
-                    "unregister " + type(error).__name__,
-                    "%s: a topic or service could not be taken down: %s: %s"
-                    % (self.label, type(error).__name__, error),
-                )
+def _has_known_layout(layout: Layout) -> bool:
+    """Return whether a layout of a type that is read or written here is the one that is known."""
+    return layout.md5sums[0] == wire_messages.MD5SUMS.get(layout.message_type, layout.md5sums[0])

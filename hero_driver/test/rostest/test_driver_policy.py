@@ -1,6 +1,8 @@
 #!/usr/bin/env python
 """Which names, types, services and parameters a robot may use."""
 
+import subprocess
+
 import rospy
 import rostest
 import stock_messages
@@ -13,6 +15,7 @@ from driver_case import (
     make_publisher,
     wait_for,
     wait_frames,
+    wait_payloads,
 )
 from fake_robot import (
     ANSWER_MD5,
@@ -23,13 +26,16 @@ from fake_robot import (
     STOCK_DECLARATIONS,
     SUB,
     Declaration,
+    encode_answer,
 )
 from geometry_msgs.msg import Twist
+from std_msgs.msg import Bool, ColorRGBA
 from std_srvs.srv import Trigger, TriggerResponse
 from text_messages import STRING_MD5, TRIGGER_REQUEST_MD5, WRONG_MD5, make_text
 from tf2_msgs.msg import TFMessage
 
 from hero_msgs.msg import Encoder, Robot
+from hero_msgs.srv import SetOdom
 
 
 class TestDriverPolicy(OwnDriverCase):
@@ -117,6 +123,68 @@ class TestDriverPolicy(OwnDriverCase):
         self.assertIn(
             "refused", driver.fleet.wait("/hero_4", Robot.READY, "error", lambda e: e.last_error).last_error
         )
+
+    def declare_anew(self, driver, robot, **changes):
+        """Let a robot come back with another declaration of its light, and of the service set_odom."""
+        robot.close()
+        driver.fleet.wait(robot.namespace, Robot.AWAY)
+        robot.declarations = [
+            entry._replace(**changes)
+            if entry.name.endswith("/led") or (entry.kind == REQUESTS and entry.name.endswith("/set_odom"))
+            else entry
+            for entry in STOCK_DECLARATIONS
+        ]
+        robot.declarations = [entry._replace(name=entry.name.format(robot.name)) for entry in robot.declarations]
+        robot.received.clear()
+        robot.connect(driver.address)
+        driver.fleet.wait_ready(robot.namespace)
+
+    def assert_reached(self, robot, light, is_reached):
+        """What is sent to a robot's light reaches it, or does not; what is sent after that to another topic does."""
+        count = len(robot.payloads_on("laser_enable"))
+        light.publish(ColorRGBA(1.0, 1.0, 1.0, 1.0))
+        make_publisher("/%s/laser_enable" % robot.name, Bool).publish(Bool(True))
+        wait_payloads(robot, "laser_enable", count + 1)
+        if is_reached:
+            wait_payloads(robot, "led")
+        self.assertEqual(len(robot.payloads_on("led")), int(is_reached))
+
+    def test_what_is_declared_with_another_md5_after_a_reconnect_gets_nothing_more(self):
+        driver = self.start()
+        robot = self.dial(driver, 11)
+        robot.answers["set_odom"] = lambda request: encode_answer(True, "set")
+        light = make_publisher("/hero_11/led", ColorRGBA)
+        set_odom = rospy.ServiceProxy("/hero_11/set_odom", SetOdom)
+        self.assert_reached(robot, light, True)
+        rospy.wait_for_service("/hero_11/set_odom", 20.0)
+        self.assertTrue(set_odom(0.0, 0.0, 0.0).success)
+        self.declare_anew(driver, robot, md5sum=WRONG_MD5)
+        for what in ("topic /hero_11/led", "service /hero_11/set_odom"):
+            driver.wait_line("hero_11: %s refused: .*%s" % (what, WRONG_MD5))
+            self.assertEqual(len(driver.find_lines(what)), 1)
+        self.assert_reached(robot, light, False)
+        with self.assertRaises(rospy.ServiceException):
+            set_odom(0.0, 0.0, 0.0)
+        self.assertEqual(robot.payloads_on("set_odom"), [])
+        self.declare_anew(driver, robot)
+        wait_for(lambda: light.get_num_connections() > 0, "the driver to listen again")
+        self.assert_reached(robot, light, True)
+        rospy.wait_for_service("/hero_11/set_odom", 20.0)
+        self.assertTrue(set_odom(0.0, 0.0, 0.0).success)
+
+    def test_what_is_declared_with_another_type_after_a_reconnect_gets_that_only(self):
+        driver = self.start()
+        robot = self.dial(driver, 12)
+        light = make_publisher("/hero_12/led", ColorRGBA)
+        self.assert_reached(robot, light, True)
+        self.declare_anew(driver, robot, message_type="std_msgs/String", md5sum=STRING_MD5)
+        driver.wait_line("hero_12: service /hero_12/set_odom refused: its halves are")
+        self.assert_reached(robot, light, False)
+        # rospy would not let this node publish a topic with two types.
+        writer = subprocess.Popen(["rostopic", "pub", "/hero_12/led", "std_msgs/String", "red"])
+        self.addCleanup(writer.wait)
+        self.addCleanup(writer.terminate)
+        self.assertEqual(wait_payloads(robot, "led"), [make_text("red")])
 
     def test_a_robot_cannot_put_anything_but_transforms_on_tf(self):
         wrong = [
