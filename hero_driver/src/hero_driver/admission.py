@@ -105,6 +105,17 @@ class Admission:
         crowd, count = self._unidentified.most_common(1)[0]
         return crowd if count > self._unidentified[host] + 1 else None
 
+    def find_largest(self, host: str) -> Optional[str]:
+        """Return the address that should give up a connection for one of host's, because all places are taken.
+
+        None while there is room, where host may not come anyway, or where no address has more connections than host
+        would have: so one address cannot keep others out, whatever it says that it is.
+        """
+        if self._total < self._limits.max_connections or self._find_own_refusal(host) is not None:
+            return None
+        largest, count = self._by_host.most_common(1)[0]
+        return largest if count > self._by_host[host] + 1 else None
+
     def note_identified(self, host: str) -> None:
         """A connection of host has said who it is, or ended before that."""
         self._unidentified[host] -= 1
@@ -154,14 +165,19 @@ class Admission:
         return refusal
 
     def _find_lasting_refusal(self, host: str) -> Optional[str]:
+        refusal = self._find_own_refusal(host)
+        if refusal is None and self._total >= self._limits.max_connections:
+            return "more than %d connections (~max_connections)" % self._limits.max_connections
+        return refusal
+
+    def _find_own_refusal(self, host: str) -> Optional[str]:
+        """Return why host may not connect, whatever others do."""
         limits = self._limits
         if limits.allow:
             address = ipaddress.ip_address(host.split("%", maxsplit=1)[0])
             mapped = getattr(address, "ipv4_mapped", None)
             if not any((mapped or address) in network for network in limits.allow):
                 return "address not in ~allow"
-        if self._total >= limits.max_connections:
-            return "more than %d connections (~max_connections)" % limits.max_connections
         if self._by_host[host] >= limits.max_connections_per_address:
             return "more than %d connections of one address (~max_connections_per_address)" % (
                 limits.max_connections_per_address

@@ -136,12 +136,18 @@ class Gateway(LinkHandler):
         return None
 
     def _make_room(self, host: str) -> None:
+        """Close a connection of the address with the most, where there are too many; a robot's last of all."""
+        peers = self.peers.values()
+        largest = self._admission.find_largest(host)
+        if largest is not None:
+            newest_first = reversed([peer for peer in peers if peer.link.address.host == largest])
+            peer = min(newest_first, key=lambda peer: peer.bridge is not None)
+            self._stops.begin(peer)
+            peer.link.close("its address has the most of too many connections (~max_connections)")
         crowd = self._admission.find_crowd(host)
         if crowd is not None:
-            for link, peer in self.peers.items():
-                if peer.record is None and link.address.host == crowd:
-                    link.close("its address has the most of too many connections (~max_unidentified)")
-                    return
+            peer = next(peer for peer in peers if peer.record is None and peer.link.address.host == crowd)
+            peer.link.close("its address has the most of too many connections (~max_unidentified)")
 
     def receive_data(self, link: Link, data: bytes, now_s: float) -> None:
         """Pass bytes to the session and its events on; the hot path of the driver."""

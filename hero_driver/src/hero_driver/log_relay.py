@@ -63,13 +63,14 @@ class LogRelay:
         host to HOST_LINES_MAX.
         """
         now_s = time.monotonic()
-        if group and not self._admit(group, GROUP_LINES_MAX, now_s):
-            return
-        if host and not self._admit("address " + host, HOST_LINES_MAX, now_s):
-            return
         last_s, suppressed = self._last.get(key, (None, 0))
         if last_s is not None and now_s - last_s < THROTTLE_S:
             self._last[key] = (last_s, suppressed + 1)
+            return
+        # What is said again and again takes nothing of what else may be said.
+        if group and not self._admit(group, GROUP_LINES_MAX, now_s):
+            return
+        if host and not self._admit("address " + host, HOST_LINES_MAX, now_s):
             return
         if len(self._last) >= KNOWN_KEYS_MAX:
             self._last.clear()

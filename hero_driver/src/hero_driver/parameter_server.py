@@ -4,8 +4,10 @@ Integers and booleans, floats and texts, alone or in lists. A robot reads below 
 unless ~parameters_outside allows more. May block; runs on a worker.
 """
 
+import xmlrpc.client
 from typing import Any, List, NamedTuple, Optional
 
+import rosgraph
 import rospy
 
 
@@ -41,8 +43,9 @@ def read_parameter(full_name: str) -> ParameterAnswer:
     """Return the value of a ROS parameter. Raises: ParameterRefusedError."""
     try:
         value = rospy.get_param(full_name, None)
-    except rospy.ROSException as error:
-        raise ParameterRefusedError("parameter %s cannot be read: %s" % (ascii(full_name), error)) from error
+    except (rospy.ROSException, rosgraph.MasterException, OSError, xmlrpc.client.Error) as error:
+        text = "parameter %s cannot be read: %s" % (ascii(full_name[:100]), error)
+        raise ParameterRefusedError(text) from error
     if value is None:
         raise ParameterRefusedError("parameter %s is not set" % ascii(full_name[:100]))
     answer = convert_parameter(value)

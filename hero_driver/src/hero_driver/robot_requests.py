@@ -36,7 +36,9 @@ class RobotRequests:
         self._call_soon = call_soon
         self._complain = complain
         self._parameters = Worker(
-            "parameters", REQUESTS_WAITING_MAX, lambda error: log.log("error", "parameters: %s" % error)
+            "parameters",
+            REQUESTS_WAITING_MAX,
+            lambda error: log.log_throttled("error", "parameters", "parameters of robots: %s" % error),
         )
         self._services = ServiceClients(config, log)
 
@@ -60,7 +62,8 @@ class RobotRequests:
                 answer = read_parameter(resolve_parameter(name, namespace, self._may_leave))
             except ParameterRefusedError as error:
                 text = "%s: %s" % (peer.label, error)
-                self._log.log_throttled("warn", namespace + name[:100], text, peer.label)
+                key = "parameter %s %s" % (namespace, name[:100])
+                self._log.log_throttled("warn", key, text, peer.label, peer.link.address.host)
                 answer = EMPTY_ANSWER
             self._call_soon(lambda: self._send_parameter(peer, answer))
 

@@ -48,6 +48,14 @@ class TestDriverLimits(OwnDriverCase):
         driver.fleet.wait("/hero_2", Robot.AWAY)
         self.dial(driver, 3)
 
+    def test_an_address_that_has_taken_all_places_makes_room_for_a_robot_of_another(self):
+        driver = self.start(max_connections=4)
+        robots = [self.dial(driver, number) for number in range(4)]
+        other = self.dial(driver, 9, source_host="127.0.0.2")
+        self.wait_refused(driver, robots[3], "hero_3 left .*the most of too many connections .*~max_connections")
+        self.wait_refused(driver, self.dial(driver, 5, ready=False), "refused: .*~max_connections")
+        self.assertTrue(all(robot.is_connected for robot in (other, *robots[:3])))
+
     def test_more_connections_of_one_address_than_allowed_are_refused(self):
         driver = self.start(max_connections_per_address=1)
         self.dial(driver, 1)

@@ -52,6 +52,28 @@ def test_connections_beyond_the_total_are_refused_until_one_leaves():
     assert admission.admit("10.0.0.3") is None
 
 
+def test_where_all_places_are_taken_the_address_with_the_most_gives_one_up():
+    admission = make_admission("10.0.0.0/24", max_connections=4, max_connections_per_address=3)
+    for host in ("10.0.0.1", "10.0.0.2", "10.0.0.2"):
+        admission.admit(host)
+    assert admission.find_largest("10.0.0.3") is None, "there is room"
+    admission.admit("10.0.0.2")
+    for host in ("10.0.0.1", "10.0.0.2", "10.0.0.3"):
+        admission.note_identified(host)
+    assert admission.find_largest("10.0.0.3") == "10.0.0.2"
+    assert admission.find_largest("10.0.0.1") == "10.0.0.2"
+    assert admission.find_largest("10.0.0.2") is None, "its own newcomer has to wait"
+    assert admission.find_largest("10.0.1.1") is None, "it may not come anyway"
+
+
+def test_addresses_that_have_the_same_share_do_not_take_places_from_each_other():
+    admission = make_admission(max_connections=4)
+    for host in ("10.0.0.1", "10.0.0.1", "10.0.0.2", "10.0.0.2"):
+        admission.admit(host)
+    assert admission.find_largest("10.0.0.1") is None
+    assert admission.find_largest("10.0.0.3") in ("10.0.0.1", "10.0.0.2")
+
+
 def test_connections_of_one_address_are_limited_each_on_its_own():
     admission = make_admission(max_connections_per_address=1)
     assert admission.admit("10.0.0.1") is None

@@ -4,7 +4,7 @@ import logging
 
 import pytest
 
-from hero_driver.log_relay import LogRelay
+from hero_driver.log_relay import GROUP_LINES_MAX, LogRelay
 
 
 class Lines(logging.Handler):
@@ -60,3 +60,25 @@ def test_a_level_that_is_set_later_counts(rosout):
     relay.log("debug", "after")
     relay.close()
     assert texts == [("DEBUG", "after")]
+
+
+def test_one_complaint_again_and_again_keeps_no_other_out(rosout):
+    _, texts = rosout
+    relay = LogRelay()
+    for _ in range(10 * GROUP_LINES_MAX):
+        relay.log_throttled("error", "same", "the same complaint", group="hero_1", host="10.0.0.1")
+    relay.log_throttled("error", "other", "another complaint", group="hero_1", host="10.0.0.1")
+    relay.close()
+    assert texts == [("ERROR", "the same complaint"), ("ERROR", "another complaint")]
+
+
+def test_ever_new_complaints_about_one_robot_are_limited_and_those_about_others_not(rosout):
+    _, texts = rosout
+    relay = LogRelay()
+    for number in range(10 * GROUP_LINES_MAX):
+        relay.log_throttled("error", "complaint %d" % number, "complaint %d" % number, group="hero_1")
+    relay.log_throttled("error", "other", "about another robot", group="hero_2")
+    relay.close()
+    assert len(texts) == GROUP_LINES_MAX + 2
+    assert "the rest is left out" in texts[GROUP_LINES_MAX][1]
+    assert texts[-1] == ("ERROR", "about another robot")

@@ -1,6 +1,10 @@
 """Parameters for robots: which names they may read, and which values fit them."""
 
+import xmlrpc.client
+
 import pytest
+import rosgraph
+import rospy
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -8,6 +12,7 @@ from hero_driver.parameter_server import (
     EMPTY_ANSWER,
     ParameterRefusedError,
     convert_parameter,
+    read_parameter,
     resolve_parameter,
 )
 
@@ -75,3 +80,21 @@ def test_everything_else_does_not_fit(value):
 
 def test_an_answer_about_nothing_is_three_empty_lists():
     assert EMPTY_ANSWER == ([], [], [])
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        ConnectionRefusedError("nobody there"),
+        rosgraph.MasterException("nobody there"),
+        xmlrpc.client.Fault(1, "nobody there"),
+        rospy.ROSException("nobody there"),
+    ],
+)
+def test_a_parameter_that_cannot_be_asked_for_is_refused_by_name(monkeypatch, error):
+    def fail(name, default):
+        raise error
+
+    monkeypatch.setattr(rospy, "get_param", fail)
+    with pytest.raises(ParameterRefusedError, match="/hero_1/gain' cannot be read: .*nobody there"):
+        read_parameter("/hero_1/gain")
