@@ -223,7 +223,8 @@ def make_proximity(payload: bytes, seq: int, stamp_ns: int, scan_time_s: float) 
     """Return the sensor_msgs/LaserScan of the eight real beams in a stock laser message, by REP 117.
 
     The stock message has 16 ranges of which the odd ones are averages, an increment that matches none of
-    them and finite values for nothing in range (RangeSensor.ino:66-72, 123-125, 167-173).
+    them and finite values for nothing in range (RangeSensor.ino:66-72, 123-125, 167-173). NaN stays: the firmware sends it
+    for a sensor without calibration, and for nothing else.
     None if payload is not a stock laser message.
     """
     header = read_header(payload)
@@ -234,11 +235,8 @@ def make_proximity(payload: bytes, seq: int, stamp_ns: int, scan_time_s: float) 
         return None
     range_min_m, range_max_m = BODY_RADIUS_M + NEAREST_M, BODY_RADIUS_M + FARTHEST_M
     ranges_m = []
-    for range_m, reading in zip(fields[8:24:2], fields[25:41:2]):
-        if math.isnan(range_m) and reading <= 0.0:
-            # Noise around no reflection at all: the firmware takes the root of a negative number.
-            range_m = math.inf
-        elif range_m >= range_max_m - CLAMP_TOLERANCE_M:
+    for range_m in fields[8:24:2]:
+        if range_m >= range_max_m - CLAMP_TOLERANCE_M:
             range_m = math.inf
         elif range_m <= range_min_m + CLAMP_TOLERANCE_M:
             range_m = -math.inf

@@ -56,6 +56,15 @@ def test_gains_of_infrared_sensors_are_above_zero(gain):
     assert "above 0" in find_request_fault("hero_msgs/SetIRCalibration", request)
 
 
+@pytest.mark.parametrize("position", range(6))
+def test_a_negative_gain_of_a_controller_is_refused_with_what_it_would_do(position):
+    gains = [200.0, 0.0, 1.5, 200.0, 0.0, 1.5]
+    gains[position] = -0.001
+    fault = find_request_fault("hero_msgs/SetPID", struct.pack("<6f", *gains))
+    assert "-0.001" in fault
+    assert "uses none and stores all" in fault
+
+
 def test_services_without_a_rule_take_every_request():
     assert find_request_fault("std_srvs/Trigger", b"") is None
     assert find_request_fault("some_srvs/Other", b"\xff" * 100) is None

@@ -255,8 +255,8 @@ def test_only_the_beams_that_were_measured_are_taken_and_straight_ahead_is_the_f
         (math.inf, 10.0, math.inf),
         (-math.inf, 950.0, -math.inf),
         (math.nan, 60.0, math.nan),  # erased calibration
-        (math.nan, 0.0, math.inf),  # no reflection: 0.5 / 0, or the root of a negative number
-        (math.nan, -1.0, math.inf),
+        (math.nan, 0.0, math.nan),  # whatever the reading: it would look free at random
+        (math.nan, -1.0, math.nan),
         (math.nan, math.nan, math.nan),
     ],
 )
