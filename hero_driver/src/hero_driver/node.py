@@ -9,9 +9,11 @@ import signal
 import sys
 import threading
 import time
+import urllib.parse
 from typing import Any, Callable, List, Optional
 
 import rosgraph
+import rosgraph.roslogging
 import rospy
 
 from hero_msgs.srv import Disconnect, DisconnectResponse
@@ -24,7 +26,7 @@ from .peer import Peer
 from .reports import FleetStatus, Reporter
 from .rospy_internals import call_before_shutdown, leave_topics_out_of_rosout, open_tcpros_server
 from .stop_interface import PARAMETER, StopInterface
-from .transport import Address, EventLoop, TransportSettings
+from .transport import Address, EventLoop, HostNotFoundError, TransportSettings
 from .worker import Worker
 
 NODE_NAME = "hero_driver"
@@ -129,7 +131,9 @@ class DriverNode:
         self._thread.start()
         self._master_watch.open()
         self._log.log("info", self._describe_start())
-        if self._config.host in ("0.0.0.0", "::") and not self._config.allow:
+        # Whatever ~host calls it: "0" is every address too.
+        listening = self._loop.listening
+        if listening is not None and listening.host in ("0.0.0.0", "::") and not self._config.allow:
             self._log.log(
                 "warn",
                 "robots are awaited on every address of this machine, and whoever reaches the port can say that it"
@@ -256,16 +260,14 @@ def main(argv: Optional[List[str]] = None) -> int:
         # Into a pipe or file Python writes nothing before it has 8 kB, and rospy does not flush.
         sys.stdout.reconfigure(line_buffering=True)
     # The driver handles signals itself: robots are stopped before ROS goes down.
+    log = LogRelay()
     try:
-        _wait_for_master()
+        _enter_ros(argv, log)
     except KeyboardInterrupt:
         return 130
-    prepare_logging()
-    log = LogRelay()
-    open_tcpros_server(lambda host, text: log.log_throttled("warn", "handshake " + host, text, host=host))
-    rospy.init_node(NODE_NAME, argv=argv, disable_signals=True)
-    leave_topics_out_of_rosout()
-    tell_of_lost_log_lines()
+    except ConfigError as error:
+        sys.stderr.write("hero_driver cannot start: %s\n" % error)
+        return 2
     try:
         parameters = _read_private_parameters()
         # The driver's own note of its last run, not a setting.
@@ -291,6 +293,27 @@ def main(argv: Optional[List[str]] = None) -> int:
         _leave_ros()
 
 
+def _enter_ros(argv: Optional[List[str]], log: LogRelay) -> None:
+    """Become a ROS node. Raises: ConfigError where the environment does not allow it."""
+    try:
+        _wait_for_master()
+    except (ValueError, OSError) as error:
+        uri = ascii(rosgraph.get_master_uri())
+        raise ConfigError(
+            "ROS_MASTER_URI is %s: %s; it must be like http://localhost:11311" % (uri, error)
+        ) from error
+    prepare_logging()
+    open_tcpros_server(lambda host, text: log.log_throttled("warn", "handshake " + host, text, host=host))
+    try:
+        rospy.init_node(NODE_NAME, argv=argv, disable_signals=True)
+    except (rosgraph.roslogging.LoggingException, NotADirectoryError, PermissionError) as error:
+        raise ConfigError(
+            "no log file can be written (%s): set ROS_LOG_DIR to a folder that can be written to" % error
+        ) from error
+    leave_topics_out_of_rosout()
+    tell_of_lost_log_lines()
+
+
 def _leave_ros() -> None:
     """Tell the ROS master that this node ends; one that does not answer must not hold it up."""
     leaving = threading.Thread(target=rospy.signal_shutdown, args=("the driver ended",), daemon=True)
@@ -299,7 +322,12 @@ def _leave_ros() -> None:
 
 
 def _wait_for_master() -> None:
-    """Return when a ROS master answers; rospy would wait too, but could not be interrupted."""
+    """Return when a ROS master answers; rospy would wait too, but could not be interrupted.
+
+    Raises: ValueError or OSError where ROS_MASTER_URI can be nobody's.
+    """
+    # Not a name that may exist later on: UnicodeError is a ValueError.
+    (urllib.parse.urlparse(rosgraph.get_master_uri()).hostname or "").encode("idna")
     if rosgraph.is_master_online():
         return
     sys.stderr.write(
@@ -329,6 +357,8 @@ def _explain_bind_error(config: DriverConfig, error: OSError) -> str:
         return "%s may not be used without privileges: choose a ~port above 1023" % where
     if error.errno == errno.EADDRNOTAVAIL:
         return "%s is not an address of this machine: use one that `ip address` shows, or 0.0.0.0" % where
+    if isinstance(error, HostNotFoundError):
+        return "%s: %s; use an address that `ip address` shows, or 0.0.0.0" % (where, error)
     return "%s cannot be listened on: %s" % (where, os.strerror(error.errno) if error.errno else error)
 
 

@@ -223,8 +223,8 @@ def make_proximity(payload: bytes, seq: int, stamp_ns: int, scan_time_s: float) 
     """Return the sensor_msgs/LaserScan of the eight real beams in a stock laser message, by REP 117.
 
     The stock message has 16 ranges of which the odd ones are averages, an increment that matches none of
-    them and finite values for nothing in range (RangeSensor.ino:66-72, 123-125, 167-173). NaN stays: the firmware sends it
-    for a sensor without calibration, and for nothing else.
+    them and finite values for nothing in range (RangeSensor.ino:66-72, 123-125, 167-173). NaN stays: the firmware
+    sends it for a sensor without calibration, and for nothing else.
     None if payload is not a stock laser message.
     """
     header = read_header(payload)

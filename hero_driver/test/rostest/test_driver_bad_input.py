@@ -4,6 +4,7 @@
 import random
 import socket
 import struct
+import tempfile
 from pathlib import Path
 
 import rosgraph
@@ -48,7 +49,31 @@ class TestDriverBadInput(OwnDriverCase):
         self.assert_start_fails({"host": "192.0.2.1"}, "192.0.2.1", "not an address of this machine")
 
     def test_a_host_name_that_does_not_exist_is_named(self):
-        self.assert_start_fails({"host": "no-such-host.invalid"}, "no-such-host.invalid")
+        for host in ("no-such-host.invalid", "10.42.0..1"):
+            with self.subTest(host=host):
+                self.assert_start_fails({"host": host}, "'%s' cannot be found" % host, "ip address")
+
+    def test_every_name_of_all_addresses_is_warned_about(self):
+        for host in ("0", "0.0.0.0"):
+            with self.subTest(host=host), DriverProcess({"host": host}) as driver:
+                driver.wait_line("robots are awaited on every address of this machine")
+
+    def test_an_environment_in_which_ros_cannot_start_is_named_in_one_line(self):
+        with tempfile.NamedTemporaryFile() as file:
+            for name, value, part in (
+                ("ROS_MASTER_URI", "localhost:11311", "http://localhost:11311"),
+                ("ROS_MASTER_URI", "ftp://localhost:11311", "http://localhost:11311"),
+                ("ROS_MASTER_URI", "http://10.42.0..1:11311", "http://localhost:11311"),
+                ("ROS_LOG_DIR", file.name, "ROS_LOG_DIR"),
+                ("ROS_LOG_DIR", "/dev/null", "ROS_LOG_DIR"),
+            ):
+                with self.subTest(name=name, value=value):
+                    driver = DriverProcess(environment={name: value})
+                    self.addCleanup(driver.fleet.close)
+                    self.assertEqual(driver.wait_end(), USAGE_ERROR, driver.lines)
+                    self.assertEqual(len(driver.lines), 1, driver.lines)
+                    for text in ("hero_driver cannot start: ", value, part):
+                        self.assertIn(text, driver.lines[0])
 
     def test_an_unknown_parameter_is_named_with_the_one_that_was_meant(self):
         self.assert_start_fails({"prot": 11411}, "~prot is not known", "did you mean ~port?")

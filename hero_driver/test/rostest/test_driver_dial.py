@@ -101,13 +101,17 @@ class TestDriverDial(OwnDriverCase):
         listener = self.listen()
         driver = self.start(
             robots=[
+                {"host": "10.42.0..1", "port": 11411},
                 {"host": "no-such-robot.invalid", "port": 11411},
                 {"host": "127.0.0.1", "port": port_of(listener)},
             ]
         )
         self.accept(listener, 2)
         driver.fleet.wait_ready("/hero_2")
-        driver.wait_line("no-such-robot.invalid:11411 cannot be reached")
+        for host in ("10.42.0..1", "no-such-robot.invalid"):
+            driver.wait_line("%s:11411 cannot be reached: '%s' cannot be found" % (host, host))
+        # The one that was there is dialled again too.
+        self.assertEqual(driver.find_lines("Traceback|made a mistake"), [])
 
     def test_a_driver_that_only_dials_listens_nowhere(self):
         listener = self.listen()

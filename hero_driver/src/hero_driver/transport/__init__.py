@@ -5,6 +5,15 @@ is written with one send. Other threads hand over work with EventLoop.call_soon(
 """
 
 from .event_loop import THE_DRIVER_ENDS, EventLoop, Reader, TransportSettings
-from .link import Address, Link, LinkHandler
+from .link import Address, HostNotFoundError, Link, LinkHandler
 
-__all__ = ["THE_DRIVER_ENDS", "Address", "EventLoop", "Link", "LinkHandler", "Reader", "TransportSettings"]
+__all__ = [
+    "THE_DRIVER_ENDS",
+    "Address",
+    "EventLoop",
+    "HostNotFoundError",
+    "Link",
+    "LinkHandler",
+    "Reader",
+    "TransportSettings",
+]

@@ -1,14 +1,13 @@
-"""Dials robots that are TCP servers, again and again while they are away; names are looked up elsewhere."""
+"""Dials robots that are TCP servers, again and again while they are away; names are looked up on threads."""
 
-import collections
 import errno
 import os
 import socket
 import threading
 import time
-from typing import Any, Callable, Deque, Optional, Tuple
+from typing import Any, Callable, Optional
 
-from .link import Address, Link, describe_error
+from .link import Address, HostNotFoundError, Link, describe_error, find_socket_address
 
 BACKOFF_FIRST_S = 0.5
 BACKOFF_MAX_S = 10.0
@@ -88,7 +87,11 @@ class Dialler:
             self._retry(error)
             return
         family, kind, protocol, _, target = info
-        sock = socket.socket(family, kind, protocol)
+        try:
+            sock = socket.socket(family, kind, protocol)
+        except OSError as no_file:
+            self._retry(describe_error(no_file))
+            return
         sock.setblocking(False)
         self._socket = sock
         result = sock.connect_ex(target)
@@ -131,39 +134,18 @@ class Dialler:
             self._loop.call_later(LINK_CHECK_S, self._watch_link)
 
 
-class Resolver:
-    """Name look-ups on a thread of their own, because they can block for seconds."""
+def start_resolving(address: Address, then: Callable[[Optional[Any], str], None]) -> None:
+    """Look address up on a thread of its own, then call then(address info or None, error) on that.
 
-    def __init__(self) -> None:
-        self._jobs: Deque[Optional[Tuple[Address, Callable[[Optional[Any], str], None]]]] = (
-            collections.deque()
-        )
-        self._ready = threading.Semaphore(0)
-        self._thread: Optional[threading.Thread] = None
+    A look-up may take many seconds, and no other robot waits for it; a dialler makes one at a time.
+    """
 
-    def resolve(self, address: Address, then: Callable[[Optional[Any], str], None]) -> None:
-        """Look address up, then call then(address info or None, error) on the thread of the look-ups."""
-        if self._thread is None:
-            self._thread = threading.Thread(target=self._run, name="resolver", daemon=True)
-            self._thread.start()
-        self._jobs.append((address, then))
-        self._ready.release()
+    def resolve() -> None:
+        try:
+            info = find_socket_address(address)
+        except HostNotFoundError as error:
+            then(None, str(error))
+        else:
+            then(info, "")
 
-    def close(self) -> None:
-        """End the thread after the look-up that it is in."""
-        self._jobs.append(None)
-        self._ready.release()
-
-    def _run(self) -> None:
-        while True:
-            self._ready.acquire()
-            job = self._jobs.popleft()
-            if job is None:
-                return
-            address, then = job
-            try:
-                infos = socket.getaddrinfo(address.host, address.port, type=socket.SOCK_STREAM)
-            except OSError as error:
-                then(None, describe_error(error))
-            else:
-                then(infos[0], "")
+    threading.Thread(target=resolve, name="resolver", daemon=True).start()

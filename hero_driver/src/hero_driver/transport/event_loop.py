@@ -13,8 +13,8 @@ import threading
 import time
 from typing import Any, Callable, Deque, Dict, List, NamedTuple, Optional, Set, Tuple, TypeVar
 
-from .dialler import Dialler, DiallerOwner, Resolver
-from .link import Address, Link, LinkHandler, LinkOwner, describe_error
+from .dialler import Dialler, DiallerOwner, start_resolving
+from .link import Address, Link, LinkHandler, LinkOwner, describe_error, find_socket_address
 from .poller import READ, WRITE, Poller
 
 T = TypeVar("T")
@@ -89,7 +89,6 @@ class EventLoop(LinkOwner, DiallerOwner):
         os.set_blocking(self._wake_write, False)
         self._running = True
         self._file_limit = _raise_file_limit()
-        self._dial_resolver = Resolver()
         self.listening: Optional[Address] = None
 
     def open(self) -> None:
@@ -336,13 +335,12 @@ class EventLoop(LinkOwner, DiallerOwner):
             reader.close()
         self._readers.clear()
         self._poller.close()
-        self._dial_resolver.close()
 
     # What the diallers use.
 
     def resolve(self, address: Address, then: Callable[[Optional[Any], str], None]) -> None:
         """Look address up on a thread of its own, then call then(sockaddr info or None, error) on the loop."""
-        self._dial_resolver.resolve(address, lambda info, error: self.call_soon(lambda: then(info, error)))
+        start_resolving(address, lambda info, error: self.call_soon(lambda: then(info, error)))
 
     def watch_dialler(self, dialler: "Dialler", sock: socket.socket) -> None:
         """Call dialler.finish() when sock has connected or failed."""
@@ -366,8 +364,7 @@ def _raise_file_limit() -> int:
 
 
 def _listen(host: str, port: int) -> socket.socket:
-    infos = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
-    family, kind, protocol, _, target = infos[0]
+    family, kind, protocol, _, target = find_socket_address(Address(host, port), socket.AI_PASSIVE)
     sock = socket.socket(family, kind, protocol)
     try:
         # A driver that starts again must not wait for the old one's connections to time out.

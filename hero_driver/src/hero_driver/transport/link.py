@@ -29,6 +29,20 @@ class Address(NamedTuple):
         return "[%s]:%d" % self if ":" in self.host else "%s:%d" % self
 
 
+class HostNotFoundError(OSError):
+    """A host is neither an address nor a name that leads to one; the text says so of it."""
+
+
+def find_socket_address(address: Address, flags: int = 0) -> Any:
+    """Return what socket.getaddrinfo() finds first for a TCP address; may block. Raises: HostNotFoundError."""
+    try:
+        return socket.getaddrinfo(address.host, address.port, type=socket.SOCK_STREAM, flags=flags)[0]
+    except (OSError, ValueError) as error:
+        # What is no name at all ("10.42.0..1") is a UnicodeError of the codec for names.
+        reason = describe_error(error) if isinstance(error, OSError) else "not a host's name"
+        raise HostNotFoundError("%s cannot be found (%s)" % (ascii(address.host), reason)) from error
+
+
 class LinkHandler:
     """What the transport calls, always on the loop's thread."""
 
