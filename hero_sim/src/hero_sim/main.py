@@ -6,8 +6,9 @@ import signal
 import sys
 from typing import TYPE_CHECKING, List, Optional
 
+from . import output
 from .errors import OptionError, SimulatorError
-from .faults import KINDS
+from .faults import KINDS, parse_fault
 
 if TYPE_CHECKING:
     from .simulator import Simulator
@@ -16,6 +17,11 @@ DEFAULT_PORT = 11411
 """The port that stock robots dial."""
 
 MOST_ROBOTS = 1000
+LARGEST_ID = 2**31 - 1
+"""Of hero_msgs/Robot."""
+
+LONGEST_RUN_S = 1e9
+"""Some thirty years."""
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -115,19 +121,22 @@ def check_options(options: argparse.Namespace) -> None:
     """Raise OptionError for a value that cannot be used."""
     if not 1 <= options.robots <= MOST_ROBOTS:
         raise OptionError("--robots %d: must be 1..%d" % (options.robots, MOST_ROBOTS))
-    if options.first_id < 0:
-        raise OptionError("--first-id %d: must be 0 or more" % options.first_id)
+    if not 0 <= options.first_id <= LARGEST_ID - options.robots + 1:
+        raise OptionError("--first-id %d: ids must be 0..%d (%d robots)" % (options.first_id, LARGEST_ID, options.robots))
     port = options.port if options.serve is None else options.serve
     name = "--port" if options.serve is None else "--serve"
     last = port if options.serve is None else port + options.robots - 1
     if not (port >= 1 and last <= 65535):
         raise OptionError("%s %d: ports must be 1..65535 (%d robots)" % (name, port, options.robots))
-    if options.seconds is not None and not options.seconds > 0:
-        raise OptionError("--seconds %g: must be more than 0" % options.seconds)
+    if options.seconds is not None and not 0 < options.seconds <= LONGEST_RUN_S:
+        raise OptionError("--seconds %g: must be more than 0, and at most %g" % (options.seconds, LONGEST_RUN_S))
     if not 0.01 <= options.speed <= 100:
         raise OptionError("--speed %g: must be 0.01..100" % options.speed)
     if not 0 <= options.seed < 2**32:
         raise OptionError("--seed %d: must be 0..4294967295" % options.seed)
+    for text in options.fault:
+        if text != "help":
+            parse_fault(text)
 
 
 def describe_faults() -> List[str]:
@@ -194,26 +203,34 @@ def find_missing() -> Optional[str]:
 
 
 def main(arguments: Optional[List[str]] = None) -> int:
-    """Run the simulator; return the exit code."""
+    """Run the simulator; return the exit status."""
+    return output.call(lambda: _run(arguments))
+
+
+def _run(arguments: Optional[List[str]]) -> int:
     options = build_parser().parse_args(arguments)
     # Loading takes a moment: Ctrl-C in it ends the program like any other, without a stack trace.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     missing = find_missing()
     if missing is not None:
-        print("hero_sim: " + missing, file=sys.stderr)
-        return 1
+        output.complain(missing)
+        return output.FAILED
     from .build import build_simulator
 
     try:
         check_options(options)
+    except OptionError as error:
+        output.complain(str(error))
+        return output.WRONG_ARGUMENTS
+    try:
         answer = answer_question(options)
         if answer is not None:
             print("\n".join(answer))
             return 0
         simulator = build_simulator(options, (lambda text: None) if options.quiet else report)
     except SimulatorError as error:
-        print("hero_sim: %s" % error, file=sys.stderr)
-        return 1
+        output.complain(str(error))
+        return output.FAILED
     stop_on_signals(simulator)
     try:
         simulator.run(options.seconds)

@@ -12,12 +12,16 @@ import sys
 import threading
 from typing import Callable, List, Tuple
 
+import rosgraph
+import rosgraph.network
+import rosgraph.roslogging
 import rospy
 from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse, Trigger, TriggerRequest, TriggerResponse
 
 from . import main as command_line
+from . import output
 from .build import build_simulator
-from .errors import SimulatorError
+from .errors import OptionError, SimulatorError
 from .faults import parse_fault
 from .ground_truth import GroundTruth
 from .simulator import Simulator
@@ -94,28 +98,53 @@ class ServiceDesk:
         return TriggerResponse(*self._ask(reset))
 
 
+def check_environment() -> None:
+    """Raise OptionError if no ROS master can ever be at ROS_MASTER_URI; one that does not run yet is waited for."""
+    uri = rosgraph.get_master_uri()
+    try:
+        rosgraph.network.parse_http_host_and_port(uri)
+        if uri.startswith("http://"):
+            return
+    except ValueError:
+        pass  # no host, no port, one beyond 65535
+    raise OptionError("ROS_MASTER_URI is %r, but must be like http://ADDRESS:11311" % uri)
+
+
 def main() -> None:
     """Run the simulator until ROS or a signal ends it."""
+    _leave(output.call(_run))
+
+
+def _run() -> int:
     arguments: List[str] = rospy.myargv(sys.argv)[1:]
     parser = command_line.build_parser()
     parser.add_argument("--clock", action="store_true", help="publish /clock: nodes with use_sim_time follow")
     options = parser.parse_args(arguments)
     try:
         command_line.check_options(options)
-        lines = command_line.answer_question(options)
     except SimulatorError as error:
-        sys.exit("hero_sim: %s" % error)
-    if lines is not None:
-        print("\n".join(lines))
-        return
-    # Until the master answers, init_node() waits in vain for as long as it takes: let a signal end that.
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
-    rospy.init_node("hero_sim", disable_signals=True)
+        output.complain(str(error))
+        return output.WRONG_ARGUMENTS
+    try:
+        lines = command_line.answer_question(options)
+        if lines is not None:
+            print("\n".join(lines))
+            return 0
+        check_environment()
+        # Until the master answers, init_node() waits in vain for as long as it takes: let a signal end that.
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+        rospy.init_node("hero_sim", disable_signals=True)
+    except SimulatorError as error:
+        output.complain(str(error))
+        return output.FAILED
+    except rosgraph.roslogging.LoggingException as error:
+        output.complain("%s: set ROS_LOG_DIR to a directory" % error)
+        return output.FAILED
     try:
         simulator = build_simulator(options, (lambda text: None) if options.quiet else rospy.loginfo)
     except SimulatorError as error:
         rospy.logfatal("hero_sim: %s", error)
-        _leave(1)
+        return output.FAILED
     command_line.stop_on_signals(simulator)
     rospy.on_shutdown(lambda: setattr(simulator, "stopping", True))
     GroundTruth(simulator, options.clock)
@@ -124,7 +153,7 @@ def main() -> None:
         simulator.run(options.seconds)
     finally:
         simulator.link.close_all()
-    _leave(0)
+    return 0
 
 
 def _leave(code: int) -> None:
@@ -132,5 +161,4 @@ def _leave(code: int) -> None:
     telling = threading.Thread(target=rospy.signal_shutdown, args=("hero_sim ends",), daemon=True)
     telling.start()
     telling.join(timeout=0.7)
-    sys.stdout.flush()
     os._exit(code)
