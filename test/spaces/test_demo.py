@@ -124,10 +124,18 @@ def read_terminal(leader):
 
 
 @pytest.mark.parametrize(
-    "arguments", [["--seconds", "soon"], ["--robots", "0"], ["--port", "80"], ["--fast"]]
+    "arguments",
+    [
+        *(["--seconds", value] for value in ("soon", "inf", "nan", "-1", "9" * 30)),
+        *(["--robots", value] for value in ("0", "-1", "08", "1e3")),
+        *(["--port", value] for value in ("80", "99999")),
+        ["--host"],
+        ["--fast"],
+    ],
 )
 def test_wrong_arguments_are_refused_in_words(demo, arguments):
     process = demo(*arguments)
     output = read_to_end(process)
-    assert process.returncode == 1
+    assert process.returncode == 2
+    assert output.startswith("demo: ")
     assert arguments[0] in output

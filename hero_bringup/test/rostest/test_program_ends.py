@@ -1,0 +1,80 @@
+#!/usr/bin/env python
+"""How programs end where nothing works: one line and the right exit status, whatever their environment and output."""
+
+import os
+import subprocess
+import unittest
+
+import rostest
+
+TIMEOUT_S = 120.0
+BAD_URIS = ("localhost", "http://", "http://localhost:99999", "ftp://localhost:11311", "http://[::1")
+NODES = (["record"], ["calibrate", "--yes", "motors"], ["hero_sim", "--flash-dir", "none"])
+PRINTING = (
+    ["calibrate", "--help"],
+    ["check", "--json"],
+    ["export", "--columns"],
+    ["hotspot", "create", "--dry-run", "--interface", "wlan0"],
+    ["plot", "--help"],
+    ["record", "--help"],
+    ["hero_sim", "--fault", "help"],
+)
+
+
+def start(command, stdout=subprocess.PIPE, **environment):
+    """Return the process of a program of hero_bringup, or of the simulator."""
+    package = "hero_sim" if command[0] == "hero_sim" else "hero_bringup"
+    return subprocess.Popen(
+        ["rosrun", package, *command],
+        stdin=subprocess.DEVNULL,
+        stdout=stdout,
+        stderr=subprocess.PIPE,
+        env={**os.environ, **environment},
+        text=True,
+    )
+
+
+class ProgramEndsTest(unittest.TestCase):
+    def end(self, process):
+        """Return exit status and lines on stderr."""
+        _, errors = process.communicate(timeout=TIMEOUT_S)
+        return process.returncode, errors.splitlines()
+
+    def test_a_master_uri_that_is_none_is_named_in_one_line(self):
+        started = [(node, uri, start(node, ROS_MASTER_URI=uri)) for node in NODES for uri in BAD_URIS]
+        for node, uri, process in started:
+            with self.subTest("%s %s" % (node[0], uri)):
+                status, lines = self.end(process)
+                self.assertEqual((status, len(lines)), (1, 1), lines)
+                self.assertTrue(lines[0].startswith(node[0] + ": "), lines)
+                self.assertIn(repr(uri), lines[0])
+
+    def test_a_log_directory_that_is_a_file_is_named_in_one_line(self):
+        started = [(node, start(node, ROS_LOG_DIR=__file__)) for node in NODES if node[0] != "record"]
+        for node, process in started:
+            with self.subTest(node[0]):
+                status, lines = self.end(process)
+                self.assertEqual((status, len(lines)), (1, 1), lines)
+                self.assertIn(__file__, lines[0])
+                self.assertIn("ROS_LOG_DIR", lines[0])
+
+    def test_a_pipe_that_nobody_reads_ends_programs_silently(self):
+        read_end, write_end = os.pipe()
+        os.close(read_end)
+        with os.fdopen(write_end, "wb") as pipe:
+            started = [(command, start(command, pipe)) for command in PRINTING]
+        for command, process in started:
+            with self.subTest(command[0]):
+                self.assertEqual(self.end(process), (141, []))
+
+    def test_an_output_that_is_full_is_told_in_one_line(self):
+        with open("/dev/full", "wb") as full:
+            started = [(command, start(command, full)) for command in PRINTING]
+        for command, process in started:
+            with self.subTest(command[0]):
+                line = command[0] + ": the output cannot be written: No space left on device"
+                self.assertEqual(self.end(process), (1, [line]))
+
+
+if __name__ == "__main__":
+    rostest.rosrun("hero_bringup", "test_program_ends", ProgramEndsTest)
