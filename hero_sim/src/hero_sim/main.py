@@ -3,7 +3,6 @@
 import argparse
 import importlib.util
 import signal
-import sys
 from typing import TYPE_CHECKING, List, Optional
 
 from . import output
@@ -122,7 +121,9 @@ def check_options(options: argparse.Namespace) -> None:
     if not 1 <= options.robots <= MOST_ROBOTS:
         raise OptionError("--robots %d: must be 1..%d" % (options.robots, MOST_ROBOTS))
     if not 0 <= options.first_id <= LARGEST_ID - options.robots + 1:
-        raise OptionError("--first-id %d: ids must be 0..%d (%d robots)" % (options.first_id, LARGEST_ID, options.robots))
+        raise OptionError(
+            "--first-id %d: ids must be 0..%d (%d robots)" % (options.first_id, LARGEST_ID, options.robots)
+        )
     port = options.port if options.serve is None else options.serve
     name = "--port" if options.serve is None else "--serve"
     last = port if options.serve is None else port + options.robots - 1
