@@ -4,6 +4,7 @@
 import json
 import os
 import signal
+import socket
 import subprocess
 import unittest
 
@@ -116,6 +117,13 @@ class FleetTest(unittest.TestCase):
             code, _, errors = run_fleet("--once", env={**os.environ, "ROS_MASTER_URI": uri})
             self.assertEqual(code, 1, uri)
             self.assert_one_line(errors, "no ROS master at %r" % uri)
+
+    def test_a_ros_master_that_hangs_is_told_in_one_line(self):
+        with socket.create_server(("127.0.0.1", 0)) as silent:
+            uri = "http://127.0.0.1:%d" % silent.getsockname()[1]
+            code, _, errors = run_fleet("--once", env={**os.environ, "ROS_MASTER_URI": uri})
+        self.assertEqual(code, 1)
+        self.assert_one_line(errors, "no answer within 3 s")
 
     def test_a_log_directory_that_is_a_file_is_told_in_one_line(self):
         code, _, errors = run_fleet("--once", env={**os.environ, "ROS_LOG_DIR": __file__})

@@ -116,8 +116,8 @@ class Program:
         rospy.signal_shutdown("the program ends")
 
 
-def run(main: Callable[[], None]) -> None:
-    """Run main and end the process; a ProgramError becomes its one line and exit status 1."""
+def run(main: Callable[[], Optional[int]]) -> None:
+    """Run main and end the process with its exit status, None: 0; a ProgramError becomes its line and status 1."""
     command_line.run(main, ProgramError)
 
 

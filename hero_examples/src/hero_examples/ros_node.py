@@ -60,8 +60,9 @@ def ask_master(method: str, *arguments: Any) -> Any:
 
     Raises: NodeError if the master does not answer in time or refuses.
     """
-    uri = rosgraph.get_master_uri()
+    uri = ""
     try:
+        uri = rosgraph.get_master_uri()
         with xmlrpc.client.ServerProxy(uri, transport=LimitedTransport()) as master:
             code, text, value = getattr(master, method)(rospy.get_name(), *arguments)
     except (OSError, OverflowError, ValueError, http.client.HTTPException, xmlrpc.client.Error, ExpatError) as error:

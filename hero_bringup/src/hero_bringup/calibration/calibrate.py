@@ -258,7 +258,7 @@ def ask(program: Program, question: str) -> str:
 def find_robots(program: Program, robot_ids: Optional[Sequence[int]]) -> Dict[int, Optional[str]]:
     """Return for each robot why it cannot be calibrated, None if it can; robot_ids None: all that are ready.
 
-    Raises: CalibrationError without a driver, without a robot, or while the driver holds all of them.
+    Raises: CalibrationError without a driver, without a robot, or while all robots are stopped.
     """
     report = None
     deadline_s = time.monotonic() + READY_TIMEOUT_S
@@ -283,7 +283,7 @@ def find_robots(program: Program, robot_ids: Optional[Sequence[int]]) -> Dict[in
     for driver in sorted({drivers.find("/hero_%d" % robot_id) for robot_id in wanted}):
         if drivers.is_stopped(driver):
             raise CalibrationError(
-                "the driver holds all robots; let them go: rosservice call %s/stop false" % driver
+                "all robots are stopped; release them: rosservice call %s/stop false" % driver
             )
     robots: Dict[int, Optional[str]] = {}
     for robot_id in wanted:

@@ -317,7 +317,7 @@ def check_robots(fleet: FleetSnapshot) -> List[Finding]:
         ]
         if message.stopped:
             troubled.insert(
-                0, "all motion is held: rosservice call %s false" % topic.replace("/robots", "/stop")
+                0, "all robots are stopped; release them: rosservice call %s false" % topic.replace("/robots", "/stop")
             )
         if not robots:
             troubled = [
