@@ -43,8 +43,7 @@ def call_stop(driver, stopped):
 class TestDriverStop(OwnDriverCase):
     def dial_stock(self, driver, number=0, **settings):
         """Return a robot with wheels that takes commands as the firmware does."""
-        robot = self.dial(driver, number, read_cycle_s=READ_CYCLE_S, has_motors=True, **settings)
-        return robot
+        return self.dial(driver, number, read_cycle_s=READ_CYCLE_S, has_motors=True, **settings)
 
     def drive(self, robot, controller=VELOCITY):
         """Let a robot move; return the publisher of its commands."""
