@@ -23,11 +23,11 @@ class Stage:
     def __init__(self, robots, *arguments):
         """Start robots simulated robots; arguments: more of hero_bringup.launch, e.g. sim_arena:=obstacles."""
         self.processes = []
-        master_port = find_free_port()
+        master_port, self.port = find_free_port(), find_free_port()
         os.environ["ROS_MASTER_URI"] = "http://localhost:%d" % master_port
         self.launch = self.start(
             ["roslaunch", "--no-summary", "-p", str(master_port), "hero_bringup", "hero_bringup.launch"]
-            + ["host:=127.0.0.1", "port:=%d" % find_free_port(), "sim:=%d" % robots, *arguments],
+            + ["host:=127.0.0.1", "port:=%d" % self.port, "sim:=%d" % robots, *arguments],
             stdout=subprocess.DEVNULL,
         )
         try:

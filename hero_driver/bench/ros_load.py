@@ -43,7 +43,7 @@ def listen(count, first, ended):
     return dict(counts, odoms_s=odoms_s)
 
 
-def command(count, first, keeps_times, ended):
+def command(count, first, linear_m_s, keeps_times, ended):
     """Send commands until ended is set; return the result."""
     commands = 0
     publishers = [
@@ -62,7 +62,7 @@ def command(count, first, keeps_times, ended):
                 ended.wait(delay_s)
             if publisher.get_num_connections():
                 message = Twist()
-                message.linear.x = 0.01
+                message.linear.x, message.angular.z = linear_m_s, 5.0 * linear_m_s
                 message.linear.y = time.time()
                 publisher.publish(message)
                 commands += 1
@@ -78,6 +78,7 @@ def main():
     parser.add_argument("role", choices=("listen", "command"))
     parser.add_argument("--robots", type=int, default=20)
     parser.add_argument("--first-id", type=int, default=0)
+    parser.add_argument("--speed", type=float, default=0.01, metavar="M/S", help="of the commands")
     parser.add_argument("--counts", action="store_true", help="keep no times of commands, for runs of hours")
     options = parser.parse_args()
     rospy.init_node("bench_" + options.role, anonymous=True, disable_signals=True)
@@ -88,7 +89,7 @@ def main():
     if options.role == "listen":
         result = listen(options.robots, options.first_id, ended)
     else:
-        result = command(options.robots, options.first_id, not options.counts, ended)
+        result = command(options.robots, options.first_id, options.speed, not options.counts, ended)
     print(json.dumps(result), flush=True)
 
 

@@ -5,13 +5,16 @@ See stop_delivery for what is sent and why.
 
 import enum
 
-from .command_shaping import COMMAND_INTERVAL_S
 from .wheel_motion import REST_READINGS, WheelMotion
 
-STOPS_MIN = 2
-"""A stop may meet a motion command in the same reading cycle, and the next one then counts."""
+STOPS_MIN = 4
+"""A stop may meet a motion command in the same reading cycle of the robot; one in the next cycle then counts."""
 
-STOPS_UNREAD = 3
+INTERVAL_S = 0.025
+"""Between two stops: there is one in each reading cycle of the robot (51 ms). Those that the firmware drops, because
+they come within 50 ms of the last one that it took, do no harm."""
+
+STOPS_UNREAD = 6
 """So many are sent to a robot that gives no readings of its wheels."""
 
 RESTLESS_READINGS = 29
@@ -100,7 +103,7 @@ class StopProgress:
         if self._stops <= STOPS_MIN:
             self._mark = self._wheels.readings
         elapsed_s = now_s - self._began_s
-        interval_s = TUNING_INTERVAL_S if was_burst else COMMAND_INTERVAL_S
+        interval_s = TUNING_INTERVAL_S if was_burst else INTERVAL_S
         if elapsed_s >= TIRED_AFTER_S:
             interval_s = TIRED_INTERVAL_S
         elif elapsed_s >= STUBBORN_AFTER_S:

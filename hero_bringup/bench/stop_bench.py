@@ -1,0 +1,219 @@
+"""Measures stops: from the press to the zero on each robot's socket, and to wheels at rest, of simulated robots that drive.
+
+Starts its own ROS master, driver and robots, which programs command at 10 Hz all the time. Run it with script/bench stop.
+"""
+
+import argparse
+import asyncio
+import contextlib
+import json
+import os
+import signal
+import socket
+import sys
+import threading
+import time
+from pathlib import Path
+
+import rosgraph
+import rospy
+from std_msgs.msg import Bool
+from std_srvs.srv import SetBool
+from tornado.httpclient import HTTPRequest
+from tornado.websocket import websocket_connect
+
+from hero_examples.drivers import Drivers
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "hero_driver" / "bench"))
+from driver_bench import find_free_port, measure_machine_us, percentile_ms, wait_for_port
+from stage import Stage
+
+HERE = Path(__file__).resolve().parent
+ROS_LOAD = HERE.parents[1] / "hero_driver" / "bench" / "ros_load.py"
+POLL_S = 0.02
+SETTLE_S = 2.0
+LIMIT_S = 5.0
+HALF_OPEN = 100
+WAYS = ("topic", "service", "program", "monitor")
+CONDITIONS = ("undisturbed", "hung master", "half-open connections", "hung driver")
+
+
+class Page:
+    """One page of the monitor, on a thread of its own."""
+
+    def __init__(self, port):
+        """Connect as a page does."""
+        self._loop = asyncio.new_event_loop()
+        threading.Thread(target=self._loop.run_forever, daemon=True).start()
+        self._socket = asyncio.run_coroutine_threadsafe(self._open(port), self._loop).result(20.0)
+
+    async def _open(self, port):
+        url = "127.0.0.1:%d" % port
+        page = await websocket_connect(HTTPRequest("ws://%s/live" % url, headers={"Origin": "http://" + url}))
+        await page.write_message(json.dumps({"do": "look", "truth": False}))
+        asyncio.ensure_future(self._drain(page))
+        return page
+
+    async def _drain(self, page):
+        while await page.read_message() is not None:
+            pass
+
+    def stop(self, stopped):
+        """Press the button, or release."""
+        message = json.dumps({"do": "stop", "stop": stopped})
+        asyncio.run_coroutine_threadsafe(self._write(message), self._loop).result(5.0)
+
+    async def _write(self, message):
+        await self._socket.write_message(message)
+
+
+class Swarm:
+    """The robots, in a process of their own."""
+
+    def __init__(self, stage, robots):
+        """Start them and what commands them; return when all move."""
+        command = [sys.executable, str(HERE / "stopped_swarm.py"), "--robots", str(robots), "--port", str(stage.port)]
+        command += ["--arena", "empty", "--flash-dir", "none", "--quiet"]
+        self._process = stage.start(command, stdin=-1, stdout=-1)
+        stage.start([sys.executable, str(ROS_LOAD), "command", "--speed", "0.1", "--robots", str(robots)], stdout=-1)
+        self.robots = robots
+        stage.wait_for(lambda: self.ask("read")["moving"] == robots, "%d robots that move" % robots)
+
+    def ask(self, command):
+        """Return the answer to mark or read."""
+        self._process.stdin.write(command + "\n")
+        self._process.stdin.flush()
+        return json.loads(self._process.stdout.readline())
+
+
+def measure_press(swarm, stop):
+    """Return (s to the zero, s to rest) of each robot after stop(True); None where that took LIMIT_S."""
+    swarm.ask("mark")
+    pressed_s = time.monotonic()
+    stop(True)
+    while True:
+        noted = swarm.ask("read")
+        is_late = time.monotonic() - pressed_s > LIMIT_S
+        if is_late or (None not in noted["zero_s"] and None not in noted["rest_s"]):
+            break
+        time.sleep(POLL_S)
+    return [
+        tuple(None if moment_s is None else moment_s - pressed_s for moment_s in moments)
+        for moments in zip(noted["zero_s"], noted["rest_s"])
+    ]
+
+
+def measure_row(stage, swarm, title, stop, presses):
+    """Press so often; print and return one row."""
+    samples = []
+    for _ in range(presses):
+        stop(False)
+        stage.wait_for(lambda: swarm.ask("read")["moving"] == swarm.robots, "all robots to move")
+        samples += measure_press(swarm, stop)
+    stop(False)
+    kept = [sample for sample in samples if None not in sample]
+    zeros_s, rests_s = (sorted(values) for values in zip(*kept))
+    row = {
+        "title": title,
+        "robots": swarm.robots,
+        "presses": presses,
+        "stopped": len(kept),
+        "of": len(samples),
+        "zero_ms": [percentile_ms(zeros_s, share) for share in (0.5, 1.0)],
+        "rest_ms": [percentile_ms(rests_s, share) for share in (0.5, 1.0)],
+    }
+    print(
+        "| %s | %d | %d of %d | %.1f / %.1f | %.0f / %.0f |"
+        % (title, swarm.robots, len(kept), len(samples), *row["zero_ms"], *row["rest_ms"]),
+        flush=True,
+    )
+    return row
+
+
+@contextlib.contextmanager
+def disturbed(stage, condition):
+    """Let something hang."""
+    frozen = []
+    with contextlib.ExitStack() as stack:
+        if condition == "hung master":
+            frozen.append(rosgraph.Master("/bench").getPid())
+        elif condition == "hung driver":
+            frozen.append(stage.start_second_driver())
+            time.sleep(SETTLE_S)
+        elif condition == "half-open connections":
+            uri = rosgraph.Master("/bench").lookupService("/hero_driver/stop")
+            host, port = uri[len("rosrpc://") :].rstrip("/").rsplit(":", 1)
+            for _ in range(HALF_OPEN):
+                stack.enter_context(socket.create_connection((host, int(port)))).sendall(b"\x10\x00")
+        for pid in frozen:
+            os.kill(pid, signal.SIGSTOP)
+        try:
+            yield
+        finally:
+            for pid in frozen:
+                os.kill(pid, signal.SIGCONT)
+
+
+class StopStage(Stage):
+    """A driver without robots of its own, and the ways to stop what it has."""
+
+    def __init__(self):
+        super().__init__(0)
+        self._topic = rospy.Publisher("/hero_driver/stop_request", Bool, queue_size=1, tcp_nodelay=True)
+        self._drivers = Drivers()
+        monitor_port = find_free_port()
+        monitor = self.start(["rosrun", "hero_bringup", "monitor", "_port:=%d" % monitor_port], stdout=-1, stderr=-1)
+        wait_for_port(monitor_port, monitor)
+        self._page = Page(monitor_port)
+        time.sleep(SETTLE_S)
+
+    def start_second_driver(self):
+        """Return the process of a driver without robots."""
+        command = ["rosrun", "hero_driver", "hero_driver", "__name:=hero_driver_b", "_port:=%d" % find_free_port()]
+        return self.start(command, stdout=-1, stderr=-1).pid
+
+    def press(self, way, stopped):
+        """Ask for a stop, or a release, in one of WAYS."""
+        if way == "topic":
+            self._topic.publish(Bool(stopped))
+        elif way == "service":
+            rospy.ServiceProxy("/hero_driver/stop", SetBool)(stopped)
+        elif way == "program":
+            self._drivers.request_stop(stopped)
+        else:
+            self._page.stop(stopped)
+
+
+def main():
+    """Run from the command line."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--robots", type=int, default=20)
+    parser.add_argument("--presses", type=int, default=100, help="of each row")
+    parser.add_argument("--ways", nargs="*", choices=WAYS, default=WAYS)
+    parser.add_argument("--conditions", nargs="*", choices=CONDITIONS, default=CONDITIONS[:1])
+    parser.add_argument("--json", metavar="FILE", help="write the figures there")
+    options = parser.parse_args()
+    machine_us = measure_machine_us()
+    stage = StopStage()
+    rows = []
+    try:
+        swarm = Swarm(stage, options.robots)
+        print("sum of 768 bytes: %.2f us" % machine_us)
+        print("| | robots | stopped | press to zero, p50 / worst, ms | press to rest, p50 / worst, ms |")
+        print("|---|---|---|---|---|")
+        for condition in options.conditions:
+            with disturbed(stage, condition):
+                for way in options.ways:
+                    if (condition, way) == ("hung master", "service"):
+                        continue  # a service is looked up with the master at each call
+                    title = way if condition == CONDITIONS[0] else "%s, %s" % (way, condition)
+                    press = lambda stopped, way=way: stage.press(way, stopped)  # noqa: E731
+                    rows.append(measure_row(stage, swarm, title, press, options.presses))
+    finally:
+        stage.close()
+    if options.json:
+        Path(options.json).write_text(json.dumps({"sum_of_768_bytes_us": machine_us, "rows": rows}, indent=2) + "\n")
+
+
+if __name__ == "__main__":
+    main()
