@@ -15,6 +15,7 @@ from typing import Dict, List, Optional, Sequence
 import rospy
 
 from hero_examples import command_line
+from hero_examples.command_line import make_printable
 
 from .checkup import environment, graph, network
 from .checkup.finding import FAIL, OK, WARN, Finding, Point, run_points
@@ -90,11 +91,6 @@ def format_findings(findings: Sequence[Finding]) -> List[str]:
         lines += ["%*s  -> %s" % (width + 6, "", make_printable(remedy)) for remedy in finding.remedy]
     count = {state: sum(finding.state == state for finding in findings) for state in (OK, WARN, FAIL)}
     return [*lines, "%d OK, %d WARN, %d FAIL" % (count[OK], count[WARN], count[FAIL])]
-
-
-def make_printable(text: str) -> str:
-    """Return the text without what would move the cursor: robots and other programs have a say in it."""
-    return "".join(letter if letter.isprintable() else "?" for letter in text)
 
 
 def parse_options(arguments: Sequence[str]) -> argparse.Namespace:

@@ -88,6 +88,8 @@ def test_the_robots_network_is_the_hotspot_or_the_only_one(addresses, wanted, in
         ([LAN, WIFI], None, [], OK, "10.42.0.1:11411"),
         ([LAN, WIFI], None, ["0.0.0.0"], OK, "10.42.0.1:11411"),
         ([LAN, WIFI], None, ["127.0.0.1"], WARN, "open on 127.0.0.1 only"),
+        ([LAN, WIFI], None, ["192.168.7.2"], WARN, "dial one of these, port 11411: 192.168.7.2 (eth0)"),
+        ([LAN, WIFI], None, ["::"], OK, "192.168.7.2 (eth0), 10.42.0.1 (wlan0)"),
         ([LAN], None, [], WARN, "192.168.7.2 (eth0)"),
         ([], None, [], WARN, "no network"),
         ([LAN], "wlan0", [], FAIL, "wlan0 has no IPv4 address"),

@@ -57,7 +57,7 @@ def call(main: Callable[[], Optional[int]], *errors: Type[Exception]) -> int:
     return status
 
 
-def say(text: str, stream: Optional[IO[str]] = None) -> None:
+def say(text: str, stream: Optional[IO[str]] = None, end: str = "\n") -> None:
     """Write a line at once, to stdout unless stream is given; the program goes on where nobody reads it.
 
     For work that must not end because of its output: a recording, robots that are being measured.
@@ -67,7 +67,7 @@ def say(text: str, stream: Optional[IO[str]] = None) -> None:
         return
     try:
         # In one piece: threads write side by side.
-        stream.write(text + "\n")
+        stream.write(text + end)
         stream.flush()
     except OSError as error:
         _drop(stream)
@@ -77,7 +77,12 @@ def say(text: str, stream: Optional[IO[str]] = None) -> None:
 def complain(text: str) -> None:
     """Write a line with the program's name to stderr."""
     with suppress(OSError):
-        print("%s: %s" % (os.path.basename(sys.argv[0]), text), file=sys.stderr, flush=True)
+        print("%s: %s" % (os.path.basename(sys.argv[0]), make_printable(text)), file=sys.stderr, flush=True)
+
+
+def make_printable(text: str) -> str:
+    """Return the text without what would move the cursor: robots, files and other programs have a say in it."""
+    return "".join(letter if letter.isprintable() else "?" for letter in text)
 
 
 def _tell(failure: OSError) -> int:

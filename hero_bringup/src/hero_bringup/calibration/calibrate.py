@@ -45,6 +45,7 @@ WALL = (
     "Place each robot with its front straight before a flat white wall, 10 cm between wall and body, 40 cm between "
     "robots: they will turn on the spot, twice."
 )
+NOBODY = "nobody is there to answer: start it in a terminal, or with --yes"
 
 
 class Calibration:
@@ -243,15 +244,20 @@ def ask(program: Program, question: str) -> str:
 
     Raises: EndedError if the program is to end meanwhile, CalibrationError where nobody can answer.
     """
-    say(question)
+    if sys.stdin is None:
+        raise CalibrationError(NOBODY)
+    say(question, end="")
     # input() would wait on, deaf to Ctrl-C: signals only set a flag here.
     while not program.wait_readable([sys.stdin.fileno()], 1.0):
         if not program.running:
             say("")
             raise EndedError
-    answer = sys.stdin.readline()
+    try:
+        answer = sys.stdin.readline()
+    except UnicodeDecodeError:
+        return ""  # a key that is no letter, as Enter
     if not answer:
-        raise CalibrationError("nobody is there to answer: start it in a terminal, or with --yes")
+        raise CalibrationError(NOBODY)
     return answer.strip().lower()
 
 

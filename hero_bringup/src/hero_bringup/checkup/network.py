@@ -18,6 +18,7 @@ HOTSPOT_ADDRESS = "10.42.0.1"
 
 HOST_REMEDY = "roslaunch hero_bringup hero_bringup.launch without host:=, or with host:=0.0.0.0, lets robots in"
 
+EVERYWHERE = {"0.0.0.0", "::"}
 LISTENING = "0A"  # TCP_LISTEN in /proc/net/tcp
 DRIVER = "hero_driver"
 VIRTUAL = ("docker", "veth", "virbr", "br-", "lxc", "tun", "tap", "podman", "vnet")
@@ -85,6 +86,8 @@ def check_addresses(
                 ["ip -4 address shows which have one"],
             )
         ]
+    if listening and not EVERYWHERE & set(listening):
+        addresses = [found for found in addresses if found.address in listening]
     if listening and all(map(is_loopback, listening)):
         says = "port %d is open on %s only: simulated robots on this PC reach it, robots in the network do not" % (
             port,

@@ -3,6 +3,8 @@
 from contextlib import contextmanager
 from typing import Iterator
 
+from hero_examples.command_line import make_printable
+
 
 class RecordingError(Exception):
     """A recording cannot be made or read; the text says why and what to do."""
@@ -18,5 +20,5 @@ def name_damage(what: str) -> Iterator[None]:
     except OSError as error:
         raise RecordingError("%s: %s" % (what, error.strerror or error)) from error
     except Exception as error:  # rosbag checks little: a wrong byte may raise anything
-        reason = "".join(letter if letter.isprintable() else " " for letter in str(error))[:200]
+        reason = make_printable(str(error))[:200]
         raise RecordingError("%s: it is damaged, or no bag (%s: %s)" % (what, type(error).__name__, reason)) from error
