@@ -7,6 +7,8 @@ import json
 import math
 from typing import Any, Dict, List, Optional, Sequence
 
+from hero_examples.command_line import make_printable
+
 from .fleet_state import Obstacle, Pose, RobotRow
 
 HEADINGS = ("ROBOT", "ADDRESS", "STATE", "ODOM", "FROM ROBOT", "POSE x y yaw", "WAY", "NEAREST", "")
@@ -30,11 +32,6 @@ def format_nearest(seen: bool, nearest: Optional[Obstacle]) -> str:
         return "free"
     where = DIRECTIONS[round(nearest.bearing_rad / (math.pi / 4)) % 8]
     return "touch %s" % where if nearest.range_m == -math.inf else "%.2f m %s" % (nearest.range_m, where)
-
-
-def make_printable(text: str) -> str:
-    """Return text without control characters."""
-    return "".join(character if character.isprintable() else "?" for character in text)
 
 
 def format_cells(row: RobotRow) -> List[str]:

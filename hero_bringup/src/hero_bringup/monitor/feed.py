@@ -17,13 +17,14 @@ from rosgraph_msgs.msg import Log
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
+from hero_examples.command_line import make_printable
 from hero_examples.drivers import Drivers
 from hero_examples.newest_message import NewestMessage
 from hero_examples.stop_status import StopStatus
 from hero_msgs.msg import Robot
 
 from ..fleet_state import Pose, yaw_of_quaternion
-from ..fleet_table import finite, make_printable
+from ..fleet_table import finite
 from ..robot_listener import STATES, is_on_map, read_pose
 from .log_thread import LogThread
 from .placement import Placement

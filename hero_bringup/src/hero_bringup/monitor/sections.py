@@ -9,8 +9,9 @@ import math
 from collections import deque
 from typing import Any, Deque, Dict, List, NamedTuple, Optional, Sequence
 
+from hero_examples.command_line import make_printable
+
 from ..fleet_state import Pose
-from ..fleet_table import make_printable
 
 LONGEST_LINE = 400
 LOG_LINES_KEPT = 500
