@@ -22,6 +22,9 @@ TRANSFORMS = "/tf"
 STOCK_SCAN_TIME_S = 0.2
 """The robot scans at 5 Hz (RangeSensor rate 5); it leaves scan_time zero."""
 
+OFFSET_MAX_S = 86400.0
+"""A clock that is further off is shown as that far off: a robot may stamp what it likes."""
+
 OFFSET_SAMPLES = 64
 """Stamps over which the clock offset is a median: about two seconds of odometry."""
 
@@ -143,7 +146,8 @@ class MessageCleaner:
         """Median of stamp minus arrival; 0 while nothing came. Positive: the robot's clock is ahead."""
         if not self._offsets_ns:
             return 0.0
-        return sorted(self._offsets_ns)[len(self._offsets_ns) // 2] / NS_PER_S
+        offset_s = sorted(self._offsets_ns)[len(self._offsets_ns) // 2] / NS_PER_S
+        return max(-OFFSET_MAX_S, min(OFFSET_MAX_S, offset_s))
 
     @property
     def refused(self) -> int:

@@ -305,7 +305,7 @@ class Gateway(LinkHandler):
         if identity is None:
             if self._config.namespace_policy == "robot":
                 if topic.info.name in names.TF_TOPICS:
-                    peer.early_topics.append(topic)
+                    peer.early_topics = [*peer.early_topics[-7:], topic]
                 else:
                     self._complain(
                         peer,

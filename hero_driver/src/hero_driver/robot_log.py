@@ -54,7 +54,8 @@ class RobotLog:
     def _receive_heartbeat(self, peer: Peer, record: RobotRecord, uptime_s: float, now_s: float) -> None:
         booted_s = now_s - uptime_s
         if record.booted_s is not None and booted_s - record.booted_s > REBOOT_SLACK_S:
-            self._log.log("warn", "%s rebooted %.1f s ago" % (peer.label, uptime_s))
+            text = "%s rebooted %.1f s ago" % (peer.label, uptime_s)
+            self._log.log_throttled("warn", "rebooted " + peer.label, text, host=peer.link.address.host)
             if peer.bridge is not None and peer.bridge.cleaner is not None and peer.boot is None:
                 peer.bridge.cleaner.note_reboot()
         # Delays of the network only make a boot look later, so the earliest is the best.

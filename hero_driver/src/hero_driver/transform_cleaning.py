@@ -3,6 +3,7 @@
 Takes payloads of tf2_msgs/TFMessage, gives single transforms; knows no ROS and no socket.
 """
 
+import re
 from typing import Callable, List, Set
 
 from . import wire_messages
@@ -10,6 +11,14 @@ from .stamps import NS_PER_S, StampFilter
 
 FRAMES_MAX = 32
 """Pairs of frames that one robot may use; stock robots have five."""
+
+FRAME_NAME_LENGTH_MAX = 128
+"""Of a frame, in bytes; stock robots' have below 40."""
+
+FRAME_NAME_SHOWN = 60
+"""Characters of a refused frame's name that reports show, of up to 4 kB."""
+
+_FRAME_NAME = re.compile(rb"[A-Za-z0-9_/.-]+")
 
 AddTransform = Callable[[bytes], None]
 """Takes the bytes of one geometry_msgs/TransformStamped."""
@@ -103,21 +112,26 @@ class TransformCleaner:
             self.refused += 1
             return False
         parent, child = wire_messages.split_frames(frames)
-        prefix = self._frame_prefix
-        if (
-            not parent.startswith(prefix)
-            or not child.startswith(prefix)
-            or len(self._own_frames) >= FRAMES_MAX
-        ):
+        if not self._is_own(parent) or not self._is_own(child) or len(self._own_frames) >= FRAMES_MAX:
             self.refused += 1
             if len(self._known_foreign) < FRAMES_MAX:
                 self._known_foreign.add(frames)
-                self.foreign_frames.add(
-                    "%s -> %s" % (ascii(parent.decode("latin-1")), ascii(child.decode("latin-1")))
-                )
+                self.foreign_frames.add("%s -> %s" % (_show_name(parent), _show_name(child)))
             return False
         self._own_frames.add(frames)
         return True
+
+    def _is_own(self, name: bytes) -> bool:
+        """Return whether a frame is the robot's own, with a name that every listener of /tf can read."""
+        return (
+            name.startswith(self._frame_prefix)
+            and len(name) <= FRAME_NAME_LENGTH_MAX
+            and _FRAME_NAME.fullmatch(name) is not None
+        )
+
+
+def _show_name(name: bytes) -> str:
+    return ascii(name[:FRAME_NAME_SHOWN].decode("latin-1"))
 
 
 def split_transforms(payload: bytes) -> List[bytes]:

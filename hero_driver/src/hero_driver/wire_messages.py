@@ -119,7 +119,7 @@ class OdometryWriter:
         """Return the robot's message with stamp and covariances, and with another estimate if one is given.
 
         estimate: pose, from pack_pose(), and velocities ahead (m/s) and around z (rad/s). None if payload is not a
-        nav_msgs/Odometry.
+        nav_msgs/Odometry, or the robot's own numbers, where they are used, are not finite.
         """
         # A robot's frames never change, so they are looked at once.
         frames = payload[_ODOMETRY_FRAMES]
@@ -129,6 +129,9 @@ class OdometryWriter:
             self._frames = frames
         if estimate is None:
             pose, twist = payload[_ODOMETRY_POSE], payload[_ODOMETRY_TWIST]
+            # A sum is finite only if each part is.
+            if not math.isfinite(sum(_POSE.unpack(pose)) + sum(_TWIST.unpack(twist))):
+                return None
         else:
             pose, linear_m_s, turn_rad_s = estimate
             twist = _TWIST.pack(linear_m_s, 0.0, 0.0, 0.0, 0.0, turn_rad_s)

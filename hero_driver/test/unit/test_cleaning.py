@@ -15,6 +15,8 @@ from robot_messages import (
     read_stamp_ns,
 )
 
+from hero_driver.cleaning import OFFSET_MAX_S
+
 UPTIME_NS = 2 * NS_PER_S
 
 
@@ -59,6 +61,13 @@ def test_the_clock_offset_is_the_median_of_stamp_minus_arrival():
     for _ in range(100):
         robot.receive("/hero_0/odom", build_odometry(NOW_NS - 5 * MS), NOW_NS)
     assert robot.cleaner.clock_offset_s == pytest.approx(-0.005)
+
+
+@pytest.mark.parametrize("stamp_ns, offset_s", [(0, -OFFSET_MAX_S), (0xFFFFFFFF * NS_PER_S, OFFSET_MAX_S)])
+def test_a_clock_that_is_absurdly_off_is_shown_as_far_off(stamp_ns, offset_s):
+    robot = CleanedRobot()
+    robot.receive("/hero_0/odom", build_odometry(stamp_ns), NOW_NS)
+    assert robot.cleaner.clock_offset_s == offset_s
 
 
 # The other topics.

@@ -81,6 +81,9 @@ def test_several_transforms_in_one_message_come_out_one_by_one():
         ("world", "map"),
         ("", ""),
         (b"hero_\xff/odom\n", "hero_0/base_link"),
+        ("hero_0/base_link", b"hero_0/\xff\xfe"),
+        ("hero_0/base_link", "hero_0/a\nb"),
+        ("hero_0/base_link", "hero_0/" + 4000 * "x"),
     ],
 )
 def test_transforms_of_frames_that_are_not_the_robots_own_are_refused_counted_and_named(pair):
@@ -91,6 +94,7 @@ def test_transforms_of_frames_that_are_not_the_robots_own_are_refused_counted_an
     (name,) = robot.cleaner.transforms.foreign_frames
     assert name.isprintable()
     assert " -> " in name
+    assert len(name) < 150
 
 
 def test_a_foreign_transform_does_not_take_its_neighbours_along():

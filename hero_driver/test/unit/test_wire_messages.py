@@ -241,6 +241,15 @@ def test_only_the_beams_that_were_measured_are_taken_and_straight_ahead_is_the_f
     assert ranges_m[4] == float32(stock[8])
 
 
+@pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf, 1e308])
+def test_odometry_of_the_robot_itself_with_absurd_numbers_is_none(number):
+    for changed in ({"x_m": number}, {"linear_m_s": number}):
+        payload = build_odometry(NOW_NS, y_m=1e308, **changed)
+        assert make_writer().rewrite(payload, 0, NOW_NS, None) is None
+        estimate = (wire_messages.pack_pose(0.0, 0.0, 0.0), 0.0, 0.0)
+        assert make_writer().rewrite(payload, 0, NOW_NS, estimate) is not None, "they are not used"
+
+
 @pytest.mark.parametrize(
     "stock_m, reading, expected_m",
     [

@@ -1,0 +1,51 @@
+"""What the driver makes of robots' log lines, whatever they say."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from hero_driver.log_relay import LogRelay
+from hero_driver.robot_log import RobotLog
+from hero_driver.rosserial.payloads import LOG_INFO, Log
+
+NOW_S = 1000.0
+
+
+@pytest.fixture(name="lines")
+def make_lines(monkeypatch):
+    """Give what a relay logs, as (level, text)."""
+    lines = []
+    monkeypatch.setattr(LogRelay, "log", lambda self, level, text: lines.append((level, text)))
+    return lines
+
+
+def make_peer():
+    return SimpleNamespace(
+        label="hero_1",
+        link=SimpleNamespace(address=SimpleNamespace(host="10.0.0.1")),
+        bridge=SimpleNamespace(cleaner=None),
+        record=SimpleNamespace(booted_s=None, dropped_messages=0),
+        refused=False,
+        boot=None,
+        log_window_s=0.0,
+        log_count=0,
+    )
+
+
+def say_uptime(robot_log, peer, uptime_ms):
+    robot_log.receive(peer, Log(LOG_INFO, "[/hero_1] Conected at time %d" % uptime_ms), NOW_S)
+
+
+def test_a_robot_whose_uptime_falls_has_rebooted(lines):
+    robot_log, peer = RobotLog(LogRelay()), make_peer()
+    say_uptime(robot_log, peer, 60000)
+    say_uptime(robot_log, peer, 2500)
+    assert ("warn", "hero_1 rebooted 2.5 s ago") in lines
+
+
+def test_a_robot_that_says_again_and_again_that_it_rebooted_gives_one_line(lines):
+    robot_log, peer = RobotLog(LogRelay()), make_peer()
+    for _ in range(500):
+        say_uptime(robot_log, peer, 9999999999)
+        say_uptime(robot_log, peer, 1)
+    assert len([text for level, text in lines if level == "warn"]) == 1
