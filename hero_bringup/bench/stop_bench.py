@@ -1,6 +1,6 @@
 """Measures stops: from the press to the zero on each robot's socket, and to wheels at rest, of simulated robots that drive.
 
-Starts its own ROS master, driver and robots, which programs command at 10 Hz all the time. Run it with script/bench stop.
+Starts its own ROS master, driver and robots, which are commanded at 10 Hz all the time. Run it with script/bench stop.
 """
 
 import argparse
@@ -51,7 +51,7 @@ class Page:
         url = "127.0.0.1:%d" % port
         page = await websocket_connect(HTTPRequest("ws://%s/live" % url, headers={"Origin": "http://" + url}))
         await page.write_message(json.dumps({"do": "look", "truth": False}))
-        asyncio.ensure_future(self._drain(page))
+        self._reader = asyncio.ensure_future(self._drain(page))
         return page
 
     async def _drain(self, page):
