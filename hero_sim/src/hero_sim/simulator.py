@@ -7,6 +7,7 @@ import time
 from typing import TYPE_CHECKING, Callable, List, Optional, Set
 
 from . import tcp_link
+from .firmware import WINDOW_LENGTH
 from .swarm import Swarm
 from .tcp_link import TcpLink
 from .wifi import Radio
@@ -60,6 +61,7 @@ class Simulator:
         self._quiet_until_ms = [0] * len(swarm.robots)
         self._away_until_ms = [0] * len(swarm.robots)
         self._carrying: Set[int] = set()
+        self._full: Set[int] = set()
 
     def run(self, seconds: Optional[float] = None) -> None:
         """Run until stopping is set, or for so many simulated seconds."""
@@ -85,6 +87,8 @@ class Simulator:
                     self.serve_robot(index)
             if self._carrying:
                 self._carry(swarm.now_ms)
+            for index in list(self._full):
+                self._limit_window(index)
             wait_s = _LONGEST_WAIT_S
             if not self.paused:
                 next_ms = min(swarm.next_due_ms, swarm.world.time_ms + 10)
@@ -141,6 +145,15 @@ class Simulator:
             if not radio.is_carrying:
                 self._carrying.discard(index)
 
+    def _limit_window(self, index: int) -> None:
+        """Leave what comes to the system while a robot's receive window is full, so that the sender feels it."""
+        waiting_length = self.swarm.robots[index].received_length + self.radios[index].down_length
+        if waiting_length >= WINDOW_LENGTH:
+            self._full.add(index)
+        else:
+            self._full.discard(index)
+        self.link.pause(index, index in self._full)
+
     def _connect(self, index: int) -> None:
         robot = self.swarm.robots[index]
         now_ms = self.swarm.now_ms
@@ -193,6 +206,7 @@ class Simulator:
             else:
                 radio.put_down(now_ms, event.data)
                 self._carrying.add(event.robot_index)
+            self._limit_window(event.robot_index)
             return
         if event.kind == tcp_link.MADE:
             if robot.is_on:

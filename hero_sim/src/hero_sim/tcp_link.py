@@ -14,6 +14,7 @@ import sys
 from typing import Dict, List, NamedTuple, Optional, Tuple
 
 from .errors import OptionError
+from .firmware import WINDOW_LENGTH
 
 MADE = "made"
 FAILED = "failed"
@@ -53,6 +54,7 @@ class _Connection:
         self.socket = sock
         self.dialling = dialling
         self.unsent = bytearray()
+        self.paused = False
 
 
 class TcpLink:
@@ -99,6 +101,8 @@ class TcpLink:
         family, address = self._resolve(self.host, port)
         listener = socket.socket(family, socket.SOCK_STREAM)
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        # What is accepted inherits it.
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, WINDOW_LENGTH)
         try:
             listener.bind(address)
             listener.listen(4)
@@ -152,6 +156,8 @@ class TcpLink:
         sock = socket.socket(family, socket.SOCK_STREAM)
         try:
             sock.setblocking(False)
+            # Linux then takes about so many bytes that nobody reads, as the robot does.
+            sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, WINDOW_LENGTH)
             if own_address.startswith("127."):
                 sock.bind((own_address, 0))
             result = sock.connect_ex(address)
@@ -195,7 +201,7 @@ class TcpLink:
             return
         if sent < len(data):
             connection.unsent += data[sent:]
-            self._selector.modify(connection.socket, selectors.EVENT_READ | selectors.EVENT_WRITE, connection)
+            self._watch(connection)
             self._events.append(LinkEvent(index, BLOCKED))
 
     def drop_unsent(self, index: int) -> None:
@@ -203,7 +209,23 @@ class TcpLink:
         connection = self._connections[index]
         if connection is not None and connection.unsent:
             connection.unsent.clear()
-            self._selector.modify(connection.socket, selectors.EVENT_READ, connection)
+            self._watch(connection)
+
+    def pause(self, index: int, paused: bool) -> None:
+        """Leave what comes for a robot to the system's buffer, or read it again."""
+        connection = self._connections[index]
+        if connection is not None and not connection.dialling and connection.paused != paused:
+            connection.paused = paused
+            self._watch(connection)
+
+    def _watch(self, connection: _Connection) -> None:
+        """Tell the selector what a connection waits for."""
+        events = 0 if connection.paused else selectors.EVENT_READ
+        if connection.unsent:
+            events |= selectors.EVENT_WRITE
+        self._forget(connection)
+        if events:
+            self._selector.register(connection.socket, events, connection)
 
     def poll(self, timeout_s: float) -> List[LinkEvent]:
         """Return what happened, after at most timeout_s."""
@@ -243,10 +265,7 @@ class TcpLink:
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER_LENGTH)
         self._connections[connection.index] = connection
-        try:
-            self._selector.modify(sock, selectors.EVENT_READ, connection)
-        except KeyError:
-            self._selector.register(sock, selectors.EVENT_READ, connection)
+        self._watch(connection)
         self._events.append(LinkEvent(connection.index, MADE))
 
     def _finish_dial(self, connection: _Connection) -> None:
@@ -256,6 +275,10 @@ class TcpLink:
             self._events.append(LinkEvent(connection.index, FAILED, errno_text(result)))
         else:
             self._open(connection)
+
+    def _forget(self, connection: _Connection) -> None:
+        if connection.socket in self._selector.get_map():
+            self._selector.unregister(connection.socket)
 
     def _flush(self, connection: _Connection) -> None:
         try:
@@ -267,7 +290,7 @@ class TcpLink:
             return
         del connection.unsent[:sent]
         if not connection.unsent:
-            self._selector.modify(connection.socket, selectors.EVENT_READ, connection)
+            self._watch(connection)
             self._events.append(LinkEvent(connection.index, UNBLOCKED))
 
     def _receive(self, connection: _Connection) -> None:
@@ -293,7 +316,7 @@ class TcpLink:
         connection = self._connections[index]
         if connection is not None:
             self._connections[index] = None
-            self._selector.unregister(connection.socket)
+            self._forget(connection)
             connection.socket.close()
 
     def abandon(self, index: int) -> None:
@@ -305,7 +328,7 @@ class TcpLink:
         connection = self._connections[index]
         if connection is not None:
             self._connections[index] = None
-            self._selector.unregister(connection.socket)
+            self._forget(connection)
             if connection.dialling:
                 connection.socket.close()
             else:

@@ -120,6 +120,11 @@ class Radio:
         """Whether bytes are on their way."""
         return bool(self._up.queue or self._down.queue)
 
+    @property
+    def down_length(self) -> int:
+        """How many bytes are on their way to the robot."""
+        return sum(len(data) for _, data in self._down.queue)
+
     def take_up(self, now_ms: int) -> bytes:
         """Return what has reached the driver's side by now."""
         return self._take(self._up, now_ms)

@@ -276,6 +276,19 @@ def test_a_frozen_robot_is_silent_and_goes_on(simulate, server):
     assert not peer.closed
 
 
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="other systems have larger buffers")
+@pytest.mark.parametrize("fault", ["frozen@16:for=8", "stall@16:for=8"])
+def test_a_robot_that_does_not_read_leaves_what_exceeds_its_window_to_the_sender(simulate, server, fault):
+    process = simulate("--port", str(server.port), "--fault", fault)
+    request_when_ready(server, 1)
+    peer = server.peers[0]
+    assert "fault" in next(line for line in process.stdout if "fault" in line)
+    for _ in range(100):
+        peer.send(ids.ID_LASER_ENABLE, bytes(100))
+    assert not wait_until_acknowledged(peer.socket, 0.3)
+    assert wait_until_acknowledged(peer.socket, LIMIT_S)
+
+
 def test_a_clock_that_jumps_shows_in_the_stamps(simulate, server):
     simulate("--port", str(server.port), "--fault", "clock-jump@16:by=-100")
     request_when_ready(server, 1)
