@@ -66,7 +66,7 @@ class TestFakeRobot(unittest.TestCase):
         self.send(LED * 51 + make_twist(VELOCITY_ID))
         self.assertFalse(self.robot.motors.is_turning)
 
-    def test_a_zero_right_behind_a_motion_is_dropped_and_a_motion_behind_a_zero_is_not(self):
+    def test_a_zero_behind_a_motion_is_dropped_but_not_a_motion_behind_a_zero(self):
         self.send(make_twist(VELOCITY_ID, 0.1) + make_twist(VELOCITY_ID))
         self.assertEqual([velocity.linear_m_s for velocity in self.robot.accepted], [0.1])
         self.send(LED * 51 + make_twist(VELOCITY_ID) + make_twist(VELOCITY_ID, 0.2))

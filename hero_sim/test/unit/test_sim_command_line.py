@@ -278,7 +278,7 @@ def test_a_frozen_robot_is_silent_and_goes_on(simulate, server):
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="other systems have larger buffers")
 @pytest.mark.parametrize("fault", ["frozen@16:for=8", "stall@16:for=8"])
-def test_a_robot_that_does_not_read_leaves_what_exceeds_its_window_to_the_sender(simulate, server, fault):
+def test_what_exceeds_the_receive_window_of_a_robot_stays_with_the_sender(simulate, server, fault):
     process = simulate("--port", str(server.port), "--fault", fault)
     request_when_ready(server, 1)
     peer = server.peers[0]

@@ -111,7 +111,7 @@ def test_a_motion_right_behind_an_accepted_zero_is_accepted():
 
 
 @both_controllers
-def test_a_frozen_robot_reads_all_that_waited_and_drops_zeros_behind_a_motion(controller):
+def test_a_robot_that_was_frozen_drops_zeros_that_waited_behind_a_motion(controller):
     driver = DriverSide("--perfect")
     driver.start_streaming()
     driver.swarm.robots[0].freeze(driver.swarm.now_ms, 500)

@@ -68,7 +68,7 @@ def count_ticks_from_rest(driver):
     return [counts[round(at_s * 1000)] for at_s, _, _ in STOCK_STEP]
 
 
-def test_the_pids_lead_a_motor_like_that_of_the_measured_build_as_its_firmware_did():
+def test_the_pids_drive_a_motor_like_the_measured_one_as_the_firmware_did():
     counts = []
     for delay_ms in range(0, 1000, 200):  # the robot's cycles meet in another way each time
         driver = start("--error", "left_gain=0.45,right_gain=0.45,lag_s=0.25")

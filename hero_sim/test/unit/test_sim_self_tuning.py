@@ -195,7 +195,7 @@ def test_self_tuning_fails_by_itself_after_the_measured_times(controller, least_
     assert max(lasted_s) - min(lasted_s) > 1.0
 
 
-def test_after_a_failed_tuning_the_last_velocity_drives_the_robot_for_a_second():
+def test_after_a_failed_tuning_the_last_velocity_drives_for_a_second():
     driver = start()
     driver.drive(0, 0.1, 0.0, 500)
     driver.send(0, VELOCITY[0], ZERO)
