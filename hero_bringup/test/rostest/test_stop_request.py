@@ -6,6 +6,8 @@ import json
 import math
 import os
 import signal
+import subprocess
+import sys
 import unittest
 import xmlrpc.client
 
@@ -30,10 +32,13 @@ class Reports:
 
     def __init__(self, driver):
         self.newest = None
+        self.forged = 0
         self._subscriber = rospy.Subscriber(driver + "/robots", RobotArray, self._receive, tcp_nodelay=True)
 
     def _receive(self, report):
-        if report._connection_header["callerid"] != rospy.get_name():
+        if report._connection_header["callerid"] == rospy.get_name():
+            self.forged += 1
+        else:
             self.newest = report
 
     @property
@@ -97,6 +102,19 @@ class StopRequestTest(unittest.TestCase):
             wait_for(self.drivers.find_silent, TIMEOUT_S, "the silence of the hung driver")
             self.assertFalse(self.drivers.read().stopped, "stopped, though a driver does not answer")
         wait_for(lambda: self.drivers.stop_status() == AT_REST, TIMEOUT_S, "the stop of the driver that hung")
+
+    def test_a_driver_that_starts_while_another_is_asked_is_stopped_too(self):
+        reports = Reports("/hero_driver_c")
+        with hanging(self.hung_pid):
+            self.drivers.request_stop(True)
+            self.assertEqual(self.drivers.wait_for_stop(), HUNG)
+            path = os.path.join(os.path.dirname(__file__), "fake_driver.py")
+            driver = subprocess.Popen([sys.executable, path, "__name:=hero_driver_c", "_robot:=2"])
+            try:
+                wait_for(lambda: reports.newest and reports.newest.stopped, TIMEOUT_S, "the stop of the new driver")
+            finally:
+                driver.terminate()
+                driver.wait()
 
     def test_every_one_of_ten_presses_reaches_the_healthy_driver(self):
         with hanging(self.hung_pid, self.master_pid):
@@ -181,22 +199,20 @@ class StopRequestTest(unittest.TestCase):
             self.assertFalse(self.drivers.read().stopped)
 
     def test_lists_that_are_not_published_by_a_driver_are_ignored(self):
-        forged = RobotArray(robots=[Robot(id=9, namespace="/hero_9", state=Robot.READY)])
-        publishers = [
-            rospy.Publisher(topic, RobotArray, queue_size=1, latch=True)
-            for topic in ("/hero_driver/robots", "/hero_9/robots")
-        ]
         listener = Drivers()
         self.addCleanup(listener.close)
-        for publisher in publishers:
-            publisher.publish(forged)
-        # The forger sends to three that listen: the test itself, and two that look for drivers, over one connection.
-        wait_for(lambda: publishers[0].get_num_connections() > 0, TIMEOUT_S, "a connection to the forger")
         wait_for(lambda: listener.read() and listener.is_settled, TIMEOUT_S, "the drivers")
-        self.assertEqual([robot.id for robot in listener.read().robots], [0, 1])
+        forged = RobotArray(robots=[Robot(id=9, namespace="/hero_9", state=Robot.READY)])
+        for topic in ("/hero_driver/robots", "/hero_9/robots"):
+            publisher = rospy.Publisher(topic, RobotArray, queue_size=1)
+            self.addCleanup(publisher.unregister)
+            reports = self.healthy if topic == "/hero_driver/robots" else Reports("/hero_9")
+            wait_for(publisher.get_num_connections, TIMEOUT_S, "somebody who listens to the forger")
+            for count in range(1, 20):
+                publisher.publish(forged)
+                wait_for(lambda reports=reports, count=count: reports.forged == count, TIMEOUT_S, "a forged list")
+                self.assertEqual([robot.id for robot in listener.read().robots], [0, 1])
         self.assertEqual(listener.names(), ["/hero_driver", "/hero_driver_b"])
-        for publisher in publishers:
-            publisher.unregister()
 
     def test_numbers_that_are_none_leave_the_json_valid(self):
         code, output, errors = run_fleet("--once", "--json")
