@@ -9,11 +9,14 @@ import rosgraph
 import rospy
 from bad_peer import declare_topic
 from driver_case import ask_parameter, list_driver_topics
-from fake_robot import PUB, STOCK_DECLARATIONS, Declaration, FakeRobot
+from fake_robot import CLIENT_ANSWERS, CLIENT_REQUESTS, PUB, STOCK_DECLARATIONS, Declaration, FakeRobot
 from life_signs import Life
 from rig import STOCK_NAMES, wait_until
+from std_msgs.msg import Bool
+from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse
 
 from hero_driver.rosserial import payloads
+from hero_msgs.msg import RobotArray
 
 STRING_MD5 = "992ce8a1687cec8c8bd883ec73ca41d1"
 
@@ -180,6 +183,45 @@ def test_nobody_takes_more_than_the_limits_give(start_driver, record, kind):
     record(
         "20 times %s from one address that may have 5" % kind, 1, int(taken <= 5), "what was beyond the limit"
     )
+
+
+def test_an_address_that_has_taken_all_places_keeps_no_other_out(start_driver, record):
+    driver = start_driver(parameters={"max_connections": 20})
+    robots = [FakeRobot(100 + number, source_host="127.0.0.66").connect(driver.address) for number in range(20)]
+    for robot in robots:
+        driver.fleet.wait_ready(robot.namespace)
+    friends = [FakeRobot(number, source_host="127.0.0.%d" % number).connect(driver.address) for number in (7, 8, 9)]
+    for friend in friends:
+        Life(driver, friend).show()
+    for robot in (*friends, *robots):
+        robot.close()
+    fault = "one address has taken all places with robots that it made up"
+    record(fault, len(friends), len(friends), "the newest of its own")
+
+
+def test_a_device_cannot_speak_for_the_fleet(start_driver, record):
+    driver = start_driver(parameters={"namespace_policy": "any"})
+    rospy.wait_for_service(driver.node + "/stop", 20.0)
+    rospy.ServiceProxy(driver.node + "/stop", SetBool)(True)
+    rospy.set_param("/secret", "s3cret")
+    device = FakeRobot(
+        declarations=[
+            Declaration(PUB, 125, "/arm_1/state", "std_msgs/String", STRING_MD5),
+            Declaration(PUB, 126, driver.node + "/stop_request", "std_msgs/Bool", Bool._md5sum),
+            Declaration(PUB, 127, "/arm_1/fleet", "hero_msgs/RobotArray", RobotArray._md5sum),
+            Declaration(CLIENT_REQUESTS, 128, driver.node + "/stop", "std_srvs/SetBool", SetBoolRequest._md5sum),
+            Declaration(CLIENT_ANSWERS, 100, driver.node + "/stop", "std_srvs/SetBool", SetBoolResponse._md5sum),
+        ]
+    ).connect(driver.address)
+    driver.fleet.wait_ready("/arm_1")
+    for topic_id in (126, 128):
+        device.send_frame(topic_id, b"\x00")
+    # Answered after both, on the same connection.
+    answer = ask_parameter(device, "/secret")
+    device.close()
+    held = [driver.fleet.newest.stopped, answer == ([], [], []), "/arm_1/fleet" not in list_names(driver.node)]
+    assert all(held)
+    record("a device that speaks for the fleet, with ~namespace_policy any", len(held), sum(held))
 
 
 def test_a_peer_that_calls_itself_differently_each_time_has_to_wait(start_driver, record):
