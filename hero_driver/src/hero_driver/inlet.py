@@ -16,7 +16,7 @@ from typing import Any, Callable, Optional
 import rospy
 from rospy.exceptions import TransportException, TransportTerminated
 
-from .rospy_internals import find_connection, replace_reading, take_socket, unregister
+from .rospy_internals import count_read, find_connection, replace_reading, take_socket, unregister
 from .transport import Reader
 
 READ_LENGTH = 4096
@@ -114,7 +114,7 @@ class MessageStream(Reader):
             return False
         if not data:
             return False
-        self._connection.stat_bytes += len(data)
+        length_read, messages = len(data), 0
         if self._rest:
             data = self._rest + data
         inlet = self._inlet
@@ -127,10 +127,11 @@ class MessageStream(Reader):
             if end - start < length:
                 break
             position = start + length
-            self._connection.stat_num_msg += 1
+            messages += 1
             inlet.last_sender = self._connection
             inlet.receive(data[start:position])
         self._rest = data[position:]
+        count_read(self._connection, length_read, messages)
         return True
 
     def close(self) -> None:

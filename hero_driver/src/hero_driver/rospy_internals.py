@@ -155,6 +155,12 @@ def take_socket(connection: Any) -> Tuple[Any, bytes]:
     return sock.dup(), buffer.getvalue()[: buffer.tell()]
 
 
+def count_read(connection: Any, length: int, messages: int) -> None:
+    """Count what was read instead of rospy, for rosnode info and the like."""
+    connection.stat_bytes += length
+    connection.stat_num_msg += messages
+
+
 def unregister(topic: Any) -> None:
     """Unregister a publisher or subscriber of rospy and give back its file; asks the ROS master, so it may block.
 
