@@ -160,6 +160,24 @@ class CalibrateTest(unittest.TestCase):
         self.assertIn("hero_3: restored motors, velocity", output)
         self.assertRegex(output, r"hero_4: FAILED: /hero_4/motors_parameters: .*not answered")
 
+    def test_2_what_was_measured_before_an_early_end_replaces_a_damaged_file(self):
+        path = self.folder + "/hero_5.yaml"
+        with open(path, "w", encoding="utf-8") as file:
+            file.write("robot: hero_5\nvelocity_gains: 2026-13-45\n")
+        process = self.start("motors", "infrared", "--robots", "5", stdin=subprocess.PIPE)
+        # The first question is answered, and nobody is there for the second one.
+        process.stdin.write(b"\n")
+        process.stdin.close()
+        process.stdin = None
+        code, output = self.finish(process)
+        self.assertEqual(code, 1, output)
+        self.assertIn("nobody is there to answer", output)
+        true = list_errors()["hero_5"]
+        for found_us, key in zip(self.load(5)["motor_centres_us"], ("left_centre_us", "right_centre_us")):
+            self.assertLessEqual(abs(found_us - true[key]), CENTRE_BOUND_US, output)
+        (damaged,) = glob.glob(self.folder + "/hero_5.damaged-*.yaml")
+        self.assertIn("hero_5: the file that was there is damaged, and kept as " + damaged, output)
+
     def test_3_robots_stop_when_it_is_broken_off(self):
         watch = Watch([3, 4])
         process = self.start("motors", "--robots", "3,4", "--yes")

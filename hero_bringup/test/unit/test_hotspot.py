@@ -194,3 +194,23 @@ def test_stop_forgets_the_hotspot_with_its_password(nmcli, monkeypatch, capsys):
     assert code == 0
     assert nmcli.read_calls()[-1].arguments == ["connection", "delete", "hero_hotspot"]
     assert "off" in output
+
+
+@pytest.mark.parametrize("ssid", ["\udcff", "\x1b[2J", "a" * 33])
+def test_a_name_that_no_network_can_have_is_refused_in_one_line(nmcli, monkeypatch, capsys, ssid):
+    code, _, errors = run(monkeypatch, capsys, "create", "--ssid=%s" % ssid, "--password-stdin")
+    assert (code, len(errors.splitlines())) == (1, 1), errors
+
+
+def test_a_password_that_is_no_text_is_refused_in_one_line(nmcli, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(b"\xff\xfe secret\n"), encoding="utf-8"))
+    with pytest.raises(hotspot.HotspotError, match="the password is not text"):
+        hotspot.run(["create", "--password-stdin"])
+
+
+def test_nmcli_that_cannot_be_executed_is_named_as_missing(monkeypatch, capsys, tmp_path):
+    (tmp_path / "nmcli").write_text("no program")
+    monkeypatch.setenv("PATH", str(tmp_path))
+    code, _, errors = run(monkeypatch, capsys, "show")
+    assert (code, len(errors.splitlines())) == (1, 1)
+    assert "nmcli is not installed" in errors
