@@ -1,4 +1,4 @@
-"""Measures stops: from the press to the zero on each robot's socket, and to wheels at rest, of simulated robots that drive.
+"""Measures stops of simulated robots that drive: from the press to the zero on each socket, and to wheels at rest.
 
 Starts its own ROS master, driver and robots, which are commanded at 10 Hz all the time. Run it with script/bench stop.
 """

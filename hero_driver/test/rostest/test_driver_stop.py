@@ -10,6 +10,7 @@ import sys
 import rospy
 import rostest
 import stock_messages
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from driver_case import DriverProcess, OwnDriverCase, Recorder, make_publisher, reads_from_somebody, wait_for
 from fake_robot import READ_CYCLE_S, SUB, TWIST_MD5, Declaration
 from geometry_msgs.msg import Twist
@@ -30,6 +31,13 @@ def make_command(linear_m_s):
     twist = Twist()
     twist.linear.x = linear_m_s
     return twist
+
+
+def is_error(diagnostics, name):
+    """Return whether a status whose name ends so is an error."""
+    return any(
+        status.name.endswith(": " + name) and status.level == DiagnosticStatus.ERROR for status in diagnostics.status
+    )
 
 
 def call_stop(driver, stopped):
@@ -172,9 +180,12 @@ class TestDriverStop(OwnDriverCase):
         robot = self.dial_stock(driver)
         call_stop(driver, True)
         self.wait_at_rest(driver, robot)
+        diagnostics = Recorder("/diagnostics", DiagnosticArray)
         robot.motors.is_pushed = True
         driver.fleet.wait("/hero_0", Robot.READY, "moving", lambda entry: entry.stop_state == Robot.MOVING)
         driver.wait_line("hero_0: its wheels turn although it was stopped")
+        for name in ("driver", "hero_0"):
+            diagnostics.wait_message(lambda array, name=name: is_error(array, name), "an error of " + name)
         self.assertIn("1 still moving: hero_0", call_stop(driver, True))
         robot.motors.is_pushed = False
         self.wait_at_rest(driver, robot)
