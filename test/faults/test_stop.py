@@ -15,7 +15,7 @@ from geometry_msgs.msg import Twist
 from rig import HERE, Master, find_free_port, start_python, wait_until
 from simulated_field import SPEED_M_S, Truth, drive, rest, start_simulator
 from std_msgs.msg import Bool
-from std_srvs.srv import SetBool
+from std_srvs.srv import SetBool, Trigger
 
 from hero_examples.drivers import Drivers
 from hero_msgs.msg import Robot
@@ -23,6 +23,9 @@ from hero_sim.srv import InjectFault
 
 ROBOTS = 3
 HALF_OPEN = 100
+TUNING_M_S = 0.01
+"""Simulated robots that tune themselves rock or spin faster than this."""
+
 WATCHDOG_M = 0.20
 """What a robot drives on at 0.1 m/s when its commander has gone and nobody stops it: 2.1 s."""
 
@@ -43,7 +46,7 @@ while not rospy.is_shutdown():
 def field(start_driver):
     """A driver with robots of its own in motion, and where they truly are."""
     port = find_free_port()
-    driver = start_driver(parameters={"port": port})
+    driver = start_driver(parameters={"port": port, "allow_self_tuning": True})
     with start_simulator(ROBOTS, port):
         truths = [Truth(number) for number in range(ROBOTS)]
         for truth in truths:
@@ -179,6 +182,24 @@ def test_a_robot_whose_program_stood_still_stops_when_it_goes_on(field, record):
     rest(truths)
     wait_until(lambda: is_confirmed(driver), "the driver's confirmation")
     record("a robot whose program stands still for 2 s with the stop in it", 1, 1)
+
+
+@pytest.mark.parametrize("controller", ["velocity_controller", "position_controller"])
+def test_a_stop_ends_the_self_tuning_of_simulated_robots(field, record, controller):
+    driver, truths = field
+    for truth in truths:
+        truth.close()
+        name = "/%s/%s/pid_calibration" % (truth.name, controller)
+        rospy.wait_for_service(name, 20.0)
+        rospy.ServiceProxy(name, Trigger)()
+    watchers = [Truth(number) for number in range(ROBOTS)]
+    wait_until(lambda: all(watcher.path and watcher.path[-1][2] > TUNING_M_S for watcher in watchers), "the tuning")
+    assert rospy.ServiceProxy(driver.node + "/stop", SetBool)(True).success
+    wait_until(lambda: is_confirmed(driver), "the driver's confirmation")
+    rest(watchers)
+    for watcher in watchers:
+        watcher.close()
+    record("simulated robots that tune the %s, then a stop" % controller, ROBOTS, ROBOTS)
 
 
 def test_a_driver_whose_loop_breaks_ends_a_self_tuning(start_driver, record, tmp_path):
