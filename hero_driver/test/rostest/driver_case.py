@@ -14,6 +14,7 @@ import rosgraph
 import roslib.packages
 import rospy
 from fake_robot import FakeRobot
+from geometry_msgs.msg import Twist
 from rosgraph_msgs.msg import Log as RosLog
 
 from hero_driver.rosserial import frames, payloads
@@ -117,6 +118,14 @@ def wait_frames(robot, topic_id, count=1):
         lambda: "%d frames %d at %s" % (count, topic_id, robot.name),
     )
     return robot.payloads_with_id(topic_id)[:count]
+
+
+def make_command(linear_m_s, angular_rad_s=0.0):
+    """Return a Twist."""
+    twist = Twist()
+    twist.linear.x = linear_m_s
+    twist.angular.z = angular_rad_s
+    return twist
 
 
 def make_publisher(topic, message_class, connected=True):

@@ -6,7 +6,7 @@ import struct
 
 import rospy
 import rostest
-from driver_case import NODE, DriverCase, Recorder, make_publisher, wait_for, wait_payloads
+from driver_case import NODE, DriverCase, Recorder, make_command, make_publisher, wait_for, wait_payloads
 from fake_motors import VELOCITY_GATE_S
 from fake_robot import READ_CYCLE_S
 from geometry_msgs.msg import Twist
@@ -20,13 +20,6 @@ from hero_msgs.srv import SetOdom
 
 VELOCITY = "velocity_controller/cmd_vel"
 POSITION = "position_controller/cmd_vel"
-
-
-def make_command(linear_m_s, turn_rad_s=0.0):
-    twist = Twist()
-    twist.linear.x = linear_m_s
-    twist.angular.z = turn_rad_s
-    return twist
 
 
 @in_steady_time

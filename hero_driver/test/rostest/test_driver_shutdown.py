@@ -7,7 +7,7 @@ import time
 
 import rospy
 import rostest
-from driver_case import OwnDriverCase, make_publisher, wait_for, wait_payloads
+from driver_case import OwnDriverCase, make_command, make_publisher, wait_for, wait_payloads
 from fake_robot import READ_CYCLE_S
 from geometry_msgs.msg import Twist
 from steady_time import in_steady_time
@@ -18,12 +18,6 @@ from hero_msgs.msg import Motor, Robot
 VELOCITY = "velocity_controller/cmd_vel"
 LIMIT_S = 2.0
 """What the driver promises for its end with 50 robots, from the signal to its exit."""
-
-
-def make_command(linear_m_s):
-    twist = Twist()
-    twist.linear.x = linear_m_s
-    return twist
 
 
 @in_steady_time

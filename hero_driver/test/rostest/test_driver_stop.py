@@ -11,7 +11,15 @@ import rospy
 import rostest
 import stock_messages
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from driver_case import DriverProcess, OwnDriverCase, Recorder, make_publisher, reads_from_somebody, wait_for
+from driver_case import (
+    DriverProcess,
+    OwnDriverCase,
+    Recorder,
+    make_command,
+    make_publisher,
+    reads_from_somebody,
+    wait_for,
+)
 from fake_robot import READ_CYCLE_S, SUB, TWIST_MD5, Declaration
 from geometry_msgs.msg import Twist
 from std_msgs.msg import Bool, ColorRGBA
@@ -25,12 +33,6 @@ VELOCITY = "velocity_controller"
 POSITION = "position_controller"
 BURST_LENGTH_MAX = 2144
 """The robot's TCP window."""
-
-
-def make_command(linear_m_s):
-    twist = Twist()
-    twist.linear.x = linear_m_s
-    return twist
 
 
 def is_error(diagnostics, name):
