@@ -56,6 +56,14 @@ class MonitorPage:
             ".map(row => [...row.children].map(cell => cell.textContent))"
         )
 
+    def facts(self):
+        """Return what is shown of the chosen robot: texts by title."""
+        titles, texts = (
+            self.run("return [...document.querySelectorAll('#facts %s')].map(one => one.textContent)" % tag)
+            for tag in ("dt", "dd")
+        )
+        return dict(zip(titles, texts))
+
     def banner(self):
         """Return level and text of what is shown about stopping."""
         script = "const banner = document.getElementById('stopping'); return [banner.dataset.level, banner.textContent]"

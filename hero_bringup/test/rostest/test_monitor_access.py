@@ -55,9 +55,10 @@ class AccessTest(unittest.TestCase):
 
     def test_it_does_not_start_for_other_machines_without_a_secret_token(self):
         with tempfile.TemporaryDirectory() as folder:
-            short, open_to_all = Path(folder) / "short", Path(folder) / "open"
-            short.write_text("1234")
-            short.chmod(0o600)
+            short, good, open_to_all = (Path(folder) / name for name in ("short", "good", "open"))
+            for file, text in ((short, "1234"), (good, TOKEN)):
+                file.write_text(text)
+                file.chmod(0o600)
             open_to_all.write_text(TOKEN)
             open_to_all.chmod(0o644)
             for arguments, reason in (
@@ -66,7 +67,10 @@ class AccessTest(unittest.TestCase):
                 (["_token_file:=%s" % open_to_all], "chmod 600"),
                 (["_token_file:=%s/none" % folder], "cannot be read"),
                 (["_rate_hz:=1000"], "1 to 30"),
-                (["_host:=nowhere.invalid", "_token_file:=%s" % short], "less than 16"),
+                (["_token_file:=%s" % folder], "cannot be read"),
+                (["_host:=nowhere.invalid", "_token_file:=%s" % good], "cannot listen"),
+                (["_host:=a..b", "_token_file:=%s" % good], "cannot listen"),
+                (["_max_connections:=1"], "10 to 10000"),
             ):
                 process = start_monitor(*arguments)
                 output = process.communicate(timeout=TIMEOUT_S)[0].decode()
