@@ -95,7 +95,8 @@ class BadDataTest(unittest.TestCase):
         """Publish a line until the page shows it; return from whom it is."""
         publisher = self.advertise("/rosout", Log)
         script = (
-            "const line = [...document.querySelectorAll('#lines li')].find(one => one.textContent.includes(arguments[0]));"
+            "const line = [...document.querySelectorAll('#lines li')]"
+            ".find(one => one.textContent.includes(arguments[0]));"
             "return line && line.querySelector('.node').textContent"
         )
 

@@ -9,8 +9,9 @@ from hero_msgs.msg import Robot, RobotArray
 
 from .driver_reports import merge
 
-TIME_LIMIT_S = 1.5
-"""After so long people are told who did not stop. A driver reports once per second, and each change within 0.1 s."""
+TIME_LIMIT_S = 1.4
+"""Then people are told who did not stop, and see it on any screen within 1.5 s. A driver reports once per second, and
+each change within 0.1 s."""
 
 CROSSING_S = 0.15
 """A report may cross the request on its way; by then a newer one has come."""
