@@ -1,7 +1,9 @@
+#!/usr/bin/env python
 """A driver without connections: takes stop requests, and reports of its robots what a test tells it to.
 
 ~ids lists the robots, as JSON; ~twin_of is an id that a second robot wants. ~behave (std_msgs/String) takes JSON: which
-robots move though stopped, and whether the others come to rest at all.
+robots move though stopped, and whether the others come to rest at all. ~rate is that of each robot, a word for a float.
+The port on which it says that it listens is the number of stop requests so far.
 """
 
 import json
@@ -22,6 +24,8 @@ class ScriptedDriver:
     def __init__(self):
         self.ids = json.loads(rospy.get_param("~ids"))
         self.twin_of = rospy.get_param("~twin_of", None)
+        self.rate = float(rospy.get_param("~rate", "88"))
+        self.requests = 0
         self.lock = threading.Lock()
         self.behaviour = {"moving": [], "rest": True}
         self.stop_time_s = None
@@ -34,9 +38,9 @@ class ScriptedDriver:
 
     def receive_stop(self, message):
         with self.lock:
-            if message.data == (self.stop_time_s is not None):
-                return
-            self.stop_time_s = rospy.get_time() if message.data else None
+            self.requests += 1
+            if message.data != (self.stop_time_s is not None):
+                self.stop_time_s = rospy.get_time() if message.data else None
         self.report()
         rospy.Timer(rospy.Duration(REST_AFTER_S), lambda event: self.report(), oneshot=True)
 
@@ -57,8 +61,9 @@ class ScriptedDriver:
 
     def report(self):
         with self.lock:
-            make = partial(Robot, since=rospy.Time.now(), firmware="v3.8", frames_per_s=88.0, bytes_per_s=12000.0)
-            report = RobotArray(listening="127.0.0.1:0", stopped=self.stop_time_s is not None)
+            rates = {"frames_per_s": self.rate, "bytes_per_s": self.rate}
+            make = partial(Robot, since=rospy.Time.now(), firmware="v3.8", **rates)
+            report = RobotArray(listening="127.0.0.1:%d" % self.requests, stopped=self.stop_time_s is not None)
             report.header.stamp = rospy.Time.now()
             for robot_id in self.ids:
                 row = make(id=robot_id, namespace="/hero_%d" % robot_id, state=Robot.READY)
