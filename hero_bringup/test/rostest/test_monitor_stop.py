@@ -10,6 +10,7 @@ import xmlrpc.client
 import rosgraph
 import rospy
 import rostest
+from geometry_msgs.msg import Twist
 from monitor_page import MISSING, MonitorPage
 from monitor_process import (
     OTHER_HOST,
@@ -133,11 +134,28 @@ class StopTest(unittest.TestCase):
         self.set_behaviour(moving=[2])
         wait_for(lambda: self.page.banner() == (RED, "NOT STOPPED: hero_2 moves"), TIMEOUT_S, self.page.banner)
 
+    def test_a_page_drives_no_robot_until_all_are_released(self):
+        commands = []
+        rospy.Subscriber("/hero_2/velocity_controller/cmd_vel", Twist, commands.append)
+        self.page.choose("hero_2")
+        button = self.page.find("#pad [aria-label='ahead']")
+        self.page.actions().click_and_hold(button).perform()
+        wait_for(lambda: any(command.linear.x > 0 for command in commands), TIMEOUT_S, "a command")
+        # Pressed on another page, while the button is held.
+        self.other.click("#stop")
+        wait_for(lambda: commands[-1].linear.x == 0, TIMEOUT_S, "a stop")
+        self.page.wait_for_text("#notices", "all robots are stopped")
+        self.wait_for_banner(GREEN, "stopped, all wheels at rest")
+        self.assertEqual(commands[-1].linear.x, 0.0)
+        self.page.actions().release().perform()
+
     def test_a_driver_that_hangs_is_named_and_the_other_one_stops(self):
-        self.suspend(self.drivers[1].pid)
+        resume = self.suspend(self.drivers[1].pid)
         self.page.click("#stop")
         wait_for(lambda: self.reports["hero_driver"].stopped, TIMEOUT_S, "the stop of the other driver")
         self.wait_for_banner(RED, "NOT STOPPED: driver hero_driver_b does not answer")
+        resume()
+        self.wait_for_banner(GREEN, "stopped, all wheels at rest")
 
     def test_a_stop_needs_no_ros_master(self):
         pid = rosgraph.Master("/test").getPid()
