@@ -1,5 +1,6 @@
 """The fleet monitor beside the tests: asked without a browser, and a second one of one's own."""
 
+import contextlib
 import http.client
 import json
 import os
@@ -7,6 +8,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import uuid
 from pathlib import Path
 
@@ -50,6 +52,14 @@ class PageClient:
         lines += ["%s: %s" % item for item in UPGRADE.items()]
         self.socket.sendall("\r\n".join([*lines, "", ""]).encode())
         assert b"101" in self.socket.recv(12), "no socket for this page"
+        self.end = threading.Event()
+        threading.Thread(target=self.keep_open, daemon=True).start()
+
+    def keep_open(self):
+        """Answer the pings that nobody reads: the monitor closes pages that do not."""
+        with contextlib.suppress(OSError):
+            while not self.end.wait(1.0):
+                self.socket.sendall(b"\x8a\x80\0\0\0\0")
 
     def send(self, **request):
         text = json.dumps(request).encode()
@@ -57,6 +67,7 @@ class PageClient:
         self.socket.sendall(bytes([0x81, 0x80 | len(text), 0, 0, 0, 0]) + text)
 
     def close(self):
+        self.end.set()
         self.socket.close()
 
 
