@@ -28,7 +28,7 @@ STOP_STATES = {
     Robot.MOVING: "MOVING",
     Robot.UNCONFIRMED: "unconfirmed",
 }
-"""As the table shows them beside the state."""
+"""As tables show them."""
 
 
 class RobotListener:

@@ -25,7 +25,7 @@ from hero_msgs.msg import Robot
 
 from ..fleet_state import Pose, yaw_of_quaternion
 from ..fleet_table import finite
-from ..robot_listener import STATES, is_on_map, read_pose
+from ..robot_listener import STATES, STOP_STATES, is_on_map, read_pose
 from .log_thread import LogThread
 from .placement import Placement
 from .robot_feed import RobotFeed
@@ -49,13 +49,6 @@ MARKERS_MAX = 2000
 LABEL = re.compile(r"(\S+?):? ")
 """How a driver's lines about one robot begin: "hero_0: voltage low", "hero_0 left (10.42.0.7:4242): ..."."""
 
-STOP_STATES = {
-    Robot.NOT_STOPPED: "",
-    Robot.STOPPING: "stopping",
-    Robot.AT_REST: "at rest",
-    Robot.MOVING: "MOVING",
-    Robot.UNCONFIRMED: "unconfirmed",
-}
 
 
 class FleetFeed:
