@@ -186,7 +186,8 @@ class TestDriverServices(DriverCase):
         for name, service_class, arguments, reason in (
             ("set_odom", SetOdom, (float("nan"), 0.0, 0.0), "finite"),
             ("velocity_controller/pid_parameters", SetPID, (float("inf"), *GAINS[1:]), "finite"),
-            ("velocity_controller/pid_parameters", SetPID, (1e30, *GAINS[1:]), "within"),
+            ("velocity_controller/pid_parameters", SetPID, (1e30, *GAINS[1:]), "from 0 to 1e6"),
+            ("velocity_controller/pid_parameters", SetPID, (-1.0, *GAINS[1:]), "negative"),
             ("motors_parameters", SetMotor, (30000, 1500), "1000..2000"),
             ("ir_calibration", SetIRCalibration, (0.0,) * 8, "above 0"),
         ):
