@@ -25,6 +25,7 @@ TIME_PERIOD_S = 2.53
 
 LASER, IMU, ENCODER, TRANSFORMS, ODOM = 125, 127, 128, 129, 130
 LED, LASER_ENABLE, MOTOR, POSITION, VELOCITY = 100, 101, 104, 106, 109
+ZERO = bytes(48)
 
 MD5 = {
     "sensor_msgs/LaserScan": "90c7ef2dc6895d81024acba2ac42f369",
@@ -185,7 +186,8 @@ class EmulatedRobot:
             elif topic_id == frames.ID_TIME and self.synchronised_s is None:
                 self.synchronised_s = now_s
                 is_new = True
-            elif topic_id == VELOCITY:
+            elif topic_id == VELOCITY and payload != ZERO:
+                # Zeros are the driver's own: it stops robots whose commander has gone.
                 self.commands += 1
                 if self._keeps_times:
                     # The commander writes the time of sending into linear.y, which robots ignore.
