@@ -20,6 +20,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from .dimensions import BODY_DIAMETER_M, GROUND_Z_M
 from .rviz_config import CHOICE_TOPIC, GOAL_TOPIC, POINT_TOPIC
+from .start import start_node
 from .view import read_names
 
 LISTEN_S = 0.5
@@ -103,6 +104,6 @@ def main() -> None:
         names = read_names(options.robots)
     except ValueError as error:
         sys.exit("goal_choice: --robots %s: %s" % (options.robots, error))
-    rospy.init_node("goal_choice")
+    start_node("goal_choice")
     GoalChoice(names)
     rospy.spin()

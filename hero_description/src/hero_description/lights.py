@@ -15,6 +15,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from .dimensions import DECK_THICKNESS_M, LIGHT_DIAMETER_M
 from .rviz_config import LIGHTS_TOPIC
+from .start import start_node
 from .view import read_names
 
 LIGHT_S = 15.0
@@ -47,7 +48,7 @@ def main() -> None:
         names = read_names(options.robots)
     except ValueError as error:
         parser.error("--robots %s: %s" % (options.robots, error))
-    rospy.init_node("hero_lights")
+    start_node("hero_lights")
     publisher = rospy.Publisher(LIGHTS_TOPIC, MarkerArray, queue_size=len(names) + 10)
 
     def show(colour: ColorRGBA, robot: Any) -> None:

@@ -5,13 +5,15 @@ import math
 import rospy
 from sensor_msgs.msg import JointState
 
+from .start import start_node
+
 RATE_HZ = 20.0
 TURN_RAD_S = 0.5
 
 
 def main() -> None:
     """Run the program turn_wheels."""
-    rospy.init_node("turn_wheels")
+    start_node("turn_wheels")
     publisher = rospy.Publisher("joint_states", JointState, queue_size=2)
     message = JointState(name=["left_wheel_joint", "right_wheel_joint"])
     angle_rad = 0.0
