@@ -40,6 +40,8 @@ class DoorsTest(unittest.TestCase):
         cls.stopped = {}
         for name in ("hero_driver", "hero_driver_b"):
             rospy.Subscriber("/%s/robots" % name, RobotArray, cls.receive, name)
+        # A driver that starts after a stop was confirmed is not asked.
+        wait_for(lambda: len(cls.stopped) == 2, TIMEOUT_S, "both drivers")
 
     @classmethod
     def tearDownClass(cls):

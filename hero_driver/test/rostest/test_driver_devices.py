@@ -162,6 +162,8 @@ class TestDriverDevices(OwnDriverCase):
         texts = Recorder("/chatter", String)
         robot.send_frame(125, make_text("still here"))
         texts.wait_count(1)
+        sent = rospy.Time.now()
+        wait_for(lambda: driver.fleet.newest.header.stamp > sent, "a report of after that")
         self.assertTrue(driver.fleet.newest.stopped)
         self.assertEqual(list_publishers("/fleet") + list_publishers("/clock"), [])
 
