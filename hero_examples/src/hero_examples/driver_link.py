@@ -52,11 +52,17 @@ class DriverLink:
                 return False
             return self._reports.get_num_connections() > 0
 
-    def request_stop(self, stopped: bool) -> None:
-        """Ask the driver to stop its robots, or to release them; rospy sends on a thread per connection."""
+    def request_stop(self, stopped: bool) -> bool:
+        """Ask the driver to stop its robots, or to release them; return whether it is connected.
+
+        rospy sends on a thread per connection.
+        """
         with self._lock:
-            if not self._is_closed:
-                self._requests.publish(stopped)
+            if self._is_closed:
+                return False
+            is_connected = bool(self._requests.get_num_connections() > 0)
+            self._requests.publish(stopped)
+            return is_connected
 
     def close(self) -> None:
         """Close the topics; waits for the ROS master. Safe twice."""

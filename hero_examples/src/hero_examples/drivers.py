@@ -158,7 +158,7 @@ class Drivers:
     def request_stop(self, stopped: bool) -> None:
         """Ask all drivers to stop all their robots, or to release them; returns at once.
 
-        Each is asked again until it reports that it did.
+        Each is asked again until it reports that it stopped; for a release each is asked once.
         """
         self._request = StopRequest(stopped, time.monotonic())
         self._wake.set()
@@ -189,8 +189,8 @@ class Drivers:
             if request is not None:
                 request.update(self._read_replies(request, now_s), self._has_looked.is_set(), now_s)
                 for link in self._links.values():
-                    if request.is_open_to(link.driver):
-                        link.request_stop(request.stopped)
+                    if request.is_open_to(link.driver) and link.request_stop(request.stopped):
+                        request.note_asked(link.driver)
             self._wake.wait(None if request is None or request.is_over else ASK_PERIOD_S)
             self._wake.clear()
 

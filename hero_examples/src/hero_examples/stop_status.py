@@ -51,6 +51,7 @@ class StopRequest:
         self.made_s = made_s
         self.is_over = False
         self._taken: Set[str] = set()
+        self._asked: Set[str] = set()
 
     def update(self, replies: Sequence[DriverReply], all_found: bool, now_s: float) -> None:
         """Take the replies of the drivers that are known.
@@ -69,8 +70,17 @@ class StopRequest:
         self.is_over = self.is_over or all_taken or (not self.stopped and self._is_late(now_s))
 
     def is_open_to(self, driver: str) -> bool:
-        """Return whether a driver is to be asked, for the first time or again."""
-        return not self.is_over and driver not in self._taken
+        """Return whether a driver is to be asked, for the first time or again.
+
+        For a release it is asked once: a repetition could undo the stop of another program that came in between.
+        """
+        if self.is_over or driver in self._taken:
+            return False
+        return self.stopped or driver not in self._asked
+
+    def note_asked(self, driver: str) -> None:
+        """A driver was asked, over a connection that stands."""
+        self._asked.add(driver)
 
     def _is_late(self, now_s: float) -> bool:
         return now_s - self.made_s >= TIME_LIMIT_S

@@ -155,3 +155,13 @@ def test_a_driver_that_falls_silent_after_the_stop_is_named():
     request = StopRequest(True, 0.0)
     request.update([make_reply(A, rest(0))], True, SOON_S)
     assert request.describe([silent(A)], LATE_S).text == "NOT STOPPED: driver hero_driver does not answer"
+
+
+@pytest.mark.parametrize(("stopped", "is_asked_again"), [(True, True), (False, False)])
+def test_a_stop_is_asked_for_again_and_a_release_is_not(stopped, is_asked_again):
+    request = StopRequest(stopped, 0.0)
+    assert request.is_open_to(A)
+    request.note_asked(A)
+    request.update([make_reply(A, stopped=not stopped)], True, SOON_S)
+    assert request.is_open_to(A) == is_asked_again
+    assert request.is_open_to(B)
