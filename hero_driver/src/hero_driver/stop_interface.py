@@ -40,12 +40,14 @@ class StopInterface:
         self._call_soon = call_soon
         self._list_robots = list_robots
         self._log = log
+        self._stopped = False  # as programs asked; at its end the driver stops robots without being asked
         self._publisher: rospy.Publisher
         self._service: rospy.Service
         self._keeper = Worker("stop parameter", 100, self._report_lost_parameter)
 
     def open(self, stopped: bool) -> None:
         """Serve; begin as stopped says. The loop does not run yet."""
+        self._stopped = stopped
         self._gateway.set_stopped(stopped)
         if stopped:
             self._log.log("warn", "all robots are stopped from the start, until ~stop releases them")
@@ -56,7 +58,7 @@ class StopInterface:
 
     def keep(self) -> None:
         """Write down whether robots are stopped, after each change and for a ROS master that was started again."""
-        self._keeper.submit(lambda: rospy.set_param(PARAMETER, self._gateway.stopped))
+        self._keeper.submit(lambda: rospy.set_param(PARAMETER, self._stopped))
 
     def close(self) -> None:
         """Keep nothing any more; safe to call twice."""
@@ -86,6 +88,7 @@ class StopInterface:
         changed = stopped is not self._gateway.stopped
         if not changed and not stopped:
             return
+        self._stopped = stopped
         self._gateway.set_stopped(stopped)
         if changed:
             # Published and written elsewhere: both may block.
