@@ -14,7 +14,7 @@ import rosgraph
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
-BENCH = ROOT / "hero_driver" / "bench"
+BENCH = ROOT / "bench"
 DEADLINE_S = 30.0
 EMULATED_NAMES = 11
 STOCK_NAMES = 18

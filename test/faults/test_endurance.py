@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 import rospy
-from driver_bench import read_one_cpu_s
 from driver_case import Recorder
 from fake_robot import FakeRobot
+from measuring import read_one_cpu_s
 from rig import (
     BENCH,
     EMULATED_NAMES,

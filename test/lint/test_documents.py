@@ -160,7 +160,7 @@ def test_every_script_and_its_options_exist(words):
     path = sources.ROOT / "script" / words[0].split("/")[-1]
     assert path.is_file(), f"there is no script/{path.name}"
     text = path.read_text(encoding="utf-8")
-    programs = re.findall(r"[\w/]+\.py", text) + [f"hero_driver/bench/{word}_bench.py" for word in words[1:]]
+    programs = re.findall(r"[\w/]+\.py", text) + [f"bench/{word}_bench.py" for word in words[1:]]
     text += "".join((sources.ROOT / name).read_text() for name in programs if (sources.ROOT / name).is_file())
     for word in words[1:]:
         option = re.match(r"^(--[\w-]+)", word)

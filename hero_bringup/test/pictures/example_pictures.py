@@ -24,9 +24,9 @@ from hero_sim.arena_file import load_arena
 
 BRINGUP = Path(__file__).resolve().parents[2]
 TESTS = BRINGUP / "test" / "rostest"
-sys.path += [str(BRINGUP / "bench"), str(TESTS)]
+sys.path += [str(BRINGUP.parent / "bench"), str(TESTS)]
 from light_watch import LightWatch  # noqa: E402
-from stage import Stage  # noqa: E402
+from running_suite import RunningSuite  # noqa: E402
 from swarm_watch import SwarmWatch  # noqa: E402
 
 DOCS = BRINGUP.parent / "hero_examples" / "docs"
@@ -43,7 +43,7 @@ class Recording:
     def __init__(self, robots, arena, *arguments):
         """robots: how many. arena: a name or a file. arguments: more of hero_bringup.launch."""
         self.arena = load_arena(arena)
-        self.stage = Stage(robots, "sim_arena:=" + arena, *arguments)
+        self.stage = RunningSuite(robots, "sim_arena:=" + arena, *arguments)
         self.watch = SwarmWatch(range(robots))
         self.watch.wait_until_complete()
         self.first = {}

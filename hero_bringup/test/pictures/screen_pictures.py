@@ -15,11 +15,11 @@ import numpy as np
 from picture_program import make_pictures
 
 BRINGUP = Path(__file__).resolve().parents[2]
-sys.path += [str(BRINGUP / "bench"), str(BRINGUP / "test" / "rostest"), str(BRINGUP.parent / "hero_driver" / "bench")]
-from driver_bench import find_free_port  # noqa: E402
+sys.path += [str(BRINGUP.parent / "bench"), str(BRINGUP / "test" / "rostest")]
+from measuring import find_free_port  # noqa: E402
 from monitor_page import MISSING as NO_BROWSER  # noqa: E402
 from monitor_page import MonitorPage  # noqa: E402
-from stage import Stage  # noqa: E402
+from running_suite import RunningSuite  # noqa: E402
 from virtual_screen import MISSING, VirtualScreen  # noqa: E402
 
 PICTURES_FOLDER = BRINGUP.parent / "docs" / "pictures"
@@ -50,7 +50,7 @@ def photograph_rviz(picture, robots, arena):
     screen = VirtualScreen(*SCREEN)
     os.environ.update(screen.environment())
     try:
-        with Stage(robots, "sim_arena:=" + arena) as stage:
+        with RunningSuite(robots, "sim_arena:=" + arena) as stage:
             stage.start_example("random_walk", "_robots:=0-%d" % (robots - 1), "_seed:=4")
             launch = ["roslaunch", "--no-summary", "hero_description", "swarm.launch", "robots:=%d" % robots]
             stage.start(launch, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
@@ -64,7 +64,7 @@ def photograph_rviz(picture, robots, arena):
 def photograph_monitor(picture, robots, arena):
     """Let robots walk in an arena, and save the page of the fleet monitor, with one robot chosen."""
     port = find_free_port()
-    with Stage(robots, "sim_arena:=" + arena) as stage:
+    with RunningSuite(robots, "sim_arena:=" + arena) as stage:
         stage.start_example("random_walk", "_robots:=0-%d" % (robots - 1), "_seed:=4")
         stage.start(["rosrun", "hero_bringup", "monitor", "_port:=%d" % port, "_control:=true"])
         stage.wait_for(lambda: is_open(port), "the monitor")

@@ -12,8 +12,8 @@ from nav_msgs.msg import Odometry
 from picture_program import make_pictures
 
 BRINGUP = Path(__file__).resolve().parents[2]
-sys.path += [str(BRINGUP / "bench"), str(BRINGUP / "test" / "rostest")]
-from stage import Stage  # noqa: E402
+sys.path += [str(BRINGUP.parent / "bench"), str(BRINGUP / "test" / "rostest")]
+from running_suite import RunningSuite  # noqa: E402
 from virtual_screen import MISSING, VirtualScreen  # noqa: E402
 
 PICTURES_FOLDER = BRINGUP.parent / "docs" / "tutorial" / "pictures"
@@ -35,7 +35,7 @@ def odometry(picture):
     screen = VirtualScreen(*SCREEN)
     os.environ.update(screen.environment())
     try:
-        with Stage(0) as stage:
+        with RunningSuite(0) as stage:
             poses = []
             rospy.Subscriber("/odom", Odometry, lambda message: poses.append(message.pose.pose.position), queue_size=10)
             start_lesson(stage, "odometry_node_solution.py")
@@ -50,7 +50,7 @@ def odometry(picture):
 
 def walk(picture):
     """The plot that the lesson on recording makes."""
-    with Stage(1, "sim_options:=--first-id 3") as stage, tempfile.TemporaryDirectory() as folder:
+    with RunningSuite(1, "sim_options:=--first-id 3") as stage, tempfile.TemporaryDirectory() as folder:
         start_lesson(stage, "random_walk.py", "_robot:=hero_3")
         rospy.wait_for_message("/hero_3/odom", Odometry, timeout=30.0)
         bag = folder + "/walk.bag"

@@ -4,15 +4,14 @@ driver."""
 
 import json
 import math
-import os
 import signal
 import subprocess
 import sys
 import threading
 import time
 import unittest
+from pathlib import Path
 
-import rospkg
 import rospy
 import rostest
 from geometry_msgs.msg import Twist
@@ -117,7 +116,7 @@ class SimulatorTest(unittest.TestCase):
 
     def test_robots_from_elsewhere_and_simulated_ones_share_a_driver(self):
         """A robot that is none of ours stands for a real one: another program, which knows no simulator."""
-        program = os.path.join(rospkg.RosPack().get_path("hero_driver"), "bench", "emulated_swarm.py")
+        program = Path(__file__).resolve().parents[3] / "bench" / "emulated_swarm.py"
         command = [sys.executable, program, "--port", "21081", "--first-id", "100", "--robots", "1"]
         other = subprocess.Popen([*command, "--seconds", "60"], stdout=subprocess.PIPE)
         try:

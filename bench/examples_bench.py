@@ -4,7 +4,6 @@ Every program drives all robots at once, for real: random obstacles, goals, form
 """
 
 import argparse
-import json
 import os
 import pty
 import signal
@@ -13,13 +12,14 @@ import sys
 import tempfile
 import threading
 import time
+from pathlib import Path
 
 import rospy
+from measuring import measure_machine_us, print_machine, read_cpu_s, write_report
+from running_suite import RunningSuite
 from sensor_msgs.msg import Joy
-from stage import Stage
 
-sys.path.append(os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, "test", "rostest"))
-from driver_bench import measure_machine_us, read_cpu_s
+sys.path.append(str(Path(__file__).resolve().parents[1] / "hero_bringup" / "test" / "rostest"))
 from swarm_watch import SwarmWatch
 
 SETTLE_S = 4.0
@@ -90,12 +90,12 @@ class Hands:
             continue
 
 
-def measure(stage, case, robots, seconds, commands, truth):
+def measure(suite, case, robots, seconds, commands, truth):
     """Return the figures of one program."""
     program, arguments = case
     topic = "/led" if program == "led_show" else "/cmd_vel"
     hands = Hands() if program.startswith("teleop") else None
-    process = stage.start_example(
+    process = suite.start_example(
         program,
         "__name:=" + program,
         *arguments,
@@ -103,7 +103,7 @@ def measure(stage, case, robots, seconds, commands, truth):
         stdout=hands.slave_fd if hands else subprocess.DEVNULL,
     )
     before = sum(commands.take_out(topic))
-    stage.wait_for(lambda: sum(commands.take_out(topic)) > before + robots, "commands of " + program)
+    suite.wait_for(lambda: sum(commands.take_out(topic)) > before + robots, "commands of " + program)
     time.sleep(SETTLE_S)
     counts, cpu_s, start_s = commands.take_out(topic), read_cpu_s(process.pid), time.monotonic()
     time.sleep(seconds)
@@ -117,7 +117,7 @@ def measure(stage, case, robots, seconds, commands, truth):
     process.send_signal(signal.SIGINT)
     process.wait(END_TIMEOUT_S)
     ended_s = time.monotonic() - end_s
-    stage.wait_for(lambda: truth.at_rest(*truth.rows), "robots at rest", 10.0)
+    suite.wait_for(lambda: truth.at_rest(*truth.rows), "robots at rest", 10.0)
     rest_s = time.monotonic() - end_s
     if hands:
         hands.ended.set()
@@ -138,26 +138,25 @@ def main():
     parser.add_argument("--json", help="write the figures to this file, too")
     options = parser.parse_args()
     machine_us = measure_machine_us()
+    print_machine(machine_us)
     results = {}
-    with Stage(options.robots) as stage:
+    with RunningSuite(options.robots) as suite:
         commands = CommandCount(options.robots)
         truth = SwarmWatch(range(options.robots))
         truth.wait_until_complete()
-        print("%d robots; sum of 768 bytes: %.1f us\n" % (options.robots, machine_us))
-        print("| program | CPU of one core | commands per robot | ended after Ctrl-C | robots at rest |")
+        print("%d robots" % options.robots)
+        print("| program | CPU of one core | commands per robot | ended after Ctrl-C | robots stopped |")
         print("|---|---|---|---|---|", flush=True)
         for title, case in list_cases(options.robots).items():
             if options.only in title:
-                found = measure(stage, case, options.robots, options.seconds, commands, truth)
+                found = measure(suite, case, options.robots, options.seconds, commands, truth)
                 results[title] = found
                 print(
                     "| %s | %.1f %% | %.1f..%.1f Hz | %.2f s | %.2f s |"
                     % (title, found["cpu_percent"], *found["rate_hz"], found["ended_s"], found["at_rest_s"]),
                     flush=True,
                 )
-    if options.json:
-        with open(options.json, "w", encoding="utf-8") as file:
-            json.dump({"robots": options.robots, "sum_us": machine_us, "programs": results}, file, indent=1)
+    write_report(options.json, machine_us, robots=options.robots, programs=results)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,8 @@
 """Loads a rosserial TCP server with an emulated swarm and prints one table, and JSON with --json.
 
-Starts its own ROS master and the server (with --port it takes those that run), listeners and commanders, each in
-a process of its own; CPU time is taken from the operating system's accounting (/proc). Run it with script/bench driver.
+Starts its own ROS master and the server (with --port it takes those that run), listeners and commanders, each in its
+own process; CPU time comes from the operating system's accounting (/proc). With --against, the driver and the one of
+another workspace are measured in turn, round by round: both meet the same machine. Run it with script/bench driver.
 """
 
 import argparse
@@ -9,128 +10,34 @@ import contextlib
 import csv
 import json
 import os
-import signal
-import socket
 import statistics
 import subprocess
 import sys
 import time
-import timeit
 from pathlib import Path
 
 import rosgraph
+from measuring import (
+    find_free_port,
+    find_tree,
+    measure_machine_us,
+    percentile_ms,
+    print_machine,
+    read_all_cpu_s,
+    read_cpu_s,
+    read_memory_mb,
+    start,
+    start_master,
+    stop,
+    wait_for_port,
+    write_report,
+)
 
 LISTENING = "0A"  # state of a socket in /proc/net/tcp, TCP_LISTEN of the kernel
 HERE = Path(__file__).resolve().parent
-TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 SETTLE_S = 3.0
 
 DRIVER_COMMAND = "rosrun hero_driver hero_driver _port:={port}"
-
-
-def find_free_port():
-    """Return a TCP port that is free now."""
-    with socket.socket() as sock:
-        sock.bind(("127.0.0.1", 0))
-        return sock.getsockname()[1]
-
-
-def measure_machine_us():
-    """Return the time (us) of summing 768 bytes, by which CPU figures of machines are compared."""
-    data = bytes(range(256)) * 3
-    return min(timeit.repeat(lambda: sum(data), number=20000, repeat=5)) / 20000 * 1e6
-
-
-def read_all_cpu_s():
-    """Return the CPU seconds by process of everything that runs on this machine.
-
-    /proc/stat would be shorter, but counts whole ticks of the clock: between them it sees nothing of short work.
-    """
-    return {
-        int(entry.name): read_one_cpu_s(entry.name)
-        for entry in Path("/proc").iterdir()
-        if entry.name.isdigit()
-    }
-
-
-def read_one_cpu_s(pid):
-    """Return the CPU seconds that one process has used, 0 if it has ended."""
-    try:
-        fields = Path("/proc/%s/stat" % pid).read_text().rpartition(")")[2].split()
-    except OSError:
-        return 0.0
-    return (int(fields[11]) + int(fields[12])) / TICKS_PER_S
-
-
-def find_tree(pid):
-    """Return pid and all its descendants."""
-    children = {}
-    for entry in Path("/proc").iterdir():
-        if entry.name.isdigit():
-            try:
-                parent = int((entry / "stat").read_text().rpartition(")")[2].split()[1])
-            except (OSError, ValueError):
-                continue
-            children.setdefault(parent, []).append(int(entry.name))
-    found, todo = [], [pid]
-    while todo:
-        found.append(todo.pop())
-        todo += children.get(found[-1], [])
-    return found
-
-
-def read_cpu_s(pid):
-    """Return the CPU seconds that the process tree of pid has used."""
-    return sum(read_one_cpu_s(member) for member in find_tree(pid))
-
-
-def read_memory_mb(pid):
-    """Return the resident memory (MB) of the process tree of pid."""
-    total_kb = 0
-    for member in find_tree(pid):
-        try:
-            lines = Path("/proc/%d/status" % member).read_text().splitlines()
-        except OSError:
-            continue
-        total_kb += sum(int(line.split()[1]) for line in lines if line.startswith("VmRSS"))
-    return total_kb / 1000.0
-
-
-def percentile_ms(values_s, share):
-    """Return a percentile (ms) of sorted values, None for none."""
-    return None if not values_s else values_s[min(len(values_s) - 1, int(share * len(values_s)))] * 1e3
-
-
-def wait_for_port(port, process):
-    """Return when something listens on port."""
-    deadline_s = time.monotonic() + 30.0
-    while time.monotonic() < deadline_s and process.poll() is None:
-        with socket.socket() as sock:
-            if sock.connect_ex(("127.0.0.1", port)) == 0:
-                return
-        time.sleep(0.05)
-    raise SystemExit(
-        "bench: %s does not listen on port %d; start it by hand to see why" % (" ".join(process.args), port)
-    )
-
-
-def start(command, environment, **options):
-    """Start a program in a process group of its own."""
-    try:
-        return subprocess.Popen(command, env=environment, start_new_session=True, text=True, **options)
-    except OSError as error:
-        raise SystemExit("bench: %s cannot be started: %s" % (command[0], error.strerror)) from error
-
-
-def stop(process, number=signal.SIGINT):
-    """End a program and return what it printed."""
-    if process.poll() is None:
-        os.killpg(process.pid, number)
-    try:
-        return process.communicate(timeout=15)[0]
-    except subprocess.TimeoutExpired:
-        os.killpg(process.pid, signal.SIGKILL)
-        return process.communicate()[0]
 
 
 def find_settling_s(count):
@@ -156,7 +63,7 @@ def find_listener(port):
 
 
 @contextlib.contextmanager
-def serve(options, environment):
+def serve(options, server_command, environment):
     """Give pairs of process id and port of the servers, which listen; those started here end afterwards."""
     if options.port:
         yield [(find_listener(options.port), options.port)]
@@ -165,7 +72,7 @@ def serve(options, environment):
     try:
         for index in range(options.drivers):
             port = find_free_port()
-            command = options.server_command.format(port=port).split()
+            command = server_command.format(port=port).split()
             if index:
                 # A second node of one name would end the first.
                 command.append("__name:=hero_driver_%d" % index)
@@ -203,10 +110,10 @@ def collect(swarms):
     return dict(total, joined_s=None if None in joined_s else max(joined_s))
 
 
-def run_once(options, count, environment):
+def run_once(options, server_command, count, environment):
     """Return the figures of one run with count robots."""
     load = [sys.executable, str(HERE / "ros_load.py")]
-    with serve(options, environment) as servers:
+    with serve(options, server_command, environment) as servers:
         # The probe of the port was a connection too: let the server forget it.
         time.sleep(1.0)
         arguments = ["--robots", str(0 if options.unheard else count)]
@@ -280,10 +187,10 @@ ROWS = (
 )
 
 
-def print_table(results, machine_us):
-    """Print medians over the repeats, one column for each number of robots."""
-    print("sum of 768 bytes: %.2f us, load of the last minute: %.2f" % (machine_us, os.getloadavg()[0]))
-    print("| | %s |" % " | ".join("%d robots" % result["robots"] for result in results))
+def print_table(results):
+    """Print medians over the rounds, one column for each server and number of robots."""
+    heads = ["%d robots%s" % (result["robots"], result["server"] and ", " + result["server"]) for result in results]
+    print("| | %s |" % " | ".join(heads))
     print("|---|%s" % ("---|" * len(results)))
     for title, key, form in ROWS:
         cells = ["-" if result[key] is None else form % result[key] for result in results]
@@ -310,12 +217,39 @@ def append_history(path, results, machine_us):
 
 
 def take_medians(runs):
-    """Return one result from several."""
+    """Return one result from several runs of one server with the same number of robots."""
     result = {}
     for key in runs[0]:
         values = [run[key] for run in runs if run[key] is not None]
         result[key] = statistics.median(values) if values else None
     return result
+
+
+def find_driver_command(workspace):
+    """Return the command that starts the driver of a built workspace, or of a checkout that script/test has built.
+
+    Raises: SystemExit if there is none.
+    """
+    for folder in (workspace, workspace / ".work" / "ws"):
+        environment = folder / "devel" / "env.sh"
+        if environment.is_file():
+            return "%s %s" % (environment.resolve(), DRIVER_COMMAND)
+    raise SystemExit(
+        "bench: %s is not a built workspace; in a checkout, script/test unit builds one" % workspace
+    )
+
+
+def measure_all(options, commands):
+    """Return the medians for each number of robots and server; the servers take turns in every round."""
+    results = []
+    with use_master(options) as environment:
+        for count in options.robots:
+            runs = {name: [] for name in commands}
+            for _ in range(options.rounds):
+                for name, command in commands.items():
+                    runs[name].append(run_once(options, command, count, environment))
+            results += [{"server": name, **take_medians(runs[name])} for name in commands]
+    return results
 
 
 @contextlib.contextmanager
@@ -325,15 +259,8 @@ def use_master(options):
         refuse_robots()
         yield dict(os.environ)
         return
-    port = find_free_port()
-    environment = dict(os.environ, ROS_MASTER_URI="http://localhost:%d" % port)
-    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    master = start(["roscore", "-p", str(port)], environment, **quiet)
-    try:
-        wait_for_port(port, master)
+    with start_master() as environment:
         yield environment
-    finally:
-        stop(master)
 
 
 def refuse_robots():
@@ -355,7 +282,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--robots", type=int, nargs="+", default=[20, 50, 100])
     parser.add_argument("--seconds", type=float, default=10.0, help="measured time of one run")
-    parser.add_argument("--repeats", type=int, default=1, help="runs of which the median is printed")
+    parser.add_argument("--rounds", type=int, default=1, help="runs of each server, whose median is printed")
     parser.add_argument("--drivers", type=int, default=1, help="servers, each with its share of the robots")
     parser.add_argument("--speed", type=float, default=1.0, help="multiplies the rates of the robots")
     parser.add_argument("--unheard", action="store_true", help="nobody listens or commands, but for /tf")
@@ -366,6 +293,12 @@ def main():
     server = parser.add_mutually_exclusive_group()
     server.add_argument("--server-command", default=DRIVER_COMMAND, help="{port} stands for the port")
     server.add_argument(
+        "--against",
+        type=Path,
+        metavar="DIR",
+        help="measure the driver of the workspace DIR, or of the checkout DIR, in turn with this one",
+    )
+    server.add_argument(
         "--port",
         type=int,
         help="a server that runs on this machine, under the ROS master of ROS_MASTER_URI, and has no robots yet",
@@ -375,18 +308,18 @@ def main():
     options = parser.parse_args()
     if options.port and options.drivers != 1:
         parser.error("--drivers %d: --port measures the one server that runs there" % options.drivers)
+    if options.against and options.history:
+        parser.error("--history is for one driver: leave --against out")
+    commands = {"": options.server_command}
+    if options.against:
+        commands = {"this driver": DRIVER_COMMAND, "the other": find_driver_command(options.against)}
     machine_us = measure_machine_us()
-    results = []
-    with use_master(options) as environment:
-        for count in options.robots:
-            runs = [run_once(options, count, environment) for _ in range(options.repeats)]
-            results.append(take_medians(runs))
-    print_table(results, machine_us)
+    print_machine(machine_us)
+    results = measure_all(options, commands)
+    print_table(results)
     if options.history:
         append_history(options.history, results, machine_us)
-    if options.json:
-        report = {"sum_of_768_bytes_us": machine_us, "load_average": os.getloadavg(), "results": results}
-        Path(options.json).write_text(json.dumps(report, indent=2) + "\n")
+    write_report(options.json, machine_us, results=results)
 
 
 if __name__ == "__main__":

@@ -5,25 +5,25 @@ Starts its own ROS master; CPU time is taken from the operating system's account
 
 import argparse
 import asyncio
+import contextlib
 import json
-import os
-import sys
+import subprocess
 import time
-from pathlib import Path
 
-from tornado.httpclient import HTTPRequest
-from tornado.websocket import websocket_connect
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "hero_driver" / "bench"))
-from driver_bench import (
+from measuring import (
     find_free_port,
     measure_machine_us,
+    print_machine,
     read_cpu_s,
     read_memory_mb,
     start,
+    start_master,
     stop,
     wait_for_port,
+    write_report,
 )
+from tornado.httpclient import HTTPRequest
+from tornado.websocket import websocket_connect
 
 SETTLE_S = 5.0
 JOIN_TIMEOUT_S = 60.0
@@ -106,30 +106,28 @@ def main():
     parser.add_argument("--seconds", type=float, default=10.0, help="measured time of each row")
     parser.add_argument("--json", metavar="FILE", help="write the figures there")
     options = parser.parse_args()
-    master_port, driver_port, port = find_free_port(), find_free_port(), find_free_port()
-    environment = dict(os.environ, ROS_MASTER_URI="http://localhost:%d" % master_port)
-    quiet = {"stdout": os.open(os.devnull, os.O_WRONLY), "stderr": os.open(os.devnull, os.O_WRONLY)}
     machine_us = measure_machine_us()
-    started = []
-    try:
-        started.append(start(["roscore", "-p", str(master_port)], environment, **quiet))
-        wait_for_port(master_port, started[-1])
-        launch = ["roslaunch", "hero_bringup", "hero_bringup.launch", "host:=127.0.0.1", "port:=%d" % driver_port]
-        started.append(start([*launch, "sim:=%d" % options.robots], environment, **quiet))
-        walk = ["roslaunch", "hero_examples", "random_walk.launch", "robots:=0-%d" % (options.robots - 1)]
-        started.append(start(walk, environment, **quiet))
-        monitor = start(["rosrun", "hero_bringup", "monitor", "_port:=%d" % port], environment, **quiet)
-        started.append(monitor)
+    print_machine(machine_us)
+    driver_port, port = find_free_port(), find_free_port()
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    with start_master() as environment, contextlib.ExitStack() as started:
+
+        def run(*command):
+            process = start(command, environment, **quiet)
+            started.callback(stop, process)
+            return process
+
+        run(
+            "roslaunch", "hero_bringup", "hero_bringup.launch", "host:=127.0.0.1", "port:=%d" % driver_port,
+            "sim:=%d" % options.robots,
+        )
+        run("roslaunch", "hero_examples", "random_walk.launch", "robots:=0-%d" % (options.robots - 1))
+        monitor = run("rosrun", "hero_bringup", "monitor", "_port:=%d" % port)
         wait_for_port(port, monitor)
-        print("sum of 768 bytes: %.2f us; %d robots" % (machine_us, options.robots))
-        print("| | CPU of one core | updates/s of each page | to each page | memory |\n|---|---|---|---|---|")
+        print("| %d robots | CPU of one core | updates/s of each page | to each page | memory |" % options.robots)
+        print("|---|---|---|---|---|")
         rows = asyncio.run(measure_all(monitor, port, options))
-    finally:
-        for process in reversed(started):
-            stop(process)
-    if options.json:
-        report = {"sum_of_768_bytes_us": machine_us, "robots": options.robots, "rows": rows}
-        Path(options.json).write_text(json.dumps(report, indent=2) + "\n")
+    write_report(options.json, machine_us, robots=options.robots, rows=rows)
 
 
 if __name__ == "__main__":

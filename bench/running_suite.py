@@ -1,24 +1,20 @@
-"""A ROS master, the driver and simulated robots as one thing, for programs that measure or record the examples."""
+"""A ROS master, the driver and simulated robots, for programs that measure or record the examples."""
 
 import os
 import subprocess
-import sys
 import time
-from pathlib import Path
 
 import rosgraph
 import rospy
+from measuring import find_free_port, start, stop
 
 from hero_msgs.msg import RobotArray
-
-sys.path.append(str(Path(__file__).resolve().parents[2] / "hero_driver" / "bench"))
-from driver_bench import find_free_port, start, stop
 
 READY_TIMEOUT_S = 60.0
 
 
-class Stage:
-    """Robots that are ready, until close(). This process is a ROS node then, so there is one stage in its life."""
+class RunningSuite:
+    """Robots that are ready, until close(). This process is a ROS node then, so it has one suite in its life."""
 
     def __init__(self, robots, *arguments):
         """Start robots simulated robots; arguments: more of hero_bringup.launch, e.g. sim_arena:=obstacles."""
@@ -32,7 +28,7 @@ class Stage:
         )
         try:
             self.wait_for(rosgraph.is_master_online, "a ROS master")
-            rospy.init_node("stage", disable_signals=True)
+            rospy.init_node("running_suite", disable_signals=True)
             newest = []
             subscriber = rospy.Subscriber("/hero_driver/robots", RobotArray, newest.append, queue_size=1)
             self.wait_for(
@@ -52,10 +48,10 @@ class Stage:
             if value:
                 return value
             time.sleep(0.02)
-        raise SystemExit("waited in vain for " + what)
+        raise SystemExit("bench: waited in vain for " + what)
 
     def start(self, command, **options):
-        """Start a program that ends with the stage."""
+        """Start a program that ends with the suite."""
         process = start(command, dict(os.environ), **options)
         self.processes.append(process)
         return process

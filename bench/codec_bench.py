@@ -5,6 +5,7 @@ import time
 import timeit
 
 import emulated_swarm
+from measuring import measure_machine_us, print_machine
 
 from hero_driver.cleaning import CleaningSettings, MessageCleaner
 from hero_driver.message_types import apply_aliases
@@ -69,6 +70,7 @@ def main():
             for topic, payload in events:
                 topic.receive(payload, start_ns + index * BURST_NS)
 
+    print_machine(measure_machine_us())
     print(
         "bytes of a burst: %d (odom, 5 transforms, encoder), 29.4 bursts per robot and second"
         % len(bursts[0])

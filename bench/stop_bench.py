@@ -17,6 +17,15 @@ from pathlib import Path
 
 import rosgraph
 import rospy
+from measuring import (
+    find_free_port,
+    measure_machine_us,
+    percentile_ms,
+    print_machine,
+    wait_for_port,
+    write_report,
+)
+from running_suite import RunningSuite
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 from tornado.httpclient import HTTPRequest
@@ -24,18 +33,13 @@ from tornado.websocket import websocket_connect
 
 from hero_examples.drivers import Drivers
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "hero_driver" / "bench"))
-from driver_bench import find_free_port, measure_machine_us, percentile_ms, wait_for_port
-from stage import Stage
-
 HERE = Path(__file__).resolve().parent
-ROS_LOAD = HERE.parents[1] / "hero_driver" / "bench" / "ros_load.py"
 POLL_S = 0.02
 SETTLE_S = 2.0
 LIMIT_S = 5.0
 REST_GOAL_S = 0.3
 HALF_OPEN = 100
-WAYS = ("topic", "service", "program", "monitor")
+METHODS = ("topic", "service", "program", "monitor")
 CONDITIONS = ("undisturbed", "hung master", "half-open connections", "hung driver")
 
 
@@ -71,14 +75,15 @@ class Page:
 class Swarm:
     """The robots, in a process of their own."""
 
-    def __init__(self, stage, robots):
+    def __init__(self, suite, robots):
         """Start them and what commands them; return when all move."""
-        command = [sys.executable, str(HERE / "stopped_swarm.py"), "--robots", str(robots), "--port", str(stage.port)]
+        command = [sys.executable, str(HERE / "stopped_swarm.py"), "--robots", str(robots), "--port", str(suite.port)]
         command += ["--arena", "empty", "--flash-dir", "none", "--quiet"]
-        self._process = stage.start(command, stdin=-1, stdout=-1)
-        stage.start([sys.executable, str(ROS_LOAD), "command", "--speed", "0.1", "--robots", str(robots)], stdout=-1)
+        self._process = suite.start(command, stdin=-1, stdout=-1)
+        load = [sys.executable, str(HERE / "ros_load.py"), "command", "--speed", "0.1", "--robots", str(robots)]
+        suite.start(load, stdout=-1)
         self.robots = robots
-        stage.wait_for(lambda: self.ask("read")["moving"] == robots, "%d robots that move" % robots)
+        suite.wait_for(lambda: self.ask("read")["moving"] == robots, "%d robots that move" % robots)
 
     def ask(self, command):
         """Return the answer to mark or read."""
@@ -104,12 +109,12 @@ def measure_press(swarm, stop):
     ]
 
 
-def measure_row(stage, swarm, title, stop, presses):
+def measure_row(suite, swarm, title, stop, presses):
     """Press so often; print and return one row."""
     samples = []
     for _ in range(presses):
         stop(False)
-        stage.wait_for(lambda: swarm.ask("read")["moving"] == swarm.robots, "all robots to move")
+        suite.wait_for(lambda: swarm.ask("read")["moving"] == swarm.robots, "all robots to move")
         samples += measure_press(swarm, stop)
     stop(False)
     kept = [sample for sample in samples if None not in sample]
@@ -133,14 +138,14 @@ def measure_row(stage, swarm, title, stop, presses):
 
 
 @contextlib.contextmanager
-def disturbed(stage, condition):
+def disturbed(suite, condition):
     """Let something hang."""
     frozen = []
     with contextlib.ExitStack() as stack:
         if condition == "hung master":
             frozen.append(rosgraph.Master("/bench").getPid())
         elif condition == "hung driver":
-            frozen.append(stage.start_second_driver())
+            frozen.append(suite.start_second_driver())
             time.sleep(SETTLE_S)
         elif condition == "half-open connections":
             uri = rosgraph.Master("/bench").lookupService("/hero_driver/stop")
@@ -156,16 +161,16 @@ def disturbed(stage, condition):
                 os.kill(pid, signal.SIGCONT)
 
 
-class StopStage(Stage):
-    """A driver without robots of its own, and the ways to stop what it has."""
+class StopSuite(RunningSuite):
+    """A driver without robots of its own, and the methods to stop its robots."""
 
-    def __init__(self, ways):
-        """Start what the ways need, and nothing else: it would cost time that the stop is measured in."""
+    def __init__(self, methods):
+        """Start what the methods need, and nothing else: it would cost time that the stop is measured in."""
         super().__init__(0)
         self._topic = rospy.Publisher("/hero_driver/stop_request", Bool, queue_size=1, tcp_nodelay=True)
-        if "program" in ways:
+        if "program" in methods:
             self._drivers = Drivers()
-        if "monitor" in ways:
+        if "monitor" in methods:
             port = find_free_port()
             monitor = self.start(["rosrun", "hero_bringup", "monitor", "_port:=%d" % port], stdout=-1, stderr=-1)
             wait_for_port(port, monitor)
@@ -177,13 +182,13 @@ class StopStage(Stage):
         command = ["rosrun", "hero_driver", "hero_driver", "__name:=hero_driver_b", "_port:=%d" % find_free_port()]
         return self.start(command, stdout=-1, stderr=-1).pid
 
-    def press(self, way, stopped):
-        """Ask for a stop, or a release, in one of WAYS."""
-        if way == "topic":
+    def press(self, method, stopped):
+        """Ask for a stop, or a release, in one of METHODS."""
+        if method == "topic":
             self._topic.publish(Bool(stopped))
-        elif way == "service":
+        elif method == "service":
             rospy.ServiceProxy("/hero_driver/stop", SetBool)(stopped)
-        elif way == "program":
+        elif method == "program":
             self._drivers.request_stop(stopped)
         else:
             self._page.stop(stopped)
@@ -194,30 +199,29 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--robots", type=int, default=20)
     parser.add_argument("--presses", type=int, default=100, help="of each row")
-    parser.add_argument("--ways", nargs="*", choices=WAYS, default=WAYS)
+    parser.add_argument("--via", nargs="*", metavar="METHOD", choices=METHODS, default=METHODS)
     parser.add_argument("--conditions", nargs="*", choices=CONDITIONS, default=CONDITIONS[:1])
     parser.add_argument("--json", metavar="FILE", help="write the figures there")
     options = parser.parse_args()
     machine_us = measure_machine_us()
-    stage = StopStage(options.ways)
+    print_machine(machine_us)
+    suite = StopSuite(options.via)
     rows = []
     try:
-        swarm = Swarm(stage, options.robots)
-        print("sum of 768 bytes: %.2f us" % machine_us)
+        swarm = Swarm(suite, options.robots)
         print("| | robots | stopped | press to zero, p50 / worst, ms | press to rest, p50 / worst, ms | within 0.3 s |")
         print("|---|---|---|---|---|---|")
         for condition in options.conditions:
-            with disturbed(stage, condition):
-                for way in options.ways:
-                    if (condition, way) == ("hung master", "service"):
+            with disturbed(suite, condition):
+                for method in options.via:
+                    if (condition, method) == ("hung master", "service"):
                         continue  # a service is looked up with the master at each call
-                    title = way if condition == CONDITIONS[0] else "%s, %s" % (way, condition)
-                    press = lambda stopped, way=way: stage.press(way, stopped)  # noqa: E731
-                    rows.append(measure_row(stage, swarm, title, press, options.presses))
+                    title = method if condition == CONDITIONS[0] else "%s, %s" % (method, condition)
+                    press = lambda stopped, method=method: suite.press(method, stopped)  # noqa: E731
+                    rows.append(measure_row(suite, swarm, title, press, options.presses))
     finally:
-        stage.close()
-    if options.json:
-        Path(options.json).write_text(json.dumps({"sum_of_768_bytes_us": machine_us, "rows": rows}, indent=2) + "\n")
+        suite.close()
+    write_report(options.json, machine_us, rows=rows)
 
 
 if __name__ == "__main__":

@@ -1,22 +1,18 @@
 """What the simulator costs: CPU at real time behind real sockets, and the real-time factor it could reach.
 
-    PYTHONPATH=hero_sim/src:hero_driver/src python3 hero_sim/bench/sim_bench.py [--robots 1,10]
-    [--seconds 10]
-
-A small server in this process takes the driver's place: it requests topics, answers the time, and drives
-every robot in a circle ten times a second. The simulator runs as a process of its own, whose CPU time is
-counted.
+A small server in this process takes the driver's place: it requests topics, answers the time, and drives every robot
+in a circle ten times a second. Only the simulator's process is counted. Run it with script/bench sim.
 """
 
 import argparse
-import os
 import selectors
 import socket
 import struct
-import subprocess
 import sys
 import time
-from typing import Dict, List, NamedTuple, Optional
+from typing import List, NamedTuple
+
+from measuring import measure_machine_us, print_machine, read_cpu_s, start, stop
 
 from hero_driver.rosserial import frames, payloads
 from hero_sim import declarations
@@ -100,28 +96,11 @@ class _Server:
         self._selector.close()
 
 
-def _read_cpu_s(pid: int) -> float:
-    with open("/proc/%d/stat" % pid, encoding="ascii") as file:
-        fields = file.read().rsplit(")", 1)[1].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
-
-
 def measure(robots: int, seconds: float) -> Measurement:
     """Run so many robots for so long behind a server of ours."""
     server = _Server()
-    command = [
-        sys.executable,
-        "-m",
-        "hero_sim",
-        "--robots",
-        str(robots),
-        "--port",
-        str(server.port),
-        "--quiet",
-        "--flash-dir",
-        "none",
-    ]
-    process = subprocess.Popen(command)
+    command = [sys.executable, "-m", "hero_sim", "--robots", str(robots), "--port", str(server.port)]
+    process = start([*command, "--quiet", "--flash-dir", "none"], None)
     try:
         server.run(_SETTLE_S)
         if len(server.peers) < robots or process.poll() is not None:
@@ -129,13 +108,12 @@ def measure(robots: int, seconds: float) -> Measurement:
                 "only %d of %d robots came within %g s" % (len(server.peers), robots, _SETTLE_S)
             )
         before = sum(peer.odoms for peer in server.peers)
-        cpu_s, start_s = _read_cpu_s(process.pid), time.monotonic()
+        cpu_s, start_s = read_cpu_s(process.pid), time.monotonic()
         server.run(seconds)
-        cpu_s, elapsed_s = _read_cpu_s(process.pid) - cpu_s, time.monotonic() - start_s
+        cpu_s, elapsed_s = read_cpu_s(process.pid) - cpu_s, time.monotonic() - start_s
         odoms = sum(peer.odoms for peer in server.peers) - before
     finally:
-        process.terminate()
-        process.wait(timeout=5.0)
+        stop(process)
         server.close()
     return Measurement(
         robots,
@@ -175,25 +153,23 @@ def measure_fastest(robots: int, simulated_ms: int = 5000) -> float:
     return simulated_ms / 1000.0 / (time.process_time() - start_s)
 
 
-def main(arguments: Optional[List[str]] = None) -> int:
+def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(prog="sim_bench.py", description="What the simulator costs.")
-    parser.add_argument("--robots", default="1,10,50,100", help="numbers of robots (%(default)s)")
-    parser.add_argument(
-        "--seconds", type=float, default=10.0, help="length of each measurement (%(default)s)"
-    )
-    options = parser.parse_args(arguments)
-    rows: Dict[int, Measurement] = {}
-    print("robots  CPU of one core  odoms of the stock rate  simulated s per s of CPU, no sockets")
-    for text in options.robots.split(","):
-        row = rows[int(text)] = measure(int(text), options.seconds)
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--robots", type=int, nargs="+", default=[1, 10, 50, 100])
+    parser.add_argument("--seconds", type=float, default=10.0, help="measured time of each row")
+    options = parser.parse_args()
+    print_machine(measure_machine_us())
+    print("| robots | CPU of one core | odoms of the stock rate | simulated s per s of CPU, no sockets |")
+    print("|---|---|---|---|")
+    for robots in options.robots:
+        row = measure(robots, options.seconds)
         print(
-            "%6d  %13.1f %%  %21.1f %%  %20.1f"
+            "| %d | %.1f %% | %.1f %% | %.1f |"
             % (row.robots, row.cpu_percent, 100.0 * row.odom_share, row.fastest),
             flush=True,
         )
-    return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()
