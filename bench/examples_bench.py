@@ -20,7 +20,7 @@ from running_suite import RunningSuite
 from sensor_msgs.msg import Joy
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "hero_bringup" / "test" / "rostest"))
-from swarm_watch import SwarmWatch
+from hero_test.swarm_watch import SwarmWatch
 
 SETTLE_S = 4.0
 """From the first command: subscriptions of all robots, and the first seconds of listening to /tf."""

@@ -122,7 +122,7 @@ def main():
             "sim:=%d" % options.robots,
         )
         run("roslaunch", "hero_examples", "random_walk.launch", "robots:=0-%d" % (options.robots - 1))
-        monitor = run("rosrun", "hero_bringup", "monitor", "_port:=%d" % port)
+        monitor = run("rosrun", "hero_monitor", "monitor", "_port:=%d" % port)
         wait_for_port(port, monitor)
         print("| %d robots | CPU of one core | updates/s of each page | to each page | memory |" % options.robots)
         print("|---|---|---|---|---|")

@@ -31,7 +31,7 @@ from std_srvs.srv import SetBool
 from tornado.httpclient import HTTPRequest
 from tornado.websocket import websocket_connect
 
-from hero_examples.drivers import Drivers
+from hero_client.drivers import Drivers
 
 HERE = Path(__file__).resolve().parent
 POLL_S = 0.02
@@ -172,7 +172,7 @@ class StopSuite(RunningSuite):
             self._drivers = Drivers()
         if "monitor" in methods:
             port = find_free_port()
-            monitor = self.start(["rosrun", "hero_bringup", "monitor", "_port:=%d" % port], stdout=-1, stderr=-1)
+            monitor = self.start(["rosrun", "hero_monitor", "monitor", "_port:=%d" % port], stdout=-1, stderr=-1)
             wait_for_port(port, monitor)
             self._page = Page(port)
         time.sleep(SETTLE_S)

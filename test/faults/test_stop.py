@@ -17,7 +17,7 @@ from simulated_field import SPEED_M_S, Truth, drive, rest, start_simulator
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, Trigger
 
-from hero_examples.drivers import Drivers
+from hero_client.drivers import Drivers
 from hero_msgs.msg import Robot
 from hero_sim.srv import InjectFault
 

@@ -14,9 +14,9 @@ SOCKET_OWNERS = (
     "hero_driver.rospy_internals",
     "hero_driver.inlet",
     "hero_sim.tcp_link",
-    "hero_bringup.checkup.network",
-    "hero_bringup.monitor.server",
-    "hero_bringup.monitor.program",
+    "hero_tools.checkup.network",
+    "hero_monitor.server",
+    "hero_monitor.program",
 )
 
 
@@ -61,14 +61,14 @@ def test_the_simulator_shares_frames_and_payloads_with_the_driver_and_nothing_el
             assert allowed, f"line {found.line}: {found.module}"
 
 
-@pytest.mark.parametrize("name", modules_below("hero_examples") + modules_below("hero_tutorial"))
+@pytest.mark.parametrize("name", modules_below("hero_client") + modules_below("hero_examples") + modules_below("hero_tutorial"))
 def test_examples_and_lessons_know_topics_only(name):
     assert not [found for found in imports_of(name) if found.top in ("hero_driver", "hero_sim")]
 
 
 @pytest.mark.parametrize("name", modules_below("hero_driver"))
 def test_the_driver_knows_nothing_of_the_packages_built_on_it(name):
-    others = {"hero_sim", "hero_examples", "hero_tutorial", "hero_bringup", "hero_description"}
+    others = {name for name in sources.list_packages() if name not in ("hero_msgs", "hero_driver")}
     assert not [found for found in imports_of(name) if found.top in others]
 
 

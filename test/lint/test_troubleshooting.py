@@ -14,7 +14,7 @@ SECTIONS = (
     "Messages of the simulator",
     "Messages of the examples",
 )
-TOOLS = sources.ROOT / "hero_bringup" / "src" / "hero_bringup"
+PAGES = sources.ROOT / "hero_monitor" / "src" / "hero_monitor" / "web"
 SOURCES = [path for path in sources.list_source_modules().values() if "test" not in path.parts]
 
 
@@ -62,7 +62,7 @@ def make_pattern(message):
 
 MESSAGES = read_messages()
 TEXTS = {PLACEHOLDER.sub("…", text) for path in SOURCES for _, text in read_texts(path)}
-TEXTS |= {path.read_text(encoding="utf-8") for path in TOOLS.glob("monitor/web/*.js")}
+TEXTS |= {path.read_text(encoding="utf-8") for path in PAGES.glob("*.js")}
 
 
 @pytest.mark.parametrize("message", MESSAGES)

@@ -10,7 +10,7 @@ from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 from std_srvs.srv import SetBool
-from swarm_watch import wait_for
+from hero_test.swarm_watch import wait_for
 from tf2_msgs.msg import TFMessage
 
 from hero_msgs.msg import Robot, RobotArray

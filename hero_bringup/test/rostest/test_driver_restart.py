@@ -11,7 +11,7 @@ import unittest
 import rospy
 import rostest
 from nav_msgs.msg import Odometry
-from swarm_watch import wait_for
+from hero_test.swarm_watch import wait_for
 
 from hero_msgs.msg import Robot, RobotArray
 

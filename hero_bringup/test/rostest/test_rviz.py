@@ -12,8 +12,8 @@ import rospy
 import rostest
 from geometry_msgs.msg import PointStamped, PoseStamped, Twist
 from std_msgs.msg import ColorRGBA
-from swarm_watch import SwarmWatch, wait_for
-from virtual_screen import MISSING, VirtualScreen
+from hero_test.swarm_watch import SwarmWatch, wait_for
+from hero_test.virtual_screen import MISSING, VirtualScreen
 
 from hero_description.rviz_config import ABOVE_PIXELS_PER_M, GOAL_TOPIC, POINT_TOPIC
 

@@ -14,13 +14,13 @@ import xmlrpc.client
 import rosgraph
 import rospy
 import rostest
-from example_program import ExampleProgram
-from program_terminal import TIMEOUT_S, ProgramTerminal, run_fleet
+from hero_test.example_program import ExampleProgram
+from hero_test.program_terminal import TIMEOUT_S, ProgramTerminal, run_fleet
 from sensor_msgs.msg import Joy
-from swarm_watch import wait_for
+from hero_test.swarm_watch import wait_for
 
-from hero_examples.drivers import Drivers
-from hero_examples.swarm import Swarm
+from hero_client.drivers import Drivers
+from hero_client.swarm import Swarm
 from hero_msgs.msg import Robot, RobotArray
 
 AT_REST = ("info", "stopped, all wheels at rest", True)
@@ -87,7 +87,7 @@ class StopRequestTest(unittest.TestCase):
         wait_for(release, TIMEOUT_S, self.drivers.stop_status)
 
     def open_table(self):
-        table = ProgramTerminal("hero_bringup", "fleet")
+        table = ProgramTerminal("hero_tools", "fleet")
         self.addCleanup(table.close)
         table.wait_for(b"2 of 2 robots ready")
         return table

@@ -11,12 +11,12 @@ import rosgraph
 import rospy
 import rostest
 from geometry_msgs.msg import Twist
-from program_terminal import ProgramTerminal, run_fleet
-from swarm_watch import SwarmWatch, wait_for
+from hero_test.program_terminal import ProgramTerminal, run_fleet
+from hero_test.swarm_watch import SwarmWatch, wait_for
 
-from hero_bringup.monitor.commander import Commander
-from hero_examples.drivers import Drivers
-from hero_examples.swarm import Swarm
+from hero_monitor.commander import Commander
+from hero_client.drivers import Drivers
+from hero_client.swarm import Swarm
 
 IDS = [0, 1, 100, 101]
 TIMEOUT_S = 20.0
@@ -94,7 +94,7 @@ class TwoDriversTest(unittest.TestCase):
         self.assertEqual([robot["id"] for robot in fleet["robots"]], [100, 101])
 
     def test_3_the_keys_of_the_table_stop_the_robots_of_both_and_release_them(self):
-        table = ProgramTerminal("hero_bringup", "fleet")
+        table = ProgramTerminal("hero_tools", "fleet")
         self.addCleanup(table.close)
         table.wait_for(b"4 of 4 robots ready")
         self.wait_until_all_move()

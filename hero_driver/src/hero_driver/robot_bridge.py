@@ -421,7 +421,7 @@ class RobotBridge:
             if not self._context.allow_self_tuning:
                 return (
                     "self-tuning spins the robot for up to a minute and finds no gains that the firmware keeps; measure"
-                    " them with hero_bringup calibrate, or set ~allow_self_tuning"
+                    " them with hero_calibration calibrate, or set ~allow_self_tuning"
                 )
             if self._context.is_stopped():
                 return "it moves the robot, and all robots are stopped (~stop)"

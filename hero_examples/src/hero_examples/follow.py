@@ -4,12 +4,12 @@ from typing import Dict, List, NamedTuple, Optional
 
 import rospy
 
-from .common_frame import DEFAULT_FRAME, CommonFrame, parse_starts
-from .control_laws import STANDSTILL, FollowLaw, Pose, follow
-from .program import Program, ProgramError, check_number, parse_robot_ids, read_parameters, run
-from .robot import MAX_LINEAR_M_S
-from .swarm import Swarm
-from .swarm_start import WaitReport
+from hero_client.common_frame import DEFAULT_FRAME, CommonFrame, parse_starts
+from hero_client.control_laws import STANDSTILL, FollowLaw, Pose, follow
+from hero_client.program import Program, ProgramError, check_number, parse_robot_ids, read_parameters, run
+from hero_client.robot import MAX_LINEAR_M_S
+from hero_client.swarm import Swarm
+from hero_client.swarm_start import WaitReport
 
 RATE_HZ = 10.0
 

@@ -13,15 +13,15 @@ import actionlib
 import rospy
 from geometry_msgs.msg import PoseStamped
 
-from .control_laws import STANDSTILL, Pose
-from .frame_watch import FrameError, FrameWatch, plain_frame, shift_pose
-from .goal_pursuit import DEFAULT_LAW, DEFAULT_TIMEOUT_S, DEFAULT_TOLERANCE_M, LAWS, Goal, GoalPursuit, State
-from .goal_reading import LARGEST_M, GoalError, check_limits, read_goal
-from .msg import GoToAction, GoToFeedback, GoToResult
-from .program import Program, ProgramError, check_flag, check_number, parse_robot_ids, read_parameters, run
-from .robot import Robot
-from .swarm import Swarm
-from .swarm_start import WaitReport, open_swarm
+from hero_client.control_laws import STANDSTILL, Pose
+from hero_client.frame_watch import FrameError, FrameWatch, plain_frame, shift_pose
+from hero_client.goal_pursuit import DEFAULT_LAW, DEFAULT_TIMEOUT_S, DEFAULT_TOLERANCE_M, LAWS, Goal, GoalPursuit, State
+from hero_client.goal_reading import LARGEST_M, GoalError, check_limits, read_goal
+from hero_msgs.msg import GoToAction, GoToFeedback, GoToResult
+from hero_client.program import Program, ProgramError, check_flag, check_number, parse_robot_ids, read_parameters, run
+from hero_client.robot import Robot
+from hero_client.swarm import Swarm
+from hero_client.swarm_start import WaitReport, open_swarm
 
 RATE_HZ = 10.0
 

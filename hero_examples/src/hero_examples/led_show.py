@@ -6,9 +6,9 @@ from typing import List, NamedTuple, Optional, Tuple
 
 import rospy
 
-from .program import Program, ProgramError, check_number, parse_robot_ids, read_parameters, run
-from .swarm import Swarm
-from .swarm_start import WaitReport, open_swarm
+from hero_client.program import Program, ProgramError, check_number, parse_robot_ids, read_parameters, run
+from hero_client.swarm import Swarm
+from hero_client.swarm_start import WaitReport, open_swarm
 
 RATE_HZ = 5.0
 """Colours per second and robot: smooth to the eye, little on the air."""

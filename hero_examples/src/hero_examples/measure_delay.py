@@ -13,11 +13,11 @@ import numpy as np
 import rospy
 from nav_msgs.msg import Odometry
 
-from .control_laws import STANDSTILL, wrap_angle
-from .program import Program, ProgramError, check_number, parse_robot_ids, read_parameters, run
-from .readings import yaw_of
-from .robot import Robot
-from .swarm_start import WaitReport, open_swarm
+from hero_client.control_laws import STANDSTILL, wrap_angle
+from hero_client.program import Program, ProgramError, check_number, parse_robot_ids, read_parameters, run
+from hero_client.readings import yaw_of
+from hero_client.robot import Robot
+from hero_client.swarm_start import WaitReport, open_swarm
 
 TURN_RAD_S = 2.0
 

@@ -7,7 +7,7 @@ from typing import Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 import rospy
 
-from .control_laws import (
+from hero_client.control_laws import (
     POTENTIAL,
     STANDSTILL,
     WANDER,
@@ -16,9 +16,9 @@ from .control_laws import (
     wander,
     wander_in_potential,
 )
-from .program import Program, ProgramError, check_number, parse_robot_ids, read_parameters, run
-from .robot import MAX_LINEAR_M_S, Robot, StaleDataError
-from .swarm_start import WaitReport, open_swarm
+from hero_client.program import Program, ProgramError, check_number, parse_robot_ids, read_parameters, run
+from hero_client.robot import MAX_LINEAR_M_S, Robot, StaleDataError
+from hero_client.swarm_start import WaitReport, open_swarm
 
 RATE_HZ = 10.0
 """Commands per second and robot: the robot takes no more than about 19, and stops by itself after 2 s without."""

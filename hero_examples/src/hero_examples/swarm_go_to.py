@@ -7,16 +7,16 @@ from typing import Any, Dict, List, NamedTuple, Optional
 import rospy
 import yaml
 
-from .assignment import assign_goals
-from .common_frame import DEFAULT_FRAME, CommonFrame, parse_starts
-from .control_laws import STANDSTILL, Pose
-from .formations import FormationError, Point, place_formation
-from .program import Program, ProgramError, check_flag, check_number, parse_robot_ids, read_parameters, run
-from .reciprocal import AvoidanceLaw
-from .robot import MAX_LINEAR_M_S
-from .swarm import Swarm
-from .swarm_start import WaitReport, open_swarm
-from .swarm_steering import SwarmSteering
+from hero_client.assignment import assign_goals
+from hero_client.common_frame import DEFAULT_FRAME, CommonFrame, parse_starts
+from hero_client.control_laws import STANDSTILL, Pose
+from hero_client.formations import FormationError, Point, place_formation
+from hero_client.program import Program, ProgramError, check_flag, check_number, parse_robot_ids, read_parameters, run
+from hero_client.reciprocal import AvoidanceLaw
+from hero_client.robot import MAX_LINEAR_M_S
+from hero_client.swarm import Swarm
+from hero_client.swarm_start import WaitReport, open_swarm
+from hero_client.swarm_steering import SwarmSteering
 
 RATE_HZ = 10.0
 

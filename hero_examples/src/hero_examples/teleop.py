@@ -6,14 +6,14 @@ import sys
 import time
 from typing import List, NamedTuple, Optional, Tuple
 
-from .control_laws import STANDSTILL, Command
-from .keyboard import Keyboard, NoTerminalError
-from .program import Program, ProgramError, check_number, parse_robot_ids, read_parameters, run
-from .robot import Robot, StaleDataError
-from .stop_status import paint
-from .swarm import Swarm
-from .swarm_start import check_stop, open_swarm
-from .teleop_keys import (
+from hero_client.control_laws import STANDSTILL, Command
+from hero_client.keyboard import Keyboard, NoTerminalError
+from hero_client.program import Program, ProgramError, check_number, parse_robot_ids, read_parameters, run
+from hero_client.robot import Robot, StaleDataError
+from hero_client.stop_status import paint
+from hero_client.swarm import Swarm
+from hero_client.swarm_start import check_stop, open_swarm
+from hero_client.teleop_keys import (
     HELP,
     MAX_LINEAR_M_S,
     MAX_TURN_RAD_S,

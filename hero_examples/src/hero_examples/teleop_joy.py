@@ -10,12 +10,12 @@ from typing import List, NamedTuple, Optional
 import rospy
 from sensor_msgs.msg import Joy
 
-from .control_laws import STANDSTILL, Command
-from .drivers import Drivers
-from .program import Program, ProgramError, check_number, parse_robot_ids, read_parameters, run
-from .robot import MAX_LINEAR_M_S
-from .swarm import Swarm
-from .swarm_start import REPORT_PERIOD_S, WaitReport, check_stop, open_swarm
+from hero_client.control_laws import STANDSTILL, Command
+from hero_client.drivers import Drivers
+from hero_client.program import Program, ProgramError, check_number, parse_robot_ids, read_parameters, run
+from hero_client.robot import MAX_LINEAR_M_S
+from hero_client.swarm import Swarm
+from hero_client.swarm_start import REPORT_PERIOD_S, WaitReport, check_stop, open_swarm
 
 PERIOD_S = 0.1
 
@@ -136,7 +136,7 @@ class StopReport:
         stopped = [robot.name for robot in self._swarm if drivers.is_robot_stopped(robot.namespace)]
         if stopped and command != STANDSTILL and not self._has_said_stopped:
             rospy.logwarn(
-                "all robots are stopped, so %s cannot move; release them: rosrun hero_bringup fleet, key r",
+                "all robots are stopped, so %s cannot move; release them: rosrun hero_tools fleet, key r",
                 ", ".join(stopped),
             )
         self._has_said_stopped = bool(stopped) and (self._has_said_stopped or command != STANDSTILL)

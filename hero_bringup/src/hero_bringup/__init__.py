@@ -1,1 +1,0 @@
-"""Programs that start and watch a swarm of HeRo robots."""

@@ -1,0 +1,70 @@
+"""Assignment and formations."""
+
+import itertools
+import math
+import random
+
+import pytest
+
+from hero_client.assignment import assign, assign_goals, assign_without_scipy
+from hero_client.formations import FormationError, place_formation
+
+
+def test_both_solvers_find_the_least_sum():
+    rng = random.Random(3)
+    for _ in range(150):
+        rows = rng.randint(1, 5)
+        columns = rng.randint(rows, 6)
+        costs = [[rng.choice([0.0, 1.0, rng.random() * 10.0]) for _ in range(columns)] for _ in range(rows)]
+        least = min(
+            sum(costs[row][column] for row, column in enumerate(order))
+            for order in itertools.permutations(range(columns), rows)
+        )
+        for solve in (assign_without_scipy, lambda table: assign(table, len(table[0]))):
+            chosen = solve(costs)
+            assert len(set(chosen)) == rows
+            assert sum(costs[row][column] for row, column in enumerate(chosen)) == pytest.approx(least)
+
+
+def test_paths_to_assigned_goals_do_not_cross():
+    assert assign_goals([(0.0, 0.0), (1.0, 0.0)], [(1.0, 1.0), (0.0, 1.0)]) == [1, 0]
+
+
+def test_more_robots_than_goals_is_an_error():
+    with pytest.raises(ValueError, match="3 robots cannot take 2 goals"):
+        assign_goals([(0.0, 0.0)] * 3, [(1.0, 1.0)] * 2)
+
+
+@pytest.mark.parametrize("shape", ["circle", "line", "grid"])
+def test_a_formation_has_its_spacing_and_its_center(shape):
+    for count in range(1, 13):
+        places = place_formation(
+            {"shape": shape, "center": [1.0, -2.0], "spacing_m": 0.3, "turn_deg": 30.0}, count, 0.2
+        )
+        assert len(places) == count
+        if count > 1:
+            nearest_m = min(math.dist(a, b) for a, b in itertools.combinations(places, 2))
+            assert nearest_m == pytest.approx(0.3)
+        if shape != "grid":
+            assert sum(x for x, _ in places) / count == pytest.approx(1.0)
+            assert sum(y for _, y in places) / count == pytest.approx(-2.0)
+
+
+@pytest.mark.parametrize(
+    "formation, says",
+    [
+        ([], "a formation is a table"),
+        ({"shape": "star"}, "shape is 'star'"),
+        ({"spacing": 1}, "unknown key 'spacing'"),
+        ({"spacing_m": 0.1}, "make spacing_m larger"),
+        ({"center": [1]}, "center holds"),
+        ({"turn_deg": True}, "turn_deg is True"),
+        ({"shape": "grid", "columns": 0}, "columns is 0"),
+        ({"shape": "points", "points": [[0, 0]]}, "at least 3 places"),
+        ({"shape": "points", "points": [[0, 0], [0, 0.5], [0, "x"]]}, "points is 'x'"),
+    ],
+)
+def test_a_wrong_formation_is_told_in_one_line(formation, says):
+    with pytest.raises(FormationError, match=says) as raised:
+        place_formation(formation, 3, 0.2)
+    assert "\n" not in str(raised.value)

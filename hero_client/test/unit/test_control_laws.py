@@ -1,0 +1,206 @@
+"""The control laws over grids of starts, goals and obstacles, on a body with the lags of the real one."""
+
+import itertools
+import math
+import random
+
+import pytest
+
+from hero_client.control_laws import (
+    BRISK,
+    STANDSTILL,
+    FollowLaw,
+    GoToLaw,
+    Pose,
+    WanderLaw,
+    WanderMemory,
+    follow,
+    go_to_point,
+    go_to_pose,
+    split_sectors,
+    wander,
+    wander_in_potential,
+    wrap_angle,
+)
+
+INF = math.inf
+FREE = [INF] * 8
+
+STEP_S = 0.1
+LAG_S = 0.5
+"""Of the robot's speed controller."""
+
+
+class Body:
+    """A robot on a plane: speeds follow commands with a lag, a standstill is quick."""
+
+    def __init__(self, pose):
+        self.pose = pose
+        self.linear_m_s = self.turn_rad_s = 0.0
+
+    def step(self, command):
+        for _ in range(10):
+            share = STEP_S / 10.0 / (0.05 if command == STANDSTILL else LAG_S)
+            self.linear_m_s += share * (command.linear_m_s - self.linear_m_s)
+            self.turn_rad_s += share * (command.turn_rad_s - self.turn_rad_s)
+            x_m, y_m, yaw_rad = self.pose
+            travel_m = self.linear_m_s * STEP_S / 10.0
+            self.pose = Pose(
+                x_m + travel_m * math.cos(yaw_rad),
+                y_m + travel_m * math.sin(yaw_rad),
+                yaw_rad + self.turn_rad_s * STEP_S / 10.0,
+            )
+
+
+def distance_m(pose, x_m, y_m):
+    return math.hypot(pose.x_m - x_m, pose.y_m - y_m)
+
+
+GRID = [
+    (distance, bearing, heading)
+    for distance, bearing, heading in itertools.product(
+        (0.05, 0.3, 1.0), [i * math.pi / 6 for i in range(12)], [i * math.pi / 4 for i in range(8)]
+    )
+]
+
+
+@pytest.mark.parametrize("law, longest_s", [(GoToLaw(), 120.0), (BRISK, 40.0)])
+def test_go_to_point_arrives_from_every_side_and_stays(law, longest_s):
+    for distance, bearing, heading in GRID:
+        body = Body(Pose(0.0, 0.0, heading))
+        x_m, y_m = distance * math.cos(bearing), distance * math.sin(bearing)
+        arrived_s = None
+        for index in range(int(longest_s / STEP_S)):
+            command = go_to_point(body.pose, x_m, y_m, law)
+            assert abs(command.linear_m_s) <= law.max_linear_m_s + 1e-12
+            assert abs(command.turn_rad_s) <= law.max_turn_rad_s + 1e-12
+            body.step(command)
+            if command == STANDSTILL:
+                arrived_s = index * STEP_S
+                break
+        assert arrived_s is not None, (distance, bearing, heading, body.pose)
+        for _ in range(20):
+            body.step(go_to_point(body.pose, x_m, y_m, law))
+        assert distance_m(body.pose, x_m, y_m) < law.tolerance_m + 0.002
+
+
+def test_a_goal_behind_is_approached_backwards():
+    assert go_to_point(Pose(0.0, 0.0, 0.0), -0.5, 0.05).linear_m_s < 0.0
+    assert go_to_point(Pose(0.0, 0.0, math.pi), -0.5, 0.05).linear_m_s > 0.0
+
+
+def test_the_tutorial_law_has_the_gains_and_limits_of_the_tutorial():
+    assert go_to_point(Pose(0.0, 0.0, 0.0), 0.1, 0.0).linear_m_s == pytest.approx(0.1 * 4 / 20)
+    assert go_to_point(Pose(0.0, 0.0, 0.0), 5.0, 0.0).linear_m_s == 0.07
+    assert go_to_point(Pose(0.0, 0.0, 0.1), 1.0, math.tan(0.2)).turn_rad_s == pytest.approx(0.1 * 8 / 20)
+    assert go_to_point(Pose(0.0, 0.0, 0.0), 0.0, 5.0).turn_rad_s == 0.1
+    assert go_to_point(Pose(0.0, 0.0, 0.0), 0.0099, 0.0) == STANDSTILL
+
+
+def test_go_to_pose_arrives_with_the_heading_from_every_side():
+    for (distance, bearing, heading), goal_yaw in itertools.product(GRID[::3], (0.0, 1.5, 3.0, -2.0)):
+        goal = Pose(distance * math.cos(bearing), distance * math.sin(bearing), goal_yaw)
+        body = Body(Pose(0.0, 0.0, heading))
+        at_goal = False
+        for _ in range(900):
+            at_goal = at_goal or distance_m(body.pose, goal.x_m, goal.y_m) < 0.01
+            command = go_to_pose(body.pose, goal, at_goal=at_goal)
+            body.step(command)
+            if command == STANDSTILL:
+                break
+        assert command == STANDSTILL, (distance, bearing, heading, goal_yaw, body.pose)
+        assert distance_m(body.pose, goal.x_m, goal.y_m) < 0.02
+        assert abs(wrap_angle(body.pose.yaw_rad - goal_yaw)) < 0.1
+
+
+def test_follow_keeps_the_gap_behind_a_leader_that_drives_a_curve():
+    law = FollowLaw()
+    leader, follower = Body(Pose(0.3, 0.0, 0.0)), Body(Pose(0.0, 0.0, 1.0))
+    gaps_m = []
+    for index in range(600):
+        leader.step(go_to_point(leader.pose, 0.5 * math.cos(index / 100), 0.5 * math.sin(index / 100), BRISK))
+        command = follow(follower.pose, leader.pose, law)
+        assert command.linear_m_s >= 0.0
+        follower.step(command)
+        gaps_m.append(distance_m(follower.pose, leader.pose.x_m, leader.pose.y_m))
+    assert min(gaps_m) > 0.09
+    assert max(gaps_m[300:]) < 0.30
+
+
+def test_each_beam_counts_for_its_sector():
+    for index, sector in ((0, 1), (1, 0), (7, 2)):
+        ranges = list(FREE)
+        ranges[index] = 0.1
+        seen = split_sectors(ranges)
+        assert seen[sector] == 0.1 and sum(math.isinf(value) for value in seen) == 2
+    for index in (2, 3, 4, 5, 6):
+        ranges = list(FREE)
+        ranges[index] = 0.05
+        assert split_sectors(ranges) == (INF, INF, INF)
+
+
+@pytest.mark.parametrize("law", [wander, wander_in_potential])
+def test_a_wanderer_without_ranges_stands_still(law):
+    assert law([], WanderMemory(), 0.5)[0] == STANDSTILL
+
+
+@pytest.mark.parametrize("law", [wander, wander_in_potential])
+@pytest.mark.parametrize("blocked_m", [0.0, 0.05, math.nan])
+def test_a_wanderer_does_not_drive_into_what_is_right_ahead(law, blocked_m):
+    memory = WanderMemory()
+    turns = set()
+    for chance in (0.0, 0.9, 0.1, 0.5, 0.7):
+        command, memory = law([blocked_m] + [INF] * 7, memory, chance)
+        assert command.linear_m_s <= 0.0
+        turns.add(math.copysign(1.0, command.turn_rad_s) if command.turn_rad_s else 0.0)
+    assert len(turns - {0.0}) == 1  # one side, and it keeps to it
+
+
+@pytest.mark.parametrize("law", [wander, wander_in_potential])
+def test_a_wanderer_turns_away_from_the_nearer_side(law):
+    left_near, right_near = list(FREE), list(FREE)
+    left_near[1], right_near[7] = 0.12, 0.12
+    assert law(left_near, WanderMemory(), 0.5)[0].turn_rad_s < 0.0
+    assert law(right_near, WanderMemory(), 0.5)[0].turn_rad_s > 0.0
+
+
+def cast_in_box(pose, half_m):
+    """Return the eight ranges inside a square room, inf beyond what the sensors see."""
+    ranges = []
+    for index in range(8):
+        angle = pose.yaw_rad + index * math.pi / 4
+        hits = []
+        for place, way in ((pose.x_m, math.cos(angle)), (pose.y_m, math.sin(angle))):
+            if abs(way) > 1e-9:
+                hits.append(((half_m if way > 0 else -half_m) - place) / way)
+        range_m = min(hits)
+        ranges.append(range_m if range_m < 0.2368 else INF)
+    return ranges
+
+
+@pytest.mark.parametrize("law", [wander, wander_in_potential])
+def test_a_wanderer_never_touches_the_walls_of_a_room_and_sees_most_of_it(law):
+    half_m, body_m = 0.5, 0.0369
+    for seed in range(6):
+        rng = random.Random(seed)
+        body = Body(Pose(rng.uniform(-0.3, 0.3), rng.uniform(-0.3, 0.3), rng.uniform(-3.0, 3.0)))
+        memory, cells, ranges = WanderMemory(), set(), FREE
+        for index in range(6000):
+            if index % 2 == 0:
+                ranges = cast_in_box(body.pose, half_m)
+            command, memory = law(ranges, memory, rng.random())
+            body.step(command)
+            assert max(abs(body.pose.x_m), abs(body.pose.y_m)) < half_m - body_m, (seed, index, body.pose)
+            cells.add((int((body.pose.x_m + half_m) / 0.2), int((body.pose.y_m + half_m) / 0.2)))
+        assert len(cells) >= 20, (seed, len(cells))
+
+
+def test_the_same_seed_gives_the_same_walk():
+    def commands(seed):
+        rng, memory, given = random.Random(seed), WanderMemory(), []
+        for _ in range(50):
+            command, memory = wander(FREE, memory, rng.random(), WanderLaw())
+            given.append(command)
+        return given
+
+    assert commands(7) == commands(7) != commands(8)

@@ -1,0 +1,93 @@
+"""Reports of several drivers become one: each robot once, stopped only if all are; only drivers are believed."""
+
+import math
+
+import pytest
+
+from hero_client.driver_reports import clean, find_drivers, merge
+from hero_msgs.msg import Robot, RobotArray
+
+
+def make_report(port, robots, stopped=False, stamp_s=1):
+    report = RobotArray(listening="10.42.0.1:%d" % port if port else "", stopped=stopped)
+    report.header.stamp.secs = stamp_s
+    for number, state in robots:
+        namespace = "" if number is None else "/hero_%d" % number
+        address = "10.42.0.%d:%d" % (number or 99, port)
+        robot_id = -1 if number is None else number
+        report.robots.append(Robot(id=robot_id, namespace=namespace, state=state, address=address))
+    return report
+
+
+def list_robots(report):
+    return [(robot.namespace, robot.state) for robot in report.robots]
+
+
+def test_one_report_stays_what_it_is():
+    report = make_report(11411, [(2, Robot.READY), (10, Robot.AWAY), (None, Robot.JOINING)], stopped=True)
+    merged = merge([report])
+    assert (merged.listening, merged.stopped, merged.header.stamp.secs) == ("10.42.0.1:11411", True, 1)
+    assert sorted(list_robots(merged)) == sorted(list_robots(report))
+
+
+def test_robots_of_all_are_there_with_all_addresses_and_the_newest_stamp():
+    first, second = make_report(2, [(100, Robot.READY)], stamp_s=7), make_report(1, [(0, Robot.READY)])
+    merged = merge([first, second, make_report(0, [])])
+    assert list_robots(merged) == [("/hero_0", Robot.READY), ("/hero_100", Robot.READY)]
+    assert merged.listening == "10.42.0.1:1, 10.42.0.1:2"
+    assert merged.header.stamp.secs == 7
+
+
+def test_a_robot_that_went_to_another_driver_is_there_once_where_it_is_now():
+    here, away = make_report(1, [(3, Robot.READY)]), make_report(2, [(3, Robot.AWAY)])
+    for reports in ([here, away], [away, here]):
+        merged = merge(reports)
+        assert list_robots(merged) == [("/hero_3", Robot.READY)]
+        assert merged.robots[0].address == "10.42.0.3:1"
+
+
+def test_who_was_refused_and_who_has_no_name_yet_is_nobody_else():
+    reports = [
+        make_report(1, [(3, Robot.READY), (None, Robot.JOINING)]),
+        make_report(2, [(3, Robot.REFUSED), (None, Robot.JOINING)]),
+    ]
+    assert len(merge(reports).robots) == 4
+
+
+def test_the_fleet_is_stopped_only_if_every_driver_is():
+    stopped, free = make_report(1, [], stopped=True), make_report(2, [])
+    assert merge([stopped, stopped]).stopped
+    assert not merge([stopped, free]).stopped
+
+
+def make_system_state(publishers, services):
+    return [list(map(list, publishers.items())), [], list(map(list, services.items()))]
+
+
+def test_a_node_with_reports_and_a_stop_service_is_a_driver():
+    state = make_system_state(
+        {"/lab/driver/robots": ["/lab/driver"], "/other/robots": ["/other"]}, {"/lab/driver/stop": ["/lab/driver"]}
+    )
+    assert find_drivers(state, ["/lab/driver/robots", "/other/robots"]) == {"/lab/driver/robots"}
+
+
+def test_reports_that_a_robot_declares_are_not_those_of_a_driver():
+    state = make_system_state({"/hero_0/robots": ["/hero_driver"]}, {"/hero_0/stop": ["/hero_driver"]})
+    assert find_drivers(state, ["/hero_0/robots"]) == set()
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf, 1e306, -1.0])
+def test_rates_that_cannot_be_shown_become_zero(number):
+    (robot,) = clean(RobotArray(robots=[Robot(frames_per_s=number, bytes_per_s=number)])).robots
+    assert (robot.frames_per_s, robot.bytes_per_s) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf, 1e306])
+def test_a_clock_offset_that_cannot_be_shown_is_unknown(number):
+    (robot,) = clean(RobotArray(robots=[Robot(clock_offset=number)])).robots
+    assert math.isnan(robot.clock_offset)
+
+
+def test_usual_numbers_stay_what_they_are():
+    (robot,) = clean(RobotArray(robots=[Robot(frames_per_s=211.0, bytes_per_s=4e4, clock_offset=-0.02)])).robots
+    assert (robot.frames_per_s, robot.bytes_per_s, robot.clock_offset) == (211.0, 4e4, -0.02)

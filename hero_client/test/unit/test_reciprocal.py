@@ -1,0 +1,124 @@
+"""Reciprocal avoidance: robots with two wheels and slow motors swap places without touching."""
+
+import math
+
+import numpy as np
+import pytest
+from test_control_laws import STEP_S, Body
+
+from hero_client.control_laws import STANDSTILL, Pose
+from hero_client.reciprocal import (
+    AvoidanceLaw,
+    half_plane,
+    keep_off,
+    nearest_allowed,
+    steer,
+    steered_point,
+    steered_velocity,
+)
+from hero_client.swarm_steering import SwarmSteering
+
+BODY_M = 0.0369
+
+
+def test_steering_and_its_opposite_agree():
+    law = AvoidanceLaw()
+    for yaw_rad in np.linspace(-3.0, 3.0, 13):
+        pose = Pose(0.3, -0.2, yaw_rad)
+        velocity = np.array([0.03, -0.02])
+        np.testing.assert_allclose(steered_velocity(pose, steer(pose, velocity, law), law.ahead_m), velocity)
+
+
+def test_a_half_plane_holds_exactly_what_leads_to_a_meeting():
+    rng = np.random.RandomState(1)
+    for _ in range(300):
+        offset = rng.uniform(-0.5, 0.5, 2)
+        radius_m, horizon_s = 0.15, 3.0
+        if np.hypot(*offset) < radius_m + 0.01:
+            continue
+        velocity = rng.uniform(-0.2, 0.2, 2)
+        normal, depth = half_plane(offset, velocity, radius_m, horizon_s, 0.1)
+        times = np.linspace(0.0, horizon_s, 3001)
+        nearest_m = np.min(np.hypot(*(offset[:, None] - velocity[:, None] * times)))
+        if abs(nearest_m - radius_m) > 0.001:
+            assert (depth > 0.0) == (nearest_m < radius_m)
+        changed = velocity + normal * depth  # the smallest change leads exactly past
+        nearest_m = np.min(np.hypot(*(offset[:, None] - changed[:, None] * times)))
+        assert nearest_m == pytest.approx(radius_m, abs=0.001)
+
+
+def test_the_nearest_allowed_velocity_is_allowed_and_nearest():
+    rng = np.random.RandomState(2)
+    grid = np.array([(x, y) for x in np.linspace(-0.1, 0.1, 81) for y in np.linspace(-0.1, 0.1, 81)])
+    grid = grid[np.hypot(grid[:, 0], grid[:, 1]) <= 0.1]
+    for _ in range(200):
+        count = rng.randint(0, 6)
+        angles = rng.uniform(-math.pi, math.pi, count)
+        normals = np.column_stack((np.cos(angles), np.sin(angles)))
+        bounds = rng.uniform(-0.1, 0.05, count)
+        wanted = rng.uniform(-0.15, 0.15, 2)
+        found = nearest_allowed(wanted, normals, bounds, 0.1)
+        allowed = grid[np.all(grid @ normals.T >= bounds, axis=1)]
+        if len(allowed):
+            assert np.all(normals @ found >= bounds - 1e-6) and np.hypot(*found) <= 0.1 + 1e-6
+            assert np.hypot(*(found - wanted)) <= np.min(np.hypot(*(allowed - wanted).T)) + 1e-6
+        else:
+            worst = np.max(bounds - normals @ found)
+            assert worst <= np.min(np.max(bounds - grid @ normals.T, axis=1)) + 1e-3
+
+
+def swap(count, radius_m, seed):
+    """Return (least distance of two centres, poses, goals) of count robots that swap places across a circle."""
+    rng = np.random.RandomState(seed)
+    angles = 2.0 * math.pi * np.arange(count) / count
+    poses = [
+        Pose(radius_m * math.cos(a), radius_m * math.sin(a), rng.uniform(-math.pi, math.pi)) for a in angles
+    ]
+    goals = [(-pose.x_m, -pose.y_m) for pose in poses]
+    bodies = [Body(pose) for pose in poses]
+    steering = SwarmSteering(goals, AvoidanceLaw(), STEP_S, seed)
+    least_m = math.inf
+    for _ in range(1500):
+        commands = steering.step([body.pose for body in bodies])
+        for body, command in zip(bodies, commands):
+            body.step(command)
+        places = np.array([body.pose[:2] for body in bodies])
+        apart = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1)) + np.eye(count)
+        least_m = min(least_m, float(apart.min()))
+        if all(command == STANDSTILL for command in commands):
+            break
+    return least_m, [body.pose for body in bodies], goals
+
+
+@pytest.mark.parametrize("count, radius_m", [(2, 0.4), (3, 0.4), (10, 0.6)])
+def test_robots_swap_places_across_a_circle_without_touching(count, radius_m):
+    for seed in range(4):
+        least_m, poses, goals = swap(count, radius_m, seed)
+        assert least_m > 2.0 * BODY_M, (seed, least_m)
+        for pose, goal in zip(poses, goals):
+            assert math.hypot(pose.x_m - goal[0], pose.y_m - goal[1]) < 0.02, seed
+
+
+def test_what_is_seen_near_is_not_driven_at_but_passed_on_the_right():
+    law = AvoidanceLaw()
+    pose = Pose(0.2, -0.1, math.pi / 2.0)
+    ahead = np.array([0.0, 0.08])
+    for gap_m in (0.09, 0.05, 0.03, 0.01):
+        ranges = [law.body_m + gap_m] + [math.inf] * 7
+        wanted, normals, bounds = keep_off(pose, ranges, ahead, law)
+        found = nearest_allowed(wanted, normals, bounds, law.max_linear_m_s)
+        limit_m_s = max(gap_m - law.keep_off_m, -law.back_off_m_s)
+        assert found[1] <= limit_m_s + 1e-9
+        assert found[0] > 0.0  # the right of a robot that looks along y
+
+
+def test_what_is_far_or_not_known_changes_nothing():
+    law = AvoidanceLaw()
+    ahead = np.array([0.08, 0.0])
+    for range_m in (math.inf, math.nan, law.body_m + law.look_m + 0.01):
+        wanted, normals, bounds = keep_off(Pose(0.0, 0.0, 0.0), [range_m] * 8, ahead, law)
+        assert wanted is ahead and normals.shape == (0, 2) and bounds.shape == (0,)
+
+
+def test_the_steered_point_is_ahead_of_the_axle():
+    np.testing.assert_allclose(steered_point(Pose(1.0, 2.0, math.pi / 2.0), 0.03), [1.0, 2.03])

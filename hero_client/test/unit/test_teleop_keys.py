@@ -1,0 +1,72 @@
+"""Keys and the time -> commands."""
+
+from hero_client.control_laws import STANDSTILL
+from hero_client.keyboard import split_keys
+from hero_client.teleop_keys import FIRST_TIMEOUT_S, MOTIONS, REPEAT_TIMEOUT_S, STOP_KEYS, KeyDrive
+
+
+def test_a_single_press_drives_until_its_time_is_out():
+    for key, (ahead, left) in MOTIONS.items():
+        drive = KeyDrive(0.1, 1.0)
+        assert drive.press(key, 10.0)
+        assert drive.command(10.0 + FIRST_TIMEOUT_S - 0.01) == (ahead * 0.1, left * 1.0)
+        assert drive.command(10.0 + FIRST_TIMEOUT_S) == STANDSTILL
+
+
+def test_a_held_key_drives_without_a_break_and_stops_soon_after():
+    drive = KeyDrive(0.1, 1.0)
+    presses_s = [0.0] + [0.66 + index * 0.04 for index in range(50)]  # the slowest usual keyboard
+    for before_s, next_s in zip(presses_s, presses_s[1:]):
+        drive.press("w", before_s)
+        assert drive.command(next_s - 0.001).linear_m_s == 0.1
+    drive.press("w", presses_s[-1])
+    assert drive.command(presses_s[-1] + REPEAT_TIMEOUT_S) == STANDSTILL
+
+
+def test_every_stop_key_stops_at_once():
+    for key in STOP_KEYS:
+        drive = KeyDrive(0.1, 1.0)
+        drive.press("q", 0.0)
+        drive.press(key, 0.1)
+        assert drive.command(0.1) == STANDSTILL
+
+
+def test_two_keys_together_make_a_curve():
+    drive = KeyDrive(0.1, 1.0)
+    drive.press("w", 0.0)
+    drive.press("a", 0.1)
+    assert drive.command(0.2) == (0.1, 1.0)
+    drive.press("x", 0.3)
+    assert drive.command(0.3) == (-0.1, 1.0)
+
+
+def test_speeds_stay_within_the_robots_limits():
+    drive = KeyDrive(0.1, 1.0)
+    for key, low, high in (("+", 0.2, 0.2), ("-", 0.02, 0.02)):
+        for _ in range(50):
+            assert drive.press(key, 0.0)
+        assert low - 1e-9 <= drive.linear_m_s <= high + 1e-9
+    for key, limit in ((">", 4.0), ("<", 0.25)):
+        for _ in range(50):
+            drive.press(key, 0.0)
+        assert drive.turn_rad_s == limit
+
+
+def test_other_keys_mean_nothing():
+    drive = KeyDrive(0.1, 1.0)
+    for key in "yuiophjklvbnm#@\r":
+        assert not drive.press(key, 0.0)
+    assert drive.command(0.0) == STANDSTILL
+
+
+def test_arrows_are_keys_whole_or_cut_in_two():
+    assert split_keys("w\x1b[Ad\x1bOC") == (["w", "up", "d", "right"], "")
+    keys, rest = split_keys("\x1b[")
+    assert keys == [] and split_keys(rest + "B") == (["down"], "")
+
+
+def test_other_escape_sequences_are_no_keys():
+    assert split_keys("\x1b[3~w") == (["w"], "")
+    assert split_keys("\x1b[1;5Aw") == (["w"], "")
+    assert split_keys("\x1bOPw") == (["w"], "")
+    assert split_keys("\x1b") == ([], "")

@@ -1,0 +1,12 @@
+"""Python package of hero_monitor, for catkin_python_setup(); not to be run by hand."""
+
+from catkin_pkg.python_setup import generate_distutils_setup
+from setuptools import setup
+
+setup(
+    **generate_distutils_setup(
+        packages=["hero_monitor"],
+        package_dir={"": "src"},
+        package_data={"hero_monitor": ["web/*"]},
+    )
+)

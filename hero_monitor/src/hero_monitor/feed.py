@@ -1,0 +1,280 @@
+"""Reads ROS topics and keeps the fleet as it is now, as pieces of JSON for pages.
+
+While no page is open it listens to the drivers' reports and to the log alone, and reads neither. Subscriptions to
+robots come and go on a thread of their own, because the ROS master may take its time.
+"""
+
+import re
+import time
+from collections import deque
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any, Callable, Deque, Dict, List, Optional, Sequence, Set
+
+import genpy
+import rospy
+from diagnostic_msgs.msg import DiagnosticArray
+from rosgraph_msgs.msg import Log
+from tf2_msgs.msg import TFMessage
+from visualization_msgs.msg import Marker, MarkerArray
+
+from hero_client.command_line import make_printable
+from hero_client.drivers import Drivers
+from hero_client.newest_message import NewestMessage
+from hero_client.stop_status import StopStatus
+from hero_msgs.msg import Robot
+
+from hero_client.fleet_state import Pose, yaw_of_quaternion
+from hero_client.fleet_state import finite
+from hero_client.robot_listener import STATES, STOP_STATES, is_on_map, read_pose
+from .log_thread import LogThread
+from .placement import Placement
+from .robot_feed import RobotFeed
+from .sections import LOG_LINES_KEPT, Sections, encode_pose, encode_ranges, shorten
+
+DRIVER_SILENT_S = 5.0
+"""The driver reports once a second; after so long it is gone."""
+
+LOG_LINES_PER_READ = 40
+"""Reading a line costs about 0.05 ms; a swarm that tunes its motors writes thousands a second."""
+
+UNREADABLE_PERIOD_S = 10.0
+"""Between two log lines about messages that cannot be read."""
+
+ROBOTS_MAX = 1000
+"""Rows of the table; a fleet has less."""
+
+MARKERS_MAX = 2000
+"""Of the arena, or true poses."""
+
+LABEL = re.compile(r"(\S+?):? ")
+"""How a driver's lines about one robot begin: "hero_0: voltage low", "hero_0 left (10.42.0.7:4242): ..."."""
+
+
+
+class FleetFeed:
+    """All that the page shows, for as long as somebody looks."""
+
+    def __init__(self, map_frame: str, log: LogThread) -> None:
+        self._log = log
+        self.sections = Sections()
+        self.placement = Placement(map_frame)
+        self.robots: Dict[str, Robot] = {}
+        self.stopped = False
+        self._map_frame = map_frame.lstrip("/")
+        self._feeds: Dict[str, RobotFeed] = {}
+        self._scene: Dict[str, NewestMessage] = {}
+        self._fleet_s = 0.0
+        self._pending_reads = 0
+        self._listening = ""
+        self._rows: Sequence[Robot] = ()
+        self._health: Dict[str, List[Any]] = {}
+        self._worker = ThreadPoolExecutor(1, "subscriptions")
+        self._change: Optional[Future[None]] = None
+        self._log_bytes: Deque[bytes] = deque()
+        self.drivers = Drivers()
+        self._reports = 0
+        # Not NewestMessage: of the log every line counts.
+        self._rosout = rospy.Subscriber("/rosout", rospy.AnyMsg, self._keep_log_line, queue_size=100)
+
+    def _keep_log_line(self, message: rospy.AnyMsg) -> None:
+        if message._connection_header["md5sum"] == Log._md5sum:
+            self._log_bytes.append(message._buff)
+            if len(self._log_bytes) > LOG_LINES_KEPT:
+                self._log_bytes.popleft()
+
+    # ---------------------------------------------------------------- subscriptions
+
+    def want(self, looking: bool, truth: bool) -> None:
+        """Say whether anybody looks, and whether at the robots' true poses as well; returns at once."""
+        if self._change is not None and not self._change.done():
+            return
+        if self._change is not None:
+            self._change.result()
+        robots = {row.namespace for row in self._rows if row.namespace and row.state != Robot.REFUSED}
+        namespaces = robots if looking else set()
+        scene = {"/tf_static", "/hero_sim/arena", "/diagnostics"} if looking else set()
+        if looking and truth:
+            scene.add("/hero_sim/markers")
+        if namespaces != set(self._feeds) or scene != set(self._scene):
+            self._change = self._worker.submit(self._change_subscriptions, namespaces, scene)
+
+    def _change_subscriptions(self, namespaces: Set[str], scene: Set[str]) -> None:
+        classes = {"/tf_static": TFMessage, "/diagnostics": DiagnosticArray}
+        for topic in scene - set(self._scene):
+            self._scene = {**self._scene, topic: NewestMessage(topic, classes.get(topic, MarkerArray))}
+        for topic in set(self._scene) - scene:
+            self._scene[topic].close()
+            self._scene = {known: kept for known, kept in self._scene.items() if known != topic}
+        for namespace in sorted(namespaces - set(self._feeds)):
+            self._feeds = {**self._feeds, namespace: RobotFeed(namespace)}
+        for namespace in set(self._feeds) - namespaces:
+            self._feeds[namespace].close()
+            self._feeds = {known: kept for known, kept in self._feeds.items() if known != namespace}
+
+    def close(self) -> None:
+        """Listen no more; does not wait for the ROS master."""
+        self._worker.shutdown(wait=False)
+
+    # ---------------------------------------------------------------- reading
+
+    def read(self) -> None:
+        """Bring the pieces up to date. One message that cannot be read leaves all others as they are."""
+        self.read_stop()
+        self._read(self._read_fleet)
+        self._read(self._read_scene)
+        for feed in list(self._feeds.values()):
+            self._read(feed.read_newest)
+        self._put_robots()
+        self._read(self._read_log)
+
+    def _read(self, part: Callable[[], None]) -> None:
+        try:
+            part()
+        except genpy.DeserializationError as error:
+            self._log.warn("a message on a robot's topic cannot be read: %s" % error, UNREADABLE_PERIOD_S)
+
+    def _read_fleet(self) -> None:
+        now_s = time.monotonic()
+        reports = self.drivers.count()
+        message = self.drivers.read() if reports != self._reports else None
+        self._reports = reports
+        if message is not None:
+            self._fleet_s = now_s
+            self._listening, self.stopped = message.listening, message.stopped
+            self._rows = message.robots[:ROBOTS_MAX]
+            self.robots = {row.namespace.strip("/"): row for row in self._rows if row.state != Robot.REFUSED}
+            self.placement.set_robots(self.robots)
+        elif self._rows and self._fleet_s and now_s - self._fleet_s < DRIVER_SILENT_S:
+            return
+        driver = bool(self._fleet_s) and now_s - self._fleet_s < DRIVER_SILENT_S
+        stamp_s = None if message is None else message.header.stamp.to_sec()
+        self.stopped = self.stopped and driver
+        fleet = {"driver": driver, "listening": make_printable(self._listening), "stopped": self.stopped}
+        self.sections.put("fleet", {**fleet, "robots": [self._make_row(row, stamp_s) for row in self._rows]})
+
+    def _make_row(self, row: Robot, stamp_s: Optional[float]) -> Dict[str, Any]:
+        name = make_printable(row.namespace.strip("/"))
+        # A robot that is refused has the name of another: what is known by name is not about this one.
+        refused = row.state == Robot.REFUSED
+        feed = None if refused else self._feeds.get(row.namespace)
+        track = None if feed is None else feed.listener.track
+        since_s = row.since.to_sec()
+        return {
+            "name": name,
+            "id": row.id,
+            "address": shorten(row.address),
+            "state": STATES.get(row.state, str(row.state)),
+            "stop": "" if refused else STOP_STATES.get(row.stop_state, str(row.stop_state)),
+            "firmware": shorten(row.firmware),
+            "hardware": shorten(row.hardware),
+            "config": shorten(row.config),
+            "since": round(stamp_s - since_s) if stamp_s is not None and since_s else None,
+            "uptime": round(row.uptime.to_sec()),
+            "reconnects": row.reconnects,
+            "frames": round(row.frames_per_s, 1),
+            "bytes": round(row.bytes_per_s),
+            "odom": None if track is None else round(track.odometry.rate_hz(time.monotonic()), 1),
+            "way": None if track is None else finite(round(track.way_m, 2)),
+            "dropped": row.dropped_messages,
+            "bad": row.bad_frames,
+            "clock": finite(round(row.clock_offset, 4)),
+            "error": shorten(row.last_error),
+            "located": not refused and self.placement.knows(name),
+            "health": [0, ""] if refused else self._health.get(name, [0, ""]),
+        }
+
+    def read_stop(self) -> bool:
+        """Bring what is known of a stop up to date; return whether pages do not know it yet."""
+        status = self.drivers.stop_status()
+        if status is None:
+            # No page has asked; another program may have.
+            moving = [name for name, row in self.robots.items() if row.stop_state == Robot.MOVING]
+            status = describe_stop_of_others(self.stopped, moving)
+        pending = status is not None and not status.is_final and status.level != "error"
+        # New each time while it is pending: pages tell from it that the monitor is alive.
+        self._pending_reads = self._pending_reads + 1 if pending else 0
+        value = None if status is None else {**status._asdict(), "reads": self._pending_reads}
+        return self.sections.put("stop", value)
+
+    def _read_scene(self) -> None:
+        taken = {topic: newest.take() for topic, newest in self._scene.items()}
+        if taken.get("/tf_static") is not None:
+            for transform in taken["/tf_static"].transforms:
+                place, turn = transform.transform.translation, transform.transform.rotation
+                pose = Pose(place.x, place.y, yaw_of_quaternion(turn.x, turn.y, turn.z, turn.w))
+                if is_on_map(pose):
+                    self.placement.receive_transform(transform.header.frame_id, transform.child_frame_id, pose)
+            self.placement.set_robots(self.robots)
+        if taken.get("/hero_sim/arena") is not None:
+            self.sections.put("arena", describe_arena(taken["/hero_sim/arena"]))
+        if taken.get("/diagnostics") is not None:
+            for status in taken["/diagnostics"].status:
+                name = status.name.rpartition(": ")[2]
+                if name in self.robots:
+                    self._health[name] = [status.level, shorten(status.message)]
+        if taken.get("/hero_sim/markers") is not None:
+            self.sections.put("truth", find_true_poses(taken["/hero_sim/markers"]))
+        elif "/hero_sim/markers" not in self._scene:
+            self.sections.put("truth", {})
+
+    def _put_robots(self) -> None:
+        poses, ranges, lights, goals = {}, {}, {}, {}
+        for feed in list(self._feeds.values()):
+            track = feed.listener.track
+            if track.pose is not None:
+                poses[feed.name] = encode_pose(self.placement.to_map(feed.name, track.pose))
+                ranges[feed.name] = encode_ranges(feed.listener.ranges_m)
+            if feed.light is not None:
+                lights[feed.name] = feed.light
+            goal = feed.find_goal(self.placement, self._map_frame)
+            if goal is not None:
+                goals[feed.name] = encode_pose(goal)
+        for name, value in (("poses", poses), ("ranges", ranges), ("lights", lights), ("goals", goals)):
+            self.sections.put(name, value)
+
+    def _read_log(self) -> None:
+        log, drivers = self.sections.log, self.drivers.names()
+        limit = LOG_LINES_PER_READ if log.count else LOG_LINES_KEPT
+        waiting = len(self._log_bytes)
+        for _ in range(waiting - limit):
+            self._log_bytes.popleft()
+            log.skip(1)
+        for _ in range(min(waiting, limit)):
+            line = Log().deserialize(self._log_bytes.popleft())
+            label = LABEL.match(line.msg) if line.name in drivers else None
+            robot = label.group(1) if label and label.group(1) in self.robots else ""
+            log.append(line.header.stamp.to_sec(), line.level, line.name.lstrip("/"), robot, line.msg)
+
+
+def describe_stop_of_others(stopped: bool, moving: Sequence[str]) -> Optional[StopStatus]:
+    """Return what people must see of a stop that no page asked for; None if there is none."""
+    if moving:
+        verb = "moves" if len(moving) == 1 else "move"
+        return StopStatus("error", "NOT STOPPED: %s %s" % (", ".join(moving), verb), is_final=False)
+    return StopStatus("info", "stopped by another program", is_final=True) if stopped else None
+
+
+def describe_arena(message: MarkerArray) -> Dict[str, List[List[int]]]:
+    """Return boxes (x, y, yaw, length, width) and circles (x, y, radius) of the arena, in mm and mrad."""
+    boxes, circles = [], []
+    for marker in message.markers[:MARKERS_MAX]:
+        pose = encode_pose(read_pose(marker.pose))
+        size = encode_pose(Pose(marker.scale.x, marker.scale.y, 0.0))
+        if pose is None or size is None or marker.action != Marker.ADD:
+            continue
+        if marker.type == Marker.CUBE:
+            boxes.append([*pose, size[0], size[1]])
+        elif marker.type == Marker.CYLINDER:
+            circles.append([pose[0], pose[1], size[0] // 2])
+    return {"boxes": boxes, "circles": circles}
+
+
+def find_true_poses(message: MarkerArray) -> Dict[str, Optional[List[int]]]:
+    """Return where the simulator's robots truly are: a marker with the name, one with the heading, for each."""
+    markers = message.markers[:MARKERS_MAX]
+    headings = {marker.id: marker for marker in markers if marker.ns == "headings"}
+    return {
+        marker.text: encode_pose(read_pose(headings[marker.id].pose))
+        for marker in markers
+        if marker.ns == "names" and marker.id in headings
+    }

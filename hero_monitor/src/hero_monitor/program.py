@@ -1,0 +1,282 @@
+"""Node hero_monitor: the fleet on a web page.
+
+    roslaunch hero_bringup monitor.launch
+
+Parameters: the README of this package. Everything runs on one thread, tornado's, except what may have to wait: for
+ROS (feed, commander) or for the terminal (log_thread).
+"""
+
+import functools
+import os
+import re
+import socket
+import stat
+from typing import TYPE_CHECKING, Any, List, NamedTuple, Optional, Union
+
+import rospy
+
+from hero_client.program import Program, ProgramError, check_flag, check_number, read_parameters, run
+from hero_client.robot import MAX_LINEAR_M_S, MAX_TURN_RAD_S
+
+from hero_client.fleet_state import Pose
+from . import requests
+from .access import TOKEN_LENGTH_MIN, Access, is_loopback
+from .commander import STOP_PERIOD_S, Commander
+from .connection_limits import ConnectionLimits
+from .dead_man import Velocity
+from .feed import FleetFeed
+from .log_thread import LogThread
+from .sections import encode
+
+if TYPE_CHECKING:
+    from .server import PageSocket
+
+LINGER_S = 10.0
+"""Subscriptions stay so long after the last page is gone: it may be a reload."""
+
+LOOK_PERIOD_S = 0.2
+"""How often the loop looks whether the program is to end."""
+
+TOKEN_REMEDY = (
+    "write one into a file that only you can read, and name it with token_file:=FILE: "
+    "(umask 077; python3 -c 'import secrets; print(secrets.token_urlsafe())' > FILE)"
+)
+
+
+class Parameters(NamedTuple):
+    """The checked parameters of the node."""
+
+    host: str
+    port: int
+    token: Optional[str]
+    host_names: List[str]
+    control: bool
+    rate_hz: float
+    map_frame: str
+    max_connections: int
+    max_connections_per_address: int
+
+
+def read_token(host: str, file: str) -> Optional[str]:
+    """Return the token in a file, None where none is needed. Raises: ProgramError."""
+    if not file:
+        if is_loopback(host):
+            return None
+        raise ProgramError(
+            "~host is %s, which other machines can reach: that needs a token; %s" % (host, TOKEN_REMEDY)
+        )
+    path = os.path.expanduser(file)
+    try:
+        with open(path, encoding="utf-8") as opened:
+            mode = os.fstat(opened.fileno()).st_mode
+            token = opened.read(1000).strip()
+    except (OSError, UnicodeDecodeError) as error:
+        raise ProgramError("~token_file %s cannot be read: %s; %s" % (path, error, TOKEN_REMEDY)) from None
+    if stat.S_ISREG(mode) and mode & (stat.S_IRWXG | stat.S_IRWXO):
+        raise ProgramError("~token_file %s can be read by others: chmod 600 %s" % (path, path))
+    if len(token) < TOKEN_LENGTH_MIN:
+        raise ProgramError(
+            "~token_file %s holds less than %d characters: %s" % (path, TOKEN_LENGTH_MIN, TOKEN_REMEDY)
+        )
+    return token
+
+
+def load_parameters() -> Parameters:
+    """Return the node's private parameters. Raises: ProgramError."""
+    given = read_parameters(
+        {
+            "host": "127.0.0.1",
+            "port": 8088,
+            "token_file": "",
+            "host_names": "",
+            "control": False,
+            "rate_hz": 10.0,
+            "map_frame": "world",
+            "max_connections": 400,
+            "max_connections_per_address": 50,
+        }
+    )
+    host = str(given["host"])
+    if not host:
+        raise ProgramError("~host is empty, but must be an address of this PC, such as 127.0.0.1")
+    names = re.split(r"[\s,]+", str(given["host_names"]).strip())
+    own_name = socket.gethostname()
+    return Parameters(
+        host,
+        check_whole_number("port", given["port"], 0, 65535),
+        read_token(host, str(given["token_file"])),
+        [name for name in [*names, own_name, own_name.partition(".")[0] + ".local", host] if name],
+        check_flag("control", given["control"]),
+        check_number("rate_hz", given["rate_hz"], 1.0, 30.0, "Hz"),
+        str(given["map_frame"]).lstrip("/"),
+        check_whole_number("max_connections", given["max_connections"], 10, 10000),
+        check_whole_number("max_connections_per_address", given["max_connections_per_address"], 5, 10000),
+    )
+
+
+def check_whole_number(name: str, value: Any, low: int, high: int) -> int:
+    """Return value if it is a whole number in low..high. Raises: ProgramError."""
+    number = check_number(name, value, low, high)
+    if number != int(number):
+        raise ProgramError("~%s is %r, but must be a whole number" % (name, value))
+    return int(number)
+
+
+class Monitor:
+    """Pages, the fleet that they show, and what they may do with it."""
+
+    def __init__(self, parameters: Parameters, program: Program) -> None:
+        # Here, so that a machine without tornado gets a line that says what to do.
+        import tornado.ioloop
+
+        from .server import Actions, Server, raise_file_limit
+
+        self._parameters = parameters
+        self._program = program
+        self._log = LogThread()
+        self._feed = FleetFeed(parameters.map_frame, self._log)
+        self._commander = Commander(self._feed.drivers)
+        self._loop = tornado.ioloop.IOLoop.current()
+        actions = Actions(self._open_page, self._receive, self._close_page)
+        # The other half of the files is for ROS: some per robot.
+        connections_max = min(parameters.max_connections, raise_file_limit() // 2)
+        limits = ConnectionLimits(connections_max, parameters.max_connections_per_address)
+        self._server = Server(Access(parameters.token, parameters.host_names), limits, actions)
+        self._tick = tornado.ioloop.PeriodicCallback(self._update_pages, 1000.0 / parameters.rate_hz)
+        self._stops = tornado.ioloop.PeriodicCallback(self._step, 1000.0 * STOP_PERIOD_S)
+        self._look = tornado.ioloop.PeriodicCallback(self._look_for_end, 1000.0 * LOOK_PERIOD_S)
+        self._leaving: Any = None
+
+    def run(self) -> None:
+        """Serve pages until the program is to end. Raises: ProgramError."""
+        wanted = self._parameters
+        try:
+            port = self._server.listen(wanted.host, wanted.port)
+        except (OSError, ValueError) as error:
+            raise ProgramError(
+                "cannot listen on %s port %d: %s; choose others with host:=ADDRESS port:=PORT"
+                % (wanted.host, wanted.port, getattr(error, "strerror", None) or error)
+            ) from None
+        host = "[%s]" % wanted.host if ":" in wanted.host else wanted.host
+        if wanted.host in ("0.0.0.0", "::"):
+            host = socket.gethostname()
+        rospy.loginfo(
+            "fleet monitor: http://%s:%d%s", host, port, "" if wanted.control else " (looking only; control:=true)"
+        )
+        self._look.start()
+        try:
+            self._loop.start()
+        finally:
+            self._commander.close()
+            self._server.close()
+            self._feed.close()
+
+    def _look_for_end(self) -> None:
+        if not self._program.running:
+            self._loop.stop()
+
+    # ---------------------------------------------------------------- pages come and go
+
+    def _open_page(self, page: "PageSocket") -> None:
+        if self._leaving is not None:
+            self._loop.remove_timeout(self._leaving)
+            self._leaving = None
+        limits = {"linear": MAX_LINEAR_M_S, "turn": MAX_TURN_RAD_S}
+        page.send(encode({"hello": {"control": self._parameters.control, "limits": limits}}))
+        if not self._tick.is_running():
+            self._tick.start()
+            self._stops.start()
+
+    def _close_page(self, page: "PageSocket") -> None:
+        self._commander.drop_page(page.number)
+        if not self._server.pages and self._leaving is None:
+            self._leaving = self._loop.call_later(LINGER_S, self._leave)
+
+    def _leave(self) -> None:
+        """Nobody looks any more."""
+        self._leaving = None
+        self._tick.stop()
+        self._stops.stop()
+        self._feed.want(looking=False, truth=False)
+
+    def _update_pages(self) -> None:
+        pages = self._server.pages
+        self._feed.want(True, any(page.truth for page in pages))
+        self._feed.read()
+        self._broadcast_updates()
+
+    def _step(self) -> None:
+        """What must not wait for the next update of the pages."""
+        self._commander.step()
+        if self._feed.read_stop():
+            self._broadcast_updates()
+
+    def _broadcast_updates(self) -> None:
+        """Send all pages what is new; a page that is still busy with the last update gets it later."""
+        for page in self._server.pages:
+            page.send_waiting()
+            if page.ready:
+                news = self._feed.sections.take_news(page.seen)
+                if news is not None:
+                    page.send(news)
+
+    # ---------------------------------------------------------------- what pages want
+
+    def _receive(self, page: "PageSocket", text: Union[str, bytes]) -> None:
+        try:
+            request = requests.read_request(text, MAX_LINEAR_M_S, MAX_TURN_RAD_S)
+        except requests.RequestError as error:
+            page.tell("error", "the page asked for something that is not understood (%s); reload it" % error)
+            return
+        if isinstance(request, requests.Look):
+            page.truth = request.truth
+        elif isinstance(request, requests.Stop):
+            self._commander.request_stop(request.stop)
+            self._feed.read_stop()
+            verb = "stop" if request.stop else "release"
+            page.acknowledge(verb)
+            # After the acknowledgement has left.
+            self._loop.add_callback(self._broadcast_updates)
+            self._log.warn("a page asks to %s all robots" % verb)
+        elif isinstance(request, requests.Release):
+            self._commander.release(page.number, "/" + request.robot)
+        elif not self._parameters.control:
+            page.tell("error", "this monitor only looks: start it with control:=true to drive robots")
+        elif request.robot not in self._feed.robots:
+            page.tell("error", "%s is not there" % request.robot)
+        elif self._feed.stopped or not self._commander.may_drive():
+            page.tell("error", "all robots are stopped: release them first")
+        elif isinstance(request, requests.Drive):
+            velocity = Velocity("/" + request.robot, request.linear_m_s, request.turn_rad_s)
+            if not self._commander.drive(page.number, velocity):
+                page.tell("error", "%s is driven from another page" % request.robot)
+        else:
+            goal = Pose(request.x_m, request.y_m, request.yaw_rad or 0.0)
+            self._commander.send_goal(
+                "/" + request.robot,
+                self._feed.placement.to_odometry(request.robot, goal),
+                request.yaw_rad is not None,
+                functools.partial(self._tell_later, page),
+            )
+
+    def _tell_later(self, page: "PageSocket", level: str, text: str) -> None:
+        """Tell a page something from another thread."""
+        self._loop.add_callback(page.tell, level, text)
+
+
+def _main() -> None:
+    with Program("hero_monitor") as program:
+        parameters = load_parameters()
+        try:
+            monitor = Monitor(parameters, program)
+        except ImportError as error:
+            raise ProgramError(
+                "needs the Python package %s: apt-get install python3-tornado, or conda install tornado"
+                % (error.name or "tornado")
+            ) from None
+        monitor.run()
+
+
+def main() -> None:
+    """Run the node."""
+    run(_main)

@@ -1,0 +1,71 @@
+"""Topics of one robot, and what the page shows of it."""
+
+import time
+from typing import Optional, Tuple
+
+from geometry_msgs.msg import PoseStamped
+from std_msgs.msg import ColorRGBA
+
+from hero_client.newest_message import NewestMessage
+
+from hero_client.fleet_state import Pose
+from hero_client.robot_listener import RobotListener, read_pose
+from .placement import Placement
+from .sections import encode_colour
+
+LIGHT_S = 15.0
+"""The firmware lets the light go dark so long after the last command (LEDStatus.ino:76)."""
+
+REACHED_M = 0.02
+"""So near a goal counts as reached, and is drawn no more; go_to_goal comes as near as 0.01 m."""
+
+
+class RobotFeed:
+    """One robot, for as long as somebody looks."""
+
+    def __init__(self, namespace: str) -> None:
+        self.name = namespace.strip("/")
+        self.listener = RobotListener(namespace)
+        self.light: Optional[str] = None
+        self._light_end_s = 0.0
+        self._goal: Optional[Tuple[str, Pose]] = None
+        self._led = NewestMessage(namespace + "/led", ColorRGBA)
+        self._goals = NewestMessage(namespace + "/goal", PoseStamped)
+
+    def read_newest(self) -> None:
+        """Read what came since the last call."""
+        self.listener.read_newest()
+        now_s = time.monotonic()
+        colour = self._led.take()
+        if colour is not None:
+            self.light = encode_colour(colour.r, colour.g, colour.b)
+            self._light_end_s = now_s + LIGHT_S
+        elif now_s > self._light_end_s:
+            self.light = None
+        goal = self._goals.take()
+        if goal is not None:
+            pose = read_pose(goal.pose)
+            self._goal = None if pose is None else (goal.header.frame_id.lstrip("/"), pose)
+
+    def find_goal(self, placement: Placement, map_frame: str) -> Optional[Pose]:
+        """Return the robot's goal on the map, None if it has none, is there, or nobody knows the goal's frame."""
+        if self._goal is None:
+            return None
+        frame, goal = self._goal
+        if frame == self.name + "/odom":
+            goal = placement.to_map(self.name, goal)
+        elif frame != map_frame:
+            return None
+        pose = self.listener.track.pose
+        if pose is not None:
+            here = placement.to_map(self.name, pose)
+            if (goal.x_m - here.x_m) ** 2 + (goal.y_m - here.y_m) ** 2 < REACHED_M**2:
+                self._goal = None
+                return None
+        return goal
+
+    def close(self) -> None:
+        """End the subscriptions."""
+        self.listener.close()
+        self._led.close()
+        self._goals.close()

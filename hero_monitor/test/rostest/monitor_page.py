@@ -1,0 +1,97 @@
+"""The fleet monitor's page in a real browser without a screen, for tests and pictures."""
+
+import os
+import shutil
+from pathlib import Path
+
+from monitor_process import TIMEOUT_S
+from hero_test.swarm_watch import wait_for
+
+MISSING = [name for name in ("chromedriver", "chromium") if shutil.which(name) is None]
+
+
+class MonitorPage:
+    """Chromium, showing the page at an address."""
+
+    def __init__(self, url):
+        # Here, because machines without a browser skip these tests.
+        from selenium import webdriver
+        from selenium.webdriver.chrome.service import Service
+
+        options = webdriver.ChromeOptions()
+        options.binary_location = shutil.which("chromium")
+        # No sandbox: it needs rights that containers lack, and only our own page is shown.
+        for argument in ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"):
+            options.add_argument(argument)
+        options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+        self.browser = webdriver.Chrome(service=Service(shutil.which("chromedriver")), options=options)
+        self.url = url
+        self.resize(1440, 900)
+        self.open()
+
+    def open(self):
+        self.browser.get(self.url)
+
+    def resize(self, width, height):
+        size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
+        self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+
+    def find(self, selector):
+        return self.browser.find_element("css selector", selector)
+
+    def click(self, selector):
+        self.find(selector).click()
+
+    def text(self, selector):
+        """Return the text of an element, also where it is scrolled out of sight."""
+        return self.find(selector).get_property("textContent").strip()
+
+    def run(self, script):
+        return self.browser.execute_script(script)
+
+    def rows(self):
+        """Return the texts of the table, a list for each robot."""
+        return self.run(
+            "return [...document.querySelectorAll('#fleet tbody tr')]"
+            ".map(row => [...row.children].map(cell => cell.textContent))"
+        )
+
+    def facts(self):
+        """Return what is shown of the chosen robot: texts by title."""
+        titles, texts = (
+            self.run("return [...document.querySelectorAll('#facts %s')].map(one => one.textContent)" % tag)
+            for tag in ("dt", "dd")
+        )
+        return dict(zip(titles, texts))
+
+    def banner(self):
+        """Return level and text of what is shown about stopping."""
+        script = "const banner = document.getElementById('stopping'); return [banner.dataset.level, banner.textContent]"
+        return tuple(self.run(script))
+
+    def choose(self, robot):
+        """Choose a robot in the table."""
+        for row in self.browser.find_elements("css selector", "#fleet tbody tr"):
+            if row.text.startswith(robot):
+                row.find_element("css selector", "button").click()
+        wait_for(lambda: self.text("#name") == robot, TIMEOUT_S, robot + " to be chosen")
+
+    def wait_for_text(self, selector, text):
+        wait_for(lambda: text in self.text(selector), TIMEOUT_S, "%r in %s" % (text, selector))
+
+    def actions(self):
+        from selenium.webdriver.common.action_chains import ActionChains
+
+        return ActionChains(self.browser, duration=50)
+
+    def save(self, name):
+        """Save a picture beside the test's results."""
+        folder = Path(os.environ.get("ROS_TEST_RESULTS_DIR", "."))
+        self.browser.save_screenshot(str(folder / name))
+
+    def errors(self):
+        """Return what the browser complained about."""
+        return [line["message"] for line in self.browser.get_log("browser") if line["level"] == "SEVERE"]
+
+    def close(self):
+        self.browser.quit()

@@ -1,0 +1,158 @@
+#!/usr/bin/env python
+"""The fleet monitor beside three simulated robots, looked at and clicked in a real browser."""
+
+import math
+import unittest
+
+import rospy
+import rostest
+from geometry_msgs.msg import Twist
+from monitor_page import MISSING, MonitorPage
+from monitor_process import HOST, OTHER_HOST, TIMEOUT_S, PageClient, end, start_monitor, wait_until_it_answers
+from rosgraph_msgs.msg import Log
+from hero_test.swarm_watch import SwarmWatch, wait_for
+
+HOSTILE = "<img src=x onerror='document.title=\"broken\"'><script>document.title='broken'</script> \u202e\x1b[31m"
+
+
+@unittest.skipIf(MISSING, "not installed: %s (script/bootstrap --test)" % ", ".join(MISSING))
+class PageTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        wait_until_it_answers(HOST)
+        cls.watch = SwarmWatch(range(3))
+        cls.watch.wait_until_complete(TIMEOUT_S)
+        # A page that never reads must not hold up the other one.
+        cls.stuck = PageClient(HOST)
+        cls.page = MonitorPage("http://%s/" % HOST)
+
+        def all_are_ready():
+            return [row[1] for row in cls.page.rows()] == ["READY"] * 3
+
+        wait_for(all_are_ready, TIMEOUT_S, "three robots that are ready")
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.page.close()
+        cls.stuck.close()
+        cls.watch.close()
+
+    def speed_of(self, robot_id):
+        """Return the true speed over the last 0.2 s, m/s."""
+        path = self.watch.path(robot_id)[-5:]
+        return math.hypot(*(path[-1, 1:3] - path[0, 1:3])) / (path[-1, 0] - path[0, 0])
+
+    def wait_until_moving(self, robot_id):
+        wait_for(lambda: self.speed_of(robot_id) > 0.02, TIMEOUT_S, "robot %d to move" % robot_id)
+
+    def wait_until_standing(self, robot_id):
+        """A robot that is left alone would drive on for 2 s: it has to stand sooner."""
+        wait_for(lambda: self.speed_of(robot_id) < 0.005, 1.5, "robot %d to stand" % robot_id)
+
+    def test_the_table_shows_every_robot_with_address_rates_and_versions(self):
+        wait_for(lambda: all(row[7] == "v3.8" for row in self.page.rows()), TIMEOUT_S, "versions")
+        rows = self.page.rows()
+        self.assertEqual([row[0] for row in rows], ["hero_0", "hero_1", "hero_2"])
+        for row in rows:
+            self.assertIn("127.0.1.", row[3])
+        wait_for(lambda: all(float(row[4].split()[0]) > 15 for row in self.page.rows()), TIMEOUT_S, "rates")
+        self.assertEqual(self.page.text("#ready"), "3 of 3 ready")
+        self.page.save("monitor_desktop.png")
+        self.page.resize(820, 1180)
+        self.page.save("monitor_tablet.png")
+        self.page.resize(1440, 900)
+
+    def test_texts_from_outside_never_become_markup(self):
+        publisher = rospy.Publisher("/rosout", Log, queue_size=5)
+        wait_for(publisher.get_num_connections, TIMEOUT_S, "listeners to the log")
+
+        def is_shown():
+            publisher.publish(Log(level=Log.WARN, name="/" + HOSTILE, msg="hero_0 " + HOSTILE))
+            return "<script>" in self.page.text("#lines")
+
+        wait_for(is_shown, TIMEOUT_S, "the line")
+        self.assertEqual(self.page.run("return document.querySelectorAll('#lines img, #lines script').length"), 0)
+        self.assertEqual(self.page.run("return document.title"), "HeRo fleet")
+        self.assertNotIn("\u202e", self.page.text("#lines"))
+        self.assertEqual(self.page.errors(), [])
+
+    def test_a_robot_drives_while_a_button_is_held_and_stops_when_it_is_let_go(self):
+        self.page.choose("hero_0")
+        button = self.page.find("#pad [aria-label='ahead']")
+        self.page.actions().click_and_hold(button).perform()
+        self.wait_until_moving(0)
+        self.page.actions().release().perform()
+        self.wait_until_standing(0)
+
+    def test_a_robot_stops_when_its_page_is_gone(self):
+        self.page.choose("hero_0")
+        button = self.page.find("#pad [aria-label='back']")
+        self.page.actions().click_and_hold(button).perform()
+        self.wait_until_moving(0)
+        # Leaves without a word: no release, no close.
+        self.page.run("WebSocket.prototype.send = () => {}")
+        self.wait_until_standing(0)
+        self.page.actions().release().perform()
+        self.page.open()
+        self.page.wait_for_text("#ready", "3 of 3")
+
+    def test_a_robot_stops_when_the_monitor_ends(self):
+        process = start_monitor("_control:=true")
+        try:
+            wait_until_it_answers(OTHER_HOST)
+            self.page.browser.get("http://%s/" % OTHER_HOST)
+            self.page.wait_for_text("#ready", "3 of 3")
+            self.page.choose("hero_0")
+            self.page.actions().click_and_hold(self.page.find("#pad [aria-label='turn left']")).perform()
+            turned = self.watch.pose(0)[2]
+            wait_for(lambda: abs(self.watch.pose(0)[2] - turned) > 0.2, TIMEOUT_S, "robot 0 to turn")
+        finally:
+            output = end(process)
+        self.wait_until_standing(0)
+        self.assertNotIn("Traceback", output)
+        self.page.actions().release().perform()
+        self.page.open()
+        self.page.wait_for_text("#ready", "3 of 3")
+
+    def click_on_map(self, right_px, down_px):
+        self.page.click("#goto")
+        canvas = self.page.find("#canvas")
+        self.page.actions().move_to_element_with_offset(canvas, right_px, down_px).click().perform()
+        self.page.click("#goto")
+
+    def test_a_click_on_the_map_sends_a_robot_there_where_a_program_listens(self):
+        self.page.choose("hero_1")
+        start = self.watch.pose(1)[:2]
+        self.click_on_map(0, 0)
+        self.page.wait_for_text("#notices", "hero_1 has a new goal")
+        wait_for(lambda: math.dist(self.watch.pose(1)[:2], start) > 0.05, TIMEOUT_S, "robot 1 to go")
+
+    def test_a_click_for_a_robot_that_nobody_brings_there_says_so(self):
+        self.page.choose("hero_0")
+        self.click_on_map(30, 30)
+        self.page.wait_for_text("#notices", "go_to_goal.launch")
+
+    def test_stop_all_stops_driven_robots_and_two_clicks_release_them(self):
+        publisher = rospy.Publisher("/hero_2/velocity_controller/cmd_vel", Twist, queue_size=1)
+        command = Twist()
+        command.linear.x = 0.03
+        command.angular.z = 1.0  # on a small circle: there is nothing to run into
+        timer = rospy.Timer(rospy.Duration(0.1), lambda event: publisher.publish(command))
+        try:
+            self.wait_until_moving(2)
+            self.page.click("#stop")
+            self.wait_until_standing(2)
+            self.page.wait_for_text("#stopping", "stopped, all wheels at rest")
+            self.page.save("monitor_stopped.png")
+            self.page.click("#release")
+            self.page.wait_for_text("#release", "again")
+            self.page.click("#release")
+            self.wait_until_moving(2)
+        finally:
+            timer.shutdown()
+        self.page.wait_for_text("#stop", "STOP ALL")
+
+
+if __name__ == "__main__":
+    rospy.init_node("test_monitor")
+    rostest.rosrun("hero_monitor", "test_monitor", PageTest)

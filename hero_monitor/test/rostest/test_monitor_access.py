@@ -1,0 +1,117 @@
+#!/usr/bin/env python
+"""Who the fleet monitor lets in, asked over HTTP: names, origins, tokens, files, and how it refuses to start."""
+
+import tempfile
+import unittest
+from pathlib import Path
+
+import rostest
+from monitor_process import (
+    HOST,
+    OTHER_HOST,
+    TIMEOUT_S,
+    UPGRADE,
+    ask,
+    end,
+    start_monitor,
+    wait_until_it_answers,
+)
+
+TOKEN = "correct-horse-battery-staple"
+
+
+class AccessTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        wait_until_it_answers(HOST)
+
+    def open_socket(self, host=HOST, **headers):
+        named = {name.replace("_", "-"): value for name, value in headers.items()}
+        return ask(host, "/live", {**UPGRADE, **named})[0]
+
+    def test_a_name_that_is_not_this_machines_is_refused(self):
+        for path in ("/", "/live", "/main.js", "/nothing"):
+            status, headers, _ = ask(HOST, path, {"Host": "evil.example:21331"})
+            self.assertEqual(status, 421, path)
+            self.assertIn("default-src 'none'", headers["Content-Security-Policy"])
+
+    def test_only_the_monitors_own_page_may_open_a_socket(self):
+        self.assertEqual(self.open_socket(Origin="http://" + HOST), 101)
+        self.assertEqual(self.open_socket(Origin="http://evil.example"), 403)
+        self.assertEqual(self.open_socket(Origin="null"), 403)
+        self.assertEqual(self.open_socket(), 403)
+
+    def test_the_page_may_load_nothing_from_elsewhere_and_run_no_inline_script(self):
+        _, headers, _ = ask(HOST)
+        policy = headers["Content-Security-Policy"]
+        self.assertIn("default-src 'none'", policy)
+        self.assertIn("script-src 'self';", policy)
+        self.assertNotIn("unsafe", policy)
+        self.assertEqual(headers["X-Content-Type-Options"], "nosniff")
+
+    def test_no_file_but_the_pages_own_is_served(self):
+        for path in ("/../program.py", "/%2e%2e/program.py", "/web/main.js", "/..", "/.", "/etc/passwd"):
+            self.assertEqual(ask(HOST, path)[0], 404, path)
+
+    def test_it_does_not_start_for_other_machines_without_a_secret_token(self):
+        with tempfile.TemporaryDirectory() as folder:
+            short, good, open_to_all = (Path(folder) / name for name in ("short", "good", "open"))
+            for file, text in ((short, "1234"), (good, TOKEN)):
+                file.write_text(text)
+                file.chmod(0o600)
+            open_to_all.write_text(TOKEN)
+            open_to_all.chmod(0o644)
+            for arguments, reason in (
+                (["_host:=0.0.0.0"], "needs a token"),
+                (["_host:=0.0.0.0", "_token_file:=%s" % short], "less than 16"),
+                (["_token_file:=%s" % open_to_all], "chmod 600"),
+                (["_token_file:=%s/none" % folder], "cannot be read"),
+                (["_rate_hz:=1000"], "1 to 30"),
+                (["_token_file:=%s" % folder], "cannot be read"),
+                (["_host:=nowhere.invalid", "_token_file:=%s" % good], "cannot listen"),
+                (["_host:=a..b", "_token_file:=%s" % good], "cannot listen"),
+                (["_max_connections:=1"], "10 to 10000"),
+            ):
+                process = start_monitor(*arguments)
+                output = process.communicate(timeout=TIMEOUT_S)[0].decode()
+                self.assertEqual(process.returncode, 1, output)
+                self.assertIn(reason, output)
+                self.assertNotIn("Traceback", output)
+
+    def test_a_port_that_is_taken_is_named(self):
+        process = start_monitor("_port:=21331")
+        output = process.communicate(timeout=TIMEOUT_S)[0].decode()
+        self.assertEqual(process.returncode, 1)
+        self.assertIn("port 21331", output)
+
+    def test_with_a_token_only_those_who_know_it_see_the_fleet(self):
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "token"
+            file.touch(mode=0o600)
+            file.write_text(TOKEN + "\n")
+            process = start_monitor("_host:=0.0.0.0", "_token_file:=%s" % file)
+            host = OTHER_HOST
+            own = {"Origin": "http://" + host}
+            try:
+                wait_until_it_answers(host)
+                self.assertIn("login.js", ask(host)[2])
+                self.assertEqual(self.open_socket(host, **own), 403)
+                wrong = ask(host, "/login", own, "POST", '{"token": "wrong"}')
+                self.assertEqual((wrong[0], wrong[1]["Set-Cookie"]), (403, None))
+                self.assertEqual(ask(host, "/login", (), "POST", '{"token": "%s"}' % TOKEN)[0], 403)
+                status, headers, _ = ask(host, "/login", own, "POST", '{"token": "%s"}' % TOKEN)
+                self.assertEqual(status, 204)
+                self.assertIn("HttpOnly", headers["Set-Cookie"])
+                self.assertIn("SameSite=Strict", headers["Set-Cookie"])
+                cookie = headers["Set-Cookie"].partition(";")[0]
+                self.assertIn("main.js", ask(host, "/", {"Cookie": cookie})[2])
+                self.assertEqual(self.open_socket(host, Cookie=cookie, **own), 101)
+                self.assertEqual(self.open_socket(host, Cookie=cookie, Origin="http://evil.example"), 403)
+            finally:
+                output = end(process)
+            self.assertNotIn(TOKEN, output)
+            self.assertNotIn("Traceback", output)
+
+
+if __name__ == "__main__":
+    rostest.rosrun("hero_monitor", "test_monitor_access", AccessTest)

@@ -1,0 +1,135 @@
+#!/usr/bin/env python
+"""The fleet monitor beset by clients without the token: those who know it get in, and their STOP ALL works."""
+
+import resource
+import socket
+import tempfile
+import unittest
+from pathlib import Path
+
+import rospy
+import rostest
+from monitor_process import (
+    OTHER_HOST,
+    TIMEOUT_S,
+    PageClient,
+    ask,
+    end,
+    log_in,
+    start_monitor,
+    start_scripted_driver,
+    wait_until_it_answers,
+)
+from hero_test.swarm_watch import wait_for
+
+from hero_msgs.msg import RobotArray
+
+TOKEN = "correct-horse-battery-staple"
+STRANGERS = 1100
+STRANGER_ADDRESSES = ["127.0.0.%d" % number for number in range(2, 32)]
+PORT = int(OTHER_HOST.rpartition(":")[2])
+FILES = 1024  # a usual soft limit
+
+
+class DoorsTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
+        cls.drivers = [start_scripted_driver("hero_driver", [0]), start_scripted_driver("hero_driver_b", [100])]
+        cls.stopped = {}
+        for name in ("hero_driver", "hero_driver_b"):
+            rospy.Subscriber("/%s/robots" % name, RobotArray, cls.receive, name)
+        # A driver that starts after a stop was confirmed is not asked.
+        wait_for(lambda: len(cls.stopped) == 2, TIMEOUT_S, "both drivers")
+
+    @classmethod
+    def tearDownClass(cls):
+        for driver in cls.drivers:
+            end(driver)
+
+    @classmethod
+    def receive(cls, message, name):
+        cls.stopped[name] = message.stopped
+
+    def setUp(self):
+        self.sockets = []
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        file = Path(folder.name) / "token"
+        file.touch(mode=0o600)
+        file.write_text(TOKEN)
+        self.process = start_monitor(
+            "_host:=0.0.0.0", "_token_file:=%s" % file, prefix=["prlimit", "--nofile=%d:" % FILES]
+        )
+        self.addCleanup(self.check_end)
+        self.addCleanup(lambda: [opened.close() for opened in self.sockets])
+        wait_until_it_answers(OTHER_HOST)
+
+    def check_end(self):
+        self.assertNotIn("Traceback", end(self.process))
+
+    def connect(self, address, count=1):
+        """Connect as somebody who sends the begin of a request and nothing more."""
+        for _ in range(count):
+            self.sockets.append(socket.create_connection(("127.0.0.1", PORT), TIMEOUT_S, (address, 0)))
+            self.sockets[-1].sendall(b"GET / HTTP/1.1\r\nHost: ")
+
+    def connect_strangers(self):
+        for address in STRANGER_ADDRESSES:
+            self.connect(address, STRANGERS // len(STRANGER_ADDRESSES) + 1)
+
+    def open_page(self):
+        status, cookie = log_in(OTHER_HOST, TOKEN)
+        self.assertEqual(status, 204)
+        self.sockets.append(PageClient(OTHER_HOST, cookie))
+        return self.sockets[-1]
+
+    def wait_until_stopped(self, stopped):
+        wait_for(lambda: list(self.stopped.values()) == [stopped] * 2, TIMEOUT_S, "stopped: %s" % stopped)
+
+    def test_a_page_opened_among_1100_strangers_stops_all_robots(self):
+        self.connect_strangers()
+        page = self.open_page()
+        page.send(do="stop", stop=True)
+        self.wait_until_stopped(True)
+        page.send(do="stop", stop=False)
+        self.wait_until_stopped(False)
+
+    def test_a_page_that_is_open_stays_when_1100_strangers_come(self):
+        page = self.open_page()
+        self.connect_strangers()
+        page.send(do="stop", stop=True)
+        self.wait_until_stopped(True)
+        page.send(do="stop", stop=False)
+        self.wait_until_stopped(False)
+
+    def test_1100_connections_of_one_address_leave_others_alone(self):
+        self.connect(STRANGER_ADDRESSES[0], STRANGERS)
+        self.connect(STRANGER_ADDRESSES[1])
+        self.open_page().send(do="stop", stop=True)
+        self.wait_until_stopped(True)
+        other = self.sockets[-2]
+        other.sendall(b"%s\r\n\r\n" % OTHER_HOST.encode())
+        self.assertIn(b"200 OK", other.recv(100))
+        self.open_page().send(do="stop", stop=False)
+        self.wait_until_stopped(False)
+
+    def test_a_connection_that_sends_no_request_is_closed(self):
+        self.connect(STRANGER_ADDRESSES[0])
+        self.assertEqual(self.sockets[-1].recv(1), b"")
+
+    def test_wrong_tokens_of_one_address_keep_no_other_from_logging_in(self):
+        stranger, owner = STRANGER_ADDRESSES[:2]
+        answers = [log_in(OTHER_HOST, "wrong", stranger)[0] for _ in range(20)]
+        self.assertEqual((answers[0], answers[-1]), (403, 429))
+        self.assertEqual(log_in(OTHER_HOST, TOKEN, stranger)[0], 429)
+        status, cookie = log_in(OTHER_HOST, TOKEN, owner)
+        self.assertEqual(status, 204)
+        # Who is logged in gets in from anywhere.
+        self.assertIn("main.js", ask(OTHER_HOST, "/", {"Cookie": cookie}, source=stranger)[2])
+
+
+if __name__ == "__main__":
+    rospy.init_node("test_monitor_doors")
+    rostest.rosrun("hero_monitor", "test_monitor_doors", DoorsTest)

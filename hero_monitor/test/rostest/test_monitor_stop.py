@@ -1,0 +1,205 @@
+#!/usr/bin/env python
+"""STOP ALL in a real browser: what people see while robots stop, stand, move though stopped, or nobody answers."""
+
+import json
+import os
+import signal
+import unittest
+import xmlrpc.client
+
+import rosgraph
+import rospy
+import rostest
+from geometry_msgs.msg import Twist
+from monitor_page import MISSING, MonitorPage
+from monitor_process import (
+    OTHER_HOST,
+    TIMEOUT_S,
+    end,
+    start_monitor,
+    start_scripted_driver,
+    wait_until_it_answers,
+)
+from std_msgs.msg import Bool, String
+from hero_test.swarm_watch import wait_for
+
+from hero_msgs.msg import RobotArray
+
+HOST = "127.0.0.1:21333"
+DRIVERS = ("hero_driver", "hero_driver_b")
+RED, AMBER, GREEN = "error", "warn", "info"
+
+
+def find_pid(node):
+    """Return the process of a node."""
+    return xmlrpc.client.ServerProxy(rosgraph.Master("/test").lookupNode(node)).getPid("/test")[2]
+
+
+@unittest.skipIf(MISSING, "not installed: %s (script/bootstrap --test)" % ", ".join(MISSING))
+class StopTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        wait_until_it_answers(HOST)
+        cls.drivers = [
+            start_scripted_driver("hero_driver", [0, 1, 2, 3], twin_of=0),
+            start_scripted_driver("hero_driver_b", [100, 101]),
+        ]
+        cls.reports = {}
+        for name in DRIVERS:
+            rospy.Subscriber("/%s/robots" % name, RobotArray, cls.receive, name)
+        cls.behave = rospy.Publisher("/hero_driver/behave", String, queue_size=5)
+        cls.requests = [rospy.Publisher("/%s/stop_request" % name, Bool, queue_size=5) for name in DRIVERS]
+        cls.page, cls.other = (MonitorPage("http://%s/" % HOST) for _ in range(2))
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.page.close()
+        cls.other.close()
+        for driver in cls.drivers:
+            end(driver)
+
+    @classmethod
+    def receive(cls, message, name):
+        cls.reports[name] = message
+
+    def setUp(self):
+        for publisher in (self.behave, *self.requests):
+            wait_for(publisher.get_num_connections, TIMEOUT_S, "connections to the drivers")
+        self.set_behaviour()
+        for page in (self.page, self.other):
+            page.open()
+            page.wait_for_text("#ready", "6 of 7")
+        self.release()
+
+    def tearDown(self):
+        self.set_behaviour()
+        self.release()
+
+    def set_behaviour(self, moving=(), rest=True):
+        self.behave.publish(json.dumps({"moving": moving, "rest": rest}))
+
+    def release(self):
+        def ask():
+            # Again and again: a monitor that has not heard of its own stop yet goes on asking for it.
+            for publisher in self.requests:
+                publisher.publish(False)
+            return self.all_report(False)
+
+        wait_for(ask, TIMEOUT_S, "the release")
+
+    def wait_for_reports(self, stopped):
+        wait_for(lambda: self.all_report(stopped), TIMEOUT_S, "stopped: %s" % stopped)
+
+    def all_report(self, stopped):
+        return [report.stopped for report in self.reports.values()] == [stopped] * len(DRIVERS)
+
+    def wait_for_banner(self, level, text, *pages):
+        for page in pages or (self.page, self.other):
+            wait_for(lambda page=page: page.banner() == (level, text), TIMEOUT_S, lambda page=page: page.banner())
+
+    def suspend(self, pid):
+        """Suspend a process until the end of the test, or until what is returned is called."""
+        os.kill(pid, signal.SIGSTOP)
+        self.addCleanup(os.kill, pid, signal.SIGCONT)
+        return lambda: os.kill(pid, signal.SIGCONT)
+
+    def stop_states(self, page):
+        return {row[0]: row[2] for row in page.rows() if row[1] != "REFUSED"}
+
+    def test_all_pages_show_that_robots_are_stopping_and_at_rest(self):
+        self.set_behaviour(rest=False)
+        self.page.click("#stop")
+        self.assertEqual(self.page.banner(), (AMBER, "stopping"))
+        wait_for(lambda: self.stop_states(self.page)["hero_0"] == "stopping", TIMEOUT_S, "a robot that stops")
+        self.page.save("monitor_stopping.png")
+        self.set_behaviour()
+        self.wait_for_banner(GREEN, "stopped, all wheels at rest")
+        self.page.save("monitor_at_rest.png")
+        for page in (self.page, self.other):
+            self.assertEqual(set(self.stop_states(page).values()), {"at rest"})
+            self.assertEqual(page.text("#stop"), "STOPPED")
+
+    def test_a_robot_that_moves_though_stopped_is_named_in_red_until_it_stands(self):
+        self.set_behaviour(moving=[3])
+        self.page.click("#stop")
+        self.wait_for_banner(RED, "NOT STOPPED: hero_3 moves")
+        self.page.save("monitor_not_stopped.png")
+        for page in (self.page, self.other):
+            self.assertEqual(self.stop_states(page)["hero_3"], "MOVING")
+            self.assertEqual(page.text("#stop"), "STOP ALL")
+        self.set_behaviour()
+        self.wait_for_banner(GREEN, "stopped, all wheels at rest")
+
+    def test_a_robot_that_moves_after_the_stop_of_another_program_is_named(self):
+        for publisher in self.requests:
+            publisher.publish(True)
+        self.wait_for_reports(True)
+        self.page.wait_for_text("#stopping", "stopped")
+        self.set_behaviour(moving=[2])
+        wait_for(lambda: self.page.banner() == (RED, "NOT STOPPED: hero_2 moves"), TIMEOUT_S, self.page.banner)
+
+    def test_a_page_drives_no_robot_until_all_are_released(self):
+        commands = []
+        rospy.Subscriber("/hero_2/velocity_controller/cmd_vel", Twist, commands.append)
+        self.page.choose("hero_2")
+        button = self.page.find("#pad [aria-label='ahead']")
+        self.page.actions().click_and_hold(button).perform()
+        wait_for(lambda: any(command.linear.x > 0 for command in commands), TIMEOUT_S, "a command")
+        # Pressed on another page, while the button is held.
+        self.other.click("#stop")
+        wait_for(lambda: commands[-1].linear.x == 0, TIMEOUT_S, "a stop")
+        self.page.wait_for_text("#notices", "all robots are stopped")
+        self.wait_for_banner(GREEN, "stopped, all wheels at rest")
+        self.assertEqual(commands[-1].linear.x, 0.0)
+        self.page.actions().release().perform()
+
+    def test_a_driver_that_hangs_is_named_and_the_other_one_stops(self):
+        resume = self.suspend(self.drivers[1].pid)
+        self.page.click("#stop")
+        wait_for(lambda: self.reports["hero_driver"].stopped, TIMEOUT_S, "the stop of the other driver")
+        self.wait_for_banner(RED, "NOT STOPPED: driver hero_driver_b does not answer")
+        resume()
+        self.wait_for_banner(GREEN, "stopped, all wheels at rest")
+
+    def test_a_stop_needs_no_ros_master(self):
+        pid = rosgraph.Master("/test").getPid()
+        os.kill(pid, signal.SIGSTOP)
+        try:
+            self.page.click("#stop")
+            self.wait_for_reports(True)
+            self.wait_for_banner(GREEN, "stopped, all wheels at rest")
+        finally:
+            os.kill(pid, signal.SIGCONT)
+
+    def test_the_page_itself_says_that_the_monitor_does_not_answer(self):
+        resume = self.suspend(find_pid("/hero_monitor"))
+        self.page.click("#stop")
+        self.assertEqual(self.page.banner(), (AMBER, "stopping"))
+        self.wait_for_banner(RED, "NOT STOPPED: the monitor does not answer", self.page)
+        self.page.save("monitor_no_answer.png")
+        resume()
+        self.wait_for_reports(True)
+        self.wait_for_banner(GREEN, "stopped, all wheels at rest")
+
+    def test_a_stop_without_a_connection_is_sent_once_there_is_one(self):
+        process = start_monitor()
+        try:
+            wait_until_it_answers(OTHER_HOST)
+            self.page.browser.get("http://%s/" % OTHER_HOST)
+            self.page.wait_for_text("#ready", "6 of 7")
+        finally:
+            end(process)
+        self.page.wait_for_text("#link", "no connection")
+        self.page.click("#stop")
+        self.assertEqual(self.page.banner(), (RED, "NOT STOPPED: there is no connection to the monitor"))
+        process = start_monitor()
+        try:
+            self.wait_for_reports(True)
+            self.wait_for_banner(GREEN, "stopped, all wheels at rest", self.page)
+        finally:
+            end(process)
+
+
+if __name__ == "__main__":
+    rospy.init_node("test_monitor_stop")
+    rostest.rosrun("hero_monitor", "test_monitor_stop", StopTest)

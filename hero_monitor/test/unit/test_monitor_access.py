@@ -1,0 +1,78 @@
+"""Who may see the fleet monitor's page: the token, names of this machine, pages of other servers."""
+
+import pytest
+
+from hero_monitor.access import Access, is_loopback, split_host
+
+TOKEN = "a secret of more than sixteen letters"
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "127.3.2.1", "::1", "localhost"])
+def test_loopback_is_this_machine_alone(host):
+    assert is_loopback(host)
+
+
+@pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.168.1.5", "10.42.0.1", "", "pc", "localhost.evil.example"])
+def test_everything_else_is_reached_from_outside(host):
+    assert not is_loopback(host)
+
+
+@pytest.mark.parametrize(
+    ("header", "parts"),
+    [
+        ("localhost:8088", ("localhost", 8088)),
+        ("PC.local", ("pc.local", 80)),
+        ("[::1]:8088", ("::1", 8088)),
+        ("pc.:1", ("pc", 1)),
+        ("", None),
+        ("user@pc", None),
+        ("pc/path", None),
+        ("pc:port", None),
+    ],
+)
+def test_a_host_header_is_split_into_name_and_port(header, parts):
+    assert split_host(header) == parts
+
+
+@pytest.mark.parametrize("header", ["localhost:8088", "127.0.0.1:8088", "[::1]:8088", "10.42.0.1", "Lab-PC:8088"])
+def test_names_and_addresses_of_this_machine_are_let_in(header):
+    assert Access(None, ["lab-pc"]).admits_host(header)
+
+
+@pytest.mark.parametrize("header", ["evil.example:8088", "127.0.0.1.evil.example", "localhost.evil.example", "", "@"])
+def test_a_name_that_was_made_to_resolve_to_this_machine_is_refused(header):
+    assert not Access(None, ["lab-pc"]).admits_host(header)
+
+
+@pytest.mark.parametrize(
+    ("origin", "admitted"),
+    [
+        ("http://localhost:8088", True),
+        ("https://LOCALHOST:8088", True),
+        ("http://localhost:8089", False),
+        ("http://evil.example", False),
+        ("http://localhost:8088.evil.example", False),
+        ("null", False),
+        ("file://", False),
+        ("", False),
+        (None, False),
+    ],
+)
+def test_only_a_page_of_this_very_server_may_open_a_socket(origin, admitted):
+    assert Access.admits_origin(origin, "localhost:8088") is admitted
+
+
+def test_the_token_is_admitted():
+    assert Access(TOKEN, []).needs_token
+    assert Access(TOKEN, []).admits_token(TOKEN)
+
+
+@pytest.mark.parametrize("token", ["", TOKEN[:-1], TOKEN + " ", "\u00fc", "\ud800", "wrong"])
+def test_a_wrong_token_is_refused(token):
+    assert not Access(TOKEN, []).admits_token(token)
+
+
+def test_without_a_token_none_is_needed_and_none_is_right():
+    access = Access(None, [])
+    assert not access.needs_token
+    assert not access.admits_token("")

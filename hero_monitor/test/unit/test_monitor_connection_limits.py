@@ -1,0 +1,140 @@
+"""Connections and wrong tokens of the monitor's clients: untrusted ones cannot lock out those who are logged in."""
+
+import pytest
+
+from hero_monitor.connection_limits import (
+    ADDRESSES_MAX,
+    TOKEN_BURST,
+    TOKEN_PERIOD_S,
+    UNTRUSTED_S,
+    ConnectionLimits,
+    TokenAttempts,
+    group_address,
+)
+
+OWNER, STRANGER = "10.0.0.1", "10.0.0.2"
+
+
+class FakeConnection:
+    def __init__(self):
+        self.is_closed = False
+
+    def close(self):
+        self.is_closed = True
+
+    def closed(self):
+        return self.is_closed
+
+
+def connect(limits, address, count=1, now_s=0.0):
+    connections = [FakeConnection() for _ in range(count)]
+    for connection in connections:
+        assert limits.admit(connection, address, now_s)
+    return connections
+
+
+def count_open(connections):
+    return sum(not connection.closed() for connection in connections)
+
+
+def test_an_address_with_too_many_connections_loses_its_oldest():
+    limits = ConnectionLimits(100, 5)
+    connections = connect(limits, STRANGER, 7)
+    assert [connection.closed() for connection in connections] == [True] * 2 + [False] * 5
+
+
+def test_trusted_connections_do_not_count_for_their_address():
+    limits = ConnectionLimits(100, 5)
+    own = connect(limits, OWNER, 5)
+    for connection in own:
+        limits.trust(connection)
+    assert count_open(connect(limits, OWNER, 5)) == 5
+    assert count_open(own) == 5
+
+
+def test_where_all_places_are_taken_the_address_with_the_most_loses_one():
+    limits = ConnectionLimits(10, 8)
+    own, others = connect(limits, OWNER, 2), connect(limits, STRANGER, 8)
+    own += connect(limits, OWNER)
+    assert count_open(own) == 3
+    assert [connection.closed() for connection in others] == [True] + [False] * 7
+
+
+def test_a_trusted_connection_is_never_evicted_for_another():
+    limits = ConnectionLimits(10, 50)
+    (own,) = connect(limits, OWNER)
+    limits.trust(own)
+    for number in range(200):
+        connect(limits, "10.0.1.%d" % (number % 50), now_s=float(number))
+    assert not own.closed()
+
+
+def test_a_new_connection_is_refused_only_where_all_are_trusted():
+    limits = ConnectionLimits(3, 3)
+    own = connect(limits, OWNER, 3)
+    for connection in own:
+        limits.trust(connection)
+    assert not limits.admit(FakeConnection(), OWNER, 1.0)
+    own[0].close()
+    assert limits.admit(FakeConnection(), OWNER, 1.0)
+
+
+def test_closed_connections_make_room():
+    limits = ConnectionLimits(10, 3)
+    first = connect(limits, STRANGER, 3)
+    first[2].close()
+    connect(limits, STRANGER)
+    assert count_open(first) == 2
+
+
+def test_a_connection_without_a_login_is_closed_after_a_while():
+    limits = ConnectionLimits(10, 10)
+    silent, own = connect(limits, STRANGER, 2, now_s=5.0)
+    limits.trust(own)
+    limits.expire(5.0 + UNTRUSTED_S)
+    assert not silent.closed()
+    limits.expire(5.1 + UNTRUSTED_S)
+    assert silent.closed() and not own.closed()
+
+
+@pytest.mark.parametrize(
+    ("address", "group"),
+    [
+        ("10.0.0.1", "10.0.0.1"),
+        ("::ffff:10.0.0.1", "10.0.0.1"),
+        ("fe80::1%wlan0", "fe80::/64"),
+        ("2001:db8:1:2:3:4:5:6", "2001:db8:1:2::/64"),
+        ("", ""),
+    ],
+)
+def test_an_ipv6_network_counts_as_one_address(address, group):
+    assert group_address(address) == group
+
+
+def use_up(attempts, address, now_s=0.0):
+    for _ in range(TOKEN_BURST):
+        assert attempts.admits(address, now_s)
+        attempts.count_wrong(address, now_s)
+    assert not attempts.admits(address, now_s)
+
+
+def test_after_too_many_wrong_tokens_an_address_has_to_wait():
+    attempts = TokenAttempts()
+    use_up(attempts, STRANGER, 100.0)
+    assert not attempts.admits(STRANGER, 99.9 + TOKEN_PERIOD_S)
+    assert attempts.admits(STRANGER, 100.1 + TOKEN_PERIOD_S)
+
+
+def test_wrong_tokens_of_one_address_keep_no_other_from_trying():
+    attempts = TokenAttempts()
+    use_up(attempts, STRANGER)
+    assert attempts.admits(OWNER, 0.0)
+
+
+def test_the_addresses_that_are_remembered_are_bounded():
+    attempts = TokenAttempts()
+    use_up(attempts, STRANGER)
+    for number in range(2 * ADDRESSES_MAX):
+        attempts.count_wrong("10.%d.%d.1" % divmod(number, 256), 0.0)
+    assert not attempts.admits(STRANGER, 0.0)
+    assert len(attempts._full_again_s) <= ADDRESSES_MAX

@@ -1,0 +1,59 @@
+"""Buttons that are held on a page: the robot drives while they are, and stops however they end."""
+
+import pytest
+
+from hero_monitor.dead_man import HOLD_TIMEOUT_S, STOPS, DeadMan, Velocity
+
+AHEAD = Velocity("/hero_0", 0.1, 0.0)
+STAND = Velocity("/hero_0", 0.0, 0.0)
+
+
+@pytest.fixture()
+def held():
+    dead_man = DeadMan()
+    assert dead_man.hold(1, AHEAD, now_s=10.0)
+    return dead_man
+
+
+def take_all(dead_man, now_s):
+    return [velocity for _ in range(2 * STOPS) for velocity in dead_man.take_stops(now_s)]
+
+
+def test_nothing_is_stopped_while_a_button_is_held(held):
+    for step in range(20):
+        now_s = 10.0 + 0.1 * step
+        assert held.hold(1, AHEAD, now_s)
+        assert held.take_stops(now_s) == []
+
+
+def test_a_released_button_stops_the_robot_and_then_leaves_it_alone(held):
+    held.release(1, "/hero_0")
+    assert take_all(held, 10.05) == [STAND] * STOPS
+    assert held.take_stops(99.0) == []
+
+
+def test_silence_stops_the_robot(held):
+    assert held.take_stops(9.99 + HOLD_TIMEOUT_S) == []
+    assert take_all(held, 10.01 + HOLD_TIMEOUT_S) == [STAND] * STOPS
+
+
+def test_a_page_that_is_gone_stops_its_robots_and_no_others(held):
+    held.hold(1, Velocity("/hero_1", 0.1, 0.0), 10.0)
+    held.hold(2, Velocity("/hero_2", 0.1, 0.0), 10.0)
+    held.drop_page(1)
+    assert {velocity.namespace for velocity in held.take_stops(10.1)} == {"/hero_0", "/hero_1"}
+
+
+def test_the_end_of_the_program_stops_all(held):
+    held.hold(2, Velocity("/hero_2", 0.1, 0.0), 10.0)
+    held.drop_all()
+    assert {velocity.namespace for velocity in held.take_stops(10.1)} == {"/hero_0", "/hero_2"}
+
+
+def test_a_robot_is_driven_from_one_page_at_a_time(held):
+    assert not held.hold(2, STAND, 10.1)
+    held.release(2, "/hero_0")
+    assert held.take_stops(10.2) == []
+    held.release(1, "/hero_0")
+    assert held.hold(2, AHEAD, 10.3)
+    assert held.take_stops(10.3) == []

@@ -1,0 +1,24 @@
+"""What the programs of this package end with: one line with the thing, the value and the remedy."""
+
+from contextlib import contextmanager
+from typing import Iterator
+
+from hero_client.command_line import make_printable
+
+
+class RecordingError(Exception):
+    """A recording cannot be made or read; the text says why and what to do."""
+
+
+@contextmanager
+def name_damage(what: str) -> Iterator[None]:
+    """Turn whatever rosbag raises in the block into one line that begins with what. Raises: RecordingError."""
+    try:
+        yield
+    except RecordingError:
+        raise
+    except OSError as error:
+        raise RecordingError("%s: %s" % (what, error.strerror or error)) from error
+    except Exception as error:  # rosbag checks little: a wrong byte may raise anything
+        reason = make_printable(str(error))[:200]
+        raise RecordingError("%s: it is damaged, or no bag (%s: %s)" % (what, type(error).__name__, reason)) from error

@@ -1,0 +1,237 @@
+"""What a recording says of robots whose ways, delays, errors and pauses are known."""
+
+import math
+import re
+
+import made_up_bag
+import numpy as np
+import pytest
+from made_up_bag import DELAY_S, ERROR_M, MOTION_DELAY_S, PERIOD_S, RADIUS_M, START_S, TURN_RAD_S, write_bag
+
+from hero_recording import analysis, plot
+from hero_recording.bags import BagSet, Message
+from hero_recording.colours import MOST_NAMED, choose_colours
+from hero_recording.errors import RecordingError
+from hero_recording.figures import Figures, hold_commands
+from hero_recording.observations import Observations, RobotObservations, StateReport
+from hero_recording.progress import Progress
+from hero_recording.topics import find_robot_topic, is_fleet_topic, make_patterns
+
+
+def observe(path, robot_ids=None):
+    bags = BagSet([str(path)], Progress())
+    observations = Observations(robot_ids)
+    bags.read(observations.wants, observations.receive)
+    return observations
+
+
+@pytest.fixture(scope="module")
+def two_robots(tmp_path_factory):
+    path = tmp_path_factory.mktemp("bags") / "two.bag"
+    write_bag(path, robot_ids=(0, 3), seconds=12.0, pause=(6.0, 8.0))
+    return path
+
+
+def test_patterns_take_robots_that_join_later_and_leave_other_topics_alone():
+    patterns = make_patterns(None, False, ["/mine"])
+
+    def is_recorded(topic):
+        return any(re.fullmatch(pattern, topic) for pattern in patterns)
+
+    for topic in (
+        *(
+            "/hero_%d/%s" % (number, name)
+            for number in (0, 7, 123)
+            for name in ("odom", "proximity", "imu", "led")
+        ),
+        "/hero_4/velocity_controller/cmd_vel",
+        "/hero_4/ground_truth",
+        *(
+            "/tf",
+            "/tf_static",
+            "/rosout",
+            "/diagnostics",
+            "/hero_driver/robots",
+            "/hero_driver_b/robots",
+            "/hero_sim/arena",
+            "/arena",
+            "/mine",
+        ),
+    ):
+        assert is_recorded(topic), topic
+    for topic in (
+        "/hero_0/laser",
+        "/hero_0/odom_raw",
+        "/camera/image",
+        "/hero_x/odom",
+        "/rosout_agg",
+        "/minefield",
+    ):
+        assert not is_recorded(topic), topic
+
+
+def test_the_lists_of_all_drivers_are_read_and_other_topics_of_that_name_are_not():
+    assert is_fleet_topic("/hero_driver/robots", "hero_msgs/RobotArray")
+    assert is_fleet_topic("/hero_driver_b/robots", "hero_msgs/RobotArray")
+    assert not is_fleet_topic("/hero_driver/robots", "std_msgs/String")
+    assert not is_fleet_topic("/hero_driver/b/robots", "hero_msgs/RobotArray")
+
+
+def test_patterns_for_some_robots_take_no_others():
+    pattern = make_patterns([1, 12], True, [])[0]
+    assert re.fullmatch(pattern, "/hero_12/laser")
+    assert not re.fullmatch(pattern, "/hero_2/odom")
+    assert not re.fullmatch(pattern, "/hero_112/odom")
+
+
+def test_a_topic_of_another_type_is_somebody_elses():
+    assert find_robot_topic("/hero_5/odom", "nav_msgs/Odometry") == (5, "odometry")
+    assert find_robot_topic("/hero_5/odom", "std_msgs/String") is None
+    assert find_robot_topic("/hero_5/speech", "std_msgs/String") is None
+
+
+def test_paths_lie_in_the_frame_that_all_robots_share(two_robots):
+    seen = observe(two_robots)
+    assert sorted(seen.robots) == [0, 3]
+    assert seen.shared_frame == "world"
+    path = analysis.read_path(seen.robots[3])
+    assert path.x_m[0] == pytest.approx(3.0 * made_up_bag.ORIGIN_X_M, abs=1e-6)
+    # The pause is driven too: the way is that of the chord.
+    driven_s = 12.0 - made_up_bag.BEGIN_S - MOTION_DELAY_S
+    assert path.length_m == pytest.approx(RADIUS_M * TURN_RAD_S * driven_s, rel=0.03)
+    assert seen.walls_m == [(-1.0, 0.0, 1.0, 0.0)]
+    assert seen.circles_m == [(0.5, 0.0, 0.1)]
+
+
+def test_only_the_robots_that_are_asked_for_are_looked_at(two_robots):
+    assert sorted(observe(two_robots, {3}).robots) == [3]
+
+
+def test_a_summary_tells_rate_gaps_delays_and_error(two_robots):
+    summary = analysis.summarise(3, observe(two_robots).robots[3])
+    assert summary.odometry_hz == pytest.approx(1.0 / PERIOD_S, rel=0.01)
+    assert summary.longest_gap_s == pytest.approx(2.0, abs=0.05)
+    assert summary.message_delay_s == pytest.approx(DELAY_S, abs=1e-6)
+    assert summary.error_m == pytest.approx(ERROR_M, abs=1e-5)
+    assert summary.yaw_error_rad == pytest.approx(0.0, abs=1e-5)
+    assert summary.motion_delay_s == pytest.approx(MOTION_DELAY_S, abs=1.5 * PERIOD_S)
+
+
+def test_without_a_shared_frame_odometry_is_laid_upon_ground_truth_where_both_begin(two_robots):
+    robot = observe(two_robots).robots[3]
+    robot.origins.clear()
+    errors = analysis.find_errors(robot)
+    assert errors.position_m.max() < 1e-5
+
+
+def test_commands_to_a_robot_that_moves_already_say_nothing_of_its_delay():
+    robot = RobotObservations()
+    for reading in range(300):
+        robot.encoder.add(reading * PERIOD_S, float(reading), float(reading))
+    robot.commands.add(5.0, 0.1, 0.0)
+    assert len(analysis.find_motion_delays(robot)) == 0
+
+
+def test_a_message_with_numbers_that_make_no_sense_is_left_out_and_counted():
+    observations = Observations()
+    for x_m in (0.0, math.nan, math.inf, 1e30, 0.1):
+        pose = made_up_bag.make_pose(1.0, x_m, 0.0, 0.0)
+        observations.receive(Message("/hero_0/odom", "nav_msgs/Odometry", pose, 1.0))
+    assert analysis.read_path(observations.robots[0]).length_m == pytest.approx(0.1)
+    assert plot.format_table(observations)[-1].startswith("hero_0: 3 messages left out")
+
+
+def test_states_become_spans_with_holes_where_the_driver_said_nothing():
+    reports = [
+        StateReport(0.0, "ready", 0),
+        StateReport(1.0, "ready", 0),
+        StateReport(1.5, "away", 0),
+        StateReport(2.5, "away", 0),
+        StateReport(10.0, "ready", 1),
+    ]
+    assert analysis.find_spans(reports) == [(0.0, 1.5, "ready"), (1.5, 2.5, "away"), (10.0, 10.0, "ready")]
+
+
+def test_a_command_that_is_not_repeated_ends_with_the_robots_watchdog():
+    times_s, linear, turn = hold_commands(np.array([0.0, 1.0, 9.0]), np.array([0.1, 0.2, 0.3]), np.zeros(3))
+    assert times_s.tolist() == [0.0, 1.0, 3.0, 9.0, 11.0]
+    assert np.allclose(linear, [0.1, 0.2, 0.0, 0.3, 0.0])
+    assert len(turn) == 5
+
+
+def test_few_robots_have_colours_of_their_own_and_many_a_scale():
+    assert len(set(choose_colours(range(MOST_NAMED)).values())) == MOST_NAMED
+    assert len(set(choose_colours(range(50)).values())) == 50
+    assert len(choose_colours([4])) == 1
+
+
+@pytest.mark.parametrize("count", [1, 50])
+def test_every_figure_has_titles_units_and_all_robots_for_one_and_for_fifty(count, tmp_path):
+    path = tmp_path / "fleet.bag"
+    write_bag(path, robot_ids=range(count), seconds=1.5)
+    drawing = Figures(observe(path), START_S, START_S + 1.5, "fleet.bag")
+    figures = {
+        "speeds": drawing.draw_speeds(),
+        "delays": drawing.draw_delays(),
+        "connections": drawing.draw_connections(),
+        "errors": drawing.draw_errors(),
+        "paths": drawing.draw_paths(),
+    }
+    for name, figure in figures.items():
+        figure.savefig(str(tmp_path / (name + ".png")), dpi=30)
+        labels = [
+            text for axes in figure.axes for text in (axes.get_xlabel(), axes.get_ylabel(), axes.get_title())
+        ]
+        assert any("(m" in label or "(s)" in label for label in labels), name
+        assert "fleet.bag" in "".join(text.get_text() for text in figure.texts)
+    for name in ("delays", "connections"):
+        names = [label.get_text() for label in figures[name].axes[0].get_yticklabels()]
+        assert names == ["hero_%d" % number for number in range(count)]
+    numbers = {text.get_text() for text in figures["paths"].axes[0].texts}
+    assert numbers == (set() if count == 1 else {str(number) for number in range(count)})
+
+
+def run_plot(capsys, *arguments):
+    plot.run(plot.parse_options([str(argument) for argument in arguments]))
+    return capsys.readouterr().out
+
+
+def test_plot_writes_png_files_beside_the_bag_and_a_table(two_robots, capsys):
+    output = run_plot(capsys, two_robots)
+    assert re.search(r"^hero_3 +1\.\d\d m +29\.\d Hz +2\.\d\d s +20 ms", output, re.MULTILINE)
+    for name in plot.FIGURES:
+        path = two_robots.parent / ("two_%s.png" % name)
+        assert path.read_bytes().startswith(b"\x89PNG")
+        assert str(path) in output
+
+
+def test_plot_writes_one_pdf_with_a_page_for_each_figure(two_robots, tmp_path, capsys):
+    run_plot(capsys, two_robots, "--format", "pdf", "--out", tmp_path / "all", "--figures", "paths,delays")
+    content = (tmp_path / "all.pdf").read_bytes()
+    assert content.startswith(b"%PDF")
+    assert content.count(b"/Type /Page ") == 2
+
+
+def test_plot_draws_an_arena_file_where_the_recording_has_none(two_robots, tmp_path):
+    options = plot.parse_options([str(two_robots), "--arena", "obstacles"])
+    seen = plot.observe(options, BagSet([str(two_robots)], Progress()))
+    assert len(seen.walls_m) > 4
+
+
+def test_wrong_input_of_plot_is_named(two_robots, tmp_path, capsys):
+    made_up_bag.rosbag.Bag(str(tmp_path / "other.bag"), "w").close()
+    with made_up_bag.rosbag.Bag(str(tmp_path / "other.bag"), "w") as bag:
+        bag.write("/chatter", made_up_bag.ColorRGBA())
+    for arguments, words in (
+        ([tmp_path / "other.bag"], "no robot in it; its topics: /chatter"),
+        ([two_robots, "--robots", "1 2"], r"no robot with these ids \(1, 2\)"),
+        ([two_robots, "--arena", tmp_path / "no.yaml"], "no.yaml cannot be read"),
+        ([two_robots, "--out", tmp_path / "no" / "where"], "cannot be written"),
+    ):
+        with pytest.raises(RecordingError, match=words):
+            run_plot(capsys, *arguments)
+    for arguments in (["--figures", "pies"], ["--robots", "x"], ["--format", "gif"]):
+        with pytest.raises(SystemExit) as caught:
+            plot.parse_options([str(two_robots), *arguments])
+        assert caught.value.code == 2
+        assert arguments[1] in capsys.readouterr().err

@@ -1,0 +1,1 @@
+"""The fleet in a terminal, the checks of an installation, and the hotspot."""

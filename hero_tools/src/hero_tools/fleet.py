@@ -1,0 +1,362 @@
+"""Topics of the driver and of its robots -> the fleet as a live table, as lines, or as JSON.
+
+    rosrun hero_tools fleet                  a table like top, redrawn in place
+    rosrun hero_tools fleet --once --json    the fleet as one line of JSON, for scripts
+
+Shows the robots of all drivers. Only listens, except for the keys: s and r ask all drivers to stop all robots and to
+release them, d calls the service disconnect. Messages of robots are kept as bytes and read when the table is drawn, so
+that fifty robots cost little. Only threads of their own wait for the ROS master.
+"""
+
+import argparse
+import contextlib
+import shutil
+import sys
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+from typing import Dict, List, Optional, Sequence, Set
+
+import rospy
+
+from hero_client.drivers import Drivers
+from hero_client.keyboard import Keyboard, NoTerminalError
+from hero_client.program import Program
+from hero_client.program import run as run_program
+from hero_client.stop_status import StopStatus, paint
+from hero_client.swarm_start import check_stop
+from hero_msgs.msg import Robot
+from hero_msgs.srv import Disconnect
+
+from hero_client.fleet_state import RobotRow, RobotTrack, find_missing, sort_rows
+from .fleet_table import format_json, format_table, format_title
+from hero_client.robot_listener import STATES, STOP_STATES, RobotListener
+
+ORDERS = ("id", "state", "nearest")
+DRIVER_TIMEOUT_S = 10.0  # how long --once waits for a driver that is just starting
+DRAW_PERIOD_S = 0.5
+ASKING_DRAW_PERIOD_S = 0.1  # while people wait for a stop
+ENTER_SCREEN = (
+    "\x1b[?1049h\x1b[?25l"  # xterm: the alternate screen, so that what was there comes back; no cursor
+)
+LEAVE_SCREEN = "\x1b[?25h\x1b[?1049l"
+HOME = "\x1b[H"
+CLEAR_LINE_END = "\x1b[K"
+CLEAR_SCREEN_END = "\x1b[J"
+KEYS_HELP = "q ends   s STOPS ALL ROBOTS   r releases them   o order   up, down choose   d disconnects the chosen robot"
+MAX_OPTION = 1e6
+
+
+class FleetListener:
+    """The drivers' lists of robots, and a listener for each robot."""
+
+    def __init__(self) -> None:
+        self.heard = False
+        self.listening = ""
+        self.stopped = False
+        self.drivers = Drivers()
+        self._listeners: Dict[str, RobotListener] = {}
+        self._asked: Set[str] = set()
+        self._worker = ThreadPoolExecutor(1, "subscriptions")
+
+    def wait_for_driver(self, program: Program, timeout_s: float) -> bool:
+        """Return as soon as every driver was heard, and whether one was heard in that time."""
+        end_s = time.monotonic() + timeout_s
+        while not (self.drivers.read() and self.drivers.is_settled) and time.monotonic() < end_s:
+            if not program.sleep(0.02):
+                break
+        return self.drivers.read() is not None
+
+    def read_rows(self, now_s: float) -> List[RobotRow]:
+        """Return the fleet as it is; listens from now on to robots that are new."""
+        report = self.drivers.read()
+        if report is None:
+            return []
+        self.heard, self.listening, self.stopped = True, report.listening, report.stopped
+        present = {robot.namespace for robot in report.robots if robot.namespace and robot.state != Robot.REFUSED}
+        for namespace in present - self._asked:
+            self._worker.submit(self._open_listener, namespace)
+        for namespace in self._asked - present:
+            self._worker.submit(self._close_listener, namespace)
+        self._asked = present
+        return [self._make_row(robot, now_s) for robot in report.robots]
+
+    def _open_listener(self, namespace: str) -> None:
+        self._listeners[namespace] = RobotListener(namespace)
+
+    def _close_listener(self, namespace: str) -> None:
+        self._listeners.pop(namespace).close()
+
+    def _make_row(self, robot: Robot, now_s: float) -> RobotRow:
+        # What comes under the name of a robot that was refused is not its own.
+        listener = None if robot.state == Robot.REFUSED else self._listeners.get(robot.namespace)
+        if listener is not None:
+            listener.read_newest()
+        track = listener.track if listener is not None else RobotTrack()
+        return RobotRow(
+            id=robot.id,
+            namespace=robot.namespace,
+            address=robot.address,
+            state=STATES.get(robot.state, str(robot.state)),
+            stop_state=STOP_STATES.get(robot.stop_state, str(robot.stop_state)),
+            odom_hz=track.odometry.rate_hz(now_s),
+            frames_per_s=robot.frames_per_s,
+            bytes_per_s=robot.bytes_per_s,
+            pose=track.pose,
+            way_m=track.way_m,
+            turned_rad=track.turned_rad,
+            proximity_seen=track.proximity_seen,
+            nearest=track.nearest,
+            reconnects=robot.reconnects,
+            clock_offset_s=robot.clock_offset,
+            firmware=robot.firmware,
+            last_error=robot.last_error,
+        )
+
+    def disconnect(self, robot: str, news: List[str]) -> None:
+        """Ask the robot's driver to close its connection; what came of it is added to the news later."""
+        driver = self.drivers.find("/" + robot)
+        threading.Thread(target=call_disconnect, args=(driver, robot, news), daemon=True).start()
+
+
+def call_disconnect(driver: str, robot: str, news: List[str]) -> None:
+    """Call a driver's disconnect service, and add what came of it to the news."""
+    try:
+        news.append(rospy.ServiceProxy(driver + "/disconnect", Disconnect)(robot).message)
+    except (rospy.ServiceException, rospy.ROSException, OSError) as error:
+        news.append("%s is not disconnected: %s" % (robot, error))
+
+
+class Screen:
+    """A terminal: the table in place, and keys."""
+
+    def __init__(self, keyboard: Keyboard) -> None:
+        self._keyboard = keyboard
+
+    def __enter__(self) -> "Screen":
+        self._keyboard.__enter__()
+        sys.stdout.write(ENTER_SCREEN)
+        return self
+
+    def __exit__(self, kind, error, traceback) -> None:  # type: ignore[no-untyped-def]
+        with contextlib.suppress(OSError):  # the terminal may be closed
+            sys.stdout.write(LEAVE_SCREEN)
+            sys.stdout.flush()
+        self._keyboard.__exit__(kind, error, traceback)
+
+    def draw(self, lines: Sequence[str]) -> None:
+        """Draw the lines over what was there, without a flicker."""
+        text = "".join(line + CLEAR_LINE_END + "\r\n" for line in lines[:-1]) + lines[-1] + CLEAR_LINE_END
+        sys.stdout.write(HOME + text + CLEAR_SCREEN_END)
+        sys.stdout.flush()
+
+    def wait_for_keys(self, program: Program, timeout_s: float) -> Optional[List[str]]:
+        """Return the keys pressed within the time; None if the terminal is gone."""
+        if program.wait_readable([self._keyboard.fileno()], timeout_s):
+            return self._keyboard.read_keys()
+        return []
+
+
+class FleetProgram:
+    """The program: listens, shows, and says at the end whether the robots that were expected came and moved."""
+
+    def __init__(self, program: Program, options: argparse.Namespace) -> None:
+        self._program = program
+        self._options = options
+        self._fleet = FleetListener()
+        self._order = options.sort
+        self._chosen: Optional[str] = None
+        self._asks_disconnect = False
+        self._news: List[str] = []
+        self._start_s = time.monotonic()
+        self._rows: List[RobotRow] = []
+
+    def _seconds_left(self) -> float:
+        if self._options.seconds is None:
+            return float("inf")
+        return float(self._start_s + self._options.seconds - time.monotonic())
+
+    def _going(self) -> bool:
+        return self._seconds_left() > 0.0 and self._program.running
+
+    def _read(self) -> None:
+        self._rows = sort_rows(self._fleet.read_rows(time.monotonic()), self._order)
+
+    def _make_lines(self, width: int, height: int) -> List[str]:
+        if not self._fleet.heard:
+            return [
+                "no driver yet: nothing on /hero_driver/robots (roslaunch hero_bringup hero_bringup.launch)"[
+                    :width
+                ]
+            ]
+        silent = self._fleet.drivers.find_silent()
+        title = format_title(self._rows, self._fleet.listening, self._fleet.stopped, silent)
+        return [title[:width], *format_table(self._rows, width, max(2, height - 1), self._find_chosen())]
+
+    def _find_chosen(self) -> Optional[int]:
+        """Return the number of the chosen robot's row."""
+        names = [row.name for row in self._rows]
+        return names.index(self._chosen) if self._chosen in names else None
+
+    def _choose(self, step: int) -> None:
+        """Choose the next robot, or the one before."""
+        chosen = self._find_chosen()
+        if self._rows:
+            number = (0 if step > 0 else -1) if chosen is None else (chosen + step) % len(self._rows)
+            self._chosen = self._rows[number].name
+
+    def _disconnect(self) -> None:
+        """Disconnect the chosen robot at the second key in a row."""
+        if self._find_chosen() is None:
+            self._news = ["choose a robot first: up, down"]
+        elif not self._asks_disconnect:
+            self._asks_disconnect = True
+            self._news = ["d again disconnects %s" % self._chosen]
+            return
+        else:
+            self._news = ["disconnecting %s" % self._chosen]
+            self._fleet.disconnect(str(self._chosen), self._news)
+        self._asks_disconnect = False
+
+    def _press(self, key: str) -> None:
+        """Do what a key says."""
+        self._asks_disconnect = self._asks_disconnect and key == "d"
+        if key == "o":
+            self._order = ORDERS[(ORDERS.index(self._order) + 1) % len(ORDERS)]
+            self._news = ["order: %s" % self._order]
+        elif key in ("s", "r"):
+            self._fleet.drivers.request_stop(key == "s")
+        elif key in ("up", "down"):
+            self._choose(1 if key == "down" else -1)
+        elif key == "d":
+            self._disconnect()
+
+    def print_fleet(self) -> None:
+        """Print the fleet once, as lines or as JSON."""
+        self._chosen = None
+        if self._options.json:
+            print(format_json(self._rows, self._fleet.listening, self._fleet.stopped), flush=True)
+        else:
+            print("\n".join(self._make_lines(200, 10000)), flush=True)
+
+    def run_once(self) -> int:
+        """Wait for the driver, listen for a moment, print."""
+        if not self._fleet.wait_for_driver(self._program, DRIVER_TIMEOUT_S):
+            if self._program.running:
+                print(
+                    "fleet: no driver: nothing on /hero_driver/robots after %.0f s" % DRIVER_TIMEOUT_S,
+                    file=sys.stderr,
+                )
+            return 1
+        end_s = (
+            time.monotonic() + 1.5
+        )  # laser scans come 5 times a second, new subscriptions take a few 0.1 s
+        while time.monotonic() < end_s and self._program.sleep(0.1):
+            self._read()
+        self.print_fleet()
+        return 0
+
+    def run_lines(self) -> int:
+        """Print the fleet every few seconds until the time is over, and once more then."""
+        next_print_s = time.monotonic() + self._options.period
+        while self._going():
+            self._program.sleep(max(0.0, min(DRAW_PERIOD_S, self._seconds_left())))
+            self._read()
+            if time.monotonic() >= next_print_s and self._seconds_left() > DRAW_PERIOD_S:
+                next_print_s += self._options.period
+                self.print_fleet()
+        self.print_fleet()
+        return self.check_expected()
+
+    def run_screen(self, keyboard: Keyboard) -> int:
+        """Show the table in place until the time is over or a key ends it."""
+        with Screen(keyboard) as screen:
+            while self._going():
+                self._read()
+                status = self._fleet.drivers.stop_status()
+                screen.draw(self._make_screen(status))
+                period_s = DRAW_PERIOD_S if status is None or status.is_final else ASKING_DRAW_PERIOD_S
+                keys = screen.wait_for_keys(self._program, min(period_s, self._seconds_left()))
+                if keys:
+                    self._news = []
+                for key in keys or ():
+                    self._press(key)
+                if keys is None or "q" in keys:
+                    break
+        if self._program.end_signal is None:
+            self.print_fleet()
+        check_stop(self._fleet.drivers)
+        return self.check_expected()
+
+    def _make_screen(self, status: Optional[StopStatus]) -> List[str]:
+        """Return all lines: the table, the state of a stop, and the keys or what they did."""
+        size = shutil.get_terminal_size()
+        left_s = self._seconds_left()
+        ending = "" if left_s == float("inf") else "   ends in %.0f s" % left_s
+        last = "".join(self._news[-1:]) or KEYS_HELP + ending
+        stop = "" if status is None else paint(status.level, status.text[: size.columns])
+        return [*self._make_lines(size.columns, size.lines - 2), stop, last[: size.columns]]
+
+    def check_expected(self) -> int:
+        """Say which of the expected robots did not join or move, and return the exit code."""
+        if self._options.expect is None:
+            return 0
+        missing = find_missing(self._rows, range(self._options.expect))
+        for robot_id, reason in missing.items():
+            print("fleet: hero_%d %s" % (robot_id, reason), file=sys.stderr)
+        if not missing:
+            print("all %d robots joined and moved" % self._options.expect)
+        return 1 if missing else 0
+
+
+def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
+    """Read the command line."""
+    parser = argparse.ArgumentParser(prog="fleet", description="The robots of all drivers, as a live table.")
+    parser.add_argument("--once", action="store_true", help="print the fleet once and end")
+    parser.add_argument(
+        "--json", action="store_true", help="print JSON, one line each time, instead of a table"
+    )
+    parser.add_argument("--seconds", type=float, metavar="S", help="end by itself after S seconds")
+    parser.add_argument(
+        "--period",
+        type=float,
+        default=5.0,
+        metavar="S",
+        help="seconds between two prints where the output is not a terminal (5)",
+    )
+    parser.add_argument("--sort", choices=ORDERS, default="id", help="order of the robots (id)")
+    parser.add_argument(
+        "--expect",
+        type=int,
+        metavar="N",
+        help="at the end name every robot of hero_0 to hero_(N-1) that did not join or move, and exit with 1",
+    )
+    options = parser.parse_args(arguments)
+    for name, lowest in (("seconds", 0.0), ("period", 0.1), ("expect", 0)):
+        value = getattr(options, name)
+        if value is not None and not lowest <= value <= MAX_OPTION:
+            parser.exit(2, "fleet: --%s %s: must be from %g to %g\n" % (name, value, lowest, MAX_OPTION))
+    return options
+
+
+def show(options: argparse.Namespace) -> int:
+    """Show the fleet until the end and return the exit code."""
+    with Program("fleet", anonymous=True) as program:
+        fleet = FleetProgram(program, options)
+        try:
+            keyboard = None if options.once or options.json or not sys.stdout.isatty() else Keyboard()
+        except NoTerminalError:
+            keyboard = None
+        if options.once:
+            exit_code = fleet.run_once()
+        elif keyboard is None:
+            exit_code = fleet.run_lines()
+        else:
+            exit_code = fleet.run_screen(keyboard)
+        return exit_code if program.end_signal is None else 128 + program.end_signal
+
+
+def main() -> None:
+    """Run the program fleet."""
+    options = parse_options(rospy.myargv()[1:])
+    run_program(lambda: show(options))

@@ -1,0 +1,131 @@
+"""Rows of the fleet -> lines of text for a terminal, or JSON for scripts.
+
+Pure. Texts that come from robots are shown without control characters, so that none can draw on the terminal.
+"""
+
+import json
+import math
+from typing import Any, Dict, List, Optional, Sequence
+
+from hero_client.command_line import make_printable
+
+from hero_client.fleet_state import Obstacle, Pose, RobotRow, finite
+
+HEADINGS = ("ROBOT", "ADDRESS", "STATE", "ODOM", "FROM ROBOT", "POSE x y yaw", "WAY", "NEAREST", "")
+MARK, UNMARK = "\x1b[7m", "\x1b[27m"  # ECMA-48: the chosen row in reverse
+RIGHT_ALIGNED = {"ODOM", "FROM ROBOT", "POSE x y yaw", "WAY"}
+DIRECTIONS = ("ahead", "ahead left", "left", "behind left", "behind", "behind right", "right", "ahead right")
+
+
+def format_pose(pose: Optional[Pose]) -> str:
+    """Return a pose in m and degrees."""
+    if pose is None:
+        return "-"
+    return "%6.2f %6.2f m %4.0f deg" % (pose.x_m, pose.y_m, math.degrees(pose.yaw_rad))
+
+
+def format_nearest(seen: bool, nearest: Optional[Obstacle]) -> str:
+    """Return range and direction of the nearest obstacle."""
+    if not seen:
+        return "-"
+    if nearest is None:
+        return "free"
+    where = DIRECTIONS[round(nearest.bearing_rad / (math.pi / 4)) % 8]
+    return "touch %s" % where if nearest.range_m == -math.inf else "%.2f m %s" % (nearest.range_m, where)
+
+
+def format_cells(row: RobotRow) -> List[str]:
+    """Return one robot's cells, in the order of HEADINGS."""
+    notes = []
+    if row.last_error:
+        notes.append(row.last_error)
+    if row.reconnects:
+        notes.append("reconnected %dx" % row.reconnects)
+    return [
+        make_printable(row.name),
+        make_printable(row.address),
+        ", ".join(filter(None, (row.state, row.stop_state))),
+        "%.1f Hz" % row.odom_hz,
+        "%.1f kB/s" % (row.bytes_per_s / 1e3),
+        format_pose(row.pose),
+        "%.2f m" % row.way_m,
+        format_nearest(row.proximity_seen, row.nearest),
+        make_printable("; ".join(notes)),
+    ]
+
+
+def format_table(
+    rows: Sequence[RobotRow], width: int, height: int, chosen: Optional[int] = None
+) -> List[str]:
+    """Return heading and rows as lines of at most width characters and at most height lines.
+
+    chosen: the number of the row that is marked, and always among those shown.
+    """
+    shown, first = list(rows), 0
+    if len(shown) > height - 1:
+        count = max(0, height - 2)
+        first = 0 if chosen is None else min(max(0, chosen - count + 1), len(rows) - count)
+        shown = shown[first : first + count]
+    table = [list(HEADINGS)] + [format_cells(row) for row in shown]
+    widths = [max(len(cells[column]) for cells in table) for column in range(len(HEADINGS))]
+    lines = []
+    for number, cells in enumerate(table, first - 1):
+        padded = [
+            cell.rjust(size) if heading in RIGHT_ALIGNED else cell.ljust(size)
+            for cell, size, heading in zip(cells, widths, HEADINGS)
+        ]
+        line = "  ".join(padded).rstrip()[:width]
+        lines.append(MARK + line.ljust(width) + UNMARK if number == chosen else line)
+    if len(shown) < len(rows):
+        lines.append(("... and %d more: make the terminal taller" % (len(rows) - len(shown)))[:width])
+    return lines
+
+
+def format_title(rows: Sequence[RobotRow], listening: str, stopped: bool, silent: Sequence[str] = ()) -> str:
+    """Return the line above the table: how many robots there are, and where the driver awaits them.
+
+    silent: names of drivers that do not answer.
+    """
+    ready = sum(row.state == "READY" for row in rows)
+    title = "%d of %d robots ready" % (ready, len(rows))
+    if stopped:
+        title += ", ALL STOPPED"  # not last: a narrow terminal cuts the end off
+    for driver in silent:
+        title += ", driver %s does not answer" % driver.strip("/")
+    if listening:
+        title += ", driver listens on %s" % make_printable(listening)
+    return title
+
+
+def make_row_dict(row: RobotRow) -> Dict[str, Any]:
+    """Return one robot for JSON. nearest is null where nothing is in range, its range_m where it touches."""
+    return {
+        "id": row.id,
+        "namespace": row.namespace,
+        "address": row.address,
+        "state": row.state,
+        "stop_state": row.stop_state,
+        "odom_hz": round(row.odom_hz, 2),
+        "frames_per_s": round(row.frames_per_s, 2),
+        "bytes_per_s": round(row.bytes_per_s, 1),
+        "pose": None
+        if row.pose is None
+        else {name: finite(value) for name, value in row.pose._asdict().items()},
+        "way_m": finite(row.way_m),
+        "moved": row.moved,
+        "nearest": None
+        if row.nearest is None
+        else {"range_m": finite(row.nearest.range_m), "bearing_rad": row.nearest.bearing_rad},
+        "reconnects": row.reconnects,
+        "clock_offset_s": finite(row.clock_offset_s),
+        "firmware": row.firmware,
+        "last_error": row.last_error,
+    }
+
+
+def format_json(rows: Sequence[RobotRow], listening: str, stopped: bool) -> str:
+    """Return the fleet as one line of JSON."""
+    return json.dumps(
+        {"listening": listening, "stopped": stopped, "robots": [make_row_dict(row) for row in rows]},
+        allow_nan=False,
+    )

@@ -1,0 +1,145 @@
+#!/usr/bin/env python
+"""The program check: beside a driver and two simulated robots, and in each of the usual broken conditions."""
+
+import json
+import os
+import socket
+import subprocess
+import time
+import unittest
+
+import rosgraph
+import rostest
+
+DEADLINE_S = 60.0  # check itself ends after 3 s; a machine that is busy may take longer
+PORT = "21310"
+NO_SUCH_NAME = "no-such-pc.invalid"  # RFC 2606
+
+
+def run_check(*arguments, **environment):
+    """Return the exit code and the findings by point; an environment variable that is None is not there."""
+    variables = {**os.environ, **environment}
+    result = subprocess.run(
+        ["rosrun", "hero_tools", "check", "--json", "--port", PORT, *arguments],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        env={name: value for name, value in variables.items() if value is not None},
+        timeout=DEADLINE_S,
+        check=False,
+    )
+    answer = json.loads(result.stdout.decode())
+    assert answer["ok"] == (result.returncode == 0)
+    return result.returncode, {point["point"]: point for point in answer["points"]}
+
+
+class CheckTest(unittest.TestCase):
+    def assert_point(self, points, name, state, says):
+        """The point is in this state, says so, and has a remedy if it is not OK."""
+        point = points[name]
+        self.assertEqual(point["state"], state, point)
+        self.assertIn(says, point["says"])
+        self.assertEqual(bool(point["remedy"]), state != "OK", point)
+
+    def test_all_that_runs_is_found_and_the_way_to_the_master_and_back_is_open(self):
+        deadline_s = time.monotonic() + DEADLINE_S
+        while True:
+            code, points = run_check()
+            if "2 of 2 robots ready" in points["robots"]["says"] or time.monotonic() > deadline_s:
+                break
+        self.assertEqual(code, 0, points)
+        self.assert_point(points, "robots", "OK", "2 of 2 robots ready, awaited on 127.0.0.1:21310")
+        self.assert_point(points, "master", "OK", rosgraph.get_master_uri())
+        self.assert_point(points, "way_back", "OK", "can connect")
+        self.assert_point(points, "nodes", "OK", "all answer")
+        self.assert_point(points, "port", "OK", "the driver listens on 127.0.0.1:21310")
+        self.assert_point(points, "addresses", "WARN", "open on 127.0.0.1 only")
+        self.assert_point(points, "packages", "OK", "all 7 packages")
+        self.assert_point(points, "messages", "OK", "equal")
+
+    def test_a_name_that_others_cannot_resolve_closes_the_way_back(self):
+        code, points = run_check(ROS_HOSTNAME=NO_SUCH_NAME)
+        self.assertEqual(code, 1)
+        self.assert_point(points, "own_name", "FAIL", NO_SUCH_NAME)
+        self.assert_point(points, "way_back", "FAIL", "did not connect")
+
+    def test_a_ros_ip_of_another_pc_is_found(self):
+        code, points = run_check(ROS_IP="192.0.2.7", ROS_HOSTNAME=None)
+        self.assertEqual(code, 1)
+        self.assert_point(points, "ros_environment", "FAIL", "192.0.2.7")
+        self.assert_point(points, "own_name", "FAIL", "not this PC")
+
+    def test_an_empty_ros_hostname_that_hides_ros_ip_is_found(self):
+        _, points = run_check(ROS_IP="127.0.0.1", ROS_HOSTNAME="")
+        self.assert_point(points, "ros_environment", "WARN", "empty")
+
+    def test_a_master_with_an_unknown_name_is_named(self):
+        code, points = run_check(ROS_MASTER_URI="http://%s:11311" % NO_SUCH_NAME)
+        self.assertEqual(code, 1)
+        self.assert_point(points, "master", "FAIL", "cannot be resolved")
+
+    def test_a_master_uri_that_is_none_is_told_with_an_example(self):
+        code, points = run_check(ROS_MASTER_URI="localhost:11311")
+        self.assertEqual(code, 1)
+        self.assert_point(points, "ros_environment", "FAIL", "must be like http://")
+
+    def test_a_log_folder_that_is_a_file_is_found_and_the_rest_is_looked_at(self):
+        code, points = run_check(ROS_LOG_DIR=__file__)
+        self.assertEqual(code, 1)
+        self.assert_point(points, "disk", "FAIL", "is a file")
+        self.assertIn("point disk", points["way_back"]["says"] + points["robots"]["says"])
+        self.assert_point(points, "nodes", "OK", "all answer")
+
+    def test_no_master_at_all_is_no_failure_on_the_pc_that_would_start_it(self):
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            port = free.getsockname()[1]
+        code, points = run_check(ROS_MASTER_URI="http://localhost:%d" % port)
+        self.assertEqual(code, 0, points)
+        self.assert_point(points, "master", "WARN", "no ROS master runs")
+        self.assertIn("not looked at", points["robots"]["says"])
+
+    def test_a_master_that_takes_the_call_and_never_answers_holds_nothing_up(self):
+        with socket.socket() as silent:
+            silent.bind(("127.0.0.1", 0))
+            silent.listen(20)
+            code, points = run_check(ROS_MASTER_URI="http://localhost:%d" % silent.getsockname()[1])
+        self.assertEqual(points["master"]["state"], "WARN")
+        self.assertEqual(code, 0)
+
+    def test_another_program_on_the_port_is_named(self):
+        with socket.socket() as other:
+            other.bind(("127.0.0.1", 0))
+            other.listen()
+            code, points = run_check("--port", str(other.getsockname()[1]))
+        self.assertEqual(code, 1)
+        self.assert_point(points, "port", "FAIL", "taken by process %d" % os.getpid())
+
+    def test_nodes_that_died_or_gave_a_name_nobody_knows_are_named(self):
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            gone = "http://localhost:%d/" % free.getsockname()[1]
+        for name, uri, says in (
+            ("/gone", gone, "listed but not reached"),
+            ("/elsewhere", "http://%s:1/" % NO_SUCH_NAME, "cannot be resolved here"),
+        ):
+            node = rosgraph.Master(name)
+            node.registerPublisher("/test_check", "std_msgs/Empty", uri)
+            _, points = run_check()
+            node.unregisterPublisher("/test_check", uri)
+            self.assert_point(points, "nodes", "WARN" if name == "/gone" else "FAIL", says)
+            self.assertIn(name, points["nodes"]["says"])
+
+    def test_wrong_use_gets_one_line_and_exit_code_2(self):
+        for arguments, says in ((["--port", "0"], "1..65535"), (["--colour"], "--colour")):
+            result = subprocess.run(
+                ["rosrun", "hero_tools", "check", *arguments],
+                capture_output=True,
+                timeout=DEADLINE_S,
+                check=False,
+            )
+            self.assertEqual(result.returncode, 2)
+            self.assertIn(says, result.stderr.decode())
+
+
+if __name__ == "__main__":
+    rostest.rosrun("hero_tools", "test_check", CheckTest)

@@ -1,0 +1,95 @@
+"""Rows become lines that fit the terminal, and JSON that every reader takes."""
+
+import json
+import math
+
+import pytest
+from test_fleet_state import make_row
+
+from hero_client.fleet_state import Obstacle, Pose
+from hero_tools.fleet_table import format_json, format_nearest, format_table, format_title
+
+
+@pytest.mark.parametrize("width", [1, 20, 79, 200])
+@pytest.mark.parametrize("height", [2, 3, 10, 100])
+def test_the_table_fits_the_terminal(width, height):
+    rows = [make_row(robot_id, last_error="x" * 300) for robot_id in range(50)]
+    lines = format_table(rows, width, height)
+    assert len(lines) <= height
+    assert max(map(len, lines)) <= width
+
+
+def test_rows_that_do_not_fit_are_counted():
+    lines = format_table([make_row(robot_id) for robot_id in range(50)], 200, 10)
+    assert "42 more" in lines[-1]
+    assert lines[-2].startswith("hero_7 ")
+
+
+@pytest.mark.parametrize("chosen", [0, 25, 49])
+def test_the_chosen_row_is_marked_and_always_shown(chosen):
+    lines = format_table([make_row(robot_id) for robot_id in range(50)], 80, 10, chosen)
+    (marked,) = [line for line in lines if line.startswith("\x1b[7m")]
+    assert "hero_%d " % chosen in marked
+    assert len(lines) <= 10
+
+
+def test_columns_stand_below_their_headings():
+    heading, *lines = format_table([make_row(0), make_row(100, pose=Pose(-12.0, 3.0, math.pi))], 200, 10)
+    for line in lines:
+        assert line.index("READY") == heading.index("STATE")
+        assert line.index("10.42") == heading.index("ADDRESS")
+
+
+def test_a_robots_texts_cannot_draw_on_the_terminal():
+    row = make_row(0, namespace="/he\x1b[2Jro", address="a\rb", last_error="bell \x07 \x9b31m")
+    text = "".join(format_table([row], 200, 10)) + format_title([row], "x\x1b[2J", False)
+    assert text.isprintable()
+
+
+@pytest.mark.parametrize(
+    ("bearing_rad", "where"),
+    [
+        (0.0, "ahead"),
+        (math.pi / 2, "left"),
+        (-math.pi / 2, "right"),
+        (math.pi, "behind"),
+        (-math.pi, "behind"),
+    ],
+)
+def test_the_nearest_obstacle_is_said_in_words(bearing_rad, where):
+    assert format_nearest(True, Obstacle(0.123, bearing_rad)) == "0.12 m " + where
+    assert format_nearest(True, Obstacle(-math.inf, bearing_rad)) == "touch " + where
+
+
+def test_nothing_near_is_free_and_nothing_heard_is_a_dash():
+    assert format_nearest(True, None) == "free"
+    assert format_nearest(False, None) == "-"
+
+
+def test_the_title_says_how_many_are_ready_and_that_all_are_stopped():
+    title = format_title([make_row(0), make_row(1, state="AWAY")], "0.0.0.0:11411", True)
+    assert "1 of 2 robots ready" in title
+    assert "0.0.0.0:11411" in title
+    assert "STOPPED" in title
+
+
+def test_json_has_no_infinity():
+    row = make_row(
+        0, nearest=Obstacle(-math.inf, 0.0), pose=Pose(math.nan, 1.0, 0.0), clock_offset_s=math.inf
+    )
+    (robot,) = json.loads(format_json([row], "", False))["robots"]
+    assert robot["nearest"] == {"range_m": None, "bearing_rad": 0.0}
+    assert robot["pose"] == {"x_m": None, "y_m": 1.0, "yaw_rad": 0.0}
+    assert robot["clock_offset_s"] is None
+    assert robot["id"] == 0
+
+
+def test_the_state_of_a_stop_stands_beside_the_robots_state():
+    row = make_row(3, stop_state="MOVING")
+    assert "READY, MOVING " in format_table([row], 200, 10)[1]
+    assert json.loads(format_json([row], "", True))["robots"][0]["stop_state"] == "MOVING"
+
+
+def test_the_title_names_drivers_that_do_not_answer():
+    title = format_title([], "", False, ["/hero_driver_b", "/lab/driver"])
+    assert "driver hero_driver_b does not answer, driver lab/driver does not answer" in title

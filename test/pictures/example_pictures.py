@@ -1,0 +1,241 @@
+"""Runs the example programs with simulated robots and draws what these truly did. Started by script/pictures.
+
+Every picture is recorded in a process of its own, with a ROS master, a driver and a simulator of its own.
+"""
+
+import json
+import math
+import os
+import pty
+import sys
+import threading
+import time
+from pathlib import Path
+
+import rospy
+import yaml
+from drawing import draw_lights, draw_paths
+from geometry_msgs.msg import PoseStamped
+from picture_program import make_pictures
+from sensor_msgs.msg import Joy
+
+from hero_client import Robot
+from hero_sim.arena_file import load_arena
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.append(str(ROOT / "bench"))
+from hero_test.light_watch import LightWatch  # noqa: E402
+from running_suite import RunningSuite  # noqa: E402
+from hero_test.swarm_watch import SwarmWatch  # noqa: E402
+
+DOCS = ROOT / "hero_examples" / "docs"
+
+
+def arena_file(name):
+    """Return the path of an arena of the tests."""
+    return str(ROOT / "hero_test" / "arenas" / ("%s_arena.yaml" % name))
+
+
+class Recording:
+    """A stage, and what its robots truly do from begin() on."""
+
+    def __init__(self, robots, arena, *arguments):
+        """robots: how many. arena: a name or a file. arguments: more of hero_bringup.launch."""
+        self.arena = load_arena(arena)
+        self.stage = RunningSuite(robots, "sim_arena:=" + arena, *arguments)
+        self.watch = SwarmWatch(range(robots))
+        self.watch.wait_until_complete()
+        self.first = {}
+        self.begin()
+
+    def begin(self):
+        """Forget what was before."""
+        self.first = {robot_id: len(rows) - 1 for robot_id, rows in self.watch.rows.items()}
+
+    def paths(self, *robot_ids):
+        """Return the rows of these robots, of all without any, since begin()."""
+        chosen = robot_ids or self.first
+        return {robot_id: self.watch.path(robot_id)[self.first[robot_id] :] for robot_id in chosen}
+
+    def go_on(self, seconds):
+        """Return when the robots have had so much more time."""
+        rows = self.watch.rows[0]
+        end_s = rows[-1][0] + seconds
+        self.stage.wait_for(lambda: rows[-1][0] >= end_s, "%g s of robots" % seconds, 2.0 * seconds + 10.0)
+
+    def wait_until_all_rest(self, what, timeout_s):
+        """Wait until nobody has moved or turned for a second."""
+
+        def rest():
+            return all(math.dist(rows[-1][1:4], rows[-20][1:4]) < 0.002 for rows in self.watch.rows.values())
+
+        self.stage.wait_for(rest, what, timeout_s)
+
+    def wait_until_all_are_at(self, goals, near_m, timeout_s):
+        """Wait until every robot stands near its goal: [(x, y)] in the order of the ids."""
+
+        def there():
+            return all(math.dist(self.watch.pose(robot_id)[:2], goal) < near_m for robot_id, goal in enumerate(goals))
+
+        self.stage.wait_for(there, "robots at their goals", timeout_s)
+        self.wait_until_all_rest("robots at rest at their goals", timeout_s)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        self.stage.close()
+
+
+def random_walk(picture):
+    """Ten robots for a minute, five by each rule."""
+    with Recording(10, "obstacles") as recording:
+        recording.stage.start_example("random_walk", "__name:=one", "_robots:=0-4", "_seed:=1")
+        recording.stage.start_example("random_walk", "__name:=two", "_robots:=5-9", "_seed:=1", "_rule:=potential")
+        recording.go_on(60.0)
+        draw_paths(picture, "random_walk: ten robots, one minute", recording.arena, recording.paths())
+
+
+def go_to_goal(picture):
+    """Ten robots, three goals each, from the topic."""
+    with Recording(10, arena_file("plots")) as recording:
+        recording.stage.start_example("go_to_goal", "_robots:=0-9")
+        publishers = [rospy.Publisher("/hero_%d/goal" % i, PoseStamped, queue_size=1) for i in range(10)]
+        recording.stage.wait_for(lambda: all(p.get_num_connections() for p in publishers), "go_to_goal")
+        starts = [recording.watch.pose(robot_id) for robot_id in range(10)]
+        goals = []
+        for turn_rad in (0.6, 2.9, 4.7):
+            round_goals = [(x_m + 0.3 * math.cos(turn_rad), y_m + 0.3 * math.sin(turn_rad)) for x_m, y_m, _ in starts]
+            for publisher, goal in zip(publishers, round_goals):
+                target = PoseStamped()
+                target.header.frame_id = "world"
+                target.pose.position.x, target.pose.position.y = goal
+                target.pose.orientation.w = 1.0
+                publisher.publish(target)
+            goals += round_goals
+            recording.wait_until_all_are_at(round_goals, 0.25, 60.0)
+        draw_paths(
+            picture, "go_to_goal: three goals each, all with heading 0", recording.arena, recording.paths(), goals,
+            size_inch=(9, 4.2),
+        )
+
+
+def swarm_go_to(picture):
+    """Ten robots that swap places."""
+    with Recording(10, arena_file("circle")) as recording:
+        swap = json.dumps(yaml.safe_load((ROOT / "hero_examples" / "test" / "rostest" / "swap.yaml").read_text()))  # rospy ignores values of several lines
+        recording.stage.start_example("swarm_go_to", "_robots:=0-9", "_formation:=" + swap, "_assign:=false")
+        goals = [(-x_m, -y_m) for x_m, y_m, _ in map(recording.watch.pose, range(10))]
+        recording.wait_until_all_are_at(goals, 0.3, 120.0)
+        near = ((-0.85, 0.85), (-0.85, 0.85))
+        draw_paths(picture, "swarm_go_to: ten robots swap places", recording.arena, recording.paths(), only_m=near)
+
+
+def follow(picture):
+    """A leader on a curve, two followers."""
+    with Recording(3, arena_file("examples")) as recording:
+        recording.stage.start_example("follow", "_robots:=0 1 2")
+        with Robot(0) as leader:
+            leader.wait_until_ready()
+            leader.drive(0.08, 0.0, duration_s=4.0)
+            leader.drive(0.08, 0.35, duration_s=9.0)
+            leader.drive(0.08, -0.35, duration_s=9.0)
+        recording.wait_until_all_rest("followers that have caught up", 20.0)
+        near = ((-0.65, 0.65), (-0.15, 1.0))
+        draw_paths(
+            picture, "follow: hero_0 is driven, the others follow", recording.arena, recording.paths(),
+            only_m=near, size_inch=(6, 5),
+        )
+
+
+def led_show(picture):
+    """The three patterns on eight robots, two rounds each."""
+    with Recording(8, "empty") as recording:
+        lights = LightWatch()
+        shows = {}
+        for pattern in ("rainbow", "chase", "blink"):
+            program = recording.stage.start_example("led_show", "__name:=" + pattern, "_pattern:=" + pattern)
+            lights.rows.clear()
+            # Every robot has some red within a round of each pattern; dark, or in its own blue, it does not listen yet.
+            recording.stage.wait_for(lambda: count_reddened(lights) == 8, "robots that listen")
+            recording.go_on(1.0)
+            lights.rows.clear()
+            recording.go_on(8.0)
+            shows["pattern:=" + pattern] = list(lights.rows)
+            program.terminate()
+            program.wait()
+            recording.stage.wait_for(lambda: max(map(max, lights.colors.values())) < 0.5, "darkness")
+        draw_lights(picture, shows)
+
+
+def count_reddened(lights):
+    """Return how many robots have had red in their light in the recorded rows."""
+    return len({robot for _, colors in list(lights.rows) for robot, color in colors.items() if color[0] > 0.5})
+
+
+def measure_delay(picture):
+    """The program's own plot, for four robots in a router's network."""
+    with Recording(4, "empty", "sim_options:=--wifi router") as recording:
+        program = recording.stage.start_example("measure_delay", "_turns:=10", "_plot:=%s" % picture)
+        if program.wait(180.0):
+            raise SystemExit("measure_delay ended with %d" % program.returncode)
+
+
+def teleop(picture):
+    """A robot that is driven through a terminal with keys."""
+    with Recording(1, arena_file("examples")) as recording:
+        master_fd, slave_fd = pty.openpty()
+        recording.stage.start_example("teleop", stdin=slave_fd, stdout=slave_fd)
+        threading.Thread(target=drain, args=(master_fd,), daemon=True).start()
+        recording.stage.wait_for(lambda: press(master_fd, "w") or recording.watch.rows[0][-1][4] > 0.05, "motion")
+        for keys, seconds in (("w", 2.0), ("q", 3.0), ("w", 2.0), ("e", 3.0), ("a", 1.0), ("w", 3.0), ("x", 1.5)):
+            end_s = time.monotonic() + seconds
+            while time.monotonic() < end_s:
+                press(master_fd, keys)
+                time.sleep(0.05)
+        press(master_fd, "s")
+        recording.wait_until_all_rest("rest", 10.0)
+        draw_one_path(picture, "teleop: keys w, q, w, e, a, w, x, s", recording)
+
+
+def teleop_joy(picture):
+    """A robot that is driven with a stick that goes round."""
+    with Recording(1, arena_file("examples")) as recording:
+        recording.stage.start_example("teleop_joy")
+        stick = rospy.Publisher("/joy", Joy, queue_size=1)
+        recording.stage.wait_for(lambda: stick.get_num_connections(), "teleop_joy")
+        start_s = time.monotonic()
+        while time.monotonic() < start_s + 16.0:
+            phase = (time.monotonic() - start_s) / 16.0 * 2.0 * math.pi
+            stick.publish(Joy(axes=[0.45 * math.copysign(1.0, math.sin(phase)), 0.7], buttons=[0, 0, 0, 0, 1]))
+            time.sleep(0.05)
+        recording.wait_until_all_rest("rest after the stick fell silent", 10.0)
+        draw_one_path(picture, "teleop_joy: stick ahead, to the left, then to the right", recording)
+
+
+def press(master_fd, keys):
+    """Type keys."""
+    os.write(master_fd, keys.encode())
+
+
+def drain(master_fd):
+    """Read what the program shows, or it would wait for a reader."""
+    while os.read(master_fd, 65536):
+        continue
+
+
+def draw_one_path(picture, title, recording):
+    """Draw the path of hero_0, near to it."""
+    rows = recording.paths(0)[0]
+    near = [(float(column.min()) - 0.15, float(column.max()) + 0.15) for column in (rows[:, 1], rows[:, 2])]
+    draw_paths(picture, title, recording.arena, {0: rows}, only_m=near, size_inch=(6, 4.5))
+
+
+PICTURES = {
+    item.__name__: item
+    for item in (random_walk, go_to_goal, swarm_go_to, follow, led_show, measure_delay, teleop, teleop_joy)
+}
+
+
+if __name__ == "__main__":
+    make_pictures(PICTURES, DOCS, __doc__)

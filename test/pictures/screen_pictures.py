@@ -1,0 +1,96 @@
+"""Saves what RViz and the fleet monitor show, on screens that nobody looks at. Started by script/pictures.
+
+The robots are simulated and walk; every picture has a ROS master, a driver and a simulator of its own.
+"""
+
+import os
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import matplotlib.image
+import numpy as np
+from picture_program import make_pictures
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path += [str(ROOT / "bench"), str(ROOT / "hero_monitor" / "test" / "rostest")]
+from measuring import find_free_port  # noqa: E402
+from monitor_page import MISSING as NO_BROWSER  # noqa: E402
+from monitor_page import MonitorPage  # noqa: E402
+from running_suite import RunningSuite  # noqa: E402
+from hero_test.virtual_screen import MISSING, VirtualScreen  # noqa: E402
+
+PICTURES_FOLDER = ROOT / "docs" / "pictures"
+WALK_S = 25.0
+SCREEN = (1200, 800)  # the size that the configuration of RViz gives its window
+VIEW = (slice(64, 768), slice(366, 1182))  # rows and columns of the view in that window
+GROUND_SHARE = 0.5  # of the view is light ground as soon as RViz draws; its first window is dark
+DRAW_TIMEOUT_S = 60.0
+
+
+def wait_until_drawn(screen, stage):
+    """Return when RViz shows the ground."""
+
+    def drawn():
+        return np.mean(np.all(screen.read()[VIEW][::4, ::4] > 230, axis=2)) > GROUND_SHARE
+
+    stage.wait_for(drawn, "a picture in RViz", DRAW_TIMEOUT_S)
+
+
+def wait_while_they_walk(stage):
+    """Return after WALK_S."""
+    end_s = time.monotonic() + WALK_S
+    stage.wait_for(lambda: time.monotonic() > end_s, "robots that walk", 2.0 * WALK_S)
+
+
+def photograph_rviz(picture, robots, arena):
+    """Let robots walk in an arena, and save the window of RViz."""
+    screen = VirtualScreen(*SCREEN)
+    os.environ.update(screen.environment())
+    try:
+        with RunningSuite(robots, "sim_arena:=" + arena) as stage:
+            stage.start_example("random_walk", "_robots:=0-%d" % (robots - 1), "_seed:=4")
+            launch = ["roslaunch", "--no-summary", "hero_description", "swarm.launch", "robots:=%d" % robots]
+            stage.start(launch, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            wait_until_drawn(screen, stage)
+            wait_while_they_walk(stage)
+            matplotlib.image.imsave(str(picture), screen.read()[VIEW])
+    finally:
+        screen.close()
+
+
+def photograph_monitor(picture, robots, arena):
+    """Let robots walk in an arena, and save the page of the fleet monitor, with one robot chosen."""
+    port = find_free_port()
+    with RunningSuite(robots, "sim_arena:=" + arena) as stage:
+        stage.start_example("random_walk", "_robots:=0-%d" % (robots - 1), "_seed:=4")
+        stage.start(["rosrun", "hero_monitor", "monitor", "_port:=%d" % port, "_control:=true"])
+        stage.wait_for(lambda: is_open(port), "the monitor")
+        page = MonitorPage("http://127.0.0.1:%d/" % port)
+        try:
+            wait_while_they_walk(stage)
+            page.choose("hero_0")
+            page.browser.save_screenshot(str(picture))
+        finally:
+            page.close()
+
+
+def is_open(port):
+    """Return whether somebody listens on a port of this machine."""
+    with socket.socket() as sock:
+        return sock.connect_ex(("127.0.0.1", port)) == 0
+
+
+PICTURES = {
+    "monitor": lambda picture: photograph_monitor(picture, 10, "obstacles"),
+    "rviz_swarm": lambda picture: photograph_rviz(picture, 4, "empty"),
+    "rviz_obstacles": lambda picture: photograph_rviz(picture, 8, "obstacles"),
+}
+
+
+if __name__ == "__main__":
+    if MISSING or NO_BROWSER:
+        sys.exit("screen_pictures: not installed: %s (script/bootstrap --test)" % ", ".join([*MISSING, *NO_BROWSER]))
+    make_pictures(PICTURES, PICTURES_FOLDER, __doc__)
