@@ -15,7 +15,7 @@ from typing import Dict, List, Optional, Sequence
 
 import rospy
 
-from hero_examples import command_line
+from hero_client import command_line
 from hero_client.command_line import say
 from hero_client.drivers import Drivers
 from hero_client.program import Program, ProgramError, parse_robot_ids

@@ -11,7 +11,7 @@ import shutil
 import sys
 from typing import List, Optional, Sequence, Set
 
-from hero_examples import command_line
+from hero_client import command_line
 from hero_client.program import ProgramError, parse_robot_ids
 
 from . import tables

@@ -9,7 +9,7 @@ import os
 import sys
 from typing import Callable, Dict, List, Optional, Sequence
 
-from hero_examples import command_line
+from hero_client import command_line
 from hero_client.program import ProgramError, parse_robot_ids
 
 from . import analysis

@@ -19,7 +19,7 @@ from typing import Dict, List, Optional, Sequence, Set
 import rosgraph
 import roslib.packages
 
-from hero_examples import command_line
+from hero_client import command_line
 from hero_client.program import ProgramError, parse_robot_ids
 from hero_client.ros_node import NodeError, check_master
 

@@ -14,7 +14,7 @@ from typing import Dict, List, Optional, Sequence
 
 import rospy
 
-from hero_examples import command_line
+from hero_client import command_line
 from hero_client.command_line import make_printable
 
 from .checkup import environment, graph, network

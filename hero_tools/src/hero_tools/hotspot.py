@@ -14,7 +14,7 @@ import subprocess
 import sys
 from typing import List, Optional, Sequence
 
-from hero_examples import command_line
+from hero_client import command_line
 
 from . import nmcli
 from .nmcli import NetworkManagerError, NmcliCall, WifiDevice
