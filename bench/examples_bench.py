@@ -8,18 +8,15 @@ import os
 import pty
 import signal
 import subprocess
-import sys
 import tempfile
 import threading
 import time
-from pathlib import Path
 
 import rospy
 from measuring import measure_machine_us, print_machine, read_cpu_s, write_report
 from running_suite import RunningSuite
 from sensor_msgs.msg import Joy
 
-sys.path.append(str(Path(__file__).resolve().parents[1] / "hero_bringup" / "test" / "rostest"))
 from hero_test.swarm_watch import SwarmWatch
 
 SETTLE_S = 4.0

@@ -24,8 +24,9 @@ from hero_sim.arena_file import load_arena
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.append(str(ROOT / "bench"))
-from hero_test.light_watch import LightWatch  # noqa: E402
 from running_suite import RunningSuite  # noqa: E402
+
+from hero_test.light_watch import LightWatch  # noqa: E402
 from hero_test.swarm_watch import SwarmWatch  # noqa: E402
 
 DOCS = ROOT / "hero_examples" / "docs"

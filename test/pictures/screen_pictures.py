@@ -20,6 +20,7 @@ from measuring import find_free_port  # noqa: E402
 from monitor_page import MISSING as NO_BROWSER  # noqa: E402
 from monitor_page import MonitorPage  # noqa: E402
 from running_suite import RunningSuite  # noqa: E402
+
 from hero_test.virtual_screen import MISSING, VirtualScreen  # noqa: E402
 
 PICTURES_FOLDER = ROOT / "docs" / "pictures"

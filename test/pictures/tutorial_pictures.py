@@ -14,6 +14,7 @@ from picture_program import make_pictures
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.append(str(ROOT / "bench"))
 from running_suite import RunningSuite  # noqa: E402
+
 from hero_test.virtual_screen import MISSING, VirtualScreen  # noqa: E402
 
 PICTURES_FOLDER = ROOT / "docs" / "tutorial" / "pictures"

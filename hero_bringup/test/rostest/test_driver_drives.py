@@ -10,11 +10,11 @@ from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 from std_srvs.srv import SetBool
-from hero_test.swarm_watch import wait_for
 from tf2_msgs.msg import TFMessage
 
 from hero_msgs.msg import Robot, RobotArray
 from hero_msgs.srv import SetIRCalibration, SetMotor, SetOdom, SetPID
+from hero_test.swarm_watch import wait_for
 
 DEADLINE_S = 30.0
 DIALLED_IN = (0, 1, 2)

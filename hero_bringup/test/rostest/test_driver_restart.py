@@ -11,9 +11,9 @@ import unittest
 import rospy
 import rostest
 from nav_msgs.msg import Odometry
-from hero_test.swarm_watch import wait_for
 
 from hero_msgs.msg import Robot, RobotArray
+from hero_test.swarm_watch import wait_for
 
 DEADLINE_S = 40.0
 

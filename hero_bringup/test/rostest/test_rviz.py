@@ -12,10 +12,10 @@ import rospy
 import rostest
 from geometry_msgs.msg import PointStamped, PoseStamped, Twist
 from std_msgs.msg import ColorRGBA
-from hero_test.swarm_watch import SwarmWatch, wait_for
-from hero_test.virtual_screen import MISSING, VirtualScreen
 
 from hero_description.rviz_config import ABOVE_PIXELS_PER_M, GOAL_TOPIC, POINT_TOPIC
+from hero_test.swarm_watch import SwarmWatch, wait_for
+from hero_test.virtual_screen import MISSING, VirtualScreen
 
 TIMEOUT_S = 60.0
 NEAR_M = 0.015

@@ -14,14 +14,14 @@ import xmlrpc.client
 import rosgraph
 import rospy
 import rostest
-from hero_test.example_program import ExampleProgram
-from hero_test.program_terminal import TIMEOUT_S, ProgramTerminal, run_fleet
 from sensor_msgs.msg import Joy
-from hero_test.swarm_watch import wait_for
 
 from hero_client.drivers import Drivers
 from hero_client.swarm import Swarm
 from hero_msgs.msg import Robot, RobotArray
+from hero_test.example_program import ExampleProgram
+from hero_test.program_terminal import TIMEOUT_S, ProgramTerminal, run_fleet
+from hero_test.swarm_watch import wait_for
 
 AT_REST = ("info", "stopped, all wheels at rest", True)
 RELEASED = ("info", "released: robots may move again", True)

@@ -11,12 +11,12 @@ import rosgraph
 import rospy
 import rostest
 from geometry_msgs.msg import Twist
-from hero_test.program_terminal import ProgramTerminal, run_fleet
-from hero_test.swarm_watch import SwarmWatch, wait_for
 
-from hero_monitor.commander import Commander
 from hero_client.drivers import Drivers
 from hero_client.swarm import Swarm
+from hero_monitor.commander import Commander
+from hero_test.program_terminal import ProgramTerminal, run_fleet
+from hero_test.swarm_watch import SwarmWatch, wait_for
 
 IDS = [0, 1, 100, 101]
 TIMEOUT_S = 20.0

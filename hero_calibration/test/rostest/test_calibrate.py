@@ -20,9 +20,9 @@ import rostest
 import yaml
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
-from hero_test.swarm_watch import wait_for
 
 from hero_sim.srv import InjectFault
+from hero_test.swarm_watch import wait_for
 
 CALIBRATE = ["rosrun", "hero_calibration", "calibrate"]
 TIMEOUT_S = 120.0

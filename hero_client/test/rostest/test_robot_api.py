@@ -9,12 +9,12 @@ import unittest
 
 import rospy
 import rostest
-from hero_test.light_watch import LightWatch
-from hero_test.swarm_watch import SwarmWatch, wait_for
 
 from hero_client import Robot, Swarm
 from hero_client.robot import GoalError, RobotNotReadyError, StaleDataError
 from hero_sim.srv import InjectFault
+from hero_test.light_watch import LightWatch
+from hero_test.swarm_watch import SwarmWatch, wait_for
 
 ROBOTS = 6
 CORNERED = 4

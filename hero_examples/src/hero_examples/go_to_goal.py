@@ -15,13 +15,29 @@ from geometry_msgs.msg import PoseStamped
 
 from hero_client.control_laws import STANDSTILL, Pose
 from hero_client.frame_watch import FrameError, FrameWatch, plain_frame, shift_pose
-from hero_client.goal_pursuit import DEFAULT_LAW, DEFAULT_TIMEOUT_S, DEFAULT_TOLERANCE_M, LAWS, Goal, GoalPursuit, State
+from hero_client.goal_pursuit import (
+    DEFAULT_LAW,
+    DEFAULT_TIMEOUT_S,
+    DEFAULT_TOLERANCE_M,
+    LAWS,
+    Goal,
+    GoalPursuit,
+    State,
+)
 from hero_client.goal_reading import LARGEST_M, GoalError, check_limits, read_goal
-from hero_msgs.msg import GoToAction, GoToFeedback, GoToResult
-from hero_client.program import Program, ProgramError, check_flag, check_number, parse_robot_ids, read_parameters, run
+from hero_client.program import (
+    Program,
+    ProgramError,
+    check_flag,
+    check_number,
+    parse_robot_ids,
+    read_parameters,
+    run,
+)
 from hero_client.robot import Robot
 from hero_client.swarm import Swarm
 from hero_client.swarm_start import WaitReport, open_swarm
+from hero_msgs.msg import GoToAction, GoToFeedback, GoToResult
 
 RATE_HZ = 10.0
 

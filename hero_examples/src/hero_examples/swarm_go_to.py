@@ -11,7 +11,15 @@ from hero_client.assignment import assign_goals
 from hero_client.common_frame import DEFAULT_FRAME, CommonFrame, parse_starts
 from hero_client.control_laws import STANDSTILL, Pose
 from hero_client.formations import FormationError, Point, place_formation
-from hero_client.program import Program, ProgramError, check_flag, check_number, parse_robot_ids, read_parameters, run
+from hero_client.program import (
+    Program,
+    ProgramError,
+    check_flag,
+    check_number,
+    parse_robot_ids,
+    read_parameters,
+    run,
+)
 from hero_client.reciprocal import AvoidanceLaw
 from hero_client.robot import MAX_LINEAR_M_S
 from hero_client.swarm import Swarm

@@ -12,15 +12,15 @@ from pathlib import Path
 import numpy as np
 import rospy
 import rostest
-from hero_test.example_program import ExampleProgram
-from hero_test.light_watch import LightWatch
 from sensor_msgs.msg import Joy
-from hero_test.swarm_watch import SwarmWatch, wait_for
 
 from hero_client import Robot
 from hero_sim.arena import measure_clearance
 from hero_sim.arena_file import load_arena
 from hero_sim.kinematics import BODY_RADIUS_M
+from hero_test.example_program import ExampleProgram
+from hero_test.light_watch import LightWatch
+from hero_test.swarm_watch import SwarmWatch, wait_for
 
 ROBOTS = 6
 WHITE, DARK, RED = (1.0, 1.0, 1.0), (0.15, 0.15, 0.15), (1.0, 0.0, 0.0)

@@ -11,9 +11,9 @@ import rospy
 import rostest
 from actionlib_msgs.msg import GoalStatus
 from geometry_msgs.msg import PoseStamped
-from hero_test.swarm_watch import SwarmWatch, wait_for
 
 from hero_msgs.msg import GoToAction, GoToGoal
+from hero_test.swarm_watch import SwarmWatch, wait_for
 
 ROBOTS = 10
 GOALS_EACH = 5

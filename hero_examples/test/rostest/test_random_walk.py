@@ -2,16 +2,16 @@
 """Ten random walkers among obstacles for two minutes, five by each rule, judged by the simulator's ground truth."""
 
 import sys
-from functools import partial
 import unittest
+from functools import partial
 
 import rosnode
 import rospy
 import rostest
-from hero_test.swarm_watch import SwarmWatch, wait_for
 
 from hero_sim.arena import measure_clearance
 from hero_sim.arena_file import load_arena
+from hero_test.swarm_watch import SwarmWatch, wait_for
 
 WALK_S = 120.0
 

@@ -7,6 +7,7 @@ import unittest
 
 import rospy
 import rostest
+
 from hero_test.swarm_watch import SwarmWatch, wait_for
 
 ROBOTS = 10

@@ -14,8 +14,8 @@ import rospy
 from geometry_msgs.msg import PoseStamped, Twist
 
 from hero_client.drivers import Drivers
-
 from hero_client.fleet_state import Pose
+
 from .dead_man import STOPS, DeadMan, Velocity
 
 GOALS_AT_ONCE = 20

@@ -19,13 +19,12 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from hero_client.command_line import make_printable
 from hero_client.drivers import Drivers
+from hero_client.fleet_state import Pose, finite, yaw_of_quaternion
 from hero_client.newest_message import NewestMessage
+from hero_client.robot_listener import STATES, STOP_STATES, is_on_map, read_pose
 from hero_client.stop_status import StopStatus
 from hero_msgs.msg import Robot
 
-from hero_client.fleet_state import Pose, yaw_of_quaternion
-from hero_client.fleet_state import finite
-from hero_client.robot_listener import STATES, STOP_STATES, is_on_map, read_pose
 from .log_thread import LogThread
 from .placement import Placement
 from .robot_feed import RobotFeed

@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any, List, NamedTuple, Optional, Union
 
 import rospy
 
+from hero_client.fleet_state import Pose
 from hero_client.program import Program, ProgramError, check_flag, check_number, read_parameters, run
 from hero_client.robot import MAX_LINEAR_M_S, MAX_TURN_RAD_S
 
-from hero_client.fleet_state import Pose
 from . import requests
 from .access import TOKEN_LENGTH_MIN, Access, is_loopback
 from .commander import STOP_PERIOD_S, Commander

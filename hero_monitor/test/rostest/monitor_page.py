@@ -5,6 +5,7 @@ import shutil
 from pathlib import Path
 
 from monitor_process import TIMEOUT_S
+
 from hero_test.swarm_watch import wait_for
 
 MISSING = [name for name in ("chromedriver", "chromium") if shutil.which(name) is None]

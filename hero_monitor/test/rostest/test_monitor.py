@@ -10,6 +10,7 @@ from geometry_msgs.msg import Twist
 from monitor_page import MISSING, MonitorPage
 from monitor_process import HOST, OTHER_HOST, TIMEOUT_S, PageClient, end, start_monitor, wait_until_it_answers
 from rosgraph_msgs.msg import Log
+
 from hero_test.swarm_watch import SwarmWatch, wait_for
 
 HOSTILE = "<img src=x onerror='document.title=\"broken\"'><script>document.title='broken'</script> \u202e\x1b[31m"

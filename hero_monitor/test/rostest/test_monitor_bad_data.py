@@ -13,6 +13,7 @@ from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import ColorRGBA
+
 from hero_test.swarm_watch import wait_for
 
 HOST = "127.0.0.1:21333"

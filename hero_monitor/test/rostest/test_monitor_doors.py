@@ -20,9 +20,9 @@ from monitor_process import (
     start_scripted_driver,
     wait_until_it_answers,
 )
-from hero_test.swarm_watch import wait_for
 
 from hero_msgs.msg import RobotArray
+from hero_test.swarm_watch import wait_for
 
 TOKEN = "correct-horse-battery-staple"
 STRANGERS = 1100

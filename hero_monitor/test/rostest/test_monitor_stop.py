@@ -21,9 +21,9 @@ from monitor_process import (
     wait_until_it_answers,
 )
 from std_msgs.msg import Bool, String
-from hero_test.swarm_watch import wait_for
 
 from hero_msgs.msg import RobotArray
+from hero_test.swarm_watch import wait_for
 
 HOST = "127.0.0.1:21333"
 DRIVERS = ("hero_driver", "hero_driver_b")

@@ -16,6 +16,7 @@ import rosgraph
 import rospy
 import rostest
 from geometry_msgs.msg import Twist, Vector3
+
 from hero_test.swarm_watch import wait_for
 
 RECORD = ["rosrun", "hero_recording", "record"]

@@ -20,17 +20,17 @@ from typing import Dict, List, Optional, Sequence, Set
 import rospy
 
 from hero_client.drivers import Drivers
+from hero_client.fleet_state import RobotRow, RobotTrack, find_missing, sort_rows
 from hero_client.keyboard import Keyboard, NoTerminalError
 from hero_client.program import Program
 from hero_client.program import run as run_program
+from hero_client.robot_listener import STATES, STOP_STATES, RobotListener
 from hero_client.stop_status import StopStatus, paint
 from hero_client.swarm_start import check_stop
 from hero_msgs.msg import Robot
 from hero_msgs.srv import Disconnect
 
-from hero_client.fleet_state import RobotRow, RobotTrack, find_missing, sort_rows
 from .fleet_table import format_json, format_table, format_title
-from hero_client.robot_listener import STATES, STOP_STATES, RobotListener
 
 ORDERS = ("id", "state", "nearest")
 DRIVER_TIMEOUT_S = 10.0  # how long --once waits for a driver that is just starting

@@ -8,7 +8,6 @@ import math
 from typing import Any, Dict, List, Optional, Sequence
 
 from hero_client.command_line import make_printable
-
 from hero_client.fleet_state import Obstacle, Pose, RobotRow, finite
 
 HEADINGS = ("ROBOT", "ADDRESS", "STATE", "ODOM", "FROM ROBOT", "POSE x y yaw", "WAY", "NEAREST", "")

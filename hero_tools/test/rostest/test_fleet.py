@@ -11,6 +11,7 @@ import unittest
 import rospy
 import rostest
 from geometry_msgs.msg import Twist
+
 from hero_test.program_terminal import FLEET, TIMEOUT_S, ProgramTerminal, run_fleet
 from hero_test.swarm_watch import wait_for
 
