@@ -15,9 +15,9 @@ from typing import List, NamedTuple
 from measuring import measure_machine_us, print_machine, read_cpu_s, start, stop
 
 from hero_driver.rosserial import frames, payloads
-from hero_sim import declarations
 from hero_sim.build import build_swarm
 from hero_sim.main import build_parser
+from hero_sim.robot import declarations
 
 _STOCK_ODOM_HZ = 29.27
 _TWIST = frames.encode_frame(declarations.ID_VELOCITY_CMD_VEL, struct.pack("<6d", 0.08, 0, 0, 0, 0, 0.6))

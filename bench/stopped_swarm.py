@@ -15,10 +15,10 @@ import time
 import numpy as np
 
 from hero_driver.rosserial import frames
-from hero_sim import declarations
 from hero_sim.build import build_simulator
-from hero_sim.kinematics import TICK_M
 from hero_sim.main import build_parser, stop_on_signals
+from hero_sim.robot import declarations
+from hero_sim.robot_constants import TICK_M
 
 REST_M_S = 0.001
 MOVING_M_S = 0.03
@@ -75,7 +75,7 @@ class Watch:
 def main():
     """Run until a signal comes."""
     options = build_parser().parse_args()
-    simulator = build_simulator(options, lambda text: None)
+    simulator, _ = build_simulator(options, lambda text: None)
     stop_on_signals(simulator)
     watch = Watch(simulator.swarm)
 

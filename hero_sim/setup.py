@@ -5,6 +5,8 @@ from setuptools import setup
 
 setup(
     **generate_distutils_setup(
-        packages=["hero_sim"], package_dir={"": "src"}, package_data={"hero_sim": ["arenas/*.yaml"]}
+        packages=["hero_sim", "hero_sim.robot", "hero_sim.world", "hero_sim.link"],
+        package_dir={"": "src"},
+        package_data={"hero_sim.world": ["arenas/*.yaml"]},
     )
 )

@@ -13,7 +13,7 @@ SOCKET_OWNERS = (
     "hero_driver.handshakes",
     "hero_driver.rospy_internals",
     "hero_driver.inlet",
-    "hero_sim.tcp_link",
+    "hero_sim.link.tcp_link",
     "hero_tools.checkup.network",
     "hero_monitor.server",
     "hero_monitor.program",
@@ -59,6 +59,40 @@ def test_the_simulator_shares_frames_and_payloads_with_the_driver_and_nothing_el
                 found.module == module or found.module.startswith(module + ".") for module in shared
             )
             assert allowed, f"line {found.line}: {found.module}"
+
+
+# What each room of the simulator may import of hero_sim besides itself; what runs the rooms stands on top.
+SIM_GROUND = {"errors", "robot_constants", "yaml_file"}
+SIM_ROOMS = {"robot": {"world"} | SIM_GROUND, "world": SIM_GROUND, "link": SIM_GROUND}
+
+
+def sim_part_of(module):
+    """The room of hero_sim that a module is in, or the module itself."""
+    parts = module.split(".")
+    return parts[1] if len(parts) > 1 and parts[0] == "hero_sim" else None
+
+
+@pytest.mark.parametrize("name", [name for name in modules_below("hero_sim") if sim_part_of(name) in SIM_ROOMS])
+def test_the_rooms_of_the_simulator_import_only_what_lies_below_them(name):
+    room = sim_part_of(name)
+    for found in imports_of(name):
+        part = sim_part_of(found.module)
+        assert part in SIM_ROOMS[room] | {room, None}, f"line {found.line}: {found.module}"
+
+
+@pytest.mark.parametrize("name", modules_below("hero_sim.robot") + modules_below("hero_sim.world"))
+def test_simulated_robots_and_their_world_know_no_clock_socket_thread_or_ros(name):
+    for found in imports_of(name):
+        assert found.top not in NOT_IN_THE_CORE and not sources.is_ros_import(found.module), f"line {found.line}"
+
+
+def test_no_module_of_the_simulator_imports_itself_through_others():
+    modules = set(modules_below("hero_sim"))
+    imports = {name: {found.module for found in imports_of(name)} & modules - {name} for name in modules}
+    while imports:
+        leaves = {name for name, imported in imports.items() if not imported & imports.keys()}
+        assert leaves, f"circle among {sorted(imports)}"
+        imports = {name: imported for name, imported in imports.items() if name not in leaves}
 
 
 @pytest.mark.parametrize("name", modules_below("hero_client") + modules_below("hero_examples") + modules_below("hero_tutorial"))

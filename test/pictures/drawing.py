@@ -3,10 +3,10 @@
 import matplotlib
 import numpy as np
 
-from hero_sim.kinematics import BODY_RADIUS_M
-
 matplotlib.use("Agg")
 from matplotlib import pyplot
+
+from hero_sim.robot_constants import BODY_RADIUS_M
 
 DPI = 90
 

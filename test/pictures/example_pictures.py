@@ -20,7 +20,7 @@ from picture_program import make_pictures
 from sensor_msgs.msg import Joy
 
 from hero_client import Robot
-from hero_sim.arena_file import load_arena
+from hero_sim.world.arena_file import load_arena
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.append(str(ROOT / "bench"))

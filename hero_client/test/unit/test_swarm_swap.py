@@ -10,8 +10,9 @@ import pytest
 from hero_client.control_laws import Pose
 from hero_client.reciprocal import AvoidanceLaw
 from hero_client.swarm_steering import SwarmSteering
-from hero_sim import declarations
-from hero_sim.kinematics import BODY_RADIUS_M, TICK_M, move_along_arc
+from hero_sim.robot import declarations
+from hero_sim.robot_constants import BODY_RADIUS_M, TICK_M
+from hero_sim.world.kinematics import move_along_arc
 
 ROOT = Path(__file__).resolve().parents[3]
 sys.path.append(str(ROOT / "hero_sim" / "test" / "unit"))

@@ -15,9 +15,9 @@ import rostest
 from sensor_msgs.msg import Joy
 
 from hero_client import Robot
-from hero_sim.arena import measure_clearance
-from hero_sim.arena_file import load_arena
-from hero_sim.kinematics import BODY_RADIUS_M
+from hero_sim.robot_constants import BODY_RADIUS_M
+from hero_sim.world.arena import measure_clearance
+from hero_sim.world.arena_file import load_arena
 from hero_test.example_program import ExampleProgram
 from hero_test.light_watch import LightWatch
 from hero_test.swarm_watch import SwarmWatch, wait_for

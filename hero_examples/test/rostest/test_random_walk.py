@@ -9,8 +9,8 @@ import rosnode
 import rospy
 import rostest
 
-from hero_sim.arena import measure_clearance
-from hero_sim.arena_file import load_arena
+from hero_sim.world.arena import measure_clearance
+from hero_sim.world.arena_file import load_arena
 from hero_test.swarm_watch import SwarmWatch, wait_for
 
 WALK_S = 120.0

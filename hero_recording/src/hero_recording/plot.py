@@ -73,8 +73,8 @@ def observe(options: argparse.Namespace, bags: BagSet) -> Observations:
 
 def read_arena(path: str, observations: Observations) -> None:
     """Take walls and obstacles from an arena file. Raises: RecordingError."""
-    from hero_sim.arena_file import load_arena
     from hero_sim.errors import SimulatorError
+    from hero_sim.world.arena_file import load_arena
 
     try:
         arena = load_arena(path)

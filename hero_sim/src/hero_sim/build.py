@@ -2,20 +2,24 @@
 
 import argparse
 import os
-from typing import Callable, List
+from typing import Callable, List, Tuple
 
 import numpy as np
 
-from . import arena as arenas
-from .arena_file import load_arena
-from .body import Body
 from .errors import OptionError
 from .fault_injector import FaultInjector
 from .faults import parse_fault
-from .firmware import Firmware, FirmwareOptions
-from .flash import NO_FLASH_DIR, Flash, check_folder, find_flash_dir, make_fingerprint
-from .range_sensors import FACTORY_CALIBRATION_COUNTS_M2, calibrate
-from .robot_errors import (
+from .link.tcp_link import TcpLink
+from .link.wifi import PROFILES, Radio
+from .robot.firmware import Firmware, FirmwareOptions
+from .robot.flash import NO_FLASH_DIR, Flash, check_folder, find_flash_dir, make_fingerprint
+from .simulator import Simulator
+from .swarm import Swarm
+from .world import arena as arenas
+from .world.arena_file import load_arena
+from .world.body import Body
+from .world.range_sensors import FACTORY_CALIBRATION_COUNTS_M2, calibrate
+from .world.robot_errors import (
     SERVO_CENTRE_US,
     RobotErrors,
     describe_robot,
@@ -23,11 +27,7 @@ from .robot_errors import (
     load_known,
     set_known,
 )
-from .simulator import Simulator
-from .swarm import Swarm
-from .tcp_link import TcpLink
-from .wifi import PROFILES, Radio
-from .world import World
+from .world.world import World
 
 BOOT_SPREAD_MS = 200
 """Robots that are started together come up within this time of each other."""
@@ -131,8 +131,8 @@ def describe_start(options: argparse.Namespace, host: str) -> str:
     return "%s: awaiting a driver on %s, port %s" % (who, host, ports)
 
 
-def build_simulator(options: argparse.Namespace, report: Callable[[str], None]) -> Simulator:
-    """Return the simulator that options describe.
+def build_simulator(options: argparse.Namespace, report: Callable[[str], None]) -> Tuple[Simulator, FaultInjector]:
+    """Return the simulator that options describe, and what takes faults for its robots.
 
     Raises: OptionError for a host, port or arena that cannot be used.
     """
@@ -150,12 +150,12 @@ def build_simulator(options: argparse.Namespace, report: Callable[[str], None]) 
         for seed in seeds[_SEEDS_BEFORE_ROBOTS + 1 :: _SEEDS_PER_ROBOT]
     ]
     simulator = Simulator(swarm, link, radios, report, options.speed)
-    simulator.injector = FaultInjector(simulator, np.random.RandomState(seeds[3]), report)
+    injector = FaultInjector(simulator, np.random.RandomState(seeds[3]), report)
     try:
         for text in options.fault:
-            simulator.injector.add(parse_fault(text))
+            injector.add(parse_fault(text))
     except OptionError:
         link.close_all()
         raise
     report(describe_start(options, host))
-    return simulator
+    return simulator, injector

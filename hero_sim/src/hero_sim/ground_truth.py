@@ -15,8 +15,8 @@ from std_msgs.msg import ColorRGBA
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
-from .firmware import Firmware
-from .kinematics import BODY_RADIUS_M
+from .robot.firmware import Firmware
+from .robot_constants import BODY_RADIUS_M
 from .simulator import Simulator
 
 FRAME = "world"

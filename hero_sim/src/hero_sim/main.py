@@ -151,7 +151,7 @@ def describe_faults() -> List[str]:
 
 def describe_error_keys() -> List[str]:
     """Return one line for each key of --error and --errors."""
-    from .robot_errors import KINDS as ERROR_KINDS
+    from .world.robot_errors import KINDS as ERROR_KINDS
 
     lines = ["KEY=VALUE,...[,robot=ID]; without robot it holds for all robots."]
     for key, kind in ERROR_KINDS.items():
@@ -165,7 +165,7 @@ def answer_question(options: argparse.Namespace) -> Optional[List[str]]:
     Raises: OptionError for an error that cannot be set.
     """
     from .build import build_errors
-    from .robot_errors import describe_errors
+    from .world.robot_errors import describe_errors
 
     if "help" in options.fault:
         return describe_faults()
@@ -228,7 +228,7 @@ def _run(arguments: Optional[List[str]]) -> int:
         if answer is not None:
             print("\n".join(answer))
             return 0
-        simulator = build_simulator(options, (lambda text: None) if options.quiet else report)
+        simulator, _ = build_simulator(options, (lambda text: None) if options.quiet else report)
     except SimulatorError as error:
         output.complain(str(error))
         return output.FAILED

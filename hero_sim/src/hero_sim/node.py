@@ -22,6 +22,7 @@ from . import main as command_line
 from . import output
 from .build import build_simulator
 from .errors import OptionError, SimulatorError
+from .fault_injector import FaultInjector
 from .faults import parse_fault
 from .ground_truth import GroundTruth
 from .simulator import Simulator
@@ -37,12 +38,10 @@ class ServiceDesk:
     """Takes wishes from rospy's threads, lets the simulator's thread fulfil them, and hands the answers
     back."""
 
-    def __init__(self, simulator: Simulator) -> None:
+    def __init__(self, simulator: Simulator, injector: FaultInjector) -> None:
         self._simulator = simulator
+        self._injector = injector
         self._wishes: queue.Queue[Tuple[Callable[[], Answer], queue.Queue]] = queue.Queue(maxsize=100)
-        inject = simulator.before_advance
-        assert inject is not None  # build_simulator gave it the faults' queue
-        self._inject = inject
         simulator.before_advance = self._run
         rospy.Service("~fault", InjectFault, self._serve_fault)
         rospy.Service("~pause", SetBool, self._serve_pause)
@@ -56,7 +55,7 @@ class ServiceDesk:
             except queue.Empty:
                 break
             answer.put(wish())
-        self._inject(now_ms)
+        self._injector.run(now_ms)
 
     def _ask(self, wish: Callable[[], Answer]) -> Answer:
         answer: queue.Queue[Answer] = queue.Queue()
@@ -71,11 +70,8 @@ class ServiceDesk:
             return InjectFaultResponse(True, "\n".join(command_line.describe_faults()))
 
         def inject() -> Answer:
-            injector = self._simulator.injector
-            if injector is None:
-                return False, "this simulator takes no faults"
             try:
-                return True, injector.add(parse_fault(request.fault))
+                return True, self._injector.add(parse_fault(request.fault))
             except SimulatorError as error:
                 return False, str(error)
 
@@ -141,14 +137,14 @@ def _run() -> int:
         output.complain("%s: set ROS_LOG_DIR to a directory" % error)
         return output.FAILED
     try:
-        simulator = build_simulator(options, (lambda text: None) if options.quiet else rospy.loginfo)
+        simulator, injector = build_simulator(options, (lambda text: None) if options.quiet else rospy.loginfo)
     except SimulatorError as error:
         rospy.logfatal("hero_sim: %s", error)
         return output.FAILED
     command_line.stop_on_signals(simulator)
     rospy.on_shutdown(lambda: setattr(simulator, "stopping", True))
     GroundTruth(simulator, options.clock)
-    ServiceDesk(simulator)
+    ServiceDesk(simulator, injector)
     try:
         simulator.run(options.seconds)
     finally:

@@ -4,16 +4,13 @@ The only file that reads a clock. It asks the swarm to catch up, carries bytes b
 """
 
 import time
-from typing import TYPE_CHECKING, Callable, List, Optional, Set
+from typing import Callable, List, Optional, Set
 
-from . import tcp_link
-from .firmware import WINDOW_LENGTH
+from .link import tcp_link
+from .link.tcp_link import TcpLink
+from .link.wifi import Radio
+from .robot_constants import RECEIVE_WINDOW_LENGTH
 from .swarm import Swarm
-from .tcp_link import TcpLink
-from .wifi import Radio
-
-if TYPE_CHECKING:
-    from .fault_injector import FaultInjector
 
 _LONGEST_WAIT_S = 0.05
 """So that a stop from a signal or another thread is seen soon."""
@@ -33,7 +30,6 @@ class Simulator:
     Attributes:
         swarm, link: what it joins.
         stopping: set from anywhere to end run().
-        injector: takes faults for the robots, None if nobody can.
         late_s: wall-clock time given up because the machine was too slow or asleep.
     """
 
@@ -53,7 +49,6 @@ class Simulator:
         self.stopping = False
         self.paused = False
         self.late_s = 0.0
-        self.injector: Optional[FaultInjector] = None
         self.before_advance: Optional[Callable[[int], None]] = None
         self._report = report
         self._said_unreachable = False
@@ -148,7 +143,7 @@ class Simulator:
     def _limit_window(self, index: int) -> None:
         """Leave what comes to the system while a robot's receive window is full, so that the sender feels it."""
         waiting_length = self.swarm.robots[index].received_length + self.radios[index].down_length
-        if waiting_length >= WINDOW_LENGTH:
+        if waiting_length >= RECEIVE_WINDOW_LENGTH:
             self._full.add(index)
         else:
             self._full.discard(index)

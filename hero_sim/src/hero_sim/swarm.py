@@ -9,8 +9,8 @@ from typing import Callable, List, Optional, Tuple
 
 import numpy as np
 
-from .firmware import Firmware
-from .world import STEP_MS, World
+from .robot.firmware import Firmware
+from .world.world import STEP_MS, World
 
 
 class Swarm:

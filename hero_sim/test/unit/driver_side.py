@@ -4,9 +4,9 @@ import collections
 import struct
 
 from hero_driver.rosserial import frames, payloads
-from hero_sim import declarations as ids
 from hero_sim import main
 from hero_sim.build import build_swarm
+from hero_sim.robot import declarations as ids
 
 SERVER_START_S = 1_700_000_000
 

@@ -4,10 +4,10 @@ import sys
 import numpy as np
 import pytest
 
-from hero_sim import arena as arenas
-from hero_sim.arena_file import SHIPPED, load_arena
 from hero_sim.errors import OptionError
-from hero_sim.kinematics import BODY_RADIUS_M
+from hero_sim.robot_constants import BODY_RADIUS_M
+from hero_sim.world import arena as arenas
+from hero_sim.world.arena_file import SHIPPED, load_arena
 
 
 def write(tmp_path, text):

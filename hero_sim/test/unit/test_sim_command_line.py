@@ -16,10 +16,10 @@ import pytest
 from driver_side import read_encoder, read_odom
 
 from hero_driver.rosserial import frames, payloads
-from hero_sim import declarations as ids
 from hero_sim import main
 from hero_sim.faults import KINDS
-from hero_sim.robot_errors import KINDS as ERROR_KINDS
+from hero_sim.robot import declarations as ids
+from hero_sim.world.robot_errors import KINDS as ERROR_KINDS
 
 LIMIT_S = 20.0
 ROOT = os.path.abspath(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", ".."))

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hero_driver.rosserial import frames
-from hero_sim import declarations as ids
+from hero_sim.robot import declarations as ids
 
 
 def test_laser_enable_stops_and_starts_the_laser_and_a_restart_forgets_it():

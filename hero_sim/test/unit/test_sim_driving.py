@@ -5,10 +5,10 @@ import pytest
 from driver_side import DriverSide, read_encoder, read_odom
 
 from hero_driver.rosserial import frames
-from hero_sim import declarations as ids
-from hero_sim.firmware import WINDOW_LENGTH
-from hero_sim.imu_hat import ImuHat
-from hero_sim.kinematics import compose
+from hero_sim.robot import declarations as ids
+from hero_sim.robot.imu_hat import ImuHat
+from hero_sim.robot_constants import RECEIVE_WINDOW_LENGTH
+from hero_sim.world.kinematics import compose
 
 both_controllers = pytest.mark.parametrize(
     "controller", [ids.ID_VELOCITY_CMD_VEL, ids.ID_POSITION_CMD_VEL], ids=["velocity", "position"]
@@ -130,11 +130,11 @@ def test_what_waited_beyond_the_receive_window_is_read_in_the_next_spin():
     driver.swarm.robots[0].freeze(driver.swarm.now_ms, 500)
     driver.swarm.reschedule(0)
     move = struct.pack("<6d", 0.1, 0, 0, 0, 0, 0)
-    for _ in range(WINDOW_LENGTH // 56 + 1):
+    for _ in range(RECEIVE_WINDOW_LENGTH // 56 + 1):
         driver.send(0, ids.ID_VELOCITY_CMD_VEL, move)
     driver.send_twist(0, 0.0, 0.0)
     driver.run(540)
-    assert driver.swarm.robots[0].motors.velocity.dropped == WINDOW_LENGTH // 56 - 1
+    assert driver.swarm.robots[0].motors.velocity.dropped == RECEIVE_WINDOW_LENGTH // 56 - 1
     driver.run(600)
     assert driver.measure_speed(0) < 0.001
 

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hero_driver.rosserial import frames, payloads
-from hero_sim import declarations as ids
+from hero_sim.robot import declarations as ids
 
 
 def test_a_boot_speaks_first_and_at_the_stock_robots_times():

@@ -8,9 +8,9 @@ import sys
 import pytest
 from driver_side import DriverSide
 
-from hero_sim import declarations as ids
 from hero_sim.errors import OptionError
-from hero_sim.flash import Flash
+from hero_sim.robot import declarations as ids
+from hero_sim.robot.flash import Flash
 
 CENTRES = struct.pack("<2h", 1490, 1512)
 
@@ -151,7 +151,7 @@ def test_a_folder_that_cannot_be_made_is_named(tmp_path):
 
 
 def test_the_fingerprint_of_a_robot_does_not_depend_on_the_process():
-    code = "from hero_sim.flash import make_fingerprint; print(make_fingerprint(['a: 1', 'b']))"
+    code = "from hero_sim.robot.flash import make_fingerprint; print(make_fingerprint(['a: 1', 'b']))"
     names = {
         subprocess.run(
             [sys.executable, "-c", code],

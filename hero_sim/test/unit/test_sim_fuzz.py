@@ -10,11 +10,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from hero_sim import robot_errors
-from hero_sim.arena import Arena
-from hero_sim.arena_file import load_arena
 from hero_sim.errors import OptionError
-from hero_sim.flash import Flash
+from hero_sim.robot.flash import Flash
+from hero_sim.world import robot_errors
+from hero_sim.world.arena import Arena
+from hero_sim.world.arena_file import load_arena
 
 ARENA = """\
 name: mine

@@ -3,7 +3,8 @@ import math
 import numpy as np
 import pytest
 
-from hero_sim import kinematics
+from hero_sim.robot_constants import TICK_M
+from hero_sim.world import kinematics
 
 
 def test_equal_wheels_drive_straight():
@@ -41,7 +42,7 @@ def test_arrays_move_like_single_robots():
 
 def test_wheels_and_body_speeds_are_inverse():
     assert kinematics.join_wheels(*kinematics.split_to_wheels(0.1, 2.5)) == pytest.approx((0.1, 2.5))
-    assert pytest.approx(0.000537, abs=1e-6) == kinematics.TICK_M
+    assert pytest.approx(0.000537, abs=1e-6) == TICK_M
 
 
 def test_a_pose_and_its_inverse_cancel():

@@ -6,7 +6,7 @@ import driver_side
 import pytest
 
 from hero_driver.rosserial import frames, payloads
-from hero_sim import declarations, messages
+from hero_sim.robot import declarations, messages
 
 ROOT = os.path.dirname(os.path.abspath(__file__)) + "/../../.."
 CAPTURES = os.environ.get("HERO_CAPTURES", os.path.join(ROOT, "..", "shared", "captures"))

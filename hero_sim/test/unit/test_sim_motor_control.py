@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hero_driver.rosserial import frames
-from hero_sim import declarations as ids
-from hero_sim.kinematics import TICK_M
+from hero_sim.robot import declarations as ids
+from hero_sim.robot_constants import TICK_M
 
 
 def start(*arguments):

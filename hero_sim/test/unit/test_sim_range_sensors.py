@@ -3,11 +3,11 @@ import math
 import numpy as np
 import pytest
 
-from hero_sim import range_sensors
-from hero_sim.arena import build_default
-from hero_sim.kinematics import BODY_RADIUS_M
-from hero_sim.robot_errors import draw_errors
-from hero_sim.world import World
+from hero_sim.robot_constants import BODY_RADIUS_M
+from hero_sim.world import range_sensors
+from hero_sim.world.arena import build_default
+from hero_sim.world.robot_errors import draw_errors
+from hero_sim.world.world import World
 
 NO_WALLS = np.empty((0, 4))
 NO_CIRCLES = np.empty((0, 3))

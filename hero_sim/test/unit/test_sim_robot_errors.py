@@ -4,7 +4,7 @@ from driver_side import parse_options
 
 from hero_sim.build import build_errors
 from hero_sim.errors import OptionError
-from hero_sim.robot_errors import KINDS, describe_errors
+from hero_sim.world.robot_errors import KINDS, describe_errors
 
 
 def build(*arguments):

@@ -4,8 +4,8 @@ import pytest
 from driver_side import DriverSide
 
 from hero_driver.rosserial import frames
-from hero_sim import declarations as ids
-from hero_sim.firmware import WINDOW_LENGTH
+from hero_sim.robot import declarations as ids
+from hero_sim.robot_constants import RECEIVE_WINDOW_LENGTH
 
 VELOCITY = (ids.ID_VELOCITY_CMD_VEL, ids.ID_VELOCITY_PID_CALIBRATION, ids.ID_VELOCITY_PID_CALIBRATION_ANSWER)
 POSITION = (ids.ID_POSITION_CMD_VEL, ids.ID_POSITION_PID_CALIBRATION, ids.ID_POSITION_PID_CALIBRATION_ANSWER)
@@ -154,7 +154,7 @@ def test_the_packets_in_several_sends_do_not_end_self_tuning(controller):
 def test_a_burst_beyond_the_receive_window_ends_no_tuning(controller):
     driver = tune(start(), controller)
     data = end_with([controller], NEUTRAL_PULSES, 178)
-    assert len(data) > WINDOW_LENGTH
+    assert len(data) > RECEIVE_WINDOW_LENGTH
     driver.send_bytes(0, data)
     driver.run(500)
     assert is_tuning(driver, controller)

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hero_sim.wifi import PROFILES, Radio
+from hero_sim.link.wifi import PROFILES, Radio
 
 
 def carry(profile, seconds=60, period_ms=34, length=1500, seed=0):

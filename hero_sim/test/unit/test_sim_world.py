@@ -5,11 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hero_sim import world as worlds
-from hero_sim.arena import build_default, build_rectangle, place_robots
-from hero_sim.arena_file import SHIPPED, load_arena
-from hero_sim.kinematics import BODY_RADIUS_M, split_to_wheels
-from hero_sim.robot_errors import SERVO_LAG_S, draw_errors
+from hero_sim.robot_constants import BODY_RADIUS_M
+from hero_sim.world import world as worlds
+from hero_sim.world.arena import build_default, build_rectangle, place_robots
+from hero_sim.world.arena_file import SHIPPED, load_arena
+from hero_sim.world.kinematics import split_to_wheels
+from hero_sim.world.robot_errors import SERVO_LAG_S, draw_errors
 
 
 def build_world(robots=1, arena=None, errors=0.0, poses=None, seed=0):

@@ -9,10 +9,11 @@ from typing import Any, List, Tuple
 
 import numpy as np
 
+from ..errors import OptionError
+from ..robot_constants import BODY_RADIUS_M
+from ..yaml_file import describe_node, fail_at, read_mapping, read_nodes
 from .arena import Arena, is_free, outline
-from .errors import OptionError
-from .kinematics import BODY_RADIUS_M, Pose
-from .yaml_file import describe_node, fail_at, read_mapping, read_nodes
+from .kinematics import Pose
 
 SHIPPED = ("empty", "obstacles", "maze")
 """Arenas that come with the simulator; --arena takes these names too."""

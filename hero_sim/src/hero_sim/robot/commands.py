@@ -3,16 +3,16 @@
 Pure. Texts and behaviour are the firmware's (files named in messages and flash); ids as declared.
 """
 
-from typing import TYPE_CHECKING, Callable, Dict, List, Optional
+from typing import Callable, Dict, List, Optional
 
 from hero_driver.rosserial import frames
 
+from ..errors import CommandError
 from . import declarations as ids
 from . import messages
-from .errors import CommandError
-
-if TYPE_CHECKING:
-    from .firmware import Firmware
+from .flash import Flash
+from .motor_control import MotorControl
+from .sensing import Sensing
 
 PULSES_US = 500
 """Writing pulses holds the loop so long (MotorDriver.ino: measured as 500 us per cmd_motor)."""
@@ -29,9 +29,22 @@ class CommandTable:
         held_us: how long the last callback held the robot's loop.
     """
 
-    def __init__(self, firmware: "Firmware") -> None:
-        """Serve firmware."""
-        self._firmware = firmware
+    def __init__(
+        self,
+        name: str,
+        sensing: Sensing,
+        motors: MotorControl,
+        flash: Flash,
+        log: Callable[[str], None],
+        warn: Callable[[str], None],
+    ) -> None:
+        """Serve the parts of the robot called name; log takes lines for the server, warn lines for people."""
+        self._name = name
+        self._sensing = sensing
+        self._motors = motors
+        self._flash = flash
+        self._log = log
+        self._warn = warn
         self._now_ms = 0
         self.held_us = 0
         self._callbacks: Dict[int, Callable[[bytes, int], Optional[bytes]]] = {
@@ -61,64 +74,63 @@ class CommandTable:
         return None if callback is None else callback(frame.payload, millis)
 
     def _set_light(self, payload: bytes, millis: int) -> None:
-        self._firmware.sensing.set_light(millis, messages.decode_color(payload))
+        self._sensing.set_light(millis, messages.decode_color(payload))
         self.held_us = LIGHT_US
 
     def _enable_laser(self, payload: bytes, millis: int) -> None:
         del millis
-        self._firmware.sensing.laser_enabled = messages.decode_bool(payload)
+        self._sensing.laser_enabled = messages.decode_bool(payload)
 
     def _drive_velocity(self, payload: bytes, millis: int) -> None:
         twist = messages.decode_twist(payload)
-        if self._firmware.motors.receive_velocity(millis, twist.linear_m_s, twist.turn_rad_s):
+        if self._motors.receive_velocity(millis, twist.linear_m_s, twist.turn_rad_s):
             self.held_us = HALT_US
 
     def _drive_position(self, payload: bytes, millis: int) -> None:
         twist = messages.decode_twist(payload)
-        if self._firmware.motors.receive_position(millis, self._now_ms, twist.linear_m_s, twist.turn_rad_s):
+        if self._motors.receive_position(millis, self._now_ms, twist.linear_m_s, twist.turn_rad_s):
             self.held_us = HALT_US
 
     def _drive_motors(self, payload: bytes, millis: int) -> None:
-        self._firmware.motors.receive_pulses(millis, *messages.decode_motor(payload))
+        self._motors.receive_pulses(millis, *messages.decode_motor(payload))
         self.held_us = PULSES_US
 
     def _calibrate_ir(self, payload: bytes, millis: int) -> bytes:
         del millis
-        flash = self._firmware.flash
-        flash.ir_calibration_counts_m2 = list(messages.decode_ir_calibration(payload))
+        self._flash.ir_calibration_counts_m2 = list(messages.decode_ir_calibration(payload))
         self._keep()
         text = "IR calibration parameters have been successfully recorded!"
-        self._firmware.log(text)
+        self._log(text)
         return _answer(ids.ID_IR_CALIBRATION_ANSWER, True, text)
 
     def _set_odom(self, payload: bytes, millis: int) -> bytes:
         del millis
-        self._firmware.sensing.set_odometry(*messages.decode_set_odom(payload))
-        self._firmware.log("[HERO] Odometry was changed!")
+        self._sensing.set_odometry(*messages.decode_set_odom(payload))
+        self._log("[HERO] Odometry was changed!")
         return _answer(ids.ID_SET_ODOM_ANSWER, True, "Odometry was changed!")
 
     def _set_motors(self, payload: bytes, millis: int) -> bytes:
         del millis
         centres_us = messages.decode_motor(payload)
-        self._firmware.flash.motor_centres_us = [float(centre) for centre in centres_us]
-        self._firmware.motors.motors.centres_us = list(centres_us)
+        self._flash.motor_centres_us = [float(centre) for centre in centres_us]
+        self._motors.motors.centres_us = list(centres_us)
         self._keep()
         text = "Motor Parameters has been succesfully recorded!"
-        self._firmware.log(text)
+        self._log(text)
         return _answer(ids.ID_MOTORS_PARAMETERS_ANSWER, True, text)
 
     def _set_position_pid(self, payload: bytes, millis: int) -> bytes:
         del millis
         gains = list(messages.decode_pid(payload))
-        self._firmware.flash.position_pid = gains
-        self._firmware.motors.position.set_gains(gains)
+        self._flash.position_pid = gains
+        self._motors.position.set_gains(gains)
         return self._record_pid(ids.ID_POSITION_PID_PARAMETERS_ANSWER, gains)
 
     def _set_velocity_pid(self, payload: bytes, millis: int) -> bytes:
         del millis
         gains = list(messages.decode_pid(payload))
-        self._firmware.flash.velocity_pid = gains
-        self._firmware.motors.velocity.set_gains(gains)
+        self._flash.velocity_pid = gains
+        self._motors.velocity.set_gains(gains)
         return self._record_pid(ids.ID_VELOCITY_PID_PARAMETERS_ANSWER, gains)
 
     def _record_pid(self, answer_id: int, gains: List[float]) -> bytes:
@@ -133,12 +145,12 @@ class CommandTable:
     def _keep(self) -> None:
         """Write the flash; where that fails, the robot goes on with what it was told, and people are told."""
         try:
-            self._firmware.flash.save()
+            self._flash.save()
         except CommandError as error:
-            self._firmware.complain(str(error))
+            self._warn(str(error))
 
     def _log_green(self, text: str) -> None:
-        self._firmware.log("\x1b[92m[/%s] %s\x1b[0m" % (self._firmware.name, text))
+        self._log("\x1b[92m[/%s] %s\x1b[0m" % (self._name, text))
 
     def _tune_position(self, payload: bytes, millis: int) -> bytes:
         del payload
@@ -149,7 +161,7 @@ class CommandTable:
         return self._tune(ids.ID_VELOCITY_PID_CALIBRATION_ANSWER, millis, of_velocity=True)
 
     def _tune(self, answer_id: int, millis: int, of_velocity: bool) -> bytes:
-        self._firmware.motors.start_tuning(millis, self._now_ms, of_velocity)
+        self._motors.start_tuning(millis, self._now_ms, of_velocity)
         self.held_us = PULSES_US
         # The firmware never sets success here (VelocityControl.ino:229-245).
         return _answer(answer_id, False, "PID Autotuning!")

@@ -10,36 +10,26 @@ from typing import Callable, List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from .body import Body
+from ..robot_constants import (
+    COMMAND_GAP_MS,
+    MAX_ANGULAR_RAD_S,
+    MAX_LINEAR_M_S,
+    MOTOR_WATCHDOG_MS,
+    POSITION_LIMIT_US,
+    POSITION_WATCHDOG_MS,
+    PULSE_RANGE_US,
+    TICK_M,
+    VELOCITY_LIMIT_US,
+    VELOCITY_WATCHDOG_MS,
+)
+from ..world.body import Body
+from ..world.kinematics import split_to_wheels
 from .flash import Flash
-from .kinematics import MAX_LINEAR_M_S, MAX_TURN_RAD_S, TICK_M, split_to_wheels
 from .motor_pid import POSITION_GAINS, VELOCITY_GAINS, Gains, MotorPid
 from .wheel_odometry import WheelOdometry
 
-COMMAND_GAP_MS = 50
-"""A Twist that comes earlier after its controller's watchdog was set is dropped, a zero too
-(VelocityControl.ino:159). An accepted motion sets the watchdog, and self-tuning sets it in every run."""
-
 CONTROL_MS = 21
 """Between two runs of a controller, 47.6 Hz (VelocityControl.ino:112)."""
-
-VELOCITY_HOLD_MS = 1000
-POSITION_HOLD_MS = 3000
-"""A controller runs until this long after its watchdog was set (VelocityControl.ino:110, PositionControl.ino:105).
-
-The watchdog is 0 at boot and after a zero: in its first 3 s of uptime a robot's position controller runs whatever
-it is told.
-"""
-
-MOTOR_HOLD_MS = 1000
-"""So long after the last write the motors keep their pulse (MotorDriver.ino:111)."""
-
-VELOCITY_LIMIT_US = 250.0
-POSITION_LIMIT_US = 130.0
-"""How far from the centre each PID goes."""
-
-PULSE_RANGE_US = (1000, 2000)
-"""Servo pulses."""
 
 _WHEEL_SIGNS = (-1, 1)
 """The servos are mounted as mirror images: a pulse below the centre drives the left wheel forward."""
@@ -75,7 +65,7 @@ class MotorDriver:
 
     def write(self, now_ms: int, left_us: int, right_us: int) -> None:
         """Put out pulses, limited to 1000..2000 us."""
-        self.halt_at_ms = now_ms + MOTOR_HOLD_MS + 1
+        self.halt_at_ms = now_ms + MOTOR_WATCHDOG_MS + 1
         pulses_us = (left_us, right_us)
         if self.attached and pulses_us == self._pulses_us:
             return
@@ -108,11 +98,11 @@ class _Controller:
     """
 
     def __init__(
-        self, motors: MotorDriver, default: Gains, stored: Sequence[float], limit_us: float, hold_ms: int
+        self, motors: MotorDriver, default: Gains, stored: Sequence[float], limit_us: float, timeout_ms: int
     ) -> None:
         """Begin without a command; stored are six gains of the flash, limit_us holds for each output."""
         self._motors = motors
-        self._hold_ms = hold_ms
+        self._timeout_ms = timeout_ms
         # A proportional gain that is not above zero is one of an erased flash.
         self.pids = [
             MotorPid(Gains(*gains) if gains[0] > 0.0 else default, limit_us)
@@ -128,7 +118,7 @@ class _Controller:
     def find_due(self, now_ms: int) -> Optional[int]:
         """Return when the controller runs next, None if its watchdog forbids that."""
         due_ms = max(self._ran_ms + CONTROL_MS, now_ms)
-        return due_ms if due_ms - self._watchdog_ms < self._hold_ms else None
+        return due_ms if due_ms - self._watchdog_ms < self._timeout_ms else None
 
     def set_gains(self, gains: Sequence[float]) -> None:
         """Take lkp lki lkd rkp rki rkd."""
@@ -171,7 +161,7 @@ class _Controller:
 
     def is_due(self, now_ms: int) -> bool:
         """Return whether the controller runs at now_ms, which counts as a run."""
-        if now_ms - self._ran_ms < CONTROL_MS or now_ms - self._watchdog_ms >= self._hold_ms:
+        if now_ms - self._ran_ms < CONTROL_MS or now_ms - self._watchdog_ms >= self._timeout_ms:
             return False
         self._ran_ms = now_ms
         return True
@@ -209,10 +199,10 @@ class MotorControl:
         self._log = log
         self.motors = MotorDriver(body, flash.motor_centres_us)
         self.velocity = _Controller(
-            self.motors, VELOCITY_GAINS, flash.velocity_pid, VELOCITY_LIMIT_US, VELOCITY_HOLD_MS
+            self.motors, VELOCITY_GAINS, flash.velocity_pid, VELOCITY_LIMIT_US, VELOCITY_WATCHDOG_MS
         )
         self.position = _Controller(
-            self.motors, POSITION_GAINS, flash.position_pid, POSITION_LIMIT_US, POSITION_HOLD_MS
+            self.motors, POSITION_GAINS, flash.position_pid, POSITION_LIMIT_US, POSITION_WATCHDOG_MS
         )
         self._start_ticks = [0, 0]
         self._tuning_start_ticks = [0, 0]
@@ -337,7 +327,7 @@ class MotorControl:
 def _limit_to_wheels(linear_m_s: float, turn_rad_s: float) -> Optional[Tuple[float, float]]:
     """Return the wheels' speeds (m/s) for a Twist within the firmware's limits, None for a zero."""
     linear_m_s = math.copysign(min(abs(linear_m_s), MAX_LINEAR_M_S), linear_m_s)
-    turn_rad_s = math.copysign(min(abs(turn_rad_s), MAX_TURN_RAD_S), turn_rad_s)
+    turn_rad_s = math.copysign(min(abs(turn_rad_s), MAX_ANGULAR_RAD_S), turn_rad_s)
     if linear_m_s == 0.0 and turn_rad_s == 0.0:
         return None
     return split_to_wheels(linear_m_s, turn_rad_s)

@@ -10,9 +10,10 @@ from typing import Dict, List, Tuple
 
 import numpy as np
 
+from ..robot_constants import BODY_RADIUS_M
 from . import range_sensors
 from .arena import Arena, distance_to_segments
-from .kinematics import BODY_RADIUS_M, join_wheels, move_along_arc
+from .kinematics import join_wheels, move_along_arc
 from .robot_errors import MAX_WHEEL_M_S, SERVO_GAIN_M_S_US, RobotErrors
 
 STEP_MS = 10

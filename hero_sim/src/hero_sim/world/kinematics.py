@@ -1,7 +1,6 @@
 """Wheel travel -> pose of a differential drive, exactly, for one robot or for an array of them.
 
 Pure: numbers and numpy only. Body frame as in REP 103: x forward, y left, angles counter-clockwise.
-Source of the body's measures: the robot's firmware (config.h) and its published drawings.
 """
 
 import math
@@ -9,18 +8,7 @@ from typing import Any, Tuple
 
 import numpy as np
 
-WHEEL_DIAMETER_M = 0.0492
-WHEEL_SEPARATION_M = 0.063
-BODY_RADIUS_M = 0.036835
-"""Radius of the round body; also what the firmware adds to each infrared distance."""
-
-TICKS_PER_TURN = 288
-TICK_M = math.pi * WHEEL_DIAMETER_M / TICKS_PER_TURN
-"""Travel of a wheel's rim per encoder tick, about 0.537 mm."""
-
-MAX_LINEAR_M_S = 0.20
-MAX_TURN_RAD_S = 8.0
-"""Limits that the firmware puts on a commanded Twist (config.h)."""
+from ..robot_constants import WHEEL_SEPARATION_M
 
 # Below this turn per step the arc is a straight line to within double precision.
 _STRAIGHT_RAD = 1e-9

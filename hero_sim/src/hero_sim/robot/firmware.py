@@ -14,10 +14,11 @@ import numpy as np
 from hero_driver.rosserial import errors as wire_errors
 from hero_driver.rosserial import frames, payloads
 
+from ..errors import CommandError
+from ..robot_constants import CONNECT_TIMEOUT_MS, RECEIVE_WINDOW_LENGTH, TIME_LOST_MS
+from ..world.body import Body
 from . import declarations
-from .body import Body
 from .commands import CommandTable
-from .errors import CommandError
 from .flash import Flash
 from .motor_control import MotorControl
 from .robot_clock import RobotClock
@@ -34,9 +35,6 @@ IMU_LOG_MS = 57
 WELCOME_MS = 1120
 """From the connection to the first pass of loop(): lights of welcome (LEDStatus.ino:93-108)."""
 
-CONNECT_TIMEOUT_MS = 5000
-"""WiFiClient's limit for a connect or a write; everything stands still meanwhile."""
-
 SPIN_MS = 51
 """Between two looks at what came in, configured: SYNC_RATE 20 Hz (config.h:49), 1000/20 + 1."""
 
@@ -47,12 +45,8 @@ LOG_MS = 1001
 UNCONFIGURED_LOG_MS = 1019
 """Between two lines "Conected at time" (ROSHandle.ino:116)."""
 
-WINDOW_LENGTH = 2144
-"""Bytes that the ESP8266's TCP takes before the program reads them; the rest waits at the sender."""
-
 TIME_REQUEST_MS = 2500
-TIME_LOST_MS = 11000
-"""SYNC_SECONDS 5: * 500 between requests, * 2200 without an answer until unconfigured (node_handle.h)."""
+"""Between two time requests (SYNC_SECONDS 5 * 500, node_handle.h)."""
 
 ANSWER_MS = (42, 75)
 """From the arrival of a service call to its answer (measured)."""
@@ -129,7 +123,9 @@ class Firmware:
         self.motors = MotorControl(
             self.name, self.body, self.sensing.odometry, self.flash, self.rng, self.log
         )
-        self.commands = CommandTable(self)
+        self.commands = CommandTable(
+            self.name, self.sensing, self.motors, self.flash, self.log, self.complain
+        )
         self._declarations = declarations.encode_declarations(self.name)
         self.configured = False
         self.crash_reason = None
@@ -392,8 +388,8 @@ class Firmware:
             # A new reader each time: the firmware forgets a packet that is not complete after 20 ms
             # (SERIAL_MSG_TIMEOUT, node_handle.h:96), and looks again only after 51 or 101 ms.
             reader = frames.FrameReader(frames.LONGEST_PAYLOAD_LENGTH)
-            self._pending.extend(reader.receive_bytes(bytes(self._received[:WINDOW_LENGTH])))
-            del self._received[:WINDOW_LENGTH]
+            self._pending.extend(reader.receive_bytes(bytes(self._received[:RECEIVE_WINDOW_LENGTH])))
+            del self._received[:RECEIVE_WINDOW_LENGTH]
 
     def _read_packets(self, now_ms: int) -> None:
         """Handle packets until they have held the loop for a millisecond; the spin goes on after that time."""

@@ -8,9 +8,9 @@ from typing import Any, Dict, List, NamedTuple, Sequence
 
 import numpy as np
 
+from ..errors import OptionError
+from ..yaml_file import fail_at, read_mapping, read_nodes
 from . import range_sensors
-from .errors import OptionError
-from .yaml_file import fail_at, read_mapping, read_nodes
 
 SERVO_CENTRE_US = 1500.0
 SERVO_DEAD_ZONE_US = 30.0

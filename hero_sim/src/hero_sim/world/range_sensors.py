@@ -10,7 +10,7 @@ from typing import Tuple
 
 import numpy as np
 
-from .kinematics import BODY_RADIUS_M
+from ..robot_constants import BODY_RADIUS_M
 
 BEAMS = 8
 BEAM_ANGLES_RAD = -math.pi + np.arange(BEAMS) * (math.pi / 4.0)

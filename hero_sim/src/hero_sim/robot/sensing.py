@@ -8,12 +8,13 @@ from typing import List, Tuple
 
 import numpy as np
 
+from ..robot_constants import LED_WATCHDOG_MS
+from ..world.body import Body
+from ..world.kinematics import compose, invert
+from ..world.range_sensors import convert_to_ranges
 from . import messages
-from .body import Body
 from .flash import Flash
 from .imu_hat import ImuHat
-from .kinematics import compose, invert
-from .range_sensors import convert_to_ranges
 from .wheel_odometry import WheelOdometry
 
 CYCLE_MS = 34
@@ -25,9 +26,6 @@ LASER_GATE_MS = 200
 LASER_READ_MS = 1
 """How long reading the infrared sensors holds the cycle up; with it /laser comes every 205 ms, as
 measured."""
-
-LED_DARK_MS = 15000
-"""The light goes out so long after the last command (LEDStatus.ino:76)."""
 
 BLUE_MS = 2000
 """So long the light is blue after the robot came up."""
@@ -84,7 +82,7 @@ class Sensing:
 
     def set_light(self, now_ms: int, color: Tuple[float, float, float, float]) -> None:
         """Take a command for the light: red, green, blue, alpha (0..1)."""
-        self._light, self._light_until_ms = color, now_ms + LED_DARK_MS
+        self._light, self._light_until_ms = color, now_ms + LED_WATCHDOG_MS
 
     def show_light(self, now_ms: int) -> Tuple[float, float, float, float]:
         """Return the colour that people see."""

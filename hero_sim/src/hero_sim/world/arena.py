@@ -9,7 +9,8 @@ from typing import List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
-from .kinematics import BODY_RADIUS_M, Pose
+from ..robot_constants import BODY_RADIUS_M
+from .kinematics import Pose
 
 START_GAP_M = 0.05
 """Free space kept around a robot that is placed by chance."""

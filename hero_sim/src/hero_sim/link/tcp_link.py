@@ -13,8 +13,8 @@ import struct
 import sys
 from typing import Dict, List, NamedTuple, Optional, Tuple
 
-from .errors import OptionError
-from .firmware import WINDOW_LENGTH
+from ..errors import OptionError
+from ..robot_constants import RECEIVE_WINDOW_LENGTH
 
 MADE = "made"
 FAILED = "failed"
@@ -102,7 +102,7 @@ class TcpLink:
         listener = socket.socket(family, socket.SOCK_STREAM)
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         # What is accepted inherits it.
-        listener.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, WINDOW_LENGTH)
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_WINDOW_LENGTH)
         try:
             listener.bind(address)
             listener.listen(4)
@@ -157,7 +157,7 @@ class TcpLink:
         try:
             sock.setblocking(False)
             # Linux then takes about so many bytes that nobody reads, as the robot does.
-            sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, WINDOW_LENGTH)
+            sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_WINDOW_LENGTH)
             if own_address.startswith("127."):
                 sock.bind((own_address, 0))
             result = sock.connect_ex(address)

@@ -9,7 +9,7 @@ import os
 from contextlib import suppress
 from typing import Any, Dict, List, Optional, Sequence, Tuple
 
-from .errors import CommandError, OptionError
+from ..errors import CommandError, OptionError
 
 _LENGTHS = {"ir_calibration_counts_m2": 8, "motor_centres_us": 2, "velocity_pid": 6, "position_pid": 6}
 

@@ -8,7 +8,7 @@ velocity controller reads too (47 times a second), a third and more of the way i
 import math
 from typing import List, Tuple
 
-from .kinematics import TICK_M, WHEEL_SEPARATION_M
+from ..robot_constants import TICK_M, WHEEL_SEPARATION_M
 
 FILTER_MEASURE_ERROR = 1.0
 FILTER_FIRST_ERROR = 1.0

@@ -11,9 +11,9 @@ from typing import List, NamedTuple, Sequence, Tuple
 
 from hero_driver.rosserial import frames
 
+from ..errors import CommandError
+from ..robot_constants import TICKS_PER_TURN, WHEEL_SEPARATION_M
 from . import declarations
-from .errors import CommandError
-from .kinematics import TICKS_PER_TURN, WHEEL_SEPARATION_M
 
 SEQ_NEVER_COUNTED = 0xFFFFFFFF
 """header.seq of odom, encoder and imu: set to -1 and never counted (Odometry.ino:60, WheelEncoder.ino:62)."""

@@ -1,0 +1,1 @@
+"""One robot by the rules of the stock firmware: bytes and time in, bytes and servo pulses out."""

@@ -1,0 +1,49 @@
+"""The robot in numbers: its body, its limits and its watchdogs. Source: the firmware (config.h and the files named)."""
+
+import math
+
+WHEEL_DIAMETER_M = 0.0492
+WHEEL_SEPARATION_M = 0.063
+BODY_RADIUS_M = 0.036835
+"""Radius of the round body; also what the firmware adds to each infrared distance."""
+
+TICKS_PER_TURN = 288
+TICK_M = math.pi * WHEEL_DIAMETER_M / TICKS_PER_TURN
+"""Travel of a wheel's rim per encoder tick, about 0.537 mm."""
+
+MAX_LINEAR_M_S = 0.20
+MAX_ANGULAR_RAD_S = 8.0
+"""Limits of a commanded Twist (config.h)."""
+
+PULSE_RANGE_US = (1000, 2000)
+"""Servo pulses."""
+
+VELOCITY_LIMIT_US = 250.0
+POSITION_LIMIT_US = 130.0
+"""How far from the centre the PID of each controller goes."""
+
+COMMAND_GAP_MS = 50
+"""A Twist that arrives earlier after its controller's watchdog was set is dropped, a zero too
+(VelocityControl.ino:159). An accepted motion sets the watchdog, and self-tuning sets it in every run."""
+
+VELOCITY_WATCHDOG_MS = 1000
+POSITION_WATCHDOG_MS = 3000
+"""A controller runs until this long after its watchdog was set (VelocityControl.ino:110, PositionControl.ino:105).
+
+The watchdog is 0 at boot and after a zero: in its first 3 s of uptime a robot's position controller always runs.
+"""
+
+MOTOR_WATCHDOG_MS = 1000
+"""The motors keep their pulse for so long after the last write (MotorDriver.ino:111)."""
+
+LED_WATCHDOG_MS = 15000
+"""The light goes out so long after the last command (LEDStatus.ino:76)."""
+
+CONNECT_TIMEOUT_MS = 5000
+"""WiFiClient's limit for a connect or a write, which block the firmware's loop."""
+
+TIME_LOST_MS = 11000
+"""Without an answer to its time requests a robot stops streaming after this (SYNC_SECONDS 5 * 2200, node_handle.h)."""
+
+RECEIVE_WINDOW_LENGTH = 2144
+"""Bytes that the ESP8266's TCP takes before the program reads them; the rest waits at the sender."""
