@@ -92,7 +92,7 @@ def start_swarms(options, count, servers, environment):
     for index, (_, port) in enumerate(servers):
         first, end = (count * number // len(servers) for number in (index, index + 1))
         command = [sys.executable, str(HERE / "emulated_swarm.py"), "--port", str(port)]
-        command += ["--first-id", str(first), "--robots", str(end - first), "--speed", str(options.speed)]
+        command += ["--first-id", str(first), "--count", str(end - first), "--speed", str(options.speed)]
         seconds = find_settling_s(count) + options.seconds + SETTLE_S
         command += ["--seconds", str(seconds)] + ["--nagle"] * options.nagle + ["--warn"] * options.warn
         swarms.append(start(command, environment, stdout=subprocess.PIPE))
@@ -116,7 +116,7 @@ def run_once(options, server_command, count, environment):
     with serve(options, server_command, environment) as servers:
         # The probe of the port was a connection too: let the server forget it.
         time.sleep(1.0)
-        arguments = ["--robots", str(0 if options.unheard else count)]
+        arguments = ["--count", str(0 if options.unheard else count)]
         listener = start([*load, "listen", *arguments], environment, stdout=subprocess.PIPE)
         commander = start([*load, "command", *arguments], environment, stdout=subprocess.PIPE)
         time.sleep(SETTLE_S)
@@ -243,7 +243,7 @@ def measure_all(options, commands):
     """Return the medians for each number of robots and server; the servers take turns in every round."""
     results = []
     with use_master(options) as environment:
-        for count in options.robots:
+        for count in options.count:
             runs = {name: [] for name in commands}
             for _ in range(options.rounds):
                 for name, command in commands.items():
@@ -280,7 +280,7 @@ def refuse_robots():
 def main():
     """Run from the command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--robots", type=int, nargs="+", default=[20, 50, 100])
+    parser.add_argument("--count", type=int, nargs="+", default=[20, 50, 100])
     parser.add_argument("--seconds", type=float, default=10.0, help="measured time of one run")
     parser.add_argument("--rounds", type=int, default=1, help="runs of each server, whose median is printed")
     parser.add_argument("--drivers", type=int, default=1, help="servers, each with its share of the robots")

@@ -278,7 +278,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--host", default="127.0.0.1")
     parser.add_argument("--port", type=int, default=11411)
-    parser.add_argument("--robots", type=int, default=20)
+    parser.add_argument("--count", type=int, default=20)
     parser.add_argument("--first-id", type=int, default=0)
     parser.add_argument("--seconds", type=float, default=10.0, help="time after the last robot has joined")
     parser.add_argument("--speed", type=float, default=1.0, help="multiplies all rates")
@@ -291,7 +291,7 @@ def main():
     address = (options.host, options.port)
     result = run(
         address,
-        options.robots,
+        options.count,
         options.seconds,
         options.speed,
         options.first_id,

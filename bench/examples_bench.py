@@ -129,7 +129,7 @@ def measure(suite, case, robots, seconds, commands, truth):
 def main():
     """Run from the command line."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--robots", type=int, default=20)
+    parser.add_argument("--count", type=int, default=20)
     parser.add_argument("--seconds", type=float, default=5.0, help="measured time of each program")
     parser.add_argument("--only", default="", help="only programs whose line contains this")
     parser.add_argument("--json", help="write the figures to this file, too")
@@ -137,23 +137,23 @@ def main():
     machine_us = measure_machine_us()
     print_machine(machine_us)
     results = {}
-    with RunningSuite(options.robots) as suite:
-        commands = CommandCount(options.robots)
-        truth = SwarmWatch(range(options.robots))
+    with RunningSuite(options.count) as suite:
+        commands = CommandCount(options.count)
+        truth = SwarmWatch(range(options.count))
         truth.wait_until_complete()
-        print("%d robots" % options.robots)
+        print("%d robots" % options.count)
         print("| program | CPU of one core | commands per robot | ended after Ctrl-C | robots stopped |")
         print("|---|---|---|---|---|", flush=True)
-        for title, case in list_cases(options.robots).items():
+        for title, case in list_cases(options.count).items():
             if options.only in title:
-                found = measure(suite, case, options.robots, options.seconds, commands, truth)
+                found = measure(suite, case, options.count, options.seconds, commands, truth)
                 results[title] = found
                 print(
                     "| %s | %.1f %% | %.1f..%.1f Hz | %.2f s | %.2f s |"
                     % (title, found["cpu_percent"], *found["rate_hz"], found["ended_s"], found["at_rest_s"]),
                     flush=True,
                 )
-    write_report(options.json, machine_us, robots=options.robots, programs=results)
+    write_report(options.json, machine_us, robots=options.count, programs=results)
 
 
 if __name__ == "__main__":

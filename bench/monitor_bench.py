@@ -84,7 +84,7 @@ async def measure_all(monitor, port, options):
     clients = [Client(port) for _ in range(5)]
     await clients[0].open()
     deadline_s = time.monotonic() + JOIN_TIMEOUT_S
-    while clients[0].ready < options.robots and time.monotonic() < deadline_s:
+    while clients[0].ready < options.count and time.monotonic() < deadline_s:
         await asyncio.sleep(0.1)
     print("robots that are ready and send odometry: %d" % clients[0].ready)
     rows.append(await measure("one page", monitor, clients[:1], options.seconds))
@@ -102,7 +102,7 @@ async def measure_all(monitor, port, options):
 def main():
     """Run from the command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--robots", type=int, default=50)
+    parser.add_argument("--count", type=int, default=50)
     parser.add_argument("--seconds", type=float, default=10.0, help="measured time of each row")
     parser.add_argument("--json", metavar="FILE", help="write the figures there")
     options = parser.parse_args()
@@ -119,15 +119,15 @@ def main():
 
         run(
             "roslaunch", "hero_bringup", "hero_bringup.launch", "host:=127.0.0.1", "port:=%d" % driver_port,
-            "sim:=%d" % options.robots,
+            "sim:=%d" % options.count,
         )
-        run("roslaunch", "hero_examples", "random_walk.launch", "robots:=0-%d" % (options.robots - 1))
+        run("roslaunch", "hero_examples", "random_walk.launch", "robots:=0-%d" % (options.count - 1))
         monitor = run("rosrun", "hero_monitor", "monitor", "_port:=%d" % port)
         wait_for_port(port, monitor)
-        print("| %d robots | CPU of one core | updates/s of each page | to each page | memory |" % options.robots)
+        print("| %d robots | CPU of one core | updates/s of each page | to each page | memory |" % options.count)
         print("|---|---|---|---|---|")
         rows = asyncio.run(measure_all(monitor, port, options))
-    write_report(options.json, machine_us, robots=options.robots, rows=rows)
+    write_report(options.json, machine_us, robots=options.count, rows=rows)
 
 
 if __name__ == "__main__":

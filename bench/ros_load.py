@@ -1,7 +1,7 @@
 """The ROS side of the benchmark: raw subscribers on every odom and on /tf, or publishers of cmd_vel.
 
-ros_load.py listen --robots N     counts messages and their age until SIGINT, then prints one JSON line
-ros_load.py command --robots N    sends cmd_vel at 10 Hz to every robot, with the time in linear.y
+ros_load.py listen --count N     counts messages and their age until SIGINT, then prints one JSON line
+ros_load.py command --count N    sends cmd_vel at 10 Hz to every robot, with the time in linear.y
 """
 
 import argparse
@@ -76,7 +76,7 @@ def main():
     """Run from the command line."""
     parser = argparse.ArgumentParser()
     parser.add_argument("role", choices=("listen", "command"))
-    parser.add_argument("--robots", type=int, default=20)
+    parser.add_argument("--count", type=int, default=20)
     parser.add_argument("--first-id", type=int, default=0)
     parser.add_argument("--speed", type=float, default=0.01, metavar="M/S", help="of the commands")
     parser.add_argument("--counts", action="store_true", help="keep no times of commands, for runs of hours")
@@ -87,9 +87,9 @@ def main():
         # On a thread of its own: the main thread may be inside the lock of the event.
         signal.signal(number, lambda *_: threading.Thread(target=ended.set).start())
     if options.role == "listen":
-        result = listen(options.robots, options.first_id, ended)
+        result = listen(options.count, options.first_id, ended)
     else:
-        result = command(options.robots, options.first_id, options.speed, not options.counts, ended)
+        result = command(options.count, options.first_id, options.speed, not options.counts, ended)
     print(json.dumps(result), flush=True)
 
 

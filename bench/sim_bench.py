@@ -99,7 +99,7 @@ class _Server:
 def measure(robots: int, seconds: float) -> Measurement:
     """Run so many robots for so long behind a server of ours."""
     server = _Server()
-    command = [sys.executable, "-m", "hero_sim", "--robots", str(robots), "--port", str(server.port)]
+    command = [sys.executable, "-m", "hero_sim", "--count", str(robots), "--port", str(server.port)]
     process = start([*command, "--quiet", "--flash-dir", "none"], None)
     try:
         server.run(_SETTLE_S)
@@ -129,7 +129,7 @@ def measure_fastest(robots: int, simulated_ms: int = 5000) -> float:
     CPU time, so that what else runs on the machine matters little.
     """
     swarm = build_swarm(
-        build_parser().parse_args(["--robots", str(robots), "--flash-dir", "none"]), [""] * robots, lambda text: None
+        build_parser().parse_args(["--count", str(robots), "--flash-dir", "none"]), [""] * robots, lambda text: None
     )
 
     def run(until_ms: int) -> None:
@@ -156,13 +156,13 @@ def measure_fastest(robots: int, simulated_ms: int = 5000) -> float:
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--robots", type=int, nargs="+", default=[1, 10, 50, 100])
+    parser.add_argument("--count", type=int, nargs="+", default=[1, 10, 50, 100])
     parser.add_argument("--seconds", type=float, default=10.0, help="measured time of each row")
     options = parser.parse_args()
     print_machine(measure_machine_us())
     print("| robots | CPU of one core | odoms of the stock rate | simulated s per s of CPU, no sockets |")
     print("|---|---|---|---|")
-    for robots in options.robots:
+    for robots in options.count:
         row = measure(robots, options.seconds)
         print(
             "| %d | %.1f %% | %.1f %% | %.1f |"

@@ -77,10 +77,10 @@ class Swarm:
 
     def __init__(self, suite, robots):
         """Start them and what commands them; return when all move."""
-        command = [sys.executable, str(HERE / "stopped_swarm.py"), "--robots", str(robots), "--port", str(suite.port)]
+        command = [sys.executable, str(HERE / "stopped_swarm.py"), "--count", str(robots), "--port", str(suite.port)]
         command += ["--arena", "empty", "--flash-dir", "none", "--quiet"]
         self._process = suite.start(command, stdin=-1, stdout=-1)
-        load = [sys.executable, str(HERE / "ros_load.py"), "command", "--speed", "0.1", "--robots", str(robots)]
+        load = [sys.executable, str(HERE / "ros_load.py"), "command", "--speed", "0.1", "--count", str(robots)]
         suite.start(load, stdout=-1)
         self.robots = robots
         suite.wait_for(lambda: self.ask("read")["moving"] == robots, "%d robots that move" % robots)
@@ -197,7 +197,7 @@ class StopSuite(RunningSuite):
 def main():
     """Run from the command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--robots", type=int, default=20)
+    parser.add_argument("--count", type=int, default=20)
     parser.add_argument("--presses", type=int, default=100, help="of each row")
     parser.add_argument("--via", nargs="*", metavar="METHOD", choices=METHODS, default=METHODS)
     parser.add_argument("--conditions", nargs="*", choices=CONDITIONS, default=CONDITIONS[:1])
@@ -208,7 +208,7 @@ def main():
     suite = StopSuite(options.via)
     rows = []
     try:
-        swarm = Swarm(suite, options.robots)
+        swarm = Swarm(suite, options.count)
         print("| | robots | stopped | press to zero, p50 / worst, ms | press to rest, p50 / worst, ms | within 0.3 s |")
         print("|---|---|---|---|---|---|")
         for condition in options.conditions:

@@ -1,6 +1,6 @@
 """Listens to a swarm of emulated robots in a process of its own, and says what is missing, late or out of order.
 
-listener.py --robots N [--first-id K]
+listener.py --count N [--first-id K]
 A line on stdin is answered with one line of JSON: `window` ends a window and tells about it, `silent` gives the
 robots of which no odom came since the window began, `count` the number of messages since then.
 """
@@ -100,11 +100,11 @@ class Listener:
 def main():
     """Run from the command line."""
     parser = argparse.ArgumentParser()
-    parser.add_argument("--robots", type=int, default=20)
+    parser.add_argument("--count", type=int, default=20)
     parser.add_argument("--first-id", type=int, default=0)
     options = parser.parse_args()
     rospy.init_node("fault_listener", anonymous=True, disable_signals=True)
-    listener = Listener(range(options.first_id, options.first_id + options.robots))
+    listener = Listener(range(options.first_id, options.first_id + options.count))
     answers = {"window": listener.end_window, "silent": listener.list_silent, "count": listener.count}
     print("{}", flush=True)
     for line in sys.stdin:

@@ -198,7 +198,7 @@ def find_trend(samples, read):
 @contextlib.contextmanager
 def swarm_at_work(driver):
     """Give the programs: swarm, commander, listener."""
-    robots = ["--robots", str(ROBOTS)]
+    robots = ["--count", str(ROBOTS)]
     with contextlib.ExitStack() as stack:
         listener = stack.enter_context(start_python("listener.py", *robots))
         listener.read()

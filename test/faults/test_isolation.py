@@ -60,7 +60,7 @@ class Scene:
 def scene(master):
     from driver_case import DriverProcess
 
-    robots = ["--robots", str(GOOD_ROBOTS)]
+    robots = ["--count", str(GOOD_ROBOTS)]
     with DriverProcess({"grace_s": 1.0}, name="isolating_driver") as driver:
         rospy.set_param("/hero_66/long", "x" * 4000)
         port = str(driver.address[1])

@@ -133,7 +133,7 @@ class Watch:
 def start_robots(host, address, port, first=0):
     """Return simulated robots that run at host and dial address."""
     path = "%s:%s" % (ROOT / "hero_sim" / "src", ROOT / "hero_driver" / "src")
-    command = [sys.executable, "-m", "hero_sim", "--robots", str(ROBOTS), "--first-id", str(first)]
+    command = [sys.executable, "-m", "hero_sim", "--count", str(ROBOTS), "--first-id", str(first)]
     return Program(
         *command,
         "--host",

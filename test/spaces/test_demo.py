@@ -71,7 +71,7 @@ def find_free_port():
 
 
 def test_it_ends_by_itself_when_all_robots_joined_and_moved_also_on_another_port(demo, taken_port):
-    process = demo("--seconds", "12", "--robots", "2", "--port", str(taken_port))
+    process = demo("--seconds", "12", "--count", "2", "--port", str(taken_port))
     output = read_to_end(process)
     assert process.returncode == 0, output
     assert f"port {taken_port} is taken" in output
@@ -79,7 +79,7 @@ def test_it_ends_by_itself_when_all_robots_joined_and_moved_also_on_another_port
 
 
 def test_robots_that_had_no_time_to_move_are_named(demo):
-    process = demo("--seconds", "1", "--robots", "2", "--port", str(find_free_port()))
+    process = demo("--seconds", "1", "--count", "2", "--port", str(find_free_port()))
     output = read_to_end(process)
     assert process.returncode == 1, output
     assert "hero_0 " in output
@@ -88,7 +88,7 @@ def test_robots_that_had_no_time_to_move_are_named(demo):
 
 def test_an_interrupt_ends_everything(demo):
     port = find_free_port()
-    process = demo("--robots", "2", "--port", str(port))
+    process = demo("--count", "2", "--port", str(port))
     wait_until_driver_listens(port)
     os.killpg(process.pid, signal.SIGINT)
     output = read_to_end(process)
@@ -101,7 +101,7 @@ def test_closing_the_terminal_ends_everything():
     port = find_free_port()
     process_id, leader = pty.fork()
     if process_id == 0:
-        os.execv(str(ROOT / "script" / "demo"), ["demo", "--robots", "2", "--no-rviz", "--port", str(port)])
+        os.execv(str(ROOT / "script" / "demo"), ["demo", "--count", "2", "--no-rviz", "--port", str(port)])
     threading.Thread(target=read_terminal, args=(leader,), daemon=True).start()
     wait_until_driver_listens(port)
     os.kill(process_id, signal.SIGHUP)
@@ -127,7 +127,7 @@ def read_terminal(leader):
     "arguments",
     [
         *(["--seconds", value] for value in ("soon", "inf", "nan", "-1", "9" * 30)),
-        *(["--robots", value] for value in ("0", "-1", "08", "1e3")),
+        *(["--count", value] for value in ("0", "-1", "08", "1e3")),
         *(["--port", value] for value in ("80", "99999")),
         ["--host"],
         ["--fast"],

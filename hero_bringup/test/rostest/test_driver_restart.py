@@ -119,7 +119,7 @@ class DriverRestartTest(unittest.TestCase):
         subscriber = rospy.Subscriber("/hero_4/odom", Odometry, odoms.append)
         self.addCleanup(subscriber.unregister)
         robots = Program(
-            sys.executable, "-m", "hero_sim", "--robots", "2", "--first-id", "4", "--port", str(self.port)
+            sys.executable, "-m", "hero_sim", "--count", "2", "--first-id", "4", "--port", str(self.port)
         )
         self.addCleanup(robots.end)
         for _ in range(2):

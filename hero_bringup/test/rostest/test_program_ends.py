@@ -54,8 +54,8 @@ class ProgramEndsTest(unittest.TestCase):
             command = ["roslaunch", "--nodes", "hero_bringup", "hero_bringup.launch", "sim:=" + sim]
             result = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True, timeout=TIMEOUT_S)
             self.assertEqual("/hero_sim" in result.stdout.split(), expected, result.stdout)
-        status, lines = self.end(start(["hero_sim", "--robots", "-1"]))
-        self.assertEqual((status, lines), (2, ["hero_sim: --robots -1: must be 1..1000"]))
+        status, lines = self.end(start(["hero_sim", "--count", "-1"]))
+        self.assertEqual((status, lines), (2, ["hero_sim: --count -1: must be 1..1000"]))
 
     def test_a_log_directory_that_is_a_file_is_named_in_one_line(self):
         started = [(node, start(node, ROS_LOG_DIR=__file__)) for node in NODES if node[0] != "record"]

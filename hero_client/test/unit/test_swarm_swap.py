@@ -29,7 +29,7 @@ class Swap:
 
     def __init__(self, seed):
         arena = ROOT / "hero_test" / "arenas" / "circle_arena.yaml"
-        self.driver = DriverSide("--robots", str(ROBOTS), "--arena", str(arena), "--seed", str(seed))
+        self.driver = DriverSide("--count", str(ROBOTS), "--arena", str(arena), "--seed", str(seed))
         self.driver.start_streaming()
         self.world = self.driver.swarm.world
         self.poses = self.world.poses.copy()

@@ -39,7 +39,7 @@ _SEEDS_PER_ROBOT = 2
 
 def draw_seeds(options: argparse.Namespace) -> np.ndarray:
     """Return the seeds of all streams of chance: places, world, boot times, faults, then two per robot."""
-    size = _SEEDS_BEFORE_ROBOTS + _SEEDS_PER_ROBOT * options.robots
+    size = _SEEDS_BEFORE_ROBOTS + _SEEDS_PER_ROBOT * options.count
     return np.random.RandomState(options.seed).randint(0, 2**31 - 1, size=size)
 
 
@@ -71,7 +71,7 @@ def build_errors(options: argparse.Namespace) -> RobotErrors:
     Raises: OptionError for an error that cannot be set.
     """
     # By id, so that a robot is the same one in any swarm.
-    ids = range(options.first_id, options.first_id + options.robots)
+    ids = range(options.first_id, options.first_id + options.count)
     rngs = [np.random.RandomState([options.seed, robot_id % 2**32]) for robot_id in ids]
     errors = draw_errors(rngs, 0.0 if options.perfect else 1.0)
     if options.errors is not None:
@@ -89,15 +89,15 @@ def build_swarm(options: argparse.Namespace, addresses: List[str], report: Calla
     # One stream of chance for each purpose, so that one more draw here does not change everything there.
     seeds = draw_seeds(options)
     try:
-        arena = load_arena(options.arena) if options.arena else arenas.build_default(options.robots)
-        poses = arenas.place_robots(arena, options.robots, np.random.RandomState(seeds[0]))
+        arena = load_arena(options.arena) if options.arena else arenas.build_default(options.count)
+        poses = arenas.place_robots(arena, options.count, np.random.RandomState(seeds[0]))
     except arenas.ArenaError as error:
         raise OptionError(str(error)) from error
     errors = build_errors(options)
     world = World(arena, poses, np.random.RandomState(seeds[1]), errors)
     exact = options.firmware_odometry == "exact"
     robots: List[Firmware] = []
-    for index in range(options.robots):
+    for index in range(options.count):
         flash = _build_flash(options, errors, index)
         robots.append(
             Firmware(
@@ -121,7 +121,7 @@ def build_swarm(options: argparse.Namespace, addresses: List[str], report: Calla
 
 def describe_start(options: argparse.Namespace, host: str) -> str:
     """Return what the robots are about to do, in one line."""
-    first, last = options.first_id, options.first_id + options.robots - 1
+    first, last = options.first_id, options.first_id + options.count - 1
     who = "hero_%d" % first if first == last else "hero_%d .. hero_%d" % (first, last)
     if options.serve is None:
         return "%s: dialling %s:%d" % (who, host, options.port)
@@ -138,7 +138,7 @@ def build_simulator(options: argparse.Namespace, report: Callable[[str], None]) 
     """
     serve = options.serve is not None
     host = options.host or ("0.0.0.0" if serve else "127.0.0.1")
-    link = TcpLink(options.robots, host, options.serve if serve else options.port, serve, options.first_id)
+    link = TcpLink(options.count, host, options.serve if serve else options.port, serve, options.first_id)
     try:
         swarm = build_swarm(options, link.own_addresses, report)
     except OptionError:

@@ -28,7 +28,7 @@ def build_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="hero_sim", description="HeRo robots without hardware, behind the same TCP socket as real ones."
     )
-    parser.add_argument("--robots", type=int, default=1, metavar="N", help="number of robots (1)")
+    parser.add_argument("--count", type=int, default=1, metavar="N", help="number of robots (1)")
     parser.add_argument("--first-id", type=int, default=0, metavar="K", help="id of the first robot (0)")
     parser.add_argument(
         "--host", default=None, help="where the driver runs (127.0.0.1); with --serve: own address"
@@ -118,17 +118,17 @@ def build_parser() -> argparse.ArgumentParser:
 
 def check_options(options: argparse.Namespace) -> None:
     """Raise OptionError for a value that cannot be used."""
-    if not 1 <= options.robots <= MOST_ROBOTS:
-        raise OptionError("--robots %d: must be 1..%d" % (options.robots, MOST_ROBOTS))
-    if not 0 <= options.first_id <= LARGEST_ID - options.robots + 1:
+    if not 1 <= options.count <= MOST_ROBOTS:
+        raise OptionError("--count %d: must be 1..%d" % (options.count, MOST_ROBOTS))
+    if not 0 <= options.first_id <= LARGEST_ID - options.count + 1:
         raise OptionError(
-            "--first-id %d: ids must be 0..%d (%d robots)" % (options.first_id, LARGEST_ID, options.robots)
+            "--first-id %d: ids must be 0..%d (%d robots)" % (options.first_id, LARGEST_ID, options.count)
         )
     port = options.port if options.serve is None else options.serve
     name = "--port" if options.serve is None else "--serve"
-    last = port if options.serve is None else port + options.robots - 1
+    last = port if options.serve is None else port + options.count - 1
     if not (port >= 1 and last <= 65535):
-        raise OptionError("%s %d: ports must be 1..65535 (%d robots)" % (name, port, options.robots))
+        raise OptionError("%s %d: ports must be 1..65535 (%d robots)" % (name, port, options.count))
     if options.seconds is not None and not 0 < options.seconds <= LONGEST_RUN_S:
         raise OptionError("--seconds %g: must be more than 0, and at most %g" % (options.seconds, LONGEST_RUN_S))
     if not 0.01 <= options.speed <= 100:

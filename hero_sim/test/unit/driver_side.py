@@ -30,7 +30,7 @@ class DriverSide:
     def __init__(self, *arguments, answer_time=True, connect=True):
         self.reports = []
         options = parse_options(*arguments)
-        self.swarm = build_swarm(options, ["127.0.0.1"] * options.robots, self.reports.append)
+        self.swarm = build_swarm(options, ["127.0.0.1"] * options.count, self.reports.append)
         self.answer_time = answer_time
         self.connect = connect
         count = len(self.swarm.robots)

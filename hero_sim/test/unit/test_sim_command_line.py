@@ -161,7 +161,7 @@ def request_when_ready(server, count):
 
 
 def test_robots_dial_declare_stream_and_drive(simulate, server):
-    simulate("--robots", "3", "--first-id", "5", "--port", str(server.port))
+    simulate("--count", "3", "--first-id", "5", "--port", str(server.port))
     request_when_ready(server, 3)
     names = {
         payloads.decode_topic_info(peer.frames[[f.topic_id for f in peer.frames].index(0)].payload).name
@@ -184,7 +184,7 @@ def test_robots_that_are_servers_are_dialled(simulate):
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
-    simulate("--robots", "1", "--host", "127.0.0.1", "--serve", str(port))
+    simulate("--count", "1", "--host", "127.0.0.1", "--serve", str(port))
     server = Server(port)
     end_s = time.monotonic() + LIMIT_S
     while not server.peers:
@@ -227,7 +227,7 @@ def test_a_robot_that_leaves_closes_and_streams_on_when_it_is_back(simulate, ser
 
 
 def test_a_duplicate_takes_the_id_of_another_robot(simulate, server):
-    simulate("--robots", "2", "--port", str(server.port), "--fault", "duplicate@3:robot=1,of=0")
+    simulate("--count", "2", "--port", str(server.port), "--fault", "duplicate@3:robot=1,of=0")
     server.run_until(lambda: len(server.peers) == 3 and server.peers[2].logs())
     assert "[/hero_0] Firmware" in server.peers[2].logs()[0]
 
@@ -333,7 +333,7 @@ def test_a_server_that_comes_late_finds_the_robots_waiting(simulate):
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
-    process = simulate("--robots", "2", "--port", str(port))
+    process = simulate("--count", "2", "--port", str(port))
     assert "dialling" in process.stdout.readline()
     assert "no driver answers at 127.0.0.1:%d" % port in process.stdout.readline()
     server = Server(port)
@@ -347,7 +347,7 @@ def test_a_server_that_comes_late_finds_the_robots_waiting(simulate):
 
 
 def test_a_network_with_delays_still_carries_everything(simulate, server):
-    simulate("--robots", "2", "--port", str(server.port), "--wifi", "hotspot")
+    simulate("--count", "2", "--port", str(server.port), "--wifi", "hotspot")
     request_when_ready(server, 2)
     server.run_until(lambda: all(peer.count(ids.ID_ODOM) > 60 for peer in server.peers))
     assert all(peer.reader.bad_frames == 0 and peer.reader.skipped_bytes == 0 for peer in server.peers)
@@ -355,7 +355,7 @@ def test_a_network_with_delays_still_carries_everything(simulate, server):
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_it_quietly(simulate, server, number):
-    process = simulate("--robots", "4", "--port", str(server.port))
+    process = simulate("--count", "4", "--port", str(server.port))
     server.run_until(lambda: len(server.peers) == 4)
     process.send_signal(number)
     _, error = process.communicate(timeout=LIMIT_S)
@@ -370,10 +370,10 @@ def test_it_ends_by_itself_after_its_seconds(simulate):
 @pytest.mark.parametrize(
     "arguments, named",
     [
-        (("--robots", "0"), "--robots 0"),
+        (("--count", "0"), "--count 0"),
         (("--port", "0"), "--port 0"),
         (("--port", "65536"), "--port 65536"),
-        (("--serve", "65530", "--robots", "10"), "--serve 65530"),
+        (("--serve", "65530", "--count", "10"), "--serve 65530"),
         (("--seconds", "-1"), "--seconds -1"),
         (("--speed", "0"), "--speed 0"),
         (("--seed", "-3"), "--seed -3"),
@@ -382,7 +382,7 @@ def test_it_ends_by_itself_after_its_seconds(simulate):
         (("--arena", "/nowhere.yaml"), "/nowhere.yaml"),
         (("--fault", "explode"), "explode"),
         (("--fault", "reboot:robot=7"), "robot 7"),
-        (("--robots", "two"), "two"),
+        (("--count", "two"), "two"),
         (("--wifi", "string"), "string"),
         (("--error", "slip=much"), "slip=much"),
         (("--print-errors", "--error", "robot=4,slip=0"), "robot 4"),
@@ -450,7 +450,7 @@ def test_the_documented_command_copies_all_that_is_needed(tmp_path):
             sys.executable,
             "-m",
             "hero_sim",
-            "--robots",
+            "--count",
             "3",
             "--arena",
             "maze",

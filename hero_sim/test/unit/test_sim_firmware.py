@@ -236,7 +236,7 @@ def test_whatever_happens_to_its_link_a_robot_runs_again_but_not_at_once(script)
 def test_robots_started_together_do_the_same_for_the_same_seed():
     runs = []
     for _ in range(2):
-        driver = DriverSide("--robots", "6", "--seed", "5")
+        driver = DriverSide("--count", "6", "--seed", "5")
         driver.start_streaming()
         for index in range(6):
             driver.send_twist(index, 0.1, 0.5 * index - 1.0)

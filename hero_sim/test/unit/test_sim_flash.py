@@ -81,7 +81,7 @@ def test_a_robot_that_is_another_one_has_a_flash_of_its_own(ros_home, arguments)
 def test_a_robot_is_the_same_one_in_a_larger_swarm(ros_home):
     del ros_home
     set_centres("--flash-dir", "")
-    assert read_centres("--flash-dir", "", "--robots", "5", "--arena", "empty") == [1490.0, 1512.0]
+    assert read_centres("--flash-dir", "", "--count", "5", "--arena", "empty") == [1490.0, 1512.0]
 
 
 def test_nothing_is_written_until_something_is_set(ros_home):

@@ -271,7 +271,7 @@ tunings = st.tuples(
     ),
 )
 def test_whatever_robots_are_sent_they_stay_out_of_walls_and_each_other_and_stop_in_the_end(seed, sent):
-    driver = DriverSide("--robots", "5", "--arena", "obstacles", "--seed", str(seed))
+    driver = DriverSide("--count", "5", "--arena", "obstacles", "--seed", str(seed))
     driver.start_streaming()
     world = driver.swarm.world
     overlaps = []

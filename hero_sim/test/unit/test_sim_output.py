@@ -44,7 +44,7 @@ def test_an_output_that_is_full_is_told_in_one_line(arguments):
     [
         *(("--seconds", value) for value in ("inf", "nan", "-1", "0", "1e999", "1e300")),
         *(("--speed", value) for value in ("inf", "nan", "-1")),
-        *(("--robots", value) for value in ("-1", "0", "9" * 30)),
+        *(("--count", value) for value in ("-1", "0", "9" * 30)),
         *(("--port", value) for value in ("-1", "0", "99999", "9" * 30)),
         *(("--serve", value) for value in ("-1", "99999")),
         *(("--seed", value) for value in ("-1", "9" * 30)),

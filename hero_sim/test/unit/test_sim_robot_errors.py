@@ -12,21 +12,21 @@ def build(*arguments):
 
 
 def test_the_same_seed_draws_the_same_robots_and_another_seed_others():
-    first, again, other = build("--robots", "3"), build("--robots", "3"), build("--robots", "3", "--seed", "1")
+    first, again, other = build("--count", "3"), build("--count", "3"), build("--count", "3", "--seed", "1")
     assert all((left == right).all() for left, right in zip(first, again))
     assert (first.wheel_scale != other.wheel_scale).all()
 
 
 def test_perfect_robots_are_all_alike():
-    errors = build("--robots", "5", "--perfect")
+    errors = build("--count", "5", "--perfect")
     assert all((np.ptp(array, axis=0) == 0).all() for array in errors)
     assert (errors.servo_centre_us == 1500).all() and (errors.slip == 0).all()
 
 
 def test_a_known_error_of_one_robot_leaves_the_others_as_drawn():
-    drawn = build("--robots", "3", "--first-id", "5")
+    drawn = build("--count", "3", "--first-id", "5")
     known = build(
-        "--robots", "3", "--first-id", "5", "--error", "robot=6,left_centre_us=1533", "--error", "slip=0.01"
+        "--count", "3", "--first-id", "5", "--error", "robot=6,left_centre_us=1533", "--error", "slip=0.01"
     )
     assert known.servo_centre_us[1].tolist() == [1533, drawn.servo_centre_us[1, 1]]
     assert (known.servo_centre_us[[0, 2]] == drawn.servo_centre_us[[0, 2]]).all()
@@ -39,17 +39,17 @@ def test_one_sensor_can_differ_from_what_is_said_of_all():
 
 
 def test_what_is_printed_can_be_read_again(tmp_path):
-    errors = build("--robots", "3", "--first-id", "2")
+    errors = build("--count", "3", "--first-id", "2")
     path = tmp_path / "errors.yaml"
     path.write_text("\n".join(describe_errors(errors, 2)))
-    again = build("--robots", "3", "--first-id", "2", "--seed", "9", "--errors", str(path))
+    again = build("--count", "3", "--first-id", "2", "--seed", "9", "--errors", str(path))
     assert all(np.allclose(left, right, rtol=1e-5) for left, right in zip(errors, again))
 
 
 def test_in_a_file_robots_come_over_all_and_the_command_line_over_the_file(tmp_path):
     path = tmp_path / "errors.yaml"
     path.write_text("hero_1: {slip: 0.03}\nall: {slip: 0.01, lag_s: 0.2}\n")
-    errors = build("--robots", "2", "--errors", str(path), "--error", "robot=0,slip=0")
+    errors = build("--count", "2", "--errors", str(path), "--error", "robot=0,slip=0")
     assert errors.slip.ravel().tolist() == [0.0, 0.03]
     assert errors.servo_lag_s.ravel().tolist() == [0.2, 0.2]
 
