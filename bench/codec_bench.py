@@ -1,4 +1,4 @@
-"""Times the pure layers on the bytes of one stock robot: frames, session, cleaning. One core, no sockets."""
+"""Times the pure layers on the bytes of one stock robot: packets, session, corrections. One core, no sockets."""
 
 import struct
 import time
@@ -7,12 +7,12 @@ import timeit
 import emulated_swarm
 from measuring import measure_machine_us, print_machine
 
-from hero_driver.cleaning import CleaningSettings, MessageCleaner
-from hero_driver.message_types import apply_aliases
-from hero_driver.odometry import WheelGeometry
-from hero_driver.rosserial import frames
+from hero_driver.corrections.robot_corrections import CorrectionSettings, RobotCorrections
+from hero_driver.corrections.tick_odometry import WheelGeometry
+from hero_driver.corrections.wheel_motion import WheelMotion
+from hero_driver.ros.message_types import apply_aliases
+from hero_driver.rosserial import packets
 from hero_driver.rosserial.session import Session, SessionLimits, TopicDeclared
-from hero_driver.wheel_motion import WheelMotion
 
 BURSTS = 3000
 REPEATS = 5
@@ -39,18 +39,18 @@ def main():
     start_ns = time.time_ns()
     stamps = [struct.pack("<II", *divmod(start_ns + index * BURST_NS, 10**9)) for index in range(BURSTS)]
     bursts = [b"".join(robot.make_burst(number, stamp)) for number, stamp in enumerate(stamps)]
-    burst_frames = frames.FrameReader().receive_bytes(bursts[0])
+    burst_packets = packets.PacketReader().receive_bytes(bursts[0])
     session = Session(SessionLimits(), 0.0)
     declared = session.receive_bytes(emulated_swarm.declare(0), 0.0, 0.0)
-    settings = CleaningSettings("ticks", WheelGeometry(), (0.0,) * 6, (0.0,) * 6, "robot", 0.05, 5.0)
+    settings = CorrectionSettings("ticks", WheelGeometry(), (0.0,) * 6, (0.0,) * 6, "robot", 0.05, 5.0)
 
     def write():
         for _ in bursts:
-            for topic_id, payload in burst_frames:
-                frames.encode_frame(topic_id, payload)
+            for topic_id, payload in burst_packets:
+                packets.encode_packet(topic_id, payload)
 
     def read():
-        reader = frames.FrameReader()
+        reader = packets.PacketReader()
         for burst in bursts:
             reader.receive_bytes(burst)
 
@@ -61,11 +61,11 @@ def main():
     messages = [session.receive_bytes(burst, 1.0, 1.0) for burst in bursts]
 
     def clean():
-        cleaner = MessageCleaner("/hero_0", settings, lambda name: NoSink(), NoSink().publish, WheelMotion())
+        corrections = RobotCorrections("/hero_0", settings, lambda name: NoSink(), NoSink().publish, WheelMotion())
         for event in declared:
             if isinstance(event, TopicDeclared) and event.topic.kind.is_from_robot:
                 info = event.topic.info
-                event.topic.receive = cleaner.choose(info.name, apply_aliases(info.message_type))
+                event.topic.receive = corrections.choose(info.name, apply_aliases(info.message_type))
         for index, events in enumerate(messages):
             for topic, payload in events:
                 topic.receive(payload, start_ns + index * BURST_NS)
@@ -77,10 +77,10 @@ def main():
     )
     print("| layer | us per burst |")
     print("|---|---|")
-    print("| frames written | %.1f |" % best_us(write, BURSTS))
-    print("| frames read | %.1f |" % best_us(read, BURSTS))
-    print("| session (with frames) | %.1f |" % best_us(receive, BURSTS))
-    print("| cleaning, everything wanted | %.1f |" % best_us(clean, BURSTS))
+    print("| packets written | %.1f |" % best_us(write, BURSTS))
+    print("| packets read | %.1f |" % best_us(read, BURSTS))
+    print("| session (with packets) | %.1f |" % best_us(receive, BURSTS))
+    print("| correction_settings, everything wanted | %.1f |" % best_us(clean, BURSTS))
 
 
 if __name__ == "__main__":

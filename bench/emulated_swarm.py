@@ -15,7 +15,7 @@ import struct
 import threading
 import time
 
-from hero_driver.rosserial import frames, payloads
+from hero_driver.rosserial import packets, payloads
 from hero_driver.rosserial.payloads import TopicInfo
 
 BURST_PERIOD_S = 0.034
@@ -41,7 +41,7 @@ MD5 = {
 
 
 def declare(number):
-    """Return the frames with which robot number declares its topics (services are left out)."""
+    """Return the packets with which robot number declares its topics (services are left out)."""
     prefix = "/hero_%d" % number
     publishers = (
         (LASER, prefix + "/laser", "sensor_msgs/LaserScan"),
@@ -57,11 +57,11 @@ def declare(number):
         (POSITION, prefix + "/position_controller/cmd_vel", "geometry_msgs/Twist"),
         (VELOCITY, prefix + "/velocity_controller/cmd_vel", "geometry_msgs/Twist"),
     )
-    parts = [frames.encode_frame(frames.ID_TIME, bytes(8))]
-    for frame_id, topics in ((frames.ID_PUBLISHER, publishers), (frames.ID_SUBSCRIBER, subscribers)):
+    parts = [packets.encode_packet(packets.ID_TIME, bytes(8))]
+    for frame_id, topics in ((packets.ID_PUBLISHER, publishers), (packets.ID_SUBSCRIBER, subscribers)):
         for topic_id, name, kind in topics:
             info = TopicInfo(topic_id, name, kind, MD5[kind], 4096)
-            parts.append(frames.encode_frame(frame_id, payloads.encode_topic_info(info)))
+            parts.append(packets.encode_packet(frame_id, payloads.encode_topic_info(info)))
     return b"".join(parts)
 
 
@@ -70,15 +70,15 @@ def text(value):
     return struct.pack("<I", len(value)) + value.encode()
 
 
-class Frame:
-    """A frame of which only the first bytes of the payload change: written once, then patched."""
+class Packet:
+    """A packet of which only the first bytes of the payload change: written once, then patched."""
 
     def __init__(self, topic_id, payload, changing):
         """changing: the slice of the payload that is different each time."""
         constant = payload[: changing.start] + payload[changing.stop :]
-        self.data = bytearray(frames.encode_frame(topic_id, payload))
-        self._place = slice(frames.HEADER_LENGTH + changing.start, frames.HEADER_LENGTH + changing.stop)
-        self._sum = (topic_id & 0xFF) + (topic_id >> 8) + frames.sum_bytes(constant)
+        self.data = bytearray(packets.encode_packet(topic_id, payload))
+        self._place = slice(packets.HEADER_LENGTH + changing.start, packets.HEADER_LENGTH + changing.stop)
+        self._sum = (topic_id & 0xFF) + (topic_id >> 8) + packets.sum_bytes(constant)
 
     def patch(self, changing):
         """Put other bytes in and mend the checksum."""
@@ -103,27 +103,27 @@ class Templates:
         encoder_tail = self._encoder_frame + bytes(88)
         encoder_changes = slice(4, 12 + len(self._encoder_frame) + 16)
         no_header = b"\xff\xff\xff\xff" + bytes(8)
-        self._odom = Frame(ODOM, bytes(12) + odom_tail, slice(0, 12))
+        self._odom = Packet(ODOM, bytes(12) + odom_tail, slice(0, 12))
         self._transforms = [
-            Frame(TRANSFORMS, b"\x01" + bytes(15) + tail, slice(8, 16)) for tail in transform_tails
+            Packet(TRANSFORMS, b"\x01" + bytes(15) + tail, slice(8, 16)) for tail in transform_tails
         ]
-        self._encoder = Frame(ENCODER, no_header + encoder_tail, encoder_changes)
-        self._laser = Frame(LASER, bytes(12) + laser_tail, slice(4, 12))
+        self._encoder = Packet(ENCODER, no_header + encoder_tail, encoder_changes)
+        self._laser = Packet(LASER, bytes(12) + laser_tail, slice(4, 12))
 
     def make_burst(self, number, stamp):
-        """Return the frames of one burst with stamp (8 bytes).
+        """Return the packets of one burst with stamp (8 bytes).
 
         number is odom's seq, by which losses are noticed; the robot drives on by a few ticks with each burst.
         """
         self._odom.patch(struct.pack("<I", number) + stamp)
-        for frame in self._transforms:
-            frame.patch(stamp)
+        for packet in self._transforms:
+            packet.patch(stamp)
         ticks = struct.pack("<2d", 3.0 * number, 2.0 * number)
         self._encoder.patch(stamp + self._encoder_frame + ticks)
-        return [self._odom.data, *(frame.data for frame in self._transforms), self._encoder.data]
+        return [self._odom.data, *(packet.data for packet in self._transforms), self._encoder.data]
 
     def make_laser(self, stamp):
-        """Return one laser frame with stamp (8 bytes)."""
+        """Return one laser packet with stamp (8 bytes)."""
         self._laser.patch(stamp)
         return self._laser.data
 
@@ -137,7 +137,7 @@ class EmulatedRobot:
         self._nagle = nagle
         self._keeps_times = keeps_times
         self.templates = Templates(number)
-        self.reader = frames.FrameReader()
+        self.reader = packets.PacketReader()
         self.socket = socket.create_connection(address)
         self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, not nagle)
         self.socket.setblocking(False)
@@ -166,7 +166,7 @@ class EmulatedRobot:
                 return
 
     def send_burst(self, parts):
-        """Send the frames of a burst: at once, or one by one as the robot does, whose TCP then has its way."""
+        """Send the packets of a burst: at once, or one by one as the robot does, whose TCP then has its way."""
         for data in parts if self._nagle else (b"".join(parts),):
             self.send(data)
 
@@ -181,9 +181,9 @@ class EmulatedRobot:
             return False
         is_new = False
         for topic_id, payload in self.reader.receive_bytes(data):
-            if topic_id == frames.ID_PUBLISHER:
+            if topic_id == packets.ID_PUBLISHER:
                 self.send(declare(self.number))
-            elif topic_id == frames.ID_TIME and self.synchronised_s is None:
+            elif topic_id == packets.ID_TIME and self.synchronised_s is None:
                 self.synchronised_s = now_s
                 is_new = True
             elif topic_id == VELOCITY and payload != ZERO:
@@ -250,10 +250,10 @@ def run(
                 log = payloads.Log(payloads.LOG_INFO, line)
                 if warns:
                     log = payloads.Log(payloads.LOG_WARN, "warning %d" % now_s)
-                robot.send(frames.encode_frame(frames.ID_LOG, payloads.encode_log(log)))
+                robot.send(packets.encode_packet(packets.ID_LOG, payloads.encode_log(log)))
                 period_s = LOG_PERIOD_S
             else:
-                robot.send(frames.encode_frame(frames.ID_TIME, bytes(8)))
+                robot.send(packets.encode_packet(packets.ID_TIME, bytes(8)))
                 period_s = TIME_PERIOD_S
             order += 1
             heapq.heappush(due, (due_s + period_s / speed, order, kind, robot))
@@ -282,7 +282,7 @@ def main():
     parser.add_argument("--first-id", type=int, default=0)
     parser.add_argument("--seconds", type=float, default=10.0, help="time after the last robot has joined")
     parser.add_argument("--speed", type=float, default=1.0, help="multiplies all rates")
-    parser.add_argument("--nagle", action="store_true", help="frames one by one and TCP without NODELAY")
+    parser.add_argument("--nagle", action="store_true", help="packets one by one and TCP without NODELAY")
     parser.add_argument("--counts", action="store_true", help="keep no times, for runs of hours")
     parser.add_argument("--warn", action="store_true", help="each robot sends one warning per second")
     options = parser.parse_args()

@@ -14,13 +14,13 @@ from typing import List, NamedTuple
 
 from measuring import measure_machine_us, print_machine, read_cpu_s, start, stop
 
-from hero_driver.rosserial import frames, payloads
+from hero_driver.rosserial import packets, payloads
 from hero_sim.build import build_swarm
 from hero_sim.main import build_parser
 from hero_sim.robot import declarations
 
 _STOCK_ODOM_HZ = 29.27
-_TWIST = frames.encode_frame(declarations.ID_VELOCITY_CMD_VEL, struct.pack("<6d", 0.08, 0, 0, 0, 0, 0.6))
+_TWIST = packets.encode_packet(declarations.ID_VELOCITY_CMD_VEL, struct.pack("<6d", 0.08, 0, 0, 0, 0, 0.6))
 _SETTLE_S = 4.0
 
 
@@ -36,7 +36,7 @@ class Measurement(NamedTuple):
 class _Peer:
     def __init__(self, sock: socket.socket) -> None:
         self.socket = sock
-        self.reader = frames.FrameReader()
+        self.reader = packets.PacketReader()
         self.odoms = 0
         self.requested = False
         self.came_s = time.monotonic()
@@ -67,7 +67,7 @@ class _Server:
             for peer in self.peers:
                 if not peer.requested and now_s - peer.came_s > 1.3:
                     peer.requested = True
-                    peer.socket.sendall(frames.encode_frame(frames.ID_PUBLISHER, b""))
+                    peer.socket.sendall(packets.encode_packet(packets.ID_PUBLISHER, b""))
             if now_s - drive_s > 0.1:
                 drive_s = now_s
                 for peer in self.peers:
@@ -85,9 +85,9 @@ class _Server:
         for frame in peer.reader.receive_bytes(peer.socket.recv(65536)):
             if frame.topic_id == declarations.ID_ODOM:
                 peer.odoms += 1
-            elif frame.topic_id == frames.ID_TIME:
+            elif frame.topic_id == packets.ID_TIME:
                 now = payloads.split_seconds(time.time())
-                peer.socket.sendall(frames.encode_frame(frames.ID_TIME, payloads.encode_time(now)))
+                peer.socket.sendall(packets.encode_packet(packets.ID_TIME, payloads.encode_time(now)))
 
     def close(self) -> None:
         for peer in self.peers:
@@ -143,7 +143,7 @@ def measure_fastest(robots: int, simulated_ms: int = 5000) -> float:
 
     run(2500)
     for robot in swarm.robots:
-        robot.receive_bytes(swarm.now_ms, frames.encode_frame(frames.ID_PUBLISHER, b""))
+        robot.receive_bytes(swarm.now_ms, packets.encode_packet(packets.ID_PUBLISHER, b""))
     run(3000)
     start_s = time.process_time()
     for step in range(simulated_ms // 100):

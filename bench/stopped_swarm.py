@@ -14,7 +14,7 @@ import time
 
 import numpy as np
 
-from hero_driver.rosserial import frames
+from hero_driver.rosserial import packets
 from hero_sim.build import build_simulator
 from hero_sim.main import build_parser, stop_on_signals
 from hero_sim.robot import declarations
@@ -22,7 +22,7 @@ from hero_sim.robot_constants import TICK_M
 
 REST_M_S = 0.001
 MOVING_M_S = 0.03
-ZERO = frames.encode_frame(declarations.ID_VELOCITY_CMD_VEL, bytes(48))
+ZERO = packets.encode_packet(declarations.ID_VELOCITY_CMD_VEL, bytes(48))
 
 
 class Watch:

@@ -3,8 +3,10 @@
 from catkin_pkg.python_setup import generate_distutils_setup
 from setuptools import setup
 
+ROOMS = ("rosserial", "transport", "fleet", "corrections", "commands", "ros", "robot_requests")
+
 setup(
     **generate_distutils_setup(
-        packages=["hero_driver", "hero_driver.rosserial", "hero_driver.transport"], package_dir={"": "src"}
+        packages=["hero_driver", *("hero_driver." + room for room in ROOMS)], package_dir={"": "src"}
     )
 )

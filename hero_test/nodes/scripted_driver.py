@@ -61,7 +61,7 @@ class ScriptedDriver:
 
     def report(self):
         with self.lock:
-            rates = {"frames_per_s": self.rate, "bytes_per_s": self.rate}
+            rates = {"packets_per_s": self.rate, "bytes_per_s": self.rate}
             make = partial(Robot, since=rospy.Time.now(), firmware="v3.8", **rates)
             report = RobotArray(listening="127.0.0.1:%d" % self.requests, stopped=self.stop_time_s is not None)
             report.header.stamp = rospy.Time.now()

@@ -18,7 +18,7 @@ import time
 
 import emulated_swarm
 
-from hero_driver.rosserial import frames, payloads
+from hero_driver.rosserial import packets, payloads
 from hero_driver.rosserial.payloads import TopicInfo
 
 OWN_NUMBER = 66
@@ -29,15 +29,15 @@ WRONG_MD5 = "0123456789abcdef0123456789abcdef"
 
 
 def declare_topic(frame_id, topic_id, name, message_type, md5sum):
-    """Return one frame of a declaration."""
+    """Return one packet of a declaration."""
     info = TopicInfo(topic_id, name, message_type, md5sum, 4096)
-    return frames.encode_frame(frame_id, payloads.encode_topic_info(info))
+    return packets.encode_packet(frame_id, payloads.encode_topic_info(info))
 
 
 def make_burst(number):
-    """Return the frames of one burst of robot number, stamped now: odom, five transforms, encoder."""
+    """Return the packets of one burst of robot number, stamped now: odom, five transforms, encoder."""
     stamp = struct.pack("<II", int(time.time()), 0)
-    return [bytes(frame) for frame in emulated_swarm.Templates(number).make_burst(10**6, stamp)]
+    return [bytes(packet) for packet in emulated_swarm.Templates(number).make_burst(10**6, stamp)]
 
 
 class Peer:
@@ -146,9 +146,9 @@ def silent_connections(peer):
 
 def never_reads(peer):
     """Asks for the time and for parameters and reads no answer."""
-    request = frames.encode_frame(frames.ID_TIME, bytes(8)) * 20
+    request = packets.encode_packet(packets.ID_TIME, bytes(8)) * 20
     request += (
-        frames.encode_frame(frames.ID_PARAMETER_REQUEST, payloads.encode_parameter_request("~long")) * 5
+        packets.encode_packet(packets.ID_PARAMETER_REQUEST, payloads.encode_parameter_request("~long")) * 5
     )
 
     def talk(sock):
@@ -162,12 +162,12 @@ def never_reads(peer):
     peer.repeat(talk)
 
 
-def huge_frames(peer):
-    """The longest frames there are, and headers that promise more."""
-    frame = frames.encode_frame(emulated_swarm.LASER, bytes(4096))
+def huge_packets(peer):
+    """The longest packets there are, and headers that promise more."""
+    packet = packets.encode_packet(emulated_swarm.LASER, bytes(4096))
     promise = b"\xff\xfe\xff\xff\x01\x7d\x00"
-    too_long = frames.encode_frame(emulated_swarm.LASER, bytes(65535))
-    peer.flood(emulated_swarm.declare(OWN_NUMBER), repeat_piece(frame * 4 + promise + too_long))
+    too_long = packets.encode_packet(emulated_swarm.LASER, bytes(65535))
+    peer.flood(emulated_swarm.declare(OWN_NUMBER), repeat_piece(packet * 4 + promise + too_long))
 
 
 def many_topics(peer):
@@ -224,13 +224,13 @@ def claims_topics(peer):
     foreign += declare_topic(
         1, 120, victim + "/velocity_controller/cmd_vel", twist, emulated_swarm.MD5[twist]
     )
-    odom = make_burst(peer.victim)[0][frames.HEADER_LENGTH : -1]
-    pieces = frames.encode_frame(140, odom) + frames.encode_frame(141, odom)
+    odom = make_burst(peer.victim)[0][packets.HEADER_LENGTH : -1]
+    pieces = packets.encode_packet(140, odom) + packets.encode_packet(141, odom)
     peer.flood(emulated_swarm.declare(OWN_NUMBER) + foreign, repeat_piece(pieces), pause_s=0.001)
 
 
 def foreign_transforms(peer):
-    """Sends transforms of another robot's frames."""
+    """Sends transforms of another robot's packets."""
     piece = b"".join(make_burst(peer.victim)[1:6])
     peer.flood(emulated_swarm.declare(OWN_NUMBER), repeat_piece(piece), pause_s=0.002)
 
@@ -241,7 +241,7 @@ def log_flood(peer):
     def pieces():
         for index in itertools.count():
             line = payloads.Log(index % 5, "line %d \x1b[31m[FATAL] forged\n" % index)
-            yield frames.encode_frame(frames.ID_LOG, payloads.encode_log(line)) * 5
+            yield packets.encode_packet(packets.ID_LOG, payloads.encode_log(line)) * 5
 
     peer.flood(emulated_swarm.declare(OWN_NUMBER), pieces, pause_s=0.001)
 
@@ -251,18 +251,18 @@ def service_answers(peer):
     name = "/hero_%d/velocity_controller/pid_parameters" % OWN_NUMBER
     service = declare_topic(2, 135, name, "hero_common/SetPID", ANSWER_MD5)
     service += declare_topic(3, 110, name, "hero_common/SetPID", SET_PID_MD5)
-    answer = frames.encode_frame(135, struct.pack("<?I", True, 2) + b"ok") * 20
+    answer = packets.encode_packet(135, struct.pack("<?I", True, 2) + b"ok") * 20
     peer.flood(emulated_swarm.declare(OWN_NUMBER) + service, repeat_piece(answer), pause_s=0.005)
 
 
 def bad_md5(peer):
     """Declares every topic with an md5 that is wrong, again and again."""
-    reader = frames.FrameReader()
+    reader = packets.PacketReader()
     burst = b""
-    for frame in reader.receive_bytes(emulated_swarm.declare(OWN_NUMBER)):
-        if frame.topic_id < frames.ID_SERVICE_SERVER_PUBLISHER:
-            info = payloads.decode_topic_info(frame.payload)._replace(md5sum=WRONG_MD5)
-            burst += frames.encode_frame(frame.topic_id, payloads.encode_topic_info(info))
+    for packet in reader.receive_bytes(emulated_swarm.declare(OWN_NUMBER)):
+        if packet.topic_id < packets.ID_SERVICE_SERVER_PUBLISHER:
+            info = payloads.decode_topic_info(packet.payload)._replace(md5sum=WRONG_MD5)
+            burst += packets.encode_packet(packet.topic_id, payloads.encode_topic_info(info))
     peer.flood(burst, repeat_piece(burst), pause_s=0.01)
 
 
@@ -274,7 +274,7 @@ KINDS = {
         connects,
         silent_connections,
         never_reads,
-        huge_frames,
+        huge_packets,
         many_topics,
         renames,
         stays,

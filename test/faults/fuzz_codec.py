@@ -8,16 +8,17 @@ import sys
 import atheris
 
 with atheris.instrument_imports():
-    from hero_driver import log_lines, wire_messages
-    from hero_driver.cleaning import CleaningSettings, MessageCleaner
-    from hero_driver.odometry import WheelGeometry
-    from hero_driver.rosserial.frames import DEFAULT_MAX_PAYLOAD_LENGTH, OVERHEAD_LENGTH
+    from hero_driver.corrections import message_layouts
+    from hero_driver.corrections.robot_corrections import CorrectionSettings, RobotCorrections
+    from hero_driver.corrections.tick_odometry import WheelGeometry
+    from hero_driver.corrections.wheel_motion import WheelMotion
+    from hero_driver.fleet import log_lines
+    from hero_driver.rosserial.packets import DEFAULT_MAX_PAYLOAD_LENGTH, OVERHEAD_LENGTH
     from hero_driver.rosserial.session import LogReceived, Session, SessionLimits
-    from hero_driver.wheel_motion import WheelMotion
 
 MAX_TOPICS = 64
 ARRIVAL_NS = 1795240942 * 10**9
-SETTINGS = CleaningSettings(
+SETTINGS = CorrectionSettings(
     "ticks", WheelGeometry(0.0492, 0.063, 288.0), (1e-4,) * 6, (1e-4,) * 6, "robot", 0.05, 5.0
 )
 TYPES = {"hero_common/Encoder": "hero_msgs/Encoder", "tf/tfMessage": "tf2_msgs/TFMessage"}
@@ -30,14 +31,14 @@ class Sink:
 
     def publish(self, payload):
         """Read the header, where there is one."""
-        wire_messages.read_header(payload)
+        message_layouts.read_header(payload)
 
 
 def try_bytes(data):
     """Let one robot say data, cut where its first byte says, and clean what comes of it."""
     session = Session(SessionLimits(max_topics=MAX_TOPICS), 0.0)
     sink = Sink()
-    cleaner = MessageCleaner("/hero_0", SETTINGS, lambda name: sink, sink.publish, WheelMotion())
+    cleaner = RobotCorrections("/hero_0", SETTINGS, lambda name: sink, sink.publish, WheelMotion())
     step = 1 + (data[0] if data else 0)
     for index, start in enumerate(range(1, len(data), step)):
         for event in session.receive_bytes(data[start : start + step], 0.01 * index, 1795240942.0):

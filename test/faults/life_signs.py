@@ -3,12 +3,12 @@
 import struct
 
 import rospy
-from driver_case import Recorder, make_publisher, wait_frames, wait_payloads
-from fake_robot import TIME_FRAME
+from driver_case import Recorder, make_publisher, wait_packets, wait_payloads
+from fake_robot import TIME_PACKET
 from std_msgs.msg import ColorRGBA
 from stock_messages import make_encoder
 
-from hero_driver.rosserial import frames
+from hero_driver.rosserial import packets
 from hero_msgs.msg import Encoder
 
 
@@ -27,7 +27,7 @@ class Life:
         """Pass count messages each way, and let the robot ask for the time."""
         robot = self._robot
         messages, lights = len(self._encoders.messages), len(robot.payloads_on("led"))
-        asked = len(robot.payloads_with_id(frames.ID_TIME))
+        asked = len(robot.payloads_with_id(packets.ID_TIME))
         for number in range(count):
             robot.send("encoder", make_encoder(robot.name, rospy.Time.now(), float(number), 0.0))
             self._light.publish(ColorRGBA(float(number), 0.0, 0.0, 0.0))
@@ -35,7 +35,7 @@ class Life:
         wait_payloads(robot, "led", lights + count)
         colours = [struct.unpack("<f", payload[:4])[0] for payload in robot.payloads_on("led")[lights:]]
         assert ticks == colours == [float(number) for number in range(count)]
-        robot.send_bytes(TIME_FRAME)
-        wait_frames(robot, frames.ID_TIME, asked + 1)
+        robot.send_bytes(TIME_PACKET)
+        wait_packets(robot, packets.ID_TIME, asked + 1)
         assert robot.is_connected and self._driver.process.poll() is None
         return True

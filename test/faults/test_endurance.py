@@ -26,7 +26,7 @@ from rig import (
     wait_until,
 )
 
-from hero_driver.rosserial import frames
+from hero_driver.rosserial import packets
 from hero_msgs.msg import Encoder
 from hero_msgs.srv import SetPID
 
@@ -158,7 +158,7 @@ class Bustle:
 
     def _replace(self, number):
         robot = FakeRobot(number).connect(self._driver.address)
-        wait_until(lambda: robot.payloads_with_id(frames.ID_TIME), "the answer to a robot's time request")
+        wait_until(lambda: robot.payloads_with_id(packets.ID_TIME), "the answer to a robot's time request")
         return robot
 
 

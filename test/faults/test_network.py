@@ -199,7 +199,7 @@ def test_jitter_of_200_ms_loses_nothing(through_relay, effort, record):
         lambda: all(len(r.messages) > marks[n] + count for n, r in watch.recorders.items()), "messages", 60.0
     )
     lost = watch.count_gaps(marks)
-    bad = sum(robot.bad_frames for robot in driver.fleet.newest.robots)
+    bad = sum(robot.bad_packets for robot in driver.fleet.newest.robots)
     record(
         "200 ms of jitter in the path of %d robots" % ROBOTS,
         ROBOTS,

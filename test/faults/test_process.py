@@ -10,14 +10,14 @@ import pytest
 import rospy
 import stock_messages
 from driver_case import Recorder, frozen, make_publisher
-from fake_robot import TIME_FRAME, FakeRobot
+from fake_robot import TIME_PACKET, FakeRobot
 from geometry_msgs.msg import Twist
 from life_signs import Life
 from rig import HERE, find_free_port, wait_until
 from simulated_field import SPEED_M_S, Truth, drive, rest, start_simulator
 from steady_time import StallWatch
 
-from hero_driver.rosserial import frames, payloads
+from hero_driver.rosserial import packets, payloads
 from hero_msgs.msg import Encoder
 
 ROBOTS = 3
@@ -169,10 +169,10 @@ def test_a_clock_that_is_set_by_an_hour_loses_nothing(start_driver, record, tmp_
 
     def ask_time():
         """Do as the robot: its clock follows the answer."""
-        asked = len(robot.payloads_with_id(frames.ID_TIME))
-        robot.send_bytes(TIME_FRAME)
-        wait_until(lambda: len(robot.payloads_with_id(frames.ID_TIME)) > asked, "the time")
-        return rospy.Time(*payloads.decode_time(robot.payloads_with_id(frames.ID_TIME)[-1]))
+        asked = len(robot.payloads_with_id(packets.ID_TIME))
+        robot.send_bytes(TIME_PACKET)
+        wait_until(lambda: len(robot.payloads_with_id(packets.ID_TIME)) > asked, "the time")
+        return rospy.Time(*payloads.decode_time(robot.payloads_with_id(packets.ID_TIME)[-1]))
 
     start = ask_time()
     wait_until(lambda: driver.fleet.newest, "a report")

@@ -25,7 +25,7 @@ BACK_WITHIN_S = 10.0
 @pytest.fixture
 def served(start_driver):
     """A driver with one robot, and what shows that it is served."""
-    driver = start_driver(parameters={"max_frames_per_s": 100000, "max_bytes_per_s": 50000000})
+    driver = start_driver(parameters={"max_packets_per_s": 100000, "max_bytes_per_s": 50000000})
     robot = FakeRobot(1).connect(driver.address)
     yield driver, robot, Life(driver, robot)
     robot.close()

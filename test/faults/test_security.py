@@ -215,7 +215,7 @@ def test_a_device_cannot_speak_for_the_fleet(start_driver, record):
     ).connect(driver.address)
     driver.fleet.wait_ready("/arm_1")
     for topic_id in (126, 128):
-        device.send_frame(topic_id, b"\x00")
+        device.send_packet(topic_id, b"\x00")
     # Answered after both, on the same connection.
     answer = ask_parameter(device, "/secret")
     device.close()

@@ -44,7 +44,7 @@ OTHER_MODULES = {
 
 
 class Import(NamedTuple):
-    """One import statement: the full name of the module, e.g. hero_driver.rosserial.frames, and where."""
+    """One import statement: the full name of the module, e.g. hero_driver.rosserial.packets, and where."""
 
     module: str
     line: int
@@ -110,7 +110,7 @@ def read_imports(path: Path) -> List[Import]:
                 package = package[: len(package) - node.level + 1]
                 base = ".".join(package + ([base] if base else []))
             imports.append(Import(base, node.lineno))
-            # `from .rosserial import frames` names a module too
+            # `from .rosserial import packets` names a module too
             imports += [Import(f"{base}.{alias.name}", node.lineno) for alias in node.names]
     return imports
 

@@ -4,19 +4,41 @@ import pytest
 import sources
 
 MODULES = sources.list_source_modules()
-NOT_IN_THE_CORE = {"asyncio", "logging", "rospy", "select", "selectors", "socket", "ssl", "threading", "time"}
+CLOCKS_AND_SOCKETS = {"asyncio", "logging", "select", "selectors", "socket", "ssl", "time"}
 SOCKETS = {"asyncio", "socket", "socketserver", "ssl", "tornado"}
 # The robots' connections, on each side; the connections to subscribers and publishers that rospy has made; the program
 # check, which asks for the addresses of names; and the pages of the fleet monitor.
 SOCKET_OWNERS = (
     "hero_driver.transport",
-    "hero_driver.handshakes",
-    "hero_driver.rospy_internals",
-    "hero_driver.inlet",
+    "hero_driver.ros.handshakes",
+    "hero_driver.ros.rospy_internals",
+    "hero_driver.ros.raw_subscriber",
     "hero_sim.link.tcp_link",
     "hero_tools.checkup.network",
     "hero_monitor.server",
     "hero_monitor.program",
+)
+
+# Each room, and what it may import of its package besides itself; what runs the rooms stands on top and may import all.
+SIM_GROUND = {"errors", "robot_constants", "yaml_file"}
+ROOMS = {
+    "hero_driver.rosserial": set(),
+    "hero_driver.transport": set(),
+    "hero_driver.fleet": set(),
+    "hero_driver.corrections": {"robot_constants"},
+    "hero_driver.commands": {"corrections", "robot_constants"},
+    "hero_driver.ros": {"rosserial", "transport", "fleet", "corrections", "commands", "robot_constants"},
+    "hero_sim.world": SIM_GROUND,
+    "hero_sim.robot": SIM_GROUND | {"world"},
+    "hero_sim.link": SIM_GROUND,
+}
+PURE_ROOMS = (
+    "hero_driver.rosserial",
+    "hero_driver.fleet",
+    "hero_driver.corrections",
+    "hero_driver.commands",
+    "hero_sim.world",
+    "hero_sim.robot",
 )
 
 
@@ -28,13 +50,46 @@ def modules_below(package):
     return [name for name in MODULES if name == package or name.startswith(package + ".")]
 
 
-@pytest.mark.parametrize("name", modules_below("hero_driver.rosserial"))
-def test_the_rosserial_core_imports_nothing_of_ours_no_clock_and_no_socket(name):
+def part_of(module, package):
+    """Return the room, or the top-level module, of package that module is or lies in; None for all others."""
+    parts = module.split(".")
+    return parts[1] if parts[0] == package and len(parts) > 1 and ".".join(parts[:2]) in MODULES else None
+
+
+@pytest.mark.parametrize("name", [name for room in PURE_ROOMS for name in modules_below(room)])
+def test_pure_rooms_know_no_ros_clock_or_socket(name):
     for found in imports_of(name):
-        assert found.top not in NOT_IN_THE_CORE, f"line {found.line}"
+        assert found.top not in CLOCKS_AND_SOCKETS, f"line {found.line}"
         assert not sources.is_ros_import(found.module), f"line {found.line}"
-        if found.top.startswith("hero_"):
-            assert found.module.startswith("hero_driver.rosserial"), f"line {found.line}"
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_rooms_import_only_what_lies_below_them(room):
+    package, own = room.split(".")
+    for name in modules_below(room):
+        for found in imports_of(name):
+            part = part_of(found.module, package)
+            assert part in ROOMS[room] | {own, None}, f"{name}, line {found.line}: {found.module}"
+
+
+@pytest.mark.parametrize("package", ("hero_driver", "hero_sim"))
+def test_neither_rooms_nor_modules_import_each_other_in_a_circle(package):
+    modules = set(modules_below(package)) - {package}
+    by_module = {name: {found.module for found in imports_of(name)} & modules - {name} for name in modules}
+    by_room = {}
+    for name, imported in by_module.items():
+        room = part_of(name, package)
+        by_room.setdefault(room, set()).update({part_of(other, package) for other in imported} - {room})
+    for imports in (by_module, by_room):
+        while imports:
+            leaves = {name for name, imported in imports.items() if not imported & imports.keys()}
+            assert leaves, f"circle among {sorted(imports)}"
+            imports = {name: imported for name, imported in imports.items() if name not in leaves}
+
+
+@pytest.mark.parametrize("name", sorted(MODULES))
+def test_nothing_imports_the_gateway_except_the_node(name):
+    assert name == "hero_driver.node" or not [f for f in imports_of(name) if f.module == "hero_driver.gateway"]
 
 
 @pytest.mark.parametrize("name", sorted(MODULES))
@@ -50,9 +105,9 @@ def test_nothing_imports_a_node(name):
 
 
 @pytest.mark.parametrize("name", modules_below("hero_sim"))
-def test_the_simulator_shares_frames_and_payloads_with_the_driver_and_nothing_else(name):
+def test_the_simulator_shares_only_packets_and_payloads_with_the_driver(name):
     core = "hero_driver.rosserial"
-    shared = [f"{core}.{module}" for module in ("errors", "frames", "payloads")]
+    shared = [f"{core}.{module}" for module in ("errors", "packets", "payloads")]
     for found in imports_of(name):
         if found.top == "hero_driver" and found.module != core:  # `from hero_driver.rosserial import ...`
             allowed = any(
@@ -61,41 +116,9 @@ def test_the_simulator_shares_frames_and_payloads_with_the_driver_and_nothing_el
             assert allowed, f"line {found.line}: {found.module}"
 
 
-# What each room of the simulator may import of hero_sim besides itself; what runs the rooms stands on top.
-SIM_GROUND = {"errors", "robot_constants", "yaml_file"}
-SIM_ROOMS = {"robot": {"world"} | SIM_GROUND, "world": SIM_GROUND, "link": SIM_GROUND}
-
-
-def sim_part_of(module):
-    """The room of hero_sim that a module is in, or the module itself."""
-    parts = module.split(".")
-    return parts[1] if len(parts) > 1 and parts[0] == "hero_sim" else None
-
-
-@pytest.mark.parametrize("name", [name for name in modules_below("hero_sim") if sim_part_of(name) in SIM_ROOMS])
-def test_the_rooms_of_the_simulator_import_only_what_lies_below_them(name):
-    room = sim_part_of(name)
-    for found in imports_of(name):
-        part = sim_part_of(found.module)
-        assert part in SIM_ROOMS[room] | {room, None}, f"line {found.line}: {found.module}"
-
-
-@pytest.mark.parametrize("name", modules_below("hero_sim.robot") + modules_below("hero_sim.world"))
-def test_simulated_robots_and_their_world_know_no_clock_socket_thread_or_ros(name):
-    for found in imports_of(name):
-        assert found.top not in NOT_IN_THE_CORE and not sources.is_ros_import(found.module), f"line {found.line}"
-
-
-def test_no_module_of_the_simulator_imports_itself_through_others():
-    modules = set(modules_below("hero_sim"))
-    imports = {name: {found.module for found in imports_of(name)} & modules - {name} for name in modules}
-    while imports:
-        leaves = {name for name, imported in imports.items() if not imported & imports.keys()}
-        assert leaves, f"circle among {sorted(imports)}"
-        imports = {name: imported for name, imported in imports.items() if name not in leaves}
-
-
-@pytest.mark.parametrize("name", modules_below("hero_client") + modules_below("hero_examples") + modules_below("hero_tutorial"))
+@pytest.mark.parametrize(
+    "name", modules_below("hero_client") + modules_below("hero_examples") + modules_below("hero_tutorial")
+)
 def test_examples_and_lessons_know_topics_only(name):
     assert not [found for found in imports_of(name) if found.top in ("hero_driver", "hero_sim")]
 
@@ -106,6 +129,5 @@ def test_the_driver_knows_nothing_of_the_packages_built_on_it(name):
     assert not [found for found in imports_of(name) if found.top in others]
 
 
-def test_the_layers_that_the_rules_name_exist():
-    core = {f"hero_driver.rosserial.{module}" for module in ("errors", "frames", "payloads", "session")}
-    assert core.union(SOCKET_OWNERS) <= set(MODULES)
+def test_the_rooms_and_modules_that_the_rules_name_exist():
+    assert {*ROOMS, *PURE_ROOMS, *SOCKET_OWNERS} <= set(MODULES)

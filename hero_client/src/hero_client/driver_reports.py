@@ -39,7 +39,7 @@ def driver_of(topic: str) -> str:
 def clean(report: RobotArray) -> RobotArray:
     """Replace numbers that nobody can show: rates by 0, clock offsets by NaN, which stands for unknown."""
     for robot in report.robots:
-        robot.frames_per_s = robot.frames_per_s if 0.0 <= robot.frames_per_s <= MAX_RATE else 0.0
+        robot.packets_per_s = robot.packets_per_s if 0.0 <= robot.packets_per_s <= MAX_RATE else 0.0
         robot.bytes_per_s = robot.bytes_per_s if 0.0 <= robot.bytes_per_s <= MAX_RATE else 0.0
         robot.clock_offset = robot.clock_offset if abs(robot.clock_offset) <= MAX_RATE else math.nan
     return report

@@ -44,7 +44,7 @@ class RobotRow(NamedTuple):
     state: str
     stop_state: str
     odom_hz: float
-    frames_per_s: float
+    packets_per_s: float
     bytes_per_s: float
     pose: Optional[Pose]
     way_m: float

@@ -1,4 +1,4 @@
-"""Commands that wait -> frames on their way: takes from the robots' command queues what may go out now.
+"""Commands that wait -> packets on their way: takes from the robots' command queues what may go out now.
 
 Runs on the thread of the sockets, except wake(). A robot that does not acknowledge is asked again later and
 delays no other.
@@ -8,7 +8,7 @@ import time
 from typing import Callable, Optional
 
 from .peer import Peer
-from .robot_bridge import RobotBridge
+from .ros.robot_bridge import RobotBridge
 from .rosserial.errors import RosserialError
 
 HEARD_S = 0.5
@@ -46,11 +46,11 @@ class CommandSender:
         if peer.link.closed:
             return
         try:
-            frame = peer.session.encode_message(topic_id, payload)
+            packet = peer.session.encode_message(topic_id, payload)
         except RosserialError as error:
             self._complain(peer, str(error))
             return
-        peer.link.send_frame(frame)
+        peer.link.send_packet(packet)
 
     def _serve(self, bridge: RobotBridge) -> None:
         peer = self._find_peer(bridge)

@@ -10,8 +10,8 @@ import ipaddress
 from dataclasses import dataclass
 from typing import Any, Dict, Mapping, Tuple
 
-from .admission import AdmissionLimits, Network
-from .odometry import WheelGeometry
+from .corrections.tick_odometry import WheelGeometry
+from .fleet.admission import AdmissionLimits, Network
 from .rosserial.session import SessionLimits
 from .transport import Address
 
@@ -54,8 +54,8 @@ class DriverConfig:
     max_unidentified: int = _number(200, 1, 5000, "", "connections that have not said who they are")
     max_topics: int = _number(64, 1, 1000, "", "ids that one robot may declare")
     max_name_length: int = _number(128, 16, 1024, "characters", "longest name of a topic or type")
-    max_payload_length: int = _number(4096, 64, 65535, "bytes", "longest payload of a frame from a robot")
-    max_frames_per_s: int = _number(5000, 10, 1000000, "1/s", "frames from one robot; stock robots send 211")
+    max_payload_length: int = _number(4096, 64, 65535, "bytes", "longest payload of a packet from a robot")
+    max_packets_per_s: int = _number(5000, 10, 1000000, "1/s", "packets from one robot; stock robots send 211")
     max_bytes_per_s: int = _number(
         2000000, 1000, 100000000, "bytes/s", "from one robot; stock robots send 44051"
     )

@@ -10,20 +10,22 @@ import time
 import traceback
 from typing import Callable, Dict, List, Optional
 
-from . import names
-from .admission import GARBAGE_REST_S, Admission, RateGuard
-from .cleaning import CleaningSettings
 from .command_sender import CommandSender
 from .config import DriverConfig
-from .fleet import Decision, Fleet, RobotRecord, RobotState, Verdict
-from .log_relay import LogRelay
-from .names import Identity, NameRules
+from .corrections.robot_corrections import CorrectionSettings
+from .fleet import namespaces
+from .fleet.admission import GARBAGE_REST_S, Admission, RateGuard
+from .fleet.namespaces import Identity, NameRules
+from .fleet.registry import Decision, FleetRegistry, RobotRecord, RobotState, Verdict
 from .peer import Peer
-from .registrar import RobotRegistrar
-from .robot_bridge import BridgeContext, RobotBridge
 from .robot_log import RobotLog
-from .robot_requests import RobotRequests
+from .robot_requests.robot_requests import RobotRequests
 from .robot_status import RobotStatus, describe_robot
+from .ros.log_relay import LogRelay
+from .ros.registrar import RobotRegistrar
+from .ros.robot_bridge import BridgeContext, RobotBridge
+from .ros.transform_publisher import TransformPublisher
+from .ros.worker import Worker
 from .rosserial.session import (
     CallReceived,
     Event,
@@ -37,9 +39,7 @@ from .rosserial.session import (
     TopicKind,
 )
 from .stop_delivery import StopDelivery, describe_doubt
-from .transform_collector import TransformCollector
 from .transport import THE_DRIVER_ENDS, EventLoop, Link, LinkHandler
-from .worker import Worker
 
 NS_PER_S = 10**9
 
@@ -76,10 +76,10 @@ class Gateway(LinkHandler):
         self._loop: EventLoop
         self._sender: CommandSender
         self._requests: RobotRequests
-        self._transforms: TransformCollector
+        self._transforms: TransformPublisher
         self._context: BridgeContext
         self.peers: Dict[Link, Peer] = {}
-        self.fleet = Fleet(config.grace_s)
+        self.fleet = FleetRegistry(config.grace_s)
         self.bridges: Dict[str, RobotBridge] = {}
         self._stops: StopDelivery
         self.stopped = False
@@ -94,7 +94,7 @@ class Gateway(LinkHandler):
         )
         self._stops = StopDelivery(loop.call_later, lambda: self.stopped, self._on_change, self._complain)
         self._requests = RobotRequests(self._config, self._log, loop.call_soon, self._complain)
-        self._transforms = TransformCollector(self._config.transform_period_s, loop.call_later)
+        self._transforms = TransformPublisher(self._config.transform_period_s, loop.call_later)
         self._context = BridgeContext(
             log=self._log.log_throttled,
             wake=self._sender.wake,
@@ -128,7 +128,7 @@ class Gateway(LinkHandler):
             return refusal
         now_s = time.monotonic()
         session = Session(self._config.session_limits, now_s)
-        guard = RateGuard(self._config.max_frames_per_s, self._config.max_bytes_per_s, now_s)
+        guard = RateGuard(self._config.max_packets_per_s, self._config.max_bytes_per_s, now_s)
         peer = Peer(link, session, guard)
         link.peer = peer
         self.peers[link] = peer
@@ -155,7 +155,7 @@ class Gateway(LinkHandler):
         session = peer.session
         arrival_ns = self._clock_ns()
         events = session.receive_bytes(data, now_s, arrival_ns / NS_PER_S)
-        refusal = peer.guard.judge(session.reader.frames, link.received_length, now_s)
+        refusal = peer.guard.judge(session.reader.packets, link.received_length, now_s)
         if refusal is not None:
             link.close(refusal)
             return
@@ -186,8 +186,8 @@ class Gateway(LinkHandler):
 
     @staticmethod
     def _send_outgoing(peer: Peer) -> None:
-        for frame in peer.session.take_frames():
-            peer.link.send_frame(frame)
+        for packet in peer.session.take_packets():
+            peer.link.send_packet(packet)
 
     def close_link(self, link: Link, reason: str) -> None:
         """Note a departure; the robot's endpoints stay up for the grace period."""
@@ -215,8 +215,8 @@ class Gateway(LinkHandler):
             self._on_change()
             return
         record = peer.record
-        record.frames += peer.session.reader.frames
-        record.bad_frames += peer.session.reader.bad_frames
+        record.packets += peer.session.reader.packets
+        record.bad_packets += peer.session.reader.bad_packets
         record.received_length += link.received_length
         now_s = time.monotonic()
         if record.link is link:
@@ -300,11 +300,11 @@ class Gateway(LinkHandler):
 
     def _identify(self, peer: Peer, topic: Topic, now_s: float) -> bool:
         """Find out which robot a peer is from the first name that tells; return whether it is settled."""
-        identity = names.identify(topic.info.name)
+        identity = namespaces.identify(topic.info.name)
         address = peer.link.address
         if identity is None:
             if self._config.namespace_policy == "robot":
-                if topic.info.name in names.TF_TOPICS:
+                if topic.info.name in namespaces.TF_TOPICS:
                     peer.early_topics = [*peer.early_topics[-7:], topic]
                 else:
                     self._complain(
@@ -313,7 +313,7 @@ class Gateway(LinkHandler):
                         " ~namespace_policy to any" % ascii(topic.info.name),
                     )
                 return False
-            identity = names.identify_any(topic.info.name, address.host)
+            identity = namespaces.identify_any(topic.info.name, address.host)
         if self._resolve(peer, topic, identity) is None:
             return False
         known = self.fleet.robots.get(identity.namespace)
@@ -325,7 +325,7 @@ class Gateway(LinkHandler):
             if refusal is not None:
                 peer.link.close(refusal)
                 return False
-        decision = self.fleet.identify(
+        decision = self.fleet.claim_identity(
             peer.link, identity, address.host, str(address), peer.session.opened_s, now_s
         )
         self._admission.note_identified(address.host)
@@ -348,14 +348,14 @@ class Gateway(LinkHandler):
             decision.old_link.close("the robot connected again from %s" % (peer.link.address,))
         bridge = self.bridges.get(identity.namespace)
         if bridge is None:
-            cleaning = self._cleaning_settings() if names.is_hero(identity) else None
+            correction_settings = self._correction_settings() if namespaces.is_hero(identity) else None
             registrar = RobotRegistrar(self._registrar, self._loop.call_later)
-            bridge = RobotBridge(identity, cleaning, self._context, registrar)
+            bridge = RobotBridge(identity, correction_settings, self._context, registrar)
             self.bridges[identity.namespace] = bridge
         peer.bridge = bridge
         rebooted = peer.boot is not None
-        if bridge.cleaner is not None:
-            bridge.cleaner.restart(rebooted and decision.verdict is not Verdict.ARRIVED)
+        if bridge.corrections is not None:
+            bridge.corrections.restart(rebooted and decision.verdict is not Verdict.ARRIVED)
         host = peer.link.address.host
         hold_s = self._admission.find_hold_s(host, record.joined_s)
         if hold_s > 0.0:
@@ -376,9 +376,9 @@ class Gateway(LinkHandler):
         for log in early_logs:
             self._robot_log.receive(peer, log, record.joined_s)
 
-    def _cleaning_settings(self) -> CleaningSettings:
+    def _correction_settings(self) -> CorrectionSettings:
         config = self._config
-        return CleaningSettings(
+        return CorrectionSettings(
             config.odometry,
             config.wheel_geometry,
             config.pose_covariance,

@@ -20,14 +20,14 @@ from hero_msgs.srv import Disconnect, DisconnectResponse
 
 from .config import ConfigError, DriverConfig, read_config
 from .gateway import STOP_LIMIT_S, Gateway
-from .log_relay import LogRelay, prepare_logging, tell_of_lost_log_lines
-from .master_watch import MasterWatch
 from .peer import Peer
 from .reports import FleetStatus, Reporter
-from .rospy_internals import call_before_shutdown, leave_topics_out_of_rosout, open_tcpros_server
+from .ros.log_relay import LogRelay, prepare_logging, tell_of_lost_log_lines
+from .ros.master_watch import MasterWatch
+from .ros.rospy_internals import call_before_shutdown, leave_topics_out_of_rosout, open_tcpros_server
+from .ros.worker import Worker
 from .stop_interface import PARAMETER, StopInterface
 from .transport import Address, EventLoop, HostNotFoundError, TransportSettings
-from .worker import Worker
 
 NODE_NAME = "hero_driver"
 
@@ -112,8 +112,9 @@ class DriverNode:
         self._crash: Optional[BaseException] = None
         self._reporter: Reporter
         self._stop_interface = StopInterface(
-            self._gateway,
             self._loop.call_soon,
+            self._gateway.set_stopped,
+            lambda: self._gateway.stopped,
             lambda: self._gateway.list_robots(time.monotonic()),
             self._log,
         )

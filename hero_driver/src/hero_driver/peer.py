@@ -3,13 +3,13 @@
 from dataclasses import dataclass, field
 from typing import List, Optional
 
-from . import log_lines
-from .admission import RateGuard
-from .fleet import RobotRecord
-from .robot_bridge import RobotBridge
+from .commands.stop_progress import StopProgress
+from .fleet import log_lines
+from .fleet.admission import RateGuard
+from .fleet.registry import RobotRecord
+from .ros.robot_bridge import RobotBridge
 from .rosserial.payloads import Log
 from .rosserial.session import Session, Topic
-from .stop_progress import StopProgress
 from .transport import Link
 
 

@@ -11,9 +11,9 @@ from diagnostic_msgs.msg import DiagnosticStatus
 
 from hero_msgs.msg import Robot, RobotArray
 
-from .fleet import RobotState
+from .commands.stop_progress import StopState
+from .fleet.registry import RobotState
 from .robot_status import RobotStatus
-from .stop_progress import StopState
 
 LARGE_CLOCK_OFFSET_S = 0.5
 """Beyond it stamps of the robot are of little use; the figures that were published stay below 0.1 s."""
@@ -71,10 +71,10 @@ class Reporter:
             if last is not None and status.now_s > last[0]:
                 elapsed_s = status.now_s - last[0]
                 self._rates[robot.namespace] = (
-                    (robot.frames - last[1]) / elapsed_s,
+                    (robot.packets - last[1]) / elapsed_s,
                     (robot.received_length - last[2]) / elapsed_s,
                 )
-            self._last_counts[robot.namespace] = (status.now_s, robot.frames, robot.received_length)
+            self._last_counts[robot.namespace] = (status.now_s, robot.packets, robot.received_length)
         for namespace in set(self._last_counts) - {robot.namespace for robot in status.robots}:
             del self._last_counts[namespace]
             self._rates.pop(namespace, None)
@@ -91,7 +91,7 @@ class Reporter:
             self._updater.force_update()
 
     def _describe(self, robot: RobotStatus, now_s: float, ros_now: rospy.Time) -> Robot:
-        frames_per_s, bytes_per_s = self._rates.get(robot.namespace, (0.0, 0.0))
+        packets_per_s, bytes_per_s = self._rates.get(robot.namespace, (0.0, 0.0))
         age = rospy.Duration.from_sec(now_s - robot.since_s)
         return Robot(
             id=robot.number,
@@ -105,10 +105,10 @@ class Reporter:
             since=ros_now - age if ros_now.to_sec() > age.to_sec() else rospy.Time(0),
             uptime=rospy.Duration.from_sec(robot.uptime_s),
             reconnects=robot.reconnects,
-            frames_per_s=frames_per_s,
+            packets_per_s=packets_per_s,
             bytes_per_s=bytes_per_s,
             dropped_messages=robot.dropped_messages,
-            bad_frames=robot.bad_frames,
+            bad_packets=robot.bad_packets,
             clock_offset=robot.clock_offset_s,
             last_error=robot.last_error,
         )
@@ -134,7 +134,7 @@ class Reporter:
         def diagnose(stat: Any) -> Any:
             robot = self._known[namespace]
             stat.summary(*_judge(robot))
-            frames_per_s, bytes_per_s = self._rates.get(namespace, (0.0, 0.0))
+            packets_per_s, bytes_per_s = self._rates.get(namespace, (0.0, 0.0))
             for key, value in (
                 ("address", robot.address),
                 ("state", robot.state.name),
@@ -144,10 +144,10 @@ class Reporter:
                 ("config", robot.config),
                 ("uptime (s)", "%.0f" % robot.uptime_s),
                 ("reconnects", robot.reconnects),
-                ("frames per second", "%.1f" % frames_per_s),
+                ("packets per second", "%.1f" % packets_per_s),
                 ("bytes per second", "%.0f" % bytes_per_s),
                 ("dropped messages", robot.dropped_messages),
-                ("bad frames", robot.bad_frames),
+                ("bad packets", robot.bad_packets),
                 ("clock offset (s)", "%.4f" % robot.clock_offset_s),
                 ("corrected stamps", robot.corrected_stamps),
                 ("odometry resets", robot.odometry_resets),

@@ -1,9 +1,9 @@
 """What robots log: versions at boot, uptime, self-tuning, and lines for /rosout. Thread of the sockets."""
 
-from . import log_lines
-from .fleet import RobotRecord
-from .log_relay import LogRelay
+from .fleet import log_lines
+from .fleet.registry import RobotRecord
 from .peer import Peer
+from .ros.log_relay import LogRelay
 from .rosserial.payloads import LOG_DEBUG, LOG_ERROR, LOG_FATAL, LOG_INFO, LOG_WARN, Log
 
 LEVELS = {LOG_DEBUG: "debug", LOG_INFO: "info", LOG_WARN: "warn", LOG_ERROR: "error", LOG_FATAL: "fatal"}
@@ -56,8 +56,8 @@ class RobotLog:
         if record.booted_s is not None and booted_s - record.booted_s > REBOOT_SLACK_S:
             text = "%s rebooted %.1f s ago" % (peer.label, uptime_s)
             self._log.log_throttled("warn", "rebooted " + peer.label, text, host=peer.link.address.host)
-            if peer.bridge is not None and peer.bridge.cleaner is not None and peer.boot is None:
-                peer.bridge.cleaner.note_reboot()
+            if peer.bridge is not None and peer.bridge.corrections is not None and peer.boot is None:
+                peer.bridge.corrections.note_reboot()
         # Delays of the network only make a boot look later, so the earliest is the best.
         if (
             record.booted_s is None

@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 from typing import List, Optional, Tuple
 
-from .fleet import RobotRecord, RobotState
+from .commands.stop_progress import StopState
+from .fleet.registry import RobotRecord, RobotState
 from .peer import Peer
-from .robot_bridge import RobotBridge
-from .stop_progress import StopState
+from .ros.robot_bridge import RobotBridge
 
 DUPLICATES_SHOWN = 8
 """Of one robot, in reports: one address could fill them with hundreds."""
@@ -28,10 +28,10 @@ class RobotStatus:
     since_s: float
     uptime_s: float  # 0 while not known
     reconnects: int
-    frames: int
+    packets: int
     received_length: int
     dropped_messages: int
-    bad_frames: int
+    bad_packets: int
     clock_offset_s: float
     corrected_stamps: int
     odometry_resets: int
@@ -49,18 +49,18 @@ def describe_robot(
     now_s: float,
 ) -> RobotStatus:
     """Return the state of the robot that record tells of; bridge and peer are its own, where it has them."""
-    cleaner = None if bridge is None else bridge.cleaner
+    corrections = None if bridge is None else bridge.corrections
     dropped = record.dropped_messages
     complaint = ""
     if bridge is not None:
         dropped += bridge.refused_commands + bridge.commands.dropped
         complaint = bridge.last_error
-    if cleaner is not None:
-        dropped += cleaner.refused
-    frames, bad_frames, received_length = record.frames, record.bad_frames, record.received_length
+    if corrections is not None:
+        dropped += corrections.refused
+    packets, bad_packets, received_length = record.packets, record.bad_packets, record.received_length
     if peer is not None:
-        frames += peer.session.reader.frames
-        bad_frames += peer.session.reader.bad_frames
+        packets += peer.session.reader.packets
+        bad_packets += peer.session.reader.bad_packets
         dropped += peer.session.undeclared_messages
         received_length += peer.link.received_length
     return RobotStatus(
@@ -76,15 +76,15 @@ def describe_robot(
         since_s=record.since_s,
         uptime_s=0.0 if record.booted_s is None or peer is None else now_s - record.booted_s,
         reconnects=record.reconnects,
-        frames=frames,
+        packets=packets,
         received_length=received_length,
         dropped_messages=dropped,
-        bad_frames=bad_frames,
-        clock_offset_s=0.0 if cleaner is None else cleaner.clock_offset_s,
-        corrected_stamps=0 if cleaner is None else cleaner.corrected_stamps,
-        odometry_resets=0 if cleaner is None else cleaner.odometry.resets,
+        bad_packets=bad_packets,
+        clock_offset_s=0.0 if corrections is None else corrections.clock_offset_s,
+        corrected_stamps=0 if corrections is None else corrections.corrected_stamps,
+        odometry_resets=0 if corrections is None else corrections.odometry.resets,
         last_error=complaint or record.last_error,
         complaint=complaint,
-        foreign_frames=[] if cleaner is None else sorted(cleaner.transforms.foreign_frames),
+        foreign_frames=[] if corrections is None else sorted(corrections.transforms.foreign_frames),
         refused=sorted(record.refused.items())[:DUPLICATES_SHOWN],
     )

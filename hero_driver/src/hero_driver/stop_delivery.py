@@ -17,10 +17,10 @@ Runs on the thread of the sockets and never blocks, except stop_without_loop(), 
 import time
 from typing import Callable, Iterable, List, Optional
 
-from .command_shaping import COMMAND_INTERVAL_S
+from .commands.stop_progress import StopProgress, StopState
+from .commands.velocity_shaper import COMMAND_INTERVAL_S
 from .peer import Peer
 from .rosserial.errors import RosserialError
-from .stop_progress import StopProgress, StopState
 
 TUNING_PULSES = 140
 """Servo pulses in front of the zeros: 70 ms of the robot's reading cycle, 1680 of its window's 2144 bytes."""
@@ -147,15 +147,15 @@ class StopDelivery:
     def _send(peer: Peer, pulses: int, now_s: float) -> None:
         """Write one stop in one piece, with servo pulses of 1500 us in front."""
         assert peer.bridge is not None
-        frames = []
+        packets = []
         for topic_id, payload in peer.bridge.list_stops(pulses):
             try:
-                frames.append(peer.session.encode_message(topic_id, payload))
+                packets.append(peer.session.encode_message(topic_id, payload))
             except RosserialError:
                 # This connection has not declared the topic again yet, so nothing can drive the robot by it.
                 continue
-        if frames:
-            peer.link.send_frame(b"".join(frames))
+        if packets:
+            peer.link.send_packet(b"".join(packets))
             peer.motion_mark = peer.link.handed_length
             peer.bridge.commands.discard_motion(now_s + COMMAND_INTERVAL_S)
 

@@ -12,12 +12,11 @@ import rospy
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, SetBoolResponse
 
-from .fleet import RobotState
-from .gateway import Gateway
-from .log_relay import LogRelay
+from .commands.stop_progress import StopState
+from .fleet.registry import RobotState
 from .robot_status import RobotStatus
-from .stop_progress import StopState
-from .worker import Worker
+from .ros.log_relay import LogRelay
+from .ros.worker import Worker
 
 PARAMETER = "~stopped"
 
@@ -30,14 +29,16 @@ class StopInterface:
 
     def __init__(
         self,
-        gateway: Gateway,
         call_soon: Callable[[Callable[[], None]], None],
+        set_stopped: Callable[[bool], None],
+        is_stopped: Callable[[], bool],
         list_robots: Callable[[], List[RobotStatus]],
         log: LogRelay,
     ) -> None:
-        """call_soon() is the loop's; list_robots() is called on the thread of the sockets."""
-        self._gateway = gateway
+        """call_soon() is the loop's; the other three are called on the thread of the sockets."""
         self._call_soon = call_soon
+        self._set_stopped = set_stopped
+        self._is_stopped = is_stopped
         self._list_robots = list_robots
         self._log = log
         self._stopped = False  # as programs asked; at its end the driver stops robots without being asked
@@ -48,7 +49,7 @@ class StopInterface:
     def open(self, stopped: bool) -> None:
         """Serve; begin as stopped says. The loop does not run yet."""
         self._stopped = stopped
-        self._gateway.set_stopped(stopped)
+        self._set_stopped(stopped)
         if stopped:
             self._log.log("warn", "all robots are stopped from the start, until ~stop releases them")
         self._publisher = rospy.Publisher("~stopped", Bool, queue_size=1, latch=True)
@@ -85,11 +86,11 @@ class StopInterface:
 
     def _set(self, stopped: bool) -> None:
         """Runs on the thread of the sockets."""
-        changed = stopped is not self._gateway.stopped
+        changed = stopped is not self._is_stopped()
         if not changed and not stopped:
             return
         self._stopped = stopped
-        self._gateway.set_stopped(stopped)
+        self._set_stopped(stopped)
         if changed:
             # Published and written elsewhere: both may block.
             self._keeper.submit(lambda: self._publisher.publish(Bool(stopped)))

@@ -17,7 +17,7 @@ from fake_robot import FakeRobot
 from geometry_msgs.msg import Twist
 from rosgraph_msgs.msg import Log as RosLog
 
-from hero_driver.rosserial import frames, payloads
+from hero_driver.rosserial import packets, payloads
 from hero_msgs.msg import Robot, RobotArray
 
 DEADLINE_S = 20.0
@@ -111,11 +111,11 @@ def wait_payloads(robot, name, count=1):
     return robot.payloads_on(name)[:count]
 
 
-def wait_frames(robot, topic_id, count=1):
+def wait_packets(robot, topic_id, count=1):
     """Return the first payloads that a robot received under an id, once it has so many."""
     wait_for(
         lambda: len(robot.payloads_with_id(topic_id)) >= count,
-        lambda: "%d frames %d at %s" % (count, topic_id, robot.name),
+        lambda: "%d packets %d at %s" % (count, topic_id, robot.name),
     )
     return robot.payloads_with_id(topic_id)[:count]
 
@@ -328,7 +328,7 @@ class OwnDriverCase(unittest.TestCase):
 
 def ask_parameter(robot, name):
     """Return the answer (ints, floats, strings) to a robot's request for a parameter."""
-    count = len(robot.payloads_with_id(frames.ID_PARAMETER_REQUEST))
-    robot.send_frame(frames.ID_PARAMETER_REQUEST, payloads.encode_parameter_request(name))
-    answers = wait_frames(robot, frames.ID_PARAMETER_REQUEST, count + 1)
+    count = len(robot.payloads_with_id(packets.ID_PARAMETER_REQUEST))
+    robot.send_packet(packets.ID_PARAMETER_REQUEST, payloads.encode_parameter_request(name))
+    answers = wait_packets(robot, packets.ID_PARAMETER_REQUEST, count + 1)
     return payloads.decode_parameter_answer(answers[count])

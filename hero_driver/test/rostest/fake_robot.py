@@ -1,6 +1,6 @@
 """A scripted robot behind a real TCP socket: says what the stock robot says, and whatever else a test wants.
 
-It takes frames as the firmware does (read cycle, receive window, the motion rules of fake_motors) and keeps them
+It takes packets as the firmware does (read cycle, receive window, the motion rules of fake_motors) and keeps them
 for the test. It stands on the codec alone, never on the driver's session or on ROS. Source: firmware v3.8 as
 measured: ids in call order, publishers from 125, subscribers from 100; one burst of declarations for each request.
 """
@@ -15,7 +15,7 @@ from typing import Callable, Dict, List, NamedTuple, Optional
 
 from fake_motors import FakeMotors
 
-from hero_driver.rosserial import frames, payloads
+from hero_driver.rosserial import packets, payloads
 
 BUFFER_LENGTH = 4096
 ANSWER_MD5 = "937c9679a518e3a18d831e57125ea522"
@@ -30,18 +30,18 @@ ENCODER_INTERVAL_S = 0.034
 TUNING_INTERVAL_S = 1.0 / 47.0
 """Between two log lines of a robot that tunes itself."""
 
-REQUEST_FRAME = frames.encode_frame(frames.ID_PUBLISHER, b"")
-TIME_FRAME = frames.encode_frame(frames.ID_TIME, bytes(8))
+REQUEST_PACKET = packets.encode_packet(packets.ID_PUBLISHER, b"")
+TIME_PACKET = packets.encode_packet(packets.ID_TIME, bytes(8))
 
-PUB, SUB = frames.ID_PUBLISHER, frames.ID_SUBSCRIBER
-ANSWERS, REQUESTS = frames.ID_SERVICE_SERVER_PUBLISHER, frames.ID_SERVICE_SERVER_SUBSCRIBER
-CLIENT_REQUESTS, CLIENT_ANSWERS = frames.ID_SERVICE_CLIENT_PUBLISHER, frames.ID_SERVICE_CLIENT_SUBSCRIBER
+PUB, SUB = packets.ID_PUBLISHER, packets.ID_SUBSCRIBER
+ANSWERS, REQUESTS = packets.ID_SERVICE_SERVER_PUBLISHER, packets.ID_SERVICE_SERVER_SUBSCRIBER
+CLIENT_REQUESTS, CLIENT_ANSWERS = packets.ID_SERVICE_CLIENT_PUBLISHER, packets.ID_SERVICE_CLIENT_SUBSCRIBER
 
 
 class Declaration(NamedTuple):
     """One endpoint; {} in the name stands for hero_N."""
 
-    kind: int  # the id of the frame that declares it
+    kind: int  # the id of the packet that declares it
     topic_id: int
     name: str
     message_type: str
@@ -109,8 +109,8 @@ STOCK_DECLARATIONS = (
 )
 
 
-class ReceivedFrame(NamedTuple):
-    """One frame from the driver."""
+class ReceivedPacket(NamedTuple):
+    """One packet from the driver."""
 
     time_s: float  # monotonic, when the robot read it
     topic_id: int
@@ -154,7 +154,7 @@ class FakeRobot:
     """One robot; connect() or serve() begin its one connection, and a test may begin another after its end.
 
     Attributes (read by tests, all in order of arrival):
-        received: frames from the driver; velocities: those with a Twist, whether the firmware took them or not;
+        received: packets from the driver; velocities: those with a Twist, whether the firmware took them or not;
         accepted: those that it took; motors: what they make of its wheels; requests: how often topics were
         asked for; ended: why the connection is over, empty while it stands.
         answers: service name -> function of the request that returns the answer, or None for no answer.
@@ -178,7 +178,7 @@ class FakeRobot:
         self.namespace = "/" + self.name
         chosen = STOCK_DECLARATIONS if declarations is None else declarations
         self.declarations = [entry._replace(name=entry.name.format(self.name)) for entry in chosen]
-        self.received: List[ReceivedFrame] = []
+        self.received: List[ReceivedPacket] = []
         self.velocities: List[Velocity] = []
         self.accepted: List[Velocity] = []
         self.motors = FakeMotors()
@@ -253,26 +253,26 @@ class FakeRobot:
         with self._write_lock, contextlib.suppress(OSError):
             self._socket.sendall(data)
 
-    def send_frame(self, topic_id: int, payload: bytes) -> None:
-        """Send one frame."""
-        self.send_bytes(frames.encode_frame(topic_id, payload))
+    def send_packet(self, topic_id: int, payload: bytes) -> None:
+        """Send one packet."""
+        self.send_bytes(packets.encode_packet(topic_id, payload))
 
     def send(self, name: str, payload: bytes) -> None:
         """Publish on one of its own topics, by the name that it declared."""
-        self.send_frame(self.find_id(name, (PUB,)), payload)
+        self.send_packet(self.find_id(name, (PUB,)), payload)
 
     def log(self, text: str, level: int = payloads.LOG_INFO) -> None:
         """Send a log line."""
-        self.send_frame(frames.ID_LOG, payloads.encode_log(payloads.Log(level, text)))
+        self.send_packet(packets.ID_LOG, payloads.encode_log(payloads.Log(level, text)))
 
     def declare(self) -> None:
         """Send the burst that answers a request for topics."""
-        self.send_bytes(TIME_FRAME + self.encode_declarations())
+        self.send_bytes(TIME_PACKET + self.encode_declarations())
 
     def encode_declarations(self) -> bytes:
-        """Return all declarations as frames."""
+        """Return all declarations as packets."""
         return b"".join(
-            frames.encode_frame(
+            packets.encode_packet(
                 entry.kind,
                 payloads.encode_topic_info(
                     payloads.TopicInfo(
@@ -285,7 +285,7 @@ class FakeRobot:
 
     def answer(self, name: str, payload: bytes) -> None:
         """Send the answer of one of its services."""
-        self.send_frame(self.find_id(name, (ANSWERS,)), payload)
+        self.send_packet(self.find_id(name, (ANSWERS,)), payload)
 
     def find_id(self, name: str, kinds) -> int:
         """Return the id of the endpoint called name (below its namespace unless it has a slash in front)."""
@@ -300,11 +300,11 @@ class FakeRobot:
     def payloads_on(self, name: str) -> List[bytes]:
         """Return what it received on a topic, or as requests of a service, in order."""
         topic_id = self.find_id(name, (SUB, REQUESTS, CLIENT_ANSWERS))
-        return [frame.payload for frame in list(self.received) if frame.topic_id == topic_id]
+        return [packet.payload for packet in list(self.received) if packet.topic_id == topic_id]
 
     def payloads_with_id(self, topic_id: int) -> List[bytes]:
         """Return what it received under an id, in order."""
-        return [frame.payload for frame in list(self.received) if frame.topic_id == topic_id]
+        return [packet.payload for packet in list(self.received) if packet.topic_id == topic_id]
 
     def _begin(self, sock: socket.socket) -> None:
         sock.settimeout(20.0)
@@ -339,14 +339,14 @@ class FakeRobot:
                     self.log("\x1b[93m[/%s] %s\x1b[0m" % (self.name, text))
 
     def _run(self, sock: socket.socket) -> None:
-        reader = frames.FrameReader()
+        reader = packets.PacketReader()
         next_time_request_s = time.monotonic() + TIME_REQUEST_INTERVAL_S
         while not self._closing.is_set():
             now_s = time.monotonic()
             if now_s >= next_time_request_s:
                 next_time_request_s = now_s + TIME_REQUEST_INTERVAL_S
                 if not self.is_silent:
-                    self.send_bytes(TIME_FRAME)
+                    self.send_bytes(TIME_PACKET)
             if self._read_cycle_s or self.is_stalled:
                 self._closing.wait(self._read_cycle_s or READ_CYCLE_S)
             ready, _, _ = select.select([sock], [], [], 0.0 if self._read_cycle_s else 0.05)
@@ -361,26 +361,26 @@ class FakeRobot:
                 self.ended = "closed by the driver"
                 return
             self.motors.begin_read(time.monotonic())
-            for frame in reader.receive_bytes(data):
-                self._take(frame)
+            for packet in reader.receive_bytes(data):
+                self._take(packet)
 
-    def _take(self, frame: frames.Frame) -> None:
+    def _take(self, packet: packets.Packet) -> None:
         now_s = time.monotonic()
-        self.received.append(ReceivedFrame(now_s, frame.topic_id, frame.payload))
-        if frame.topic_id == frames.ID_PUBLISHER:
+        self.received.append(ReceivedPacket(now_s, packet.topic_id, packet.payload))
+        if packet.topic_id == packets.ID_PUBLISHER:
             self.requests += 1
             if self.declares:
                 self.declare()
             return
         for entry in self.declarations:
-            if entry.topic_id != frame.topic_id:
+            if entry.topic_id != packet.topic_id:
                 continue
             if entry.kind == REQUESTS:
-                self._serve(entry.name, frame.payload)
-            elif entry.name.endswith("/cmd_vel") and len(frame.payload) == 48:
-                self._take_velocity(entry.name, frame.payload, now_s)
+                self._serve(entry.name, packet.payload)
+            elif entry.name.endswith("/cmd_vel") and len(packet.payload) == 48:
+                self._take_velocity(entry.name, packet.payload, now_s)
             elif entry.name.endswith("/cmd_motor"):
-                self.motors.take_pulses(frame.payload)
+                self.motors.take_pulses(packet.payload)
             elif entry.name.endswith("/led"):
                 self.motors.take_led()
 

@@ -16,7 +16,7 @@ from fake_robot import PUB, STOCK_DECLARATIONS, Declaration, FakeRobot
 from std_msgs.msg import ColorRGBA
 from std_srvs.srv import SetBool
 
-from hero_driver.rosserial import frames
+from hero_driver.rosserial import packets
 from hero_msgs.msg import Encoder, Robot
 
 USAGE_ERROR = 2
@@ -110,9 +110,9 @@ class TestDriverBadInput(OwnDriverCase):
 
     def make_encoder_frame(self, robot, ticks=1.0):
         payload = stock_messages.make_encoder(robot.name, rospy.Time.now(), ticks, ticks)
-        return frames.encode_frame(128, payload)
+        return packets.encode_packet(128, payload)
 
-    def test_garbage_between_frames_is_counted_and_the_next_good_frame_is_read(self):
+    def test_garbage_between_packets_is_counted_and_the_next_good_packet_is_read(self):
         driver, bad, good = self.start_pair()
         encoders = Recorder("/hero_1/encoder", Encoder)
         chance = random.Random(7)
@@ -123,7 +123,7 @@ class TestDriverBadInput(OwnDriverCase):
             bad.send_bytes(self.make_encoder_frame(bad, float(count)))
         self.assertEqual([m.left_ticks for m in encoders.wait_count(20)], [float(n) for n in range(1, 21)])
         self.assertGreaterEqual(
-            driver.fleet.wait("/hero_1", Robot.READY, "counted", lambda e: e.bad_frames >= 20).bad_frames, 20
+            driver.fleet.wait("/hero_1", Robot.READY, "counted", lambda e: e.bad_packets >= 20).bad_packets, 20
         )
         self.assert_alive(good)
 
@@ -132,26 +132,26 @@ class TestDriverBadInput(OwnDriverCase):
         encoders = Recorder("/hero_1/encoder", Encoder)
         bad.send_bytes(b"\xff\xfe\xff\xff\x01\x80\x00" + self.make_encoder_frame(bad))
         encoders.wait_count(1)
-        driver.fleet.wait("/hero_1", Robot.READY, "counted", lambda e: e.bad_frames >= 1)
+        driver.fleet.wait("/hero_1", Robot.READY, "counted", lambda e: e.bad_packets >= 1)
 
     def test_wrong_checksums_are_counted_and_what_follows_is_read(self):
         driver, bad, _ = self.start_pair()
         encoders = Recorder("/hero_1/encoder", Encoder)
-        good_frame = self.make_encoder_frame(bad, 2.0)
-        flipped = good_frame[:-1] + bytes([good_frame[-1] ^ 0x10])
-        bad.send_bytes(flipped + good_frame + flipped)
-        bad.send_bytes(good_frame)
+        good_packet = self.make_encoder_frame(bad, 2.0)
+        flipped = good_packet[:-1] + bytes([good_packet[-1] ^ 0x10])
+        bad.send_bytes(flipped + good_packet + flipped)
+        bad.send_bytes(good_packet)
         encoders.wait_count(2)
-        driver.fleet.wait("/hero_1", Robot.READY, "counted", lambda e: e.bad_frames >= 2)
+        driver.fleet.wait("/hero_1", Robot.READY, "counted", lambda e: e.bad_packets >= 2)
 
-    def test_a_frame_that_comes_byte_by_byte_is_read(self):
+    def test_a_packet_that_comes_byte_by_byte_is_read(self):
         _, bad, _ = self.start_pair()
         encoders = Recorder("/hero_1/encoder", Encoder)
         for byte in self.make_encoder_frame(bad, 3.0):
             bad.send_bytes(bytes([byte]))
         self.assertEqual(encoders.wait_count(1)[0].left_ticks, 3.0)
 
-    def test_a_robot_that_vanishes_in_the_middle_of_a_frame_harms_nobody_and_may_return(self):
+    def test_a_robot_that_vanishes_in_the_middle_of_a_packet_harms_nobody_and_may_return(self):
         driver, bad, good = self.start_pair()
         bad.send_bytes(self.make_encoder_frame(bad)[:40])
         bad.close()
@@ -162,10 +162,10 @@ class TestDriverBadInput(OwnDriverCase):
     def test_half_a_declaration_and_declarations_of_nonsense_are_reported(self):
         driver, bad, good = self.start_pair()
         burst = bad.encode_declarations()
-        first = frames.FrameReader().receive_bytes(burst)[0].payload
-        bad.send_frame(PUB, first[: len(first) // 2])
-        bad.send_frame(PUB, first + b"more")
-        bad.send_frame(PUB, struct.pack("<HI", 140, 0xFFFFFFFF) + b"name")
+        first = packets.PacketReader().receive_bytes(burst)[0].payload
+        bad.send_packet(PUB, first[: len(first) // 2])
+        bad.send_packet(PUB, first + b"more")
+        bad.send_packet(PUB, struct.pack("<HI", 140, 0xFFFFFFFF) + b"name")
         line = driver.wait_line("hero_1: TopicInfo: ")
         self.assertNotIn("Traceback", line)
         self.assert_alive(bad)
@@ -211,7 +211,7 @@ class TestDriverBadInput(OwnDriverCase):
             for _ in range(150):
                 topic_id = chance.choice([*range(12), *range(95, 140), 65535])
                 payload = bytes(chance.randrange(256) for _ in range(chance.choice([0, 1, 4, 8, 40, 300])))
-                robot.send_frame(topic_id, payload)
+                robot.send_packet(topic_id, payload)
             robot.close()
         self.assert_alive(good)
         self.assertIsNone(driver.process.poll())

@@ -14,7 +14,7 @@ from std_msgs.msg import Bool, ColorRGBA
 from std_srvs.srv import SetBool
 from steady_time import in_steady_time
 
-from hero_driver.command_shaping import STOPPED_MOTORS
+from hero_driver.commands.velocity_shaper import STOPPED_MOTORS
 from hero_msgs.msg import Motor, Robot
 from hero_msgs.srv import SetOdom
 

@@ -13,7 +13,7 @@ from driver_case import (
     list_publishers,
     make_publisher,
     wait_for,
-    wait_frames,
+    wait_packets,
 )
 from fake_robot import (
     ANSWER_MD5,
@@ -57,24 +57,24 @@ class TestDriverDevices(OwnDriverCase):
         wait_for(lambda: driver.fleet.newest.robots, "the device in the report")
         self.assertEqual(driver.fleet.newest.robots[0].id, -1)
         texts = Recorder("/chatter", String)
-        robot.send_frame(125, make_text("hello"))
+        robot.send_packet(125, make_text("hello"))
         self.assertEqual(texts.wait_count(1)[0].data, "hello")
         numbers = make_publisher("/numbers", Int32)
         for number in range(30):
             numbers.publish(Int32(number))
-        self.assertEqual(wait_frames(robot, 100, 30), [struct.pack("<i", number) for number in range(30)])
+        self.assertEqual(wait_packets(robot, 100, 30), [struct.pack("<i", number) for number in range(30)])
         # A foreign robot's cmd_vel has no gate of 50 ms: what is published is sent, in order, all of it.
         drive = make_publisher("/cmd_vel", Twist)
         sent = [stock_messages.make_twist(0.1 * index, 0.0) for index in range(1, 11)]
         for payload in sent:
             drive.publish(stock_messages.from_bytes(Twist, payload))
-        self.assertEqual(wait_frames(robot, 101, 10), sent)
+        self.assertEqual(wait_packets(robot, 101, 10), sent)
         rospy.wait_for_service("/blink", 20.0)
         answer = rospy.ServiceProxy("/blink", Trigger)()
         self.assertEqual((answer.success, answer.message), (True, "/blink"))
         self.assertEqual(robot.payloads_with_id(102), [b""])
-        robot.send_frame(127, b"")
-        self.assertEqual(wait_frames(robot, 103), [stock_messages.to_bytes(TriggerResponse(True, "..."))])
+        robot.send_packet(127, b"")
+        self.assertEqual(wait_packets(robot, 103), [stock_messages.to_bytes(TriggerResponse(True, "..."))])
         self.assertEqual(ask_parameter(robot, "/limit"), ([12], [], []))
         self.assertEqual(ask_parameter(robot, "/hidden/list"), ([], [], ["x", "y"]))
 
@@ -85,7 +85,7 @@ class TestDriverDevices(OwnDriverCase):
         hero = self.dial(driver, 10)
         transforms = Recorder("/tf", TFMessage)
         stamp = rospy.Time.now()
-        device.send_frame(tf_declaration.topic_id, stock_messages.make_transform("map", "crane", stamp, 1.5))
+        device.send_packet(tf_declaration.topic_id, stock_messages.make_transform("map", "crane", stamp, 1.5))
         stock_messages.send_burst(hero, 0.0, 0.0, stamp)
 
         def list_frames():
@@ -102,7 +102,7 @@ class TestDriverDevices(OwnDriverCase):
         extra = [Declaration(PUB, 140, "/chatter", "std_msgs/String", STRING_MD5)]
         robot = self.dial(driver, 9, declarations=[*STOCK_DECLARATIONS, *extra], read_cycle_s=0.051)
         texts = Recorder("/chatter", String)
-        robot.send_frame(140, make_text("free"))
+        robot.send_packet(140, make_text("free"))
         texts.wait_count(1)
         Recorder("/hero_9/proximity", rospy.AnyMsg)
         drive = make_publisher("/hero_9/velocity_controller/cmd_vel", Twist)
@@ -118,7 +118,7 @@ class TestDriverDevices(OwnDriverCase):
             devices.append(self.dial(driver, ready=False, declarations=declarations))
         for device, name in zip(devices, ("left", "right")):
             texts = Recorder("/" + name, String)
-            device.send_frame(125, make_text(name))
+            device.send_packet(125, make_text(name))
             self.assertEqual(texts.wait_count(1)[0].data, name)
             self.assertTrue(device.is_connected)
 
@@ -133,7 +133,7 @@ class TestDriverDevices(OwnDriverCase):
         self.assertIn(WRONG_MD5, line)
         self.assertIn(STRING_MD5, line)
         texts = Recorder("/other", String)
-        robot.send_frame(126, make_text("still here"))
+        robot.send_packet(126, make_text("still here"))
         texts.wait_count(1)
 
     def test_a_device_can_neither_call_nor_publish_nor_serve_what_drivers_serve(self):
@@ -157,10 +157,10 @@ class TestDriverDevices(OwnDriverCase):
             driver.wait_line("topic '%s' refused: only drivers and ROS itself" % entry.name)
         for name in {entry.name for entry in refused}:
             self.assertEqual(len(driver.find_lines("topic '%s' refused" % name)), 1, name)
-        robot.send_frame(126, b"\x00")
-        robot.send_frame(127, b"\x00")
+        robot.send_packet(126, b"\x00")
+        robot.send_packet(127, b"\x00")
         texts = Recorder("/chatter", String)
-        robot.send_frame(125, make_text("still here"))
+        robot.send_packet(125, make_text("still here"))
         texts.wait_count(1)
         sent = rospy.Time.now()
         wait_for(lambda: driver.fleet.newest.header.stamp > sent, "a report of after that")

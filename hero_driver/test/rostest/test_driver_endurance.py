@@ -18,7 +18,7 @@ from driver_case import (
     list_driver_topics,
     make_publisher,
     wait_for,
-    wait_frames,
+    wait_packets,
     wait_payloads,
 )
 from fake_robot import (
@@ -26,13 +26,13 @@ from fake_robot import (
     CLIENT_ANSWERS,
     CLIENT_REQUESTS,
     STOCK_DECLARATIONS,
-    TIME_FRAME,
+    TIME_PACKET,
     Declaration,
 )
 from std_msgs.msg import ColorRGBA
 from std_srvs.srv import Trigger, TriggerResponse
 
-from hero_driver.rosserial import frames
+from hero_driver.rosserial import packets
 from hero_msgs.msg import Encoder, Robot
 
 TRIGGER_REQUEST_MD5 = "d41d8cd98f00b204e9800998ecf8427e"
@@ -49,9 +49,9 @@ def count_resources(pid):
 
 class TestDriverEndurance(OwnDriverCase):
     def assert_time_is_answered(self, robot):
-        count = len(robot.payloads_with_id(frames.ID_TIME))
-        robot.send_bytes(TIME_FRAME)
-        wait_frames(robot, frames.ID_TIME, count + 1)
+        count = len(robot.payloads_with_id(packets.ID_TIME))
+        robot.send_bytes(TIME_PACKET)
+        wait_packets(robot, packets.ID_TIME, count + 1)
 
     def send_encoder(self, robot, ticks):
         robot.send("encoder", stock_messages.make_encoder(robot.name, rospy.Time.now(), ticks, ticks))
@@ -78,7 +78,7 @@ class TestDriverEndurance(OwnDriverCase):
         self.assertEqual(late.wait_count(1)[0].left_ticks, 9.0)
 
     def test_a_subscriber_that_does_not_read_keeps_nobody_waiting(self):
-        driver = self.start(max_frames_per_s=1000000, max_bytes_per_s=100000000)
+        driver = self.start(max_packets_per_s=1000000, max_bytes_per_s=100000000)
         loud, other = self.dial(driver, 1), self.dial(driver, 2)
         scans = Recorder("/hero_1/laser", rospy.AnyMsg)
         reader = subprocess.Popen(
@@ -127,10 +127,10 @@ class TestDriverEndurance(OwnDriverCase):
                 )
             ]
             robots.append(self.dial(driver, number, declarations=[*STOCK_DECLARATIONS, *clients]))
-        robots[0].send_frame(140, b"")
-        robots[1].send_frame(141, b"")
+        robots[0].send_packet(140, b"")
+        robots[1].send_packet(141, b"")
         self.assertEqual(
-            wait_frames(robots[1], 121), [stock_messages.to_bytes(TriggerResponse(True, "at once"))]
+            wait_packets(robots[1], 121), [stock_messages.to_bytes(TriggerResponse(True, "at once"))]
         )
         self.assert_time_is_answered(robots[0])
         make_publisher("/hero_1/led", ColorRGBA).publish(ColorRGBA())
@@ -138,7 +138,7 @@ class TestDriverEndurance(OwnDriverCase):
         self.assertEqual(robots[0].payloads_with_id(120), [])
         release.set()
         self.assertEqual(
-            wait_frames(robots[0], 120), [stock_messages.to_bytes(TriggerResponse(True, "at last"))]
+            wait_packets(robots[0], 120), [stock_messages.to_bytes(TriggerResponse(True, "at last"))]
         )
 
     def test_many_returns_leave_no_threads_sockets_or_topics_behind(self):

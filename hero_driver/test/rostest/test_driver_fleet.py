@@ -59,27 +59,27 @@ class TestDriverFleet(DriverCase):
         self.assertEqual((entry.firmware, entry.hardware, entry.config), ("v3.8", "v2.5", "v2.3"))
         self.assertLessEqual(entry.since.to_sec(), rospy.Time.now().to_sec())
         self.assertLess(entry.uptime.to_sec(), 200.0)
-        self.assertEqual((entry.last_error, entry.bad_frames), ("", 0))
+        self.assertEqual((entry.last_error, entry.bad_packets), ("", 0))
         status = self.wait_status("hero_1", DiagnosticStatus.OK)
         self.assertIn(robot.address, [value.value for value in status.values])
         self.assertTrue(self.wait_status("driver", DiagnosticStatus.OK))
 
-    def test_rates_bad_frames_and_clock_offset_are_counted(self):
+    def test_rates_bad_packets_and_clock_offset_are_counted(self):
         robot = self.join(2)
         ahead = rospy.Duration(1.5)
         end_s = time.monotonic() + 20.0
-        bad_frame = b"\xff\xfe\x01\x00\x00garbage"
-        robot.send_bytes(bad_frame)
+        bad_packet = b"\xff\xfe\x01\x00\x00garbage"
+        robot.send_bytes(bad_packet)
 
         def look():
             self.assertLess(time.monotonic(), end_s, self.fleet.newest)
             stock_messages.send_burst(robot, 0.0, 0.0, rospy.Time.now() + ahead)
             time.sleep(0.02)
             entry = self.fleet.find("/hero_2")
-            return entry if entry.frames_per_s > 7 and entry.clock_offset > 1.0 and entry.bad_frames else None
+            return entry if entry.packets_per_s > 7 and entry.clock_offset > 1.0 and entry.bad_packets else None
 
         entry = wait_for(look, "rates")
-        self.assertGreater(entry.bytes_per_s, 100 * entry.frames_per_s)
+        self.assertGreater(entry.bytes_per_s, 100 * entry.packets_per_s)
         self.assertLess(entry.clock_offset, 1.6)
         self.wait_status("hero_2", DiagnosticStatus.WARN, "clock")
 

@@ -12,12 +12,12 @@ from driver_case import (
 from fake_robot import (
     PUB,
     STOCK_DECLARATIONS,
-    TIME_FRAME,
+    TIME_PACKET,
     Declaration,
 )
 from text_messages import STRING_MD5
 
-from hero_driver.rosserial import frames
+from hero_driver.rosserial import packets
 from hero_msgs.msg import Encoder, Robot
 
 
@@ -89,23 +89,23 @@ class TestDriverLimits(OwnDriverCase):
         encoders.wait_count(1)
 
     def test_a_robot_that_sends_too_much_is_disconnected_with_the_reason(self):
-        driver = self.start(max_frames_per_s=300, max_bytes_per_s=200000)
+        driver = self.start(max_packets_per_s=300, max_bytes_per_s=200000)
         quiet, flooding, fat = self.dial(driver, 1), self.dial(driver, 2), self.dial(driver, 3)
-        flooding.send_bytes(TIME_FRAME * 400)
-        self.wait_refused(driver, flooding, "hero_2 left .*300 frames per second .*~max_frames_per_s")
-        fat.send_bytes(frames.encode_frame(125, bytes(4000)) * 60)
+        flooding.send_bytes(TIME_PACKET * 400)
+        self.wait_refused(driver, flooding, "hero_2 left .*300 packets per second .*~max_packets_per_s")
+        fat.send_bytes(packets.encode_packet(125, bytes(4000)) * 60)
         self.wait_refused(driver, fat, "hero_3 left .*200000 bytes per second .*~max_bytes_per_s")
         self.assertTrue(quiet.is_connected)
         self.assertEqual(driver.fleet.find("/hero_1").reconnects, 0)
 
-    def test_frames_longer_than_allowed_are_counted_as_bad(self):
+    def test_packets_longer_than_allowed_are_counted_as_bad(self):
         driver = self.start(max_payload_length=2048)
         robot = self.dial(driver, 1)
         encoders = Recorder("/hero_1/encoder", Encoder)
-        robot.send_frame(128, bytes(3000))
+        robot.send_packet(128, bytes(3000))
         robot.send("encoder", stock_messages.make_encoder("hero_1", rospy.Time.now(), 1.0, 1.0))
         encoders.wait_count(1)
-        driver.fleet.wait("/hero_1", Robot.READY, "counted", lambda e: e.bad_frames >= 1)
+        driver.fleet.wait("/hero_1", Robot.READY, "counted", lambda e: e.bad_packets >= 1)
 
     def test_a_flood_of_log_lines_is_limited_and_others_are_heard(self):
         driver = self.start()

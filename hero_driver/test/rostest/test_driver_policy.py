@@ -14,7 +14,7 @@ from driver_case import (
     list_publishers,
     make_publisher,
     wait_for,
-    wait_frames,
+    wait_packets,
     wait_payloads,
 )
 from fake_robot import (
@@ -57,7 +57,7 @@ class TestDriverPolicy(OwnDriverCase):
             self.assertIn("~namespace_policy", line)
             self.assertEqual(len(driver.find_lines("topic '%s' refused" % entry.name)), 1)
         encoders = Recorder("/hero_1/encoder", Encoder)
-        robot.send_frame(140, make_text("not heard"))
+        robot.send_packet(140, make_text("not heard"))
         robot.send("encoder", stock_messages.make_encoder("hero_1", rospy.Time.now(), 1.0, 1.0))
         encoders.wait_count(1)
         self.assertEqual(list_publishers("/chatter"), [])
@@ -195,7 +195,7 @@ class TestDriverPolicy(OwnDriverCase):
         evil, good = self.dial(driver, 20, declarations=wrong), self.dial(driver, 21)
         transforms = Recorder("/tf", TFMessage)
         for _ in range(5):
-            evil.send_frame(129, make_text("no transform"))
+            evil.send_packet(129, make_text("no transform"))
             stock_messages.send_burst(good, 0.0, 0.0)
         wait_for(
             lambda: sum(len(message.transforms) for message in list(transforms.messages)) == 25,
@@ -258,10 +258,10 @@ class TestDriverPolicy(OwnDriverCase):
         driver = self.start()
         robot = self.dial(driver, 7, declarations=[*STOCK_DECLARATIONS, *clients])
         driver.wait_line("hero_7: topic '/launch_rocket' refused")
-        robot.send_frame(141, b"")
-        robot.send_frame(140, b"")
+        robot.send_packet(141, b"")
+        robot.send_packet(140, b"")
         self.assertEqual(
-            wait_frames(robot, 120), [stock_messages.to_bytes(TriggerResponse(True, "from ROS"))]
+            wait_packets(robot, 120), [stock_messages.to_bytes(TriggerResponse(True, "from ROS"))]
         )
         self.assertEqual(called, ["/hero_7/home"])
         self.assertEqual(robot.payloads_with_id(121), [])

@@ -12,7 +12,7 @@ from fake_robot import READ_CYCLE_S
 from geometry_msgs.msg import Twist
 from steady_time import in_steady_time
 
-from hero_driver.rosserial import frames
+from hero_driver.rosserial import packets
 from hero_msgs.msg import Motor, Robot
 
 VELOCITY = "velocity_controller/cmd_vel"
@@ -42,7 +42,7 @@ class TestDriverShutdown(OwnDriverCase):
             taken = [velocity for velocity in robot.accepted if velocity.name.endswith("/" + VELOCITY)]
             self.assertTrue(taken[-1].is_zero, robot.name)
             # While unconfigured the firmware runs no watchdog, so this must never reach a moving robot.
-            self.assertEqual(robot.payloads_with_id(frames.ID_TX_STOP), [])
+            self.assertEqual(robot.payloads_with_id(packets.ID_TX_STOP), [])
 
     def end_by(self, number, count=3):
         driver = self.start()

@@ -25,7 +25,7 @@ from geometry_msgs.msg import Twist
 from std_msgs.msg import Bool, ColorRGBA
 from std_srvs.srv import SetBool, Trigger
 
-from hero_driver.command_shaping import STOPPED_MOTORS
+from hero_driver.commands.velocity_shaper import STOPPED_MOTORS
 from hero_msgs.msg import Motor, Robot
 from hero_msgs.srv import Disconnect
 
@@ -141,8 +141,8 @@ class TestDriverStop(OwnDriverCase):
         call_stop(driver, True)
         self.wait_at_rest(driver, robot)
         by_read = {}
-        for frame in list(robot.received):
-            by_read[frame.time_s] = by_read.get(frame.time_s, 0) + len(frame.payload) + 8
+        for packet in list(robot.received):
+            by_read[packet.time_s] = by_read.get(packet.time_s, 0) + len(packet.payload) + 8
         motors = robot.payloads_on("cmd_motor")
         self.assertEqual(set(motors), {STOPPED_MOTORS})
         self.assertGreater(len(motors), 110)
@@ -329,9 +329,9 @@ class TestDriverStop(OwnDriverCase):
         robot.is_stalled = robot.is_silent = False
         self.wait_at_rest(driver, robot)
         late = [
-            frame.payload
-            for frame in robot.received[before:]
-            if frame.topic_id == robot.find_id("cmd_motor", (SUB,)) and frame.payload != STOPPED_MOTORS
+            packet.payload
+            for packet in robot.received[before:]
+            if packet.topic_id == robot.find_id("cmd_motor", (SUB,)) and packet.payload != STOPPED_MOTORS
         ]
         # What was on its way before the driver could notice, at most one in 0.06 s of half a second.
         self.assertLess(len(late), 15)

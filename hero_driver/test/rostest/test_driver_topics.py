@@ -16,17 +16,17 @@ from driver_case import (
     list_driver_topics,
     make_publisher,
     wait_for,
-    wait_frames,
+    wait_packets,
     wait_payloads,
 )
-from fake_robot import STOCK_DECLARATIONS, SUB, TIME_FRAME, FakeRobot, boot_line, heartbeat_line
+from fake_robot import STOCK_DECLARATIONS, SUB, TIME_PACKET, FakeRobot, boot_line, heartbeat_line
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Log as RosLog
 from sensor_msgs.msg import Imu
 from std_msgs.msg import Bool, ColorRGBA
 
-from hero_driver.rosserial import frames, payloads
+from hero_driver.rosserial import packets, payloads
 from hero_msgs.msg import Encoder, Motor
 
 CAPTURES = Path(__file__).resolve().parents[4] / "shared" / "captures"
@@ -145,7 +145,7 @@ class TestDriverTopics(DriverCase):
         robot = self.join(6)
         light = make_publisher("/hero_6/led", ColorRGBA)
         light.publish(ColorRGBA(1.0, 0.0, 0.0, 0.0))
-        wait_frames(robot, 100)
+        wait_packets(robot, 100)
         robot.close()
         self.fleet.wait("/hero_6", 2)
         # An older firmware: without laser_enable and with its slots in another order.
@@ -156,13 +156,13 @@ class TestDriverTopics(DriverCase):
         ]
         returned = self.join(6, declarations=older)
         light.publish(ColorRGBA(2.0, 0.0, 0.0, 0.0))
-        wait_frames(returned, 107)
+        wait_packets(returned, 107)
         switch = make_publisher("/hero_6/laser_enable", Bool)
         switch.publish(Bool(True))
         light.publish(ColorRGBA(3.0, 0.0, 0.0, 0.0))
-        wait_frames(returned, 107, 2)
-        declared = {entry.topic_id for entry in older} | {frames.ID_PUBLISHER, frames.ID_TIME}
-        self.assertEqual({frame.topic_id for frame in returned.received} - declared, set())
+        wait_packets(returned, 107, 2)
+        declared = {entry.topic_id for entry in older} | {packets.ID_PUBLISHER, packets.ID_TIME}
+        self.assertEqual({packet.topic_id for packet in returned.received} - declared, set())
 
     def test_a_command_that_does_not_fit_the_robots_buffer_is_not_sent(self):
         small = [
@@ -178,12 +178,12 @@ class TestDriverTopics(DriverCase):
 
     def test_each_time_request_is_answered_with_ros_time(self):
         robot = self.join(8)
-        before = len(robot.payloads_with_id(frames.ID_TIME))
+        before = len(robot.payloads_with_id(packets.ID_TIME))
         earliest = rospy.Time.now()
         for count in range(1, 4):
-            robot.send_bytes(TIME_FRAME)
-            wait_frames(robot, frames.ID_TIME, before + count)
-        times = [payloads.decode_time(payload) for payload in robot.payloads_with_id(frames.ID_TIME)[before:]]
+            robot.send_bytes(TIME_PACKET)
+            wait_packets(robot, packets.ID_TIME, before + count)
+        times = [payloads.decode_time(payload) for payload in robot.payloads_with_id(packets.ID_TIME)[before:]]
         for secs, nsecs in times:
             self.assertLessEqual(earliest.to_nsec(), secs * 10**9 + nsecs)
             self.assertLessEqual(secs * 10**9 + nsecs, rospy.Time.now().to_nsec())
@@ -262,10 +262,10 @@ class TestDriverTopics(DriverCase):
         self.wait_topics("/hero_0")
         odoms, encoders = Recorder("/hero_0/odom_raw", Odometry), Recorder("/hero_0/encoder", Encoder)
         robot.send_bytes(recorded[8000:])
-        sent = frames.FrameReader().receive_bytes(recorded)
-        later = frames.FrameReader().receive_bytes(recorded[8000:])
-        odoms.wait_count(sum(frame.topic_id == 130 for frame in later))
-        encoders.wait_count(sum(frame.topic_id == 128 for frame in later))
+        sent = packets.PacketReader().receive_bytes(recorded)
+        later = packets.PacketReader().receive_bytes(recorded[8000:])
+        odoms.wait_count(sum(packet.topic_id == 130 for packet in later))
+        encoders.wait_count(sum(packet.topic_id == 128 for packet in later))
         self.assertEqual(
             stock_messages.to_bytes(odoms.messages[-1]), [f.payload for f in sent if f.topic_id == 130][-1]
         )

@@ -10,16 +10,16 @@ from driver_case import DEADLINE_S, wait_for
 from fake_motors import NEUTRAL_PULSES
 from fake_robot import FakeRobot
 
-from hero_driver.rosserial import frames, payloads
+from hero_driver.rosserial import packets, payloads
 
-NEUTRAL = frames.encode_frame(104, NEUTRAL_PULSES)
-LED = frames.encode_frame(100, bytes(16))
+NEUTRAL = packets.encode_packet(104, NEUTRAL_PULSES)
+LED = packets.encode_packet(100, bytes(16))
 POSITION_ID, VELOCITY_ID = 106, 109
 TUNE_POSITION_ID, TUNE_VELOCITY_ID = 108, 111
 
 
 def make_twist(topic_id, linear_m_s=0.0):
-    return frames.encode_frame(topic_id, struct.pack("<6d", linear_m_s, 0, 0, 0, 0, 0))
+    return packets.encode_packet(topic_id, struct.pack("<6d", linear_m_s, 0, 0, 0, 0, 0))
 
 
 class TestFakeRobot(unittest.TestCase):
@@ -30,30 +30,30 @@ class TestFakeRobot(unittest.TestCase):
         self.addCleanup(self.server.close)
         self.addCleanup(self.robot.close)
         self.server.settimeout(DEADLINE_S)
-        self.reader = frames.FrameReader()
+        self.reader = packets.PacketReader()
         self.requests = 0
         self.send(b"")
 
-    def wait_frame(self, topic_id, condition=lambda payload: True):
+    def wait_packet(self, topic_id, condition=lambda payload: True):
         """Return the next payload under an id that condition() likes."""
 
         def read():
             found = [
-                frame.payload
-                for frame in self.reader.receive_bytes(self.server.recv(65536))
-                if frame.topic_id == topic_id and condition(frame.payload)
+                packet.payload
+                for packet in self.reader.receive_bytes(self.server.recv(65536))
+                if packet.topic_id == topic_id and condition(packet.payload)
             ]
             return found[:1]
 
-        return wait_for(read, "frame %d" % topic_id)[0]
+        return wait_for(read, "packet %d" % topic_id)[0]
 
     def wait_ticks(self, condition=lambda ticks: True):
-        return read_ticks(self.wait_frame(128, lambda payload: condition(read_ticks(payload))))
+        return read_ticks(self.wait_packet(128, lambda payload: condition(read_ticks(payload))))
 
     def send(self, data):
         """Send data in one piece and wait until the robot has handled it."""
         self.requests += 1
-        self.server.sendall(data + frames.encode_frame(frames.ID_PUBLISHER, b""))
+        self.server.sendall(data + packets.encode_packet(packets.ID_PUBLISHER, b""))
         wait_for(lambda: self.robot.requests == self.requests, "the robot to read")
 
     def test_wheels_turn_while_the_last_accepted_command_is_motion(self):
@@ -77,9 +77,9 @@ class TestFakeRobot(unittest.TestCase):
             (TUNE_VELOCITY_ID, 136, VELOCITY_ID),
             (TUNE_POSITION_ID, 134, POSITION_ID),
         ):
-            self.server.sendall(frames.encode_frame(tune_id, b""))
-            self.assertEqual(self.wait_frame(answer_id), b"\0\x0f\0\0\0PID Autotuning!")
-            self.wait_frame(frames.ID_LOG, lambda p: "Tunning" in payloads.decode_log(p).text)
+            self.server.sendall(packets.encode_packet(tune_id, b""))
+            self.assertEqual(self.wait_packet(answer_id), b"\0\x0f\0\0\0PID Autotuning!")
+            self.wait_packet(packets.ID_LOG, lambda p: "Tunning" in payloads.decode_log(p).text)
             for count in (0, 60, 178):  # too short, too short, longer than the receive window
                 self.send(NEUTRAL * count + make_twist(topic_id))
                 self.assertTrue(self.robot.motors.is_turning)

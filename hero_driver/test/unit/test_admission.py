@@ -4,7 +4,7 @@ import ipaddress
 
 import pytest
 
-from hero_driver.admission import (
+from hero_driver.fleet.admission import (
     ARRIVALS_PER_S,
     GARBAGE_LENGTH_MAX,
     GARBAGE_REST_LENGTH,
@@ -139,10 +139,10 @@ def test_a_stock_robot_stays_far_below_the_limits():
         assert guard.judge(7 * step, 1500 * step, step * 0.034) is None
 
 
-def test_too_many_frames_within_a_second_are_too_much():
+def test_too_many_packets_within_a_second_are_too_much():
     guard = RateGuard(100, 10**6, 0.0)
     assert guard.judge(100, 800, 0.5) is None
-    assert guard.judge(101, 808, 0.9) == "more than 100 frames per second (~max_frames_per_s)"
+    assert guard.judge(101, 808, 0.9) == "more than 100 packets per second (~max_packets_per_s)"
 
 
 def test_too_many_bytes_within_a_second_are_too_much():
@@ -163,17 +163,17 @@ def test_a_pause_is_no_credit():
     assert guard.judge(101, 10008, 100.5) is not None
 
 
-def test_bytes_without_a_good_frame_end_it_however_slowly_they_come():
+def test_bytes_without_a_good_packet_end_it_however_slowly_they_come():
     guard = RateGuard(5000, 2000000, 0.0)
     received = 0
     while received + 1000 <= GARBAGE_LENGTH_MAX:
         received += 1000
         assert guard.judge(0, received, received * 0.01) is None
     refusal = guard.judge(0, received + 1000, received * 0.01)
-    assert refusal == "%d bytes without one good frame: this does not speak rosserial" % (received + 1000)
+    assert refusal == "%d bytes without one good packet: this does not speak rosserial" % (received + 1000)
 
 
-def test_a_good_frame_forgives_the_garbage_before_it():
+def test_a_good_packet_forgives_the_garbage_before_it():
     guard = RateGuard(5000, 2000000, 0.0)
     for step in range(100):
         received = 60008 * step
@@ -181,7 +181,7 @@ def test_a_good_frame_forgives_the_garbage_before_it():
         assert guard.judge(step + 1, received + 60008, step * 2.0 + 1.0) is None
 
 
-def test_a_read_without_a_good_frame_is_garbage_and_what_is_left_of_a_frame_is_not():
+def test_a_read_without_a_good_packet_is_garbage_and_what_is_left_of_a_packet_is_not():
     guard = RateGuard(5000, 2000000, 0.0)
     guard.judge(1, 10000, 0.1)
     guard.judge(1, 10000 + GARBAGE_REST_LENGTH - 1, 0.2)

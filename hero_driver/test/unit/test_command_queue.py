@@ -5,8 +5,8 @@ import threading
 
 import pytest
 
-from hero_driver.command_queue import IN_FLIGHT_MAX, QUEUE_LENGTH, RETRY_S, CommandQueue
-from hero_driver.command_shaping import STOPPED_MOTORS, ZERO_TWIST
+from hero_driver.commands.command_queue import IN_FLIGHT_MAX, QUEUE_LENGTH, RETRY_S, CommandQueue
+from hero_driver.commands.velocity_shaper import STOPPED_MOTORS, ZERO_TWIST
 
 VELOCITY = "/hero_0/velocity_controller/cmd_vel"
 POSITION = "/hero_0/position_controller/cmd_vel"

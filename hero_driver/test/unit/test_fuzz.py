@@ -6,12 +6,12 @@ import unicodedata
 from conversation import T0, TIME_OF_DAY_S, open_session
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from vectors import ENCODER_MESSAGE, GOOD, HANDSHAKE, ODOM_MESSAGE, TIME_REQUEST, VECTORS, build_frame
+from vectors import ENCODER_MESSAGE, GOOD, HANDSHAKE, ODOM_MESSAGE, TIME_REQUEST, VECTORS, build_packet
 
 from hero_driver.config import ConfigError, DriverConfig, read_config
-from hero_driver.log_lines import LONGEST_TEXT, read_log_line
-from hero_driver.names import identify
-from hero_driver.rosserial.frames import DEFAULT_MAX_PAYLOAD_LENGTH, OVERHEAD_LENGTH, FrameReader
+from hero_driver.fleet.log_lines import LONGEST_TEXT, read_log_line
+from hero_driver.fleet.namespaces import identify
+from hero_driver.rosserial.packets import DEFAULT_MAX_PAYLOAD_LENGTH, OVERHEAD_LENGTH, PacketReader
 from hero_driver.rosserial.session import SessionEnded
 
 MAX_TOPICS = 8
@@ -73,18 +73,18 @@ def test_a_garbled_robot_never_raises_and_never_grows_beyond_its_bounds(script, 
     assert len(session.topics) <= MAX_TOPICS
     assert session.reader.buffered_length < DEFAULT_MAX_PAYLOAD_LENGTH + OVERHEAD_LENGTH
     assert not any(type(event) is SessionEnded for event in events)
-    # One answer for each frame that asks for one, and nothing else.
-    assert len(session.take_frames()) <= session.reader.frames + 2
+    # One answer for each packet that asks for one, and nothing else.
+    assert len(session.take_packets()) <= session.reader.packets + 2
 
 
 @few
 @given(script=changes)
-def test_after_any_garbage_a_good_frame_is_read_within_one_frame_length(script):
-    reader = FrameReader()
+def test_after_any_garbage_a_good_packet_is_read_within_one_packet_length(script):
+    reader = PacketReader()
     reader.receive_bytes(change(STREAM, script))
     longest = DEFAULT_MAX_PAYLOAD_LENGTH + OVERHEAD_LENGTH
-    frames = reader.receive_bytes(GOOD.data * (longest // len(GOOD.data) + 2))
-    assert (GOOD.topic_id, GOOD.payload) in [(frame.topic_id, frame.payload) for frame in frames]
+    packets = reader.receive_bytes(GOOD.data * (longest // len(GOOD.data) + 2))
+    assert (GOOD.topic_id, GOOD.payload) in [(packet.topic_id, packet.payload) for packet in packets]
 
 
 @few
@@ -103,11 +103,11 @@ def test_what_one_robot_sends_never_changes_what_another_one_says(bad):
 
 
 @given(order=st.permutations(range(12)), ids=st.lists(st.integers(0, 65535), min_size=12, max_size=12))
-def test_good_frames_in_any_order_are_all_read(order, ids):
+def test_good_packets_in_any_order_are_all_read(order, ids):
     session = open_session()
-    frames = [build_frame(ids[index], bytes([index]) * index) for index in order]
-    talk(session, b"".join(frames))
-    assert session.reader.frames == len(frames)
+    packets = [build_packet(ids[index], bytes([index]) * index) for index in order]
+    talk(session, b"".join(packets))
+    assert session.reader.packets == len(packets)
 
 
 values = st.recursive(

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hero_driver.log_lines import LONGEST_TEXT, BootLine, Heartbeat, clean_text, read_log_line
+from hero_driver.fleet.log_lines import LONGEST_TEXT, BootLine, Heartbeat, clean_text, read_log_line
 
 BOOT = "\x1b[94m[/hero_0] Firmware: v3.8 | Hardware: v2.5 | Config: v2.3 | IP: 127.0.0.1 \x1b[0m"
 

@@ -4,7 +4,7 @@ import logging
 
 import pytest
 
-from hero_driver.log_relay import GROUP_LINES_MAX, LogRelay
+from hero_driver.ros.log_relay import GROUP_LINES_MAX, LogRelay
 
 
 class Lines(logging.Handler):

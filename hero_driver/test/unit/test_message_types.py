@@ -7,7 +7,7 @@ import pytest
 import rospy.msg
 from vectors import ANSWER_MD5, EMPTY_MD5, MOTOR_MD5, SET_PID_MD5, STOCK_TOPICS, TWIST_MD5
 
-from hero_driver.message_types import (
+from hero_driver.ros.message_types import (
     MessageTypeError,
     RawMessage,
     apply_aliases,

@@ -2,8 +2,8 @@
 
 import threading
 
-from hero_driver.registrar import HELD_MAX, RobotRegistrar
-from hero_driver.worker import Worker
+from hero_driver.ros.registrar import HELD_MAX, RobotRegistrar
+from hero_driver.ros.worker import Worker
 
 DEADLINE_S = 20.0
 

@@ -6,11 +6,11 @@ import pytest
 import rospy
 
 from hero_driver import reports
-from hero_driver.fleet import RobotRecord, RobotState
-from hero_driver.names import Identity
+from hero_driver.commands.stop_progress import StopState
+from hero_driver.fleet.namespaces import Identity
+from hero_driver.fleet.registry import RobotRecord, RobotState
 from hero_driver.reports import FleetStatus, Reporter
 from hero_driver.robot_status import DUPLICATES_SHOWN, describe_robot
-from hero_driver.stop_progress import StopState
 from hero_msgs.msg import Robot, RobotArray
 
 NOW_S = 1000.0
@@ -92,7 +92,7 @@ def test_what_a_robot_says_of_itself_keeps_no_other_out_of_the_report(reporter):
         booted_s=NOW_S - 9999999.999,
         last_error="x" * 5000,
         dropped_messages=2**63,
-        bad_frames=2**63,
+        bad_packets=2**63,
         reconnects=2**31,
     )
     other = make_record(identity=Identity("/hero_8", 8))

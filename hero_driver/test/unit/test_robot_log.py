@@ -4,8 +4,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from hero_driver.log_relay import LogRelay
 from hero_driver.robot_log import RobotLog
+from hero_driver.ros.log_relay import LogRelay
 from hero_driver.rosserial.payloads import LOG_INFO, Log
 
 NOW_S = 1000.0
@@ -23,7 +23,7 @@ def make_peer():
     return SimpleNamespace(
         label="hero_1",
         link=SimpleNamespace(address=SimpleNamespace(host="10.0.0.1")),
-        bridge=SimpleNamespace(cleaner=None),
+        bridge=SimpleNamespace(corrections=None),
         record=SimpleNamespace(booted_s=None, dropped_messages=0),
         refused=False,
         boot=None,

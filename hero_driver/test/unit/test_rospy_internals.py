@@ -9,8 +9,8 @@ import pytest
 from rosgraph.network import decode_ros_handshake_header, encode_ros_handshake_header
 from rospy.impl import rosout, tcpros_base
 
-from hero_driver import rospy_internals
-from hero_driver.rospy_internals import RosoutHandler, leave_topics_out_of_rosout, open_tcpros_server
+from hero_driver.ros import rospy_internals
+from hero_driver.ros.rospy_internals import RosoutHandler, leave_topics_out_of_rosout, open_tcpros_server
 
 DEADLINE_S = 20.0
 

@@ -5,7 +5,7 @@ import threading
 import pytest
 import rospy
 
-from hero_driver.services import RobotService
+from hero_driver.ros.services import RobotService
 
 NAME = "/hero_0/set_odom"
 LONG_S = 60.0

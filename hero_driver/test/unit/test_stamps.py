@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hero_driver.stamps import NS_PER_S, STEP_NS, StampFilter
+from hero_driver.corrections.stamps import NS_PER_S, STEP_NS, StampFilter
 
 NOW_NS = 1795240942 * NS_PER_S
 MS = 10**6

@@ -2,13 +2,13 @@
 
 import pytest
 
-from hero_driver.stop_progress import (
+from hero_driver.commands.stop_progress import (
     REPORT_AFTER_S,
     TIRED_AFTER_S,
     StopProgress,
     StopState,
 )
-from hero_driver.wheel_motion import WheelMotion
+from hero_driver.corrections.wheel_motion import WheelMotion
 
 READING_S = 0.034
 READ_CYCLE_S = 0.051

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from hero_driver.wheel_motion import REST_READINGS, WheelMotion
+from hero_driver.corrections.wheel_motion import REST_READINGS, WheelMotion
 
 
 def read_all(wheels, ticks):

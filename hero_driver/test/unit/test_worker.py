@@ -3,7 +3,7 @@
 import sys
 import threading
 
-from hero_driver.worker import Worker
+from hero_driver.ros.worker import Worker
 
 DEADLINE_S = 20.0
 

@@ -5,15 +5,15 @@ from typing import Callable, List, Tuple
 
 import numpy as np
 
-from hero_driver.rosserial import frames, payloads
+from hero_driver.rosserial import packets, payloads
 
 from . import faults
 from .errors import OptionError
 from .faults import Fault
 from .simulator import Simulator
 
-_SPOILED_LOG = frames.encode_frame(
-    frames.ID_LOG, payloads.encode_log(payloads.Log(payloads.LOG_INFO, "a line that is spoiled on its way"))
+_SPOILED_LOG = packets.encode_packet(
+    packets.ID_LOG, payloads.encode_log(payloads.Log(payloads.LOG_INFO, "a line that is spoiled on its way"))
 )
 
 
@@ -118,7 +118,7 @@ class FaultInjector:
         if fault.kind == faults.BAD_LENGTH:
             return _SPOILED_LOG[:4] + bytes((_SPOILED_LOG[4] ^ 0x55,)) + _SPOILED_LOG[5:]
         if fault.kind == faults.LONG_FRAME:
-            return frames.encode_frame(frames.ID_LOG, bytes(frames.LONGEST_PAYLOAD_LENGTH))[
-                : frames.HEADER_LENGTH
+            return packets.encode_packet(packets.ID_LOG, bytes(packets.LONGEST_PAYLOAD_LENGTH))[
+                : packets.HEADER_LENGTH
             ]
-        return frames.encode_frame(int(fault.values["id"]) & 0xFFFF, b"\x01\x02\x03\x04")
+        return packets.encode_packet(int(fault.values["id"]) & 0xFFFF, b"\x01\x02\x03\x04")

@@ -233,10 +233,10 @@ class SimulatorTest(unittest.TestCase):
         odoms = [Newest("/hero_%d/odom" % number, Odometry) for number in (2, 4)]
         for odom in odoms:
             odom.wait()
-        before = self.find(4).bad_frames
+        before = self.find(4).bad_packets
         for fault in ("garbage", "half-frame", "bad-checksum", "bad-length", "long-frame", "foreign-id"):
             self.inject(fault + ":robot=4")
-        wait_for(lambda: self.find(4) and self.find(4).bad_frames >= before + 3, "bad frames of hero_4")
+        wait_for(lambda: self.find(4) and self.find(4).bad_packets >= before + 3, "bad frames of hero_4")
         for odom in odoms:
             odom.wait_for_more()
 

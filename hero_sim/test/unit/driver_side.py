@@ -3,7 +3,7 @@
 import collections
 import struct
 
-from hero_driver.rosserial import frames, payloads
+from hero_driver.rosserial import packets, payloads
 from hero_sim import main
 from hero_sim.build import build_swarm
 from hero_sim.robot import declarations as ids
@@ -34,7 +34,7 @@ class DriverSide:
         self.answer_time = answer_time
         self.connect = connect
         count = len(self.swarm.robots)
-        self.readers = [frames.FrameReader() for _ in range(count)]
+        self.readers = [packets.PacketReader() for _ in range(count)]
         self.arrivals = [[] for _ in range(count)]
         self.connects = [[] for _ in range(count)]
 
@@ -61,14 +61,14 @@ class DriverSide:
         robot.outbox.clear()
         for frame in self.readers[index].receive_bytes(data):
             self.arrivals[index].append(Arrival(self.swarm.now_ms, frame.topic_id, frame.payload))
-            if frame.topic_id == frames.ID_TIME and self.answer_time:
-                self.send(index, frames.ID_TIME, payloads.encode_time(self.server_time()))
+            if frame.topic_id == packets.ID_TIME and self.answer_time:
+                self.send(index, packets.ID_TIME, payloads.encode_time(self.server_time()))
 
     def server_time(self):
         return payloads.split_seconds(SERVER_START_S + self.swarm.now_ms / 1000.0)
 
     def send(self, index, topic_id, payload=b""):
-        self.send_bytes(index, frames.encode_frame(topic_id, payload))
+        self.send_bytes(index, packets.encode_packet(topic_id, payload))
 
     def send_bytes(self, index, data):
         self.swarm.robots[index].receive_bytes(self.swarm.now_ms, data)
@@ -83,7 +83,7 @@ class DriverSide:
         """
         self.run(2500)
         for index in range(len(self.swarm.robots)):
-            self.send(index, frames.ID_PUBLISHER)
+            self.send(index, packets.ID_PUBLISHER)
         self.run(1700)
         assert all(robot.configured and not robot.motors.motors.attached for robot in self.swarm.robots)
 

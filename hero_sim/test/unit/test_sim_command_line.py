@@ -15,7 +15,7 @@ import time
 import pytest
 from driver_side import read_encoder, read_odom
 
-from hero_driver.rosserial import frames, payloads
+from hero_driver.rosserial import packets, payloads
 from hero_sim import main
 from hero_sim.faults import KINDS
 from hero_sim.robot import declarations as ids
@@ -97,8 +97,8 @@ class Server:
 class Peer:
     def __init__(self, sock):
         self.socket = sock
-        self.reader = frames.FrameReader()
-        self.frames = []
+        self.reader = packets.PacketReader()
+        self.packets = []
         self.closed = False
 
     def receive(self):
@@ -110,26 +110,26 @@ class Peer:
             self.closed = True
             return False
         for frame in self.reader.receive_bytes(data):
-            self.frames.append(frame)
-            if frame.topic_id == frames.ID_TIME:
-                self.send(frames.ID_TIME, payloads.encode_time(payloads.split_seconds(time.time())))
+            self.packets.append(frame)
+            if frame.topic_id == packets.ID_TIME:
+                self.send(packets.ID_TIME, payloads.encode_time(payloads.split_seconds(time.time())))
         return True
 
     def send(self, topic_id, payload=b""):
-        self.socket.sendall(frames.encode_frame(topic_id, payload))
+        self.socket.sendall(packets.encode_packet(topic_id, payload))
 
     def count(self, topic_id):
-        return sum(frame.topic_id == topic_id for frame in self.frames)
+        return sum(frame.topic_id == topic_id for frame in self.packets)
 
     def logs(self):
         return [
             payloads.decode_log(frame.payload).text
-            for frame in self.frames
-            if frame.topic_id == frames.ID_LOG
+            for frame in self.packets
+            if frame.topic_id == packets.ID_LOG
         ]
 
     def last(self, topic_id):
-        return [frame.payload for frame in self.frames if frame.topic_id == topic_id][-1]
+        return [frame.payload for frame in self.packets if frame.topic_id == topic_id][-1]
 
 
 @pytest.fixture
@@ -156,7 +156,7 @@ def request_when_ready(server, count):
         and all(any("Conected" in text for text in peer.logs()) for peer in server.peers)
     )
     for peer in server.peers:
-        peer.send(frames.ID_PUBLISHER)
+        peer.send(packets.ID_PUBLISHER)
     server.run_until(lambda: all(peer.count(ids.ID_ODOM) > 3 for peer in server.peers))
 
 
@@ -164,20 +164,20 @@ def test_robots_dial_declare_stream_and_drive(simulate, server):
     simulate("--count", "3", "--first-id", "5", "--port", str(server.port))
     request_when_ready(server, 3)
     names = {
-        payloads.decode_topic_info(peer.frames[[f.topic_id for f in peer.frames].index(0)].payload).name
+        payloads.decode_topic_info(peer.packets[[f.topic_id for f in peer.packets].index(0)].payload).name
         for peer in server.peers
     }
     assert names == {"/hero_5/laser", "/hero_6/laser", "/hero_7/laser"}
     peer = server.peers[0]
 
     def moved():
-        if len(peer.frames) % 5 == 0:
+        if len(peer.packets) % 5 == 0:
             peer.send(ids.ID_POSITION_CMD_VEL, struct.pack("<6d", 0.1, 0, 0, 0, 0, 0))
         return read_odom(peer.last(ids.ID_ODOM))[2][0] > 0.05
 
     server.run_until(moved)
     assert read_odom(server.peers[1].last(ids.ID_ODOM))[2][0] == 0.0
-    assert all(peer.reader.bad_frames == 0 for peer in server.peers)
+    assert all(peer.reader.bad_packets == 0 for peer in server.peers)
 
 
 def test_robots_that_are_servers_are_dialled(simulate):
@@ -211,9 +211,9 @@ def test_a_robot_that_vanishes_sends_no_end_and_its_successor_boots(simulate, se
     assert not old.closed
     assert "Firmware" in new.logs()[0]
     # Without power nothing is acknowledged either: what the driver sends stays in its own system.
-    old.send(frames.ID_PUBLISHER)
+    old.send(packets.ID_PUBLISHER)
     assert not wait_until_acknowledged(old.socket, 0.5)
-    new.send(frames.ID_PUBLISHER)
+    new.send(packets.ID_PUBLISHER)
     assert wait_until_acknowledged(new.socket, LIMIT_S)
 
 
@@ -222,7 +222,7 @@ def test_a_robot_that_leaves_closes_and_streams_on_when_it_is_back(simulate, ser
     request_when_ready(server, 1)
     server.run_until(lambda: server.peers[0].closed)
     server.run_until(lambda: len(server.peers) == 2 and server.peers[1].count(ids.ID_ODOM) > 0)
-    assert server.peers[1].count(frames.ID_PUBLISHER) == 0
+    assert server.peers[1].count(packets.ID_PUBLISHER) == 0
     assert not any("Firmware" in text for text in server.peers[1].logs())
 
 
@@ -236,11 +236,11 @@ def test_zero_topics_are_declared_at_the_second_request_only(simulate, server):
     simulate("--port", str(server.port), "--fault", "zero-topics@0.1")
     server.run_until(lambda: server.peers and any("Conected" in text for text in server.peers[-1].logs()))
     peer = server.peers[-1]
-    peer.send(frames.ID_PUBLISHER)
+    peer.send(packets.ID_PUBLISHER)
     server.run_until(lambda: peer.count(ids.ID_ODOM) > 3)
-    assert peer.count(frames.ID_PUBLISHER) == 0
-    peer.send(frames.ID_PUBLISHER)
-    server.run_until(lambda: peer.count(frames.ID_PUBLISHER) == 5)
+    assert peer.count(packets.ID_PUBLISHER) == 0
+    peer.send(packets.ID_PUBLISHER)
+    server.run_until(lambda: peer.count(packets.ID_PUBLISHER) == 5)
 
 
 def test_wrong_bytes_cost_at_most_the_frame_beside_them(simulate, server):
@@ -250,7 +250,7 @@ def test_wrong_bytes_cost_at_most_the_frame_beside_them(simulate, server):
     request_when_ready(server, 1)
     peer = server.peers[0]
     # All but the garbage begin like a frame.
-    server.run_until(lambda: peer.reader.bad_frames >= 4 and peer.reader.skipped_bytes > 200)
+    server.run_until(lambda: peer.reader.bad_packets >= 4 and peer.reader.skipped_bytes > 200)
     seen = peer.count(ids.ID_ODOM)
     server.run_until(lambda: peer.count(ids.ID_ODOM) > seen + 5)
     assert not peer.closed
@@ -266,7 +266,7 @@ def test_a_frozen_robot_is_silent_and_goes_on(simulate, server):
     stamps = []
 
     def gap():
-        stamps.append((time.monotonic(), len(peer.frames)))
+        stamps.append((time.monotonic(), len(peer.packets)))
         quiet = [at_s for at_s, count in stamps if count == stamps[-1][1]]
         return quiet[-1] - quiet[0] > 1.0
 
@@ -350,7 +350,7 @@ def test_a_network_with_delays_still_carries_everything(simulate, server):
     simulate("--count", "2", "--port", str(server.port), "--wifi", "hotspot")
     request_when_ready(server, 2)
     server.run_until(lambda: all(peer.count(ids.ID_ODOM) > 60 for peer in server.peers))
-    assert all(peer.reader.bad_frames == 0 and peer.reader.skipped_bytes == 0 for peer in server.peers)
+    assert all(peer.reader.bad_packets == 0 and peer.reader.skipped_bytes == 0 for peer in server.peers)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

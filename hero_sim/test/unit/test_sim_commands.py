@@ -5,7 +5,7 @@ from driver_side import DriverSide, read_laser
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hero_driver.rosserial import frames
+from hero_driver.rosserial import packets
 from hero_sim.robot import declarations as ids
 
 
@@ -68,7 +68,7 @@ def test_an_id_in_an_empty_slot_is_ignored():
 def test_a_frame_in_two_pieces_is_lost_unless_both_come_before_the_robot_looks():
     driver = DriverSide()
     driver.start_streaming()
-    frame = frames.encode_frame(ids.ID_LASER_ENABLE, b"\x00")
+    frame = packets.encode_packet(ids.ID_LASER_ENABLE, b"\x00")
     driver.send_bytes(0, frame[:5])
     driver.run(60)
     driver.send_bytes(0, frame[5:])
@@ -102,9 +102,9 @@ def test_a_robot_survives_whatever_a_server_sends(sent, noise):
         driver.send(0, topic_id, payload)
     driver.run(400)
     driver.send_bytes(0, noise)
-    driver.send(0, frames.ID_PUBLISHER)
+    driver.send(0, packets.ID_PUBLISHER)
     driver.run(400)
     if driver.swarm.robots[0].crash_reason is None:
-        assert driver.list_frames(0, frames.ID_PUBLISHER)
+        assert driver.list_frames(0, packets.ID_PUBLISHER)
     else:
         assert any(12 <= topic_id <= 99 or topic_id in (2, 3, 4, 5, 7, 8, 9, 1) for topic_id, _ in sent)

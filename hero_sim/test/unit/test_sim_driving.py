@@ -4,7 +4,7 @@ import struct
 import pytest
 from driver_side import DriverSide, read_encoder, read_odom
 
-from hero_driver.rosserial import frames
+from hero_driver.rosserial import packets
 from hero_sim.robot import declarations as ids
 from hero_sim.robot.imu_hat import ImuHat
 from hero_sim.robot_constants import RECEIVE_WINDOW_LENGTH
@@ -19,11 +19,11 @@ def test_a_stop_of_transmission_leaves_log_lines_and_lets_a_moving_robot_run_awa
     driver = DriverSide("--perfect")
     driver.start_streaming()
     driver.drive(0, 0.1, 0.0, 600)
-    driver.send(0, frames.ID_TX_STOP)
+    driver.send(0, packets.ID_TX_STOP)
     driver.run(500)
     since_ms = driver.swarm.now_ms
     driver.run(1500)
-    assert {arrival.topic_id for arrival in driver.arrivals[0] if arrival.at_ms > since_ms} == {frames.ID_LOG}
+    assert {arrival.topic_id for arrival in driver.arrivals[0] if arrival.at_ms > since_ms} == {packets.ID_LOG}
     # 0.06 m/s on the stock robot; where in its cycle the stop comes makes the difference.
     assert 0.03 < driver.measure_speed(0) < 0.10
 
@@ -88,7 +88,7 @@ def test_a_stop_within_50_ms_of_the_last_command_is_dropped():
     driver = DriverSide()
     driver.start_streaming()
     driver.drive(0, 0.1, 0.0, 1000)
-    move = frames.encode_frame(ids.ID_VELOCITY_CMD_VEL, struct.pack("<6d", 0.1, 0, 0, 0, 0, 0))
+    move = packets.encode_packet(ids.ID_VELOCITY_CMD_VEL, struct.pack("<6d", 0.1, 0, 0, 0, 0, 0))
     driver.run(60)
     driver.send_bytes(0, move)
     driver.send_twist(0, 0.0, 0.0)

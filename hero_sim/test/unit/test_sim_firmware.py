@@ -5,7 +5,7 @@ from driver_side import SERVER_START_S, DriverSide, read_odom
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hero_driver.rosserial import frames, payloads
+from hero_driver.rosserial import packets, payloads
 from hero_sim.robot import declarations as ids
 
 
@@ -26,18 +26,18 @@ def test_a_boot_speaks_first_and_at_the_stock_robots_times():
 def test_nothing_but_log_lines_comes_before_a_request():
     driver = DriverSide()
     driver.run(10000)
-    assert {arrival.topic_id for arrival in driver.arrivals[0]} == {frames.ID_LOG}
+    assert {arrival.topic_id for arrival in driver.arrivals[0]} == {packets.ID_LOG}
 
 
 def test_a_request_is_answered_by_a_time_request_and_all_declarations_in_one_burst():
     driver = DriverSide()
     driver.run(2500)
-    driver.send(0, frames.ID_PUBLISHER)
+    driver.send(0, packets.ID_PUBLISHER)
     driver.run(102)
     burst = [
         arrival
         for arrival in driver.arrivals[0]
-        if arrival.topic_id < 7 or arrival.topic_id == frames.ID_TIME
+        if arrival.topic_id < 7 or arrival.topic_id == packets.ID_TIME
     ]
     assert [arrival.topic_id for arrival in burst[:25]] == [10, 0, 2, 0, 0, 0, 0] + [2] * 6 + [
         1,
@@ -60,7 +60,7 @@ def test_a_repeated_request_repeats_the_burst_one_per_spin():
     driver = DriverSide()
     driver.start_streaming()
     driver.arrivals[0].clear()
-    driver.send_bytes(0, frames.encode_frame(0, b"") * 3)
+    driver.send_bytes(0, packets.encode_packet(0, b"") * 3)
     driver.run(300)
     times = [arrival.at_ms for arrival in driver.list_frames(0, 0)][::5]
     assert len(times) == 3
@@ -71,14 +71,14 @@ def test_a_request_before_the_robot_advertised_gets_no_topics_and_undeclared_dat
     driver = DriverSide()
     while not driver.connects[0]:
         driver.run(1)
-    driver.send(0, frames.ID_PUBLISHER)
+    driver.send(0, packets.ID_PUBLISHER)
     driver.run(3000)
-    assert len(driver.list_frames(0, frames.ID_TIME)) >= 1
-    assert not driver.list_frames(0, frames.ID_PUBLISHER)
+    assert len(driver.list_frames(0, packets.ID_TIME)) >= 1
+    assert not driver.list_frames(0, packets.ID_PUBLISHER)
     assert driver.list_frames(0, ids.ID_ODOM)
-    driver.send(0, frames.ID_PUBLISHER)
+    driver.send(0, packets.ID_PUBLISHER)
     driver.run(200)
-    assert len(driver.list_frames(0, frames.ID_PUBLISHER)) == 5
+    assert len(driver.list_frames(0, packets.ID_PUBLISHER)) == 5
 
 
 def test_rates_are_the_stock_robots():
@@ -130,12 +130,12 @@ def test_stamps_are_uptime_before_the_first_answer_and_server_time_after():
 def test_a_late_answer_puts_the_clock_ahead_by_its_lateness():
     driver = DriverSide(answer_time=False)
     driver.run(2500)
-    driver.send(0, frames.ID_PUBLISHER)
+    driver.send(0, packets.ID_PUBLISHER)
     driver.run(400)
     # The answer holds the time at which it is made, 0.3 s and more after the robot asked.
-    asked_ms = driver.list_frames(0, frames.ID_TIME)[0].at_ms
+    asked_ms = driver.list_frames(0, packets.ID_TIME)[0].at_ms
     made_ms = driver.swarm.now_ms
-    driver.send(0, frames.ID_TIME, payloads.encode_time(driver.server_time()))
+    driver.send(0, packets.ID_TIME, payloads.encode_time(driver.server_time()))
     driver.run(200)
     arrival = driver.list_frames(0, ids.ID_ODOM)[-1]
     seconds, nanoseconds = read_odom(arrival.payload)[0]
@@ -146,14 +146,14 @@ def test_a_late_answer_puts_the_clock_ahead_by_its_lateness():
 def test_without_time_answers_a_robot_stops_streaming_after_eleven_seconds_and_a_request_revives_it():
     driver = DriverSide(answer_time=False)
     driver.run(2500)
-    driver.send(0, frames.ID_PUBLISHER)
+    driver.send(0, packets.ID_PUBLISHER)
     driver.run(20000)
-    asked = [arrival.at_ms for arrival in driver.list_frames(0, frames.ID_TIME)]
+    asked = [arrival.at_ms for arrival in driver.list_frames(0, packets.ID_TIME)]
     assert len(asked) == 5
     assert all(2501 <= later - earlier <= 2551 for earlier, later in zip(asked, asked[1:]))
     last_ms = driver.list_frames(0, ids.ID_ODOM)[-1].at_ms
     assert last_ms - asked[0] == pytest.approx(11000, abs=60)
-    driver.send(0, frames.ID_PUBLISHER)
+    driver.send(0, packets.ID_PUBLISHER)
     driver.run(200)
     assert driver.list_frames(0, ids.ID_ODOM, last_ms + 1)
 
@@ -172,7 +172,7 @@ def test_a_robot_that_lost_its_connection_dials_at_every_look_and_streams_on_at_
     back_ms = driver.connects[0][-1]
     driver.run(60)
     assert driver.list_frames(0, ids.ID_ODOM, back_ms)[0].at_ms - back_ms <= 35
-    assert not driver.list_frames(0, frames.ID_PUBLISHER, back_ms)
+    assert not driver.list_frames(0, packets.ID_PUBLISHER, back_ms)
 
 
 def test_a_zero_that_came_with_the_end_of_a_connection_is_lost():
@@ -188,19 +188,19 @@ def test_a_zero_that_came_with_the_end_of_a_connection_is_lost():
     assert driver.measure_speed(0) > 0.03
 
 
-packets = st.sampled_from(
+packet_bytes = st.sampled_from(
     [
-        frames.encode_frame(frames.ID_PUBLISHER, b""),
-        frames.encode_frame(ids.ID_LED, bytes(16)) * 5,
-        frames.encode_frame(ids.ID_CMD_MOTOR, bytes(4)) * 5,
-        frames.encode_frame(ids.ID_VELOCITY_CMD_VEL, bytes(48)),
-        frames.encode_frame(ids.ID_VELOCITY_PID_CALIBRATION, b""),
+        packets.encode_packet(packets.ID_PUBLISHER, b""),
+        packets.encode_packet(ids.ID_LED, bytes(16)) * 5,
+        packets.encode_packet(ids.ID_CMD_MOTOR, bytes(4)) * 5,
+        packets.encode_packet(ids.ID_VELOCITY_CMD_VEL, bytes(48)),
+        packets.encode_packet(ids.ID_VELOCITY_PID_CALIBRATION, b""),
     ]
 )
 happenings = st.sampled_from(["lost", "made", "failed", "frozen", "blocked", "unblocked", "restarted"])
 
 
-@given(script=st.lists(st.tuples(st.integers(0, 120), st.one_of(packets, happenings)), max_size=25))
+@given(script=st.lists(st.tuples(st.integers(0, 120), st.one_of(packet_bytes, happenings)), max_size=25))
 @settings(max_examples=100, deadline=None)
 def test_whatever_happens_to_its_link_a_robot_runs_again_but_not_at_once(script):
     driver = DriverSide()

@@ -5,7 +5,7 @@ import struct
 import driver_side
 import pytest
 
-from hero_driver.rosserial import frames, payloads
+from hero_driver.rosserial import packets, payloads
 from hero_sim.robot import declarations, messages
 
 ROOT = os.path.dirname(os.path.abspath(__file__)) + "/../../.."
@@ -13,9 +13,9 @@ CAPTURES = os.environ.get("HERO_CAPTURES", os.path.join(ROOT, "..", "shared", "c
 
 
 def read_frames(data):
-    reader = frames.FrameReader()
+    reader = packets.PacketReader()
     result = reader.receive_bytes(data)
-    assert reader.bad_frames == 0 and reader.buffered_length == 0
+    assert reader.bad_packets == 0 and reader.buffered_length == 0
     return result
 
 
@@ -108,7 +108,7 @@ def capture():
     if not os.path.exists(path):
         pytest.skip("no captures of a stock robot here (HERO_CAPTURES names their folder)")
     with open(path, "rb") as file:
-        return frames.FrameReader().receive_bytes(file.read())
+        return packets.PacketReader().receive_bytes(file.read())
 
 
 def test_the_stock_robots_own_cycles_are_rebuilt_byte_for_byte(capture):
@@ -138,7 +138,7 @@ def test_the_stock_robots_own_cycles_are_rebuilt_byte_for_byte(capture):
 
 def test_the_stock_robots_own_handshake_and_laser_are_rebuilt_byte_for_byte(capture):
     declared = [frame for frame in capture if frame.topic_id < 4]
-    assert b"".join(frames.encode_frame(*frame) for frame in declared) == declarations.encode_declarations(
+    assert b"".join(packets.encode_packet(*frame) for frame in declared) == declarations.encode_declarations(
         "hero_0"
     )
     lasers = [frame for frame in capture if frame.topic_id == 125]

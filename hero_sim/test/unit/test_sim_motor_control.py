@@ -6,7 +6,7 @@ from driver_side import DriverSide, read_encoder
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hero_driver.rosserial import frames
+from hero_driver.rosserial import packets
 from hero_sim.robot import declarations as ids
 from hero_sim.robot_constants import TICK_M
 
@@ -222,7 +222,7 @@ def test_neutral_pulses_let_a_wheel_with_another_centre_creep_for_a_second():
 def test_until_3_s_of_uptime_the_position_controller_holds_the_robot():
     driver = DriverSide("--perfect", "--motors", "factory", "--error", "left_centre_us=1540")
     driver.run(1900)
-    driver.send(0, frames.ID_PUBLISHER)
+    driver.send(0, packets.ID_PUBLISHER)
     attached_ms = []
     robot = driver.swarm.robots[0]
     for _ in range(3000):
@@ -281,7 +281,7 @@ def test_whatever_robots_are_sent_they_stay_out_of_walls_and_each_other_and_stop
         driver.run(100)
     for robot in range(5):
         # Behind packets that hold its loop for 55 ms a robot accepts zeros, also while it tunes itself.
-        neutral = frames.encode_frame(ids.ID_CMD_MOTOR, struct.pack("<2h", 1500, 1500))
+        neutral = packets.encode_packet(ids.ID_CMD_MOTOR, struct.pack("<2h", 1500, 1500))
         driver.send_bytes(robot, neutral * 110)
         driver.send_twist(robot, 0.0, 0.0)
         driver.send_twist(robot, 0.0, 0.0, ids.ID_POSITION_CMD_VEL)

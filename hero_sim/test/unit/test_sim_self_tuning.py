@@ -3,15 +3,15 @@ import struct
 import pytest
 from driver_side import DriverSide
 
-from hero_driver.rosserial import frames
+from hero_driver.rosserial import packets
 from hero_sim.robot import declarations as ids
 from hero_sim.robot_constants import RECEIVE_WINDOW_LENGTH
 
 VELOCITY = (ids.ID_VELOCITY_CMD_VEL, ids.ID_VELOCITY_PID_CALIBRATION, ids.ID_VELOCITY_PID_CALIBRATION_ANSWER)
 POSITION = (ids.ID_POSITION_CMD_VEL, ids.ID_POSITION_PID_CALIBRATION, ids.ID_POSITION_PID_CALIBRATION_ANSWER)
 ZERO = bytes(48)
-NEUTRAL_PULSES = frames.encode_frame(ids.ID_CMD_MOTOR, struct.pack("<2h", 1500, 1500))
-DARK = frames.encode_frame(ids.ID_LED, bytes(16))
+NEUTRAL_PULSES = packets.encode_packet(ids.ID_CMD_MOTOR, struct.pack("<2h", 1500, 1500))
+DARK = packets.encode_packet(ids.ID_LED, bytes(16))
 
 both_controllers = pytest.mark.parametrize("controller", [VELOCITY, POSITION], ids=["velocity", "position"])
 
@@ -36,7 +36,7 @@ def is_tuning(driver, controller):
 
 def end_with(controllers, filler, count):
     """Return what is sent at once: packets that hold the robot's loop, and the zeros behind them."""
-    zeros = [frames.encode_frame(controller[0], ZERO) for controller in controllers]
+    zeros = [packets.encode_packet(controller[0], ZERO) for controller in controllers]
     return filler * count + b"".join(zeros)
 
 

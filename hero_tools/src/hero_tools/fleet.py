@@ -100,7 +100,7 @@ class FleetListener:
             state=STATES.get(robot.state, str(robot.state)),
             stop_state=STOP_STATES.get(robot.stop_state, str(robot.stop_state)),
             odom_hz=track.odometry.rate_hz(now_s),
-            frames_per_s=robot.frames_per_s,
+            packets_per_s=robot.packets_per_s,
             bytes_per_s=robot.bytes_per_s,
             pose=track.pose,
             way_m=track.way_m,

@@ -105,7 +105,7 @@ def make_row_dict(row: RobotRow) -> Dict[str, Any]:
         "state": row.state,
         "stop_state": row.stop_state,
         "odom_hz": round(row.odom_hz, 2),
-        "frames_per_s": round(row.frames_per_s, 2),
+        "packets_per_s": round(row.packets_per_s, 2),
         "bytes_per_s": round(row.bytes_per_s, 1),
         "pose": None
         if row.pose is None

@@ -27,7 +27,7 @@ def make_row(robot_id, **changes):
         state="READY",
         stop_state="",
         odom_hz=29.3,
-        frames_per_s=211.0,
+        packets_per_s=211.0,
         bytes_per_s=44051.0,
         pose=Pose(0.0, 0.0, 0.0),
         way_m=1.0,

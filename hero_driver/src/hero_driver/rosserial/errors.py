@@ -1,6 +1,6 @@
 """The exceptions of the rosserial core: all of them are mistakes of ours, never of the peer.
 
-What a peer does wrong is an event or a counter (see frames.FrameReader and session.Session); decoding
+What a peer does wrong is an event or a counter (see packets.PacketReader and session.Session); decoding
 functions raise PayloadError so that the session can turn it into such an event.
 """
 
@@ -9,8 +9,8 @@ class RosserialError(Exception):
     """Base of everything that the rosserial core raises."""
 
 
-class FrameTooLongError(RosserialError, ValueError):
-    """A payload does not fit the length that a frame or the peer's buffer can hold."""
+class PacketTooLongError(RosserialError, ValueError):
+    """A payload does not fit the length that a packet or the peer's buffer can hold."""
 
 
 class TopicIdError(RosserialError, ValueError):

@@ -1,4 +1,4 @@
-"""Payloads of rosserial's own frames <-> Python values; payloads of topics are not looked at here.
+"""Payloads of rosserial's own packets <-> Python values; payloads of topics are not looked at here.
 
 Field order is the wire of rosserial_msgs: TopicInfo (id, name, type, md5, buffer size), Log (level, text),
 RequestParam (name and the lists ints, floats, strings) and std_msgs/Time (seconds, nanoseconds).
@@ -9,7 +9,7 @@ import struct
 from typing import List, NamedTuple, Sequence, Tuple
 
 from .errors import PayloadError
-from .frames import Bytes
+from .packets import Bytes
 
 _UINT16 = struct.Struct("<H")
 _UINT32 = struct.Struct("<I")
@@ -97,7 +97,7 @@ def _encode_text(text: str) -> bytes:
 
 
 def encode_topic_info(info: TopicInfo) -> bytes:
-    """Return the payload that declares info (frame ids 0..5 say in which direction)."""
+    """Return the payload that declares info (packet ids 0..5 say in which direction)."""
     return b"".join(
         (
             _UINT16.pack(info.topic_id),

@@ -11,9 +11,9 @@ import re
 from dataclasses import dataclass, field
 from typing import Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple, Union
 
-from . import frames, payloads
-from .errors import FrameTooLongError, PayloadError, TopicIdError
-from .frames import Bytes, FrameReader, encode_frame
+from . import packets, payloads
+from .errors import PacketTooLongError, PayloadError, TopicIdError
+from .packets import Bytes, PacketReader, encode_packet
 from .payloads import Log, TopicInfo
 
 REQUEST_INTERVAL_S = 1.5
@@ -42,14 +42,14 @@ _NAME = re.compile(r"[/~]?[a-zA-Z][a-zA-Z0-9_/]*\Z")
 
 
 class TopicKind(enum.Enum):
-    """What a declared id carries, seen from the robot; the value is the id of the declaring frame."""
+    """What a declared id carries, seen from the robot; the value is the id of the declaring packet."""
 
-    PUBLISHER = frames.ID_PUBLISHER
-    SUBSCRIBER = frames.ID_SUBSCRIBER
-    SERVICE_ANSWERS = frames.ID_SERVICE_SERVER_PUBLISHER
-    SERVICE_REQUESTS = frames.ID_SERVICE_SERVER_SUBSCRIBER
-    CLIENT_REQUESTS = frames.ID_SERVICE_CLIENT_PUBLISHER
-    CLIENT_ANSWERS = frames.ID_SERVICE_CLIENT_SUBSCRIBER
+    PUBLISHER = packets.ID_PUBLISHER
+    SUBSCRIBER = packets.ID_SUBSCRIBER
+    SERVICE_ANSWERS = packets.ID_SERVICE_SERVER_PUBLISHER
+    SERVICE_REQUESTS = packets.ID_SERVICE_SERVER_SUBSCRIBER
+    CLIENT_REQUESTS = packets.ID_SERVICE_CLIENT_PUBLISHER
+    CLIENT_ANSWERS = packets.ID_SERVICE_CLIENT_SUBSCRIBER
 
     @property
     def is_from_robot(self) -> bool:
@@ -59,7 +59,7 @@ class TopicKind(enum.Enum):
 
 _MESSAGES = frozenset((TopicKind.PUBLISHER, TopicKind.SERVICE_ANSWERS))
 _FROM_ROBOT = _MESSAGES | {TopicKind.CLIENT_REQUESTS}
-_KIND_BY_FRAME_ID = {kind.value: kind for kind in TopicKind}
+_KIND_BY_PACKET_ID = {kind.value: kind for kind in TopicKind}
 
 
 def _ignore(payload: bytes, arrival_ns: int) -> None:
@@ -105,7 +105,7 @@ class LogReceived(NamedTuple):
 
 
 class TimeRequested(NamedTuple):
-    """The robot asked for the time; the answer is among take_frames()."""
+    """The robot asked for the time; the answer is among take_packets()."""
 
 
 class ParameterRequested(NamedTuple):
@@ -142,7 +142,7 @@ Event = Union[
 class SessionLimits:
     """What one peer may do before it is refused."""
 
-    max_payload_length: int = frames.DEFAULT_MAX_PAYLOAD_LENGTH
+    max_payload_length: int = packets.DEFAULT_MAX_PAYLOAD_LENGTH
     max_topics: int = 64
     max_name_length: int = 128
     declare_timeout_s: float = 20.0
@@ -154,9 +154,9 @@ class Session:
 
     Attributes:
         topics: declared topics by id.
-        reader: the frame reader, for its counters.
+        reader: the packet reader, for its counters.
         undeclared_messages: messages on ids that were not declared.
-        outgoing: frames that the session itself wants to send; take_frames() takes them.
+        outgoing: packets that the session itself wants to send; take_packets() takes them.
         last_receive_s: when bytes came last, or the conversation began.
     """
 
@@ -164,7 +164,7 @@ class Session:
         self.topics: Dict[int, Topic] = {}
         self._messages: Dict[int, Topic] = {}  # those of the topics that come as Message
         self._receivers: Dict[int, Topic] = {}  # those that the robot receives
-        self.reader = FrameReader(limits.max_payload_length)
+        self.reader = PacketReader(limits.max_payload_length)
         self.undeclared_messages = 0
         self.opened_s = now_s
         self.last_receive_s = now_s
@@ -216,48 +216,48 @@ class Session:
         if not self.topics and now_s - self.opened_s > self._limits.declare_timeout_s:
             return [SessionEnded("declared no topic within %.1f s" % self._limits.declare_timeout_s)]
         if self._request_due_s is not None and now_s >= self._request_due_s:
-            self.outgoing.append(encode_frame(frames.ID_PUBLISHER, b""))
+            self.outgoing.append(encode_packet(packets.ID_PUBLISHER, b""))
             self._last_request_s = now_s
             self._requests += 1
             self._request_due_s = None if self.topics else now_s + REQUEST_INTERVAL_S
         return []
 
-    def take_frames(self) -> List[bytes]:
-        """Return the frames that the session itself wants to send, and forget them."""
+    def take_packets(self) -> List[bytes]:
+        """Return the packets that the session itself wants to send, and forget them."""
         outgoing, self.outgoing = self.outgoing, []
         return outgoing
 
     def encode_message(self, topic_id: int, payload: Bytes) -> bytes:
-        """Return the frame that sends payload to the robot.
+        """Return the packet that sends payload to the robot.
 
         Raises: TopicIdError unless this connection declared topic_id as something that the robot receives
-        (the robot indexes an array with the id unchecked, node_handle.h:326), FrameTooLongError for more
+        (the robot indexes an array with the id unchecked, node_handle.h:326), PacketTooLongError for more
         than the robot's buffer (unchecked too, node_handle.h:232).
         """
         topic = self._receivers.get(topic_id)
         if topic is None:
             raise TopicIdError("id %d was not declared as something that this robot receives" % topic_id)
         if len(payload) > topic.info.buffer_length:
-            raise FrameTooLongError(
+            raise PacketTooLongError(
                 "%s: a message of %d bytes does not fit the robot's buffer of %d bytes"
                 % (topic.info.name, len(payload), topic.info.buffer_length)
             )
-        return encode_frame(topic_id, payload)
+        return encode_packet(topic_id, payload)
 
     def encode_parameter_answer(
         self, ints: Sequence[int], floats: Sequence[float], strings: Sequence[str]
     ) -> bytes:
-        """Return the frame that answers a ParameterRequested.
+        """Return the packet that answers a ParameterRequested.
 
-        Raises: PayloadError for numbers outside 32 bits, FrameTooLongError for more than the robot's buffer.
+        Raises: PayloadError for numbers outside 32 bits, PacketTooLongError for more than the robot's buffer.
         """
         payload = payloads.encode_parameter_answer(ints, floats, strings)
         if len(payload) > self._limits.max_payload_length:
-            raise FrameTooLongError(
+            raise PacketTooLongError(
                 "a parameter of %d bytes does not fit the robot's buffer of %d bytes"
                 % (len(payload), self._limits.max_payload_length)
             )
-        return encode_frame(frames.ID_PARAMETER_REQUEST, payload)
+        return encode_packet(packets.ID_PARAMETER_REQUEST, payload)
 
     def _receive_special(
         self, topic_id: int, payload: bytes, now_s: float, time_of_day_s: float
@@ -266,13 +266,13 @@ class Session:
         if topic is not None and topic.kind is TopicKind.CLIENT_REQUESTS:
             self._last_configured_s = now_s
             return CallReceived(topic, payload)
-        if topic_id in _KIND_BY_FRAME_ID:
-            return self._declare(_KIND_BY_FRAME_ID[topic_id], payload)
-        if topic_id == frames.ID_TIME:
+        if topic_id in _KIND_BY_PACKET_ID:
+            return self._declare(_KIND_BY_PACKET_ID[topic_id], payload)
+        if topic_id == packets.ID_TIME:
             payloads.decode_time(payload)
             self._last_configured_s = now_s
             answer = payloads.encode_time(payloads.split_seconds(time_of_day_s))
-            self.outgoing.append(encode_frame(frames.ID_TIME, answer))
+            self.outgoing.append(encode_packet(packets.ID_TIME, answer))
             if not self.topics:
                 due_s = now_s + TIME_WITHOUT_TOPICS_S
                 # Only the first time is it the handshake of a boot; a peer may answer each request like this.
@@ -280,12 +280,12 @@ class Session:
                     due_s if self._requests < 2 else max(due_s, self._earliest_repeat_s(now_s))
                 )
             return TimeRequested()
-        if topic_id == frames.ID_LOG:
+        if topic_id == packets.ID_LOG:
             log = payloads.decode_log(payload)
             if not self.topics or now_s - self._last_configured_s > UNCONFIGURED_S:
                 self._expect_topics_by(self._earliest_repeat_s(now_s))
             return LogReceived(log)
-        if topic_id == frames.ID_PARAMETER_REQUEST:
+        if topic_id == packets.ID_PARAMETER_REQUEST:
             return ParameterRequested(payloads.decode_parameter_request(payload))
         return self._receive_undeclared(topic_id, now_s)
 
@@ -350,8 +350,8 @@ class Session:
             return "its type %s is not of the form package/Type" % _shorten(info.message_type)
         if not _MD5SUM.match(info.md5sum):
             return "its md5 %s is not 32 hexadecimal digits" % _shorten(info.md5sum)
-        if info.topic_id < frames.FIRST_TOPIC_ID:
-            return "its id %d is below %d" % (info.topic_id, frames.FIRST_TOPIC_ID)
+        if info.topic_id < packets.FIRST_TOPIC_ID:
+            return "its id %d is below %d" % (info.topic_id, packets.FIRST_TOPIC_ID)
         if info.buffer_length < BUFFER_LENGTH_MIN:
             return "its buffer_size is %d" % info.buffer_length
         return None

@@ -221,7 +221,7 @@ class EventLoop(LinkOwner, DiallerOwner):
 
     def _set_options(self, sock: socket.socket) -> None:
         sock.setblocking(False)
-        # The robot drops a frame whose parts arrive more than 20 ms apart (node_handle.h:199), so nothing
+        # The robot drops a packet whose parts arrive more than 20 ms apart (node_handle.h:199), so nothing
         # may wait for an acknowledgement.
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)

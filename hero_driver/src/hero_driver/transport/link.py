@@ -1,4 +1,4 @@
-"""One TCP connection: reads, and writes each frame with one send or keeps it until the socket takes it."""
+"""One TCP connection: reads, and writes each packet with one send or keeps it until the socket takes it."""
 
 import collections
 import fcntl
@@ -9,7 +9,7 @@ import termios
 from typing import Any, Callable, Deque, NamedTuple, Optional
 
 READ_LENGTH = 4096
-"""Read at once from one robot: two bursts. What looks like a frame at every second byte costs 1 ms at this length,
+"""Read at once from one robot: two bursts. What looks like a packet at every second byte costs 1 ms at this length,
 so that no robot's bytes, however wrong, delay the others by more in a turn of the loop."""
 
 UNSENT_MAX = 65536
@@ -102,7 +102,7 @@ class Link:
         self.closed = False
         self.rests = False  # it is not read for a while
         self.peer: Any = None  # the handler's own record of who is at the other end
-        self.handed_length = 0  # bytes of all frames given to send_frame()
+        self.handed_length = 0  # bytes of all packets given to send_packet()
         self.received_length = 0  # bytes of all that read() has returned
         self._loop = loop
         self._socket = sock
@@ -112,21 +112,21 @@ class Link:
         self._unsent: Deque[bytes] = collections.deque()
         self._unsent_length = 0
 
-    def send_frame(self, frame: bytes) -> None:
-        """Write one whole frame with one send, or keep it until the socket takes it."""
+    def send_packet(self, packet: bytes) -> None:
+        """Write one whole packet with one send, or keep it until the socket takes it."""
         if self.closed:
             return
-        self.handed_length += len(frame)
+        self.handed_length += len(packet)
         if self._unsent:
-            self._keep(frame)
+            self._keep(packet)
             return
-        rest = self._write(frame)
+        rest = self._write(packet)
         if rest:
             self._keep(rest)
             self._loop.watch(self)
 
     def read_unacknowledged_length(self) -> int:
-        """Return how many bytes of frames the peer's TCP has not acknowledged.
+        """Return how many bytes of packets the peer's TCP has not acknowledged.
 
         Where the system cannot tell, only those that the socket has not taken.
         """
@@ -152,7 +152,7 @@ class Link:
 
     @property
     def is_full(self) -> bool:
-        """Whether frames wait until the socket takes them."""
+        """Whether packets wait until the socket takes them."""
         return bool(self._unsent)
 
     def read(self) -> bytes:

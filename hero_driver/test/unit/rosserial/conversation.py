@@ -14,7 +14,7 @@ def open_session(**limits):
     """Return a session that has asked for topics once."""
     session = Session(SessionLimits(**limits), T0)
     session.poll(T0)
-    assert session.take_frames() == [REQUEST]
+    assert session.take_packets() == [REQUEST]
     return session
 
 
@@ -22,7 +22,7 @@ def open_declared_session(**limits):
     """Return a session with the topics of the stock robot."""
     session = open_session(**limits)
     receive(session, HANDSHAKE, T0 + 0.1)
-    session.take_frames()
+    session.take_packets()
     return session
 
 
@@ -33,9 +33,9 @@ def receive(session, data, now_s=T0 + 1.0):
 
 def list_requests(session):
     """Take what session wants to send; return the requests for topics and check that the rest answers times."""
-    sent = session.take_frames()
-    requests = [frame for frame in sent if frame == REQUEST]
-    assert len(requests) + sum(frame[5:7] == b"\x0a\x00" for frame in sent) == len(sent)
+    sent = session.take_packets()
+    requests = [packet for packet in sent if packet == REQUEST]
+    assert len(requests) + sum(packet[5:7] == b"\x0a\x00" for packet in sent) == len(sent)
     return requests
 
 

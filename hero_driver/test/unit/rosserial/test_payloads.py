@@ -1,4 +1,4 @@
-"""Payloads of rosserial's own frames: read from bytes by hand, written back, refused when odd."""
+"""Payloads of rosserial's own packets: read from bytes by hand, written back, refused when odd."""
 
 import math
 import struct
@@ -51,8 +51,8 @@ def test_a_declaration_is_read_from_bytes_and_written_as_the_same_bytes():
 
 @pytest.mark.parametrize("topic", STOCK_TOPICS, ids=lambda topic: "%d %s" % topic[1:3])
 def test_every_declaration_of_the_stock_robot_is_read(topic):
-    frame = build_declaration(*topic)
-    assert decode_topic_info(frame[7:-1]) == TopicInfo(*topic[1:], 4096)
+    packet = build_declaration(*topic)
+    assert decode_topic_info(packet[7:-1]) == TopicInfo(*topic[1:], 4096)
 
 
 def test_a_log_line_is_read_with_its_colours():

@@ -14,12 +14,12 @@ from vectors import (
     TX_STOP,
     VECTORS,
     build_declaration,
-    build_frame,
     build_log,
+    build_packet,
     build_text,
 )
 
-from hero_driver.rosserial.errors import FrameTooLongError, PayloadError
+from hero_driver.rosserial.errors import PacketTooLongError, PayloadError
 from hero_driver.rosserial.session import (
     LogReceived,
     ParameterRequested,
@@ -32,7 +32,7 @@ from hero_driver.rosserial.session import (
     TopicKind,
 )
 
-TIME_ANSWER = build_frame(10, (1795240942).to_bytes(4, "little") + (500000000).to_bytes(4, "little"))
+TIME_ANSWER = build_packet(10, (1795240942).to_bytes(4, "little") + (500000000).to_bytes(4, "little"))
 HEARTBEAT = build_log(1, "\x1b[96m[/hero_0] Conected at time 1638\x1b[0m")
 
 
@@ -41,12 +41,12 @@ HEARTBEAT = build_log(1, "\x1b[96m[/hero_0] Conected at time 1638\x1b[0m")
 
 def test_a_new_session_asks_for_topics_at_once_and_only_once():
     session = Session(SessionLimits(), T0)
-    assert session.take_frames() == []
+    assert session.take_packets() == []
     assert session.poll(T0) == []
-    assert session.take_frames() == [REQUEST]
-    assert session.take_frames() == []
+    assert session.take_packets() == [REQUEST]
+    assert session.take_packets() == []
     session.poll(T0 + 1.4)
-    assert session.take_frames() == []
+    assert session.take_packets() == []
 
 
 def test_the_request_is_repeated_every_one_and_a_half_seconds_while_nothing_is_declared():
@@ -62,7 +62,7 @@ def test_nothing_is_asked_any_more_once_a_topic_is_declared():
     assert events[0] == TimeRequested()
     assert [event.topic.info.topic_id for event in events[1:]] == [topic[1] for topic in STOCK_TOPICS]
     assert all(type(event) is TopicDeclared for event in events[1:])
-    session.take_frames()
+    session.take_packets()
     assert poll_until(session, T0 + 0.1, T0 + 5.0) == ([], [])
 
 
@@ -99,7 +99,7 @@ def test_a_robot_that_still_streams_on_a_new_connection_is_asked_at_once_if_nobo
     session = Session(SessionLimits(), T0)
     receive(session, ODOM_MESSAGE, T0 + 0.02)
     session.poll(T0 + 0.02)
-    assert session.take_frames() == [REQUEST]
+    assert session.take_packets() == [REQUEST]
 
 
 def test_log_lines_before_any_topic_are_events_and_a_reason_to_ask_again():
@@ -108,7 +108,7 @@ def test_log_lines_before_any_topic_are_events_and_a_reason_to_ask_again():
     assert type(event) is LogReceived
     assert event.log == (1, "\x1b[96m[/hero_0] Conected at time 1638\x1b[0m")
     session.poll(T0 + 0.9)
-    assert session.take_frames() == [REQUEST]
+    assert session.take_packets() == [REQUEST]
 
 
 def test_an_undeclared_id_beside_declared_topics_is_reported_and_asked_for_a_few_times_only():
@@ -116,7 +116,7 @@ def test_an_undeclared_id_beside_declared_topics_is_reported_and_asked_for_a_few
     request_times_s, problems = [], []
     for step in range(2000):
         now_s = T0 + 1.0 + step * 0.01
-        problems += receive(session, build_frame(124, b""), now_s)
+        problems += receive(session, build_packet(124, b""), now_s)
         session.poll(now_s)
         request_times_s += [now_s] * len(list_requests(session))
     assert 1 <= len(request_times_s) <= 5
@@ -148,7 +148,7 @@ def test_a_robot_that_lost_its_configuration_is_asked_at_most_every_half_second_
     assert len(request_times_s) > 2
     assert all(later - earlier >= 0.5 - 1e-6 for earlier, later in zip(request_times_s, request_times_s[1:]))
     receive(session, HANDSHAKE, T0 + 11.0)
-    session.take_frames()
+    session.take_packets()
     request_times_s = []
     for step in range(20):
         receive(session, HEARTBEAT, T0 + 11.0 + step * 0.1)
@@ -173,20 +173,20 @@ def test_a_robot_that_asks_for_the_time_or_sends_data_has_not_lost_its_configura
 def test_a_time_request_is_answered_with_the_time_at_which_it_arrived():
     session = open_declared_session()
     assert receive(session, TIME_REQUEST) == [TimeRequested()]
-    assert session.take_frames() == [TIME_ANSWER]
+    assert session.take_packets() == [TIME_ANSWER]
 
 
 def test_every_time_request_of_a_read_is_answered():
     session = open_declared_session()
     receive(session, TIME_REQUEST * 3)
-    assert session.take_frames() == [TIME_ANSWER] * 3
+    assert session.take_packets() == [TIME_ANSWER] * 3
 
 
 def test_a_time_request_of_another_length_is_a_problem_and_not_answered():
     session = open_declared_session()
-    (problem,) = receive(session, build_frame(10, bytes(4)))
+    (problem,) = receive(session, build_packet(10, bytes(4)))
     assert problem == Problem("Time: has 4 bytes instead of 8")
-    assert session.take_frames() == []
+    assert session.take_packets() == []
 
 
 # Giving up.
@@ -238,7 +238,7 @@ def test_a_message_comes_with_its_topic_in_the_order_of_the_wire():
 
 def test_the_answer_of_a_service_is_a_message_of_its_topic():
     session = open_declared_session()
-    ((topic, payload),) = receive(session, build_frame(131, b"\x01\x00\x00\x00\x00"))
+    ((topic, payload),) = receive(session, build_packet(131, b"\x01\x00\x00\x00\x00"))
     assert topic.kind is TopicKind.SERVICE_ANSWERS
     assert topic.info.name == "/hero_0/set_odom"
     assert payload == b"\x01\x00\x00\x00\x00"
@@ -246,15 +246,15 @@ def test_the_answer_of_a_service_is_a_message_of_its_topic():
 
 def test_data_on_an_id_that_the_robot_receives_is_not_passed_on():
     session = open_declared_session()
-    (problem,) = receive(session, build_frame(109, bytes(48)))
+    (problem,) = receive(session, build_packet(109, bytes(48)))
     assert type(problem) is Problem
     assert session.undeclared_messages == 1
 
 
-def test_a_parameter_request_is_an_event_and_its_answer_a_frame():
+def test_a_parameter_request_is_an_event_and_its_answer_a_packet():
     session = open_declared_session()
-    assert receive(session, build_frame(6, build_text("~gain"))) == [ParameterRequested("~gain")]
-    assert session.encode_parameter_answer([7], [], []) == build_frame(
+    assert receive(session, build_packet(6, build_text("~gain"))) == [ParameterRequested("~gain")]
+    assert session.encode_parameter_answer([7], [], []) == build_packet(
         6, bytes.fromhex("01000000 07000000 00000000 00000000")
     )
 
@@ -262,7 +262,7 @@ def test_a_parameter_request_is_an_event_and_its_answer_a_frame():
 def test_a_parameter_longer_than_the_robots_buffer_is_never_encoded():
     session = open_declared_session(max_payload_length=100)
     assert len(session.encode_parameter_answer([0] * 22, [], [])) == 100 + 8
-    with pytest.raises(FrameTooLongError, match="104 bytes"):
+    with pytest.raises(PacketTooLongError, match="104 bytes"):
         session.encode_parameter_answer([0] * 23, [], [])
     with pytest.raises(PayloadError):
         session.encode_parameter_answer([2**31], [], [])
@@ -270,9 +270,9 @@ def test_a_parameter_longer_than_the_robots_buffer_is_never_encoded():
 
 @pytest.mark.parametrize("frame_id", [0, 1, 2, 3, 4, 5, 6, 7, 10])
 @pytest.mark.parametrize("payload", [b"", b"\x00", b"\xff" * 40], ids=["empty", "one byte", "noise"])
-def test_a_special_frame_with_a_broken_payload_is_a_problem_and_nothing_more(frame_id, payload):
+def test_a_special_packet_with_a_broken_payload_is_a_problem_and_nothing_more(frame_id, payload):
     session = open_declared_session()
-    (problem,) = receive(session, build_frame(frame_id, payload))
+    (problem,) = receive(session, build_packet(frame_id, payload))
     assert type(problem) is Problem
     assert len(session.topics) == len(STOCK_TOPICS)
     assert type(receive(session, ODOM_MESSAGE)[0]) is tuple
@@ -281,16 +281,16 @@ def test_a_special_frame_with_a_broken_payload_is_a_problem_and_nothing_more(fra
 @pytest.mark.parametrize("topic_id", [8, 9, 11, 50, 99, 300, 65535])
 def test_an_id_without_a_meaning_is_counted_and_does_no_harm(topic_id):
     session = open_declared_session()
-    receive(session, build_frame(topic_id, b"abc") + TX_STOP)
+    receive(session, build_packet(topic_id, b"abc") + TX_STOP)
     assert session.undeclared_messages == 2
     assert type(receive(session, ODOM_MESSAGE)[0]) is tuple
 
 
-def test_bad_frames_are_counted_by_the_reader_and_cost_nothing_else():
+def test_bad_packets_are_counted_by_the_reader_and_cost_nothing_else():
     session = open_declared_session()
     events = receive(session, ODOM_MESSAGE[:-1] + b"\x00" + ENCODER_MESSAGE)
     assert [topic.info.topic_id for topic, _ in events] == [128]
-    assert session.reader.bad_frames == 1
+    assert session.reader.bad_packets == 1
 
 
 @given(chunks=st.lists(st.one_of(st.binary(max_size=100), st.sampled_from([v.data for v in VECTORS]))))
@@ -305,11 +305,11 @@ def test_arbitrary_bytes_never_raise(chunks):
 special = st.tuples(st.sampled_from([0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 100, 125]), st.binary(max_size=80))
 
 
-@given(frames=st.lists(special, max_size=30))
-def test_good_frames_with_arbitrary_payloads_never_raise(frames):
+@given(packets=st.lists(special, max_size=30))
+def test_good_packets_with_arbitrary_payloads_never_raise(packets):
     session = open_session()
-    for topic_id, payload in frames:
-        receive(session, build_frame(topic_id, payload), T0)
+    for topic_id, payload in packets:
+        receive(session, build_packet(topic_id, payload), T0)
     session.poll(T0 + 1.0)
 
 

@@ -38,7 +38,7 @@ def test_a_whole_conversation_has_the_topics_data_and_logs_of_the_robot(read_cap
         "/hero_0/set_odom": 1,
     }
     assert session.undeclared_messages == 0
-    assert (session.reader.frames, session.reader.bad_frames) == (3171, 0)
+    assert (session.reader.packets, session.reader.bad_packets) == (3171, 0)
 
 
 def test_the_handshake_by_hand_is_that_of_the_real_robot(read_capture):
@@ -55,7 +55,7 @@ def test_a_robot_that_declared_nothing_is_asked_again_and_then_understood(read_c
     assert session.topics == {}
 
     session = open_session()
-    run(session, capture[: len(capture) - 53] + HANDSHAKE)  # 53 bytes of the last frame are missing
+    run(session, capture[: len(capture) - 53] + HANDSHAKE)  # 53 bytes of the last packet are missing
     assert sorted(session.topics) == sorted(topic[1] for topic in STOCK_TOPICS)
     events, _ = run(session, capture)
     messages = [event for event in events if type(event) is tuple]

@@ -12,10 +12,10 @@ from vectors import (
     TO_ROBOT,
     TWIST_MD5,
     build_declaration,
-    build_frame,
+    build_packet,
 )
 
-from hero_driver.rosserial.errors import FrameTooLongError, TopicIdError
+from hero_driver.rosserial.errors import PacketTooLongError, TopicIdError
 from hero_driver.rosserial.session import Problem, TopicDeclared, TopicKind
 
 ODOM = next(topic for topic in STOCK_TOPICS if topic[1] == 130)
@@ -51,7 +51,7 @@ def test_the_stock_robots_topics_are_kept_by_id_with_kind_and_direction():
         (5, TopicKind.CLIENT_ANSWERS, False),
     ],
 )
-def test_the_id_of_the_declaring_frame_says_the_kind_and_the_direction(frame_id, kind, is_from_robot):
+def test_the_id_of_the_declaring_packet_says_the_kind_and_the_direction(frame_id, kind, is_from_robot):
     session = open_session()
     (event,) = receive(session, declare_twist(110, "/hero_0/x", frame_id))
     assert event.topic.kind is kind
@@ -61,7 +61,7 @@ def test_the_id_of_the_declaring_frame_says_the_kind_and_the_direction(frame_id,
 def test_ids_of_an_older_firmware_are_taken_as_they_are_declared():
     session = open_session()
     receive(session, declare_twist(106, "/hero_0/velocity_controller/cmd_vel"))
-    assert session.encode_message(106, bytes(48)) == build_frame(106, bytes(48))
+    assert session.encode_message(106, bytes(48)) == build_packet(106, bytes(48))
     with pytest.raises(TopicIdError):
         session.encode_message(109, bytes(48))
 
@@ -96,15 +96,15 @@ def test_an_id_that_changes_its_direction_changes_what_may_be_sent():
     receive(session, declare_twist(109, "/hero_0/twist", frame_id=0))
     with pytest.raises(TopicIdError):
         session.encode_message(109, bytes(48))
-    assert type(receive(session, build_frame(109, bytes(48)))[0]) is tuple
+    assert type(receive(session, build_packet(109, bytes(48)))[0]) is tuple
     receive(session, declare_twist(130, "/hero_0/odom", frame_id=1))
-    assert session.encode_message(130, bytes(48)) == build_frame(130, bytes(48))
+    assert session.encode_message(130, bytes(48)) == build_packet(130, bytes(48))
 
 
 # What is refused while everything else works.
 
 BAD_DECLARATIONS = {
-    "id of a special frame": (declare_twist(7, "/hero_0/x"), "its id 7 is below 100"),
+    "id of a special packet": (declare_twist(7, "/hero_0/x"), "its id 7 is below 100"),
     "id below the first topic": (declare_twist(99, "/hero_0/x"), "its id 99 is below 100"),
     "empty name": (declare_twist(120, ""), "not a ROS name"),
     "name with a space": (declare_twist(120, "/hero_0/a b"), "not a ROS name"),
@@ -199,10 +199,10 @@ def test_longer_names_are_taken_where_they_are_allowed():
 
 
 @pytest.mark.parametrize("topic_id", TO_ROBOT)
-def test_a_message_for_an_id_that_the_robot_receives_is_one_frame(topic_id):
+def test_a_message_for_an_id_that_the_robot_receives_is_one_packet(topic_id):
     session = open_declared_session()
-    assert session.encode_message(topic_id, b"\x01\x02") == build_frame(topic_id, b"\x01\x02")
-    assert session.take_frames() == []
+    assert session.encode_message(topic_id, b"\x01\x02") == build_packet(topic_id, b"\x01\x02")
+    assert session.take_packets() == []
 
 
 @pytest.mark.parametrize("topic_id", [*FROM_ROBOT, 0, 6, 7, 10, 11, 99, 112, 124, 137, 65535, -1])
@@ -222,14 +222,14 @@ def test_a_message_fills_the_robots_buffer_and_never_more():
     session = open_session()
     receive(session, declare_twist(100, "/hero_0/x", buffer_length=48))
     assert len(session.encode_message(100, bytes(48))) == 56
-    with pytest.raises(FrameTooLongError, match="/hero_0/x.*49 bytes.*48 bytes"):
+    with pytest.raises(PacketTooLongError, match="/hero_0/x.*49 bytes.*48 bytes"):
         session.encode_message(100, bytes(49))
 
 
-def test_a_robot_that_claims_a_huge_buffer_does_not_break_the_frames():
+def test_a_robot_that_claims_a_huge_buffer_does_not_break_the_packets():
     session = open_session()
     receive(session, declare_twist(100, "/hero_0/x", buffer_length=2**31 - 1))
-    with pytest.raises(FrameTooLongError):
+    with pytest.raises(PacketTooLongError):
         session.encode_message(100, bytes(65536))
 
 
@@ -246,9 +246,9 @@ def test_only_declared_ids_of_the_right_direction_and_length_ever_leave(declared
         receive(session, declare_twist(declared_id, "/hero_0/x", frame_id, buffer_length=buffer_length))
     frame_id, buffer_length = declared.get(topic_id, (0, 0))
     if topic_id >= 100 and frame_id in (1, 3, 5) and buffer_length >= max(1, length):
-        assert session.encode_message(topic_id, bytes(length)) == build_frame(topic_id, bytes(length))
+        assert session.encode_message(topic_id, bytes(length)) == build_packet(topic_id, bytes(length))
     else:
-        with pytest.raises((TopicIdError, FrameTooLongError)):
+        with pytest.raises((TopicIdError, PacketTooLongError)):
             session.encode_message(topic_id, bytes(length))
 
 

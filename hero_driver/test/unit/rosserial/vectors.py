@@ -1,6 +1,6 @@
-"""Frames and declarations of the stock robot, written by hand, for tests of the rosserial core.
+"""Packets and declarations of the stock robot, written by hand, for tests of the rosserial core.
 
-Nothing here uses the code under test: frames are hexadecimal digits, or put together by build_frame() below
+Nothing here uses the code under test: packets are hexadecimal digits, or put together by build_packet() below
 with plain sums.
 """
 
@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 
 class Vector(NamedTuple):
-    """One frame and what it holds."""
+    """One packet and what it holds."""
 
     name: str
     data: bytes
@@ -17,8 +17,8 @@ class Vector(NamedTuple):
     payload: bytes
 
 
-def build_frame(topic_id, payload):
-    """Return the frame that carries payload, by the words of the protocol, without struct tables or tricks."""
+def build_packet(topic_id, payload):
+    """Return the packet that carries payload, by the words of the protocol, without struct tables or tricks."""
     length = [len(payload) % 256, len(payload) // 256]
     topic = [topic_id % 256, topic_id // 256]
     head = [0xFF, 0xFE, *length, 255 - sum(length) % 256, *topic]
@@ -32,14 +32,14 @@ def build_text(text):
 
 
 def build_declaration(frame_id, topic_id, name, message_type, md5sum, buffer_length=4096):
-    """Return the frame with which the robot declares one topic."""
+    """Return the packet with which the robot declares one topic."""
     payload = topic_id.to_bytes(2, "little") + build_text(name) + build_text(message_type) + build_text(md5sum)
-    return build_frame(frame_id, payload + buffer_length.to_bytes(4, "little", signed=True))
+    return build_packet(frame_id, payload + buffer_length.to_bytes(4, "little", signed=True))
 
 
 def build_log(level, text):
-    """Return the frame with one log line of the robot."""
-    return build_frame(7, bytes([level]) + build_text(text))
+    """Return the packet with one log line of the robot."""
+    return build_packet(7, bytes([level]) + build_text(text))
 
 
 REQUEST = bytes.fromhex("ff fe 00 00 ff 00 00 ff")
@@ -87,13 +87,13 @@ VECTORS = [
     Vector("727 bytes of zeros, as long as odometry", bytes.fromhex("ff fe d7 02 26 82 00") + bytes(727) + b"\x7d",
            130, bytes(727)),
     Vector("300 times ff", bytes.fromhex("ff fe 2c 01 d2 82 00") + b"\xff" * 300 + b"\xa9", 130, b"\xff" * 300),
-    Vector("starts of frames inside", bytes.fromhex("ff fe 06 00 f9 80 00 fffe fffe fffe 88"), 128,
+    Vector("starts of packets inside", bytes.fromhex("ff fe 06 00 f9 80 00 fffe fffe fffe 88"), 128,
            bytes.fromhex("fffefffefffe")),
     Vector("length checksum of 00", bytes.fromhex("ff fe ff 00 00 80 00") + bytes(255) + b"\x7f", 128, bytes(255)),
     Vector("id above 255", bytes.fromhex("ff fe 01 00 fe 02 01 07 f5"), 258, b"\x07"),
 ]
 GOOD = VECTORS[4]
-"""What follows the broken frames in tests."""
+"""What follows the broken packets in tests."""
 
 TWIST_MD5 = "9f195f881246fdfa2798d1d3eebca84a"
 ANSWER_MD5 = "937c9679a518e3a18d831e57125ea522"
@@ -101,7 +101,7 @@ SET_PID_MD5 = "f0d0bdba02bc62a48d52638e38dc8a4b"
 MOTOR_MD5 = "44d4249d207ce6a89de3d72080e4d0b5"
 EMPTY_MD5 = "d41d8cd98f00b204e9800998ecf8427e"
 
-# id of the declaring frame, id, name, type, md5: as firmware v3.8 declares itself, in its order.
+# id of the declaring packet, id, name, type, md5: as firmware v3.8 declares itself, in its order.
 STOCK_TOPICS = [
     (0, 125, "/hero_0/laser", "sensor_msgs/LaserScan", "90c7ef2dc6895d81024acba2ac42f369"),
     (2, 126, "/hero_0/ir_calibration", "hero_common/SetIRCalibration", ANSWER_MD5),
@@ -134,5 +134,5 @@ TO_ROBOT = [topic_id for frame_id, topic_id, *_ in STOCK_TOPICS if frame_id in (
 HANDSHAKE = TIME_REQUEST + b"".join(build_declaration(*topic) for topic in STOCK_TOPICS)
 """What a stock robot answers to a request, in one burst."""
 
-ODOM_MESSAGE = build_frame(130, struct.pack("<I", 4294967295) + bytes(723))
-ENCODER_MESSAGE = build_frame(128, struct.pack("<I", 4294967295) + bytes(114))
+ODOM_MESSAGE = build_packet(130, struct.pack("<I", 4294967295) + bytes(723))
+ENCODER_MESSAGE = build_packet(128, struct.pack("<I", 4294967295) + bytes(114))

@@ -5,7 +5,7 @@ Pure. Texts and behaviour are the firmware's (files named in messages and flash)
 
 from typing import Callable, Dict, List, Optional
 
-from hero_driver.rosserial import frames
+from hero_driver.rosserial import packets
 
 from ..errors import CommandError
 from . import declarations as ids
@@ -62,7 +62,7 @@ class CommandTable:
             ids.ID_VELOCITY_PID_CALIBRATION: self._tune_velocity,
         }
 
-    def receive(self, frame: frames.Frame, millis: int, now_ms: int) -> Optional[bytes]:
+    def receive(self, frame: packets.Packet, millis: int, now_ms: int) -> Optional[bytes]:
         """Do what frame says; return the frame of the answer if it called a service.
 
         Raises: CommandError for a payload that is not the declared message.
@@ -168,4 +168,4 @@ class CommandTable:
 
 
 def _answer(topic_id: int, success: bool, text: str) -> bytes:
-    return frames.encode_frame(topic_id, messages.encode_answer(success, text))
+    return packets.encode_packet(topic_id, messages.encode_answer(success, text))

@@ -6,7 +6,7 @@ from 125 (100 + 25 subscriber slots) and subscribers from 100 (ros.h of the firm
 
 from typing import List, NamedTuple, Tuple
 
-from hero_driver.rosserial import frames, payloads
+from hero_driver.rosserial import packets, payloads
 
 BUFFER_LENGTH = 4096
 """INPUT_SIZE and OUTPUT_SIZE of the firmware's NodeHandle."""
@@ -54,10 +54,10 @@ class Declaration(NamedTuple):
     md5sum: str
 
 
-_PUB = frames.ID_PUBLISHER
-_SUB = frames.ID_SUBSCRIBER
-_ANS = frames.ID_SERVICE_SERVER_PUBLISHER
-_REQ = frames.ID_SERVICE_SERVER_SUBSCRIBER
+_PUB = packets.ID_PUBLISHER
+_SUB = packets.ID_SUBSCRIBER
+_ANS = packets.ID_SERVICE_SERVER_PUBLISHER
+_REQ = packets.ID_SERVICE_SERVER_SUBSCRIBER
 
 _TWIST_MD5 = "9f195f881246fdfa2798d1d3eebca84a"
 _MOTOR_MD5 = "44d4249d207ce6a89de3d72080e4d0b5"
@@ -164,5 +164,5 @@ def encode_declarations(name: str) -> bytes:
         info = payloads.TopicInfo(
             entry.topic_id, entry.name.replace("%s", name), entry.message_type, entry.md5sum, BUFFER_LENGTH
         )
-        parts.append(frames.encode_frame(entry.kind, payloads.encode_topic_info(info)))
+        parts.append(packets.encode_packet(entry.kind, payloads.encode_topic_info(info)))
     return b"".join(parts)

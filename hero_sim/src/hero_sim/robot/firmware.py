@@ -12,7 +12,7 @@ from typing import Callable, Deque, List, NamedTuple, Optional, Tuple
 import numpy as np
 
 from hero_driver.rosserial import errors as wire_errors
-from hero_driver.rosserial import frames, payloads
+from hero_driver.rosserial import packets, payloads
 
 from ..errors import CommandError
 from ..robot_constants import CONNECT_TIMEOUT_MS, RECEIVE_WINDOW_LENGTH, TIME_LOST_MS
@@ -58,7 +58,7 @@ _PHASE_BOOT = "boot"  # dialling for the first time
 _PHASE_SETUP = "setup"  # connected or not, the lights of welcome play
 _PHASE_LOOP = "loop"
 
-_TIME_REQUEST = frames.encode_frame(frames.ID_TIME, bytes(8))
+_TIME_REQUEST = packets.encode_packet(packets.ID_TIME, bytes(8))
 
 
 class FirmwareOptions(NamedTuple):
@@ -132,7 +132,7 @@ class Firmware:
         self.outbox.clear()
         self.wants_connection = False
         self._received = bytearray()
-        self._pending: Deque[frames.Frame] = deque()
+        self._pending: Deque[packets.Packet] = deque()
         self._spinning = False
         self._held_us = 0
         self._answers: List[Tuple[int, bytes]] = []
@@ -247,7 +247,7 @@ class Firmware:
     def log(self, text: str) -> None:
         """Send a log line (level info, as all of the firmware's are)."""
         self.send(
-            frames.encode_frame(frames.ID_LOG, payloads.encode_log(payloads.Log(payloads.LOG_INFO, text)))
+            packets.encode_packet(packets.ID_LOG, payloads.encode_log(payloads.Log(payloads.LOG_INFO, text)))
         )
 
     def complain(self, text: str) -> None:
@@ -387,7 +387,7 @@ class Firmware:
         if self._received:
             # A new reader each time: the firmware forgets a packet that is not complete after 20 ms
             # (SERIAL_MSG_TIMEOUT, node_handle.h:96), and looks again only after 51 or 101 ms.
-            reader = frames.FrameReader(frames.LONGEST_PAYLOAD_LENGTH)
+            reader = packets.PacketReader(packets.LONGEST_PAYLOAD_LENGTH)
             self._pending.extend(reader.receive_bytes(bytes(self._received[:RECEIVE_WINDOW_LENGTH])))
             del self._received[:RECEIVE_WINDOW_LENGTH]
 
@@ -407,19 +407,19 @@ class Firmware:
             self._last_request_ms = self.to_millis(now_ms)
             self._request_time(self._last_request_ms)
 
-    def _receive_frame(self, frame: frames.Frame, millis: int, now_ms: int) -> bool:
+    def _receive_frame(self, frame: packets.Packet, millis: int, now_ms: int) -> bool:
         """Take one frame; return whether the firmware goes on reading."""
-        if frame.topic_id == frames.ID_PUBLISHER:
+        if frame.topic_id == packets.ID_PUBLISHER:
             self._answer_topics(millis)
             return False
         if len(frame.payload) > declarations.BUFFER_LENGTH:
             self.crash_reason = "a payload of %d bytes for its buffer of 4096" % len(frame.payload)
             return False
-        if frame.topic_id == frames.ID_TIME:
+        if frame.topic_id == packets.ID_TIME:
             self._receive_time(frame.payload, millis)
-        elif frame.topic_id == frames.ID_TX_STOP:
+        elif frame.topic_id == packets.ID_TX_STOP:
             self._unconfigure()
-        elif frame.topic_id == frames.ID_PARAMETER_REQUEST:
+        elif frame.topic_id == packets.ID_PARAMETER_REQUEST:
             pass  # this firmware asks for no parameters, so it ignores answers
         elif not declarations.ID_LED <= frame.topic_id <= declarations.ID_LAST_SUBSCRIBER_SLOT:
             self.crash_reason = "id %d, which is outside its table of subscribers" % frame.topic_id
@@ -428,7 +428,7 @@ class Firmware:
             self._receive_command(frame, millis, now_ms)
         return True
 
-    def _receive_command(self, frame: frames.Frame, millis: int, now_ms: int) -> None:
+    def _receive_command(self, frame: packets.Packet, millis: int, now_ms: int) -> None:
         try:
             answer = self.commands.receive(frame, millis, now_ms)
             self._held_us += self.commands.held_us

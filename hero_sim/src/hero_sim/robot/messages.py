@@ -9,7 +9,7 @@ import math
 import struct
 from typing import List, NamedTuple, Sequence, Tuple
 
-from hero_driver.rosserial import frames
+from hero_driver.rosserial import packets
 
 from ..errors import CommandError
 from ..robot_constants import TICKS_PER_TURN, WHEEL_SEPARATION_M
@@ -70,15 +70,15 @@ class _Template:
         self._frames: List[Tuple[int, int, int]] = []  # first byte that is summed, checksum's place, payload
         for topic_id, payload in messages:
             start = len(self.data)
-            self.data += frames.encode_frame(topic_id, payload)
+            self.data += packets.encode_packet(topic_id, payload)
             self._frames.append((start + 5, len(self.data) - 1, len(payload)))
-            self.payload_starts.append(start + frames.HEADER_LENGTH)
+            self.payload_starts.append(start + packets.HEADER_LENGTH)
 
     def seal(self) -> bytes:
         """Return the burst with right checksums."""
         view = memoryview(self.data)
         for first, last, _ in self._frames:
-            self.data[last] = 255 - frames.sum_bytes(view[first:last])
+            self.data[last] = 255 - packets.sum_bytes(view[first:last])
         return bytes(self.data)
 
 

@@ -1,0 +1,59 @@
+"""Checks service requests before they reach a robot, which checks nothing itself. Pure: bytes in, words out.
+
+The firmware prints what it is given into buffers of 100 bytes (VelocityControl.ino:209) and stores it in its
+flash, so a number that is not finite, or absurd, would outlive a reboot.
+"""
+
+import math
+import struct
+from typing import NamedTuple, Optional
+
+from ..corrections.tick_odometry import Pose
+
+_SET_ODOM = struct.Struct("<3d")
+
+
+class _Rule(NamedTuple):
+    layout: struct.Struct
+    low: float
+    high: float
+    text: str
+
+
+_RULES = {
+    "hero_msgs/SetOdom": _Rule(_SET_ODOM, -1e6, 1e6, "x, y (m) and theta (rad) must be finite, within +-1e6"),
+    "hero_msgs/SetPID": _Rule(
+        struct.Struct("<6f"),
+        0.0,
+        1e6,
+        "gains must be finite, from 0 to 1e6; of a set with a negative one the robot uses none and stores all",
+    ),
+    "hero_msgs/SetMotor": _Rule(struct.Struct("<2h"), 1000, 2000, "pulses must lie within 1000..2000 us"),
+    "hero_msgs/SetIRCalibration": _Rule(
+        struct.Struct("<8d"), 1e-6, 1e3, "gains must be finite, above 0 and at most 1e3 counts m^2"
+    ),
+}
+
+
+def find_request_fault(service_type: str, request: bytes) -> Optional[str]:
+    """Return why a request to a service of service_type may not be sent, None if it may."""
+    rule = _RULES.get(service_type)
+    if rule is None:
+        return None
+    if len(request) != rule.layout.size:
+        return "a request of %d bytes is not a %s" % (len(request), service_type)
+    values = rule.layout.unpack(request)
+    if not all(math.isfinite(value) and rule.low <= value <= rule.high for value in values):
+        return "%s: %s" % (", ".join("%g" % value for value in values), rule.text)
+    return None
+
+
+def read_set_odom_pose(request: bytes) -> Pose:
+    """Return the pose in a checked request of hero_msgs/SetOdom."""
+    x_m, y_m, theta_rad = _SET_ODOM.unpack(request)
+    return Pose(x_m, y_m, math.remainder(theta_rad, 2.0 * math.pi))
+
+
+def is_success(answer: bytes) -> bool:
+    """Return the first field of an answer of one of the robot's services."""
+    return answer[:1] == b"\x01"

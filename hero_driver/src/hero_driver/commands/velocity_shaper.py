@@ -1,0 +1,135 @@
+"""Shapes a stream of motion commands so that the robot accepts all of them and a stop is never lost.
+
+The firmware drops a velocity that arrives within 50 ms of the last accepted one, stops included
+(VelocityControl.ino:159, PositionControl.ino:160). So: the newest command wins, commands are spaced, and a
+stop is always sent, twice. Servo pulses (cmd_motor) are shaped alike: the robot reads every 51 ms, so only the
+newest matters, and none may pile up in front of a stop. Pure: payloads and time go in, payloads come out.
+"""
+
+import math
+import struct
+from typing import Optional
+
+COMMAND_INTERVAL_S = 0.06
+"""Time between two commands to one controller: the firmware's 50 ms and some room for its 51 ms read cycle."""
+
+STOP_REPEATS = 1
+"""How often a stop is sent again."""
+
+LINEAR_LIMIT_M_S = 0.20
+"""The firmware's own limit (config.h:60)."""
+
+ANGULAR_LIMIT_RAD_S = 8.0
+"""The firmware's own limit (config.h:61)."""
+
+TWIST_LENGTH = 48
+_TWIST = struct.Struct("<6d")
+
+ZERO_TWIST = bytes(TWIST_LENGTH)
+
+MOTOR_CENTRE_US = 1500
+STOPPED_MOTORS = struct.pack("<hh", MOTOR_CENTRE_US, MOTOR_CENTRE_US)
+
+STOP_PAYLOADS = {"geometry_msgs/Twist": ZERO_TWIST, "hero_msgs/Motor": STOPPED_MOTORS}
+"""Message types that move a robot, and the payload of each that stops it."""
+
+
+def check_twist(payload: bytes, clamp: bool) -> Optional[bytes]:
+    """Return what to send for payload (geometry_msgs/Twist), or None if a component is not finite.
+
+    What stops the robot becomes ZERO_TWIST: it uses only linear.x and angular.z. With clamp, these
+    two are brought into the firmware's limits.
+    """
+    if len(payload) != TWIST_LENGTH:
+        return None
+    components = _TWIST.unpack(payload)
+    # A sum of finite numbers may overflow; only then are the six looked at one by one.
+    if not math.isfinite(sum(components)) and not all(map(math.isfinite, components)):
+        return None
+    linear_m_s, angular_rad_s = components[0], components[5]
+    if linear_m_s == 0.0 and angular_rad_s == 0.0:
+        return ZERO_TWIST
+    is_within = abs(linear_m_s) <= LINEAR_LIMIT_M_S and abs(angular_rad_s) <= ANGULAR_LIMIT_RAD_S
+    if is_within or not clamp:
+        return payload
+    clamped_m_s = max(-LINEAR_LIMIT_M_S, min(LINEAR_LIMIT_M_S, linear_m_s))
+    clamped_rad_s = max(-ANGULAR_LIMIT_RAD_S, min(ANGULAR_LIMIT_RAD_S, angular_rad_s))
+    return _TWIST.pack(clamped_m_s, *components[1:5], clamped_rad_s)
+
+
+def check_device_twist(payload: bytes) -> Optional[bytes]:
+    """Return payload (geometry_msgs/Twist) unchanged, or None if a component is not finite.
+
+    Devices other than HeRos may use all six components and have limits of their own.
+    """
+    if len(payload) != TWIST_LENGTH or not all(map(math.isfinite, _TWIST.unpack(payload))):
+        return None
+    return payload if any(_TWIST.unpack(payload)) else ZERO_TWIST
+
+
+def check_motor_pulses(payload: bytes) -> Optional[bytes]:
+    """Return payload (hero_msgs/Motor) unchanged, or None if it has another length."""
+    return payload if len(payload) == len(STOPPED_MOTORS) else None
+
+
+class VelocityShaper:
+    """The pending commands of one motion topic of one robot.
+
+    At most one stop and one later command wait; a stop that waits is never replaced by what comes after it.
+    """
+
+    def __init__(self, stop_payload: bytes = ZERO_TWIST, interval_s: float = COMMAND_INTERVAL_S) -> None:
+        """stop_payload: the command that stops the robot; interval_s: least time between two commands."""
+        self._stop_payload = stop_payload
+        self._interval_s = interval_s
+        self._stop_pending = False
+        self._newest: Optional[bytes] = None
+        self._repeats_left = 0
+        self._next_s = -math.inf
+
+    @property
+    def is_idle(self) -> bool:
+        """Whether nothing waits to be sent."""
+        return not self._stop_pending and self._newest is None and self._repeats_left == 0
+
+    def offer(self, payload: bytes) -> None:
+        """Take a checked command; it replaces one that waits, except a stop."""
+        if payload == self._stop_payload:
+            self._stop_pending = True
+            self._newest = None
+        else:
+            self._newest = payload
+
+    def discard_motion(self) -> None:
+        """Forget what waits except stops."""
+        self._newest = None
+
+    def delay_until(self, next_s: float) -> None:
+        """Send nothing before next_s: another command went to the same controller."""
+        self._next_s = max(self._next_s, next_s)
+
+    def due_in_s(self, now_s: float) -> Optional[float]:
+        """Return in how many seconds take() has something, None if nothing waits."""
+        if self.is_idle:
+            return None
+        return max(0.0, self._next_s - now_s)
+
+    def take(self, now_s: float, holds_motion: bool = False) -> Optional[bytes]:
+        """Return the payload to send now, if any; with holds_motion only a stop."""
+        if now_s < self._next_s:
+            return None
+        if self._stop_pending:
+            payload = self._stop_payload
+            self._stop_pending = False
+            self._repeats_left = STOP_REPEATS
+        elif self._newest is not None and not holds_motion:
+            payload = self._newest
+            self._newest = None
+            self._repeats_left = 0
+        elif self._repeats_left:
+            payload = self._stop_payload
+            self._repeats_left -= 1
+        else:
+            return None
+        self._next_s = now_s + self._interval_s
+        return payload

@@ -1,0 +1,292 @@
+"""What one robot sends -> what ROS programs should get: corrected odometry, proximity, stamps, own transforms.
+
+Takes payloads and times of arrival, gives payloads to the sinks of their topics; knows no ROS and no socket.
+Everything that is not named here passes through untouched.
+"""
+
+import collections
+import functools
+import itertools
+from dataclasses import dataclass
+from typing import Any, Callable, DefaultDict, Deque, Dict, Iterator, List, Protocol, Tuple
+
+from . import message_layouts
+from .stamps import NS_PER_S, StampFilter
+from .tick_odometry import Pose, TickOdometry, WheelGeometry
+from .transforms import AddTransform, TransformCorrector
+from .wheel_motion import WheelMotion
+
+TRANSFORMS = "/tf"
+"""Name under which single transforms are returned; they are collected over all robots."""
+
+STOCK_SCAN_TIME_S = 0.2
+"""The robot scans at 5 Hz (RangeSensor rate 5); it leaves scan_time zero."""
+
+OFFSET_MAX_S = 86400.0
+"""A clock that is further off is shown as that far off: a robot may stamp what it likes."""
+
+OFFSET_SAMPLES = 64
+"""Stamps over which the clock offset is a median: about two seconds of odometry."""
+
+HELD_MAX = 8
+"""Messages that may wait for the encoder reading of their own burst; a burst has two."""
+
+BURST_NS = 10 * 10**6
+"""Stamps of one burst lie closer together than this, those of two bursts are 34 ms apart."""
+
+
+class Sink(Protocol):
+    """Where the messages of one topic go."""
+
+    @property
+    def is_wanted(self) -> bool:
+        """Whether somebody listens."""
+
+    def publish(self, payload: bytes) -> None:
+        """Send payload to everybody who listens."""
+
+
+FindSink = Callable[[str], Sink]
+Clean = Callable[[bytes, int], None]
+"""Takes a payload and its arrival (ns)."""
+
+
+_Held = Tuple[Callable[[Any, bytes], None], Any, bytes]
+"""Odometry, or its transform, that waits for the encoder reading of its burst: what writes it, and its arguments."""
+
+
+@dataclass(frozen=True)
+class CorrectionSettings:
+    """The parameters that matter here, as in config.DriverConfig."""
+
+    odometry: str
+    geometry: WheelGeometry
+    pose_covariance: Tuple[float, ...]
+    twist_covariance: Tuple[float, ...]
+    stamps: str
+    max_future_s: float
+    max_age_s: float
+
+
+class RobotCorrections:
+    """The data of one robot; one per robot, kept over its reconnects.
+
+    Attributes:
+        odometry: the robot's tick odometry.
+        transforms: the robot's transforms.
+    """
+
+    def __init__(
+        self,
+        namespace: str,
+        settings: CorrectionSettings,
+        find_sink: FindSink,
+        add_transform: AddTransform,
+        wheels: WheelMotion,
+    ) -> None:
+        """Clean the data of the robot in namespace.
+
+        find_sink(name) gives the sink of a topic that was chosen or derived; add_transform takes transforms of all
+        robots; wheels is told of the encoder's readings, or of odometry where there is no encoder.
+        """
+        self._wheels = wheels
+        self._find_sink = find_sink
+        self._add_transform = add_transform
+        self._namespace = namespace
+        self._stamps = StampFilter(settings.stamps == "arrival", settings.max_future_s, settings.max_age_s)
+        self._writer = message_layouts.OdometryWriter(settings.pose_covariance, settings.twist_covariance)
+        self._uses_ticks = settings.odometry == "ticks"
+        self._offsets_ns: Deque[int] = collections.deque(maxlen=OFFSET_SAMPLES)
+        self._seqs: DefaultDict[str, Iterator[int]] = collections.defaultdict(itertools.count)
+        self.odometry = TickOdometry(settings.geometry)
+        self.transforms = TransformCorrector(
+            namespace, self._stamps, add_transform, self._take_odom_transform
+        )
+        self._refused = 0
+        self._packed_pose = self._pack_pose()
+        self._uses_estimate = False
+        self._odom_name = namespace + "/odom"
+        self._odom_seqs = self._seqs[self._odom_name]
+        self._raw_name = namespace + "/odom_raw"
+        self._proximity_name = namespace + "/proximity"
+        self._odom_sink: Sink
+        self._raw_sink: Sink
+        self._has_encoder = False
+        self._hears_encoder = False
+        self._is_first_reading = True
+        self._max_age_ns = int(settings.max_age_s * NS_PER_S)
+        self._encoder_follows = True
+        self._encoder_stamp_ns = -BURST_NS
+        self._odom_stamp_ns = -BURST_NS
+        self._held: List[_Held] = []
+
+    def restart(self, rebooted: bool) -> None:
+        """A new connection begins; after a reboot the robot's counters begin anew too."""
+        self._has_encoder = self._uses_estimate = self._hears_encoder = False
+        self._is_first_reading = True
+        self._encoder_stamp_ns = self._odom_stamp_ns = -BURST_NS
+        self._encoder_follows = True
+        self._held = []
+        if rebooted:
+            self.note_reboot()
+
+    def note_reboot(self) -> None:
+        """The robot's counters begin anew; the pose stays."""
+        self.odometry.expect_reset()
+        self._wheels.forget_ticks()
+
+    def set_pose(self, pose: Pose) -> None:
+        """The robot's odometry was set, which zeroes its counters."""
+        self.odometry.set_pose(pose)
+        self._wheels.forget_ticks()
+        self._packed_pose = self._pack_pose()
+
+    @property
+    def clock_offset_s(self) -> float:
+        """Median of stamp minus arrival; 0 while nothing came. Positive: the robot's clock is ahead."""
+        if not self._offsets_ns:
+            return 0.0
+        offset_s = sorted(self._offsets_ns)[len(self._offsets_ns) // 2] / NS_PER_S
+        return max(-OFFSET_MAX_S, min(OFFSET_MAX_S, offset_s))
+
+    @property
+    def refused(self) -> int:
+        """Messages and transforms that could not be used."""
+        return self._refused + self.transforms.refused
+
+    @property
+    def corrected_stamps(self) -> int:
+        """Stamps that were replaced so far."""
+        return self._stamps.corrected
+
+    def find_derived(self, name: str, message_type: str) -> Dict[str, str]:
+        """Return the topics, with types, that exist besides the one called name."""
+        if name == self._odom_name and message_type == "nav_msgs/Odometry":
+            return {self._raw_name: message_type}
+        if name == self._namespace + "/laser" and message_type == "sensor_msgs/LaserScan":
+            return {self._proximity_name: message_type}
+        return {}
+
+    def choose(self, name: str, message_type: str) -> Clean:
+        """Return what takes the payloads of the topic called name."""
+        if name == TRANSFORMS and message_type == "tf2_msgs/TFMessage":
+            return self.transforms.clean
+        sink = self._find_sink(name)
+        if name == self._odom_name and message_type == "nav_msgs/Odometry":
+            self._odom_sink, self._raw_sink = sink, self._find_sink(self._raw_name)
+            return self._clean_odometry
+        if name == self._namespace + "/encoder" and message_type == "hero_msgs/Encoder":
+            self._hears_encoder = True
+            self._has_encoder = self._uses_ticks
+            self._uses_estimate = self._has_encoder and self.odometry.has_reading
+            return functools.partial(self._clean_encoder, name, sink)
+        if name == self._namespace + "/laser" and message_type == "sensor_msgs/LaserScan":
+            return functools.partial(self._clean_laser, sink, self._find_sink(self._proximity_name))
+        if name == self._namespace + "/imu" and message_type == "sensor_msgs/Imu":
+            return functools.partial(self._clean_stamped, name, sink)
+        return lambda payload, _: sink.publish(payload)
+
+    def _clean_stamped(self, name: str, sink: Sink, payload: bytes, arrival_ns: int) -> None:
+        stamp_ns = message_layouts.read_stamp_ns(payload)
+        if stamp_ns is None:
+            self._refused += 1
+            return
+        stamp_ns = self._stamps.correct(name, stamp_ns, arrival_ns)
+        sink.publish(message_layouts.restamp(payload, next(self._seqs[name]), stamp_ns))
+
+    def _clean_laser(self, sink: Sink, proximity_sink: Sink, payload: bytes, arrival_ns: int) -> None:
+        stamp_ns = message_layouts.read_stamp_ns(payload)
+        if stamp_ns is None:
+            self._refused += 1
+            return
+        sink.publish(payload)
+        if not proximity_sink.is_wanted:
+            return
+        name = self._proximity_name
+        stamp_ns = self._stamps.correct(name, stamp_ns, arrival_ns)
+        proximity = message_layouts.make_proximity(payload, next(self._seqs[name]), stamp_ns, STOCK_SCAN_TIME_S)
+        if proximity is None:
+            self._refused += 1
+        else:
+            proximity_sink.publish(proximity)
+
+    # Odometry. In one burst the robot sends odom, tf and then the encoder reading that belongs to them, so
+    # odom and its transform wait for the reading. Where none follows, because it was lost or because another
+    # firmware has another order, nothing waits for longer than until the next odom.
+
+    def _clean_odometry(self, payload: bytes, arrival_ns: int) -> None:
+        stamp_ns = message_layouts.read_stamp_ns(payload)
+        if stamp_ns is None:
+            self._refused += 1
+            return
+        self._offsets_ns.append(stamp_ns - arrival_ns)
+        self.transforms.passed_ns = 0  # another burst
+        self._raw_sink.publish(payload)
+        if not self._hears_encoder:
+            velocity = message_layouts.read_odometry_velocity(payload)
+            if velocity is not None:
+                self._wheels.read_velocity(*velocity)
+        corrected_ns = self._stamps.correct(self._odom_name, stamp_ns, arrival_ns)
+        if self._has_encoder:
+            if self._held:
+                self._release()
+                self._encoder_follows = False
+            self._odom_stamp_ns = stamp_ns
+            if self._encoder_follows and abs(stamp_ns - self._encoder_stamp_ns) > BURST_NS:
+                self._held.append((self._write_odometry, corrected_ns, payload))
+                return
+        self._write_odometry(corrected_ns, payload)
+
+    def _clean_encoder(self, name: str, sink: Sink, payload: bytes, arrival_ns: int) -> None:
+        reading = message_layouts.read_encoder(payload)
+        if reading is None:
+            self._refused += 1
+            return
+        stamp_ns, left_ticks, right_ticks = reading
+        self._wheels.read_ticks(left_ticks, right_ticks)
+        self._encoder_stamp_ns = stamp_ns
+        self._encoder_follows = abs(stamp_ns - self._odom_stamp_ns) <= BURST_NS
+        if self._is_first_reading:
+            # The boot line may have gone down another connection, which never said who it was.
+            self._is_first_reading = False
+            counts_from_boot = abs(arrival_ns - stamp_ns) > self._max_age_ns
+            if counts_from_boot or self.odometry.looks_reset(left_ticks, right_ticks):
+                self.note_reboot()
+        if self.odometry.integrate(left_ticks, right_ticks, stamp_ns / NS_PER_S):
+            # One pose goes out twice, as odometry and as a transform.
+            self._packed_pose = self._pack_pose()
+        self._uses_estimate = self._has_encoder and self.odometry.has_reading
+        if sink.is_wanted:
+            self._clean_stamped(name, sink, payload, arrival_ns)
+        if self._held:
+            self._release()
+
+    def _release(self) -> None:
+        held, self._held = self._held, []
+        for write, start, data in held:
+            write(start, data)
+
+    def _pack_pose(self) -> bytes:
+        return message_layouts.pack_pose(self.odometry.x_m, self.odometry.y_m, self.odometry.yaw_rad)
+
+    def _write_odometry(self, stamp_ns: int, payload: bytes) -> None:
+        odometry = self.odometry
+        estimate = (
+            (self._packed_pose, odometry.linear_m_s, odometry.turn_rad_s) if self._uses_estimate else None
+        )
+        written = self._writer.rewrite(payload, next(self._odom_seqs), stamp_ns, estimate)
+        if written is None:
+            self._refused += 1
+        else:
+            self._odom_sink.publish(written)
+
+    def _take_odom_transform(self, head: bytes, tail: bytes) -> None:
+        if not self._held:
+            self._write_odom_transform(head, tail)
+        elif len(self._held) < HELD_MAX:
+            self._held.append((self._write_odom_transform, head, tail))
+        else:
+            self._refused += 1
+
+    def _write_odom_transform(self, head: bytes, tail: bytes) -> None:
+        self._add_transform(head + (self._packed_pose if self._uses_estimate else tail))

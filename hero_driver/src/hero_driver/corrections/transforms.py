@@ -1,0 +1,142 @@
+"""Transforms of one robot -> those of its own frames, each with a stamp that can be trusted.
+
+Takes payloads of tf2_msgs/TFMessage, gives single transforms; knows no ROS and no socket.
+"""
+
+import re
+from typing import Callable, List, Set
+
+from . import message_layouts
+from .stamps import NS_PER_S, StampFilter
+
+FRAMES_MAX = 32
+"""Pairs of frames that one robot may use; stock robots have five."""
+
+FRAME_NAME_LENGTH_MAX = 128
+"""Of a frame, in bytes; stock robots' have below 40."""
+
+FRAME_NAME_SHOWN = 60
+"""Characters of a refused frame's name that reports show, of up to 4 kB."""
+
+_FRAME_NAME = re.compile(rb"[A-Za-z0-9_/.-]+")
+
+AddTransform = Callable[[bytes], None]
+"""Takes the bytes of one geometry_msgs/TransformStamped."""
+
+TakeOdomTransform = Callable[[bytes, bytes], None]
+"""Takes the transform from odom to base_link in two parts: seq, stamp and frames; translation and rotation."""
+
+
+class TransformCorrector:
+    """The transforms of one robot; one per robot, kept over its reconnects.
+
+    Attributes:
+        passed_ns: the stamp that was right last, so that it needs no other look for this burst's other transforms; to
+            be set to 0 when a burst begins.
+        refused: transforms and messages that could not be used.
+        foreign_frames: frames of transforms that are not the robot's own, by name, for the report.
+    """
+
+    def __init__(
+        self,
+        namespace: str,
+        stamps: StampFilter,
+        add_transform: AddTransform,
+        take_odom_transform: TakeOdomTransform,
+    ) -> None:
+        """Clean the transforms of the robot in namespace; the one that tells its odometry goes its own way."""
+        self.passed_ns = 0
+        self.refused = 0
+        self.foreign_frames: Set[str] = set()
+        self._stamps = stamps
+        self._last_ns = stamps.last_ns
+        self._add_transform = add_transform
+        self._take_odom_transform = take_odom_transform
+        self._frame_prefix = namespace.lstrip("/").encode() + b"/"
+        self._odom_frames = message_layouts.join_frames(
+            self._frame_prefix + b"odom", self._frame_prefix + b"base_link"
+        )
+        self._own_frames: Set[bytes] = set()
+        self._known_foreign: Set[bytes] = set()
+        self._passed_start = b""  # of the transform that had passed_ns
+
+    def clean(self, payload: bytes, arrival_ns: int) -> None:
+        """Take a message of transforms that came at arrival_ns."""
+        # Stock robots send one transform in a message, of frames that were seen before.
+        frames = payload[message_layouts.TRANSFORM_FRAMES]
+        last_ns = self._last_ns.get(frames)
+        if last_ns is None:
+            self._clean_unknown(payload, arrival_ns)
+            return
+        # All transforms of a burst have one stamp: what passes for the first passes for the others too.
+        if (
+            last_ns < self.passed_ns
+            and payload[message_layouts.TRANSFORM_START] == self._passed_start
+            and frames != self._odom_frames
+        ):
+            self._last_ns[frames] = self.passed_ns
+            self._add_transform(payload[message_layouts.TRANSFORM])
+            return
+        count, _, secs, nsecs = message_layouts.read_transforms_start(payload)
+        if count != 1:
+            self._clean_unknown(payload, arrival_ns)
+            return
+        stamp_ns = secs * NS_PER_S + nsecs
+        corrected_ns = self._stamps.correct(frames, stamp_ns, arrival_ns)
+        if corrected_ns == stamp_ns and nsecs < NS_PER_S:
+            self._passed_start, self.passed_ns = payload[message_layouts.TRANSFORM_START], stamp_ns
+            head = payload[message_layouts.TRANSFORM_HEAD]
+        else:
+            head = message_layouts.pack_transform_head(corrected_ns, frames)
+        self._pass_on(frames, head, payload[message_layouts.TRANSFORM_TAIL])
+
+    def _clean_unknown(self, payload: bytes, arrival_ns: int) -> None:
+        transforms = message_layouts.read_transforms(payload)
+        if transforms is None:
+            self.refused += 1
+            return
+        for stamp_ns, frames, tail in transforms:
+            if frames in self._own_frames or self._admit_frames(frames):
+                corrected_ns = self._stamps.correct(frames, stamp_ns, arrival_ns)
+                self._pass_on(frames, message_layouts.pack_transform_head(corrected_ns, frames), tail)
+
+    def _pass_on(self, frames: bytes, head: bytes, tail: bytes) -> None:
+        if frames == self._odom_frames:
+            self._take_odom_transform(head, tail)
+        else:
+            self._add_transform(head + tail)
+
+    def _admit_frames(self, frames: bytes) -> bool:
+        """Return whether the robot may send a pair of frames that is not known as its own."""
+        if frames in self._known_foreign:
+            self.refused += 1
+            return False
+        parent, child = message_layouts.split_frames(frames)
+        if not self._is_own(parent) or not self._is_own(child) or len(self._own_frames) >= FRAMES_MAX:
+            self.refused += 1
+            if len(self._known_foreign) < FRAMES_MAX:
+                self._known_foreign.add(frames)
+                self.foreign_frames.add("%s -> %s" % (_show_name(parent), _show_name(child)))
+            return False
+        self._own_frames.add(frames)
+        return True
+
+    def _is_own(self, name: bytes) -> bool:
+        """Return whether a frame is the robot's own, with a name that every listener of /tf can read."""
+        return (
+            name.startswith(self._frame_prefix)
+            and len(name) <= FRAME_NAME_LENGTH_MAX
+            and _FRAME_NAME.fullmatch(name) is not None
+        )
+
+
+def _show_name(name: bytes) -> str:
+    return ascii(name[:FRAME_NAME_SHOWN].decode("latin-1"))
+
+
+def split_transforms(payload: bytes) -> List[bytes]:
+    """Return the transforms of a device that is no HeRo as they are; none if payload is no TFMessage."""
+    transforms = message_layouts.read_transforms(payload) or []
+    return [
+        message_layouts.pack_transform_head(stamp_ns, frames) + tail for stamp_ns, frames, tail in transforms
+    ]

@@ -1,0 +1,162 @@
+"""Who is here: arrival, identity, return, duplicate, departure with a grace period. Pure; time enters as now_s.
+
+A robot is known by its namespace. It has at most one connection that counts; a second one from the same
+address is the robot after a power cycle and takes over, one from another address is a second robot with the
+same id and has to wait: until the first one has been away for the grace period, so that it does not get the id
+of a robot that loses its connection for a moment. A robot that was never there at the same time as the known one is
+the known one at a new address.
+"""
+
+import enum
+from dataclasses import dataclass, field
+from typing import Any, Dict, List, Optional
+
+from .namespaces import Identity
+
+ALIVE_S = 3.0
+"""A robot that was heard within this time is alive: stock robots speak at least every 2.5 s."""
+
+FLAP_S = 5.0
+"""Two take-overs within this time, where the loser still speaks while the winner does, are two robots behind
+one address: a robot that boots or reconnects is silent on its old connection."""
+
+
+RIVALS_MAX = 16
+"""Addresses that are remembered because a second robot with the id of the known one came from them."""
+
+
+class RobotState(enum.Enum):
+    """As in hero_msgs/Robot."""
+
+    JOINING = 0
+    READY = 1
+    AWAY = 2
+    REFUSED = 3
+
+
+class Verdict(enum.Enum):
+    """What becomes of a connection that said who it is."""
+
+    ARRIVED = "arrived"  # first time
+    RETURNED = "returned"  # was away
+    TOOK_OVER = "took over"  # the old connection is dead or of the same robot: close it
+    REFUSED = "refused"  # the robot that is here stays
+
+
+@dataclass
+class RobotRecord:
+    """What is known of one robot, over all its connections."""
+
+    identity: Identity
+    host: str
+    address: str
+    link: Optional[Any]
+    state: RobotState
+    since_s: float
+    last_heard_s: float
+    joined_s: float
+    reconnects: int = 0
+    firmware: str = ""
+    hardware: str = ""
+    config: str = ""
+    booted_s: Optional[float] = None
+    last_error: str = ""
+    dropped_messages: int = 0
+    bad_packets: int = 0  # of earlier connections
+    packets: int = 0  # of earlier connections
+    received_length: int = 0
+    refused: Dict[str, str] = field(default_factory=dict)  # address -> reason, of duplicates that are connected
+    rivals: Dict[str, float] = field(default_factory=dict)  # host -> when a duplicate from there was first refused
+
+    def enter(self, state: RobotState, now_s: float) -> None:
+        """Change the state and note since when."""
+        if state is not self.state:
+            self.state = state
+            self.since_s = now_s
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What FleetRegistry.claim_identity() says about a connection."""
+
+    verdict: Verdict
+    record: RobotRecord
+    old_link: Optional[Any] = None  # to be closed, when the verdict is TOOK_OVER
+    reason: str = ""  # when REFUSED
+
+
+class FleetRegistry:
+    """All robots by namespace."""
+
+    def __init__(self, grace_s: float) -> None:
+        self.robots: Dict[str, RobotRecord] = {}
+        self._grace_s = grace_s
+
+    def claim_identity(
+        self, link: Any, identity: Identity, host: str, address: str, opened_s: float, now_s: float
+    ) -> Decision:
+        """Decide about a connection (link) from address, open since opened_s, that says it is identity."""
+        record = self.robots.get(identity.namespace)
+        if record is None:
+            record = RobotRecord(
+                identity, host, address, link, RobotState.JOINING, now_s, last_heard_s=now_s, joined_s=now_s
+            )
+            self.robots[identity.namespace] = record
+            return Decision(Verdict.ARRIVED, record)
+        if self._is_duplicate(record, host, opened_s, now_s):
+            reason = (
+                "two robots call themselves %s: %s was first and keeps the id, %s is refused; give one of them"
+                " another id on its configuration page" % (identity.namespace, record.address, address)
+            )
+            record.refused[address] = reason
+            if len(record.rivals) < RIVALS_MAX:
+                record.rivals.setdefault(host, now_s)
+            return Decision(Verdict.REFUSED, record, reason=reason)
+        old_link = record.link
+        record.rivals.pop(host, None)
+        record.host, record.address, record.link = host, address, link
+        record.joined_s = record.last_heard_s = now_s
+        record.reconnects += 1
+        record.refused.pop(address, None)
+        record.enter(RobotState.JOINING, now_s)
+        verdict = Verdict.RETURNED if old_link is None else Verdict.TOOK_OVER
+        return Decision(verdict, record, old_link)
+
+    @staticmethod
+    def _is_duplicate(record: RobotRecord, host: str, opened_s: float, now_s: float) -> bool:
+        if host != record.host and FleetRegistry.is_reserved(record, host):
+            return True
+        if record.link is None or now_s - record.last_heard_s >= ALIVE_S:
+            return False
+        is_second = record.last_heard_s > opened_s and record.reconnects > 0
+        return host != record.host or (is_second and now_s - record.joined_s < FLAP_S)
+
+    @staticmethod
+    def is_reserved(record: RobotRecord, host: str) -> bool:
+        """Return whether the id is kept for the known robot when one from host wants it.
+
+        So it is where the known one was heard after another from host was refused: there are two of them.
+        """
+        refused_s = record.rivals.get(host)
+        return refused_s is not None and record.last_heard_s > refused_s
+
+    def leave(self, link: Any, reason: str, now_s: float) -> Optional[RobotRecord]:
+        """A connection is gone; return the robot that is away now, None if it was nobody's."""
+        for record in self.robots.values():
+            if record.link is link:
+                record.link = None
+                record.last_error = reason
+                record.enter(RobotState.AWAY, now_s)
+                return record
+        return None
+
+    def collect_expired(self, now_s: float) -> List[RobotRecord]:
+        """Forget the robots that were away for longer than the grace period, and return them."""
+        expired = [
+            record
+            for record in self.robots.values()
+            if record.state is RobotState.AWAY and now_s - record.since_s >= self._grace_s
+        ]
+        for record in expired:
+            del self.robots[record.identity.namespace]
+        return expired

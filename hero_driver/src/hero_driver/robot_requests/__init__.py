@@ -1,0 +1,1 @@
+"""What robots ask of ROS: parameters and services, served on worker threads."""

@@ -1,0 +1,136 @@
+"""Publishers, subscribers and services of one robot in ROS: what asks the ROS master, and so may block.
+
+Everything here is a job of the registrar, except what says otherwise. A topic or service that a robot declares again
+with another type or md5 is taken down first: programs made for the one before must not reach the other.
+"""
+
+import functools
+from typing import Any, Callable, Dict, NamedTuple, Optional, Sequence, Tuple
+
+import rospy
+
+from . import message_types
+from .message_types import MessageTypeError
+from .raw_publisher import RawPublisher
+from .raw_subscriber import RawSubscriber
+
+QUEUE_LENGTH = 50
+"""Messages that wait for a slow subscriber, or for a slow robot: more than a second of odometry."""
+
+
+class Layout(NamedTuple):
+    """What a robot declares of a topic or service besides its name."""
+
+    message_type: str
+    md5sums: Tuple[str, ...]  # of a service: of its request and of its answer
+
+
+class Endpoints:
+    """The endpoints of one robot that are registered with the ROS master."""
+
+    def __init__(self, label: str, log: Callable[[str, str, str], None]) -> None:
+        """label is the robot's name in log lines; log(level, throttle key, text)."""
+        self._label = label
+        self._log = log
+        self._subscribers: Dict[str, Tuple[Layout, RawSubscriber]] = {}
+        self._servers: Dict[str, Tuple[Layout, Any]] = {}
+        self._errors: Dict[str, str] = {}
+        self._closed = False
+
+    @property
+    def last_error(self) -> str:
+        """The newest complaint about a declared topic that still holds, empty if there is none (any thread)."""
+        return next(reversed(list(self._errors.values())), "")
+
+    def complain(self, name: str, text: str) -> None:
+        """Log once what is wrong with a topic or service (any thread)."""
+        if self._errors.get(name) != text:
+            self._errors.pop(name, None)
+            self._errors[name] = text
+            self._log("error", self._label + name + text, "%s: %s" % (self._label, text))
+
+    def end(self) -> None:
+        """Register nothing more (thread of the sockets); close() has to follow."""
+        self._closed = True
+
+    def advertise(
+        self,
+        name: str,
+        layout: Layout,
+        publishers: Sequence[Tuple[str, RawPublisher]],
+        replaced: Sequence[RawPublisher],
+    ) -> None:
+        """Register the topics that the messages of a declared one become; what was there instead goes first."""
+        for publisher in replaced:
+            for call in publisher.release():
+                call()
+        message_class = self._find_class("topic", name, layout)
+        if message_class is None:
+            return
+        for publisher_name, publisher in publishers:
+            if not publisher.is_open:
+                publisher.open(publisher_name, message_types.make_raw_class(message_class))
+
+    def subscribe(self, name: str, layout: Layout, make_subscriber: Callable[[str], RawSubscriber]) -> bool:
+        """Subscribe to a topic with the subscriber that make_subscriber(type) gives; return whether it can be used."""
+        known = self._subscribers.get(name)
+        if known is not None and known[0] != layout:
+            del self._subscribers[name]
+            known[1].close()
+        message_class = self._find_class("topic", name, layout)
+        if message_class is None:
+            return False
+        if name not in self._subscribers:
+            subscriber = make_subscriber(message_class._type)
+            self._subscribers[name] = layout, subscriber
+            subscriber.open(name, message_types.make_raw_class(message_class), QUEUE_LENGTH)
+        return True
+
+    def serve(self, name: str, layout: Layout, call: Callable[[bytes], bytes]) -> bool:
+        """Offer a service, whose answers call(request) gives; return whether it can be used."""
+        known = self._servers.get(name)
+        if known is not None and known[0] != layout:
+            del self._servers[name]
+            known[1].shutdown("the robot declared it with another type")
+        service_class = self._find_class("service", name, layout)
+        if service_class is None:
+            return False
+        if name not in self._servers:
+            raw_class = message_types.make_raw_service(service_class)
+
+            def handle(request: Any) -> Any:
+                return raw_class._response_class(call(request.data))
+
+            self._servers[name] = layout, rospy.Service(name, raw_class, handle)
+        return True
+
+    def close(self, released: Sequence[Callable[[], None]], publishers: Sequence[RawPublisher]) -> None:
+        """Take everything down: what was released, and what a job before this one has opened of publishers."""
+        calls = [*released, *(call for publisher in publishers for call in publisher.release())]
+        calls += [subscriber.close for _, subscriber in self._subscribers.values()]
+        calls += [functools.partial(server.shutdown, "the robot left") for _, server in self._servers.values()]
+        self._subscribers.clear()
+        self._servers.clear()
+        for call in calls:
+            try:
+                call()
+            except Exception as error:  # noqa: BLE001 - what cannot be taken down must not keep the others up
+                self._log(
+                    "error",
+                    "unregister " + type(error).__name__,
+                    "%s: a topic or service could not be taken down: %s: %s"
+                    % (self._label, type(error).__name__, error),
+                )
+
+    def _find_class(self, kind: str, name: str, layout: Layout) -> Optional[Any]:
+        """Return the class of a topic or service; None, after one clear complaint, if it cannot be used."""
+        if self._closed:
+            return None
+        find = message_types.find_service_class if kind == "service" else message_types.find_message_class
+        try:
+            found = find(layout.message_type, *layout.md5sums)
+        except MessageTypeError as error:
+            self.complain(name, "%s %s refused: %s" % (kind, name, error))
+            return None
+        self._errors.pop(name, None)
+        return found

@@ -1,0 +1,98 @@
+"""Message bytes -> all subscribers of a topic, written at once by the thread that has them.
+
+rospy gives each subscriber a thread and a queue; waking one thread per message costs about as much as all
+the rest of the driver. Here the thread of the sockets writes to the subscribers' sockets itself and never
+waits: what a slow subscriber's socket does not take is kept, whole messages only, up to a limit, then the
+oldest goes. rospy does everything else: registration, handshakes, statistics, shutdown.
+Source of the framing: ROS TCPROS, a 32-bit length before each message.
+"""
+
+import collections
+import struct
+from typing import Any, Callable, Deque, Dict, List
+
+from .rospy_internals import NO_CONNECTIONS, open_publisher, send, unregister
+
+RETRY_S = 0.01
+"""How soon a subscriber whose socket was full is tried again."""
+
+_LENGTH = struct.Struct("<I")
+
+CallLater = Callable[[float, Callable[[], None]], None]
+
+
+class RawPublisher:
+    """One topic's way out; open() may be called by any thread, the rest only by the thread of the sockets."""
+
+    def __init__(self, queue_length: int, call_later: CallLater) -> None:
+        """Keep queue_length messages for each slow subscriber; call_later(delay_s, call) is the loop's."""
+        self._queue_length = queue_length
+        self._call_later = call_later
+        self._publisher: Any = None
+        self._impl: Any = NO_CONNECTIONS  # rospy's, of the topic
+        self._backlogs: Dict[Any, Deque[bytes]] = {}
+        self.raw_class: Any = None
+        self.dropped = 0
+
+    def open(self, name: str, raw_class: Any) -> None:
+        """Register the topic called name; asks the ROS master, so it may block."""
+        self.raw_class = raw_class
+        self._publisher, self._impl = open_publisher(name, raw_class)
+
+    def release(self) -> List[Callable[[], None]]:
+        """Publish no more; return what unregisters the topic, to be called where blocking is allowed."""
+        publisher, self._publisher = self._publisher, None
+        self._impl = NO_CONNECTIONS
+        self._backlogs.clear()
+        return [] if publisher is None else [lambda: unregister(publisher)]
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the topic is registered."""
+        return self._publisher is not None
+
+    @property
+    def is_wanted(self) -> bool:
+        """Whether somebody listens."""
+        return bool(self._impl.connections)
+
+    def publish(self, payload: bytes) -> None:
+        """Send payload to everybody who listens."""
+        connections = self._impl.connections
+        if not connections:
+            return
+        data = _LENGTH.pack(len(payload)) + payload
+        for connection in connections:
+            backlog = self._backlogs.get(connection) if self._backlogs else None
+            if backlog is not None:
+                self._keep(backlog, data)
+                continue
+            rest = send(connection, data)
+            if rest:
+                if not self._backlogs:
+                    self._call_later(RETRY_S, self._retry)
+                self._backlogs[connection] = collections.deque((rest,))
+
+    def _keep(self, backlog: Deque[bytes], data: bytes) -> None:
+        if len(backlog) > self._queue_length:
+            # The first one is on its way in part and has to be finished; the second is the oldest whole one.
+            del backlog[1]
+            self.dropped += 1
+        backlog.append(data)
+
+    def _retry(self) -> None:
+        connections = self._impl.connections or ()
+        for connection, backlog in list(self._backlogs.items()):
+            if connection not in connections:
+                del self._backlogs[connection]
+                continue
+            while backlog:
+                rest = send(connection, backlog[0])
+                if rest:
+                    backlog[0] = rest
+                    break
+                backlog.popleft()
+            if not backlog:
+                del self._backlogs[connection]
+        if self._backlogs:
+            self._call_later(RETRY_S, self._retry)

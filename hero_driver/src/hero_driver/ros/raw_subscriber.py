@@ -1,0 +1,142 @@
+"""Messages of ROS programs -> payloads, read by the thread of the sockets.
+
+rospy reads each publisher of a topic on a thread of its own; waking it, and then the thread of the sockets,
+for every command costs several times what the command itself costs. Here rospy does the registration and the
+handshake and hands over the first message; then its thread rests, and the publisher's socket is read by the
+loop until it ends. After that rospy goes on by its own rules: it closes, or it connects again.
+Source of the framing: ROS TCPROS, a 32-bit length before each message.
+"""
+
+import functools
+import socket
+import struct
+import threading
+from typing import Any, Callable, Optional
+
+import rospy
+from rospy.exceptions import TransportException, TransportTerminated
+
+from ..transport import Reader
+from .rospy_internals import count_read, find_connection, replace_reading, take_socket, unregister
+
+READ_LENGTH = 4096
+"""Read at once from one publisher: 78 velocities, so that one that floods does not delay the robots."""
+
+MESSAGE_LENGTH_MAX = 1 << 20
+"""A robot takes messages of 4 kB; a publisher that announces more than this does not speak TCPROS."""
+
+_LENGTH = struct.Struct("<I")
+
+AddReader = Callable[[Reader], None]
+
+
+def _drop(payload: bytes) -> None:
+    """Take a message for which it is too late."""
+
+
+class RawSubscriber:
+    """One topic's way in."""
+
+    def __init__(
+        self,
+        receive: Callable[[bytes], None],
+        add_reader: AddReader,
+        on_sender_lost: Callable[[], None] = lambda: None,
+    ) -> None:
+        """receive(payload) is called by any thread, add_reader(reader) is the loop's.
+
+        on_sender_lost() is called on the loop's thread when the publisher of the newest message has gone.
+        """
+        self.receive = receive
+        self.on_sender_lost = on_sender_lost
+        self.last_sender: Any = None  # connection of the newest message, where this module reads it
+        self._add_reader = add_reader
+        self._subscriber: Any = None
+
+    def open(self, name: str, raw_class: Any, queue_length: int) -> None:
+        """Subscribe to the topic called name; asks the ROS master, so it may block."""
+        self._subscriber = rospy.Subscriber(
+            name, raw_class, self._take, queue_size=queue_length, tcp_nodelay=True
+        )
+
+    def close(self) -> None:
+        """Unsubscribe; asks the ROS master. What the loop still reads is dropped, and ends by itself."""
+        self.receive = _drop
+        subscriber, self._subscriber = self._subscriber, None
+        if subscriber is not None:
+            unregister(subscriber)
+
+    def _take(self, message: Any) -> None:
+        """A message came through rospy, on the thread of its publisher's connection."""
+        connection = find_connection(self._subscriber, message)
+        self.last_sender = connection
+        self.receive(message.data)
+        if connection is not None:
+            replace_reading(connection, functools.partial(self._hand_over, connection))
+
+    def _hand_over(self, connection: Any) -> None:
+        """Let the loop read connection; return never, but raise as rospy's own reading does when it ends."""
+        sock, rest = take_socket(connection)
+        if sock is None:
+            raise TransportTerminated("closed")
+        stream = MessageStream(self, connection, sock, rest)
+        self._add_reader(stream)
+        stream.ended.wait()
+        if stream.error is not None:
+            raise TransportException("read failed: %s" % stream.error)
+        raise TransportTerminated("closed")
+
+
+class MessageStream(Reader):
+    """The connection of one publisher, while the loop reads it."""
+
+    def __init__(self, subscriber: RawSubscriber, connection: Any, sock: socket.socket, rest: bytes) -> None:
+        """connection is rospy's, for its statistics; rest is the begun message that rospy has read."""
+        self._subscriber = subscriber
+        self._connection = connection
+        self._socket = sock
+        self._rest = rest
+        self.ended = threading.Event()
+        self.error: Optional[OSError] = None
+
+    def fileno(self) -> int:
+        """Return the socket's file descriptor, the same one until close()."""
+        return self._socket.fileno()
+
+    def read(self) -> bool:
+        """Pass on the messages that have come; return whether the connection still stands."""
+        try:
+            data = self._socket.recv(READ_LENGTH, socket.MSG_DONTWAIT)
+        except (BlockingIOError, InterruptedError):
+            return True
+        except OSError as error:
+            self.error = error
+            return False
+        if not data:
+            return False
+        length_read, messages = len(data), 0
+        if self._rest:
+            data = self._rest + data
+        subscriber = self._subscriber
+        position, end = 0, len(data)
+        while end - position >= _LENGTH.size:
+            length: int = _LENGTH.unpack_from(data, position)[0]
+            if length > MESSAGE_LENGTH_MAX:
+                return False
+            start = position + _LENGTH.size
+            if end - start < length:
+                break
+            position = start + length
+            messages += 1
+            subscriber.last_sender = self._connection
+            subscriber.receive(data[start:position])
+        self._rest = data[position:]
+        count_read(self._connection, length_read, messages)
+        return True
+
+    def close(self) -> None:
+        """Let rospy's thread go on."""
+        self._socket.close()
+        self.ended.set()
+        if self._subscriber.last_sender is self._connection:
+            self._subscriber.on_sender_lost()

@@ -1,0 +1,447 @@
+"""One robot's place in ROS: its publishers, subscribers and services. ROS begins here.
+
+receive_message() and the other methods without a comment run on the thread of the sockets and never block;
+what needs the ROS master is a job for the registrar. Endpoints stay up when the connection goes and are
+there again when the robot returns.
+"""
+
+import functools
+import math
+import time
+from typing import Callable, Dict, List, Optional, Set, Tuple
+
+from ..commands.command_queue import CommandQueue
+from ..commands.service_requests import find_request_fault, is_success, read_set_odom_pose
+from ..commands.velocity_shaper import (
+    STOP_PAYLOADS,
+    STOPPED_MOTORS,
+    ZERO_TWIST,
+    check_device_twist,
+    check_motor_pulses,
+    check_twist,
+)
+from ..corrections import message_layouts
+from ..corrections.robot_corrections import TRANSFORMS, CorrectionSettings, RobotCorrections
+from ..corrections.transforms import split_transforms
+from ..corrections.wheel_motion import WheelMotion
+from ..fleet.namespaces import Identity
+from ..rosserial.session import Topic, TopicKind
+from . import message_types
+from .endpoints import QUEUE_LENGTH, Endpoints, Layout
+from .raw_publisher import CallLater, RawPublisher
+from .raw_subscriber import AddReader, RawSubscriber
+from .registrar import RobotRegistrar
+from .services import RobotService
+
+VELOCITY_CONTROLLER = "/velocity_controller/cmd_vel"
+MOTOR_TYPE = "hero_msgs/Motor"
+ODOMETRY_TYPE = "nav_msgs/Odometry"
+TRANSFORM_TYPE = "tf2_msgs/TFMessage"
+TWIST_TYPE = "geometry_msgs/Twist"
+CALIBRATION_SUFFIX = "/pid_calibration"
+SET_ODOM_TYPE = "hero_msgs/SetOdom"
+
+LONGEST_WATCHDOG_S = 4.0
+"""After this time without a command the robot stops by itself (PositionControl.ino:105, MotorDriver.ino:111)."""
+
+TUNING_HEARD_S = 1.0
+"""A robot that tunes itself logs up to 47 lines per second (VelocityControl.ino:118)."""
+
+
+class BridgeContext:
+    """What all bridges share."""
+
+    def __init__(
+        self,
+        log: Callable[[str, str, str], None],
+        wake: Callable[["RobotBridge"], None],
+        stop: Callable[["RobotBridge"], None],
+        add_transform: Callable[[bytes], None],
+        call_soon: Callable[[Callable[[], None]], None],
+        call_later: CallLater,
+        add_reader: AddReader,
+        is_stopped: Callable[[], bool],
+        clamp: bool,
+        allow_self_tuning: bool,
+        orphan_stop_s: float,
+        service_timeout_s: float,
+        command_max_age_s: float,
+        max_names: int,
+    ) -> None:
+        """Take what the rest of the driver does for bridges.
+
+        wake(bridge): commands wait, stop(bridge): the robot has to stop (any thread); log(level, throttle key,
+        text); call_soon(call), call_later(delay_s, call) and add_reader(reader) are the loop's. max_names: topics and
+        services that one robot may have over all its connections.
+        """
+        self.log = log
+        self.wake = wake
+        self.stop = stop
+        self.add_transform = add_transform
+        self.call_soon = call_soon
+        self.call_later = call_later
+        self.add_reader = add_reader
+        self.is_stopped = is_stopped
+        self.clamp = clamp
+        self.allow_self_tuning = allow_self_tuning
+        self.orphan_stop_s = orphan_stop_s
+        self.service_timeout_s = service_timeout_s
+        self.command_max_age_s = command_max_age_s
+        self.max_names = max_names
+
+
+class RobotBridge:
+    """The endpoints of one robot."""
+
+    def __init__(
+        self,
+        identity: Identity,
+        correction_settings: Optional[CorrectionSettings],
+        context: BridgeContext,
+        registrar: RobotRegistrar,
+    ) -> None:
+        """correction_settings is None for devices that are no HeRos: their messages pass through as they are."""
+        self.identity = identity
+        self.label = identity.namespace.lstrip("/")
+        self.commands = CommandQueue(context.command_max_age_s)
+        self.wheels = WheelMotion()
+        self.refused_commands = 0
+        self._context = context
+        self.registrar = registrar
+        self._endpoints = Endpoints(self.label, context.log)
+        self._closed = False
+        self._connected = False
+        self._connection = 0
+        self._publishers: Dict[str, RawPublisher] = {}
+        self.corrections: Optional[RobotCorrections] = None
+        if correction_settings is not None:
+            self.corrections = RobotCorrections(
+                identity.namespace,
+                correction_settings,
+                self._publishers.__getitem__,
+                context.add_transform,
+                self.wheels,
+            )
+        self._services: Dict[str, RobotService] = {}
+        self._service_halves: Dict[Tuple[str, TopicKind], Topic] = {}
+        self._ids: Dict[str, int] = {}
+        self._layouts: Dict[str, Layout] = {}  # as declared last, of what the robot takes
+        self._publisher_layouts: Dict[str, Layout] = {}  # and of what it sends
+        self._commanded_s: Dict[str, float] = {}  # motion topic -> when motion, not a stop, was last offered
+        self._tuning_heard_s = -math.inf
+        self._names: Set[str] = set()
+        self._subscribed_types: Dict[str, str] = {}
+
+    # The connection's life.
+
+    def attach(self) -> None:
+        """A connection stands; its topics are declared next."""
+        self._connection += 1
+        self._ids.clear()
+        self._service_halves.clear()
+        self.wheels.restart()
+        self._connected = True
+
+    def detach(self, reason: str) -> None:
+        """The connection is gone; endpoints stay, calls that wait fail now, commands that wait are dropped."""
+        self._connected = False
+        self._ids.clear()
+        self.commands.clear()
+        for service in list(self._services.values()):
+            service.fail(reason)
+
+    def close(self) -> None:
+        """Take all endpoints down; safe to call twice."""
+        if self._closed:
+            return
+        self._closed = True
+        self.detach("the robot left")
+        # This thread is the one that publishes: once it has let go of a publisher, that can be unregistered.
+        # A job of the registrar may be opening another one right now, so it looks again.
+        publishers = list(self._publishers.values())
+        self._publishers.clear()
+        released = [call for publisher in publishers for call in publisher.release()]
+        self._endpoints.end()
+        self.registrar.submit(lambda: self._endpoints.close(released, publishers), always=True)
+
+    @property
+    def last_error(self) -> str:
+        """The newest complaint about a declared topic that still holds, empty if there is none."""
+        return self._endpoints.last_error
+
+    # From the robot.
+
+    def declare(self, topic: Topic, name: str) -> None:
+        """The robot declared topic, which is called name in ROS."""
+        info, kind = topic.info, topic.kind
+        if name not in self._names:
+            if len(self._names) >= self._context.max_names:
+                text = "topic %s refused: more than %d names (2 * max_topics)" % (name, len(self._names))
+                self._endpoints.complain("names", text)
+                return
+            self._names.add(name)
+        ros_type = message_types.apply_aliases(info.message_type)
+        layout = Layout(ros_type, (info.md5sum,))
+        if kind is TopicKind.PUBLISHER:
+            replaced = self._replace_publisher(name, layout)
+            publishers = self._choose_publishers(topic, name, layout)
+            self._submit(lambda: self._endpoints.advertise(name, layout, publishers, replaced))
+        elif kind is TopicKind.SUBSCRIBER:
+            self._subscribed_types[name] = ros_type
+            make_subscriber = functools.partial(self._make_subscriber, name)
+            self._take_input(topic, name, layout, lambda: self._endpoints.subscribe(name, layout, make_subscriber))
+        elif kind in (TopicKind.SERVICE_ANSWERS, TopicKind.SERVICE_REQUESTS):
+            self._declare_service_half(topic, name)
+
+    def _take_input(self, topic: Topic, name: str, layout: Layout, register: Callable[[], bool]) -> None:
+        """The robot takes what is sent to name; register() is a job that tells whether that can be used.
+
+        It gets nothing before that where programs may still send what was declared under this name before.
+        """
+        connection, known = self._connection, self._layouts.get(name)
+        self._layouts[name] = layout
+        self._ids.pop(name, None)
+        if known in (None, layout) and _has_known_layout(layout):
+            self._ids[name] = topic.info.topic_id
+
+        def settle(is_usable: bool) -> None:
+            if connection != self._connection or self._layouts.get(name) != layout:
+                return
+            if not is_usable:
+                self._ids.pop(name, None)
+            elif name not in self._ids:
+                self._ids[name] = topic.info.topic_id
+                if self._context.is_stopped() and self.is_motion(name):
+                    self._context.stop(self)
+
+        def do() -> None:
+            is_usable = register()
+            self._context.call_soon(lambda: settle(is_usable))
+
+        self._submit(do)
+
+    def _replace_publisher(self, name: str, layout: Layout) -> List[RawPublisher]:
+        """Return the publisher of a topic that is declared with another layout than before; it is used no more."""
+        known, self._publisher_layouts[name] = self._publisher_layouts.get(name, layout), layout
+        return [self._publishers.pop(name)] if known != layout and name in self._publishers else []
+
+    def _choose_publishers(self, topic: Topic, name: str, layout: Layout) -> List[Tuple[str, RawPublisher]]:
+        """Set up the way of a topic's messages; return the topics that they become, with their publishers."""
+        ros_type = layout.message_type
+        if not _has_known_layout(layout):
+            # The registrar will refuse it with both md5s.
+            return []
+        if name == TRANSFORMS:
+            if ros_type != TRANSFORM_TYPE:
+                self._endpoints.complain(name, "topic /tf refused: its type is %s, not %s" % (ros_type, TRANSFORM_TYPE))
+            elif self.corrections is None:
+                topic.receive = self._pass_transforms
+            else:
+                topic.receive = self.corrections.choose(name, ros_type)
+            return []
+        derived = {} if self.corrections is None else self.corrections.find_derived(name, ros_type)
+        for publisher_name in (name, *derived):
+            self._publishers.setdefault(publisher_name, RawPublisher(QUEUE_LENGTH, self._context.call_later))
+        if self.corrections is None:
+            publisher = self._publishers[name]
+            receive = self._pass_odometry if ros_type == ODOMETRY_TYPE else self._pass_message
+            topic.receive = functools.partial(receive, publisher)
+        else:
+            topic.receive = self.corrections.choose(name, ros_type)
+        return [(publisher_name, self._publishers[publisher_name]) for publisher_name in (name, *derived)]
+
+    @staticmethod
+    def _pass_message(publisher: RawPublisher, payload: bytes, _arrival_ns: int) -> None:
+        publisher.publish(payload)
+
+    def _pass_odometry(self, publisher: RawPublisher, payload: bytes, _arrival_ns: int) -> None:
+        publisher.publish(payload)
+        velocity = message_layouts.read_odometry_velocity(payload)
+        if velocity is not None:
+            self.wheels.read_velocity(*velocity)
+
+    def _pass_transforms(self, payload: bytes, _arrival_ns: int) -> None:
+        for transform in split_transforms(payload):
+            self._context.add_transform(transform)
+
+    def _declare_service_half(self, topic: Topic, name: str) -> None:
+        self._service_halves[name, topic.kind] = topic
+        requests = self._service_halves.get((name, TopicKind.SERVICE_REQUESTS))
+        answers = self._service_halves.get((name, TopicKind.SERVICE_ANSWERS))
+        if requests is None or answers is None:
+            return
+        if requests.info.message_type != answers.info.message_type:
+            self._endpoints.complain(
+                name,
+                "service %s refused: its halves are %s and %s"
+                % (name, requests.info.message_type, answers.info.message_type),
+            )
+            return
+        ros_type = message_types.apply_aliases(requests.info.message_type)
+        layout = Layout(ros_type, (requests.info.md5sum, answers.info.md5sum))
+        service = self._services.get(name)
+        if service is None or self._layouts.get(name) != layout:
+            service = self._make_service(name, ros_type)
+        known_service = service
+        answers.receive = lambda payload, _: self._receive_answer(known_service, payload)
+        self._take_input(requests, name, layout, lambda: self._endpoints.serve(name, layout, known_service.call))
+
+    def _make_service(self, name: str, ros_type: str) -> RobotService:
+        def send(request: bytes) -> Optional[str]:
+            if self._services.get(name) is not service:
+                return "the robot declared it with another type"
+            return self._send_request(name, ros_type, request)
+
+        service = self._services[name] = RobotService(name, ros_type, self._context.service_timeout_s, send)
+        return service
+
+    def _receive_answer(self, service: RobotService, payload: bytes) -> None:
+        request = service.receive_answer(payload)
+        if (
+            request is not None
+            and self.corrections is not None
+            and service.service_type == SET_ODOM_TYPE
+            and is_success(payload)
+        ):
+            # The answer comes before the first reading of the counters that the robot has just zeroed.
+            self.corrections.set_pose(read_set_odom_pose(request))
+
+    # To the robot.
+
+    def find_id(self, name: str) -> Optional[int]:
+        """Return the id under which the robot receives the topic or service called name."""
+        return self._ids.get(name)
+
+    def is_motion(self, name: str) -> bool:
+        """Return whether messages on the topic called name move the robot."""
+        return self._subscribed_types.get(name) in STOP_PAYLOADS
+
+    def list_stops(self, pulses: int) -> List[Tuple[int, bytes]]:
+        """Return ids and payloads that stop the robot, in the order in which it has to get them.
+
+        pulses: how many servo pulses of 1500 us to put in front; a robot that takes no Twist gets one at least.
+        """
+        twists, motors = [], []
+        for name, topic_id in self._ids.items():
+            ros_type = self._subscribed_types.get(name)
+            if ros_type == TWIST_TYPE:
+                twists.append((topic_id, ZERO_TWIST))
+            elif ros_type == MOTOR_TYPE:
+                motors.append((topic_id, STOPPED_MOTORS))
+        return motors * (pulses if twists else max(1, pulses)) + twists
+
+    def forget_motion(self) -> None:
+        """Drop the motion commands that wait: the robot is being stopped."""
+        self._commanded_s.clear()
+        self.commands.discard_motion(time.monotonic())
+
+    @property
+    def is_commanded(self) -> bool:
+        """Whether a program has asked for motion, and not for a stop, since the last forget_motion()."""
+        return bool(self._commanded_s)
+
+    # Self-tuning.
+
+    def note_tuning(self, tunes: bool) -> None:
+        """The robot said that it tunes itself, or that it has ended that."""
+        self._tuning_heard_s = time.monotonic() if tunes else -math.inf
+
+    def tunes(self, now_s: float) -> bool:
+        """Return whether the robot tunes itself, as far as its log tells."""
+        return now_s - self._tuning_heard_s < TUNING_HEARD_S
+
+    # A ROS program sent a message for the robot (any thread).
+
+    def _make_subscriber(self, name: str, ros_type: str) -> RawSubscriber:
+        receive = self._choose_receiver(name, ros_type)
+        return RawSubscriber(receive, self._context.add_reader, functools.partial(self._lose_sender, name))
+
+    def _choose_receiver(self, name: str, ros_type: str) -> Callable[[bytes], None]:
+        """Return what takes the messages of a topic that the robot subscribes to."""
+        stop_payload = STOP_PAYLOADS.get(ros_type)
+        if stop_payload is None:
+            return functools.partial(self._receive_command, name)
+        check: Callable[[bytes], Optional[bytes]] = check_motor_pulses
+        if ros_type != MOTOR_TYPE:
+            is_hero = self.corrections is not None
+            check = functools.partial(check_twist, clamp=self._context.clamp) if is_hero else check_device_twist
+        return functools.partial(self._receive_motion, name, check, stop_payload)
+
+    def _receive_motion(
+        self, name: str, check: Callable[[bytes], Optional[bytes]], stop_payload: bytes, payload: bytes
+    ) -> None:
+        command = check(payload)
+        if command is None:
+            self.refused_commands += 1
+            self._context.log(
+                "warn",
+                name,
+                "%s: a command on %s is not finite and was refused; correct the program that sends it"
+                % (self.label, name),
+            )
+            if name in self._commanded_s:
+                # It must not go on with what it was told before.
+                self._context.stop(self)
+        elif not self._connected or (self._context.is_stopped() and command != stop_payload):
+            self.refused_commands += 1
+        else:
+            now_s = time.monotonic()
+            if command != stop_payload:
+                self._commanded_s[name] = now_s
+            elif name in self._commanded_s:
+                self._commanded_s.pop(name, None)
+            if self.corrections is not None:
+                self.commands.offer_motion(name, command, stop_payload, now_s)
+            else:
+                self.commands.offer(name, command, is_motion=True)
+            self._context.wake(self)
+
+    def _lose_sender(self, name: str) -> None:
+        """The program that sent the newest command of a motion topic has gone (thread of the sockets)."""
+        commanded_s = self._commanded_s.get(name)
+        if commanded_s is None or time.monotonic() - commanded_s > LONGEST_WATCHDOG_S:
+            return
+
+        def stop_orphan() -> None:
+            if self._commanded_s.get(name) == commanded_s:
+                self._context.stop(self)
+
+        self._context.call_later(self._context.orphan_stop_s, stop_orphan)
+
+    def _receive_command(self, name: str, payload: bytes) -> None:
+        if not self._connected:
+            self.refused_commands += 1
+            return
+        self.commands.offer(name, payload)
+        self._context.wake(self)
+
+    def _send_request(self, name: str, service_type: str, request: bytes) -> Optional[str]:
+        """Send a service request (a thread of rospy's); return why not, if so."""
+        fault = find_request_fault(service_type, request) if self.corrections is not None else None
+        if fault is not None:
+            return fault
+        if not self._connected or name not in self._ids:
+            return "the robot is not connected"
+        if name.endswith(CALIBRATION_SUFFIX):
+            if not self._context.allow_self_tuning:
+                return (
+                    "self-tuning spins the robot for up to a minute and finds no gains that the firmware keeps; measure"
+                    " them with hero_calibration calibrate, or set ~allow_self_tuning"
+                )
+            if self._context.is_stopped():
+                return "it moves the robot, and all robots are stopped (~stop)"
+            self.note_tuning(True)
+        self.commands.offer(name, request)
+        self._context.wake(self)
+        return None
+
+    # Jobs of the registrar; these may block.
+
+    def _submit(self, job: Callable[[], None]) -> None:
+        if not self.registrar.submit(job):
+            self._endpoints.complain("registrar", "too many topics wait for the ROS master; is it reachable?")
+
+
+def _has_known_layout(layout: Layout) -> bool:
+    """Return whether a layout of a type that is read or written here is the one that is known."""
+    return layout.md5sums[0] == message_layouts.MD5SUMS.get(layout.message_type, layout.md5sums[0])

@@ -1,0 +1,53 @@
+"""Transforms of all robots -> few tf messages: what arrives within a period goes out as one TFMessage.
+
+One message for each transform, as robots send them, would make every listener of /tf handle 150 messages
+per robot and second, and a small queue would lose most of them. Runs on the thread of the sockets.
+"""
+
+from typing import Callable, List
+
+from tf2_msgs.msg import TFMessage
+
+from ..corrections import message_layouts
+from .message_types import make_raw_class
+from .raw_publisher import CallLater, RawPublisher
+
+QUEUE_LENGTH = 200
+"""Two seconds of messages for a listener that is slow."""
+
+TRANSFORMS_MAX = 500
+"""A message holds at most so many: 50 kB, about 3 s of one robot, 30 ms of a hundred."""
+
+
+class TransformPublisher:
+    """The publisher of /tf.
+
+    Attributes:
+        add: takes the bytes of one geometry_msgs/TransformStamped. It is the list's own method, because it is
+            called 150 times per robot and second; schedule() has to follow.
+        is_scheduled: whether what was added is going to be published already.
+    """
+
+    def __init__(self, period_s: float, call_later: CallLater) -> None:
+        """Collect for period_s; call_later(delay_s, call) runs call on the same thread."""
+        self._period_s = period_s
+        self._call_later = call_later
+        self._publisher = RawPublisher(QUEUE_LENGTH, call_later)
+        self._publisher.open("/tf", make_raw_class(TFMessage))
+        self._transforms: List[bytes] = []
+        self.add: Callable[[bytes], None] = self._transforms.append
+        self.is_scheduled = False
+
+    def schedule(self) -> None:
+        """See to it that what was added is published; for after each read, unless is_scheduled."""
+        if self._transforms:
+            self.is_scheduled = True
+            self._call_later(self._period_s, self._publish)
+
+    def _publish(self) -> None:
+        self.is_scheduled = False
+        if self._publisher.is_wanted:
+            for start in range(0, len(self._transforms), TRANSFORMS_MAX):
+                part = self._transforms[start : start + TRANSFORMS_MAX]
+                self._publisher.publish(message_layouts.pack_transform_message(part))
+        self._transforms.clear()

@@ -1,0 +1,228 @@
+"""Messages of publishers over real sockets: rospy's thread hands over after the first, nothing is lost."""
+
+import socket
+import struct
+import threading
+import time
+
+import pytest
+import rospy
+from rospy.impl.tcpros_base import TCPROSTransport
+from rospy.impl.tcpros_pubsub import TCPROSSub
+from rospy.topics import _SubscriberImpl
+from std_msgs.msg import String
+
+from hero_driver.ros.message_types import make_raw_class
+from hero_driver.ros.raw_subscriber import MESSAGE_LENGTH_MAX, RawSubscriber
+from hero_driver.transport import EventLoop, LinkHandler, TransportSettings
+
+DEADLINE_S = 20.0
+RAW_CLASS = make_raw_class(String)
+
+
+def frame(payload):
+    return struct.pack("<I", len(payload)) + payload
+
+
+class Handler(LinkHandler):
+    """Keeps the faults that the loop reports."""
+
+    def __init__(self):
+        self.faults = []
+
+    def report_fault(self, error):
+        self.faults.append(error)
+
+
+class Bench:
+    """A raw subscriber, a real loop on a thread of its own, and publishers behind rospy's own connections."""
+
+    def __init__(self, monkeypatch):
+        self.handler = Handler()
+        self.loop = EventLoop(TransportSettings("", 0, (), 1.0, True), self.handler)
+        self.loop.open()
+        self.loop_thread = threading.Thread(target=self.loop.run, daemon=True)
+        self.loop_thread.start()
+        self.received = []  # pairs: payload, whether it came on the loop's thread
+        self.arrived = threading.Condition()
+        self.fails_on = None
+        self.impl = _SubscriberImpl("/topic", RAW_CLASS)
+        bench = self
+
+        class Subscriber:
+            """What rospy.Subscriber is to a raw subscriber, without a ROS master."""
+
+            def __init__(self, name, raw_class, callback, queue_size, tcp_nodelay):
+                self.impl = bench.impl
+                self.impl.add_callback(callback, None)
+
+            def unregister(self):
+                self.impl.close()
+
+        monkeypatch.setattr(rospy, "Subscriber", Subscriber)
+        self.subscriber = RawSubscriber(self.receive, self.loop.add_reader)
+        self.subscriber.open("/topic", RAW_CLASS, 50)
+
+    def receive(self, payload):
+        if payload == self.fails_on:
+            raise ValueError("not this one")
+        with self.arrived:
+            self.received.append((payload, threading.current_thread() is self.loop_thread))
+            self.arrived.notify_all()
+
+    def publish(self):
+        """Connect a publisher; return its socket, rospy's connection and rospy's thread."""
+        ours, theirs = socket.socketpair()
+        connection = TCPROSTransport(TCPROSSub("/topic", RAW_CLASS, queue_size=50), "/topic")
+        connection.socket = ours
+        connection.header = {"callerid": "/publisher"}
+        connection.set_endpoint_id("http://publisher:%d/" % theirs.fileno())
+        assert self.impl.add_connection(connection)
+        thread = threading.Thread(
+            target=connection.receive_loop, args=(self.impl.receive_callback,), daemon=True
+        )
+        thread.start()
+        return theirs, connection, thread
+
+    def publish_adopted(self):
+        """As publish(), after the loop has taken over."""
+        publisher, connection, thread = self.publish()
+        before = len(self.received)
+        deadline_s = time.monotonic() + DEADLINE_S
+        while not any(on_loop for _, on_loop in self.received[before:]):
+            assert time.monotonic() < deadline_s
+            count = len(self.received)
+            publisher.sendall(frame(b"hello"))
+            self.wait_for(count + 1)
+        return publisher, connection, thread
+
+    def wait_for(self, count):
+        with self.arrived:
+            assert self.arrived.wait_for(lambda: len(self.received) >= count, DEADLINE_S), self.received
+
+    def list_payloads(self):
+        return [payload for payload, _ in self.received]
+
+    def close(self):
+        self.loop.stop()
+        self.loop_thread.join(DEADLINE_S)
+
+
+@pytest.fixture
+def bench(monkeypatch):
+    bench = Bench(monkeypatch)
+    yield bench
+    bench.close()
+
+
+def wait_until_ended(thread):
+    thread.join(DEADLINE_S)
+    assert not thread.is_alive()
+
+
+def test_messages_come_on_the_thread_of_the_sockets_after_the_first(bench):
+    publisher, connection, _ = bench.publish_adopted()
+    before = len(bench.received)
+    messages_before = connection.stat_num_msg
+    for number in range(100):
+        publisher.sendall(frame(b"%d" % number))
+    bench.wait_for(before + 100)
+    assert bench.received[before:] == [(b"%d" % number, True) for number in range(100)]
+    assert connection.stat_num_msg == messages_before + 100
+
+
+def test_messages_are_whole_and_in_order_however_they_are_cut(bench):
+    messages = [b"x" * length for length in (0, 1, 3, 4, 5, 48, 5000)]
+    publisher, _, _ = bench.publish_adopted()
+    before = len(bench.received)
+    for byte in b"".join(map(frame, messages)):
+        publisher.sendall(bytes((byte,)))
+    bench.wait_for(before + len(messages))
+    assert bench.list_payloads()[before:] == messages
+
+
+def test_what_rospy_has_read_already_comes_first_and_a_begun_message_is_not_lost(bench):
+    publisher, _, _ = bench.publish()
+    stream = b"".join(frame(b"%d" % number) for number in range(10)) + frame(b"a message in two parts")
+    publisher.sendall(stream[:-5])
+    bench.wait_for(10)
+    publisher.sendall(stream[-5:])
+    bench.wait_for(11)
+    publisher.sendall(frame(b"last"))
+    bench.wait_for(12)
+    assert bench.list_payloads() == [
+        *[b"%d" % number for number in range(10)],
+        b"a message in two parts",
+        b"last",
+    ]
+
+
+def test_several_publishers_of_one_topic_are_all_heard(bench):
+    publishers = [bench.publish_adopted()[0] for _ in range(5)]
+    before = len(bench.received)
+    for number, publisher in enumerate(publishers):
+        publisher.sendall(frame(b"%d" % number))
+    bench.wait_for(before + 5)
+    assert sorted(bench.list_payloads()[before:]) == [b"%d" % number for number in range(5)]
+
+
+def test_a_publisher_that_goes_leaves_nothing_behind(bench):
+    publisher, connection, thread = bench.publish_adopted()
+    publisher.close()
+    wait_until_ended(thread)
+    assert connection.done
+    assert not bench.loop._readers
+
+
+def test_closing_the_inlet_ends_what_the_loop_reads(bench):
+    _, connection, thread = bench.publish_adopted()
+    bench.subscriber.close()
+    wait_until_ended(thread)
+    assert connection.done
+    assert not bench.loop._readers
+    bench.subscriber.close()
+
+
+def test_the_end_of_the_loop_lets_the_threads_of_rospy_go(bench):
+    _, _, thread = bench.publish_adopted()
+    bench.close()
+    wait_until_ended(thread)
+
+
+def test_a_publisher_that_does_not_speak_tcpros_is_closed_and_the_others_go_on(bench):
+    other, _, _ = bench.publish_adopted()
+    publisher, _, thread = bench.publish_adopted()
+    publisher.sendall(struct.pack("<I", MESSAGE_LENGTH_MAX + 1))
+    wait_until_ended(thread)
+    before = len(bench.received)
+    other.sendall(frame(b"still here"))
+    bench.wait_for(before + 1)
+    assert bench.received[-1] == (b"still here", True)
+
+
+def test_a_message_that_cannot_be_taken_is_reported_and_ends_its_publisher_only(bench):
+    other, _, _ = bench.publish_adopted()
+    publisher, _, thread = bench.publish_adopted()
+    bench.fails_on = b"bad"
+    publisher.sendall(frame(b"bad"))
+    wait_until_ended(thread)
+    assert [str(fault) for fault in bench.handler.faults] == ["not this one"]
+    before = len(bench.received)
+    other.sendall(frame(b"still here"))
+    bench.wait_for(before + 1)
+
+
+def test_rospy_keeps_reading_where_topic_statistics_are_wanted(bench, monkeypatch):
+    class Statistics:
+        def callback(self, message, publisher, length):
+            """Count nothing."""
+
+        def shutdown(self):
+            """End nothing."""
+
+    monkeypatch.setattr(bench.impl, "statistics_logger", Statistics())
+    publisher, _, _ = bench.publish()
+    for number in range(20):
+        publisher.sendall(frame(b"%d" % number))
+    bench.wait_for(20)
+    assert bench.received == [(b"%d" % number, False) for number in range(20)]
