@@ -119,7 +119,7 @@ def main():
 
         run(
             "roslaunch", "hero_bringup", "hero_bringup.launch", "host:=127.0.0.1", "port:=%d" % driver_port,
-            "sim:=%d" % options.count,
+            "count:=%d" % options.count,
         )
         run("roslaunch", "hero_examples", "random_walk.launch", "robots:=0-%d" % (options.count - 1))
         monitor = run("rosrun", "hero_monitor", "monitor", "_port:=%d" % port)

@@ -17,13 +17,13 @@ class RunningSuite:
     """Robots that are ready, until close(). This process is a ROS node then, so it has one suite in its life."""
 
     def __init__(self, robots, *arguments):
-        """Start robots simulated robots; arguments: more of hero_bringup.launch, e.g. sim_arena:=obstacles."""
+        """Start robots simulated robots; arguments: more of hero_bringup.launch, e.g. arena:=obstacles."""
         self.processes = []
         master_port, self.port = find_free_port(), find_free_port()
         os.environ["ROS_MASTER_URI"] = "http://localhost:%d" % master_port
         self.launch = self.start(
             ["roslaunch", "--no-summary", "-p", str(master_port), "hero_bringup", "hero_bringup.launch"]
-            + ["host:=127.0.0.1", "port:=%d" % self.port, "sim:=%d" % robots, *arguments],
+            + ["host:=127.0.0.1", "port:=%d" % self.port, "count:=%d" % robots, *arguments],
             stdout=subprocess.DEVNULL,
         )
         try:

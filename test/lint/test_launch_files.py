@@ -20,16 +20,34 @@ def test_every_argument_is_documented(path):
         assert argument.get("doc"), f"{name_of(path)}: arg {argument.get('name')} has no doc"
 
 
+def find_forwarded(path):
+    """Return the launch file to which all arguments are passed on; None for a file that has nodes of its own."""
+    for include in ElementTree.parse(path).getroot().findall("include"):
+        if include.get("pass_all_args") == "true":
+            package, file = re.fullmatch(r"\$\(find (\w+)\)/(.+)", include.get("file")).groups()
+            return sources.ROOT / package / file
+    return None
+
+
 @pytest.mark.parametrize("path", LAUNCH_FILES, ids=name_of)
 def test_every_argument_is_in_the_readme_of_its_package(path):
     readme = (sources.ROOT / sources.package_of(path) / "README.md").read_text(encoding="utf-8")
     assert path.name in readme, f"{path.name} is not in the README of {sources.package_of(path)}"
+    if find_forwarded(path):
+        return
     for argument in ElementTree.parse(path).getroot().findall("arg"):
         name = argument.get("name")
         # `~name` where the argument is the node's parameter
-        assert f"`{name}`" in readme or f"`~{name}`" in readme, (
-            f"{path.name}: `{argument.get('name')}` is missing"
-        )
+        assert f"`{name}`" in readme or f"`~{name}`" in readme, f"{path.name}: `{name}` is missing"
+
+
+@pytest.mark.parametrize("path", list(filter(find_forwarded, LAUNCH_FILES)), ids=name_of)
+def test_a_launch_file_that_passes_arguments_on_declares_the_same(path):
+    own, forwarded = (
+        [argument.attrib for argument in ElementTree.parse(file).getroot().findall("arg")]
+        for file in (path, find_forwarded(path))
+    )
+    assert own == forwarded, f"{name_of(path)}: arguments differ from those of {name_of(find_forwarded(path))}"
 
 
 @pytest.mark.parametrize("path", LAUNCH_FILES + sources.list_files(".test"), ids=name_of)

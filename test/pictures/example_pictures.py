@@ -43,7 +43,7 @@ class Recording:
     def __init__(self, robots, arena, *arguments):
         """robots: how many. arena: a name or a file. arguments: more of hero_bringup.launch."""
         self.arena = load_arena(arena)
-        self.stage = RunningSuite(robots, "sim_arena:=" + arena, *arguments)
+        self.stage = RunningSuite(robots, "arena:=" + arena, *arguments)
         self.watch = SwarmWatch(range(robots))
         self.watch.wait_until_complete()
         self.first = {}
@@ -176,7 +176,7 @@ def count_reddened(lights):
 
 def measure_delay(picture):
     """The program's own plot, for four robots in a router's network."""
-    with Recording(4, "empty", "sim_options:=--wifi router") as recording:
+    with Recording(4, "empty", "wifi:=router") as recording:
         program = recording.stage.start_example("measure_delay", "_turns:=10", "_plot:=%s" % picture)
         if program.wait(180.0):
             raise SystemExit("measure_delay ended with %d" % program.returncode)

@@ -51,9 +51,9 @@ def photograph_rviz(picture, robots, arena):
     screen = VirtualScreen(*SCREEN)
     os.environ.update(screen.environment())
     try:
-        with RunningSuite(robots, "sim_arena:=" + arena) as stage:
+        with RunningSuite(robots, "arena:=" + arena) as stage:
             stage.start_example("random_walk", "_robots:=0-%d" % (robots - 1), "_seed:=4")
-            launch = ["roslaunch", "--no-summary", "hero_description", "swarm.launch", "robots:=%d" % robots]
+            launch = ["roslaunch", "--no-summary", "hero_description", "swarm.launch", "robots:=0-%d" % (robots - 1)]
             stage.start(launch, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
             wait_until_drawn(screen, stage)
             wait_while_they_walk(stage)
@@ -65,7 +65,7 @@ def photograph_rviz(picture, robots, arena):
 def photograph_monitor(picture, robots, arena):
     """Let robots walk in an arena, and save the page of the fleet monitor, with one robot chosen."""
     port = find_free_port()
-    with RunningSuite(robots, "sim_arena:=" + arena) as stage:
+    with RunningSuite(robots, "arena:=" + arena) as stage:
         stage.start_example("random_walk", "_robots:=0-%d" % (robots - 1), "_seed:=4")
         stage.start(["rosrun", "hero_monitor", "monitor", "_port:=%d" % port, "_control:=true"])
         stage.wait_for(lambda: is_open(port), "the monitor")

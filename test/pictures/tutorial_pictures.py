@@ -51,7 +51,7 @@ def odometry(picture):
 
 def walk(picture):
     """The plot that the lesson on recording makes."""
-    with RunningSuite(1, "sim_options:=--first-id 3") as stage, tempfile.TemporaryDirectory() as folder:
+    with RunningSuite(1, "first_id:=3") as stage, tempfile.TemporaryDirectory() as folder:
         start_lesson(stage, "random_walk.py", "_robot:=hero_3")
         rospy.wait_for_message("/hero_3/odom", Odometry, timeout=30.0)
         bag = folder + "/walk.bag"

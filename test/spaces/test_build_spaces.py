@@ -187,7 +187,7 @@ def test_driver_and_simulated_robots_start_and_their_odometry_arrives(space):
         . {setup}
         read -r master_port robot_port < <({python} {free_ports})
         export ROS_MASTER_URI=http://localhost:$master_port ROS_HOSTNAME=localhost ROS_HOME={directory}/ros_home
-        roslaunch -p $master_port hero_bringup hero_bringup.launch host:=127.0.0.1 port:=$robot_port sim:=2 \\
+        roslaunch -p $master_port hero_bringup hero_bringup.launch host:=127.0.0.1 port:=$robot_port count:=2 \\
             >{directory}/launch.log 2>&1 &
         launch=$!
         trap 'kill -INT $launch; wait $launch || true; tail -n 40 {directory}/launch.log' EXIT

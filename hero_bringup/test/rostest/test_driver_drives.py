@@ -2,10 +2,14 @@
 """The main job with simulated robots: they dial in or are dialled, are driven, calibrated and stopped."""
 
 import math
+import re
 import unittest
+from pathlib import Path
 
 import rospy
 import rostest
+import yaml
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
@@ -200,6 +204,17 @@ class DriverDrivesTest(unittest.TestCase):
             for link in ("base_link", "left_wheel_link", "right_wheel_link", "hat_link", "laser_link")
         }
         wait_for(lambda: expected <= frames, DEADLINE_S, "all frames of all robots")
+
+    def test_the_aggregator_configuration_sorts_every_diagnostic_once(self):
+        config = yaml.safe_load((Path(__file__).parents[2] / "config" / "diagnostics.yaml").read_text())
+        groups = {name: [] for name in config["analyzers"]}
+        for status in Watch("/diagnostics", DiagnosticArray).wait_more().status:
+            matching = [
+                name for name, group in config["analyzers"].items() if re.fullmatch(group["regex"], status.name)
+            ]
+            self.assertEqual(len(matching), 1, status.name)
+            groups[matching[0]].append(status.name.rpartition(": ")[2])
+        self.assertEqual(groups, {"drivers": ["driver"], "robots": ["hero_0", "hero_1", "hero_2", "hero_9"]})
 
 
 if __name__ == "__main__":

@@ -105,13 +105,13 @@ class DriverRestartTest(unittest.TestCase):
         with socket.socket() as taken:
             taken.bind(("127.0.0.1", self.port))
             taken.listen(1)
-            program = self.launch("sim:=1")
+            program = self.launch("count:=1")
             program.wait_end()
         self.assertEqual(len(program.find("~port %d is in use" % self.port)), 1, program.lines)
         self.assertEqual(program.find("Traceback"), [])
 
     def test_simulated_robots_come_with_it(self):
-        self.launch("sim:=2")
+        self.launch("count:=2")
         self.wait_ready([0, 1])
 
     def test_robots_are_back_when_the_driver_is_started_again(self):

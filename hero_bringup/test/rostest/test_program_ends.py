@@ -50,8 +50,8 @@ class ProgramEndsTest(unittest.TestCase):
                 self.assertIn(repr(uri), lines[0])
 
     def test_a_negative_number_of_simulated_robots_is_refused_by_the_simulator(self):
-        for sim, expected in (("-1", True), ("0", False)):
-            command = ["roslaunch", "--nodes", "hero_bringup", "hero_bringup.launch", "sim:=" + sim]
+        for count, expected in (("-1", True), ("0", False)):
+            command = ["roslaunch", "--nodes", "hero_bringup", "hero_bringup.launch", "count:=" + count]
             result = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True, timeout=TIMEOUT_S)
             self.assertEqual("/hero_sim" in result.stdout.split(), expected, result.stdout)
         status, lines = self.end(start(["hero_sim", "--count", "-1"]))

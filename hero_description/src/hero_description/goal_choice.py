@@ -4,7 +4,7 @@ RViz calls all its goal tools by one name, so one for each robot could not be to
 chooses it, a disc below it shows that, and goals go to it, on /hero_N/goal. Who drives there is another program:
 go_to_goal of hero_examples.
 
-    rosrun hero_description goal_choice --robots 4
+    rosrun hero_description goal_choice --robots 0-3
 """
 
 import argparse
@@ -21,7 +21,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from .dimensions import BODY_DIAMETER_M, GROUND_Z_M
 from .rviz_config import CHOICE_TOPIC, GOAL_TOPIC, POINT_TOPIC
 from .start import start_node
-from .view import read_names
+from .view import ROBOTS_HELP, read_names
 
 LISTEN_S = 0.5
 """How long it listens to /tf after a click: a swarm's /tf is too much to be read for nothing."""
@@ -98,7 +98,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         prog="goal_choice", description="RViz's goals, for the robot that was clicked."
     )
-    parser.add_argument("--robots", default="1", help="a number (4: hero_0 to hero_3) or ids (0,2,5)")
+    parser.add_argument("--robots", default="0", help=ROBOTS_HELP)
     options = parser.parse_args(rospy.myargv()[1:])
     try:
         names = read_names(options.robots)

@@ -1,6 +1,6 @@
 """Colours that robots are told to show -> spheres on their hats, for RViz.
 
-    rosrun hero_description lights --robots 4
+    rosrun hero_description lights --robots 0-3
 
 The robot does not report its light; what is shown is the last colour on /hero_N/led, for as long as the firmware
 shows it. Works with simulated and real robots.
@@ -16,7 +16,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from .dimensions import DECK_THICKNESS_M, LIGHT_DIAMETER_M
 from .rviz_config import LIGHTS_TOPIC
 from .start import start_node
-from .view import read_names
+from .view import ROBOTS_HELP, read_names
 
 LIGHT_S = 15.0
 """The firmware lets the light go dark so long after the last command (LEDStatus.ino:76)."""
@@ -42,7 +42,7 @@ def make_marker(name: str, number: int, colour: ColorRGBA) -> Marker:
 def main() -> None:
     """Run the node lights."""
     parser = argparse.ArgumentParser(prog="lights", description="The robots' lights, for RViz.")
-    parser.add_argument("--robots", default="1", help="a number (4: hero_0 to hero_3) or ids (0,2,5)")
+    parser.add_argument("--robots", default="0", help=ROBOTS_HELP)
     options = parser.parse_args(rospy.myargv()[1:])
     try:
         names = read_names(options.robots)

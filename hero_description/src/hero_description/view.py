@@ -1,6 +1,6 @@
 """Starts RViz with a configuration made for the robots that are there.
 
-    rosrun hero_description view --robots 4 --fixed-frame world
+    rosrun hero_description view --robots 0-3 --fixed-frame world
 
 RViz takes this program's place, so that a signal reaches it and its exit code is this program's.
 """
@@ -18,25 +18,26 @@ import rospy
 from .rviz_config import VIEWS, make_config
 
 LONGEST_SWARM = 100
+ROBOTS_HELP = "ids of the robots, such as 0 1 2 or 0-3 (0)"
 
 
 def read_names(text: str) -> List[str]:
-    """Return the robots' names of a number ("4": hero_0 to hero_3) or of ids ("0,2,5"). Raises: ValueError."""
-    if re.fullmatch(r"\d+", text):
-        ids = list(range(int(text)))
-    elif re.fullmatch(r"\d+(,\d+)+,?|\d+,", text):
-        ids = [int(part) for part in text.split(",") if part]
-    else:
-        raise ValueError("neither a number of robots nor ids as in 0,2,5")
+    """Return the names of the robots with these ids ("0 1 2", "0,1,2" or "0-2"). Raises: ValueError."""
+    ids: List[int] = []
+    for word in text.replace(",", " ").split():
+        if not re.fullmatch(r"\d+(-\d+)?", word):
+            raise ValueError("must be ids such as 0 1 2 or 0-3")
+        first, _, last = word.partition("-")
+        ids.extend(range(int(first), min(int(last or first), int(first) + LONGEST_SWARM) + 1))
     if not 0 < len(ids) <= LONGEST_SWARM:
-        raise ValueError("must be 1 to %d robots" % LONGEST_SWARM)
+        raise ValueError("must be the ids of 1 to %d robots, such as 0 1 2 or 0-3" % LONGEST_SWARM)
     return ["hero_%d" % robot_id for robot_id in ids]
 
 
 def main() -> None:
     """Run the program view."""
     parser = argparse.ArgumentParser(prog="view", description="RViz, set up for the robots that are there.")
-    parser.add_argument("--robots", default="1", help="a number (4: hero_0 to hero_3) or ids (0,2,5)")
+    parser.add_argument("--robots", default="0", help=ROBOTS_HELP)
     parser.add_argument("--fixed-frame", default="world", help="frame in which all is shown (world)")
     parser.add_argument("--view", choices=sorted(VIEWS), default="orbit", help="from where to look (orbit)")
     arguments = rospy.myargv()
