@@ -197,6 +197,19 @@ def print_table(results):
         print("| %s | %s |" % (title, " | ".join(cells)))
 
 
+def print_run(name, runs):
+    """Print the newest run of a server: its figures show whether the machine was steady."""
+    run = runs[-1]
+    print(
+        "round %d: %d robots%s: CPU %.1f %%, p99 of odom %s, of cmd_vel %s, everything else %.2f cores"
+        % (len(runs), run["robots"], name and ", " + name, run["server_cpu_percent"],
+           *("-" if run[key] is None else "%.2f ms" % run[key] for key in ("odom_p99_ms", "command_p99_ms")),
+           run["other_cores"]),
+        file=sys.stderr,
+        flush=True,
+    )
+
+
 def append_history(path, results, machine_us):
     """Add a line for each number of robots to the CSV file that shows what commits cost."""
     commit = subprocess.run(
@@ -233,7 +246,7 @@ def find_driver_command(workspace):
     for folder in (workspace, workspace / ".work" / "ws"):
         environment = folder / "devel" / "env.sh"
         if environment.is_file():
-            return "%s %s" % (environment.resolve(), DRIVER_COMMAND)
+            return "%s %s" % (environment.absolute(), DRIVER_COMMAND)
     raise SystemExit(
         "bench: %s is not a built workspace; in a checkout, script/test unit builds one" % workspace
     )
@@ -248,6 +261,7 @@ def measure_all(options, commands):
             for _ in range(options.rounds):
                 for name, command in commands.items():
                     runs[name].append(run_once(options, command, count, environment))
+                    print_run(name, runs[name])
             results += [{"server": name, **take_medians(runs[name])} for name in commands]
     return results
 

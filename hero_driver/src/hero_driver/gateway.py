@@ -162,7 +162,7 @@ class Gateway(LinkHandler):
         if session.outgoing:
             self._send_outgoing(peer)
         if not events and peer.record is None and peer.guard.hears_garbage:
-            self._loop.rest(link, GARBAGE_REST_S)
+            self._loop.pause_reading(link, GARBAGE_REST_S)
         for event in events:
             if type(event) is tuple:
                 topic, payload = event

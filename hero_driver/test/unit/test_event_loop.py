@@ -1,5 +1,6 @@
 """A real loop with real connections: when a link is read, and when not."""
 
+import os
 import socket
 import struct
 import threading
@@ -9,18 +10,18 @@ import pytest
 from hero_driver.transport import EventLoop, LinkHandler, TransportSettings
 
 DEADLINE_S = 20.0
-REST_S = 0.2
+PAUSE_S = 0.2
 
 
 class Handler(LinkHandler):
-    """Lets a link rest after each read, and notes what comes when."""
+    """Pauses reading after each read, and notes what comes when."""
 
-    def __init__(self, rest_s):
+    def __init__(self, pause_s):
         self.changed = threading.Condition()
         self.reads = []  # pairs: bytes, when they were read
         self.endings = []
-        self.loop = None
-        self._rest_s = rest_s
+        self.loop = self.thread = None
+        self._pause_s = pause_s
 
     def open_link(self, link):
         """Take everybody."""
@@ -29,7 +30,7 @@ class Handler(LinkHandler):
         with self.changed:
             self.reads.append((data, now_s))
             self.changed.notify_all()
-        self.loop.rest(link, self._rest_s)
+        self.loop.pause_reading(link, self._pause_s)
 
     def poll_link(self, link, now_s):
         """Have nothing to do."""
@@ -48,12 +49,13 @@ class Handler(LinkHandler):
 def start():
     loops = []
 
-    def start_loop(rest_s):
-        handler = Handler(rest_s)
+    def start_loop(pause_s):
+        handler = Handler(pause_s)
         handler.loop = EventLoop(TransportSettings("127.0.0.1", 0, (), 1.0, True), handler)
         handler.loop.open()
         thread = threading.Thread(target=handler.loop.run, daemon=True)
         thread.start()
+        handler.thread = thread
         loops.append((handler.loop, thread))
         return handler, socket.create_connection(handler.loop.listening)
 
@@ -63,8 +65,8 @@ def start():
         thread.join(DEADLINE_S)
 
 
-def test_a_link_that_rests_is_read_when_the_time_is_over_and_loses_nothing(start):
-    handler, far = start(REST_S)
+def test_a_paused_link_is_read_again_in_time_and_loses_nothing(start):
+    handler, far = start(PAUSE_S)
     with far:
         far.sendall(b"first")
         handler.wait(lambda: len(handler.reads) == 1)
@@ -72,10 +74,10 @@ def test_a_link_that_rests_is_read_when_the_time_is_over_and_loses_nothing(start
         handler.wait(lambda: len(handler.reads) == 2)
     (first, first_s), (second, second_s) = handler.reads
     assert (first, second) == (b"first", b"second")
-    assert second_s - first_s >= REST_S
+    assert second_s - first_s >= PAUSE_S
 
 
-def test_a_link_that_rests_does_not_hold_up_another(start):
+def test_a_paused_link_does_not_delay_another(start):
     handler, far = start(DEADLINE_S)
     with far, socket.create_connection(handler.loop.listening) as other:
         far.sendall(b"first")
@@ -86,7 +88,7 @@ def test_a_link_that_rests_does_not_hold_up_another(start):
         assert handler.reads[1][0] == b"other"
 
 
-def test_a_link_that_breaks_while_it_rests_is_closed_at_once(start):
+def test_a_paused_link_that_breaks_is_closed_at_once(start):
     handler, far = start(10 * DEADLINE_S)
     far.sendall(b"first")
     handler.wait(lambda: len(handler.reads) == 1)
@@ -94,3 +96,25 @@ def test_a_link_that_breaks_while_it_rests_is_closed_at_once(start):
     far.close()
     handler.wait(lambda: handler.endings)
     assert handler.endings == ["read failed: Connection reset by peer"]
+
+
+def test_the_end_of_the_loop_closes_every_file_that_it_opened(start):
+    before = set(os.listdir("/proc/self/fd"))
+    handler, far = start(PAUSE_S)
+    with far:
+        far.sendall(b"first")
+        handler.wait(lambda: handler.reads)
+        handler.loop.stop()
+        handler.wait(lambda: handler.endings)
+        handler.thread.join(DEADLINE_S)
+    assert set(os.listdir("/proc/self/fd")) == before
+
+
+def test_a_call_after_the_end_of_the_loop_does_no_harm(start):
+    handler, far = start(PAUSE_S)
+    far.close()
+    handler.loop.stop()
+    handler.thread.join(DEADLINE_S)
+    calls = []
+    handler.loop.call_soon(lambda: calls.append("late"))
+    assert calls == []

@@ -1,23 +1,27 @@
 """The loop that owns all sockets, timers and the clock, and the listening socket with them."""
 
 import collections
+import contextlib
 import errno
 import functools
 import heapq
 import itertools
 import os
 import resource
+import select
 import socket
 import sys
 import threading
 import time
-from typing import Any, Callable, Deque, Dict, List, NamedTuple, Optional, Set, Tuple, TypeVar
+from typing import Callable, Deque, Dict, List, NamedTuple, Optional, Set, Tuple, TypeVar
 
-from .dialler import Dialler, DiallerOwner, start_resolving
-from .link import Address, Link, LinkHandler, LinkOwner, describe_error, find_socket_address
-from .poller import READ, WRITE, Poller
+from .dialler import start_dialler
+from .link import Address, Link, LinkHandler, describe_error, find_socket_address
 
 T = TypeVar("T")
+
+READ = select.EPOLLIN
+WRITE = select.EPOLLOUT
 
 LISTEN_BACKLOG = 256
 """A whole swarm reconnects within 51 ms when the driver comes back (ArduinoTcpHardware.h:99)."""
@@ -67,13 +71,15 @@ class Reader:
         raise NotImplementedError
 
 
-class EventLoop(LinkOwner, DiallerOwner):
+class EventLoop:
     """The thread that owns all sockets. open(), then run() on that thread, stop() from any."""
 
     def __init__(self, settings: TransportSettings, handler: LinkHandler) -> None:
         self._settings = settings
         self._handler = handler
-        self._poller = Poller()
+        # selectors does the same, but what it adds in Python is a twentieth of all that the driver does.
+        self._epoll = select.epoll()
+        self._serves: Dict[int, Callable[[int], None]] = {}
         self._listener: Optional[socket.socket] = None
         self._links: Dict[int, Link] = {}
         self._readers: Set[Reader] = set()
@@ -82,12 +88,10 @@ class EventLoop(LinkOwner, DiallerOwner):
         self._timers: List[Tuple[float, int, Callable[[], None]]] = []
         self._timer_numbers = itertools.count()
         self._calls: Deque[Callable[[], None]] = collections.deque()
-        self._wake_lock = threading.Lock()
-        self._is_awake = False
-        self._wake_read, self._wake_write = os.pipe()
-        os.set_blocking(self._wake_read, False)
-        os.set_blocking(self._wake_write, False)
-        self._running = True
+        self._wake_receiver, self._wake_sender = socket.socketpair()
+        self._wake_receiver.setblocking(False)
+        self._wake_sender.setblocking(False)
+        self.ended = threading.Event()
         self._file_limit = _raise_file_limit()
         self.listening: Optional[Address] = None
 
@@ -100,9 +104,9 @@ class EventLoop(LinkOwner, DiallerOwner):
             self._listener = _listen(self._settings.host, self._settings.port)
             self.listening = Address(*self._listener.getsockname()[:2])
             self._listen_on(self._listener)
-        self._poller.register(self._wake_read, READ, lambda _: self._call(self._take_wake))
+        self._register(self._wake_receiver.fileno(), READ, self._take_wake)
         for address in self._settings.dial:
-            Dialler(self, address).dial()
+            start_dialler(self, address)
         self.call_later(POLL_INTERVAL_S, self._poll_links)
 
     def run(self) -> None:
@@ -110,7 +114,7 @@ class EventLoop(LinkOwner, DiallerOwner):
         self._thread_id = threading.get_ident()
         self._turned_s = time.monotonic()
         try:
-            while self._running:
+            while not self.ended.is_set():
                 self._run_once()
         except BaseException:
             self._handler.stop_without_loop()
@@ -126,8 +130,8 @@ class EventLoop(LinkOwner, DiallerOwner):
             timeout_s = self._timers[0][0] - self._turned_s
             if timeout_s < 0.0:
                 timeout_s = 0.0
-        serves = self._poller.serves
-        for descriptor, mask in self._poller.wait(timeout_s):
+        serves = self._serves
+        for descriptor, mask in self._epoll.poll(timeout_s):
             # What was closed in this turn is not there. Where its number has gone to, there is a connection that was
             # accepted since, and reading it for nothing does no harm.
             serve = serves.get(descriptor)
@@ -141,7 +145,7 @@ class EventLoop(LinkOwner, DiallerOwner):
 
     def stop(self) -> None:
         """Let run() return; from any thread."""
-        self.call_soon(self._end)
+        self.call_soon(self.ended.set)
 
     def call_soon(self, call: Callable[[], None]) -> None:
         """Run call on the loop's thread, soon; from any thread."""
@@ -149,11 +153,9 @@ class EventLoop(LinkOwner, DiallerOwner):
         if threading.get_ident() == self._thread_id:
             # The loop looks at its calls before it waits again.
             return
-        with self._wake_lock:
-            if self._is_awake:
-                return
-            self._is_awake = True
-        os.write(self._wake_write, b"\0")
+        # Where the socket is full the loop has been woken already; where it is closed the loop has ended.
+        with contextlib.suppress(OSError):
+            self._wake_sender.send(b"\0")
 
     def call_here(self, call: Callable[[T], None], argument: T) -> None:
         """Run call(argument) on the loop's thread: now if that is this thread, else soon."""
@@ -171,19 +173,19 @@ class EventLoop(LinkOwner, DiallerOwner):
         heapq.heappush(self._timers, (time.monotonic() + delay_s, next(self._timer_numbers), call))
 
     def watch(self, link: Link) -> None:
-        """Wait for what link is for now: to be read unless it rests, to be written where something waits."""
-        self._poller.modify(link.fileno(), (0 if link.rests else READ) | (WRITE if link.is_full else 0))
+        """Wait for what link needs now: to be read unless it is paused, to be written where something is unsent."""
+        self._epoll.modify(link.fileno(), (0 if link.is_paused else READ) | (WRITE if link.is_full else 0))
 
-    def rest(self, link: Link, delay_s: float) -> None:
-        """Read link again only after delay_s, or when its end comes; only from the loop's thread."""
-        link.rests = True
-        self.watch(link)
+    def pause_reading(self, link: Link, delay_s: float) -> None:
+        """Read link again only after delay_s, or when its connection breaks; only from the loop's thread."""
 
         def resume() -> None:
-            link.rests = False
+            link.is_paused = False
             if not link.closed:
                 self.watch(link)
 
+        link.is_paused = True
+        self.watch(link)
         self.call_later(delay_s, resume)
 
     def close_link(self, link: Link, reason: str) -> None:
@@ -191,13 +193,14 @@ class EventLoop(LinkOwner, DiallerOwner):
         if link.closed:
             return
         del self._links[link.fileno()]
-        self._poller.unregister(link.fileno())
+        self._unregister(link.fileno())
         link.discard()
         self._handler.close_link(link, reason)
+        link.on_close()
 
-    def add_link(self, sock: socket.socket, address: Address) -> Optional[Link]:
-        """Take over a connected socket; return its link, or None if it was refused or broke already."""
-        link = Link(self, sock, address, self._settings.acknowledges_at_once)
+    def add_link(self, sock: socket.socket, address: Address, on_close: Callable[[], None]) -> None:
+        """Take over a connected socket; on_close() is called when it is closed again, which may be at once."""
+        link = Link(self, sock, address, self._settings.acknowledges_at_once, on_close)
         try:
             self._set_options(sock)
         except OSError as error:
@@ -206,9 +209,10 @@ class EventLoop(LinkOwner, DiallerOwner):
             self._handler.report_trouble(
                 "connection of %s broke at once: %s" % (address, describe_error(error))
             )
-            return None
+            on_close()
+            return
         self._links[sock.fileno()] = link
-        self._poller.register(sock.fileno(), READ, functools.partial(self._serve_link, link))
+        self._register(sock.fileno(), READ, functools.partial(self._serve_link, link))
         try:
             refusal = self._handler.open_link(link)
         except Exception as error:  # noqa: BLE001 - our mistake with this one must not keep others out
@@ -216,8 +220,6 @@ class EventLoop(LinkOwner, DiallerOwner):
             refusal = "a mistake of the driver"
         if refusal is not None:
             link.close(refusal)
-            return None
-        return link
 
     def _set_options(self, sock: socket.socket) -> None:
         sock.setblocking(False)
@@ -226,19 +228,27 @@ class EventLoop(LinkOwner, DiallerOwner):
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
         user_timeout_ms = int(self._settings.user_timeout_s * 1000)
-        for option, value in (
-            ("TCP_KEEPIDLE", max(1, user_timeout_ms // 2000)),
-            ("TCP_KEEPINTVL", 1),
-            ("TCP_KEEPCNT", 3),
-            ("TCP_USER_TIMEOUT", user_timeout_ms),
-        ):
-            if hasattr(socket, option):
-                sock.setsockopt(socket.IPPROTO_TCP, getattr(socket, option), value)
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPIDLE, max(1, user_timeout_ms // 2000))
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPINTVL, 1)
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPCNT, 3)
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, user_timeout_ms)
+
+    def _register(self, descriptor: int, mask: int, serve: Callable[[int], None]) -> None:
+        """Call serve(what descriptor is ready for, neither READ nor WRITE where it broke) when mask says so."""
+        self._epoll.register(descriptor, mask)
+        self._serves[descriptor] = serve
+
+    def _unregister(self, descriptor: int) -> None:
+        """Undo _register(), before descriptor is closed."""
+        self._epoll.unregister(descriptor)
+        del self._serves[descriptor]
 
     def _serve_link(self, link: Link, mask: int) -> None:
         try:
             if mask & WRITE:
-                self._serve_write(link)
+                link.flush()
+                if not link.is_full and not link.closed:
+                    self.watch(link)
             # What is neither is a broken connection, of which reading says why.
             if mask != WRITE and not link.closed:
                 data = link.read()
@@ -256,7 +266,7 @@ class EventLoop(LinkOwner, DiallerOwner):
 
     def _watch_reader(self, reader: Reader) -> None:
         self._readers.add(reader)
-        self._poller.register(reader.fileno(), READ, functools.partial(self._serve_reader, reader))
+        self._register(reader.fileno(), READ, functools.partial(self._serve_reader, reader))
 
     def _serve_reader(self, reader: Reader, _mask: int) -> None:
         goes_on = False
@@ -265,17 +275,15 @@ class EventLoop(LinkOwner, DiallerOwner):
         except Exception as error:  # noqa: BLE001 - as above
             self._handler.report_fault(error)
         if not goes_on:
-            self._poller.unregister(reader.fileno())
+            self._unregister(reader.fileno())
             self._readers.discard(reader)
             reader.close()
 
     def _listen_on(self, listener: socket.socket) -> None:
-        self._poller.register(listener.fileno(), READ, lambda _: self._call(self._accept))
+        self._register(listener.fileno(), READ, lambda _: self._call(self._accept))
 
-    def _take_wake(self) -> None:
-        with self._wake_lock:
-            os.read(self._wake_read, 1)
-            self._is_awake = False
+    def _take_wake(self, _mask: int) -> None:
+        self._wake_receiver.recv(4096)
 
     def _accept(self) -> None:
         listener = self._listener
@@ -294,7 +302,7 @@ class EventLoop(LinkOwner, DiallerOwner):
             sock.close()
             self._pause_accept(listener, OSError(errno.EMFILE, os.strerror(errno.EMFILE)))
             return
-        self.add_link(sock, Address(*address[:2]))
+        self.add_link(sock, Address(*address[:2]), lambda: None)
 
     def _pause_accept(self, listener: socket.socket, error: OSError) -> None:
         remedy = ""
@@ -303,17 +311,13 @@ class EventLoop(LinkOwner, DiallerOwner):
         self._handler.report_trouble(
             "cannot take more connections (%s)%s; those connected go on" % (describe_error(error), remedy)
         )
-        self._poller.unregister(listener.fileno())
+        self._unregister(listener.fileno())
 
         def resume() -> None:
             if self._listener is not None:
                 self._listen_on(listener)
 
         self.call_later(ACCEPT_PAUSE_S, resume)
-
-    def _serve_write(self, link: Link) -> None:
-        if link.flush() and not link.closed:
-            self.watch(link)
 
     def _poll_links(self) -> None:
         self.call_later(POLL_INTERVAL_S, self._poll_links)
@@ -322,10 +326,8 @@ class EventLoop(LinkOwner, DiallerOwner):
             if not link.closed:
                 self._handler.poll_link(link, now_s)
 
-    def _end(self) -> None:
-        self._running = False
-
     def _close_all(self) -> None:
+        self.ended.set()
         if self._listener is not None:
             self._listener.close()
             self._listener = None
@@ -334,25 +336,13 @@ class EventLoop(LinkOwner, DiallerOwner):
         for reader in self._readers:
             reader.close()
         self._readers.clear()
-        self._poller.close()
-
-    # What the diallers use.
-
-    def resolve(self, address: Address, then: Callable[[Optional[Any], str], None]) -> None:
-        """Look address up on a thread of its own, then call then(sockaddr info or None, error) on the loop."""
-        start_resolving(address, lambda info, error: self.call_soon(lambda: then(info, error)))
-
-    def watch_dialler(self, dialler: "Dialler", sock: socket.socket) -> None:
-        """Call dialler.finish() when sock has connected or failed."""
-        self._poller.register(sock.fileno(), WRITE, lambda _: self._call(dialler.finish))
-
-    def unwatch_dialler(self, sock: socket.socket) -> None:
-        """Undo watch_dialler()."""
-        self._poller.unregister(sock.fileno())
+        self._epoll.close()
+        self._wake_receiver.close()
+        self._wake_sender.close()
 
     def report_trouble(self, text: str) -> None:
-        """Pass text on to the handler."""
-        self._handler.report_trouble(text)
+        """Pass text on to the handler; from any thread."""
+        self.call_soon(lambda: self._handler.report_trouble(text))
 
 
 def _raise_file_limit() -> int:

@@ -6,7 +6,10 @@ import functools
 import socket
 import struct
 import termios
-from typing import Any, Callable, Deque, NamedTuple, Optional
+from typing import TYPE_CHECKING, Any, Callable, Deque, NamedTuple, Optional
+
+if TYPE_CHECKING:
+    from .event_loop import EventLoop
 
 READ_LENGTH = 4096
 """Read at once from one robot: two bursts. What looks like a packet at every second byte costs 1 ms at this length,
@@ -75,39 +78,32 @@ class LinkHandler:
         raise NotImplementedError
 
 
-class LinkOwner:
-    """What a link needs of the loop that owns it."""
-
-    def call_soon(self, call: Callable[[], None]) -> None:
-        """Run call on the loop's thread, soon; from any thread."""
-        raise NotImplementedError
-
-    def watch(self, link: "Link") -> None:
-        """What link is to be waited for has changed."""
-        raise NotImplementedError
-
-    def close_link(self, link: "Link", reason: str) -> None:
-        """Close link and tell the handler; safe to call twice."""
-        raise NotImplementedError
-
-
 class Link:
     """One TCP connection to one robot."""
 
     def __init__(
-        self, loop: LinkOwner, sock: socket.socket, address: Address, acknowledges_at_once: bool
+        self,
+        loop: "EventLoop",
+        sock: socket.socket,
+        address: Address,
+        acknowledges_at_once: bool,
+        on_close: Callable[[], None] = lambda: None,
     ) -> None:
-        """acknowledges_at_once: what is read is acknowledged now, not within 40 ms as Linux would."""
+        """acknowledges_at_once: what is read is acknowledged now, not within 40 ms as Linux would.
+
+        on_close() is called once, after the end.
+        """
         self.address = address
         self.closed = False
-        self.rests = False  # it is not read for a while
+        self.is_paused = False  # not read for a while
         self.peer: Any = None  # the handler's own record of who is at the other end
         self.handed_length = 0  # bytes of all packets given to send_packet()
         self.received_length = 0  # bytes of all that read() has returned
+        self.on_close = on_close
         self._loop = loop
         self._socket = sock
         self._acknowledge: Optional[Callable[[], None]] = None
-        if acknowledges_at_once and hasattr(socket, "TCP_QUICKACK"):
+        if acknowledges_at_once:
             self._acknowledge = functools.partial(sock.setsockopt, socket.IPPROTO_TCP, socket.TCP_QUICKACK, 1)
         self._unsent: Deque[bytes] = collections.deque()
         self._unsent_length = 0
@@ -126,19 +122,12 @@ class Link:
             self._loop.watch(self)
 
     def read_unacknowledged_length(self) -> int:
-        """Return how many bytes of packets the peer's TCP has not acknowledged.
-
-        Where the system cannot tell, only those that the socket has not taken.
-        """
+        """Return how many bytes of packets the peer's TCP has not acknowledged."""
         if self.closed:
             return 0
-        # What can be written to is answered in a third of the time.
+        # A writable buffer is answered in a third of the time. SIOCOUTQ has the number of TIOCOUTQ (tcp(7)).
         answer = bytearray(_INT.size)
-        try:
-            # SIOCOUTQ has the number of TIOCOUTQ (tcp(7)).
-            fcntl.ioctl(self._socket.fileno(), termios.TIOCOUTQ, answer)
-        except OSError:
-            return self._unsent_length
+        fcntl.ioctl(self._socket.fileno(), termios.TIOCOUTQ, answer)
         length: int = _INT.unpack(answer)[0]
         return length + self._unsent_length
 
