@@ -235,7 +235,7 @@ class Gateway(LinkHandler):
             self._admission.note_departure(link.address.host, now_s - peer.session.opened_s, now_s)
         self._admit_duplicates(record, lambda host: not self.fleet.is_reserved(record, host))
 
-    def report_fault(self, error: Exception) -> None:
+    def report_bug(self, error: Exception) -> None:
         """Log a mistake of the driver itself, with the place; only the connection at hand is lost."""
         place = "".join(traceback.format_tb(error.__traceback__)[-2:]).replace("\n", " ")
         self._log.log_throttled(
@@ -244,9 +244,9 @@ class Gateway(LinkHandler):
             "the driver made a mistake, please report it: %s: %s; %s" % (type(error).__name__, error, place),
         )
 
-    def report_trouble(self, text: str) -> None:
-        """Log what the network has to say."""
-        self._log.log_throttled("warn", "trouble " + text[:40], text)
+    def warn_network(self, text: str) -> None:
+        """Log what the transport warns of."""
+        self._log.log_throttled("warn", "network " + text[:40], text)
 
     # What a session tells.
 
@@ -484,7 +484,7 @@ class Gateway(LinkHandler):
             if data:
                 self.receive_data(peer.link, data, time.monotonic())
         except Exception as error:  # noqa: BLE001 - one robot's trouble must not keep the others moving
-            self.report_fault(error)
+            self.report_bug(error)
 
     def _poll_fleet(self) -> None:
         self._loop.call_later(FLEET_POLL_S, self._poll_fleet)

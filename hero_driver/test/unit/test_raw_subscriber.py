@@ -30,7 +30,7 @@ class Handler(LinkHandler):
     def __init__(self):
         self.faults = []
 
-    def report_fault(self, error):
+    def report_bug(self, error):
         self.faults.append(error)
 
 

@@ -3,16 +3,12 @@
 Looking a name up and connecting block; the thread hands each connection over to the loop and waits for its end.
 """
 
-import functools
 import socket
 import threading
 import time
-from typing import TYPE_CHECKING
+from typing import Callable
 
 from .link import Address, describe_error, find_socket_address
-
-if TYPE_CHECKING:
-    from .event_loop import EventLoop
 
 BACKOFF_FIRST_S = 0.5
 BACKOFF_MAX_S = 10.0
@@ -22,22 +18,29 @@ STABLE_S = 3.0
 """A connection that lasted so long is dialled again quickly; one that hangs up at once is not."""
 
 
-def start_dialler(loop: "EventLoop", address: Address) -> None:
-    """Keep a connection to address until the loop ends."""
-    threading.Thread(target=_dial_until_end, args=(loop, address), name="dialler", daemon=True).start()
+HandOver = Callable[[socket.socket, Address, Callable[[], None]], None]
+"""Takes a connected socket, its address, and what to call when it is closed again."""
 
 
-def _dial_until_end(loop: "EventLoop", address: Address) -> None:
+def start_dialler(address: Address, hand_over: HandOver, warn: Callable[[str], None], ended: threading.Event) -> None:
+    """Keep a connection to address until ended is set; hand_over() and warn() are called on the dialler's thread."""
+    arguments = (address, hand_over, warn, ended)
+    threading.Thread(target=_dial_until_end, args=arguments, name="dialler", daemon=True).start()
+
+
+def _dial_until_end(
+    address: Address, hand_over: HandOver, warn: Callable[[str], None], ended: threading.Event
+) -> None:
     backoff_s = BACKOFF_FIRST_S
     reported = ""
-    while not loop.ended.is_set():
+    while not ended.is_set():
         try:
             sock = _connect(address)
         except OSError as error:
             reason = describe_error(error)
             if reason != reported:
                 reported = reason
-                loop.report_trouble(
+                warn(
                     "robot at %s cannot be reached: %s; dialling again, check that it is on and that host and port"
                     " in ~robots are right" % (address, reason)
                 )
@@ -45,11 +48,11 @@ def _dial_until_end(loop: "EventLoop", address: Address) -> None:
             reported = ""
             connected_s = time.monotonic()
             closed = threading.Event()
-            loop.call_soon(functools.partial(loop.add_link, sock, address, closed.set))
+            hand_over(sock, address, closed.set)
             closed.wait()
             if time.monotonic() - connected_s >= STABLE_S:
                 backoff_s = BACKOFF_FIRST_S
-        loop.ended.wait(backoff_s)
+        ended.wait(backoff_s)
         backoff_s = min(2 * backoff_s, BACKOFF_MAX_S)
 
 

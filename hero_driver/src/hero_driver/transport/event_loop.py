@@ -16,7 +16,7 @@ import time
 from typing import Callable, Deque, Dict, List, NamedTuple, Optional, Set, Tuple, TypeVar
 
 from .dialler import start_dialler
-from .link import Address, Link, LinkHandler, describe_error, find_socket_address
+from .link import Address, Link, LinkHandler, LinkOwner, describe_error, find_socket_address
 
 T = TypeVar("T")
 
@@ -71,7 +71,7 @@ class Reader:
         raise NotImplementedError
 
 
-class EventLoop:
+class EventLoop(LinkOwner):
     """The thread that owns all sockets. open(), then run() on that thread, stop() from any."""
 
     def __init__(self, settings: TransportSettings, handler: LinkHandler) -> None:
@@ -91,7 +91,7 @@ class EventLoop:
         self._wake_receiver, self._wake_sender = socket.socketpair()
         self._wake_receiver.setblocking(False)
         self._wake_sender.setblocking(False)
-        self.ended = threading.Event()
+        self._ended = threading.Event()
         self._file_limit = _raise_file_limit()
         self.listening: Optional[Address] = None
 
@@ -106,7 +106,7 @@ class EventLoop:
             self._listen_on(self._listener)
         self._register(self._wake_receiver.fileno(), READ, self._take_wake)
         for address in self._settings.dial:
-            start_dialler(self, address)
+            start_dialler(address, self._hand_over, self._warn_network, self._ended)
         self.call_later(POLL_INTERVAL_S, self._poll_links)
 
     def run(self) -> None:
@@ -114,7 +114,7 @@ class EventLoop:
         self._thread_id = threading.get_ident()
         self._turned_s = time.monotonic()
         try:
-            while not self.ended.is_set():
+            while not self._ended.is_set():
                 self._run_once()
         except BaseException:
             self._handler.stop_without_loop()
@@ -145,7 +145,7 @@ class EventLoop:
 
     def stop(self) -> None:
         """Let run() return; from any thread."""
-        self.call_soon(self.ended.set)
+        self.call_soon(self._ended.set)
 
     def call_soon(self, call: Callable[[], None]) -> None:
         """Run call on the loop's thread, soon; from any thread."""
@@ -198,7 +198,7 @@ class EventLoop:
         self._handler.close_link(link, reason)
         link.on_close()
 
-    def add_link(self, sock: socket.socket, address: Address, on_close: Callable[[], None]) -> None:
+    def _add_link(self, sock: socket.socket, address: Address, on_close: Callable[[], None]) -> None:
         """Take over a connected socket; on_close() is called when it is closed again, which may be at once."""
         link = Link(self, sock, address, self._settings.acknowledges_at_once, on_close)
         try:
@@ -206,7 +206,7 @@ class EventLoop:
         except OSError as error:
             # The peer may be gone already.
             link.discard()
-            self._handler.report_trouble(
+            self._handler.warn_network(
                 "connection of %s broke at once: %s" % (address, describe_error(error))
             )
             on_close()
@@ -216,8 +216,8 @@ class EventLoop:
         try:
             refusal = self._handler.open_link(link)
         except Exception as error:  # noqa: BLE001 - our mistake with this one must not keep others out
-            self._handler.report_fault(error)
-            refusal = "a mistake of the driver"
+            self._handler.report_bug(error)
+            refusal = "a bug of the driver"
         if refusal is not None:
             link.close(refusal)
 
@@ -255,14 +255,14 @@ class EventLoop:
                 if data:
                     self._handler.receive_data(link, data, time.monotonic())
         except Exception as error:  # noqa: BLE001 - one robot's trouble, or our mistake with it, is not the others'
-            self._handler.report_fault(error)
-            self.close_link(link, "a mistake of the driver")
+            self._handler.report_bug(error)
+            self.close_link(link, "a bug of the driver")
 
     def _call(self, call: Callable[[], None]) -> None:
         try:
             call()
         except Exception as error:  # noqa: BLE001 - as above; the loop is all that can still stop the robots
-            self._handler.report_fault(error)
+            self._handler.report_bug(error)
 
     def _watch_reader(self, reader: Reader) -> None:
         self._readers.add(reader)
@@ -273,7 +273,7 @@ class EventLoop:
         try:
             goes_on = reader.read()
         except Exception as error:  # noqa: BLE001 - as above
-            self._handler.report_fault(error)
+            self._handler.report_bug(error)
         if not goes_on:
             self._unregister(reader.fileno())
             self._readers.discard(reader)
@@ -302,13 +302,13 @@ class EventLoop:
             sock.close()
             self._pause_accept(listener, OSError(errno.EMFILE, os.strerror(errno.EMFILE)))
             return
-        self.add_link(sock, Address(*address[:2]), lambda: None)
+        self._add_link(sock, Address(*address[:2]), lambda: None)
 
     def _pause_accept(self, listener: socket.socket, error: OSError) -> None:
         remedy = ""
         if error.errno in (errno.EMFILE, errno.ENFILE):
             remedy = "; raise the limit of open files (ulimit -n) and start again"
-        self._handler.report_trouble(
+        self._handler.warn_network(
             "cannot take more connections (%s)%s; those connected go on" % (describe_error(error), remedy)
         )
         self._unregister(listener.fileno())
@@ -327,7 +327,7 @@ class EventLoop:
                 self._handler.poll_link(link, now_s)
 
     def _close_all(self) -> None:
-        self.ended.set()
+        self._ended.set()
         if self._listener is not None:
             self._listener.close()
             self._listener = None
@@ -340,9 +340,13 @@ class EventLoop:
         self._wake_receiver.close()
         self._wake_sender.close()
 
-    def report_trouble(self, text: str) -> None:
-        """Pass text on to the handler; from any thread."""
-        self.call_soon(lambda: self._handler.report_trouble(text))
+    # What diallers call, on their threads.
+
+    def _hand_over(self, sock: socket.socket, address: Address, on_close: Callable[[], None]) -> None:
+        self.call_soon(lambda: self._add_link(sock, address, on_close))
+
+    def _warn_network(self, text: str) -> None:
+        self.call_soon(lambda: self._handler.warn_network(text))
 
 
 def _raise_file_limit() -> int:

@@ -6,10 +6,7 @@ import functools
 import socket
 import struct
 import termios
-from typing import TYPE_CHECKING, Any, Callable, Deque, NamedTuple, Optional
-
-if TYPE_CHECKING:
-    from .event_loop import EventLoop
+from typing import Any, Callable, Deque, NamedTuple, Optional
 
 READ_LENGTH = 4096
 """Read at once from one robot: two bursts. What looks like a packet at every second byte costs 1 ms at this length,
@@ -65,7 +62,7 @@ class LinkHandler:
         """Called every POLL_INTERVAL_S for each connection."""
         raise NotImplementedError
 
-    def report_fault(self, error: Exception) -> None:
+    def report_bug(self, error: Exception) -> None:
         """One of the calls above, or one made for the loop, raised error; the loop goes on."""
         raise NotImplementedError
 
@@ -73,8 +70,24 @@ class LinkHandler:
         """The loop itself has broken and ends after this: stop what moves at the other ends; this may block."""
         raise NotImplementedError
 
-    def report_trouble(self, text: str) -> None:
-        """Something about the network itself should reach the user's eyes."""
+    def warn_network(self, text: str) -> None:
+        """Something about the network that the user should know."""
+        raise NotImplementedError
+
+
+class LinkOwner:
+    """What a link needs of the loop that owns it."""
+
+    def call_soon(self, call: Callable[[], None]) -> None:
+        """Run call on the loop's thread, soon; from any thread."""
+        raise NotImplementedError
+
+    def watch(self, link: "Link") -> None:
+        """Wait for what link needs now: to be read, to be written, or both."""
+        raise NotImplementedError
+
+    def close_link(self, link: "Link", reason: str) -> None:
+        """Close link and tell the handler; safe to call twice."""
         raise NotImplementedError
 
 
@@ -83,7 +96,7 @@ class Link:
 
     def __init__(
         self,
-        loop: "EventLoop",
+        loop: LinkOwner,
         sock: socket.socket,
         address: Address,
         acknowledges_at_once: bool,
