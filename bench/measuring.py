@@ -10,6 +10,8 @@ import time
 import timeit
 from pathlib import Path
 
+from hero_test.processes import find_free_port
+
 TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 
 
@@ -77,13 +79,6 @@ def read_memory_mb(pid):
 def percentile_ms(values_s, share):
     """Return a percentile (ms) of sorted values, None for none."""
     return None if not values_s else values_s[min(len(values_s) - 1, int(share * len(values_s)))] * 1e3
-
-
-def find_free_port():
-    """Return a TCP port that is free now."""
-    with socket.socket() as sock:
-        sock.bind(("127.0.0.1", 0))
-        return sock.getsockname()[1]
 
 
 def wait_for_port(port, process):

@@ -3,14 +3,15 @@
 import json
 import os
 import signal
-import socket
 import subprocess
 import sys
-import time
 from pathlib import Path
 from typing import NamedTuple
 
 import rosgraph
+
+from hero_test.processes import find_free_port
+from hero_test.waiting import wait_for
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
@@ -19,26 +20,6 @@ DEADLINE_S = 30.0
 EMULATED_NAMES = 11
 STOCK_NAMES = 18
 """Topics and services of an emulated robot and of one with the complete stock firmware, odom_raw included."""
-
-
-def wait_until(condition, what, deadline_s=DEADLINE_S):
-    """Return the first true value of condition(), and after how many seconds it came."""
-    start_s = time.monotonic()
-    while True:
-        value = condition()
-        now_s = time.monotonic()
-        if value:
-            return value, now_s - start_s
-        if now_s - start_s > deadline_s:
-            raise AssertionError("waited %g s for %s" % (deadline_s, what() if callable(what) else what))
-        time.sleep(0.02)
-
-
-def find_free_port():
-    """Return a TCP port that nobody uses now."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 class Program:
@@ -111,7 +92,7 @@ class Master:
             start_new_session=True,
         )
         uri = self.environment["ROS_MASTER_URI"]
-        wait_until(lambda: rosgraph.is_master_online(uri), "a ROS master at " + uri)
+        wait_for(lambda: rosgraph.is_master_online(uri), "a ROS master at " + uri)
 
     @property
     def pid(self):

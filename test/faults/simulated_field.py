@@ -5,7 +5,9 @@ import math
 import rospy
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
-from rig import Program, wait_until
+from rig import Program
+
+from hero_test.waiting import wait_for
 
 SPEED_M_S = 0.1
 REST_M_S = 0.003
@@ -63,9 +65,9 @@ def drive(truths):
     """Let all robots drive in circles; return when they do."""
     for truth in truths:
         truth.command.linear.x, truth.command.angular.z = SPEED_M_S, 0.5
-    wait_until(lambda: all(truth.is_moving for truth in truths), "all robots to move")
+    wait_for(lambda: all(truth.is_moving for truth in truths), "all robots to move")
 
 
 def rest(truths):
     """Return when all robots stand, whatever they are told."""
-    wait_until(lambda: all(truth.is_at_rest for truth in truths), "all robots to stand")
+    wait_for(lambda: all(truth.is_at_rest for truth in truths), "all robots to stand")

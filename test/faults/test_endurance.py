@@ -23,12 +23,12 @@ from rig import (
     count_holdings,
     count_robots_names,
     start_python,
-    wait_until,
 )
 
 from hero_driver.rosserial import packets
 from hero_msgs.msg import Encoder
 from hero_msgs.srv import SetPID
+from hero_test.waiting import wait_for
 
 ROBOTS = 20
 BESIDES = 3
@@ -148,7 +148,7 @@ class Bustle:
         self._returning.close()
         self._returning = self._replace(RETURNING)
         before, self._cut = self._cut, self._replace(CUT)
-        wait_until(lambda: before.ended, "the end of the connection that power left")
+        wait_for(lambda: before.ended, "the end of the connection that power left")
         before.close()
         rospy.wait_for_service(SERVICE, 20.0)
         # Anew each time, as the programs of a class do it.
@@ -158,7 +158,7 @@ class Bustle:
 
     def _replace(self, number):
         robot = FakeRobot(number).connect(self._driver.address)
-        wait_until(lambda: robot.payloads_with_id(packets.ID_TIME), "the answer to a robot's time request")
+        wait_for(lambda: robot.payloads_with_id(packets.ID_TIME), "the answer to a robot's time request")
         return robot
 
 
@@ -255,10 +255,10 @@ def test_a_swarm_at_work_loses_nothing_and_the_driver_stays_as_it_is(start_drive
     with swarm_at_work(driver) as (swarm, commander, listener):
         bustle = Bustle(driver)
         watch = Watch(driver, listener)
-        wait_until(lambda: not listener.ask("silent"), "all robots at the listener")
+        wait_for(lambda: not listener.ask("silent"), "all robots at the listener")
         bustle.act()
         names = EMULATED_NAMES * ROBOTS + STOCK_NAMES * BESIDES
-        wait_until(lambda: count_robots_names(driver) == names, "all topics of all robots")
+        wait_for(lambda: count_robots_names(driver) == names, "all topics of all robots")
         watch.skip()
         if effort.is_long:
             work(watch, bustle, max(SAMPLES_MIN, round(effort.minutes)), SAMPLE_S, ROUND_S)
@@ -267,7 +267,7 @@ def test_a_swarm_at_work_loses_nothing_and_the_driver_stays_as_it_is(start_drive
         bustle.close()
         sent = commander.interrupt()["commands"]
         robots = swarm.interrupt()
-        wait_until(lambda: watch.skip()["transforms"] == 0, "the last transforms")
+        wait_for(lambda: watch.skip()["transforms"] == 0, "the last transforms")
     samples = watch.samples
     missing = sent - robots["commands"]
     record(

@@ -1,15 +1,17 @@
 """Twenty good robots at stock rates and one bad peer at a time: the good ones lose nothing."""
 
 import sys
+import time
 
 import emulated_swarm
 import pytest
 import rospy
 import stock_messages
 from fake_robot import FakeRobot
-from rig import BENCH, EMULATED_NAMES, Program, count_holdings, count_robots_names, start_python, wait_until
+from rig import BENCH, EMULATED_NAMES, Program, count_holdings, count_robots_names, start_python
 
 from hero_msgs.msg import Encoder
+from hero_test.waiting import wait_for
 
 GOOD_ROBOTS = 20
 NEWCOMER = 77
@@ -47,7 +49,7 @@ class Scene:
     def hear(self, seconds):
         """Return when the good robots have been heard for about so long since the last window."""
         count = int(seconds * 2 * GOOD_ROBOTS / emulated_swarm.BURST_PERIOD_S)
-        wait_until(lambda: self.listener.ask("count") >= count, "%d messages" % count, seconds + 30.0)
+        wait_for(lambda: self.listener.ask("count") >= count, "%d messages" % count, seconds + 30.0)
 
     def end_window(self):
         """Return what the listener got since the last call."""
@@ -78,8 +80,8 @@ def scene(master):
                 *robots,
             ) as swarm:
                 started = Scene(driver, listener, swarm, commander)
-                wait_until(lambda: not listener.ask("silent"), "all robots at the listener")
-                wait_until(
+                wait_for(lambda: not listener.ask("silent"), "all robots at the listener")
+                wait_for(
                     lambda: count_robots_names(driver) == EMULATED_NAMES * GOOD_ROBOTS,
                     "all topics of all robots",
                 )
@@ -90,6 +92,7 @@ def join_and_leave(driver):
     """Let one more robot join, until what it sends arrives in ROS; return how long that took."""
     robot = FakeRobot(NEWCOMER, source_host="127.0.0.77")
     encoders = []
+    start_s = time.monotonic()
     subscriber = rospy.Subscriber(robot.namespace + "/encoder", Encoder, encoders.append, tcp_nodelay=True)
 
     def is_heard():
@@ -100,7 +103,8 @@ def join_and_leave(driver):
         return encoders
 
     try:
-        return wait_until(is_heard, lambda: "the newcomer: %s" % (robot.ended or driver.lines[-20:]))[1]
+        wait_for(is_heard, lambda: "the newcomer: %s" % (robot.ended or driver.lines[-20:]))
+        return time.monotonic() - start_s
     finally:
         robot.close()
         subscriber.unregister()
@@ -130,7 +134,7 @@ def test_a_bad_peer_takes_nothing_from_the_good_robots(scene, effort, record, ki
     window = scene.end_window()
     assert did["connects"], did
     assert (window["silent"], window["lost"], window["disordered"]) == ([], 0, 0), (window, did)
-    wait_until(
+    wait_for(
         lambda: count_holdings(scene.driver).registrations <= before.registrations,
         lambda: "the bad peer's topics to go: %s" % count_holdings(scene.driver).describe_growth(before),
         60.0,
@@ -147,7 +151,7 @@ def test_all_robots_stayed_and_every_transform_arrived(scene, record):
     scene.end_window()
     commanded = scene.commander.interrupt()["commands_s"]
     sent = scene.swarm.interrupt()
-    wait_until(lambda: scene.end_window()["transforms"] == 0, "the last transforms")
+    wait_for(lambda: scene.end_window()["transforms"] == 0, "the last transforms")
     received = {stamp_s for stamp_s, _ in sent["commands_s"]}
     missing = [stamp_s for stamp_s in commanded if stamp_s not in received]
     record(

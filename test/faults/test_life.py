@@ -6,9 +6,10 @@ import emulated_swarm
 from driver_case import list_driver_topics
 from fake_robot import FakeRobot
 from life_signs import Life
-from rig import EMULATED_NAMES, STOCK_NAMES, count_holdings, count_robots_names, wait_until
+from rig import EMULATED_NAMES, STOCK_NAMES, count_holdings, count_robots_names
 
 from hero_msgs.msg import Robot
+from hero_test.waiting import wait_for
 
 SWARM = 10
 MEMORY_GROWTH_KB = 5000
@@ -60,7 +61,7 @@ def run_rounds(driver, swarm, rounds, act):
     def settle():
         # Robots that leave at once get no topics: these stay until they have them.
         swarm.cut_power()
-        wait_until(lambda: is_settled(driver), "the topics of all robots")
+        wait_for(lambda: is_settled(driver), "the topics of all robots")
 
     warm_up = max(3, rounds // 10)
     for _ in range(warm_up):
@@ -75,7 +76,7 @@ def run_rounds(driver, swarm, rounds, act):
         now = count_holdings(driver)
         return now.threads <= before.threads and now.files <= before.files + SWARM
 
-    wait_until(is_flat, lambda: count_holdings(driver).describe_growth(before))
+    wait_for(is_flat, lambda: count_holdings(driver).describe_growth(before))
     return before, count_holdings(driver)
 
 
@@ -120,7 +121,7 @@ def test_power_cuts_leave_nothing_behind(start_driver, effort, record):
     swarm = Swarm(driver)
     rounds = effort.choose(20, 1000)
     before, after = run_rounds(driver, swarm, rounds, swarm.cut_power)
-    wait_until(lambda: count_states(driver) == SWARM + 1, "all robots to be ready")
+    wait_for(lambda: count_states(driver) == SWARM + 1, "all robots to be ready")
     life.show(10)
     judge(record, "power cuts (no FIN) of a swarm of %d" % SWARM, rounds, before, after)
     swarm.leave()
@@ -135,9 +136,9 @@ def test_robots_that_leave_for_good_leave_nothing_behind(start_driver, effort, r
     def act():
         swarm = Swarm(driver)
         swarm.join()
-        wait_until(lambda: list_driver_topics("/hero_109", driver.node), "topics of the last one")
+        wait_for(lambda: list_driver_topics("/hero_109", driver.node), "topics of the last one")
         swarm.leave()
-        wait_until(lambda: not count_robots_names(driver), "all topics to be gone")
+        wait_for(lambda: not count_robots_names(driver), "all topics to be gone")
 
     act()
     before = count_holdings(driver)

@@ -13,9 +13,11 @@ from pathlib import Path
 import pytest
 import rosgraph
 from driver_case import Recorder
-from rig import ROOT, Program, count_holdings, find_free_port, start_python, wait_until
+from rig import ROOT, Program, count_holdings, start_python
 
 from hero_msgs.msg import Encoder, Robot
+from hero_test.processes import find_free_port
+from hero_test.waiting import wait_for
 
 ROBOTS = 5
 PC, ROBOT_NET, SECOND_PC = "10.98.1.1", "10.98.1.2", "10.98.2.2"
@@ -33,7 +35,7 @@ class Host:
         self._process = subprocess.Popen(["unshare", "--net", "sleep", "infinity"])
         self.prefix = ["nsenter", "--net=/proc/%d/ns/net" % self._process.pid]
         own = os.readlink("/proc/self/ns/net")
-        wait_until(lambda: os.readlink("/proc/%d/ns/net" % self._process.pid) != own, "a namespace")
+        wait_for(lambda: os.readlink("/proc/%d/ns/net" % self._process.pid) != own, "a namespace")
         self.cable = cable
         run("ip link add %s0 type veth peer name %s1" % (cable, cable))
         run("ip link set %s1 netns %d" % (cable, self._process.pid))
@@ -96,6 +98,7 @@ class Watch:
 
     def wait_all_heard(self, what):
         """Return after how many seconds all robots are ready, and heard anew."""
+        start_s = time.monotonic()
         counts = {number: len(recorder.messages) for number, recorder in self.recorders.items()}
 
         def are_heard():
@@ -105,7 +108,8 @@ class Watch:
                 for number in self.numbers
             )
 
-        return wait_until(are_heard, what, 150.0)[1]
+        wait_for(are_heard, what, 150.0)
+        return time.monotonic() - start_s
 
     def count_lost(self, marks):
         """Return how many readings since marks are missing; the robots' own stamps are 34 ms apart."""
@@ -168,7 +172,7 @@ def through_relay(lab):
         yield driver, relay, watch
         watch.close()
     relay.ask("clear")
-    wait_until(
+    wait_for(
         lambda: not any(driver.fleet.find("/hero_%d" % n, Robot.READY) for n in range(ROBOTS)), "robots to go"
     )
 
@@ -181,7 +185,7 @@ def by_cable(lab):
         watch.wait_all_heard("all robots")
         yield driver, robots, watch
         watch.close()
-    wait_until(
+    wait_for(
         lambda: not any(driver.fleet.find("/hero_%d" % n, Robot.READY) for n in range(ROBOTS)), "robots to go"
     )
 
@@ -195,7 +199,7 @@ def test_jitter_of_200_ms_loses_nothing(through_relay, effort, record):
     returns, marks = count_returns(driver), watch.mark()
     relay.ask("jitter 0.2")
     count = effort.choose(60, 600)
-    wait_until(
+    wait_for(
         lambda: all(len(r.messages) > marks[n] + count for n, r in watch.recorders.items()), "messages", 60.0
     )
     lost = watch.count_gaps(marks)
@@ -230,12 +234,12 @@ def test_a_cut_cable_is_noticed_and_all_robots_return(by_cable, effort, record):
     cut_s = effort.choose(7.0, 30.0)
     robots.cut()
     start_s = time.monotonic()
-    wait_until(
+    wait_for(
         lambda: all(driver.fleet.find("/hero_%d" % n, Robot.AWAY) for n in range(ROBOTS)),
         "all robots to be away",
     )
     noticed_s = time.monotonic() - start_s
-    wait_until(lambda: time.monotonic() - start_s >= cut_s, "the end of the cut", cut_s + 5.0)
+    wait_for(lambda: time.monotonic() - start_s >= cut_s, "the end of the cut", cut_s + 5.0)
     robots.mend()
     back_s = watch.wait_all_heard("all robots after the cut")
     record(
@@ -264,7 +268,7 @@ def test_robots_with_another_address_are_the_same_robots(lab, record):
             found = [driver.fleet.find("/hero_%d" % number, Robot.READY) for number in range(ROBOTS)]
             return all(robot and robot.address.startswith(OTHER_ROBOT_NET + ":") for robot in found)
 
-        wait_until(have_moved, lambda: "all robots at their new address: %s" % driver.fleet.newest, 60.0)
+        wait_for(have_moved, lambda: "all robots at their new address: %s" % driver.fleet.newest, 60.0)
         watch.wait_all_heard("all robots at their new address")
         back_s = time.monotonic() - start_s
     watch.close()
@@ -322,12 +326,12 @@ def test_where_no_ports_are_left_those_connected_lose_nothing(by_cable, record):
             for _ in range(3):
                 rosgraph.Master("/faults").lookupNode(driver.node)
                 count_holdings(driver)
-        wait_until(
+        wait_for(
             lambda: all(len(r.messages) > marks[n] + 60 for n, r in watch.recorders.items()), "messages"
         )
     finally:
         ports.write_text(usual)
-    wait_until(lambda: rosgraph.Master("/faults").lookupNode(driver.node), "the master to be reached again")
+    wait_for(lambda: rosgraph.Master("/faults").lookupNode(driver.node), "the master to be reached again")
     assert driver.process.poll() is None
     record(
         "no ports are left",

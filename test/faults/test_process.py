@@ -13,12 +13,14 @@ from driver_case import Recorder, frozen, make_publisher
 from fake_robot import TIME_PACKET, FakeRobot
 from geometry_msgs.msg import Twist
 from life_signs import Life
-from rig import HERE, find_free_port, wait_until
+from rig import HERE
 from simulated_field import SPEED_M_S, Truth, drive, rest, start_simulator
 from steady_time import StallWatch
 
 from hero_driver.rosserial import packets, payloads
 from hero_msgs.msg import Encoder
+from hero_test.processes import find_free_port
+from hero_test.waiting import wait_for
 
 ROBOTS = 3
 FREE_DISTANCE_M = 0.03
@@ -60,7 +62,7 @@ def test_robots_that_move_stop_when_the_driver_ends_and_are_driveable_again(
         # As roslaunch does with respawn: the same node, while the robots and the programs wait.
         started_s = time.monotonic()
         driver = start_driver(parameters={"port": port}, name="ended_driver")
-        wait_until(lambda: all(truth.is_moving for truth in truths), "all robots to move again")
+        wait_for(lambda: all(truth.is_moving for truth in truths), "all robots to move again")
         if max(went_m) >= limit_m and watch.longest_s >= STALL_S and void < VOID_MAX:
             void += 1
             continue
@@ -171,11 +173,11 @@ def test_a_clock_that_is_set_by_an_hour_loses_nothing(start_driver, record, tmp_
         """Do as the robot: its clock follows the answer."""
         asked = len(robot.payloads_with_id(packets.ID_TIME))
         robot.send_bytes(TIME_PACKET)
-        wait_until(lambda: len(robot.payloads_with_id(packets.ID_TIME)) > asked, "the time")
+        wait_for(lambda: len(robot.payloads_with_id(packets.ID_TIME)) > asked, "the time")
         return rospy.Time(*payloads.decode_time(robot.payloads_with_id(packets.ID_TIME)[-1]))
 
     start = ask_time()
-    wait_until(lambda: driver.fleet.newest, "a report")
+    wait_for(lambda: driver.fleet.newest, "a report")
     reports = driver.fleet.newest.header.stamp
     for count in range(1, 101):
         stamp = start + rospy.Duration(0.03 * count)
@@ -187,7 +189,7 @@ def test_a_clock_that_is_set_by_an_hour_loses_nothing(start_driver, record, tmp_
     ticks = [message.left_ticks for message in encoders.wait_count(100)]
     stepped = abs((encoders.messages[-1].header.stamp - encoders.messages[49].header.stamp).to_sec() - step_s)
     # Reports go on too.
-    wait_until(
+    wait_for(
         lambda: abs((driver.fleet.newest.header.stamp - reports).to_sec() - step_s) < 60.0,
         "a report after the step",
     )
@@ -241,7 +243,7 @@ def test_a_mistake_of_the_driver_with_one_connection_costs_that_connection_alone
     life = Life(driver, robot)
     trigger.write_text("")
     unlucky = FakeRobot(2).connect(driver.address)
-    wait_until(lambda: unlucky.ended, "the unlucky one to be closed")
+    wait_for(lambda: unlucky.ended, "the unlucky one to be closed")
     driver.wait_line("the driver made a mistake, please report it: RuntimeError")
     life.show()
     trigger.unlink()
@@ -262,11 +264,11 @@ def test_a_driver_whose_loop_breaks_stops_the_robots_and_ends(start_driver, reco
     command = Twist()
     command.linear.x = SPEED_M_S
     publisher.publish(command)
-    wait_until(lambda: robot.velocities, "motion")
+    wait_for(lambda: robot.velocities, "motion")
     with StallWatch() as watch:
         trigger.write_text("")
         code = driver.wait_end()
-        wait_until(lambda: robot.ended, "the end of the connection")
+        wait_for(lambda: robot.ended, "the end of the connection")
     stops, taken = (
         [velocity.is_zero for velocity in velocities if "velocity_controller" in velocity.name]
         for velocities in (robot.velocities, robot.accepted)

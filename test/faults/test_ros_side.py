@@ -12,12 +12,13 @@ from driver_case import frozen, has_connection, list_driver_topics, make_publish
 from fake_robot import FakeRobot
 from geometry_msgs.msg import Twist
 from life_signs import Life
-from rig import STOCK_NAMES, count_holdings, start_python, wait_until
+from rig import STOCK_NAMES, count_holdings, start_python
 from rosgraph_msgs.msg import Clock
 from steady_time import StallWatch
 from stock_messages import make_laser
 
 from hero_msgs.srv import SetPID
+from hero_test.waiting import wait_for
 
 BACK_WITHIN_S = 10.0
 
@@ -36,7 +37,7 @@ def start_reader(driver, topic):
     reader = subprocess.Popen(
         ["rostopic", "echo", topic], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
     )
-    wait_until(lambda: has_connection(driver.node, topic, "rostopic"), "a reader of " + topic)
+    wait_for(lambda: has_connection(driver.node, topic, "rostopic"), "a reader of " + topic)
     return reader
 
 
@@ -68,7 +69,7 @@ def test_subscribers_that_die_cost_nobody_else_anything(served, effort, record):
         os.kill(reader.pid, signal.SIGKILL)
         life.show(5)
         reader.wait()
-    wait_until(
+    wait_for(
         lambda: not has_connection(driver.node, "/hero_1/encoder", "rostopic"), "the dead to be forgotten"
     )
     record("a subscriber dies (SIGKILL)", deaths, deaths)
@@ -84,7 +85,7 @@ def test_subscribers_that_come_and_go_leave_nothing_behind(served, effort, recor
             connected = program.read()
             assert connected == crowd, connected
             life.show()
-        wait_until(
+        wait_for(
             lambda: not has_connection(driver.node, "/hero_1/encoder", "crowd"), "the crowd to be gone"
         )
 
@@ -94,7 +95,7 @@ def test_subscribers_that_come_and_go_leave_nothing_behind(served, effort, recor
         come_and_go()
     life.show()
     # Python gives memory back late, and rospy ends its threads when it looks at its connections.
-    wait_until(
+    wait_for(
         lambda: count_holdings(driver).threads <= before.threads
         and count_holdings(driver).files <= before.files,
         lambda: count_holdings(driver).describe_growth(before),
@@ -119,7 +120,7 @@ def test_a_publisher_at_1_khz_delays_nobody_and_its_stop_arrives(served, effort,
             life.show()
     with StallWatch() as watch:
         publisher.publish(stop)
-        wait_until(lambda: [v.is_zero for v in robot.velocities[-2:]] == [True, True], "two stops")
+        wait_for(lambda: [v.is_zero for v in robot.velocities[-2:]] == [True, True], "two stops")
     # It reads at once: only a machine that stood still lets it drop the second.
     least = 1 if watch.stood_still else 2
     assert [v.is_zero for v in robot.accepted[-least:]] == [True] * least, "stops that are taken"
@@ -160,7 +161,7 @@ def test_a_master_that_is_killed_and_started_again_knows_every_robot(master, ser
     driver, robot, life = served
     tries = effort.choose(1, 10)
     back_s = []
-    wait_until(lambda: len(list_driver_topics("/hero_1", driver.node)) == STOCK_NAMES, "all topics")
+    wait_for(lambda: len(list_driver_topics("/hero_1", driver.node)) == STOCK_NAMES, "all topics")
     for _ in range(tries):
         life.show()
         master.kill()
@@ -168,7 +169,7 @@ def test_a_master_that_is_killed_and_started_again_knows_every_robot(master, ser
         life.show(20)
         master.start()
         back_s.append(
-            wait_until(
+            wait_for(
                 lambda: len(list_driver_topics("/hero_1", driver.node)) == STOCK_NAMES,
                 "all topics again",
                 30.0,
@@ -181,7 +182,7 @@ def test_a_master_that_is_killed_and_started_again_knows_every_robot(master, ser
         assert program.read() == 1
     twist = make_publisher("/hero_1/position_controller/cmd_vel", Twist)
     twist.publish(Twist())
-    wait_until(lambda: robot.payloads_on("position_controller/cmd_vel"), "a command of a new program")
+    wait_for(lambda: robot.payloads_on("position_controller/cmd_vel"), "a command of a new program")
     record(
         "the ROS master is killed and started again",
         tries,
@@ -199,11 +200,11 @@ def test_simulated_time_that_does_not_run_stops_nothing(start_driver, record):
         life.show(10)
         clock = rospy.Publisher("/clock", Clock, queue_size=1, latch=True)
         clock.publish(Clock(rospy.Time(1000)))
-        wait_until(lambda: driver.fleet.newest.header.stamp == rospy.Time(1000), "a report at simulated time")
+        wait_for(lambda: driver.fleet.newest.header.stamp == rospy.Time(1000), "a report at simulated time")
         life.show(10)
         # It goes back, as a bag does that begins anew.
         clock.publish(Clock(rospy.Time(500)))
-        wait_until(lambda: driver.fleet.newest.header.stamp == rospy.Time(500), "a report at an earlier time")
+        wait_for(lambda: driver.fleet.newest.header.stamp == rospy.Time(500), "a report at an earlier time")
         life.show(10)
         clock.unregister()
         robot.close()

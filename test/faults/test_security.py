@@ -11,12 +11,13 @@ from bad_peer import declare_topic
 from driver_case import ask_parameter, list_driver_topics
 from fake_robot import CLIENT_ANSWERS, CLIENT_REQUESTS, PUB, STOCK_DECLARATIONS, Declaration, FakeRobot
 from life_signs import Life
-from rig import STOCK_NAMES, wait_until
+from rig import STOCK_NAMES
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse
 
 from hero_driver.rosserial import payloads
 from hero_msgs.msg import RobotArray
+from hero_test.waiting import wait_for
 
 STRING_MD5 = "992ce8a1687cec8c8bd883ec73ca41d1"
 
@@ -172,7 +173,7 @@ def test_nobody_takes_more_than_the_limits_give(start_driver, record, kind):
                 emulated_swarm.declare(100 + number) + declare_topic(0, 150, "/hero_1/x", "a/B", STRING_MD5)
             )
     driver.wait_line("~max_connections_per_address")
-    wait_until(lambda: driver.find_lines("refused"), "a refusal")
+    wait_for(lambda: driver.find_lines("refused"), "a refusal")
     life.show()
     taken = sum(
         robot.namespace.startswith("/hero_1") and robot.id >= 100 for robot in driver.fleet.newest.robots
@@ -236,13 +237,13 @@ def test_a_peer_that_calls_itself_differently_each_time_has_to_wait(start_driver
             sock.settimeout(20.0)
             sock.connect(driver.address)
             known.append(sock.sendall(emulated_swarm.declare(100 + len(known))))
-            wait_until(lambda: driver.find_lines("hero_%d" % (99 + len(known))) or found(), "an answer")
+            wait_for(lambda: driver.find_lines("hero_%d" % (99 + len(known))) or found(), "an answer")
         return found()
 
     def found():
         return driver.find_lines("new robots of one address")
 
-    wait_until(is_refused, "a refusal", 60.0)
+    wait_for(is_refused, "a refusal", 60.0)
     life.show()
     # Whoever has another address need not wait.
     other = FakeRobot(2, source_host="127.0.0.8").connect(driver.address)
@@ -268,7 +269,7 @@ def test_names_that_leave_at_once_get_no_topics_and_a_robot_that_stays_gets_them
     driver.wait_line("hero_%d left" % numbers[-1])
     # It comes from the same address, so its topics have to wait, and come.
     robot = FakeRobot(2, source_host="127.0.0.66").connect(driver.address)
-    wait_until(lambda: len(list_driver_topics("/hero_2", driver.node)) == STOCK_NAMES, "all topics")
+    wait_for(lambda: len(list_driver_topics("/hero_2", driver.node)) == STOCK_NAMES, "all topics")
     with_topics = [n for n in numbers[-10:] if list_driver_topics("/hero_%d" % n, driver.node)]
     robot.close()
     record("names that leave at once", len(numbers), len(numbers) - len(with_topics), "their topics")

@@ -12,7 +12,7 @@ import rospy
 from driver_case import frozen, make_publisher
 from fake_robot import READ_CYCLE_S, FakeRobot
 from geometry_msgs.msg import Twist
-from rig import HERE, Master, find_free_port, start_python, wait_until
+from rig import HERE, Master, start_python
 from simulated_field import SPEED_M_S, Truth, drive, rest, start_simulator
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, Trigger
@@ -20,6 +20,8 @@ from std_srvs.srv import SetBool, Trigger
 from hero_client.drivers import Drivers
 from hero_msgs.msg import Robot
 from hero_sim.srv import InjectFault
+from hero_test.processes import find_free_port
+from hero_test.waiting import wait_for
 
 ROBOTS = 3
 HALF_OPEN = 100
@@ -66,7 +68,7 @@ def is_confirmed(driver):
 def asking(drivers_known):
     """Yield the Drivers of a program that has just started, once it has found so many."""
     drivers = Drivers()
-    wait_until(lambda: len(drivers.names()) == drivers_known and drivers.read(), lambda: "%s" % drivers.names())
+    wait_for(lambda: len(drivers.names()) == drivers_known and drivers.read(), lambda: "%s" % drivers.names())
     yield drivers
     drivers.close()
 
@@ -78,9 +80,9 @@ def test_a_stop_needs_no_master(field, master, record):
     with frozen(master.pid):
         requests.publish(Bool(True))
         rest(truths)
-        wait_until(lambda: is_confirmed(driver), "the driver's confirmation")
+        wait_for(lambda: is_confirmed(driver), "the driver's confirmation")
         requests.publish(Bool(False))
-        wait_until(lambda: all(truth.is_moving for truth in truths), "all robots to move")
+        wait_for(lambda: all(truth.is_moving for truth in truths), "all robots to move")
         requests.publish(Bool(True))
         rest(truths)
     record("a stop, a release and a stop while the ROS master hangs", 3, 3)
@@ -106,7 +108,7 @@ def test_half_open_connections_keep_nobody_from_a_stop(field, record):
         rest(truths)
         requests = make_publisher(driver.node + "/stop_request", Bool)
         requests.publish(Bool(False))
-        wait_until(lambda: not driver.fleet.newest.stopped, "the release")
+        wait_for(lambda: not driver.fleet.newest.stopped, "the release")
     record("%d connections to the driver that send 2 bytes and wait" % HALF_OPEN, 2, 2)
 
 
@@ -122,15 +124,15 @@ def test_a_hung_driver_keeps_nobody_else_from_a_stop(field, start_driver, record
                 for _ in range(presses):
                     drivers.request_stop(True)
                 rest(truths)
-                wait_until(lambda: is_confirmed(driver), "the driver's confirmation")
-                wait_until(lambda: drivers.stop_status().level == "error", "a verdict")
+                wait_for(lambda: is_confirmed(driver), "the driver's confirmation")
+                wait_for(lambda: drivers.stop_status().level == "error", "a verdict")
                 assert drivers.stop_status().text == "NOT STOPPED: driver %s does not answer" % hung.node[1:]
                 drivers.request_stop(False)
-                wait_until(lambda: not driver.fleet.newest.stopped, "the release")
+                wait_for(lambda: not driver.fleet.newest.stopped, "the release")
             drive(truths)
             drivers.request_stop(True)
             rest(truths)
-        wait_until(lambda: is_confirmed(hung), "the stop, once it goes on")
+        wait_for(lambda: is_confirmed(hung), "the stop, once it goes on")
     robot.close()
     record("twelve stops of two drivers, one of which hangs", 12, 12)
 
@@ -144,7 +146,7 @@ def test_robots_stop_when_their_commander_is_killed(field, record, controller):
     watcher = Truth(0)
     watcher.publisher.unregister()
     commander = subprocess.Popen([sys.executable, "-c", COMMANDER % (SPEED_M_S, topic)])
-    wait_until(lambda: watcher.is_moving, "the robot to move")
+    wait_for(lambda: watcher.is_moving, "the robot to move")
     mark = len(watcher.path) - 1
     commander.kill()
     commander.wait()
@@ -162,12 +164,12 @@ def test_a_stop_in_a_pause_of_the_radio_arrives(field, record):
     positions = [Truth(number, "position_controller") for number in range(ROBOTS)]
     for truth in positions:
         truth.command.linear.x = SPEED_M_S
-    wait_until(lambda: all(truth.is_moving for truth in positions), "all robots to move")
+    wait_for(lambda: all(truth.is_moving for truth in positions), "all robots to move")
     inject = rospy.ServiceProxy("/hero_sim/fault", InjectFault)
     assert inject("stall:for=0.3").success
     assert rospy.ServiceProxy(driver.node + "/stop", SetBool)(True).success
     rest(positions)
-    wait_until(lambda: is_confirmed(driver), "the driver's confirmation")
+    wait_for(lambda: is_confirmed(driver), "the driver's confirmation")
     for truth in positions:
         truth.close()
     record("a radio that carries nothing for 0.3 s with the stop in it, position control", ROBOTS, ROBOTS)
@@ -180,7 +182,7 @@ def test_a_robot_whose_program_stood_still_stops_when_it_goes_on(field, record):
     assert inject("frozen:for=2,robot=0").success
     assert rospy.ServiceProxy(driver.node + "/stop", SetBool)(True).success
     rest(truths)
-    wait_until(lambda: is_confirmed(driver), "the driver's confirmation")
+    wait_for(lambda: is_confirmed(driver), "the driver's confirmation")
     record("a robot whose program stands still for 2 s with the stop in it", 1, 1)
 
 
@@ -193,9 +195,9 @@ def test_a_stop_ends_the_self_tuning_of_simulated_robots(field, record, controll
         rospy.wait_for_service(name, 20.0)
         rospy.ServiceProxy(name, Trigger)()
     watchers = [Truth(number) for number in range(ROBOTS)]
-    wait_until(lambda: all(watcher.path and watcher.path[-1][2] > TUNING_M_S for watcher in watchers), "the tuning")
+    wait_for(lambda: all(watcher.path and watcher.path[-1][2] > TUNING_M_S for watcher in watchers), "the tuning")
     assert rospy.ServiceProxy(driver.node + "/stop", SetBool)(True).success
-    wait_until(lambda: is_confirmed(driver), "the driver's confirmation")
+    wait_for(lambda: is_confirmed(driver), "the driver's confirmation")
     rest(watchers)
     for watcher in watchers:
         watcher.close()
@@ -213,7 +215,7 @@ def test_a_driver_whose_loop_breaks_ends_a_self_tuning(start_driver, record, tmp
     twist = Twist()
     twist.linear.x = SPEED_M_S
     make_publisher("/hero_2/velocity_controller/cmd_vel", Twist).publish(twist)
-    wait_until(lambda: robots[1].motors.is_turning, "motion")
+    wait_for(lambda: robots[1].motors.is_turning, "motion")
     trigger.write_text("")
     assert driver.wait_end() == 1
     resting = sum(not robot.motors.is_turning for robot in robots)

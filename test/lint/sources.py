@@ -4,6 +4,7 @@ Run as a program it prints the modules that know nothing of ROS, which script/li
 """
 
 import ast
+import re
 import subprocess
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
@@ -68,6 +69,13 @@ def list_files(*suffixes: str) -> List[Path]:
 def list_packages() -> List[str]:
     """Names of the catkin packages, which are also their directories."""
     return sorted(path.parent.name for path in ROOT.glob("*/package.xml"))
+
+
+def list_programs(package: str) -> List[str]:
+    """Programs of a package that rosrun finds: those that CMake makes, and scripts in nodes/."""
+    text = (ROOT / package / "CMakeLists.txt").read_text(encoding="utf-8").replace("${PROJECT_NAME}", package)
+    scripts = [path.name for path in sorted((ROOT / package / "nodes").glob("*"))]
+    return re.findall(r"hero_add_program\((\w+)", text) + scripts
 
 
 def list_python_files() -> List[Path]:

@@ -101,23 +101,6 @@ def test_only_known_libraries_are_imported(path):
         assert known, f"{path}:{found.line}: {found.module}: tell test/lint/sources.py which package it is in"
 
 
-@pytest.mark.parametrize("path", sources.list_files(".test"), ids=str)
-def test_every_rostest_is_registered(path):
-    package = sources.package_of(path)
-    name = str(path.relative_to(sources.ROOT / package))
-    text = read_cmake(package)
-    assert re.search(rf"add_rostest\(\s*{re.escape(name)}\b", text), f"{package}: add_rostest({name})"
-
-
-@pytest.mark.parametrize("package", PACKAGES)
-def test_every_node_is_installed_and_can_be_run(package):
-    text = read_cmake(package)
-    for path in sorted((sources.ROOT / package / "nodes").glob("*")):
-        assert path.stat().st_mode & 0o111, f"chmod +x {path}"
-        assert path.read_text(encoding="utf-8").startswith("#!/usr/bin/env python\n"), path
-        assert re.search(rf"nodes/{re.escape(path.name)}\b", text), f"{package}: catkin_install_python"
-
-
 @pytest.mark.parametrize("package", PACKAGES)
 def test_every_directory_that_nodes_read_is_installed(package):
     text = read_cmake(package)

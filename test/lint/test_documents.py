@@ -67,13 +67,6 @@ def has_option(text, option):
     return option == "--help" or f'"{option}"' in text
 
 
-@lru_cache(maxsize=None)
-def list_programs(package):
-    """Programs that rosrun finds in a package."""
-    places = (sources.ROOT / package / folder for folder in ("nodes", "scripts", "bin"))
-    return {path.name for place in places if place.is_dir() for path in place.iterdir()}
-
-
 def documented_names():
     """Names of topics and services that the READMEs of the packages list, with N for a robot's number."""
     names = set(NAMES_OF_ROS)
@@ -127,7 +120,7 @@ def test_every_rosrun_names_a_program_and_its_options(words):
     if package not in PACKAGES:
         assert not package.startswith("hero_"), f"there is no package {package}"
         return
-    assert program in list_programs(package), f"{package} has no program {program}"
+    assert program in sources.list_programs(package), f"{package} has no program {program}"
     for argument in arguments:
         option = re.match(r"^(--[\w-]+)", argument)
         if option:

@@ -5,6 +5,7 @@ install space is tried after its sources and its build are gone.
 """
 
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -22,8 +23,12 @@ PROBE_TIMEOUT_S = 120.0
 NODE_START_S = 3
 LAUNCH_FILES = sorted(ROOT.glob("*/launch/*.launch"))
 PACKAGES = sorted(path.parent.name for path in ROOT.glob("*/package.xml"))
-NODES = sorted(path for path in ROOT.glob("*/nodes/*") if path.is_file() and path.suffix != ".py")
-LESSONS = sorted(path.name for path in ROOT.glob("hero_tutorial/nodes/*.py"))
+PROGRAMS = [
+    (path.parent.name, program)
+    for path in sorted(ROOT.glob("*/CMakeLists.txt"))
+    for program in re.findall(r"hero_add_program\((\w+)", path.read_text().replace("${PROJECT_NAME}", path.parent.name))
+]
+TUTORIALS = sorted(path.name for path in ROOT.glob("hero_tutorial/nodes/*.py"))
 CMAKE_ARGUMENTS = f"-DPYTHON_EXECUTABLE={sys.executable}"
 
 # Without the variables of a workspace that happens to be sourced.
@@ -151,33 +156,31 @@ def test_every_launch_file_can_be_read(space):
     side_by_side(read, LAUNCH_FILES)
 
 
-def test_rosrun_finds_every_node_and_python_has_what_it_imports(space):
+def test_rosrun_starts_every_program_whatever_python3_is_first_on_path(space):
     # As with pyenv or conda: the first python3 on PATH is another one, without rospy.
     other = space.directory / "other_python"
     other.mkdir()
     (other / "python3").write_text("#!/bin/sh\necho No module named rospy\nexit 1\n")
     (other / "python3").chmod(0o755)
 
-    def start(path):
-        package = path.parents[1].name
-        first_line = space.run(f"head -n 1 $(catkin_find --first-only --libexec {package} {path.name})")
-        assert first_line.startswith("#!"), path.name
+    def start(item):
+        package, program = item
         # A node that knows no --help waits for a master, in vain, until it is killed.
-        command = f"PATH={other}:$PATH timeout -s KILL {NODE_START_S} rosrun {package} {path.name} --help"
+        command = f"PATH={other}:$PATH timeout -s KILL {NODE_START_S} rosrun {package} {program} --help"
         output = space.run(f"export ROS_MASTER_URI=http://localhost:1\n({command}) 2>&1 || true")
-        assert "Traceback" not in output and "No module named" not in output, f"{path.name}:\n{output}"
+        assert "Traceback" not in output and "No module named" not in output, f"{program}:\n{output}"
+        assert "Couldn't find executable" not in output, output
 
-    side_by_side(start, NODES)
+    side_by_side(start, PROGRAMS)
 
 
-def test_scripts_of_the_lessons_find_what_they_import_with_the_interpreter_that_they_name(space):
+def test_the_tutorials_scripts_are_installed_and_find_what_they_import(space):
     """They know no --help, so they are not run but read as modules, which does all but main()."""
-    names = " ".join(LESSONS)
-    enter = "cd $(catkin_find --first-only --libexec hero_tutorial)"
-    (first_line,) = space.run(f"{enter} && head -qn 1 {names} | sort -u").splitlines()
-    assert first_line.startswith("#!/") and "env " not in first_line, first_line
+    names = " ".join(TUTORIALS)
     program = "import runpy, sys\nfor name in sys.argv[1:]:\n    runpy.run_path(name, run_name='read')"
-    space.run(f"{enter} && {first_line[2:].strip()} - {names} <<'END'\n{program}\nEND")
+    space.run(
+        f"cd $(catkin_find --first-only --libexec hero_tutorial) && {sys.executable} - {names} <<'END'\n{program}\nEND"
+    )
 
 
 def test_driver_and_simulated_robots_start_and_their_odometry_arrives(space):

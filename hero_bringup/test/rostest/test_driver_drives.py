@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """The main job with simulated robots: they dial in or are dialled, are driven, calibrated and stopped."""
 
 import math
@@ -18,7 +18,7 @@ from tf2_msgs.msg import TFMessage
 
 from hero_msgs.msg import Robot, RobotArray
 from hero_msgs.srv import SetIRCalibration, SetMotor, SetOdom, SetPID
-from hero_test.swarm_watch import wait_for
+from hero_test.waiting import wait_for
 
 DEADLINE_S = 30.0
 DIALLED_IN = (0, 1, 2)
@@ -42,7 +42,7 @@ class Watch:
     def wait_more(self, count=1):
         """Wait for so many messages from now on; return the newest."""
         seen = self.count
-        wait_for(lambda: self.count >= seen + count, DEADLINE_S, "%d more messages on %s" % (count, self._topic))
+        wait_for(lambda: self.count >= seen + count, "%d more messages on %s" % (count, self._topic))
         return self.newest
 
 
@@ -56,7 +56,7 @@ class Driven:
         self.publisher = rospy.Publisher(
             namespace + "/velocity_controller/cmd_vel", Twist, queue_size=1, tcp_nodelay=True
         )
-        wait_for(lambda: self.publisher.get_num_connections() > 0, DEADLINE_S, "the driver at cmd_vel of " + namespace)
+        wait_for(lambda: self.publisher.get_num_connections() > 0, "the driver at cmd_vel of " + namespace)
         self.odom.wait_more()
         self.truth.wait_more()
         self._command = Twist()
@@ -99,7 +99,7 @@ class DriverDrivesTest(unittest.TestCase):
                 cls.fleet.newest
                 and {robot.id for robot in cls.fleet.newest.robots if robot.state == Robot.READY} == numbers
             ),
-            DEADLINE_S, "four robots",
+            "four robots",
         )
 
     def take(self, number):
@@ -116,9 +116,9 @@ class DriverDrivesTest(unittest.TestCase):
         """Drive back and forth in the free space before the robot, and return how far odom and truth say."""
         start, odom_start = robot.position, robot.odom.newest.pose.pose.position
         robot.drive(SPEED_M_S)
-        wait_for(lambda: math.dist(robot.position, start) > way_m, DEADLINE_S, "the robot to move")
+        wait_for(lambda: math.dist(robot.position, start) > way_m, "the robot to move")
         robot.drive(0.0)
-        wait_for(lambda: robot.is_at_rest, DEADLINE_S, "the robot to stop")
+        wait_for(lambda: robot.is_at_rest, "the robot to stop")
         robot.truth.wait_more(2)
         robot.odom.wait_more(2)
         odom_end = robot.odom.newest.pose.pose.position
@@ -152,15 +152,15 @@ class DriverDrivesTest(unittest.TestCase):
         for robot in robots:
             robot.drive(0.0, 2.0)
         for robot in robots:
-            wait_for(lambda r=robot: r.truth.newest.twist.twist.angular.z > 1.0, DEADLINE_S, "the robot to turn")
+            wait_for(lambda r=robot: r.truth.newest.twist.twist.angular.z > 1.0, "the robot to turn")
         self.assertTrue(self.call("/hero_driver/stop", SetBool, True).success)
         for robot in robots:
-            wait_for(lambda r=robot: r.is_at_rest, DEADLINE_S, "the robot to stop")
+            wait_for(lambda r=robot: r.is_at_rest, "the robot to stop")
             robot.truth.wait_more(20)
             self.assertTrue(robot.is_at_rest)
         self.assertTrue(self.call("/hero_driver/stop", SetBool, False).success)
         for robot in robots:
-            wait_for(lambda r=robot: r.truth.newest.twist.twist.angular.z > 1.0, DEADLINE_S, "the robot to turn again")
+            wait_for(lambda r=robot: r.truth.newest.twist.twist.angular.z > 1.0, "the robot to turn again")
 
     def test_three_robots_are_calibrated_and_driven_through_one_driver(self):
         for number in DIALLED_IN:
@@ -176,11 +176,11 @@ class DriverDrivesTest(unittest.TestCase):
         robots = [self.take(number) for number in DIALLED_IN]
         for robot in robots:
             wait_for(
-                lambda r=robot: math.hypot(r.odom.newest.pose.pose.position.x - 1.0, 0.0) < 0.01, DEADLINE_S, "x = 1 m"
+                lambda r=robot: math.hypot(r.odom.newest.pose.pose.position.x - 1.0, 0.0) < 0.01, "x = 1 m"
             )
             robot.drive(0.0, 1.5)
         for robot in robots:
-            wait_for(lambda r=robot: r.truth.newest.twist.twist.angular.z > 0.7, DEADLINE_S, "the robot to turn")
+            wait_for(lambda r=robot: r.truth.newest.twist.twist.angular.z > 0.7, "the robot to turn")
             self.assertAlmostEqual(robot.odom.newest.pose.pose.position.y, 2.0, delta=0.02)
 
     def test_absurd_gains_do_not_reach_a_robot(self):
@@ -203,7 +203,7 @@ class DriverDrivesTest(unittest.TestCase):
             for number in (*DIALLED_IN, DIALLED)
             for link in ("base_link", "left_wheel_link", "right_wheel_link", "hat_link", "laser_link")
         }
-        wait_for(lambda: expected <= frames, DEADLINE_S, "all frames of all robots")
+        wait_for(lambda: expected <= frames, "all frames of all robots")
 
     def test_the_aggregator_configuration_sorts_every_diagnostic_once(self):
         config = yaml.safe_load((Path(__file__).parents[2] / "config" / "diagnostics.yaml").read_text())

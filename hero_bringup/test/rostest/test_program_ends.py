@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """How programs end where nothing works: one line and the right exit status, whatever their environment and output."""
 
 import os

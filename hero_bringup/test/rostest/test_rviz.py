@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """rviz:=true on a screen that nobody looks at: robots are drawn where the simulator says that they are."""
 
 import os
@@ -14,8 +14,9 @@ from geometry_msgs.msg import PointStamped, PoseStamped, Twist
 from std_msgs.msg import ColorRGBA
 
 from hero_description.rviz_config import ABOVE_PIXELS_PER_M, GOAL_TOPIC, POINT_TOPIC
-from hero_test.swarm_watch import SwarmWatch, wait_for
+from hero_test.swarm_watch import SwarmWatch
 from hero_test.virtual_screen import MISSING, VirtualScreen
+from hero_test.waiting import wait_for
 
 TIMEOUT_S = 60.0
 NEAR_M = 0.015
@@ -106,7 +107,7 @@ class RvizTest(unittest.TestCase):
             return self.errors is not None and max(self.errors.values()) < NEAR_M
 
         try:
-            wait_for(are_in_place, TIMEOUT_S, "robots to be drawn where they are")
+            wait_for(are_in_place, "robots to be drawn where they are")
         except AssertionError as error:
             raise AssertionError("%s; off by (m): %s" % (error, self.errors)) from None
         finally:
@@ -127,7 +128,7 @@ class RvizTest(unittest.TestCase):
             rospy.sleep(0.1)
             return np.hypot(*np.subtract(self.watch.pose(0)[:2], start)) > 0.2
 
-        wait_for(has_driven, TIMEOUT_S, "robot 0 to drive")
+        wait_for(has_driven, "robot 0 to drive")
         drive.publish(Twist())
         self.wait_until_drawn_in_place("rviz_driven.png")
 
@@ -146,11 +147,11 @@ class RvizTest(unittest.TestCase):
             goal.publish(PoseStamped())
             return goals[2]
 
-        wait_for(goes_to_the_chosen_one, TIMEOUT_S, "a goal for robot 2")
+        wait_for(goes_to_the_chosen_one, "a goal for robot 2")
         self.assertEqual(goals[1], [])
 
         def send_until(count):
-            wait_for(lambda: goal.publish(PoseStamped()) or len(goals[2]) >= count, TIMEOUT_S, "more goals")
+            wait_for(lambda: goal.publish(PoseStamped()) or len(goals[2]) >= count, "more goals")
 
         send_until(5)
         first = len(goals[0])

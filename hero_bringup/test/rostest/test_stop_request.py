@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """A stop of all robots while a driver hangs, while the ROS master hangs, and what people see of it."""
 
 import contextlib
@@ -7,7 +7,6 @@ import math
 import os
 import signal
 import subprocess
-import sys
 import unittest
 import xmlrpc.client
 
@@ -20,8 +19,9 @@ from hero_client.drivers import Drivers
 from hero_client.swarm import Swarm
 from hero_msgs.msg import Robot, RobotArray
 from hero_test.example_program import ExampleProgram
-from hero_test.program_terminal import TIMEOUT_S, ProgramTerminal, run_fleet
-from hero_test.swarm_watch import wait_for
+from hero_test.processes import find_program
+from hero_test.program_terminal import ProgramTerminal, run_fleet
+from hero_test.waiting import wait_for
 
 AT_REST = ("info", "stopped, all wheels at rest", True)
 RELEASED = ("info", "released: robots may move again", True)
@@ -73,10 +73,10 @@ class StopRequestTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.reports = {driver: Reports(driver) for driver in ("/hero_driver", "/hero_driver_b")}
-        wait_for(lambda: all(reports.newest for reports in cls.reports.values()), TIMEOUT_S, "both drivers")
+        wait_for(lambda: all(reports.newest for reports in cls.reports.values()), "both drivers")
         cls.healthy = cls.reports["/hero_driver"]
         cls.drivers = Drivers()
-        wait_for(lambda: len(cls.drivers.names()) == 2, TIMEOUT_S, "drivers that are found")
+        wait_for(lambda: len(cls.drivers.names()) == 2, "drivers that are found")
         cls.master_pid, cls.hung_pid = find_pid(None), find_pid("/hero_driver_b")
 
     def setUp(self):
@@ -84,7 +84,7 @@ class StopRequestTest(unittest.TestCase):
             self.drivers.request_stop(False)
             return self.drivers.wait_for_stop() == RELEASED
 
-        wait_for(release, TIMEOUT_S, self.drivers.stop_status)
+        wait_for(release, self.drivers.stop_status)
 
     def open_table(self):
         table = ProgramTerminal("hero_tools", "fleet")
@@ -95,29 +95,29 @@ class StopRequestTest(unittest.TestCase):
     def test_a_stop_of_all_is_told_as_stopping_and_then_at_rest(self):
         self.drivers.request_stop(True)
         self.assertEqual(self.drivers.stop_status(), ("warn", "stopping", False))
-        wait_for(lambda: self.drivers.stop_status() == AT_REST, TIMEOUT_S, self.drivers.stop_status)
+        wait_for(lambda: self.drivers.stop_status() == AT_REST, self.drivers.stop_status)
         self.assertTrue(self.drivers.read().stopped)
 
     def test_a_hung_driver_is_named_and_stopped_when_it_goes_on(self):
         with hanging(self.hung_pid):
             self.drivers.request_stop(True)
             self.assertIn("driver hero_driver_b does not answer", self.drivers.wait_for_stop().text)
-            wait_for(lambda: self.drivers.stop_status() == HUNG, TIMEOUT_S, self.drivers.stop_status)
+            wait_for(lambda: self.drivers.stop_status() == HUNG, self.drivers.stop_status)
             self.assertTrue(self.healthy.newest.stopped)
-            wait_for(self.drivers.find_silent, TIMEOUT_S, "the silence of the hung driver")
+            wait_for(self.drivers.find_silent, "the silence of the hung driver")
             self.assertFalse(self.drivers.read().stopped, "stopped, though a driver does not answer")
-        wait_for(lambda: self.drivers.stop_status() == AT_REST, TIMEOUT_S, "the stop of the driver that hung")
+        wait_for(lambda: self.drivers.stop_status() == AT_REST, "the stop of the driver that hung")
 
     def test_a_driver_that_starts_while_another_is_asked_is_stopped_too(self):
         reports = Reports("/hero_driver_c")
         with hanging(self.hung_pid):
             self.drivers.request_stop(True)
             self.assertIn("driver hero_driver_b does not answer", self.drivers.wait_for_stop().text)
-            wait_for(lambda: self.drivers.stop_status() == HUNG, TIMEOUT_S, self.drivers.stop_status)
-            path = os.path.join(os.path.dirname(__file__), "scripted_driver.py")
-            driver = subprocess.Popen([sys.executable, path, "__name:=hero_driver_c", "_ids:='[2]'"])
+            wait_for(lambda: self.drivers.stop_status() == HUNG, self.drivers.stop_status)
+            program = find_program("hero_test", "scripted_driver")
+            driver = subprocess.Popen([program, "__name:=hero_driver_c", "_ids:='[2]'"])
             try:
-                wait_for(lambda: reports.newest and reports.newest.stopped, TIMEOUT_S, "the stop of the new driver")
+                wait_for(lambda: reports.newest and reports.newest.stopped, "the stop of the new driver")
             finally:
                 driver.terminate()
                 driver.wait()
@@ -127,15 +127,15 @@ class StopRequestTest(unittest.TestCase):
             for _ in range(10):
                 before = self.healthy.requests
                 self.drivers.request_stop(True)
-                wait_for(lambda before=before: self.healthy.requests > before, TIMEOUT_S, "a request")
+                wait_for(lambda before=before: self.healthy.requests > before, "a request")
             self.assertIn("driver hero_driver_b does not answer", self.drivers.wait_for_stop().text)
-            wait_for(lambda: self.drivers.stop_status() == HUNG, TIMEOUT_S, self.drivers.stop_status)
+            wait_for(lambda: self.drivers.stop_status() == HUNG, self.drivers.stop_status)
 
     def test_the_key_s_stops_though_the_master_and_a_driver_hang(self):
         table = self.open_table()
         with hanging(self.hung_pid, self.master_pid):
             table.press(b"s")
-            wait_for(lambda: self.healthy.newest.stopped, TIMEOUT_S, "the stop of the healthy driver")
+            wait_for(lambda: self.healthy.newest.stopped, "the stop of the healthy driver")
             table.wait_for(b"stopping")
             table.wait_for(b"\x1b[1;31mNOT STOPPED: driver hero_driver_b does not answer")
             table.wait_for_next(b"hero_driver_b does not answer, driver listens")
@@ -178,7 +178,7 @@ class StopRequestTest(unittest.TestCase):
             teleop.press(b"\r")
             teleop.wait_for(b"\x1b[1;31mhero_0 | NOT STOPPED: driver hero_driver_b does not answer")
         teleop.press(b"r")
-        wait_for(lambda: not self.healthy.newest.stopped, TIMEOUT_S, "the release")
+        wait_for(lambda: not self.healthy.newest.stopped, "the release")
         teleop.press(b"\x04")
         self.assertEqual(teleop.wait_for_end(), 0)
 
@@ -186,7 +186,7 @@ class StopRequestTest(unittest.TestCase):
         joystick = rospy.Publisher("/joy", Joy, queue_size=10)
         teleop = ExampleProgram("teleop_joy", "_robots:=0")
         self.addCleanup(teleop.close)
-        wait_for(lambda: joystick.get_num_connections() > 0, TIMEOUT_S, "teleop_joy")
+        wait_for(lambda: joystick.get_num_connections() > 0, "teleop_joy")
         joystick.publish(Joy(axes=[math.nan, 1.0], buttons=[0, 0, 0, 0, 1]))
         teleop.wait_for_text("not finite")
         for is_pressed in (0, 1, 0):  # so short a press must not be missed
@@ -201,24 +201,24 @@ class StopRequestTest(unittest.TestCase):
     def test_a_swarm_stops_and_releases_all_robots(self):
         with Swarm([0], odom=False, proximity=False) as swarm:
             # A machine that stands still for a moment must not fail the test: the first answer may be too early.
-            wait_for(lambda: swarm.emergency_stop() == AT_REST, TIMEOUT_S, swarm.drivers.stop_status)
+            wait_for(lambda: swarm.emergency_stop() == AT_REST, swarm.drivers.stop_status)
             self.assertTrue(self.drivers.read().stopped)
-            wait_for(lambda: swarm.release_stop() == RELEASED, TIMEOUT_S, swarm.drivers.stop_status)
+            wait_for(lambda: swarm.release_stop() == RELEASED, swarm.drivers.stop_status)
             self.assertFalse(self.drivers.read().stopped)
 
     def test_lists_that_are_not_published_by_a_driver_are_ignored(self):
         listener = Drivers()
         self.addCleanup(listener.close)
-        wait_for(lambda: listener.read() and listener.is_settled, TIMEOUT_S, "the drivers")
+        wait_for(lambda: listener.read() and listener.is_settled, "the drivers")
         forged = RobotArray(robots=[Robot(id=9, namespace="/hero_9", state=Robot.READY)])
         for topic in ("/hero_driver/robots", "/hero_9/robots"):
             publisher = rospy.Publisher(topic, RobotArray, queue_size=1)
             self.addCleanup(publisher.unregister)
             reports = self.healthy if topic == "/hero_driver/robots" else Reports("/hero_9")
-            wait_for(publisher.get_num_connections, TIMEOUT_S, "somebody who listens to the forger")
+            wait_for(publisher.get_num_connections, "somebody who listens to the forger")
             for count in range(1, 20):
                 publisher.publish(forged)
-                wait_for(lambda reports=reports, count=count: reports.forged == count, TIMEOUT_S, "a forged list")
+                wait_for(lambda reports=reports, count=count: reports.forged == count, "a forged list")
                 self.assertEqual([robot.id for robot in listener.read().robots], [0, 1])
         self.assertEqual(listener.names(), ["/hero_driver", "/hero_driver_b"])
 

@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """Two drivers under one ROS master: programs find the robots of both, and a stop reaches both."""
 
 import json
@@ -16,7 +16,8 @@ from hero_client.drivers import Drivers
 from hero_client.swarm import Swarm
 from hero_monitor.commander import Commander
 from hero_test.program_terminal import ProgramTerminal, run_fleet
-from hero_test.swarm_watch import SwarmWatch, wait_for
+from hero_test.swarm_watch import SwarmWatch
+from hero_test.waiting import wait_for
 
 IDS = [0, 1, 100, 101]
 TIMEOUT_S = 20.0
@@ -48,7 +49,7 @@ class TwoDriversTest(unittest.TestCase):
             report = cls.drivers.read()
             return report and [robot.id for robot in report.robots if robot.state == robot.READY] == IDS
 
-        wait_for(all_are_ready, TIMEOUT_S, "four robots that are ready")
+        wait_for(all_are_ready, "four robots that are ready")
 
     def drive(self, speed_m_s=0.05):
         """Tell all robots to drive, once."""
@@ -65,10 +66,10 @@ class TwoDriversTest(unittest.TestCase):
             self.drive()
             return all(map(self.is_moving, IDS))
 
-        wait_for(all_move, TIMEOUT_S, "motion of all")
+        wait_for(all_move, "motion of all")
 
     def wait_for_status(self, *expected):
-        wait_for(lambda: self.drivers.stop_status() == expected, TIMEOUT_S, self.drivers.stop_status)
+        wait_for(lambda: self.drivers.stop_status() == expected, self.drivers.stop_status)
 
     def release(self):
         self.drivers.request_stop(False)
@@ -134,7 +135,7 @@ class TwoDriversTest(unittest.TestCase):
         os.kill(find_pid("/hero_driver_b"), signal.SIGKILL)
         self.assertEqual([robot["id"] for robot in read_fleet()["robots"]], [0, 1])
         # Who listened before forgets its robots.
-        wait_for(lambda: len(self.drivers.read().robots) == 2, TIMEOUT_S, "robots of the other driver alone")
+        wait_for(lambda: len(self.drivers.read().robots) == 2, "robots of the other driver alone")
         self.drivers.request_stop(True)
         self.wait_for_status("error", "NOT STOPPED: driver hero_driver_b does not answer", False)
         self.assertTrue(self.drivers.is_stopped("/hero_driver"))

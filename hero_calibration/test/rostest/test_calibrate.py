@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """Simulated robots with known errors through the real program: what it finds, what robots do when it ends, restoring.
 
 Robots 0 to 2 stand before a wall, 3 to 6 have room, 7 and 8 stand too near to each other. The simulator runs twice
@@ -22,7 +22,7 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 
 from hero_sim.srv import InjectFault
-from hero_test.swarm_watch import wait_for
+from hero_test.waiting import wait_for
 
 CALIBRATE = ["rosrun", "hero_calibration", "calibrate"]
 TIMEOUT_S = 120.0
@@ -88,7 +88,7 @@ class CalibrateTest(unittest.TestCase):
         open_floor = self.start("motors", "velocity", "--robots", "3-8", "--yes")
         wall = self.start("infrared", "--robots", "0-2,42", "--yes", "--samples", "12")
         watch = Watch(range(9))
-        wait_for(lambda: watch.speeds[6] > 0.02, TIMEOUT_S, "motion of hero_6")
+        wait_for(lambda: watch.speeds[6] > 0.02, "motion of hero_6", TIMEOUT_S)
         rospy.ServiceProxy("/hero_sim/fault", InjectFault)("vanish:robot=6")
         output = {}
         readers = [
@@ -101,7 +101,7 @@ class CalibrateTest(unittest.TestCase):
             reader.join()
         self.check_floor(*output["floor"])
         self.check_wall(*output["wall"])
-        wait_for(lambda: max(watch.speeds.values()) < 1e-3, TIMEOUT_S, "standstill")
+        wait_for(lambda: max(watch.speeds.values()) < 1e-3, "standstill", TIMEOUT_S)
 
     def check_floor(self, code, output):
         self.assertEqual(code, 1, output)
@@ -181,12 +181,12 @@ class CalibrateTest(unittest.TestCase):
     def test_3_robots_stop_when_it_is_broken_off(self):
         watch = Watch([3, 4])
         process = self.start("motors", "--robots", "3,4", "--yes")
-        wait_for(lambda: min(watch.speeds.values()) > 0.03, TIMEOUT_S, "motion")
+        wait_for(lambda: min(watch.speeds.values()) > 0.03, "motion", TIMEOUT_S)
         os.killpg(process.pid, signal.SIGINT)
         code, output = self.finish(process)
         self.assertEqual(code, 130, output)
         self.assertIn("ended before all was done", output)
-        wait_for(lambda: max(watch.speeds.values()) < 1e-3, TIMEOUT_S, "standstill")
+        wait_for(lambda: max(watch.speeds.values()) < 1e-3, "standstill", TIMEOUT_S)
         self.assertEqual(glob.glob(self.folder + "/*"), [])
 
     def test_4_in_a_terminal_it_asks_and_q_and_ctrl_c_end_it_before_anything_moves(self):

@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """Robot and Swarm as a user's program has them, judged by the simulator's ground truth."""
 
 import math
@@ -14,7 +14,8 @@ from hero_client import Robot, Swarm
 from hero_client.robot import GoalError, RobotNotReadyError, StaleDataError
 from hero_sim.srv import InjectFault
 from hero_test.light_watch import LightWatch
-from hero_test.swarm_watch import SwarmWatch, wait_for
+from hero_test.swarm_watch import SwarmWatch
+from hero_test.waiting import wait_for
 
 ROBOTS = 6
 CORNERED = 4
@@ -40,7 +41,7 @@ class RobotApiTest(unittest.TestCase):
     def setUpClass(cls):
         cls.watch = SwarmWatch(range(ROBOTS))
         cls.watch.wait_until_complete(60.0)
-        cls.swarm = wait_for(cls.discover_all, 60.0, "a swarm of all simulated robots")
+        cls.swarm = wait_for(cls.discover_all, "a swarm of all simulated robots")
         cls.swarm.wait_until_ready(timeout_s=DEADLINE_S)
 
     @staticmethod
@@ -69,7 +70,7 @@ class RobotApiTest(unittest.TestCase):
         true_way_m = math.dist(true_before[:2], self.watch.pose(0)[:2])
         self.assertGreater(true_way_m, 0.1)
         wait_for(
-            lambda: abs(math.dist(before[:2], robot.pose[:2]) - true_way_m) < 0.01, 2.0, "odometry that knows the way"
+            lambda: abs(math.dist(before[:2], robot.pose[:2]) - true_way_m) < 0.01, "odometry that knows the way", 2.0
         )
 
     def test_03_velocity_says_how_the_robot_moves_until_it_is_stopped(self):
@@ -81,7 +82,7 @@ class RobotApiTest(unittest.TestCase):
             # The truth of one moment: the wheels' controller lets it swing.
             return is_told and self.speed(0) < -0.02
 
-        wait_for(drives_back_and_turns, 5.0, "velocity that follows the command, and is true")
+        wait_for(drives_back_and_turns, "velocity that follows the command, and is true")
         robot.stop()
         self.watch.wait_until_stopped(0)
 
@@ -92,7 +93,7 @@ class RobotApiTest(unittest.TestCase):
             robot.drive(9.0, 0.0)
             return self.speed(1) > 0.15
 
-        wait_for(is_fast, 5.0, "full speed")
+        wait_for(is_fast, "full speed")
         self.assertLess(max(row[4] for row in self.watch.rows[1]), 0.22)
         robot.stop()
         self.watch.wait_until_stopped(1)
@@ -116,9 +117,9 @@ class RobotApiTest(unittest.TestCase):
         lights = LightWatch()
         self.swarm[0].led("green")
         self.swarm[1].led((1.0, 0.0, 0.0))
-        wait_for(lambda: lights.is_lit(0, (0.0, 1.0, 0.0)) and lights.is_lit(1, (1.0, 0.0, 0.0)), 5.0, "two lights")
+        wait_for(lambda: lights.is_lit(0, (0.0, 1.0, 0.0)) and lights.is_lit(1, (1.0, 0.0, 0.0)), "two lights")
         self.swarm.led("blue")
-        wait_for(lambda: all(lights.is_lit(i, (0.0, 0.0, 1.0)) for i in range(ROBOTS)), 5.0, "blue everywhere")
+        wait_for(lambda: all(lights.is_lit(i, (0.0, 0.0, 1.0)) for i in range(ROBOTS)), "blue everywhere")
         with self.assertRaisesRegex(ValueError, "pink.*there are: .*green"):
             self.swarm[0].led("pink")
         lights.close()
@@ -191,7 +192,7 @@ class RobotApiTest(unittest.TestCase):
                     robot.drive(0.1, 0.0)
                     return self.speed(1) > 0.05
 
-                wait_for(moves, 5.0, "motion")
+                wait_for(moves, "motion")
                 raise RuntimeError("a mistake in the user's program")
 
         with self.assertRaisesRegex(RuntimeError, "mistake"):
@@ -205,10 +206,10 @@ class RobotApiTest(unittest.TestCase):
             driver.drive(0.05, 0.0)
             return self.speed(0) > 0.03
 
-        wait_for(moves, 5.0, "motion")
+        wait_for(moves, "motion")
         with Swarm([0, 1]) as watchers:
             watchers.wait_until_ready(timeout_s=DEADLINE_S)
-            wait_for(moves, 5.0, "motion")
+            wait_for(moves, "motion")
         self.assertGreater(self.speed(0), 0.02)
         self.swarm.stop()
         self.watch.wait_until_stopped(0)
@@ -216,7 +217,7 @@ class RobotApiTest(unittest.TestCase):
     def test_14_a_plain_script_that_is_ended_leaves_its_robot_standing(self):
         for number, code in ((signal.SIGINT, -signal.SIGINT), (signal.SIGTERM, 143), (signal.SIGHUP, 129)):
             script = subprocess.Popen([sys.executable, "-c", DRIVE_FOR_EVER], stderr=subprocess.PIPE)
-            wait_for(lambda: self.speed(2) > 0.05, DEADLINE_S, "motion by the script")
+            wait_for(lambda: self.speed(2) > 0.05, "motion by the script")
             script.send_signal(number)
             errors = script.communicate(timeout=DEADLINE_S)[1].decode()
             self.watch.wait_until_stopped(2)

@@ -4,14 +4,10 @@ import contextlib
 import os
 import re
 import signal
-import subprocess
-import threading
-import time
 import unittest
 import xmlrpc.client
 
 import rosgraph
-import roslib.packages
 import rospy
 from fake_robot import FakeRobot
 from geometry_msgs.msg import Twist
@@ -19,21 +15,10 @@ from rosgraph_msgs.msg import Log as RosLog
 
 from hero_driver.rosserial import packets, payloads
 from hero_msgs.msg import Robot, RobotArray
+from hero_test.processes import Program, find_program
+from hero_test.waiting import wait_for
 
-DEADLINE_S = 20.0
 NODE = "/hero_driver"
-
-
-def wait_for(condition, what, deadline_s=DEADLINE_S):
-    """Return the first true value of condition(); fail with what was waited for."""
-    end_s = time.monotonic() + deadline_s
-    while True:
-        value = condition()
-        if value:
-            return value
-        if time.monotonic() > end_s:
-            raise AssertionError("waited %g s for %s" % (deadline_s, what() if callable(what) else what))
-        time.sleep(0.005)
 
 
 @contextlib.contextmanager
@@ -234,7 +219,7 @@ class DriverCase(unittest.TestCase):
         )[0]
 
 
-class DriverProcess:
+class DriverProcess(Program):
     """A driver with parameters of its own, for tests that end it or start it wrong; use it with `with`."""
 
     _count = 0
@@ -248,19 +233,9 @@ class DriverProcess:
         self.node = "/" + (name or "driver_%d_%d" % (os.getpid(), DriverProcess._count))
         for key, value in {"port": 0, **(parameters or {})}.items():
             rospy.set_param("%s/%s" % (self.node, key), value)
-        executable = roslib.packages.find_node("hero_driver", "hero_driver")[0]
-        self.process = subprocess.Popen(
-            [*prefix, executable, "__name:=" + self.node[1:], *arguments],
-            env={**os.environ, **(environment or {})},
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            universal_newlines=True,
-            start_new_session=True,
-        )
-        self.lines = []
-        self._reader = threading.Thread(target=self._read, daemon=True)
-        self._reader.start()
+        executable = find_program("hero_driver", "hero_driver")
+        command = [*prefix, executable, "__name:=" + self.node[1:], *arguments]
+        super().__init__(*command, environment=environment)
         self.fleet = Fleet(self.node)
 
     def __enter__(self):
@@ -268,9 +243,7 @@ class DriverProcess:
 
     def __exit__(self, *_):
         self.fleet.close()
-        if self.process.poll() is None:
-            self.process.send_signal(signal.SIGINT)
-        self.wait_end()
+        self.end()
 
     @property
     def address(self):
@@ -282,29 +255,6 @@ class DriverProcess:
         if self.fleet.newest is None:
             raise AssertionError("the driver ended: %s" % self.lines)
         return self.fleet.address
-
-    def find_lines(self, pattern):
-        """Return what it printed that matches a pattern."""
-        return [line for line in list(self.lines) if re.search(pattern, line)]
-
-    def wait_line(self, pattern):
-        """Return the first line that it prints that matches a pattern."""
-        return wait_for(lambda: self.find_lines(pattern), lambda: "%r among %s" % (pattern, self.lines))[0]
-
-    def wait_end(self):
-        """Return its exit code; what it printed is complete then."""
-        try:
-            code = self.process.wait(DEADLINE_S)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            raise
-        self._reader.join()
-        self.process.stdout.close()
-        return code
-
-    def _read(self):
-        for line in self.process.stdout:
-            self.lines.append(line.rstrip("\n"))
 
 
 class OwnDriverCase(unittest.TestCase):

@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """What bad input gets: one clear line and an exit code from the node, a counter and nothing else from a robot."""
 
 import random
@@ -11,13 +11,14 @@ import rosgraph
 import rospy
 import rostest
 import stock_messages
-from driver_case import DriverProcess, OwnDriverCase, Recorder, make_publisher, wait_for, wait_payloads
+from driver_case import DriverProcess, OwnDriverCase, Recorder, make_publisher, wait_payloads
 from fake_robot import PUB, STOCK_DECLARATIONS, Declaration, FakeRobot
 from std_msgs.msg import ColorRGBA
 from std_srvs.srv import SetBool
 
 from hero_driver.rosserial import packets
 from hero_msgs.msg import Encoder, Robot
+from hero_test.waiting import wait_for
 
 USAGE_ERROR = 2
 

@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """Commands to robots that take them as the firmware does: a stop always arrives, an old command never does."""
 
 import math
@@ -6,7 +6,7 @@ import struct
 
 import rospy
 import rostest
-from driver_case import NODE, DriverCase, Recorder, make_command, make_publisher, wait_for, wait_payloads
+from driver_case import NODE, DriverCase, Recorder, make_command, make_publisher, wait_payloads
 from fake_motors import VELOCITY_GATE_S
 from fake_robot import READ_CYCLE_S
 from geometry_msgs.msg import Twist
@@ -17,6 +17,7 @@ from steady_time import in_steady_time
 from hero_driver.commands.velocity_shaper import STOPPED_MOTORS
 from hero_msgs.msg import Motor, Robot
 from hero_msgs.srv import SetOdom
+from hero_test.waiting import wait_for
 
 VELOCITY = "velocity_controller/cmd_vel"
 POSITION = "position_controller/cmd_vel"

@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """Rosserial devices that are no HeRos, with ~namespace_policy any."""
 
 import struct
@@ -6,15 +6,7 @@ import struct
 import rospy
 import rostest
 import stock_messages
-from driver_case import (
-    OwnDriverCase,
-    Recorder,
-    ask_parameter,
-    list_publishers,
-    make_publisher,
-    wait_for,
-    wait_packets,
-)
+from driver_case import OwnDriverCase, Recorder, ask_parameter, list_publishers, make_publisher, wait_packets
 from fake_robot import (
     ANSWER_MD5,
     CLIENT_ANSWERS,
@@ -33,6 +25,7 @@ from text_messages import STRING_MD5, TRIGGER_REQUEST_MD5, WRONG_MD5, make_text
 from tf2_msgs.msg import TFMessage
 
 from hero_msgs.msg import RobotArray
+from hero_test.waiting import wait_for
 
 
 @in_steady_time

@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """Robots that are TCP servers: the driver dials them, and dials again while they are away."""
 
 import contextlib
@@ -8,11 +8,12 @@ import threading
 import rospy
 import rostest
 import stock_messages
-from driver_case import OwnDriverCase, Recorder, make_publisher, wait_for, wait_payloads
+from driver_case import OwnDriverCase, Recorder, make_publisher, wait_payloads
 from fake_robot import FakeRobot
 from std_msgs.msg import ColorRGBA
 
 from hero_msgs.msg import Encoder, Robot
+from hero_test.waiting import wait_for
 
 
 def listen(port=0):

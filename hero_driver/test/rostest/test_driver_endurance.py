@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """What others do to the driver: a master that does not answer, readers that do not read, services that hang."""
 
 import contextlib
@@ -17,7 +17,6 @@ from driver_case import (
     has_connection,
     list_driver_topics,
     make_publisher,
-    wait_for,
     wait_packets,
     wait_payloads,
 )
@@ -34,6 +33,7 @@ from std_srvs.srv import Trigger, TriggerResponse
 
 from hero_driver.rosserial import packets
 from hero_msgs.msg import Encoder, Robot
+from hero_test.waiting import wait_for
 
 TRIGGER_REQUEST_MD5 = "d41d8cd98f00b204e9800998ecf8427e"
 

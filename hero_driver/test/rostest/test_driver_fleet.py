@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """Who is here: arrival, return, power cycle, a second robot with the same id, silence, and the reports about it."""
 
 import time
@@ -7,21 +7,14 @@ import rospy
 import rostest
 import stock_messages
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from driver_case import (
-    NODE,
-    DriverCase,
-    Recorder,
-    list_driver_topics,
-    make_publisher,
-    wait_for,
-    wait_payloads,
-)
+from driver_case import NODE, DriverCase, Recorder, list_driver_topics, make_publisher, wait_payloads
 from fake_robot import FakeRobot, boot_line, heartbeat_line
 from geometry_msgs.msg import Twist
 from std_msgs.msg import ColorRGBA
 
 from hero_msgs.msg import Encoder, Robot
 from hero_msgs.srv import SetOdom
+from hero_test.waiting import wait_for
 
 OTHER_HOST = "127.0.0.2"
 

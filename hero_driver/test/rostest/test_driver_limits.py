@@ -1,14 +1,10 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """Who is let in, and how much one robot may send."""
 
 import rospy
 import rostest
 import stock_messages
-from driver_case import (
-    OwnDriverCase,
-    Recorder,
-    wait_for,
-)
+from driver_case import OwnDriverCase, Recorder
 from fake_robot import (
     PUB,
     STOCK_DECLARATIONS,
@@ -19,6 +15,7 @@ from text_messages import STRING_MD5
 
 from hero_driver.rosserial import packets
 from hero_msgs.msg import Encoder, Robot
+from hero_test.waiting import wait_for
 
 
 class TestDriverLimits(OwnDriverCase):

@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """What ROS programs get of what robots send: scans, odometry, transforms and stamps that can be trusted."""
 
 import math
@@ -7,7 +7,7 @@ import rospy
 import rostest
 import stock_messages
 from diagnostic_msgs.msg import DiagnosticArray
-from driver_case import DriverCase, DriverProcess, Recorder, wait_for
+from driver_case import DriverCase, DriverProcess, Recorder
 from fake_robot import STOCK_DECLARATIONS, FakeRobot, boot_line, encode_answer, heartbeat_line
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, LaserScan
@@ -16,6 +16,7 @@ from tf2_msgs.msg import TFMessage
 
 from hero_msgs.msg import Encoder, Robot
 from hero_msgs.srv import SetOdom
+from hero_test.waiting import wait_for
 
 STEP_S = 0.034
 """Between two bursts of the stock robot."""

@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """Which names, types, services and parameters a robot may use."""
 
 import subprocess
@@ -13,7 +13,6 @@ from driver_case import (
     list_driver_topics,
     list_publishers,
     make_publisher,
-    wait_for,
     wait_packets,
     wait_payloads,
 )
@@ -36,6 +35,7 @@ from tf2_msgs.msg import TFMessage
 
 from hero_msgs.msg import Encoder, Robot
 from hero_msgs.srv import SetOdom
+from hero_test.waiting import wait_for
 
 
 class TestDriverPolicy(OwnDriverCase):

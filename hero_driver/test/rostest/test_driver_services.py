@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """Services of robots as ROS services: all of them, one call at a time, and what becomes of calls that go wrong."""
 
 import struct
@@ -8,13 +8,14 @@ import genpy
 import rospy
 import rostest
 import stock_messages
-from driver_case import DriverCase, make_publisher, wait_for, wait_payloads
+from driver_case import DriverCase, make_publisher, wait_payloads
 from fake_robot import encode_answer
 from std_msgs.msg import ColorRGBA
 from std_srvs.srv import Trigger
 
 from hero_msgs.msg import Robot
 from hero_msgs.srv import SetIRCalibration, SetMotor, SetOdom, SetPID
+from hero_test.waiting import wait_for
 
 GAINS = (100.0, 2.0, 0.5, 101.0, 2.5, 0.25)
 

@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """The end of the driver: every robot takes a stop, and only then is its connection closed."""
 
 import signal
@@ -7,13 +7,14 @@ import time
 
 import rospy
 import rostest
-from driver_case import OwnDriverCase, make_command, make_publisher, wait_for, wait_payloads
+from driver_case import OwnDriverCase, make_command, make_publisher, wait_payloads
 from fake_robot import READ_CYCLE_S
 from geometry_msgs.msg import Twist
 from steady_time import in_steady_time
 
 from hero_driver.rosserial import packets
 from hero_msgs.msg import Motor, Robot
+from hero_test.waiting import wait_for
 
 VELOCITY = "velocity_controller/cmd_vel"
 LIMIT_S = 2.0

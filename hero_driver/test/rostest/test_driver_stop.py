@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """Stops that the robot's wheels confirm: robots that tune themselves, that stall, that return, and new drivers."""
 
 import math
@@ -18,7 +18,6 @@ from driver_case import (
     make_command,
     make_publisher,
     reads_from_somebody,
-    wait_for,
 )
 from fake_robot import READ_CYCLE_S, SUB, TWIST_MD5, Declaration
 from geometry_msgs.msg import Twist
@@ -28,6 +27,7 @@ from std_srvs.srv import SetBool, Trigger
 from hero_driver.commands.velocity_shaper import STOPPED_MOTORS
 from hero_msgs.msg import Motor, Robot
 from hero_msgs.srv import Disconnect
+from hero_test.waiting import wait_for
 
 VELOCITY = "velocity_controller"
 POSITION = "position_controller"

@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """Topics of stock robots through the driver, both ways, and the handshakes that robots get wrong."""
 
 import struct
@@ -10,15 +10,7 @@ import rospy
 import rosservice
 import rostest
 import stock_messages
-from driver_case import (
-    DriverCase,
-    Recorder,
-    list_driver_topics,
-    make_publisher,
-    wait_for,
-    wait_packets,
-    wait_payloads,
-)
+from driver_case import DriverCase, Recorder, list_driver_topics, make_publisher, wait_packets, wait_payloads
 from fake_robot import STOCK_DECLARATIONS, SUB, TIME_PACKET, FakeRobot, boot_line, heartbeat_line
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
@@ -28,6 +20,7 @@ from std_msgs.msg import Bool, ColorRGBA
 
 from hero_driver.rosserial import packets, payloads
 from hero_msgs.msg import Encoder, Motor
+from hero_test.waiting import wait_for
 
 CAPTURES = Path(__file__).resolve().parents[4] / "shared" / "captures"
 README = Path(__file__).resolve().parents[2] / "README.md"

@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """The fake robot itself: it tunes, drops and stops as the stock firmware does, seen from a server's socket."""
 
 import socket
@@ -6,11 +6,11 @@ import struct
 import unittest
 
 import rostest
-from driver_case import DEADLINE_S, wait_for
 from fake_motors import NEUTRAL_PULSES
 from fake_robot import FakeRobot
 
 from hero_driver.rosserial import packets, payloads
+from hero_test.waiting import TIMEOUT_S, wait_for
 
 NEUTRAL = packets.encode_packet(104, NEUTRAL_PULSES)
 LED = packets.encode_packet(100, bytes(16))
@@ -29,7 +29,7 @@ class TestFakeRobot(unittest.TestCase):
             self.server, _ = listener.accept()
         self.addCleanup(self.server.close)
         self.addCleanup(self.robot.close)
-        self.server.settimeout(DEADLINE_S)
+        self.server.settimeout(TIMEOUT_S)
         self.reader = packets.PacketReader()
         self.requests = 0
         self.send(b"")

@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """follow, led_show, measure_delay, teleop_joy, joy_driver and go_to_goal as programs, judged by the ground truth."""
 
 import math
@@ -20,7 +20,8 @@ from hero_sim.world.arena import measure_clearance
 from hero_sim.world.arena_file import load_arena
 from hero_test.example_program import ExampleProgram
 from hero_test.light_watch import LightWatch
-from hero_test.swarm_watch import SwarmWatch, wait_for
+from hero_test.swarm_watch import SwarmWatch
+from hero_test.waiting import wait_for
 
 ROBOTS = 6
 WHITE, DARK, RED = (1.0, 1.0, 1.0), (0.15, 0.15, 0.15), (1.0, 0.0, 0.0)
@@ -74,7 +75,7 @@ class ExampleNodesTest(unittest.TestCase):
             leader.wait_until_ready(timeout_s=10.0)
             leader.drive(0.08, 0.25, duration_s=10.0)
             wait_for(
-                lambda: self.speed(1) < 0.005 and self.speed(2) < 0.005, 10.0, "followers that have caught up"
+                lambda: self.speed(1) < 0.005 and self.speed(2) < 0.005, "followers that have caught up"
             )
         for robot_id in (1, 2):
             ahead = self.watch.path(robot_id - 1)
@@ -98,15 +99,15 @@ class ExampleNodesTest(unittest.TestCase):
                 lit.update(whites)
             return lit == set(range(4))
 
-        wait_for(all_were_lit_alone, 20.0, "each of four robots lit alone")
+        wait_for(all_were_lit_alone, "each of four robots lit alone")
         self.assertEqual(0, program.end())
-        wait_for(lambda: all(self.lights.is_lit(robot_id, DARK) for robot_id in range(4)), 2.0, "darkness")
+        wait_for(lambda: all(self.lights.is_lit(robot_id, DARK) for robot_id in range(4)), "darkness", 2.0)
 
     def test_3_delays_are_measured_printed_and_plotted(self):
         with tempfile.TemporaryDirectory() as folder:
             plot = Path(folder) / "delay.png"
             program = self.start("measure_delay", "_robots:=4 5", "_turns:=2", "_plot:=%s" % plot)
-            self.assertEqual(0, program.wait(40.0), program.text())
+            self.assertEqual(0, program.wait_end(40.0), program.text())
             self.assertEqual(b"\x89PNG", plot.read_bytes()[:4])
         for name in ("hero_4", "hero_5"):
             motion_ms = float(re.search(name + r" command to motion: p50 ([\d.]+) ms.*lost 0", program.text())[1])
@@ -119,7 +120,7 @@ class ExampleNodesTest(unittest.TestCase):
         program = self.start("teleop_joy", "_robots:=0 1")
         program.wait_for_text("hold button 4")
         program.wait_for_text("nothing on /joy")
-        wait_for(lambda: stick.get_num_connections() == 1, 10.0, "teleop_joy on /joy")
+        wait_for(lambda: stick.get_num_connections() == 1, "teleop_joy on /joy")
 
         def push(button):
             stick.publish(Joy(axes=[0.0, -0.4], buttons=[0, 0, 0, 0, button]))
@@ -130,13 +131,13 @@ class ExampleNodesTest(unittest.TestCase):
             push(button)
             return all(self.speed(robot_id) < -0.02 for robot_id in (0, 1))
 
-        wait_for(lambda: drives(1), 10.0, "both robots going back")
+        wait_for(lambda: drives(1), "both robots going back")
         self.watch.wait_until_stopped(0, 1, act=lambda: push(0))
         self.assertGreater(min(row[4] for row in self.watch.rows[0][first[0] :]), -0.12)
-        wait_for(lambda: drives(1), 10.0, "both robots going back again")
-        wait_for(lambda: self.watch.at_rest(0, 1), 1.8, "rest after the joystick fell silent")
+        wait_for(lambda: drives(1), "both robots going back again")
+        wait_for(lambda: self.watch.at_rest(0, 1), "rest after the joystick fell silent", 1.8)
         stick.publish(Joy(axes=[0.0], buttons=[0]))
-        self.assertEqual(1, program.wait())
+        self.assertEqual(1, program.wait_end())
         self.assertRegex(program.text(), r"teleop_joy: the joystick has 1 axes and 1 buttons: set ~linear_axis")
         stick.unregister()
 
@@ -145,7 +146,7 @@ class ExampleNodesTest(unittest.TestCase):
             environment = dict(os.environ, ROS_PACKAGE_PATH=folder, CMAKE_PREFIX_PATH=folder)
             absent = ExampleProgram("joy_driver", environment=environment)
             self.addCleanup(absent.close)
-            self.assertEqual(1, absent.wait())
+            self.assertEqual(1, absent.wait_end())
             self.assertRegex(absent.text(), r"\Ajoy_driver: no joystick driver: .*joy_driver:=false\n\Z")
             package = Path(folder) / "joy"
             package.mkdir()
@@ -154,7 +155,7 @@ class ExampleNodesTest(unittest.TestCase):
             node.write_text('#!/bin/sh\necho "joy_node got $*"\n')
             node.chmod(0o755)
             present = self.start("joy_driver", "_dev:=/dev/input/js7", environment=environment)
-            self.assertEqual(0, present.wait(), present.text())
+            self.assertEqual(0, present.wait_end(), present.text())
             self.assertIn("_dev:=/dev/input/js7", present.text())
 
     def test_6_go_to_goal_goes_around_a_post_and_another_robot(self):
@@ -162,7 +163,7 @@ class ExampleNodesTest(unittest.TestCase):
         program = self.start(
             "go_to_goal", "_robots:=3", "_goals:=0.1 -0.92", "_frame:=world", "_avoid:=true", "_once:=true"
         )
-        self.assertEqual(0, program.wait(80.0), program.text())
+        self.assertEqual(0, program.wait_end(80.0), program.text())
         self.assertIn("hero_3 is at its goal", program.text())
         rows = self.watch.path(3)[first[3] :]
         self.assertLess(math.dist(rows[-1, 1:3], (0.1, -0.92)), 0.1)
@@ -173,14 +174,14 @@ class ExampleNodesTest(unittest.TestCase):
 
     def test_7_a_goal_that_cannot_be_reached_ends_with_the_reason(self):
         program = self.start("go_to_goal", "_robots:=2", "_goals:=50 0", "_timeout_s:=1", "_once:=true")
-        self.assertEqual(1, program.wait())
+        self.assertEqual(1, program.wait_end())
         self.assertRegex(program.text(), r"hero_2 did not reach its goal: not there after 1 s, 4\d\.\d+ m are left")
         self.watch.wait_until_stopped(2)
 
     def test_8_a_wrong_parameter_gets_one_line_with_name_value_and_remedy(self):
         programs = {case: self.start(*case) for case in WRONG}
         for case, program in programs.items():
-            self.assertEqual(1, program.wait(60.0), case)
+            self.assertEqual(1, program.wait_end(60.0), case)
             self.assertRegex(program.text(), r"\A%s: [^\n]*%s[^\n]*\n\Z" % (case[0], WRONG[case]))
 
     def test_9_every_program_says_what_it_waits_for_when_no_robot_answers(self):
@@ -191,7 +192,7 @@ class ExampleNodesTest(unittest.TestCase):
         }
         programs = [self.start(name, *more.get(name, ["_robots:=55"])) for name in WAITING]
         for program in programs:
-            program.wait_for_text("hero_55: waiting: n", 40.0)
+            program.wait_for_text("hero_55: waiting: n")
         for program in programs:
             self.assertIn(program.end(), (0, 1))
             self.assertNotIn("Traceback", program.text())

@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """Fifty seeded goals through the action, ten robots at once, judged by the simulator's ground truth."""
 
 import math
@@ -13,7 +13,8 @@ from actionlib_msgs.msg import GoalStatus
 from geometry_msgs.msg import PoseStamped
 
 from hero_msgs.msg import GoToAction, GoToGoal
-from hero_test.swarm_watch import SwarmWatch, wait_for
+from hero_test.swarm_watch import SwarmWatch
+from hero_test.waiting import wait_for
 
 ROBOTS = 10
 GOALS_EACH = 5
@@ -89,21 +90,21 @@ class GoToGoalTest(unittest.TestCase):
         self.assertTrue(first.wait_for_server(rospy.Duration(30.0)))
         feedback = []
         first.send_goal(make_goal(start[0] + 0.25, start[1] + 0.25, 0.0), feedback_cb=feedback.append)
-        wait_for(lambda: feedback, 10.0, "feedback")
+        wait_for(lambda: feedback, "feedback")
         self.send({0: start})
         self.assertTrue(self.clients[0].get_result().reached)
-        wait_for(lambda: first.get_state() == GoalStatus.PREEMPTED, 10.0, "the end of the first goal")
+        wait_for(lambda: first.get_state() == GoalStatus.PREEMPTED, "the end of the first goal")
         self.assertEqual("another goal came", first.get_result().reason)
 
     def test_3_a_cancelled_robot_stands(self):
         start = self.starts[1]
         client = self.clients[1]
         client.send_goal(make_goal(start[0] + 0.25, start[1] - 0.25, 0.0))
-        wait_for(lambda: self.watch.rows[1][-1][4] > 0.03, 10.0, "motion")
+        wait_for(lambda: self.watch.rows[1][-1][4] > 0.03, "motion")
         client.cancel_goal()
         self.assertTrue(client.wait_for_result(rospy.Duration(10.0)))
         self.assertEqual("cancelled", client.get_result().reason)
-        wait_for(lambda: abs(self.watch.rows[1][-1][4]) < 0.001, 3.0, "rest")
+        wait_for(lambda: abs(self.watch.rows[1][-1][4]) < 0.001, "rest", 3.0)
 
     def test_4_a_goal_in_an_unknown_frame_fails_with_the_frames_name(self):
         client = self.clients[2]
@@ -114,7 +115,7 @@ class GoToGoalTest(unittest.TestCase):
 
     def test_5_a_goal_on_the_topic_moves_the_robot_there(self):
         publisher = rospy.Publisher("/hero_3/goal", PoseStamped, queue_size=1)
-        wait_for(lambda: publisher.get_num_connections() > 0, 10.0, "go_to_goal's subscriber")
+        wait_for(lambda: publisher.get_num_connections() > 0, "go_to_goal's subscriber")
         x_m, y_m, _ = self.starts[3]
         publisher.publish(make_goal(x_m, y_m, 1.0).target)
 
@@ -123,7 +124,7 @@ class GoToGoalTest(unittest.TestCase):
             turned_rad = abs(math.remainder(pose[2] - 1.0, 2.0 * math.pi))
             return math.hypot(pose[0] - x_m, pose[1] - y_m) < TRUE_TOLERANCE_M and turned_rad < TURN_TOLERANCE_RAD
 
-        wait_for(is_there, 60.0, "the robot at the goal from the topic")
+        wait_for(is_there, "the robot at the goal from the topic")
 
 
 if __name__ == "__main__":

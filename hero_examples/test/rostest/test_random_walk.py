@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """Ten random walkers among obstacles for two minutes, five by each rule, judged by the simulator's ground truth."""
 
 import sys
@@ -11,7 +11,8 @@ import rostest
 
 from hero_sim.world.arena import measure_clearance
 from hero_sim.world.arena_file import load_arena
-from hero_test.swarm_watch import SwarmWatch, wait_for
+from hero_test.swarm_watch import SwarmWatch
+from hero_test.waiting import wait_for
 
 WALK_S = 120.0
 
@@ -24,14 +25,14 @@ class RandomWalkTest(unittest.TestCase):
         watch = SwarmWatch(range(10))
         watch.wait_until_complete(60.0)
         start_s = rospy.get_time()
-        wait_for(lambda: rospy.get_time() - start_s > WALK_S, 3.0 * WALK_S, "the end of the walk")
+        wait_for(lambda: rospy.get_time() - start_s > WALK_S, "the end of the walk", 3.0 * WALK_S)
         rosnode.kill_nodes(["/random_walk_by_sectors", "/random_walk_in_potential"])
         ids = sorted(watch.rows)
 
         def all_rest():
             return all(abs(watch.rows[robot_id][-1][4]) < 0.001 for robot_id in ids)
 
-        wait_for(all_rest, 3.0, "robots at rest after the walk")
+        wait_for(all_rest, "robots at rest after the walk", 3.0)
         watch.close()
         arena = load_arena("obstacles")
         clearance = partial(measure_clearance, arena=arena)

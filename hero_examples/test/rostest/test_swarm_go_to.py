@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """Ten robots swap places across a circle, judged by the simulator's ground truth."""
 
 import math
@@ -8,7 +8,8 @@ import unittest
 import rospy
 import rostest
 
-from hero_test.swarm_watch import SwarmWatch, wait_for
+from hero_test.swarm_watch import SwarmWatch
+from hero_test.waiting import wait_for
 
 ROBOTS = 10
 
@@ -31,7 +32,7 @@ class SwarmGoToTest(unittest.TestCase):
             )
             return moved and all(rows[-1][4] == 0.0 for rows in watch.rows.values())
 
-        wait_for(all_rest, 100.0, "all robots at rest on the other side")
+        wait_for(all_rest, "all robots at rest on the other side", 100.0)
         watch.close()
         off_m = {robot_id: round(math.dist(watch.pose(robot_id)[:2], goal), 3) for robot_id, goal in goals.items()}
         sys.stdout.write("least gap %.4f m, off %s\n" % (watch.least_gap_m(), off_m))

@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """Teleop in a real pseudo-terminal: real key bytes in, Twist messages out, the terminal's settings before and after."""
 
 import os
@@ -15,22 +15,12 @@ import rospy
 import rostest
 from geometry_msgs.msg import Twist
 
+from hero_test.waiting import wait_for
+
 DEADLINE_S = 30.0
 
 # The shell owns the terminal, as it does for a user, and keeps it open when teleop has ended.
 FOREGROUND_SHELL = 'trap : INT TERM HUP; "$@"; echo "status=$?="; cat >/dev/null'
-
-
-
-def wait_for(condition, what):
-    """Return the first true value of condition()."""
-    deadline_s = time.monotonic() + DEADLINE_S
-    while time.monotonic() < deadline_s:
-        value = condition()
-        if value:
-            return value
-        time.sleep(0.01)
-    raise AssertionError("waited %g s for %s" % (DEADLINE_S, what))
 
 
 class Recorder:

@@ -4,9 +4,7 @@ import os
 import shutil
 from pathlib import Path
 
-from monitor_process import TIMEOUT_S
-
-from hero_test.swarm_watch import wait_for
+from hero_test.waiting import wait_for
 
 MISSING = [name for name in ("chromedriver", "chromium") if shutil.which(name) is None]
 
@@ -75,10 +73,10 @@ class MonitorPage:
         for row in self.browser.find_elements("css selector", "#fleet tbody tr"):
             if row.text.startswith(robot):
                 row.find_element("css selector", "button").click()
-        wait_for(lambda: self.text("#name") == robot, TIMEOUT_S, robot + " to be chosen")
+        wait_for(lambda: self.text("#name") == robot, robot + " to be chosen")
 
     def wait_for_text(self, selector, text):
-        wait_for(lambda: text in self.text(selector), TIMEOUT_S, "%r in %s" % (text, selector))
+        wait_for(lambda: text in self.text(selector), "%r in %s" % (text, selector))
 
     def actions(self):
         from selenium.webdriver.common.action_chains import ActionChains

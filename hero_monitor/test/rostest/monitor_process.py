@@ -7,12 +7,11 @@ import os
 import signal
 import socket
 import subprocess
-import sys
 import threading
 import uuid
-from pathlib import Path
 
-from hero_test.swarm_watch import wait_for
+from hero_test.processes import find_program
+from hero_test.waiting import wait_for
 
 TIMEOUT_S = 30.0
 HOST = "127.0.0.1:21331"
@@ -86,9 +85,8 @@ def start_monitor(*arguments, prefix=()):
 def start_scripted_driver(name, ids, **parameters):
     """Start a driver that reports robots with these ids."""
     private = ["_%s:=%s" % item for item in parameters.items()]
-    script = Path(__file__).with_name("scripted_driver.py")
     return subprocess.Popen(
-        [sys.executable, str(script), "__name:=" + name, "_ids:='%s'" % json.dumps(ids), *private],
+        [find_program("hero_test", "scripted_driver"), "__name:=" + name, "_ids:='%s'" % json.dumps(ids), *private],
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         start_new_session=True,
@@ -109,4 +107,4 @@ def wait_until_it_answers(host):
         except OSError:
             return False
 
-    wait_for(answers, TIMEOUT_S, "an answer of " + host)
+    wait_for(answers, "an answer of " + host)

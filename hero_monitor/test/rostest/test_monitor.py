@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """The fleet monitor beside three simulated robots, looked at and clicked in a real browser."""
 
 import math
@@ -11,7 +11,8 @@ from monitor_page import MISSING, MonitorPage
 from monitor_process import HOST, OTHER_HOST, TIMEOUT_S, PageClient, end, start_monitor, wait_until_it_answers
 from rosgraph_msgs.msg import Log
 
-from hero_test.swarm_watch import SwarmWatch, wait_for
+from hero_test.swarm_watch import SwarmWatch
+from hero_test.waiting import wait_for
 
 HOSTILE = "<img src=x onerror='document.title=\"broken\"'><script>document.title='broken'</script> \u202e\x1b[31m"
 
@@ -30,7 +31,7 @@ class PageTest(unittest.TestCase):
         def all_are_ready():
             return [row[1] for row in cls.page.rows()] == ["READY"] * 3
 
-        wait_for(all_are_ready, TIMEOUT_S, "three robots that are ready")
+        wait_for(all_are_ready, "three robots that are ready")
 
     @classmethod
     def tearDownClass(cls):
@@ -44,19 +45,19 @@ class PageTest(unittest.TestCase):
         return math.hypot(*(path[-1, 1:3] - path[0, 1:3])) / (path[-1, 0] - path[0, 0])
 
     def wait_until_moving(self, robot_id):
-        wait_for(lambda: self.speed_of(robot_id) > 0.02, TIMEOUT_S, "robot %d to move" % robot_id)
+        wait_for(lambda: self.speed_of(robot_id) > 0.02, "robot %d to move" % robot_id)
 
     def wait_until_standing(self, robot_id):
         """A robot that is left alone would drive on for 2 s: it has to stand sooner."""
-        wait_for(lambda: self.speed_of(robot_id) < 0.005, 1.5, "robot %d to stand" % robot_id)
+        wait_for(lambda: self.speed_of(robot_id) < 0.005, "robot %d to stand" % robot_id, 1.5)
 
     def test_the_table_shows_every_robot_with_address_rates_and_versions(self):
-        wait_for(lambda: all(row[7] == "v3.8" for row in self.page.rows()), TIMEOUT_S, "versions")
+        wait_for(lambda: all(row[7] == "v3.8" for row in self.page.rows()), "versions")
         rows = self.page.rows()
         self.assertEqual([row[0] for row in rows], ["hero_0", "hero_1", "hero_2"])
         for row in rows:
             self.assertIn("127.0.1.", row[3])
-        wait_for(lambda: all(float(row[4].split()[0]) > 15 for row in self.page.rows()), TIMEOUT_S, "rates")
+        wait_for(lambda: all(float(row[4].split()[0]) > 15 for row in self.page.rows()), "rates")
         self.assertEqual(self.page.text("#ready"), "3 of 3 ready")
         self.page.save("monitor_desktop.png")
         self.page.resize(820, 1180)
@@ -65,13 +66,13 @@ class PageTest(unittest.TestCase):
 
     def test_texts_from_outside_never_become_markup(self):
         publisher = rospy.Publisher("/rosout", Log, queue_size=5)
-        wait_for(publisher.get_num_connections, TIMEOUT_S, "listeners to the log")
+        wait_for(publisher.get_num_connections, "listeners to the log")
 
         def is_shown():
             publisher.publish(Log(level=Log.WARN, name="/" + HOSTILE, msg="hero_0 " + HOSTILE))
             return "<script>" in self.page.text("#lines")
 
-        wait_for(is_shown, TIMEOUT_S, "the line")
+        wait_for(is_shown, "the line")
         self.assertEqual(self.page.run("return document.querySelectorAll('#lines img, #lines script').length"), 0)
         self.assertEqual(self.page.run("return document.title"), "HeRo fleet")
         self.assertNotIn("\u202e", self.page.text("#lines"))
@@ -106,7 +107,7 @@ class PageTest(unittest.TestCase):
             self.page.choose("hero_0")
             self.page.actions().click_and_hold(self.page.find("#pad [aria-label='turn left']")).perform()
             turned = self.watch.pose(0)[2]
-            wait_for(lambda: abs(self.watch.pose(0)[2] - turned) > 0.2, TIMEOUT_S, "robot 0 to turn")
+            wait_for(lambda: abs(self.watch.pose(0)[2] - turned) > 0.2, "robot 0 to turn")
         finally:
             output = end(process)
         self.wait_until_standing(0)
@@ -126,7 +127,7 @@ class PageTest(unittest.TestCase):
         start = self.watch.pose(1)[:2]
         self.click_on_map(0, 0)
         self.page.wait_for_text("#notices", "hero_1 has a new goal")
-        wait_for(lambda: math.dist(self.watch.pose(1)[:2], start) > 0.05, TIMEOUT_S, "robot 1 to go")
+        wait_for(lambda: math.dist(self.watch.pose(1)[:2], start) > 0.05, "robot 1 to go")
 
     def test_a_click_for_a_robot_that_nobody_brings_there_says_so(self):
         self.page.choose("hero_0")

@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """Who the fleet monitor lets in, asked over HTTP: names, origins, tokens, files, and how it refuses to start."""
 
 import tempfile

@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """Numbers and log lines of one robot or program that are wrong: the page shows the others as before."""
 
 import math
@@ -8,13 +8,13 @@ import rospy
 import rostest
 from geometry_msgs.msg import Point, PoseStamped, Quaternion
 from monitor_page import MISSING, MonitorPage
-from monitor_process import TIMEOUT_S, end, start_scripted_driver, wait_until_it_answers
+from monitor_process import end, start_scripted_driver, wait_until_it_answers
 from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import ColorRGBA
 
-from hero_test.swarm_watch import wait_for
+from hero_test.waiting import wait_for
 
 HOST = "127.0.0.1:21333"
 
@@ -51,7 +51,7 @@ class BadDataTest(unittest.TestCase):
     @staticmethod
     def advertise(topic, message_class):
         publisher = rospy.Publisher(topic, message_class, queue_size=5)
-        wait_for(publisher.get_num_connections, TIMEOUT_S, "listeners to " + topic)
+        wait_for(publisher.get_num_connections, "listeners to " + topic)
         return publisher
 
     def wait_for_pose(self, robot, pose):
@@ -60,7 +60,7 @@ class BadDataTest(unittest.TestCase):
         def is_shown():
             return self.page.facts().get("pose", "").startswith(pose)
 
-        wait_for(is_shown, TIMEOUT_S, self.page.facts)
+        wait_for(is_shown, self.page.facts)
 
     def check_that_others_are_shown(self, x_m):
         self.good.publish(make_odometry(x_m, 0.5))
@@ -105,7 +105,7 @@ class BadDataTest(unittest.TestCase):
             publisher.publish(Log(level=Log.INFO, name=node, msg=text))
             return self.page.browser.execute_script(script, text.rpartition(": ")[2])
 
-        return wait_for(is_shown, TIMEOUT_S, text)
+        return wait_for(is_shown, text)
 
     def test_only_lines_of_a_driver_are_those_of_a_robot(self):
         self.assertEqual(self.find_source("/hero_driver", "hero_0: battery is low"), "hero_0")
@@ -114,7 +114,7 @@ class BadDataTest(unittest.TestCase):
 
     def test_a_refused_robot_shows_nothing_of_the_one_with_its_name(self):
         self.good.publish(make_odometry(0.0, 0.0))
-        wait_for(lambda: self.page.rows()[0][4] != "-", TIMEOUT_S, self.page.rows)
+        wait_for(lambda: self.page.rows()[0][4] != "-", self.page.rows)
         refused = self.page.rows()[1]
         self.assertEqual(refused[:5], ["hero_0", "REFUSED", "", "127.0.9.9:5", "-"])
 

@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """The fleet monitor beset by clients without the token: those who know it get in, and their STOP ALL works."""
 
 import resource
@@ -22,7 +22,7 @@ from monitor_process import (
 )
 
 from hero_msgs.msg import RobotArray
-from hero_test.swarm_watch import wait_for
+from hero_test.waiting import wait_for
 
 TOKEN = "correct-horse-battery-staple"
 STRANGERS = 1100
@@ -41,7 +41,7 @@ class DoorsTest(unittest.TestCase):
         for name in ("hero_driver", "hero_driver_b"):
             rospy.Subscriber("/%s/robots" % name, RobotArray, cls.receive, name)
         # A driver that starts after a stop was confirmed is not asked.
-        wait_for(lambda: len(cls.stopped) == 2, TIMEOUT_S, "both drivers")
+        wait_for(lambda: len(cls.stopped) == 2, "both drivers")
 
     @classmethod
     def tearDownClass(cls):
@@ -86,7 +86,7 @@ class DoorsTest(unittest.TestCase):
         return self.sockets[-1]
 
     def wait_until_stopped(self, stopped):
-        wait_for(lambda: list(self.stopped.values()) == [stopped] * 2, TIMEOUT_S, "stopped: %s" % stopped)
+        wait_for(lambda: list(self.stopped.values()) == [stopped] * 2, "stopped: %s" % stopped)
 
     def test_a_page_opened_among_1100_strangers_stops_all_robots(self):
         self.connect_strangers()

@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """STOP ALL in a real browser: what people see while robots stop, stand, move though stopped, or nobody answers."""
 
 import json
@@ -14,7 +14,6 @@ from geometry_msgs.msg import Twist
 from monitor_page import MISSING, MonitorPage
 from monitor_process import (
     OTHER_HOST,
-    TIMEOUT_S,
     end,
     start_monitor,
     start_scripted_driver,
@@ -23,7 +22,7 @@ from monitor_process import (
 from std_msgs.msg import Bool, String
 
 from hero_msgs.msg import RobotArray
-from hero_test.swarm_watch import wait_for
+from hero_test.waiting import wait_for
 
 HOST = "127.0.0.1:21333"
 DRIVERS = ("hero_driver", "hero_driver_b")
@@ -64,7 +63,7 @@ class StopTest(unittest.TestCase):
 
     def setUp(self):
         for publisher in (self.behave, *self.requests):
-            wait_for(publisher.get_num_connections, TIMEOUT_S, "connections to the drivers")
+            wait_for(publisher.get_num_connections, "connections to the drivers")
         self.set_behaviour()
         for page in (self.page, self.other):
             page.open()
@@ -85,17 +84,17 @@ class StopTest(unittest.TestCase):
                 publisher.publish(False)
             return self.all_report(False)
 
-        wait_for(ask, TIMEOUT_S, "the release")
+        wait_for(ask, "the release")
 
     def wait_for_reports(self, stopped):
-        wait_for(lambda: self.all_report(stopped), TIMEOUT_S, "stopped: %s" % stopped)
+        wait_for(lambda: self.all_report(stopped), "stopped: %s" % stopped)
 
     def all_report(self, stopped):
         return [report.stopped for report in self.reports.values()] == [stopped] * len(DRIVERS)
 
     def wait_for_banner(self, level, text, *pages):
         for page in pages or (self.page, self.other):
-            wait_for(lambda page=page: page.banner() == (level, text), TIMEOUT_S, lambda page=page: page.banner())
+            wait_for(lambda page=page: page.banner() == (level, text), lambda page=page: page.banner())
 
     def suspend(self, pid):
         """Suspend a process until the end of the test, or until what is returned is called."""
@@ -110,7 +109,7 @@ class StopTest(unittest.TestCase):
         self.set_behaviour(rest=False)
         self.page.click("#stop")
         self.assertEqual(self.page.banner(), (AMBER, "stopping"))
-        wait_for(lambda: self.stop_states(self.page)["hero_0"] == "stopping", TIMEOUT_S, "a robot that stops")
+        wait_for(lambda: self.stop_states(self.page)["hero_0"] == "stopping", "a robot that stops")
         self.page.save("monitor_stopping.png")
         self.set_behaviour()
         self.wait_for_banner(GREEN, "stopped, all wheels at rest")
@@ -136,7 +135,7 @@ class StopTest(unittest.TestCase):
         self.wait_for_reports(True)
         self.page.wait_for_text("#stopping", "stopped")
         self.set_behaviour(moving=[2])
-        wait_for(lambda: self.page.banner() == (RED, "NOT STOPPED: hero_2 moves"), TIMEOUT_S, self.page.banner)
+        wait_for(lambda: self.page.banner() == (RED, "NOT STOPPED: hero_2 moves"), self.page.banner)
 
     def test_a_page_drives_no_robot_until_all_are_released(self):
         commands = []
@@ -144,10 +143,10 @@ class StopTest(unittest.TestCase):
         self.page.choose("hero_2")
         button = self.page.find("#pad [aria-label='ahead']")
         self.page.actions().click_and_hold(button).perform()
-        wait_for(lambda: any(command.linear.x > 0 for command in commands), TIMEOUT_S, "a command")
+        wait_for(lambda: any(command.linear.x > 0 for command in commands), "a command")
         # Pressed on another page, while the button is held.
         self.other.click("#stop")
-        wait_for(lambda: commands[-1].linear.x == 0, TIMEOUT_S, "a stop")
+        wait_for(lambda: commands[-1].linear.x == 0, "a stop")
         self.page.wait_for_text("#notices", "all robots are stopped")
         self.wait_for_banner(GREEN, "stopped, all wheels at rest")
         self.assertEqual(commands[-1].linear.x, 0.0)
@@ -156,7 +155,7 @@ class StopTest(unittest.TestCase):
     def test_a_driver_that_hangs_is_named_and_the_other_one_stops(self):
         resume = self.suspend(self.drivers[1].pid)
         self.page.click("#stop")
-        wait_for(lambda: self.reports["hero_driver"].stopped, TIMEOUT_S, "the stop of the other driver")
+        wait_for(lambda: self.reports["hero_driver"].stopped, "the stop of the other driver")
         self.wait_for_banner(RED, "NOT STOPPED: driver hero_driver_b does not answer")
         resume()
         self.wait_for_banner(GREEN, "stopped, all wheels at rest")

@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """Recordings of simulated robots behind the real driver: what is in them, how they end, what plot and export make."""
 
 import csv
@@ -17,7 +17,7 @@ import rospy
 import rostest
 from geometry_msgs.msg import Twist, Vector3
 
-from hero_test.swarm_watch import wait_for
+from hero_test.waiting import wait_for
 
 RECORD = ["rosrun", "hero_recording", "record"]
 TIMEOUT_S = 60.0
@@ -67,7 +67,7 @@ class RecordTest(unittest.TestCase):
         def has_grown():
             return sum(os.path.getsize(path) for path in glob.glob(self.folder + "/*.bag*")) >= least
 
-        wait_for(has_grown, TIMEOUT_S, "recording of %d bytes in %s: %s" % (least, self.folder, self.files()))
+        wait_for(has_grown, "recording of %d bytes in %s: %s" % (least, self.folder, self.files()))
 
     def test_a_recording_holds_robots_that_join_later_and_can_be_plotted_and_exported(self):
         launch = [
@@ -81,7 +81,7 @@ class RecordTest(unittest.TestCase):
         ]
         # As a shell does it: roslaunch's nodes run elsewhere, and know the folder by PWD.
         recording = self.start(*launch, cwd=self.folder, env=dict(os.environ, PWD=self.folder))
-        wait_for(lambda: self.files("hero_*_0.bag.active"), TIMEOUT_S, "recording")
+        wait_for(lambda: self.files("hero_*_0.bag.active"), "recording")
         late = self.start(
             *(
                 "rosrun",
@@ -96,10 +96,10 @@ class RecordTest(unittest.TestCase):
             )
         )
         publisher = rospy.Publisher("/hero_7/velocity_controller/cmd_vel", Twist, queue_size=1)
-        wait_for(publisher.get_num_connections, TIMEOUT_S, "hero_7")
+        wait_for(publisher.get_num_connections, "hero_7")
         # The recorder asks the ROS master for new topics once in a while; nobody else listens to these.
-        wait_for(lambda: hears_all_of("/hero_7/"), TIMEOUT_S, "the recorder listening to hero_7")
-        wait_for(lambda: self.files("hero_*_1.bag*"), TIMEOUT_S, "second file of a split")
+        wait_for(lambda: hears_all_of("/hero_7/"), "the recorder listening to hero_7")
+        wait_for(lambda: self.files("hero_*_1.bag*"), "second file of a split")
         for _ in range(15):
             publisher.publish(Twist(angular=Vector3(0.0, 0.0, 2.0)))
             time.sleep(0.1)
@@ -166,7 +166,7 @@ class RecordTest(unittest.TestCase):
         free_mb = shutil.disk_usage(self.folder).free / 1e6
         limit_mb = int(free_mb - DISK_STEP / 1e6 / 2)
         recording = self.start(*RECORD, "--folder", self.folder, "--min-free-mb", str(limit_mb), stdout=stdout)
-        wait_for(lambda: self.files("hero_*.bag.active"), TIMEOUT_S, "recording")
+        wait_for(lambda: self.files("hero_*.bag.active"), "recording")
         self.assertIsNone(recording.poll())
         with open(os.path.join(self.folder, "filler"), "wb") as filler:
             os.posix_fallocate(filler.fileno(), 0, DISK_STEP)
@@ -203,7 +203,7 @@ class RecordTest(unittest.TestCase):
             with self.subTest(number):
                 recording = self.start(*RECORD, "--folder", self.folder)
                 recording.stdout.close()
-                wait_for(lambda: self.files("hero_*.bag.active"), TIMEOUT_S, "recording")
+                wait_for(lambda: self.files("hero_*.bag.active"), "recording")
                 # To record alone: roslaunch and service managers signal one process, and its recorder is its own.
                 os.kill(recording.pid, number)
                 self.assertEqual(recording.wait(TIMEOUT_S), 0)

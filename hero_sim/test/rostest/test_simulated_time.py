@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """The simulator drives /clock: everything runs faster than the wall clock, and stamps are simulated time."""
 
 import statistics
@@ -12,19 +12,7 @@ from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import SetBool
 
-LIMIT_S = 40.0
-
-
-def wait_for(condition, what):
-    """Return what condition() returns as soon as that is true; LIMIT_S is wall-clock time."""
-    end_s = time.monotonic() + LIMIT_S
-    while True:
-        result = condition()
-        if result:
-            return result
-        if time.monotonic() > end_s:
-            raise AssertionError("within %g s there was no %s" % (LIMIT_S, what))
-        time.sleep(0.02)
+from hero_test.waiting import wait_for
 
 
 class SimulatedTimeTest(unittest.TestCase):

@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """The simulator as a node behind the driver: it drives, its truth is published, and each fault shows at the
 driver."""
 
@@ -24,20 +24,9 @@ from visualization_msgs.msg import MarkerArray
 from hero_msgs.msg import Robot, RobotArray
 from hero_msgs.srv import SetOdom
 from hero_sim.srv import InjectFault
+from hero_test.waiting import wait_for
 
 LIMIT_S = 30.0
-
-
-def wait_for(condition, what, limit_s=LIMIT_S):
-    """Return what condition() returns as soon as that is true; fail with what after limit_s."""
-    end_s = time.monotonic() + limit_s
-    while True:
-        result = condition()
-        if result:
-            return result
-        if time.monotonic() > end_s:
-            raise AssertionError("within %g s there was no %s" % (limit_s, what))
-        time.sleep(0.02)
 
 
 class Newest:

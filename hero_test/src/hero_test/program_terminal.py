@@ -10,7 +10,8 @@ import subprocess
 import termios
 import threading
 
-from hero_test.swarm_watch import wait_for
+from hero_test.processes import find_program
+from hero_test.waiting import wait_for
 
 FLEET = ["rosrun", "hero_tools", "fleet"]
 TIMEOUT_S = 60.0
@@ -27,13 +28,11 @@ class ProgramTerminal:
     """A terminal with a program, which is read all the time: a program that nobody reads stands still."""
 
     def __init__(self, package, program, *arguments):
-        # The program itself: rosrun is a shell, and a signal for it would not reach the program.
-        found = subprocess.check_output(["catkin_find", "--first-only", "--libexec", package, program])
         self._leader, self._follower = pty.openpty()
         fcntl.ioctl(self._follower, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 200, 0, 0))
         self.settings_before = self.settings()
         streams = {"stdin": self._follower, "stdout": self._follower, "stderr": self._follower}
-        self.process = subprocess.Popen([found.decode().strip(), *arguments], **streams, start_new_session=True)
+        self.process = subprocess.Popen([find_program(package, program), *arguments], **streams, start_new_session=True)
         self.output = bytearray()
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
@@ -54,7 +53,6 @@ class ProgramTerminal:
         """Wait for text in the output from start on."""
         wait_for(
             lambda: text in self.output[start:],
-            TIMEOUT_S,
             lambda: "%r in %r" % (text, bytes(self.output[start:][-2000:])),
         )
 

@@ -8,6 +8,8 @@ import numpy as np
 import rospy
 from nav_msgs.msg import Odometry
 
+from hero_test.waiting import wait_for
+
 BODY_RADIUS_M = 0.036835
 """Of the robot's body, which the simulator draws as a disc."""
 
@@ -30,17 +32,6 @@ of them that face each other are 0.5 s apart when they see each other."""
 
 CREEP_M_S = 0.01
 """Slower than this a robot does not run into anything; things run into it."""
-
-
-def wait_for(condition, timeout_s, what):
-    """Return the first true value of condition(); what: text, or what gives it when the time is over."""
-    deadline_s = time.monotonic() + timeout_s
-    while time.monotonic() < deadline_s:
-        value = condition()
-        if value:
-            return value
-        time.sleep(0.02)
-    raise AssertionError("waited %g s for %s" % (timeout_s, what() if callable(what) else what))
 
 
 class SwarmWatch:
@@ -92,7 +83,7 @@ class SwarmWatch:
             act()
             return self.at_rest(*robot_ids)
 
-        wait_for(stopped, STOP_TIMEOUT_S, "rest of %s" % (robot_ids,))
+        wait_for(stopped, "rest of %s" % (robot_ids,), STOP_TIMEOUT_S)
 
     def path(self, robot_id):
         """Return all rows as an array (T, 5)."""
@@ -101,7 +92,7 @@ class SwarmWatch:
 
     def wait_until_complete(self, timeout_s=30.0):
         """Wait until every robot was heard of."""
-        wait_for(lambda: all(self.rows.values()), timeout_s, "ground truth of %s" % sorted(self.rows))
+        wait_for(lambda: all(self.rows.values()), "ground truth of %s" % sorted(self.rows), timeout_s)
 
     def lengths_m(self):
         """Return how far each robot drove."""

@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """The program check: beside a driver and two simulated robots, and in each of the usual broken conditions."""
 
 import json

@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """The program fleet beside two simulated robots: as JSON, as lines, and in a terminal."""
 
 import json
@@ -12,8 +12,8 @@ import rospy
 import rostest
 from geometry_msgs.msg import Twist
 
-from hero_test.program_terminal import FLEET, TIMEOUT_S, ProgramTerminal, run_fleet
-from hero_test.swarm_watch import wait_for
+from hero_test.program_terminal import FLEET, ProgramTerminal, run_fleet
+from hero_test.waiting import wait_for
 
 
 class FleetTest(unittest.TestCase):
@@ -24,7 +24,7 @@ class FleetTest(unittest.TestCase):
             robots = json.loads(output)["robots"] if code == 0 else []
             return [robot["state"] for robot in robots] == ["READY", "READY"]
 
-        wait_for(both_are_ready, TIMEOUT_S, "two robots that are ready")
+        wait_for(both_are_ready, "two robots that are ready")
 
     def test_json_holds_state_address_rates_pose_and_nearest_obstacle_of_every_robot(self):
         code, output, errors = run_fleet("--once", "--json")

@@ -1,8 +1,7 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """Goes through the pages of one course: ROS master of the rostest, simulator, real commands in real terminals."""
 
 import os
-import socket
 import sys
 import tempfile
 import unittest
@@ -13,14 +12,10 @@ import rostest
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from lesson_runner import Course
 
+from hero_test.processes import find_free_port
+
 PACKAGE = Path(__file__).resolve().parents[2]
 PAGES = PACKAGE.parent / "docs" / "tutorial"
-
-
-def find_free_port():
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        return free.getsockname()[1]
 
 
 def make_changes():

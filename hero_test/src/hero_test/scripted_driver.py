@@ -1,4 +1,3 @@
-#!/usr/bin/env python
 """A driver without connections: takes stop requests, and reports of its robots what a test tells it to.
 
 ~ids lists the robots, as JSON; ~twin_of is an id that a second robot wants. ~behave (std_msgs/String) takes JSON: which
@@ -83,7 +82,7 @@ class ScriptedDriver:
             self.publisher.publish(report)
 
 
-if __name__ == "__main__":
+def main():
     rospy.init_node("scripted_driver")
-    driver = ScriptedDriver()
+    driver = ScriptedDriver()  # noqa: F841 - its subscribers live as long as it does
     rospy.spin()

@@ -1,0 +1,38 @@
+# CMake functions for the packages of the suite. They are here because every package can find hero_msgs.
+
+# hero_add_program(NAME [MODULE]): a program NAME for rosrun that calls main() of a module of the package (default: NAME).
+#
+# Its first line names the interpreter of the build, in the devel and the install space: catkin_install_python() would
+# write "env python3" for the install space, and the first python3 on PATH (pyenv, conda) may have no rospy.
+function(hero_add_program name)
+  set(module ${name})
+  if(ARGC GREATER 1)
+    set(module ${ARGV1})
+  endif()
+  set(program ${CMAKE_CURRENT_BINARY_DIR}/programs/${name})
+  file(WRITE ${program} "#!${PYTHON_EXECUTABLE}\nfrom ${PROJECT_NAME}.${module} import main\n\nmain()\n")
+  install(PROGRAMS ${program} DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
+  file(COPY ${program} DESTINATION ${CATKIN_DEVEL_PREFIX}/${CATKIN_PACKAGE_BIN_DESTINATION}
+    FILE_PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)
+endfunction()
+
+# hero_add_tests(): run_tests runs test/unit by pytest and every test/rostest/*.test, and checks the launch files.
+function(hero_add_tests)
+  if(IS_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR}/test/unit)
+    set(results ${CATKIN_TEST_RESULTS_DIR}/${PROJECT_NAME}/pytest.xml)
+    catkin_run_tests_target("pytest" "unit" "pytest.xml"
+      COMMAND "${PYTHON_EXECUTABLE} -m pytest test/unit --hypothesis-seed=0 --junitxml=${results}"
+      WORKING_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR})
+  endif()
+  if(IS_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR}/launch)
+    find_package(roslaunch REQUIRED)
+    roslaunch_add_file_check(launch)
+  endif()
+  file(GLOB rostests RELATIVE ${CMAKE_CURRENT_SOURCE_DIR} test/rostest/*.test)
+  if(rostests)
+    find_package(rostest REQUIRED)
+    foreach(rostest ${rostests})
+      add_rostest(${rostest})
+    endforeach()
+  endif()
+endfunction()

@@ -1,0 +1,85 @@
+"""Programs as processes of their own, what they print, and free ports for them. Knows nothing of ROS topics."""
+
+import os
+import re
+import signal
+import socket
+import subprocess
+import threading
+
+from hero_test.waiting import TIMEOUT_S, wait_for
+
+
+def find_free_port():
+    """Return a TCP port that nobody uses now."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def find_program(package, name):
+    """Return the path of a program: rosrun is a shell around it, which would get the signals meant for it."""
+    found = subprocess.check_output(["catkin_find", "--first-only", "--libexec", package, name])
+    return found.decode().strip()
+
+
+class Program:
+    """A program in a session of its own, and the lines that it prints, errors among them."""
+
+    def __init__(self, *command, environment=None):
+        """environment: variables besides ours."""
+        self.process = subprocess.Popen(
+            command,
+            env={**os.environ, **(environment or {})},
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            universal_newlines=True,
+            start_new_session=True,
+        )
+        self.lines = []
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def _read(self):
+        with self.process.stdout:
+            for line in self.process.stdout:
+                self.lines.append(line.rstrip("\n"))
+
+    def text(self):
+        """Return all that it printed so far."""
+        return "".join(line + "\n" for line in list(self.lines))
+
+    def find_lines(self, pattern):
+        """Return the lines that match a regular expression."""
+        return [line for line in list(self.lines) if re.search(pattern, line)]
+
+    def wait_line(self, pattern):
+        """Return the first line that matches a regular expression, once it is printed."""
+        return wait_for(lambda: self.find_lines(pattern), lambda: "%r among %s" % (pattern, self.lines))[0]
+
+    def wait_for_text(self, text):
+        """Wait until it has printed a text."""
+        self.wait_line(re.escape(text))
+
+    def wait_end(self, timeout_s=TIMEOUT_S):
+        """Wait until it has ended by itself; return its exit code. All that it printed is known then."""
+        try:
+            code = self.process.wait(timeout_s)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            raise
+        self._reader.join()
+        return code
+
+    def end(self, number=signal.SIGINT):
+        """Send a signal, wait for the end and return the exit code; safe when it has ended."""
+        if self.process.poll() is None:
+            self.process.send_signal(number)
+        return self.wait_end()
+
+    def close(self):
+        """Kill it unless it has ended."""
+        if self.process.poll() is None:
+            self.process.kill()
+        self.wait_end()
