@@ -10,7 +10,7 @@ from hero_msgs.srv import SetOdom
 
 def main():
     rospy.init_node("set_odom")
-    robot = rospy.get_param("~robot", "hero_3")
+    robot = "hero_%d" % rospy.get_param("~id", 3)
     service = robot + "/set_odom"
     try:
         rospy.wait_for_service(service, timeout=5.0)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python
-"""Brings a robot to a goal in its odometry frame with the unicycle control law, then says "arrived" and ends."""
+"""Drives a robot to a goal in its odometry frame with a unicycle controller, then logs "arrived" and exits."""
 
 import math
 
@@ -11,9 +11,9 @@ from tf.transformations import euler_from_quaternion
 
 PERIOD_S = 0.2  # 5 Hz
 LINEAR_GAIN = 0.5  # m/s per m of distance
-TURN_GAIN = 1.0  # rad/s per rad off the way
+ANGULAR_GAIN = 1.0  # rad/s per rad of heading error
 MAX_LINEAR_M_S = 0.1
-MAX_TURN_RAD_S = 1.0
+MAX_ANGULAR_RAD_S = 1.0
 TOLERANCE_M = 0.01
 MAX_AGE_S = 1.0
 
@@ -45,10 +45,10 @@ class GoToGoal:
             rospy.loginfo("arrived")
             rospy.signal_shutdown("arrived")
             return
-        off_rad = normalize_angle(math.atan2(dy_m, dx_m) - yaw_rad)
+        error_rad = normalize_angle(math.atan2(dy_m, dx_m) - yaw_rad)
         command = Twist()
-        command.linear.x = cut(LINEAR_GAIN * distance_m * math.cos(off_rad), MAX_LINEAR_M_S)
-        command.angular.z = cut(TURN_GAIN * off_rad, MAX_TURN_RAD_S)
+        command.linear.x = clamp(LINEAR_GAIN * distance_m * math.cos(error_rad), MAX_LINEAR_M_S)
+        command.angular.z = clamp(ANGULAR_GAIN * error_rad, MAX_ANGULAR_RAD_S)
         self.publisher.publish(command)
 
     def stop(self):
@@ -57,13 +57,13 @@ class GoToGoal:
         rospy.sleep(0.2)
 
 
-def cut(value, limit):
+def clamp(value, limit):
     return max(-limit, min(limit, value))
 
 
 def main():
     rospy.init_node("go_to_goal")
-    robot = rospy.get_param("~robot", "hero_3")
+    robot = "hero_%d" % rospy.get_param("~id", 3)
     GoToGoal(robot, rospy.get_param("~goal_x_m", 0.15), rospy.get_param("~goal_y_m", 0.0))
     rospy.spin()
 

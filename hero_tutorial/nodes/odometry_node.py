@@ -1,5 +1,5 @@
 #!/usr/bin/env python
-"""Drives a square on paper: odometry on the topic odom and the transform map -> base_link, without any robot."""
+"""Simulates a robot driving a square: publishes odometry on odom and the transform from map to base_link."""
 
 import contextlib
 import math
@@ -10,28 +10,28 @@ from geometry_msgs.msg import TransformStamped
 from nav_msgs.msg import Odometry
 
 LINEAR_M_S = 0.6  # along a side
-TURN_RAD_S = 0.2  # on the spot, at a corner
-CORNERS = ((0, 0), (1, 0), (1, 1), (0, 1))  # in sides
+ANGULAR_RAD_S = 0.2  # on the spot, at a corner
+CORNERS = ((0, 0), (1, 0), (1, 1), (0, 1))  # in side lengths
 
 
-def find_motion(elapsed_s, side_m):
-    """Return x (m), y (m), yaw (rad), speed ahead (m/s) and turn (rad/s), so long after the start."""
+def compute_motion(elapsed_s, side_m):
+    """Return x (m), y (m), yaw (rad), linear (m/s) and angular (rad/s) velocity at a time since the start."""
     drive_s = side_m / LINEAR_M_S
-    turn_s = math.pi / 2 / TURN_RAD_S
+    turn_s = math.pi / 2 / ANGULAR_RAD_S
     sides, in_side_s = divmod(elapsed_s, drive_s + turn_s)
     corner = int(sides) % 4
     heading_rad = corner * math.pi / 2
-    way_m = LINEAR_M_S * min(in_side_s, drive_s)
-    x_m = CORNERS[corner][0] * side_m + way_m * math.cos(heading_rad)
-    y_m = CORNERS[corner][1] * side_m + way_m * math.sin(heading_rad)
+    distance_m = LINEAR_M_S * min(in_side_s, drive_s)
+    x_m = CORNERS[corner][0] * side_m + distance_m * math.cos(heading_rad)
+    y_m = CORNERS[corner][1] * side_m + distance_m * math.sin(heading_rad)
     if in_side_s < drive_s:
         return x_m, y_m, heading_rad, LINEAR_M_S, 0.0
-    return x_m, y_m, heading_rad + TURN_RAD_S * (in_side_s - drive_s), 0.0, TURN_RAD_S
+    return x_m, y_m, heading_rad + ANGULAR_RAD_S * (in_side_s - drive_s), 0.0, ANGULAR_RAD_S
 
 
 def make_odometry(motion, stamp):
-    """Return the message: the pose as seen from map, the velocity as felt in base_link."""
-    x_m, y_m, yaw_rad, linear_m_s, turn_rad_s = motion
+    """Return the message: the pose in the frame map, the velocity in the frame base_link."""
+    x_m, y_m, yaw_rad, linear_m_s, angular_rad_s = motion
     message = Odometry()
     message.header.stamp = stamp
     message.header.frame_id = "map"
@@ -41,12 +41,12 @@ def make_odometry(motion, stamp):
     message.pose.pose.orientation.z = math.sin(yaw_rad / 2)
     message.pose.pose.orientation.w = math.cos(yaw_rad / 2)
     message.twist.twist.linear.x = linear_m_s
-    message.twist.twist.angular.z = turn_rad_s
+    message.twist.twist.angular.z = angular_rad_s
     return message
 
 
 def make_transform(odometry):
-    """Return the same pose as the transform map -> base_link."""
+    """Return the same pose as the transform from map to base_link."""
     transform = TransformStamped()
     transform.header = odometry.header
     transform.child_frame_id = odometry.child_frame_id
@@ -65,7 +65,7 @@ def main():
     start = rospy.Time.now()
     while not rospy.is_shutdown():
         now = rospy.Time.now()
-        odometry = make_odometry(find_motion((now - start).to_sec(), side_m), now)
+        odometry = make_odometry(compute_motion((now - start).to_sec(), side_m), now)
         publisher.publish(odometry)
         broadcaster.sendTransform(make_transform(odometry))
         rate.sleep()

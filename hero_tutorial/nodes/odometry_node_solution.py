@@ -1,5 +1,5 @@
 #!/usr/bin/env python
-"""Draws the way that odometry on the topic odom takes: every tenth pose, as a nav_msgs/Path on the topic path."""
+"""Publishes every tenth pose of odom as a nav_msgs/Path on path."""
 
 import rospy
 from geometry_msgs.msg import PoseStamped

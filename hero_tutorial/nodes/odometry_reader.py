@@ -1,5 +1,5 @@
 #!/usr/bin/env python
-"""Says once a second where a robot thinks it is."""
+"""Logs a robot's pose estimate once a second."""
 
 import math
 
@@ -19,7 +19,7 @@ def print_pose(message):
 
 def main():
     rospy.init_node("odometry_reader")
-    robot = rospy.get_param("~robot", "hero_3")
+    robot = "hero_%d" % rospy.get_param("~id", 3)
     rospy.Subscriber(robot + "/odom", Odometry, print_pose, queue_size=1)
     rospy.spin()
 

@@ -1,12 +1,12 @@
 #!/usr/bin/env python
-"""Odometry in a bag -> a picture of the path: plot_path.py BAG TOPIC PICTURE."""
+"""Plots the path in a bag of odometry: plot_path.py BAG TOPIC PICTURE."""
 
 import sys
 
 import matplotlib
 import rosbag
 
-matplotlib.use("Agg")  # draws into files, needs no display
+matplotlib.use("Agg")  # renders to files, needs no display
 from matplotlib import pyplot
 
 
@@ -15,15 +15,15 @@ def main():
     with rosbag.Bag(bag_file) as bag:
         positions = [message.pose.pose.position for _, message, _ in bag.read_messages([topic])]
     if not positions:
-        sys.exit("%s has no message on %s" % (bag_file, topic))
+        sys.exit("%s has no messages on %s" % (bag_file, topic))
     figure, axes = pyplot.subplots(figsize=(5, 5), constrained_layout=True)
     axes.plot([position.x for position in positions], [position.y for position in positions])
-    axes.plot(positions[-1].x, positions[-1].y, "o")  # where it ended
+    axes.plot(positions[-1].x, positions[-1].y, "o")  # the last pose
     axes.set_aspect("equal", "datalim")
     axes.set_xlabel("x in m")
     axes.set_ylabel("y in m")
     figure.savefig(picture_file)
-    print("%d poses of %s drawn in %s" % (len(positions), topic, picture_file))
+    print("%d poses of %s plotted in %s" % (len(positions), topic, picture_file))
 
 
 if __name__ == "__main__":

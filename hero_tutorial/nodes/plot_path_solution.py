@@ -1,5 +1,5 @@
 #!/usr/bin/env python
-"""Odometry in a bag -> a picture of the speed over time: plot_path_solution.py BAG TOPIC PICTURE."""
+"""Plots the speed over time in a bag of odometry: plot_path_solution.py BAG TOPIC PICTURE."""
 
 import sys
 
@@ -15,7 +15,7 @@ def main():
     with rosbag.Bag(bag_file) as bag:
         messages = [message for _, message, _ in bag.read_messages([topic])]
     if not messages:
-        sys.exit("%s has no message on %s" % (bag_file, topic))
+        sys.exit("%s has no messages on %s" % (bag_file, topic))
     start = messages[0].header.stamp
     times_s = [(message.header.stamp - start).to_sec() for message in messages]
     speeds_m_s = [message.twist.twist.linear.x for message in messages]
@@ -24,7 +24,7 @@ def main():
     axes.set_xlabel("time in s")
     axes.set_ylabel("speed in m/s")
     figure.savefig(picture_file)
-    print("%.1f s drawn, mean speed %.3f m/s" % (times_s[-1], sum(speeds_m_s) / len(speeds_m_s)))
+    print("%.1f s plotted, mean speed %.3f m/s" % (times_s[-1], sum(speeds_m_s) / len(speeds_m_s)))
 
 
 if __name__ == "__main__":

@@ -1,5 +1,5 @@
 #!/usr/bin/env python
-"""Says hello once a second, until Ctrl-C."""
+"""Logs a greeting once a second until Ctrl-C."""
 
 import contextlib
 
@@ -15,5 +15,5 @@ def main():
 
 
 if __name__ == "__main__":
-    with contextlib.suppress(rospy.ROSInterruptException):  # Ctrl-C while the rate sleeps
+    with contextlib.suppress(rospy.ROSInterruptException):  # Ctrl-C during rate.sleep()
         main()

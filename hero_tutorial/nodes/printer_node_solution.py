@@ -1,5 +1,5 @@
 #!/usr/bin/env python
-"""Says a text of your choice, as often as you choose, until Ctrl-C."""
+"""Logs a text at a rate, both set by parameters, until Ctrl-C."""
 
 import contextlib
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python
-"""Counts on the topic publisher_node_example, ten times a second."""
+"""Publishes a counter on publisher_node_example ten times a second."""
 
 import contextlib
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python
-"""Publishes a sine on the topic sine, as smooth as you choose; the time comes from the clock, not from counting."""
+"""Publishes a sine wave on sine; its phase comes from the clock, not from counting cycles."""
 
 import contextlib
 import math

@@ -1,5 +1,5 @@
 #!/usr/bin/env python
-"""Publishes twice each number that comes on publisher_node_example, on the topic publisher_subscriber."""
+"""Doubles each number received on publisher_node_example and publishes it on publisher_subscriber."""
 
 import rospy
 from std_msgs.msg import Int32
@@ -12,7 +12,7 @@ def main():
     def publish_double(message):
         publisher.publish(2 * message.data)
 
-    # After the publisher: the first number can come before the next line is run.
+    # Created after the publisher, because the first callback may run at once.
     rospy.Subscriber("publisher_node_example", Int32, publish_double, queue_size=10)
     rospy.spin()
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python
-"""Publishes the mean of the last ten numbers of publisher_node_example, on the topic mean_of_ten."""
+"""Publishes the mean of the last ten numbers of publisher_node_example on mean_of_ten."""
 
 import collections
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python
-"""Lets a robot walk at random: ahead while nothing is near, else it turns on the spot until the way is free."""
+"""Random walk: drive forward while nothing is near, otherwise turn on the spot until the path is clear."""
 
 import random
 
@@ -7,31 +7,31 @@ import rospy
 from geometry_msgs.msg import Twist
 from sensor_msgs.msg import LaserScan
 
-AHEAD_M_S = 0.08
-DRIFT_RAD_S = 0.5  # largest turn while it walks
-TURN_RAD_S = 1.5  # turn away from an obstacle
-NEAR_M = 0.14  # from the centre of the robot; the body ends at 0.037 m
-RIGHT, AHEAD, LEFT = 3, 4, 5  # of the eight ranges: 45 degrees to the right, straight ahead, 45 to the left
+LINEAR_M_S = 0.08
+DRIFT_RAD_S = 0.5  # largest angular speed while driving forward
+TURN_RAD_S = 1.5  # angular speed while turning away from an obstacle
+NEAR_M = 0.14  # from the robot's centre; the body radius is 0.037 m
+FRONT_RIGHT, FRONT, FRONT_LEFT = 3, 4, 5  # indices into the eight ranges
 
 
 class RandomWalk:
     def __init__(self, robot):
-        self.turn_sign = 0  # 1 while it turns left, -1 right, 0 while it walks
+        self.turn_sign = 0  # 1 while turning left, -1 while turning right, 0 while driving forward
         self.publisher = rospy.Publisher(robot + "/velocity_controller/cmd_vel", Twist, queue_size=1)
         self.subscriber = rospy.Subscriber(robot + "/proximity", LaserScan, self.walk, queue_size=1)
         rospy.on_shutdown(self.stop)
 
     def walk(self, scan):
-        """Send one command for each scan: no scans, no commands, and the robot stands after 2 s."""
+        """Send one command per scan: if the scans stop, so do the commands, and the robot stops within 2 s."""
         command = Twist()
-        # inf, nothing in range, is further than anything; nan, not calibrated, is not.
-        if all(range_m > NEAR_M for range_m in scan.ranges[RIGHT : LEFT + 1]):
+        # True for inf (nothing in range), false for nan (not calibrated).
+        if all(range_m > NEAR_M for range_m in scan.ranges[FRONT_RIGHT : FRONT_LEFT + 1]):
             self.turn_sign = 0
-            command.linear.x = AHEAD_M_S
+            command.linear.x = LINEAR_M_S
             command.angular.z = random.uniform(-DRIFT_RAD_S, DRIFT_RAD_S)
         else:
-            if self.turn_sign == 0:  # choose a side and keep to it, or a corner holds the robot
-                self.turn_sign = 1 if scan.ranges[LEFT] >= scan.ranges[RIGHT] else -1
+            if self.turn_sign == 0:  # keep turning to the same side, or the robot gets stuck in corners
+                self.turn_sign = 1 if scan.ranges[FRONT_LEFT] >= scan.ranges[FRONT_RIGHT] else -1
             command.angular.z = self.turn_sign * TURN_RAD_S
         self.publisher.publish(command)
 
@@ -43,7 +43,7 @@ class RandomWalk:
 
 def main():
     rospy.init_node("random_walk")
-    RandomWalk(rospy.get_param("~robot", "hero_3"))
+    RandomWalk("hero_%d" % rospy.get_param("~id", 3))
     rospy.spin()
 
 

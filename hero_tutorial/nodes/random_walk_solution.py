@@ -1,5 +1,5 @@
 #!/usr/bin/env python
-"""Lets the light of a robot say what its sensors see: red while something is near, else green."""
+"""Sets the robot's LED from its sensors: red while something is near, otherwise green."""
 
 import rospy
 from sensor_msgs.msg import LaserScan
@@ -11,15 +11,15 @@ GREEN = ColorRGBA(0.0, 1.0, 0.0, 1.0)
 
 
 def main():
-    rospy.init_node("light")
-    robot = rospy.get_param("~robot", "hero_3")
+    rospy.init_node("led_from_proximity")
+    robot = "hero_%d" % rospy.get_param("~id", 3)
     publisher = rospy.Publisher(robot + "/led", ColorRGBA, queue_size=1)
 
-    def shine(scan):
-        # inf is nothing in range; the light goes dark 15 s after the last message, so send with each scan
+    def set_led(scan):
+        # inf means nothing in range. The LED turns off 15 s after the last message, so publish with each scan.
         publisher.publish(RED if any(not range_m > NEAR_M for range_m in scan.ranges) else GREEN)
 
-    rospy.Subscriber(robot + "/proximity", LaserScan, shine, queue_size=1)
+    rospy.Subscriber(robot + "/proximity", LaserScan, set_led, queue_size=1)
     rospy.spin()
 
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python
-"""Prints every number that comes on the topic publisher_node_example."""
+"""Logs every number received on publisher_node_example."""
 
 import rospy
 from std_msgs.msg import Int32
@@ -12,7 +12,7 @@ def print_number(message):
 def main():
     rospy.init_node("subscriber_node")
     rospy.Subscriber("publisher_node_example", Int32, print_number, queue_size=10)
-    rospy.spin()  # waits for Ctrl-C; rospy calls print_number meanwhile
+    rospy.spin()  # blocks until Ctrl-C; rospy calls print_number on its own thread
 
 
 if __name__ == "__main__":

@@ -1,11 +1,11 @@
 #!/usr/bin/env python
-"""Watches the numbers on publisher_node_example: says once a second how many came, and how many are missing."""
+"""Logs once a second how many numbers were received on publisher_node_example, and how many are missing."""
 
 import rospy
 from std_msgs.msg import Int32
 
 
-class GapWatch:
+class GapCounter:
     def __init__(self):
         self.received = 0
         self.missing = 0
@@ -20,8 +20,8 @@ class GapWatch:
 
 
 def main():
-    rospy.init_node("gap_watch")
-    rospy.Subscriber("publisher_node_example", Int32, GapWatch().receive, queue_size=10)
+    rospy.init_node("gap_counter")
+    rospy.Subscriber("publisher_node_example", Int32, GapCounter().receive, queue_size=10)
     rospy.spin()
 
 

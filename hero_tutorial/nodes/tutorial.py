@@ -1,5 +1,5 @@
 #!/usr/bin/env python
-"""Drives a robot slowly ahead: 0.01 m/s, told once a second, until Ctrl-C."""
+"""Drives a robot slowly forward, at 0.01 m/s, until Ctrl-C."""
 
 import contextlib
 
@@ -10,18 +10,18 @@ from rospy.core import is_shutdown_requested
 
 def main():
     rospy.init_node("tutorial")
-    robot = rospy.get_param("~robot", "hero_3")
+    robot = "hero_%d" % rospy.get_param("~id", 3)
     publisher = rospy.Publisher(robot + "/velocity_controller/cmd_vel", Twist, queue_size=1)
 
     def stop():
         publisher.publish(Twist())  # all speeds zero
-        rospy.sleep(0.2)  # time for the message to leave, before the node ends
+        rospy.sleep(0.2)  # lets the message leave before the node exits
 
     rospy.on_shutdown(stop)
     command = Twist()
     command.linear.x = 0.01  # m/s
     rate = rospy.Rate(1)  # Hz
-    while not is_shutdown_requested():  # as is_shutdown, but true already while stop() runs
+    while not is_shutdown_requested():  # unlike is_shutdown, already true while stop() runs
         publisher.publish(command)
         rate.sleep()
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python
-"""Turns a robot to the left by about a quarter of a turn, and ends."""
+"""Turns a robot left by about a quarter turn, then exits."""
 
 import contextlib
 import math
@@ -8,12 +8,12 @@ import rospy
 from geometry_msgs.msg import Twist
 from rospy.core import is_shutdown_requested
 
-TURN_RAD_S = 1.0
+ANGULAR_RAD_S = 1.0
 
 
 def main():
     rospy.init_node("tutorial")
-    robot = rospy.get_param("~robot", "hero_3")
+    robot = "hero_%d" % rospy.get_param("~id", 3)
     publisher = rospy.Publisher(robot + "/velocity_controller/cmd_vel", Twist, queue_size=1)
 
     def stop():
@@ -22,15 +22,15 @@ def main():
 
     rospy.on_shutdown(stop)
     command = Twist()
-    command.angular.z = TURN_RAD_S
+    command.angular.z = ANGULAR_RAD_S
     rate = rospy.Rate(10)  # Hz
     while publisher.get_num_connections() == 0 and not is_shutdown_requested():
-        rate.sleep()  # nobody listens yet: what is published now is lost
-    end = rospy.Time.now() + rospy.Duration(math.pi / 2 / TURN_RAD_S)
+        rate.sleep()  # messages published before a subscriber connects are lost
+    end = rospy.Time.now() + rospy.Duration(math.pi / 2 / ANGULAR_RAD_S)
     while rospy.Time.now() < end and not is_shutdown_requested():
         publisher.publish(command)
         rate.sleep()
-    rospy.loginfo("turned for a quarter")
+    rospy.loginfo("turned a quarter")
 
 
 if __name__ == "__main__":

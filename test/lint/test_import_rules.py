@@ -119,7 +119,7 @@ def test_the_simulator_shares_only_packets_and_payloads_with_the_driver(name):
 @pytest.mark.parametrize(
     "name", modules_below("hero_client") + modules_below("hero_examples") + modules_below("hero_tutorial")
 )
-def test_examples_and_lessons_know_topics_only(name):
+def test_examples_and_tutorials_know_topics_only(name):
     assert not [found for found in imports_of(name) if found.top in ("hero_driver", "hero_sim")]
 
 

@@ -24,7 +24,7 @@ SQUARE_TIMEOUT_S = 150.0
 WALK_S = 30
 
 
-def start_lesson(stage, name, *arguments):
+def start_script(stage, name, *arguments):
     """Start a node of hero_tutorial."""
     return stage.start(["rosrun", "hero_tutorial", name, *arguments])
 
@@ -39,7 +39,7 @@ def odometry(picture):
         with RunningSuite(0) as stage:
             poses = []
             rospy.Subscriber("/odom", Odometry, lambda message: poses.append(message.pose.pose.position), queue_size=10)
-            start_lesson(stage, "odometry_node_solution.py")
+            start_script(stage, "odometry_node_solution.py")
             launch = ["roslaunch", "--no-summary", "hero_tutorial", "odometry.launch"]
             stage.start(launch, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
             stage.wait_for(lambda: poses and poses[-1].y > 9.99 and poses[-1].x < 0.01, "a square", SQUARE_TIMEOUT_S)
@@ -50,9 +50,9 @@ def odometry(picture):
 
 
 def walk(picture):
-    """The plot that the lesson on recording makes."""
+    """The plot that the tutorial on recording makes."""
     with RunningSuite(1, "first_id:=3") as stage, tempfile.TemporaryDirectory() as folder:
-        start_lesson(stage, "random_walk.py", "_robot:=hero_3")
+        start_script(stage, "random_walk.py", "_id:=3")
         rospy.wait_for_message("/hero_3/odom", Odometry, timeout=30.0)
         bag = folder + "/walk.bag"
         subprocess.run(["rosbag", "record", "-O", bag, "--duration=%d" % WALK_S, "/hero_3/odom"], check=True)

@@ -1,4 +1,4 @@
-"""The square on paper of the lesson on odometry."""
+"""The simulated square of the odometry tutorial."""
 
 import importlib.util
 import math
@@ -13,37 +13,37 @@ STEP_S = 0.01
 
 
 @pytest.fixture(scope="module")
-def find_motion():
+def compute_motion():
     pytest.importorskip("rospy", reason="the script imports rospy")
     spec = importlib.util.spec_from_file_location("odometry_node", str(FILE))
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    return module.find_motion
+    return module.compute_motion
 
 
-def test_the_corners_are_ten_metres_apart_and_the_square_is_closed(find_motion):
-    corners = [find_motion(side * SIDE_S + 1e-6, SIDE_M)[:2] for side in range(5)]
+def test_the_corners_are_ten_metres_apart_and_the_square_is_closed(compute_motion):
+    corners = [compute_motion(side * SIDE_S + 1e-6, SIDE_M)[:2] for side in range(5)]
     for found, right in zip(corners, [(0, 0), (10, 0), (10, 10), (0, 10), (0, 0)]):
         assert found == pytest.approx(right, abs=1e-5)
 
 
-def test_the_heading_turns_left_by_a_quarter_at_each_corner(find_motion):
-    headings = [find_motion((side + 1) * SIDE_S - 1e-6, SIDE_M)[2] for side in range(4)]
+def test_the_robot_turns_left_by_a_quarter_at_each_corner(compute_motion):
+    headings = [compute_motion((side + 1) * SIDE_S - 1e-6, SIDE_M)[2] for side in range(4)]
     assert headings == pytest.approx([math.pi / 2 * (side + 1) for side in range(4)], abs=1e-5)
 
 
-def test_pose_and_speeds_belong_together(find_motion):
-    """The pose changes by what the speeds say, but for the steps in which a side ends."""
+def test_pose_and_velocity_are_consistent(compute_motion):
+    """The pose changes at the given velocity, except in the steps in which a side or a turn ends."""
     jumps = 0
     for step in range(int(4 * SIDE_S / STEP_S)):
-        x_m, y_m, yaw_rad, linear_m_s, turn_rad_s = find_motion(step * STEP_S, SIDE_M)
-        assert (linear_m_s, turn_rad_s) in ((0.6, 0.0), (0.0, 0.2))
-        next_x_m, next_y_m, next_yaw_rad = find_motion((step + 1) * STEP_S, SIDE_M)[:3]
+        x_m, y_m, yaw_rad, linear_m_s, angular_rad_s = compute_motion(step * STEP_S, SIDE_M)
+        assert (linear_m_s, angular_rad_s) in ((0.6, 0.0), (0.0, 0.2))
+        next_x_m, next_y_m, next_yaw_rad = compute_motion((step + 1) * STEP_S, SIDE_M)[:3]
         off_m = math.hypot(
             next_x_m - x_m - linear_m_s * STEP_S * math.cos(yaw_rad),
             next_y_m - y_m - linear_m_s * STEP_S * math.sin(yaw_rad),
         )
-        off_rad = math.remainder(next_yaw_rad - yaw_rad - turn_rad_s * STEP_S, 2 * math.pi)
+        off_rad = math.remainder(next_yaw_rad - yaw_rad - angular_rad_s * STEP_S, 2 * math.pi)
         jumps += off_m > 1e-9 or abs(off_rad) > 1e-9
         assert off_m <= 0.6 * STEP_S
     assert jumps <= 8

@@ -1,4 +1,4 @@
-"""What can be said of the pages of the courses without running them; the rostests run them."""
+"""The pages of the courses, without running them; the rostests run them."""
 
 import re
 import sys
@@ -7,33 +7,33 @@ from pathlib import Path
 import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from lesson_runner import check_same_as, read_blocks
+from tutorial_runner import check_same_as, read_blocks
 
 PACKAGE = Path(__file__).resolve().parents[2]
 TUTORIAL = PACKAGE.parent / "docs" / "tutorial"
 PAGES = sorted(TUTORIAL.glob("*/[0-9]*.md"))
-PARTS = ["Goal", "Do it", "What happens", "Exercise", "Solution"]
+SECTIONS = ["Goal", "Steps", "How it works", "Exercise", "Solution"]
 
 
 def name_of(path):
     return str(path.relative_to(TUTORIAL))
 
 
-def test_both_courses_are_there():
+def test_both_courses_are_complete():
     assert len([page for page in PAGES if page.parent.name == "ros_basics"]) == 7
     assert len([page for page in PAGES if page.parent.name == "hero"]) == 14
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
-def test_every_page_has_the_same_parts_and_says_what_older_versions_get_wrong(page):
+def test_every_page_has_the_same_sections_and_lists_common_mistakes(page):
     outside = re.sub(r"^```.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
-    assert re.findall(r"^## (.*)$", outside, flags=re.MULTILINE) == PARTS
+    assert re.findall(r"^## (.*)$", outside, flags=re.MULTILINE) == SECTIONS
     assert re.match(r"# %d\. " % int(page.name[:2]), outside)
-    assert "**What older versions of this lesson get wrong.**" in outside
+    assert "**Common mistakes.**" in outside
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
-def test_every_block_can_be_read_and_shows_the_file_that_it_names(page):
+def test_every_block_can_be_parsed_and_equals_the_file_it_shows(page):
     for block in read_blocks(page):
         check_same_as(block, page, PACKAGE)
         if block.language == "console":

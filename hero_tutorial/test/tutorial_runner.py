@@ -1,30 +1,29 @@
-"""Runs the pages of a course as a newcomer would: types their commands into terminals, compares what comes.
+"""Runs the pages of a course: types their commands into terminals and compares the output with the page.
 
-A page is plain Markdown. What is run are its ```console blocks:
+A page is plain Markdown. Its ```console blocks are run:
 
     $ command            typed into the terminal
-    > more of it         further lines of the same command
+    > continuation       further lines of the same command
     ^C                   Ctrl-C is pressed
-    anything else        what the terminal must show: "..." stands for any text within a line, a line "..." for any
-                         number of lines
+    anything else        expected output: "..." matches any text within a line, a line "..." any number of lines
 
-A command that is followed by ^C must show its lines first, and is then interrupted; lines after ^C must come last.
-A block that begins with lines shows what a program that was left running has shown when it ends by itself.
-A comment right before a block tells what a reader needs not be told, apart by ";":
+A command that is followed by ^C must print its lines first, and is then interrupted; lines after ^C must come last.
+A block that starts with output lines shows what a program that was left running prints before it ends by itself.
+A comment right before a block holds instructions for the test, separated by ";":
 
-    <!-- lesson: terminal 2 -->            typed into this terminal; without, into terminal 1
-    <!-- lesson: goes on -->               the last command still runs when the block ends; a later ^C in this terminal
-                                           ends it
-    <!-- lesson: presses w -->             this key is pressed when the lines have come
-    <!-- lesson: when COMMAND -->          the test waits until this succeeds: a program that says nothing has come up
-    <!-- lesson: fails -->                 the last command ends with an exit code other than 0
-    <!-- lesson: within 60 s -->           time for each command; without, DEADLINE_S
-    <!-- lesson: instead COMMAND -->       the test types this in place of the block's only command
-    <!-- lesson: not run, REASON -->       not typed
-    <!-- lesson: file PATH -->             the block, of whatever language, is written to this file
-    <!-- lesson: same as FILE -->          the block shows this file of the package, character by character
+    <!-- tutorial: terminal 2 -->          use this terminal instead of terminal 1
+    <!-- tutorial: keeps running -->       the last command is still running when the block ends; a later ^C in this
+                                           terminal ends it
+    <!-- tutorial: presses w -->           press this key when the lines have been printed
+    <!-- tutorial: when COMMAND -->        wait until this command succeeds, e.g. for a program that prints nothing
+    <!-- tutorial: fails -->               the last command exits with a status other than 0
+    <!-- tutorial: within 60 s -->         time limit for each command; the default is DEADLINE_S
+    <!-- tutorial: instead COMMAND -->     type this in place of the block's only command
+    <!-- tutorial: not run, REASON -->     skip the block
+    <!-- tutorial: file PATH -->           write the block, in any language, to this file
+    <!-- tutorial: same as FILE -->        the block must equal this file of the package
 
-This module knows nothing of ROS. Terminals are real ones (pseudo terminals with an interactive bash).
+Independent of ROS. The terminals are pseudo terminals running an interactive bash.
 """
 
 import os
@@ -37,14 +36,14 @@ from typing import Dict, List, NamedTuple, Optional
 import pexpect
 
 DEADLINE_S = 30.0
-"""For one command, or for the lines that it must show; generous, because it only ends what has failed."""
+"""For one command, or for the lines that it must print; generous, because it only ends what has failed."""
 
 ENDING_S = 20.0
 """For the end of a program after Ctrl-C."""
 
 QUIET_S = 0.05
-"""Ctrl-C is pressed when nothing has come for so long. If it comes while the main thread logs a line, rospy hangs: its
-signal handler waits for a lock that the same thread holds. A test is quick enough to hit that, every time."""
+"""Ctrl-C is pressed after this much silence. rospy hangs if the signal arrives while the main thread logs a line: the
+signal handler waits for a lock that this thread holds. A test is fast enough to hit that every time."""
 
 PROMPT_PATTERN = re.compile("\x02([0-9]+)\x03")
 COLUMNS = 400  # so that nothing wraps
@@ -52,19 +51,19 @@ CONTROL_SEQUENCE = re.compile(r"\x1b\][^\x07\x1b]*(?:\x07|\x1b\\)|\x1b\[[0-9;?]*
 
 
 class PageError(Exception):
-    """A page is not written as this module reads it: page, line, and what is wrong."""
+    """A page cannot be parsed: page, line and cause."""
 
 
-class LessonError(Exception):
-    """A command did not do what its page says: page, line, command, expected, got."""
+class TutorialError(Exception):
+    """A command did not do what its page shows: page, line, command, expected and actual output."""
 
 
 class Step(NamedTuple):
-    """One thing that is done in a terminal: a command is typed, or Ctrl-C pressed, and lines are awaited."""
+    """One action in a terminal: type a command or press Ctrl-C, then wait for lines."""
 
     line: int
     command: Optional[str]
-    """None: Ctrl-C is pressed. Empty: the end of what runs is awaited."""
+    """None: press Ctrl-C. Empty: wait for the running program to end."""
     expected: List[str]
 
 
@@ -75,7 +74,7 @@ class Block(NamedTuple):
     language: str
     text: str
     terminal: int
-    goes_on: bool
+    keeps_running: bool
     fails: bool
     presses: Optional[str]
     deadline_s: float
@@ -86,7 +85,7 @@ class Block(NamedTuple):
     same_as: Optional[str]
 
     def read_steps(self, page: Path) -> List[Step]:
-        """Return what is done in the terminal. Raises: PageError."""
+        """Return the actions in the terminal. Raises: PageError."""
         steps: List[Step] = []
         for number, line in enumerate(self.text.splitlines(), self.line + 1):
             if line.startswith("$ "):
@@ -106,56 +105,56 @@ class Block(NamedTuple):
         return steps
 
 
-def read_marks(text: str, where: str) -> Dict[str, object]:
-    """Return what a comment says as values for Block. Raises: PageError for words that are not known."""
-    marks: Dict[str, object] = {}
-    for mark in filter(None, (part.strip() for part in text.split(";"))):
-        number = re.match(r"terminal (\d+)$", mark)
-        seconds = re.match(r"within (\d+) s$", mark)
-        argument = re.match(r"(presses|instead|when|not run,|file|same as) +(.+)$", mark, re.DOTALL)
+def read_instructions(text: str, where: str) -> Dict[str, object]:
+    """Return the instructions of a comment as fields of Block. Raises: PageError for an unknown instruction."""
+    instructions: Dict[str, object] = {}
+    for instruction in filter(None, (part.strip() for part in text.split(";"))):
+        number = re.match(r"terminal (\d+)$", instruction)
+        seconds = re.match(r"within (\d+) s$", instruction)
+        argument = re.match(r"(presses|instead|when|not run,|file|same as) +(.+)$", instruction, re.DOTALL)
         if number:
-            marks["terminal"] = int(number.group(1))
+            instructions["terminal"] = int(number.group(1))
         elif seconds:
-            marks["deadline_s"] = float(seconds.group(1))
-        elif mark in ("goes on", "fails"):
-            marks[mark.replace(" ", "_")] = True
+            instructions["deadline_s"] = float(seconds.group(1))
+        elif instruction in ("keeps running", "fails"):
+            instructions[instruction.replace(" ", "_")] = True
         elif argument:
-            marks[argument.group(1).rstrip(",").replace(" ", "_")] = argument.group(2)
+            instructions[argument.group(1).rstrip(",").replace(" ", "_")] = argument.group(2)
         else:
-            raise PageError("%s: unknown mark '%s'" % (where, mark))
-    return marks
+            raise PageError("%s: unknown instruction '%s'" % (where, instruction))
+    return instructions
 
 
 def read_blocks(page: Path) -> List[Block]:
-    """Return the blocks of a page in their order. Raises: PageError."""
+    """Return the blocks of a page in order. Raises: PageError."""
     blocks = []
-    marks: Dict[str, object] = {}
+    instructions: Dict[str, object] = {}
     lines = page.read_text(encoding="utf-8").splitlines()
     number = 0
     while number < len(lines):
         line = lines[number]
         number += 1
-        mark = re.match(r"<!-- lesson: (.*) -->$", line)
-        if mark:
-            marks = read_marks(mark.group(1), "%s:%d" % (page, number))
+        comment = re.match(r"<!-- tutorial: (.*) -->$", line)
+        if comment:
+            instructions = read_instructions(comment.group(1), "%s:%d" % (page, number))
         elif line.startswith("```"):
             if "```" not in lines[number:]:
-                raise PageError("%s:%d: the block has no end" % (page, number))
+                raise PageError("%s:%d: the block is not closed" % (page, number))
             end = lines.index("```", number)
             text = "".join(inside + "\n" for inside in lines[number:end])
-            blocks.append(make_block(number, line[3:].strip(), text, marks))
+            blocks.append(make_block(number, line[3:].strip(), text, instructions))
             number = end + 1
-            marks = {}
-        elif line.strip() and marks:
-            raise PageError("%s:%d: a mark without a block" % (page, number))
+            instructions = {}
+        elif line.strip() and instructions:
+            raise PageError("%s:%d: an instruction without a block" % (page, number))
     return blocks
 
 
-def make_block(line: int, language: str, text: str, marks: Dict[str, object]) -> Block:
-    """Return a block with what its marks do not say."""
+def make_block(line: int, language: str, text: str, instructions: Dict[str, object]) -> Block:
+    """Return a block, with defaults for what its instructions do not set."""
     values: Dict[str, object] = {
         "terminal": 1,
-        "goes_on": False,
+        "keeps_running": False,
         "fails": False,
         "presses": None,
         "deadline_s": DEADLINE_S,
@@ -165,25 +164,25 @@ def make_block(line: int, language: str, text: str, marks: Dict[str, object]) ->
         "file": None,
         "same_as": None,
     }
-    values.update(marks)
+    values.update(instructions)
     return Block(line=line, language=language, text=text, **values)  # type: ignore[arg-type]
 
 
 def make_pattern(expected: List[str]) -> str:
-    """Return the regular expression of lines, "..." standing for anything."""
+    """Return a regular expression for the lines, in which "..." matches anything."""
     pattern = ""
     for line in expected:
         if line.strip() == "...":
             pattern += r"(?:[^\n]*\n)*?"
         else:
-            # The last three of four dots are the ellipsis: "0...." is 0. and anything.
+            # Of four dots the last three are the ellipsis: "0...." is "0." and anything.
             parts = re.split(r"\.\.\.(?!\.)", line.rstrip())
             pattern += "[^\\n]*".join(re.escape(part) for part in parts) + r"\n"
     return pattern
 
 
 def count_matching(expected: List[str], got: str) -> int:
-    """Return how many of the expected lines the output begins with."""
+    """Return how many of the expected lines the output starts with."""
     count = 0
     while count < len(expected) and re.match(make_pattern(expected[: count + 1]), got):
         count += 1
@@ -191,7 +190,7 @@ def count_matching(expected: List[str], got: str) -> int:
 
 
 def clean_output(raw: str) -> str:
-    """Return what a terminal shows in the end: no control sequences, of lines that were written over the last text."""
+    """Return what the terminal shows in the end, without control sequences and overwritten text."""
     lines = CONTROL_SEQUENCE.sub("", raw).replace("\r\n", "\n").split("\n")
     shown = [line.rstrip("\r").rsplit("\r", 1)[-1].rstrip() for line in lines]
     text = "\n".join(shown).expandtabs(4)
@@ -199,10 +198,10 @@ def clean_output(raw: str) -> str:
 
 
 class Terminal:
-    """One bash in a pseudo terminal, with at most one command that runs."""
+    """One bash in a pseudo terminal, running at most one command."""
 
     def __init__(self, environment: Dict[str, str]) -> None:
-        """Open it in the home directory of the environment."""
+        """Start it in the home directory of the environment."""
         environment = dict(environment, PS1="\x02$?\x03", PS2="", HISTFILE="", TERM="dumb")
         environment.pop("PROMPT_COMMAND", None)
         self._bash = pexpect.spawn(
@@ -216,15 +215,14 @@ class Terminal:
             dimensions=(50, COLUMNS),
         )
         self._raw = ""
-        self.runs = False
         self.exit_code = 0
-        self.runs = True
+        self.is_busy = True
         self.wait_for_end(DEADLINE_S)
 
     def type_line(self, command: str) -> None:
-        """Type a command and Return."""
+        """Type a command and press Return."""
         self._raw = ""
-        self.runs = True
+        self.is_busy = True
         self._bash.sendline(command)
 
     def press(self, key: str) -> None:
@@ -232,67 +230,67 @@ class Terminal:
         self._bash.send(key)
 
     def interrupt(self) -> bool:
-        """Press Ctrl-C in a moment of silence, and forget what was shown; return False if nothing runs any more."""
+        """Press Ctrl-C in a moment of silence and discard the output; return False if nothing is running."""
         deadline_s = time.monotonic() + ENDING_S
         while self._read(QUIET_S) and time.monotonic() < deadline_s:
             continue
-        if self.runs:
+        if self.is_busy:
             self._raw = ""
             self._bash.sendintr()
-        return self.runs
+        return self.is_busy
 
     @property
     def output(self) -> str:
-        """What the command has shown so far."""
+        """What the command has printed so far."""
         return clean_output(self._raw)
 
     def _read(self, timeout_s: float) -> bool:
-        """Take in what has come, and see whether the command has ended; return whether anything came."""
+        """Read new output and notice the end of the command; return whether anything was read."""
         try:
             self._raw += self._bash.read_nonblocking(65536, timeout_s)
         except pexpect.TIMEOUT:
             return False
         except pexpect.EOF:
-            raise LessonError("the terminal was closed") from None
+            raise TutorialError("the terminal was closed") from None
         ended = PROMPT_PATTERN.search(self._raw)
         if ended:
-            self.runs = False
+            self.is_busy = False
             self.exit_code = int(ended.group(1))
             self._raw = self._raw[: ended.start()]
         return True
 
     def wait_for_end(self, timeout_s: float) -> bool:
-        """Wait for the end of the command; return whether it came."""
+        """Wait for the command to end; return whether it did."""
         deadline_s = time.monotonic() + timeout_s
-        while self.runs and time.monotonic() < deadline_s:
+        while self.is_busy and time.monotonic() < deadline_s:
             self._read(0.2)
-        return not self.runs
+        return not self.is_busy
 
     def wait_for_lines(self, expected: List[str], timeout_s: float) -> bool:
-        """Wait until the output begins with these lines; return whether it does while the command still runs."""
+        """Wait until the output starts with these lines; return whether it does while the command is running."""
         deadline_s = time.monotonic() + timeout_s
-        while self.runs and time.monotonic() < deadline_s:
+        while self.is_busy and time.monotonic() < deadline_s:
             self._read(0.2)
             if count_matching(expected, self.output) == len(expected):
-                return self.runs
+                return self.is_busy
         return False
 
     def close(self) -> None:
-        """Interrupt what runs, and close the terminal."""
-        if self.runs:
+        """Interrupt the running command and close the terminal."""
+        if self.is_busy:
             self._bash.sendintr()
             self.wait_for_end(ENDING_S)
         self._bash.close(force=True)
 
 
 class Course:
-    """The terminals in which the pages of a course are gone through, one after the other, in one home directory."""
+    """The terminals in which the pages of a course run one after the other, sharing one home directory."""
 
     def __init__(self, home: Path, package: Path, changes: Dict[str, str]) -> None:
-        """Begin without terminals.
+        """Start without terminals.
 
-        home: an empty directory. package: what "same as" looks in. changes: text in a block -> what stands there
-        in this run, e.g. the path of an interpreter.
+        home: an empty directory. package: where "same as" looks for files. changes: replacements for text in
+        console blocks, e.g. the path of an interpreter.
         """
         self._environment = dict(os.environ, HOME=str(home))
         self._package = package
@@ -300,7 +298,7 @@ class Course:
         self._terminals: Dict[int, Terminal] = {}
 
     def run_page(self, page: Path) -> None:
-        """Do what the page says. Raises: PageError, LessonError."""
+        """Run a page. Raises: PageError, TutorialError."""
         for block in read_blocks(page):
             check_same_as(block, page, self._package)
             if block.language == "console":
@@ -326,12 +324,12 @@ class Course:
             if step.command is None:
                 self._interrupt(terminal, step, page)
                 continue
-            if terminal.runs != (step.command == ""):
-                state = "busy" if terminal.runs else "idle"
+            if terminal.is_busy != (step.command == ""):
+                state = "busy" if terminal.is_busy else "idle"
                 raise PageError("%s:%d: terminal %d is %s" % (page, step.line, block.terminal, state))
             if step.command:
                 terminal.type_line(step.command)
-            if (last and block.goes_on) or (not last and steps[index + 1].command is None):
+            if (last and block.keeps_running) or (not last and steps[index + 1].command is None):
                 if not terminal.wait_for_lines(step.expected, block.deadline_s):
                     self._fail(page, step, terminal)
                 if last and block.presses:
@@ -356,11 +354,11 @@ class Course:
                 return
             time.sleep(0.1)
         output = result.stdout.decode(errors="replace")
-        raise LessonError("%s:%d: %s: did not succeed in time:\n%s" % (page, block.line, command, output))
+        raise TutorialError("%s:%d: %s: did not succeed in time:\n%s" % (page, block.line, command, output))
 
     def _interrupt(self, terminal: Terminal, step: Step, page: Path) -> None:
-        if not terminal.runs:
-            raise PageError("%s:%d: ^C, but nothing runs in this terminal" % (page, step.line))
+        if not terminal.is_busy:
+            raise PageError("%s:%d: ^C, but nothing is running in this terminal" % (page, step.line))
         ended = terminal.interrupt() and terminal.wait_for_end(ENDING_S)
         if not ended or not re.fullmatch(make_pattern(["...", *step.expected]), terminal.output):
             self._fail(page, step, terminal)
@@ -371,7 +369,7 @@ class Course:
         return text
 
     def _fail(self, page: Path, step: Step, terminal: Terminal) -> None:
-        """Raises: LessonError with all that is known."""
+        """Raises: TutorialError, always."""
         output = terminal.output
         count = count_matching(step.expected, output)
         if step.command is None:
@@ -379,14 +377,14 @@ class Course:
         if count < len(step.expected):
             missing = "%s:%d: %s" % (page.name, step.line + 1 + count, step.expected[count])
         else:
-            missing = "no more lines, and the end of the command with the right exit code"
-        state = "it still runs" if terminal.runs else "it ended with exit code %d" % terminal.exit_code
-        raise LessonError(
+            missing = "no more lines, and the right exit status"
+        state = "still running" if terminal.is_busy else "ended with exit status %d" % terminal.exit_code
+        raise TutorialError(
             "%s:%d: $ %s\n  expected: %s\n  got (%s):\n%s"
             % (
                 page,
                 step.line,
-                "^C" if step.command is None else step.command or "(what was left running)",
+                "^C" if step.command is None else step.command or "(the program that was left running)",
                 missing,
                 state,
                 "".join("    %s\n" % line for line in output.splitlines()[-60:]),
@@ -394,15 +392,15 @@ class Course:
         )
 
     def close(self) -> None:
-        """End everything that runs, last opened first."""
+        """End everything that is running, in reverse order."""
         for terminal in reversed(list(self._terminals.values())):
             terminal.close()
         self._terminals.clear()
 
 
 def check_same_as(block: Block, page: Path, package: Path) -> None:
-    """Raises: LessonError if the block does not show the file that it says it shows."""
+    """Raises: TutorialError if the block differs from the file that it is marked as."""
     if block.same_as is None:
         return
     if block.text != (package / block.same_as).read_text(encoding="utf-8"):
-        raise LessonError("%s:%d: the block differs from %s" % (page, block.line, package / block.same_as))
+        raise TutorialError("%s:%d: the block differs from %s" % (page, block.line, package / block.same_as))

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Goes through the pages of one course: ROS master of the rostest, simulator, real commands in real terminals."""
+"""Runs the pages of one course with the simulator: real commands in real terminals."""
 
 import os
 import sys
@@ -10,7 +10,7 @@ from pathlib import Path
 import rostest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from lesson_runner import Course
+from tutorial_runner import Course
 
 from hero_test.processes import find_free_port
 
@@ -19,7 +19,7 @@ PAGES = PACKAGE.parent / "docs" / "tutorial"
 
 
 def make_changes():
-    """What differs between a reader's machine and a test: which python, where the suite is built, which port."""
+    """Return what differs between a reader's machine and this test: interpreter, build directory and port."""
     port = find_free_port()
     return {
         "/usr/bin/python3": sys.executable,
@@ -32,10 +32,10 @@ def make_changes():
     }
 
 
-class LessonsTest(unittest.TestCase):
+class TutorialsTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.home = tempfile.TemporaryDirectory(prefix="lessons_")
+        cls.home = tempfile.TemporaryDirectory(prefix="tutorials_")
         cls.course = Course(Path(cls.home.name), PACKAGE, make_changes())
         cls.failed = None
 
@@ -46,7 +46,7 @@ class LessonsTest(unittest.TestCase):
 
     def run_page(self, page):
         if self.failed:
-            self.fail("not tried, because the pages build on each other: " + self.failed)
+            self.fail("not run, because the pages build on each other: " + self.failed)
         try:
             self.course.run_page(page)
         except Exception as error:
@@ -55,12 +55,12 @@ class LessonsTest(unittest.TestCase):
 
 
 def add_pages(course):
-    """One test for each page, in the order of their names."""
+    """Add one test per page, in the order of the pages."""
     for page in sorted((PAGES / course).glob("[0-9]*.md")):
-        name = "test_%s_does_what_the_page_says" % page.stem
-        setattr(LessonsTest, name, lambda self, page=page: self.run_page(page))
+        name = "test_%s_works_as_shown" % page.stem
+        setattr(TutorialsTest, name, lambda self, page=page: self.run_page(page))
 
 
 if __name__ == "__main__":
     add_pages(sys.argv[1])
-    rostest.rosrun("hero_tutorial", "lessons_%s" % sys.argv[1], LessonsTest, sys.argv)
+    rostest.rosrun("hero_tutorial", "tutorials_%s" % sys.argv[1], TutorialsTest, sys.argv)
