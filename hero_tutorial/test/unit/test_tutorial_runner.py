@@ -71,7 +71,7 @@ def test_a_command_that_does_not_end_is_an_error(try_page):
 
 
 def test_a_program_prints_its_lines_and_is_then_interrupted(try_page):
-    program = "$ (trap 'echo stopped; exit' INT; echo ready; while :; do sleep 0.05; done)"
+    program = "$ (trap 'kill $!; echo stopped; exit' INT; sleep 60 & echo ready; wait)"
     try_page(console(program, "ready", "^C", "stopped"))
     with pytest.raises(TutorialError, match="expected: 05_page.md:5: finished"):
         try_page(console(program, "ready", "^C", "finished"))
