@@ -1,8 +1,8 @@
-"""Free space on a disk -> whether a recording may begin or go on. Reads the file system, writes nothing."""
+"""Decides from the free space of a disk whether a recording may start or go on. Writes no files."""
 
 import os
 import shutil
-from typing import Callable, Optional
+from typing import Optional
 
 from .errors import RecordingError
 
@@ -14,66 +14,34 @@ def read_free_mb(folder: str) -> float:
     return shutil.disk_usage(folder).free / MB
 
 
-class DiskGuard:
-    """Watches the free space of one folder.
+def prepare_folder(folder: str, limit_mb: float) -> float:
+    """Create a folder if it is missing, and return what is free there (MB).
 
-    Attributes:
-        folder: where the recording goes.
-        limit_mb: recording ends when less than this is free.
+    Raises: RecordingError if it cannot be created or written to, or less than the limit is free.
     """
-
-    def __init__(
-        self, folder: str, limit_mb: float, read_free: Callable[[str], float] = read_free_mb
-    ) -> None:
-        """Watch folder, which may not exist yet; read_free stands for the file system."""
-        self.folder = folder
-        self.limit_mb = limit_mb
-        self._read_free = read_free
-
-    def prepare(self) -> float:
-        """Make the folder and return what is free there (MB).
-
-        Raises: RecordingError if it cannot be made or written to, or too little is free.
-        """
-        try:
-            os.makedirs(self.folder, exist_ok=True)
-        except OSError as error:
-            raise RecordingError(
-                "%s cannot be made: %s; choose another folder" % (self.folder, error.strerror)
-            ) from error
-        if not os.access(self.folder, os.W_OK | os.X_OK):
-            raise RecordingError("%s is not writable; choose another folder" % self.folder)
-        try:
-            free_mb = self._read_free(self.folder)
-        except OSError as error:
-            raise RecordingError(
-                "%s cannot be read: %s; choose another folder" % (self.folder, error.strerror)
-            ) from error
-        if free_mb < self.limit_mb:
-            raise RecordingError(
-                "only %.0f MB are free in %s and the limit is %.0f MB, so nothing is recorded; "
-                "free some space, choose another folder, or lower min_free_mb"
-                % (free_mb, self.folder, self.limit_mb)
-            )
-        return free_mb
-
-    def read_free_above_limit_mb(self) -> Optional[float]:
-        """Return what may still be recorded (MB), None if the folder is gone."""
-        try:
-            return max(0.0, self._read_free(self.folder) - self.limit_mb)
-        except OSError:
-            return None
-
-    def find_reason_to_end(self) -> Optional[str]:
-        """Return why the recording has to end now, in words; None if it may go on."""
-        try:
-            free_mb = self._read_free(self.folder)
-        except OSError as error:
-            return "%s is gone: %s" % (self.folder, error.strerror)
-        if free_mb >= self.limit_mb:
-            return None
-        return "only %.0f MB are left in %s, less than the limit of %.0f MB (min_free_mb)" % (
-            free_mb,
-            self.folder,
-            self.limit_mb,
+    try:
+        os.makedirs(folder, exist_ok=True)
+        free_mb = read_free_mb(folder)
+    except OSError as error:
+        raise RecordingError(
+            "%s cannot be created or read: %s; choose another folder" % (folder, error.strerror)
+        ) from error
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise RecordingError("%s is not writable; choose another folder" % folder)
+    if free_mb < limit_mb:
+        raise RecordingError(
+            "only %.0f MB are free in %s and the limit is %.0f MB, so nothing is recorded; "
+            "free some space, choose another folder, or lower min_free_mb" % (free_mb, folder, limit_mb)
         )
+    return free_mb
+
+
+def find_reason_to_stop(folder: str, limit_mb: float) -> Optional[str]:
+    """Return why a recording in a folder has to stop now, as text; None if it may go on."""
+    try:
+        free_mb = read_free_mb(folder)
+    except OSError as error:
+        return "%s is gone: %s" % (folder, error.strerror)
+    if free_mb >= limit_mb:
+        return None
+    return "only %.0f MB are left in %s, less than the limit of %.0f MB (min_free_mb)" % (free_mb, folder, limit_mb)

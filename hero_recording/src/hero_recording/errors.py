@@ -1,4 +1,4 @@
-"""What the programs of this package end with: one line with the thing, the value and the remedy."""
+"""The error of this package's programs, one line with the thing, the value and the remedy."""
 
 from contextlib import contextmanager
 from typing import Iterator
@@ -11,7 +11,7 @@ class RecordingError(Exception):
 
 
 @contextmanager
-def name_damage(what: str) -> Iterator[None]:
+def explain_bag_errors(what: str) -> Iterator[None]:
     """Turn whatever rosbag raises in the block into one line that begins with what. Raises: RecordingError."""
     try:
         yield

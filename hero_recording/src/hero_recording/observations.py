@@ -1,10 +1,12 @@
-"""Messages of a recording -> what was seen of each robot, as arrays. Pure: messages are taken as they are.
+"""Collects what a recording tells of each robot into arrays. Pure: messages are read by their fields.
 
-Times are the recorder's, seconds since 1970; stamps are the robot's clock, which the driver keeps in step.
+Times are the recorder's, seconds since 1970; stamps are the robot's clock, which the driver synchronizes.
 """
 
 import math
-from typing import Any, Dict, Iterable, List, NamedTuple, Optional, Protocol, Set, Tuple
+from typing import Any, Dict, Iterable, List, NamedTuple, Optional, Set, Tuple
+
+from hero_client.readings import yaw_of
 
 from .series import Series
 from .topics import (
@@ -15,6 +17,7 @@ from .topics import (
     STATIC_TRANSFORMS_TOPIC,
     TRANSFORMS_TYPES,
     VELOCITY_COMMAND,
+    Message,
     find_robot_topic,
     is_arena_topic,
     is_fleet_topic,
@@ -27,17 +30,8 @@ STATE_NAMES = {0: "joining", 1: "ready", 2: "away", 3: "refused"}
 """Of hero_msgs/Robot."""
 
 
-class Message(Protocol):
-    """What of a recorded message is looked at."""
-
-    topic: str
-    type: str
-    content: Any
-    time_s: float
-
-
 class Origin(NamedTuple):
-    """Where the odom frame of a robot lies from time_s on."""
+    """Pose of a robot's odom frame from time_s on."""
 
     time_s: float
     x_m: float
@@ -46,7 +40,7 @@ class Origin(NamedTuple):
 
 
 class StateReport(NamedTuple):
-    """What the driver said of a robot."""
+    """State of a robot as its driver reported it."""
 
     time_s: float
     state: str
@@ -54,18 +48,18 @@ class StateReport(NamedTuple):
 
 
 class RobotObservations:
-    """What was seen of one robot.
+    """The recorded data of one robot.
 
     Attributes:
-        odometry, ground_truth: rows of arrival s, stamp s, x m, y m, yaw rad, linear m/s, turn rad/s.
+        odometry, ground_truth: rows of arrival s, stamp s, x m, y m, yaw rad, linear m/s, angular rad/s.
         encoder: rows of arrival s, left ticks, right ticks.
-        commands: rows of arrival s, linear m/s, turn rad/s, of both controllers.
-        origins: where its odom frame lies in the frame that all robots share.
+        commands: rows of arrival s, linear m/s, angular rad/s, of both controllers.
+        origins: poses of its odom frame in the frame that all robots share.
         states: reports of the driver.
     """
 
     def __init__(self) -> None:
-        """Begin empty."""
+        """Start empty."""
         self.odometry = Series(2, 5)
         self.ground_truth = Series(2, 5)
         self.encoder = Series(3, 0)  # ticks grow beyond seven digits in some hours
@@ -74,24 +68,24 @@ class RobotObservations:
         self.states: List[StateReport] = []
 
     @property
-    def left_out(self) -> int:
-        """How many messages hold numbers that make no sense."""
-        return sum(series.left_out for series in (self.odometry, self.ground_truth, self.commands))
+    def skipped(self) -> int:
+        """Number of messages with absurd numbers."""
+        return sum(series.skipped for series in (self.odometry, self.ground_truth, self.commands))
 
 
 class Observations:
-    """What was seen of all robots.
+    """The recorded data of all robots.
 
     Attributes:
         robots: by id.
         walls_m: segments x1 y1 x2 y2 of the arena.
         circles_m: round obstacles x y radius.
-        shared_frame: name of the frame in which origins are; empty if the recording holds none.
-        fleet_times_s: when the driver reported.
+        shared_frame: frame of the origins; empty if none were recorded.
+        fleet_times_s: times of the driver's reports.
     """
 
     def __init__(self, robot_ids: Optional[Set[int]] = None) -> None:
-        """Begin empty; robot_ids: look at these only, None at all."""
+        """Start empty; robot_ids None: all robots."""
         self._robot_ids = robot_ids
         self.robots: Dict[int, RobotObservations] = {}
         self.walls_m: List[Tuple[float, float, float, float]] = []
@@ -100,7 +94,7 @@ class Observations:
         self.fleet_times_s: List[float] = []
 
     def wants(self, topic: str, message_type: str) -> bool:
-        """Return whether receive() has a use for a topic."""
+        """Return whether receive() uses a topic."""
         found = find_robot_topic(topic, message_type)
         if found is not None:
             kinds = (ODOMETRY, GROUND_TRUTH, ENCODER, VELOCITY_COMMAND, POSITION_COMMAND)
@@ -118,10 +112,10 @@ class Observations:
         return self.robots.setdefault(robot_id, RobotObservations())
 
     def receive(self, message: Message) -> None:
-        """Take one message of a topic that wants() takes."""
+        """Store a message of a topic that wants() accepts."""
         found = find_robot_topic(message.topic, message.type)
         if found is not None:
-            self._receive_of_robot(self._robot(found.robot_id), found.kind, message)
+            self._receive_robot_message(self._robot(found.robot_id), found.kind, message)
         elif is_fleet_topic(message.topic, message.type):
             self._receive_fleet(message)
         elif message.topic == STATIC_TRANSFORMS_TOPIC:
@@ -129,17 +123,17 @@ class Observations:
         else:
             self._receive_arena(message.content.markers)
 
-    def _receive_of_robot(self, robot: RobotObservations, kind: str, message: Message) -> None:
+    def _receive_robot_message(self, robot: RobotObservations, kind: str, message: Message) -> None:
         content = message.content
         if kind in (ODOMETRY, GROUND_TRUTH):
-            pose, twist = content.pose.pose, content.twist.twist
+            position, twist = content.pose.pose.position, content.twist.twist
             series = robot.odometry if kind == ODOMETRY else robot.ground_truth
             series.add(
                 message.time_s,
                 content.header.stamp.to_sec(),
-                pose.position.x,
-                pose.position.y,
-                yaw_of(pose.orientation),
+                position.x,
+                position.y,
+                yaw_of(content.pose.pose.orientation),
                 twist.linear.x,
                 twist.angular.z,
             )
@@ -162,12 +156,12 @@ class Observations:
             if frame != "odom" or not number.isdecimal() or not self._wants_robot(int(number)):
                 continue
             self.shared_frame = transform.header.frame_id.strip("/")
-            place = transform.transform.translation
-            origin = Origin(message.time_s, place.x, place.y, yaw_of(transform.transform.rotation))
+            translation = transform.transform.translation
+            origin = Origin(message.time_s, translation.x, translation.y, yaw_of(transform.transform.rotation))
             if not all(map(math.isfinite, origin)):
                 continue
             origins = self._robot(int(number)).origins
-            # Latched messages are recorded again at the begin of every file of a split.
+            # Latched messages are recorded again at the start of every file of a split.
             if not origins or origins[-1][1:] != origin[1:]:
                 origins.append(origin)
 
@@ -182,8 +176,3 @@ class Observations:
                 self.walls_m.append((x_m - half_x_m, y_m - half_y_m, x_m + half_x_m, y_m + half_y_m))
             elif marker.type == CYLINDER:
                 self.circles_m.append((x_m, y_m, marker.scale.x / 2.0))
-
-
-def yaw_of(quaternion: Any) -> float:
-    """Return the turn about z of a quaternion that turns about z only (rad, -pi to pi)."""
-    return math.remainder(2.0 * math.atan2(quaternion.z, quaternion.w), 2.0 * math.pi)

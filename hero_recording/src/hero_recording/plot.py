@@ -1,4 +1,4 @@
-"""Program plot: bags -> figures of all robots, and a table in words.
+"""Program plot: draws figures of all robots in bags, and prints a table.
 
 rosrun hero_recording plot hero_2026-11-21-10-00-00_0.bag
 """
@@ -7,51 +7,43 @@ import argparse
 import importlib.util
 import os
 import sys
-from typing import Callable, Dict, List, Optional, Sequence
+from typing import List, Optional, Sequence
 
 from hero_client import command_line
-from hero_client.program import ProgramError, parse_robot_ids
 
 from . import analysis
 from .bags import BagSet
 from .errors import RecordingError
-from .observations import Observations
-from .progress import Progress
+from .observations import Observations, RobotObservations
+from .options import list_of, robot_ids
 
 FIGURES = ("paths", "speeds", "delays", "connections", "errors")
-FORMATS = ("png", "pdf")
-SMALLEST_WAY_M = 0.05
-"""Below this a share of the way says nothing."""
+SHORTEST_DISTANCE_M = 0.05
+"""An error is not given as a share of less than this."""
+
+HEADINGS = (
+    "ROBOT",
+    "DISTANCE",
+    "ODOM",
+    "LONGEST GAP",
+    "MESSAGE DELAY",
+    "99 %",
+    "COMMAND TO MOTION",
+    "RECONNECTS",
+    "FINAL ERROR",
+)
 
 
 def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     """Read the command line."""
-    parser = argparse.ArgumentParser(prog="plot", description="Draw what bags hold of the robots.")
+    parser = argparse.ArgumentParser(prog="plot", description="Plot recordings of robots.")
     parser.add_argument("bags", nargs="+", metavar="FILE.bag", help="the bags of one recording, in any order")
-    parser.add_argument("--robots", default="all", help="ids, e.g. '0 1 2' or 0-3 (all)")
-    parser.add_argument(
-        "--figures",
-        default=",".join(FIGURES),
-        metavar="LIST",
-        help="which, with commas between (%(default)s)",
-    )
-    parser.add_argument(
-        "--format", choices=FORMATS, default="png", help="png: a file each; pdf: one file (png)"
-    )
-    parser.add_argument("--out", metavar="PREFIX", help="begin of the files' names (the first bag's name)")
-    parser.add_argument(
-        "--arena", metavar="FILE", help="arena file of hero_sim to draw, for recordings without one"
-    )
-    options = parser.parse_args(arguments)
-    options.figures = [name for name in options.figures.split(",") if name]
-    for name in options.figures:
-        if name not in FIGURES:
-            parser.error("--figures %s: known are %s" % (name, ",".join(FIGURES)))
-    try:
-        options.robots = parse_robot_ids("robots", options.robots)
-    except ProgramError as error:
-        parser.error(str(error).replace("~", "--"))
-    return options
+    parser.add_argument("--robots", type=robot_ids, default="all", help="ids, e.g. '0 1 2' or 0-3 (all)")
+    every, text = ",".join(FIGURES), "which, separated by commas (%(default)s)"
+    parser.add_argument("--figures", type=list_of(FIGURES), default=every, metavar="LIST", help=text)
+    parser.add_argument("--format", choices=("png", "pdf"), default="png", help="a PNG for each, or one PDF (png)")
+    parser.add_argument("--out", metavar="PREFIX", help="prefix of the file names (the first bag's name)")
+    return parser.parse_args(arguments)
 
 
 def observe(options: argparse.Namespace, bags: BagSet) -> Observations:
@@ -59,36 +51,18 @@ def observe(options: argparse.Namespace, bags: BagSet) -> Observations:
     observations = Observations(None if options.robots is None else set(options.robots))
     bags.read(observations.wants, observations.receive)
     if not observations.robots:
-        wanted = (
-            "" if options.robots is None else " with these ids (%s)" % ", ".join(map(str, options.robots))
-        )
+        wanted = "" if options.robots is None else " with these ids (%s)" % ", ".join(map(str, options.robots))
         raise RecordingError(
-            "%s: no robot%s in it; its topics: %s"
-            % (", ".join(bags.paths), wanted, ", ".join(sorted(bags.topics)[:8]) or "none")
+            "%s: no robot%s in it; its topics: %s" % (", ".join(bags.paths), wanted, bags.describe_topics())
         )
-    if options.arena is not None:
-        read_arena(options.arena, observations)
     return observations
 
 
-def read_arena(path: str, observations: Observations) -> None:
-    """Take walls and obstacles from an arena file. Raises: RecordingError."""
-    from hero_sim.errors import SimulatorError
-    from hero_sim.world.arena_file import load_arena
-
-    try:
-        arena = load_arena(path)
-    except SimulatorError as error:
-        raise RecordingError(str(error)) from error
-    observations.walls_m = [tuple(row) for row in arena.segments_m.tolist()]
-    observations.circles_m = [tuple(row) for row in arena.circles_m.tolist()]
-
-
 def draw(options: argparse.Namespace, observations: Observations, bags: BagSet) -> List[str]:
-    """Write the figures; return the names of the files. Raises: RecordingError."""
+    """Write the figures; return the paths of the files. Raises: RecordingError."""
     import matplotlib
 
-    matplotlib.use("Agg")  # no display is needed, and none is opened
+    matplotlib.use("Agg")  # works without a display
     from matplotlib.backends.backend_pdf import PdfPages
 
     from .figures import Figures
@@ -97,82 +71,61 @@ def draw(options: argparse.Namespace, observations: Observations, bags: BagSet) 
     if len(bags.paths) > 1:
         names += " and %d more" % (len(bags.paths) - 1)
     drawing = Figures(observations, bags.start_s, bags.end_s, names)
-    makers: Dict[str, Callable[[], Optional[object]]] = {
-        "paths": drawing.draw_paths,
-        "speeds": drawing.draw_speeds,
-        "delays": drawing.draw_delays,
-        "connections": drawing.draw_connections,
-        "errors": drawing.draw_errors,
-    }
-    prefix = options.out or os.path.splitext(bags.paths[0])[0]
-    figures = [(name, makers[name]()) for name in options.figures]
+    figures = [(name, getattr(drawing, "draw_" + name)()) for name in options.figures]
     figures = [(name, figure) for name, figure in figures if figure is not None]
     if not figures:
         raise RecordingError("%s: nothing to draw of %s" % (names, ", ".join(options.figures)))
+    prefix = options.out or os.path.splitext(bags.paths[0])[0]
     try:
         if options.format == "pdf":
-            path = prefix if prefix.endswith(".pdf") else prefix + ".pdf"
-            with PdfPages(path) as pages:
+            paths = [prefix if prefix.endswith(".pdf") else prefix + ".pdf"]
+            with PdfPages(paths[0]) as pages:
                 for _, figure in figures:
                     pages.savefig(figure)
-            return [path]
-        paths = []
-        for name, figure in figures:
-            path = "%s_%s.png" % (prefix, name)
-            figure.savefig(path, dpi=130)
-            paths.append(path)
-        return paths
+        else:
+            paths = ["%s_%s.png" % (prefix, name) for name, _ in figures]
+            for path, (_, figure) in zip(paths, figures):
+                figure.savefig(path, dpi=130)
     except OSError as error:
         raise RecordingError(
             "%s cannot be written: %s; choose another --out" % (error.filename or prefix, error.strerror)
         ) from error
+    return paths
 
 
 def format_table(observations: Observations) -> List[str]:
-    """Return the robots in numbers, a line each."""
-    rows = [
-        [
-            "ROBOT",
-            "WAY",
-            "ODOM",
-            "LONGEST GAP",
-            "MESSAGE DELAY",
-            "99 %",
-            "COMMAND TO MOTION",
-            "RECONNECTS",
-            "ERROR AT THE END",
-        ]
-    ]
-    for robot_id, robot in sorted(observations.robots.items()):
-        summary = analysis.summarise(robot_id, robot)
-        error = format_number("%.0f mm", summary.error_m, 1e3)
-        if summary.error_m is not None and summary.way_m > SMALLEST_WAY_M:
-            error += " (%.1f %% of the way)" % (100.0 * summary.error_m / summary.way_m)
-        rows.append(
-            [
-                "hero_%d" % robot_id,
-                "%.2f m" % summary.way_m,
-                format_number("%.1f Hz", summary.odometry_hz),
-                format_number("%.2f s", summary.longest_gap_s),
-                format_number("%.0f ms", summary.message_delay_s, 1e3),
-                format_number("%.0f ms", summary.slow_message_delay_s, 1e3),
-                format_number("%.0f ms", summary.motion_delay_s, 1e3),
-                format_number("%d", summary.reconnects),
-                error,
-            ]
-        )
-    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    """Return a line for each robot, with headings."""
+    robots = sorted(observations.robots.items())
+    rows = [list(HEADINGS)]
+    rows += [["hero_%d" % robot_id, *format_summary(robot)] for robot_id, robot in robots]
+    widths = [max(map(len, column)) for column in zip(*rows)]
     lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths)).rstrip() for row in rows]
-    for robot_id, robot in sorted(observations.robots.items()):
-        if robot.left_out:
-            lines.append(
-                "hero_%d: %d messages left out: they hold nan, inf or absurd numbers" % (robot_id, robot.left_out)
-            )
+    for robot_id, robot in robots:
+        if robot.skipped:
+            lines.append("hero_%d: skipped %d messages with nan, inf or absurd numbers" % (robot_id, robot.skipped))
     return lines
 
 
+def format_summary(robot: RobotObservations) -> List[str]:
+    """Return the cells of a robot."""
+    summary = analysis.summarize(robot)
+    error = format_number("%.0f mm", summary.error_m, 1e3)
+    if summary.error_m is not None and summary.distance_m > SHORTEST_DISTANCE_M:
+        error += " (%.1f %% of the distance)" % (100.0 * summary.error_m / summary.distance_m)
+    return [
+        "%.2f m" % summary.distance_m,
+        format_number("%.1f Hz", summary.odometry_hz),
+        format_number("%.2f s", summary.longest_gap_s),
+        format_number("%.0f ms", summary.message_delay_s, 1e3),
+        format_number("%.0f ms", summary.slow_message_delay_s, 1e3),
+        format_number("%.0f ms", summary.motion_delay_s, 1e3),
+        format_number("%d", summary.reconnects),
+        error,
+    ]
+
+
 def format_number(text: str, value: Optional[float], factor: float = 1.0) -> str:
-    """Return a number in words, "-" for one that is not known."""
+    """Return a number as text, "-" for an unknown one."""
     return "-" if value is None else text % (value * factor)
 
 
@@ -182,11 +135,10 @@ def run(options: argparse.Namespace) -> None:
         raise RecordingError(
             "matplotlib is missing; install it: apt install python3-matplotlib, or pip install matplotlib"
         )
-    bags = BagSet(options.bags, Progress())
+    bags = BagSet(options.bags)
     observations = observe(options, bags)
     print("\n".join(format_table(observations)))
-    for path in draw(options, observations, bags):
-        print(path)
+    print("\n".join(draw(options, observations, bags)))
 
 
 def main() -> None:

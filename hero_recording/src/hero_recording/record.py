@@ -1,7 +1,7 @@
-"""Program record: topics of all robots -> bags, split by size, until Ctrl-C or until the disk is nearly full.
+"""Program record: records topics of all robots into bags, until Ctrl-C or until the disk is nearly full.
 
-rosbag's own recorder writes; this program gives it the right topics, watches the disk, and sees to it that every
-file is closed when it ends.
+rosbag's own recorder writes; this program tells it the topics, watches the disk, and makes sure that every file is
+closed at the end.
 """
 
 import argparse
@@ -20,63 +20,35 @@ import rosgraph
 import roslib.packages
 
 from hero_client import command_line
-from hero_client.program import ProgramError, parse_robot_ids
-from hero_client.ros_node import NodeError, check_master
+from hero_client.ros_node import NodeError, ask_master, check_master
 
-from .disk_guard import MB, DiskGuard
+from .disk_guard import MB, find_reason_to_stop, prepare_folder
 from .errors import RecordingError
-from .mending import ACTIVE_SUFFIX, mend_bag
-from .progress import Progress
+from .options import robot_ids
+from .repair import ACTIVE_SUFFIX, repair_bag
 from .topics import make_patterns
 
 CHECK_PERIOD_S = 0.5
-"""Between two looks at the disk; fifty robots fill 3 MB in that time, uncompressed."""
+"""Between two checks of the disk; fifty robots fill 3 MB in that time, uncompressed."""
 
 REPORT_PERIOD_S = 60.0
 SILENCE_S = 15.0
-"""So long after the start an empty recording is worth a line."""
+"""An empty recording is reported this long after the start."""
 
 CLOSING_S = 10.0
-"""The recorder has to close its files within this; roslaunch itself waits 15 s before it gets rough."""
+"""The recorder has to close its files within this; roslaunch waits 15 s before it sends SIGTERM."""
 
 EMPTY_BAG_BYTES = 10000
-"""A bag without messages is a header of 4 kB and no more than the names of topics."""
-
-
-class Recorder:
-    """rosbag's recorder as a child process, which is told to end and then waited for."""
-
-    def __init__(self, command: Sequence[str]) -> None:
-        """Start it."""
-        # Its stdout names every topic that it subscribes to; warnings and errors go to stderr.
-        self._process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
-
-    def wait(self, timeout_s: float) -> Optional[int]:
-        """Return its exit code, None if it still runs after timeout_s."""
-        try:
-            return self._process.wait(timeout_s)
-        except subprocess.TimeoutExpired:
-            return None
-
-    def close(self) -> int:
-        """End it: gently, then less so; return its exit code. Safe twice."""
-        for ending in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL):
-            if self._process.poll() is None:
-                self._process.send_signal(ending)
-            code = self.wait(CLOSING_S if ending is signal.SIGINT else 2.0)
-            if code is not None:
-                return code
-        return -signal.SIGKILL
+"""A bag without messages is a header of 4 kB and at most the names of topics."""
 
 
 class Recording:
-    """One recording: its files, its end, what is said about it."""
+    """One recording: its files, its end, and its messages to the user."""
 
     def __init__(self, options: argparse.Namespace, recorder_arguments: Sequence[str]) -> None:
         """Prepare; recorder_arguments are ROS's own, such as __name:=. Raises: RecordingError."""
         self._options = options
-        self._guard = DiskGuard(options.folder, options.min_free_mb)
-        self._free_mb = self._guard.prepare()
+        self._free_mb = prepare_folder(options.folder, options.min_free_mb)
         self._pattern = os.path.join(glob.escape(options.folder), options.name + "_[0-9]*.bag*")
         self._old_files: Set[str] = set(glob.glob(self._pattern))
         self._command = make_command(options, recorder_arguments)
@@ -99,14 +71,11 @@ class Recording:
         """Record until something ends it; return the exit code."""
         for path in sorted(self._old_files):
             if path.endswith(ACTIVE_SUFFIX):
-                say(
-                    "%s was cut off, or another recording writes it; to mend it: record --mend %s"
-                    % (path, path)
-                )
+                say("%s was cut off, or is being recorded; to repair it: record --repair %s" % (path, path))
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             signal.signal(number, self._receive_signal)
         say(
-            "recording to %s, %s are free there, ends by itself when less than %s are; Ctrl-C ends it"
+            "recording to %s until Ctrl-C; %s are free, stops by itself below %s"
             % (
                 os.path.join(self._options.folder, self._options.name + "_*.bag"),
                 format_size(self._free_mb * MB),
@@ -114,29 +83,30 @@ class Recording:
             )
         )
         start_s = time.monotonic()
-        recorder = Recorder(self._command)
-        reason, code = None, None
+        # Its stdout names every topic that it subscribes to; warnings and errors go to stderr.
+        recorder = subprocess.Popen(self._command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+        reason = None
         try:
             reason = self._watch(recorder, start_s)
         finally:
-            code = recorder.close()
-            mended = self._mend_leftovers()
-        self._summarise(time.monotonic() - start_s)
+            code = end_process(recorder)
+            repaired = self._repair_leftovers()
+        self._summarize(time.monotonic() - start_s)
         if reason is not None:
-            command_line.complain("ended: " + reason)
+            command_line.complain("stopped: " + reason)
             return 1
-        if mended or code not in (0, -signal.SIGINT, -signal.SIGTERM):
-            command_line.complain("rosbag's recorder ended badly (exit code %s); its last lines say why" % code)
+        if repaired or code not in (0, -signal.SIGINT, -signal.SIGTERM):
+            command_line.complain("rosbag's recorder failed (exit code %s); its last lines tell why" % code)
             return 1
         return 0
 
-    def _watch(self, recorder: Recorder, start_s: float) -> Optional[str]:
-        """Wait for the end; return its reason if it is not one that was wished for."""
+    def _watch(self, recorder: "subprocess.Popen[bytes]", start_s: float) -> Optional[str]:
+        """Wait for the end; return the reason if the disk forced it."""
         next_report_s = start_s + SILENCE_S
         while self._end_signal is None:
-            if recorder.wait(CHECK_PERIOD_S) is not None:
+            if wait_for_exit(recorder, CHECK_PERIOD_S) is not None:
                 return None
-            reason = self._guard.find_reason_to_end()
+            reason = find_reason_to_stop(self._options.folder, self._options.min_free_mb)
             if reason is not None:
                 return reason
             now_s = time.monotonic()
@@ -148,57 +118,58 @@ class Recording:
         return None
 
     def _report(self, elapsed_s: float) -> None:
-        files = self._find_files()
-        sizes = sum(files.values())
-        if sizes <= EMPTY_BAG_BYTES:
-            say("nothing came in %.0f s: does the driver run, has a robot joined?" % elapsed_s)
-            return
-        text = "%s in %d file%s after %s" % (
-            format_size(sizes),
-            len(files),
-            "" if len(files) == 1 else "s",
-            format_time(elapsed_s),
-        )
-        free_mb = self._guard.read_free_above_limit_mb()
-        if not self._options.max_files and free_mb is not None:
-            text += ", space for about %s more" % format_time(free_mb * MB / (sizes / elapsed_s))
-        say(text)
+        sizes = self._find_files().values()
+        if sum(sizes) <= EMPTY_BAG_BYTES:
+            say("nothing received in %.0f s: is the driver running, has a robot joined?" % elapsed_s)
+        else:
+            say("%s in %d files after %.0f s" % (format_size(sum(sizes)), len(sizes), elapsed_s))
 
-    def _mend_leftovers(self) -> bool:
-        """Mend what the recorder could not close; return whether there was anything."""
+    def _repair_leftovers(self) -> bool:
+        """Repair what the recorder could not close; return whether there was anything."""
         leftovers = [path for path in self._find_files() if path.endswith(ACTIVE_SUFFIX)]
         for path in leftovers:
             try:
-                say("mended %s" % mend_bag(path, Progress()))
+                say(repair_bag(path))
             except RecordingError as error:
                 command_line.complain(str(error))
         return bool(leftovers)
 
-    def _summarise(self, elapsed_s: float) -> None:
+    def _summarize(self, elapsed_s: float) -> None:
         files = self._find_files()
         if sum(files.values()) <= EMPTY_BAG_BYTES:
-            say("nothing was recorded: no robot, no driver was heard")
+            say("nothing was recorded: no robot and no driver published anything")
         for path, size in files.items():
             say("%s  %s" % (path, format_size(size)))
-        say("%s in %s" % (format_size(sum(files.values())), format_time(elapsed_s)))
+        say("%s in %.0f s" % (format_size(sum(files.values())), elapsed_s))
 
 
 def format_size(size: float) -> str:
-    """Return a size in words."""
+    """Return a number of bytes as text."""
     return "%.1f GB" % (size / 1e9) if size >= 1e9 else "%.1f MB" % (size / 1e6)
 
 
-def format_time(duration_s: float) -> str:
-    """Return a duration in words."""
-    if duration_s < 120.0:
-        return "%.0f s" % duration_s
-    if duration_s < 7200.0:
-        return "%.0f min" % (duration_s / 60.0)
-    return "%.0f h" % (duration_s / 3600.0)
+def wait_for_exit(process: "subprocess.Popen[bytes]", timeout_s: float) -> Optional[int]:
+    """Return the exit code of a process, None if it still runs after timeout_s."""
+    try:
+        return process.wait(timeout_s)
+    except subprocess.TimeoutExpired:
+        return None
+
+
+def end_process(process: "subprocess.Popen[bytes]") -> int:
+    """End a process, by force if SIGINT does not, and return its exit code."""
+    for number, timeout_s in ((signal.SIGINT, CLOSING_S), (signal.SIGTERM, 2.0)):
+        if process.poll() is None:
+            process.send_signal(number)
+        code = wait_for_exit(process, timeout_s)
+        if code is not None:
+            return code
+    process.kill()
+    return process.wait()
 
 
 def say(text: str) -> None:
-    """Write a line for people; the recording goes on where nobody reads it."""
+    """Write a line; the recording goes on where nobody reads it."""
     command_line.say("record: " + text)
 
 
@@ -220,40 +191,41 @@ def make_command(options: argparse.Namespace, recorder_arguments: Sequence[str])
     return [*command, *make_patterns(options.robots, options.raw, options.topics), *recorder_arguments]
 
 
+def read_launch_options(ros_arguments: Sequence[str]) -> List[str]:
+    """Return the private parameters of the node that a launch file starts, as command line options.
+
+    Raises: NodeError if the ROS master does not answer.
+    """
+    name = rosgraph.names.load_mappings(ros_arguments).get("__name")
+    if name is None:
+        return []
+    namespace = rosgraph.names.make_caller_id(name)
+    parameters = ask_master("getParam", namespace) if ask_master("hasParam", namespace) else {}
+    options = []
+    for key, value in sorted(parameters.items()):
+        if value is not False:  # a flag is given or left out
+            options.append("--" + key.replace("_", "-") + ("" if value is True else "=%s" % value))
+    return options
+
+
 def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     """Read the command line."""
-    parser = argparse.ArgumentParser(prog="record", description="Record all robots into bags, split by size.")
-    parser.add_argument("--folder", default=".", help="where the bags go (here); it is made if need be")
-    parser.add_argument("--name", default="hero", help="begin of the files' names, NAME_DATE_0.bag (hero)")
-    parser.add_argument(
-        "--robots", default="all", help="ids, e.g. '0 1 2' or 0-3 (all, also those that join later)"
+    parser = argparse.ArgumentParser(
+        prog="record", description="Record all robots into bags.", allow_abbrev=False
     )
-    parser.add_argument(
-        "--topics", default="", help="more topics to record, regular expressions with spaces between"
-    )
+    parser.add_argument("--folder", default=".", help="where the bags go (here); created if missing")
+    parser.add_argument("--name", default="hero", help="prefix of the file names, NAME_DATE_0.bag (hero)")
+    parser.add_argument("--robots", type=robot_ids, default="all", help="ids, e.g. '0 1 2' or 0-3 (all, including later ones)")
+    parser.add_argument("--topics", default="", help="more topics: regular expressions separated by spaces")
     parser.add_argument("--raw", action="store_true", help="record odom_raw, laser and laser_enable too")
-    parser.add_argument(
-        "--split-mb", type=int, default=256, metavar="MB", help="begin a new file at this size (256)"
-    )
-    parser.add_argument(
-        "--max-files", type=int, default=0, metavar="N", help="keep the newest N files only (0: keep all)"
-    )
-    parser.add_argument(
-        "--min-free-mb", type=float, default=1000.0, metavar="MB", help="end when less is free (1000)"
-    )
-    parser.add_argument(
-        "--compression", choices=("lz4", "bz2", "none"), default="lz4", help="of the bags (lz4)"
-    )
-    parser.add_argument("--seconds", type=float, metavar="S", help="end by itself after S seconds")
-    parser.add_argument(
-        "--mend", nargs="+", metavar="FILE", help="record nothing, but mend recordings that were cut off"
-    )
+    parser.add_argument("--split-mb", type=int, default=256, metavar="MB", help="size of a file (256)")
+    parser.add_argument("--max-files", type=int, default=0, metavar="N", help="keep only the newest N (0: all)")
+    parser.add_argument("--min-free-mb", type=float, default=1000.0, metavar="MB", help="stop below this (1000)")
+    parser.add_argument("--compression", choices=("lz4", "bz2", "none"), default="lz4", help="of the bags (lz4)")
+    parser.add_argument("--seconds", type=float, metavar="S", help="stop after S seconds")
+    parser.add_argument("--repair", nargs="+", metavar="FILE", help="repair recordings that were cut off, and exit")
     options = parser.parse_args(arguments)
-    for name, lowest, highest in (
-        ("split_mb", 1, 100000),
-        ("max_files", 0, 10000),
-        ("min_free_mb", 0.0, 1e9),
-    ):
+    for name, lowest, highest in (("split_mb", 1, 100000), ("max_files", 0, 10000), ("min_free_mb", 0.0, 1e9)):
         value = getattr(options, name)
         if not lowest <= value <= highest:
             parser.error("--%s %s: must be %g..%g" % (name.replace("_", "-"), value, lowest, highest))
@@ -261,10 +233,6 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
         parser.error("--seconds %g: must be more than 0, and finite" % options.seconds)
     if not re.fullmatch(r"[\w][\w.-]*", options.name):
         parser.error("--name %r: must be letters, digits, _ . and -" % options.name)
-    try:
-        options.robots = parse_robot_ids("robots", options.robots)
-    except ProgramError as error:
-        parser.error(str(error).replace("~", "--"))
     options.topics = options.topics.split()
     for pattern in options.topics:
         try:
@@ -276,15 +244,16 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
 
 
 def run(arguments: Sequence[str]) -> int:
-    """Do what the command line says; return the exit code. Raises: RecordingError, NodeError."""
+    """Run with the arguments of the command line; return the exit code. Raises: RecordingError, NodeError."""
     ros_arguments = [word for word in arguments if rosgraph.names.REMAP in word]
-    options = parse_options([word for word in arguments if rosgraph.names.REMAP not in word])
-    if options.mend:
-        for path in options.mend:
-            say("mended %s" % mend_bag(path, Progress()))
+    options = [word for word in arguments if rosgraph.names.REMAP not in word]
+    parsed = parse_options(read_launch_options(ros_arguments) + options)
+    if parsed.repair:
+        for path in parsed.repair:
+            say(repair_bag(path))
         return 0
     check_master()
-    return Recording(options, ros_arguments).run()
+    return Recording(parsed, ros_arguments).run()
 
 
 def main() -> None:

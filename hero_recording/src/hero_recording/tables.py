@@ -1,181 +1,91 @@
-"""Messages of a recording -> rows of one table per robot and kind, columns with units. Pure.
+"""The tables of an export: where the value of each column is found in a message. Pure.
 
-Every table begins with time_s, when the recorder got the message; stamp_s is when the robot measured it, by its own
-clock, which the driver keeps in step. Both are seconds since 1970. Frames and units are those of the topics:
-docs/robot_interface.md.
+Every table begins with time_s, when the recorder received the message; stamp_s is when the robot measured it. The
+columns are explained in docs/recording.md.
 """
 
 import math
+from operator import attrgetter
 from typing import Any, Callable, Dict, List, NamedTuple, Tuple
 
+from hero_client.readings import yaw_of
+
 from . import topics
-from .observations import STATE_NAMES, yaw_of
+from .observations import STATE_NAMES
 
 Row = Tuple[Any, ...]
+Columns = Dict[str, Callable[[Any], Any]]
+"""Name of each column after time_s, and the function that reads its value from a message."""
 
 STATUS = "status"
-"""What the driver says of a robot, once a second and at every change."""
+"""What the driver reports of a robot, once a second and at every change."""
 
-TEXT, NUMBER = "text", "number"
-
-BEAMS = ("behind", "behind_right", "right", "ahead_right", "ahead", "ahead_left", "left", "behind_left")
-"""Of /hero_N/proximity by index: counter-clockwise from straight behind."""
+BEAMS = ("rear", "rear_right", "right", "front_right", "front", "front_left", "left", "rear_left")
+"""Of /hero_N/proximity by index: counter-clockwise from the rear."""
 
 
-class Column(NamedTuple):
-    """A column of a table: name with unit, what it holds, the unit alone, and what it means."""
-
-    name: str
-    kind: str
-    unit: str
-    meaning: str
-
-
-class Table(NamedTuple):
-    """A kind of table: its columns, and what makes a row of a message's content (without time_s)."""
-
-    columns: Tuple[Column, ...]
-    read: Callable[[Any], Row]
-
-
-def _number(name: str, unit: str, meaning: str) -> Column:
-    return Column(name, NUMBER, unit, meaning)
-
-
-TIME = _number("time_s", "s", "when the recorder got it, since 1970")
-_STAMP = _number("stamp_s", "s", "when it was measured, since 1970")
-
-_POSE = (
-    TIME,
-    _STAMP,
-    _number("x_m", "m", "position"),
-    _number("y_m", "m", "position"),
-    _number("yaw_rad", "rad", "heading, counter-clockwise, -pi to pi"),
-    _number("linear_m_s", "m/s", "speed ahead"),
-    _number("turn_rad_s", "rad/s", "turn to the left"),
-)
-_COMMAND = (
-    TIME,
-    _number("linear_m_s", "m/s", "speed ahead"),
-    _number("turn_rad_s", "rad/s", "turn to the left"),
-)
-_ENCODER_FIELDS = (
-    ("left_ticks", "", "since boot or the last set_odom, 288 per turn of the wheel"),
-    ("right_ticks", "", "as left_ticks"),
-    ("left_speed", "m/s", "of the wheel's rim, unfiltered"),
-    ("right_speed", "m/s", "as left_speed"),
-    ("left_speed_filtered", "m/s", "of the wheel's rim, filtered by the robot"),
-    ("right_speed_filtered", "m/s", "as left_speed_filtered"),
-)
-
-
-def _stamp_of(content: Any) -> float:
+def _read_stamp(content: Any) -> float:
     return float(content.header.stamp.to_sec())
 
 
-def _read_pose(content: Any) -> Row:
-    pose, twist = content.pose.pose, content.twist.twist
-    place = pose.position
-    return (_stamp_of(content), place.x, place.y, yaw_of(pose.orientation), twist.linear.x, twist.angular.z)
+def _range_reader(index: int) -> Callable[[Any], Any]:
+    return lambda content: content.ranges[index] if index < len(content.ranges) else math.nan
 
 
-def _read_command(content: Any) -> Row:
-    return (content.linear.x, content.angular.z)
-
-
-def _read_imu(content: Any) -> Row:
-    turn, acceleration = content.angular_velocity, content.linear_acceleration
-    quaternion = content.orientation
-    return (
-        _stamp_of(content),
-        *(quaternion.x, quaternion.y, quaternion.z, quaternion.w),
-        *(turn.x, turn.y, turn.z),
-        *(acceleration.x, acceleration.y, acceleration.z),
-    )
-
-
-TABLES: Dict[str, Table] = {
-    topics.ODOMETRY: Table(_POSE, _read_pose),
-    topics.GROUND_TRUTH: Table(_POSE, _read_pose),
-    topics.ENCODER: Table(
-        (
-            TIME,
-            _STAMP,
-            *(
-                _number(name + ("_m_s" if unit else ""), unit or "ticks", meaning)
-                for name, unit, meaning in _ENCODER_FIELDS
-            ),
-        ),
-        lambda content: (_stamp_of(content), *(getattr(content, name) for name, _, _ in _ENCODER_FIELDS)),
-    ),
-    topics.PROXIMITY: Table(
-        (
-            TIME,
-            _STAMP,
-            *(
-                _number(
-                    beam + "_m",
-                    "m",
-                    "from the robot's centre; inf: nothing, -inf: too close, nan: not calibrated",
-                )
-                for beam in BEAMS
-            ),
-        ),
-        lambda content: (_stamp_of(content), *(*content.ranges, *[math.nan] * len(BEAMS))[: len(BEAMS)]),
-    ),
-    topics.VELOCITY_COMMAND: Table(_COMMAND, _read_command),
-    topics.POSITION_COMMAND: Table(_COMMAND, _read_command),
-    topics.MOTOR_COMMAND: Table(
-        (TIME, _number("left_us", "us", "servo pulse"), _number("right_us", "us", "servo pulse")),
-        lambda content: (content.left_motor_pwm, content.right_motor_pwm),
-    ),
-    topics.LED: Table(
-        (TIME, *(_number(name, "1", "0 to 1") for name in ("red", "green", "blue", "alpha"))),
-        lambda content: (content.r, content.g, content.b, content.a),
-    ),
-    topics.IMU: Table(
-        (
-            TIME,
-            _STAMP,
-            *(_number("orientation_" + axis, "1", "quaternion") for axis in "xyzw"),
-            *(
-                _number("turn_raw_%s" % axis, "counts", "as the robot sends it, not calibrated")
-                for axis in "xyz"
-            ),
-            *(
-                _number("acceleration_raw_%s" % axis, "1000 counts", "as the robot sends it; 8.192 is 1 g")
-                for axis in "xyz"
-            ),
-        ),
-        _read_imu,
-    ),
-    STATUS: Table(
-        (
-            TIME,
-            Column("state", TEXT, "", "joining, ready, away or refused"),
-            Column("address", TEXT, "", "host:port of the robot"),
-            _number("packets_per_s", "1/s", "from the robot, mean of the last second"),
-            _number("bytes_per_s", "bytes/s", "from the robot, mean of the last second"),
-            _number("clock_offset_s", "s", "stamp minus arrival, median of the last second"),
-            _number("reconnects", "1", "since the driver began"),
-            _number("dropped_messages", "1", "since the driver began"),
-            _number("bad_packets", "1", "since the driver began"),
-            Column("last_error", TEXT, "", "empty if there was none"),
-        ),
-        lambda robot: (
-            STATE_NAMES.get(robot.state, str(robot.state)),
-            robot.address,
-            robot.packets_per_s,
-            robot.bytes_per_s,
-            robot.clock_offset,
-            robot.reconnects,
-            robot.dropped_messages,
-            robot.bad_packets,
-            robot.last_error,
-        ),
-    ),
+_POSE: Columns = {
+    "stamp_s": _read_stamp,
+    "x_m": attrgetter("pose.pose.position.x"),
+    "y_m": attrgetter("pose.pose.position.y"),
+    "yaw_rad": lambda content: yaw_of(content.pose.pose.orientation),
+    "linear_m_s": attrgetter("twist.twist.linear.x"),
+    "angular_rad_s": attrgetter("twist.twist.angular.z"),
 }
-"""By kind, which is also the file's name."""
+_TWIST: Columns = {"linear_m_s": attrgetter("linear.x"), "angular_rad_s": attrgetter("angular.z")}
+
+TABLES: Dict[str, Columns] = {
+    topics.ODOMETRY: _POSE,
+    topics.GROUND_TRUTH: _POSE,
+    topics.ENCODER: {
+        "stamp_s": _read_stamp,
+        "left_ticks": attrgetter("left_ticks"),
+        "right_ticks": attrgetter("right_ticks"),
+        "left_speed_m_s": attrgetter("left_speed"),
+        "right_speed_m_s": attrgetter("right_speed"),
+        "left_speed_filtered_m_s": attrgetter("left_speed_filtered"),
+        "right_speed_filtered_m_s": attrgetter("right_speed_filtered"),
+    },
+    topics.PROXIMITY: {
+        "stamp_s": _read_stamp,
+        **{beam + "_m": _range_reader(index) for index, beam in enumerate(BEAMS)},
+    },
+    topics.VELOCITY_COMMAND: _TWIST,
+    topics.POSITION_COMMAND: _TWIST,
+    topics.MOTOR_COMMAND: {"left_us": attrgetter("left_motor_pwm"), "right_us": attrgetter("right_motor_pwm")},
+    topics.LED: {
+        "red": attrgetter("r"),
+        "green": attrgetter("g"),
+        "blue": attrgetter("b"),
+        "alpha": attrgetter("a"),
+    },
+    topics.IMU: {
+        "stamp_s": _read_stamp,
+        **{"orientation_" + axis: attrgetter("orientation." + axis) for axis in "xyzw"},
+        **{"angular_raw_" + axis: attrgetter("angular_velocity." + axis) for axis in "xyz"},
+        **{"acceleration_raw_" + axis: attrgetter("linear_acceleration." + axis) for axis in "xyz"},
+    },
+    STATUS: {
+        "state": lambda robot: STATE_NAMES.get(robot.state, str(robot.state)),
+        "address": attrgetter("address"),
+        "packets_per_s": attrgetter("packets_per_s"),
+        "bytes_per_s": attrgetter("bytes_per_s"),
+        "clock_offset_s": attrgetter("clock_offset"),
+        "reconnects": attrgetter("reconnects"),
+        "dropped_messages": attrgetter("dropped_messages"),
+        "bad_packets": attrgetter("bad_packets"),
+        "last_error": attrgetter("last_error"),
+    },
+}
+"""By kind, which is also the name of the file."""
 
 
 class RobotRow(NamedTuple):
@@ -186,20 +96,18 @@ class RobotRow(NamedTuple):
     row: Row
 
 
-def wants(topic: str, message_type: str) -> bool:
+def is_exported(topic: str, message_type: str) -> bool:
     """Return whether read_rows() makes rows of a topic."""
-    return topics.find_robot_topic(topic, message_type) is not None or topics.is_fleet_topic(
-        topic, message_type
-    )
+    return topics.find_robot_topic(topic, message_type) is not None or topics.is_fleet_topic(topic, message_type)
 
 
 def read_rows(topic: str, message_type: str, content: Any, time_s: float) -> List[RobotRow]:
-    """Return the rows that a message is worth."""
+    """Return the rows that a message adds."""
     found = topics.find_robot_topic(topic, message_type)
     if found is not None:
-        return [RobotRow(found.robot_id, found.kind, (time_s, *TABLES[found.kind].read(content)))]
-    return [
-        RobotRow(robot.id, STATUS, (time_s, *TABLES[STATUS].read(robot)))
-        for robot in content.robots
-        if robot.id >= 0
-    ]
+        return [_read_row(found.robot_id, found.kind, content, time_s)]
+    return [_read_row(robot.id, STATUS, robot, time_s) for robot in content.robots if robot.id >= 0]
+
+
+def _read_row(robot_id: int, kind: str, content: Any, time_s: float) -> RobotRow:
+    return RobotRow(robot_id, kind, (time_s, *(read(content) for read in TABLES[kind].values())))

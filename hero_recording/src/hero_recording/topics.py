@@ -1,10 +1,10 @@
-"""Names of topics -> what a recording keeps and what its readers find in it. Pure.
+"""The topics that are recorded, and what each of them holds. Pure.
 
-The patterns are regular expressions, so that robots that join later are recorded too.
+The patterns are regular expressions: robots that join later are recorded too.
 """
 
 import re
-from typing import List, NamedTuple, Optional, Sequence
+from typing import Any, List, NamedTuple, Optional, Sequence
 
 ODOMETRY = "odometry"
 GROUND_TRUTH = "ground_truth"
@@ -27,10 +27,10 @@ ROBOT_TOPICS = {
     "led": (LED, "std_msgs/ColorRGBA"),
     "imu": (IMU, "sensor_msgs/Imu"),
 }
-"""Below /hero_N/: what it is, and its type. A topic of another type by that name is somebody else's."""
+"""Below /hero_N/: kind and type. A topic of that name with another type belongs to another program."""
 
 RAW_ROBOT_TOPICS = ("odom_raw", "laser", "laser_enable")
-"""What the stock robot sends and odom and proximity are made from."""
+"""The robot's own messages, from which the driver makes odom and proximity."""
 
 FLEET_TYPE = "hero_msgs/RobotArray"
 STATIC_TRANSFORMS_TOPIC = "/tf_static"
@@ -45,11 +45,20 @@ SHARED_PATTERNS = (
     "/hero_driver[^/]*/(robots|stopped)",
     "/(.*/)?arena",
 )
-"""Topics of no single robot: where frames are, log lines, the fleets of all drivers (docs/several_machines.md), the
-simulator's walls."""
+"""Topics of no single robot: frames, log lines, the robots of all drivers (docs/several_machines.md), walls."""
 
 _FLEET_TOPIC = re.compile(r"/hero_driver[^/]*/robots")
 _ROBOT_TOPIC = re.compile(r"/hero_([0-9]{1,9})/(.+)")
+
+
+class Message(NamedTuple):
+    """A message as it was recorded."""
+
+    topic: str
+    type: str
+    content: Any
+    time_s: float
+    """When the recorder received it, since 1970."""
 
 
 class RobotTopic(NamedTuple):
@@ -60,14 +69,14 @@ class RobotTopic(NamedTuple):
 
 
 def make_patterns(robot_ids: Optional[Sequence[int]], with_raw: bool, extra: Sequence[str]) -> List[str]:
-    """Return the regular expressions of the topics to record; robot_ids None: all robots, also later ones."""
+    """Return the regular expressions of the topics to record; robot_ids None: all robots, including later ones."""
     robots = r"[0-9]+" if robot_ids is None else "(%s)" % "|".join(map(str, robot_ids))
     names = [*ROBOT_TOPICS, *(RAW_ROBOT_TOPICS if with_raw else ())]
     return ["/hero_%s/(%s)" % (robots, "|".join(names)), *SHARED_PATTERNS, *extra]
 
 
 def find_robot_topic(topic: str, message_type: str) -> Optional[RobotTopic]:
-    """Return whose topic it is and what it holds; None if it is no robot's, or of another type."""
+    """Return the robot and the kind of a topic; None if it is no robot's, or of another type."""
     match = _ROBOT_TOPIC.fullmatch(topic)
     if match is None:
         return None
@@ -76,10 +85,10 @@ def find_robot_topic(topic: str, message_type: str) -> Optional[RobotTopic]:
 
 
 def is_fleet_topic(topic: str, message_type: str) -> bool:
-    """Return whether a topic holds the robots of a driver."""
+    """Return whether a topic lists the robots of a driver."""
     return message_type == FLEET_TYPE and _FLEET_TOPIC.fullmatch(topic) is not None
 
 
 def is_arena_topic(topic: str, message_type: str) -> bool:
-    """Return whether a topic holds the walls of an arena, as the simulator draws them."""
+    """Return whether a topic holds the walls and obstacles of an arena."""
     return message_type == MARKERS_TYPE and topic.split("/")[-1] == "arena"

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Recordings of simulated robots behind the real driver: what is in them, how they end, what plot and export make."""
+"""Recordings of simulated robots behind the real driver: contents, ends, plot and export."""
 
 import csv
 import glob
@@ -17,7 +17,7 @@ import rospy
 import rostest
 from geometry_msgs.msg import Twist, Vector3
 
-from hero_test.waiting import wait_for
+from hero_test.swarm_watch import wait_for
 
 RECORD = ["rosrun", "hero_recording", "record"]
 TIMEOUT_S = 60.0
@@ -26,8 +26,8 @@ DISK_STEP = 400 * 10**6
 """Bytes that are taken from the disk at once; others on this machine take less in the seconds of the test."""
 
 
-def hears_all_of(namespace):
-    """Return whether there is a subscriber of each topic of a robot that is recorded."""
+def is_subscribed(namespace):
+    """Return whether each recorded topic of a robot has a subscriber."""
     subscribed = dict(rosgraph.Master("/test").getSystemState()[1])
     return all(namespace + topic in subscribed for topic in ROBOT_TOPICS)
 
@@ -62,14 +62,14 @@ class RecordTest(unittest.TestCase):
         return sorted(os.path.basename(path) for path in glob.glob(os.path.join(self.folder, pattern)))
 
     def wait_for_data(self, least=1):
-        """Wait until so many bytes are on the disk; rosbag writes them in chunks."""
+        """Wait until this many bytes are on the disk; rosbag writes them in chunks."""
 
         def has_grown():
             return sum(os.path.getsize(path) for path in glob.glob(self.folder + "/*.bag*")) >= least
 
         wait_for(has_grown, "recording of %d bytes in %s: %s" % (least, self.folder, self.files()))
 
-    def test_a_recording_holds_robots_that_join_later_and_can_be_plotted_and_exported(self):
+    def test_robots_that_join_later_are_recorded_plotted_and_exported(self):
         launch = [
             "roslaunch",
             "--wait",
@@ -98,7 +98,7 @@ class RecordTest(unittest.TestCase):
         publisher = rospy.Publisher("/hero_7/velocity_controller/cmd_vel", Twist, queue_size=1)
         wait_for(publisher.get_num_connections, "hero_7")
         # The recorder asks the ROS master for new topics once in a while; nobody else listens to these.
-        wait_for(lambda: hears_all_of("/hero_7/"), "the recorder listening to hero_7")
+        wait_for(lambda: is_subscribed("/hero_7/"), "subscriptions to hero_7")
         wait_for(lambda: self.files("hero_*_1.bag*"), "second file of a split")
         for _ in range(15):
             publisher.publish(Twist(angular=Vector3(0.0, 0.0, 2.0)))
@@ -144,11 +144,11 @@ class RecordTest(unittest.TestCase):
         subprocess.run(command, cwd=self.folder, check=True, stdout=subprocess.PIPE)
         with open(os.path.join(self.folder, "tables", "hero_7", "odometry.csv"), encoding="utf-8") as file:
             rows = list(csv.DictReader(file))
-        self.assertGreater(max(float(row["turn_rad_s"]) for row in rows), 1.0)
+        self.assertGreater(max(float(row["angular_rad_s"]) for row in rows), 1.0)
         times_s = [float(row["time_s"]) for row in rows]
         self.assertEqual(times_s, sorted(times_s))
 
-    def test_a_recording_whose_recorder_was_killed_is_mended(self):
+    def test_a_recording_whose_recorder_was_killed_is_repaired(self):
         recording = self.start(*RECORD, "--folder", self.folder, "--compression", "none")
         # The first chunk is whole as soon as the second one begins.
         self.wait_for_data(900 * 1024)
@@ -156,13 +156,13 @@ class RecordTest(unittest.TestCase):
         os.kill(int(children.stdout.split()[0]), signal.SIGKILL)
         output = recording.communicate(timeout=TIMEOUT_S)[0].decode()
         self.assertEqual(recording.returncode, 1, output)
-        self.assertIn("mended", output)
+        self.assertIn("repaired", output)
         self.assertEqual(self.files("*.active"), [])
         with rosbag.Bag(glob.glob(self.folder + "/*.bag")[0]) as bag:
             self.assertGreater(bag.get_message_count("/hero_0/odom"), 10)
 
     def fill_the_disk_while_recording(self, stdout=subprocess.PIPE):
-        """Record until the disk gets full; return the recording and the limit (MB) at which it had to end."""
+        """Record until the disk is full; return the recording and the limit (MB) at which it had to stop."""
         free_mb = shutil.disk_usage(self.folder).free / 1e6
         limit_mb = int(free_mb - DISK_STEP / 1e6 / 2)
         recording = self.start(*RECORD, "--folder", self.folder, "--min-free-mb", str(limit_mb), stdout=stdout)
@@ -177,14 +177,14 @@ class RecordTest(unittest.TestCase):
         (name,) = self.files("*.bag")
         rosbag.Bag(os.path.join(self.folder, name)).close()
 
-    def test_a_recording_ends_cleanly_when_the_disk_gets_full(self):
+    def test_a_recording_stops_cleanly_when_the_disk_is_full(self):
         recording, limit_mb = self.fill_the_disk_while_recording()
         output = recording.communicate(timeout=TIMEOUT_S)[0].decode()
         self.assertEqual(recording.returncode, 1, output)
-        self.assertRegex(output, r"ended: only \d+ MB are left in .* less than the limit of %d MB" % limit_mb)
+        self.assertRegex(output, r"stopped: only \d+ MB are left in .* less than the limit of %d MB" % limit_mb)
         self.assert_one_closed_bag()
 
-    def test_the_disk_is_guarded_though_nobody_reads_what_record_prints(self):
+    def test_the_disk_is_watched_with_a_closed_output(self):
         read_end, write_end = os.pipe()
         os.close(read_end)
         with os.fdopen(write_end, "wb") as closed_pipe:
@@ -192,13 +192,13 @@ class RecordTest(unittest.TestCase):
         self.assertEqual(recording.wait(TIMEOUT_S), 1)
         self.assert_one_closed_bag()
 
-    def test_the_disk_is_guarded_though_the_output_of_record_is_full(self):
+    def test_the_disk_is_watched_with_a_full_output(self):
         with open("/dev/full", "wb") as full:
             recording, _ = self.fill_the_disk_while_recording(full)
         self.assertEqual(recording.wait(TIMEOUT_S), 1)
         self.assert_one_closed_bag()
 
-    def test_each_signal_ends_a_recording_that_nobody_reads_with_closed_bags(self):
+    def test_each_signal_ends_a_recording_with_closed_bags(self):
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             with self.subTest(number):
                 recording = self.start(*RECORD, "--folder", self.folder)
@@ -210,7 +210,7 @@ class RecordTest(unittest.TestCase):
                 self.assert_one_closed_bag()
                 os.remove(os.path.join(self.folder, self.files("*.bag")[0]))
 
-    def test_wrong_starts_are_refused_in_one_line_and_record_nothing(self):
+    def test_wrong_options_are_refused_in_one_line(self):
         environment = dict(os.environ, ROS_MASTER_URI="http://127.0.0.1:9")
         for arguments, code, words, env in (
             (["--min-free-mb", "1e9"], 1, "nothing is recorded", None),

@@ -1,25 +1,24 @@
-"""What a recording says of robots whose ways, delays, errors and pauses are known."""
+"""Analysis, figures and table of robots whose paths, delays, errors and pauses are known."""
 
 import math
 import re
 
-import made_up_bag
+import synthetic_bag
 import numpy as np
 import pytest
-from made_up_bag import DELAY_S, ERROR_M, MOTION_DELAY_S, PERIOD_S, RADIUS_M, START_S, TURN_RAD_S, write_bag
+from synthetic_bag import DELAY_S, ERROR_M, MOTION_DELAY_S, PERIOD_S, RADIUS_M, START_S, ANGULAR_RAD_S, write_bag
 
 from hero_recording import analysis, plot
-from hero_recording.bags import BagSet, Message
-from hero_recording.colours import MOST_NAMED, choose_colours
+from hero_recording.bags import BagSet
+from hero_recording.colors import MOST_NAMED, choose_colors
 from hero_recording.errors import RecordingError
-from hero_recording.figures import Figures, hold_commands
+from hero_recording.figures import Figures
 from hero_recording.observations import Observations, RobotObservations, StateReport
-from hero_recording.progress import Progress
-from hero_recording.topics import find_robot_topic, is_fleet_topic, make_patterns
+from hero_recording.topics import Message, find_robot_topic, is_fleet_topic, make_patterns
 
 
 def observe(path, robot_ids=None):
-    bags = BagSet([str(path)], Progress())
+    bags = BagSet([str(path)])
     observations = Observations(robot_ids)
     bags.read(observations.wants, observations.receive)
     return observations
@@ -32,7 +31,7 @@ def two_robots(tmp_path_factory):
     return path
 
 
-def test_patterns_take_robots_that_join_later_and_leave_other_topics_alone():
+def test_robots_that_join_later_are_recorded_and_other_topics_are_not():
     patterns = make_patterns(None, False, ["/mine"])
 
     def is_recorded(topic):
@@ -70,78 +69,78 @@ def test_patterns_take_robots_that_join_later_and_leave_other_topics_alone():
         assert not is_recorded(topic), topic
 
 
-def test_the_lists_of_all_drivers_are_read_and_other_topics_of_that_name_are_not():
+def test_reports_of_all_drivers_are_read():
     assert is_fleet_topic("/hero_driver/robots", "hero_msgs/RobotArray")
     assert is_fleet_topic("/hero_driver_b/robots", "hero_msgs/RobotArray")
     assert not is_fleet_topic("/hero_driver/robots", "std_msgs/String")
     assert not is_fleet_topic("/hero_driver/b/robots", "hero_msgs/RobotArray")
 
 
-def test_patterns_for_some_robots_take_no_others():
+def test_patterns_for_some_robots_match_no_others():
     pattern = make_patterns([1, 12], True, [])[0]
     assert re.fullmatch(pattern, "/hero_12/laser")
     assert not re.fullmatch(pattern, "/hero_2/odom")
     assert not re.fullmatch(pattern, "/hero_112/odom")
 
 
-def test_a_topic_of_another_type_is_somebody_elses():
+def test_a_topic_of_another_type_is_ignored():
     assert find_robot_topic("/hero_5/odom", "nav_msgs/Odometry") == (5, "odometry")
     assert find_robot_topic("/hero_5/odom", "std_msgs/String") is None
     assert find_robot_topic("/hero_5/speech", "std_msgs/String") is None
 
 
-def test_paths_lie_in_the_frame_that_all_robots_share(two_robots):
+def test_paths_are_in_the_shared_frame(two_robots):
     seen = observe(two_robots)
     assert sorted(seen.robots) == [0, 3]
     assert seen.shared_frame == "world"
     path = analysis.read_path(seen.robots[3])
-    assert path.x_m[0] == pytest.approx(3.0 * made_up_bag.ORIGIN_X_M, abs=1e-6)
-    # The pause is driven too: the way is that of the chord.
-    driven_s = 12.0 - made_up_bag.BEGIN_S - MOTION_DELAY_S
-    assert path.length_m == pytest.approx(RADIUS_M * TURN_RAD_S * driven_s, rel=0.03)
+    assert path.x_m[0] == pytest.approx(3.0 * synthetic_bag.ORIGIN_X_M, abs=1e-6)
+    # During the pause the path is a chord.
+    driven_s = 12.0 - synthetic_bag.START_DELAY_S - MOTION_DELAY_S
+    assert path.length_m == pytest.approx(RADIUS_M * ANGULAR_RAD_S * driven_s, rel=0.03)
     assert seen.walls_m == [(-1.0, 0.0, 1.0, 0.0)]
     assert seen.circles_m == [(0.5, 0.0, 0.1)]
 
 
-def test_only_the_robots_that_are_asked_for_are_looked_at(two_robots):
+def test_robots_can_be_selected(two_robots):
     assert sorted(observe(two_robots, {3}).robots) == [3]
 
 
-def test_a_summary_tells_rate_gaps_delays_and_error(two_robots):
-    summary = analysis.summarise(3, observe(two_robots).robots[3])
+def test_a_summary_holds_rate_gaps_delays_and_error(two_robots):
+    summary = analysis.summarize(observe(two_robots).robots[3])
     assert summary.odometry_hz == pytest.approx(1.0 / PERIOD_S, rel=0.01)
     assert summary.longest_gap_s == pytest.approx(2.0, abs=0.05)
     assert summary.message_delay_s == pytest.approx(DELAY_S, abs=1e-6)
     assert summary.error_m == pytest.approx(ERROR_M, abs=1e-5)
-    assert summary.yaw_error_rad == pytest.approx(0.0, abs=1e-5)
     assert summary.motion_delay_s == pytest.approx(MOTION_DELAY_S, abs=1.5 * PERIOD_S)
 
 
-def test_without_a_shared_frame_odometry_is_laid_upon_ground_truth_where_both_begin(two_robots):
+def test_without_an_origin_odometry_is_aligned_with_ground_truth(two_robots):
     robot = observe(two_robots).robots[3]
     robot.origins.clear()
-    errors = analysis.find_errors(robot)
+    errors = analysis.compute_errors(robot)
     assert errors.position_m.max() < 1e-5
+    assert errors.yaw_rad == pytest.approx(0.0, abs=1e-5)
 
 
-def test_commands_to_a_robot_that_moves_already_say_nothing_of_its_delay():
+def test_commands_to_a_moving_robot_have_no_motion_delay():
     robot = RobotObservations()
     for reading in range(300):
         robot.encoder.add(reading * PERIOD_S, float(reading), float(reading))
     robot.commands.add(5.0, 0.1, 0.0)
-    assert len(analysis.find_motion_delays(robot)) == 0
+    assert len(analysis.compute_motion_delays(robot)) == 0
 
 
-def test_a_message_with_numbers_that_make_no_sense_is_left_out_and_counted():
+def test_messages_with_absurd_numbers_are_skipped_and_counted():
     observations = Observations()
     for x_m in (0.0, math.nan, math.inf, 1e30, 0.1):
-        pose = made_up_bag.make_pose(1.0, x_m, 0.0, 0.0)
+        pose = synthetic_bag.make_pose(1.0, x_m, 0.0, 0.0)
         observations.receive(Message("/hero_0/odom", "nav_msgs/Odometry", pose, 1.0))
     assert analysis.read_path(observations.robots[0]).length_m == pytest.approx(0.1)
-    assert plot.format_table(observations)[-1].startswith("hero_0: 3 messages left out")
+    assert plot.format_table(observations)[-1].startswith("hero_0: skipped 3 messages")
 
 
-def test_states_become_spans_with_holes_where_the_driver_said_nothing():
+def test_states_become_spans_with_gaps_where_the_driver_was_silent():
     reports = [
         StateReport(0.0, "ready", 0),
         StateReport(1.0, "ready", 0),
@@ -152,21 +151,21 @@ def test_states_become_spans_with_holes_where_the_driver_said_nothing():
     assert analysis.find_spans(reports) == [(0.0, 1.5, "ready"), (1.5, 2.5, "away"), (10.0, 10.0, "ready")]
 
 
-def test_a_command_that_is_not_repeated_ends_with_the_robots_watchdog():
-    times_s, linear, turn = hold_commands(np.array([0.0, 1.0, 9.0]), np.array([0.1, 0.2, 0.3]), np.zeros(3))
+def test_a_command_that_is_not_repeated_ends_with_the_watchdog():
+    times_s, linear, angular = analysis.end_commands(np.array([0.0, 1.0, 9.0]), np.array([0.1, 0.2, 0.3]), np.zeros(3))
     assert times_s.tolist() == [0.0, 1.0, 3.0, 9.0, 11.0]
     assert np.allclose(linear, [0.1, 0.2, 0.0, 0.3, 0.0])
-    assert len(turn) == 5
+    assert len(angular) == 5
 
 
-def test_few_robots_have_colours_of_their_own_and_many_a_scale():
-    assert len(set(choose_colours(range(MOST_NAMED)).values())) == MOST_NAMED
-    assert len(set(choose_colours(range(50)).values())) == 50
-    assert len(choose_colours([4])) == 1
+def test_few_robots_have_distinct_colors_and_many_a_scale():
+    assert len(set(choose_colors(range(MOST_NAMED)).values())) == MOST_NAMED
+    assert len(set(choose_colors(range(50)).values())) == 50
+    assert len(choose_colors([4])) == 1
 
 
 @pytest.mark.parametrize("count", [1, 50])
-def test_every_figure_has_titles_units_and_all_robots_for_one_and_for_fifty(count, tmp_path):
+def test_figures_of_one_and_of_fifty_robots_have_titles_units_and_ids(count, tmp_path):
     path = tmp_path / "fleet.bag"
     write_bag(path, robot_ids=range(count), seconds=1.5)
     drawing = Figures(observe(path), START_S, START_S + 1.5, "fleet.bag")
@@ -196,7 +195,7 @@ def run_plot(capsys, *arguments):
     return capsys.readouterr().out
 
 
-def test_plot_writes_png_files_beside_the_bag_and_a_table(two_robots, capsys):
+def test_plot_writes_png_files_beside_the_bag_and_prints_a_table(two_robots, capsys):
     output = run_plot(capsys, two_robots)
     assert re.search(r"^hero_3 +1\.\d\d m +29\.\d Hz +2\.\d\d s +20 ms", output, re.MULTILINE)
     for name in plot.FIGURES:
@@ -205,27 +204,20 @@ def test_plot_writes_png_files_beside_the_bag_and_a_table(two_robots, capsys):
         assert str(path) in output
 
 
-def test_plot_writes_one_pdf_with_a_page_for_each_figure(two_robots, tmp_path, capsys):
+def test_plot_writes_a_pdf_with_a_page_for_each_figure(two_robots, tmp_path, capsys):
     run_plot(capsys, two_robots, "--format", "pdf", "--out", tmp_path / "all", "--figures", "paths,delays")
     content = (tmp_path / "all.pdf").read_bytes()
     assert content.startswith(b"%PDF")
     assert content.count(b"/Type /Page ") == 2
 
 
-def test_plot_draws_an_arena_file_where_the_recording_has_none(two_robots, tmp_path):
-    options = plot.parse_options([str(two_robots), "--arena", "obstacles"])
-    seen = plot.observe(options, BagSet([str(two_robots)], Progress()))
-    assert len(seen.walls_m) > 4
-
-
-def test_wrong_input_of_plot_is_named(two_robots, tmp_path, capsys):
-    made_up_bag.rosbag.Bag(str(tmp_path / "other.bag"), "w").close()
-    with made_up_bag.rosbag.Bag(str(tmp_path / "other.bag"), "w") as bag:
-        bag.write("/chatter", made_up_bag.ColorRGBA())
+def test_wrong_input_of_plot_is_refused_by_name(two_robots, tmp_path, capsys):
+    synthetic_bag.rosbag.Bag(str(tmp_path / "other.bag"), "w").close()
+    with synthetic_bag.rosbag.Bag(str(tmp_path / "other.bag"), "w") as bag:
+        bag.write("/chatter", synthetic_bag.ColorRGBA())
     for arguments, words in (
         ([tmp_path / "other.bag"], "no robot in it; its topics: /chatter"),
         ([two_robots, "--robots", "1 2"], r"no robot with these ids \(1, 2\)"),
-        ([two_robots, "--arena", tmp_path / "no.yaml"], "no.yaml cannot be read"),
         ([two_robots, "--out", tmp_path / "no" / "where"], "cannot be written"),
     ):
         with pytest.raises(RecordingError, match=words):

@@ -1,20 +1,20 @@
-"""Robots -> colours that people with any kind of colour vision tell apart. Pure."""
+"""Colors of robots and states, distinguishable with any kind of color vision. Pure."""
 
 from typing import Dict, Sequence, Tuple
 
-Colour = Tuple[float, float, float]
+Color = Tuple[float, float, float]
 
 # Okabe and Ito's palette (2008) without its yellow, which is hard to see on white.
 _FEW = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 
 MOST_NAMED = len(_FEW)
-"""So many robots get a colour of their own and a line in the legend; more get a shade, and their number beside them."""
+"""Up to this many robots have a color and a line in the legend; more have a shade and are labeled with their id."""
 
-STATE_COLOURS = {"ready": "#009E73", "joining": "#56B4E9", "away": "#D55E00", "refused": "#000000"}
+STATE_COLORS = {"ready": "#009E73", "joining": "#56B4E9", "away": "#D55E00", "refused": "#000000"}
 
 
-def choose_colours(robot_ids: Sequence[int]) -> Dict[int, Colour]:
-    """Return a colour for each robot: told apart at a glance if they are few, else a scale by their order."""
+def choose_colors(robot_ids: Sequence[int]) -> Dict[int, Color]:
+    """Return a color for each robot: distinct ones for few, a scale in order of their ids for many."""
     from matplotlib import colors, pyplot
 
     if len(robot_ids) <= MOST_NAMED:

@@ -1,4 +1,4 @@
-"""Bags with robots that drive circles, for tests: everything in them is known."""
+"""Bags of robots that drive circles with known paths, delays and errors, for tests."""
 
 import math
 
@@ -15,10 +15,10 @@ from hero_msgs.msg import Encoder, Robot, RobotArray
 
 START_S = 1700000000.0
 RADIUS_M = 0.2
-TURN_RAD_S = 0.5
+ANGULAR_RAD_S = 0.5
 PERIOD_S = 0.034
 ERROR_M = 0.01
-"""Ground truth lies so much further in x than odometry says."""
+"""Offset of the ground truth in x."""
 
 DELAY_S = 0.02
 """Of all messages."""
@@ -26,21 +26,21 @@ DELAY_S = 0.02
 ORIGIN_X_M = 1.0
 """Of hero_N's odom frame in the world, times N."""
 
-BEGIN_S = 1.0
-"""The robots get their first command so long after the begin, and stand until then."""
+START_DELAY_S = 1.0
+"""The robots get their first command this long after the start."""
 
 MOTION_DELAY_S = 0.1
 
 
-def turn_about_z(angle_rad):
-    return Quaternion(0.0, 0.0, math.sin(angle_rad / 2.0), math.cos(angle_rad / 2.0))
+def make_quaternion(yaw_rad):
+    return Quaternion(0.0, 0.0, math.sin(yaw_rad / 2.0), math.cos(yaw_rad / 2.0))
 
 
 def make_pose(stamp_s, x_m, y_m, yaw_rad, speed_m_s=0.0):
     message = Odometry()
     message.header.stamp = Time.from_sec(stamp_s)
     message.pose.pose.position.x, message.pose.pose.position.y = x_m, y_m
-    message.pose.pose.orientation = turn_about_z(yaw_rad)
+    message.pose.pose.orientation = make_quaternion(yaw_rad)
     message.twist.twist.linear.x = speed_m_s
     message.twist.twist.angular.z = speed_m_s / RADIUS_M
     return message
@@ -73,18 +73,17 @@ def make_fleet(robot_ids, state):
     )
 
 
-def write_bag(path, robot_ids=(0,), seconds=5.0, start_s=START_S, pause=None, foreign=True):
-    """Write a bag; pause (begin s, end s): nothing comes from the robots, and the driver calls them away."""
-    with rosbag.Bag(str(path), "w", chunk_threshold=20000) as bag:
+def write_bag(path, robot_ids=(0,), seconds=5.0, start_s=START_S, pause=None, compression="none"):
+    """Write a bag; pause (start s, end s): the robots send nothing, and the driver reports them away."""
+    with rosbag.Bag(str(path), "w", compression, chunk_threshold=20000) as bag:
 
         def write(topic, message, time_s):
             bag.write(topic, message, Time.from_sec(start_s + time_s))
 
         write("/tf_static", make_origins(robot_ids), 0.0)
         write("/hero_sim/arena", make_arena(), 0.0)
-        if foreign:
-            write("/chatter", ColorRGBA(), 0.0)
-            write("/hero_0/led", Twist(), 0.0)  # a type that does not fit the name
+        write("/chatter", ColorRGBA(), 0.0)
+        write("/hero_0/led", Twist(), 0.0)  # a type that does not fit the name
         for step in range(int(seconds / PERIOD_S)):
             time_s = step * PERIOD_S
             away = pause is not None and pause[0] <= time_s < pause[1]
@@ -94,9 +93,9 @@ def write_bag(path, robot_ids=(0,), seconds=5.0, start_s=START_S, pause=None, fo
                 )
             if away:
                 continue
-            driven_s = max(0.0, time_s - BEGIN_S - MOTION_DELAY_S)
-            yaw_rad = TURN_RAD_S * driven_s
-            speed_m_s = RADIUS_M * TURN_RAD_S if driven_s else 0.0
+            driven_s = max(0.0, time_s - START_DELAY_S - MOTION_DELAY_S)
+            yaw_rad = ANGULAR_RAD_S * driven_s
+            speed_m_s = RADIUS_M * ANGULAR_RAD_S if driven_s else 0.0
             x_m, y_m = RADIUS_M * math.sin(yaw_rad), RADIUS_M * (1.0 - math.cos(yaw_rad))
             for robot_id in robot_ids:
                 name = "/hero_%d/" % robot_id
@@ -107,10 +106,10 @@ def write_bag(path, robot_ids=(0,), seconds=5.0, start_s=START_S, pause=None, fo
                 encoder = Encoder(left_ticks=round(driven_s * 200.0), right_ticks=round(driven_s * 200.0))
                 encoder.header.stamp = Time.from_sec(stamp_s)
                 write(name + "encoder", encoder, time_s)
-                if time_s >= BEGIN_S and step % 3 == 0:
+                if time_s >= START_DELAY_S and step % 3 == 0:
                     command = Twist()
-                    command.linear.x = RADIUS_M * TURN_RAD_S
-                    command.angular.z = TURN_RAD_S
+                    command.linear.x = RADIUS_M * ANGULAR_RAD_S
+                    command.angular.z = ANGULAR_RAD_S
                     write(name + "velocity_controller/cmd_vel", command, time_s)
                 if step % 6 == 0:
                     scan = LaserScan(ranges=[0.1, math.inf, -math.inf, math.nan, 0.2, 0.2, 0.2, 0.2])
