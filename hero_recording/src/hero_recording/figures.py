@@ -45,7 +45,9 @@ class Figures:
 
     # -- shared by all figures -----------------------------------------------------------------------------
 
-    def _begin(self, height_in: float, text: str, rows: int = 1, columns: int = 1, **options: Any) -> Tuple[Figure, Any]:
+    def _begin(
+        self, height_in: float, text: str, rows: int = 1, columns: int = 1, **options: Any
+    ) -> Tuple[Figure, Any]:
         figure = Figure(figsize=(WIDTH_IN, height_in), constrained_layout=True)
         axes = figure.subplots(rows, columns, squeeze=False, **options)
         figure.suptitle(text + "\n", fontsize=12, fontweight="bold")

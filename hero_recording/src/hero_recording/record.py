@@ -215,7 +215,7 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     )
     parser.add_argument("--folder", default=".", help="where the bags go (here); created if missing")
     parser.add_argument("--name", default="hero", help="prefix of the file names, NAME_DATE_0.bag (hero)")
-    parser.add_argument("--robots", type=robot_ids, default="all", help="ids, e.g. '0 1 2' or 0-3 (all, including later ones)")
+    parser.add_argument("--robots", type=robot_ids, default="all", help="ids, e.g. '0 1 2' or 0-3 (all)")
     parser.add_argument("--topics", default="", help="more topics: regular expressions separated by spaces")
     parser.add_argument("--raw", action="store_true", help="record odom_raw, laser and laser_enable too")
     parser.add_argument("--split-mb", type=int, default=256, metavar="MB", help="size of a file (256)")

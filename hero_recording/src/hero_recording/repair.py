@@ -47,15 +47,14 @@ def repair_bag(path: str) -> str:
 
 def _find_damage(path: str) -> Optional[int]:
     """Return the position of the first chunk that cannot be read, None without one; the file is only read."""
-    position = None
+    damage = None
     with rosbag.Bag(path, "r", allow_unindexed=True) as bag:
         try:
             for position in tqdm(bag.reindex(), os.path.basename(path), unit=" chunks", leave=False, disable=None):
-                pass
-        except io.UnsupportedOperation:  # reindex() tried to cut off the end of a file that is open for reading
-            damage = position
-        else:
+                damage = position
             damage = None
+        except io.UnsupportedOperation:
+            pass  # reindex() tried to cut off the end, at the last position, of a file that is open for reading
         if not bag.get_message_count():
             raise RecordingError("%s holds no messages that can be read: it is left as it is" % path)
     return damage

@@ -37,4 +37,6 @@ class Series:
 
     def columns(self) -> Tuple[np.ndarray, ...]:
         """Return one array per column, times as float64, values as float32; add() must not follow."""
-        return tuple(np.frombuffer(column, dtype=column.typecode) if column else np.zeros(0) for column in self._columns)
+        return tuple(
+            np.frombuffer(column, dtype=column.typecode) if column else np.zeros(0) for column in self._columns
+        )

@@ -3,10 +3,19 @@
 import math
 import re
 
-import synthetic_bag
 import numpy as np
 import pytest
-from synthetic_bag import DELAY_S, ERROR_M, MOTION_DELAY_S, PERIOD_S, RADIUS_M, START_S, ANGULAR_RAD_S, write_bag
+import synthetic_bag
+from synthetic_bag import (
+    ANGULAR_RAD_S,
+    DELAY_S,
+    ERROR_M,
+    MOTION_DELAY_S,
+    PERIOD_S,
+    RADIUS_M,
+    START_S,
+    write_bag,
+)
 
 from hero_recording import analysis, plot
 from hero_recording.bags import BagSet

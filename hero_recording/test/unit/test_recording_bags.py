@@ -6,8 +6,8 @@ import pytest
 import rosbag
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from synthetic_bag import START_S, write_bag
 from std_msgs.msg import String
+from synthetic_bag import START_S, write_bag
 
 from hero_recording import disk_guard, plot
 from hero_recording.bags import BagSet
