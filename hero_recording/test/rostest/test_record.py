@@ -17,7 +17,7 @@ import rospy
 import rostest
 from geometry_msgs.msg import Twist, Vector3
 
-from hero_test.swarm_watch import wait_for
+from hero_test.waiting import wait_for
 
 RECORD = ["rosrun", "hero_recording", "record"]
 TIMEOUT_S = 60.0
