@@ -60,7 +60,7 @@ def main():
 
     messages = [session.receive_bytes(burst, 1.0, 1.0) for burst in bursts]
 
-    def clean():
+    def correct():
         corrections = RobotCorrections("/hero_0", settings, lambda name: NoSink(), NoSink().publish, WheelMotion())
         for event in declared:
             if isinstance(event, TopicDeclared) and event.topic.kind.is_from_robot:
@@ -80,7 +80,7 @@ def main():
     print("| packets written | %.1f |" % best_us(write, BURSTS))
     print("| packets read | %.1f |" % best_us(read, BURSTS))
     print("| session (with packets) | %.1f |" % best_us(receive, BURSTS))
-    print("| correction_settings, everything wanted | %.1f |" % best_us(clean, BURSTS))
+    print("| corrections, everything wanted | %.1f |" % best_us(correct, BURSTS))
 
 
 if __name__ == "__main__":

@@ -230,7 +230,7 @@ def claims_topics(peer):
 
 
 def foreign_transforms(peer):
-    """Sends transforms of another robot's packets."""
+    """Sends transforms of another robot's frames."""
     piece = b"".join(make_burst(peer.victim)[1:6])
     peer.flood(emulated_swarm.declare(OWN_NUMBER), repeat_piece(piece), pause_s=0.002)
 

@@ -22,7 +22,7 @@ BAD_PEERS = {
     "connects": "connects and leaves, as fast as it can",
     "silent_connections": "holds connections that say nothing",
     "never_reads": "asks and never reads the answers",
-    "huge_frames": "sends huge frames",
+    "huge_packets": "sends huge packets",
     "many_topics": "declares 10,000 topics",
     "renames": "comes under a new name each time",
     "stays": "comes under a new name each time and stays a while",

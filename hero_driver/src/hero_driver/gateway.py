@@ -30,6 +30,7 @@ from .rosserial.session import (
     CallReceived,
     Event,
     LogReceived,
+    MessageReceived,
     ParameterRequested,
     Problem,
     Session,
@@ -164,9 +165,8 @@ class Gateway(LinkHandler):
         if not events and peer.record is None and peer.guard.hears_garbage:
             self._loop.pause_reading(link, GARBAGE_REST_S)
         for event in events:
-            if type(event) is tuple:
-                topic, payload = event
-                topic.receive(payload, arrival_ns)
+            if isinstance(event, MessageReceived):
+                event.topic.receive(event.payload, arrival_ns)
             else:
                 self._receive_event(peer, event, now_s)
                 if link.closed:

@@ -9,7 +9,7 @@ Source: ros_lib node_handle.h (negotiateTopics, requestSyncTime, spinOnce) and t
 import enum
 import re
 from dataclasses import dataclass, field
-from typing import Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple, Union
+from typing import Callable, Dict, List, NamedTuple, Optional, Sequence, Union
 
 from . import packets, payloads
 from .errors import PacketTooLongError, PayloadError, TopicIdError
@@ -80,9 +80,11 @@ class Topic:
     receive: Callable[[bytes, int], None] = field(default=_ignore, compare=False, repr=False)
 
 
-Message = Tuple[Topic, bytes]
-"""The robot sent a payload on a topic that it declared. A plain tuple, because there are 200 per robot and second and
-one with names costs five times as much; no other event is one, so `type(event) is tuple` tells."""
+class MessageReceived(NamedTuple):
+    """The robot sent a payload on a topic that it declared, or the answer of a service that it offers."""
+
+    topic: Topic
+    payload: bytes
 
 
 class CallReceived(NamedTuple):
@@ -127,7 +129,7 @@ class SessionEnded(NamedTuple):
 
 
 Event = Union[
-    Message,
+    MessageReceived,
     CallReceived,
     TopicDeclared,
     LogReceived,
@@ -162,7 +164,7 @@ class Session:
 
     def __init__(self, limits: SessionLimits, now_s: float) -> None:
         self.topics: Dict[int, Topic] = {}
-        self._messages: Dict[int, Topic] = {}  # those of the topics that come as Message
+        self._messages: Dict[int, Topic] = {}  # those of which messages come
         self._receivers: Dict[int, Topic] = {}  # those that the robot receives
         self.reader = PacketReader(limits.max_payload_length)
         self.undeclared_messages = 0
@@ -180,25 +182,11 @@ class Session:
     def receive_bytes(self, data: Bytes, now_s: float, time_of_day_s: float) -> List[Event]:
         """Return the events that data causes, in order. Never raises, whatever data holds."""
         self.last_receive_s = now_s
-        ids, contents = self.reader.receive_columns(data)
-        try:
-            # Most reads hold messages only.
-            topics = list(map(self._messages.__getitem__, ids))
-        except KeyError:
-            return self._receive_each(ids, contents, now_s, time_of_day_s)
-        if topics:
-            self._last_configured_s = now_s
-        return list(zip(topics, contents))
-
-    def _receive_each(
-        self, ids: Sequence[int], contents: Sequence[bytes], now_s: float, time_of_day_s: float
-    ) -> List[Event]:
         events: List[Event] = []
-        for topic_id, payload in zip(ids, contents):
-            # What came before in this read may have declared it.
+        for topic_id, payload in self.reader.receive_bytes(data):
             topic = self._messages.get(topic_id)
             if topic is not None:
-                events.append((topic, payload))
+                events.append(MessageReceived(topic, payload))
                 self._last_configured_s = now_s
                 continue
             try:

@@ -22,6 +22,7 @@ from vectors import (
 from hero_driver.rosserial.errors import PacketTooLongError, PayloadError
 from hero_driver.rosserial.session import (
     LogReceived,
+    MessageReceived,
     ParameterRequested,
     Problem,
     Session,
@@ -92,7 +93,7 @@ def test_data_without_any_declared_topic_makes_the_session_ask_at_most_every_hal
     assert request_times_s == pytest.approx([T0 + 0.5, T0 + 1.0, T0 + 1.5])
     assert session.undeclared_messages == 2 * 199
     receive(session, HANDSHAKE, T0 + 2.0)
-    assert type(receive(session, ODOM_MESSAGE, T0 + 2.0)[0]) is tuple
+    assert isinstance(receive(session, ODOM_MESSAGE, T0 + 2.0)[0], MessageReceived)
 
 
 def test_a_robot_that_still_streams_on_a_new_connection_is_asked_at_once_if_nobody_asked_yet():
@@ -228,7 +229,7 @@ def test_a_declared_session_does_not_end_while_the_robot_speaks():
 def test_a_message_comes_with_its_topic_in_the_order_of_the_wire():
     session = open_declared_session()
     events = receive(session, ODOM_MESSAGE + HEARTBEAT + ENCODER_MESSAGE)
-    assert [type(event) for event in events] == [tuple, LogReceived, tuple]
+    assert [type(event) for event in events] == [MessageReceived, LogReceived, MessageReceived]
     topic, payload = events[0]
     assert topic.info.name == "/hero_0/odom"
     assert topic.kind is TopicKind.PUBLISHER
@@ -275,7 +276,7 @@ def test_a_special_packet_with_a_broken_payload_is_a_problem_and_nothing_more(fr
     (problem,) = receive(session, build_packet(frame_id, payload))
     assert type(problem) is Problem
     assert len(session.topics) == len(STOCK_TOPICS)
-    assert type(receive(session, ODOM_MESSAGE)[0]) is tuple
+    assert isinstance(receive(session, ODOM_MESSAGE)[0], MessageReceived)
 
 
 @pytest.mark.parametrize("topic_id", [8, 9, 11, 50, 99, 300, 65535])
@@ -283,7 +284,7 @@ def test_an_id_without_a_meaning_is_counted_and_does_no_harm(topic_id):
     session = open_declared_session()
     receive(session, build_packet(topic_id, b"abc") + TX_STOP)
     assert session.undeclared_messages == 2
-    assert type(receive(session, ODOM_MESSAGE)[0]) is tuple
+    assert isinstance(receive(session, ODOM_MESSAGE)[0], MessageReceived)
 
 
 def test_bad_packets_are_counted_by_the_reader_and_cost_nothing_else():

@@ -16,7 +16,7 @@ from vectors import (
 )
 
 from hero_driver.rosserial.errors import PacketTooLongError, TopicIdError
-from hero_driver.rosserial.session import Problem, TopicDeclared, TopicKind
+from hero_driver.rosserial.session import MessageReceived, Problem, TopicDeclared, TopicKind
 
 ODOM = next(topic for topic in STOCK_TOPICS if topic[1] == 130)
 CMD_VEL = next(topic for topic in STOCK_TOPICS if topic[1] == 109)
@@ -96,7 +96,7 @@ def test_an_id_that_changes_its_direction_changes_what_may_be_sent():
     receive(session, declare_twist(109, "/hero_0/twist", frame_id=0))
     with pytest.raises(TopicIdError):
         session.encode_message(109, bytes(48))
-    assert type(receive(session, build_packet(109, bytes(48)))[0]) is tuple
+    assert isinstance(receive(session, build_packet(109, bytes(48)))[0], MessageReceived)
     receive(session, declare_twist(130, "/hero_0/odom", frame_id=1))
     assert session.encode_message(130, bytes(48)) == build_packet(130, bytes(48))
 
@@ -155,7 +155,7 @@ def test_a_bad_declaration_is_a_problem_in_one_line_while_the_others_work(name):
     events = receive(
         session, build_declaration(*ODOM) + declaration + build_declaration(*CMD_VEL) + ODOM_MESSAGE
     )
-    assert [type(event) for event in events] == [TopicDeclared, Problem, TopicDeclared, tuple]
+    assert [type(event) for event in events] == [TopicDeclared, Problem, TopicDeclared, MessageReceived]
     assert words in events[1].text
     assert "refused" in events[1].text
     assert events[1].text.isprintable()
