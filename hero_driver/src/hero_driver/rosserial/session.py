@@ -1,7 +1,7 @@
-"""One conversation with one robot: bytes in -> events out, commands in -> bytes out.
+"""One conversation with one robot: bytes in and events out, commands in and packets out.
 
 The session asks for the robot's topics until it has them, answers its time requests, keeps what the robot
-declared and lets nothing else out. It holds no socket and no clock: time enters as `now_s` (monotonic, s)
+declared and never sends an undeclared topic id. It holds no socket and no clock: time enters as `now_s` (monotonic, s)
 and `time_of_day_s` (ROS time, s). A peer's mistake is a Problem event or a counter, never an exception.
 Source: ros_lib node_handle.h (negotiateTopics, requestSyncTime, spinOnce) and the stock robot as measured.
 """
@@ -15,6 +15,23 @@ from . import packets, payloads
 from .errors import PacketTooLongError, PayloadError, TopicIdError
 from .packets import Bytes, PacketReader, encode_packet
 from .payloads import Log, TopicInfo
+
+__all__ = [
+    "CallReceived",
+    "Event",
+    "LogReceived",
+    "MessageReceived",
+    "ParameterRequested",
+    "Problem",
+    "Session",
+    "SessionEnded",
+    "SessionLimits",
+    "SessionState",
+    "TimeRequested",
+    "Topic",
+    "TopicDeclared",
+    "TopicKind",
+]
 
 REQUEST_INTERVAL_S = 1.5
 """Between two requests for topics while none were declared: the robot's boot takes 1.07 s (LEDStatus.ino:93)."""
@@ -140,6 +157,39 @@ Event = Union[
 ]
 
 
+class SessionState(enum.Enum):
+    """What the session waits for."""
+
+    ASKING = "asking"  # the robot has declared nothing yet: ask for its topics again and again
+    DECLARED = "declared"
+    ASKING_AGAIN = "asking again"  # it has declared topics, but seems to have forgotten them: ask once more
+    ENDED = "ended"
+
+
+class _Happening(enum.Enum):
+    REQUESTED = "the session asked for topics"
+    DECLARED = "the robot declared a topic"
+    FORGOTTEN = "the robot shows that it is running without the configuration that it had declared"
+    TIMED_OUT = "the robot was silent, or declared nothing, for too long"
+
+
+_NEXT_STATES = {
+    (SessionState.ASKING, _Happening.REQUESTED): SessionState.ASKING,
+    (SessionState.ASKING, _Happening.DECLARED): SessionState.DECLARED,
+    (SessionState.ASKING, _Happening.FORGOTTEN): SessionState.ASKING,
+    (SessionState.ASKING, _Happening.TIMED_OUT): SessionState.ENDED,
+    (SessionState.DECLARED, _Happening.DECLARED): SessionState.DECLARED,
+    (SessionState.DECLARED, _Happening.FORGOTTEN): SessionState.ASKING_AGAIN,
+    (SessionState.DECLARED, _Happening.TIMED_OUT): SessionState.ENDED,
+    (SessionState.ASKING_AGAIN, _Happening.REQUESTED): SessionState.DECLARED,
+    (SessionState.ASKING_AGAIN, _Happening.DECLARED): SessionState.DECLARED,
+    (SessionState.ASKING_AGAIN, _Happening.FORGOTTEN): SessionState.ASKING_AGAIN,
+    (SessionState.ASKING_AGAIN, _Happening.TIMED_OUT): SessionState.ENDED,
+    (SessionState.ENDED, _Happening.DECLARED): SessionState.ENDED,
+    (SessionState.ENDED, _Happening.FORGOTTEN): SessionState.ENDED,
+}
+
+
 @dataclass(frozen=True)
 class SessionLimits:
     """What one peer may do before it is refused."""
@@ -155,6 +205,7 @@ class Session:
     """The state of one conversation; one per connection, never reused.
 
     Attributes:
+        state: what the session waits for.
         topics: declared topics by id.
         reader: the packet reader, for its counters.
         undeclared_messages: messages on ids that were not declared.
@@ -163,6 +214,7 @@ class Session:
     """
 
     def __init__(self, limits: SessionLimits, now_s: float) -> None:
+        self.state = SessionState.ASKING
         self.topics: Dict[int, Topic] = {}
         self._messages: Dict[int, Topic] = {}  # those of which messages come
         self._receivers: Dict[int, Topic] = {}  # those that the robot receives
@@ -173,7 +225,7 @@ class Session:
         self._limits = limits
         self.outgoing: List[bytes] = []
         self._last_request_s: Optional[float] = None
-        self._request_due_s: Optional[float] = now_s
+        self._request_due_s = now_s  # where the state is one of asking
         self._undeclared_repeats = 0
         self._changes = 0
         self._requests = 0
@@ -199,15 +251,21 @@ class Session:
 
     def poll(self, now_s: float) -> List[Event]:
         """Do what is due by now_s; call it at least a few times per second."""
+        reason = ""
         if now_s - self.last_receive_s > self._limits.silence_timeout_s:
-            return [SessionEnded("silent for %.1f s" % (now_s - self.last_receive_s))]
-        if not self.topics and now_s - self.opened_s > self._limits.declare_timeout_s:
-            return [SessionEnded("declared no topic within %.1f s" % self._limits.declare_timeout_s)]
-        if self._request_due_s is not None and now_s >= self._request_due_s:
+            reason = "silent for %.1f s" % (now_s - self.last_receive_s)
+        elif self.state is SessionState.ASKING and now_s - self.opened_s > self._limits.declare_timeout_s:
+            reason = "declared no topic within %.1f s" % self._limits.declare_timeout_s
+        if reason and self.state is not SessionState.ENDED:
+            self._enter_next(_Happening.TIMED_OUT)
+            return [SessionEnded(reason)]
+        is_asking = self.state in (SessionState.ASKING, SessionState.ASKING_AGAIN)
+        if is_asking and now_s >= self._request_due_s:
             self.outgoing.append(encode_packet(packets.ID_PUBLISHER, b""))
             self._last_request_s = now_s
             self._requests += 1
-            self._request_due_s = None if self.topics else now_s + REQUEST_INTERVAL_S
+            self._request_due_s = now_s + REQUEST_INTERVAL_S
+            self._enter_next(_Happening.REQUESTED)
         return []
 
     def take_packets(self) -> List[bytes]:
@@ -261,17 +319,15 @@ class Session:
             self._last_configured_s = now_s
             answer = payloads.encode_time(payloads.split_seconds(time_of_day_s))
             self.outgoing.append(encode_packet(packets.ID_TIME, answer))
-            if not self.topics:
+            if self.state is SessionState.ASKING:
                 due_s = now_s + TIME_WITHOUT_TOPICS_S
                 # Only the first time is it the handshake of a boot; a peer may answer each request like this.
-                self._expect_topics_by(
-                    due_s if self._requests < 2 else max(due_s, self._earliest_repeat_s(now_s))
-                )
+                self._ask_by(due_s if self._requests < 2 else max(due_s, self._earliest_repeat_s(now_s)))
             return TimeRequested()
         if topic_id == packets.ID_LOG:
             log = payloads.decode_log(payload)
-            if not self.topics or now_s - self._last_configured_s > UNCONFIGURED_S:
-                self._expect_topics_by(self._earliest_repeat_s(now_s))
+            if self.state is SessionState.ASKING or now_s - self._last_configured_s > UNCONFIGURED_S:
+                self._ask_by(self._earliest_repeat_s(now_s))
             return LogReceived(log)
         if topic_id == packets.ID_PARAMETER_REQUEST:
             return ParameterRequested(payloads.decode_parameter_request(payload))
@@ -279,30 +335,35 @@ class Session:
 
     def _receive_undeclared(self, topic_id: int, now_s: float) -> Optional[Event]:
         self.undeclared_messages += 1
-        if not self.topics:
-            self._expect_topics_by(self._earliest_repeat_s(now_s))
+        if self.state is SessionState.ASKING:
+            self._ask_by(self._earliest_repeat_s(now_s))
             return None
-        if self._undeclared_repeats >= UNDECLARED_REPEATS or self._request_due_s is not None:
+        if self._undeclared_repeats >= UNDECLARED_REPEATS or self.state is SessionState.ASKING_AGAIN:
             return None
         self._undeclared_repeats += 1
-        self._request_due_s = self._earliest_repeat_s(now_s)
+        self._ask_by(self._earliest_repeat_s(now_s))
         return Problem("sends id %d, which it did not declare; asked again for its topics" % topic_id)
 
     def _earliest_repeat_s(self, now_s: float) -> float:
         return now_s if self._last_request_s is None else max(now_s, self._last_request_s + REPEAT_INTERVAL_S)
 
-    def _expect_topics_by(self, due_s: float) -> None:
-        if self._request_due_s is None or due_s < self._request_due_s:
+    def _ask_by(self, due_s: float) -> None:
+        """Ask for the topics at due_s, or when that was to be done anyway."""
+        if self.state is SessionState.DECLARED or due_s < self._request_due_s:
             self._request_due_s = due_s
+        self._enter_next(_Happening.FORGOTTEN)
+
+    def _enter_next(self, happening: _Happening) -> None:
+        self.state = _NEXT_STATES[self.state, happening]
 
     def _declare(self, kind: TopicKind, payload: bytes) -> Optional[Event]:
         info = payloads.decode_topic_info(payload)
-        complaint = self._find_fault(info)
-        if complaint is not None:
-            return Problem("topic %s refused: %s" % (_shorten(info.name), complaint))
+        fault = self._find_fault(info)
+        if fault is not None:
+            return Problem("topic %s refused: %s" % (_shorten(info.name), fault))
         topic = Topic(info, kind)
         # The robot is answering the last request.
-        self._request_due_s = None
+        self._enter_next(_Happening.DECLARED)
         if self.topics.get(info.topic_id) == topic:
             return None
         if info.topic_id not in self.topics and len(self.topics) >= self._limits.max_topics:
