@@ -59,7 +59,7 @@ def run_rounds(driver, swarm, rounds, act):
     """Do act() in rounds; return what the driver held after the first ones and after the last."""
 
     def settle():
-        # Robots that leave at once get no topics: these stay until they have them.
+        # What waits for the ROS master is dropped with a connection: these stay until all topics are there.
         swarm.cut_power()
         wait_for(lambda: is_settled(driver), "the topics of all robots")
 

@@ -60,7 +60,7 @@ class DriverConfig:
         2000000, 1000, 100000000, "bytes/s", "from one robot; stock robots send 44051"
     )
     declare_timeout_s: float = _number(
-        20.0, 2.0, 600.0, "s", "time to declare a topic, else it is disconnected"
+        20.0, 2.0, 600.0, "s", "time for a robot to declare a topic that identifies it, else it is disconnected"
     )
     silence_timeout_s: float = _number(6.0, 3.0, 600.0, "s", "silence after which a connection is closed")
     quick_acknowledge: bool = _plain(
@@ -121,7 +121,6 @@ class DriverConfig:
             self.max_payload_length,
             self.max_topics,
             self.max_name_length,
-            self.declare_timeout_s,
             self.silence_timeout_s,
         )
 
@@ -129,7 +128,12 @@ class DriverConfig:
     def admission_limits(self) -> AdmissionLimits:
         """Who may connect."""
         return AdmissionLimits(
-            self.allow, self.max_connections, self.max_connections_per_address, self.max_unidentified
+            self.allow,
+            self.max_connections,
+            self.max_connections_per_address,
+            self.max_unidentified,
+            self.max_packets_per_s,
+            self.max_bytes_per_s,
         )
 
     @property

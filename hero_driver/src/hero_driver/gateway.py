@@ -14,15 +14,14 @@ from .command_sender import CommandSender
 from .config import DriverConfig
 from .corrections.robot_corrections import CorrectionSettings
 from .fleet import namespaces
-from .fleet.admission import GARBAGE_REST_S, Admission, RateGuard
+from .fleet.admission import Admission
 from .fleet.namespaces import Identity, NameRules
-from .fleet.registry import Decision, FleetRegistry, RobotRecord, RobotState, Verdict
+from .fleet.registry import Decision, FleetRegistry, RobotEvent, RobotRecord, Verdict
 from .peer import Peer
 from .robot_log import RobotLog
 from .robot_requests.robot_requests import RobotRequests
 from .robot_status import RobotStatus, describe_robot
 from .ros.log_relay import LogRelay
-from .ros.registrar import RobotRegistrar
 from .ros.robot_bridge import BridgeContext, RobotBridge
 from .ros.transform_publisher import TransformPublisher
 from .ros.worker import Worker
@@ -129,41 +128,40 @@ class Gateway(LinkHandler):
             return refusal
         now_s = time.monotonic()
         session = Session(self._config.session_limits, now_s)
-        guard = RateGuard(self._config.max_packets_per_s, self._config.max_bytes_per_s, now_s)
-        peer = Peer(link, session, guard)
+        peer = Peer(link, session, self._admission.limit_rate(now_s))
         link.peer = peer
         self.peers[link] = peer
         self.poll_link(link, now_s)
         return None
 
     def _make_room(self, host: str) -> None:
-        """Close a connection of the address with the most, where there are too many; a robot's last of all."""
-        peers = self.peers.values()
-        largest = self._admission.find_largest(host)
-        if largest is not None:
-            newest_first = reversed([peer for peer in peers if peer.link.address.host == largest])
-            peer = min(newest_first, key=lambda peer: peer.bridge is not None)
-            self._stops.begin(peer)
-            peer.link.close("its address has the most of too many connections (~max_connections)")
-        crowd = self._admission.find_crowd(host)
-        if crowd is not None:
-            peer = next(peer for peer in peers if peer.record is None and peer.link.address.host == crowd)
-            peer.link.close("its address has the most of too many connections (~max_unidentified)")
+        """Evict a connection of the address with the most, where a cap is reached: unidentified ones first."""
+        eviction = self._admission.find_eviction(host)
+        if eviction is None:
+            return
+        largest, parameter = eviction
+        peers = [peer for peer in self.peers.values() if peer.link.address.host == largest]
+        peer = next((peer for peer in peers if peer.record is None), peers[-1])
+        self._stops.begin(peer)
+        peer.link.close("its address has the most of too many connections (%s)" % parameter)
 
     def receive_data(self, link: Link, data: bytes, now_s: float) -> None:
         """Pass bytes to the session and its events on; the hot path of the driver."""
         peer: Peer = link.peer
         session = peer.session
+        reader = session.reader
+        packets, skipped_bytes = reader.packets, reader.skipped_bytes
         arrival_ns = self._clock_ns()
         events = session.receive_bytes(data, now_s, arrival_ns / NS_PER_S)
-        refusal = peer.guard.judge(session.reader.packets, link.received_length, now_s)
+        refusal = peer.rate_limit.admit(reader.packets - packets, len(data), now_s)
+        if refusal is None and reader.skipped_bytes != skipped_bytes:
+            garbage_length = reader.skipped_bytes - skipped_bytes
+            refusal = self._admission.admit_garbage(link.address.host, garbage_length, now_s)
         if refusal is not None:
             link.close(refusal)
             return
         if session.outgoing:
             self._send_outgoing(peer)
-        if not events and peer.record is None and peer.guard.hears_garbage:
-            self._loop.pause_reading(link, GARBAGE_REST_S)
         for event in events:
             if isinstance(event, MessageReceived):
                 event.topic.receive(event.payload, arrival_ns)
@@ -230,9 +228,7 @@ class Gateway(LinkHandler):
             )
             self._on_change()
         if peer.bridge is not None:
-            peer.bridge.registrar.end()
             peer.bridge.detach(reason)
-            self._admission.note_departure(link.address.host, now_s - peer.session.opened_s, now_s)
         self._admit_duplicates(record, lambda host: not self.fleet.is_reserved(record, host))
 
     def report_bug(self, error: Exception) -> None:
@@ -284,8 +280,7 @@ class Gateway(LinkHandler):
         if self.stopped and peer.stop is None and peer.bridge.is_motion(name):
             # After the whole burst of declarations: every motion topic is to get its zero.
             self._loop.call_soon(lambda: self._stops.begin(peer))
-        if peer.record.state is not RobotState.READY:
-            peer.record.enter(RobotState.READY, now_s)
+        if peer.record.receive(RobotEvent.DECLARED, now_s):
             self._on_change()
 
     def _resolve(self, peer: Peer, topic: Topic, identity: Identity) -> Optional[str]:
@@ -321,7 +316,7 @@ class Gateway(LinkHandler):
             # Only needed here, and every read would cost more.
             known.last_heard_s = known.link.peer.session.last_receive_s
         if known is None:
-            refusal = self._admission.admit_arrival(address.host, now_s)
+            refusal = self._admission.admit_new_robot(address.host, now_s)
             if refusal is not None:
                 peer.link.close(refusal)
                 return False
@@ -349,22 +344,12 @@ class Gateway(LinkHandler):
         bridge = self.bridges.get(identity.namespace)
         if bridge is None:
             correction_settings = self._correction_settings() if namespaces.is_hero(identity) else None
-            registrar = RobotRegistrar(self._registrar, self._loop.call_later)
-            bridge = RobotBridge(identity, correction_settings, self._context, registrar)
+            bridge = RobotBridge(identity, correction_settings, self._context, self._registrar)
             self.bridges[identity.namespace] = bridge
         peer.bridge = bridge
         rebooted = peer.boot is not None
         if bridge.corrections is not None:
             bridge.corrections.restart(rebooted and decision.verdict is not Verdict.ARRIVED)
-        host = peer.link.address.host
-        hold_s = self._admission.find_hold_s(host, record.joined_s)
-        if hold_s > 0.0:
-            text = "robots of %s leave as soon as they have come: new topics of its robots wait for %g s" % (
-                host,
-                hold_s,
-            )
-            self._log.log_throttled("warn", "held " + host, text, host=host)
-        bridge.registrar.begin(hold_s)
         bridge.attach()
         text = "%s %s (%s)" % (bridge.label, decision.verdict.value, peer.link.address)
         self._log.log_throttled("info", "joined " + bridge.label, text, host=peer.link.address.host)

@@ -5,7 +5,7 @@ from typing import List, Optional
 
 from .commands.stop_progress import StopProgress
 from .fleet import log_lines
-from .fleet.admission import RateGuard
+from .fleet.admission import RateLimit
 from .fleet.registry import RobotRecord
 from .ros.robot_bridge import RobotBridge
 from .rosserial.payloads import Log
@@ -19,7 +19,7 @@ class Peer:
 
     link: Link
     session: Session
-    guard: RateGuard
+    rate_limit: RateLimit
     record: Optional[RobotRecord] = None
     bridge: Optional[RobotBridge] = None
     refused: bool = (

@@ -68,7 +68,6 @@ def test_values_come_where_they_belong():
     assert config.session_limits.silence_timeout_s == 8.0
     assert config.session_limits.max_payload_length == 4096
     assert config.session_limits.max_name_length == 128
-    assert config.session_limits.declare_timeout_s == 20.0
     assert config.wheel_geometry.wheel_separation_m == 0.0635
     assert config.wheel_geometry.wheel_diameter_m == 0.0492
     assert config.wheel_geometry.ticks_per_turn == 288.0

@@ -1,4 +1,4 @@
-"""Who is here: arrival, identity, return, duplicate, departure with a grace period. Pure; time enters as now_s.
+"""The robots of one driver: arrival, return, duplicate, departure with a grace period. Pure; time enters as now_s.
 
 A robot is known by its namespace. It has at most one connection that counts; a second one from the same
 address is the robot after a power cycle and takes over, one from another address is a second robot with the
@@ -13,13 +13,14 @@ from typing import Any, Dict, List, Optional
 
 from .namespaces import Identity
 
+__all__ = ["Decision", "FleetRegistry", "RobotEvent", "RobotRecord", "RobotState", "Verdict"]
+
 ALIVE_S = 3.0
 """A robot that was heard within this time is alive: stock robots speak at least every 2.5 s."""
 
 FLAP_S = 5.0
 """Two take-overs within this time, where the loser still speaks while the winner does, are two robots behind
 one address: a robot that boots or reconnects is silent on its old connection."""
-
 
 RIVALS_MAX = 16
 """Addresses that are remembered because a second robot with the id of the known one came from them."""
@@ -32,6 +33,27 @@ class RobotState(enum.Enum):
     READY = 1
     AWAY = 2
     REFUSED = 3
+
+
+class RobotEvent(enum.Enum):
+    """What changes the state of a robot."""
+
+    CONNECTED = "a connection said that it is this robot, and was let in"
+    DECLARED = "the robot declared a topic"
+    LOST = "its connection ended"
+
+
+_NEXT_STATES = {
+    (RobotState.JOINING, RobotEvent.CONNECTED): RobotState.JOINING,
+    (RobotState.JOINING, RobotEvent.DECLARED): RobotState.READY,
+    (RobotState.JOINING, RobotEvent.LOST): RobotState.AWAY,
+    (RobotState.READY, RobotEvent.CONNECTED): RobotState.JOINING,
+    (RobotState.READY, RobotEvent.DECLARED): RobotState.READY,
+    (RobotState.READY, RobotEvent.LOST): RobotState.AWAY,
+    (RobotState.AWAY, RobotEvent.CONNECTED): RobotState.JOINING,
+}
+"""A robot begins as JOINING and is forgotten when it was AWAY for the grace period. REFUSED is no state of a robot,
+but what duplicates are shown as."""
 
 
 class Verdict(enum.Enum):
@@ -68,11 +90,13 @@ class RobotRecord:
     refused: Dict[str, str] = field(default_factory=dict)  # address -> reason, of duplicates that are connected
     rivals: Dict[str, float] = field(default_factory=dict)  # host -> when a duplicate from there was first refused
 
-    def enter(self, state: RobotState, now_s: float) -> None:
-        """Change the state and note since when."""
-        if state is not self.state:
-            self.state = state
-            self.since_s = now_s
+    def receive(self, event: RobotEvent, now_s: float) -> bool:
+        """Enter the next state; return whether it is another one."""
+        last, self.state = self.state, _NEXT_STATES[self.state, event]
+        if self.state is last:
+            return False
+        self.since_s = now_s
+        return True
 
 
 @dataclass(frozen=True)
@@ -118,7 +142,7 @@ class FleetRegistry:
         record.joined_s = record.last_heard_s = now_s
         record.reconnects += 1
         record.refused.pop(address, None)
-        record.enter(RobotState.JOINING, now_s)
+        record.receive(RobotEvent.CONNECTED, now_s)
         verdict = Verdict.RETURNED if old_link is None else Verdict.TOOK_OVER
         return Decision(verdict, record, old_link)
 
@@ -146,7 +170,7 @@ class FleetRegistry:
             if record.link is link:
                 record.link = None
                 record.last_error = reason
-                record.enter(RobotState.AWAY, now_s)
+                record.receive(RobotEvent.LOST, now_s)
                 return record
         return None
 

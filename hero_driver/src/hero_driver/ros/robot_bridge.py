@@ -30,8 +30,8 @@ from . import message_types
 from .endpoints import QUEUE_LENGTH, Endpoints, Layout
 from .raw_publisher import CallLater, RawPublisher
 from .raw_subscriber import AddReader, RawSubscriber
-from .registrar import RobotRegistrar
 from .services import RobotService
+from .worker import Worker
 
 VELOCITY_CONTROLLER = "/velocity_controller/cmd_vel"
 MOTOR_TYPE = "hero_msgs/Motor"
@@ -98,7 +98,7 @@ class RobotBridge:
         identity: Identity,
         correction_settings: Optional[CorrectionSettings],
         context: BridgeContext,
-        registrar: RobotRegistrar,
+        registrar: Worker,
     ) -> None:
         """correction_settings is None for devices that are no HeRos: their messages pass through as they are."""
         self.identity = identity
@@ -107,7 +107,7 @@ class RobotBridge:
         self.wheels = WheelMotion()
         self.refused_commands = 0
         self._context = context
-        self.registrar = registrar
+        self._registrar = registrar
         self._endpoints = Endpoints(self.label, context.log)
         self._closed = False
         self._connected = False
@@ -145,6 +145,7 @@ class RobotBridge:
     def detach(self, reason: str) -> None:
         """The connection is gone; endpoints stay, calls that wait fail now, commands that wait are dropped."""
         self._connected = False
+        self._connection += 1  # what waits for the ROS master is left out
         self._ids.clear()
         self.commands.clear()
         for service in list(self._services.values()):
@@ -162,7 +163,7 @@ class RobotBridge:
         self._publishers.clear()
         released = [call for publisher in publishers for call in publisher.release()]
         self._endpoints.end()
-        self.registrar.submit(lambda: self._endpoints.close(released, publishers), always=True)
+        self._registrar.submit(lambda: self._endpoints.close(released, publishers), always=True)
 
     @property
     def last_error(self) -> str:
@@ -438,7 +439,14 @@ class RobotBridge:
     # Jobs of the registrar; these may block.
 
     def _submit(self, job: Callable[[], None]) -> None:
-        if not self.registrar.submit(job):
+        """Queue a job, to be dropped if the connection ends first: a robot that returns declares everything again."""
+        connection = self._connection
+
+        def run() -> None:
+            if connection == self._connection:
+                job()
+
+        if not self._registrar.submit(run):
             self._endpoints.complain("registrar", "too many topics wait for the ROS master; is it reachable?")
 
 

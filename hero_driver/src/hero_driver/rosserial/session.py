@@ -170,7 +170,7 @@ class _Happening(enum.Enum):
     REQUESTED = "the session asked for topics"
     DECLARED = "the robot declared a topic"
     FORGOTTEN = "the robot shows that it is running without the configuration that it had declared"
-    TIMED_OUT = "the robot was silent, or declared nothing, for too long"
+    TIMED_OUT = "the robot was silent for too long"
 
 
 _NEXT_STATES = {
@@ -197,7 +197,6 @@ class SessionLimits:
     max_payload_length: int = packets.DEFAULT_MAX_PAYLOAD_LENGTH
     max_topics: int = 64
     max_name_length: int = 128
-    declare_timeout_s: float = 20.0
     silence_timeout_s: float = 6.0
 
 
@@ -251,14 +250,10 @@ class Session:
 
     def poll(self, now_s: float) -> List[Event]:
         """Do what is due by now_s; call it at least a few times per second."""
-        reason = ""
-        if now_s - self.last_receive_s > self._limits.silence_timeout_s:
-            reason = "silent for %.1f s" % (now_s - self.last_receive_s)
-        elif self.state is SessionState.ASKING and now_s - self.opened_s > self._limits.declare_timeout_s:
-            reason = "declared no topic within %.1f s" % self._limits.declare_timeout_s
-        if reason and self.state is not SessionState.ENDED:
+        silent_s = now_s - self.last_receive_s
+        if silent_s > self._limits.silence_timeout_s and self.state is not SessionState.ENDED:
             self._enter_next(_Happening.TIMED_OUT)
-            return [SessionEnded(reason)]
+            return [SessionEnded("silent for %.1f s" % silent_s)]
         is_asking = self.state in (SessionState.ASKING, SessionState.ASKING_AGAIN)
         if is_asking and now_s >= self._request_due_s:
             self.outgoing.append(encode_packet(packets.ID_PUBLISHER, b""))

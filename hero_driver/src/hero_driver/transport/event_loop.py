@@ -173,20 +173,8 @@ class EventLoop(LinkOwner):
         heapq.heappush(self._timers, (time.monotonic() + delay_s, next(self._timer_numbers), call))
 
     def watch(self, link: Link) -> None:
-        """Wait for what link needs now: to be read unless it is paused, to be written where something is unsent."""
-        self._epoll.modify(link.fileno(), (0 if link.is_paused else READ) | (WRITE if link.is_full else 0))
-
-    def pause_reading(self, link: Link, delay_s: float) -> None:
-        """Read link again only after delay_s, or when its connection breaks; only from the loop's thread."""
-
-        def resume() -> None:
-            link.is_paused = False
-            if not link.closed:
-                self.watch(link)
-
-        link.is_paused = True
-        self.watch(link)
-        self.call_later(delay_s, resume)
+        """Wait until link can be read, and until it can be written where something is unsent."""
+        self._epoll.modify(link.fileno(), READ | (WRITE if link.is_full else 0))
 
     def close_link(self, link: Link, reason: str) -> None:
         """Close link and tell the handler; safe to call twice."""
