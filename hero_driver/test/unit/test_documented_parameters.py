@@ -35,7 +35,7 @@ def test_the_launch_file_has_the_defaults_of_the_code():
     defaults = DriverConfig()
     assert arguments["host"] == defaults.host
     assert arguments["port"] == str(defaults.port)
-    assert {name for name in arguments if name != "config"} <= set(DriverConfig.__dataclass_fields__)
+    assert {name for name in arguments if name not in ("config", "name")} <= set(DriverConfig.__dataclass_fields__)
 
 
 def test_the_launch_file_says_what_each_argument_means():

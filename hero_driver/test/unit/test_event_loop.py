@@ -1,4 +1,4 @@
-"""A real loop with real connections: when a link is read, and when not."""
+"""A real loop with real connections: what it reads, and how it ends."""
 
 import os
 import socket
@@ -10,18 +10,16 @@ import pytest
 from hero_driver.transport import EventLoop, LinkHandler, TransportSettings
 
 DEADLINE_S = 20.0
-PAUSE_S = 0.2
 
 
 class Handler(LinkHandler):
-    """Pauses reading after each read, and notes what comes when."""
+    """Notes what comes when."""
 
-    def __init__(self, pause_s):
+    def __init__(self):
         self.changed = threading.Condition()
         self.reads = []  # pairs: bytes, when they were read
         self.endings = []
         self.loop = self.thread = None
-        self._pause_s = pause_s
 
     def open_link(self, link):
         """Take everybody."""
@@ -30,7 +28,6 @@ class Handler(LinkHandler):
         with self.changed:
             self.reads.append((data, now_s))
             self.changed.notify_all()
-        self.loop.pause_reading(link, self._pause_s)
 
     def poll_link(self, link, now_s):
         """Have nothing to do."""
@@ -49,8 +46,8 @@ class Handler(LinkHandler):
 def start():
     loops = []
 
-    def start_loop(pause_s):
-        handler = Handler(pause_s)
+    def start_loop():
+        handler = Handler()
         handler.loop = EventLoop(TransportSettings("127.0.0.1", 0, (), 1.0, True), handler)
         handler.loop.open()
         thread = threading.Thread(target=handler.loop.run, daemon=True)
@@ -65,31 +62,8 @@ def start():
         thread.join(DEADLINE_S)
 
 
-def test_a_paused_link_is_read_again_in_time_and_loses_nothing(start):
-    handler, far = start(PAUSE_S)
-    with far:
-        far.sendall(b"first")
-        handler.wait(lambda: len(handler.reads) == 1)
-        far.sendall(b"second")
-        handler.wait(lambda: len(handler.reads) == 2)
-    (first, first_s), (second, second_s) = handler.reads
-    assert (first, second) == (b"first", b"second")
-    assert second_s - first_s >= PAUSE_S
-
-
-def test_a_paused_link_does_not_delay_another(start):
-    handler, far = start(DEADLINE_S)
-    with far, socket.create_connection(handler.loop.listening) as other:
-        far.sendall(b"first")
-        handler.wait(lambda: len(handler.reads) == 1)
-        far.sendall(b"second")
-        other.sendall(b"other")
-        handler.wait(lambda: len(handler.reads) == 2)
-        assert handler.reads[1][0] == b"other"
-
-
-def test_a_paused_link_that_breaks_is_closed_at_once(start):
-    handler, far = start(10 * DEADLINE_S)
+def test_a_connection_that_breaks_is_closed_at_once_with_the_reason(start):
+    handler, far = start()
     far.sendall(b"first")
     handler.wait(lambda: len(handler.reads) == 1)
     far.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
@@ -100,7 +74,7 @@ def test_a_paused_link_that_breaks_is_closed_at_once(start):
 
 def test_the_end_of_the_loop_closes_every_file_that_it_opened(start):
     before = set(os.listdir("/proc/self/fd"))
-    handler, far = start(PAUSE_S)
+    handler, far = start()
     with far:
         far.sendall(b"first")
         handler.wait(lambda: handler.reads)
@@ -111,7 +85,7 @@ def test_the_end_of_the_loop_closes_every_file_that_it_opened(start):
 
 
 def test_a_call_after_the_end_of_the_loop_does_no_harm(start):
-    handler, far = start(PAUSE_S)
+    handler, far = start()
     far.close()
     handler.loop.stop()
     handler.thread.join(DEADLINE_S)

@@ -4,7 +4,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hero_driver.fleet.namespaces import Identity
-from hero_driver.fleet.registry import ALIVE_S, FLAP_S, RIVALS_MAX, FleetRegistry, RobotState, Verdict
+from hero_driver.fleet.registry import (
+    ALIVE_S,
+    FLAP_S,
+    RIVALS_MAX,
+    FleetRegistry,
+    RobotEvent,
+    RobotState,
+    Verdict,
+)
 from hero_msgs.msg import Robot
 
 HERO = Identity("/hero_0", 0)
@@ -248,8 +256,8 @@ def test_a_robot_may_take_over_again_when_the_quarrel_is_long_past():
 def test_a_state_is_entered_once():
     fleet = make_fleet()
     record = identify(fleet, 1, T0).record
-    record.enter(RobotState.READY, T0 + 1.0)
-    record.enter(RobotState.READY, T0 + 2.0)
+    assert record.receive(RobotEvent.DECLARED, T0 + 1.0)
+    assert not record.receive(RobotEvent.DECLARED, T0 + 2.0)
     assert (record.state, record.since_s) == (RobotState.READY, T0 + 1.0)
 
 
