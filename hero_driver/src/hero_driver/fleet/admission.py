@@ -9,9 +9,9 @@ __all__ = ["GARBAGE_BURST_LENGTH", "GARBAGE_PER_S", "NEW_ROBOTS_PER_S", "Admissi
 
 Network = Union[ipaddress.IPv4Network, ipaddress.IPv6Network]
 
-GARBAGE_BURST_LENGTH = 131072
-"""Bytes outside of packets that one address may send at once: a hundred simulated robots that reconnect leave
-truncated packets of below 1 kB each. To search 4096 bytes takes up to 1 ms."""
+GARBAGE_BURST_LENGTH = 65536
+"""Bytes outside of packets that one address may send at once: a robot that reconnects leaves a truncated packet of
+below 1 kB, and to search 4096 bytes takes up to 1 ms."""
 
 GARBAGE_PER_S = 16384.0
 """Bytes outside of packets that one address may send per second after that."""
