@@ -21,7 +21,6 @@ class CommandSender:
 
     def __init__(
         self,
-        call_here: Callable[[Callable[[RobotBridge], None], RobotBridge], None],
         call_later: Callable[[float, Callable[[], None]], None],
         find_peer: Callable[[RobotBridge], Optional[Peer]],
         is_stopped: Callable[[], bool],
@@ -31,15 +30,10 @@ class CommandSender:
 
         is_stopped(): whether no robot may get anything but stops.
         """
-        self._call_here = call_here
         self._call_later = call_later
         self._find_peer = find_peer
         self._is_stopped = is_stopped
         self._complain = complain
-
-    def wake(self, bridge: RobotBridge) -> None:
-        """Commands for a robot wait; from any thread."""
-        self._call_here(self._serve, bridge)
 
     def send_message(self, peer: Peer, topic_id: int, payload: bytes) -> None:
         """Send one message now, if the connection declared its id and it fits."""
@@ -52,7 +46,8 @@ class CommandSender:
             return
         peer.link.send_packet(packet)
 
-    def _serve(self, bridge: RobotBridge) -> None:
+    def send_commands(self, bridge: RobotBridge) -> None:
+        """Send what waits for a robot and may go out; come back for the remainder."""
         peer = self._find_peer(bridge)
         if peer is None:
             return

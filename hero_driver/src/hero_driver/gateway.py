@@ -90,19 +90,17 @@ class Gateway(LinkHandler):
         """Begin to serve what loop brings."""
         self._loop = loop
         self._sender = CommandSender(
-            loop.call_here, loop.call_later, self._find_peer, lambda: self.stopped, self._complain
+            loop.call_later, self._find_peer, lambda: self.stopped, self._complain
         )
         self._stops = StopDelivery(loop.call_later, lambda: self.stopped, self._on_change, self._complain)
         self._requests = RobotRequests(self._config, self._log, loop.call_soon, self._complain)
         self._transforms = TransformPublisher(self._config.transform_period_s, loop.call_later)
         self._context = BridgeContext(
+            loop=loop,
             log=self._log.log_throttled,
-            wake=self._sender.wake,
-            stop=lambda bridge: loop.call_here(self._stop_robot, bridge),
+            send_commands=self._sender.send_commands,
+            stop=self._stop_robot,
             add_transform=self._transforms.add,
-            call_soon=loop.call_soon,
-            call_later=loop.call_later,
-            add_reader=loop.add_reader,
             is_stopped=lambda: self.stopped,
             clamp=self._config.clamp,
             allow_self_tuning=self._config.allow_self_tuning,

@@ -2,6 +2,7 @@
 
 import contextlib
 import errno
+import functools
 import io
 import os
 import queue
@@ -27,7 +28,7 @@ from .ros.master_watch import MasterWatch
 from .ros.rospy_internals import call_before_shutdown, leave_topics_out_of_rosout, open_tcpros_server
 from .ros.worker import Worker
 from .stop_interface import PARAMETER, StopInterface
-from .transport import Address, EventLoop, HostNotFoundError, TransportSettings
+from .transport import Address, EventLoop, HostNotFoundError, NoAnswerError, TransportSettings
 
 NODE_NAME = "hero_driver"
 
@@ -112,7 +113,7 @@ class DriverNode:
         self._crash: Optional[BaseException] = None
         self._reporter: Reporter
         self._stop_interface = StopInterface(
-            self._loop.call_soon,
+            self._loop,
             self._gateway.set_stopped,
             lambda: self._gateway.stopped,
             lambda: self._gateway.list_robots(time.monotonic()),
@@ -167,15 +168,18 @@ class DriverNode:
     def close(self) -> None:
         """Stop all robots, then close their connections; safe to call twice."""
         if self._thread.is_alive():
-            stopped = threading.Event()
-
-            def finish(doubtful: List[Peer]) -> None:
-                self._gateway.report_doubtful(doubtful)
-                stopped.set()
-
             deadline_s = time.monotonic() + STOP_LIMIT_S
-            self._loop.call_soon(lambda: self._gateway.stop_and_wait(deadline_s, finish))
-            if not stopped.wait(STOP_LIMIT_S + 0.3):
+
+            def stop_robots(answer: Callable[[None], None]) -> None:
+                def finish(doubtful: List[Peer]) -> None:
+                    self._gateway.report_doubtful(doubtful)
+                    answer(None)
+
+                self._gateway.stop_and_wait(deadline_s, finish)
+
+            try:
+                self._loop.ask(stop_robots, STOP_LIMIT_S + 0.3)
+            except NoAnswerError:
                 self._log.log("error", "the driver ends, and could not stop the robots: its loop hangs")
             self._loop.stop()
             self._thread.join(1.0)
@@ -215,11 +219,9 @@ class DriverNode:
         return "hero_driver: %s" % "; ".join(parts)
 
     def _report(self, is_periodic: bool) -> None:
-        answers: queue.Queue[FleetStatus] = queue.Queue()
-        self._loop.call_soon(lambda: answers.put(self._take_status()))
         try:
-            status = answers.get(timeout=1.0)
-        except queue.Empty:
+            status = self._loop.ask(lambda answer: answer(self._take_status()), 1.0)
+        except NoAnswerError:
             return
         if is_periodic:
             self._reporter.measure_rates(status)
@@ -243,13 +245,12 @@ class DriverNode:
 
     def _serve_disconnect(self, request: Any) -> DisconnectResponse:
         namespace = "/" + request.robot.strip("/")
-        done: queue.Queue[bool] = queue.Queue()
         deadline_s = time.monotonic() + STOP_LIMIT_S
-        self._loop.call_soon(lambda: self._gateway.disconnect(namespace, deadline_s, done.put))
+        disconnect = functools.partial(self._gateway.disconnect, namespace, deadline_s)
         try:
-            was_there = done.get(timeout=STOP_LIMIT_S + 1.0)
-        except queue.Empty:
-            return DisconnectResponse(False, "the driver did not come to it")
+            was_there = self._loop.ask(disconnect, STOP_LIMIT_S + 1.0)
+        except NoAnswerError as error:
+            return DisconnectResponse(False, str(error))
         if not was_there:
             return DisconnectResponse(False, "%s is not connected" % namespace)
         return DisconnectResponse(True, "%s is disconnected; it will dial again" % namespace)

@@ -5,7 +5,6 @@ until ~robots says that the robots are stopped. Whether they are is kept on the 
 that is started again under the same name.
 """
 
-import queue
 from typing import Any, Callable, List
 
 import rospy
@@ -17,6 +16,7 @@ from .fleet.registry import RobotState
 from .robot_status import RobotStatus
 from .ros.log_relay import LogRelay
 from .ros.worker import Worker
+from .transport import EventLoop, NoAnswerError
 
 PARAMETER = "~stopped"
 
@@ -29,14 +29,14 @@ class StopInterface:
 
     def __init__(
         self,
-        call_soon: Callable[[Callable[[], None]], None],
+        loop: EventLoop,
         set_stopped: Callable[[bool], None],
         is_stopped: Callable[[], bool],
         list_robots: Callable[[], List[RobotStatus]],
         log: LogRelay,
     ) -> None:
-        """call_soon() is the loop's; the other three are called on the thread of the sockets."""
-        self._call_soon = call_soon
+        """The three functions are called on the thread of the sockets."""
+        self._loop = loop
         self._set_stopped = set_stopped
         self._is_stopped = is_stopped
         self._list_robots = list_robots
@@ -67,22 +67,20 @@ class StopInterface:
 
     def _serve(self, request: Any) -> SetBoolResponse:
         stopped = bool(request.data)
-        answers: queue.Queue[List[RobotStatus]] = queue.Queue()
 
-        def set_and_answer() -> None:
+        def set_and_answer(answer: Callable[[List[RobotStatus]], None]) -> None:
             self._set(stopped)
-            answers.put(self._list_robots())
+            answer(self._list_robots())
 
-        self._call_soon(set_and_answer)
         try:
-            robots = answers.get(timeout=ANSWER_WAIT_S)
-        except queue.Empty:
+            robots = self._loop.ask(set_and_answer, ANSWER_WAIT_S)
+        except NoAnswerError:
             return SetBoolResponse(False, "NOT STOPPED: the driver hangs" if stopped else "the driver hangs")
         return SetBoolResponse(True, describe_stop(robots) if stopped else "robots may move")
 
     def _take_request(self, message: Bool) -> None:
         stopped = bool(message.data)
-        self._call_soon(lambda: self._set(stopped))
+        self._loop.call_soon(lambda: self._set(stopped))
 
     def _set(self, stopped: bool) -> None:
         """Runs on the thread of the sockets."""

@@ -60,7 +60,7 @@ class Bench:
                 self.impl.close()
 
         monkeypatch.setattr(rospy, "Subscriber", Subscriber)
-        self.subscriber = RawSubscriber(self.receive, self.loop.add_reader)
+        self.subscriber = RawSubscriber(self.receive, self.loop)
         self.subscriber.open("/topic", RAW_CLASS, 50)
 
     def receive(self, payload):

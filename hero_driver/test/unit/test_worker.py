@@ -1,201 +1,162 @@
-"""Jobs on a thread of their own: in order, bounded, one bad job costs no other."""
+"""Calls on another thread: in order, bounded, one bad call costs no other."""
 
 import sys
 import threading
 
+import pytest
+
 from hero_driver.ros.worker import Worker
+from hero_driver.transport import CallQueue
 
 DEADLINE_S = 20.0
 
 
-class Bench:
-    """A worker whose first job can be held until it is let go."""
+class Calls:
+    """A worker whose calls can be held until they are let go."""
 
-    def __init__(self, queue_length=10):
+    def __init__(self, queue_length=10, on_error=None):
         self.errors = []
         self.done = []
         self.gate = threading.Event()
-        self.worker = Worker("bench", queue_length, self.errors.append)
+        self.worker = Worker("calls", queue_length, on_error or self.errors.append)
 
     def hold(self):
         """Keep the worker busy; return when it is."""
         busy = threading.Event()
 
-        def job():
+        def wait():
             busy.set()
             self.gate.wait(DEADLINE_S)
 
-        assert self.worker.submit(job)
+        assert self.worker.submit(wait)
         assert busy.wait(DEADLINE_S)
 
-    def submit(self, number):
-        return self.worker.submit(lambda: self.done.append(number))
+    def submit(self, number, **options):
+        return self.worker.submit(lambda: self.done.append(number), **options)
 
     def wait(self):
-        """Return when all jobs submitted so far are done."""
+        """Return when all calls submitted so far are made."""
         reached = threading.Event()
-        assert self.worker.submit(reached.set)
+        assert self.worker.submit(reached.set, always=True)
         assert reached.wait(DEADLINE_S)
 
+    def is_ended(self):
+        self.worker._thread.join(DEADLINE_S)
+        return not self.worker._thread.is_alive()
 
-def test_jobs_are_done_in_the_order_in_which_they_came_on_another_thread():
-    bench = Bench(200)
+
+def test_calls_are_made_in_order_on_one_thread_with_the_workers_name():
+    calls = Calls(200)
     threads = []
     for number in range(100):
-        assert bench.submit(number)
-    bench.worker.submit(lambda: threads.append(threading.current_thread()))
-    bench.wait()
-    assert bench.done == list(range(100))
-    assert threads[0] is not threading.current_thread()
-    assert threads[0].daemon
-    assert threads[0].name == "bench"
+        assert calls.submit(number)
+        calls.worker.submit(lambda: threads.append(threading.current_thread()))
+    calls.wait()
+    assert calls.done == list(range(100))
+    assert {thread.name for thread in threads} == {"calls"}
 
 
-def test_jobs_beyond_the_length_of_the_queue_are_refused_and_counted():
-    bench = Bench(queue_length=3)
-    bench.hold()
-    assert [bench.submit(number) for number in range(5)] == [True, True, True, False, False]
-    assert bench.worker.refused_jobs == 2
-    bench.gate.set()
-    bench.worker.close(drain=True)
-    assert bench.done == [0, 1, 2]
+def test_a_full_queue_refuses_the_newest_calls_and_counts_them():
+    calls = Calls(queue_length=3)
+    calls.hold()
+    assert [calls.submit(number) for number in range(5)] == [True, True, True, False, False]
+    assert calls.worker.refused == 2
+    calls.gate.set()
+    calls.wait()
+    assert calls.done == [0, 1, 2]
 
 
-def test_a_job_that_raises_is_reported_and_the_next_one_is_done():
-    bench = Bench()
-    error = ValueError("bad job")
+def test_a_full_queue_takes_what_has_to_be_done_always():
+    calls = Calls(queue_length=1)
+    calls.hold()
+    assert [calls.submit(1), calls.submit(2), calls.submit(3, always=True)] == [True, False, True]
+    calls.gate.set()
+    calls.wait()
+    assert calls.done == [1, 3]
+
+
+@pytest.mark.parametrize("error", [ValueError, SystemExit])
+def test_a_call_that_fails_is_reported_and_the_next_one_is_made(error):
+    calls = Calls()
 
     def fail():
-        raise error
+        raise error("bad call")
 
-    bench.worker.submit(fail)
-    bench.submit(1)
-    bench.wait()
-    assert bench.errors == [error]
-    assert bench.done == [1]
-
-
-def test_a_job_that_wants_to_end_the_thread_ends_nothing():
-    bench = Bench()
-    bench.worker.submit(sys.exit)
-    bench.submit(1)
-    bench.wait()
-    assert [type(error) for error in bench.errors] == [SystemExit]
-    assert bench.done == [1]
+    calls.worker.submit(fail)
+    calls.submit(1)
+    calls.wait()
+    assert [type(reported) for reported in calls.errors] == [error]
+    assert calls.done == [1]
 
 
-def test_an_error_that_cannot_be_reported_is_counted_and_the_next_job_is_done():
-    def fail(_):
-        raise OSError("no space left on device")
+def test_an_error_that_cannot_be_reported_does_not_end_the_thread():
+    def fail(error):
+        raise OSError("the terminal is gone")
 
-    bench = Bench()
-    bench.worker = Worker("bench", 10, fail)
-    bench.worker.submit(lambda: 1 / 0)
-    bench.submit(1)
-    bench.wait()
-    assert bench.worker.lost_errors == 1
-    assert bench.done == [1]
+    calls = Calls(on_error=fail)
+    calls.worker.submit(sys.exit)
+    calls.submit(1)
+    calls.wait()
+    assert calls.done == [1]
 
 
-def test_a_job_that_must_be_done_is_taken_although_too_many_wait():
-    bench = Bench(queue_length=1)
-    bench.hold()
-    assert [bench.submit(1), bench.submit(2)] == [True, False]
-    assert bench.worker.submit(lambda: bench.done.append(3), always=True)
-    bench.gate.set()
-    bench.worker.close(drain=True)
-    assert bench.done == [1, 3]
+def test_a_closed_worker_forgets_what_waits_and_takes_nothing():
+    calls = Calls()
+    calls.hold()
+    calls.submit(1)
+    calls.worker.end()
+    assert not calls.submit(2, always=True)
+    calls.gate.set()
+    assert calls.is_ended()
+    assert calls.done == []
 
 
-def test_submitting_does_not_wait_for_a_job_that_hangs():
-    bench = Bench()
-    bench.hold()
-    assert bench.submit(1)
-    assert bench.done == []
-    bench.gate.set()
-    bench.wait()
-    assert bench.done == [1]
+def test_a_drained_worker_makes_the_calls_that_wait_before_it_ends():
+    calls = Calls()
+    calls.hold()
+    for number in range(5):
+        calls.submit(number)
+    calls.worker.end(drain=True)
+    calls.gate.set()
+    assert calls.is_ended()
+    assert calls.done == list(range(5))
 
 
-def test_closing_with_drain_does_what_waits():
-    bench = Bench()
-    bench.hold()
-    for number in range(3):
-        bench.submit(number)
-    bench.gate.set()
-    bench.worker.close(drain=True)
-    assert bench.done == [0, 1, 2]
+def test_a_worker_may_be_closed_twice_and_by_its_own_thread():
+    calls = Calls()
+    calls.worker.submit(calls.worker.close)
+    assert calls.is_ended()
+    calls.worker.close()
 
 
-def test_closing_without_drain_forgets_what_waits():
-    bench = Bench()
-    bench.hold()
-    ended = bench.worker._thread
-    bench.submit(1)
-    bench.worker.close()
-    bench.gate.set()
-    ended.join(DEADLINE_S)
-    assert not ended.is_alive()
-    assert bench.done == []
+def test_closing_leaves_a_worker_that_hangs_behind():
+    calls = Calls()
+    calls.hold()
+    calls.worker.close(drain=True)
+    assert calls.worker._thread.is_alive()
+    calls.gate.set()
+    assert calls.is_ended()
 
 
-def test_a_closed_worker_takes_no_job():
-    bench = Bench()
-    bench.worker.close()
-    assert not bench.submit(1)
-    assert bench.worker.refused_jobs == 1
-
-
-def test_closing_twice_and_without_any_job_is_safe():
-    bench = Bench()
-    bench.worker.close()
-    bench.worker.close(drain=True)
-    bench = Bench()
-    bench.wait()
-    bench.worker.close(drain=True)
-    bench.worker.close()
-    assert not bench.worker._thread.is_alive()
-
-
-def test_closing_leaves_a_job_that_hangs_behind():
-    bench = Bench()
-    bench.hold()
-    bench.worker.close(drain=True)
-    assert bench.worker._thread.is_alive()
-    bench.gate.set()
-    bench.worker._thread.join(DEADLINE_S)
-    assert not bench.worker._thread.is_alive()
-
-
-def test_a_job_may_close_its_worker():
-    bench = Bench()
-    closed = threading.Event()
-
-    def close():
-        bench.worker.close()
-        closed.set()
-
-    bench.worker.submit(close)
-    assert closed.wait(DEADLINE_S)
-
-
-def test_a_job_may_submit_another_one():
-    bench = Bench()
-    bench.worker.submit(lambda: bench.submit(1))
-    bench.wait()
-    bench.wait()
-    assert bench.done == [1]
-
-
-def test_no_job_of_many_threads_is_lost_uncounted():
-    bench = Bench(queue_length=50)
+def test_every_call_of_many_threads_is_made_or_refused():
+    calls = Calls(queue_length=50)
     threads = [
-        threading.Thread(target=lambda: [bench.submit(number) for number in range(300)]) for _ in range(4)
+        threading.Thread(target=lambda: [calls.submit(number) for number in range(300)]) for _ in range(4)
     ]
     for thread in threads:
         thread.start()
     for thread in threads:
-        thread.join(DEADLINE_S)
-    bench.worker.close(drain=True)
-    bench.worker._thread.join(DEADLINE_S)
-    assert len(bench.done) + bench.worker.refused_jobs == 1200
+        thread.join()
+    calls.worker.end(drain=True)
+    assert calls.is_ended()
+    assert len(calls.done) + calls.worker.refused == 1200
+
+
+def test_a_call_made_by_a_call_waits_for_the_next_time():
+    made = []
+    queue = CallQueue(10, lambda: None, made.append)
+    queue.submit(lambda: queue.submit(lambda: made.append("second")))
+    queue.make_calls()
+    assert made == []
+    queue.make_calls()
+    assert made == ["second"]

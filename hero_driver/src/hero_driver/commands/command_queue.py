@@ -1,11 +1,10 @@
-"""Commands to one robot, from ROS threads to the thread of the sockets.
+"""Commands that wait to be sent to one robot.
 
-Motion commands are shaped (command_shaping), everything else goes in order and never waits behind them. Queues
+Motion commands are shaped (velocity_shaper), everything else goes in order and never waits behind them. Queues
 are bounded: a motion command that waits is replaced by a newer one, of the rest the oldest is dropped and counted.
 """
 
 import collections
-import threading
 from typing import Deque, Dict, List, Optional, Set, Tuple
 
 from .velocity_shaper import VelocityShaper
@@ -23,11 +22,10 @@ Command = Tuple[str, bytes]
 
 
 class CommandQueue:
-    """What waits to be sent to one robot; every method may be called from any thread."""
+    """What waits to be sent to one robot."""
 
     def __init__(self, max_age_s: float) -> None:
         """max_age_s: shaped motion commands older than this are dropped."""
-        self._lock = threading.Lock()
         self._max_age_s = max_age_s
         self._shapers: Dict[str, VelocityShaper] = {}
         self._offered_s: Dict[str, float] = {}
@@ -38,49 +36,44 @@ class CommandQueue:
 
     def offer_motion(self, name: str, payload: bytes, stop_payload: bytes, now_s: float) -> None:
         """Take a checked motion command for the topic called name, which stop_payload stops."""
-        with self._lock:
-            shaper = self._shapers.get(name)
-            if shaper is None:
-                shaper = self._shapers[name] = VelocityShaper(stop_payload)
-            shaper.offer(payload)
-            self._offered_s[name] = now_s
-            self._is_idle = False
+        shaper = self._shapers.get(name)
+        if shaper is None:
+            shaper = self._shapers[name] = VelocityShaper(stop_payload)
+        shaper.offer(payload)
+        self._offered_s[name] = now_s
+        self._is_idle = False
 
     def offer(self, name: str, payload: bytes, is_motion: bool = False) -> None:
         """Take anything else; is_motion: it moves a device that takes all commands as they come."""
-        with self._lock:
-            if is_motion:
-                self._unshaped.add(name)
-            if len(self._waiting) >= QUEUE_LENGTH:
-                self._waiting.popleft()
-                self.dropped += 1
-            self._waiting.append((name, payload))
-            self._is_idle = False
+        if is_motion:
+            self._unshaped.add(name)
+        if len(self._waiting) >= QUEUE_LENGTH:
+            self._waiting.popleft()
+            self.dropped += 1
+        self._waiting.append((name, payload))
+        self._is_idle = False
 
     def discard_motion(self, resume_s: float) -> None:
         """Forget the motion commands that wait, and send none before resume_s; stops that wait are kept."""
-        with self._lock:
-            for shaper in self._shapers.values():
-                shaper.discard_motion()
-                shaper.delay_until(resume_s)
-            if self._unshaped:
-                self._waiting = collections.deque(
-                    command for command in self._waiting if command[0] not in self._unshaped
-                )
+        for shaper in self._shapers.values():
+            shaper.discard_motion()
+            shaper.delay_until(resume_s)
+        if self._unshaped:
+            self._waiting = collections.deque(
+                command for command in self._waiting if command[0] not in self._unshaped
+            )
 
     def clear(self) -> None:
         """Forget everything: the connection is gone."""
-        with self._lock:
-            self.dropped += len(self._waiting)
-            self._waiting.clear()
-            self._shapers.clear()
-            self._offered_s.clear()
+        self.dropped += len(self._waiting)
+        self._waiting.clear()
+        self._shapers.clear()
+        self._offered_s.clear()
 
     @property
     def is_idle(self) -> bool:
         """Whether nothing waits."""
-        with self._lock:
-            return not self._waiting and all(shaper.is_idle for shaper in self._shapers.values())
+        return not self._waiting and all(shaper.is_idle for shaper in self._shapers.values())
 
     def take(
         self, in_flight_length: int, motion_acknowledged: bool, holds_motion: bool, now_s: float
@@ -93,19 +86,18 @@ class CommandQueue:
         """
         commands: List[Command] = []
         is_idle = motion_acknowledged
-        with self._lock:
-            if motion_acknowledged:
-                for name, shaper in self._shapers.items():
-                    if now_s - self._offered_s.get(name, now_s) > self._max_age_s:
-                        shaper.discard_motion()
-                    payload = shaper.take(now_s, holds_motion)
-                    if payload is not None:
-                        commands.append((name, payload))
-                    is_idle = is_idle and shaper.is_idle
-            while self._waiting and in_flight_length < IN_FLIGHT_MAX:
-                in_flight_length += len(self._waiting[0][1])
-                commands.append(self._waiting.popleft())
-            self._is_idle = is_idle and not self._waiting
+        if motion_acknowledged:
+            for name, shaper in self._shapers.items():
+                if now_s - self._offered_s.get(name, now_s) > self._max_age_s:
+                    shaper.discard_motion()
+                payload = shaper.take(now_s, holds_motion)
+                if payload is not None:
+                    commands.append((name, payload))
+                is_idle = is_idle and shaper.is_idle
+        while self._waiting and in_flight_length < IN_FLIGHT_MAX:
+            in_flight_length += len(self._waiting[0][1])
+            commands.append(self._waiting.popleft())
+        self._is_idle = is_idle and not self._waiting
         return commands
 
     def due_in_s(self, motion_may_go: bool, now_s: float) -> Optional[float]:
@@ -115,12 +107,11 @@ class CommandQueue:
         """
         if self._is_idle:
             return None
-        with self._lock:
-            if self._waiting:
-                return RETRY_S
-            due_s: Optional[float] = None
-            for shaper in self._shapers.values():
-                delay_s = shaper.due_in_s(now_s)
-                if delay_s is not None and (due_s is None or delay_s < due_s):
-                    due_s = delay_s
+        if self._waiting:
+            return RETRY_S
+        due_s: Optional[float] = None
+        for shaper in self._shapers.values():
+            delay_s = shaper.due_in_s(now_s)
+            if delay_s is not None and (due_s is None or delay_s < due_s):
+                due_s = delay_s
         return due_s if motion_may_go or due_s is None else max(RETRY_S, due_s)

@@ -1,6 +1,6 @@
-"""What robots ask of ROS: parameters and services. Asked on the thread of the sockets, done on workers."""
+"""What robots ask of ROS: parameters and services. Each robot that asks has a worker, because ROS may block."""
 
-from typing import Callable
+from typing import Callable, Dict
 
 from ..config import DriverConfig
 from ..peer import Peer
@@ -8,6 +8,7 @@ from ..ros.log_relay import LogRelay
 from ..ros.worker import Worker
 from ..rosserial.errors import RosserialError
 from ..rosserial.session import Topic, TopicKind
+from ..transport import Call
 from .parameters import (
     EMPTY_ANSWER,
     ParameterAnswer,
@@ -17,7 +18,8 @@ from .parameters import (
 )
 from .service_clients import ServiceClients
 
-REQUESTS_WAITING_MAX = 1000
+REQUESTS_WAITING_MAX = 20
+"""Of one robot: it waits for an answer before it asks again."""
 
 
 class RobotRequests:
@@ -27,7 +29,7 @@ class RobotRequests:
         self,
         config: DriverConfig,
         log: LogRelay,
-        call_soon: Callable[[Callable[[], None]], None],
+        call_soon: Callable[[Call], None],
         complain: Callable[[Peer, str], None],
     ) -> None:
         """Take the loop's call_soon(); complain reports a robot's trouble."""
@@ -35,21 +37,20 @@ class RobotRequests:
         self._log = log
         self._call_soon = call_soon
         self._complain = complain
-        self._parameters = Worker(
-            "parameters",
-            REQUESTS_WAITING_MAX,
-            lambda error: log.log_throttled("error", "parameters", "parameters of robots: %s" % error),
-        )
-        self._services = ServiceClients(config, log)
+        self._workers: Dict[str, Worker] = {}  # of the robots that have asked for anything
+        self._services = ServiceClients(config.service_timeout_s)
 
     def close(self) -> None:
         """End the workers."""
-        self._parameters.close()
-        self._services.close()
+        for worker in self._workers.values():
+            worker.close()
 
     def forget(self, label: str) -> None:
-        """The robot called label is gone for good."""
-        self._services.forget(label)
+        """End the worker of the robot called label, once its call is over: the robot is gone for good."""
+        worker = self._workers.pop(label, None)
+        if worker is not None:
+            worker.end()
+            self._services.forget(label)
 
     def answer_parameter(self, peer: Peer, name: str) -> None:
         """Send a robot the parameter that it calls name, or empty lists with the reason in the log."""
@@ -67,8 +68,7 @@ class RobotRequests:
                 answer = EMPTY_ANSWER
             self._call_soon(lambda: self._send_parameter(peer, answer))
 
-        if not self._parameters.submit(read):
-            self._complain(peer, "asks for too many parameters at once")
+        self._submit(peer, read)
 
     def call_service(
         self,
@@ -89,10 +89,27 @@ class RobotRequests:
             return
         answer_id = answers[0].info.topic_id
 
-        def send(payload: bytes) -> None:
-            self._call_soon(lambda: send_message(peer, answer_id, payload))
+        def call() -> None:
+            try:
+                payload = self._services.call(peer.label, name, topic.info, answers[0].info, request)
+            except Exception as error:  # noqa: BLE001 - the protocol has no error answer, so the robot gets nothing
+                text = "%s: call of service %s failed: %s" % (peer.label, name, error)
+                self._log.log_throttled("error", peer.label + name, text)
+            else:
+                self._call_soon(lambda: send_message(peer, answer_id, payload))
 
-        self._services.call(peer.label, name, topic.info, answers[0].info, request, send)
+        self._submit(peer, call)
+
+    def _submit(self, peer: Peer, call: Call) -> None:
+        label = peer.label
+        if label not in self._workers:
+            self._workers[label] = Worker(
+                "requests of " + label,
+                REQUESTS_WAITING_MAX,
+                lambda error: self._log.log_throttled("error", "requests", "%s: a request failed: %s" % (label, error)),
+            )
+        if not self._workers[label].submit(call):
+            self._complain(peer, "asks for too much at once: %d requests wait" % REQUESTS_WAITING_MAX)
 
     def _send_parameter(self, peer: Peer, answer: ParameterAnswer) -> None:
         try:

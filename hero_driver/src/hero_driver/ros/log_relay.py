@@ -50,7 +50,7 @@ class LogRelay:
         number, write = _LEVELS[level]
         if not self._logger.isEnabledFor(number):
             return
-        dropped = self._worker.refused_jobs
+        dropped = self._worker.refused
         if dropped != self._reported_drops:
             text = "%s (%d log lines before it were dropped)" % (text, dropped - self._reported_drops)
         if self._worker.submit(lambda: write("%s", text)):

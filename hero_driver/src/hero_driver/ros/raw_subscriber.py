@@ -16,7 +16,7 @@ from typing import Any, Callable, Optional
 import rospy
 from rospy.exceptions import TransportException, TransportTerminated
 
-from ..transport import Reader
+from ..transport import EventLoop, Reader
 from .rospy_internals import count_read, find_connection, replace_reading, take_socket, unregister
 
 READ_LENGTH = 4096
@@ -26,8 +26,6 @@ MESSAGE_LENGTH_MAX = 1 << 20
 """A robot takes messages of 4 kB; a publisher that announces more than this does not speak TCPROS."""
 
 _LENGTH = struct.Struct("<I")
-
-AddReader = Callable[[Reader], None]
 
 
 def _drop(payload: bytes) -> None:
@@ -40,17 +38,14 @@ class RawSubscriber:
     def __init__(
         self,
         receive: Callable[[bytes], None],
-        add_reader: AddReader,
+        loop: EventLoop,
         on_sender_lost: Callable[[], None] = lambda: None,
     ) -> None:
-        """receive(payload) is called by any thread, add_reader(reader) is the loop's.
-
-        on_sender_lost() is called on the loop's thread when the publisher of the newest message has gone.
-        """
+        """receive(payload) is called on the loop's thread, on_sender_lost() when the newest message's publisher left."""
         self.receive = receive
         self.on_sender_lost = on_sender_lost
         self.last_sender: Any = None  # connection of the newest message, where this module reads it
-        self._add_reader = add_reader
+        self._loop = loop
         self._subscriber: Any = None
 
     def open(self, name: str, raw_class: Any, queue_length: int) -> None:
@@ -69,10 +64,14 @@ class RawSubscriber:
     def _take(self, message: Any) -> None:
         """A message came through rospy, on the thread of its publisher's connection."""
         connection = find_connection(self._subscriber, message)
-        self.last_sender = connection
-        self.receive(message.data)
+        self._loop.call_soon(functools.partial(self.take, connection, message.data))
         if connection is not None:
             replace_reading(connection, functools.partial(self._hand_over, connection))
+
+    def take(self, connection: Any, payload: bytes) -> None:
+        """Pass on one message that came on connection; on the loop's thread."""
+        self.last_sender = connection
+        self.receive(payload)
 
     def _hand_over(self, connection: Any) -> None:
         """Let the loop read connection; return never, but raise as rospy's own reading does when it ends."""
@@ -80,7 +79,7 @@ class RawSubscriber:
         if sock is None:
             raise TransportTerminated("closed")
         stream = MessageStream(self, connection, sock, rest)
-        self._add_reader(stream)
+        self._loop.add_reader(stream)
         stream.ended.wait()
         if stream.error is not None:
             raise TransportException("read failed: %s" % stream.error)

@@ -8,7 +8,7 @@ there again when the robot returns.
 import functools
 import math
 import time
-from typing import Callable, Dict, List, Optional, Set, Tuple
+from typing import Callable, Dict, List, NamedTuple, Optional, Set, Tuple
 
 from ..commands.command_queue import CommandQueue
 from ..commands.service_requests import find_request_fault, is_success, read_set_odom_pose
@@ -26,10 +26,11 @@ from ..corrections.transforms import split_transforms
 from ..corrections.wheel_motion import WheelMotion
 from ..fleet.namespaces import Identity
 from ..rosserial.session import Topic, TopicKind
+from ..transport import EventLoop
 from . import message_types
 from .endpoints import QUEUE_LENGTH, Endpoints, Layout
-from .raw_publisher import CallLater, RawPublisher
-from .raw_subscriber import AddReader, RawSubscriber
+from .raw_publisher import RawPublisher
+from .raw_subscriber import RawSubscriber
 from .services import RobotService
 from .worker import Worker
 
@@ -48,46 +49,21 @@ TUNING_HEARD_S = 1.0
 """A robot that tunes itself logs up to 47 lines per second (VelocityControl.ino:118)."""
 
 
-class BridgeContext:
-    """What all bridges share."""
+class BridgeContext(NamedTuple):
+    """What all bridges share; the functions are called on the thread of the sockets."""
 
-    def __init__(
-        self,
-        log: Callable[[str, str, str], None],
-        wake: Callable[["RobotBridge"], None],
-        stop: Callable[["RobotBridge"], None],
-        add_transform: Callable[[bytes], None],
-        call_soon: Callable[[Callable[[], None]], None],
-        call_later: CallLater,
-        add_reader: AddReader,
-        is_stopped: Callable[[], bool],
-        clamp: bool,
-        allow_self_tuning: bool,
-        orphan_stop_s: float,
-        service_timeout_s: float,
-        command_max_age_s: float,
-        max_names: int,
-    ) -> None:
-        """Take what the rest of the driver does for bridges.
-
-        wake(bridge): commands wait, stop(bridge): the robot has to stop (any thread); log(level, throttle key,
-        text); call_soon(call), call_later(delay_s, call) and add_reader(reader) are the loop's. max_names: topics and
-        services that one robot may have over all its connections.
-        """
-        self.log = log
-        self.wake = wake
-        self.stop = stop
-        self.add_transform = add_transform
-        self.call_soon = call_soon
-        self.call_later = call_later
-        self.add_reader = add_reader
-        self.is_stopped = is_stopped
-        self.clamp = clamp
-        self.allow_self_tuning = allow_self_tuning
-        self.orphan_stop_s = orphan_stop_s
-        self.service_timeout_s = service_timeout_s
-        self.command_max_age_s = command_max_age_s
-        self.max_names = max_names
+    loop: EventLoop
+    log: Callable[[str, str, str], None]  # level, throttle key, text; from any thread
+    send_commands: Callable[["RobotBridge"], None]
+    stop: Callable[["RobotBridge"], None]
+    add_transform: Callable[[bytes], None]
+    is_stopped: Callable[[], bool]
+    clamp: bool
+    allow_self_tuning: bool
+    orphan_stop_s: float
+    service_timeout_s: float
+    command_max_age_s: float
+    max_names: int  # topics and services of one robot over all its connections
 
 
 class RobotBridge:
@@ -217,7 +193,7 @@ class RobotBridge:
 
         def do() -> None:
             is_usable = register()
-            self._context.call_soon(lambda: settle(is_usable))
+            self._context.loop.call_soon(lambda: settle(is_usable))
 
         self._submit(do)
 
@@ -242,7 +218,7 @@ class RobotBridge:
             return []
         derived = {} if self.corrections is None else self.corrections.find_derived(name, ros_type)
         for publisher_name in (name, *derived):
-            self._publishers.setdefault(publisher_name, RawPublisher(QUEUE_LENGTH, self._context.call_later))
+            self._publishers.setdefault(publisher_name, RawPublisher(QUEUE_LENGTH, self._context.loop.call_later))
         if self.corrections is None:
             publisher = self._publishers[name]
             receive = self._pass_odometry if ros_type == ODOMETRY_TYPE else self._pass_message
@@ -293,7 +269,8 @@ class RobotBridge:
                 return "the robot declared it with another type"
             return self._send_request(name, ros_type, request)
 
-        service = self._services[name] = RobotService(name, ros_type, self._context.service_timeout_s, send)
+        loop, timeout_s = self._context.loop, self._context.service_timeout_s
+        service = self._services[name] = RobotService(name, ros_type, timeout_s, send, loop.ask, loop.call_later)
         return service
 
     def _receive_answer(self, service: RobotService, payload: bytes) -> None:
@@ -351,11 +328,11 @@ class RobotBridge:
         """Return whether the robot tunes itself, as far as its log tells."""
         return now_s - self._tuning_heard_s < TUNING_HEARD_S
 
-    # A ROS program sent a message for the robot (any thread).
+    # A ROS program sent a message for the robot.
 
     def _make_subscriber(self, name: str, ros_type: str) -> RawSubscriber:
         receive = self._choose_receiver(name, ros_type)
-        return RawSubscriber(receive, self._context.add_reader, functools.partial(self._lose_sender, name))
+        return RawSubscriber(receive, self._context.loop, functools.partial(self._lose_sender, name))
 
     def _choose_receiver(self, name: str, ros_type: str) -> Callable[[bytes], None]:
         """Return what takes the messages of a topic that the robot subscribes to."""
@@ -395,7 +372,7 @@ class RobotBridge:
                 self.commands.offer_motion(name, command, stop_payload, now_s)
             else:
                 self.commands.offer(name, command, is_motion=True)
-            self._context.wake(self)
+            self._context.send_commands(self)
 
     def _lose_sender(self, name: str) -> None:
         """The program that sent the newest command of a motion topic has gone (thread of the sockets)."""
@@ -407,17 +384,17 @@ class RobotBridge:
             if self._commanded_s.get(name) == commanded_s:
                 self._context.stop(self)
 
-        self._context.call_later(self._context.orphan_stop_s, stop_orphan)
+        self._context.loop.call_later(self._context.orphan_stop_s, stop_orphan)
 
     def _receive_command(self, name: str, payload: bytes) -> None:
         if not self._connected:
             self.refused_commands += 1
             return
         self.commands.offer(name, payload)
-        self._context.wake(self)
+        self._context.send_commands(self)
 
     def _send_request(self, name: str, service_type: str, request: bytes) -> Optional[str]:
-        """Send a service request (a thread of rospy's); return why not, if so."""
+        """Send a service request; return why not, if so."""
         fault = find_request_fault(service_type, request) if self.corrections is not None else None
         if fault is not None:
             return fault
@@ -433,7 +410,7 @@ class RobotBridge:
                 return "it moves the robot, and all robots are stopped (~stop)"
             self.note_tuning(True)
         self.commands.offer(name, request)
-        self._context.wake(self)
+        self._context.send_commands(self)
         return None
 
     # Jobs of the registrar; these may block.

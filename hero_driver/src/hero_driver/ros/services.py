@@ -1,99 +1,127 @@
 """Services that a robot offers, as ROS services: one call at a time, with a time limit and clear errors.
 
-A call carries no number on the wire: the answer is known by its topic and its order. So after a time-out
-the service stays closed until the late answer came or as long again has passed; otherwise the late answer
-would be taken for that of the next call.
+A call carries no number on the wire: its answer is known by topic and order only. So after a timeout the service stays
+closed until the late answer has come or as long again has passed; otherwise the late answer would be taken for that of
+the next call. Everything here runs on the thread of the sockets, except RobotService.call().
 """
 
-import threading
+import collections
 import time
-from typing import Callable, Optional
+from typing import Callable, Deque, Optional, Tuple
 
 import rospy
 
-Send = Callable[[bytes], Optional[str]]
-"""Sends a request; returns why it cannot be sent, None if it is on its way."""
+from ..transport import NoAnswerError
+
+Answer = Tuple[bytes, str]
+"""The robot's answer, and empty text; or nothing, and why there is none."""
+
+HANG_WAIT_S = 1.0
+"""How long after its time limit a call may stay unanswered by the thread of the sockets."""
+
+
+class _Call:
+    def __init__(self, request: bytes, answer: Callable[[Answer], None], due_s: float) -> None:
+        self.request = request
+        self.answer = answer
+        self.due_s = due_s
+
+    def fail(self, reason: str) -> None:
+        self.answer((b"", reason))
 
 
 class RobotService:
     """One service of one robot, over all its connections."""
 
-    def __init__(self, name: str, service_type: str, timeout_s: float, send: Send) -> None:
+    def __init__(
+        self,
+        name: str,
+        service_type: str,
+        timeout_s: float,
+        send: Callable[[bytes], Optional[str]],
+        ask: Callable[[Callable[[Callable[[Answer], None]], None], float], Answer],
+        call_later: Callable[[float, Callable[[], None]], None],
+    ) -> None:
+        """send(request) returns why it cannot be sent, None if it is on its way; ask and call_later are the loop's."""
         self.name = name
         self.service_type = service_type
         self._timeout_s = timeout_s
         self._send = send
-        self._call_lock = threading.Lock()
-        self._changed = threading.Condition()
-        self._request = b""
-        self._answer: Optional[bytes] = None
-        self._failure: Optional[str] = None
-        self._is_waiting = False
+        self._ask = ask
+        self._call_later = call_later
+        self._waiting: Deque[_Call] = collections.deque()
+        self._current: Optional[_Call] = None
+        self._late_request: Optional[bytes] = None  # of the call that timed out, until its answer has come
         self._late_until_s = 0.0
 
     def call(self, request: bytes) -> bytes:
-        """Return the robot's answer to request. Raises: rospy.ServiceException with the reason of a failure."""
-        deadline_s = time.monotonic() + self._timeout_s
-        if not self._call_lock.acquire(timeout=self._timeout_s):
-            raise rospy.ServiceException(
-                "%s is busy: earlier calls took longer than %.1f s (~service_timeout_s)"
-                % (self.name, self._timeout_s)
-            )
+        """Return the robot's answer to request; on a thread of rospy's.
+
+        Raises: rospy.ServiceException with the reason of a failure.
+        """
+        limit_s = 1.5 * self._timeout_s + HANG_WAIT_S
         try:
-            return self._call_alone(request, max(deadline_s, time.monotonic() + self._timeout_s / 2.0))
-        finally:
-            self._call_lock.release()
+            payload, failure = self._ask(lambda answer: self._begin(request, answer), limit_s)
+        except NoAnswerError as error:
+            failure = "was not answered: %s" % error
+        if failure:
+            raise rospy.ServiceException("%s %s" % (self.name, failure))
+        return payload
 
     def receive_answer(self, payload: bytes) -> Optional[bytes]:
         """Take the robot's answer; return the request that it answers, None if there was none."""
-        with self._changed:
-            if self._is_waiting:
-                self._answer = payload
-                self._changed.notify_all()
-            elif self._late_until_s == 0.0:
-                return None
-            self._late_until_s = 0.0
-            return self._request
+        call, self._current = self._current, None
+        if call is None:
+            request, self._late_request = self._late_request, None
+            return request
+        call.answer((payload, ""))
+        self._send_next()
+        return call.request
 
     def fail(self, reason: str) -> None:
-        """End a call that waits, because the robot left."""
-        with self._changed:
-            self._late_until_s = 0.0
-            if self._is_waiting:
-                self._failure = reason
-                self._changed.notify_all()
+        """End the call that is on its way, because the robot left."""
+        self._late_request = None
+        call, self._current = self._current, None
+        if call is not None:
+            call.fail("was not answered: %s" % reason)
+            self._send_next()
 
-    def _call_alone(self, request: bytes, deadline_s: float) -> bytes:
-        with self._changed:
-            if time.monotonic() < self._late_until_s:
-                raise rospy.ServiceException(
-                    "%s has not answered the call before this one yet; try again in %.1f s"
-                    % (self.name, self._late_until_s - time.monotonic())
+    def _begin(self, request: bytes, answer: Callable[[Answer], None]) -> None:
+        call = _Call(request, answer, time.monotonic() + self._timeout_s)
+        self._waiting.append(call)
+        self._call_later(self._timeout_s, lambda: self._expire(call))
+        self._send_next()
+
+    def _send_next(self) -> None:
+        while self._current is None and self._waiting:
+            call = self._waiting.popleft()
+            now_s = time.monotonic()
+            if self._late_request is not None and now_s < self._late_until_s:
+                call.fail(
+                    "has not answered the call before this one yet; try again in %.1f s" % (self._late_until_s - now_s)
                 )
-            self._answer = self._failure = None
-            self._request = request
-            self._is_waiting = True
-        try:
-            refusal = self._send(request)
+                continue
+            # An answer may come before send() returns.
+            self._current = call
+            # A call that had to wait for its turn gets half of the time limit at least.
+            call.due_s = max(call.due_s, now_s + self._timeout_s / 2.0)
+            refusal = self._send(call.request)
             if refusal is not None:
-                raise rospy.ServiceException("%s cannot be called: %s" % (self.name, refusal))
-            return self._wait(deadline_s)
-        finally:
-            with self._changed:
-                self._is_waiting = False
+                self._current = None
+                call.fail("cannot be called: %s" % refusal)
 
-    def _wait(self, deadline_s: float) -> bytes:
-        with self._changed:
-            while True:
-                if self._answer is not None:
-                    return self._answer
-                if self._failure is not None:
-                    raise rospy.ServiceException("%s was not answered: %s" % (self.name, self._failure))
-                left_s = deadline_s - time.monotonic()
-                if left_s <= 0.0:
-                    self._late_until_s = time.monotonic() + self._timeout_s
-                    raise rospy.ServiceException(
-                        "%s was not answered within %.1f s (~service_timeout_s)"
-                        % (self.name, self._timeout_s)
-                    )
-                self._changed.wait(left_s)
+    def _expire(self, call: _Call) -> None:
+        limit = "%.1f s (~service_timeout_s)" % self._timeout_s
+        if call in self._waiting:
+            self._waiting.remove(call)
+            call.fail("is busy: earlier calls took longer than %s" % limit)
+        elif call is self._current:
+            now_s = time.monotonic()
+            if now_s < call.due_s:
+                self._call_later(call.due_s - now_s, lambda: self._expire(call))
+                return
+            self._current = None
+            self._late_request = call.request
+            self._late_until_s = now_s + self._timeout_s
+            call.fail("was not answered within %s" % limit)
+            self._send_next()

@@ -1,19 +1,23 @@
 """TCP: accepts robots that dial in, dials robots that are servers; owns sockets, clock and write buffers.
 
 One thread runs the loop and calls a LinkHandler with bytes; it knows nothing of packets beyond that each one
-is written with one send. Other threads hand over work with EventLoop.call_soon(). Nothing here blocks.
+is written with one send. Other threads hand over work with EventLoop.call_soon() and ask(). Nothing here blocks.
 """
 
-from .event_loop import THE_DRIVER_ENDS, EventLoop, Reader, TransportSettings
+from .call_queue import Call, CallQueue
+from .event_loop import THE_DRIVER_ENDS, EventLoop, NoAnswerError, Reader, TransportSettings
 from .link import Address, HostNotFoundError, Link, LinkHandler
 
 __all__ = [
     "THE_DRIVER_ENDS",
     "Address",
+    "Call",
+    "CallQueue",
     "EventLoop",
     "HostNotFoundError",
     "Link",
     "LinkHandler",
+    "NoAnswerError",
     "Reader",
     "TransportSettings",
 ]

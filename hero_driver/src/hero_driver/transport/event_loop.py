@@ -1,20 +1,21 @@
 """The loop that owns all sockets, timers and the clock, and the listening socket with them."""
 
-import collections
 import contextlib
 import errno
 import functools
 import heapq
 import itertools
 import os
+import queue
 import resource
 import select
 import socket
 import sys
 import threading
 import time
-from typing import Callable, Deque, Dict, List, NamedTuple, Optional, Set, Tuple, TypeVar
+from typing import Callable, Dict, List, NamedTuple, Optional, Set, Tuple, TypeVar
 
+from .call_queue import CallQueue
 from .dialler import start_dialler
 from .link import Address, Link, LinkHandler, LinkOwner, describe_error, find_socket_address
 
@@ -30,6 +31,9 @@ POLL_INTERVAL_S = 0.1
 """Sessions are polled this often for what is due (repeated requests, silence)."""
 
 
+CALLS_MAX = 10000
+"""Calls of other threads that may wait: each of them has a bound of its own, so more come only if the loop hangs."""
+
 ACCEPT_PAUSE_S = 0.5
 """Rest of the listener when the process has no file descriptors left; those connected go on."""
 
@@ -40,6 +44,10 @@ not open a file for one."""
 
 THE_DRIVER_ENDS = "the driver ends"
 """Reason with which all links are closed at the end."""
+
+
+class NoAnswerError(Exception):
+    """The loop did not answer in time: it hangs or has ended."""
 
 
 class TransportSettings(NamedTuple):
@@ -87,7 +95,7 @@ class EventLoop(LinkOwner):
         self._turned_s = 0.0  # when the last turn ended
         self._timers: List[Tuple[float, int, Callable[[], None]]] = []
         self._timer_numbers = itertools.count()
-        self._calls: Deque[Callable[[], None]] = collections.deque()
+        self._calls = CallQueue(CALLS_MAX, self._wake, self._report_call)
         self._wake_receiver, self._wake_sender = socket.socketpair()
         self._wake_receiver.setblocking(False)
         self._wake_sender.setblocking(False)
@@ -124,7 +132,7 @@ class EventLoop(LinkOwner):
 
     def _run_once(self) -> None:
         timeout_s = None
-        if self._calls:
+        if len(self._calls):
             timeout_s = 0.0
         elif self._timers:
             timeout_s = self._timers[0][0] - self._turned_s
@@ -137,8 +145,7 @@ class EventLoop(LinkOwner):
             serve = serves.get(descriptor)
             if serve is not None:
                 serve(mask)
-        for _ in range(len(self._calls)):
-            self._call(self._calls.popleft())
+        self._calls.make_calls()
         now_s = self._turned_s = time.monotonic()
         while self._timers and self._timers[0][0] <= now_s:
             self._call(heapq.heappop(self._timers)[2])
@@ -148,21 +155,32 @@ class EventLoop(LinkOwner):
         self.call_soon(self._ended.set)
 
     def call_soon(self, call: Callable[[], None]) -> None:
-        """Run call on the loop's thread, soon; from any thread."""
-        self._calls.append(call)
-        if threading.get_ident() == self._thread_id:
-            # The loop looks at its calls before it waits again.
-            return
-        # Where the socket is full the loop has been woken already; where it is closed the loop has ended.
-        with contextlib.suppress(OSError):
-            self._wake_sender.send(b"\0")
+        """Run call on the loop's thread, soon; from any thread. Dropped if CALLS_MAX others wait already."""
+        self._calls.submit(call, always=threading.get_ident() == self._thread_id)
 
-    def call_here(self, call: Callable[[T], None], argument: T) -> None:
-        """Run call(argument) on the loop's thread: now if that is this thread, else soon."""
-        if threading.get_ident() == self._thread_id:
-            call(argument)
-        else:
-            self.call_soon(lambda: call(argument))
+    def ask(self, call: Callable[[Callable[[T], None]], None], timeout_s: float) -> T:
+        """Run call(answer) on the loop's thread; wait for what it gives to answer() and return that.
+
+        From any other thread. Raises: NoAnswerError after timeout_s.
+        """
+        answers: queue.SimpleQueue[T] = queue.SimpleQueue()
+        self.call_soon(lambda: call(answers.put))
+        try:
+            return answers.get(timeout=timeout_s)
+        except queue.Empty:
+            raise NoAnswerError("the driver did not answer within %.1f s" % timeout_s) from None
+
+    def _wake(self) -> None:
+        # The loop looks at its calls before it waits again.
+        if threading.get_ident() != self._thread_id:
+            # Where the socket is full the loop has been woken already; where it is closed the loop has ended.
+            with contextlib.suppress(OSError):
+                self._wake_sender.send(b"\0")
+
+    def _report_call(self, error: BaseException) -> None:
+        if not isinstance(error, Exception):
+            raise error
+        self._handler.report_bug(error)
 
     def add_reader(self, reader: Reader) -> None:
         """Read reader whenever there is something to read, until it ends; from any thread."""

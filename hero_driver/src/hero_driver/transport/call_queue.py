@@ -1,0 +1,61 @@
+"""How threads hand work to one another: a bounded queue of calls, which the receiving thread makes in order.
+
+When the queue is full the new call is refused and counted, and its sender is told. The loop of the sockets has one such
+queue, and so has every worker.
+"""
+
+import collections
+import contextlib
+import threading
+from typing import Callable, Deque
+
+Call = Callable[[], None]
+
+
+class CallQueue:
+    """Calls for one thread, from any other."""
+
+    def __init__(self, length_max: int, wake: Call, on_error: Callable[[BaseException], None]) -> None:
+        """wake() is called after each new call, on its sender's thread; on_error gets what a call raises."""
+        self._calls: Deque[Call] = collections.deque()
+        self._length_max = length_max
+        self._wake = wake
+        self._on_error = on_error
+        self._lock = threading.Lock()
+        self._closed = False
+        self.refused = 0
+
+    def __len__(self) -> int:
+        return len(self._calls)
+
+    def submit(self, call: Call, always: bool = False) -> bool:
+        """Queue call; return False, and count it, if too many wait (unless always) or the queue is closed."""
+        with self._lock:
+            if self._closed or (len(self._calls) >= self._length_max and not always):
+                self.refused += 1
+                return False
+            self._calls.append(call)
+        self._wake()
+        return True
+
+    def make_calls(self) -> None:
+        """Make the calls that wait now; what they submit in turn waits for the next time."""
+        for _ in range(len(self._calls)):
+            with self._lock:
+                if not self._calls:
+                    return
+                call = self._calls.popleft()
+            try:
+                call()
+            except BaseException as error:  # noqa: BLE001 - not even SystemExit may end the thread that serves all
+                # Where it would be told (a terminal, a disk) may be what is broken.
+                with contextlib.suppress(Exception):
+                    self._on_error(error)
+
+    def close(self, drain: bool = False) -> None:
+        """Refuse new calls, and forget those that wait unless they are to be drained; safe twice."""
+        with self._lock:
+            self._closed = True
+            if not drain:
+                self._calls.clear()
+        self._wake()
