@@ -41,7 +41,7 @@ class RawSubscriber:
         loop: EventLoop,
         on_sender_lost: Callable[[], None] = lambda: None,
     ) -> None:
-        """receive(payload) is called on the loop's thread, on_sender_lost() when the newest message's publisher left."""
+        """receive(payload) is called on the loop's thread, on_sender_lost() when the newest one's publisher left."""
         self.receive = receive
         self.on_sender_lost = on_sender_lost
         self.last_sender: Any = None  # connection of the newest message, where this module reads it
