@@ -14,18 +14,26 @@ PRINTING = (
     ["calibrate", "--help"],
     ["check", "--json"],
     ["export", "--columns"],
-    ["hotspot", "create", "--dry-run", "--interface", "wlan0"],
+    ["hotspot", "--help"],
     ["plot", "--help"],
     ["record", "--help"],
     ["hero_sim", "--fault", "help"],
 )
+PACKAGES = {
+    "calibrate": "hero_calibration",
+    "check": "hero_tools",
+    "export": "hero_recording",
+    "hero_sim": "hero_sim",
+    "hotspot": "hero_tools",
+    "plot": "hero_recording",
+    "record": "hero_recording",
+}
 
 
 def start(command, stdout=subprocess.PIPE, **environment):
-    """Return the process of a program of hero_bringup, or of the simulator."""
-    package = "hero_sim" if command[0] == "hero_sim" else "hero_bringup"
+    """Return the process of a program of the suite."""
     return subprocess.Popen(
-        ["rosrun", package, *command],
+        ["rosrun", PACKAGES[command[0]], *command],
         stdin=subprocess.DEVNULL,
         stdout=stdout,
         stderr=subprocess.PIPE,

@@ -23,7 +23,6 @@ ONE_DEVICE = "wlan0:wifi:disconnected:\neth0:ethernet:connected:Wired connection
 ABLE = (
     "WIFI-PROPERTIES.WPA2:yes\nWIFI-PROPERTIES.AP:yes\nWIFI-PROPERTIES.2GHZ:yes\nWIFI-PROPERTIES.5GHZ:yes\n"
 )
-ALLOWED = "org.freedesktop.NetworkManager.wifi.share.protected:yes\n"
 ON = (
     "802-11-wireless.ssid:swarm\n802-11-wireless.band:bg\nconnection.interface-name:wlan0\n"
     "ipv4.addresses:10.42.0.1/24\nGENERAL.STATE:activated\nIP4.ADDRESS[1]:10.42.0.1/24\n"
@@ -46,7 +45,6 @@ class ScriptedNmcli:
         self.answers: Dict[str, List] = {
             "device status": [0, ONE_DEVICE],
             "device show": [0, ABLE],
-            "general permissions": [0, ALLOWED],
             "-f NAME connection show": [0, ""],
             "connection show hero_hotspot": [0, ON],
             "connection edit": [0, "Connection 'hero_hotspot' (1b4f) successfully updated.\n"],

@@ -5,44 +5,38 @@ import threading
 
 import pytest
 
-from hero_tools.checkup import environment, graph, network
-from hero_tools.checkup.finding import FAIL, OK, WARN, Finding, run_points
+from hero_tools.checkup import computer, graph, network
 from hero_tools.checkup.network import Address
-from hero_tools.checkup.system_command import NOT_THERE, Answer, ask_system
+from hero_tools.checkup.points import FAIL, NOT_THERE, OK, WARN, Answer, ask_system, ok, run_points
 
 
-def test_a_point_that_hangs_or_breaks_is_a_failure_of_its_own():
+def test_a_point_that_hangs_or_breaks_fails_alone():
     release = threading.Event()
 
     def hang():
         release.wait()
-        return []
+        return ok("late")
 
     def broken():
         raise ValueError("two\nlines")
 
-    points = {"hangs": hang, "breaks": broken, "works": lambda: [Finding("works", OK, "fine")]}
-    findings = run_points(points, 0.2)
+    findings = run_points({"hangs": hang, "breaks": broken, "works": lambda: ok("fine")}, 0.2)
     release.set()
-    assert [(finding.point, finding.state) for finding in findings] == [
-        ("hangs", FAIL),
-        ("breaks", FAIL),
-        ("works", OK),
-    ]
-    assert "no answer within 0.2 s" in findings[0].says
-    assert "two lines" in findings[1].says
+    assert {name: finding.state for name, finding in findings.items()} == {"hangs": FAIL, "breaks": FAIL, "works": OK}
+    assert "no answer within 0.2 s" in findings["hangs"].text
+    assert "two lines" in findings["breaks"].text
 
 
 def test_a_port_that_nobody_holds_is_free_and_one_that_another_program_holds_is_named():
     with socket.socket() as holder:
         holder.bind(("127.0.0.1", 0))
         port = holder.getsockname()[1]
-        assert network.check_port(port)[0].state == OK
+        assert network.check_port(port).state == OK
         holder.listen()
-        (finding,) = network.check_port(port)
+        finding = network.check_port(port)
     assert finding.state == FAIL
-    assert "taken by process" in finding.says
-    assert "127.0.0.1" in finding.says
+    assert "taken by process" in finding.text
+    assert "127.0.0.1" in finding.text
     assert any("port:=" in line for line in finding.remedy)
 
 
@@ -56,7 +50,7 @@ def test_a_port_held_on_ipv6_is_seen_too():
 def test_the_socket_of_another_users_program_leads_to_how_to_find_it(monkeypatch):
     monkeypatch.setattr(network, "find_listeners", lambda port: {"0.0.0.0": "1"})
     monkeypatch.setattr(network, "find_process", lambda number: None)
-    (finding,) = network.check_port(11411)
+    finding = network.check_port(11411)
     assert finding.state == WARN
     assert "ss -ltnp" in finding.remedy[0]
 
@@ -69,17 +63,26 @@ WIFI, LAN, DOCKER = (
 
 
 @pytest.mark.parametrize(
-    ("addresses", "wanted", "interface"),
+    ("addresses", "interface"),
     [
-        ([LAN, WIFI], None, "wlan0"),
-        ([LAN, DOCKER], None, "eth0"),
-        ([LAN, Address("wlan0", "192.168.8.2")], None, None),
-        ([LAN, WIFI], "eth0", "eth0"),
-        ([], None, None),
+        ([LAN, WIFI], "wlan0"),
+        ([LAN, DOCKER], "eth0"),
+        ([LAN, Address("wlan0", "192.168.8.2")], None),
+        ([], None),
     ],
 )
-def test_the_robots_network_is_the_hotspot_or_the_only_one(addresses, wanted, interface):
-    assert network.find_robot_interface(addresses, wanted) == interface
+def test_the_robots_network_is_the_hotspot_or_the_only_one(addresses, interface):
+    assert network.find_robot_interface(addresses) == interface
+
+
+def test_the_firewall_commands_name_the_interface_and_the_port():
+    finding = network.advise_firewall("wlan0", 11412)
+    assert finding.remedy == (
+        "ufw: sudo ufw allow in on wlan0 to any port 11412 proto tcp",
+        "firewalld: sudo firewall-cmd --permanent --zone=$(firewall-cmd --get-zone-of-interface=wlan0)"
+        " --add-port=11412/tcp && sudo firewall-cmd --reload",
+    )
+    assert all("INTERFACE" in line for line in network.advise_firewall(None, 11411).remedy)
 
 
 @pytest.mark.parametrize(
@@ -88,7 +91,7 @@ def test_the_robots_network_is_the_hotspot_or_the_only_one(addresses, wanted, in
         ([LAN, WIFI], None, [], OK, "10.42.0.1:11411"),
         ([LAN, WIFI], None, ["0.0.0.0"], OK, "10.42.0.1:11411"),
         ([LAN, WIFI], None, ["127.0.0.1"], WARN, "open on 127.0.0.1 only"),
-        ([LAN, WIFI], None, ["192.168.7.2"], WARN, "dial one of these, port 11411: 192.168.7.2 (eth0)"),
+        ([LAN, WIFI], None, ["192.168.7.2"], WARN, "connect to one of these, port 11411: 192.168.7.2 (eth0)"),
         ([LAN, WIFI], None, ["::"], OK, "192.168.7.2 (eth0), 10.42.0.1 (wlan0)"),
         ([LAN], None, [], WARN, "192.168.7.2 (eth0)"),
         ([], None, [], WARN, "no network"),
@@ -96,26 +99,26 @@ def test_the_robots_network_is_the_hotspot_or_the_only_one(addresses, wanted, in
         (None, None, [], WARN, "ip is missing"),
     ],
 )
-def test_addresses_that_robots_can_dial_are_listed(addresses, wanted, listening, state, says):
-    (finding,) = network.check_addresses(addresses, wanted, 11411, listening)
+def test_addresses_that_robots_can_connect_to_are_listed(addresses, wanted, listening, state, says):
+    finding = network.check_addresses(addresses, wanted, 11411, listening)
     assert finding.state == state
-    assert says in finding.says
+    assert says in finding.text
     assert bool(finding.remedy) == (state != OK)
 
 
 def test_no_address_is_named_where_the_driver_does_not_listen():
-    (finding,) = network.check_addresses([LAN, WIFI], None, 11411, ["127.0.0.1"])
-    assert not any(entry.address in finding.says + " ".join(finding.remedy) for entry in (LAN, WIFI))
+    finding = network.check_addresses([LAN, WIFI], None, 11411, ["127.0.0.1"])
+    assert not any(entry.address in finding.text + " ".join(finding.remedy) for entry in (LAN, WIFI))
     assert "host:=0.0.0.0" in finding.remedy[0]
 
 
 @pytest.mark.parametrize("uri", ["localhost", "http://", "http://pc:99999", "http://[::1", "ftp://pc:1", "http://pc:0"])
 def test_a_bad_master_uri_is_named_with_its_value(monkeypatch, uri):
     monkeypatch.setenv("ROS_MASTER_URI", uri)
-    for finding in (*graph.check_variables([]), *graph.check_master([])):
+    for finding in (graph.check_variables([]), graph.check_master([])):
         assert finding.state == FAIL
-        assert repr(uri) in finding.says
-        assert "http://ADDRESS:11311" in finding.says
+        assert repr(uri) in finding.text
+        assert "http://ADDRESS:11311" in finding.text
 
 
 def test_only_addresses_of_this_pc_are_its_own():
@@ -127,66 +130,66 @@ def test_only_addresses_of_this_pc_are_its_own():
 @pytest.mark.parametrize(
     ("chrony", "systemd", "state", "says"),
     [
-        (Answer(0, "Leap status     : Normal\n", ""), Answer(NOT_THERE, "", ""), OK, "chrony"),
+        (Answer(0, "Leap status     : Normal\n"), Answer(NOT_THERE, ""), OK, "chrony"),
         (
-            Answer(0, "Leap status     : Not synchronised\n", ""),
-            Answer(NOT_THERE, "", ""),
+            Answer(0, "Leap status     : Not synchronised\n"),
+            Answer(NOT_THERE, ""),
             WARN,
             "not synchronised",
         ),
-        (Answer(NOT_THERE, "", ""), Answer(0, "NTP=yes\nNTPSynchronized=yes\n", ""), OK, "timedatectl"),
-        (Answer(NOT_THERE, "", ""), Answer(0, "NTP=no\nNTPSynchronized=no\n", ""), WARN, "not synchronised"),
-        (Answer(NOT_THERE, "", ""), Answer(1, "", "not booted with systemd"), WARN, "not known"),
+        (Answer(NOT_THERE, ""), Answer(0, "NTP=yes\nNTPSynchronized=yes\n"), OK, "timedatectl"),
+        (Answer(NOT_THERE, ""), Answer(0, "NTP=no\nNTPSynchronized=no\n"), WARN, "not synchronised"),
+        (Answer(NOT_THERE, ""), Answer(1, ""), WARN, "unknown"),
     ],
 )
 def test_the_clock_is_judged_by_what_keeps_it_right(monkeypatch, chrony, systemd, state, says):
     answers = {"chronyc": chrony, "timedatectl": systemd}
-    monkeypatch.setattr(environment, "ask_system", lambda command: answers[command[0]])
-    (finding,) = environment.check_clock()
+    monkeypatch.setattr(computer, "ask_system", lambda command: answers[command[0]])
+    finding = computer.check_clock()
     assert finding.state == state
-    assert says in finding.says
+    assert says in finding.text
 
 
 def test_a_clock_that_was_never_set_is_a_failure(monkeypatch):
-    monkeypatch.setattr(environment.time, "time", lambda: 3600.0)
-    assert environment.check_clock()[0].state == FAIL
+    monkeypatch.setattr(computer.time, "time", lambda: 3600.0)
+    assert computer.check_clock().state == FAIL
 
 
 def test_a_disk_that_is_nearly_full_and_a_folder_that_cannot_be_written_are_found(monkeypatch, tmp_path):
     monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path / "not" / "made" / "yet"))
-    assert environment.check_disk()[0].state in (OK, WARN)
-    monkeypatch.setattr(environment, "SMALL_DISK_BYTES", 1e30)
-    assert environment.check_disk()[0].state == WARN
-    monkeypatch.setattr(environment, "FULL_DISK_BYTES", 1e30)
-    assert environment.check_disk()[0].state == FAIL
+    assert computer.check_disk().state in (OK, WARN)
+    monkeypatch.setattr(computer, "SMALL_DISK_BYTES", 1e30)
+    assert computer.check_disk().state == WARN
+    monkeypatch.setattr(computer, "FULL_DISK_BYTES", 1e30)
+    assert computer.check_disk().state == FAIL
     monkeypatch.setenv("ROS_LOG_DIR", "/proc/nowhere")
-    monkeypatch.setattr(environment.os, "access", lambda path, mode: False)
-    assert "cannot be written" in environment.check_disk()[0].says
+    monkeypatch.setattr(computer.os, "access", lambda path, mode: False)
+    assert "cannot be written" in computer.check_disk().text
 
 
 def test_a_log_folder_that_is_a_file_or_below_one_is_found(monkeypatch, tmp_path):
     (tmp_path / "file").write_text("")
     for path in ("file", "file/log"):
         monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path / path))
-        (finding,) = environment.check_disk()
+        finding = computer.check_disk()
         assert finding.state == FAIL
-        assert "%s is a file" % (tmp_path / "file") in finding.says
+        assert "%s is a file" % (tmp_path / "file") in finding.text
 
 
 def test_messages_of_another_layout_are_found(monkeypatch):
-    assert environment.check_messages()[0].state == OK
-    monkeypatch.setitem(environment.FIRMWARE_MD5, "hero_msgs.msg.Motor", "0" * 32)
-    (finding,) = environment.check_messages()
+    assert computer.check_messages().state == OK
+    monkeypatch.setitem(computer.FIRMWARE_MD5, "hero_msgs.msg.Motor", "0" * 32)
+    finding = computer.check_messages()
     assert finding.state == FAIL
-    assert "hero_msgs.msg.Motor" in finding.says
+    assert "hero_msgs.msg.Motor" in finding.text
 
 
 def test_packages_that_are_not_on_the_path_are_named(monkeypatch):
-    assert environment.check_packages()[0].state == OK
-    monkeypatch.setattr(environment, "SUITE", ("hero_msgs", "hero_nowhere"))
-    (finding,) = environment.check_packages()
+    assert computer.check_packages().state == OK
+    monkeypatch.setattr(computer, "SUITE", ("hero_msgs", "hero_nowhere"))
+    finding = computer.check_packages()
     assert finding.state == FAIL
-    assert "hero_nowhere" in finding.says
+    assert "hero_nowhere" in finding.text
     assert "source" in finding.remedy[0]
 
 

@@ -43,7 +43,7 @@ def test_create_makes_a_wpa2_access_point_at_2_4_ghz_that_shares_the_address_rob
     assert "ipv4.method shared ipv4.addresses 10.42.0.1/24" in told
     assert edit.typed == "set wifi-sec.psk %s\nsave\nquit\n" % PASSWORD
     assert up.arguments[-2:] == ["up", "hero_hotspot"]
-    assert "robots must join 'swarm' and dial 10.42.0.1, port 11411" in output
+    assert "this network, its password, 10.42.0.1 and 11411" in output
     assert "http://192.168.4.1" in output
 
 
@@ -57,42 +57,12 @@ def test_the_password_is_on_no_command_line_in_no_output_and_in_no_history_of_nm
     assert PASSWORD not in output + errors
 
 
-def test_a_dry_run_prints_the_exact_commands_and_runs_none_that_changes_anything(nmcli, monkeypatch, capsys):
-    code, output, _ = run(monkeypatch, capsys, "create", "--ssid", "a b", "--dry-run")
-    assert code == 0
-    lines = output.splitlines()
-    assert lines[0].startswith(
-        "nmcli connection add type wifi ifname wlan0 con-name hero_hotspot autoconnect no ssid 'a b'"
-    )
-    assert lines[1] == (
-        'read -rs PASSWORD; printf \'%s\\n\' "set wifi-sec.psk $PASSWORD" "save" "quit"'
-        " | HOME=/dev/null nmcli connection edit hero_hotspot"
-    )
-    assert lines[2] == "nmcli --wait 30 connection up hero_hotspot"
-    assert not [call for call in nmcli.read_calls() if "connection" in call.arguments]
-
-
-def test_a_dry_run_for_a_named_interface_needs_no_network_manager(monkeypatch, capsys, tmp_path):
-    monkeypatch.setenv("PATH", str(tmp_path))
-    code, output, errors = run(monkeypatch, capsys, "create", "--interface", "wlan7", "--dry-run")
-    assert (code, errors) == (0, "")
-    assert "ifname wlan7" in output
-
-
-@pytest.mark.parametrize("band", ["a", "5GHz", "ac"])
-def test_5_ghz_is_refused_with_the_reason(nmcli, monkeypatch, capsys, band):
-    code, _, errors = run(monkeypatch, capsys, "create", "--band", band)
-    assert code == 2
-    assert "robots hear 2.4 GHz only" in errors
-    assert not nmcli.read_calls()
-
-
 @pytest.mark.parametrize(
     ("password", "says"),
     [
         ("short", "5 characters"),
         ("x" * 64, "64 characters"),
-        ("pässwörter", "ASCII"),
+        ("pässwörter", "non-ASCII"),
         (" begins so", "space"),
     ],
 )
@@ -116,10 +86,10 @@ def test_unconfigured_robots_get_the_network_that_they_look_for(nmcli, monkeypat
     code, output, _ = run(monkeypatch, capsys, "create", "--factory")
     assert code == 0
     assert "hero_network" in output
-    assert "everybody knows this password" in output
+    assert "its password is public" in output
 
 
-def test_without_nmcli_it_says_how_to_get_it_and_what_else_will_do(monkeypatch, capsys, tmp_path):
+def test_without_nmcli_it_says_how_to_get_it(monkeypatch, capsys, tmp_path):
     monkeypatch.setenv("PATH", str(tmp_path))
     code, _, errors = run(monkeypatch, capsys, "create", "--factory")
     assert code == 1
@@ -130,10 +100,10 @@ def test_without_nmcli_it_says_how_to_get_it_and_what_else_will_do(monkeypatch, 
 @pytest.mark.parametrize(
     ("part", "code", "answer", "says"),
     [
-        ("device status", 8, "Error: NetworkManager is not running.\n", "NetworkManager does not run"),
+        ("device status", 8, "Error: NetworkManager is not running.\n", "NetworkManager is not running"),
         ("device status", 0, "lo:loopback:unmanaged:\n", "no Wi-Fi device"),
         ("device status", 0, "wlan0:wifi:unavailable:\n", "switched off"),
-        ("device status", 0, "wlan0:wifi:unmanaged:\n", "not managed"),
+        ("device status", 0, "wlan0:wifi:unmanaged:\n", "unmanaged"),
         ("device status", 0, "wlan0:wifi:connected:home\\: up\n", "connected to 'home: up'"),
         (
             "device status",
@@ -143,23 +113,17 @@ def test_without_nmcli_it_says_how_to_get_it_and_what_else_will_do(monkeypatch, 
         ),
         ("device show", 0, "WIFI-PROPERTIES.AP:no\n", "cannot be an access point"),
         ("device show", 0, "WIFI-PROPERTIES.AP:yes\nWIFI-PROPERTIES.2GHZ:no\n", "2.4 GHz"),
-        (
-            "general permissions",
-            0,
-            "org.freedesktop.NetworkManager.wifi.share.protected:no\n",
-            "may not share",
-        ),
-        ("connection add", 4, "Error: Failed to add 'x' connection: Insufficient privileges\n", "root shell"),
+        ("connection add", 4, "Error: Failed to add 'x' connection: Insufficient privileges\n", "or as root"),
         (
             "connection up",
             4,
             "Error: Connection activation failed: No suitable device found\n",
-            "nmcli radio wifi on",
+            "No suitable device",
         ),
         ("connection edit", 0, "Error: Failed to save 'hero_hotspot'\n", "Failed to save"),
     ],
 )
-def test_what_is_in_the_way_is_said_in_one_line(nmcli, monkeypatch, capsys, part, code, answer, says):
+def test_an_obstacle_is_reported_in_one_line_with_its_remedy(nmcli, monkeypatch, capsys, part, code, answer, says):
     nmcli.answer(part, code, answer)
     exit_code, output, errors = run(monkeypatch, capsys, "create", "--password-stdin")
     assert exit_code == 1
@@ -176,24 +140,24 @@ def test_a_hotspot_that_cannot_be_switched_on_leaves_nothing_behind(nmcli, monke
     assert nmcli.read_calls()[-1].arguments == ["connection", "delete", "hero_hotspot"]
 
 
-def test_show_says_what_robots_dial_and_never_the_password(nmcli, monkeypatch, capsys):
+def test_status_prints_the_address_for_robots_and_never_the_password(nmcli, monkeypatch, capsys):
     nmcli.answer("-f NAME connection show", 0, "Wired connection 1\nhero_hotspot\n")
-    code, output, _ = run(monkeypatch, capsys, "show")
+    code, output, _ = run(monkeypatch, capsys, "status")
     assert code == 0
-    assert "hotspot 'swarm' is on, on wlan0; robots dial 10.42.0.1, port 11411" in output
+    assert "hotspot 'swarm' is on (wlan0); robots connect to 10.42.0.1, port 11411" in output
     assert not [call for call in nmcli.read_calls() if {"-s", "--show-secrets"} & set(call.arguments)]
 
 
-def test_show_without_a_hotspot_says_so_and_fails(nmcli, monkeypatch, capsys):
-    assert run(monkeypatch, capsys, "show")[0] == 1
+def test_status_without_a_hotspot_fails(nmcli, monkeypatch, capsys):
+    assert run(monkeypatch, capsys, "status")[0] == 1
 
 
-def test_stop_forgets_the_hotspot_with_its_password(nmcli, monkeypatch, capsys):
+def test_remove_deletes_the_hotspot_with_its_password(nmcli, monkeypatch, capsys):
     nmcli.answer("-f NAME connection show", 0, "hero_hotspot\n")
-    code, output, _ = run(monkeypatch, capsys, "stop")
+    code, output, _ = run(monkeypatch, capsys, "remove")
     assert code == 0
     assert nmcli.read_calls()[-1].arguments == ["connection", "delete", "hero_hotspot"]
-    assert "off" in output
+    assert "removed" in output
 
 
 @pytest.mark.parametrize("ssid", ["\udcff", "\x1b[2J", "a" * 33])
@@ -211,6 +175,6 @@ def test_a_password_that_is_no_text_is_refused_in_one_line(nmcli, monkeypatch, c
 def test_nmcli_that_cannot_be_executed_is_named_as_missing(monkeypatch, capsys, tmp_path):
     (tmp_path / "nmcli").write_text("no program")
     monkeypatch.setenv("PATH", str(tmp_path))
-    code, _, errors = run(monkeypatch, capsys, "show")
+    code, _, errors = run(monkeypatch, capsys, "status")
     assert (code, len(errors.splitlines())) == (1, 1)
     assert "nmcli is not installed" in errors

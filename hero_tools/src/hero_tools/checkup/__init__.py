@@ -1,1 +1,1 @@
-"""What the program check looks at: one module per area, each point a function that returns findings."""
+"""What the program check inspects: one module per area, each point a function that returns a finding."""

@@ -1,16 +1,16 @@
-"""The ROS master, the way to it and back, and the robots -> findings.
+"""The ROS master, the connections to it and back, and the robots.
 
-"And back" is tried, not guessed: the node rosout runs beside the master and subscribes to /rosout, so it must be able
-to connect to a node here. That it has done so is what the point `way_back` waits for.
+The return path is tried: the node rosout runs beside the master and must connect to a node here that has /rosout.
 """
 
+import functools
 import http.client
 import os
 import threading
 import time
 import urllib.parse
 import xmlrpc.client
-from typing import Any, Dict, List, Optional, Sequence, Set, Tuple
+from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple
 
 import rosgraph
 import rosgraph.roslogging
@@ -19,17 +19,18 @@ from rosgraph_msgs.msg import Log
 
 from hero_msgs.msg import Robot, RobotArray
 
-from .finding import FAIL, OK, WARN, Finding
 from .network import HOST_REMEDY, Address, find_source_address, is_loopback, is_own, resolve
+from .points import Finding, fail, ok, warn
 
 CALL_TIMEOUT_S = 0.6
-BACK_TIMEOUT_S = 0.8
-ROBOTS_TIMEOUT_S = 0.8
+CONNECT_TIMEOUT_S = 0.8
+REPORT_TIMEOUT_S = 0.8
 NODES_ASKED = 30
+LINES_MAX = 10
 CALLER = "/hero_check"
 STATES = {Robot.JOINING: "joining", Robot.READY: "ready", Robot.AWAY: "away", Robot.REFUSED: "refused"}
-
-NO_LOGS = Finding("", WARN, "not looked at: without a folder for logs no node starts (point disk)")
+CALL_ERRORS = (OSError, http.client.HTTPException, xmlrpc.client.Error, ValueError, TypeError)
+CLEAN_UP = "did it end without a word? rosnode cleanup"
 
 
 class BoundedTransport(xmlrpc.client.Transport):
@@ -41,7 +42,7 @@ class BoundedTransport(xmlrpc.client.Transport):
 
 
 def call(uri: str, method: str, *arguments: Any) -> Any:
-    """Call the master's or a node's API and return its value.
+    """Call the API of the master or of a node and return its value.
 
     Raises: OSError, http.client.HTTPException, xmlrpc.client.Error.
     """
@@ -52,137 +53,90 @@ def call(uri: str, method: str, *arguments: Any) -> Any:
     return value
 
 
-CALL_ERRORS = (OSError, http.client.HTTPException, xmlrpc.client.Error, ValueError, TypeError)
-
-
-def read_master_uri() -> Tuple[str, int]:
-    """Return host and port of ROS_MASTER_URI.
-
-    Raises: ValueError with what is wrong.
-    """
+def read_master_host() -> str:
+    """Return the host of ROS_MASTER_URI. Raises: ValueError with what is wrong."""
     uri = rosgraph.get_master_uri()
     try:
         parts = urllib.parse.urlsplit(uri)
         if parts.scheme == "http" and parts.hostname and parts.port:
-            return parts.hostname, parts.port
+            return parts.hostname
     except ValueError:
         pass  # a port beyond 65535, half an IPv6 address
     raise ValueError("ROS_MASTER_URI is %s, but must be like http://ADDRESS:11311" % ascii(uri))
 
 
-def check_variables(own: Optional[Sequence[Address]]) -> List[Finding]:
-    """Look at the variables by which nodes find each other."""
-    point = "ros_environment"
+def check_variables(own: Optional[Sequence[Address]]) -> Finding:
+    """Check the variables by which nodes find each other."""
     try:
-        read_master_uri()
+        read_master_host()
     except ValueError as error:
-        return [Finding(point, FAIL, str(error), ["export ROS_MASTER_URI=http://localhost:11311"])]
+        return fail(str(error), "export ROS_MASTER_URI=http://localhost:11311")
     ip, hostname = os.environ.get("ROS_IP", ""), os.environ.get("ROS_HOSTNAME", "")
     addresses = [found.address for found in own or []]
     if ip and own is not None and ip not in addresses and not ip.startswith("127."):
-        says = "ROS_IP is %s, which is not an address of this PC" % ascii(ip)
-        return [
-            Finding(point, FAIL, says, ["export ROS_IP=%s" % (addresses[0] if addresses else "127.0.0.1")])
-        ]
-    says = "master %s, ROS_IP %s, ROS_HOSTNAME %s" % (rosgraph.get_master_uri(), ip or "-", hostname or "-")
+        remedy = "export ROS_IP=%s" % (addresses[0] if addresses else "127.0.0.1")
+        return fail("ROS_IP is %s, which is not an address of this PC" % ascii(ip), remedy)
+    text = "master %s, ROS_IP %s, ROS_HOSTNAME %s" % (rosgraph.get_master_uri(), ip or "-", hostname or "-")
     if ip and not hostname and "ROS_HOSTNAME" in os.environ:
-        return [
-            Finding(
-                point,
-                WARN,
-                says + ": ROS_HOSTNAME is set but empty, which hides ROS_IP",
-                ["unset ROS_HOSTNAME"],
-            )
-        ]
+        return warn(text + ": ROS_HOSTNAME is set but empty, which hides ROS_IP", "unset ROS_HOSTNAME")
     if ip and hostname:
-        return [Finding(point, WARN, says + ": ROS_HOSTNAME wins over ROS_IP", ["unset ROS_HOSTNAME"])]
-    return [Finding(point, OK, says)]
+        return warn(text + ": ROS_HOSTNAME takes precedence over ROS_IP", "unset ROS_HOSTNAME")
+    return ok(text)
 
 
-def check_own_name(own: Sequence[Address]) -> List[Finding]:
-    """Look whether others find the nodes of this PC by the name that they give."""
-    point = "own_name"
+def check_own_name(own: Sequence[Address]) -> Finding:
+    """Check whether other PCs find the nodes of this PC by the name that they register."""
     name = rosgraph.network.get_host_name()
     found = resolve(name)
-    source = "as ROS_IP or ROS_HOSTNAME says" if rosgraph.network.get_address_override() else "the host name"
     try:
-        master_host, _ = read_master_uri()
+        master = resolve(read_master_host())
     except ValueError:
-        master_host = "localhost"
-    master = resolve(master_host)
-    remote = bool(master) and not any(is_own(address, own) for address in master)
-    address = (find_source_address(next(iter(master))) if remote else None) or (
-        own[0].address if own else "127.0.0.1"
-    )
-    remedy = ["export ROS_IP=%s" % address]
-    if not remote:
-        remedy = ["one PC: export ROS_HOSTNAME=localhost", "several PCs: export ROS_IP=%s" % address]
-    says = "nodes here call themselves %s (%s)" % (ascii(name)[1:-1], source)
+        master = resolve("localhost")
+    is_remote = bool(master) and not any(is_own(address, own) for address in master)
+    address = find_source_address(next(iter(master))) if is_remote else None
+    export = "export ROS_IP=%s" % (address or (own[0].address if own else "127.0.0.1"))
+    remedy = [export] if is_remote else ["one PC: export ROS_HOSTNAME=localhost", "several PCs: " + export]
+    source = "ROS_IP or ROS_HOSTNAME" if rosgraph.network.get_address_override() else "the host name"
+    text = "nodes here register as %s (%s)" % (ascii(name)[1:-1], source)
     if not found:
-        return [
-            Finding(
-                point,
-                FAIL,
-                says + ", which cannot be resolved: topics are listed but nothing arrives",
-                remedy,
-            )
-        ]
+        return fail(text + ", which cannot be resolved: topics are listed but nothing arrives", *remedy)
     if not any(is_own(entry, own) for entry in found):
-        return [
-            Finding(
-                point, FAIL, "%s, which leads to %s: not this PC" % (says, ", ".join(sorted(found))), remedy
-            )
-        ]
-    if remote and all(entry.startswith("127.") for entry in found):
-        says += ", which means %s: the PC of the master would dial itself" % ", ".join(sorted(found))
-        return [Finding(point, FAIL, says, remedy)]
-    return [Finding(point, OK, says)]
+        return fail("%s, which leads to %s: not this PC" % (text, ", ".join(sorted(found))), *remedy)
+    if is_remote and all(entry.startswith("127.") for entry in found):
+        return fail("%s: the master's PC would connect to itself (%s)" % (text, ", ".join(sorted(found))), *remedy)
+    return ok(text)
 
 
-def check_master(own: Sequence[Address]) -> List[Finding]:
-    """Look whether the master answers at ROS_MASTER_URI."""
-    point = "master"
+def check_master(own: Sequence[Address]) -> Finding:
+    """Check whether the master answers at ROS_MASTER_URI."""
     try:
-        host, _ = read_master_uri()
+        host = read_master_host()
     except ValueError as error:
-        return [Finding(point, FAIL, str(error), ["export ROS_MASTER_URI=http://localhost:11311"])]
+        return fail(str(error), "export ROS_MASTER_URI=http://localhost:11311")
     uri = rosgraph.get_master_uri()
     addresses = resolve(host)
     if not addresses:
-        remedy = [
+        return fail(
+            "%s: the name %s cannot be resolved" % (uri, host),
             "export ROS_MASTER_URI=http://ADDRESS_OF_THE_MASTER_PC:11311",
             "or a line 'ADDRESS %s' in /etc/hosts" % host,
-        ]
-        return [Finding(point, FAIL, "%s: the name %s cannot be resolved" % (uri, host), remedy)]
+        )
     try:
         call(uri, "getUri")
     except CALL_ERRORS as error:
         if any(is_own(address, own) for address in addresses):
-            return [
-                Finding(
-                    point,
-                    WARN,
-                    "no ROS master runs at %s" % uri,
-                    ["roslaunch hero_bringup hero_bringup.launch starts one"],
-                )
-            ]
-        remedy = ["is that PC on, is a master running there, is its port open? ping %s" % host]
-        return [
-            Finding(
-                point, FAIL, "no ROS master answers at %s: %s" % (uri, " ".join(str(error).split())), remedy
-            )
-        ]
-    return [Finding(point, OK, "answers at %s" % uri)]
+            return warn("no ROS master runs at " + uri, "roslaunch hero_bringup hero_bringup.launch starts one")
+        return fail(
+            "no ROS master answers at %s: %s" % (uri, " ".join(str(error).split())),
+            "is that PC on, is a master running there, is its port open? ping %s" % host,
+        )
+    return ok("answers at " + uri)
 
 
-def check_nodes() -> List[Finding]:
-    """Look whether the nodes that the master lists can be reached by the names they gave."""
-    point = "nodes"
+def check_nodes() -> Finding:
+    """Check whether the nodes that the master lists can be reached under the names they registered."""
     uri = rosgraph.get_master_uri()
-    publishers, subscribers, services = call(uri, "getSystemState")
-    names: Set[str] = {
-        name for group in (publishers, subscribers, services) for _, users in group for name in users
-    }
+    names = {name for group in call(uri, "getSystemState") for _, users in group for name in users}
     nodes: Dict[str, str] = {}
     for name in sorted(names)[:NODES_ASKED]:
         try:
@@ -200,160 +154,103 @@ def check_nodes() -> List[Finding]:
         except CALL_ERRORS:
             silent.append("%s at %s" % (name, node_uri))
     if unknown:
-        remedy = ["on the PC of that node: export ROS_IP=ITS_ADDRESS, and start the node again"]
-        return [Finding(point, FAIL, "names that cannot be resolved here: " + ", ".join(unknown[:5]), remedy)]
+        text = "names that cannot be resolved here: " + ", ".join(unknown[:LINES_MAX])
+        return fail(text, "on the PC of that node: export ROS_IP=ITS_ADDRESS, and restart the node")
     if silent:
-        return [
-            Finding(
-                point,
-                WARN,
-                "listed but not reached: " + ", ".join(silent[:5]),
-                ["ended without a word? rosnode cleanup", "on another PC: its ROS_IP, its firewall"],
-            )
-        ]
-    return [Finding(point, OK, "%d of %d nodes asked, all answer" % (len(nodes), len(names)))]
+        text = "listed but not reached: " + ", ".join(silent[:LINES_MAX])
+        return warn(text, CLEAN_UP, "on another PC: its ROS_IP, its firewall")
+    return ok("%d of %d nodes asked, all answer" % (len(nodes), len(names)))
 
 
-def check_way_back(publisher: rospy.Publisher) -> List[Finding]:
-    """Look whether rosout, which runs beside the master, has connected to this node."""
-    point = "way_back"
-    end_s = time.monotonic() + BACK_TIMEOUT_S
-    while time.monotonic() < end_s:
-        if publisher.get_num_connections():
-            return [Finding(point, OK, "nodes beside the master can connect to nodes here")]
-        time.sleep(0.02)
-    subscribers = dict(call(rosgraph.get_master_uri(), "getSystemState")[1]).get("/rosout", [])
-    if not subscribers:
-        return [
-            Finding(
-                point,
-                WARN,
-                "not tried: no node rosout runs beside the master",
-                ["start the master with roscore or roslaunch"],
-            )
-        ]
-    says = "%s lists this node but did not connect to it within %.1f s" % (subscribers[0], BACK_TIMEOUT_S)
-    return [
-        Finding(
-            point,
-            FAIL,
-            says,
-            [
-                "export ROS_IP=THE_ADDRESS_OF_THIS_PC (point own_name)",
-                "a firewall here may drop connections from that PC",
-            ],
-        )
-    ]
-
-
-class FleetSnapshot:
-    """The newest list of robots of each driver."""
+class OwnNode:
+    """This program as a node: a publisher on /rosout, and the newest report of every driver."""
 
     def __init__(self) -> None:
-        self.drivers: Dict[str, RobotArray] = {}
+        rospy.init_node("hero_check", anonymous=True, disable_signals=True, disable_rosout=True)
+        self.publisher = rospy.Publisher("/rosout", Log, queue_size=1)
+        self.reports: Dict[str, RobotArray] = {}
         uri = rosgraph.get_master_uri()
         types = dict(call(uri, "getTopicTypes"))
         # The master keeps the types of topics whose publishers have ended.
         published = [topic for topic, _ in call(uri, "getSystemState")[0]]
-        self._topics = [topic for topic in published if types.get(topic) == RobotArray._type]
-        self._subscribers = [
+        self.topics = sorted(topic for topic in published if types.get(topic) == RobotArray._type)
+        for topic in self.topics:
             rospy.Subscriber(topic, RobotArray, self._receive, callback_args=topic, queue_size=1)
-            for topic in self._topics
-        ]
 
-    def _receive(self, message: RobotArray, topic: str) -> None:
-        self.drivers[topic] = message
-
-    def wait(self) -> None:
-        """Wait until every driver was heard, or for ROBOTS_TIMEOUT_S."""
-        end_s = time.monotonic() + ROBOTS_TIMEOUT_S
-        while len(self.drivers) < len(self._topics) and time.monotonic() < end_s:
-            time.sleep(0.02)
-
-    @property
-    def silent(self) -> List[str]:
-        """Topics of drivers that are registered but say nothing."""
-        return [topic for topic in self._topics if topic not in self.drivers]
+    def _receive(self, report: RobotArray, topic: str) -> None:
+        self.reports[topic] = report
 
 
-def check_robots(fleet: FleetSnapshot) -> List[Finding]:
-    """Say which robots the drivers report."""
-    point = "robots"
-    fleet.wait()
-    if fleet.silent:
-        return [
-            Finding(
-                point,
-                FAIL,
-                "nothing comes on %s although it is listed" % ", ".join(fleet.silent),
-                ["has the driver ended? rosnode cleanup", "points own_name and way_back say more"],
-            )
-        ]
-    if not fleet.drivers:
-        return [Finding(point, WARN, "no driver runs", ["roslaunch hero_bringup hero_bringup.launch"])]
-    findings = []
-    for topic, message in sorted(fleet.drivers.items()):
-        robots = message.robots
-        ready = [robot for robot in robots if robot.state == Robot.READY]
-        says = "%s: %d of %d robots ready, awaited on %s" % (
-            topic,
-            len(ready),
-            len(robots),
-            message.listening or "no port",
-        )
-        versions = sorted({robot.firmware for robot in ready if robot.firmware})
-        if versions:
-            says += ", firmware " + ", ".join(versions)
-        troubled = [
-            "%s at %s is %s%s"
-            % (
-                robot.namespace or "a robot",
-                robot.address,
-                STATES.get(robot.state, "?"),
-                ": " + robot.last_error if robot.last_error else "",
-            )
-            for robot in robots
-            if robot.state != Robot.READY
-        ]
-        if message.stopped:
-            troubled.insert(
-                0, "all robots are stopped; release them: rosservice call %s false" % topic.replace("/robots", "/stop")
-            )
-        if not robots:
-            troubled = [
-                HOST_REMEDY
-                if is_loopback(message.listening.rpartition(":")[0])
-                else "robots must be on, in this network, and dial this PC (point addresses): docs/troubleshooting.md"
-            ]
-        findings.append(Finding(point, WARN if troubled else OK, says, troubled[:10]))
-    return findings
+_entry = threading.Lock()
+_enter = functools.lru_cache(maxsize=None)(OwnNode)
 
 
-class OwnNode:
-    """This program as a node of the graph, from the first use on."""
+def as_node(point: Callable[[OwnNode], Finding]) -> Finding:
+    """Run a point that needs a node; the first one starts it."""
+    try:
+        with _entry:
+            node = _enter()
+    except rosgraph.roslogging.LoggingException:
+        return warn("skipped: no node starts without a log directory (point disk)")
+    return point(node)
 
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._entered: Optional[Tuple[rospy.Publisher, FleetSnapshot]] = None
 
-    def enter(self) -> Tuple[rospy.Publisher, FleetSnapshot]:
-        """Return the publisher on /rosout and the robots; the first call starts the node."""
-        with self._lock:
-            if self._entered is None:
-                rospy.init_node("hero_check", anonymous=True, disable_signals=True, disable_rosout=True)
-                self._entered = rospy.Publisher("/rosout", Log, queue_size=1), FleetSnapshot()
-            return self._entered
+def wait_until(condition: Callable[[], bool], timeout_s: float) -> bool:
+    """Return as soon as a condition holds, or whether it does after timeout_s."""
+    end_s = time.monotonic() + timeout_s
+    while not condition() and time.monotonic() < end_s:
+        time.sleep(0.02)
+    return condition()
 
-    def check_way_back(self) -> List[Finding]:
-        """See check_way_back."""
-        try:
-            return check_way_back(self.enter()[0])
-        except rosgraph.roslogging.LoggingException:
-            return [NO_LOGS._replace(point="way_back")]
 
-    def check_robots(self) -> List[Finding]:
-        """See check_robots."""
-        try:
-            return check_robots(self.enter()[1])
-        except rosgraph.roslogging.LoggingException:
-            return [NO_LOGS._replace(point="robots")]
+def check_return_path(node: OwnNode) -> Finding:
+    """Check whether rosout, which runs beside the master, connects to this node."""
+    if wait_until(lambda: node.publisher.get_num_connections() > 0, CONNECT_TIMEOUT_S):
+        return ok("nodes beside the master can connect to nodes here")
+    subscribers = dict(call(rosgraph.get_master_uri(), "getSystemState")[1]).get("/rosout", [])
+    if not subscribers:
+        return warn("not tried: no node rosout runs beside the master", "start the master with roscore or roslaunch")
+    return fail(
+        "%s lists this node but did not connect to it within %.1f s" % (subscribers[0], CONNECT_TIMEOUT_S),
+        "export ROS_IP=THE_ADDRESS_OF_THIS_PC (point own_name)",
+        "a firewall here may drop connections from that PC",
+    )
+
+
+def check_robots(node: OwnNode) -> Finding:
+    """Print which robots the drivers report."""
+    wait_until(lambda: len(node.reports) == len(node.topics), REPORT_TIMEOUT_S)
+    silent = [topic for topic in node.topics if topic not in node.reports]
+    if silent:
+        text = "nothing arrives on %s although it is listed" % ", ".join(silent)
+        return fail(text, CLEAN_UP, "points own_name and return_path say more")
+    if not node.topics:
+        return warn("no driver runs", "roslaunch hero_bringup hero_bringup.launch")
+    described = [describe_report(topic, node.reports[topic]) for topic in node.topics]
+    text = "; ".join(text for text, _ in described)
+    remedies = [line for _, lines in described for line in lines]
+    return warn(text, *remedies[:LINES_MAX]) if remedies else ok(text)
+
+
+def describe_report(topic: str, report: RobotArray) -> Tuple[str, List[str]]:
+    """Return one line on a driver's robots, and a line for each that cannot be driven."""
+    ready = [robot for robot in report.robots if robot.state == Robot.READY]
+    text = "%s: %d of %d robots ready" % (topic, len(ready), len(report.robots))
+    text += ", the driver listens on %s" % (report.listening or "no port")
+    versions = sorted({robot.firmware for robot in ready if robot.firmware})
+    if versions:
+        text += ", firmware " + ", ".join(versions)
+    lines = []
+    if report.stopped:
+        service = topic.replace("/robots", "/stop")
+        lines.append("all robots are stopped; release them: rosservice call %s false" % service)
+    for robot in report.robots:
+        if robot.state != Robot.READY:
+            error = ": " + robot.last_error if robot.last_error else ""
+            name, state = robot.namespace or "a robot", STATES.get(robot.state, "?")
+            lines.append("%s at %s is %s%s" % (name, robot.address, state, error))
+    if not report.robots:
+        is_local = is_loopback(report.listening.rpartition(":")[0])
+        general = "robots must be on, in this network, and connect to this PC (point addresses)"
+        lines = [HOST_REMEDY if is_local else general]
+    return text, lines

@@ -1,6 +1,6 @@
-"""This PC in its network -> addresses that robots can dial, the program on the driver's port, names that resolve.
+"""Addresses that robots can connect to, the firewall's rules, the program on the driver's port, names that resolve.
 
-The listening ports are read from /proc (proc(5)), so that nothing has to be bound or connected to find out.
+The listening ports are read from /proc (proc(5)): nothing is bound or connected.
 """
 
 import ipaddress
@@ -10,13 +10,12 @@ import socket
 from pathlib import Path
 from typing import Dict, List, NamedTuple, Optional, Sequence, Set
 
-from .finding import FAIL, OK, WARN, Finding
-from .system_command import NOT_THERE, ask_system
+from .points import Finding, ask_system, fail, ok, warn
 
 HOTSPOT_ADDRESS = "10.42.0.1"
-"""What robots dial that nobody configured, and what NetworkManager gives a PC that shares a hotspot."""
+"""The address that robots connect to by default, and that NetworkManager gives a PC that shares a hotspot."""
 
-HOST_REMEDY = "roslaunch hero_bringup hero_bringup.launch without host:=, or with host:=0.0.0.0, lets robots in"
+HOST_REMEDY = "roslaunch hero_bringup hero_bringup.launch without host:=, or with host:=0.0.0.0, admits robots"
 
 EVERYWHERE = {"0.0.0.0", "::"}
 LISTENING = "0A"  # TCP_LISTEN in /proc/net/tcp
@@ -32,7 +31,7 @@ class Address(NamedTuple):
 
 
 def read_addresses() -> Optional[List[Address]]:
-    """Return this PC's IPv4 addresses without loopback; None where the command ip is missing."""
+    """Return this PC's IPv4 addresses without loopback; None if the command ip is missing."""
     answer = ask_system(["ip", "-j", "-4", "address", "show", "up"])
     if answer.code != 0:
         return None
@@ -44,10 +43,8 @@ def read_addresses() -> Optional[List[Address]]:
     ]
 
 
-def find_robot_interface(addresses: Sequence[Address], wanted: Optional[str]) -> Optional[str]:
-    """Return the interface to the robots' network: as wanted, that of the hotspot, or the only one that is real."""
-    if wanted is not None:
-        return wanted
+def find_robot_interface(addresses: Sequence[Address]) -> Optional[str]:
+    """Return the interface to the robots' network: the hotspot's, else the only one that is real."""
     for found in addresses:
         if found.address == HOTSPOT_ADDRESS:
             return found.interface
@@ -56,7 +53,7 @@ def find_robot_interface(addresses: Sequence[Address], wanted: Optional[str]) ->
 
 
 def is_loopback(address: str) -> bool:
-    """Whether an address is one of those that only programs on this PC reach; False for text that is no address."""
+    """Whether only programs on this PC can reach an address; False for text that is no address."""
     try:
         return ipaddress.ip_address(address.strip("[]")).is_loopback
     except ValueError:
@@ -64,66 +61,48 @@ def is_loopback(address: str) -> bool:
 
 
 def check_addresses(
-    addresses: Optional[Sequence[Address]], wanted: Optional[str], port: int, listening: Sequence[str]
-) -> List[Finding]:
-    """Say which addresses robots can be told to dial; listening: where somebody listens on the port already."""
-    point = "addresses"
+    addresses: Optional[Sequence[Address]], interface: Optional[str], port: int, listening: Sequence[str]
+) -> Finding:
+    """List the addresses that robots can connect to; listening: where a program listens on the port already."""
     if addresses is None:
-        return [
-            Finding(
-                point,
-                WARN,
-                "the command ip is missing, so addresses are not known",
-                ["sudo apt install iproute2"],
-            )
-        ]
-    if wanted is not None and wanted not in {found.interface for found in addresses}:
-        return [
-            Finding(
-                point,
-                FAIL,
-                "interface %s has no IPv4 address" % wanted,
-                ["ip -4 address shows which have one"],
-            )
-        ]
+        return warn("unknown: the command ip is missing", "sudo apt install iproute2")
+    if interface is not None and interface not in {found.interface for found in addresses}:
+        return fail("interface %s has no IPv4 address" % interface, "ip -4 address shows which have one")
+    if listening and all(map(is_loopback, listening)):
+        text = "port %d is open on %s only: simulated robots on this PC reach it, robots in the network do not"
+        return warn(text % (port, ", ".join(listening)), HOST_REMEDY)
     if listening and not EVERYWHERE & set(listening):
         addresses = [found for found in addresses if found.address in listening]
-    if listening and all(map(is_loopback, listening)):
-        says = "port %d is open on %s only: simulated robots on this PC reach it, robots in the network do not" % (
-            port,
-            ", ".join(listening),
-        )
-        return [Finding(point, WARN, says, [HOST_REMEDY])]
     if not addresses:
-        return [
-            Finding(
-                point,
-                WARN,
-                "no network: only simulated robots on this PC reach the driver",
-                ["rosrun hero_tools hotspot create", "or join the robots' 2.4 GHz network"],
-            )
-        ]
+        return warn(
+            "no network: only simulated robots on this PC reach the driver",
+            "rosrun hero_tools hotspot create",
+            "or join the robots' 2.4 GHz network",
+        )
     listed = ", ".join("%s (%s)" % (found.address, found.interface) for found in addresses)
     if any(found.address == HOTSPOT_ADDRESS for found in addresses):
-        return [
-            Finding(
-                point,
-                OK,
-                "robots that nobody configured dial %s:%d, which is this PC; all: %s"
-                % (HOTSPOT_ADDRESS, port, listed),
-            )
-        ]
-    says = "robots must be told to dial one of these, port %d: %s" % (port, listed)
-    remedy = [
-        "a robot that nobody configured dials %s: rosrun hero_tools hotspot create gives this PC that address"
-        % HOTSPOT_ADDRESS,
+        text = "robots connect to %s:%d by default, which is this PC; all: %s"
+        return ok(text % (HOTSPOT_ADDRESS, port, listed))
+    return warn(
+        "robots must be configured to connect to one of these, port %d: %s" % (port, listed),
+        "rosrun hero_tools hotspot create gives this PC the default address, %s" % HOTSPOT_ADDRESS,
         "or set the address on the robot's page (docs/network.md)",
-    ]
-    return [Finding(point, WARN, says, remedy)]
+    )
+
+
+def advise_firewall(interface: Optional[str], port: int) -> Finding:
+    """Print the commands that admit robots; the rules themselves are not read."""
+    name = interface or "INTERFACE"
+    zone = "--permanent --zone=$(firewall-cmd --get-zone-of-interface=%s)" % name
+    return ok(
+        "not inspected; to admit robots on %s to port %d:" % (name, port),
+        "ufw: sudo ufw allow in on %s to any port %d proto tcp" % (name, port),
+        "firewalld: sudo firewall-cmd %s --add-port=%d/tcp && sudo firewall-cmd --reload" % (zone, port),
+    )
 
 
 def find_listeners(port: int, proc: Path = Path("/proc")) -> Dict[str, str]:
-    """Return address and socket number of everybody who listens on the TCP port."""
+    """Return the address and socket number of each listener on a TCP port."""
     found = {}
     for name in ("tcp", "tcp6"):
         table = proc / "net" / name
@@ -157,42 +136,36 @@ def find_process(socket_number: str, proc: Path = Path("/proc")) -> Optional[int
     return None
 
 
-def check_port(port: int) -> List[Finding]:
-    """Say whether the port is free, or our driver listens on it, or who else does."""
+def check_port(port: int) -> Finding:
+    """Check whether the port is free, held by our driver, or by another program."""
     listeners = find_listeners(port)
     if not listeners:
-        return [Finding("port", OK, "TCP port %d is free" % port)]
+        return ok("TCP port %d is free" % port)
     address, number = next(iter(listeners.items()))
     process = find_process(number)
     if process is None:
-        says = "TCP port %d on %s is held by a program of another user" % (port, address)
-        return [Finding("port", WARN, says, ["who: sudo ss -ltnp 'sport = :%d'" % port])]
+        return warn(
+            "TCP port %d on %s is held by a program of another user" % (port, address),
+            "to see which: sudo ss -ltnp 'sport = :%d'" % port,
+        )
     try:
         words = Path("/proc/%d/cmdline" % process).read_bytes().decode(errors="replace").split("\0")
     except OSError as error:
         words = [str(error)]
     if any(Path(word).name == DRIVER for word in words[:3]):
-        return [Finding("port", OK, "the driver listens on %s:%d (process %d)" % (address, port, process))]
-    command = "".join(letter if letter.isprintable() else "?" for letter in " ".join(words).strip())[:80]
-    says = "TCP port %d on %s is taken by process %d (%s), which is not the driver" % (
-        port,
-        address,
-        process,
-        command,
-    )
-    remedy = [
+        return ok("the driver listens on %s:%d (process %d)" % (address, port, process))
+    return fail(
+        "TCP port %d on %s is taken by process %d (%s), which is not the driver"
+        % (port, address, process, " ".join(words).strip()[:80]),
         "end it: kill %d" % process,
-        "or use another port, and set it on the robots too: roslaunch hero_bringup hero_bringup.launch port:=11412",
-    ]
-    return [Finding("port", FAIL, says, remedy)]
+        "or use another port, on the robots too: roslaunch hero_bringup hero_bringup.launch port:=11412",
+    )
 
 
 def resolve(name: str) -> Set[str]:
     """Return the IPv4 addresses of a name; empty if it has none. May take seconds: the name server's time limit."""
     try:
-        return {
-            str(found[4][0]) for found in socket.getaddrinfo(name, None, socket.AF_INET, socket.SOCK_STREAM)
-        }
+        return {str(found[4][0]) for found in socket.getaddrinfo(name, None, socket.AF_INET, socket.SOCK_STREAM)}
     except (OSError, UnicodeError):
         return set()
 
@@ -205,6 +178,4 @@ def is_own(address: str, own: Sequence[Address]) -> bool:
 def find_source_address(target: str) -> Optional[str]:
     """Return the own address from which packets to target leave."""
     answer = ask_system(["ip", "-j", "route", "get", target])
-    if answer.code in (0, NOT_THERE) and answer.output:
-        return str(json.loads(answer.output)[0].get("prefsrc") or "") or None
-    return None
+    return str(json.loads(answer.output)[0].get("prefsrc") or "") or None if answer.output else None

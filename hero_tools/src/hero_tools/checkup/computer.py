@@ -1,0 +1,161 @@
+"""Python, packages, messages, clock and disk of this PC."""
+
+import importlib
+import os
+import platform
+import shutil
+import sys
+import time
+from pathlib import Path
+
+import rospkg
+
+from .points import NOT_THERE, Finding, ask_system, fail, ok, warn
+
+SUITE = (
+    "hero_bringup",
+    "hero_calibration",
+    "hero_client",
+    "hero_description",
+    "hero_driver",
+    "hero_examples",
+    "hero_monitor",
+    "hero_msgs",
+    "hero_recording",
+    "hero_sim",
+    "hero_tools",
+    "hero_tutorial",
+)
+NEEDED_MODULES = ("rospy", "numpy", "yaml", "actionlib", "tf2_ros", "diagnostic_updater")
+FIRMWARE_MD5 = {
+    # as stock firmware v3.8 declares them; the services' as rosservice calls them
+    "hero_msgs.msg.Encoder": "b5586cdbae9b740afc6a1f403a2d7dde",
+    "hero_msgs.msg.Motor": "44d4249d207ce6a89de3d72080e4d0b5",
+    "hero_msgs.srv.SetIRCalibration": "fc55fd34ad2ef676815ba2e14521ac73",
+    "hero_msgs.srv.SetMotor": "07e32bced0fc14456815cdd097819b89",
+    "hero_msgs.srv.SetOdom": "4ed90569b1afd039b963e42a12637d2b",
+    "hero_msgs.srv.SetPID": "69c16eccc66fd6b477afb5e5500b4b47",
+}
+OLDEST_PYTHON = (3, 8)
+SMALL_DISK_BYTES = 1e9
+FULL_DISK_BYTES = 50e6
+FIRST_PLAUSIBLE_TIME_S = 1.7e9  # November 2023: a clock before it was never set
+SOURCE = "source the workspace in this terminal: source devel/setup.bash"
+SEVERAL_PCS = "this matters only if several PCs share a ROS master"
+
+
+def check_python() -> Finding:
+    """Check this interpreter, its modules, and the python3 that is first on PATH."""
+    version = platform.python_version()
+    if sys.version_info < OLDEST_PYTHON:
+        return fail("Python %s; 3.8 or newer is needed" % version, "use a newer system")
+    missing = []
+    for name in NEEDED_MODULES:
+        try:
+            importlib.import_module(name)
+        except ImportError:
+            missing.append(name)
+    if missing:
+        return fail(
+            "Python %s (%s) lacks %s" % (version, sys.executable, ", ".join(missing)),
+            "Debian 12: script/bootstrap; elsewhere: rosdep install --from-paths src --ignore-src -y",
+        )
+    text = "Python %s (%s) has all modules" % (version, sys.executable)
+    other = shutil.which("python3")
+    if other and os.path.realpath(other) != os.path.realpath(sys.executable):
+        look = "import importlib.util as i, sys; sys.exit(not i.find_spec('rospy'))"
+        if ask_system([other, "-c", look]).code != 0:
+            return warn(
+                "%s; the first python3 on PATH, %s, has no rospy" % (text, other),
+                "rosrun and roslaunch are not affected; your own scripts: %s FILE" % sys.executable,
+                "build with -DPYTHON_EXECUTABLE=%s" % sys.executable,
+            )
+    return ok(text)
+
+
+def check_packages() -> Finding:
+    """Check that the suite is on ROS_PACKAGE_PATH, in one version."""
+    finder = rospkg.RosPack()
+    paths, versions, missing = [], set(), []
+    for name in SUITE:
+        try:
+            paths.append(finder.get_path(name))
+            versions.add(finder.get_manifest(name).version)
+        except rospkg.ResourceNotFound:
+            missing.append(name)
+    if missing:
+        return fail("not on ROS_PACKAGE_PATH: " + ", ".join(missing), SOURCE)
+    if len(versions) > 1:
+        return fail(
+            "packages of several versions are mixed: " + ", ".join(sorted(versions)),
+            "rebuild all of them from one clone, and source only that workspace",
+        )
+    return ok("all of version %s, below %s" % (versions.pop(), os.path.commonpath(paths)))
+
+
+def check_messages() -> Finding:
+    """Compare the built messages with those of the firmware."""
+    wrong = []
+    for name, md5 in FIRMWARE_MD5.items():
+        module, _, kind = name.rpartition(".")
+        try:
+            built = getattr(importlib.import_module(module), kind)._md5sum
+        except (ImportError, AttributeError) as error:
+            return fail("%s is not built: %s" % (name, error), "build the workspace: catkin build", SOURCE)
+        if built != md5:
+            wrong.append("%s has md5 %s, the firmware %s" % (name, built, md5))
+    if wrong:
+        return fail(
+            "; ".join(wrong), "rebuild hero_msgs; another package of that name may hide it: rospack find hero_msgs"
+        )
+    return ok("%d types match those of firmware v3.8" % len(FIRMWARE_MD5))
+
+
+def check_clock() -> Finding:
+    """Check whether a time service runs; nodes on several PCs compare stamps."""
+    if time.time() < FIRST_PLAUSIBLE_TIME_S:
+        return fail("the clock shows %s" % time.strftime("%Y-%m-%d"), "sudo date --set '2030-01-31 12:00'")
+    chrony = ask_system(["chronyc", "-n", "tracking"])
+    if chrony.code == 0:
+        states = [line.split(":")[1].strip() for line in chrony.output.splitlines() if line.startswith("Leap status")]
+        if states == ["Normal"]:
+            return ok("synchronised by chrony")
+        return warn("chrony runs but is not synchronised", "chronyc sources shows why", SEVERAL_PCS)
+    systemd = ask_system(["timedatectl", "show", "--property=NTP", "--property=NTPSynchronized"])
+    if "NTPSynchronized=yes" in systemd.output:
+        return ok("synchronised (timedatectl)")
+    if systemd.code == 0:
+        return warn("not synchronised (timedatectl)", "sudo timedatectl set-ntp true, and a time server", SEVERAL_PCS)
+    missing = "neither chronyc nor timedatectl is installed: " if chrony.code == systemd.code == NOT_THERE else ""
+    return warn(missing + "unknown whether the clock is right", "sudo apt install chrony", SEVERAL_PCS)
+
+
+def check_disk() -> Finding:
+    """Check the disk space where ROS writes its logs."""
+    directory = Path(rospkg.get_log_dir())
+    existing = directory
+    while not existing.exists() and existing != existing.parent:
+        existing = existing.parent
+    if not existing.is_dir() or not os.access(existing, os.W_OK):
+        reason = "cannot be written" if existing.is_dir() else "cannot be created: %s is a file" % existing
+        return fail("log directory %s %s" % (directory, reason), "export ROS_LOG_DIR=/a/directory/of/yours")
+    free_bytes = shutil.disk_usage(existing).free
+    text = "%.1f GB free for logs in %s" % (free_bytes / 1e9, directory)
+    if free_bytes >= SMALL_DISK_BYTES:
+        return ok(text)
+    remedy = "rosclean purge deletes old logs; export ROS_LOG_DIR=/another/disk moves them"
+    return fail(text, remedy) if free_bytes < FULL_DISK_BYTES else warn(text, remedy)
+
+
+def check_versions() -> Finding:
+    """Print what runs here, for a report."""
+    release = Path("/etc/os-release")
+    lines = release.read_text().splitlines() if release.is_file() else []
+    names = [line.partition("=")[2].strip('"') for line in lines if line.startswith("PRETTY_NAME=")]
+    try:
+        ros = "rospy " + rospkg.RosPack().get_manifest("rospy").version
+    except rospkg.ResourceNotFound:
+        ros = "rospy not found"
+    system = (names or [platform.system()])[0]
+    distribution = os.environ.get("ROS_DISTRO") or "Debian's packages"
+    return ok("ROS: %s (%s); %s; Linux %s" % (distribution, ros, system, platform.release()))

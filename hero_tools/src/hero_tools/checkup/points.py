@@ -1,0 +1,87 @@
+"""Points of the check: functions that return what they found, run side by side within a time limit."""
+
+import os
+import subprocess
+import threading
+import time
+from typing import Callable, Dict, List, NamedTuple, Sequence
+
+OK = "OK"
+WARN = "WARN"
+FAIL = "FAIL"
+
+# Administration tools on Debian, which the PATH of a user does not contain.
+TOOL_PATH = "/usr/sbin:/sbin"
+NOT_THERE = 127
+
+
+class Finding(NamedTuple):
+    """What a point found, and the remedy: lines to read or to paste."""
+
+    state: str
+    text: str
+    remedy: Sequence[str] = ()
+
+
+def ok(text: str, *remedy: str) -> Finding:
+    """Nothing to do."""
+    return Finding(OK, text, remedy)
+
+
+def warn(text: str, *remedy: str) -> Finding:
+    """May keep robots from being driven."""
+    return Finding(WARN, text, remedy)
+
+
+def fail(text: str, *remedy: str) -> Finding:
+    """Keeps robots from being driven."""
+    return Finding(FAIL, text, remedy)
+
+
+Point = Callable[[], Finding]
+
+
+def run_points(points: Dict[str, Point], timeout_s: float) -> Dict[str, Finding]:
+    """Run all points at once and return their findings, at the latest after timeout_s.
+
+    A point that hangs (a silent name server, a disk) or breaks fails; its thread ends with the program.
+    """
+    found: Dict[str, Finding] = {}
+
+    def run(name: str, point: Point) -> None:
+        try:
+            found[name] = point()
+        except Exception as error:  # noqa: BLE001  a point that broke must not hide the others
+            text = "%s: %s" % (type(error).__name__, " ".join(str(error).split()))
+            found[name] = fail("this point broke: %s" % text, "please report it")
+
+    threads = [threading.Thread(target=run, args=item, daemon=True) for item in points.items()]
+    for thread in threads:
+        thread.start()
+    end_s = time.monotonic() + timeout_s
+    for thread in threads:
+        thread.join(max(0.0, end_s - time.monotonic()))
+    late = fail("no answer within %.1f s" % timeout_s, "a name server or a disk hangs; the other points are valid")
+    return {name: found.get(name, late) for name in points}
+
+
+class Answer(NamedTuple):
+    """How a command ended; code NOT_THERE: there is no such command; -1: it did not end in time."""
+
+    code: int
+    output: str
+
+
+def ask_system(command: List[str], timeout_s: float = 0.9) -> Answer:
+    """Run a command that only reads, without a terminal and in English."""
+    environment = dict(os.environ, LC_ALL="C", PATH="%s:%s" % (os.environ.get("PATH", ""), TOOL_PATH))
+    try:
+        result = subprocess.run(
+            command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+            env=environment, timeout=timeout_s, check=False,
+        )  # fmt: skip
+    except OSError:
+        return Answer(NOT_THERE, "")
+    except subprocess.TimeoutExpired:
+        return Answer(-1, "")
+    return Answer(result.returncode, result.stdout.decode(errors="replace"))
