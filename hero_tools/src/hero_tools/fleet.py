@@ -1,11 +1,11 @@
-"""Topics of the driver and of its robots -> the fleet as a live table, as lines, or as JSON.
+"""Shows the robots of all drivers as a live table, as lines, or as JSON.
 
     rosrun hero_tools fleet                  a table like top, redrawn in place
     rosrun hero_tools fleet --once --json    the fleet as one line of JSON, for scripts
 
-Shows the robots of all drivers. Only listens, except for the keys: s and r ask all drivers to stop all robots and to
-release them, d calls the service disconnect. Messages of robots are kept as bytes and read when the table is drawn, so
-that fifty robots cost little. Only threads of their own wait for the ROS master.
+Only listens, except for keys: s and r ask all drivers to stop and to release all robots, d calls the service
+disconnect. Messages of robots are decoded only when the table is drawn, which keeps fifty robots cheap. Only worker
+threads wait for the ROS master.
 """
 
 import argparse
@@ -20,7 +20,7 @@ from typing import Dict, List, Optional, Sequence, Set
 import rospy
 
 from hero_client.drivers import Drivers
-from hero_client.fleet_state import RobotRow, RobotTrack, find_missing, sort_rows
+from hero_client.fleet_state import RobotTrack
 from hero_client.keyboard import Keyboard, NoTerminalError
 from hero_client.program import Program
 from hero_client.program import run as run_program
@@ -30,20 +30,19 @@ from hero_client.swarm_start import check_stop
 from hero_msgs.msg import Robot
 from hero_msgs.srv import Disconnect
 
+from .fleet_rows import ORDERS, RobotRow, find_missing, sort_rows
 from .fleet_table import format_json, format_table, format_title
 
-ORDERS = ("id", "state", "nearest")
 DRIVER_TIMEOUT_S = 10.0  # how long --once waits for a driver that is just starting
+LISTEN_S = 1.5  # scans arrive 5 times a second, new subscriptions take a few 0.1 s
 DRAW_PERIOD_S = 0.5
 ASKING_DRAW_PERIOD_S = 0.1  # while people wait for a stop
-ENTER_SCREEN = (
-    "\x1b[?1049h\x1b[?25l"  # xterm: the alternate screen, so that what was there comes back; no cursor
-)
+ENTER_SCREEN = "\x1b[?1049h\x1b[?25l"  # xterm: the alternate screen, no cursor
 LEAVE_SCREEN = "\x1b[?25h\x1b[?1049l"
 HOME = "\x1b[H"
 CLEAR_LINE_END = "\x1b[K"
 CLEAR_SCREEN_END = "\x1b[J"
-KEYS_HELP = "q ends   s STOPS ALL ROBOTS   r releases them   o order   up, down choose   d disconnects the chosen robot"
+KEYS_HELP = "q quit   s STOP ALL ROBOTS   r release them   o order   up, down choose   d disconnect the chosen robot"
 MAX_OPTION = 1e6
 
 
@@ -60,7 +59,7 @@ class FleetListener:
         self._worker = ThreadPoolExecutor(1, "subscriptions")
 
     def wait_for_driver(self, program: Program, timeout_s: float) -> bool:
-        """Return as soon as every driver was heard, and whether one was heard in that time."""
+        """Return as soon as every driver has reported, and whether one has within timeout_s."""
         end_s = time.monotonic() + timeout_s
         while not (self.drivers.read() and self.drivers.is_settled) and time.monotonic() < end_s:
             if not program.sleep(0.02):
@@ -68,7 +67,7 @@ class FleetListener:
         return self.drivers.read() is not None
 
     def read_rows(self, now_s: float) -> List[RobotRow]:
-        """Return the fleet as it is; listens from now on to robots that are new."""
+        """Return the robots now; subscribes to topics of robots that are new."""
         report = self.drivers.read()
         if report is None:
             return []
@@ -88,7 +87,7 @@ class FleetListener:
         self._listeners.pop(namespace).close()
 
     def _make_row(self, robot: Robot, now_s: float) -> RobotRow:
-        # What comes under the name of a robot that was refused is not its own.
+        # Topics under the name of a robot that was refused are those of another robot.
         listener = None if robot.state == Robot.REFUSED else self._listeners.get(robot.namespace)
         if listener is not None:
             listener.read_newest()
@@ -103,7 +102,7 @@ class FleetListener:
             packets_per_s=robot.packets_per_s,
             bytes_per_s=robot.bytes_per_s,
             pose=track.pose,
-            way_m=track.way_m,
+            distance_m=track.way_m,
             turned_rad=track.turned_rad,
             proximity_seen=track.proximity_seen,
             nearest=track.nearest,
@@ -114,13 +113,13 @@ class FleetListener:
         )
 
     def disconnect(self, robot: str, news: List[str]) -> None:
-        """Ask the robot's driver to close its connection; what came of it is added to the news later."""
+        """Ask the robot's driver to close its connection; the outcome is added to news later."""
         driver = self.drivers.find("/" + robot)
         threading.Thread(target=call_disconnect, args=(driver, robot, news), daemon=True).start()
 
 
 def call_disconnect(driver: str, robot: str, news: List[str]) -> None:
-    """Call a driver's disconnect service, and add what came of it to the news."""
+    """Call a driver's disconnect service and add the outcome to news."""
     try:
         news.append(rospy.ServiceProxy(driver + "/disconnect", Disconnect)(robot).message)
     except (rospy.ServiceException, rospy.ROSException, OSError) as error:
@@ -158,7 +157,7 @@ class Screen:
 
 
 class FleetProgram:
-    """The program: listens, shows, and says at the end whether the robots that were expected came and moved."""
+    """The program: listens, shows, and checks at the end whether the expected robots joined and moved."""
 
     def __init__(self, program: Program, options: argparse.Namespace) -> None:
         self._program = program
@@ -184,11 +183,8 @@ class FleetProgram:
 
     def _make_lines(self, width: int, height: int) -> List[str]:
         if not self._fleet.heard:
-            return [
-                "no driver yet: nothing on /hero_driver/robots (roslaunch hero_bringup hero_bringup.launch)"[
-                    :width
-                ]
-            ]
+            text = "no driver yet: nothing on /hero_driver/robots (roslaunch hero_bringup hero_bringup.launch)"
+            return [text[:width]]
         silent = self._fleet.drivers.find_silent()
         title = format_title(self._rows, self._fleet.listening, self._fleet.stopped, silent)
         return [title[:width], *format_table(self._rows, width, max(2, height - 1), self._find_chosen())]
@@ -219,7 +215,7 @@ class FleetProgram:
         self._asks_disconnect = False
 
     def _press(self, key: str) -> None:
-        """Do what a key says."""
+        """Execute the command of a key."""
         self._asks_disconnect = self._asks_disconnect and key == "d"
         if key == "o":
             self._order = ORDERS[(ORDERS.index(self._order) + 1) % len(ORDERS)]
@@ -243,14 +239,10 @@ class FleetProgram:
         """Wait for the driver, listen for a moment, print."""
         if not self._fleet.wait_for_driver(self._program, DRIVER_TIMEOUT_S):
             if self._program.running:
-                print(
-                    "fleet: no driver: nothing on /hero_driver/robots after %.0f s" % DRIVER_TIMEOUT_S,
-                    file=sys.stderr,
-                )
+                text = "fleet: no driver: nothing on /hero_driver/robots after %.0f s"
+                print(text % DRIVER_TIMEOUT_S, file=sys.stderr)
             return 1
-        end_s = (
-            time.monotonic() + 1.5
-        )  # laser scans come 5 times a second, new subscriptions take a few 0.1 s
+        end_s = time.monotonic() + LISTEN_S
         while time.monotonic() < end_s and self._program.sleep(0.1):
             self._read()
         self.print_fleet()
@@ -289,7 +281,7 @@ class FleetProgram:
         return self.check_expected()
 
     def _make_screen(self, status: Optional[StopStatus]) -> List[str]:
-        """Return all lines: the table, the state of a stop, and the keys or what they did."""
+        """Return all lines: the table, the state of a stop, and the keys or their outcome."""
         size = shutil.get_terminal_size()
         left_s = self._seconds_left()
         ending = "" if left_s == float("inf") else "   ends in %.0f s" % left_s
@@ -298,7 +290,7 @@ class FleetProgram:
         return [*self._make_lines(size.columns, size.lines - 2), stop, last[: size.columns]]
 
     def check_expected(self) -> int:
-        """Say which of the expected robots did not join or move, and return the exit code."""
+        """Print which of the expected robots did not join or move, and return the exit status."""
         if self._options.expect is None:
             return 0
         missing = find_missing(self._rows, range(self._options.expect))
@@ -312,24 +304,24 @@ class FleetProgram:
 def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(prog="fleet", description="The robots of all drivers, as a live table.")
-    parser.add_argument("--once", action="store_true", help="print the fleet once and end")
+    parser.add_argument("--once", action="store_true", help="print the fleet once and quit")
     parser.add_argument(
         "--json", action="store_true", help="print JSON, one line each time, instead of a table"
     )
-    parser.add_argument("--seconds", type=float, metavar="S", help="end by itself after S seconds")
+    parser.add_argument("--seconds", type=float, metavar="S", help="quit after S seconds")
     parser.add_argument(
         "--period",
         type=float,
         default=5.0,
         metavar="S",
-        help="seconds between two prints where the output is not a terminal (5)",
+        help="seconds between two prints if the output is not a terminal (5)",
     )
     parser.add_argument("--sort", choices=ORDERS, default="id", help="order of the robots (id)")
     parser.add_argument(
         "--expect",
         type=int,
         metavar="N",
-        help="at the end name every robot of hero_0 to hero_(N-1) that did not join or move, and exit with 1",
+        help="at the end list each of hero_0 to hero_(N-1) that did not join or move, and exit with 1",
     )
     options = parser.parse_args(arguments)
     for name, lowest in (("seconds", 0.0), ("period", 0.1), ("expect", 0)):

@@ -1,6 +1,6 @@
-"""Rows of the fleet -> lines of text for a terminal, or JSON for scripts.
+"""Formats the fleet as lines for a terminal, or as JSON for scripts. Pure.
 
-Pure. Texts that come from robots are shown without control characters, so that none can draw on the terminal.
+Texts from robots are stripped of control characters, which could draw on the terminal.
 """
 
 import json
@@ -8,12 +8,14 @@ import math
 from typing import Any, Dict, List, Optional, Sequence
 
 from hero_client.command_line import make_printable
-from hero_client.fleet_state import Obstacle, Pose, RobotRow, finite
+from hero_client.fleet_state import Obstacle, Pose, finite
 
-HEADINGS = ("ROBOT", "ADDRESS", "STATE", "ODOM", "FROM ROBOT", "POSE x y yaw", "WAY", "NEAREST", "")
+from .fleet_rows import RobotRow
+
+HEADINGS = ("ROBOT", "ADDRESS", "STATE", "ODOM", "FROM ROBOT", "POSE x y yaw", "DISTANCE", "NEAREST", "")
 MARK, UNMARK = "\x1b[7m", "\x1b[27m"  # ECMA-48: the chosen row in reverse
-RIGHT_ALIGNED = {"ODOM", "FROM ROBOT", "POSE x y yaw", "WAY"}
-DIRECTIONS = ("ahead", "ahead left", "left", "behind left", "behind", "behind right", "right", "ahead right")
+RIGHT_ALIGNED = {"ODOM", "FROM ROBOT", "POSE x y yaw", "DISTANCE"}
+DIRECTIONS = ("front", "front left", "left", "rear left", "rear", "rear right", "right", "front right")
 
 
 def format_pose(pose: Optional[Pose]) -> str:
@@ -24,7 +26,7 @@ def format_pose(pose: Optional[Pose]) -> str:
 
 
 def format_nearest(seen: bool, nearest: Optional[Obstacle]) -> str:
-    """Return range and direction of the nearest obstacle."""
+    """Return range and direction of the nearest obstacle; seen: whether any scan has arrived."""
     if not seen:
         return "-"
     if nearest is None:
@@ -35,11 +37,7 @@ def format_nearest(seen: bool, nearest: Optional[Obstacle]) -> str:
 
 def format_cells(row: RobotRow) -> List[str]:
     """Return one robot's cells, in the order of HEADINGS."""
-    notes = []
-    if row.last_error:
-        notes.append(row.last_error)
-    if row.reconnects:
-        notes.append("reconnected %dx" % row.reconnects)
+    notes = [row.last_error, "reconnected %dx" % row.reconnects if row.reconnects else ""]
     return [
         make_printable(row.name),
         make_printable(row.address),
@@ -47,18 +45,18 @@ def format_cells(row: RobotRow) -> List[str]:
         "%.1f Hz" % row.odom_hz,
         "%.1f kB/s" % (row.bytes_per_s / 1e3),
         format_pose(row.pose),
-        "%.2f m" % row.way_m,
+        "%.2f m" % row.distance_m,
         format_nearest(row.proximity_seen, row.nearest),
-        make_printable("; ".join(notes)),
+        make_printable("; ".join(filter(None, notes))),
     ]
 
 
 def format_table(
     rows: Sequence[RobotRow], width: int, height: int, chosen: Optional[int] = None
 ) -> List[str]:
-    """Return heading and rows as lines of at most width characters and at most height lines.
+    """Return heading and rows in at most height lines of at most width characters.
 
-    chosen: the number of the row that is marked, and always among those shown.
+    chosen: the number of the row that is marked and always shown.
     """
     shown, first = list(rows), 0
     if len(shown) > height - 1:
@@ -81,10 +79,7 @@ def format_table(
 
 
 def format_title(rows: Sequence[RobotRow], listening: str, stopped: bool, silent: Sequence[str] = ()) -> str:
-    """Return the line above the table: how many robots there are, and where the driver awaits them.
-
-    silent: names of drivers that do not answer.
-    """
+    """Return the line above the table; silent: names of drivers that do not answer."""
     ready = sum(row.state == "READY" for row in rows)
     title = "%d of %d robots ready" % (ready, len(rows))
     if stopped:
@@ -97,7 +92,7 @@ def format_title(rows: Sequence[RobotRow], listening: str, stopped: bool, silent
 
 
 def make_row_dict(row: RobotRow) -> Dict[str, Any]:
-    """Return one robot for JSON. nearest is null where nothing is in range, its range_m where it touches."""
+    """Return one robot for JSON. nearest is null if nothing is in range, its range_m null on contact."""
     return {
         "id": row.id,
         "namespace": row.namespace,
@@ -107,14 +102,10 @@ def make_row_dict(row: RobotRow) -> Dict[str, Any]:
         "odom_hz": round(row.odom_hz, 2),
         "packets_per_s": round(row.packets_per_s, 2),
         "bytes_per_s": round(row.bytes_per_s, 1),
-        "pose": None
-        if row.pose is None
-        else {name: finite(value) for name, value in row.pose._asdict().items()},
-        "way_m": finite(row.way_m),
+        "pose": row.pose and {name: finite(value) for name, value in row.pose._asdict().items()},
+        "distance_m": finite(row.distance_m),
         "moved": row.moved,
-        "nearest": None
-        if row.nearest is None
-        else {"range_m": finite(row.nearest.range_m), "bearing_rad": row.nearest.bearing_rad},
+        "nearest": row.nearest and {name: finite(value) for name, value in row.nearest._asdict().items()},
         "reconnects": row.reconnects,
         "clock_offset_s": finite(row.clock_offset_s),
         "firmware": row.firmware,

@@ -10,7 +10,7 @@ import unittest
 import rosgraph
 import rostest
 
-from hero_test.swarm_watch import wait_for
+from hero_test.waiting import wait_for
 
 DEADLINE_S = 60.0  # check itself ends after 3 s; a machine that is busy may take longer
 PORT = "21310"
@@ -46,7 +46,7 @@ class CheckTest(unittest.TestCase):
             code, points = run_check()
             return (code, points) if "2 of 2 robots ready" in points["robots"]["text"] else None
 
-        code, points = wait_for(find_robots, DEADLINE_S, "two robots that are ready")
+        code, points = wait_for(find_robots, "two robots that are ready", DEADLINE_S)
         self.assertEqual(code, 0, points)
         self.assert_point(points, "robots", "OK", "2 of 2 robots ready, the driver listens on 127.0.0.1:21310")
         self.assert_point(points, "master", "OK", rosgraph.get_master_uri())

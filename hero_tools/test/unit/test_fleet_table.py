@@ -1,10 +1,10 @@
-"""Rows become lines that fit the terminal, and JSON that every reader takes."""
+"""The fleet as lines that fit the terminal, and as valid JSON."""
 
 import json
 import math
 
 import pytest
-from test_fleet_state import make_row
+from test_fleet_rows import make_row
 
 from hero_client.fleet_state import Obstacle, Pose
 from hero_tools.fleet_table import format_json, format_nearest, format_table, format_title
@@ -49,24 +49,24 @@ def test_a_robots_texts_cannot_draw_on_the_terminal():
 @pytest.mark.parametrize(
     ("bearing_rad", "where"),
     [
-        (0.0, "ahead"),
+        (0.0, "front"),
         (math.pi / 2, "left"),
         (-math.pi / 2, "right"),
-        (math.pi, "behind"),
-        (-math.pi, "behind"),
+        (math.pi, "rear"),
+        (-math.pi, "rear"),
     ],
 )
-def test_the_nearest_obstacle_is_said_in_words(bearing_rad, where):
+def test_the_nearest_obstacle_has_a_direction_in_words(bearing_rad, where):
     assert format_nearest(True, Obstacle(0.123, bearing_rad)) == "0.12 m " + where
     assert format_nearest(True, Obstacle(-math.inf, bearing_rad)) == "touch " + where
 
 
-def test_nothing_near_is_free_and_nothing_heard_is_a_dash():
+def test_free_is_shown_apart_from_no_scan_yet():
     assert format_nearest(True, None) == "free"
     assert format_nearest(False, None) == "-"
 
 
-def test_the_title_says_how_many_are_ready_and_that_all_are_stopped():
+def test_the_title_counts_ready_robots_and_shows_a_stop():
     title = format_title([make_row(0), make_row(1, state="AWAY")], "0.0.0.0:11411", True)
     assert "1 of 2 robots ready" in title
     assert "0.0.0.0:11411" in title

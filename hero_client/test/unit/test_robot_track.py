@@ -1,45 +1,12 @@
-"""What is heard of robots becomes rows: rates, ways, the nearest obstacle, who is missing."""
+"""Rate, distance and nearest obstacle of one robot, from what its topics said so far."""
 
 import math
 
 import pytest
 
-from hero_client.fleet_state import (
-    Obstacle,
-    Pose,
-    RateMeter,
-    RobotRow,
-    RobotTrack,
-    find_missing,
-    find_nearest,
-    sort_rows,
-    yaw_of_quaternion,
-)
+from hero_client.fleet_state import Pose, RateMeter, RobotTrack, find_nearest, yaw_of_quaternion
 
 EIGHTH = math.pi / 4
-
-
-def make_row(robot_id, **changes):
-    row = RobotRow(
-        id=robot_id,
-        namespace="/hero_%d" % robot_id,
-        address="10.42.0.%d:4000" % (robot_id + 10),
-        state="READY",
-        stop_state="",
-        odom_hz=29.3,
-        packets_per_s=211.0,
-        bytes_per_s=44051.0,
-        pose=Pose(0.0, 0.0, 0.0),
-        way_m=1.0,
-        turned_rad=0.0,
-        proximity_seen=True,
-        nearest=None,
-        reconnects=0,
-        clock_offset_s=0.0,
-        firmware="v3.8",
-        last_error="",
-    )
-    return row._replace(**changes)
 
 
 def test_a_rate_is_what_came_divided_by_the_time_it_took():
@@ -90,40 +57,6 @@ def test_infinite_is_nothing_not_a_number_is_nothing_and_minus_infinite_is_neare
 
 def test_yaw_of_a_quaternion():
     assert yaw_of_quaternion(0.0, 0.0, math.sin(1.0), math.cos(1.0)) == pytest.approx(2.0)
-
-
-def test_nobody_is_missing_when_all_joined_and_moved():
-    assert find_missing([make_row(0), make_row(1)], range(2)) == {}
-
-
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({"id": 7, "namespace": "/hero_7"}, "did not join"),
-        ({"state": "REFUSED", "last_error": "second hero_0"}, "REFUSED: second hero_0"),
-        ({"pose": None}, "no odometry"),
-        ({"way_m": 0.01}, "did not move"),
-    ],
-)
-def test_a_robot_that_did_not_join_or_move_is_named_with_the_reason(changes, words):
-    missing = find_missing([make_row(0, **changes), make_row(1)], range(2))
-    assert list(missing) == [0]
-    assert words in missing[0]
-
-
-def test_a_robot_that_turned_on_the_spot_has_moved():
-    assert find_missing([make_row(0, way_m=0.0, turned_rad=2.0)], [0]) == {}
-
-
-def test_rows_are_sorted_by_id_state_or_nearness():
-    far = make_row(2, nearest=Obstacle(0.2, 0.0))
-    near = make_row(10, nearest=Obstacle(0.1, 0.0))
-    away = make_row(3, state="AWAY")
-    nameless = make_row(-1, namespace="")
-    rows = [near, nameless, away, far]
-    assert [row.id for row in sort_rows(rows, "id")] == [2, 3, 10, -1]
-    assert next(row.id for row in sort_rows(rows, "state")) == 3
-    assert [row.id for row in sort_rows(rows, "nearest")][:2] == [10, 2]
 
 
 @pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf, 1e306])

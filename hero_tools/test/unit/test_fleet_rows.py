@@ -1,0 +1,63 @@
+"""The fleet as rows: their order, and which expected robot did not join or move."""
+
+import pytest
+
+from hero_client.fleet_state import Obstacle, Pose
+from hero_tools.fleet_rows import RobotRow, find_missing, sort_rows
+
+
+def make_row(robot_id, **changes):
+    row = RobotRow(
+        id=robot_id,
+        namespace="/hero_%d" % robot_id,
+        address="10.42.0.%d:4000" % (robot_id + 10),
+        state="READY",
+        stop_state="",
+        odom_hz=29.3,
+        packets_per_s=211.0,
+        bytes_per_s=44051.0,
+        pose=Pose(0.0, 0.0, 0.0),
+        distance_m=1.0,
+        turned_rad=0.0,
+        proximity_seen=True,
+        nearest=None,
+        reconnects=0,
+        clock_offset_s=0.0,
+        firmware="v3.8",
+        last_error="",
+    )
+    return row._replace(**changes)
+
+
+def test_no_robot_is_missing_if_all_joined_and_moved():
+    assert find_missing([make_row(0), make_row(1)], range(2)) == {}
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"id": 7, "namespace": "/hero_7"}, "did not join"),
+        ({"state": "REFUSED", "last_error": "second hero_0"}, "REFUSED: second hero_0"),
+        ({"pose": None}, "no odometry"),
+        ({"distance_m": 0.01}, "did not move"),
+    ],
+)
+def test_a_robot_that_did_not_join_or_move_is_named_with_the_reason(changes, words):
+    missing = find_missing([make_row(0, **changes), make_row(1)], range(2))
+    assert list(missing) == [0]
+    assert words in missing[0]
+
+
+def test_a_robot_that_turned_on_the_spot_has_moved():
+    assert find_missing([make_row(0, distance_m=0.0, turned_rad=2.0)], [0]) == {}
+
+
+def test_rows_are_sorted_by_id_state_or_nearest_obstacle():
+    far = make_row(2, nearest=Obstacle(0.2, 0.0))
+    near = make_row(10, nearest=Obstacle(0.1, 0.0))
+    away = make_row(3, state="AWAY")
+    nameless = make_row(-1, namespace="")
+    rows = [near, nameless, away, far]
+    assert [row.id for row in sort_rows(rows, "id")] == [2, 3, 10, -1]
+    assert next(row.id for row in sort_rows(rows, "state")) == 3
+    assert [row.id for row in sort_rows(rows, "nearest")][:2] == [10, 2]
