@@ -1,21 +1,19 @@
-"""Markdown files -> their links, headings and the commands that they tell people to type."""
+"""Reads Markdown files: their lines, and the commands that they tell people to type."""
 
 import re
 import shlex
 from pathlib import Path
-from typing import List, NamedTuple, Set
+from typing import List, NamedTuple
 
 import sources
 
 SHELLS = ("console", "bash", "sh", "shell")
 FENCE = re.compile(r"^( *)(`{3,}|~{3,}) *(\w*)")
-LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)(?: \"[^\"]*\")?\)")
 INLINE = re.compile(r"`([^`]+)`")
 # What a command of ROS or of ours begins with; other words in backticks are no commands.
 BEGINNINGS = re.compile(
     r"^(roslaunch|rosrun|rostest|rostopic|rosservice|rosmsg|rossrv|(\S*/)?script/\w+|python3 -m)\b"
 )
-HEADING = re.compile(r"^#{1,6} +(.*?) *#*$")
 
 
 class Line(NamedTuple):
@@ -60,27 +58,6 @@ def read_lines(path: Path) -> List[Line]:
             lines.append(Line(number, text, ""))
         blank_before = not text.strip()
     return lines
-
-
-def read_links(path: Path) -> List[str]:
-    """Return the targets of all links and pictures."""
-    text = "\n".join(INLINE.sub("", line.text) for line in read_lines(path) if not line.block)
-    return LINK.findall(text)
-
-
-def read_anchors(path: Path) -> Set[str]:
-    """Return the anchors of the headings, as GitHub and MkDocs make them; a second heading of a name gets -1."""
-    anchors: Set[str] = set()
-    for line in read_lines(path):
-        found = HEADING.match(line.text)
-        if found and not line.block:
-            plain = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", found.group(1))
-            anchor = re.sub(r"[^\w\- ]", "", plain).strip().lower().replace(" ", "-")
-            again = 0
-            while (anchor + "-%d" % again if again else anchor) in anchors:
-                again += 1
-            anchors.add(anchor + "-%d" % again if again else anchor)
-    return anchors
 
 
 def read_commands(path: Path) -> List[Command]:

@@ -7,40 +7,20 @@ import ast
 import re
 import subprocess
 import xml.etree.ElementTree as ElementTree
+from functools import lru_cache
 from pathlib import Path
 from typing import Dict, List, NamedTuple
 
 ROOT = Path(__file__).resolve().parents[2]
 
-ROS_MODULES = {
+ROS_MODULES = (
+    "actionlib angles diagnostic_updater genpy rosbag rosgraph roslaunch roslib rosnode rospy rosservice rostest"
+    " rostopic rosunit std_srvs tf tf2_ros"
+).split()
+OTHER_PACKAGES = {
     # module that is imported: package to declare
-    "actionlib": "actionlib",
-    "angles": "angles",
-    "diagnostic_updater": "diagnostic_updater",
-    "genpy": "genpy",
-    "rosbag": "rosbag",
-    "rosgraph": "rosgraph",
-    "roslaunch": "roslaunch",
-    "roslib": "roslib",
-    "rosnode": "rosnode",
-    "rospkg": "python3-rospkg",
-    "rospy": "rospy",
-    "rosservice": "rosservice",
-    "rostest": "rostest",
-    "rostopic": "rostopic",
-    "rosunit": "rosunit",
-    "tf": "tf",
-    "tf2_ros": "tf2_ros",
-    "std_srvs": "std_srvs",
-}
-OTHER_MODULES = {
-    "numpy": "python3-numpy",
-    "yaml": "python3-yaml",
-    "matplotlib": "python3-matplotlib",
-    "pexpect": "python3-pexpect",
-    "scipy": "python3-scipy",
-    "tornado": "python3-tornado",
-    "tqdm": "python3-tqdm",
+    **{name: name for name in ROS_MODULES},
+    **{name: f"python3-{name}" for name in "matplotlib numpy pexpect rospkg scipy tornado tqdm yaml".split()},
 }
 
 
@@ -55,6 +35,7 @@ class Import(NamedTuple):
         return self.module.split(".")[0]
 
 
+@lru_cache(maxsize=None)
 def list_files(*suffixes: str) -> List[Path]:
     """Files of the repository that git knows or would add, that exist, and end as given."""
     command = ["git", "-C", str(ROOT), "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
@@ -73,11 +54,11 @@ def list_packages() -> List[str]:
 
 def list_programs(package: str) -> List[str]:
     """Programs of a package that rosrun finds: those that CMake makes, and scripts in nodes/."""
-    text = (ROOT / package / "CMakeLists.txt").read_text(encoding="utf-8").replace("${PROJECT_NAME}", package)
     scripts = [path.name for path in sorted((ROOT / package / "nodes").glob("*"))]
-    return re.findall(r"hero_add_program\((\w+)", text) + scripts
+    return re.findall(r"hero_add_program\((\w+)", read_cmake(package)) + scripts
 
 
+@lru_cache(maxsize=None)
 def list_python_files() -> List[Path]:
     """Python modules and the scripts without extension."""
     return [path for path in list_files() if path.suffix == ".py" or is_python_script(path)]
@@ -91,6 +72,23 @@ def is_python_script(path: Path) -> bool:
     return first_line.startswith(b"#!") and b"python" in first_line
 
 
+def name_of(path: Path) -> str:
+    """The path of a file within the repository."""
+    return str(path.relative_to(ROOT))
+
+
+@lru_cache(maxsize=None)
+def parse(path: Path) -> ast.Module:
+    """The syntax tree of a Python file."""
+    return ast.parse(path.read_text(encoding="utf-8"), filename=str(path))
+
+
+def read_cmake(package: str) -> str:
+    """CMakeLists.txt of a package."""
+    text = (ROOT / package / "CMakeLists.txt").read_text(encoding="utf-8")
+    return text.replace("${PROJECT_NAME}", package)
+
+
 def package_of(path: Path) -> str:
     """The catkin package that a file belongs to, or the top directory's name."""
     return path.relative_to(ROOT).parts[0]
@@ -102,11 +100,11 @@ def module_name(path: Path) -> str:
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
+@lru_cache(maxsize=None)
 def read_imports(path: Path) -> List[Import]:
     """All imports of a file, wherever they stand in it; relative ones resolved."""
-    tree = ast.parse(path.read_text(encoding="utf-8"), filename=str(path))
     imports = []
-    for node in ast.walk(tree):
+    for node in ast.walk(parse(path)):
         if isinstance(node, ast.Import):
             imports += [Import(alias.name, node.lineno) for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
@@ -123,6 +121,7 @@ def read_imports(path: Path) -> List[Import]:
     return imports
 
 
+@lru_cache(maxsize=None)
 def list_source_modules() -> Dict[str, Path]:
     """Modules below every <package>/src by their names."""
     return {

@@ -1,16 +1,19 @@
-"""Markdown files: every link leads somewhere, every command names scripts, programs, files and options that exist."""
+"""Markdown files: commands name what exists, READMEs list what programs have, promises name tests.
 
+Links are checked by mkdocs (script/docs).
+"""
+
+import ast
 import re
 import xml.etree.ElementTree as ElementTree
 from functools import lru_cache
 
 import documents
-import pytest
 import sources
 
-PAGES = sources.list_files(".md")
 PACKAGES = sources.list_packages()
-COMMANDS = [command for page in PAGES for command in documents.read_commands(page)]
+COMMANDS = [command for page in sources.list_files(".md") for command in documents.read_commands(page)]
+TEST_NAME = re.compile(r"`(test_\w+)`")
 # Begin no command but stand before one.
 PREFIXES = ("sudo", "time", "timeout", "env", "exec", "nohup", "do", "then")
 NAMES_OF_ROS = {"/tf", "/tf_static", "/rosout", "/rosout_agg", "/diagnostics", "/clock", "/joy", "/odom"}
@@ -18,10 +21,6 @@ TALKS_ABOUT_NAMES = {
     "rostopic": ("echo", "hz", "bw", "info", "pub", "delay"),
     "rosservice": ("call", "info", "args", "type"),
 }
-
-
-def name_of(path):
-    return str(path.relative_to(sources.ROOT))
 
 
 def strip_prefixes(words):
@@ -33,26 +32,20 @@ def strip_prefixes(words):
 
 
 def commands_of(*programs):
-    """Commands that start one of the programs, as parameters of a test."""
-    found = []
+    """Commands that start one of the programs, as (place, words)."""
     for command in COMMANDS:
         words = strip_prefixes(command.words)
         if words and words[0] in programs:
-            found.append(pytest.param(words, id=str(command)))
-    return found
+            yield command, words
 
 
 @lru_cache(maxsize=None)
 def read_arguments(package, name):
     """Names of the arguments of a launch file, or None if there is no such file."""
-    places = [
-        path
-        for path in sources.list_files(".launch")
-        if path.name == name and sources.package_of(path) == package
-    ]
-    if not places:
-        return None
-    return {argument.get("name") for argument in ElementTree.parse(places[0]).getroot().findall("arg")}
+    for path in sources.list_files(".launch"):
+        if path.name == name and sources.package_of(path) == package:
+            return {argument.get("name") for argument in ElementTree.parse(path).getroot().findall("arg")}
+    return None
 
 
 @lru_cache(maxsize=None)
@@ -62,155 +55,153 @@ def read_package_text(package):
     return "\n".join(path.read_text(encoding="utf-8") for path in files if "test" not in path.parts)
 
 
-def has_option(text, option):
-    """Whether a program's text names the option; --help is everybody's."""
-    return option == "--help" or f'"{option}"' in text
+def find_options(words):
+    """Options among the words of a command, without --help, which is everybody's."""
+    found = (re.match(r"^(--[\w-]+)", word) for word in words)
+    return [option.group(1) for option in found if option and option.group(1) != "--help"]
+
+
+@lru_cache(maxsize=None)
+def read_words(package):
+    """Everything between backticks in the README of a package."""
+    lines = documents.read_lines(sources.ROOT / package / "README.md")
+    return {word for line in lines for word in documents.INLINE.findall(line.text)}
 
 
 def documented_names():
     """Names of topics and services that the READMEs of the packages list, with N for a robot's number."""
     names = set(NAMES_OF_ROS)
     for package in PACKAGES:
-        for line in documents.read_lines(sources.ROOT / package / "README.md"):
-            names |= {word for word in documents.INLINE.findall(line.text) if re.match(r"^/[\w/]+$", word)}
-            if package == "hero_driver":
-                names |= {
-                    "/hero_driver/" + word[1:]
-                    for word in documents.INLINE.findall(line.text)
-                    if re.match(r"^~\w+$", word)
-                }
-    return names
+        names |= {word for word in read_words(package) if re.match(r"^/[\w/]+$", word)}
+    return names | {"/hero_driver/" + word[1:] for word in read_words("hero_driver") if re.match(r"^~\w+$", word)}
 
 
-DOCUMENTED_NAMES = documented_names()
+def test_every_roslaunch_names_a_launch_file_and_its_arguments():
+    for place, words in commands_of("roslaunch"):
+        plain = [word for word in words[1:] if not word.startswith("-")]
+        if "-p" in words:
+            plain.remove(words[words.index("-p") + 1])
+        package, file, *arguments = [*plain, "", ""]
+        assert package in PACKAGES or not package.startswith("hero_"), f"{place}: no package {package}"
+        if package in PACKAGES:
+            known = read_arguments(package, file)
+            assert known is not None, f"{place}: {package} has no launch/{file}"
+            given = {argument.partition(":=")[0] for argument in arguments if ":=" in argument}
+            assert given <= known, f"{place}: {file} has no argument {given - known}"
 
 
-@pytest.mark.parametrize("page", PAGES, ids=name_of)
-def test_every_link_leads_to_a_file_and_a_heading_that_exist(page):
-    for target in documents.read_links(page):
-        if re.match(r"[a-z]+:", target):
-            continue
-        file, _, anchor = target.partition("#")
-        place = page.parent / file if file else page
-        assert place.is_file(), f"{name_of(page)}: {target}: no such file"
-        if anchor:
-            assert anchor in documents.read_anchors(place), f"{name_of(page)}: {target}: no such heading"
+def test_every_rosrun_names_a_program_its_options_and_parameters():
+    for place, words in commands_of("rosrun"):
+        package, program, *arguments = [*words[1:], "", ""]
+        assert package in PACKAGES or not package.startswith("hero_"), f"{place}: no package {package}"
+        if package in PACKAGES:
+            assert program in sources.list_programs(package), f"{place}: {package} has no program {program}"
+            for option in find_options(arguments):
+                assert f'"{option}"' in read_package_text(package), f"{place}: no option {option}"
+            for name in re.findall(r"(?:^| )_([a-z]\w*):=", " ".join(arguments)):
+                assert re.search(rf"\b{name}\b", read_package_text(package)), f"{place}: no parameter {name}"
 
 
-@pytest.mark.parametrize("words", commands_of("roslaunch"))
-def test_every_roslaunch_names_a_launch_file_and_its_arguments(words):
-    plain = [word for word in words[1:] if not word.startswith("-")]
-    if "-p" in words:
-        plain.remove(words[words.index("-p") + 1])
-    if not plain or plain[0] not in PACKAGES:
-        assert not plain or not plain[0].startswith("hero_"), f"there is no package {plain[0]}"
-        return
-    package, file, *arguments = [*plain, ""][:2] + plain[2:]
-    known = read_arguments(package, file)
-    assert known is not None, f"{package} has no launch/{file}"
-    for argument in arguments:
-        name, given, _ = argument.partition(":=")
-        if given:
-            assert name in known, f"{file} has no argument {name}"
+def test_every_rostest_exists():
+    for place, words in commands_of("rostest"):
+        if len(words) > 2 and words[1] in PACKAGES:
+            assert (sources.ROOT / words[1] / "test" / "rostest" / words[2]).is_file(), place
 
 
-@pytest.mark.parametrize("words", commands_of("rosrun"))
-def test_every_rosrun_names_a_program_and_its_options(words):
-    package, program, *arguments = [*words[1:], "", ""][: max(2, len(words) - 1)]
-    if package not in PACKAGES:
-        assert not package.startswith("hero_"), f"there is no package {package}"
-        return
-    assert program in sources.list_programs(package), f"{package} has no program {program}"
-    for argument in arguments:
-        option = re.match(r"^(--[\w-]+)", argument)
-        if option:
-            assert has_option(read_package_text(package), option.group(1)), (
-                f"{program} has no option {option.group(1)}"
-            )
-        parameter = re.match(r"^_(\w+):=", argument)
-        if parameter and not argument.startswith("__"):
-            assert re.search(rf"\b{parameter.group(1)}\b", read_package_text(package)), (
-                f"no parameter {argument}"
-            )
+def test_every_script_and_its_options_exist():
+    for place in COMMANDS:
+        words = strip_prefixes(place.words)
+        if words and re.match(r"^(\S*/)?script/\w+$", words[0]):
+            path = sources.ROOT / "script" / words[0].split("/")[-1]
+            assert path.is_file(), f"{place}: there is no script/{path.name}"
+            text = path.read_text(encoding="utf-8")
+            programs = re.findall(r"[\w/]+\.py", text) + [f"bench/{word}_bench.py" for word in words[1:]]
+            files = (sources.ROOT / name for name in programs)
+            text += "".join(file.read_text(encoding="utf-8") for file in files if file.is_file())
+            for option in find_options(words):
+                assert option in text, f"{place}: script/{path.name} has no option {option}"
 
 
-@pytest.mark.parametrize("words", commands_of("rostest"))
-def test_every_rostest_exists(words):
-    if len(words) > 2 and words[1] in PACKAGES:
-        assert (sources.ROOT / words[1] / "test" / "rostest" / words[2]).is_file()
+def test_every_topic_and_service_that_a_command_names_is_in_a_readme():
+    documented = documented_names()
+    for place, words in commands_of(*TALKS_ABOUT_NAMES):
+        if len(words) > 2 and words[1] in TALKS_ABOUT_NAMES[words[0]]:
+            for name in [word for word in words[2:] if word.startswith("/")][:1]:
+                plain = re.sub(r"/hero_(\d+|N|\$\{?\w+\}?)(?=/|$)", "/hero_N", name)
+                plain = re.sub(r"^/hero_driver_\w+", "/hero_driver", plain)  # one of several drivers
+                known = any(plain == known or plain.startswith(known + "/") for known in documented)
+                assert known or "$" in plain, f"{place}: no README of a package lists {name}"
 
 
-@pytest.mark.parametrize(
-    "words",
-    [
-        pytest.param(strip_prefixes(command.words), id=str(command))
-        for command in COMMANDS
-        if strip_prefixes(command.words)
-        and re.match(r"^(\S*/)?script/\w+$", strip_prefixes(command.words)[0])
-    ],
-)
-def test_every_script_and_its_options_exist(words):
-    path = sources.ROOT / "script" / words[0].split("/")[-1]
-    assert path.is_file(), f"there is no script/{path.name}"
-    text = path.read_text(encoding="utf-8")
-    programs = re.findall(r"[\w/]+\.py", text) + [f"bench/{word}_bench.py" for word in words[1:]]
-    text += "".join((sources.ROOT / name).read_text() for name in programs if (sources.ROOT / name).is_file())
-    for word in words[1:]:
-        option = re.match(r"^(--[\w-]+)", word)
-        assert not option or option.group(1) in text, f"script/{path.name} has no option {option.group(1)}"
+def test_every_type_that_a_command_shows_exists():
+    for place, words in commands_of("rosmsg", "rossrv"):
+        folder = words[0][3:]
+        for word in words[1:]:
+            package, _, kind = word.partition("/")
+            if package in PACKAGES and kind:
+                assert (sources.ROOT / package / folder / f"{kind}.{folder}").is_file(), f"{place}: {word}"
 
 
-@pytest.mark.parametrize("words", commands_of(*TALKS_ABOUT_NAMES))
-def test_every_topic_and_service_that_is_asked_for_is_in_a_readme(words):
-    if len(words) < 3 or words[1] not in TALKS_ABOUT_NAMES[words[0]]:
-        return
-    names = [word for word in words[2:] if word.startswith("/")][:1]
-    for name in names:
-        plain = re.sub(r"/hero_(\d+|N|\$\{?\w+\}?)(?=/|$)", "/hero_N", name)
-        plain = re.sub(r"^/hero_driver_\w+", "/hero_driver", plain)  # one of several drivers
-        assert "$" in plain or any(
-            plain == known or plain.startswith(known + "/") for known in DOCUMENTED_NAMES
-        ), f"no README of a package lists {name}"
+def test_every_module_that_a_command_runs_has_its_options():
+    for place, words in commands_of("python3"):
+        module = words[words.index("-m") + 1] if "-m" in words else ""
+        if module in PACKAGES:
+            for option in find_options(words):
+                assert f'"{option}"' in read_package_text(module), f"{place}: no option {option}"
 
 
-@pytest.mark.parametrize("words", commands_of("rosmsg", "rossrv"))
-def test_every_type_that_is_shown_exists(words):
-    folder = {"rosmsg": "msg", "rossrv": "srv"}[words[0]]
-    for word in words[1:]:
-        package, _, kind = word.partition("/")
-        if package in PACKAGES and kind:
-            assert (sources.ROOT / package / folder / f"{kind}.{folder}").is_file(), word
+def test_every_option_of_a_program_is_in_the_readme_of_its_package():
+    for package in PACKAGES:
+        readme = (sources.ROOT / package / "README.md").read_text(encoding="utf-8")
+        for option in set(re.findall(r'add_argument\(\s*"(--[\w-]+)"', read_package_text(package))):
+            # Or as the argument of a launch file of the same name.
+            argument = f"`{option[2:].replace('-', '_')}`"
+            assert re.search(rf"`{option}\b", readme) or argument in readme, f"README of {package}: {option}"
 
 
-@pytest.mark.parametrize("words", [found for found in commands_of("python3") if "-m" in found.values[0]])
-def test_every_module_that_is_run_exists_with_its_options(words):
-    module = words[words.index("-m") + 1]
-    if module not in PACKAGES:
-        return
-    for word in words:
-        option = re.match(r"^(--[\w-]+)", word)
-        assert not option or has_option(read_package_text(module), option.group(1)), (
-            f"{module} has no option {word}"
-        )
+def calls_in(package, names):
+    """Calls of functions or classes of these names in the package's modules, as (path, call)."""
+    for path in sources.list_source_modules().values():
+        if sources.package_of(path) == package:
+            for node in ast.walk(sources.parse(path)):
+                if isinstance(node, ast.Call) and getattr(node.func, "attr", getattr(node.func, "id", "")) in names:
+                    yield path, node
 
 
-@pytest.mark.parametrize("package", PACKAGES)
-def test_every_option_of_a_program_is_in_the_readme_of_its_package(package):
-    readme = (sources.ROOT / package / "README.md").read_text(encoding="utf-8")
-    sources_below = [
-        path for path in sources.list_source_modules().values() if sources.package_of(path) == package
-    ]
-    text = "\n".join(path.read_text(encoding="utf-8") for path in sources_below)
-    options = set(re.findall(r'add_argument\(\s*"(--[\w-]+)"', text))
-    # Or as the argument of a launch file of the same name.
-    missing = sorted(
-        option
-        for option in options
-        if not re.search(rf"`{option}\b", readme) and f"`{option[2:].replace('-', '_')}`" not in readme
-    )
-    assert not missing, f"not in the README of {package}: {missing}"
+def test_every_parameter_of_a_program_is_in_the_readme():
+    for package in PACKAGES:
+        words = read_words(package)
+        for path, call in calls_in(package, ("read_parameters",)):
+            for key in getattr(call.args[0], "keys", []):
+                known = not isinstance(key, ast.Constant) or words & {key.value, f"~{key.value}"}
+                assert known, f"{path.name}: parameter {key.value} is not in the README of {package}"
 
 
-def test_commands_are_found_at_all():
+def test_every_topic_and_service_of_a_program_is_in_the_readme():
+    for package in PACKAGES:
+        known = {re.split(r"[/~]", word)[-1] for word in read_words(package)}
+        for path, call in calls_in(package, ("Publisher", "Subscriber", "Service")):
+            # Of "/hero_%d/odom" % number, and of namespace + "/odom", the last part: the rest is often a variable.
+            texts = [
+                part.value
+                for part in ast.walk(call.args[0] if call.args else call.func)
+                if isinstance(part, ast.Constant) and isinstance(part.value, str)
+            ]
+            last = re.split(r"[/~]", texts[-1])[-1] if texts else ""
+            where = f"{path.name}:{call.lineno}: {last} is not in the README of {package}"
+            assert not re.match(r"^\w+$", last) or last in known, where
+
+
+def test_every_promise_names_a_test_that_exists():
+    texts = [path.read_text(encoding="utf-8") for path in sources.list_python_files() if "test" in path.parts]
+    defined = {name for text in texts for name in re.findall(r"^ *def (test_\w+)\(", text, re.MULTILINE)}
+    for page in ("docs/reliability.md", "docs/security.md"):
+        for name in TEST_NAME.findall((sources.ROOT / page).read_text(encoding="utf-8")):
+            assert name in defined, f"{page} names {name}, which no file defines"
+
+
+def test_commands_parameters_and_topics_are_found_at_all():
     assert len(COMMANDS) > 100
-    assert len(commands_of("roslaunch")) > 20
+    assert len(list(commands_of("roslaunch"))) > 20
+    assert len([call for package in PACKAGES for call in calls_in(package, ("read_parameters",))]) >= 5
+    assert len([call for package in PACKAGES for call in calls_in(package, ("Publisher", "Subscriber"))]) >= 15

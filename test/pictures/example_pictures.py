@@ -124,7 +124,8 @@ def go_to_goal(picture):
 def swarm_go_to(picture):
     """Ten robots that swap places."""
     with Recording(10, arena_file("circle")) as recording:
-        swap = json.dumps(yaml.safe_load((ROOT / "hero_examples" / "test" / "rostest" / "swap.yaml").read_text()))  # rospy ignores values of several lines
+        text = (ROOT / "hero_examples" / "test" / "rostest" / "swap.yaml").read_text()
+        swap = json.dumps(yaml.safe_load(text))  # rospy ignores values of several lines
         recording.stage.start_example("swarm_go_to", "_robots:=0-9", "_formation:=" + swap, "_assign:=false")
         goals = [(-x_m, -y_m) for x_m, y_m, _ in map(recording.watch.pose, range(10))]
         recording.wait_until_all_are_at(goals, 0.3, 120.0)

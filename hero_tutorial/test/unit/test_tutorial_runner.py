@@ -7,7 +7,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import tutorial_runner
-from tutorial_runner import Course, TutorialError, PageError, clean_output, make_pattern, read_blocks
+from tutorial_runner import Course, PageError, TutorialError, clean_output, make_pattern, read_blocks
 
 
 @pytest.fixture()

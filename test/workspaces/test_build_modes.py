@@ -1,7 +1,7 @@
-"""Proof that the suite builds with each of catkin's tools in a new workspace, and starts from what they make.
+"""The suite builds and starts in each build mode: catkin build, catkin_make, install space.
 
-Each workspace gets a copy of the repository, so that nothing is found by accident in another place; the
-install space is tried after its sources and its build are gone.
+Each workspace holds a fresh copy of the repository, so nothing is found in another place by accident. The install
+space is tested after sources, build and devel space have been deleted.
 """
 
 import os
@@ -16,8 +16,10 @@ from pathlib import Path
 
 import pytest
 
+from hero_test.processes import find_free_port
+
 ROOT = Path(__file__).resolve().parents[2]
-SCRATCH = ROOT / ".work" / "spaces"
+SCRATCH = ROOT / ".work" / "workspaces"
 BUILD_TIMEOUT_S = 600.0
 PROBE_TIMEOUT_S = 120.0
 NODE_START_S = 3
@@ -70,7 +72,7 @@ def copy_sources(destination):
         shutil.copytree(str(ROOT / package), str(destination / package), ignore=ignored)
 
 
-class Space:
+class Workspace:
     """A built workspace: sourcing `setup` makes the suite available."""
 
     def __init__(self, setup, directory):
@@ -93,13 +95,13 @@ def build_with_catkin_build():
     workspace = new_workspace("catkin_build")
     script = f"catkin config --init --cmake-args {CMAKE_ARGUMENTS} && catkin build --no-status --summarize"
     run(script, workspace, BUILD_TIMEOUT_S)
-    return Space(workspace / "devel" / "setup.bash", workspace)
+    return Workspace(workspace / "devel" / "setup.bash", workspace)
 
 
 def build_with_catkin_make():
     workspace = new_workspace("catkin_make")
     run(f"catkin_make {CMAKE_ARGUMENTS}", workspace, BUILD_TIMEOUT_S)
-    return Space(workspace / "devel" / "setup.bash", workspace)
+    return Workspace(workspace / "devel" / "setup.bash", workspace)
 
 
 def build_and_install():
@@ -111,7 +113,7 @@ def build_and_install():
     run(script, workspace, BUILD_TIMEOUT_S)
     for gone in ("src", "build", "devel"):
         shutil.rmtree(str(workspace / gone))
-    return Space(workspace / "install" / "setup.bash", workspace)
+    return Workspace(workspace / "install" / "setup.bash", workspace)
 
 
 BUILDERS = {
@@ -122,18 +124,18 @@ BUILDERS = {
 
 
 @pytest.fixture(scope="module", params=sorted(BUILDERS))
-def space(request):
-    """Each kind of workspace, built once; removed at the end of the tests if they pass."""
+def workspace(request):
+    """A workspace of each build mode, built once."""
     return BUILDERS[request.param]()
 
 
-def test_every_package_is_found_in_the_workspace_and_nowhere_else(space):
-    found = space.run(f"for name in {' '.join(PACKAGES)}; do rospack find $name; done").split()
+def test_every_package_is_found_only_in_the_workspace(workspace):
+    found = workspace.run(f"for name in {' '.join(PACKAGES)}; do rospack find $name; done").split()
     assert len(found) == len(PACKAGES)
-    assert all(path.startswith(str(space.directory)) for path in found), found
+    assert all(path.startswith(str(workspace.directory)) for path in found), found
 
 
-def test_every_module_can_be_imported(space):
+def test_every_module_can_be_imported(workspace):
     modules = []
     for package in PACKAGES:
         source = ROOT / package / "src"
@@ -143,22 +145,22 @@ def test_every_module_can_be_imported(space):
                 modules.append(name[: -len(".__init__")] if name.endswith(".__init__") else name)
     modules += ["hero_msgs.msg", "hero_msgs.srv"]
     program = "\n".join(f"import {name}; print({name}.__file__)" for name in modules)
-    space.run(f"{sys.executable} - <<'END'\n{program}\nEND")
+    workspace.run(f"{sys.executable} - <<'END'\n{program}\nEND")
 
 
-def test_every_launch_file_can_be_read(space):
+def test_every_launch_file_can_be_read(workspace):
     def read(path):
         package = path.parents[1].name
-        listed = space.run(f"roslaunch --files {package} {path.name}")
+        listed = workspace.run(f"roslaunch --files {package} {path.name}")
         assert path.name in listed
-        space.run(f"roslaunch --nodes {package} {path.name}")
+        workspace.run(f"roslaunch --nodes {package} {path.name}")
 
     side_by_side(read, LAUNCH_FILES)
 
 
-def test_rosrun_starts_every_program_whatever_python3_is_first_on_path(space):
+def test_programs_start_whatever_python3_is_first_on_path(workspace):
     # As with pyenv or conda: the first python3 on PATH is another one, without rospy.
-    other = space.directory / "other_python"
+    other = workspace.directory / "other_python"
     other.mkdir()
     (other / "python3").write_text("#!/bin/sh\necho No module named rospy\nexit 1\n")
     (other / "python3").chmod(0o755)
@@ -167,28 +169,28 @@ def test_rosrun_starts_every_program_whatever_python3_is_first_on_path(space):
         package, program = item
         # A node that knows no --help waits for a master, in vain, until it is killed.
         command = f"PATH={other}:$PATH timeout -s KILL {NODE_START_S} rosrun {package} {program} --help"
-        output = space.run(f"export ROS_MASTER_URI=http://localhost:1\n({command}) 2>&1 || true")
+        output = workspace.run(f"export ROS_MASTER_URI=http://localhost:1\n({command}) 2>&1 || true")
         assert "Traceback" not in output and "No module named" not in output, f"{program}:\n{output}"
         assert "Couldn't find executable" not in output, output
 
     side_by_side(start, PROGRAMS)
 
 
-def test_the_tutorials_scripts_are_installed_and_find_what_they_import(space):
+def test_tutorial_scripts_are_found_and_import(workspace):
     """They know no --help, so they are not run but read as modules, which does all but main()."""
     names = " ".join(TUTORIALS)
     program = "import runpy, sys\nfor name in sys.argv[1:]:\n    runpy.run_path(name, run_name='read')"
-    space.run(
+    workspace.run(
         f"cd $(catkin_find --first-only --libexec hero_tutorial) && {sys.executable} - {names} <<'END'\n{program}\nEND"
     )
 
 
-def test_driver_and_simulated_robots_start_and_their_odometry_arrives(space):
+def test_driver_and_simulated_robots_start_and_odometry_arrives(workspace):
     """The main path of the suite, on ports of its own, from this workspace."""
     program = textwrap.dedent(
         """
         . {setup}
-        read -r master_port robot_port < <({python} {free_ports})
+        master_port={master_port} robot_port={robot_port}
         export ROS_MASTER_URI=http://localhost:$master_port ROS_HOSTNAME=localhost ROS_HOME={directory}/ros_home
         roslaunch -p $master_port hero_bringup hero_bringup.launch host:=127.0.0.1 port:=$robot_port count:=2 \\
             >{directory}/launch.log 2>&1 &
@@ -197,10 +199,11 @@ def test_driver_and_simulated_robots_start_and_their_odometry_arrives(space):
         {python} {wait_for_odometry} hero_0 hero_1
         """
     ).format(
-        setup=space.setup,
-        directory=space.directory,
+        setup=workspace.setup,
+        directory=workspace.directory,
         python=sys.executable,
-        free_ports=Path(__file__).with_name("free_ports.py"),
+        master_port=find_free_port(),
+        robot_port=find_free_port(),
         wait_for_odometry=Path(__file__).with_name("wait_for_odometry.py"),
     )
-    run(program, space.directory)
+    run(program, workspace.directory)

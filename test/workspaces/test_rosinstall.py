@@ -45,13 +45,13 @@ def packages_in(workspace):
     return {path.parent.name for path in (workspace / "src" / "hero").glob("*/package.xml")}
 
 
-def test_vcs_reads_the_file_where_the_clone_lies_beside_src(workspace):
+def test_vcs_reads_the_file_of_a_clone_beside_src(workspace):
     run("vcs import src < hero/rosinstall.yaml", workspace)
     assert "hero_driver" in packages_in(workspace)
 
 
 @pytest.mark.parametrize("command", ["vcs import src < hero.rosinstall", "wstool init src hero.rosinstall"])
-def test_both_tools_bring_the_suite_from_where_the_clone_came_from(workspace, command):
+def test_both_tools_fetch_the_suite_from_the_address_of_the_clone(workspace, command):
     run("git -C hero remote remove origin", workspace)
     run("hero/script/rosinstall > hero.rosinstall", workspace)
     run(command, workspace)

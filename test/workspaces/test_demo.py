@@ -6,10 +6,12 @@ import signal
 import socket
 import subprocess
 import threading
-import time
 from pathlib import Path
 
 import pytest
+
+from hero_test.processes import find_free_port
+from hero_test.waiting import wait_for
 
 ROOT = Path(__file__).resolve().parents[2]
 TIMEOUT_S = 120.0
@@ -53,24 +55,16 @@ def read_to_end(process):
     return process.communicate(timeout=TIMEOUT_S)[0].decode()
 
 
+def listens(port):
+    with socket.socket() as probe:
+        return probe.connect_ex(("127.0.0.1", port)) == 0
+
+
 def wait_until_driver_listens(port):
-    deadline_s = time.monotonic() + TIMEOUT_S
-    while time.monotonic() < deadline_s:
-        try:
-            socket.create_connection(("127.0.0.1", port), 1.0).close()
-            return
-        except OSError:
-            time.sleep(0.1)
-    raise AssertionError(f"nobody listens on port {port}")
+    wait_for(lambda: listens(port), f"the driver on port {port}", TIMEOUT_S)
 
 
-def find_free_port():
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        return free.getsockname()[1]
-
-
-def test_it_ends_by_itself_when_all_robots_joined_and_moved_also_on_another_port(demo, taken_port):
+def test_it_ends_when_all_robots_moved_also_on_another_port(demo, taken_port):
     process = demo("--seconds", "12", "--count", "2", "--port", str(taken_port))
     output = read_to_end(process)
     assert process.returncode == 0, output
@@ -78,7 +72,7 @@ def test_it_ends_by_itself_when_all_robots_joined_and_moved_also_on_another_port
     assert "all 2 robots joined and moved" in output
 
 
-def test_robots_that_had_no_time_to_move_are_named(demo):
+def test_robots_that_did_not_move_are_named(demo):
     process = demo("--seconds", "1", "--count", "2", "--port", str(find_free_port()))
     output = read_to_end(process)
     assert process.returncode == 1, output
@@ -93,8 +87,7 @@ def test_an_interrupt_ends_everything(demo):
     os.killpg(process.pid, signal.SIGINT)
     output = read_to_end(process)
     assert process.returncode == 130, output
-    with socket.socket() as driver:
-        assert driver.connect_ex(("127.0.0.1", port)) != 0, "the driver still listens"
+    assert not listens(port), "the driver still listens"
 
 
 def test_closing_the_terminal_ends_everything():
@@ -106,12 +99,8 @@ def test_closing_the_terminal_ends_everything():
     wait_until_driver_listens(port)
     os.kill(process_id, signal.SIGHUP)
     os.close(leader)
-    deadline_s = time.monotonic() + TIMEOUT_S
-    while os.waitpid(process_id, os.WNOHANG) == (0, 0):
-        assert time.monotonic() < deadline_s, "the demo goes on"
-        time.sleep(0.1)
-    with socket.socket() as driver:
-        assert driver.connect_ex(("127.0.0.1", port)) != 0, "the driver still listens"
+    wait_for(lambda: os.waitpid(process_id, os.WNOHANG) != (0, 0), "the end of the demo", TIMEOUT_S)
+    assert not listens(port), "the driver still listens"
 
 
 def read_terminal(leader):
@@ -133,7 +122,7 @@ def read_terminal(leader):
         ["--fast"],
     ],
 )
-def test_wrong_arguments_are_refused_in_words(demo, arguments):
+def test_wrong_arguments_are_refused_in_one_line(demo, arguments):
     process = demo(*arguments)
     output = read_to_end(process)
     assert process.returncode == 2

@@ -1,0 +1,195 @@
+"""package.xml, CHANGELOG.rst and launch files: complete, alike, and true to what the sources use."""
+
+import ast
+import re
+import sys
+import xml.etree.ElementTree as ElementTree
+
+import pytest
+import sources
+from catkin_pkg.changelog import get_changelog_from_path
+from catkin_pkg.package_version import get_forthcoming_label
+
+PACKAGES = sources.list_packages()
+LAUNCH_FILES = sources.list_files(".launch")
+STANDARD_LIBRARY = getattr(sys, "stdlib_module_names", None)
+
+# The packages from the ground up: each depends only on packages before it, whatever its tests use.
+ORDER = (
+    "hero_msgs",
+    "hero_test",
+    "hero_driver",
+    "hero_sim",
+    "hero_client",
+    "hero_description",
+    "hero_tools",
+    "hero_monitor",
+    "hero_recording",
+    "hero_calibration",
+    "hero_examples",
+    "hero_bringup",
+    "hero_tutorial",
+    "hero",
+)
+FOR_LEARNING = {"hero_examples", "hero_tutorial"}
+KNOW_NEITHER_DRIVER_NOR_SIMULATOR = {"hero_client", "hero_examples", "hero_tutorial", "hero_description"}
+
+
+def needed_package(module, own_package):
+    """The package that must be declared for an import, or None for the standard library and for our own."""
+    top = module.split(".")[0]
+    if top in (own_package, "__future__"):
+        return None
+    if top.endswith("_msgs") or top in PACKAGES:
+        return top
+    return sources.OTHER_PACKAGES.get(top)
+
+
+def find_needs(package, in_tests):
+    """Return the packages that the Python sources of a package import, each with one place."""
+    needs = {}
+    for path in sources.list_python_files():
+        parts = path.relative_to(sources.ROOT).parts
+        if parts[0] == package and path.name != "setup.py" and ("test" in parts) == in_tests:
+            for found in sources.read_imports(path):
+                needed = needed_package(found.module, package)
+                if needed:
+                    needs.setdefault(needed, f"{sources.name_of(path)}:{found.line}")
+    return needs
+
+
+def find_launch_needs(package):
+    """Return the packages that the launch files of a package take nodes or files from."""
+    needs = {}
+    for path in LAUNCH_FILES:
+        if sources.package_of(path) == package:
+            text = path.read_text(encoding="utf-8")
+            names = {node.get("pkg") for node in ElementTree.fromstring(text).iter() if node.get("pkg")}
+            for name in names | set(re.findall(r"\$\(find (\w+)\)", text)) - {package}:
+                if "$" not in name and name != package:
+                    needs[name] = sources.name_of(path)
+    return needs
+
+
+def test_every_package_xml_is_complete_and_like_the_others():
+    versions = set()
+    for package in PACKAGES:
+        root = ElementTree.parse(sources.ROOT / package / "package.xml").getroot()
+        versions.add(root.findtext("version"))
+        assert root.get("format") == "3", package
+        assert root.findtext("name") == package
+        assert root.findtext("license") == "BSD-3-Clause", package
+        assert root.find("url") is not None and root.find("author") is not None, package
+        assert root.find("export/architecture_independent") is not None, f"{package}: nothing is compiled"
+    assert len(versions) == 1, "all packages carry one version"
+
+
+def test_every_package_has_a_changelog_of_its_version():
+    for package in PACKAGES:
+        changelog = get_changelog_from_path(str(sources.ROOT / package), package)
+        assert changelog, f"{package} has no CHANGELOG.rst"
+        version = ElementTree.parse(sources.ROOT / package / "package.xml").getroot().findtext("version")
+        versions = [found for found, _, _ in changelog.foreach_version()]
+        assert version in versions or get_forthcoming_label(changelog.rst), f"{package}: nothing about {version}"
+
+
+def test_every_package_has_a_readme_that_begins_with_its_name():
+    for package in PACKAGES:
+        assert (sources.ROOT / package / "README.md").read_text(encoding="utf-8").startswith(f"# {package}\n")
+
+
+def test_packages_depend_only_on_packages_below_them():
+    assert sorted(ORDER) == PACKAGES
+    for package in PACKAGES:
+        depends = set(sources.read_dependencies(package, "depend", "build_depend", "exec_depend")) & set(PACKAGES)
+        above = depends - set(ORDER[: ORDER.index(package)])
+        assert not above, f"{package} depends on {above}"
+        if package not in (*FOR_LEARNING, "hero_bringup", "hero"):
+            assert not depends & FOR_LEARNING, f"{package} depends on {depends & FOR_LEARNING}"
+        if package in KNOW_NEITHER_DRIVER_NOR_SIMULATOR:
+            assert not depends & {"hero_driver", "hero_sim"}, f"{package} knows topics only"
+
+
+def test_every_import_and_launched_node_is_declared():
+    missing = []
+    for package in PACKAGES:
+        declared = set(sources.read_dependencies(package, "depend", "exec_depend"))
+        needs = {**find_launch_needs(package), **find_needs(package, in_tests=False)}
+        missing += [f"{package}: exec_depend {name} ({where})" for name, where in needs.items() if name not in declared]
+        declared = set(sources.read_dependencies(package))
+        needs = find_needs(package, in_tests=True)
+        missing += [f"{package}: test_depend {name} ({where})" for name, where in needs.items() if name not in declared]
+    assert not missing, missing
+
+
+def test_every_declared_dependency_of_ours_or_of_ros_is_used():
+    checkable = {*PACKAGES, *sources.OTHER_PACKAGES.values()} - {"roslaunch", "rostest"}  # hero_add_tests() uses these
+    for package in PACKAGES:
+        used = {**find_needs(package, in_tests=False), **find_needs(package, in_tests=True)}
+        suffixes = (".launch", ".test", ".msg", ".srv", ".action", ".py", "CMakeLists.txt")
+        paths = [path for path in sources.list_files(*suffixes) if sources.package_of(path) == package]
+        text = "\n".join(path.read_text(encoding="utf-8") for path in paths)
+        for name in sources.read_dependencies(package, "depend", "exec_depend", "test_depend"):
+            if package != "hero" and (name in checkable or name.endswith("_msgs")):
+                assert name in used or re.search(rf"\b{name}\b", text), f"{package} declares {name} for nothing"
+
+
+@pytest.mark.skipif(STANDARD_LIBRARY is None, reason="needs Python 3.10")
+def test_only_known_libraries_are_imported():
+    for path in sources.list_source_modules().values():
+        package = sources.package_of(path)
+        for found in sources.read_imports(path):
+            known = found.top in STANDARD_LIBRARY or found.top == package or needed_package(found.module, package)
+            assert known, f"{path}:{found.line}: {found.module}: tell test/lint/sources.py which package it is in"
+
+
+def test_bootstrap_installs_the_python_packages_that_are_declared():
+    listed = (sources.ROOT / "script" / "bootstrap").read_text(encoding="utf-8").split()
+    for package in PACKAGES:
+        for name in sources.read_dependencies(package):
+            assert not name.startswith("python3-") or name in listed, f"{name}: add to DEBIAN_PACKAGES"
+
+
+def test_every_program_has_a_module_with_a_main():
+    for package in PACKAGES:
+        text = sources.read_cmake(package)
+        for name, module in re.findall(r"hero_add_program\((\w+) ?(\w*)\)", text):
+            path = sources.ROOT / package / "src" / package / f"{module or name}.py"
+            functions = [node for node in ast.parse(path.read_text()).body if isinstance(node, ast.FunctionDef)]
+            assert "main" in [function.name for function in functions], f"{package}: {name}"
+
+
+def find_forwarded(path):
+    """Return the launch file to which all arguments are passed on; None for a file that has nodes of its own."""
+    for include in ElementTree.parse(path).getroot().findall("include"):
+        if include.get("pass_all_args") == "true":
+            package, file = re.fullmatch(r"\$\(find (\w+)\)/(.+)", include.get("file")).groups()
+            return sources.ROOT / package / file
+    return None
+
+
+def read_arguments(path):
+    return [argument.attrib for argument in ElementTree.parse(path).getroot().findall("arg")]
+
+
+def test_launch_arguments_are_documented_there_and_in_the_readme():
+    for path in LAUNCH_FILES:
+        readme = (sources.ROOT / sources.package_of(path) / "README.md").read_text(encoding="utf-8")
+        assert path.name in readme, f"{path.name} is not in the README of {sources.package_of(path)}"
+        forwarded = find_forwarded(path)
+        if forwarded:
+            same = read_arguments(path) == read_arguments(forwarded)
+            assert same, f"{sources.name_of(path)}: not the arguments that it passes on"
+            continue
+        for argument in read_arguments(path):
+            name = argument["name"]
+            assert argument.get("doc"), f"{path.name}: {name} has no doc"
+            # `~name` where the argument is the node's parameter
+            assert f"`{name}`" in readme or f"`~{name}`" in readme, f"{path.name}: no `{name}` in the README"
+
+
+def test_launched_nodes_say_where_their_output_goes():
+    for path in LAUNCH_FILES:
+        for node in ElementTree.parse(path).getroot().iter("node"):
+            assert node.get("output"), f"{sources.name_of(path)}: node {node.get('name')}: output="
+            assert not node.get("name").startswith("/"), f"{sources.name_of(path)}: {node.get('name')}"

@@ -1,0 +1,6 @@
+"""Makes the tests' helpers importable before anything is built."""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "hero_test" / "src"))
