@@ -12,6 +12,7 @@ import subprocess
 import sys
 import textwrap
 from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache
 from pathlib import Path
 
 import pytest
@@ -123,10 +124,25 @@ BUILDERS = {
 }
 
 
-@pytest.fixture(scope="module", params=sorted(BUILDERS))
+@lru_cache(maxsize=None)
+def build(mode):
+    """Build a workspace, once."""
+    return BUILDERS[mode]()
+
+
+@pytest.fixture(params=sorted(BUILDERS))
 def workspace(request):
-    """A workspace of each build mode, built once."""
-    return BUILDERS[request.param]()
+    """A workspace of each build mode."""
+    return build(request.param)
+
+
+def test_run_tests_runs_unit_tests_and_checks_launch_files():
+    workspace = build("catkin_build")
+    # roslaunch-check and rostest take the first python3 on PATH.
+    path = f"{Path(sys.executable).parent}:$PATH"
+    workspace.run(f"PATH={path} catkin run_tests --no-status --no-deps hero_description")
+    results = workspace.directory / "build" / "hero_description" / "test_results" / "hero_description"
+    assert {file.name for file in results.iterdir()} == {"pytest.xml", "roslaunch-check_launch.xml"}
 
 
 def test_every_package_is_found_only_in_the_workspace(workspace):
