@@ -26,7 +26,7 @@ from hero_test.virtual_screen import MISSING, VirtualScreen  # noqa: E402
 PICTURES_FOLDER = ROOT / "docs" / "pictures"
 WALK_S = 25.0
 SCREEN = (1200, 800)  # the size that the configuration of RViz gives its window
-VIEW = (slice(64, 768), slice(366, 1182))  # rows and columns of the view in that window
+VIEW = (slice(164, 768), slice(366, 1182))  # rows and columns of the arena in that window
 GROUND_SHARE = 0.5  # of the view is light ground as soon as RViz draws; its first window is dark
 DRAW_TIMEOUT_S = 60.0
 
