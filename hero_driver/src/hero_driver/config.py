@@ -1,7 +1,7 @@
 """The node's private parameters: read once, checked, frozen.
 
-Each field below is a parameter; its metadata holds unit, range and meaning, from which the table in the
-README is checked.
+Each field below is a parameter; its metadata holds unit, range and meaning, from which docs/driver_parameters.md and
+config/hero_driver.yaml are generated.
 """
 
 import dataclasses
@@ -38,58 +38,56 @@ def _plain(default: Any, text: str, unit: str = "") -> Any:
 class DriverConfig:
     """All parameters of the driver."""
 
-    host: str = _plain("0.0.0.0", "address to listen on; empty: do not listen, only dial ~robots")
-    port: int = _number(DEFAULT_PORT, 0, 65535, "", "TCP port to listen on; 0: any free one")
-    robots: Tuple[Address, ...] = _plain(
-        (), "robots that are TCP servers, to be dialled: a list of {host, port}"
-    )
+    host: str = _plain("0.0.0.0", "address to listen on; empty: only connect to ~robots")
+    port: int = _number(DEFAULT_PORT, 0, 65535, "", "TCP port to listen on; 0: any free port")
+    robots: Tuple[Address, ...] = _plain((), "robots that are TCP servers, to connect to: a list of {host, port}")
     namespace_policy: str = _choice(
         "robot",
         ("robot", "any"),
-        "robot: HeRos only, each within /hero_N and /tf; any: all but those of drivers and of ROS",
+        "names allowed. robot: HeRos only, each in /hero_N and /tf; any: all except those of drivers and of ROS",
     )
-    allow: Tuple[Network, ...] = _plain((), "networks (CIDR) that robots may come from; empty: all")
+    allow: Tuple[Network, ...] = _plain((), "networks (CIDR) that robots may connect from; empty: all")
     max_connections: int = _number(400, 1, 5000, "", "connections in total")
-    max_connections_per_address: int = _number(400, 1, 5000, "", "connections of one address")
-    max_unidentified: int = _number(200, 1, 5000, "", "connections that have not said who they are")
-    max_topics: int = _number(64, 1, 1000, "", "ids that one robot may declare")
+    max_connections_per_address: int = _number(400, 1, 5000, "", "connections per address")
+    max_unidentified: int = _number(200, 1, 5000, "", "connections that have not identified themselves")
+    max_topics: int = _number(64, 1, 1000, "", "topic ids that one robot may declare")
     max_name_length: int = _number(128, 16, 1024, "characters", "longest name of a topic or type")
     max_payload_length: int = _number(4096, 64, 65535, "bytes", "longest payload of a packet from a robot")
-    max_packets_per_s: int = _number(5000, 10, 1000000, "1/s", "packets from one robot; stock robots send 211")
+    max_packets_per_s: int = _number(5000, 10, 1000000, "1/s", "packets per robot; stock robots send 211")
     max_bytes_per_s: int = _number(
-        2000000, 1000, 100000000, "bytes/s", "from one robot; stock robots send 44051"
+        2000000, 1000, 100000000, "bytes/s", "bytes per robot; stock robots send 44051"
     )
     declare_timeout_s: float = _number(
-        20.0, 2.0, 600.0, "s", "time for a robot to declare a topic that identifies it, else it is disconnected"
+        20.0, 2.0, 600.0, "s", "time for a robot to declare a topic that identifies it; then it is disconnected"
     )
     silence_timeout_s: float = _number(6.0, 3.0, 600.0, "s", "silence after which a connection is closed")
     quick_acknowledge: bool = _plain(
-        True, "acknowledge what robots send at once, else their TCP holds the rest of each burst back for 40 ms"
+        True, "acknowledge data at once; otherwise some TCP stacks delay the rest of each burst by 40 ms"
     )
-    grace_s: float = _number(10.0, 0.0, 3600.0, "s", "time that the topics of a robot stay up after it left")
-    service_timeout_s: float = _number(5.0, 0.1, 600.0, "s", "time that a robot has to answer a service call")
-    parameters_outside: bool = _plain(False, "robots may read parameters outside their own namespace")
-    clamp: bool = _plain(False, "bring velocities into the firmware's limits (0.20 m/s, 8.0 rad/s)")
+    grace_s: float = _number(10.0, 0.0, 3600.0, "s", "time that a robot's topics and id are kept after it disconnects")
+    service_timeout_s: float = _number(5.0, 0.1, 600.0, "s", "time for a robot to answer a service call")
+    parameters_outside: bool = _plain(False, "allow robots to read parameters outside their namespace")
+    clamp: bool = _plain(False, "limit velocities to those of the firmware (0.20 m/s, 8.0 rad/s)")
     command_max_age_s: float = _number(
-        2.0, 0.1, 60.0, "s", "a motion command that could not be sent for so long is dropped; stops are not"
+        2.0, 0.1, 60.0, "s", "age at which a motion command that could not be sent is dropped; stops are kept"
     )
     orphan_stop_s: float = _number(
-        0.25, 0.0, 10.0, "s", "a robot is stopped so long after the program that drove it has gone"
+        0.25, 0.0, 10.0, "s", "delay before a robot is stopped when the program that drove it ends"
     )
     allow_self_tuning: bool = _plain(
-        False, "pid_calibration may be called: the robot spins for up to a minute, and keeps no gains"
+        False, "allow pid_calibration, during which a robot spins for up to a minute and finds no gains that it keeps"
     )
     start_stopped: str = _choice(
         "as_before",
         ("as_before", "always", "never"),
-        "robots are stopped when the driver starts: as when the last driver of this name ended, always, or never",
+        "whether robots are stopped when the driver starts; as_before: if they were when a driver of this name ended",
     )
     odometry: str = _choice(
-        "ticks", ("ticks", "robot"), "ticks: odom from the encoder ticks; robot: the robot's own estimate"
+        "ticks", ("ticks", "robot"), "source of odom: encoder ticks, or the robot's own estimate"
     )
     wheel_diameter_m: float = _number(0.0492, 0.001, 1.0, "m", "diameter of a wheel")
     wheel_separation_m: float = _number(0.063, 0.001, 1.0, "m", "distance between the wheels")
-    ticks_per_turn: float = _number(288.0, 1.0, 1000000.0, "", "encoder ticks per turn of a wheel")
+    ticks_per_turn: float = _number(288.0, 1.0, 1000000.0, "", "encoder ticks per revolution of a wheel")
     pose_covariance: Tuple[float, ...] = _plain(
         (1e-4, 1e-4, 1e-9, 1e-9, 1e-9, 1e-2),
         "diagonal of odom's pose covariance: x, y, z, roll, pitch, yaw",
@@ -100,18 +98,20 @@ class DriverConfig:
         "diagonal of odom's twist covariance: x, y, z, roll, pitch, yaw",
         "m^2/s^2, rad^2/s^2",
     )
-    stamps: str = _choice("robot", ("robot", "arrival"), "whose clock stamps messages")
+    stamps: str = _choice(
+        "robot", ("robot", "arrival"), "clock of the stamps: the robot's, or time of arrival at the driver"
+    )
     max_future_s: float = _number(
-        0.05, 0.0, 10.0, "s", "a robot's stamp further ahead is replaced by its arrival"
+        0.05, 0.0, 10.0, "s", "stamps further in the future are replaced by the time of arrival"
     )
     max_age_s: float = _number(
-        5.0, 0.1, 3600.0, "s", "a robot's stamp further back is replaced by its arrival"
+        5.0, 0.1, 3600.0, "s", "stamps further in the past are replaced by the time of arrival"
     )
     transform_period_s: float = _number(
-        0.01, 0.001, 1.0, "s", "transforms of all robots are collected so long"
+        0.01, 0.001, 1.0, "s", "period at which the transforms of all robots are published"
     )
     report_period_s: float = _number(
-        1.0, 0.1, 60.0, "s", "time between two messages on ~robots and /diagnostics"
+        1.0, 0.1, 60.0, "s", "period of ~robots and /diagnostics"
     )
 
     @property

@@ -1,4 +1,4 @@
-"""README, YAML file, launch file and code tell the same of every parameter."""
+"""The page of parameters, the YAML file and the launch file agree with the code."""
 
 import xml.etree.ElementTree
 from pathlib import Path
@@ -11,13 +11,7 @@ from hero_driver.config import DriverConfig, read_config
 PACKAGE = Path(__file__).resolve().parents[2]
 
 
-def test_the_readme_lists_every_parameter_with_default_unit_and_range():
-    section = (PACKAGE / "README.md").read_text().split("## Parameters")[1].split("\n## ")[0]
-    rows = [line for line in section.splitlines() if line.startswith("| `")]
-    assert rows == documented_parameters.make_rows()
-
-
-def test_the_page_of_the_documents_is_the_one_that_the_table_makes():
+def test_the_page_of_parameters_is_generated_from_the_code():
     page = PACKAGE.parent / "docs" / "driver_parameters.md"
     assert page.read_text() == documented_parameters.make_page()
     assert all(row in page.read_text() for row in documented_parameters.make_rows())
