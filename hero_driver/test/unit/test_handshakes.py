@@ -24,7 +24,6 @@ class Server:
 
     def open(self, **settings):
         self.reader = HandshakeReader(lambda *served: self.served.put(served), **settings)
-        self.reader.open()
 
     def connect(self, data=b"", host="127.0.0.1"):
         """Return a client that has sent data and is in the reader's hands."""
@@ -41,7 +40,6 @@ class Server:
         return served
 
     def close(self):
-        self.reader.close()
         for sock in (self._listener, *self._clients):
             sock.close()
 
@@ -99,7 +97,6 @@ def test_a_connection_that_is_served_slowly_holds_up_nobody(server):
         server.served.put((sock, address, header))
 
     server.reader = HandshakeReader(serve)
-    server.reader.open()
     first = server.connect()
     first.sendall(HEADER)
     assert first_is_served.wait(DEADLINE_S)
@@ -133,12 +130,3 @@ def test_one_too_many_closes_the_oldest_of_the_address_with_the_most(server):
         client.sendall(HEADER)
     addresses = {server.take()[1] for _ in range(4)}
     assert addresses == {client.getsockname() for client in (other, many[1], many[2], newest)}
-
-
-def test_those_that_wait_are_closed_at_the_end_and_so_is_what_comes_after_it(server):
-    server.open()
-    client = server.connect(b"\x10\x00")
-    server.reader.close()
-    late = server.connect()
-    assert is_closed(client)
-    assert is_closed(late)

@@ -21,7 +21,7 @@ class TcprosServer:
     def __init__(self):
         self.warnings = queue.Queue()
         self.headers = []
-        self._handshakes = open_tcpros_server(lambda host, text: self.warnings.put((host, text)))
+        open_tcpros_server(lambda host, text: self.warnings.put((host, text)))
         self._server = tcpros_base._tcpros_server
         self._server.topic_connection_handler = self._serve
         self._clients = []
@@ -43,7 +43,6 @@ class TcprosServer:
 
     def close(self):
         self._server.shutdown()
-        self._handshakes.close()
         for client in self._clients:
             client.close()
 

@@ -1,19 +1,16 @@
-"""Reads the connection headers of programs that connect, all on one thread, none of which can hold up another.
+"""Reads the connection headers of programs that connect, each on its own thread: none can delay another.
 
 TCPROS: a program that connects sends a 32-bit length and a connection header of that length, then it waits for the
-answer. Knows no ROS: what is complete goes to serve().
+answer. Knows no ROS: a complete header goes to serve().
 """
 
 import collections
 import contextlib
-import functools
-import os
-import selectors
 import socket
 import struct
 import threading
 import time
-from typing import Any, Callable, Counter, Deque, Dict, Optional, Tuple
+from typing import Any, Callable, Counter, Dict
 
 HANDSHAKE_TIMEOUT_S = 5.0
 """A program sends its header as soon as it has connected."""
@@ -27,146 +24,79 @@ HEADER_LENGTH_MAX = 65536
 _LENGTH = struct.Struct("<I")
 
 Serve = Callable[[socket.socket, Any, bytes], None]
-"""Takes over a connection: its socket, which blocks, the address of its other end, and the header with its length."""
-
-
-class _Pending:
-    """A connection whose header is not complete."""
-
-    def __init__(self, sock: socket.socket, address: Any, deadline_s: float) -> None:
-        self.socket = sock
-        self.address = address
-        self.deadline_s = deadline_s
-        self.data = b""
-        self.length = _LENGTH.size
-
-    def read(self) -> Optional[bool]:
-        """Return whether the header is complete, None where the connection has ended or sends something else.
-
-        Nothing behind the header is read: it is left to the one who is served.
-        """
-        try:
-            data = self.socket.recv(self.length - len(self.data))
-        except (BlockingIOError, InterruptedError):
-            return False
-        except OSError:
-            return None
-        if not data:
-            return None
-        self.data += data
-        if len(self.data) == _LENGTH.size and self.length == _LENGTH.size:
-            length: int = _LENGTH.unpack(self.data)[0]
-            if not 0 < length <= HEADER_LENGTH_MAX:
-                return None
-            self.length += length
-        return len(self.data) == self.length
+"""Takes over a connection: its blocking socket, the address of its other end, and the header with its length."""
 
 
 class HandshakeReader:
-    """One thread that reads headers; add() is called by the thread that accepts connections."""
+    """The threads that read headers; add() is called by the thread that accepts connections."""
 
     def __init__(self, serve: Serve, timeout_s: float = HANDSHAKE_TIMEOUT_S, pending_max: int = PENDING_MAX) -> None:
-        """serve() is called on a thread of its own for each connection, so that it may block."""
+        """serve() is called on the connection's thread, and may block."""
         self._serve = serve
         self._timeout_s = timeout_s
         self._pending_max = pending_max
-        self._accepted: Deque[Tuple[socket.socket, Any]] = collections.deque()
-        self._pending: Dict[int, _Pending] = {}  # by file; the oldest first
-        self._selector = selectors.DefaultSelector()
-        self._wake_read, self._wake_write = os.pipe()
-        os.set_blocking(self._wake_read, False)
-        os.set_blocking(self._wake_write, False)
-        self._selector.register(self._wake_read, selectors.EVENT_READ)
-        self._running = True
-        self._thread = threading.Thread(target=self._run, name="handshakes", daemon=True)
-
-    def open(self) -> None:
-        """Begin to read."""
-        self._thread.start()
-
-    def close(self) -> None:
-        """Close the connections that wait and end the thread; safe to call twice."""
-        self._running = False
-        if self._thread.is_alive():
-            self._wake()
-            self._thread.join()
+        self._lock = threading.Lock()
+        self._pending: Dict[socket.socket, Any] = {}  # the other end's address of each; the oldest first
 
     def add(self, sock: socket.socket, address: Any) -> None:
         """Take over a connection that was just accepted from address (host, port, ...)."""
-        if not self._running:
-            sock.close()
-            return
-        self._accepted.append((sock, address))
-        self._wake()
-
-    def _wake(self) -> None:
-        # A pipe that is full wakes the thread too.
-        with contextlib.suppress(BlockingIOError):
-            os.write(self._wake_write, b"\0")
-
-    def _run(self) -> None:
-        try:
-            while self._running:
-                for key, _ in self._selector.select(self._find_wait_s()):
-                    if key.data is None:
-                        self._take_accepted()
-                    elif self._pending.get(key.fd) is key.data:
-                        self._read(key.data)
-                self._close_expired()
-        finally:
-            for pending in list(self._pending.values()):
-                self._forget(pending).close()
-            while self._accepted:
-                self._accepted.popleft()[0].close()
-            self._selector.close()
-            os.close(self._wake_read)
-            os.close(self._wake_write)
-
-    def _find_wait_s(self) -> Optional[float]:
-        oldest = next(iter(self._pending.values()), None)
-        return None if oldest is None else max(0.0, oldest.deadline_s - time.monotonic())
-
-    def _take_accepted(self) -> None:
-        os.read(self._wake_read, 4096)
-        while self._accepted:
-            sock, address = self._accepted.popleft()
+        with self._lock:
             if len(self._pending) >= self._pending_max:
                 self._evict()
-            sock.setblocking(False)
-            pending = _Pending(sock, address, time.monotonic() + self._timeout_s)
-            self._pending[sock.fileno()] = pending
-            self._selector.register(sock, selectors.EVENT_READ, pending)
-
-    def _evict(self) -> None:
-        counts: Counter[str] = collections.Counter(pending.address[0] for pending in self._pending.values())
-        most = counts.most_common(1)[0][0]
-        self._forget(next(p for p in self._pending.values() if p.address[0] == most)).close()
-
-    def _read(self, pending: _Pending) -> None:
-        is_complete = pending.read()
-        if is_complete is None:
-            self._forget(pending).close()
-        elif is_complete:
-            self._start_serving(self._forget(pending), pending)
-
-    def _start_serving(self, sock: socket.socket, pending: _Pending) -> None:
-        sock.setblocking(True)
-        call = functools.partial(self._serve, sock, pending.address, pending.data)
+            self._pending[sock] = address
         try:
-            threading.Thread(target=call, name="handshake", daemon=True).start()
+            threading.Thread(target=self._run, args=(sock, address), name="handshake", daemon=True).start()
         except RuntimeError:
             # The system has no thread left: the next connection may get one.
+            self._forget(sock)
             sock.close()
 
-    def _close_expired(self) -> None:
-        now_s = time.monotonic()
-        while self._pending:
-            oldest = next(iter(self._pending.values()))
-            if oldest.deadline_s > now_s:
-                return
-            self._forget(oldest).close()
+    def _evict(self) -> None:
+        counts: Counter[str] = collections.Counter(address[0] for address in self._pending.values())
+        most = counts.most_common(1)[0][0]
+        victim = next(sock for sock, address in self._pending.items() if address[0] == most)
+        del self._pending[victim]
+        with contextlib.suppress(OSError):
+            victim.shutdown(socket.SHUT_RDWR)  # its own thread closes it
 
-    def _forget(self, pending: _Pending) -> socket.socket:
-        del self._pending[pending.socket.fileno()]
-        self._selector.unregister(pending.socket)
-        return pending.socket
+    def _forget(self, sock: socket.socket) -> bool:
+        """Return whether sock was still pending."""
+        with self._lock:
+            return self._pending.pop(sock, None) is not None
+
+    def _run(self, sock: socket.socket, address: Any) -> None:
+        header = b""
+        with contextlib.suppress(OSError):
+            header = self._read_header(sock)
+        if self._forget(sock) and header:
+            sock.settimeout(None)
+            self._serve(sock, address, header)
+        else:
+            sock.close()
+
+    def _read_header(self, sock: socket.socket) -> bytes:
+        """Return a header with its length, empty if there is none; what follows it is left unread.
+
+        Raises: OSError where the connection breaks or the time is over.
+        """
+        deadline_s = time.monotonic() + self._timeout_s
+        data = _read(sock, _LENGTH.size, deadline_s)
+        if len(data) < _LENGTH.size:
+            return b""
+        length: int = _LENGTH.unpack(data)[0]
+        if not 0 < length <= HEADER_LENGTH_MAX:
+            return b""
+        header = _read(sock, length, deadline_s)
+        return data + header if len(header) == length else b""
+
+
+def _read(sock: socket.socket, length: int, deadline_s: float) -> bytes:
+    """Return length bytes, fewer at the end of the connection. Raises: OSError."""
+    data = b""
+    while len(data) < length:
+        sock.settimeout(max(0.001, deadline_s - time.monotonic()))
+        part = sock.recv(length - len(data))
+        if not part:
+            break
+        data += part
+    return data

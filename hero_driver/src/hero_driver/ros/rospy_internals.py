@@ -33,7 +33,7 @@ ROSOUT_LOGGER = "rosout"
 # Programs that connect: subscribers and service clients.
 
 
-def open_tcpros_server(warn: Callable[[str, str], None]) -> HandshakeReader:
+def open_tcpros_server(warn: Callable[[str, str], None]) -> None:
     """Serve programs that connect, none of which can hold up another; call it before rospy.init_node().
 
     rospy reads connection headers on the thread that accepts connections, one after another and without a time
@@ -47,13 +47,10 @@ def open_tcpros_server(warn: Callable[[str, str], None]) -> HandshakeReader:
         if reason:
             warn(address[0], "connection of %s to a topic or service refused: %s" % (address[0], reason))
 
-    handshakes = HandshakeReader(serve)
-    handshakes.open()
-    server._tcp_server_callback = handshakes.add
+    server._tcp_server_callback = HandshakeReader(serve).add
     tcpros_base.start_tcpros_server()
     # A second listen() on a socket that listens changes how many may wait.
     server.tcp_ros_server.server_sock.listen(WAITING_CONNECTIONS)
-    return handshakes
 
 
 def _serve_connection(server: Any, sock: socket.socket, address: Any, data: bytes) -> str:
