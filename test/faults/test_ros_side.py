@@ -168,13 +168,9 @@ def test_a_master_that_is_killed_and_started_again_knows_every_robot(master, ser
         # What is connected goes on without it.
         life.show(20)
         master.start()
-        back_s.append(
-            wait_for(
-                lambda: len(list_driver_topics("/hero_1", driver.node)) == STOCK_NAMES,
-                "all topics again",
-                30.0,
-            )[1]
-        )
+        started_s = time.monotonic()
+        wait_for(lambda: len(list_driver_topics("/hero_1", driver.node)) == STOCK_NAMES, "all topics again")
+        back_s.append(time.monotonic() - started_s)
         life.show()
     driver.wait_line("the ROS master was started again: .* registered anew")
     # A program that starts now finds the robot, and a publisher that is registered now reaches it.
