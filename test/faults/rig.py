@@ -17,8 +17,8 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 BENCH = ROOT / "bench"
 DEADLINE_S = 30.0
-EMULATED_NAMES = 11
-STOCK_NAMES = 18
+EMULATED_NAMES = 12
+STOCK_NAMES = 19
 """Topics and services of an emulated robot and of one with the complete stock firmware, odom_raw included."""
 
 

@@ -155,6 +155,17 @@ class TestDriverCommands(DriverCase):
         wait_for(lambda: robot.payloads_on("cmd_motor")[-2:] == [STOPPED_MOTORS] * 2, "the stop, twice")
         self.assertLess(len(robot.payloads_on("cmd_motor")), 10)
 
+    def test_cmd_vel_is_an_alias_of_the_velocity_controller_and_the_newest_command_wins(self):
+        robot = self.join_stock(20)
+        alias = make_publisher("/hero_20/cmd_vel", Twist)
+        controller = make_publisher("/hero_20/" + VELOCITY, Twist)
+        for publisher, linear_m_s in ((alias, 0.05), (controller, 0.1), (alias, 0.15)):
+            publisher.publish(make_command(linear_m_s))
+            wait_for(lambda v=linear_m_s: robot.accepted and robot.accepted[-1].linear_m_s == v, "the newest command")
+        controller.publish(make_command(0.0))
+        self.wait_stopped(robot)
+        self.assertEqual({velocity.name.rpartition("hero_20/")[2] for velocity in robot.velocities}, {VELOCITY})
+
     def test_velocities_that_are_not_finite_are_refused_counted_and_reported_once(self):
         robot = self.join(11)
         publisher = make_publisher("/hero_11/" + VELOCITY, Twist)

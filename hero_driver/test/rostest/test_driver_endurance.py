@@ -152,7 +152,7 @@ class TestDriverEndurance(OwnDriverCase):
                 driver.fleet.wait("/hero_1", Robot.AWAY)
 
         come_and_go(3)
-        wait_for(lambda: len(list_driver_topics("/hero_1", driver.node)) == 18, "all topics and services")
+        wait_for(lambda: len(list_driver_topics("/hero_1", driver.node)) == 19, "all topics and services")
         topics = list_driver_topics("/hero_1", driver.node)
         before = count_resources(driver.process.pid)
         come_and_go(30)
@@ -172,7 +172,7 @@ class TestDriverEndurance(OwnDriverCase):
             for number in numbers:
                 robot = self.dial(driver, number)
                 wait_for(
-                    lambda n=robot.namespace: len(list_driver_topics(n, driver.node)) == 18, "its topics"
+                    lambda n=robot.namespace: len(list_driver_topics(n, driver.node)) == 19, "its topics"
                 )
                 robot.close()
                 driver.fleet.wait_gone(robot.namespace)

@@ -273,7 +273,7 @@ class TestDriverStop(OwnDriverCase):
         code = (
             "import rospy; from geometry_msgs.msg import Twist; rospy.init_node('commander');"
             "t = Twist(); t.linear.x = 0.1;"
-            "p = rospy.Publisher('/hero_0/velocity_controller/cmd_vel', Twist, queue_size=1)\n"
+            "p = rospy.Publisher('/hero_0/cmd_vel', Twist, queue_size=1)\n"
             "while not rospy.is_shutdown(): p.publish(t); rospy.sleep(0.05)"
         )
         commander = subprocess.Popen([sys.executable, "-c", code])
@@ -294,6 +294,19 @@ class TestDriverStop(OwnDriverCase):
         # Both are handled in order: a stop would be there before what comes now.
         wait_for(lambda: not reads_from_somebody(driver.node, "/hero_41/velocity_controller/cmd_vel"), "its end")
         make_publisher("/hero_41/led", ColorRGBA).publish(ColorRGBA())
+        wait_for(lambda: robot.payloads_on("led"), "the next command")
+        self.assertTrue(robot.motors.is_turning)
+
+    def test_the_end_of_a_program_on_cmd_vel_does_not_stop_one_that_drives_since(self):
+        driver = self.start(orphan_stop_s=0.0)
+        robot = self.dial_stock(driver, 43)
+        older = make_publisher("/hero_43/cmd_vel", Twist)
+        older.publish(make_command(0.05))
+        wait_for(lambda: robot.velocities, "the first command")
+        self.drive(robot)
+        older.unregister()
+        wait_for(lambda: not reads_from_somebody(driver.node, "/hero_43/cmd_vel"), "its end")
+        make_publisher("/hero_43/led", ColorRGBA).publish(ColorRGBA())
         wait_for(lambda: robot.payloads_on("led"), "the next command")
         self.assertTrue(robot.motors.is_turning)
 

@@ -38,6 +38,7 @@ SUBSCRIBED = {
     "laser_enable": "std_msgs/Bool",
     "cmd_motor": "hero_msgs/Motor",
     "position_controller/cmd_vel": "geometry_msgs/Twist",
+    "cmd_vel": "geometry_msgs/Twist",
     "velocity_controller/cmd_vel": "geometry_msgs/Twist",
 }
 SERVICES = {

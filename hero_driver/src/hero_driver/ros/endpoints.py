@@ -23,6 +23,7 @@ class Layout(NamedTuple):
 
     message_type: str
     md5sums: Tuple[str, ...]  # of a service: of its request and of its answer
+    is_alias: bool = False  # not declared by the robot
 
 
 class Endpoints:
@@ -75,8 +76,7 @@ class Endpoints:
         """Subscribe to a topic with the subscriber that make_subscriber(type) gives; return whether it can be used."""
         known = self._subscribers.get(name)
         if known is not None and known[0] != layout:
-            del self._subscribers[name]
-            known[1].close()
+            self.unsubscribe(name)
         message_class = self._find_class("topic", name, layout)
         if message_class is None:
             return False
@@ -85,6 +85,11 @@ class Endpoints:
             self._subscribers[name] = layout, subscriber
             subscriber.open(name, message_types.make_raw_class(message_class), QUEUE_LENGTH)
         return True
+
+    def unsubscribe(self, name: str) -> None:
+        """Undo subscribe(); does nothing where there was none."""
+        if name in self._subscribers:
+            self._subscribers.pop(name)[1].close()
 
     def serve(self, name: str, layout: Layout, call: Callable[[bytes], bytes]) -> bool:
         """Offer a service, whose answers call(request) gives; return whether it can be used."""

@@ -35,6 +35,10 @@ from .services import RobotService
 from .worker import Worker
 
 VELOCITY_CONTROLLER = "/velocity_controller/cmd_vel"
+VELOCITY_ALIAS = "/cmd_vel"
+"""What teleop_twist_keyboard, move_base and the like publish on: the same commands as VELOCITY_CONTROLLER's, as if two
+programs published on one topic. The newest command wins."""
+
 MOTOR_TYPE = "hero_msgs/Motor"
 ODOMETRY_TYPE = "nav_msgs/Odometry"
 TRANSFORM_TYPE = "tf2_msgs/TFMessage"
@@ -103,7 +107,8 @@ class RobotBridge:
         self._ids: Dict[str, int] = {}
         self._layouts: Dict[str, Layout] = {}  # as declared last, of what the robot takes
         self._publisher_layouts: Dict[str, Layout] = {}  # and of what it sends
-        self._commanded_s: Dict[str, float] = {}  # motion topic -> when motion, not a stop, was last offered
+        # Motion topic -> when motion, not a stop, was last offered, and on which topic of ROS.
+        self._commanded: Dict[str, Tuple[float, str]] = {}
         self._tuning_heard_s = -math.inf
         self._names: Set[str] = set()
         self._subscribed_types: Dict[str, str] = {}
@@ -165,10 +170,22 @@ class RobotBridge:
             self._submit(lambda: self._endpoints.advertise(name, layout, publishers, replaced))
         elif kind is TopicKind.SUBSCRIBER:
             self._subscribed_types[name] = ros_type
-            make_subscriber = functools.partial(self._make_subscriber, name)
-            self._take_input(topic, name, layout, lambda: self._endpoints.subscribe(name, layout, make_subscriber))
+            self._take_input(topic, name, layout, lambda: self._subscribe(name, layout))
         elif kind in (TopicKind.SERVICE_ANSWERS, TopicKind.SERVICE_REQUESTS):
             self._declare_service_half(topic, name)
+
+    def _subscribe(self, name: str, layout: Layout) -> bool:
+        """Subscribe to what the robot takes, and to its alias (job of the registrar); return whether it can be used."""
+        is_usable = self._endpoints.subscribe(name, layout, functools.partial(self._make_subscriber, name, name))
+        alias = self.identity.namespace + VELOCITY_ALIAS
+        if self.corrections is None or name != self.identity.namespace + VELOCITY_CONTROLLER or alias in self._ids:
+            return is_usable
+        if is_usable and layout.message_type == TWIST_TYPE:
+            make_subscriber = functools.partial(self._make_subscriber, name, alias)
+            self._endpoints.subscribe(alias, layout._replace(is_alias=True), make_subscriber)
+        else:
+            self._endpoints.unsubscribe(alias)
+        return is_usable
 
     def _take_input(self, topic: Topic, name: str, layout: Layout, register: Callable[[], bool]) -> None:
         """The robot takes what is sent to name; register() is a job that tells whether that can be used.
@@ -310,13 +327,13 @@ class RobotBridge:
 
     def forget_motion(self) -> None:
         """Drop the motion commands that wait: the robot is being stopped."""
-        self._commanded_s.clear()
+        self._commanded.clear()
         self.commands.discard_motion(time.monotonic())
 
     @property
     def is_commanded(self) -> bool:
         """Whether a program has asked for motion, and not for a stop, since the last forget_motion()."""
-        return bool(self._commanded_s)
+        return bool(self._commanded)
 
     # Self-tuning.
 
@@ -330,11 +347,12 @@ class RobotBridge:
 
     # A ROS program sent a message for the robot.
 
-    def _make_subscriber(self, name: str, ros_type: str) -> RawSubscriber:
-        receive = self._choose_receiver(name, ros_type)
-        return RawSubscriber(receive, self._context.loop, functools.partial(self._lose_sender, name))
+    def _make_subscriber(self, name: str, source: str, ros_type: str) -> RawSubscriber:
+        """Return the subscriber to source, which is name or an alias of it."""
+        receive = self._choose_receiver(name, source, ros_type)
+        return RawSubscriber(receive, self._context.loop, functools.partial(self._lose_sender, name, source))
 
-    def _choose_receiver(self, name: str, ros_type: str) -> Callable[[bytes], None]:
+    def _choose_receiver(self, name: str, source: str, ros_type: str) -> Callable[[bytes], None]:
         """Return what takes the messages of a topic that the robot subscribes to."""
         stop_payload = STOP_PAYLOADS.get(ros_type)
         if stop_payload is None:
@@ -343,21 +361,26 @@ class RobotBridge:
         if ros_type != MOTOR_TYPE:
             is_hero = self.corrections is not None
             check = functools.partial(check_twist, clamp=self._context.clamp) if is_hero else check_device_twist
-        return functools.partial(self._receive_motion, name, check, stop_payload)
+        return functools.partial(self._receive_motion, name, source, check, stop_payload)
 
     def _receive_motion(
-        self, name: str, check: Callable[[bytes], Optional[bytes]], stop_payload: bytes, payload: bytes
+        self,
+        name: str,
+        source: str,
+        check: Callable[[bytes], Optional[bytes]],
+        stop_payload: bytes,
+        payload: bytes,
     ) -> None:
         command = check(payload)
         if command is None:
             self.refused_commands += 1
             self._context.log(
                 "warn",
-                name,
+                source,
                 "%s: a command on %s is not finite and was refused; correct the program that sends it"
-                % (self.label, name),
+                % (self.label, source),
             )
-            if name in self._commanded_s:
+            if name in self._commanded:
                 # It must not go on with what it was told before.
                 self._context.stop(self)
         elif not self._connected or (self._context.is_stopped() and command != stop_payload):
@@ -365,23 +388,23 @@ class RobotBridge:
         else:
             now_s = time.monotonic()
             if command != stop_payload:
-                self._commanded_s[name] = now_s
-            elif name in self._commanded_s:
-                self._commanded_s.pop(name, None)
+                self._commanded[name] = (now_s, source)
+            else:
+                self._commanded.pop(name, None)
             if self.corrections is not None:
                 self.commands.offer_motion(name, command, stop_payload, now_s)
             else:
                 self.commands.offer(name, command, is_motion=True)
             self._context.send_commands(self)
 
-    def _lose_sender(self, name: str) -> None:
-        """The program that sent the newest command of a motion topic has gone (thread of the sockets)."""
-        commanded_s = self._commanded_s.get(name)
-        if commanded_s is None or time.monotonic() - commanded_s > LONGEST_WATCHDOG_S:
+    def _lose_sender(self, name: str, source: str) -> None:
+        """The program that sent the newest command on source has gone (thread of the sockets)."""
+        commanded = self._commanded.get(name)
+        if commanded is None or commanded[1] != source or time.monotonic() - commanded[0] > LONGEST_WATCHDOG_S:
             return
 
         def stop_orphan() -> None:
-            if self._commanded_s.get(name) == commanded_s:
+            if self._commanded.get(name) == commanded:
                 self._context.stop(self)
 
         self._context.loop.call_later(self._context.orphan_stop_s, stop_orphan)
