@@ -1,4 +1,4 @@
-"""Measures what the fleet monitor costs: simulated robots that walk at random, and pages that look.
+"""Measures what the fleet monitor costs: simulated robots that walk at random, and open pages.
 
 Starts its own ROS master; CPU time is taken from the operating system's accounting. Run it with script/bench monitor.
 """
@@ -37,11 +37,11 @@ class Client:
         self.frames = self.length = 0
         self.ready = 0
 
-    async def open(self, truth=False):
+    async def open(self, ground_truth=False):
         """Connect as a page does."""
         request = HTTPRequest("ws://%s/live" % self.url, headers={"Origin": "http://" + self.url})
         self.socket = await websocket_connect(request)
-        await self.socket.write_message(json.dumps({"do": "look", "truth": truth}))
+        await self.socket.write_message(json.dumps({"do": "show", "ground_truth": ground_truth}))
         self.reader = asyncio.ensure_future(self.read())
 
     async def read(self):
@@ -80,7 +80,7 @@ async def measure(title, monitor, clients, seconds):
 
 async def measure_all(monitor, port, options):
     """Return all rows."""
-    rows = [await measure("nobody looks", monitor, [], options.seconds)]
+    rows = [await measure("no page", monitor, [], options.seconds)]
     clients = [Client(port) for _ in range(5)]
     await clients[0].open()
     deadline_s = time.monotonic() + JOIN_TIMEOUT_S
@@ -88,7 +88,7 @@ async def measure_all(monitor, port, options):
         await asyncio.sleep(0.1)
     print("robots that are ready and send odometry: %d" % clients[0].ready)
     rows.append(await measure("one page", monitor, clients[:1], options.seconds))
-    await clients[1].open(truth=True)
+    await clients[1].open(ground_truth=True)
     rows.append(await measure("two pages, one with true poses", monitor, clients[:2], options.seconds))
     clients[1].close()
     for client in clients[1:]:

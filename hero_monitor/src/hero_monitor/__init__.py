@@ -1,16 +1,16 @@
-"""The fleet in a browser: one web page that shows the robots, stops them, and on request drives them.
+"""The fleet on a web page that shows the robots, stops them, and on request drives them.
 
-| Module | What it does |
+| Module | Purpose |
 |---|---|
 | access | decides by token, Host and Origin who may see the page |
-| connection_limits | keeps room for those that are logged in |
-| feed, robot_feed | keep the fleet as it is now, from topics |
-| sections | splits it into numbered pieces of JSON, so that a page gets what is new to it |
-| requests | checks what a page sends |
+| connection_limits | limits the connections and token attempts of untrusted clients |
+| feed, robot_feed, placement | read topics |
+| sections | encodes the fleet as numbered sections of JSON, of which a page gets those that are new to it |
+| requests | parses what a page sends |
 | dead_man | drives a robot only while its button is held |
 | commander | publishes stops, velocities and goals |
-| log_thread | logs without waiting for the terminal |
-| server | speaks HTTP and WebSocket (tornado) |
-| program | reads parameters and wires all of these to one node |
-| web/ | what people see |
+| background | runs what may block on other threads |
+| server | HTTP and WebSocket (tornado) |
+| program | reads parameters and wires everything |
+| web/ | the page |
 """

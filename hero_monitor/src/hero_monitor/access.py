@@ -1,8 +1,8 @@
-"""Who may see the page: decides by headers and tokens. Pure. Sessions are signed cookies (server).
+"""Decides by headers and token who may see the page. Pure. Sessions are signed cookies (server).
 
-Three dangers: somebody on the network who does not know the token; a web page of somebody else, open in the same
-browser, that opens a WebSocket to this server (browsers allow that, RFC 6455 section 10.2: the server must look at
-Origin); and a foreign name that is made to resolve to this machine (DNS rebinding: the server must look at Host).
+Three threats: a client on the network without the token; a page of another server in the same browser that opens a
+WebSocket to this one (browsers allow that, RFC 6455 section 10.2: the server must check Origin); and a foreign name
+that resolves to this PC (DNS rebinding: the server must check Host).
 """
 
 import hmac
@@ -11,11 +11,11 @@ from typing import FrozenSet, Iterable, Optional, Tuple
 from urllib.parse import urlsplit
 
 TOKEN_LENGTH_MIN = 16
-"""Short of this a token can be guessed."""
+"""A shorter token could be guessed."""
 
 
 def is_loopback(host: str) -> bool:
-    """Return whether an address to bind to is reached from this machine alone."""
+    """Return whether an address to bind to can be reached from this PC only."""
     try:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
@@ -23,7 +23,7 @@ def is_loopback(host: str) -> bool:
 
 
 def split_host(header: str) -> Optional[Tuple[str, int]]:
-    """Return host (without brackets, lower case) and port of a Host header, None if it is none."""
+    """Return host (without brackets, lower case) and port of a Host header; None if it is invalid."""
     try:
         parts = urlsplit("//" + header)
         if parts.hostname is None or parts.path or parts.query or parts.fragment or "@" in parts.netloc:
@@ -37,7 +37,7 @@ class Access:
     """The rules of one server."""
 
     def __init__(self, token: Optional[str], host_names: Iterable[str]) -> None:
-        """token: None where none is needed; host_names: names by which this machine may be called."""
+        """token: None if none is needed; host_names: names of this PC."""
         self._token = token
         self._host_names: FrozenSet[str] = frozenset(name.lower().rstrip(".") for name in host_names)
 
@@ -47,10 +47,7 @@ class Access:
         return self._token is not None
 
     def admits_host(self, header: str) -> bool:
-        """Return whether a Host header names this machine.
-
-        An address is always right: to rebind a name one needs a name.
-        """
+        """Return whether a Host header names this PC; any address does, because DNS rebinding needs a name."""
         host = split_host(header)
         if host is None:
             return False
@@ -64,7 +61,7 @@ class Access:
 
     @staticmethod
     def admits_origin(origin: Optional[str], host_header: str) -> bool:
-        """Return whether the page that asks came from this very server. No Origin: no."""
+        """Return whether a request comes from a page of this server; without Origin it does not."""
         if not origin:
             return False
         scheme, _, netloc = origin.partition("://")

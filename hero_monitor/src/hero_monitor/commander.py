@@ -1,13 +1,12 @@
-"""Carries out what pages ask for: stops, velocities and goals.
+"""Carries out what pages request: stops, velocities and goals.
 
-Nothing here waits on the caller's thread: topics are opened and goals handed over on a thread of their own, and the
-outcome is told later in words. A stop is published at once, on topics that are open since the driver was found.
+A stop is published at once, on topics that are open since the driver was found: no lock and no queue delays it. Topics
+for driving are opened, and goals sent, in the background.
 """
 
 import math
 import time
-from concurrent.futures import ThreadPoolExecutor
-from typing import Callable, Dict, Optional
+from typing import Dict, NamedTuple, Optional
 
 import rosgraph
 import rospy
@@ -16,48 +15,49 @@ from geometry_msgs.msg import PoseStamped, Twist
 from hero_client.drivers import Drivers
 from hero_client.fleet_state import Pose
 
+from .background import Background
 from .dead_man import STOPS, DeadMan, Velocity
 
-GOALS_AT_ONCE = 20
 GOAL_LISTENER_TIMEOUT_S = 2.0
-"""To reach a program that listens to goals; connections are there after about 0.1 s."""
+"""To connect to a program that takes goals; about 0.1 s is usual."""
 
 STOP_PERIOD_S = 0.06
 
-Tell = Callable[[str, str], None]
-"""Takes a level (info, warn, error) and a text for people, on any thread."""
+
+class Notice(NamedTuple):
+    """A line for the people at a page."""
+
+    level: str  # info, warn, error
+    text: str
 
 
 class Commander:
-    """What pages make robots do. Times are monotonic."""
+    """What pages make robots do. All methods return at once, except send_goal()."""
 
-    def __init__(self, drivers: Drivers) -> None:
+    def __init__(self, drivers: Drivers, background: Background) -> None:
         self._drivers = drivers
+        self._background = background
         self._dead_man = DeadMan()
-        self._worker = ThreadPoolExecutor(1, "commands")
         self._velocities: Dict[str, Optional[rospy.Publisher]] = {}
         self._goals: Dict[str, rospy.Publisher] = {}
-        self._waiting_goals = 0
-
-    # ---------------------------------------------------------------- driving by hand
 
     def drive(self, page: int, velocity: Velocity) -> bool:
-        """Drive a robot for a moment; return False if another page drives it."""
+        """Drive a robot for HOLD_TIMEOUT_S; return False if another page drives it."""
         if not self._dead_man.hold(page, velocity, time.monotonic()):
             return False
         self._publish(velocity)
         return True
 
     def release(self, page: int, namespace: str) -> None:
-        """A page lets go of a robot."""
+        """Stop a robot that this page drives."""
         self._dead_man.release(page, namespace)
 
     def drop_page(self, page: int) -> None:
-        """A page is gone."""
+        """Stop all robots that this page drives."""
         self._dead_man.drop_page(page)
 
     def step(self) -> None:
-        """Stop what is to be stopped; to be called every 0.06 to 0.1 s."""
+        """Send the stops that are due; to be called every STOP_PERIOD_S."""
         for velocity in self._dead_man.take_stops(time.monotonic()):
             self._publish(velocity)
 
@@ -65,53 +65,38 @@ class Commander:
         publisher = self._velocities.get(velocity.namespace)
         if publisher is not None:
             message = Twist()
-            message.linear.x, message.angular.z = velocity.linear_m_s, velocity.turn_rad_s
+            message.linear.x, message.angular.z = velocity.linear_m_s, velocity.angular_rad_s
             publisher.publish(message)
         elif velocity.namespace not in self._velocities:
             self._velocities[velocity.namespace] = None
-            self._worker.submit(self._open_velocity, velocity.namespace)
+            self._background.submit(self._open_velocity, velocity.namespace)
 
     def _open_velocity(self, namespace: str) -> None:
         self._velocities[namespace] = rospy.Publisher(
             namespace + "/velocity_controller/cmd_vel", Twist, queue_size=1, tcp_nodelay=True
         )
 
-    # ---------------------------------------------------------------- goals
-
-    def send_goal(self, namespace: str, goal: Pose, with_heading: bool, tell: Tell) -> None:
-        """Give a goal in hero_N/odom to whoever listens for goals of this robot."""
-        if self._waiting_goals >= GOALS_AT_ONCE:
-            tell("error", "too many goals at once")
-            return
-        self._waiting_goals += 1
-        self._worker.submit(self._send_goal, namespace, goal, with_heading, tell)
-
-    def _send_goal(self, namespace: str, goal: Pose, with_heading: bool, tell: Tell) -> None:
+    def send_goal(self, namespace: str, goal: Pose, with_heading: bool) -> Notice:
+        """Send a goal in hero_N/odom to the program that takes goals for this robot; may take seconds."""
         name, topic = namespace.strip("/"), namespace + "/goal"
         try:
             if not self._has_listener(topic):
-                tell(
-                    "error",
-                    'nobody takes goals for %s: roslaunch hero_examples go_to_goal.launch robots:="%s"'
-                    % (name, name.rpartition("_")[2]),
-                )
-                return
-            message = PoseStamped()
-            message.header.stamp = rospy.Time.now()
-            message.header.frame_id = name + "/odom"
-            message.pose.position.x, message.pose.position.y = goal.x_m, goal.y_m
-            if with_heading:
-                turn = message.pose.orientation
-                turn.z, turn.w = math.sin(goal.yaw_rad / 2.0), math.cos(goal.yaw_rad / 2.0)
-            self._goals[topic].publish(message)
-            tell("info", "%s has a new goal" % name)
+                launch = "roslaunch hero_examples go_to_goal.launch robots:=%s" % name.rpartition("_")[2]
+                return Notice("error", "no program takes goals for %s: %s" % (name, launch))
         except rosgraph.MasterException as error:
-            tell("error", "the ROS master does not answer: %s" % error)
-        finally:
-            self._waiting_goals -= 1
+            return Notice("error", "the ROS master does not answer: %s" % error)
+        message = PoseStamped()
+        message.header.stamp = rospy.Time.now()
+        message.header.frame_id = name + "/odom"
+        message.pose.position.x, message.pose.position.y = goal.x_m, goal.y_m
+        if with_heading:
+            message.pose.orientation.z = math.sin(goal.yaw_rad / 2.0)
+            message.pose.orientation.w = math.cos(goal.yaw_rad / 2.0)
+        self._goals[topic].publish(message)
+        return Notice("info", "%s has a new goal" % name)
 
     def _has_listener(self, topic: str) -> bool:
-        """Return whether a node other than this one listens, once the way to it is open."""
+        """Return whether another node subscribes to a topic, as soon as it is connected."""
         own_name = rospy.get_name()
         _, subscribed, _ = rosgraph.Master(own_name).getSystemState()
         others = [node for name, nodes in subscribed if name == topic for node in nodes if node != own_name]
@@ -121,12 +106,10 @@ class Commander:
             # Not latched: a program that starts later must not find an old goal.
             self._goals[topic] = rospy.Publisher(topic, PoseStamped, queue_size=2, tcp_nodelay=True)
         deadline_s = time.monotonic() + GOAL_LISTENER_TIMEOUT_S
-        # The page shows goals, so this node listens as well, and counts.
+        # This node subscribes too, to show goals, and counts.
         while self._goals[topic].get_num_connections() < len(others) + 1 and time.monotonic() < deadline_s:
             time.sleep(0.02)
         return True
-
-    # ---------------------------------------------------------------- stop
 
     def request_stop(self, stop: bool) -> None:
         """Ask all drivers to stop all robots, or to release them."""
@@ -136,14 +119,13 @@ class Commander:
             self.step()
 
     def may_drive(self) -> bool:
-        """Return whether pages may drive robots: not while they are being stopped, or released."""
+        """Return whether pages may drive robots: not while robots are being stopped or released."""
         status = self._drivers.stop_status()
         return status is None or status.is_final
 
     def close(self) -> None:
-        """Stop all that was driven by hand, more than once; takes about 0.2 s."""
+        """Stop all robots that pages drive, several times; takes about 0.2 s."""
         self._dead_man.drop_all()
         for _ in range(STOPS):
             self.step()
             time.sleep(STOP_PERIOD_S)
-        self._worker.shutdown(wait=False)

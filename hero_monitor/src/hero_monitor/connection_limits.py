@@ -1,6 +1,6 @@
 """Limits for connections and token attempts, so that untrusted clients cannot lock out those who are logged in. Pure.
 
-A connection is trusted once a request of somebody logged in has arrived on it. A new connection always gets in while
+A connection is trusted once a request with a login has arrived on it. A new connection always gets in while
 an untrusted one can be evicted for it: one of its own address when that address has too many, else one of the address
 with the most. Times enter as now_s, any clock that never steps.
 """
@@ -81,7 +81,7 @@ class ConnectionLimits:
         oldest.close()
 
     def trust(self, connection: Connection) -> None:
-        """A request of somebody who is logged in has arrived on this connection."""
+        """Exempt a connection on which a request with a login has arrived."""
         if self._untrusted.pop(connection, None) is not None:
             self._trusted.add(connection)
 
@@ -104,7 +104,7 @@ class TokenAttempts:
         return full_s - now_s <= (TOKEN_BURST - 1) * TOKEN_PERIOD_S
 
     def count_wrong(self, address: str, now_s: float) -> None:
-        """A token from this address was wrong."""
+        """Count a wrong token."""
         address = group_address(address)
         if len(self._full_again_s) >= ADDRESSES_MAX and address not in self._full_again_s:
             del self._full_again_s[min(self._full_again_s, key=lambda known: self._full_again_s[known])]

@@ -1,24 +1,24 @@
-"""Buttons that are held and let go -> velocities and stops. Pure; time enters as now_s, any clock that never steps.
+"""Dead man's switch: a robot drives only while a page keeps reporting that a button is held. Pure.
 
-A robot drives only while a page says again and again that its button is held. Silence stops it: a page that is
-hidden, a browser that crashed and a network that is gone say nothing.
+Silence stops it: a hidden page, a browser that crashed and a network that is gone send nothing. Times enter as now_s,
+any clock that never steps.
 """
 
 from typing import Dict, List, NamedTuple
 
 HOLD_TIMEOUT_S = 0.4
-"""Pages speak every 0.1 s while a button is held; after so long without a word the robot is stopped."""
+"""Pages report every 0.1 s while a button is held; a robot is stopped after this time without a report."""
 
 STOPS = 3
-"""How often a stop is sent, a step apart: a robot drops what comes within 50 ms of the last command."""
+"""How often a stop is sent, one step apart: a robot drops commands within 50 ms of the last one."""
 
 
 class Velocity(NamedTuple):
-    """What one robot is told: m/s ahead, rad/s to the left."""
+    """The velocity of one robot, as in Twist."""
 
     namespace: str
     linear_m_s: float
-    turn_rad_s: float
+    angular_rad_s: float
 
 
 class Hold(NamedTuple):
@@ -29,14 +29,14 @@ class Hold(NamedTuple):
 
 
 class DeadMan:
-    """All robots that pages drive."""
+    """The robots that pages drive."""
 
     def __init__(self) -> None:
         self._holds: Dict[str, Hold] = {}
         self._stops: Dict[str, int] = {}
 
     def hold(self, page: int, velocity: Velocity, now_s: float) -> bool:
-        """A page says that it drives a robot; return False if another page drives it already."""
+        """Note that a page drives a robot; return False if another page drives it already."""
         held = self._holds.get(velocity.namespace)
         if held is not None and held.page != page:
             return False
@@ -45,18 +45,18 @@ class DeadMan:
         return True
 
     def release(self, page: int, namespace: str) -> None:
-        """A page says that it lets go of a robot; only the page that holds it can."""
+        """Stop a robot, if this page drives it."""
         held = self._holds.get(namespace)
         if held is not None and held.page == page:
             self._begin_stop(namespace)
 
     def drop_page(self, page: int) -> None:
-        """A page is gone: all that it drove stops."""
+        """Stop all robots that this page drives."""
         for namespace in [name for name, held in self._holds.items() if held.page == page]:
             self._begin_stop(namespace)
 
     def drop_all(self) -> None:
-        """Stop all that is driven."""
+        """Stop all robots that are driven."""
         for namespace in list(self._holds):
             self._begin_stop(namespace)
 
@@ -65,7 +65,7 @@ class DeadMan:
         self._stops[namespace] = STOPS
 
     def take_stops(self, now_s: float) -> List[Velocity]:
-        """Return the stops that are due at this step; steps are to be 0.06 s apart or more."""
+        """Return the stops that are due at this step; steps must be at least 0.06 s apart."""
         for namespace in [name for name, held in self._holds.items() if now_s - held.last_s > HOLD_TIMEOUT_S]:
             self._begin_stop(namespace)
         due = [Velocity(namespace, 0.0, 0.0) for namespace in self._stops]

@@ -1,13 +1,13 @@
-"""Reads ROS topics and keeps the fleet as it is now, as pieces of JSON for pages.
+"""Reads ROS topics into sections of JSON for pages.
 
-While no page is open it listens to the drivers' reports and to the log alone, and reads neither. Subscriptions to
-robots come and go on a thread of their own, because the ROS master may take its time.
+While no page is open, only the drivers' reports and the log are subscribed to, and neither is decoded. Topics of robots
+are subscribed to in the background, because the ROS master may block.
 """
 
 import re
 import time
 from collections import deque
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
 from typing import Any, Callable, Deque, Dict, List, Optional, Sequence, Set
 
 import genpy
@@ -25,36 +25,35 @@ from hero_client.robot_listener import STATES, STOP_STATES, is_on_map, read_pose
 from hero_client.stop_status import StopStatus
 from hero_msgs.msg import Robot
 
-from .log_thread import LogThread
+from .background import Background
 from .placement import Placement
 from .robot_feed import RobotFeed
 from .sections import LOG_LINES_KEPT, Sections, encode_pose, encode_ranges, shorten
 
 DRIVER_SILENT_S = 5.0
-"""The driver reports once a second; after so long it is gone."""
+"""The driver reports once a second; it is gone after this time without a report."""
 
 LOG_LINES_PER_READ = 40
-"""Reading a line costs about 0.05 ms; a swarm that tunes its motors writes thousands a second."""
+"""Decoding a line takes about 0.05 ms; a swarm that tunes its motors logs thousands a second."""
 
 UNREADABLE_PERIOD_S = 10.0
 """Between two log lines about messages that cannot be read."""
 
 ROBOTS_MAX = 1000
-"""Rows of the table; a fleet has less."""
+"""Rows of the table."""
 
 MARKERS_MAX = 2000
-"""Of the arena, or true poses."""
+"""Of the arena, or of ground truth."""
 
 LABEL = re.compile(r"(\S+?):? ")
 """How a driver's lines about one robot begin: "hero_0: voltage low", "hero_0 left (10.42.0.7:4242): ..."."""
 
 
-
 class FleetFeed:
-    """All that the page shows, for as long as somebody looks."""
+    """Everything that pages show."""
 
-    def __init__(self, map_frame: str, log: LogThread) -> None:
-        self._log = log
+    def __init__(self, map_frame: str, background: Background) -> None:
+        self._background = background
         self.sections = Sections()
         self.placement = Placement(map_frame)
         self.robots: Dict[str, Robot] = {}
@@ -67,7 +66,6 @@ class FleetFeed:
         self._listening = ""
         self._rows: Sequence[Robot] = ()
         self._health: Dict[str, List[Any]] = {}
-        self._worker = ThreadPoolExecutor(1, "subscriptions")
         self._change: Optional[Future[None]] = None
         self._log_bytes: Deque[bytes] = deque()
         self.drivers = Drivers()
@@ -83,19 +81,19 @@ class FleetFeed:
 
     # ---------------------------------------------------------------- subscriptions
 
-    def want(self, looking: bool, truth: bool) -> None:
-        """Say whether anybody looks, and whether at the robots' true poses as well; returns at once."""
+    def update_subscriptions(self, has_pages: bool, ground_truth: bool) -> None:
+        """Subscribe to robots only while a page is open, and to ground truth on request; returns at once."""
         if self._change is not None and not self._change.done():
             return
         if self._change is not None:
             self._change.result()
         robots = {row.namespace for row in self._rows if row.namespace and row.state != Robot.REFUSED}
-        namespaces = robots if looking else set()
-        scene = {"/tf_static", "/hero_sim/arena", "/diagnostics"} if looking else set()
-        if looking and truth:
+        namespaces = robots if has_pages else set()
+        scene = {"/tf_static", "/hero_sim/arena", "/diagnostics"} if has_pages else set()
+        if has_pages and ground_truth:
             scene.add("/hero_sim/markers")
         if namespaces != set(self._feeds) or scene != set(self._scene):
-            self._change = self._worker.submit(self._change_subscriptions, namespaces, scene)
+            self._change = self._background.submit(self._change_subscriptions, namespaces, scene)
 
     def _change_subscriptions(self, namespaces: Set[str], scene: Set[str]) -> None:
         classes = {"/tf_static": TFMessage, "/diagnostics": DiagnosticArray}
@@ -110,14 +108,10 @@ class FleetFeed:
             self._feeds[namespace].close()
             self._feeds = {known: kept for known, kept in self._feeds.items() if known != namespace}
 
-    def close(self) -> None:
-        """Listen no more; does not wait for the ROS master."""
-        self._worker.shutdown(wait=False)
-
     # ---------------------------------------------------------------- reading
 
     def read(self) -> None:
-        """Bring the pieces up to date. One message that cannot be read leaves all others as they are."""
+        """Update the sections; a message that cannot be decoded affects no other."""
         self.read_stop()
         self._read(self._read_fleet)
         self._read(self._read_scene)
@@ -130,7 +124,7 @@ class FleetFeed:
         try:
             part()
         except genpy.DeserializationError as error:
-            self._log.warn("a message on a robot's topic cannot be read: %s" % error, UNREADABLE_PERIOD_S)
+            self._background.warn("a message on a robot's topic cannot be read: %s" % error, UNREADABLE_PERIOD_S)
 
     def _read_fleet(self) -> None:
         now_s = time.monotonic()
@@ -153,7 +147,7 @@ class FleetFeed:
 
     def _make_row(self, row: Robot, stamp_s: Optional[float]) -> Dict[str, Any]:
         name = make_printable(row.namespace.strip("/"))
-        # A robot that is refused has the name of another: what is known by name is not about this one.
+        # Topics and diagnostics under the name of a robot that was refused are those of another robot.
         refused = row.state == Robot.REFUSED
         feed = None if refused else self._feeds.get(row.namespace)
         track = None if feed is None else feed.listener.track
@@ -170,10 +164,10 @@ class FleetFeed:
             "since": round(stamp_s - since_s) if stamp_s is not None and since_s else None,
             "uptime": round(row.uptime.to_sec()),
             "reconnects": row.reconnects,
-            "frames": round(row.packets_per_s, 1),
+            "packets": round(row.packets_per_s, 1),
             "bytes": round(row.bytes_per_s),
             "odom": None if track is None else round(track.odometry.rate_hz(time.monotonic()), 1),
-            "way": None if track is None else finite(round(track.way_m, 2)),
+            "distance": None if track is None else finite(round(track.way_m, 2)),
             "dropped": row.dropped_messages,
             "bad": row.bad_packets,
             "clock": finite(round(row.clock_offset, 4)),
@@ -183,14 +177,14 @@ class FleetFeed:
         }
 
     def read_stop(self) -> bool:
-        """Bring what is known of a stop up to date; return whether pages do not know it yet."""
+        """Update the status of a stop; return whether it has changed."""
         status = self.drivers.stop_status()
         if status is None:
             # No page has asked; another program may have.
             moving = [name for name, row in self.robots.items() if row.stop_state == Robot.MOVING]
             status = describe_stop_of_others(self.stopped, moving)
         pending = status is not None and not status.is_final and status.level != "error"
-        # New each time while it is pending: pages tell from it that the monitor is alive.
+        # Different each time while it is pending, which shows pages that the monitor is alive.
         self._pending_reads = self._pending_reads + 1 if pending else 0
         value = None if status is None else {**status._asdict(), "reads": self._pending_reads}
         return self.sections.put("stop", value)
@@ -212,9 +206,9 @@ class FleetFeed:
                 if name in self.robots:
                     self._health[name] = [status.level, shorten(status.message)]
         if taken.get("/hero_sim/markers") is not None:
-            self.sections.put("truth", find_true_poses(taken["/hero_sim/markers"]))
+            self.sections.put("ground_truth", find_true_poses(taken["/hero_sim/markers"]))
         elif "/hero_sim/markers" not in self._scene:
-            self.sections.put("truth", {})
+            self.sections.put("ground_truth", {})
 
     def _put_robots(self) -> None:
         poses, ranges, lights, goals = {}, {}, {}, {}
@@ -246,7 +240,7 @@ class FleetFeed:
 
 
 def describe_stop_of_others(stopped: bool, moving: Sequence[str]) -> Optional[StopStatus]:
-    """Return what people must see of a stop that no page asked for; None if there is none."""
+    """Return the status of a stop that another program requested; None if there is none."""
     if moving:
         verb = "moves" if len(moving) == 1 else "move"
         return StopStatus("error", "NOT STOPPED: %s %s" % (", ".join(moving), verb), is_final=False)
@@ -269,7 +263,7 @@ def describe_arena(message: MarkerArray) -> Dict[str, List[List[int]]]:
 
 
 def find_true_poses(message: MarkerArray) -> Dict[str, Optional[List[int]]]:
-    """Return where the simulator's robots truly are: a marker with the name, one with the heading, for each."""
+    """Return the ground truth of simulated robots; each has a marker with its name and one with its heading."""
     markers = message.markers[:MARKERS_MAX]
     headings = {marker.id: marker for marker in markers if marker.ns == "headings"}
     return {

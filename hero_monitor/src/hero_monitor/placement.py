@@ -1,8 +1,7 @@
-"""Poses in each robot's own odometry frame <-> poses on the one map. Pure. Lengths in m, angles in rad.
+"""Converts between poses in hero_N/odom and poses on the map. Pure.
 
-A robot knows its pose in hero_N/odom alone. Who knows more (the simulator, a tracking system) publishes on /tf_static
-where that frame lies in the map's. Robots of which nobody knows that are put side by side, each with its own origin,
-and the page says so.
+A robot knows only its pose in hero_N/odom. The simulator or a tracking system publishes on /tf_static where that frame
+lies on the map. Robots without such a transform are drawn side by side, and the page says so.
 """
 
 import math
@@ -11,13 +10,13 @@ from typing import Dict, Iterable, List
 from hero_client.fleet_state import Pose
 
 APART_M = 1.0
-"""Between the origins of two robots of which nobody knows where they are: farther than a short drive."""
+"""Between the origins of robots without a map transform: farther than a short drive."""
 
 NOWHERE = Pose(0.0, 0.0, 0.0)
 
 
 class Placement:
-    """Where the odometry frames of all robots lie on the map."""
+    """The odometry frames of all robots on the map."""
 
     def __init__(self, map_frame: str) -> None:
         self._map_frame = map_frame.lstrip("/")
@@ -25,17 +24,17 @@ class Placement:
         self._assumed: Dict[str, Pose] = {}
 
     def receive_transform(self, parent: str, child: str, pose: Pose) -> None:
-        """Take one transform; only those from the map's frame to an odometry frame count."""
+        """Take one transform; all but those from the map's frame to an odometry frame are ignored."""
         robot, _, frame = child.lstrip("/").rpartition("/")
         if parent.lstrip("/") == self._map_frame and frame == "odom" and robot:
             self._known[robot] = pose
 
     def knows(self, robot: str) -> bool:
-        """Return whether somebody said where this robot's odometry frame lies."""
+        """Return whether a robot's odometry frame has a map transform."""
         return robot in self._known
 
     def set_robots(self, robots: Iterable[str]) -> None:
-        """Put those of which nothing is known side by side, in the order given."""
+        """Place robots without a map transform side by side, in the order given."""
         unknown: List[str] = [robot for robot in robots if robot not in self._known]
         middle = (len(unknown) - 1) / 2.0
         self._assumed = {

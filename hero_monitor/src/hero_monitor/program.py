@@ -2,11 +2,10 @@
 
     roslaunch hero_bringup monitor.launch
 
-Parameters: the README of this package. Everything runs on one thread, tornado's, except what may have to wait: for
-ROS (feed, commander) or for the terminal (log_thread).
+Parameters: the README of this package. Everything runs on tornado's thread, except what may block (background).
 """
 
-import functools
+import asyncio
 import os
 import re
 import socket
@@ -21,21 +20,22 @@ from hero_client.robot import MAX_LINEAR_M_S, MAX_TURN_RAD_S
 
 from . import requests
 from .access import TOKEN_LENGTH_MIN, Access, is_loopback
+from .background import Background
 from .commander import STOP_PERIOD_S, Commander
 from .connection_limits import ConnectionLimits
 from .dead_man import Velocity
 from .feed import FleetFeed
-from .log_thread import LogThread
 from .sections import encode
 
 if TYPE_CHECKING:
     from .server import PageSocket
 
 LINGER_S = 10.0
-"""Subscriptions stay so long after the last page is gone: it may be a reload."""
+"""How long subscriptions outlive the last page, which may only reload."""
 
-LOOK_PERIOD_S = 0.2
-"""How often the loop looks whether the program is to end."""
+END_CHECK_PERIOD_S = 0.2
+
+GOALS_AT_ONCE = 20
 
 TOKEN_REMEDY = (
     "write one into a file that only you can read, and name it with token_file:=FILE: "
@@ -133,9 +133,9 @@ class Monitor:
 
         self._parameters = parameters
         self._program = program
-        self._log = LogThread()
-        self._feed = FleetFeed(parameters.map_frame, self._log)
-        self._commander = Commander(self._feed.drivers)
+        self._background = Background()
+        self._feed = FleetFeed(parameters.map_frame, self._background)
+        self._commander = Commander(self._feed.drivers, self._background)
         self._loop = tornado.ioloop.IOLoop.current()
         actions = Actions(self._open_page, self._receive, self._close_page)
         # The other half of the files is for ROS: some per robot.
@@ -144,11 +144,12 @@ class Monitor:
         self._server = Server(Access(parameters.token, parameters.host_names), limits, actions)
         self._tick = tornado.ioloop.PeriodicCallback(self._update_pages, 1000.0 / parameters.rate_hz)
         self._stops = tornado.ioloop.PeriodicCallback(self._step, 1000.0 * STOP_PERIOD_S)
-        self._look = tornado.ioloop.PeriodicCallback(self._look_for_end, 1000.0 * LOOK_PERIOD_S)
+        self._end_check = tornado.ioloop.PeriodicCallback(self._check_end, 1000.0 * END_CHECK_PERIOD_S)
         self._leaving: Any = None
+        self._pending_goals = 0
 
     def run(self) -> None:
-        """Serve pages until the program is to end. Raises: ProgramError."""
+        """Serve pages until the program ends. Raises: ProgramError."""
         wanted = self._parameters
         try:
             port = self._server.listen(wanted.host, wanted.port)
@@ -160,18 +161,17 @@ class Monitor:
         host = "[%s]" % wanted.host if ":" in wanted.host else wanted.host
         if wanted.host in ("0.0.0.0", "::"):
             host = socket.gethostname()
-        rospy.loginfo(
-            "fleet monitor: http://%s:%d%s", host, port, "" if wanted.control else " (looking only; control:=true)"
-        )
-        self._look.start()
+        hint = "" if wanted.control else " (view only; control:=true allows driving)"
+        rospy.loginfo("fleet monitor: http://%s:%d%s", host, port, hint)
+        self._end_check.start()
         try:
             self._loop.start()
         finally:
             self._commander.close()
             self._server.close()
-            self._feed.close()
+            self._background.close()
 
-    def _look_for_end(self) -> None:
+    def _check_end(self) -> None:
         if not self._program.running:
             self._loop.stop()
 
@@ -181,8 +181,7 @@ class Monitor:
         if self._leaving is not None:
             self._loop.remove_timeout(self._leaving)
             self._leaving = None
-        limits = {"linear": MAX_LINEAR_M_S, "turn": MAX_TURN_RAD_S}
-        page.send(encode({"hello": {"control": self._parameters.control, "limits": limits}}))
+        page.send(encode({"hello": {"control": self._parameters.control}}))
         if not self._tick.is_running():
             self._tick.start()
             self._stops.start()
@@ -193,43 +192,43 @@ class Monitor:
             self._leaving = self._loop.call_later(LINGER_S, self._leave)
 
     def _leave(self) -> None:
-        """Nobody looks any more."""
+        """The last page has been gone for LINGER_S."""
         self._leaving = None
         self._tick.stop()
         self._stops.stop()
-        self._feed.want(looking=False, truth=False)
+        self._feed.update_subscriptions(has_pages=False, ground_truth=False)
 
     def _update_pages(self) -> None:
         pages = self._server.pages
-        self._feed.want(True, any(page.truth for page in pages))
+        self._feed.update_subscriptions(True, any(page.ground_truth for page in pages))
         self._feed.read()
         self._broadcast_updates()
 
     def _step(self) -> None:
-        """What must not wait for the next update of the pages."""
+        """Do what cannot wait for the next update of the pages."""
         self._commander.step()
         if self._feed.read_stop():
             self._broadcast_updates()
 
     def _broadcast_updates(self) -> None:
-        """Send all pages what is new; a page that is still busy with the last update gets it later."""
+        """Send all pages what is new to them; a page that is still receiving the last update gets it later."""
         for page in self._server.pages:
             page.send_waiting()
             if page.ready:
-                news = self._feed.sections.take_news(page.seen)
-                if news is not None:
-                    page.send(news)
+                updates = self._feed.sections.take_updates(page.seen)
+                if updates is not None:
+                    page.send(updates)
 
-    # ---------------------------------------------------------------- what pages want
+    # ---------------------------------------------------------------- requests of pages
 
     def _receive(self, page: "PageSocket", text: Union[str, bytes]) -> None:
         try:
             request = requests.read_request(text, MAX_LINEAR_M_S, MAX_TURN_RAD_S)
         except requests.RequestError as error:
-            page.tell("error", "the page asked for something that is not understood (%s); reload it" % error)
+            page.tell("error", "invalid request (%s): reload the page" % error)
             return
-        if isinstance(request, requests.Look):
-            page.truth = request.truth
+        if isinstance(request, requests.Show):
+            page.ground_truth = request.ground_truth
         elif isinstance(request, requests.Stop):
             self._commander.request_stop(request.stop)
             self._feed.read_stop()
@@ -237,31 +236,36 @@ class Monitor:
             page.acknowledge(verb)
             # After the acknowledgement has left.
             self._loop.add_callback(self._broadcast_updates)
-            self._log.warn("a page asks to %s all robots" % verb)
+            self._background.warn("a page requests to %s all robots" % verb)
         elif isinstance(request, requests.Release):
             self._commander.release(page.number, "/" + request.robot)
         elif not self._parameters.control:
-            page.tell("error", "this monitor only looks: start it with control:=true to drive robots")
+            page.tell("error", "this monitor is view only: start it with control:=true to drive robots")
         elif request.robot not in self._feed.robots:
-            page.tell("error", "%s is not there" % request.robot)
+            page.tell("error", "%s is not connected" % request.robot)
         elif self._feed.stopped or not self._commander.may_drive():
             page.tell("error", "all robots are stopped: release them first")
         elif isinstance(request, requests.Drive):
-            velocity = Velocity("/" + request.robot, request.linear_m_s, request.turn_rad_s)
+            velocity = Velocity("/" + request.robot, request.linear_m_s, request.angular_rad_s)
             if not self._commander.drive(page.number, velocity):
                 page.tell("error", "%s is driven from another page" % request.robot)
+        elif self._pending_goals >= GOALS_AT_ONCE:
+            page.tell("error", "too many goals at once")
         else:
-            goal = Pose(request.x_m, request.y_m, request.yaw_rad or 0.0)
-            self._commander.send_goal(
-                "/" + request.robot,
-                self._feed.placement.to_odometry(request.robot, goal),
-                request.yaw_rad is not None,
-                functools.partial(self._tell_later, page),
-            )
+            self._loop.add_callback(self._send_goal, page, request)
 
-    def _tell_later(self, page: "PageSocket", level: str, text: str) -> None:
-        """Tell a page something from another thread."""
-        self._loop.add_callback(page.tell, level, text)
+    async def _send_goal(self, page: "PageSocket", request: requests.GoTo) -> None:
+        """Send a goal in the background, and tell the page the outcome."""
+        goal = Pose(request.x_m, request.y_m, request.yaw_rad or 0.0)
+        goal = self._feed.placement.to_odometry(request.robot, goal)
+        self._pending_goals += 1
+        try:
+            sending = self._background.submit(
+                self._commander.send_goal, "/" + request.robot, goal, request.yaw_rad is not None
+            )
+            page.tell(*await asyncio.wrap_future(sending))
+        finally:
+            self._pending_goals -= 1
 
 
 def _main() -> None:

@@ -1,6 +1,6 @@
-"""Text that a page sends -> a checked request. Pure.
+"""Parses and checks the requests of pages. Pure.
 
-Nothing of it is believed: the page may be of another version, or not be a page at all.
+Nothing is trusted: the page may be of another version, or not a page at all.
 """
 
 import json
@@ -12,31 +12,31 @@ FARTHEST_GOAL_M = 1000.0
 
 
 class RequestError(Exception):
-    """The text is no request; the error's text says why, in words for people."""
+    """The text is not a valid request; the message says why."""
 
 
 class Stop(NamedTuple):
-    """Stop all robots, or let them go again."""
+    """Stop all robots, or release them."""
 
     stop: bool
 
 
 class Drive(NamedTuple):
-    """A button is held: m/s ahead and rad/s to the left."""
+    """A button is held; a velocity as in Twist."""
 
     robot: str
     linear_m_s: float
-    turn_rad_s: float
+    angular_rad_s: float
 
 
 class Release(NamedTuple):
-    """The button is let go."""
+    """The button is released."""
 
     robot: str
 
 
 class GoTo(NamedTuple):
-    """A goal in the frame of the map: m, m, rad; no heading where any will do."""
+    """A goal in the map's frame; without yaw_rad the final heading is free."""
 
     robot: str
     x_m: float
@@ -44,13 +44,13 @@ class GoTo(NamedTuple):
     yaw_rad: Optional[float]
 
 
-class Look(NamedTuple):
-    """What this page wants to see beside the fleet."""
+class Show(NamedTuple):
+    """What the page shows in addition to the fleet."""
 
-    truth: bool
+    ground_truth: bool
 
 
-Request = Union[Stop, Drive, Release, GoTo, Look]
+Request = Union[Stop, Drive, Release, GoTo, Show]
 
 
 def read_number(fields: Dict[str, Any], name: str, limit: float) -> float:
@@ -79,8 +79,8 @@ def read_flag(fields: Dict[str, Any], name: str) -> bool:
     return value
 
 
-def read_request(text: Union[str, bytes], max_linear_m_s: float, max_turn_rad_s: float) -> Request:
-    """Return what a page wants. Raises: RequestError."""
+def read_request(text: Union[str, bytes], max_linear_m_s: float, max_angular_rad_s: float) -> Request:
+    """Return the request in a text. Raises: RequestError."""
     if isinstance(text, bytes) or len(text) > LONGEST_TEXT:
         raise RequestError("not a short text")
     try:
@@ -94,13 +94,13 @@ def read_request(text: Union[str, bytes], max_linear_m_s: float, max_turn_rad_s:
         return Stop(read_flag(fields, "stop"))
     if kind == "drive":
         linear_m_s = read_number(fields, "linear", max_linear_m_s)
-        return Drive(read_robot(fields), linear_m_s, read_number(fields, "turn", max_turn_rad_s))
+        return Drive(read_robot(fields), linear_m_s, read_number(fields, "angular", max_angular_rad_s))
     if kind == "release":
         return Release(read_robot(fields))
     if kind == "goal":
         x_m, y_m = (read_number(fields, name, FARTHEST_GOAL_M) for name in ("x", "y"))
         yaw_rad = None if fields.get("yaw") is None else read_number(fields, "yaw", 2 * math.pi)
         return GoTo(read_robot(fields), x_m, y_m, yaw_rad)
-    if kind == "look":
-        return Look(read_flag(fields, "truth"))
+    if kind == "show":
+        return Show(read_flag(fields, "ground_truth"))
     raise RequestError("unknown request")

@@ -1,4 +1,4 @@
-"""Topics of one robot, and what the page shows of it."""
+"""The topics of one robot that the page shows."""
 
 import time
 from typing import Optional, Tuple
@@ -14,14 +14,14 @@ from .placement import Placement
 from .sections import encode_colour
 
 LIGHT_S = 15.0
-"""The firmware lets the light go dark so long after the last command (LEDStatus.ino:76)."""
+"""The firmware switches the LED off this long after the last command (LEDStatus.ino:76)."""
 
 REACHED_M = 0.02
-"""So near a goal counts as reached, and is drawn no more; go_to_goal comes as near as 0.01 m."""
+"""A goal within this distance is reached and no longer drawn; go_to_goal stops within 0.01 m."""
 
 
 class RobotFeed:
-    """One robot, for as long as somebody looks."""
+    """One robot, while a page is open."""
 
     def __init__(self, namespace: str) -> None:
         self.name = namespace.strip("/")
@@ -33,7 +33,7 @@ class RobotFeed:
         self._goals = NewestMessage(namespace + "/goal", PoseStamped)
 
     def read_newest(self) -> None:
-        """Read what came since the last call."""
+        """Read what arrived since the last call."""
         self.listener.read_newest()
         now_s = time.monotonic()
         colour = self._led.take()
@@ -48,7 +48,7 @@ class RobotFeed:
             self._goal = None if pose is None else (goal.header.frame_id.lstrip("/"), pose)
 
     def find_goal(self, placement: Placement, map_frame: str) -> Optional[Pose]:
-        """Return the robot's goal on the map, None if it has none, is there, or nobody knows the goal's frame."""
+        """Return the robot's goal on the map; None if there is none, it is reached, or its frame is unknown."""
         if self._goal is None:
             return None
         frame, goal = self._goal

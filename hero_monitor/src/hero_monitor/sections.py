@@ -1,7 +1,7 @@
-"""The fleet as numbered pieces of JSON, so that each page gets what is new to it and no more. Pure.
+"""The fleet as numbered sections of JSON, of which each page gets those that are new to it. Pure.
 
-Every piece is whole in itself: a page that was too slow for some of them needs none of those to understand the next.
-Lengths travel in mm and angles in mrad, as whole numbers: short, and finer than anybody can see.
+Every section is complete in itself: a page that missed some needs none of them to understand the next. Lengths are
+integers in mm and angles in mrad: short, and finer than a screen can show.
 """
 
 import json
@@ -14,14 +14,13 @@ from hero_client.fleet_state import Pose
 
 LONGEST_LINE = 400
 LOG_LINES_KEPT = 500
-"""What a page that opens now can still read."""
+"""Lines that a new page gets."""
 
 LOG_LINES_AT_ONCE = 100
-"""The most lines in one message: a slow page gets the newest, and is told how many it missed."""
-
+"""Lines in one message; a slow page gets the newest, and the number of those it missed."""
 
 FARTHEST_M = 10000.0
-"""Coordinates and sizes beyond this are not drawn: a map of them would show nothing, and its grid would never end."""
+"""Coordinates and sizes beyond this are not drawn: the map would show nothing but an endless grid."""
 
 FARTHEST_RANGE_M = 100.0
 
@@ -29,11 +28,11 @@ FARTHEST_RANGE_M = 100.0
 class LogLine(NamedTuple):
     """One line of /rosout."""
 
-    number: int  # counts all lines from the start
+    number: int  # of all lines since the start
     time_s: float
     level: int  # as in rosgraph_msgs/Log: 1 debug, 2 info, 4 warn, 8 error, 16 fatal
     node: str
-    robot: str  # which robot it is about; empty if none
+    robot: str  # the robot that it concerns; empty if none
     text: str
 
 
@@ -43,24 +42,24 @@ def encode(value: Any) -> str:
 
 
 def shorten(text: str) -> str:
-    """Return a text of at most LONGEST_LINE characters, without what cannot be printed."""
+    """Return a text cut to LONGEST_LINE, without unprintable characters."""
     return make_printable(text if len(text) <= LONGEST_LINE else text[: LONGEST_LINE - 3] + "...")
 
 
 def encode_pose(pose: Optional[Pose]) -> Optional[List[int]]:
-    """Return a pose as mm, mm, mrad; None for none, and for one that cannot be drawn."""
+    """Return a pose as mm, mm, mrad; None without one, or if it cannot be drawn."""
     if pose is None or not all(abs(value) <= FARTHEST_M for value in pose):
         return None
     return [round(value * 1000.0) for value in pose]
 
 
 def encode_ranges(ranges_m: Sequence[float]) -> List[Optional[int]]:
-    """Return proximity ranges in mm: None where nothing is, 0 where it touches, -1 where the sensor says nothing."""
+    """Return proximity ranges in mm: None for nothing in range, 0 for contact, -1 for an invalid reading."""
     return [encode_range(range_m) for range_m in ranges_m]
 
 
 def encode_range(range_m: float) -> Optional[int]:
-    """Return one range; see encode_ranges. -Inf, +Inf and NaN are those of REP 117."""
+    """Return one range, see encode_ranges; infinities and NaN as in REP 117."""
     if abs(range_m) <= FARTHEST_RANGE_M:
         return max(0, round(range_m * 1000.0))
     if math.isinf(range_m):
@@ -69,7 +68,7 @@ def encode_range(range_m: float) -> Optional[int]:
 
 
 def encode_colour(red: float, green: float, blue: float) -> Optional[str]:
-    """Return a colour as #rrggbb, None for a light that is dark or a colour that is none."""
+    """Return a colour as #rrggbb; None for a dark light or an invalid colour."""
     parts = [red, green, blue]
     if not all(map(math.isfinite, parts)):
         return None
@@ -85,23 +84,23 @@ class LogRing:
         self._lines: Deque[LogLine] = deque(maxlen=LOG_LINES_KEPT)
 
     def append(self, time_s: float, level: int, node: str, robot: str, text: str) -> None:
-        """Take a line, without what cannot be printed."""
+        """Add a line, without unprintable characters."""
         self.count += 1
         self._lines.append(LogLine(self.count, round(time_s, 3), level, shorten(node), robot, shorten(text)))
 
     def skip(self, count: int) -> None:
-        """Count lines that nobody had the time to read."""
+        """Count lines that were dropped unread."""
         self.count += count
 
     def encode_after(self, number: int) -> str:
-        """Return the lines after that one as JSON: the newest of them, and how many are missing before."""
+        """Return the newest lines after that number as JSON, and how many are missing before them."""
         new = [line for line in self._lines if line.number > number][-LOG_LINES_AT_ONCE:]
         first = new[0].number if new else self.count + 1
         return encode({"missed": max(0, first - number - 1) if number else 0, "lines": new})
 
 
 class Page:
-    """What one page has got already."""
+    """What one page has received."""
 
     def __init__(self) -> None:
         self.versions: Dict[str, int] = {}
@@ -109,7 +108,7 @@ class Page:
 
 
 class Sections:
-    """The pieces as they are now."""
+    """The current sections."""
 
     def __init__(self) -> None:
         self.log = LogRing()
@@ -117,7 +116,7 @@ class Sections:
         self._versions: Dict[str, int] = {}
 
     def put(self, name: str, value: Any) -> bool:
-        """Replace a piece; return whether it differs from the one before: only then is it new."""
+        """Replace a section; return whether it has changed."""
         text = encode(value)
         if self._texts.get(name) == text:
             return False
@@ -125,8 +124,8 @@ class Sections:
         self._versions[name] = self._versions.get(name, 0) + 1
         return True
 
-    def take_news(self, page: Page) -> Optional[str]:
-        """Return all that is new to a page as one JSON object, None if nothing is; it counts as got."""
+    def take_updates(self, page: Page) -> Optional[str]:
+        """Return the sections that are new to a page as one JSON object, None without any; marks them as received."""
         parts = [
             '"%s":%s' % (name, self._texts[name])
             for name, version in self._versions.items()

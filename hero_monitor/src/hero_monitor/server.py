@@ -1,7 +1,7 @@
-"""HTTP and one WebSocket per page, with tornado: sends pieces of JSON, receives requests. Knows nothing of ROS.
+"""HTTP and one WebSocket per page (tornado): sends sections of JSON, receives requests. Knows nothing of ROS.
 
-One thread owns all connections. Nothing that a page does can hold up another: a slow page misses updates instead of
-making them wait (every piece is whole in itself), and what cannot be sent at once takes 64 kB at most.
+One thread owns all connections. No page can delay another: a slow page misses updates (every section is complete in
+itself), and what cannot be sent at once takes 64 kB at most.
 """
 
 import itertools
@@ -31,14 +31,14 @@ from .sections import Page, encode
 WEB = Path(__file__).resolve().parent / "web"
 COOKIE = "hero_monitor"
 SESSION_DAYS = 0.5
-"""How long a browser that gave the token is let in."""
+"""How long a login lasts."""
 
 PAGES_MAX = 30
 SEND_BUFFER = 65536
-"""Bytes that the system may hold back for one page: about a second of a large swarm."""
+"""Bytes that the kernel may buffer for one page: about a second of a large swarm."""
 
 WAITING_MAX = 5
-"""Notices and acknowledgements kept for a page that is slow."""
+"""Notices and acknowledgements kept for a slow page."""
 
 PING_INTERVAL_S = 3.0
 PING_TIMEOUT_S = 9.0
@@ -48,7 +48,7 @@ EXPIRE_PERIOD_S = 1.0
 
 
 class Actions(NamedTuple):
-    """What the server asks of the rest; all return at once."""
+    """What the server calls; all return at once."""
 
     open_page: Callable[["PageSocket"], None]
     receive: Callable[["PageSocket", Union[str, bytes]], None]
@@ -56,22 +56,22 @@ class Actions(NamedTuple):
 
 
 class BaseHandler(tornado.web.RequestHandler):
-    """A request whose Host names this machine; everything carries headers that keep foreign content out."""
+    """A request whose Host names this PC; every answer has headers that keep foreign content out."""
 
     access: Access
     limits: ConnectionLimits
 
     def initialize(self, access: Access, limits: ConnectionLimits, **others: Any) -> None:
-        """Take what all handlers share."""
+        """Set what all handlers share."""
         self.access = access
         self.limits = limits
         for name, value in others.items():
             setattr(self, name, value)
 
     def set_default_headers(self) -> None:
-        """Forbid the page everything but its own files and its own socket."""
+        """Restrict the page to its own files and its own socket."""
         host = self.request.headers.get("Host", "")
-        # Named, too, because browsers before 2022 do not count ws: as 'self'.
+        # Browsers before 2022 do not count ws: as 'self'.
         socket_host = host if self.access_admits(host) else ""
         self.set_header(
             "Content-Security-Policy",
@@ -89,12 +89,12 @@ class BaseHandler(tornado.web.RequestHandler):
         self.clear_header("Server")
 
     def access_admits(self, host: str) -> bool:
-        """Whether the Host is one of ours; asked before initialize() as well."""
+        """Whether the Host is ours; called before initialize() as well."""
         access = getattr(self, "access", None)
         return access is not None and access.admits_host(host)
 
     def prepare(self) -> Optional[Awaitable[None]]:
-        """Refuse names that are not this machine's; trust the connection of a browser that is logged in."""
+        """Refuse names that are not this PC's; trust the connection of a browser that is logged in."""
         self.set_default_headers()
         if not self.access.admits_host(self.request.headers.get("Host", "")):
             raise tornado.web.HTTPError(421)
@@ -109,11 +109,11 @@ class BaseHandler(tornado.web.RequestHandler):
         return not self.access.needs_token or self.get_secure_cookie(COOKIE, max_age_days=SESSION_DAYS) is not None
 
     def write_error(self, status_code: int, **others: Any) -> None:
-        """Say in one line what is wrong."""
+        """Send one line that says what is wrong."""
         reasons = {
             403: "not allowed",
             404: "there is no such page",
-            421: "this name is not one of this machine's; see host_names in docs/monitor.md",
+            421: "not a name of this PC; see host_names in docs/monitor.md",
             429: "too many wrong tokens from this address; wait %d s" % TOKEN_PERIOD_S,
             503: "too many pages are open",
         }
@@ -122,7 +122,7 @@ class BaseHandler(tornado.web.RequestHandler):
 
 
 class FileHandler(BaseHandler):
-    """The page's own files, which hold nothing secret; the page itself only for those that may see it."""
+    """The page's files, which hold nothing secret; the login page for browsers that are not logged in."""
 
     def get(self, name: str) -> None:
         """Send a file."""
@@ -143,7 +143,7 @@ class LoginHandler(BaseHandler):
     attempts: TokenAttempts
 
     def post(self) -> None:
-        """Check the token; addresses that sent too many wrong ones have to wait."""
+        """Check the token, rate-limited per address."""
         if not self.access.admits_origin(self.request.headers.get("Origin"), self.request.host):
             raise tornado.web.HTTPError(403)
         address, now_s = self.request.remote_ip or "", time.monotonic()
@@ -168,7 +168,7 @@ class PageSocket(tornado.websocket.WebSocketHandler, BaseHandler):
     pages: List["PageSocket"]
 
     def prepare(self) -> Optional[Awaitable[None]]:
-        """Refuse who may not see the fleet, and one page too many."""
+        """Refuse browsers that are not logged in, and pages beyond PAGES_MAX."""
         BaseHandler.prepare(self)
         if not self.is_logged_in:
             raise tornado.web.HTTPError(403)
@@ -181,16 +181,16 @@ class PageSocket(tornado.websocket.WebSocketHandler, BaseHandler):
         return self.access.admits_origin(origin, self.request.host)
 
     async def get(self, *arguments: Any, **others: Any) -> None:
-        """Refuse those that say no Origin, which tornado lets in: every browser says it."""
+        """Refuse requests without Origin, which tornado admits: every browser sends it."""
         if not self.access.admits_origin(self.request.headers.get("Origin"), self.request.host):
             raise tornado.web.HTTPError(403)
         await super().get(*arguments, **others)
 
     def open(self, *arguments: str, **others: str) -> None:
-        """A page is there."""
+        """Register a page."""
         self.number = next(PageSocket.numbers)
         self.seen = Page()
-        self.truth = False
+        self.ground_truth = False
         self._sending: Optional[Awaitable[None]] = None
         self._waiting: Deque[str] = deque(maxlen=WAITING_MAX)
         self.set_nodelay(True)
@@ -202,18 +202,18 @@ class PageSocket(tornado.websocket.WebSocketHandler, BaseHandler):
         self.actions.open_page(self)
 
     def on_message(self, message: Union[str, bytes]) -> None:
-        """A page wants something."""
+        """Pass a request on."""
         self.actions.receive(self, message)
 
     def on_close(self) -> None:
-        """A page is gone."""
+        """Unregister a page."""
         if self in self.pages:
             self.pages.remove(self)
             self.actions.close_page(self)
 
     @property
     def ready(self) -> bool:
-        """Whether everything that was sent has left."""
+        """Whether everything has been sent."""
         return self._sending is None or self._sending.done()  # type: ignore[attr-defined]
 
     def send(self, text: str) -> None:
@@ -224,11 +224,11 @@ class PageSocket(tornado.websocket.WebSocketHandler, BaseHandler):
             return
 
     def tell(self, level: str, text: str) -> None:
-        """Show a line to the people at this page."""
+        """Show a notice on this page."""
         self._send_when_ready({"notice": {"level": level, "text": text}})
 
     def acknowledge(self, request: str) -> None:
-        """Tell the page that its request has arrived."""
+        """Tell the page that its request was received."""
         self._send_when_ready({"received": request})
 
     def _send_when_ready(self, value: Dict[str, Any]) -> None:
@@ -236,7 +236,7 @@ class PageSocket(tornado.websocket.WebSocketHandler, BaseHandler):
         self.send_waiting()
 
     def send_waiting(self) -> None:
-        """Send what waits, if the page is quick enough; of too many the oldest are lost."""
+        """Send what waits as soon as the page has received the rest; beyond WAITING_MAX the oldest are dropped."""
         while self._waiting and self.ready:
             self.send(self._waiting.popleft())
 
@@ -258,7 +258,7 @@ class Server:
     """The server, from its start to its end."""
 
     def __init__(self, access: Access, limits: ConnectionLimits, actions: Actions) -> None:
-        # Of requests that are no HTTP and cookies that are no sessions tornado logs each: anybody could fill the disk.
+        # tornado logs each invalid request and cookie: any client could fill the disk.
         logging.getLogger("tornado.general").setLevel(logging.ERROR)
         self.pages: List[PageSocket] = []
         shared: Dict[str, Any] = {"access": access, "limits": limits}
@@ -288,14 +288,14 @@ class Server:
         )
 
     def listen(self, host: str, port: int) -> int:
-        """Await pages; return the port. Raises: OSError."""
+        """Listen for pages; return the port. Raises: OSError."""
         sockets = tornado.netutil.bind_sockets(port, host, backlog=LISTEN_BACKLOG)
         self._http.add_sockets(sockets)
         self._expiry.start()
         return int(sockets[0].getsockname()[1])
 
     def close(self) -> None:
-        """Send all pages away."""
+        """Disconnect all pages."""
         self._expiry.stop()
         self._http.stop()
         for page in list(self.pages):
@@ -306,16 +306,16 @@ class NotFoundHandler(BaseHandler):
     """Every other path."""
 
     def get(self) -> None:
-        """There is nothing."""
+        """Answer 404."""
         raise tornado.web.HTTPError(404)
 
 
 def ignore_request(handler: tornado.web.RequestHandler) -> None:
-    """Requests are not logged: an address may be typed with a secret in it."""
+    """Log no request: a URL may contain a secret by mistake."""
 
 
 def raise_file_limit() -> int:
-    """Let this process open as many files as the system allows it; return how many."""
+    """Raise the limit of open files to the hard limit; return it."""
     _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
     return sys.maxsize if hard == resource.RLIM_INFINITY else hard

@@ -80,7 +80,7 @@ class PageTest(unittest.TestCase):
 
     def test_a_robot_drives_while_a_button_is_held_and_stops_when_it_is_let_go(self):
         self.page.choose("hero_0")
-        button = self.page.find("#pad [aria-label='ahead']")
+        button = self.page.find("#pad [aria-label='forward']")
         self.page.actions().click_and_hold(button).perform()
         self.wait_until_moving(0)
         self.page.actions().release().perform()
@@ -88,7 +88,7 @@ class PageTest(unittest.TestCase):
 
     def test_a_robot_stops_when_its_page_is_gone(self):
         self.page.choose("hero_0")
-        button = self.page.find("#pad [aria-label='back']")
+        button = self.page.find("#pad [aria-label='backward']")
         self.page.actions().click_and_hold(button).perform()
         self.wait_until_moving(0)
         # Leaves without a word: no release, no close.

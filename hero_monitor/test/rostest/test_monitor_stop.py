@@ -141,7 +141,7 @@ class StopTest(unittest.TestCase):
         commands = []
         rospy.Subscriber("/hero_2/velocity_controller/cmd_vel", Twist, commands.append)
         self.page.choose("hero_2")
-        button = self.page.find("#pad [aria-label='ahead']")
+        button = self.page.find("#pad [aria-label='forward']")
         self.page.actions().click_and_hold(button).perform()
         wait_for(lambda: any(command.linear.x > 0 for command in commands), "a command")
         # Pressed on another page, while the button is held.

@@ -1,17 +1,17 @@
-"""Buttons that are held on a page: the robot drives while they are, and stops however they end."""
+"""The robot drives while a button is held on a page, and stops however that ends."""
 
 import pytest
 
 from hero_monitor.dead_man import HOLD_TIMEOUT_S, STOPS, DeadMan, Velocity
 
-AHEAD = Velocity("/hero_0", 0.1, 0.0)
-STAND = Velocity("/hero_0", 0.0, 0.0)
+FORWARD = Velocity("/hero_0", 0.1, 0.0)
+STOPPED = Velocity("/hero_0", 0.0, 0.0)
 
 
 @pytest.fixture()
 def held():
     dead_man = DeadMan()
-    assert dead_man.hold(1, AHEAD, now_s=10.0)
+    assert dead_man.hold(1, FORWARD, now_s=10.0)
     return dead_man
 
 
@@ -22,19 +22,19 @@ def take_all(dead_man, now_s):
 def test_nothing_is_stopped_while_a_button_is_held(held):
     for step in range(20):
         now_s = 10.0 + 0.1 * step
-        assert held.hold(1, AHEAD, now_s)
+        assert held.hold(1, FORWARD, now_s)
         assert held.take_stops(now_s) == []
 
 
 def test_a_released_button_stops_the_robot_and_then_leaves_it_alone(held):
     held.release(1, "/hero_0")
-    assert take_all(held, 10.05) == [STAND] * STOPS
+    assert take_all(held, 10.05) == [STOPPED] * STOPS
     assert held.take_stops(99.0) == []
 
 
 def test_silence_stops_the_robot(held):
     assert held.take_stops(9.99 + HOLD_TIMEOUT_S) == []
-    assert take_all(held, 10.01 + HOLD_TIMEOUT_S) == [STAND] * STOPS
+    assert take_all(held, 10.01 + HOLD_TIMEOUT_S) == [STOPPED] * STOPS
 
 
 def test_a_page_that_is_gone_stops_its_robots_and_no_others(held):
@@ -51,9 +51,9 @@ def test_the_end_of_the_program_stops_all(held):
 
 
 def test_a_robot_is_driven_from_one_page_at_a_time(held):
-    assert not held.hold(2, STAND, 10.1)
+    assert not held.hold(2, STOPPED, 10.1)
     held.release(2, "/hero_0")
     assert held.take_stops(10.2) == []
     held.release(1, "/hero_0")
-    assert held.hold(2, AHEAD, 10.3)
+    assert held.hold(2, FORWARD, 10.3)
     assert held.take_stops(10.3) == []

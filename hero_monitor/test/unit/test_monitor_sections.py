@@ -1,4 +1,4 @@
-"""What pages get: what is new, whole pieces, short numbers; and what they send back, checked."""
+"""What pages receive: new sections with short numbers; and what they send, checked."""
 
 import json
 import math
@@ -19,59 +19,59 @@ from hero_monitor.sections import (
 )
 
 
-def test_a_page_gets_each_piece_once_until_it_changes():
+def test_a_page_gets_each_section_once_until_it_changes():
     sections, page = Sections(), Page()
     sections.put("poses", {"hero_0": [1, 2, 3]})
     sections.put("fleet", {})
-    assert json.loads(sections.take_news(page)) == {"poses": {"hero_0": [1, 2, 3]}, "fleet": {}}
-    assert sections.take_news(page) is None
+    assert json.loads(sections.take_updates(page)) == {"poses": {"hero_0": [1, 2, 3]}, "fleet": {}}
+    assert sections.take_updates(page) is None
     sections.put("poses", {"hero_0": [1, 2, 3]})
-    assert sections.take_news(page) is None
+    assert sections.take_updates(page) is None
     sections.put("poses", {"hero_0": [1, 2, 4]})
-    assert json.loads(sections.take_news(page)) == {"poses": {"hero_0": [1, 2, 4]}}
+    assert json.loads(sections.take_updates(page)) == {"poses": {"hero_0": [1, 2, 4]}}
 
 
-def test_a_page_that_missed_pieces_gets_the_newest_whole():
+def test_a_page_that_missed_updates_gets_the_newest():
     sections, quick, slow = Sections(), Page(), Page()
     for step in range(10):
         sections.put("poses", {"hero_0": [step]})
-        assert json.loads(sections.take_news(quick)) == {"poses": {"hero_0": [step]}}
-    assert json.loads(sections.take_news(slow)) == {"poses": {"hero_0": [9]}}
+        assert json.loads(sections.take_updates(quick)) == {"poses": {"hero_0": [step]}}
+    assert json.loads(sections.take_updates(slow)) == {"poses": {"hero_0": [9]}}
 
 
 def test_a_new_page_gets_the_newest_lines_and_a_slow_one_a_count():
     sections, early = Sections(), Page()
     sections.log.append(1.0, 2, "node", "", "first")
-    sections.take_news(early)
+    sections.take_updates(early)
     for number in range(LOG_LINES_KEPT + 50):
         sections.log.append(2.0, 2, "node", "hero_3", "line %d" % number)
-    news = json.loads(sections.take_news(early))["log"]
-    assert len(news["lines"]) == LOG_LINES_AT_ONCE
-    assert news["lines"][-1][-1] == "line %d" % (LOG_LINES_KEPT + 49)
-    assert news["missed"] == LOG_LINES_KEPT + 50 - LOG_LINES_AT_ONCE
-    assert json.loads(sections.take_news(Page()))["log"]["missed"] == 0
-    assert sections.take_news(early) is None
+    updates = json.loads(sections.take_updates(early))["log"]
+    assert len(updates["lines"]) == LOG_LINES_AT_ONCE
+    assert updates["lines"][-1][-1] == "line %d" % (LOG_LINES_KEPT + 49)
+    assert updates["missed"] == LOG_LINES_KEPT + 50 - LOG_LINES_AT_ONCE
+    assert json.loads(sections.take_updates(Page()))["log"]["missed"] == 0
+    assert sections.take_updates(early) is None
 
 
-def test_lines_that_nobody_had_time_to_read_count_as_missed():
+def test_lines_that_were_dropped_unread_count_as_missed():
     sections, page = Sections(), Page()
     sections.log.append(1.0, 2, "node", "", "first")
-    sections.take_news(page)
+    sections.take_updates(page)
     sections.log.skip(1000)
     sections.log.append(1.0, 2, "node", "", "last")
-    news = json.loads(sections.take_news(page))["log"]
-    assert (news["missed"], len(news["lines"])) == (1000, 1)
+    updates = json.loads(sections.take_updates(page))["log"]
+    assert (updates["missed"], len(updates["lines"])) == (1000, 1)
 
 
 def test_log_lines_are_short_and_hold_nothing_that_cannot_be_printed():
     sections = Sections()
     sections.log.append(1.0, 2, "no\x1bde", "", "a\u202eb\n" + 1000 * "x")
-    line = json.loads(sections.take_news(Page()))["log"]["lines"][0]
+    line = json.loads(sections.take_updates(Page()))["log"]["lines"][0]
     assert line[3] == "no?de"
     assert line[5].startswith("a?b?x") and len(line[5]) <= 400
 
 
-def test_numbers_are_whole_and_what_is_not_finite_has_a_meaning():
+def test_numbers_are_integers_and_those_not_finite_have_a_code():
     assert encode_pose(Pose(0.1234, -1.0, math.pi)) == [123, -1000, 3142]
     assert encode_pose(Pose(math.nan, 0.0, 0.0)) is None
     assert encode_ranges([0.1, math.inf, -math.inf, math.nan]) == [100, None, 0, -1]
@@ -86,7 +86,7 @@ def test_a_pose_that_cannot_be_drawn_is_none(pose):
     assert encode_pose(None) is None
 
 
-def test_a_range_that_no_sensor_measures_says_nothing():
+def test_an_impossible_range_is_an_invalid_reading():
     assert encode_ranges([3e38, -3e38, 1e306]) == [-1, -1, -1]
 
 
@@ -106,7 +106,7 @@ def test_a_pose_on_the_map_and_back_is_the_same(placement):
     assert placement.to_odometry("hero_0", on_map) == pytest.approx(pose)
 
 
-def test_robots_of_which_nobody_knows_where_they_are_stand_side_by_side(placement):
+def test_robots_without_a_map_transform_are_placed_side_by_side(placement):
     placement.set_robots(["hero_0", "hero_1", "hero_2"])
     assert placement.knows("hero_0") and not placement.knows("hero_1") and not placement.knows("hero_2")
     origin = Pose(0.0, 0.0, 0.0)
@@ -118,13 +118,13 @@ def read(**fields):
     return requests.read_request(json.dumps(fields), 0.2, 8.0)
 
 
-def test_requests_of_the_page_are_understood():
+def test_requests_of_the_page_are_parsed():
     assert read(do="stop", stop=True) == requests.Stop(True)
-    assert read(do="drive", robot="hero_1", linear=-0.2, turn=8) == requests.Drive("hero_1", -0.2, 8.0)
+    assert read(do="drive", robot="hero_1", linear=-0.2, angular=8) == requests.Drive("hero_1", -0.2, 8.0)
     assert read(do="release", robot="hero_1") == requests.Release("hero_1")
     assert read(do="goal", robot="hero_1", x=1, y=2) == requests.GoTo("hero_1", 1.0, 2.0, None)
     assert read(do="goal", robot="hero_1", x=1, y=2, yaw=3).yaw_rad == 3.0
-    assert read(do="look", truth=False) == requests.Look(False)
+    assert read(do="show", ground_truth=False) == requests.Show(False)
 
 
 @pytest.mark.parametrize(
@@ -140,19 +140,19 @@ def test_requests_of_the_page_are_understood():
         " " * 3000,
         '{"do":"stop"}',
         '{"do":"stop","stop":1}',
-        '{"do":"drive","robot":"hero_0","linear":0.3,"turn":0}',
-        '{"do":"drive","robot":"hero_0","linear":NaN,"turn":0}',
-        '{"do":"drive","robot":"hero_0","linear":0.1,"turn":1e999}',
-        '{"do":"drive","robot":"hero_0","linear":"0.1","turn":0}',
-        '{"do":"drive","robot":"hero_0","linear":true,"turn":0}',
-        '{"do":"drive","robot":7,"linear":0.1,"turn":0}',
+        '{"do":"drive","robot":"hero_0","linear":0.3,"angular":0}',
+        '{"do":"drive","robot":"hero_0","linear":NaN,"angular":0}',
+        '{"do":"drive","robot":"hero_0","linear":0.1,"angular":1e999}',
+        '{"do":"drive","robot":"hero_0","linear":"0.1","angular":0}',
+        '{"do":"drive","robot":"hero_0","linear":true,"angular":0}',
+        '{"do":"drive","robot":7,"linear":0.1,"angular":0}',
         '{"do":"goal","robot":"hero_0","x":1}',
         '{"do":"goal","robot":"hero_0","x":1,"y":1,"yaw":"north"}',
         '{"do":"goal","robot":"","x":1,"y":1}',
-        '{"do":"look"}',
+        '{"do":"show"}',
         '{"do":"reboot"}',
     ],
 )
-def test_what_is_no_request_is_refused(text):
+def test_an_invalid_request_is_refused(text):
     with pytest.raises(requests.RequestError):
         requests.read_request(text, 0.2, 8.0)

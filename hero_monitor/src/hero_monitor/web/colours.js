@@ -1,4 +1,4 @@
-// Every robot has a colour of its own: hues a golden angle apart, so that neighbours in number differ most.
+// One hue per robot, a golden angle apart: robots with neighbouring ids differ most.
 
 export function isDark() {
   const theme = document.documentElement.dataset.theme;

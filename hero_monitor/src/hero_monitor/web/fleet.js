@@ -1,4 +1,4 @@
-// The table of the fleet. Cells are changed in place, so that selection, scrolling and screen readers are left alone.
+// The table of robots. Cells change in place, which keeps selection, scrolling and screen readers undisturbed.
 
 import { colourOf } from "./colours.js";
 
@@ -13,7 +13,7 @@ const number = (value, digits, unit) => (value === null ? "-" : `${value.toFixed
 
 export const healthOf = (robot) => robot.error || (robot.health[0] > 0 ? robot.health[1] : "");
 
-/** Heading, text of the cell, what it is sorted by, and whether it is a number. */
+/** Heading, text of a cell, sort key, and whether it is a number. */
 const COLUMNS = [
   ["Robot", (robot) => robot.name || robot.address, (robot) => robot.id, false],
   ["State", (robot) => robot.state, (robot) => robot.state, false],
@@ -23,7 +23,7 @@ const COLUMNS = [
   ["From robot", (robot) => number(robot.bytes / 1000, 1, " kB/s"), (robot) => robot.bytes, true],
   ["Clock", (robot) => number(robot.clock === null ? null : robot.clock * 1000, 1, " ms"), (robot) => Math.abs(robot.clock ?? 0), true],
   ["Firmware", (robot) => robot.firmware || "-", (robot) => robot.firmware, false],
-  ["Returns", (robot) => String(robot.reconnects), (robot) => robot.reconnects, true],
+  ["Reconnects", (robot) => String(robot.reconnects), (robot) => robot.reconnects, true],
   ["Last error", (robot) => healthOf(robot), (robot) => healthOf(robot), false],
 ];
 

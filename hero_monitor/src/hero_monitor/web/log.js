@@ -1,4 +1,4 @@
-// The lines of the log: what nodes and robots say, the newest at the bottom.
+// Log lines of nodes and robots, newest at the bottom.
 
 import { colourOf } from "./colours.js";
 

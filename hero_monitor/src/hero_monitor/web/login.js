@@ -1,4 +1,4 @@
-// The token, in exchange for a cookie.
+// Exchanges the token for a cookie.
 
 const form = document.getElementById("form");
 const answer = document.getElementById("answer");
@@ -15,7 +15,7 @@ form.addEventListener("submit", async (event) => {
       location.reload();
       return;
     }
-    answer.textContent = reply.status === 429 ? "Too many tries. Wait a moment." : "That is not the token.";
+    answer.textContent = reply.status === 429 ? "Too many attempts. Wait a moment." : "Wrong token.";
   } catch {
     answer.textContent = "The monitor does not answer.";
   }

@@ -1,6 +1,6 @@
-// The page as a whole: one socket to the monitor, what came over it, and who shows it.
+// The page: one socket to the monitor, the state that it sends, and the panels that show it.
 //
-// Names and texts come from robots, programs and the network: they only ever become text, never markup.
+// Names and texts come from robots, programs and the network: they are inserted as text, never as markup.
 
 import { FleetTable } from "./fleet.js";
 import { FleetMap } from "./map.js";
@@ -9,20 +9,20 @@ import { RobotPanel } from "./robot.js";
 import { StopPanel } from "./stop.js";
 
 const RETRY_MS = 1000;
-const SILENT_MS = 5000; // the driver reports once a second, so something new comes at least so often
+const SILENT_MS = 5000; // the driver reports once a second
 const NOTICE_MS = 6000;
 
 const element = (id) => document.getElementById(id);
 
-/** What is known of the fleet, and which robot is chosen. */
+/** The sections as received, and the name of the chosen robot. */
 const state = {
-  hello: { control: false, limits: { linear: 0.2, turn: 8 } },
+  hello: { control: false },
   fleet: { driver: false, listening: "", stopped: false, robots: [] },
   poses: {},
   ranges: {},
   lights: {},
   goals: {},
-  truth: {},
+  ground_truth: {},
   arena: { boxes: [], circles: [] },
   chosen: null,
 };
@@ -32,14 +32,14 @@ let lastMs = 0;
 
 const isOpen = () => socket !== null && socket.readyState === WebSocket.OPEN;
 
-/** Send a request; false where there is nobody to send it to. */
+/** Send a request; false without a connection. */
 function send(request) {
   if (!isOpen()) return false;
   socket.send(JSON.stringify(request));
   return true;
 }
 
-/** Whether requests pile up on a network that carries nothing: then a button that is held must not be sent. */
+/** Whether requests queue up on a stalled network: commands of a held button must not. */
 function congested() {
   return socket !== null && socket.bufferedAmount > 0;
 }
@@ -68,7 +68,7 @@ const map = new FleetMap(state, { choose, send, notice });
 const table = new FleetTable(choose);
 const log = new LogView();
 const panel = new RobotPanel({ send, congested, map });
-const stop = new StopPanel({ send, isOpen, letGo: () => panel.letGo(), notice });
+const stop = new StopPanel({ send, isOpen, releaseRobot: () => panel.release(), notice });
 
 function showHead() {
   const open = isOpen();
@@ -83,26 +83,26 @@ function showHead() {
   const empty = element("empty");
   empty.hidden = open && robots.length > 0;
   empty.textContent = !open
-    ? "No connection to the monitor. What you see is old."
+    ? "No connection to the monitor. This view is outdated."
     : driver
-      ? "No robot yet. Robots appear here when they reach the driver."
+      ? "No robots. Robots appear here when they connect to the driver."
       : "No driver: roslaunch hero_bringup hero_bringup.launch";
 }
 
-function receive(news) {
-  for (const name of ["hello", "fleet", "poses", "ranges", "lights", "goals", "truth", "arena"]) {
-    if (name in news) state[name] = news[name];
+function receive(updates) {
+  for (const name of ["hello", "fleet", "poses", "ranges", "lights", "goals", "ground_truth", "arena"]) {
+    if (name in updates) state[name] = updates[name];
   }
-  stop.receive(news);
-  if ("notice" in news) notice(news.notice.level, news.notice.text);
-  if ("log" in news) log.append(news.log);
-  if ("fleet" in news || "hello" in news) {
+  stop.receive(updates);
+  if ("notice" in updates) notice(updates.notice.level, updates.notice.text);
+  if ("log" in updates) log.append(updates.log);
+  if ("fleet" in updates || "hello" in updates) {
     if (state.chosen !== null && !state.fleet.robots.some((robot) => robot.name === state.chosen)) choose(null);
     table.show(state);
     showHead();
   }
-  if ("poses" in news || "fleet" in news || "hello" in news) panel.show(state);
-  map.update(news);
+  if ("poses" in updates || "fleet" in updates || "hello" in updates) panel.show(state);
+  map.update(updates);
 }
 
 function connect() {
@@ -114,7 +114,7 @@ function connect() {
     lastMs = Date.now();
     log.clear();
     stop.open();
-    send({ do: "look", truth: map.shows.truth });
+    map.requestGroundTruth();
     showHead();
   });
   own.addEventListener("message", (event) => {
@@ -122,17 +122,17 @@ function connect() {
     receive(JSON.parse(event.data));
   });
   own.addEventListener("close", async () => {
-    panel.letGo();
+    panel.release();
     socket = null;
     showHead();
     stop.show();
     if (!opened) {
-      // The monitor may have been started anew, with another token: then this page is the login page.
+      // A restarted monitor may have another token: then this page becomes the login page.
       try {
         const page = await (await fetch(".", { cache: "no-store" })).text();
         if (page.includes("login.js")) location.reload();
       } catch {
-        // It does not answer; go on trying.
+        // It does not answer; keep trying.
       }
     }
     setTimeout(connect, RETRY_MS);

@@ -1,17 +1,12 @@
-// The map: robots as they are, seen from above; x to the right, y up, as in ROS. Lengths in mm, angles in mrad.
+// The map, seen from above: x to the right, y up, as in ROS. Lengths in mm, angles in mrad.
 
-import { colourOf, isDark } from "./colours.js";
+import { BODY_MM, MapPainter, TRAIL_MS } from "./painter.js";
 
-const BODY_MM = 36.85;
-const WHEEL_MM = [24.6, 6, 31.5]; // radius, width, distance from the middle
-const SENSOR_REACH_MM = 236.8;
-const TRAIL_MS = 60000;
 const TRAIL_STEP_MM = 8;
-const TRAIL_INKS = [0.15, 0.28, 0.42, 0.6];
 const CLICK_PX = 6;
 const PIXELS_PER_MM = { least: 0.01, most: 8 };
-const SPARE = 0.05; // of the map's size, around what Fit shows
-const EDGE_PX = 36; // above and below lie tools and hints
+const MARGIN = 0.05; // of the map's size, around what Fit shows
+const EDGE_PX = 36; // covered by tools above and hints below
 
 const element = (id) => document.getElementById(id);
 
@@ -22,10 +17,10 @@ export class FleetMap {
     this.send = send;
     this.notice = notice;
     this.canvas = element("canvas");
-    this.paper = this.canvas.getContext("2d");
-    this.shows = { trails: true, beams: true, names: true, truth: localStorage.getItem("truth") === "true" };
+    this.painter = new MapPainter(this);
+    this.shows = { trails: true, beams: true, names: true, ground_truth: localStorage.getItem("ground_truth") === "true" };
     this.view = { x: 0, y: 0, scale: 0.3 };
-    this.held = false; // people chose what they see: it stays until they press Fit
+    this.pinned = false; // then the view stays until Fit is pressed
     this.trails = new Map();
     this.pointers = new Map();
     this.going = false;
@@ -36,7 +31,7 @@ export class FleetMap {
       element(name).addEventListener("click", () => this.toggle(name));
     }
     element("fit").addEventListener("click", () => {
-      this.held = false;
+      this.pinned = false;
       this.fit();
     });
     element("zoomin").addEventListener("click", () => this.zoom(1.4));
@@ -48,11 +43,16 @@ export class FleetMap {
   toggle(name) {
     this.shows[name] = !this.shows[name];
     element(name).setAttribute("aria-pressed", String(this.shows[name]));
-    if (name === "truth") {
-      localStorage.setItem("truth", String(this.shows.truth));
-      this.send({ do: "look", truth: this.shows.truth });
+    if (name === "ground_truth") {
+      localStorage.setItem("ground_truth", String(this.shows.ground_truth));
+      this.requestGroundTruth();
     }
     this.draw();
+  }
+
+  /** Subscribe to ground truth or not; to be repeated on each connection. */
+  requestGroundTruth() {
+    this.send({ do: "show", ground_truth: this.shows.ground_truth });
   }
 
   setGoing(going) {
@@ -61,7 +61,7 @@ export class FleetMap {
     this.canvas.classList.toggle("going", going);
     element("hint").hidden = !going;
     element("hint").textContent = going
-      ? `Click where ${this.state.chosen} shall go; drag to say where it shall look.`
+      ? `Click the goal of ${this.state.chosen}; drag to set its final heading.`
       : "";
     this.draw();
   }
@@ -159,14 +159,14 @@ export class FleetMap {
   }
 
   pan(px, py) {
-    this.held = true;
+    this.pinned = true;
     this.view.x -= px / this.view.scale;
     this.view.y += py / this.view.scale;
     this.draw();
   }
 
   zoom(factor, px = this.width / 2, py = this.height / 2) {
-    this.held = true;
+    this.pinned = true;
     const [x, y] = this.toMap(px, py);
     const { least, most } = PIXELS_PER_MM;
     this.view.scale = Math.min(most, Math.max(least, this.view.scale * factor));
@@ -192,7 +192,7 @@ export class FleetMap {
     for (const [x, y, radius] of this.state.arena.circles) add(x, y, radius);
     if (!xs.length) return false;
     const [left, right, low, high] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
-    const room = 1 - SPARE;
+    const room = 1 - MARGIN;
     this.view.x = (left + right) / 2;
     this.view.y = (low + high) / 2;
     this.view.scale = Math.min(
@@ -210,21 +210,21 @@ export class FleetMap {
     this.height = clientHeight;
     this.canvas.width = Math.round(clientWidth * ratio);
     this.canvas.height = Math.round(clientHeight * ratio);
-    this.paper.setTransform(ratio, 0, 0, ratio, 0, 0);
-    if (!this.held) this.fit();
+    this.painter.context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    if (!this.pinned) this.fit();
     this.draw();
   }
 
-  // ------------------------------------------------------------ news
+  // ------------------------------------------------------------ updates
 
-  update(news) {
-    if ("poses" in news) this.keepTrails();
+  update(updates) {
+    if ("poses" in updates) this.keepTrails();
     const count = Object.keys(this.state.poses).length;
-    if (!this.held && this.fittedFor !== this.sceneKey(count) && this.fit()) this.fittedFor = this.sceneKey(count);
+    if (!this.pinned && this.fittedFor !== this.sceneKey(count) && this.fit()) this.fittedFor = this.sceneKey(count);
     this.draw();
   }
 
-  /** What is there to be seen: when it changes, everything is shown anew. */
+  /** What there is to see: when it changes, the view fits it again. */
   sceneKey(count) {
     return `${count} ${this.state.arena.boxes.length} ${this.state.fleet.robots.filter((robot) => robot.located).length}`;
   }
@@ -237,7 +237,7 @@ export class FleetMap {
       this.trails.set(name, trail);
       const last = trail[trail.length - 1];
       const step = last ? Math.hypot(pose[0] - last[0], pose[1] - last[1]) : Infinity;
-      // A robot that was carried, or whose odometry was set: no line across the map.
+      // The robot was carried, or its odometry was set: no line across the map.
       if (last && step > 500) trail.length = 0;
       if (step > TRAIL_STEP_MM) trail.push([pose[0], pose[1], now]);
     }
@@ -254,279 +254,7 @@ export class FleetMap {
     this.waiting = true;
     requestAnimationFrame(() => {
       this.waiting = false;
-      this.paint();
+      if (this.width) this.painter.paint();
     });
-  }
-
-  paint() {
-    if (!this.width) return;
-    const { paper, view, state } = this;
-    const style = getComputedStyle(document.documentElement);
-    this.ink = (name) => style.getPropertyValue(name).trim();
-    paper.save();
-    paper.fillStyle = this.ink("--floor");
-    paper.fillRect(0, 0, this.width, this.height);
-    paper.translate(this.width / 2, this.height / 2);
-    paper.scale(view.scale, -view.scale);
-    paper.translate(-view.x, -view.y);
-    this.paintGrid();
-    this.paintArena();
-    const robots = state.fleet.robots.filter((robot) => robot.state !== "REFUSED" && state.poses[robot.name]);
-    if (this.shows.trails) for (const robot of robots) this.paintTrail(robot);
-    if (this.shows.truth) for (const robot of robots) this.paintTruth(robot);
-    for (const robot of robots) this.paintGoal(robot);
-    if (this.shows.beams) for (const robot of robots) this.paintBeams(robot);
-    for (const robot of robots) this.paintRobot(robot);
-    if (this.aim) this.paintAim();
-    paper.restore();
-    if (this.shows.names) this.paintNames(robots);
-    this.paintScale();
-  }
-
-  at(pose, paint) {
-    const { paper } = this;
-    paper.save();
-    paper.translate(pose[0], pose[1]);
-    paper.rotate(pose[2] / 1000);
-    paint(paper);
-    paper.restore();
-  }
-
-  paintGrid() {
-    const { paper, view } = this;
-    const steps = [10, 100, 1000, 10000];
-    const fine = steps.find((step) => step * view.scale >= 14) || 100000;
-    const [left, low] = this.toMap(0, this.height);
-    const [right, high] = this.toMap(this.width, 0);
-    for (const [step, ink] of [[fine, "--grid"], [fine * 10, "--grid-bold"]]) {
-      paper.strokeStyle = this.ink(ink);
-      paper.lineWidth = 1 / view.scale;
-      paper.beginPath();
-      for (let x = Math.ceil(left / step) * step; x <= right; x += step) {
-        paper.moveTo(x, low);
-        paper.lineTo(x, high);
-      }
-      for (let y = Math.ceil(low / step) * step; y <= high; y += step) {
-        paper.moveTo(left, y);
-        paper.lineTo(right, y);
-      }
-      paper.stroke();
-    }
-  }
-
-  paintArena() {
-    const { paper, state, view } = this;
-    paper.fillStyle = this.ink("--wall");
-    for (const [x, y, yaw, length, width] of state.arena.boxes) {
-      const thick = Math.max(width, 3 / view.scale);
-      this.at([x, y, yaw], () => paper.fillRect(-length / 2, -thick / 2, length, thick));
-    }
-    for (const [x, y, radius] of state.arena.circles) {
-      paper.beginPath();
-      paper.arc(x, y, radius, 0, 2 * Math.PI);
-      paper.fill();
-    }
-  }
-
-  paintTrail(robot) {
-    const trail = this.trails.get(robot.name);
-    if (!trail || trail.length < 2) return;
-    const { paper, view } = this;
-    const now = Date.now();
-    paper.lineWidth = Math.max(5, 1.5 / view.scale);
-    paper.lineJoin = paper.lineCap = "round";
-    // In a few pieces, the older the fainter.
-    const pieces = TRAIL_INKS.map(() => new Path2D());
-    const pose = this.state.poses[robot.name];
-    [...trail, [pose[0], pose[1], now]].forEach(([x, y, time], index, points) => {
-      if (index === 0) return;
-      const age = Math.min(0.999, (now - time) / TRAIL_MS);
-      const piece = pieces[Math.floor((1 - age) * (TRAIL_INKS.length - 0.001))];
-      piece.moveTo(points[index - 1][0], points[index - 1][1]);
-      piece.lineTo(x, y);
-    });
-    pieces.forEach((piece, index) => {
-      paper.strokeStyle = colourOf(robot.id, TRAIL_INKS[index]);
-      paper.stroke(piece);
-    });
-  }
-
-  paintTruth(robot) {
-    const truth = this.state.truth[robot.name];
-    if (!truth) return;
-    const { paper, view } = this;
-    paper.strokeStyle = this.ink("--ink");
-    paper.lineWidth = 1.2 / view.scale;
-    paper.setLineDash([4 / view.scale, 3 / view.scale]);
-    this.at(truth, () => {
-      paper.beginPath();
-      paper.arc(0, 0, BODY_MM, 0, 2 * Math.PI);
-      paper.moveTo(0, 0);
-      paper.lineTo(BODY_MM * 1.35, 0);
-      paper.stroke();
-    });
-    paper.setLineDash([]);
-  }
-
-  paintGoal(robot) {
-    const goal = this.state.goals[robot.name];
-    if (!goal) return;
-    const { paper, view, state } = this;
-    const pose = state.poses[robot.name];
-    paper.strokeStyle = paper.fillStyle = colourOf(robot.id);
-    paper.lineWidth = Math.max(3, 1.5 / view.scale);
-    paper.setLineDash([14, 12]);
-    paper.beginPath();
-    paper.moveTo(pose[0], pose[1]);
-    paper.lineTo(goal[0], goal[1]);
-    paper.stroke();
-    paper.setLineDash([]);
-    for (const radius of [26, 11]) {
-      paper.beginPath();
-      paper.arc(goal[0], goal[1], Math.max(radius, (radius / 4) / view.scale), 0, 2 * Math.PI);
-      if (radius === 11) paper.fill();
-      else paper.stroke();
-    }
-  }
-
-  paintBeams(robot) {
-    const ranges = this.state.ranges[robot.name];
-    if (!ranges || robot.state !== "READY") return;
-    const { paper, view } = this;
-    this.at(this.state.poses[robot.name], () => {
-      ranges.forEach((range, index) => {
-        const turn = -Math.PI + (index * 2 * Math.PI) / ranges.length;
-        const [cosine, sine] = [Math.cos(turn), Math.sin(turn)];
-        if (range === null || range < 0) {
-          // Nothing in reach: a tick that shows where the sensor looks.
-          paper.strokeStyle = this.ink("--beam-free");
-          paper.lineWidth = 1 / view.scale;
-          paper.beginPath();
-          paper.moveTo(BODY_MM * cosine, BODY_MM * sine);
-          paper.lineTo((BODY_MM + 14) * cosine, (BODY_MM + 14) * sine);
-          paper.stroke();
-          return;
-        }
-        const near = Math.min(1, Math.max(0, (range - BODY_MM) / (SENSOR_REACH_MM - BODY_MM)));
-        const reach = Math.max(range, BODY_MM);
-        const ink = `hsl(${(near * 48).toFixed(0)} 90% ${isDark() ? 58 : 44}%)`;
-        paper.strokeStyle = paper.fillStyle = ink;
-        paper.lineWidth = Math.max(2.5, 1 / view.scale);
-        paper.globalAlpha = 0.45;
-        paper.beginPath();
-        paper.moveTo(BODY_MM * cosine, BODY_MM * sine);
-        paper.lineTo(reach * cosine, reach * sine);
-        paper.stroke();
-        paper.globalAlpha = 1;
-        paper.beginPath();
-        paper.arc(reach * cosine, reach * sine, Math.max(5, 2 / view.scale), 0, 2 * Math.PI);
-        paper.fill();
-      });
-    });
-  }
-
-  paintRobot(robot) {
-    const { paper, view, state } = this;
-    const here = robot.state === "READY";
-    const light = state.lights[robot.name];
-    this.at(state.poses[robot.name], () => {
-      paper.globalAlpha = here ? 1 : 0.4;
-      if (light) {
-        const glow = paper.createRadialGradient(0, 0, BODY_MM * 0.6, 0, 0, BODY_MM * 2);
-        glow.addColorStop(0, light + "99");
-        glow.addColorStop(1, light + "00");
-        paper.fillStyle = glow;
-        paper.beginPath();
-        paper.arc(0, 0, BODY_MM * 2, 0, 2 * Math.PI);
-        paper.fill();
-      }
-      paper.fillStyle = this.ink("--tyre");
-      for (const side of [-1, 1]) {
-        paper.fillRect(-WHEEL_MM[0], side * WHEEL_MM[2] - WHEEL_MM[1] / 2, 2 * WHEEL_MM[0], WHEEL_MM[1]);
-      }
-      paper.fillStyle = this.ink("--shell");
-      paper.strokeStyle = colourOf(robot.id);
-      paper.lineWidth = Math.max(6, 1.6 / view.scale);
-      if (!here) paper.setLineDash([12, 9]);
-      paper.beginPath();
-      paper.arc(0, 0, BODY_MM - 3, 0, 2 * Math.PI);
-      paper.fill();
-      paper.stroke();
-      paper.setLineDash([]);
-      // An arrowhead says where ahead is.
-      paper.fillStyle = colourOf(robot.id);
-      paper.beginPath();
-      paper.moveTo(BODY_MM * 1.38, 0);
-      paper.lineTo(BODY_MM * 0.72, BODY_MM * 0.48);
-      paper.lineTo(BODY_MM * 0.72, -BODY_MM * 0.48);
-      paper.closePath();
-      paper.fill();
-      paper.fillStyle = light || this.ink("--dark-light");
-      paper.beginPath();
-      paper.arc(-2, 0, BODY_MM * 0.42, 0, 2 * Math.PI);
-      paper.fill();
-      paper.globalAlpha = 1;
-      if (robot.name === state.chosen) {
-        paper.strokeStyle = this.ink("--accent");
-        paper.lineWidth = 2.5 / view.scale;
-        paper.beginPath();
-        paper.arc(0, 0, BODY_MM * 1.5 + 4 / view.scale, 0, 2 * Math.PI);
-        paper.stroke();
-      }
-    });
-  }
-
-  paintAim() {
-    const { paper, view } = this;
-    const { from, to } = this.aim;
-    paper.strokeStyle = paper.fillStyle = this.ink("--accent");
-    paper.lineWidth = 2 / view.scale;
-    paper.beginPath();
-    paper.arc(from[0], from[1], 6 / view.scale, 0, 2 * Math.PI);
-    paper.fill();
-    if (!to) return;
-    paper.beginPath();
-    paper.moveTo(from[0], from[1]);
-    paper.lineTo(to[0], to[1]);
-    paper.stroke();
-  }
-
-  paintNames(robots) {
-    const { paper, view, state } = this;
-    paper.font = "600 12px system-ui, sans-serif";
-    paper.textAlign = "center";
-    paper.textBaseline = "top";
-    paper.lineWidth = 3;
-    paper.strokeStyle = this.ink("--floor");
-    for (const robot of robots) {
-      const pose = state.poses[robot.name];
-      const x = this.width / 2 + (pose[0] - view.x) * view.scale;
-      const y = this.height / 2 - (pose[1] - view.y) * view.scale + BODY_MM * 1.25 * view.scale + 3;
-      // Where names would lie on each other the number has to do.
-      const short = robots.length > 12 && BODY_MM * view.scale < 22 && robot.name !== state.chosen && robot.id >= 0;
-      const text = short ? String(robot.id) : robot.name;
-      paper.strokeText(text, x, y);
-      paper.fillStyle = robot.state === "READY" ? this.ink("--ink") : this.ink("--bad");
-      paper.fillText(text, x, y);
-    }
-  }
-
-  paintScale() {
-    const { paper, view } = this;
-    const length = [10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000].find((mm) => mm * view.scale > 60) || 10000;
-    const wide = length * view.scale;
-    const [x, y] = [14, this.height - 14];
-    paper.strokeStyle = paper.fillStyle = this.ink("--quiet");
-    paper.lineWidth = 1.5;
-    paper.beginPath();
-    paper.moveTo(x, y - 5);
-    paper.lineTo(x, y);
-    paper.lineTo(x + wide, y);
-    paper.lineTo(x + wide, y - 5);
-    paper.stroke();
-    paper.font = "12px system-ui, sans-serif";
-    paper.textAlign = "left";
-    paper.textBaseline = "bottom";
-    paper.fillText(length < 1000 ? `${length / 10} cm` : `${length / 1000} m`, x + 5, y - 3);
   }
 }

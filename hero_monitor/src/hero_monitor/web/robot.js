@@ -1,8 +1,8 @@
-// The chosen robot: what is known of it, and, where the monitor allows it, driving it.
+// The chosen robot: its data, and controls for driving it if the monitor allows that.
 //
-// Dead man's switch: while a button or key is held the page says so every 100 ms. It stops saying so when the button
-// is let go, the page is hidden or loses the keyboard, or the network is stuck; the monitor stops the robot when it
-// hears "release", or hears nothing for 0.4 s, or the socket closes.
+// Dead man's switch: while a button or key is held, the page sends a command every 100 ms. It stops sending when the
+// button is released, the page is hidden or loses focus, or the network stalls. The monitor stops the robot on
+// "release", after 0.4 s of silence, or when the socket closes.
 
 import { colourOf } from "./colours.js";
 import { healthOf, spanOf } from "./fleet.js";
@@ -27,35 +27,35 @@ export class RobotPanel {
     this.facts = new Map();
     const pad = element("pad");
     for (const button of pad.querySelectorAll("button")) {
-      const way = button.dataset.way.split(" ").map(Number);
+      const direction = button.dataset.direction.split(" ").map(Number);
       button.addEventListener("pointerdown", (event) => {
         event.preventDefault();
         pad.focus();
         button.setPointerCapture(event.pointerId);
         button.classList.add("down");
-        this.hold(way);
+        this.hold(direction);
       });
       for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) {
         button.addEventListener(end, () => {
           button.classList.remove("down");
-          this.letGo();
+          this.release();
         });
       }
       button.addEventListener("contextmenu", (event) => event.preventDefault());
       // A button that is reached with Tab is held with the space bar.
       button.addEventListener("keydown", (event) => {
-        if (event.code === "Space" && !event.repeat) this.hold(way);
+        if (event.code === "Space" && !event.repeat) this.hold(direction);
         if (event.code === "Space") event.preventDefault();
       });
-      button.addEventListener("keyup", (event) => event.code === "Space" && this.letGo());
+      button.addEventListener("keyup", (event) => event.code === "Space" && this.release());
     }
     pad.addEventListener("keydown", (event) => this.pressKey(event));
     pad.addEventListener("keyup", (event) => this.liftKey(event));
-    pad.addEventListener("focusout", () => this.letGo());
-    addEventListener("blur", () => this.letGo());
-    addEventListener("pagehide", () => this.letGo());
-    document.addEventListener("visibilitychange", () => document.hidden && this.letGo());
-    for (const [id, unit] of [["linear", "m/s"], ["turn", "rad/s"]]) {
+    pad.addEventListener("focusout", () => this.release());
+    addEventListener("blur", () => this.release());
+    addEventListener("pagehide", () => this.release());
+    document.addEventListener("visibilitychange", () => document.hidden && this.release());
+    for (const [id, unit] of [["linear", "m/s"], ["angular", "rad/s"]]) {
       const show = () => (element(`${id}_value`).textContent = `${Number(element(id).value).toFixed(2)} ${unit}`);
       element(id).addEventListener("input", show);
       show();
@@ -67,7 +67,7 @@ export class RobotPanel {
   setGoing(going) {
     this.map.setGoing(going && this.name !== null);
     element("goto").setAttribute("aria-pressed", String(this.map.going));
-    element("goto").textContent = this.map.going ? "Choosing a place" : "Go to a place";
+    element("goto").textContent = this.map.going ? "Choosing a goal" : "Go to goal";
   }
 
   pressKey(event) {
@@ -81,7 +81,7 @@ export class RobotPanel {
   liftKey(event) {
     if (!this.keys.delete(event.code)) return;
     if (this.keys.size) this.holdKeys();
-    else this.letGo();
+    else this.release();
   }
 
   holdKeys() {
@@ -90,26 +90,26 @@ export class RobotPanel {
     this.hold(sum.map(Math.sign));
   }
 
-  hold(way) {
+  hold(direction) {
     if (this.name === null) return;
-    this.driving = { robot: this.name, way };
-    this.say();
-    if (this.timer === null) this.timer = setInterval(() => this.say(), HOLD_MS);
+    this.driving = { robot: this.name, direction };
+    this.sendCommand();
+    if (this.timer === null) this.timer = setInterval(() => this.sendCommand(), HOLD_MS);
   }
 
-  say() {
+  sendCommand() {
     if (document.hidden || !document.hasFocus()) {
-      this.letGo();
+      this.release();
       return;
     }
     if (this.congested()) return;
-    const { robot, way } = this.driving;
-    // Backwards the turn is the other way round, as with a car.
-    const turn = way[1] * (way[0] < 0 ? -1 : 1) * Number(element("turn").value);
-    this.send({ do: "drive", robot, linear: way[0] * Number(element("linear").value), turn });
+    const { robot, direction } = this.driving;
+    // Backwards the turn is inverted, as in a car.
+    const angular = direction[1] * (direction[0] < 0 ? -1 : 1) * Number(element("angular").value);
+    this.send({ do: "drive", robot, linear: direction[0] * Number(element("linear").value), angular });
   }
 
-  letGo() {
+  release() {
     this.keys.clear();
     if (this.timer !== null) clearInterval(this.timer);
     this.timer = null;
@@ -121,7 +121,7 @@ export class RobotPanel {
     const robot = state.fleet.robots.find((one) => one.name === state.chosen && one.state !== "REFUSED") || null;
     const name = robot === null ? null : robot.name;
     if (name !== this.name) {
-      this.letGo();
+      this.release();
       this.name = name;
       this.setGoing(false);
     }
@@ -132,7 +132,7 @@ export class RobotPanel {
     element("control").hidden = robot === null || !state.hello.control;
     element("advice").hidden = robot !== null && state.hello.control;
     element("advice").textContent =
-      robot === null ? "Click a robot on the map or in the table." : "This monitor only looks. control:=true lets it drive robots.";
+      robot === null ? "Click a robot on the map or in the table." : "View only. control:=true lets the monitor drive robots.";
     const trouble = robot ? healthOf(robot) : "";
     element("trouble").hidden = !trouble;
     element("trouble").textContent = trouble;
@@ -146,23 +146,23 @@ export class RobotPanel {
     const facts = [
       ["pose", pose ? `${metres(pose[0])} ${metres(pose[1])} m, ${((pose[2] / 1000) * (180 / Math.PI)).toFixed(0)}°` : "-"],
       ["stop", robot.stop || "-"],
-      ["frame", robot.located ? "map" : "own odometry: place on the map unknown"],
-      ["way", robot.way === null ? "-" : `${robot.way.toFixed(2)} m since you look`],
+      ["frame", robot.located ? "map" : "own odometry: position on the map unknown"],
+      ["distance", robot.distance === null ? "-" : `${robot.distance.toFixed(2)} m since this view opened`],
       ["nearest", ranges.length ? `${metres(Math.min(...ranges))} m` : "nothing in range"],
       ["odometry", robot.odom === null ? "-" : `${robot.odom.toFixed(1)} Hz`],
-      ["from robot", `${robot.frames.toFixed(0)} frames/s, ${(robot.bytes / 1000).toFixed(1)} kB/s`],
+      ["from robot", `${robot.packets.toFixed(0)} packets/s, ${(robot.bytes / 1000).toFixed(1)} kB/s`],
       ["address", robot.address],
-      ["versions", [robot.firmware, robot.hardware, robot.config].filter(Boolean).join(", ") || "not said yet"],
+      ["versions", [robot.firmware, robot.hardware, robot.config].filter(Boolean).join(", ") || "unknown"],
       ["up for", robot.uptime ? spanOf(robot.uptime) : "-"],
       ["state since", spanOf(robot.since)],
-      ["returns", String(robot.reconnects)],
-      ["clock ahead", robot.clock === null ? "-" : `${(robot.clock * 1000).toFixed(1)} ms`],
-      ["dropped", `${robot.dropped} messages, ${robot.bad} bad frames`],
-      ["diagnosis", robot.health[1] || "-"],
+      ["reconnects", String(robot.reconnects)],
+      ["clock offset", robot.clock === null ? "-" : `${(robot.clock * 1000).toFixed(1)} ms`],
+      ["dropped", `${robot.dropped} messages, ${robot.bad} bad packets`],
+      ["diagnostics", robot.health[1] || "-"],
     ];
-    const truth = state.truth[robot.name];
+    const truth = state.ground_truth[robot.name];
     if (pose && truth) {
-      facts.splice(1, 0, ["odometry is off", `${Math.hypot(pose[0] - truth[0], pose[1] - truth[1]).toFixed(0)} mm`]);
+      facts.splice(1, 0, ["odometry error", `${Math.hypot(pose[0] - truth[0], pose[1] - truth[1]).toFixed(0)} mm`]);
     }
     return facts;
   }

@@ -1,21 +1,21 @@
-// STOP ALL: what people see from the press until all wheels are at rest, also where the monitor does not answer.
+// STOP ALL: its status from the press until all wheels are at rest, even if the monitor does not answer.
 
-const ANSWER_MS = 1400; // with one step of the timer, people see within 1.5 s that nothing came back
+const ANSWER_MS = 1400; // with one step of the timer, a missing answer shows within 1.5 s
 const STEP_MS = 100;
 const ASK_MS = 4000;
 
 const element = (id) => document.getElementById(id);
 
 export class StopPanel {
-  constructor({ send, isOpen, letGo, notice }) {
+  constructor({ send, isOpen, releaseRobot, notice }) {
     this.send = send;
     this.isOpen = isOpen;
-    this.letGo = letGo;
+    this.releaseRobot = releaseRobot;
     this.notice = notice;
     this.pressedMs = null; // when it was pressed; null once the monitor has acknowledged that
-    this.status = null; // what the monitor says of the last request
-    this.stopped = false; // whether the drivers say that all robots are stopped
-    this.heardMs = 0; // while robots are being stopped the monitor says something all the time
+    this.status = null; // the monitor's status of the last request
+    this.stopped = false; // whether all drivers report that they have stopped
+    this.heardMs = 0; // while robots are being stopped the monitor sends updates all the time
     this.askedMs = 0;
     element("stop").addEventListener("click", () => this.press());
     element("release").addEventListener("click", () => this.release());
@@ -23,7 +23,7 @@ export class StopPanel {
   }
 
   press() {
-    this.letGo();
+    this.releaseRobot();
     this.pressedMs = this.pressedMs ?? Date.now();
     this.send({ do: "stop", stop: true });
     this.show();
@@ -38,24 +38,24 @@ export class StopPanel {
     if (!this.send({ do: "stop", stop: false })) this.notice("error", "NOT RELEASED: no connection to the monitor");
   }
 
-  /** A new connection: what was pressed without one is sent now. */
+  /** Send on a new connection what was pressed without one. */
   open() {
     if (this.pressedMs !== null) this.send({ do: "stop", stop: true });
   }
 
-  receive(news) {
+  receive(updates) {
     this.heardMs = Date.now();
-    if (news.received === "stop") this.pressedMs = null;
-    if ("fleet" in news) this.stopped = news.fleet.stopped;
-    if ("stop" in news) {
-      const passing = news.stop !== null && news.stop.is_final && news.stop.level !== "error" && !this.stopped;
-      if (passing && this.status !== null) this.notice(news.stop.level, news.stop.text);
-      this.status = news.stop;
+    if (updates.received === "stop") this.pressedMs = null;
+    if ("fleet" in updates) this.stopped = updates.fleet.stopped;
+    if ("stop" in updates) {
+      const passing = updates.stop !== null && updates.stop.is_final && updates.stop.level !== "error" && !this.stopped;
+      if (passing && this.status !== null) this.notice(updates.stop.level, updates.stop.text);
+      this.status = updates.stop;
     }
     this.show();
   }
 
-  /** Why nobody can say whether the robots stop; null while the monitor answers. */
+  /** Why the outcome is unknown; null while the monitor answers. */
   failure() {
     const pressed = this.pressedMs !== null;
     if (!pressed && (this.status === null || this.status.is_final)) return null;
@@ -64,7 +64,7 @@ export class StopPanel {
     return Date.now() - (pressed ? this.pressedMs : this.heardMs) >= ANSWER_MS ? "the monitor does not answer" : null;
   }
 
-  /** Level and text for people, null for nothing. */
+  /** Level and text of the banner; null for none. */
   describe() {
     const failure = this.failure();
     if (failure !== null) return ["error", `NOT STOPPED: ${failure}`];

@@ -1,0 +1,288 @@
+// Paints the map: grid, arena, trails, goals, beams and robots. Lengths in mm, angles in mrad.
+
+import { colourOf, isDark } from "./colours.js";
+
+export const BODY_MM = 36.85;
+export const TRAIL_MS = 60000;
+const WHEEL_MM = [24.6, 6, 31.5]; // radius, width, distance from the middle
+const SENSOR_REACH_MM = 236.8;
+const TRAIL_INKS = [0.15, 0.28, 0.42, 0.6];
+
+export class MapPainter {
+  constructor(map) {
+    this.map = map;
+    this.context = map.canvas.getContext("2d");
+  }
+
+  paint() {
+    const { map, context } = this;
+    const { view, state, shows } = map;
+    Object.assign(this, { view, state, width: map.width, height: map.height });
+    const style = getComputedStyle(document.documentElement);
+    this.ink = (name) => style.getPropertyValue(name).trim();
+    context.save();
+    context.fillStyle = this.ink("--floor");
+    context.fillRect(0, 0, this.width, this.height);
+    context.translate(this.width / 2, this.height / 2);
+    context.scale(view.scale, -view.scale);
+    context.translate(-view.x, -view.y);
+    this.paintGrid();
+    this.paintArena();
+    const robots = state.fleet.robots.filter((robot) => robot.state !== "REFUSED" && state.poses[robot.name]);
+    if (shows.trails) for (const robot of robots) this.paintTrail(robot);
+    if (shows.ground_truth) for (const robot of robots) this.paintGroundTruth(robot);
+    for (const robot of robots) this.paintGoal(robot);
+    if (shows.beams) for (const robot of robots) this.paintBeams(robot);
+    for (const robot of robots) this.paintRobot(robot);
+    if (map.aim) this.paintAim(map.aim);
+    context.restore();
+    if (shows.names) this.paintNames(robots);
+    this.paintScale();
+  }
+
+  at(pose, paint) {
+    const { context } = this;
+    context.save();
+    context.translate(pose[0], pose[1]);
+    context.rotate(pose[2] / 1000);
+    paint(context);
+    context.restore();
+  }
+
+  paintGrid() {
+    const { context, view } = this;
+    const steps = [10, 100, 1000, 10000];
+    const fine = steps.find((step) => step * view.scale >= 14) || 100000;
+    const [left, low] = this.map.toMap(0, this.height);
+    const [right, high] = this.map.toMap(this.width, 0);
+    for (const [step, ink] of [[fine, "--grid"], [fine * 10, "--grid-bold"]]) {
+      context.strokeStyle = this.ink(ink);
+      context.lineWidth = 1 / view.scale;
+      context.beginPath();
+      for (let x = Math.ceil(left / step) * step; x <= right; x += step) {
+        context.moveTo(x, low);
+        context.lineTo(x, high);
+      }
+      for (let y = Math.ceil(low / step) * step; y <= high; y += step) {
+        context.moveTo(left, y);
+        context.lineTo(right, y);
+      }
+      context.stroke();
+    }
+  }
+
+  paintArena() {
+    const { context, state, view } = this;
+    context.fillStyle = this.ink("--wall");
+    for (const [x, y, yaw, length, width] of state.arena.boxes) {
+      const thick = Math.max(width, 3 / view.scale);
+      this.at([x, y, yaw], () => context.fillRect(-length / 2, -thick / 2, length, thick));
+    }
+    for (const [x, y, radius] of state.arena.circles) {
+      context.beginPath();
+      context.arc(x, y, radius, 0, 2 * Math.PI);
+      context.fill();
+    }
+  }
+
+  paintTrail(robot) {
+    const trail = this.map.trails.get(robot.name);
+    if (!trail || trail.length < 2) return;
+    const { context, view } = this;
+    const now = Date.now();
+    context.lineWidth = Math.max(5, 1.5 / view.scale);
+    context.lineJoin = context.lineCap = "round";
+    // In a few pieces, older ones fainter.
+    const pieces = TRAIL_INKS.map(() => new Path2D());
+    const pose = this.state.poses[robot.name];
+    [...trail, [pose[0], pose[1], now]].forEach(([x, y, time], index, points) => {
+      if (index === 0) return;
+      const age = Math.min(0.999, (now - time) / TRAIL_MS);
+      const piece = pieces[Math.floor((1 - age) * (TRAIL_INKS.length - 0.001))];
+      piece.moveTo(points[index - 1][0], points[index - 1][1]);
+      piece.lineTo(x, y);
+    });
+    pieces.forEach((piece, index) => {
+      context.strokeStyle = colourOf(robot.id, TRAIL_INKS[index]);
+      context.stroke(piece);
+    });
+  }
+
+  paintGroundTruth(robot) {
+    const pose = this.state.ground_truth[robot.name];
+    if (!pose) return;
+    const { context, view } = this;
+    context.strokeStyle = this.ink("--ink");
+    context.lineWidth = 1.2 / view.scale;
+    context.setLineDash([4 / view.scale, 3 / view.scale]);
+    this.at(pose, () => {
+      context.beginPath();
+      context.arc(0, 0, BODY_MM, 0, 2 * Math.PI);
+      context.moveTo(0, 0);
+      context.lineTo(BODY_MM * 1.35, 0);
+      context.stroke();
+    });
+    context.setLineDash([]);
+  }
+
+  paintGoal(robot) {
+    const goal = this.state.goals[robot.name];
+    if (!goal) return;
+    const { context, view, state } = this;
+    const pose = state.poses[robot.name];
+    context.strokeStyle = context.fillStyle = colourOf(robot.id);
+    context.lineWidth = Math.max(3, 1.5 / view.scale);
+    context.setLineDash([14, 12]);
+    context.beginPath();
+    context.moveTo(pose[0], pose[1]);
+    context.lineTo(goal[0], goal[1]);
+    context.stroke();
+    context.setLineDash([]);
+    for (const radius of [26, 11]) {
+      context.beginPath();
+      context.arc(goal[0], goal[1], Math.max(radius, (radius / 4) / view.scale), 0, 2 * Math.PI);
+      if (radius === 11) context.fill();
+      else context.stroke();
+    }
+  }
+
+  paintBeams(robot) {
+    const ranges = this.state.ranges[robot.name];
+    if (!ranges || robot.state !== "READY") return;
+    const { context, view } = this;
+    this.at(this.state.poses[robot.name], () => {
+      ranges.forEach((range, index) => {
+        const turn = -Math.PI + (index * 2 * Math.PI) / ranges.length;
+        const [cosine, sine] = [Math.cos(turn), Math.sin(turn)];
+        if (range === null || range < 0) {
+          // Nothing in range: a tick shows the sensor's direction.
+          context.strokeStyle = this.ink("--beam-free");
+          context.lineWidth = 1 / view.scale;
+          context.beginPath();
+          context.moveTo(BODY_MM * cosine, BODY_MM * sine);
+          context.lineTo((BODY_MM + 14) * cosine, (BODY_MM + 14) * sine);
+          context.stroke();
+          return;
+        }
+        const near = Math.min(1, Math.max(0, (range - BODY_MM) / (SENSOR_REACH_MM - BODY_MM)));
+        const reach = Math.max(range, BODY_MM);
+        const ink = `hsl(${(near * 48).toFixed(0)} 90% ${isDark() ? 58 : 44}%)`;
+        context.strokeStyle = context.fillStyle = ink;
+        context.lineWidth = Math.max(2.5, 1 / view.scale);
+        context.globalAlpha = 0.45;
+        context.beginPath();
+        context.moveTo(BODY_MM * cosine, BODY_MM * sine);
+        context.lineTo(reach * cosine, reach * sine);
+        context.stroke();
+        context.globalAlpha = 1;
+        context.beginPath();
+        context.arc(reach * cosine, reach * sine, Math.max(5, 2 / view.scale), 0, 2 * Math.PI);
+        context.fill();
+      });
+    });
+  }
+
+  paintRobot(robot) {
+    const { context, view, state } = this;
+    const here = robot.state === "READY";
+    const light = state.lights[robot.name];
+    this.at(state.poses[robot.name], () => {
+      context.globalAlpha = here ? 1 : 0.4;
+      if (light) {
+        const glow = context.createRadialGradient(0, 0, BODY_MM * 0.6, 0, 0, BODY_MM * 2);
+        glow.addColorStop(0, light + "99");
+        glow.addColorStop(1, light + "00");
+        context.fillStyle = glow;
+        context.beginPath();
+        context.arc(0, 0, BODY_MM * 2, 0, 2 * Math.PI);
+        context.fill();
+      }
+      context.fillStyle = this.ink("--tyre");
+      for (const side of [-1, 1]) {
+        context.fillRect(-WHEEL_MM[0], side * WHEEL_MM[2] - WHEEL_MM[1] / 2, 2 * WHEEL_MM[0], WHEEL_MM[1]);
+      }
+      context.fillStyle = this.ink("--shell");
+      context.strokeStyle = colourOf(robot.id);
+      context.lineWidth = Math.max(6, 1.6 / view.scale);
+      if (!here) context.setLineDash([12, 9]);
+      context.beginPath();
+      context.arc(0, 0, BODY_MM - 3, 0, 2 * Math.PI);
+      context.fill();
+      context.stroke();
+      context.setLineDash([]);
+      // An arrowhead marks the front.
+      context.fillStyle = colourOf(robot.id);
+      context.beginPath();
+      context.moveTo(BODY_MM * 1.38, 0);
+      context.lineTo(BODY_MM * 0.72, BODY_MM * 0.48);
+      context.lineTo(BODY_MM * 0.72, -BODY_MM * 0.48);
+      context.closePath();
+      context.fill();
+      context.fillStyle = light || this.ink("--dark-light");
+      context.beginPath();
+      context.arc(-2, 0, BODY_MM * 0.42, 0, 2 * Math.PI);
+      context.fill();
+      context.globalAlpha = 1;
+      if (robot.name === state.chosen) {
+        context.strokeStyle = this.ink("--accent");
+        context.lineWidth = 2.5 / view.scale;
+        context.beginPath();
+        context.arc(0, 0, BODY_MM * 1.5 + 4 / view.scale, 0, 2 * Math.PI);
+        context.stroke();
+      }
+    });
+  }
+
+  paintAim({ from, to }) {
+    const { context, view } = this;
+    context.strokeStyle = context.fillStyle = this.ink("--accent");
+    context.lineWidth = 2 / view.scale;
+    context.beginPath();
+    context.arc(from[0], from[1], 6 / view.scale, 0, 2 * Math.PI);
+    context.fill();
+    if (!to) return;
+    context.beginPath();
+    context.moveTo(from[0], from[1]);
+    context.lineTo(to[0], to[1]);
+    context.stroke();
+  }
+
+  paintNames(robots) {
+    const { context, view, state } = this;
+    context.font = "600 12px system-ui, sans-serif";
+    context.textAlign = "center";
+    context.textBaseline = "top";
+    context.lineWidth = 3;
+    context.strokeStyle = this.ink("--floor");
+    for (const robot of robots) {
+      const pose = state.poses[robot.name];
+      const x = this.width / 2 + (pose[0] - view.x) * view.scale;
+      const y = this.height / 2 - (pose[1] - view.y) * view.scale + BODY_MM * 1.25 * view.scale + 3;
+      // Ids alone where names would overlap.
+      const short = robots.length > 12 && BODY_MM * view.scale < 22 && robot.name !== state.chosen && robot.id >= 0;
+      const text = short ? String(robot.id) : robot.name;
+      context.strokeText(text, x, y);
+      context.fillStyle = robot.state === "READY" ? this.ink("--ink") : this.ink("--bad");
+      context.fillText(text, x, y);
+    }
+  }
+
+  paintScale() {
+    const { context, view } = this;
+    const length = [10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000].find((mm) => mm * view.scale > 60) || 10000;
+    const wide = length * view.scale;
+    const [x, y] = [14, this.height - 14];
+    context.strokeStyle = context.fillStyle = this.ink("--quiet");
+    context.lineWidth = 1.5;
+    context.beginPath();
+    context.moveTo(x, y - 5);
+    context.lineTo(x, y);
+    context.lineTo(x + wide, y);
+    context.lineTo(x + wide, y - 5);
+    context.stroke();
+    context.font = "12px system-ui, sans-serif";
+    context.textAlign = "left";
+    context.textBaseline = "bottom";
+    context.fillText(length < 1000 ? `${length / 10} cm` : `${length / 1000} m`, x + 5, y - 3);
+  }
+}
