@@ -1,56 +1,41 @@
-"""What can go wrong with a robot on request: `KIND[@SECONDS][:key=value,...]` -> Fault.
+"""What can go wrong with a robot on request: `KIND[@SECONDS][:key=value,...]`.
 
 Pure. The same text is used on the command line (--fault) and in the ROS service.
 """
 
 import math
-from typing import Dict, NamedTuple, Optional, Tuple
+from typing import Dict, List, NamedTuple, Optional
 
 from .errors import OptionError
 
-REBOOT = "reboot"
-VANISH = "vanish"
-LEAVE = "leave"
-DUPLICATE = "duplicate"
-ZERO_TOPICS = "zero-topics"
-FROZEN = "frozen"
-STALL = "stall"
-GARBAGE = "garbage"
-HALF_FRAME = "half-frame"
-BAD_CHECKSUM = "bad-checksum"
-BAD_LENGTH = "bad-length"
-LONG_FRAME = "long-frame"
-CLOCK_JUMP = "clock-jump"
-SLOW_SERVICE = "slow-service"
-FOREIGN_FRAMES = "foreign-id"
-TUNE_VELOCITY = "tune-velocity"
-TUNE_POSITION = "tune-position"
-PUSH = "push"
+__all__ = ["KINDS", "Fault", "describe_kinds", "parse_fault"]
 
-KINDS: Dict[str, Tuple[str, Dict[str, float]]] = {
-    REBOOT: ("starts again at once; the old connection gets no FIN", {}),
-    VANISH: ("power cut: no FIN, no acknowledgement; comes back by booting after for (0: never)", {"for": 0.0}),
-    LEAVE: ("closes its connection (FIN) and dials again after for, still streaming", {"for": 3.0}),
-    DUPLICATE: ("starts again with the id of another robot (as one whose flash was erased)", {"of": -1.0}),
-    ZERO_TOPICS: ("starts again and answers the first request without declaring anything", {}),
-    FROZEN: (
-        "its program stands still for so long; the connection stays, the motors keep their pulses",
-        {"for": 5.0},
-    ),
-    STALL: ("its radio carries nothing for so long, then everything at once", {"for": 2.0}),
-    GARBAGE: ("sends random bytes between two frames", {"bytes": 200.0}),
-    HALF_FRAME: ("sends the first half of a frame, and the next frame right behind it", {}),
-    BAD_CHECKSUM: ("sends a frame whose payload does not match its checksum", {}),
-    BAD_LENGTH: ("sends a header whose length does not match its checksum", {}),
-    LONG_FRAME: ("sends a right header that promises 65535 bytes, which never come", {}),
-    CLOCK_JUMP: ("its clock is wrong by so much until the next time answer", {"by": 60.0}),
-    SLOW_SERVICE: ("answers service calls so much later, from now on", {"by": 5.0}),
-    FOREIGN_FRAMES: ("sends a frame with an id that it did not declare", {"id": 199.0}),
-    TUNE_VELOCITY: ("its velocity controller tunes itself, as after a call of pid_calibration", {}),
-    TUNE_POSITION: ("its position controller tunes itself", {}),
-    PUSH: ("somebody pushes it forward by hand for so long, at speed; its wheels turn", {"for": 3.0, "speed": 0.1}),
+
+class Kind(NamedTuple):
+    """One sort of fault: what happens, and its keys with their defaults (s, m/s, bytes, ids)."""
+
+    meaning: str
+    defaults: Dict[str, float] = {}
+
+
+KINDS: Dict[str, Kind] = {
+    "reboot": Kind("restarts at once; the old connection gets no FIN"),
+    "vanish": Kind("power cut: no FIN, no acknowledgement; boots again after for (0: never)", {"for": 0.0}),
+    "leave": Kind("closes its connection (FIN) and connects again after for, still streaming", {"for": 3.0}),
+    "duplicate": Kind("restarts with the id of another robot (as one whose flash was erased)", {"of": -1.0}),
+    "zero-topics": Kind("restarts and answers the first request without declaring anything"),
+    "frozen": Kind("its program blocks for so long; connection and servo pulses stay", {"for": 5.0}),
+    "stall": Kind("its radio carries nothing for so long, then everything at once", {"for": 2.0}),
+    "garbage": Kind("sends random bytes between two packets", {"bytes": 200.0}),
+    "half-packet": Kind("sends the first half of a packet, and the next packet right behind it"),
+    "bad-checksum": Kind("sends a packet whose payload does not match its checksum"),
+    "bad-length": Kind("sends a header whose length does not match its checksum"),
+    "long-packet": Kind("sends a valid header that promises 65535 bytes, which never come"),
+    "clock-jump": Kind("its clock is wrong by so much until the next time answer", {"by": 60.0}),
+    "slow-service": Kind("answers service calls so much later, from now on", {"by": 5.0}),
+    "foreign-id": Kind("sends a packet with an id that it did not declare", {"id": 199.0}),
+    "push": Kind("is pushed forward by hand at speed; its wheels turn", {"for": 3.0, "speed": 0.1}),
 }
-"""What each fault does, and its keys with their defaults (s, m/s, bytes, ids)."""
 
 
 class Fault(NamedTuple):
@@ -63,7 +48,7 @@ class Fault(NamedTuple):
 
 
 def parse_fault(text: str) -> Fault:
-    """Return the fault that text asks for, e.g. `vanish@5:robot=1,for=3`.
+    """Return the fault that text describes, e.g. `vanish@5:robot=1,for=3`.
 
     Raises: OptionError that names what is wrong and what would do.
     """
@@ -72,12 +57,12 @@ def parse_fault(text: str) -> Fault:
     if kind not in KINDS:
         raise OptionError("fault %r: unknown kind %r; known are %s" % (text, kind, ", ".join(sorted(KINDS))))
     at_s = _read_number(text, "time after @", at_text) if at_text else 0.0
-    values = dict(KINDS[kind][1])
+    values = dict(KINDS[kind].defaults)
     robot_id: Optional[int] = None
     for pair in filter(None, tail.split(",")):
         key, equals, value_text = pair.partition("=")
         if not equals or key not in values and key != "robot":
-            known = ", ".join(["robot"] + sorted(values))
+            known = ", ".join(["robot", *sorted(values)])
             raise OptionError("fault %r: %r is not one of %s, as key=value" % (text, pair, known))
         value = _read_number(text, key, value_text)
         if key == "robot":
@@ -95,3 +80,12 @@ def _read_number(text: str, what: str, number: str) -> float:
     if not math.isfinite(value) or value < 0 and what != "by":
         raise OptionError("fault %r: %s must be 0 or more, not %s" % (text, what, number))
     return value
+
+
+def describe_kinds() -> List[str]:
+    """Return one line for each kind of fault, with its keys and their defaults."""
+    lines = ["KIND[@SECONDS][:robot=ID,key=value,...]; without robot it happens to every robot."]
+    for name, kind in sorted(KINDS.items()):
+        keys = " ".join("%s=%g" % item for item in sorted(kind.defaults.items()))
+        lines.append("  %-13s %s%s" % (name, kind.meaning, " (%s)" % keys if keys else ""))
+    return lines

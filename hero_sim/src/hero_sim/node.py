@@ -1,8 +1,6 @@
 """The simulator as a ROS node: the same command line, and on top ground truth, markers, services and /clock.
 
 ROS begins here and in ground_truth. The robots themselves talk to the driver over TCP and never over ROS.
-Services come in on threads of rospy; they put what they want into a queue, and the simulator's thread does it
-between two steps.
 """
 
 import os
@@ -10,7 +8,7 @@ import queue
 import signal
 import sys
 import threading
-from typing import Callable, List, Tuple
+from typing import Callable, Tuple
 
 import rosgraph
 import rosgraph.network
@@ -23,7 +21,7 @@ from . import output
 from .build import build_simulator
 from .errors import OptionError, SimulatorError
 from .fault_injector import FaultInjector
-from .faults import parse_fault
+from .faults import describe_kinds, parse_fault
 from .ground_truth import GroundTruth
 from .simulator import Simulator
 from .srv import InjectFault, InjectFaultRequest, InjectFaultResponse
@@ -34,47 +32,42 @@ SERVICE_LIMIT_S = 2.0
 Answer = Tuple[bool, str]
 
 
-class ServiceDesk:
-    """Takes wishes from rospy's threads, lets the simulator's thread fulfil them, and hands the answers
-    back."""
+class RequestQueue:
+    """Queues service calls from rospy's threads for the simulator's thread, and returns the answers."""
 
     def __init__(self, simulator: Simulator, injector: FaultInjector) -> None:
         self._simulator = simulator
         self._injector = injector
-        self._wishes: queue.Queue[Tuple[Callable[[], Answer], queue.Queue]] = queue.Queue(maxsize=100)
-        simulator.before_advance = self._run
+        self._requests: queue.Queue[Tuple[Callable[[], Answer], queue.Queue]] = queue.Queue(maxsize=100)
+        simulator.before_advance.append(self._run)
         rospy.Service("~fault", InjectFault, self._serve_fault)
         rospy.Service("~pause", SetBool, self._serve_pause)
         rospy.Service("~reset", Trigger, self._serve_reset)
 
     def _run(self, now_ms: int) -> None:
-        """Fulfil what was wished since the last step (simulator's thread)."""
-        while True:
-            try:
-                wish, answer = self._wishes.get_nowait()
-            except queue.Empty:
-                break
-            answer.put(wish())
-        self._injector.run(now_ms)
+        """Execute the requests since the last step (simulator's thread)."""
+        del now_ms
+        while not self._requests.empty():
+            request, answer = self._requests.get()
+            answer.put(request())
 
-    def _ask(self, wish: Callable[[], Answer]) -> Answer:
+    def _ask(self, request: Callable[[], Answer]) -> Answer:
         answer: queue.Queue[Answer] = queue.Queue()
         try:
-            self._wishes.put_nowait((wish, answer))
+            self._requests.put_nowait((request, answer))
             return answer.get(timeout=SERVICE_LIMIT_S)
         except (queue.Empty, queue.Full):
             return False, "the simulator did not answer within %g s" % SERVICE_LIMIT_S
 
     def _serve_fault(self, request: InjectFaultRequest) -> InjectFaultResponse:
-        if request.fault == "help":
-            return InjectFaultResponse(True, "\n".join(command_line.describe_faults()))
-
         def inject() -> Answer:
             try:
                 return True, self._injector.add(parse_fault(request.fault))
             except SimulatorError as error:
                 return False, str(error)
 
+        if request.fault == "help":
+            return InjectFaultResponse(True, "\n".join(describe_kinds()))
         return InjectFaultResponse(*self._ask(inject))
 
     def _serve_pause(self, request: SetBoolRequest) -> SetBoolResponse:
@@ -89,7 +82,7 @@ class ServiceDesk:
 
         def reset() -> Answer:
             self._simulator.swarm.reset()
-            return True, "every robot stands at its start; its own odometry does not know"
+            return True, "every robot is at its start; its own odometry does not know"
 
         return TriggerResponse(*self._ask(reset))
 
@@ -108,53 +101,46 @@ def check_environment() -> None:
 
 def main() -> None:
     """Run the simulator until ROS or a signal ends it."""
-    _leave(output.call(_run))
+    status = output.call(_run)
+    # ROS is told, but a master that is gone must not delay the end for long.
+    shutdown = threading.Thread(target=rospy.signal_shutdown, args=("hero_sim ends",), daemon=True)
+    shutdown.start()
+    shutdown.join(timeout=0.7)
+    os._exit(status)
 
 
 def _run() -> int:
-    arguments: List[str] = rospy.myargv(sys.argv)[1:]
     parser = command_line.build_parser()
     parser.add_argument("--clock", action="store_true", help="publish /clock: nodes with use_sim_time follow")
-    options = parser.parse_args(arguments)
+    options = parser.parse_args(rospy.myargv(sys.argv)[1:])
     try:
         command_line.check_options(options)
-    except SimulatorError as error:
-        output.complain(str(error))
-        return output.WRONG_ARGUMENTS
+    except OptionError as error:
+        return output.fail(str(error), output.WRONG_ARGUMENTS)
     try:
         lines = command_line.answer_question(options)
         if lines is not None:
             print("\n".join(lines))
             return 0
         check_environment()
-        # Until the master answers, init_node() waits in vain for as long as it takes: let a signal end that.
+        # Until the master answers, init_node() waits for as long as it takes: let a signal end that.
         signal.signal(signal.SIGINT, signal.SIG_DFL)
         rospy.init_node("hero_sim", disable_signals=True)
-    except SimulatorError as error:
-        output.complain(str(error))
-        return output.FAILED
+    except OptionError as error:
+        return output.fail(str(error))
     except rosgraph.roslogging.LoggingException as error:
-        output.complain("%s: set ROS_LOG_DIR to a directory" % error)
-        return output.FAILED
+        return output.fail("%s: set ROS_LOG_DIR to a directory" % error)
     try:
         simulator, injector = build_simulator(options, (lambda text: None) if options.quiet else rospy.loginfo)
-    except SimulatorError as error:
+    except OptionError as error:
         rospy.logfatal("hero_sim: %s", error)
         return output.FAILED
     command_line.stop_on_signals(simulator)
     rospy.on_shutdown(lambda: setattr(simulator, "stopping", True))
     GroundTruth(simulator, options.clock)
-    ServiceDesk(simulator, injector)
+    RequestQueue(simulator, injector)
     try:
         simulator.run(options.seconds)
     finally:
         simulator.link.close_all()
     return 0
-
-
-def _leave(code: int) -> None:
-    """End the process: ROS is told, but a master that is gone does not hold us up for long."""
-    telling = threading.Thread(target=rospy.signal_shutdown, args=("hero_sim ends",), daemon=True)
-    telling.start()
-    telling.join(timeout=0.7)
-    os._exit(code)

@@ -1,10 +1,12 @@
-"""The output of the simulator, which may be a pipe that nobody reads or a disk that is full, and its exit status."""
+"""The output of the simulator, which may be a closed pipe or a full disk, and its exit status."""
 
 import errno
 import os
 import signal
 import sys
 from typing import Callable
+
+__all__ = ["WRONG_ARGUMENTS", "call", "fail"]
 
 FAILED = 1
 WRONG_ARGUMENTS = 2
@@ -16,13 +18,14 @@ PIPE_CLOSED = 128 + signal.SIGPIPE
 _OUTPUT_ERRORS = (errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 
-def complain(text: str) -> None:
-    """Write a line with the program's name to stderr."""
+def fail(text: str, status: int = FAILED) -> int:
+    """Print a line with the program's name to stderr; return the exit status."""
     print("hero_sim: " + text, file=sys.stderr)
+    return status
 
 
 def call(run: Callable[[], int]) -> int:
-    """Return the exit status of run(), which includes that of its output; argparse ends count, too."""
+    """Return the exit status of run(), which includes that of its output; exits by argparse count, too."""
     try:
         try:
             status = run()
@@ -39,6 +42,5 @@ def call(run: Callable[[], int]) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         if error.errno == errno.EPIPE:
             return PIPE_CLOSED
-        complain("the output cannot be written: %s" % error.strerror)
-        return FAILED
+        return fail("the output cannot be written: %s" % error.strerror)
     return status

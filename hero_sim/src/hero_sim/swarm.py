@@ -1,7 +1,7 @@
 """A world and the firmware of every robot in it, moved through simulated time together.
 
 Pure: no socket and no clock. The caller says up to which millisecond to go, carries the robots' bytes and
-tells what became of their connections; the same calls with the same seed give the same run.
+reports their connections; the same calls with the same seed give the same run.
 """
 
 import heapq
@@ -12,6 +12,8 @@ import numpy as np
 from .robot.firmware import Firmware
 from .world.world import STEP_MS, World
 
+__all__ = ["Swarm"]
+
 
 class Swarm:
     """All robots, in the order of their places in the world.
@@ -19,6 +21,7 @@ class Swarm:
     Attributes:
         now_ms: how far everything has been moved.
         robots: the firmware of each.
+        after_step: called with the world's time (ms) after each physics step.
     """
 
     def __init__(self, world: World, robots: List[Firmware]) -> None:
@@ -36,11 +39,11 @@ class Swarm:
             self.reschedule(index)
 
     def reschedule(self, index: int) -> None:
-        """Take note that a robot has to run at another time than before."""
+        """Note that the time at which a robot has to run has changed."""
         heapq.heappush(self._queue, (self.robots[index].due_ms, index))
 
     def advance(self, until_ms: int) -> List[int]:
-        """Move everything on to until_ms; return which robots have frames to send or want a connection."""
+        """Move everything on to until_ms; return which robots have packets to send or want a connection."""
         touched = set()
         queue = self._queue
         while True:
@@ -49,7 +52,7 @@ class Swarm:
                 due_ms, index = heapq.heappop(queue)
                 robot = self.robots[index]
                 if due_ms != robot.due_ms:
-                    continue  # it was put off or brought forward since
+                    continue  # it was rescheduled since
                 self.now_ms = max(self.now_ms, due_ms)
                 robot.run(self.now_ms)
                 touched.add(index)
@@ -64,13 +67,13 @@ class Swarm:
                 return sorted(touched)
 
     def reset(self) -> None:
-        """Put every robot back to its start, standing, as if somebody carried it there."""
+        """Put every robot back to its start, at rest, as if somebody carried it there."""
         before = [robot.body.true_pose for robot in self.robots]
         for robot in self.robots:
-            robot.motors.halt(robot.to_millis(self.now_ms))
+            robot.motors.stop(robot.to_millis(self.now_ms))
         self.world.reset()
         for robot, pose in zip(self.robots, before):
-            robot.body.carry(pose)
+            robot.body.follow_carry(pose)
 
     @property
     def next_due_ms(self) -> int:

@@ -1,15 +1,15 @@
-"""A YAML file -> its nodes, which know their lines, or one line that says what is wrong.
+"""YAML files as nodes that know their lines, and errors that name file, line and reason.
 
-Borders: the only file that needs PyYAML, and only when a file is read. Without it, a file that is JSON as well can be
-read all the same, but for comments on lines of their own; the shipped arenas are written that way.
+A file may come from anybody: whatever it holds is read or refused with one OptionError.
 """
 
-import json
-from typing import Any, Dict, NamedTuple, Optional, Tuple
+from typing import Any, Dict, Tuple
+
+import yaml
 
 from .errors import OptionError
 
-_TOO_DEEP = "lists within lists, deeper than can be read"
+__all__ = ["describe_node", "fail_at", "read_mapping", "read_nodes"]
 
 _LONGEST_SHOWN = 60
 
@@ -17,7 +17,7 @@ _LONGEST_SHOWN = 60
 def read_nodes(path: str, option: str, remedy: str) -> Any:
     """Return the root node of the file at path, None if it is empty.
 
-    option and remedy name what was asked for and what would do where the file cannot be read at all.
+    option names what was asked for and remedy what would do, for a file that cannot be read at all.
 
     Raises: OptionError with file, line and reason.
     """
@@ -29,59 +29,21 @@ def read_nodes(path: str, option: str, remedy: str) -> Any:
     except UnicodeDecodeError as error:
         raise OptionError("%s is not a text file in UTF-8: %s" % (option, error)) from error
     try:
-        import yaml
-    except ImportError:
-        return _read_json(text, option)
-    try:
         return yaml.compose(text, Loader=yaml.SafeLoader)
     except yaml.reader.ReaderError as error:
         line = text.count("\n", 0, error.position) + 1
-        raise OptionError(
-            "%s:%d: the character U+%04X may not stand in a YAML file" % (path, line, error.character)
-        ) from error
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        line = mark.line + 1 if mark is not None else 1
-        problem = getattr(error, "problem", None) or str(error)
-        raise OptionError("%s:%d: %s" % (path, line, " ".join(problem.split()))) from error
-    except RecursionError as error:
-        raise OptionError("%s:1: %s" % (path, _TOO_DEEP)) from error
-
-
-class _JsonNode(NamedTuple):
-    """Stands for a node of PyYAML whose line is not known."""
-
-    id: str
-    value: Any
-    start_mark: Optional[Any] = None
-
-
-def _read_json(text: str, option: str) -> Any:
-    lines = ["" if line.lstrip().startswith("#") else line for line in text.splitlines()]
-    try:
-        return _convert_json(json.loads("\n".join(lines)))
-    except RecursionError as error:
-        raise OptionError("%s: %s" % (option, _TOO_DEEP)) from error
-    except ValueError as error:
-        raise OptionError(
-            "%s: PyYAML is missing, and the file is not JSON (%s); install PyYAML: apt install python3-yaml, or "
-            "pip install PyYAML" % (option, error)
-        ) from error
-
-
-def _convert_json(value: Any) -> _JsonNode:
-    if isinstance(value, dict):
-        pairs = [(_convert_json(key), _convert_json(entry)) for key, entry in value.items()]
-        return _JsonNode("mapping", pairs)
-    if isinstance(value, list):
-        return _JsonNode("sequence", [_convert_json(entry) for entry in value])
-    return _JsonNode("scalar", "" if value is None else str(value))
+        reason = "the character U+%04X may not stand in a YAML file" % error.character
+    except yaml.MarkedYAMLError as error:
+        line = error.problem_mark.line + 1 if error.problem_mark is not None else 1
+        reason = " ".join(str(error.problem or error).split())
+    except RecursionError:
+        line, reason = 1, "lists within lists, deeper than can be read"
+    raise OptionError("%s:%d: %s" % (path, line, reason))
 
 
 def fail_at(path: str, node: Any, reason: str) -> OptionError:
     """Return the error that names file, line and reason."""
-    mark = node.start_mark if node is not None else None
-    return OptionError("%s:%d: %s" % (path, mark.line + 1 if mark is not None else 1, reason))
+    return OptionError("%s:%d: %s" % (path, node.start_mark.line + 1 if node is not None else 1, reason))
 
 
 def describe_node(node: Any) -> str:

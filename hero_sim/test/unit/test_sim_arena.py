@@ -1,5 +1,4 @@
 import math
-import sys
 
 import numpy as np
 import pytest
@@ -100,7 +99,7 @@ def test_a_start_that_touches_something_is_refused_with_its_line(tmp_path, secon
 
 def test_too_many_robots_are_refused(tmp_path):
     arena = load_arena(write(tmp_path, "bounds_m: [0, 0, 0.3, 0.3]\n"))
-    with pytest.raises(arenas.ArenaError, match="no free place"):
+    with pytest.raises(OptionError, match="no free place"):
         arenas.place_robots(arena, 30, np.random.RandomState(0))
 
 
@@ -109,29 +108,3 @@ def test_nobody_is_placed_inside_an_obstacle(tmp_path):
     arena = load_arena(write(tmp_path, "bounds_m: [0, 0, 1, 1]\npolygons_m: [%s]\ncircles_m: []\n" % square))
     inside = arenas.measure_clearance(np.array([[0.5, 0.5], [0.05, 0.5]]), arena)
     assert inside[0] < 0 < inside[1]
-
-
-@pytest.mark.parametrize("name", SHIPPED)
-def test_shipped_arenas_are_the_same_without_pyyaml(monkeypatch, name):
-    arena = load_arena(name)
-    monkeypatch.setitem(sys.modules, "yaml", None)
-    again = load_arena(name)
-    assert all(np.array_equal(left, right) for left, right in zip(arena[1:5], again[1:5]))
-    assert all(np.array_equal(left, right) for left, right in zip(arena.polygons_m, again.polygons_m))
-
-
-@pytest.mark.parametrize(
-    "text, words",
-    [
-        ("bounds_m: [0, 0, 1, 1]", "PyYAML is missing, and the file is not JSON"),
-        ('{"bounds": 3}', "unknown key 'bounds'"),
-        ("[]", "an arena is a mapping"),
-        ('# a line\n{"bounds_m": [0, 0, 1, null]}', "'' is not a number"),
-    ],
-)
-def test_without_pyyaml_a_wrong_file_is_still_named_with_the_reason(tmp_path, monkeypatch, text, words):
-    path = write(tmp_path, text)
-    monkeypatch.setitem(sys.modules, "yaml", None)
-    with pytest.raises(OptionError) as caught:
-        load_arena(path)
-    assert words in str(caught.value) and path in str(caught.value)

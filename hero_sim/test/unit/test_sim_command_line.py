@@ -244,7 +244,7 @@ def test_zero_topics_are_declared_at_the_second_request_only(simulate, server):
 
 
 def test_wrong_bytes_cost_at_most_the_frame_beside_them(simulate, server):
-    kinds = ("garbage", "half-frame", "bad-checksum", "bad-length", "long-frame")
+    kinds = ("garbage", "half-packet", "bad-checksum", "bad-length", "long-packet")
     faults = ["--fault=%s@%g" % (kind, 16 + 0.2 * index) for index, kind in enumerate(kinds)]
     process = simulate("--port", str(server.port), *faults)
     request_when_ready(server, 1)
@@ -296,13 +296,6 @@ def test_a_clock_that_jumps_shows_in_the_stamps(simulate, server):
     server.run_until(lambda: time.time() - read_odom(peer.last(ids.ID_ODOM))[0][0] > 98)
 
 
-@pytest.mark.parametrize("controller", ["velocity", "position"])
-def test_a_robot_can_be_made_to_tune_itself(simulate, server, controller):
-    simulate("--port", str(server.port), "--fault", "tune-%s@16" % controller)
-    request_when_ready(server, 1)
-    server.run_until(lambda: sum("Tunning Motor Set" in text for text in server.peers[0].logs()) > 40)
-
-
 def test_a_robot_that_is_pushed_counts_ticks_without_a_command(simulate, server):
     simulate("--port", str(server.port), "--fault", "push@16:for=1,speed=0.2")
     request_when_ready(server, 1)
@@ -334,7 +327,7 @@ def test_a_server_that_comes_late_finds_the_robots_waiting(simulate):
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
     process = simulate("--count", "2", "--port", str(port))
-    assert "dialling" in process.stdout.readline()
+    assert "connecting" in process.stdout.readline()
     assert "no driver answers at 127.0.0.1:%d" % port in process.stdout.readline()
     server = Server(port)
     server.listener = socket.socket()

@@ -8,7 +8,7 @@ from hero_driver.rosserial import packets
 from hero_sim.robot import declarations as ids
 from hero_sim.robot.imu_hat import ImuHat
 from hero_sim.robot_constants import RECEIVE_WINDOW_LENGTH
-from hero_sim.world.kinematics import compose
+from hero_sim.world.kinematics import Pose
 
 both_controllers = pytest.mark.parametrize(
     "controller", [ids.ID_VELOCITY_CMD_VEL, ids.ID_POSITION_CMD_VEL], ids=["velocity", "position"]
@@ -256,7 +256,7 @@ def test_a_robots_odom_frame_stays_over_a_restart_follows_set_odom_and_is_carrie
     driver.drive(0, 0.1, 0.5, 3000, ids.ID_POSITION_CMD_VEL)
     driver.send_twist(0, 0.0, 0.0, ids.ID_POSITION_CMD_VEL)
     driver.run(1000)
-    assert compose(robot.body.odom_origin, robot.sensing.odometry.pose) == pytest.approx(
+    assert robot.body.odom_origin.compose(robot.sensing.odometry.pose) == pytest.approx(
         driver.true_pose(0), abs=0.02
     )
     robot.switch_on(driver.swarm.now_ms)
@@ -265,7 +265,7 @@ def test_a_robots_odom_frame_stays_over_a_restart_follows_set_odom_and_is_carrie
     driver.start_streaming()
     driver.send(0, ids.ID_SET_ODOM, struct.pack("<3d", 0.5, 0.0, 1.0))
     driver.run(200)
-    assert compose(robot.body.odom_origin, (0.5, 0.0, 1.0)) == pytest.approx(driver.true_pose(0))
+    assert robot.body.odom_origin.compose(Pose(0.5, 0.0, 1.0)) == pytest.approx(driver.true_pose(0))
     driver.swarm.reset()
     assert driver.true_pose(0) == pytest.approx(start)
-    assert compose(robot.body.odom_origin, (0.5, 0.0, 1.0)) == pytest.approx(driver.true_pose(0))
+    assert robot.body.odom_origin.compose(Pose(0.5, 0.0, 1.0)) == pytest.approx(driver.true_pose(0))

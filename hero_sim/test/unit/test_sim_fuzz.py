@@ -3,7 +3,6 @@
 import json
 import math
 import re
-import sys
 
 import numpy as np
 import pytest
@@ -159,15 +158,3 @@ def test_what_fuzzing_found_is_refused_with_file_line_and_reason(path, text, lin
         load_arena(str(path))
     assert str(caught.value).startswith("%s:%d: " % (path, line))
     assert words in str(caught.value)
-
-
-@given(content=mappings.map(json.dumps))
-@settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-def test_without_pyyaml_any_file_is_read_or_refused_too(path, content):
-    path.write_text(content, encoding="utf-8")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(sys.modules, "yaml", None)
-        read_arena(path)
-        path.write_text("[" * 20000, encoding="utf-8")
-        with pytest.raises(OptionError, match="deeper"):
-            load_arena(str(path))

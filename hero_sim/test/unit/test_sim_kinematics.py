@@ -46,13 +46,12 @@ def test_wheels_and_body_speeds_are_inverse():
 
 
 def test_a_pose_and_its_inverse_cancel():
-    pose = (0.3, -0.7, 2.1)
-    assert kinematics.compose(pose, kinematics.invert(pose)) == pytest.approx((0.0, 0.0, 0.0))
-    assert kinematics.compose(kinematics.invert(pose), pose) == pytest.approx((0.0, 0.0, 0.0))
+    pose = kinematics.Pose(0.3, -0.7, 2.1)
+    assert pose.compose(pose.invert()) == pytest.approx((0.0, 0.0, 0.0))
+    assert pose.invert().compose(pose) == pytest.approx((0.0, 0.0, 0.0))
 
 
 def test_poses_are_joined_like_steps_on_a_floor():
-    # One metre ahead, a quarter turn to the left, then one metre ahead again.
-    assert kinematics.compose((1.0, 0.0, math.pi / 2), (1.0, 0.0, 0.0)) == pytest.approx(
-        (1.0, 1.0, math.pi / 2)
-    )
+    # One metre forward, a quarter turn to the left, then one metre forward again.
+    corner, side = kinematics.Pose(1.0, 0.0, math.pi / 2), kinematics.Pose(1.0, 0.0, 0.0)
+    assert corner.compose(side) == pytest.approx((1.0, 1.0, math.pi / 2))

@@ -7,6 +7,7 @@ import pytest
 
 from hero_driver.rosserial import packets, payloads
 from hero_sim.robot import declarations, messages
+from hero_sim.world.kinematics import Pose
 
 ROOT = os.path.dirname(os.path.abspath(__file__)) + "/../../.."
 CAPTURES = os.environ.get("HERO_CAPTURES", os.path.join(ROOT, "..", "shared", "captures"))
@@ -21,7 +22,7 @@ def read_frames(data):
 
 def encode_cycle(name="hero_0", ticks=(0, 0)):
     encoder = [float(value) for value in range(11)]
-    return messages.CycleMessages(name).encode((7, 8), (1.0, 2.0, 0.5), (0.1, -0.2), ticks, encoder)
+    return messages.CycleMessages(name).encode((7, 8), Pose(1.0, 2.0, 0.5), (0.1, -0.2), ticks, encoder)
 
 
 def test_a_cycle_is_odom_then_five_transforms_then_the_encoder():
@@ -125,7 +126,7 @@ def test_the_stock_robots_own_cycles_are_rebuilt_byte_for_byte(capture):
             values = struct.unpack_from("<4d", transform.payload, len(transform.payload) - 32)
             ticks.append(round(2.0 * math.atan2(values[1], values[3]) * 288 / (2 * math.pi)) - 1)
         data = encoder.encode(
-            stamp, (pose[0], pose[1], theta_rad), twist, ticks, driver_side.read_encoder(cycle[6].payload)
+            stamp, Pose(pose[0], pose[1], theta_rad), twist, ticks, driver_side.read_encoder(cycle[6].payload)
         )
         for ours, theirs in zip(read_frames(data), cycle):
             assert ours.topic_id == theirs.topic_id

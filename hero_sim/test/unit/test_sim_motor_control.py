@@ -60,7 +60,7 @@ def count_ticks_from_rest(driver):
         if ms % 100 == 99:
             driver.send_twist(0, 0.1, 0.0)
         driver.run(1)
-        ticks = (driver.swarm.world.read_wheels(0, driver.swarm.now_ms)[0] - start_m) / TICK_M
+        ticks = (driver.swarm.robots[0].body.read_wheels(driver.swarm.now_ms)[0] - start_m) / TICK_M
         if first_ms is None and ticks >= 1.0:
             first_ms = driver.swarm.now_ms
         if first_ms is not None:
@@ -113,14 +113,14 @@ def test_the_proportional_gain_alone_leaves_the_error_that_control_theory_says()
 
 
 def test_the_integral_gain_closes_the_gap_the_sooner_the_larger_it_is():
-    ways_m = []
+    distances_m = []
     for integral in (1000.0, 2300.0):
         driver = start()
         set_velocity_gains(driver, 1200.0, integral, 0.1)
-        ways_m.append(measure_mean_speed(driver, 1)[0])
+        distances_m.append(measure_mean_speed(driver, 1)[0])
         measure_mean_speed(driver, 6)
         assert measure_mean_speed(driver)[0] == pytest.approx(0.1, abs=0.006)
-    assert ways_m[1] > 1.15 * ways_m[0]
+    assert distances_m[1] > 1.15 * distances_m[0]
 
 
 def test_each_wheel_has_gains_of_its_own():
@@ -148,26 +148,26 @@ def test_a_stop_and_a_turn_back_make_the_controller_forget_its_integral():
 def test_a_position_command_goes_as_far_as_its_speed_reaches_in_a_second():
     driver = start("--firmware-odometry", "exact")
     driver.send_twist(0, 0.1, 0.0, ids.ID_POSITION_CMD_VEL)
-    ways_m = []
+    distances_m = []
     for _ in range(290):
         driver.run(10)
-        ways_m.append(driver.swarm.world.travels_m[0, 0])
-    assert 0.1 < max(ways_m) < 0.15
-    assert np.mean(ways_m[-50:]) == pytest.approx(0.1, abs=0.02)
+        distances_m.append(driver.swarm.world.travels_m[0, 0])
+    assert 0.1 < max(distances_m) < 0.15
+    assert np.mean(distances_m[-50:]) == pytest.approx(0.1, abs=0.02)
 
 
 def test_the_gains_of_the_position_controller_matter():
-    ways_m = []
+    distances_m = []
     for gains in ((5.0, 9.0, 0.1), (1.0, 0.0, 0.0)):
         driver = start()
         driver.send(0, ids.ID_POSITION_PID_PARAMETERS, struct.pack("<6f", *gains, *gains))
         driver.run(200)
         driver.send_twist(0, 0.1, 0.0, ids.ID_POSITION_CMD_VEL)
         driver.run(2900)
-        ways_m.append(driver.swarm.world.travels_m[0, 0])
+        distances_m.append(driver.swarm.world.travels_m[0, 0])
     # With 1 us per tick the wheel stops where the output meets the dead zone of 30 us.
-    assert ways_m[1] == pytest.approx(0.1 - 30 * TICK_M, abs=0.004)
-    assert abs(ways_m[0] - 0.1) < abs(ways_m[1] - 0.1) + 0.03
+    assert distances_m[1] == pytest.approx(0.1 - 30 * TICK_M, abs=0.004)
+    assert abs(distances_m[0] - 0.1) < abs(distances_m[1] - 0.1) + 0.03
 
 
 def test_a_zero_for_one_controller_leaves_the_other_driving():
@@ -275,7 +275,7 @@ def test_whatever_robots_are_sent_they_stay_out_of_walls_and_each_other_and_stop
     driver.start_streaming()
     world = driver.swarm.world
     overlaps = []
-    driver.swarm.after_step = lambda now_ms: overlaps.append(world.find_overlaps(1e-6).any())
+    driver.swarm.after_step = lambda now_ms: overlaps.append(world.find_overlaps().any())
     for robot, (topic_id, payload) in sent:
         driver.send(robot, topic_id, payload)
         driver.run(100)

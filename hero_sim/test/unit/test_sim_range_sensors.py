@@ -3,6 +3,7 @@ import math
 import numpy as np
 import pytest
 
+from hero_sim.robot import ranges
 from hero_sim.robot_constants import BODY_RADIUS_M
 from hero_sim.world import range_sensors
 from hero_sim.world.arena import build_default
@@ -54,32 +55,32 @@ def test_the_signal_at_20_cm_is_that_of_the_published_table():
 
 @pytest.mark.parametrize("distance_m", np.arange(0.03, 0.191, 0.005))
 def test_ranges_err_less_than_half_a_centimetre_to_19_cm(distance_m):
-    calibration = range_sensors.calibrate(ALPHA[0], BETA[0])
-    range_m = range_sensors.convert_to_ranges(measure(wall_at(distance_m)), calibration)[4]
+    calibration = ranges.calibrate(ALPHA[0], BETA[0])
+    range_m = ranges.convert_to_ranges(measure(wall_at(distance_m)), calibration)[4]
     assert range_m - BODY_RADIUS_M == pytest.approx(distance_m, abs=0.005)
 
 
 def test_farther_things_fade_until_the_firmware_reports_nothing_in_reach():
     signals = [measure(wall_at(distance_m))[4] for distance_m in np.arange(0.20, 0.40, 0.01)]
     assert all(np.diff(signals) < 0.0)
-    calibration = range_sensors.calibrate(ALPHA[0], BETA[0])
-    assert range_sensors.convert_to_ranges(signals[-1], calibration)[4] == pytest.approx(0.256835)
+    calibration = ranges.calibrate(ALPHA[0], BETA[0])
+    assert ranges.convert_to_ranges(signals[-1], calibration)[4] == pytest.approx(0.256835)
 
 
 def test_nothing_in_reach_is_a_finite_range_above_range_max():
-    ranges_m = range_sensors.convert_to_ranges(np.array([0.0, 1.0]), np.array([0.42, 0.42]))
+    ranges_m = ranges.convert_to_ranges(np.array([0.0, 1.0]), np.array([0.42, 0.42]))
     assert ranges_m == pytest.approx([0.256835, 0.256835])
 
 
 def test_an_erased_calibration_makes_every_range_nan():
-    assert np.isnan(range_sensors.convert_to_ranges(np.full(8, 60.0), np.full(8, np.nan))).all()
+    assert np.isnan(ranges.convert_to_ranges(np.full(8, 60.0), np.full(8, np.nan))).all()
 
 
 def test_the_stock_capture_gives_the_stock_ranges():
     # Readings and ranges of one /laser of a stock robot with the factory's 0.5.
     counts = np.array([10.0, 20.0, 40.0, 160.0, 400.0, 900.0, 320.0, 80.0])
     expected = [0.2568350, 0.1949489, 0.1486384, 0.0927367, 0.0721903, 0.0604052, 0.0763635, 0.1158919]
-    assert range_sensors.convert_to_ranges(counts, np.full(8, 0.5)) == pytest.approx(expected, abs=2e-7)
+    assert ranges.convert_to_ranges(counts, np.full(8, 0.5)) == pytest.approx(expected, abs=2e-7)
 
 
 def test_beams_go_counter_clockwise_from_behind_and_the_fifth_looks_ahead():

@@ -75,11 +75,11 @@ def test_self_tuning_of_the_velocity_controller_spins_the_robot():
 
 def test_self_tuning_of_the_position_controller_rocks_the_wheels():
     driver = tune(start(), POSITION, 1000)
-    ways_m = []
+    distances_m = []
     for _ in range(100):
         driver.run(20)
-        ways_m.append(driver.swarm.world.travels_m[0].tolist())
-    for wheel_m in zip(*ways_m):
+        distances_m.append(driver.swarm.world.travels_m[0].tolist())
+    for wheel_m in zip(*distances_m):
         assert 0.001 < max(wheel_m) - min(wheel_m) < 0.02
 
 

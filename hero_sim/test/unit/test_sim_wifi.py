@@ -12,9 +12,9 @@ def carry(profile, seconds=60, period_ms=34, length=1500, seed=0):
     sent, arrivals, pieces = 0, [], []
     for now_ms in range(seconds * 1000):
         if now_ms % period_ms == 0:
-            radio.put_up(now_ms, sent.to_bytes(4, "little") * (length // 4))
+            radio.up.put(now_ms, sent.to_bytes(4, "little") * (length // 4))
             sent += 1
-        data = radio.take_up(now_ms)
+        data = radio.up.take(now_ms)
         for start in range(0, len(data), length // 4 * 4):
             arrivals.append(now_ms)
             pieces.append(int.from_bytes(data[start : start + 4], "little"))
@@ -62,8 +62,8 @@ def test_a_narrow_network_delays_what_exceeds_its_bandwidth():
         np.random.RandomState(0),
     )
     for _ in range(100):
-        radio.put_up(0, bytes(1000))
-    arrived_ms = next(now_ms for now_ms in range(5000) if radio.take_up(now_ms) and not radio.is_carrying)
+        radio.up.put(0, bytes(1000))
+    arrived_ms = next(now_ms for now_ms in range(5000) if radio.up.take(now_ms) and not radio.is_carrying)
     assert arrived_ms == pytest.approx(1000 + 5, abs=2)
 
 
@@ -71,11 +71,11 @@ def test_a_stall_holds_everything_and_then_lets_everything_through():
     radio = Radio(PROFILES["ideal"], np.random.RandomState(0))
     radio.stall(100, 500)
     assert not radio.is_transparent(100)
-    radio.put_up(150, b"a")
-    radio.put_up(300, b"b")
-    radio.put_down(300, b"c")
-    assert radio.take_up(599) == b"" and radio.take_down(599) == b""
-    assert radio.take_up(600) == b"ab" and radio.take_down(600) == b"c"
+    radio.up.put(150, b"a")
+    radio.up.put(300, b"b")
+    radio.down.put(300, b"c")
+    assert radio.up.take(599) == b"" and radio.down.take(599) == b""
+    assert radio.up.take(600) == b"ab" and radio.down.take(600) == b"c"
     assert radio.is_transparent(601)
 
 
@@ -90,7 +90,7 @@ def test_nothing_is_lost_whatever_the_pace(profile, gaps, seed):
     now_ms, received = 0, b""
     for number, gap_ms in enumerate(gaps):
         now_ms += gap_ms
-        radio.put_down(now_ms, bytes((number,)))
-        received += radio.take_down(now_ms)
-    received += radio.take_down(now_ms + 60000)
+        radio.down.put(now_ms, bytes((number,)))
+        received += radio.down.take(now_ms)
+    received += radio.down.take(now_ms + 60000)
     assert received == bytes(range(len(gaps)))

@@ -9,6 +9,7 @@ from hero_sim.robot_constants import BODY_RADIUS_M
 from hero_sim.world import world as worlds
 from hero_sim.world.arena import build_default, build_rectangle, place_robots
 from hero_sim.world.arena_file import SHIPPED, load_arena
+from hero_sim.world.body import Body
 from hero_sim.world.kinematics import split_to_wheels
 from hero_sim.world.robot_errors import SERVO_LAG_S, draw_errors
 
@@ -34,7 +35,7 @@ def run(world, seconds):
 def test_a_push_turns_the_wheels_of_a_robot_at_rest_for_its_time():
     world = build_world(robots=2)
     start_m = world.poses[0, :2].copy()
-    world.push(0, 0.1, 1000)
+    Body(world, 0).push(0.1, 1000)
     run(world, 0.5)
     assert world.speeds_m_s.tolist() == [[0.1, 0.1], [0.0, 0.0]]
     run(world, 2.0)
@@ -124,7 +125,7 @@ def test_nobody_is_ever_inside_a_wall_or_another_robot(arena, robots, seed, comm
         world.commands_m_s[:] = np.array(speeds).reshape(9, 2)[:robots]
         for _ in range(100):
             world.step()
-            assert not world.find_overlaps(1e-6).any()
+            assert not world.find_overlaps().any()
     assert (world.poses[:, :2] > (x_min, y_min)).all()
     assert (world.poses[:, :2] < (x_max, y_max)).all()
 
@@ -135,7 +136,7 @@ def test_robots_that_are_pressed_into_a_corner_stay_apart():
     world.commands_m_s[:] = 0.28
     for _ in range(800):
         world.step()
-        assert not world.find_overlaps(1e-6).any()
+        assert not world.find_overlaps().any()
 
 
 def test_the_same_seed_gives_the_same_way():
@@ -162,6 +163,6 @@ def test_reading_wheels_within_a_step_meets_the_end_of_the_step():
     world = build_world()
     command(world, 0, 0.2, 0.0)
     run(world, 0.2)
-    foreseen_m = world.read_wheels(0, world.time_ms + worlds.STEP_MS)
+    foreseen_m = Body(world, 0).read_wheels(world.time_ms + worlds.STEP_MS)
     world.step()
-    assert world.read_wheels(0, world.time_ms) == pytest.approx(foreseen_m)
+    assert Body(world, 0).travels_m == pytest.approx(foreseen_m)

@@ -1,7 +1,7 @@
-"""Robots <-> the driver over TCP: the only file of the simulator that touches sockets.
+"""The robots' TCP connections to the driver: the only file of the simulator that touches sockets.
 
-One selector serves all robots. Robots dial the driver as the firmware does, or, as servers, await it on one
-port each. Nothing here knows what the bytes mean.
+One selector serves all robots. Robots connect to the driver as the firmware does, or, as servers, wait for it on
+one port each. Nothing here knows what the bytes mean.
 """
 
 import ctypes
@@ -16,6 +16,8 @@ from typing import Dict, List, NamedTuple, Optional, Tuple
 from ..errors import OptionError
 from ..robot_constants import RECEIVE_WINDOW_LENGTH
 
+__all__ = ["BLOCKED", "DATA", "FAILED", "LOST", "MADE", "UNBLOCKED", "LinkEvent", "TcpLink"]
+
 MADE = "made"
 FAILED = "failed"
 LOST = "lost"
@@ -24,14 +26,14 @@ BLOCKED = "blocked"
 UNBLOCKED = "unblocked"
 
 _READ_LENGTH = 65536
+
 _MOST_UNSENT = 1 << 20
-"""Bytes kept for a driver that does not read; the robot stands still by then, so more means a fault of
-ours."""
+"""Bytes kept for a driver that does not read; the robot is blocked long before, so more would be a bug of ours."""
 
 _MOST_ABANDONED = 200
-"""Connections of robots that lost their power; by so many later ones the driver has given the first one up."""
+"""Connections of robots that lost their power; after so many later ones the driver has given up the first one."""
 
-# Like the ESP8266, whose own send buffer is two segments: a server that does not read is felt soon.
+# Like the ESP8266, whose own send buffer is two segments: a server that does not read is noticed soon.
 _SEND_BUFFER_LENGTH = 16384
 
 _SO_ATTACH_FILTER = 26
@@ -45,14 +47,15 @@ class LinkEvent(NamedTuple):
 
     robot_index: int
     kind: str
-    data: bytes = b""  # received bytes, or the reason in words
+    data: bytes = b""  # received bytes
+    reason: str = ""  # of a failure or a loss
 
 
 class _Connection:
-    def __init__(self, index: int, sock: socket.socket, dialling: bool) -> None:
+    def __init__(self, index: int, sock: socket.socket) -> None:
         self.index = index
         self.socket = sock
-        self.dialling = dialling
+        self.is_open = False
         self.unsent = bytearray()
         self.paused = False
 
@@ -65,7 +68,7 @@ class TcpLink:
     """
 
     def __init__(self, count: int, host: str, port: int, serve: bool = False, first_number: int = 0) -> None:
-        """Dial host:port for each of count robots, or, with serve, listen on port, port + 1, ...
+        """Connect each of count robots to host:port, or, with serve, listen on port, port + 1, ...
 
         first_number tells the robots of several simulators on one machine apart.
 
@@ -79,88 +82,73 @@ class TcpLink:
         self._listeners: Dict[int, socket.socket] = {}
         self._abandoned: List[socket.socket] = []
         self._events: List[LinkEvent] = []
-        self._address = self._resolve(host, port)
+        self._family, self._address = _resolve(host, port)
         self.own_addresses = [self._find_own_address(first_number + index) for index in range(count)]
         if serve:
             for index in range(count):
                 self._listen(index, port + index)
 
-    @staticmethod
-    def _resolve(host: str, port: int) -> Tuple[int, Tuple]:
-        try:
-            found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
-        except (OSError, UnicodeError) as error:
-            raise OptionError(
-                "host %r cannot be resolved: %s; give a name or an address" % (host, error)
-            ) from error
-        # IPv4 first: robots know nothing else.
-        found.sort(key=lambda entry: entry[0] != socket.AF_INET)
-        return found[0][0], found[0][4]
-
     def _listen(self, index: int, port: int) -> None:
-        family, address = self._resolve(self.host, port)
-        listener = socket.socket(family, socket.SOCK_STREAM)
+        listener = socket.socket(self._family, socket.SOCK_STREAM)
+        self._listeners[index] = listener
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         # What is accepted inherits it.
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_WINDOW_LENGTH)
         try:
-            listener.bind(address)
+            listener.bind((self._address[0], port, *self._address[2:]))
             listener.listen(4)
         except OSError as error:
-            listener.close()
             self.close_all()
             raise OptionError(
                 "cannot listen on %s:%d for robot %d: %s; choose another --serve PORT"
                 % (self.host, port, index, error.strerror)
             ) from error
         listener.setblocking(False)
-        self._listeners[index] = listener
         self._selector.register(listener, selectors.EVENT_READ, index)
 
     def _find_own_address(self, number: int) -> str:
-        """Return the address from which robot number dials, as its boot line names it.
+        """Return the address from which robot number connects, as its boot line names it.
 
-        To a driver on this machine each robot dials from an address of its own, as robots on a network do:
+        To a driver on this machine each robot connects from its own address, as robots on a network do:
         127.0.1.1, 127.0.1.2, ... Where the system has only 127.0.0.1, all share that.
         """
-        family, address = self._address
-        with socket.socket(family, socket.SOCK_DGRAM) as probe:
+        is_local = str(self._address[0]).startswith("127.")
+        with socket.socket(self._family, socket.SOCK_DGRAM) as probe:
             try:
-                if family == socket.AF_INET and str(address[0]).startswith("127.") and not self.serve:
+                if is_local and not self.serve:
                     own = "127.0.%d.%d" % (1 + number // 250 % 250, 1 + number % 250)
                     probe.bind((own, 0))
                     return own
-                probe.connect(address)
+                probe.connect(self._address)
                 return str(probe.getsockname()[0])
             except OSError:
-                # No way there yet (robots say so when they dial), or a system with a single loopback address.
-                return "127.0.0.1" if str(address[0]).startswith("127.") else "0.0.0.0"
+                # No route yet (robots report it when they connect), or a system with a single loopback address.
+                return "127.0.0.1" if is_local else "0.0.0.0"
 
-    def dial(self, index: int) -> None:
-        """Begin to connect a robot; poll() tells how it went."""
+    def connect(self, index: int) -> None:
+        """Begin to connect a robot; poll() returns the outcome."""
         self.close(index)
         try:
             sock = self._begin_connect(self.own_addresses[index])
         except OSError as error:
-            self._events.append(LinkEvent(index, FAILED, (error.strerror or str(error)).encode()))
+            self._events.append(LinkEvent(index, FAILED, reason=error.strerror or str(error)))
             return
-        self._connections[index] = _Connection(index, sock, dialling=True)
-        self._selector.register(sock, selectors.EVENT_WRITE, self._connections[index])
+        self._connections[index] = connection = _Connection(index, sock)
+        self._selector.register(sock, selectors.EVENT_WRITE, connection)
 
     def _begin_connect(self, own_address: str) -> socket.socket:
         """Return a socket that is being connected.
 
         Raises: OSError where that fails at once: refused, no route, no more files or ports.
         """
-        family, address = self._address
-        sock = socket.socket(family, socket.SOCK_STREAM)
+        sock = socket.socket(self._family, socket.SOCK_STREAM)
         try:
             sock.setblocking(False)
             # Linux then takes about so many bytes that nobody reads, as the robot does.
             sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_WINDOW_LENGTH)
             if own_address.startswith("127."):
                 sock.bind((own_address, 0))
-            result = sock.connect_ex(address)
+            result = sock.connect_ex(self._address)
             if result not in (0, errno.EINPROGRESS):
                 raise OSError(result, os.strerror(result))
         except OSError:
@@ -168,58 +156,60 @@ class TcpLink:
             raise
         return sock
 
-    def is_dialling(self, index: int) -> bool:
-        """Return whether a dial() of this robot is still under way."""
+    def is_connecting(self, index: int) -> bool:
+        """Return whether a connect() of this robot is still under way."""
         connection = self._connections[index]
-        return connection is not None and connection.dialling
+        return connection is not None and not connection.is_open
+
+    def _find_open(self, index: int) -> Optional[_Connection]:
+        connection = self._connections[index]
+        return connection if connection is not None and connection.is_open else None
 
     def is_open(self, index: int) -> bool:
         """Return whether a robot has a connection."""
-        connection = self._connections[index]
-        return connection is not None and not connection.dialling
-
-    def has_unsent(self, index: int) -> bool:
-        """Return whether the driver has not taken all that a robot sent."""
-        connection = self._connections[index]
-        return connection is not None and bool(connection.unsent)
+        return self._find_open(index) is not None
 
     def send(self, index: int, data: bytes) -> None:
-        """Send data for a robot, later if the driver does not read now (poll() reports BLOCKED)."""
-        connection = self._connections[index]
-        if connection is None or connection.dialling:
+        """Send data for a robot, later if the driver does not read now (poll() then returns BLOCKED)."""
+        connection = self._find_open(index)
+        if connection is None:
             return
         if connection.unsent:
             if len(connection.unsent) < _MOST_UNSENT:
                 connection.unsent += data
             return
-        try:
-            sent = connection.socket.send(data)
-        except BlockingIOError:
-            sent = 0
-        except OSError as error:
-            self._lose(connection, error)
-            return
-        if sent < len(data):
+        sent = self._try_send(connection, data)
+        if sent is not None and sent < len(data):
             connection.unsent += data[sent:]
             self._watch(connection)
             self._events.append(LinkEvent(index, BLOCKED))
 
+    def _try_send(self, connection: _Connection, data: bytes) -> Optional[int]:
+        """Return how much of data the system took, None if the connection is lost."""
+        try:
+            return connection.socket.send(data)
+        except BlockingIOError:
+            return 0
+        except OSError as error:
+            self._lose(connection, error.strerror or str(error))
+            return None
+
     def drop_unsent(self, index: int) -> None:
-        """Forget what could not be sent, as a write that ran into its time limit does."""
-        connection = self._connections[index]
+        """Drop what could not be sent, as a write that ran into its time limit does."""
+        connection = self._find_open(index)
         if connection is not None and connection.unsent:
             connection.unsent.clear()
             self._watch(connection)
 
     def pause(self, index: int, paused: bool) -> None:
-        """Leave what comes for a robot to the system's buffer, or read it again."""
-        connection = self._connections[index]
-        if connection is not None and not connection.dialling and connection.paused != paused:
+        """Leave what arrives for a robot in the system's buffer, or read it again."""
+        connection = self._find_open(index)
+        if connection is not None and connection.paused != paused:
             connection.paused = paused
             self._watch(connection)
 
     def _watch(self, connection: _Connection) -> None:
-        """Tell the selector what a connection waits for."""
+        """Register with the selector what a connection waits for."""
         events = 0 if connection.paused else selectors.EVENT_READ
         if connection.unsent:
             events |= selectors.EVENT_WRITE
@@ -227,17 +217,19 @@ class TcpLink:
         if events:
             self._selector.register(connection.socket, events, connection)
 
+    def _forget(self, connection: _Connection) -> None:
+        if connection.socket in self._selector.get_map():
+            self._selector.unregister(connection.socket)
+
     def poll(self, timeout_s: float) -> List[LinkEvent]:
         """Return what happened, after at most timeout_s."""
-        if self._events:
-            timeout_s = 0.0
-        for key, mask in self._selector.select(timeout_s):
+        for key, mask in self._selector.select(0.0 if self._events else timeout_s):
             if isinstance(key.data, int):
                 self._accept(key.data)
                 continue
-            connection = key.data
-            if connection.dialling:
-                self._finish_dial(connection)
+            connection: _Connection = key.data
+            if not connection.is_open:
+                self._finish_connect(connection)
                 continue
             if mask & selectors.EVENT_WRITE:
                 self._flush(connection)
@@ -250,46 +242,34 @@ class TcpLink:
         try:
             sock, _ = self._listeners[index].accept()
         except OSError:
-            # The caller gave up before we looked; the listener is as good as before.
+            # The caller gave up before; the listener still works.
             return
-        if self._connections[index] is not None:
+        connection = self._connections[index]
+        if connection is not None:
             # One client at a time. The newest wins: the older one may be dead without our knowledge.
-            self.close(index)
-            self._events.append(LinkEvent(index, LOST, b"another client came"))
-        self._open(_Connection(index, sock, dialling=False))
+            self._lose(connection, "another client came")
+        self._open(_Connection(index, sock))
 
     def _open(self, connection: _Connection) -> None:
-        connection.dialling = False
-        sock = connection.socket
-        sock.setblocking(False)
-        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER_LENGTH)
+        connection.is_open = True
+        connection.socket.setblocking(False)
+        connection.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        connection.socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER_LENGTH)
         self._connections[connection.index] = connection
         self._watch(connection)
         self._events.append(LinkEvent(connection.index, MADE))
 
-    def _finish_dial(self, connection: _Connection) -> None:
+    def _finish_connect(self, connection: _Connection) -> None:
         result = connection.socket.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
         if result:
             self.close(connection.index)
-            self._events.append(LinkEvent(connection.index, FAILED, errno_text(result)))
+            self._events.append(LinkEvent(connection.index, FAILED, reason=os.strerror(result)))
         else:
             self._open(connection)
 
-    def _forget(self, connection: _Connection) -> None:
-        if connection.socket in self._selector.get_map():
-            self._selector.unregister(connection.socket)
-
     def _flush(self, connection: _Connection) -> None:
-        try:
-            sent = connection.socket.send(connection.unsent)
-        except BlockingIOError:
-            return
-        except OSError as error:
-            self._lose(connection, error)
-            return
-        del connection.unsent[:sent]
-        if not connection.unsent:
+        del connection.unsent[: self._try_send(connection, connection.unsent) or 0]
+        if self._connections[connection.index] is connection and not connection.unsent:
             self._watch(connection)
             self._events.append(LinkEvent(connection.index, UNBLOCKED))
 
@@ -299,17 +279,16 @@ class TcpLink:
         except BlockingIOError:
             return
         except OSError as error:
-            self._lose(connection, error)
+            self._lose(connection, error.strerror or str(error))
             return
         if data:
             self._events.append(LinkEvent(connection.index, DATA, data))
         else:
-            self.close(connection.index)
-            self._events.append(LinkEvent(connection.index, LOST, b"the driver closed"))
+            self._lose(connection, "the driver closed")
 
-    def _lose(self, connection: _Connection, error: OSError) -> None:
+    def _lose(self, connection: _Connection, reason: str) -> None:
         self.close(connection.index)
-        self._events.append(LinkEvent(connection.index, LOST, (error.strerror or str(error)).encode()))
+        self._events.append(LinkEvent(connection.index, LOST, reason=reason))
 
     def close(self, index: int) -> None:
         """End a robot's connection, if it has one, in the orderly way (FIN)."""
@@ -325,31 +304,41 @@ class TcpLink:
         The driver gets no FIN, and on Linux not even acknowledgements: what it sends stays unsent. Elsewhere the
         system goes on acknowledging until its buffer is full. The socket stays open until the program ends.
         """
-        connection = self._connections[index]
-        if connection is not None:
-            self._connections[index] = None
-            self._forget(connection)
-            if connection.dialling:
-                connection.socket.close()
-            else:
-                _make_deaf(connection.socket)
-                self._abandoned.append(connection.socket)
-                if len(self._abandoned) > _MOST_ABANDONED:
-                    self._abandoned.pop(0).close()
+        connection = self._find_open(index)
+        if connection is None:
+            self.close(index)
+            return
+        self._connections[index] = None
+        self._forget(connection)
+        _drop_incoming(connection.socket)
+        self._abandoned.append(connection.socket)
+        if len(self._abandoned) > _MOST_ABANDONED:
+            self._abandoned.pop(0).close()
 
     def close_all(self) -> None:
         """End every connection; safe to call twice."""
         for index in range(len(self._connections)):
             self.close(index)
-        for sock in list(self._listeners.values()) + self._abandoned:
+        for sock in [*self._listeners.values(), *self._abandoned]:
             sock.close()
         self._listeners.clear()
         self._abandoned.clear()
         self._selector.close()
 
 
-def _make_deaf(sock: socket.socket) -> None:
-    """Let the system drop every segment for this socket unseen, so that nothing is acknowledged."""
+def _resolve(host: str, port: int) -> Tuple[int, Tuple]:
+    """Return family and address. Raises: OptionError."""
+    try:
+        found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
+    except (OSError, UnicodeError) as error:
+        raise OptionError("host %r cannot be resolved: %s; give a name or an address" % (host, error)) from error
+    # IPv4 first: robots know nothing else.
+    found.sort(key=lambda entry: entry[0] != socket.AF_INET)
+    return found[0][0], found[0][4]
+
+
+def _drop_incoming(sock: socket.socket) -> None:
+    """Let the system drop every segment for this socket, so that nothing is acknowledged."""
     if not sys.platform.startswith("linux"):
         return
     drop_all = ctypes.create_string_buffer(_DROP_ALL)
@@ -359,8 +348,3 @@ def _make_deaf(sock: socket.socket) -> None:
     except OSError:
         # A kernel built without socket filters: the peer is acknowledged, as on other systems.
         return
-
-
-def errno_text(code: int) -> bytes:
-    """Return the words for an error number of the operating system."""
-    return os.strerror(code).encode()

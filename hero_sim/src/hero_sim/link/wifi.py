@@ -1,14 +1,16 @@
-"""A robot's radio: bytes in, the same bytes out at the time at which they would arrive.
+"""A robot's Wi-Fi: bytes in, the same bytes out at the time at which they would arrive.
 
-Pure: time enters in milliseconds. Order is kept, as TCP keeps it; what the air loses comes late, not never.
+Pure: time enters in milliseconds. Order is kept, as TCP keeps it; what the air loses arrives late, not never.
 Source: published recordings of one HeRo on Wi-Fi: gaps between odoms p95 44-53 ms, p99 48-113 ms, longest
 148-1274 ms; ping 5-30 ms with spikes of 100-280 ms every few seconds.
 """
 
 from collections import deque
-from typing import Deque, Dict, List, NamedTuple, Tuple
+from typing import Deque, Dict, NamedTuple, Tuple
 
 import numpy as np
+
+__all__ = ["PROFILES", "Radio", "WifiProfile"]
 
 
 class WifiProfile(NamedTuple):
@@ -33,14 +35,13 @@ PROFILES: Dict[str, WifiProfile] = {
 their worst: links that are lost for seconds."""
 
 
-class _Quiet:
+class _Outages:
     """Times at which nothing passes, drawn one after another."""
 
     def __init__(self, every_ms: float, length_ms: Tuple[float, float], rng: np.random.RandomState) -> None:
         self._every_ms = every_ms
         self._length_ms = length_ms
         self._rng = rng
-        self._start_ms = self._end_ms = -1.0
         self._draw(0.0)
 
     def _draw(self, from_ms: float) -> None:
@@ -48,96 +49,85 @@ class _Quiet:
         self._end_ms = self._start_ms + self._rng.uniform(*self._length_ms)
 
     def find_end(self, at_ms: float) -> float:
-        """Return when something sent at at_ms can pass."""
+        """Return when bytes sent at at_ms can pass."""
         while self._end_ms < at_ms:
             self._draw(self._end_ms)
         return self._end_ms if self._start_ms <= at_ms else at_ms
 
 
+class _Air:
+    """What both directions of a connection share."""
+
+    def __init__(self, profile: WifiProfile, rng: np.random.RandomState) -> None:
+        self.profile = profile
+        self.is_ideal = profile == PROFILES["ideal"]
+        self.rng = rng
+        self.stalled_until_ms = 0.0
+        kinds = ((profile.spike_every_ms, profile.spike_ms), (profile.stall_every_ms, profile.stall_ms))
+        self.outages = [_Outages(every_ms, length_ms, rng) for every_ms, length_ms in kinds if every_ms > 0]
+
+
 class _Direction:
-    def __init__(self) -> None:
+    def __init__(self, air: _Air) -> None:
+        self._air = air
+        self._busy_ms = 0.0  # end of the transmission of the last bytes
         self.queue: Deque[Tuple[float, bytes]] = deque()
-        self.busy_ms = 0.0  # end of the transmission of the last bytes
+
+    @property
+    def length(self) -> int:
+        """How many bytes are on their way."""
+        return sum(len(data) for _, data in self.queue)
+
+    def put(self, now_ms: int, data: bytes) -> None:
+        """Send bytes."""
+        air, profile = self._air, self._air.profile
+        at_ms = max(float(now_ms), air.stalled_until_ms)
+        if not air.is_ideal:
+            if profile.bytes_per_s:
+                at_ms = max(at_ms, self._busy_ms) + len(data) / profile.bytes_per_s * 1000.0
+                self._busy_ms = at_ms
+            at_ms += profile.base_ms + air.rng.exponential(profile.jitter_ms)
+            for outages in air.outages:
+                at_ms = outages.find_end(at_ms)
+        # What was sent later may be due earlier; it waits in the queue behind the other all the same.
+        self.queue.append((at_ms, data))
+
+    def take(self, now_ms: int) -> bytes:
+        """Return what has arrived by now."""
+        parts = []
+        if now_ms >= self._air.stalled_until_ms:
+            while self.queue and self.queue[0][0] <= now_ms:
+                parts.append(self.queue.popleft()[1])
+        return b"".join(parts)
 
 
 class Radio:
-    """Both directions of one robot's connection."""
+    """Both directions of one robot's connection.
+
+    Attributes:
+        up, down: from the robot to the driver, and back.
+    """
 
     def __init__(self, profile: WifiProfile, rng: np.random.RandomState) -> None:
-        """Behave as profile says, with chance from rng."""
-        self._profile = profile
-        self._rng = rng
-        self._quiet: List[_Quiet] = []
-        for every_ms, length_ms in (
-            (profile.spike_every_ms, profile.spike_ms),
-            (profile.stall_every_ms, profile.stall_ms),
-        ):
-            if every_ms > 0:
-                self._quiet.append(_Quiet(every_ms, length_ms, rng))
-        self._up = _Direction()
-        self._down = _Direction()
-        self._stalled_until_ms = 0.0
-        self._ideal = profile == PROFILES["ideal"]
-
-    def is_transparent(self, now_ms: int) -> bool:
-        """Return whether bytes pass at once, so that nobody needs to queue them."""
-        return (
-            self._ideal and now_ms >= self._stalled_until_ms and not self._up.queue and not self._down.queue
-        )
-
-    def stall(self, now_ms: int, for_ms: int) -> None:
-        """Carry nothing for for_ms."""
-        self._stalled_until_ms = now_ms + for_ms
-
-    def clear(self) -> None:
-        """Forget what is on its way, as when a connection ends."""
-        self._up.queue.clear()
-        self._down.queue.clear()
-
-    def put_up(self, now_ms: int, data: bytes) -> None:
-        """Take bytes from the robot."""
-        self._put(self._up, now_ms, data)
-
-    def put_down(self, now_ms: int, data: bytes) -> None:
-        """Take bytes for the robot."""
-        self._put(self._down, now_ms, data)
-
-    def _put(self, direction: _Direction, now_ms: int, data: bytes) -> None:
-        profile = self._profile
-        at_ms = max(float(now_ms), self._stalled_until_ms)
-        if not self._ideal:
-            if profile.bytes_per_s:
-                at_ms = max(at_ms, direction.busy_ms) + len(data) / profile.bytes_per_s * 1000.0
-                direction.busy_ms = at_ms
-            at_ms += profile.base_ms + self._rng.exponential(profile.jitter_ms)
-            for quiet in self._quiet:
-                at_ms = quiet.find_end(at_ms)
-        # What was sent later may be due earlier; it waits in the queue behind the other all the same.
-        direction.queue.append((at_ms, data))
+        """Delay bytes as profile says, with delays drawn from rng."""
+        self._air = _Air(profile, rng)
+        self.up = _Direction(self._air)
+        self.down = _Direction(self._air)
 
     @property
     def is_carrying(self) -> bool:
         """Whether bytes are on their way."""
-        return bool(self._up.queue or self._down.queue)
+        return bool(self.up.queue or self.down.queue)
 
-    @property
-    def down_length(self) -> int:
-        """How many bytes are on their way to the robot."""
-        return sum(len(data) for _, data in self._down.queue)
+    def is_transparent(self, now_ms: int) -> bool:
+        """Return whether bytes pass at once, so that nobody needs to queue them."""
+        return self._air.is_ideal and now_ms >= self._air.stalled_until_ms and not self.is_carrying
 
-    def take_up(self, now_ms: int) -> bytes:
-        """Return what has reached the driver's side by now."""
-        return self._take(self._up, now_ms)
+    def stall(self, now_ms: int, for_ms: int) -> None:
+        """Carry nothing for for_ms."""
+        self._air.stalled_until_ms = now_ms + for_ms
 
-    def take_down(self, now_ms: int) -> bytes:
-        """Return what has reached the robot by now."""
-        return self._take(self._down, now_ms)
-
-    def _take(self, direction: _Direction, now_ms: int) -> bytes:
-        queue = direction.queue
-        if not queue or queue[0][0] > now_ms or now_ms < self._stalled_until_ms:
-            return b""
-        parts = []
-        while queue and queue[0][0] <= now_ms:
-            parts.append(queue.popleft()[1])
-        return b"".join(parts)
+    def clear(self) -> None:
+        """Drop what is on its way, as when a connection ends."""
+        self.up.queue.clear()
+        self.down.queue.clear()

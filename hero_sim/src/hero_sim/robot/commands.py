@@ -1,4 +1,4 @@
-"""Does what packets from the server ask of a robot, and answers for its services.
+"""What packets from the server do to a robot, and the answers of its services.
 
 Pure. Texts and behaviour are the firmware's (files named in messages and flash); ids as declared.
 """
@@ -14,19 +14,21 @@ from .flash import Flash
 from .motor_control import MotorControl
 from .sensing import Sensing
 
-PULSES_US = 500
-"""Writing pulses holds the loop so long (MotorDriver.ino: measured as 500 us per cmd_motor)."""
+__all__ = ["CommandTable"]
 
-HALT_US = 1000
+PULSES_US = 500
+"""How long writing pulses blocks the loop (MotorDriver.ino: measured as 500 us per cmd_motor)."""
+
+STOP_US = 1000
 LIGHT_US = 1000
-"""So do switching the motors off, and setting the light."""
+"""The same for switching the motors off, and for setting the light."""
 
 
 class CommandTable:
     """The callbacks of one robot, by topic id.
 
     Attributes:
-        held_us: how long the last callback held the robot's loop.
+        blocked_us: how long the last callback blocked the robot's loop.
     """
 
     def __init__(
@@ -45,9 +47,10 @@ class CommandTable:
         self._flash = flash
         self._log = log
         self._warn = warn
+        self._millis = 0
         self._now_ms = 0
-        self.held_us = 0
-        self._callbacks: Dict[int, Callable[[bytes, int], Optional[bytes]]] = {
+        self.blocked_us = 0
+        self._callbacks: Dict[int, Callable[[bytes], Optional[bytes]]] = {
             ids.ID_LED: self._set_light,
             ids.ID_LASER_ENABLE: self._enable_laser,
             ids.ID_IR_CALIBRATION: self._calibrate_ir,
@@ -62,88 +65,78 @@ class CommandTable:
             ids.ID_VELOCITY_PID_CALIBRATION: self._tune_velocity,
         }
 
-    def receive(self, frame: packets.Packet, millis: int, now_ms: int) -> Optional[bytes]:
-        """Do what frame says; return the frame of the answer if it called a service.
+    def receive(self, packet: packets.Packet, millis: int, now_ms: int) -> Optional[bytes]:
+        """Execute packet at millis of the robot, now_ms of the world; return a service's answer, as a packet.
 
         Raises: CommandError for a payload that is not the declared message.
         """
-        self._now_ms = now_ms
-        self.held_us = 0
-        callback = self._callbacks.get(frame.topic_id)
+        self._millis, self._now_ms = millis, now_ms
+        self.blocked_us = 0
+        callback = self._callbacks.get(packet.topic_id)
         # The slots without a subscriber are empty: the firmware ignores them.
-        return None if callback is None else callback(frame.payload, millis)
+        return None if callback is None else callback(packet.payload)
 
-    def _set_light(self, payload: bytes, millis: int) -> None:
-        self._sensing.set_light(millis, messages.decode_color(payload))
-        self.held_us = LIGHT_US
+    def _set_light(self, payload: bytes) -> None:
+        self._sensing.set_light(self._millis, messages.decode_color(payload))
+        self.blocked_us = LIGHT_US
 
-    def _enable_laser(self, payload: bytes, millis: int) -> None:
-        del millis
+    def _enable_laser(self, payload: bytes) -> None:
         self._sensing.laser_enabled = messages.decode_bool(payload)
 
-    def _drive_velocity(self, payload: bytes, millis: int) -> None:
-        twist = messages.decode_twist(payload)
-        if self._motors.receive_velocity(millis, twist.linear_m_s, twist.turn_rad_s):
-            self.held_us = HALT_US
+    def _drive_velocity(self, payload: bytes) -> None:
+        if self._motors.receive_velocity(self._millis, *messages.decode_twist(payload)):
+            self.blocked_us = STOP_US
 
-    def _drive_position(self, payload: bytes, millis: int) -> None:
-        twist = messages.decode_twist(payload)
-        if self._motors.receive_position(millis, self._now_ms, twist.linear_m_s, twist.turn_rad_s):
-            self.held_us = HALT_US
+    def _drive_position(self, payload: bytes) -> None:
+        if self._motors.receive_position(self._millis, self._now_ms, *messages.decode_twist(payload)):
+            self.blocked_us = STOP_US
 
-    def _drive_motors(self, payload: bytes, millis: int) -> None:
-        self._motors.receive_pulses(millis, *messages.decode_motor(payload))
-        self.held_us = PULSES_US
+    def _drive_motors(self, payload: bytes) -> None:
+        self._motors.receive_pulses(self._millis, *messages.decode_motor(payload))
+        self.blocked_us = PULSES_US
 
-    def _calibrate_ir(self, payload: bytes, millis: int) -> bytes:
-        del millis
+    def _calibrate_ir(self, payload: bytes) -> bytes:
         self._flash.ir_calibration_counts_m2 = list(messages.decode_ir_calibration(payload))
-        self._keep()
         text = "IR calibration parameters have been successfully recorded!"
-        self._log(text)
-        return _answer(ids.ID_IR_CALIBRATION_ANSWER, True, text)
+        return self._record(ids.ID_IR_CALIBRATION_ANSWER, text)
 
-    def _set_odom(self, payload: bytes, millis: int) -> bytes:
-        del millis
-        self._sensing.set_odometry(*messages.decode_set_odom(payload))
+    def _set_odom(self, payload: bytes) -> bytes:
+        self._sensing.set_odometry(messages.decode_set_odom(payload))
         self._log("[HERO] Odometry was changed!")
         return _answer(ids.ID_SET_ODOM_ANSWER, True, "Odometry was changed!")
 
-    def _set_motors(self, payload: bytes, millis: int) -> bytes:
-        del millis
+    def _set_motors(self, payload: bytes) -> bytes:
         centres_us = messages.decode_motor(payload)
-        self._flash.motor_centres_us = [float(centre) for centre in centres_us]
+        self._flash.motor_centres_us = [float(centre_us) for centre_us in centres_us]
         self._motors.motors.centres_us = list(centres_us)
-        self._keep()
-        text = "Motor Parameters has been succesfully recorded!"
+        return self._record(ids.ID_MOTORS_PARAMETERS_ANSWER, "Motor Parameters has been succesfully recorded!")
+
+    def _record(self, answer_id: int, text: str) -> bytes:
+        self._save_flash()
         self._log(text)
-        return _answer(ids.ID_MOTORS_PARAMETERS_ANSWER, True, text)
+        return _answer(answer_id, True, text)
 
-    def _set_position_pid(self, payload: bytes, millis: int) -> bytes:
-        del millis
-        gains = list(messages.decode_pid(payload))
-        self._flash.position_pid = gains
-        self._motors.position.set_gains(gains)
-        return self._record_pid(ids.ID_POSITION_PID_PARAMETERS_ANSWER, gains)
+    def _set_position_pid(self, payload: bytes) -> bytes:
+        self._flash.position_pid = list(messages.decode_pid(payload))
+        self._motors.position.set_gains(self._flash.position_pid)
+        return self._record_pid(ids.ID_POSITION_PID_PARAMETERS_ANSWER, self._flash.position_pid)
 
-    def _set_velocity_pid(self, payload: bytes, millis: int) -> bytes:
-        del millis
-        gains = list(messages.decode_pid(payload))
-        self._flash.velocity_pid = gains
-        self._motors.velocity.set_gains(gains)
-        return self._record_pid(ids.ID_VELOCITY_PID_PARAMETERS_ANSWER, gains)
+    def _set_velocity_pid(self, payload: bytes) -> bytes:
+        self._flash.velocity_pid = list(messages.decode_pid(payload))
+        self._motors.velocity.set_gains(self._flash.velocity_pid)
+        return self._record_pid(ids.ID_VELOCITY_PID_PARAMETERS_ANSWER, self._flash.velocity_pid)
 
     def _record_pid(self, answer_id: int, gains: List[float]) -> bytes:
+        text = "PID Parameters has been succesfully recorded!"
         self._log_green("Left  Motor PID = [%f, %f, %f]" % tuple(gains[:3]))
         self._log_green("Right Motor PID = [%f, %f, %f]" % tuple(gains[3:]))
         self._log_green("Recording values in the flash... ")
-        self._keep()
-        text = "PID Parameters has been succesfully recorded!"
+        self._save_flash()
         self._log_green(text + " ")
         return _answer(answer_id, True, text)
 
-    def _keep(self) -> None:
-        """Write the flash; where that fails, the robot goes on with what it was told, and people are told."""
+    def _save_flash(self) -> None:
+        """Write the flash; where that fails, the robot goes on with its new parameters, and people are told."""
         try:
             self._flash.save()
         except CommandError as error:
@@ -152,17 +145,17 @@ class CommandTable:
     def _log_green(self, text: str) -> None:
         self._log("\x1b[92m[/%s] %s\x1b[0m" % (self._name, text))
 
-    def _tune_position(self, payload: bytes, millis: int) -> bytes:
+    def _tune_position(self, payload: bytes) -> bytes:
         del payload
-        return self._tune(ids.ID_POSITION_PID_CALIBRATION_ANSWER, millis, of_velocity=False)
+        return self._tune(ids.ID_POSITION_PID_CALIBRATION_ANSWER, of_velocity=False)
 
-    def _tune_velocity(self, payload: bytes, millis: int) -> bytes:
+    def _tune_velocity(self, payload: bytes) -> bytes:
         del payload
-        return self._tune(ids.ID_VELOCITY_PID_CALIBRATION_ANSWER, millis, of_velocity=True)
+        return self._tune(ids.ID_VELOCITY_PID_CALIBRATION_ANSWER, of_velocity=True)
 
-    def _tune(self, answer_id: int, millis: int, of_velocity: bool) -> bytes:
-        self._motors.start_tuning(millis, self._now_ms, of_velocity)
-        self.held_us = PULSES_US
+    def _tune(self, answer_id: int, of_velocity: bool) -> bytes:
+        self._motors.start_tuning(self._millis, self._now_ms, of_velocity)
+        self.blocked_us = PULSES_US
         # The firmware never sets success here (VelocityControl.ino:229-245).
         return _answer(answer_id, False, "PID Autotuning!")
 

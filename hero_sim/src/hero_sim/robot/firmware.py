@@ -2,7 +2,7 @@
 
 Pure: no socket, no clock, no thread. Time enters in whole milliseconds, as the firmware's millis() counts it,
 so the robot runs as fast as its caller likes. Two things stand for the hardware: a Body (wheels, sensors,
-motors) and a radio, which looks at wants_connection, connects and carries outbox away.
+motors) and a radio, which connects when wants_connection is set and sends what is in outbox.
 Source: the firmware's files named at the constants, and measurements of the complete stock firmware.
 """
 
@@ -18,11 +18,13 @@ from ..errors import CommandError
 from ..robot_constants import CONNECT_TIMEOUT_MS, RECEIVE_WINDOW_LENGTH, TIME_LOST_MS
 from ..world.body import Body
 from . import declarations
+from .clock import RobotClock
 from .commands import CommandTable
 from .flash import Flash
 from .motor_control import MotorControl
-from .robot_clock import RobotClock
 from .sensing import Sensing
+
+__all__ = ["Firmware", "FirmwareOptions"]
 
 VERSIONS = "Firmware: v3.8 | Hardware: v2.5 | Config: v2.3"
 
@@ -36,7 +38,7 @@ WELCOME_MS = 1120
 """From the connection to the first pass of loop(): lights of welcome (LEDStatus.ino:93-108)."""
 
 SPIN_MS = 51
-"""Between two looks at what came in, configured: SYNC_RATE 20 Hz (config.h:49), 1000/20 + 1."""
+"""Between two spins, configured: SYNC_RATE 20 Hz (config.h:49), 1000/20 + 1."""
 
 UNCONFIGURED_SPIN_MS = 101
 """The same while unconfigured: loop() waits 50 ms, and the gate passes every second time."""
@@ -54,15 +56,15 @@ ANSWER_MS = (42, 75)
 _NEVER_MS = 2**62
 
 _PHASE_OFF = "off"
-_PHASE_BOOT = "boot"  # dialling for the first time
-_PHASE_SETUP = "setup"  # connected or not, the lights of welcome play
+_PHASE_BOOT = "boot"  # until the first attempt to connect has ended
+_PHASE_SETUP = "setup"  # setup(), connected or not, with the lights of welcome
 _PHASE_LOOP = "loop"
 
 _TIME_REQUEST = packets.encode_packet(packets.ID_TIME, bytes(8))
 
 
 class FirmwareOptions(NamedTuple):
-    """What the people who start the simulator choose for a robot."""
+    """What is chosen for a robot at the start of the simulator."""
 
     imu_hat: bool = False
     exact_odometry: bool = False
@@ -78,10 +80,11 @@ class Firmware:
         name: hero_N, in topics and frames.
         due_ms: when run() has to be called next.
         connected: whether the radio has a connection.
-        wants_connection: set while the firmware dials.
-        outbox: frames for the radio, in order.
+        wants_connection: whether the firmware is connecting.
+        outbox: packets for the radio, in order.
         configured: whether the robot streams.
         body: its hardware.
+        crash_reason: why the robot has to be restarted, None while it runs.
     """
 
     def __init__(
@@ -93,54 +96,45 @@ class Firmware:
         options: FirmwareOptions,
         report: Callable[[str], None],
     ) -> None:
-        """Build a robot that is switched off; report takes lines for the people who watch."""
+        """Build a robot that is switched off; report takes lines for people."""
         self.robot_id = robot_id
         self.name = "hero_%d" % robot_id
         self.options = options
         self.flash = flash
         self.rng = rng
+        self.body = body
         self.outbox: List[bytes] = []
         self.connected = False
-        self.wants_connection = False
-        self.configured = False
         self.due_ms = 0
         self.zero_topics_next = False
         self.answer_delay_ms = 0
-        self.crash_reason: Optional[str] = None
-        self.body = body
         self._report = report
         self._phase = _PHASE_OFF
         self._booted_at_ms = 0
         self._setup: List[Tuple[int, Callable[[int], None]]] = []
-        self._start_programs()
+        self._reset_memory()
 
-    def _start_programs(self) -> None:
+    def _reset_memory(self) -> None:
         """Give everything that lives in RAM its first value."""
+        name, body, flash, options = self.name, self.body, self.flash, self.options
         self.clock = RobotClock()
-        self.sensing = Sensing(
-            self.name, self.body, self.options.imu_hat, self.options.exact_odometry, self.flash
-        )
-        self.motors = MotorControl(
-            self.name, self.body, self.sensing.odometry, self.flash, self.rng, self.log
-        )
-        self.commands = CommandTable(
-            self.name, self.sensing, self.motors, self.flash, self.log, self.complain
-        )
-        self._declarations = declarations.encode_declarations(self.name)
+        self.sensing = Sensing(name, body, options.imu_hat, options.exact_odometry, flash)
+        self.motors = MotorControl(name, body, self.sensing.odometry, flash, self.rng, self.log)
+        self._commands = CommandTable(name, self.sensing, self.motors, flash, self.log, self.warn)
+        self._declarations = declarations.encode_declarations(name)
         self.configured = False
-        self.crash_reason = None
+        self.crash_reason: Optional[str] = None
         self.outbox.clear()
         self.wants_connection = False
         self._received = bytearray()
         self._pending: Deque[packets.Packet] = deque()
         self._spinning = False
-        self._held_us = 0
+        self._blocked_us = 0
         self._answers: List[Tuple[int, bytes]] = []
         self._advertised = False
         self._blocked_until_ms: Optional[int] = None
         self._next_spin_ms = 0
         self._next_log_ms = 0
-        self._requested_at_ms = 0
         self._last_request_ms = 0
         self._last_answer_ms = 0
         self._arrived_at_ms = 0
@@ -152,20 +146,17 @@ class Firmware:
         if robot_id is not None:
             self.robot_id = robot_id
             self.name = "hero_%d" % robot_id
-        self.body.release()
-        self._start_programs()
+        self.switch_off()
         self._booted_at_ms = now_ms
         self._phase = _PHASE_BOOT
-        self._setup = []
         self.sensing.show_searching()
         self.due_ms = now_ms + BOOT_MS
 
     def switch_off(self) -> None:
-        """Cut the power; the radio has to be told apart."""
+        """Cut the power; the caller cuts the radio's connection."""
         self._phase = _PHASE_OFF
         self.body.release()
-        self._start_programs()
-        self.sensing.show_dark()
+        self._reset_memory()
         self.due_ms = _NEVER_MS
 
     @property
@@ -174,20 +165,13 @@ class Firmware:
         return self._phase != _PHASE_OFF
 
     def freeze(self, now_ms: int, for_ms: int) -> None:
-        """Stand still in the program for for_ms: nothing is read, sent or watched, the motors keep their
-        pulses."""
-        self._blocked_until_ms = now_ms + for_ms
-        self.due_ms = now_ms + for_ms
-
-    def start_tuning(self, now_ms: int, of_velocity: bool) -> None:
-        """Let a controller tune itself, as its pid_calibration does."""
-        if self.is_on:
-            self.motors.start_tuning(self.to_millis(now_ms), now_ms, of_velocity)
+        """Block the program for for_ms: nothing is read, sent or watched, the motors keep their pulses."""
+        self._blocked_until_ms = self.due_ms = now_ms + for_ms
 
     # -- radio ---------------------------------------------------------------------------------------------
 
     def connection_made(self, now_ms: int) -> None:
-        """Be told that the radio has a connection."""
+        """The radio has a connection."""
         self.connected = True
         self.wants_connection = False
         self._received.clear()
@@ -198,7 +182,7 @@ class Firmware:
             self._unblock(now_ms)
 
     def connection_failed(self, now_ms: int) -> None:
-        """Be told that nobody answers; the next look at the radio tries again."""
+        """Nobody answers; the next spin tries again."""
         self.wants_connection = False
         if self._phase == _PHASE_BOOT and self.due_ms > now_ms:
             self._begin_setup(now_ms)
@@ -206,11 +190,11 @@ class Firmware:
             self._unblock(now_ms)
 
     def connection_lost(self) -> None:
-        """Be told that the connection ended; the firmware notices when it looks next."""
+        """The connection ended; the firmware notices in its next spin."""
         self.connected = False
 
     def receive_bytes(self, now_ms: int, data: bytes) -> None:
-        """Take bytes into the radio's buffer; they are read at the next spin."""
+        """Put bytes into the radio's buffer; the next spin reads them."""
         if not self._received:
             self._arrived_at_ms = now_ms
         self._received += data
@@ -221,12 +205,12 @@ class Firmware:
         return len(self._received)
 
     def block_writing(self, now_ms: int) -> None:
-        """Be told that the radio cannot take more: the whole loop stands until it can, or 5 s."""
+        """The radio accepts no more bytes: the whole loop blocks until it does, or 5 s."""
         if self._blocked_until_ms is None and self._phase == _PHASE_LOOP:
             self.freeze(now_ms, CONNECT_TIMEOUT_MS)
 
     def unblock_writing(self, now_ms: int) -> None:
-        """Be told that the radio takes bytes again."""
+        """The radio accepts bytes again."""
         if self._blocked_until_ms is not None and not self.wants_connection:
             self._unblock(now_ms)
 
@@ -234,24 +218,18 @@ class Firmware:
         self._blocked_until_ms = None
         self.due_ms = now_ms
 
-    def _dial(self, now_ms: int) -> None:
-        self.wants_connection = True
-        self._blocked_until_ms = now_ms + CONNECT_TIMEOUT_MS
-        self.due_ms = self._blocked_until_ms
-
     def send(self, data: bytes) -> None:
-        """Hand frames to the radio; without a connection they are lost."""
+        """Hand packets to the radio; without a connection they are lost."""
         if self.connected:
             self.outbox.append(data)
 
     def log(self, text: str) -> None:
         """Send a log line (level info, as all of the firmware's are)."""
-        self.send(
-            packets.encode_packet(packets.ID_LOG, payloads.encode_log(payloads.Log(payloads.LOG_INFO, text)))
-        )
+        line = payloads.encode_log(payloads.Log(payloads.LOG_INFO, text))
+        self.send(packets.encode_packet(packets.ID_LOG, line))
 
-    def complain(self, text: str) -> None:
-        """Tell the people who watch, not the server."""
+    def warn(self, text: str) -> None:
+        """Report a line to people, not to the server."""
         self._report("%s: %s" % (self.name, text))
 
     # -- time passes ---------------------------------------------------------------------------------------
@@ -268,18 +246,17 @@ class Firmware:
             self._blocked_until_ms = None
             self.wants_connection = False
         if self._phase == _PHASE_BOOT:
-            self._dial_first(now_ms)
+            self._connect_first(now_ms)
         elif self._phase == _PHASE_SETUP:
             self._run_setup(now_ms)
         else:
             self._run_loop(now_ms)
 
-    def _dial_first(self, now_ms: int) -> None:
-        if self.connected:
-            self._begin_setup(now_ms)
-        elif not self.wants_connection and now_ms < self._booted_at_ms + BOOT_MS + CONNECT_TIMEOUT_MS:
+    def _connect_first(self, now_ms: int) -> None:
+        timeout_at_ms = self._booted_at_ms + BOOT_MS + CONNECT_TIMEOUT_MS
+        if not self.connected and not self.wants_connection and now_ms < timeout_at_ms:
             self.wants_connection = True
-            self.due_ms = self._booted_at_ms + BOOT_MS + CONNECT_TIMEOUT_MS
+            self.due_ms = timeout_at_ms
         else:
             self.wants_connection = False
             self._begin_setup(now_ms)
@@ -328,7 +305,7 @@ class Firmware:
         return now_ms - self._booted_at_ms
 
     def _run_loop(self, now_ms: int) -> None:
-        """Be one pass of loop() (firmware.ino:160-190), or go on with a spin that holds it."""
+        """Run one pass of loop() (firmware.ino:160-190), or continue a spin that blocks it."""
         millis = self.to_millis(now_ms)
         if not self._spinning:
             if now_ms >= self._next_log_ms:
@@ -336,7 +313,7 @@ class Firmware:
                 self._next_log_ms = now_ms + (LOG_MS if self.configured else UNCONFIGURED_LOG_MS)
             if self.configured:
                 self._run_configured(millis, now_ms)
-            # A controller that is due comes first, also after the loop stood still.
+            # A controller that is due comes first, also after the loop was blocked.
             if now_ms >= self._next_spin_ms and not self._is_controller_due(millis):
                 self._begin_spin(now_ms)
         if self._spinning:
@@ -344,16 +321,19 @@ class Firmware:
         if self._spinning or self._blocked_until_ms is not None:
             return
         self._send_answers(now_ms)
+        self.due_ms = max(self._find_due(), now_ms + 1)
+
+    def _find_due(self) -> int:
         due_ms = min(self._next_log_ms, self._next_spin_ms)
         if self.configured:
-            due_ms = min(due_ms, self._booted_at_ms + self._find_due_millis())
-        if self._answers:
-            due_ms = min(due_ms, self._answers[0][0])
-        self.due_ms = max(due_ms, now_ms + 1)
+            due_ms = min(due_ms, self._booted_at_ms + self.sensing.due_ms)
+            if self.motors.due_ms is not None:
+                due_ms = min(due_ms, self._booted_at_ms + self.motors.due_ms)
+        return min(due_ms, self._answers[0][0]) if self._answers else due_ms
 
     def _is_controller_due(self, millis: int) -> bool:
-        motors_due_ms = self.motors.due_ms
-        return self.configured and motors_due_ms is not None and millis >= motors_due_ms
+        due_ms = self.motors.due_ms
+        return self.configured and due_ms is not None and millis >= due_ms
 
     def _run_configured(self, millis: int, now_ms: int) -> None:
         """Run sensors and controllers."""
@@ -362,11 +342,6 @@ class Firmware:
             self.send(self.sensing.run_cycle(millis, now_ms, self.clock.stamp(millis)))
         elif self._is_controller_due(millis):
             self.motors.run(millis, now_ms, self.sensing.read_encoders)
-
-    def _find_due_millis(self) -> int:
-        motors_due_ms = self.motors.due_ms
-        due_ms = self.sensing.due_ms
-        return due_ms if motors_due_ms is None else min(due_ms, motors_due_ms)
 
     # -- conversation --------------------------------------------------------------------------------------
 
@@ -380,10 +355,11 @@ class Firmware:
         else:
             # Each attempt to read connects anew (ArduinoTcpHardware.h:99-108).
             self._pending.clear()
-            self._dial(now_ms)
+            self.wants_connection = True
+            self.freeze(now_ms, CONNECT_TIMEOUT_MS)
 
     def _begin_reading(self) -> None:
-        """Take what is in the receive window."""
+        """Take the packets from the receive window."""
         if self._received:
             # A new reader each time: the firmware forgets a packet that is not complete after 20 ms
             # (SERIAL_MSG_TIMEOUT, node_handle.h:96), and looks again only after 51 or 101 ms.
@@ -392,48 +368,47 @@ class Firmware:
             del self._received[:RECEIVE_WINDOW_LENGTH]
 
     def _read_packets(self, now_ms: int) -> None:
-        """Handle packets until they have held the loop for a millisecond; the spin goes on after that time."""
+        """Handle packets until they have blocked the loop for a millisecond; the spin goes on after that time."""
+        millis = self.to_millis(now_ms)
         while self._pending:
-            if not self._receive_frame(self._pending.popleft(), self.to_millis(now_ms), now_ms):
-                # After a request of topics spinOnce() returns; the others wait for the next one.
+            if not self._receive_packet(self._pending.popleft(), millis, now_ms):
+                # After a request for topics spinOnce() returns; the others wait for the next one.
                 break
-            if self._held_us >= 1000:
-                self.due_ms = now_ms + self._held_us // 1000
-                self._held_us %= 1000
+            if self._blocked_us >= 1000:
+                self.due_ms = now_ms + self._blocked_us // 1000
+                self._blocked_us %= 1000
                 return
         self._spinning = False
         self._next_spin_ms = now_ms + (SPIN_MS if self.configured else UNCONFIGURED_SPIN_MS)
-        if self.configured and self.to_millis(now_ms) - self._last_request_ms > TIME_REQUEST_MS:
-            self._last_request_ms = self.to_millis(now_ms)
-            self._request_time(self._last_request_ms)
+        if self.configured and millis - self._last_request_ms > TIME_REQUEST_MS:
+            self._request_time(millis)
 
-    def _receive_frame(self, frame: packets.Packet, millis: int, now_ms: int) -> bool:
-        """Take one frame; return whether the firmware goes on reading."""
-        if frame.topic_id == packets.ID_PUBLISHER:
+    def _receive_packet(self, packet: packets.Packet, millis: int, now_ms: int) -> bool:
+        """Handle one packet; return whether the firmware goes on reading."""
+        topic_id = packet.topic_id
+        if topic_id == packets.ID_PUBLISHER:
             self._answer_topics(millis)
             return False
-        if len(frame.payload) > declarations.BUFFER_LENGTH:
-            self.crash_reason = "a payload of %d bytes for its buffer of 4096" % len(frame.payload)
+        if len(packet.payload) > declarations.BUFFER_LENGTH:
+            self.crash_reason = "a payload of %d bytes for its buffer of 4096" % len(packet.payload)
             return False
-        if frame.topic_id == packets.ID_TIME:
-            self._receive_time(frame.payload, millis)
-        elif frame.topic_id == packets.ID_TX_STOP:
+        if topic_id == packets.ID_TIME:
+            self._receive_time(packet.payload, millis)
+        elif topic_id == packets.ID_TX_STOP:
             self._unconfigure()
-        elif frame.topic_id == packets.ID_PARAMETER_REQUEST:
-            pass  # this firmware asks for no parameters, so it ignores answers
-        elif not declarations.ID_LED <= frame.topic_id <= declarations.ID_LAST_SUBSCRIBER_SLOT:
-            self.crash_reason = "id %d, which is outside its table of subscribers" % frame.topic_id
+        elif declarations.ID_LED <= topic_id <= declarations.ID_LAST_SUBSCRIBER_SLOT:
+            self._receive_command(packet, millis, now_ms)
+        elif topic_id != packets.ID_PARAMETER_REQUEST:  # answers for parameters, which this firmware ignores
+            self.crash_reason = "id %d, which is outside its table of subscribers" % topic_id
             return False
-        else:
-            self._receive_command(frame, millis, now_ms)
         return True
 
-    def _receive_command(self, frame: packets.Packet, millis: int, now_ms: int) -> None:
+    def _receive_command(self, packet: packets.Packet, millis: int, now_ms: int) -> None:
         try:
-            answer = self.commands.receive(frame, millis, now_ms)
-            self._held_us += self.commands.held_us
+            answer = self._commands.receive(packet, millis, now_ms)
+            self._blocked_us += self._commands.blocked_us
         except CommandError as error:
-            self.complain(str(error))
+            self.warn(str(error))
             return
         # Without a configured link the callback runs, but its answer is not sent (node_handle.h:478).
         if answer is not None and self.configured:
@@ -452,19 +427,18 @@ class Firmware:
             self.send(self._declarations)
         self.zero_topics_next = False
         self.configured = True
-        self._last_request_ms = self._last_answer_ms = millis
+        self._last_answer_ms = millis
 
     def _request_time(self, millis: int) -> None:
         self.send(_TIME_REQUEST)
-        self._requested_at_ms = millis
+        self._last_request_ms = millis
 
     def _receive_time(self, payload: bytes, millis: int) -> None:
         try:
-            answer = payloads.decode_time(payload)
+            self.clock.receive_answer(payloads.decode_time(payload), self._last_request_ms)
         except wire_errors.PayloadError as error:
-            self.complain(str(error))
+            self.warn(str(error))
             return
-        self.clock.take_answer(answer, self._requested_at_ms, millis)
         self._last_answer_ms = millis
 
     def _unconfigure(self) -> None:

@@ -1,6 +1,6 @@
 """The parameters that a robot keeps without power, in memory and in one file per robot.
 
-Borders: the only file of the simulated robot that touches the file system besides arena_file.
+The only file of the simulated robot that touches the file system.
 """
 
 import hashlib
@@ -11,15 +11,17 @@ from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 from ..errors import CommandError, OptionError
 
+__all__ = ["NO_FLASH_DIR", "Flash", "check_folder", "find_flash_dir", "make_fingerprint"]
+
 _LENGTHS = {"ir_calibration_counts_m2": 8, "motor_centres_us": 2, "velocity_pid": 6, "position_pid": 6}
 
 _LARGEST = 3.4e38  # a float of 32 bits
 
 NO_FLASH_DIR = "none"
-"""What people say instead of a folder if nothing shall be kept over a restart of the simulator."""
+"""The option's value that keeps nothing over a restart of the simulator."""
 
 _ERASED_PID = [-1.0] * 6
-"""What the firmware takes for "use the gains of the program"."""
+"""The firmware then uses the gains of the program."""
 
 _REMEDY = "delete it to begin anew, or start with --flash-dir none"
 
@@ -32,19 +34,19 @@ def _make_mapping(pairs: List[Tuple[str, Any]]) -> Dict[str, Any]:
     return content
 
 
-def _is_kept(key: str, value: Any) -> bool:
-    """Whether a value is a number that a robot may keep; only a sensor without a calibration holds NaN."""
+def _is_storable(key: str, value: Any) -> bool:
+    """Return whether a value is a number that a robot may keep; only a sensor without a calibration has NaN."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return False
     return abs(value) <= _LARGEST or (value != value and key == "ir_calibration_counts_m2")
 
 
 class Flash:
-    """What one robot keeps: calibration of the sensors, middle of the servos, PID parameters.
+    """The parameters of one robot: calibration of the sensors, centres of the servos, PID gains.
 
     Attributes:
         ir_calibration_counts_m2: one per sensor; NaN for a robot that was never calibrated.
-        motor_centres_us: servo pulse at which each wheel stands.
+        motor_centres_us: servo pulse at which each wheel rests.
         is_from_file: whether an earlier run set something.
         velocity_pid, position_pid: lkp lki lkd rkp rki rkd; -1 for a robot that was never tuned.
     """
@@ -52,7 +54,7 @@ class Flash:
     def __init__(
         self, ir_calibration_counts_m2: Sequence[float], motor_centres_us: Sequence[float] = (1500.0, 1500.0)
     ) -> None:
-        """Begin with this calibration and these centres, and keep what is set in memory only."""
+        """Begin with this calibration and these centres, and keep changes in memory only."""
         self.ir_calibration_counts_m2 = [float(value) for value in ir_calibration_counts_m2]
         self.motor_centres_us = list(motor_centres_us)
         self.velocity_pid = list(_ERASED_PID)
@@ -61,7 +63,7 @@ class Flash:
         self._path: Optional[str] = None
 
     def keep_in(self, path: str) -> None:
-        """Take over what the file at path holds, if it is there, and write it at each change from now on.
+        """Load the file at path, if it is there, and write it at each change from now on.
 
         Raises: OptionError if the file cannot be read or is not ours.
         """
@@ -69,7 +71,7 @@ class Flash:
         try:
             with open(path, encoding="utf-8") as file:
                 content = json.load(file, object_pairs_hook=_make_mapping)
-        except (FileNotFoundError, NotADirectoryError):  # the latter: told when something has to be kept
+        except (FileNotFoundError, NotADirectoryError):  # the latter is reported when something has to be kept
             return
         except (OSError, RecursionError, ValueError) as error:
             reason = error.strerror if isinstance(error, OSError) else error
@@ -77,7 +79,7 @@ class Flash:
         for key, length in _LENGTHS.items():
             values = content.get(key) if isinstance(content, dict) else None
             if not (
-                isinstance(values, list) and len(values) == length and all(_is_kept(key, value) for value in values)
+                isinstance(values, list) and len(values) == length and all(_is_storable(key, value) for value in values)
             ):
                 raise OptionError(
                     "flash file %s: %s must be a list of %d finite numbers; %s" % (path, key, length, _REMEDY)
@@ -103,32 +105,28 @@ class Flash:
         except OSError as error:
             with suppress(OSError):
                 os.remove(written)
-            raise CommandError(
-                "flash file %s cannot be written: %s" % (self._path, error.strerror)
-            ) from error
+            raise CommandError("flash file %s cannot be written: %s" % (self._path, error.strerror)) from error
 
 
 def find_flash_dir() -> str:
-    """Return the folder in which robots keep their parameters unless people name another: beside ROS's logs."""
+    """Return the default folder of the robots' parameters: beside ROS's logs."""
     ros_home = os.environ.get("ROS_HOME") or os.path.join(os.path.expanduser("~"), ".ros")
     return os.path.join(ros_home, "hero_sim")
 
 
 def check_folder(folder: str) -> None:
-    """Make the folder that people named.
+    """Make the folder of the option --flash-dir.
 
     Raises: OptionError if it cannot be used.
     """
     try:
         os.makedirs(folder, exist_ok=True)
     except OSError as error:
-        raise OptionError(
-            "--flash-dir %s cannot be made: %s; choose another" % (folder, error.strerror)
-        ) from error
+        raise OptionError("--flash-dir %s cannot be made: %s; choose another" % (folder, error.strerror)) from error
     if not os.access(folder, os.W_OK):
         raise OptionError("--flash-dir %s is not writable; choose another" % folder)
 
 
 def make_fingerprint(lines: Sequence[str]) -> str:
-    """Return a short name for what lines say, the same on every machine."""
+    """Return a short hash of lines, the same on every machine."""
     return hashlib.sha256("\n".join(lines).encode()).hexdigest()[:8]

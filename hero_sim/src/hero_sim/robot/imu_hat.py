@@ -1,7 +1,7 @@
-"""True heading and turn rate of one robot -> what its IMU hat reports, in the firmware's units and as late.
+"""What the IMU hat reports of a robot's heading, in the firmware's units and with its delay.
 
 Pure. Source: IMUSensor.ino. The hat fills a queue 100 times a second and the firmware takes one reading per
-cycle, so what it sees grows older, up to 0.24 s, until the queue overflows and is emptied.
+cycle, so its readings grow older, up to 0.24 s, until the queue overflows and is emptied.
 """
 
 import math
@@ -11,8 +11,8 @@ from typing import Deque, NamedTuple, Tuple
 UNIT_QUATERNION = 16383.0 / 16384.0
 """The largest part of a quaternion that the hat sends (0.99994, a 14-bit fixed point number)."""
 
-TURN_COUNTS_PER_RAD_S = 16.4 * 180.0 / math.pi
-"""Raw turn rate at a full scale of 2000 deg/s (assumption: the hat's usual scale)."""
+ANGULAR_COUNTS_PER_RAD_S = 16.4 * 180.0 / math.pi
+"""Raw angular speed at a full scale of 2000 deg/s (assumption: the hat's usual scale)."""
 
 GRAVITY = 8.192
 """1 g in the hat's unit: raw counts / 1000 (IMUSensor.ino:182-188)."""
@@ -26,7 +26,7 @@ class ImuReading(NamedTuple):
 
     heading_rad: float  # since power-on, -pi..pi
     quaternion: Tuple[float, float, float, float]  # x y z w
-    turn_counts: Tuple[float, float, float]
+    angular_counts: Tuple[float, float, float]
     acceleration: Tuple[float, float, float]
 
 
@@ -40,26 +40,18 @@ class ImuHat:
         self._read_at_ms = 0
         self._queue: Deque[Tuple[int, float, float]] = deque()
 
-    def read(self, now_ms: int, heading_rad: float, turn_rad_s: float) -> ImuReading:
-        """Put the true heading (world) and turn rate in, take the oldest reading that is still queued."""
-        self._queue.append((now_ms, heading_rad - self._start_rad, turn_rad_s))
-        # Since the last look as many readings came as 10 ms fit in, and one was taken.
+    def read(self, now_ms: int, heading_rad: float, angular_rad_s: float) -> ImuReading:
+        """Queue the true heading (world) and angular speed, and take the oldest reading from the queue."""
+        self._queue.append((now_ms, heading_rad - self._start_rad, angular_rad_s))
+        # Since the last read as many readings came as 10 ms fit in, and one was taken.
         self._age_ms += max(now_ms - self._read_at_ms - _FILL_MS, 0)
         if self._age_ms > OLDEST_MS:
             self._age_ms = 0
         self._read_at_ms = now_ms
         while self._queue[0][0] < now_ms - self._age_ms:
             self._queue.popleft()
-        _, seen_rad, seen_rad_s = self._queue[0]
-        seen_rad = math.remainder(seen_rad, 2.0 * math.pi)
-        return ImuReading(
-            seen_rad,
-            (
-                0.0,
-                0.0,
-                math.sin(seen_rad / 2.0) * UNIT_QUATERNION,
-                math.cos(seen_rad / 2.0) * UNIT_QUATERNION,
-            ),
-            (0.0, 0.0, float(round(seen_rad_s * TURN_COUNTS_PER_RAD_S))),
-            (0.0, 0.0, GRAVITY),
-        )
+        _, old_rad, old_rad_s = self._queue[0]
+        old_rad = math.remainder(old_rad, 2.0 * math.pi)
+        yaw_z, yaw_w = math.sin(old_rad / 2.0) * UNIT_QUATERNION, math.cos(old_rad / 2.0) * UNIT_QUATERNION
+        angular_counts = (0.0, 0.0, float(round(old_rad_s * ANGULAR_COUNTS_PER_RAD_S)))
+        return ImuReading(old_rad, (0.0, 0.0, yaw_z, yaw_w), angular_counts, (0.0, 0.0, GRAVITY))

@@ -1,4 +1,4 @@
-"""Turns the commands of one robot into servo pulses, with the firmware's PIDs, gates, limits and watchdogs.
+"""Servo pulses from the commands of one robot, with the firmware's PIDs, gates, limits and watchdogs.
 
 Pure: time enters in the robot's own milliseconds. Source: VelocityControl.ino, PositionControl.ino and
 MotorDriver.ino, by what they do, and measurements of the stock robot. The two controllers know nothing of each
@@ -28,6 +28,8 @@ from .flash import Flash
 from .motor_pid import POSITION_GAINS, VELOCITY_GAINS, Gains, MotorPid
 from .wheel_odometry import WheelOdometry
 
+__all__ = ["MotorControl"]
+
 CONTROL_MS = 21
 """Between two runs of a controller, 47.6 Hz (VelocityControl.ino:112)."""
 
@@ -41,31 +43,31 @@ POSITION_TUNING_MS = (11000, 49000)
 _TUNING_START_US = 130
 _TUNING_STEP_US = 80
 _TUNING_BAND_TICKS = 1
+# Its relay would switch at 1 m/s, which no wheel reaches: its output stays where it starts.
+_VELOCITY_TUNING_US = (_TUNING_STEP_US - _TUNING_START_US, _TUNING_START_US + _TUNING_STEP_US)
 
 
 class MotorDriver:
-    """The servos' pulses and the watchdog over them.
+    """The servos' pulses and their watchdog.
 
     Attributes:
-        centres_us: what the robot takes for the pulses at which its wheels stand, left and right.
+        centres_us: the robot's calibration: the pulses at which its wheels should rest, left and right.
         attached: whether pulses go out.
-        halt_at_ms: when the watchdog ends them.
+        stop_at_ms: when the watchdog stops them.
     """
 
     def __init__(self, body: Body, centres_us: Sequence[float]) -> None:
         """Begin without pulses; centres that no servo has are taken for 1500, as of an erased flash."""
+        low_us, high_us = PULSE_RANGE_US
         self._body = body
-        self.centres_us = [
-            int(centre_us) if PULSE_RANGE_US[0] < centre_us < PULSE_RANGE_US[1] else 1500
-            for centre_us in centres_us
-        ]
+        self.centres_us = [int(pulse_us) if low_us < pulse_us < high_us else 1500 for pulse_us in centres_us]
         self.attached = False
-        self.halt_at_ms = 0
+        self.stop_at_ms = 0
         self._pulses_us = (0, 0)
 
     def write(self, now_ms: int, left_us: int, right_us: int) -> None:
-        """Put out pulses, limited to 1000..2000 us."""
-        self.halt_at_ms = now_ms + MOTOR_WATCHDOG_MS + 1
+        """Write pulses, limited to 1000..2000 us."""
+        self.stop_at_ms = now_ms + MOTOR_WATCHDOG_MS + 1
         pulses_us = (left_us, right_us)
         if self.attached and pulses_us == self._pulses_us:
             return
@@ -75,15 +77,15 @@ class MotorDriver:
         self._body.write_pulses(min(max(left_us, low_us), high_us), min(max(right_us, low_us), high_us))
 
     def drive(self, now_ms: int, outputs_us: Sequence[int]) -> None:
-        """Put out what controllers want beyond the centres, forward positive."""
-        left_us, right_us = (
+        """Write the controllers' outputs beyond the centres, forward positive."""
+        pulses_us = [
             centre_us + sign * output_us
             for centre_us, sign, output_us in zip(self.centres_us, _WHEEL_SIGNS, outputs_us)
-        )
-        self.write(now_ms, left_us, right_us)
+        ]
+        self.write(now_ms, *pulses_us)
 
-    def halt(self) -> None:
-        """Take the pulses away."""
+    def stop(self) -> None:
+        """Stop the pulses."""
         self.attached = False
         self._body.release()
 
@@ -92,7 +94,8 @@ class _Controller:
     """What velocity and position controller have in common.
 
     Attributes:
-        gains: of the left and right wheel.
+        pids: of the left and right wheel.
+        targets: of the left and right wheel (m/s or ticks).
         tuning: whether it tunes itself.
         dropped: commands that came too early.
     """
@@ -121,7 +124,7 @@ class _Controller:
         return due_ms if due_ms - self._watchdog_ms < self._timeout_ms else None
 
     def set_gains(self, gains: Sequence[float]) -> None:
-        """Take lkp lki lkd rkp rki rkd."""
+        """Set lkp lki lkd rkp rki rkd."""
         for pid, three in zip(self.pids, (gains[:3], gains[3:])):
             pid.set_gains(Gains(*three))
 
@@ -132,7 +135,7 @@ class _Controller:
         return early
 
     def command(self, now_ms: int, targets: Sequence[float]) -> None:
-        """Take targets for the wheels; a wheel that has to reverse starts its PID anew."""
+        """Set targets for the wheels; a wheel that has to reverse starts its PID anew."""
         for pid, target, last in zip(self.pids, targets, self.targets):
             if target * last < 0.0:
                 pid.reset()
@@ -141,7 +144,7 @@ class _Controller:
         self.tuning = False
 
     def stop(self) -> None:
-        """Idle from now on; the next command is taken at once, and the caller halts the motors."""
+        """Idle from now on; the next command is accepted at once, and the caller stops the motors."""
         for pid in self.pids:
             pid.reset()
         self._watchdog_ms = 0
@@ -154,7 +157,7 @@ class _Controller:
         self._tuning_end_ms = now_ms + for_ms
 
     def continue_tuning(self, now_ms: int) -> bool:
-        """Keep the watchdog fresh; return whether this was the last run of the tuning."""
+        """Reset the watchdog; return whether this was the last run of the tuning."""
         self._watchdog_ms = now_ms
         self.tuning = now_ms < self._tuning_end_ms
         return not self.tuning
@@ -167,7 +170,7 @@ class _Controller:
         return True
 
     def run_pids(self, now_ms: int, measured: Sequence[float]) -> None:
-        """Write what the PIDs make of the measured wheels."""
+        """Write the PIDs' outputs for the measured wheels."""
         for pid, target, value in zip(self.pids, self.targets, measured):
             pid.run(now_ms, target, value)
         self._motors.drive(now_ms, [pid.output_us for pid in self.pids])
@@ -177,7 +180,7 @@ class MotorControl:
     """The controllers and the motor driver of one robot.
 
     Attributes:
-        motors: what puts out the pulses.
+        motors: what writes the pulses.
         velocity, position: the controllers, for their gains.
         due_ms: when run() has something to do, None while nothing drives.
     """
@@ -191,18 +194,18 @@ class MotorControl:
         rng: np.random.RandomState,
         log: Callable[[str], None],
     ) -> None:
-        """Begin as after power-on, with what the flash holds; log takes lines, rng draws how long tuning lasts."""
+        """Begin as after power-on, with the flash's parameters; rng draws how long tuning lasts."""
         self._name = name
         self._body = body
         self._odometry = odometry
         self._rng = rng
         self._log = log
-        self.motors = MotorDriver(body, flash.motor_centres_us)
+        self.motors = motors = MotorDriver(body, flash.motor_centres_us)
         self.velocity = _Controller(
-            self.motors, VELOCITY_GAINS, flash.velocity_pid, VELOCITY_LIMIT_US, VELOCITY_WATCHDOG_MS
+            motors, VELOCITY_GAINS, flash.velocity_pid, VELOCITY_LIMIT_US, VELOCITY_WATCHDOG_MS
         )
         self.position = _Controller(
-            self.motors, POSITION_GAINS, flash.position_pid, POSITION_LIMIT_US, POSITION_WATCHDOG_MS
+            motors, POSITION_GAINS, flash.position_pid, POSITION_LIMIT_US, POSITION_WATCHDOG_MS
         )
         self._start_ticks = [0, 0]
         self._tuning_start_ticks = [0, 0]
@@ -211,55 +214,49 @@ class MotorControl:
         self._reschedule(0)
 
     def _reschedule(self, now_ms: int) -> None:
-        wanted_ms = [self.motors.halt_at_ms] if self.motors.attached else []
-        for controller in (self.velocity, self.position):
-            due_ms = controller.find_due(now_ms)
-            if due_ms is not None:
-                wanted_ms.append(due_ms)
-        self.due_ms = min(wanted_ms) if wanted_ms else None
+        candidates_ms = [controller.find_due(now_ms) for controller in (self.velocity, self.position)]
+        candidates_ms += [self.motors.stop_at_ms if self.motors.attached else None]
+        self.due_ms = min((due_ms for due_ms in candidates_ms if due_ms is not None), default=None)
 
-    def receive_velocity(self, now_ms: int, linear_m_s: float, turn_rad_s: float) -> bool:
-        """Take a Twist for the velocity controller; return whether it was a zero that was accepted."""
+    def receive_velocity(self, now_ms: int, linear_m_s: float, angular_rad_s: float) -> bool:
+        """Receive a Twist for the velocity controller; return whether it was a zero that was accepted."""
         if self.velocity.is_too_early(now_ms):
             return False
-        wheels_m_s = _limit_to_wheels(linear_m_s, turn_rad_s)
-        self._take(self.velocity, now_ms, wheels_m_s)
-        return wheels_m_s is None
+        return self._command(self.velocity, now_ms, _limit_to_wheels(linear_m_s, angular_rad_s))
 
-    def receive_position(self, now_ms: int, world_ms: int, linear_m_s: float, turn_rad_s: float) -> bool:
-        """Take a Twist for the position controller, which goes as far as that speed reaches in a second.
+    def receive_position(self, now_ms: int, world_ms: int, linear_m_s: float, angular_rad_s: float) -> bool:
+        """Receive a Twist for the position controller, which drives as far as that speed reaches in a second.
 
         Return whether it was a zero that was accepted; world_ms is the world's time of now_ms.
         """
         if self.position.is_too_early(now_ms):
             return False
-        wheels_m_s = _limit_to_wheels(linear_m_s, turn_rad_s)
         self._start_ticks = self._count_ticks(world_ms)
-        ways_ticks = None if wheels_m_s is None else [wheel_m_s / TICK_M for wheel_m_s in wheels_m_s]
-        self._take(self.position, now_ms, ways_ticks)
-        return wheels_m_s is None
+        wheels_m_s = _limit_to_wheels(linear_m_s, angular_rad_s)
+        return self._command(self.position, now_ms, [wheel_m_s / TICK_M for wheel_m_s in wheels_m_s])
 
-    def _take(self, controller: _Controller, now_ms: int, targets: Optional[Sequence[float]]) -> None:
-        if targets is None:
+    def _command(self, controller: _Controller, now_ms: int, targets: Sequence[float]) -> bool:
+        stops = not any(targets)
+        if stops:
             self._log("\x1b[93m[/%s] Reseting PID...\x1b[0m" % self._name)
             controller.stop()
-            self.motors.halt()
+            self.motors.stop()
         else:
             controller.command(now_ms, targets)
         self._reschedule(now_ms)
+        return stops
 
     def receive_pulses(self, now_ms: int, left_us: int, right_us: int) -> None:
-        """Take a Motor command; a controller that is commanded too overwrites it."""
+        """Receive a Motor command; a controller that is commanded too overwrites it."""
         self.motors.write(now_ms, left_us, right_us)
         self._reschedule(now_ms)
 
     def start_tuning(self, now_ms: int, world_ms: int, of_velocity: bool) -> None:
-        """Begin a controller's self-tuning; what ends it is its own failure or a Twist that is not dropped."""
+        """Begin a controller's self-tuning, which ends by its own failure or by a Twist that is not dropped."""
         self._log("\x1b[94m[/%s] Starting Motors Auto Tuning! Wait... \x1b[0m" % self._name)
         controller = self.velocity if of_velocity else self.position
-        controller.start_tuning(
-            now_ms, int(self._rng.randint(*(VELOCITY_TUNING_MS if of_velocity else POSITION_TUNING_MS)))
-        )
+        limits_ms = VELOCITY_TUNING_MS if of_velocity else POSITION_TUNING_MS
+        controller.start_tuning(now_ms, int(self._rng.randint(*limits_ms)))
         self._tuning_start_ticks = self._count_ticks(world_ms)
         self._relay = [1, 1]
         start_us = _TUNING_START_US if of_velocity else 0
@@ -274,30 +271,25 @@ class MotorControl:
         """
         if self.position.is_due(now_ms):
             if self.position.tuning:
-                self._tune_position(now_ms, self._count_way(world_ms, self._tuning_start_ticks))
+                self._tune_position(now_ms, self._count_ticks_since(world_ms, self._tuning_start_ticks))
             else:
-                self.position.run_pids(now_ms, self._count_way(world_ms, self._start_ticks))
+                self.position.run_pids(now_ms, self._count_ticks_since(world_ms, self._start_ticks))
         if self.velocity.is_due(now_ms):
             read_encoders(now_ms, world_ms)
             if self.velocity.tuning:
-                self._tune_velocity(now_ms)
+                self._tune(self.velocity, now_ms, self._odometry.filtered_m_s, _VELOCITY_TUNING_US)
             else:
                 self.velocity.run_pids(now_ms, self._odometry.filtered_m_s)
-        if self.motors.attached and now_ms >= self.motors.halt_at_ms:
-            self.motors.halt()
+        if self.motors.attached and now_ms >= self.motors.stop_at_ms:
+            self.motors.stop()
         self._reschedule(now_ms)
 
-    def _tune_velocity(self, now_ms: int) -> None:
-        # Its relay would switch at 1 m/s, which no wheel reaches: it stays where it starts.
-        outputs_us = (_TUNING_STEP_US - _TUNING_START_US, _TUNING_START_US + _TUNING_STEP_US)
-        self._tune(self.velocity, now_ms, self._odometry.filtered_m_s, outputs_us)
-
-    def _tune_position(self, now_ms: int, way_ticks: Sequence[int]) -> None:
-        """Rock each wheel about where it stands."""
-        for wheel, ticks in enumerate(way_ticks):
+    def _tune_position(self, now_ms: int, moved_ticks: Sequence[int]) -> None:
+        """Rock each wheel about its place."""
+        for wheel, ticks in enumerate(moved_ticks):
             if self._relay[wheel] * ticks > _TUNING_BAND_TICKS:
                 self._relay[wheel] = -self._relay[wheel]
-        self._tune(self.position, now_ms, way_ticks, [_TUNING_STEP_US * relay for relay in self._relay])
+        self._tune(self.position, now_ms, moved_ticks, [_TUNING_STEP_US * relay for relay in self._relay])
 
     def _tune(
         self, controller: _Controller, now_ms: int, measured: Sequence[float], outputs_us: Sequence[int]
@@ -313,21 +305,19 @@ class MotorControl:
     def _count_ticks(self, world_ms: int) -> List[int]:
         return self._odometry.count_ticks(*self._body.read_wheels(world_ms))
 
-    def _count_way(self, world_ms: int, start_ticks: Sequence[int]) -> List[int]:
+    def _count_ticks_since(self, world_ms: int, start_ticks: Sequence[int]) -> List[int]:
         return [now - start for now, start in zip(self._count_ticks(world_ms), start_ticks)]
 
-    def halt(self, now_ms: int) -> None:
+    def stop(self, now_ms: int) -> None:
         """Switch the motors off and forget all commands."""
         self.velocity.stop()
         self.position.stop()
-        self.motors.halt()
+        self.motors.stop()
         self._reschedule(now_ms)
 
 
-def _limit_to_wheels(linear_m_s: float, turn_rad_s: float) -> Optional[Tuple[float, float]]:
-    """Return the wheels' speeds (m/s) for a Twist within the firmware's limits, None for a zero."""
+def _limit_to_wheels(linear_m_s: float, angular_rad_s: float) -> Tuple[float, float]:
+    """Return the wheels' speeds (m/s) for a Twist within the firmware's limits; both are 0 only for a zero Twist."""
     linear_m_s = math.copysign(min(abs(linear_m_s), MAX_LINEAR_M_S), linear_m_s)
-    turn_rad_s = math.copysign(min(abs(turn_rad_s), MAX_ANGULAR_RAD_S), turn_rad_s)
-    if linear_m_s == 0.0 and turn_rad_s == 0.0:
-        return None
-    return split_to_wheels(linear_m_s, turn_rad_s)
+    angular_rad_s = math.copysign(min(abs(angular_rad_s), MAX_ANGULAR_RAD_S), angular_rad_s)
+    return split_to_wheels(linear_m_s, angular_rad_s)

@@ -1,13 +1,12 @@
-"""Target and measurement of one wheel -> servo pulse beyond its centre, as the firmware's PID computes it.
+"""The firmware's PID of one wheel: from target and measurement to the servo pulse beyond its centre.
 
 Pure. Source: the gains and limits of VelocityControl.ino:31-47 and PositionControl.ino:31-47, and the behaviour of
 the PID library that the firmware brings: it counts its sample time in microseconds, so the 50000 that the
-firmware sets are 50 ms, and it computes at the first run after them. The runs come every 21 ms, so that makes 63.
-With a motor like that of the build that was measured, its wheels follow that build's through 3 s of driving to
-7 % of the way.
+firmware sets are 50 ms, and it computes at the first run after them; with a run every 21 ms that is every 63 ms.
+With a motor like that of the measured build, the distance of its wheels over 3 s of driving differs by up to 7 %.
 """
 
-from typing import NamedTuple, Tuple
+from typing import NamedTuple
 
 SAMPLE_MS = 50
 
@@ -20,8 +19,6 @@ class Gains(NamedTuple):
     derivative: float
 
 
-WheelGains = Tuple[Gains, Gains]
-
 VELOCITY_GAINS = Gains(1200.0, 2300.0, 0.1)
 """Of an erased flash; the unit is m/s."""
 
@@ -33,8 +30,8 @@ class MotorPid:
     """The PID of one wheel; times are the robot's own milliseconds.
 
     Attributes:
-        gains: as last set; set_gains() changes them.
-        output_us: what it computed last, whole microseconds, forward positive.
+        gains: as last set by set_gains().
+        output_us: last output, whole microseconds, forward positive.
     """
 
     def __init__(self, gains: Gains, limit_us: float) -> None:
@@ -47,7 +44,7 @@ class MotorPid:
         self._computed_ms = -SAMPLE_MS
 
     def set_gains(self, gains: Gains) -> None:
-        """Take new gains; the library ignores a set with a negative one, and keeps its integral."""
+        """Set gains; the library ignores a set with a negative one, and keeps its integral."""
         if min(gains) >= 0.0:
             self.gains = gains
 
@@ -66,7 +63,7 @@ class MotorPid:
         self._sum_us = self._limit(self._sum_us + self.gains.integral * sample_s * error)
         damping_us = self.gains.derivative / sample_s * (measured - self._last_input)
         self._last_input = measured
-        # The firmware cuts the fraction off.
+        # The firmware truncates.
         self.output_us = int(self._limit(self.gains.proportional * error + self._sum_us - damping_us))
 
     def _limit(self, value_us: float) -> float:

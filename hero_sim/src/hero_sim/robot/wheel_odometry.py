@@ -1,20 +1,23 @@
-"""Wheel travel -> encoder values and odometry, in the way and with the losses of the stock firmware.
+"""Encoder values and odometry from wheel travel, with the losses of the stock firmware.
 
-Pure. Source: WheelEncoder.ino and Odometry.ino as measured on the stock robot. The loss: whoever reads the
+Pure. Source: WheelEncoder.ino and Odometry.ino as measured on the stock robot. The loss: every reading of the
 encoders overwrites the distances of the last interval, and odometry adds only the last interval. While the
-velocity controller reads too (47 times a second), a third and more of the way is missed.
+velocity controller reads too (47 times a second), a third and more of the path is missed.
 """
 
 import math
 from typing import List, Tuple
 
-from ..robot_constants import TICK_M, WHEEL_SEPARATION_M
+from ..robot_constants import TICK_M
+from ..world.kinematics import Pose, join_wheels
+
+__all__ = ["WheelOdometry"]
 
 FILTER_MEASURE_ERROR = 1.0
 FILTER_FIRST_ERROR = 1.0
 FILTER_PROCESS_NOISE_S_M = 10.0
-"""Kalman filter in front of the speeds. Only the ratios count; they reproduce the decay of the speeds that
-the stock robot sends after a stop to five digits."""
+"""Kalman filter in front of the speeds. Only the ratios count; they reproduce to five digits the decay of the
+speeds that the stock robot sends after a stop."""
 
 
 class _SpeedFilter:
@@ -36,16 +39,16 @@ class WheelOdometry:
     """Encoders and odometry of one robot.
 
     Attributes:
-        pose: x m, y m, theta rad, as the robot believes.
+        pose: what the robot takes for its pose.
         ticks: counts of the left and right wheel since the last set_pose(), as last read.
         filtered_m_s: speeds of the left and right wheel, behind the filter, as last read.
     """
 
     def __init__(self, exact: bool = False, left_m: float = 0.0, right_m: float = 0.0) -> None:
-        """Count from wheel travels left_m and right_m on; with exact, no interval is missed (a robot with the
-        firmware's fault repaired)."""
-        self.pose = (0.0, 0.0, 0.0)
+        """Count from wheel travels left_m and right_m on; with exact, no interval is missed (a repaired firmware)."""
+        self.pose = Pose(0.0, 0.0, 0.0)
         self.ticks = (0, 0)
+        self.filtered_m_s = (0.0, 0.0)
         self._exact = exact
         self._counted_ticks = (math.floor(left_m / TICK_M), math.floor(right_m / TICK_M))
         self._base_ticks = self._counted_ticks
@@ -55,13 +58,10 @@ class WheelOdometry:
         self._timestep_s = 0.0
         self._speeds_m_s = (0.0, 0.0)
         self._filters = (_SpeedFilter(), _SpeedFilter())
-        self.filtered_m_s = (0.0, 0.0)
 
     def read_encoders(self, now_us: int, left_m: float, right_m: float) -> None:
-        """Take over the wheels' travel (m) at now_us of the robot's own clock; overwrites the last
-        interval."""
-        left = math.floor(left_m / TICK_M)
-        right = math.floor(right_m / TICK_M)
+        """Take the wheels' travel (m) at now_us of the robot's own clock; overwrites the last interval."""
+        left, right = math.floor(left_m / TICK_M), math.floor(right_m / TICK_M)
         self._counted_ticks = (left, right)
         ticks = (left - self._base_ticks[0], right - self._base_ticks[1])
         self._diff_ticks = (ticks[0] - self.ticks[0], ticks[1] - self.ticks[1])
@@ -75,59 +75,45 @@ class WheelOdometry:
             self.filtered_m_s = (self._filters[0].update(left_m_s), self._filters[1].update(right_m_s))
 
     def count_ticks(self, left_m: float, right_m: float) -> List[int]:
-        """Return what the counters show at these travels (m), without reading the encoders for a message."""
-        return [
-            math.floor(left_m / TICK_M) - self._base_ticks[0],
-            math.floor(right_m / TICK_M) - self._base_ticks[1],
-        ]
+        """Return the counters at these travels (m), without reading the encoders for a message."""
+        left_base, right_base = self._base_ticks
+        return [math.floor(left_m / TICK_M) - left_base, math.floor(right_m / TICK_M) - right_base]
 
     def integrate(self) -> None:
         """Add the last interval to the pose."""
+        left, right = self._diff_ticks
         if self._exact:
-            steps = (self.ticks[0] - self._integrated_ticks[0], self.ticks[1] - self._integrated_ticks[1])
+            left, right = self.ticks[0] - self._integrated_ticks[0], self.ticks[1] - self._integrated_ticks[1]
             self._integrated_ticks = self.ticks
-        else:
-            steps = self._diff_ticks
-        if steps == (0, 0):
+        if left == right == 0:
             return
-        left_m, right_m = steps[0] * TICK_M, steps[1] * TICK_M
-        travel_m, turn_rad = (left_m + right_m) / 2.0, (right_m - left_m) / WHEEL_SEPARATION_M
+        travel_m, rotation_rad = join_wheels(left * TICK_M, right * TICK_M)
         x_m, y_m, theta_rad = self.pose
-        heading_rad = theta_rad + turn_rad / 2.0
-        theta_rad = math.remainder(theta_rad + turn_rad, 2.0 * math.pi)
-        self.pose = (
+        heading_rad = theta_rad + rotation_rad / 2.0
+        self.pose = Pose(
             x_m + travel_m * math.cos(heading_rad),
             y_m + travel_m * math.sin(heading_rad),
-            theta_rad,
+            math.remainder(theta_rad + rotation_rad, 2.0 * math.pi),
         )
 
-    def set_pose(self, x_m: float, y_m: float, theta_rad: float) -> None:
+    def set_pose(self, pose: Pose) -> None:
         """Begin anew at this pose; the tick counters go to zero (Odometry.ino:234)."""
-        self.pose = (x_m, y_m, theta_rad)
+        self.pose = pose
         self._base_ticks = self._counted_ticks
         self.ticks = self._diff_ticks = self._integrated_ticks = (0, 0)
 
     def set_heading(self, theta_rad: float) -> None:
         """Overrule the heading, as the robot does when it has an IMU."""
-        self.pose = (self.pose[0], self.pose[1], theta_rad)
+        self.pose = Pose(self.pose.x_m, self.pose.y_m, theta_rad)
 
     @property
     def twist(self) -> Tuple[float, float]:
-        """Filtered speed (m/s) and turn rate (rad/s)."""
-        left_m_s, right_m_s = self.filtered_m_s
-        return (left_m_s + right_m_s) / 2.0, (right_m_s - left_m_s) / WHEEL_SEPARATION_M
+        """Filtered linear (m/s) and angular speed (rad/s)."""
+        linear_m_s, angular_rad_s = join_wheels(*self.filtered_m_s)
+        return linear_m_s, angular_rad_s
 
-    def list_encoder_values(self) -> List[float]:
+    def list_encoder_values(self) -> Tuple[float, ...]:
         """Return the eleven values of an Encoder message, in the order of its fields."""
         left, right = self._diff_ticks
-        return [
-            float(self.ticks[0]),
-            float(self.ticks[1]),
-            float(left),
-            float(right),
-            left * TICK_M,
-            right * TICK_M,
-            self._timestep_s,
-            *self._speeds_m_s,
-            *self.filtered_m_s,
-        ]
+        travels_m = (left * TICK_M, right * TICK_M)
+        return (*self.ticks, left, right, *travels_m, self._timestep_s, *self._speeds_m_s, *self.filtered_m_s)

@@ -1,7 +1,6 @@
-"""The flat world that robots drive in: walls, round obstacles and where robots start.
+"""The flat world that robots drive in: walls, round obstacles and the robots' start poses.
 
-Pure: numpy only; files are read in arena_file. Frame `world`: x right, y up, m; angles counter-clockwise,
-rad.
+Pure: numpy only; files are read in arena_file. Frame `world`: x right, y up, m; angles counter-clockwise, rad.
 """
 
 import math
@@ -9,17 +8,18 @@ from typing import List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
+from ..errors import OptionError
 from ..robot_constants import BODY_RADIUS_M
 from .kinematics import Pose
 
+__all__ = ["Arena", "build_default", "is_free", "measure_clearance", "outline", "place_robots"]
+
 START_GAP_M = 0.05
-"""Free space kept around a robot that is placed by chance."""
+"""Free space kept around a robot that is placed at random."""
 
 _MOST_TRIES = 2000
 
-
-class ArenaError(ValueError):
-    """An arena that cannot be used; the text says what is wrong and where."""
+Segment = Tuple[float, float, float, float]  # x1 y1 x2 y2
 
 
 class Arena(NamedTuple):
@@ -29,7 +29,7 @@ class Arena(NamedTuple):
         name: for people.
         segments_m: walls and the edges of polygons, shape (S, 4), x1 y1 x2 y2.
         circles_m: round obstacles, shape (C, 3), x y radius.
-        starts: free poses (x m, y m, theta rad) of the first robots; the others are placed by chance.
+        starts: free poses of the first robots; the others are placed at random.
         bounds_m: x min, y min, x max, y max of the area in which robots are placed.
         polygons_m: the corners of each solid polygon, whose edges are among the segments.
     """
@@ -38,20 +38,19 @@ class Arena(NamedTuple):
     segments_m: np.ndarray
     circles_m: np.ndarray
     starts: Tuple[Pose, ...]
-    bounds_m: Tuple[float, float, float, float]
+    bounds_m: Segment
     polygons_m: Tuple[np.ndarray, ...] = ()
 
 
-def outline(corners_m: List[Tuple[float, float]]) -> List[Tuple[float, float, float, float]]:
-    """Return the walls (x1 y1 x2 y2) that close the polygon of corners_m."""
-    following = corners_m[1:] + corners_m[:1]
-    return [(x1, y1, x2, y2) for (x1, y1), (x2, y2) in zip(corners_m, following)]
+def outline(corners_m: List[Tuple[float, float]]) -> List[Segment]:
+    """Return the walls that close the polygon of corners_m."""
+    return [(*corner, *following) for corner, following in zip(corners_m, corners_m[1:] + corners_m[:1])]
 
 
 def build_rectangle(width_m: float, height_m: float, robots: int) -> Arena:
     """Return a rectangular field around the origin with robots spread over it in rows.
 
-    Each start looks along the rim, counter-clockwise, so that nobody drives at a neighbour or a wall at once.
+    Each start is headed along the rim, counter-clockwise, so that nobody drives at a neighbour or a wall at once.
     """
     x_m, y_m = width_m / 2.0, height_m / 2.0
     columns = max(1, int(math.ceil(math.sqrt(robots))))
@@ -59,37 +58,31 @@ def build_rectangle(width_m: float, height_m: float, robots: int) -> Arena:
     starts: List[Pose] = []
     for index in range(robots):
         row, column = divmod(index, columns)
-        start_x = -x_m + width_m * (column + 0.5) / columns
-        start_y = -y_m + height_m * (row + 0.5) / rows
-        starts.append((start_x, start_y, _tangent(start_x, start_y)))
+        start_x_m = -x_m + width_m * (column + 0.5) / columns
+        start_y_m = -y_m + height_m * (row + 0.5) / rows
+        starts.append(Pose(start_x_m, start_y_m, _find_tangent(start_x_m, start_y_m)))
     walls = outline([(-x_m, -y_m), (x_m, -y_m), (x_m, y_m), (-x_m, y_m)])
     return Arena("rectangle", np.array(walls), np.empty((0, 3)), tuple(starts), (-x_m, -y_m, x_m, y_m))
 
 
 def build_default(robots: int) -> Arena:
-    """Return a square field: 1.5 m wide for up to four robots, wider for more so that they stay apart."""
+    """Return a square field: 1.5 m wide for up to four robots, wider for more so that they keep their distance."""
     columns = max(1, int(math.ceil(math.sqrt(robots))))
     side_m = max(1.5, 0.4 * columns)
     return build_rectangle(side_m, side_m, robots)
 
 
-def _tangent(x_m: float, y_m: float) -> float:
-    """Return the heading along the nearer wall, counter-clockwise around the origin; 0 at the origin."""
+def _find_tangent(x_m: float, y_m: float) -> float:
+    """Return the heading along the nearest wall, counter-clockwise around the origin; 0 at the origin."""
     if abs(x_m) < 1e-9 and abs(y_m) < 1e-9:
         return 0.0
-    if abs(x_m) > abs(y_m) + 1e-9:
-        return math.pi / 2.0 if x_m > 0.0 else -math.pi / 2.0
-    if abs(y_m) > abs(x_m) + 1e-9:
-        return math.pi if y_m > 0.0 else 0.0
-    # On a diagonal both walls are equally near: take the one that lies ahead counter-clockwise.
-    if x_m > 0.0:
-        return math.pi if y_m > 0.0 else math.pi / 2.0
-    return -math.pi / 2.0 if y_m > 0.0 else 0.0
+    # On a diagonal two walls are equally near: the one that follows counter-clockwise counts.
+    wall = math.floor(math.atan2(y_m, x_m) / (math.pi / 2.0) + 0.5 + 1e-9)
+    return math.remainder((wall + 1) * (math.pi / 2.0), 2.0 * math.pi)
 
 
 def measure_clearance(points_m: np.ndarray, arena: Arena) -> np.ndarray:
-    """Return the distance (m) of each point (P, 2) to the nearest wall or obstacle's rim, negative inside
-    one."""
+    """Return the distance (m) of each point (P, 2) to the nearest wall or obstacle, negative inside one."""
     clearance_m = np.full(len(points_m), np.inf)
     if len(arena.segments_m):
         clearance_m = np.minimum(clearance_m, distance_to_segments(points_m, arena.segments_m)[0].min(axis=1))
@@ -130,22 +123,21 @@ def distance_to_segments(
 def place_robots(arena: Arena, robots: int, rng: np.random.RandomState) -> np.ndarray:
     """Return start poses, shape (robots, 3): the arena's own first, then free places drawn from rng.
 
-    Raises: ArenaError if no free place is left.
+    Raises: OptionError if no free place is left.
     """
-    poses: List[Pose] = []
-    for index in range(robots):
-        own = index < len(arena.starts)
-        poses.append(arena.starts[index] if own else _draw_place(arena, poses, rng, robots))
-    return np.array(poses, dtype=float).reshape(-1, 3)
+    poses: List[Pose] = list(arena.starts[:robots])
+    while len(poses) < robots:
+        poses.append(_draw_place(arena, poses, rng, robots))
+    return np.array(poses, dtype=float)
 
 
 def _draw_place(arena: Arena, poses: List[Pose], rng: np.random.RandomState, robots: int) -> Pose:
     x_min, y_min, x_max, y_max = arena.bounds_m
     for _ in range(_MOST_TRIES):
-        pose = (rng.uniform(x_min, x_max), rng.uniform(y_min, y_max), rng.uniform(-math.pi, math.pi))
+        pose = Pose(rng.uniform(x_min, x_max), rng.uniform(y_min, y_max), rng.uniform(-math.pi, math.pi))
         if is_free(pose, poses, arena, BODY_RADIUS_M + START_GAP_M):
             return pose
-    raise ArenaError(
+    raise OptionError(
         "arena %s: no free place for robot %d of %d; take fewer robots or a larger arena"
         % (arena.name, len(poses) + 1, robots)
     )
@@ -155,4 +147,4 @@ def is_free(pose: Pose, poses: Sequence[Pose], arena: Arena, radius_m: float) ->
     """Return whether a robot with radius_m fits at pose, beside stock robots at poses."""
     if measure_clearance(np.array([pose[:2]]), arena)[0] < radius_m:
         return False
-    return all(math.hypot(pose[0] - x, pose[1] - y) >= radius_m + BODY_RADIUS_M for x, y, _ in poses)
+    return all(math.hypot(pose.x_m - x_m, pose.y_m - y_m) >= radius_m + BODY_RADIUS_M for x_m, y_m, _ in poses)

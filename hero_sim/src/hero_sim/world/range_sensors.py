@@ -1,8 +1,7 @@
-"""Poses, walls and obstacles -> what the eight infrared sensors of each robot read.
+"""The signals of each robot's eight infrared sensors, from poses, walls and obstacles; without noise.
 
-Pure: numpy only, over robots x beams x obstacles at once. No noise is drawn here: the caller passes it in.
-Source of the infrared model: measurements that the robot's authors published (signal of a TCRT5000 against a
-white wall) and RangeSensor.ino for the way the firmware turns the signal into a distance.
+Pure: numpy only, over robots x beams x obstacles at once. Source of the infrared model: measurements published by
+the robot's authors (signal of a TCRT5000 against a white wall).
 """
 
 import math
@@ -14,7 +13,7 @@ from ..robot_constants import BODY_RADIUS_M
 
 BEAMS = 8
 BEAM_ANGLES_RAD = -math.pi + np.arange(BEAMS) * (math.pi / 4.0)
-"""Directions in the body frame, counter-clockwise; index 4 looks straight ahead."""
+"""Directions in the body frame, counter-clockwise; index 4 is the front sensor."""
 
 ALPHA_COUNTS_M2 = 0.423
 BETA_COUNTS = -0.93
@@ -25,7 +24,7 @@ FIT_END_M = 0.18
 TABLE_END_M = 0.20
 TABLE_END_EXCESS_COUNTS = 12.0 - ALPHA_COUNTS_M2 / TABLE_END_M**2
 """The fit ends at 18 cm: the published table still has 12 counts at 20 cm, where the fit would give 9.6. Between
-the two the offset is led from beta to what the table has, and beyond the table it fades like the light."""
+the two the offset is interpolated, and beyond the table it fades with the light."""
 
 SATURATION_COUNTS = 950.0
 """The signal of anything nearer than about 2 cm."""
@@ -33,20 +32,9 @@ SATURATION_COUNTS = 950.0
 NOISE_COUNTS = 1.3
 """Standard deviation of one reading (published: 1 to 1.6 counts)."""
 
-FACTORY_CALIBRATION_COUNTS_M2 = 0.5
-"""What the firmware takes for alpha until it is calibrated."""
-
-CALIBRATION_DISTANCE_M = 0.10
-"""Distance of the wall when a robot is calibrated: alpha_i = mean(signal) * 0.10^2."""
-
-# The diode does not see a line but a cone. Its rim is modelled by two more rays, which count less.
-# Assumption: half angle and weight are not in the published data.
+# The diode sees a cone, whose rim is modelled by two more rays of less weight. Half angle and weight are assumptions.
 _CONE_RAD = np.array([0.0, -0.21, 0.21])
 _CONE_WEIGHT = np.array([1.0, 0.7, 0.7])
-
-MIN_DISTANCE_M = 0.01
-MAX_DISTANCE_M = 0.22
-"""Clamp of the firmware's distance, before it adds the body radius (RangeSensor.ino:123)."""
 
 _FAR_M = 1e6
 
@@ -90,12 +78,12 @@ def cast_at_circles(
     to_x = circles_m[:, 0] - origins_m[:, 0, None, None]
     to_y = circles_m[:, 1] - origins_m[:, 1, None, None]
     radius_m = circles_m[:, 2]
-    ahead_m = ray_x * to_x + ray_y * to_y
-    aside_m = ray_x * to_y - ray_y * to_x
-    inside_m2 = radius_m**2 - aside_m**2
-    hit = (inside_m2 > 0.0) & (ahead_m > 0.0)
+    along_m = ray_x * to_x + ray_y * to_y
+    across_m = ray_x * to_y - ray_y * to_x
+    inside_m2 = radius_m**2 - across_m**2
+    hit = (inside_m2 > 0.0) & (along_m > 0.0)
     depth_m = np.sqrt(np.where(hit, inside_m2, 0.0))
-    distance_m = np.where(hit, np.maximum(ahead_m - depth_m, 0.0), _FAR_M)
+    distance_m = np.where(hit, np.maximum(along_m - depth_m, 0.0), _FAR_M)
     first = np.argmin(distance_m, axis=-1)[..., None]
     cosine = depth_m / radius_m
     return np.take_along_axis(distance_m, first, -1)[..., 0], np.take_along_axis(cosine, first, -1)[..., 0]
@@ -129,25 +117,8 @@ def measure_signals(
 
 
 def _offset(bright: np.ndarray, beta_counts: np.ndarray) -> np.ndarray:
-    """Return what the table has beside alpha * bright (counts); bright is cosine / distance^2."""
+    """Return the signal's part besides alpha * bright (counts); bright is cosine / distance^2."""
     distance_m = 1.0 / np.sqrt(np.maximum(bright, 1e-12))
     share = np.clip((distance_m - FIT_END_M) / (TABLE_END_M - FIT_END_M), 0.0, 1.0)
     beyond = np.minimum(bright * TABLE_END_M**2, 1.0) * TABLE_END_EXCESS_COUNTS
     return beta_counts + share * (beyond - beta_counts)
-
-
-def calibrate(alpha_counts_m2: np.ndarray, beta_counts: np.ndarray) -> np.ndarray:
-    """Return the calibration that a robot with these sensors gets from a wall at 10 cm (counts m^2)."""
-    square_m2 = CALIBRATION_DISTANCE_M**2
-    return (alpha_counts_m2 / square_m2 + beta_counts) * square_m2
-
-
-def convert_to_ranges(counts: np.ndarray, calibration_counts_m2: np.ndarray) -> np.ndarray:
-    """Return the firmware's ranges (m from the robot's centre): NaN for a calibration that is erased.
-
-    Nothing in reach gives 0.2568 m, above the firmware's own range_max of 0.2368 m (RangeSensor.ino:123-125).
-    """
-    with np.errstate(divide="ignore", invalid="ignore"):
-        distance_m = np.sqrt(calibration_counts_m2 / np.asarray(counts, dtype=float))
-    # NaN goes through a clip unchanged, as through the firmware's constrain().
-    return BODY_RADIUS_M + np.clip(distance_m, MIN_DISTANCE_M, MAX_DISTANCE_M)

@@ -1,7 +1,7 @@
 """How each robot differs from the drawing: drawn from a seed, or set to known values.
 
 `KEY=VALUE,...[,robot=ID]` on the command line (--error), or a YAML file (--errors); the keys are those of KINDS.
-Pure but for the reading of that file. What the robot itself believes is in its flash, not here.
+Pure but for the reading of that file. A robot's own calibration is in its flash, not here.
 """
 
 from typing import Any, Dict, List, NamedTuple, Sequence
@@ -10,14 +10,19 @@ import numpy as np
 
 from ..errors import OptionError
 from ..yaml_file import fail_at, read_mapping, read_nodes
-from . import range_sensors
+from .range_sensors import ALPHA_COUNTS_M2, BEAMS, BETA_COUNTS
+
+__all__ = [
+    "KINDS", "MAX_WHEEL_M_S", "SERVO_CENTRE_US", "SERVO_GAIN_M_S_US", "RobotErrors", "describe_errors",
+    "describe_keys", "describe_robot", "draw_errors", "load_known", "set_known",
+]  # fmt: skip
 
 SERVO_CENTRE_US = 1500.0
 SERVO_DEAD_ZONE_US = 30.0
 SERVO_FULL_M_S = 0.25
 SERVO_FULL_US = 250.0
 SERVO_GAIN_M_S_US = SERVO_FULL_M_S / (SERVO_FULL_US - SERVO_DEAD_ZONE_US)
-"""A wheel stands for pulses within the dead zone around its centre, and reaches the robot's published top speed
+"""A wheel rests for pulses within the dead zone around its centre, and reaches the robot's published top speed
 of 0.25 m/s at the 250 us to which the firmware limits itself. The dead zone is an assumption; with it and the
 firmware's gains, one velocity command drives 0.13 to 0.17 m, as measured."""
 
@@ -48,27 +53,23 @@ class Kind(NamedTuple):
 _LEFT, _RIGHT, _ALL = slice(0, 1), slice(1, 2), slice(None)
 
 KINDS: Dict[str, Kind] = {
-    "left_centre_us": Kind("servo_centre_us", _LEFT, 1000, 2000, "pulse at which the left wheel stands"),
+    "left_centre_us": Kind("servo_centre_us", _LEFT, 1000, 2000, "pulse at which the left wheel rests"),
     "right_centre_us": Kind("servo_centre_us", _RIGHT, 1000, 2000, "the same of the right wheel"),
-    "dead_zone_us": Kind("dead_zone_us", _ALL, 0, 200, "a wheel stands within so much of its centre"),
+    "dead_zone_us": Kind("dead_zone_us", _ALL, 0, 200, "a wheel rests for pulses this close to its centre"),
     "left_gain": Kind("servo_gain", _LEFT, 0, 5, "speed of the left servo, 1 as drawn"),
     "right_gain": Kind("servo_gain", _RIGHT, 0, 5, "the same of the right servo"),
     "lag_s": Kind("servo_lag_s", _ALL, 0.001, 5, "time constant of the servos"),
-    "left_wheel": Kind("wheel_scale", _LEFT, 0.5, 2, "way of the left wheel, 1 as its ticks say"),
+    "left_wheel": Kind("wheel_scale", _LEFT, 0.5, 2, "travel of the left wheel per travel that its ticks show"),
     "right_wheel": Kind("wheel_scale", _RIGHT, 0.5, 2, "the same of the right wheel"),
-    "slip": Kind("slip", _ALL, 0, 0.5, "sd of the share of the way that a wheel loses in each step"),
+    "slip": Kind("slip", _ALL, 0, 0.5, "sd of the share of its travel that a wheel loses in each step"),
     "ripple_m_s": Kind("ripple_m_s", _ALL, 0, 0.1, "sd of a running servo's speed"),
     "alpha_counts_m2": Kind("alpha_counts_m2", _ALL, 0.01, 10, "brightness of all infrared sensors"),
     "beta_counts": Kind("beta_counts", _ALL, -20, 20, "offset of all infrared sensors"),
 }
-KINDS.update(
-    {
-        "alpha%d_counts_m2" % index: Kind(
-            "alpha_counts_m2", slice(index, index + 1), 0.01, 10, "brightness of infrared sensor %d" % index
-        )
-        for index in range(range_sensors.BEAMS)
-    }
-)
+for _index in range(BEAMS):
+    KINDS["alpha%d_counts_m2" % _index] = Kind(
+        "alpha_counts_m2", slice(_index, _index + 1), 0.01, 10, "brightness of infrared sensor %d" % _index
+    )
 
 
 class RobotErrors(NamedTuple):
@@ -86,12 +87,12 @@ class RobotErrors(NamedTuple):
 
 
 def draw_errors(rngs: Sequence[np.random.RandomState], scale: float = 1.0) -> RobotErrors:
-    """Return what is usual: one robot drawn from each of rngs; with scale 0 all are as drawn on paper.
+    """Return usual differences: one robot drawn from each of rngs; with scale 0 all are as on the drawing.
 
     Sources: odometry off by 1.4 to 3.0 % of the path and alpha from 0.39 to 0.44 are published; that servos of
     one kind differ by some per cent and some microseconds is an assumption.
     """
-    drawn = np.array([rng.standard_normal(6 + range_sensors.BEAMS) for rng in rngs]) * scale
+    drawn = np.array([rng.standard_normal(6 + BEAMS) for rng in rngs]) * scale
     same = np.ones((len(rngs), 1))
     return RobotErrors(
         servo_centre_us=SERVO_CENTRE_US + np.rint(6.0 * drawn[:, 0:2]),
@@ -101,18 +102,18 @@ def draw_errors(rngs: Sequence[np.random.RandomState], scale: float = 1.0) -> Ro
         wheel_scale=1.0 + 0.003 * drawn[:, 4:6],
         slip=same * 0.02 * scale,
         ripple_m_s=same * 0.003 * scale,
-        alpha_counts_m2=range_sensors.ALPHA_COUNTS_M2 * (1.0 + 0.02 * drawn[:, 6:]),
-        beta_counts=same * range_sensors.BETA_COUNTS,
+        alpha_counts_m2=ALPHA_COUNTS_M2 * (1.0 + 0.02 * drawn[:, 6:]),
+        beta_counts=same * BETA_COUNTS,
     )
 
 
 def set_known(errors: RobotErrors, first_id: int, text: str) -> None:
-    """Put what text says, `KEY=VALUE,...[,robot=ID]`, over what was drawn; without robot it holds for all.
+    """Put text, `KEY=VALUE,...[,robot=ID]`, over what was drawn; without robot it holds for all.
 
     Raises: OptionError that names what is wrong and what would do.
     """
     values: Dict[str, float] = {}
-    rows = slice(None)
+    rows = _ALL
     for pair in text.split(","):
         key, equals, value_text = (part.strip() for part in pair.partition("="))
         try:
@@ -124,11 +125,11 @@ def set_known(errors: RobotErrors, first_id: int, text: str) -> None:
                 values[key] = _read_value(key, value_text)
         except ValueError as error:
             raise OptionError("--error %s: %s" % (text, error)) from error
-    _put(errors, rows, values)
+    _set_values(errors, rows, values)
 
 
 def load_known(errors: RobotErrors, first_id: int, path: str) -> None:
-    """Put what the file says over what was drawn: a mapping of all or hero_N to keys and values.
+    """Put the file at path over what was drawn: a mapping of all or hero_N to keys and values.
 
     Raises: OptionError with file, line and reason.
     """
@@ -136,23 +137,17 @@ def load_known(errors: RobotErrors, first_id: int, path: str) -> None:
     robots = read_mapping(path, root, "must map all, hero_0, hero_1, ... to keys and values")
     # What holds for all comes first, so that single robots can differ from it.
     for name in sorted(robots, key=lambda name: name != "all"):
-        key_node, entries_node = robots[name]
-        try:
-            rows = _find_rows(_strip_name(name), len(errors.slip), first_id) if name != "all" else slice(None)
-        except ValueError as error:
-            raise fail_at(path, key_node, str(error)) from error
+        node, entries_node = robots[name]
         values: Dict[str, float] = {}
-        entries = read_mapping(path, entries_node, "%s must be a mapping of keys to numbers" % name)
-        for key, (_, value_node) in entries.items():
-            try:
-                values[key] = _read_value(key, value_node.value if value_node.id == "scalar" else None)
-            except ValueError as error:
-                raise fail_at(path, value_node, str(error)) from error
-        _put(errors, rows, values)
-
-
-def _strip_name(name: str) -> str:
-    return name[len("hero_") :] if name.startswith("hero_") else name
+        try:
+            robot_id = name[len("hero_") :] if name.startswith("hero_") else name
+            rows = _ALL if name == "all" else _find_rows(robot_id, len(errors.slip), first_id)
+            entries = read_mapping(path, entries_node, "%s must be a mapping of keys to numbers" % name)
+            for key, (_, node) in entries.items():
+                values[key] = _read_value(key, node.value if node.id == "scalar" else None)
+        except ValueError as error:
+            raise fail_at(path, node, str(error)) from error
+        _set_values(errors, rows, values)
 
 
 def _read_value(key: str, text: Any) -> float:
@@ -162,9 +157,8 @@ def _read_value(key: str, text: Any) -> float:
     try:
         number = float(text)
     except (TypeError, ValueError) as error:
-        raise ValueError(
-            "%s must be a number, not %s" % (key, "a list or a mapping" if text is None else repr(text))
-        ) from error
+        found = "a list or a mapping" if text is None else repr(text)
+        raise ValueError("%s must be a number, not %s" % (key, found)) from error
     if not kind.least <= number <= kind.most:
         raise ValueError("%s %g is not in %g..%g" % (key, number, kind.least, kind.most))
     return number
@@ -182,10 +176,18 @@ def _find_rows(text: str, count: int, first_id: int) -> slice:
     return slice(row, row + 1)
 
 
-def _put(errors: RobotErrors, rows: slice, values: Dict[str, float]) -> None:
-    # What means all sensors comes first, so that single ones can differ from it.
+def _set_values(errors: RobotErrors, rows: slice, values: Dict[str, float]) -> None:
+    # A key for all sensors comes first, so that single ones can differ from it.
     for key in sorted(values, key=lambda key: KINDS[key].columns != _ALL):
         getattr(errors, KINDS[key].array)[rows, KINDS[key].columns] = values[key]
+
+
+def describe_keys() -> List[str]:
+    """Return one line for each key of --error and --errors."""
+    lines = ["KEY=VALUE,...[,robot=ID]; without robot it holds for all robots."]
+    for key, kind in KINDS.items():
+        lines.append("  %-16s %s (%g..%g)" % (key, kind.meaning, kind.least, kind.most))
+    return lines
 
 
 def describe_errors(errors: RobotErrors, first_id: int) -> List[str]:
@@ -199,9 +201,5 @@ def describe_errors(errors: RobotErrors, first_id: int) -> List[str]:
 
 def describe_robot(errors: RobotErrors, row: int) -> List[str]:
     """Return the differences of one robot, `KEY: VALUE` each."""
-    lines: List[str] = []
-    for key, kind in KINDS.items():
-        columns = getattr(errors, kind.array)[row, kind.columns]
-        if len(columns) == 1:
-            lines.append("%s: %.6g" % (key, columns[0]))
-    return lines
+    columns = {key: getattr(errors, kind.array)[row, kind.columns] for key, kind in KINDS.items()}
+    return ["%s: %.6g" % (key, values[0]) for key, values in columns.items() if len(values) == 1]

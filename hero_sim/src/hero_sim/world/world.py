@@ -1,11 +1,9 @@
-"""Motor commands of all robots -> wheel travel, poses and collisions, one fixed step at a time.
+"""The physics of all robots: wheel travel, poses and collisions, one fixed step at a time.
 
-Pure: numpy only, no clock, no socket. Everything is an array over robots. The firmware sets the motor
-commands and reads the wheels; nothing here knows about messages.
-What a pulse makes of a wheel, and how robots differ, is in robot_errors.
+Pure: numpy only. Everything is an array over robots. The robots' bodies set servo commands and read the wheels;
+nothing here knows about messages.
 """
 
-import math
 from typing import Dict, List, Tuple
 
 import numpy as np
@@ -14,13 +12,16 @@ from ..robot_constants import BODY_RADIUS_M
 from . import range_sensors
 from .arena import Arena, distance_to_segments
 from .kinematics import join_wheels, move_along_arc
-from .robot_errors import MAX_WHEEL_M_S, SERVO_GAIN_M_S_US, RobotErrors
+from .robot_errors import RobotErrors
+
+__all__ = ["STEP_MS", "World"]
 
 STEP_MS = 10
 """Length of a physics step; the fastest robot moves 3 mm in it, far less than its radius."""
 
 _CONTACT_PASSES = 4
 _TOUCH_M = 1e-9
+_OVERLAP_M = 1e-6
 
 
 class World:
@@ -30,187 +31,151 @@ class World:
         time_ms: end of the last step.
         poses: true poses (N, 3): x m, y m, theta rad, frame world.
         errors: how each robot differs from the drawing.
-        commands_m_s: what the servos are told (N, 2), as the wheel speed it stands for, left and right.
+        commands_m_s: the servos' commands (N, 2), as the wheel speeds they stand for, left and right.
         speeds_m_s, travels_m: of the wheels (N, 2).
+        wheel_rows: travels and speeds of the wheels as lists: single reads are much faster than from arrays.
+        pushes: speed and end time of the robots that are pushed by hand, by index.
     """
 
     def __init__(
         self, arena: Arena, poses: np.ndarray, rng: np.random.RandomState, errors: RobotErrors
     ) -> None:
-        """Place robots at poses; slip, ripple and the noise of sensors are drawn from rng."""
+        """Place robots at poses; slip, ripple and sensor noise are drawn from rng."""
         count = len(poses)
         self.arena = arena
         self.time_ms = 0
         self.poses = np.array(poses, dtype=float).reshape(count, 3)
-        self.start_poses = self.poses.copy()
+        self._start_poses = self.poses.copy()
         self.commands_m_s = np.zeros((count, 2))
         self.speeds_m_s = np.zeros((count, 2))
         self.travels_m = np.zeros((count, 2))
         self.errors = errors
-        # The share of the way to its target that a servo's speed goes in one step.
+        self.pushes: Dict[int, Tuple[float, int]] = {}
+        self.wheel_rows: List[List[float]] = []
+        # The share of the difference to its command by which a servo's speed changes in one step.
         self._servo_gain = -np.expm1(-STEP_MS / 1000.0 / errors.servo_lag_s)
         self._rng = rng
-        self.present = np.ones(count, dtype=bool)
-        self._pushes: Dict[int, Tuple[float, int]] = {}
-        self.wheel_rows: List[List[float]] = []
-        self._publish_rows()
+        self._update_rows()
 
-    def _publish_rows(self) -> None:
-        # The firmware reads single wheels many times a step: lists are far quicker there than arrays.
+    def _update_rows(self) -> None:
         self.wheel_rows = np.hstack((self.travels_m, self.speeds_m_s)).tolist()
-
-    def read_wheels(self, index: int, time_ms: int) -> List[float]:
-        """Return the travel (m) of the left and right wheel of a robot, at a time within the running step."""
-        left_m, right_m, left_m_s, right_m_s = self.wheel_rows[index]
-        ahead_s = (time_ms - self.time_ms) / 1000.0
-        return [left_m + left_m_s * ahead_s, right_m + right_m_s * ahead_s]
-
-    def write_pulses(self, index: int, left_us: float, right_us: float) -> None:
-        """Give the servos of a robot pulses; below its centre the left wheel rolls forward."""
-        centre_us = self.errors.servo_centre_us[index].tolist()
-        dead_zone_us = float(self.errors.dead_zone_us[index, 0])
-        gains = self.errors.servo_gain[index].tolist()
-        self.commands_m_s[index] = [
-            _convert_pulse(beyond_us, dead_zone_us, gain)
-            for beyond_us, gain in zip((centre_us[0] - left_us, right_us - centre_us[1]), gains)
-        ]
-
-    def push(self, index: int, speed_m_s: float, for_ms: int) -> None:
-        """Push a robot forward for so long; its wheels turn with it."""
-        self._pushes[index] = (speed_m_s, self.time_ms + for_ms)
-
-    def release(self, index: int) -> None:
-        """Take the pulses of a robot away."""
-        self.commands_m_s[index] = 0.0
 
     def step(self) -> None:
         """Move everything on by STEP_MS."""
-        step_s = STEP_MS / 1000.0
         # Travel is taken with the speed of the step's start, so that reads within the step meet its end.
-        rolled_m = self.speeds_m_s * step_s
+        rolled_m = self.speeds_m_s * (STEP_MS / 1000.0)
         self.travels_m += rolled_m
         ripple_m_s = self._rng.standard_normal(self.speeds_m_s.shape) * self.errors.ripple_m_s
         reached_m_s = np.where(self.commands_m_s == 0.0, 0.0, self.commands_m_s + ripple_m_s)
         self.speeds_m_s += (reached_m_s - self.speeds_m_s) * self._servo_gain
         self.speeds_m_s[np.abs(self.speeds_m_s) < 1e-6] = 0.0
-        for index, (speed_m_s, until_ms) in list(self._pushes.items()):
+        for index, (speed_m_s, until_ms) in list(self.pushes.items()):
             self.speeds_m_s[index] = speed_m_s
             if self.time_ms >= until_ms:
-                del self._pushes[index]
+                del self.pushes[index]
         self.time_ms += STEP_MS
         if rolled_m.any():
             self._move_bodies(rolled_m)
-        self._publish_rows()
+        self._update_rows()
 
     def _move_bodies(self, rolled_m: np.ndarray) -> None:
         slipped = np.abs(self._rng.standard_normal(rolled_m.shape)) * self.errors.slip
         ground_m = rolled_m * self.errors.wheel_scale * (1.0 - slipped)
-        before = self.poses[:, :2].copy()
-        moved = move_along_arc(
-            self.poses[:, 0], self.poses[:, 1], self.poses[:, 2], ground_m[:, 0], ground_m[:, 1]
-        )
-        self.poses[:] = np.column_stack(moved)
-        self._separate(before)
+        before_m = self.poses[:, :2].copy()
+        self.poses[:] = np.column_stack(move_along_arc(*self.poses.T, *ground_m.T))
+        self._separate(before_m)
 
-    def _separate(self, before: np.ndarray) -> None:
-        """Push bodies out of walls, obstacles and each other; who cannot get free stays where he was."""
+    def _separate(self, before_m: np.ndarray) -> None:
+        """Push bodies out of walls, obstacles and each other; those that cannot get free stay where they were."""
         for _ in range(_CONTACT_PASSES):
             if not self._push_apart():
                 return
-        # Whoever still overlaps goes back to where he was free; that may block another, so look again.
-        positions = self.poses[:, :2]
+        # Whatever still overlaps goes back to where it was free; that may block another, so look again.
+        positions_m = self.poses[:, :2]
         while True:
-            stuck = self.find_overlaps() & (positions != before).any(axis=1)
+            stuck = self.find_overlaps() & (positions_m != before_m).any(axis=1)
             if not stuck.any():
                 return
-            positions[stuck] = before[stuck]
+            positions_m[stuck] = before_m[stuck]
 
     def _push_apart(self) -> bool:
-        positions = self.poses[:, :2]
+        positions_m = self.poses[:, :2]
         moved = False
-        if len(positions) > 1:
-            apart = positions[:, None, :] - positions
-            distance_m2 = (apart**2).sum(axis=2)
+        if len(positions_m) > 1:
+            apart_m = positions_m[:, None, :] - positions_m
+            distance_m2 = (apart_m**2).sum(axis=2)
             np.fill_diagonal(distance_m2, np.inf)
             firsts, seconds = np.nonzero(distance_m2 < (2.0 * BODY_RADIUS_M) ** 2 - _TOUCH_M)
             if len(firsts):
                 moved = True
                 distance_m = np.sqrt(np.maximum(distance_m2[firsts, seconds], 1e-12))
-                push = apart[firsts, seconds] * ((BODY_RADIUS_M - distance_m / 2.0) / distance_m)[:, None]
-                np.add.at(positions, firsts, push)
-        return self._push_off_walls(positions) or self._push_off_circles(positions) or moved
+                push_m = apart_m[firsts, seconds] * ((BODY_RADIUS_M - distance_m / 2.0) / distance_m)[:, None]
+                np.add.at(positions_m, firsts, push_m)
+        return self._push_off_walls(positions_m) or self._push_off_circles(positions_m) or moved
 
-    def _push_off_walls(self, positions: np.ndarray) -> bool:
+    def _push_off_walls(self, positions_m: np.ndarray) -> bool:
         if not len(self.arena.segments_m):
             return False
-        distance_m, near_x, near_y = distance_to_segments(positions, self.arena.segments_m)
+        distance_m, near_x_m, near_y_m = distance_to_segments(positions_m, self.arena.segments_m)
         robots, walls = np.nonzero(distance_m < BODY_RADIUS_M - _TOUCH_M)
         for robot, wall in zip(robots, walls):
-            away = positions[robot] - (near_x[robot, wall], near_y[robot, wall])
-            length_m = max(float(np.hypot(*away)), 1e-9)
+            away_m = positions_m[robot] - (near_x_m[robot, wall], near_y_m[robot, wall])
+            length_m = max(float(np.hypot(*away_m)), 1e-9)
             if length_m < BODY_RADIUS_M:
-                positions[robot] += away * ((BODY_RADIUS_M - length_m) / length_m)
+                positions_m[robot] += away_m * ((BODY_RADIUS_M - length_m) / length_m)
         return len(robots) > 0
 
-    def _push_off_circles(self, positions: np.ndarray) -> bool:
+    def _push_off_circles(self, positions_m: np.ndarray) -> bool:
         circles_m = self.arena.circles_m
         if not len(circles_m):
             return False
-        apart = positions[:, None, :] - circles_m[:, :2]
-        distance_m = np.hypot(apart[..., 0], apart[..., 1])
-        robots, others = np.nonzero(distance_m < circles_m[:, 2] + BODY_RADIUS_M - _TOUCH_M)
-        for robot, other in zip(robots, others):
-            length_m = max(float(distance_m[robot, other]), 1e-9)
-            wanted_m = circles_m[other, 2] + BODY_RADIUS_M
-            positions[robot] += apart[robot, other] * ((wanted_m - length_m) / length_m)
+        apart_m = positions_m[:, None, :] - circles_m[:, :2]
+        distance_m = np.hypot(apart_m[..., 0], apart_m[..., 1])
+        robots, circles = np.nonzero(distance_m < circles_m[:, 2] + BODY_RADIUS_M - _TOUCH_M)
+        for robot, circle in zip(robots, circles):
+            length_m = max(float(distance_m[robot, circle]), 1e-9)
+            free_m = circles_m[circle, 2] + BODY_RADIUS_M
+            positions_m[robot] += apart_m[robot, circle] * ((free_m - length_m) / length_m)
         return len(robots) > 0
 
-    def find_overlaps(self, slack_m: float = 1e-6) -> np.ndarray:
-        """Return which robots (N,) reach more than slack_m into a wall, an obstacle or another robot."""
-        positions = self.poses[:, :2]
-        bad = np.zeros(len(positions), dtype=bool)
-        if len(positions) > 1:
-            apart = positions[:, None, :] - positions
-            distance_m2 = (apart**2).sum(axis=2)
+    def find_overlaps(self) -> np.ndarray:
+        """Return which robots (N,) reach more than 1 um into a wall, an obstacle or another robot."""
+        positions_m = self.poses[:, :2]
+        overlaps = np.zeros(len(positions_m), dtype=bool)
+        if len(positions_m) > 1:
+            distance_m2 = ((positions_m[:, None, :] - positions_m) ** 2).sum(axis=2)
             np.fill_diagonal(distance_m2, np.inf)
-            bad |= (distance_m2 < (2.0 * BODY_RADIUS_M - slack_m) ** 2).any(axis=1)
+            overlaps |= (distance_m2 < (2.0 * BODY_RADIUS_M - _OVERLAP_M) ** 2).any(axis=1)
         if len(self.arena.segments_m):
-            bad |= (distance_to_segments(positions, self.arena.segments_m)[0] < BODY_RADIUS_M - slack_m).any(
-                axis=1
-            )
+            distance_m, _, _ = distance_to_segments(positions_m, self.arena.segments_m)
+            overlaps |= (distance_m < BODY_RADIUS_M - _OVERLAP_M).any(axis=1)
         for x_m, y_m, radius_m in self.arena.circles_m:
-            bad |= np.hypot(positions[:, 0] - x_m, positions[:, 1] - y_m) < radius_m + BODY_RADIUS_M - slack_m
-        return bad
+            distance_m = np.hypot(positions_m[:, 0] - x_m, positions_m[:, 1] - y_m)
+            overlaps |= distance_m < radius_m + BODY_RADIUS_M - _OVERLAP_M
+        return overlaps
 
     def measure_body_speeds(self) -> np.ndarray:
-        """Return linear (m/s) and turning speed (rad/s) of each robot (N, 2), as its wheels have it."""
-        linear_m_s, turn_rad_s = join_wheels(self.speeds_m_s[:, 0], self.speeds_m_s[:, 1])
-        return np.column_stack((linear_m_s, turn_rad_s))
+        """Return linear (m/s) and angular speed (rad/s) of each robot (N, 2), as its wheels have it."""
+        return np.column_stack(join_wheels(*self.speeds_m_s.T))
 
     def read_infrared(self, which: np.ndarray) -> np.ndarray:
-        """Return one noisy reading (whole counts, 0..1023) of the eight sensors of the robots which, (R,
-        8)."""
+        """Return one noisy reading (whole counts, 0..1023) of the eight sensors of the robots which, (R, 8)."""
+        arena, errors = self.arena, self.errors
         signals = range_sensors.measure_signals(
             self.poses,
             which,
-            self.arena.segments_m,
-            self.arena.circles_m,
-            self.errors.alpha_counts_m2[which],
-            self.errors.beta_counts[which],
+            arena.segments_m,
+            arena.circles_m,
+            errors.alpha_counts_m2[which],
+            errors.beta_counts[which],
         )
         noisy = signals + self._rng.normal(0.0, range_sensors.NOISE_COUNTS, signals.shape)
         # Adding zero turns -0.0 into 0.0, whose inverse is the right infinity.
         return np.clip(np.rint(noisy), 0, 1023) + 0.0
 
     def reset(self) -> None:
-        """Put every robot back to its start, standing."""
-        self.poses[:] = self.start_poses
+        """Put every robot back to its start, at rest."""
+        self.poses[:] = self._start_poses
         for motion in (self.commands_m_s, self.speeds_m_s):
             motion[:] = 0.0
-        self._publish_rows()
-
-
-def _convert_pulse(beyond_us: float, dead_zone_us: float, gain: float) -> float:
-    """Return the wheel speed (m/s) of a servo whose pulse lies so far beyond its centre, forward positive."""
-    driven_us = max(abs(beyond_us) - dead_zone_us, 0.0)
-    return math.copysign(min(driven_us * SERVO_GAIN_M_S_US * gain, MAX_WHEEL_M_S), beyond_us)
+        self._update_rows()
