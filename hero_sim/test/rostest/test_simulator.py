@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The simulator as a node behind the driver: it drives, its truth is published, and each fault shows at the
+"""The simulator as a node behind the driver: it drives, its ground truth is published, and each fault shows at the
 driver."""
 
 import json
@@ -80,7 +80,7 @@ class SimulatorTest(unittest.TestCase):
         answer = self.call_fault(fault)
         self.assertTrue(answer.success, answer.message)
 
-    def test_truth_and_odometry_agree_about_a_way(self):
+    def test_ground_truth_and_odometry_agree_about_a_distance(self):
         truth, odom = Newest("/hero_5/ground_truth", Odometry), Newest("/hero_5/odom", Odometry)
         start = truth.wait().pose.pose.position
         before = odom.wait().pose.pose.position
@@ -94,7 +94,7 @@ class SimulatorTest(unittest.TestCase):
             here = truth.message.pose.pose.position
             return math.hypot(here.x - start.x, here.y - start.y) > 0.1
 
-        wait_for(driven, "way of 0.1 m")
+        wait_for(driven, "distance of 0.1 m")
         publisher.publish(Twist())
         wait_for(lambda: abs(truth.message.twist.twist.linear.x) < 1e-3, "stop")
         odom.wait_for_more()
@@ -223,7 +223,7 @@ class SimulatorTest(unittest.TestCase):
         for odom in odoms:
             odom.wait()
         before = self.find(4).bad_packets
-        for fault in ("garbage", "half-frame", "bad-checksum", "bad-length", "long-frame", "foreign-id"):
+        for fault in ("garbage", "half-packet", "bad-checksum", "bad-length", "long-packet", "foreign-id"):
             self.inject(fault + ":robot=4")
         wait_for(lambda: self.find(4) and self.find(4).bad_packets >= before + 3, "bad frames of hero_4")
         for odom in odoms:

@@ -28,6 +28,7 @@ _TWIST = struct.Struct("<6d")
 _QUATERNION = struct.Struct("<4d")
 _ENCODER = struct.Struct("<11d")
 _COVARIANCE_LENGTH = 36 * 8
+_SUMMED_OFFSET = 5  # sync, length and its checksum are not part of a packet's last checksum
 
 # Places of the robot's parts in base_link (m), as the firmware sends them in its transforms.
 _WHEEL_Y_M = WHEEL_SEPARATION_M / 2.0
@@ -83,7 +84,7 @@ class _Template:
         for topic_id, payload in messages:
             start = len(self.data)
             self.data += packets.encode_packet(topic_id, payload)
-            self._sums.append((start + packets.CHECKED_OFFSET, len(self.data) - 1))
+            self._sums.append((start + _SUMMED_OFFSET, len(self.data) - 1))
             self.payload_starts.append(start + packets.HEADER_LENGTH)
 
     def seal(self) -> bytes:
