@@ -146,8 +146,9 @@ def test_run_tests_runs_unit_tests_and_checks_launch_files():
 
 
 def test_every_package_is_found_only_in_the_workspace(workspace):
-    found = workspace.run(f"for name in {' '.join(PACKAGES)}; do rospack find $name; done").split()
-    assert len(found) == len(PACKAGES)
+    names = sorted(set(PACKAGES) - {"hero"})  # rospack knows no metapackages
+    found = workspace.run(f"for name in {' '.join(names)}; do rospack find $name; done").split()
+    assert len(found) == len(names)
     assert all(path.startswith(str(workspace.directory)) for path in found), found
 
 

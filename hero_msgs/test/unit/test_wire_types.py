@@ -1,4 +1,4 @@
-"""The types are those of the stock firmware: md5 sums and fields in their order, measured on the wire (v3.8)."""
+"""Types equal those of the stock firmware (v3.8): md5 sums and order of fields, measured on the wire."""
 
 import re
 from pathlib import Path
@@ -38,8 +38,8 @@ def test_services_have_the_md5s_that_the_robot_declares(service, md5, request_md
     assert service._response_class._md5sum == RESPONSE_MD5
 
 
-def test_set_frequency_asks_for_one_number_and_answers_like_the_others():
-    """Firmware v3.8 does not serve it, so its md5 was never seen on the wire: its fields are held instead."""
+def test_set_frequency_has_one_number_and_the_common_response():
+    """Firmware v3.8 does not serve it, so its md5 was never measured."""
     assert srv.SetFrequencyRequest.__slots__ == ["frequency"]
     assert srv.SetFrequencyRequest._slot_types == ["float64"]
     assert srv.SetFrequencyResponse._md5sum == RESPONSE_MD5
@@ -57,7 +57,7 @@ def test_set_frequency_asks_for_one_number_and_answers_like_the_others():
         (srv.SetPIDResponse, ["success", "message"], ["bool", "string"]),
     ],
 )
-def test_fields_stand_in_the_order_of_the_wire(message, names, types):
+def test_fields_are_in_the_order_of_the_wire(message, names, types):
     assert message.__slots__ == names
     assert message._slot_types == types
 
@@ -69,7 +69,7 @@ def definition_files():
 @pytest.mark.parametrize("path", definition_files(), ids=lambda path: path.name)
 def test_every_field_is_documented_on_its_line(path):
     lines = path.read_text(encoding="utf-8").splitlines()
-    assert lines[0].startswith("# "), "begins with what the type is for"
+    assert lines[0].startswith("# "), "begins with the purpose of the type"
     for line in lines:
         if line.strip() and not line.startswith(("#", "---")):
             assert re.search(r"\S +# \S", line), line
