@@ -1,4 +1,4 @@
-"""A peer that does its worst to the driver for a while, from an address of its own; when thrown out it comes again.
+"""A peer that misbehaves for a while, from its own address, and reconnects when it is disconnected.
 
 bad_peer.py KIND --port PORT [--source ADDRESS] [--victim N]
 It ends at SIGINT and prints one line of JSON: how often it connected, was thrown out, and how many bytes it sent.

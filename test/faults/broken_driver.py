@@ -1,4 +1,4 @@
-"""The driver with one of its parts broken on purpose, for faults that no input causes.
+"""The driver with one part broken on purpose, for faults that no input causes.
 
 broken_driver.py PART TRIGGER [anything that the driver takes]
 While the file TRIGGER exists, PART raises an exception: `loop` the loop of the sockets itself, `open_link` what a

@@ -1,4 +1,4 @@
-"""What the families of the fault suite share: a ROS master and node of their own, short or long form, the table."""
+"""Fixtures of the fault suite: its own ROS master and node, the short or long form, the table of results."""
 
 import json
 import os

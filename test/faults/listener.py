@@ -1,4 +1,4 @@
-"""Listens to a swarm of emulated robots in a process of its own, and says what is missing, late or out of order.
+"""Subscribes to emulated robots in its own process, and counts what is missing, late or out of order.
 
 listener.py --count N [--first-id K]
 A line on stdin is answered with one line of JSON: `window` ends a window and tells about it, `silent` gives the

@@ -1,4 +1,4 @@
-"""A relay in the path of robots: passes bytes on late, unevenly, or not at all for a while.
+"""A TCP relay between robots and driver that delays, bunches or holds back bytes.
 
 relay.py LISTEN_HOST LISTEN_PORT TARGET_HOST TARGET_PORT
 Lines on stdin set how: `jitter 0.2` (each piece up to so many seconds late, in order), `stall 3` (nothing for so

@@ -1,4 +1,4 @@
-"""The parts of which the faults are made: masters, programs with a pipe, what a process holds, free ports."""
+"""Parts of the fault suite: ROS masters, programs controlled by a pipe, resources of a process."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""Runs the families of the fault suite, each with a ROS master of its own, and prints one table.
+"""Runs the families of the fault suite, each with its own ROS master, and prints one table.
 
 Usage: run.py RESULTS_DIR [--minutes N] [FAMILY ...]
 Without --minutes: the short form, two families at once. With it: the long form, one family after another, in

@@ -1,4 +1,4 @@
-"""A swarm at work for minutes or hours: nothing is lost, and what the driver holds and uses stays the same.
+"""A swarm that runs for minutes or hours: nothing is lost, and the driver's resources do not grow.
 
 Twenty robots at stock rates get commands at 10 Hz and are listened to without a gap. Beside them, round after round:
 a subscriber comes and goes, a robot connects again, another one's power is cut, a third one's service is called.
@@ -250,7 +250,7 @@ def judge(samples, is_long):
     return words
 
 
-def test_a_swarm_at_work_loses_nothing_and_the_driver_stays_as_it_is(start_driver, effort, record):
+def test_nothing_is_lost_and_the_driver_does_not_grow(start_driver, effort, record):
     driver = start_driver(parameters={"grace_s": 3600.0})
     with swarm_at_work(driver) as (swarm, commander, listener):
         bustle = Bustle(driver)

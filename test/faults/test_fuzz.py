@@ -1,4 +1,4 @@
-"""Garbled robots at the real driver, and, in the long form, coverage-guided fuzzing of what reads their bytes."""
+"""Robots that send garbage to a real driver; in the long form, coverage-guided fuzzing of the code that reads it."""
 
 import os
 import random
@@ -10,8 +10,8 @@ import pytest
 import rospy
 import rosservice
 from fake_robot import STOCK_DECLARATIONS, FakeRobot
-from life_signs import Life
 from rig import HERE
+from service_check import ServiceCheck
 
 from hero_msgs.srv import SetPID
 
@@ -33,10 +33,10 @@ def garble(data, chance):
     return bytes(changed)
 
 
-def test_garbled_robots_leave_the_driver_and_the_others_as_they_are(start_driver, effort, record):
+def test_garbled_robots_do_not_affect_the_driver_or_other_robots(start_driver, effort, record):
     driver = start_driver()
     witness = FakeRobot(1).connect(driver.address)
-    life = Life(driver, witness)
+    service = ServiceCheck(driver, witness)
     chance = random.Random(effort.choose(5, os.getpid()))
     conversations = effort.choose(200, 20000)
     for count in range(conversations):
@@ -55,17 +55,17 @@ def test_garbled_robots_leave_the_driver_and_the_others_as_they_are(start_driver
             data = data[length:]
         robot.close()
         if count % 20 == 0:
-            life.show()
-    life.show(10)
+            service.verify()
+    service.verify(10)
     witness.close()
     assert not driver.find_lines("Traceback|made a mistake"), driver.find_lines("Traceback|mistake")[:3]
     record("conversations of garbled robots", conversations, conversations)
 
 
-def test_absurd_service_requests_never_reach_a_robot(start_driver, record):
+def test_invalid_service_requests_never_reach_a_robot(start_driver, record):
     driver = start_driver()
     robot = FakeRobot(1).connect(driver.address)
-    life = Life(driver, robot)
+    service = ServiceCheck(driver, robot)
     refused = 0
     requests = [
         (name, SetPID, [value] + [1.0] * 5)
@@ -79,7 +79,7 @@ def test_absurd_service_requests_never_reach_a_robot(start_driver, record):
             rospy.ServiceProxy(full_name, service)(*values)
         refused += robot.payloads_on(name) == []
     assert rosservice.get_service_type("/hero_1/set_odom") == "hero_msgs/SetOdom"
-    life.show()
+    service.verify()
     robot.close()
     record(
         "service requests with NaN, inf and absurd PIDs", len(requests), refused, "nothing; each is refused"

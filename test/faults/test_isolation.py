@@ -1,4 +1,4 @@
-"""Twenty good robots at stock rates and one bad peer at a time: the good ones lose nothing."""
+"""Twenty good robots at stock rates beside one misbehaving peer at a time: the robots lose nothing."""
 
 import sys
 import time
@@ -111,7 +111,7 @@ def join_and_leave(driver):
 
 
 @pytest.mark.parametrize("kind", BAD_PEERS)
-def test_a_bad_peer_takes_nothing_from_the_good_robots(scene, effort, record, kind):
+def test_a_misbehaving_peer_costs_other_robots_no_message(scene, effort, record, kind):
     seconds = effort.choose(1.5, 10.0)
     if effort.is_long:
         # What these robots' delays are by themselves.

@@ -1,4 +1,4 @@
-"""What the network does, between hosts that are namespaces of this test's own: late, stalled, cut, renumbered.
+"""Network faults between hosts that are network namespaces: delay, stalls, cut cables, changed addresses.
 
 The PC with the master and the first driver is the namespace that run.py gave to this process; robots and a second
 PC are others, joined to it by virtual cables. Nothing of the machine's own network is touched.
@@ -229,7 +229,7 @@ def test_stalls_of_3_s_keep_every_connection(through_relay, effort, record):
     )
 
 
-def test_a_cut_cable_is_noticed_and_all_robots_return(by_cable, effort, record):
+def test_a_cut_cable_is_detected_and_all_robots_return(by_cable, effort, record):
     driver, robots, watch = by_cable
     cut_s = effort.choose(7.0, 30.0)
     robots.cut()
@@ -250,7 +250,7 @@ def test_a_cut_cable_is_noticed_and_all_robots_return(by_cable, effort, record):
     )
 
 
-def test_robots_with_another_address_are_the_same_robots(lab, record):
+def test_robots_keep_their_identity_when_their_address_changes(lab, record):
     driver, robots, _, port = lab
     watch = Watch(driver, range(ROBOTS))
     with start_robots(robots, PC, port):
@@ -278,7 +278,7 @@ def test_robots_with_another_address_are_the_same_robots(lab, record):
     )
 
 
-def test_of_two_drivers_on_two_hosts_one_is_killed_and_the_others_robots_lose_nothing(
+def test_killing_one_of_two_drivers_does_not_affect_the_other(
     by_cable, master, record
 ):
     from driver_case import DriverProcess
@@ -313,7 +313,7 @@ def test_of_two_drivers_on_two_hosts_one_is_killed_and_the_others_robots_lose_no
     )
 
 
-def test_where_no_ports_are_left_those_connected_lose_nothing(by_cable, record):
+def test_running_out_of_ports_does_not_affect_connected_robots(by_cable, record):
     driver, _, watch = by_cable
     ports = Path("/proc/sys/net/ipv4/ip_local_port_range")
     usual = ports.read_text()

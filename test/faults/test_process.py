@@ -1,4 +1,4 @@
-"""What ends or starves the driver while robots move: signals, full disks, wrong clocks, no more files, own mistakes."""
+"""The driver ends or runs out of resources while robots move: signals, full disks, clock changes, its own bugs."""
 
 import signal
 import socket
@@ -12,9 +12,9 @@ import stock_messages
 from driver_case import Recorder, frozen, make_publisher
 from fake_robot import TIME_PACKET, FakeRobot
 from geometry_msgs.msg import Twist
-from life_signs import Life
 from rig import HERE
-from simulated_field import SPEED_M_S, Truth, drive, rest, start_simulator
+from service_check import ServiceCheck
+from simulated_robots import SPEED_M_S, GroundTruth, drive, start_simulator, wait_until_stopped
 from steady_time import StallWatch
 
 from hero_driver.rosserial import packets, payloads
@@ -37,32 +37,32 @@ def field(master):
     """Simulated robots that dial one port, whoever listens there; returns the port and where they truly are."""
     port = find_free_port()
     with start_simulator(ROBOTS, port):
-        yield port, [Truth(number) for number in range(ROBOTS)]
+        yield port, [GroundTruth(number) for number in range(ROBOTS)]
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL], ids=lambda s: s.name)
-def test_robots_that_move_stop_when_the_driver_ends_and_are_driveable_again(
+def test_robots_stop_when_the_driver_ends_and_can_be_driven_again(
     field, start_driver, effort, record, number
 ):
-    port, truths = field
+    port, ground_truths = field
     tries = effort.choose(1, 10)
     limit_m = WATCHDOG_DISTANCE_M if number == signal.SIGKILL else FREE_DISTANCE_M
     distances_m, back_s = [], []
     void = 0
     driver = start_driver(parameters={"port": port}, name="ended_driver")
     while len(back_s) < tries:
-        drive(truths)
-        marks = [len(truth.path) - 1 for truth in truths]
+        drive(ground_truths)
+        marks = [len(ground_truth.path) - 1 for ground_truth in ground_truths]
         with StallWatch() as watch:
             driver.process.send_signal(number)
             assert driver.wait_end() == (0 if number != signal.SIGKILL else -signal.SIGKILL)
-            rest(truths)
-        went_m = [truth.measure_from(mark) for truth, mark in zip(truths, marks)]
+            wait_until_stopped(ground_truths)
+        went_m = [ground_truth.measure_from(mark) for ground_truth, mark in zip(ground_truths, marks)]
         driver.fleet.close()
         # As roslaunch does with respawn: the same node, while the robots and the programs wait.
         started_s = time.monotonic()
         driver = start_driver(parameters={"port": port}, name="ended_driver")
-        wait_for(lambda: all(truth.is_moving for truth in truths), "all robots to move again")
+        wait_for(lambda: all(ground_truth.is_moving for ground_truth in ground_truths), "all robots to move again")
         if max(went_m) >= limit_m and watch.longest_s >= STALL_S and void < VOID_MAX:
             void += 1
             continue
@@ -81,7 +81,7 @@ def test_robots_that_move_stop_when_the_driver_ends_and_are_driveable_again(
     )
 
 
-def test_a_master_that_hangs_does_not_keep_the_driver_from_its_end(master, start_driver, record):
+def test_the_driver_ends_although_the_master_hangs(master, start_driver, record):
     driver = start_driver()
     # A number of its own: the master may go on to list what this driver could not take down.
     robot = FakeRobot(90).connect(driver.address)
@@ -113,36 +113,36 @@ FILL = "{ dd if=/dev/zero of=%s/filler bs=1k 2>/dev/null || true; }"
     reason="this system lets no test have mounts of its own (unshare --mount): run it as root, not in a chroot",
 )
 @pytest.mark.parametrize("when", ["from the start", "while it runs"])
-def test_a_full_disk_for_the_logs_costs_the_logs_alone(start_driver, record, tmp_path, when):
+def test_a_full_disk_affects_only_the_logs(start_driver, record, tmp_path, when):
     script = FILL % tmp_path if when == "from the start" else "true"
     driver = start_driver(
         prefix=make_small_disk(tmp_path, script), environment={"ROS_LOG_DIR": str(tmp_path)}
     )
     robot = FakeRobot(1).connect(driver.address)
-    life = Life(driver, robot)
+    service = ServiceCheck(driver, robot)
     for count in range(200):
         # Each robot's own words go into the log: 60 kB, of which half fits.
         robot.log("line %d %s" % (count, "x" * 300))
         if count % 50 == 0:
-            life.show()
+            service.verify()
     driver.wait_line("hero_driver: the log file cannot be written .*No space left")
     lines = len(driver.find_lines("log file cannot be written"))
-    assert life.show(20) and lines == 1
+    assert service.verify(20) and lines == 1
     robot.close()
     tracebacks = len(driver.find_lines("Traceback"))
     record("a full disk below the log directory, " + when, 1, int(tracebacks == 0), "log lines")
 
 
-def test_a_log_directory_that_cannot_be_made_costs_the_logs_alone(start_driver, record):
+def test_an_impossible_log_directory_affects_only_the_logs(start_driver, record):
     driver = start_driver(environment={"ROS_LOG_DIR": "/proc/no/such/place"})
     robot = FakeRobot(1).connect(driver.address)
-    Life(driver, robot).show(20)
+    ServiceCheck(driver, robot).verify(20)
     robot.close()
     assert driver.find_lines("/proc/no/such/place") and not driver.find_lines("Traceback")
     record("no log directory", 1, 1, "the log file")
 
 
-def test_an_output_that_nobody_reads_any_more_costs_the_output_alone(start_driver, record):
+def test_a_closed_output_affects_only_the_output(start_driver, record):
     # As `hero_driver | head -n 1`.
     deafen = (
         "import os, sys; end, start = os.pipe(); os.dup2(start, 1); os.dup2(start, 2); os.close(end);"
@@ -150,10 +150,10 @@ def test_an_output_that_nobody_reads_any_more_costs_the_output_alone(start_drive
     )
     driver = start_driver(prefix=[sys.executable, "-c", deafen])
     robot = FakeRobot(1).connect(driver.address)
-    life = Life(driver, robot)
+    service = ServiceCheck(driver, robot)
     for count in range(20):
         robot.log("line %d" % count)
-    life.show(20)
+    service.verify(20)
     robot.close()
     record("standard output is closed", 1, 1, "what it would have printed")
 
@@ -162,11 +162,11 @@ def test_an_output_that_nobody_reads_any_more_costs_the_output_alone(start_drive
 
 
 @pytest.mark.parametrize("step_s", [3600, -3600], ids=["forwards", "backwards"])
-def test_a_clock_that_is_set_by_an_hour_loses_nothing(start_driver, record, tmp_path, step_s):
+def test_setting_the_clock_by_an_hour_loses_nothing(start_driver, record, tmp_path, step_s):
     clock = tmp_path / "clock"
     driver = start_driver(prefix=[sys.executable, str(HERE / "broken_driver.py"), "clock", str(clock)])
     robot = FakeRobot(1).connect(driver.address)
-    life = Life(driver, robot)
+    service = ServiceCheck(driver, robot)
     encoders = Recorder("/hero_1/encoder", Encoder)
 
     def ask_time():
@@ -193,7 +193,7 @@ def test_a_clock_that_is_set_by_an_hour_loses_nothing(start_driver, record, tmp_
         lambda: abs((driver.fleet.newest.header.stamp - reports).to_sec() - step_s) < 60.0,
         "a report after the step",
     )
-    life.show()
+    service.verify()
     robot.close()
     assert stepped < 30.0, stepped
     record(
@@ -206,20 +206,20 @@ def test_a_clock_that_is_set_by_an_hour_loses_nothing(start_driver, record, tmp_
 # Its files.
 
 
-def test_where_no_more_files_can_be_opened_those_connected_lose_nothing(start_driver, record):
+def test_running_out_of_files_does_not_affect_connected_robots(start_driver, record):
     driver = start_driver(prefix=["prlimit", "--nofile=96:96"])
     robot = FakeRobot(1).connect(driver.address)
-    life = Life(driver, robot)
-    life.show()
+    service = ServiceCheck(driver, robot)
+    service.verify()
     others = [socket.create_connection(driver.address) for _ in range(90)]
     line = driver.wait_line("cannot take more connections")
     assert "limit of open files" in line
-    life.show(40)
+    service.verify(40)
     for other in others:
         other.close()
     late = FakeRobot(2).connect(driver.address)
-    Life(driver, late).show()
-    life.show(10)
+    ServiceCheck(driver, late).verify()
+    service.verify(10)
     for each in (robot, late):
         each.close()
     assert not driver.find_lines("Traceback")
@@ -234,18 +234,18 @@ def test_where_no_more_files_can_be_opened_those_connected_lose_nothing(start_dr
 # Its own mistakes.
 
 
-def test_a_mistake_of_the_driver_with_one_connection_costs_that_connection_alone(
+def test_a_driver_bug_in_one_connection_closes_only_that_one(
     start_driver, record, tmp_path
 ):
     trigger = tmp_path / "break"
     driver = start_driver(prefix=[sys.executable, str(HERE / "broken_driver.py"), "open_link", str(trigger)])
     robot = FakeRobot(1).connect(driver.address)
-    life = Life(driver, robot)
+    service = ServiceCheck(driver, robot)
     trigger.write_text("")
     unlucky = FakeRobot(2).connect(driver.address)
     wait_for(lambda: unlucky.ended, "the unlucky one to be closed")
     driver.wait_line("the driver made a mistake, please report it: RuntimeError")
-    life.show()
+    service.verify()
     trigger.unlink()
     unlucky.close()
     unlucky.connect(driver.address)
@@ -255,7 +255,7 @@ def test_a_mistake_of_the_driver_with_one_connection_costs_that_connection_alone
     record("an exception while a connection is taken", 1, 1, "that connection")
 
 
-def test_a_driver_whose_loop_breaks_stops_the_robots_and_ends(start_driver, record, tmp_path):
+def test_a_broken_event_loop_stops_the_robots_and_ends_the_driver(start_driver, record, tmp_path):
     trigger = tmp_path / "break"
     driver = start_driver(prefix=[sys.executable, str(HERE / "broken_driver.py"), "loop", str(trigger)])
     robot = FakeRobot(1).connect(driver.address)

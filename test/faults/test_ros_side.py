@@ -1,4 +1,4 @@
-"""What ROS programs and the master do to the driver: hang, die, come in crowds, flood it, start again."""
+"""Faults of ROS programs and the master: they hang, die, connect in large numbers, flood the driver, restart."""
 
 import os
 import signal
@@ -11,9 +11,9 @@ import rospy
 from driver_case import frozen, has_connection, list_driver_topics, make_publisher
 from fake_robot import FakeRobot
 from geometry_msgs.msg import Twist
-from life_signs import Life
 from rig import STOCK_NAMES, count_holdings, start_python
 from rosgraph_msgs.msg import Clock
+from service_check import ServiceCheck
 from steady_time import StallWatch
 from stock_messages import make_laser
 
@@ -28,7 +28,7 @@ def served(start_driver):
     """A driver with one robot, and what shows that it is served."""
     driver = start_driver(parameters={"max_packets_per_s": 100000, "max_bytes_per_s": 50000000})
     robot = FakeRobot(1).connect(driver.address)
-    yield driver, robot, Life(driver, robot)
+    yield driver, robot, ServiceCheck(driver, robot)
     robot.close()
 
 
@@ -41,8 +41,8 @@ def start_reader(driver, topic):
     return reader
 
 
-def test_a_subscriber_that_is_stopped_costs_nobody_else_anything(served, effort, record):
-    driver, robot, life = served
+def test_a_suspended_subscriber_affects_nobody_else(served, effort, record):
+    driver, robot, service = served
     reader = start_reader(driver, "/hero_1/laser")
     # The buffers of the system hold some MB; this is more.
     scan = make_laser("hero_1", rospy.Time(3), [0.1] * 8) + bytes(3500)
@@ -52,7 +52,7 @@ def test_a_subscriber_that_is_stopped_costs_nobody_else_anything(served, effort,
         for _ in range(rounds):
             for _ in range(100):
                 robot.send("laser", scan)
-            life.show()
+            service.verify()
         growth = count_holdings(driver).describe_growth(before)
     reader.kill()
     reader.wait()
@@ -60,14 +60,14 @@ def test_a_subscriber_that_is_stopped_costs_nobody_else_anything(served, effort,
     record(fault, rounds, rounds, "its own oldest messages; " + growth)
 
 
-def test_subscribers_that_die_cost_nobody_else_anything(served, effort, record):
-    driver, _, life = served
+def test_dying_subscribers_affect_nobody_else(served, effort, record):
+    driver, _, service = served
     deaths = effort.choose(4, 40)
-    life.show()
+    service.verify()
     for _ in range(deaths):
         reader = start_reader(driver, "/hero_1/encoder")
         os.kill(reader.pid, signal.SIGKILL)
-        life.show(5)
+        service.verify(5)
         reader.wait()
     wait_for(
         lambda: not has_connection(driver.node, "/hero_1/encoder", "rostopic"), "the dead to be forgotten"
@@ -75,25 +75,25 @@ def test_subscribers_that_die_cost_nobody_else_anything(served, effort, record):
     record("a subscriber dies (SIGKILL)", deaths, deaths)
 
 
-def test_subscribers_that_come_and_go_leave_nothing_behind(served, effort, record):
-    driver, _, life = served
-    crowd, rounds = effort.choose((20, 5), (100, 10))
-    life.show()
+def test_subscribers_that_come_and_go_leak_nothing(served, effort, record):
+    driver, _, service = served
+    count, rounds = effort.choose((20, 5), (100, 10))
+    service.verify()
 
     def come_and_go():
-        with start_python("crowd.py", "/hero_1/encoder", crowd) as program:
+        with start_python("many_subscribers.py", "/hero_1/encoder", count) as program:
             connected = program.read()
-            assert connected == crowd, connected
-            life.show()
+            assert connected == count, connected
+            service.verify()
         wait_for(
-            lambda: not has_connection(driver.node, "/hero_1/encoder", "crowd"), "the crowd to be gone"
+            lambda: not has_connection(driver.node, "/hero_1/encoder", "many_subscribers"), "the subscribers to be gone"
         )
 
     come_and_go()
     before = count_holdings(driver)
     for _ in range(rounds):
         come_and_go()
-    life.show()
+    service.verify()
     # Python gives memory back late, and rospy ends its threads when it looks at its connections.
     wait_for(
         lambda: count_holdings(driver).threads <= before.threads
@@ -102,12 +102,12 @@ def test_subscribers_that_come_and_go_leave_nothing_behind(served, effort, recor
     )
     growth = count_holdings(driver).describe_growth(before)
     record(
-        "%d subscribers come and go" % (crowd * rounds), crowd * rounds, crowd * rounds, "nothing; " + growth
+        "%d subscribers come and go" % (count * rounds), count * rounds, count * rounds, "nothing; " + growth
     )
 
 
 def test_a_publisher_at_1_khz_delays_nobody_and_its_stop_arrives(served, effort, record):
-    _, robot, life = served
+    _, robot, service = served
     publisher = make_publisher("/hero_1/velocity_controller/cmd_vel", Twist)
     count = effort.choose(2000, 20000)
     command, stop = Twist(), Twist()
@@ -117,7 +117,7 @@ def test_a_publisher_at_1_khz_delays_nobody_and_its_stop_arrives(served, effort,
         publisher.publish(command)
         time.sleep(max(0.0, start_s + 0.001 * number - time.monotonic()))
         if number % 500 == 0:
-            life.show()
+            service.verify()
     with StallWatch() as watch:
         publisher.publish(stop)
         wait_for(lambda: [v.is_zero for v in robot.velocities[-2:]] == [True, True], "two stops")
@@ -133,8 +133,8 @@ def test_a_publisher_at_1_khz_delays_nobody_and_its_stop_arrives(served, effort,
     )
 
 
-def test_fifty_clients_that_call_at_once_get_their_answers(served, effort, record):
-    _, _, life = served
+def test_fifty_simultaneous_service_calls_are_answered(served, effort, record):
+    _, _, service = served
     name = "/hero_1/velocity_controller/pid_parameters"
     rospy.wait_for_service(name, 20.0)
     calls = effort.choose(2, 20)
@@ -150,31 +150,31 @@ def test_fifty_clients_that_call_at_once_get_their_answers(served, effort, recor
     threads = [threading.Thread(target=call) for _ in range(50)]
     for thread in threads:
         thread.start()
-    life.show(10)
+    service.verify(10)
     for thread in threads:
         thread.join()
     assert not failures, failures[:3]
     record("50 clients call one service at once", 50 * calls, sum(answers))
 
 
-def test_a_master_that_is_killed_and_started_again_knows_every_robot(master, served, effort, record):
-    driver, robot, life = served
+def test_a_restarted_master_learns_of_every_robot(master, served, effort, record):
+    driver, robot, service = served
     tries = effort.choose(1, 10)
     back_s = []
     wait_for(lambda: len(list_driver_topics("/hero_1", driver.node)) == STOCK_NAMES, "all topics")
     for _ in range(tries):
-        life.show()
+        service.verify()
         master.kill()
         # What is connected goes on without it.
-        life.show(20)
+        service.verify(20)
         master.start()
         started_s = time.monotonic()
         wait_for(lambda: len(list_driver_topics("/hero_1", driver.node)) == STOCK_NAMES, "all topics again")
         back_s.append(time.monotonic() - started_s)
-        life.show()
+        service.verify()
     driver.wait_line("the ROS master was started again: .* registered anew")
     # A program that starts now finds the robot, and a publisher that is registered now reaches it.
-    with start_python("crowd.py", "/hero_1/encoder", 1) as program:
+    with start_python("many_subscribers.py", "/hero_1/encoder", 1) as program:
         assert program.read() == 1
     twist = make_publisher("/hero_1/position_controller/cmd_vel", Twist)
     twist.publish(Twist())
@@ -187,21 +187,21 @@ def test_a_master_that_is_killed_and_started_again_knows_every_robot(master, ser
     )
 
 
-def test_simulated_time_that_does_not_run_stops_nothing(start_driver, record):
+def test_paused_simulated_time_stops_nothing(start_driver, record):
     rospy.set_param("/use_sim_time", True)
     try:
         driver = start_driver()
         robot = FakeRobot(3).connect(driver.address)
-        life = Life(driver, robot)
-        life.show(10)
+        service = ServiceCheck(driver, robot)
+        service.verify(10)
         clock = rospy.Publisher("/clock", Clock, queue_size=1, latch=True)
         clock.publish(Clock(rospy.Time(1000)))
         wait_for(lambda: driver.fleet.newest.header.stamp == rospy.Time(1000), "a report at simulated time")
-        life.show(10)
+        service.verify(10)
         # It goes back, as a bag does that begins anew.
         clock.publish(Clock(rospy.Time(500)))
         wait_for(lambda: driver.fleet.newest.header.stamp == rospy.Time(500), "a report at an earlier time")
-        life.show(10)
+        service.verify(10)
         clock.unregister()
         robot.close()
         driver.process.send_signal(signal.SIGTERM)

@@ -1,4 +1,4 @@
-"""What strangers can and cannot do, tried from outside: other addresses, other names, forged lines, hidden paths."""
+"""What untrusted peers can do, tested from outside: other addresses and names, forged log lines, path traversal."""
 
 import re
 import socket
@@ -10,7 +10,7 @@ import rospy
 from bad_peer import declare_topic
 from driver_case import ask_parameter
 from fake_robot import CLIENT_ANSWERS, CLIENT_REQUESTS, PUB, STOCK_DECLARATIONS, Declaration, FakeRobot
-from life_signs import Life
+from service_check import ServiceCheck
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse
 
@@ -41,7 +41,7 @@ def list_names(node):
     return {name for part in state for name, nodes in part if node in nodes}
 
 
-def test_the_driver_says_that_it_listens_everywhere_and_how_to_keep_strangers_out(start_driver, record):
+def test_a_default_bind_is_warned_about_with_the_remedy(start_driver, record):
     driver = start_driver()
     line = driver.wait_line("every address of this machine")
     assert "~host" in line and "~allow" in line
@@ -53,10 +53,10 @@ def test_the_driver_says_that_it_listens_everywhere_and_how_to_keep_strangers_ou
     record("a default bind on all addresses, said with its remedy", 1, 1)
 
 
-def test_addresses_outside_the_allow_list_get_no_word(start_driver, record):
+def test_addresses_outside_the_allow_list_get_no_byte(start_driver, record):
     driver = start_driver(parameters={"allow": ["127.0.0.7/32"]})
     robot = FakeRobot(1, source_host="127.0.0.7").connect(driver.address)
-    life = Life(driver, robot)
+    service = ServiceCheck(driver, robot)
     tries = 50
     heard = 0
     for number in range(tries):
@@ -70,12 +70,12 @@ def test_addresses_outside_the_allow_list_get_no_word(start_driver, record):
             except OSError:
                 continue
     assert not driver.fleet.find("/hero_2")
-    life.show()
+    service.verify()
     robot.close()
     record("connections from addresses that are not in ~allow", tries, tries - bool(heard) * tries)
 
 
-def test_names_and_types_cannot_leave_the_robots_place_or_run_anything(start_driver, record):
+def test_robots_cannot_escape_their_namespace_or_run_code(start_driver, record):
     driver = start_driver()
     evil = [
         Declaration(PUB, 150 + n, name, "std_msgs/String", STRING_MD5) for n, name in enumerate(EVIL_NAMES)
@@ -87,8 +87,8 @@ def test_names_and_types_cannot_leave_the_robots_place_or_run_anything(start_dri
     robot = FakeRobot(7, declarations=STOCK_DECLARATIONS)
     robot.declarations += evil
     robot.connect(driver.address)
-    life = Life(driver, robot)
-    life.show()
+    service = ServiceCheck(driver, robot)
+    service.verify()
     outside = [
         name
         for name in list_names(driver.node)
@@ -101,10 +101,10 @@ def test_names_and_types_cannot_leave_the_robots_place_or_run_anything(start_dri
     )
 
 
-def test_log_lines_of_robots_cannot_look_like_those_of_others(start_driver, record):
+def test_robots_cannot_forge_log_lines_of_others(start_driver, record):
     driver = start_driver()
     robot = FakeRobot(7).connect(driver.address)
-    life = Life(driver, robot)
+    service = ServiceCheck(driver, robot)
     texts = [
         "first\n[FATAL] [1.0]: hero_1 left",
         "\r[ERROR] over it",
@@ -119,7 +119,7 @@ def test_log_lines_of_robots_cannot_look_like_those_of_others(start_driver, reco
         robot.log(text, payloads.LOG_WARN)
     robot.log("the end")
     driver.wait_line("hero_7: the end")
-    life.show()
+    service.verify()
     robot.close()
     lines = list(driver.lines)
     forged = [
@@ -137,7 +137,7 @@ def test_log_lines_of_robots_cannot_look_like_those_of_others(start_driver, reco
     )
 
 
-def test_robots_cannot_read_what_others_keep_on_the_parameter_server(start_driver, record):
+def test_robots_cannot_read_foreign_parameters(start_driver, record):
     rospy.set_param("/hero_1/password", "s3cret")
     rospy.set_param("/wifi_password", "s3cret")
     driver = start_driver()
@@ -157,10 +157,10 @@ def test_robots_cannot_read_what_others_keep_on_the_parameter_server(start_drive
 
 
 @pytest.mark.parametrize("kind", ["a connection", "a robot"])
-def test_nobody_takes_more_than_the_limits_give(start_driver, record, kind):
+def test_no_peer_exceeds_the_limits(start_driver, record, kind):
     driver = start_driver(parameters={"max_connections_per_address": 5, "max_connections": 50})
     friend = FakeRobot(1, source_host="127.0.0.7").connect(driver.address)
-    life = Life(driver, friend)
+    service = ServiceCheck(driver, friend)
     socks = []
     for number in range(20):
         sock = socket.socket()
@@ -173,7 +173,7 @@ def test_nobody_takes_more_than_the_limits_give(start_driver, record, kind):
             )
     driver.wait_line("~max_connections_per_address")
     wait_for(lambda: driver.find_lines("refused"), "a refusal")
-    life.show()
+    service.verify()
     taken = sum(
         robot.namespace.startswith("/hero_1") and robot.id >= 100 for robot in driver.fleet.newest.robots
     )
@@ -185,21 +185,21 @@ def test_nobody_takes_more_than_the_limits_give(start_driver, record, kind):
     )
 
 
-def test_an_address_that_has_taken_all_places_keeps_no_other_out(start_driver, record):
+def test_one_address_cannot_occupy_all_connections(start_driver, record):
     driver = start_driver(parameters={"max_connections": 20})
     robots = [FakeRobot(100 + number, source_host="127.0.0.66").connect(driver.address) for number in range(20)]
     for robot in robots:
         driver.fleet.wait_ready(robot.namespace)
     friends = [FakeRobot(number, source_host="127.0.0.%d" % number).connect(driver.address) for number in (7, 8, 9)]
     for friend in friends:
-        Life(driver, friend).show()
+        ServiceCheck(driver, friend).verify()
     for robot in (*friends, *robots):
         robot.close()
     fault = "one address has taken all places with robots that it made up"
     record(fault, len(friends), len(friends), "the newest of its own")
 
 
-def test_a_device_cannot_speak_for_the_fleet(start_driver, record):
+def test_a_device_cannot_impersonate_the_driver(start_driver, record):
     driver = start_driver(parameters={"namespace_policy": "any"})
     rospy.wait_for_service(driver.node + "/stop", 20.0)
     rospy.ServiceProxy(driver.node + "/stop", SetBool)(True)
@@ -224,10 +224,10 @@ def test_a_device_cannot_speak_for_the_fleet(start_driver, record):
     record("a device that speaks for the fleet, with ~namespace_policy any", len(held), sum(held))
 
 
-def test_a_peer_that_calls_itself_differently_each_time_has_to_wait(start_driver, record):
+def test_new_robot_names_are_rate_limited_per_address(start_driver, record):
     driver = start_driver(parameters={"max_connections_per_address": 3})
     friend = FakeRobot(1, source_host="127.0.0.7").connect(driver.address)
-    life = Life(driver, friend)
+    service = ServiceCheck(driver, friend)
     known = []
 
     def is_refused():
@@ -243,7 +243,7 @@ def test_a_peer_that_calls_itself_differently_each_time_has_to_wait(start_driver
         return driver.find_lines("new robots from one address")
 
     wait_for(is_refused, "a refusal", 60.0)
-    life.show()
+    service.verify()
     # Whoever has another address need not wait.
     other = FakeRobot(2, source_host="127.0.0.8").connect(driver.address)
     driver.fleet.wait_ready("/hero_2")

@@ -1,4 +1,4 @@
-"""Stops while something hangs or has gone: the ROS master, another driver, connections, the program that commands."""
+"""Stops while something hangs or is gone: the ROS master, another driver, connections, the commanding program."""
 
 import contextlib
 import signal
@@ -13,7 +13,7 @@ from driver_case import frozen, make_publisher
 from fake_robot import READ_CYCLE_S, FakeRobot
 from geometry_msgs.msg import Twist
 from rig import HERE, Master, start_python
-from simulated_field import SPEED_M_S, Truth, drive, rest, start_simulator
+from simulated_robots import SPEED_M_S, GroundTruth, drive, start_simulator, wait_until_stopped
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, Trigger
 
@@ -50,12 +50,12 @@ def field(start_driver):
     port = find_free_port()
     driver = start_driver(parameters={"port": port, "allow_self_tuning": True})
     with start_simulator(ROBOTS, port):
-        truths = [Truth(number) for number in range(ROBOTS)]
-        for truth in truths:
-            driver.fleet.wait_ready("/" + truth.name)
-        yield driver, truths
-        for truth in truths:
-            truth.close()
+        ground_truths = [GroundTruth(number) for number in range(ROBOTS)]
+        for ground_truth in ground_truths:
+            driver.fleet.wait_ready("/" + ground_truth.name)
+        yield driver, ground_truths
+        for ground_truth in ground_truths:
+            ground_truth.close()
 
 
 def is_confirmed(driver):
@@ -74,17 +74,17 @@ def asking(drivers_known):
 
 
 def test_a_stop_needs_no_master(field, master, record):
-    driver, truths = field
+    driver, ground_truths = field
     requests = make_publisher(driver.node + "/stop_request", Bool)
-    drive(truths)
+    drive(ground_truths)
     with frozen(master.pid):
         requests.publish(Bool(True))
-        rest(truths)
+        wait_until_stopped(ground_truths)
         wait_for(lambda: is_confirmed(driver), "the driver's confirmation")
         requests.publish(Bool(False))
-        wait_for(lambda: all(truth.is_moving for truth in truths), "all robots to move")
+        wait_for(lambda: all(ground_truth.is_moving for ground_truth in ground_truths), "all robots to move")
         requests.publish(Bool(True))
-        rest(truths)
+        wait_until_stopped(ground_truths)
     record("a stop, a release and a stop while the ROS master hangs", 3, 3)
 
 
@@ -94,9 +94,9 @@ def test_a_stop_works_after_the_master_was_killed(record):
     record("a stop after the ROS master was killed", 1, int(at_rest))
 
 
-def test_half_open_connections_keep_nobody_from_a_stop(field, record):
-    driver, truths = field
-    drive(truths)
+def test_half_open_connections_do_not_delay_a_stop(field, record):
+    driver, ground_truths = field
+    drive(ground_truths)
     uri = rosgraph.Master("/faults").lookupService(driver.node + "/stop")
     host, port = uri[len("rosrpc://") :].rstrip("/").rsplit(":", 1)
     with contextlib.ExitStack() as stack:
@@ -105,33 +105,33 @@ def test_half_open_connections_keep_nobody_from_a_stop(field, record):
             sock.sendall(b"\x10\x00")
         answer = rospy.ServiceProxy(driver.node + "/stop", SetBool)(True)
         assert answer.success, answer.message
-        rest(truths)
+        wait_until_stopped(ground_truths)
         requests = make_publisher(driver.node + "/stop_request", Bool)
         requests.publish(Bool(False))
         wait_for(lambda: not driver.fleet.newest.stopped, "the release")
     record("%d connections to the driver that send 2 bytes and wait" % HALF_OPEN, 2, 2)
 
 
-def test_a_hung_driver_keeps_nobody_else_from_a_stop(field, start_driver, record):
-    driver, truths = field
+def test_a_hung_driver_does_not_delay_stops_of_others(field, start_driver, record):
+    driver, ground_truths = field
     hung = start_driver()
     robot = FakeRobot(90, has_motors=True).connect(hung.address)
     hung.fleet.wait_ready("/hero_90")
     with asking(2) as drivers:
         with frozen(hung.process.pid):
             for presses in (1, 10):
-                drive(truths)
+                drive(ground_truths)
                 for _ in range(presses):
                     drivers.request_stop(True)
-                rest(truths)
+                wait_until_stopped(ground_truths)
                 wait_for(lambda: is_confirmed(driver), "the driver's confirmation")
                 wait_for(lambda: drivers.stop_status().level == "error", "a verdict")
                 assert drivers.stop_status().text == "NOT STOPPED: driver %s does not answer" % hung.node[1:]
                 drivers.request_stop(False)
                 wait_for(lambda: not driver.fleet.newest.stopped, "the release")
-            drive(truths)
+            drive(ground_truths)
             drivers.request_stop(True)
-            rest(truths)
+            wait_until_stopped(ground_truths)
         wait_for(lambda: is_confirmed(hung), "the stop, once it goes on")
     robot.close()
     record("twelve stops of two drivers, one of which hangs", 12, 12)
@@ -139,72 +139,72 @@ def test_a_hung_driver_keeps_nobody_else_from_a_stop(field, start_driver, record
 
 @pytest.mark.parametrize("controller", ["velocity_controller", "position_controller"])
 def test_robots_stop_when_their_commander_is_killed(field, record, controller):
-    _, truths = field
-    truth = truths[0]
-    topic = "/%s/%s/cmd_vel" % (truth.name, controller)
-    truth.close()
-    watcher = Truth(0)
+    _, ground_truths = field
+    ground_truth = ground_truths[0]
+    topic = "/%s/%s/cmd_vel" % (ground_truth.name, controller)
+    ground_truth.close()
+    watcher = GroundTruth(0)
     watcher.publisher.unregister()
     commander = subprocess.Popen([sys.executable, "-c", COMMANDER % (SPEED_M_S, topic)])
     wait_for(lambda: watcher.is_moving, "the robot to move")
     mark = len(watcher.path) - 1
     commander.kill()
     commander.wait()
-    rest([watcher])
+    wait_until_stopped([watcher])
     went_m = watcher.measure_from(mark)
     watcher.close()
     lost = "%.3f m driven on" % went_m
     record("the program that commands the %s is killed" % controller, 1, int(went_m < WATCHDOG_M), lost)
 
 
-def test_a_stop_in_a_pause_of_the_radio_arrives(field, record):
-    driver, truths = field
-    for truth in truths:
-        truth.close()
-    positions = [Truth(number, "position_controller") for number in range(ROBOTS)]
-    for truth in positions:
-        truth.command.linear.x = SPEED_M_S
-    wait_for(lambda: all(truth.is_moving for truth in positions), "all robots to move")
+def test_a_stop_during_a_radio_pause_arrives(field, record):
+    driver, ground_truths = field
+    for ground_truth in ground_truths:
+        ground_truth.close()
+    positions = [GroundTruth(number, "position_controller") for number in range(ROBOTS)]
+    for ground_truth in positions:
+        ground_truth.command.linear.x = SPEED_M_S
+    wait_for(lambda: all(ground_truth.is_moving for ground_truth in positions), "all robots to move")
     inject = rospy.ServiceProxy("/hero_sim/fault", InjectFault)
     assert inject("stall:for=0.3").success
     assert rospy.ServiceProxy(driver.node + "/stop", SetBool)(True).success
-    rest(positions)
+    wait_until_stopped(positions)
     wait_for(lambda: is_confirmed(driver), "the driver's confirmation")
-    for truth in positions:
-        truth.close()
+    for ground_truth in positions:
+        ground_truth.close()
     record("a radio that carries nothing for 0.3 s with the stop in it, position control", ROBOTS, ROBOTS)
 
 
-def test_a_robot_whose_program_stood_still_stops_when_it_goes_on(field, record):
-    driver, truths = field
-    drive(truths)
+def test_a_robot_that_hung_stops_when_it_resumes(field, record):
+    driver, ground_truths = field
+    drive(ground_truths)
     inject = rospy.ServiceProxy("/hero_sim/fault", InjectFault)
     assert inject("frozen:for=2,robot=0").success
     assert rospy.ServiceProxy(driver.node + "/stop", SetBool)(True).success
-    rest(truths)
+    wait_until_stopped(ground_truths)
     wait_for(lambda: is_confirmed(driver), "the driver's confirmation")
     record("a robot whose program stands still for 2 s with the stop in it", 1, 1)
 
 
 @pytest.mark.parametrize("controller", ["velocity_controller", "position_controller"])
 def test_a_stop_ends_the_self_tuning_of_simulated_robots(field, record, controller):
-    driver, truths = field
-    for truth in truths:
-        truth.close()
-        name = "/%s/%s/pid_calibration" % (truth.name, controller)
+    driver, ground_truths = field
+    for ground_truth in ground_truths:
+        ground_truth.close()
+        name = "/%s/%s/pid_calibration" % (ground_truth.name, controller)
         rospy.wait_for_service(name, 20.0)
         rospy.ServiceProxy(name, Trigger)()
-    watchers = [Truth(number) for number in range(ROBOTS)]
+    watchers = [GroundTruth(number) for number in range(ROBOTS)]
     wait_for(lambda: all(watcher.path and watcher.path[-1][2] > TUNING_M_S for watcher in watchers), "the tuning")
     assert rospy.ServiceProxy(driver.node + "/stop", SetBool)(True).success
     wait_for(lambda: is_confirmed(driver), "the driver's confirmation")
-    rest(watchers)
+    wait_until_stopped(watchers)
     for watcher in watchers:
         watcher.close()
     record("simulated robots that tune the %s, then a stop" % controller, ROBOTS, ROBOTS)
 
 
-def test_a_driver_whose_loop_breaks_ends_a_self_tuning(start_driver, record, tmp_path):
+def test_a_broken_event_loop_ends_a_self_tuning(start_driver, record, tmp_path):
     trigger = tmp_path / "break"
     driver = start_driver(prefix=[sys.executable, str(HERE / "broken_driver.py"), "loop", str(trigger)])
     robots = [FakeRobot(number, read_cycle_s=READ_CYCLE_S, has_motors=True) for number in (1, 2)]
@@ -224,7 +224,7 @@ def test_a_driver_whose_loop_breaks_ends_a_self_tuning(start_driver, record, tmp
     record("an exception in the loop of the sockets, a robot that tunes itself and one that drives", 2, resting)
 
 
-def test_robots_that_tune_themselves_stop_when_the_driver_ends(start_driver, record):
+def test_self_tuning_robots_stop_when_the_driver_ends(start_driver, record):
     driver = start_driver()
     robots = [FakeRobot(number, read_cycle_s=READ_CYCLE_S, has_motors=True) for number in (1, 2)]
     for robot, controller in zip(robots, ("velocity_controller", "position_controller")):

@@ -1,4 +1,4 @@
-"""Many subscribers of one topic, each with a connection of its own, in one process: crowd.py TOPIC COUNT.
+"""Many subscribers of one topic, each with its own connection, in one process: many_subscribers.py TOPIC COUNT.
 
 rospy shares one connection among the subscribers of a process, so these speak to the driver by themselves. Prints
 how many are connected, and stays until it is killed.
@@ -22,10 +22,10 @@ def encode_header(fields):
 
 def find_publisher(topic):
     """Return the address of the first publisher of topic, as TCPROS (host, port)."""
-    master = rosgraph.Master("/crowd")
+    master = rosgraph.Master("/many_subscribers")
     node = dict(master.getSystemState()[0])[topic][0]
     api = xmlrpc.client.ServerProxy(master.lookupNode(node))
-    _, _, (_, host, port) = api.requestTopic("/crowd", topic, [["TCPROS"]])
+    _, _, (_, host, port) = api.requestTopic("/many_subscribers", topic, [["TCPROS"]])
     return host, port
 
 
@@ -33,7 +33,7 @@ def subscribe(address, topic, number):
     """Return a socket on which messages come."""
     sock = socket.create_connection(address, 20.0)
     fields = {
-        "callerid": "/crowd_%d" % number,
+        "callerid": "/many_subscribers_%d" % number,
         "topic": topic,
         "md5sum": "*",
         "type": "*",

@@ -1,4 +1,4 @@
-"""Simulated robots for the faults, where they truly are, and programs that drive them."""
+"""Simulated robots for the fault suite: their ground truth, and programs that drive them."""
 
 import math
 
@@ -13,7 +13,7 @@ SPEED_M_S = 0.1
 REST_M_S = 0.003
 
 
-class Truth:
+class GroundTruth:
     """Where the simulator has one robot, and a program that drives it at 10 Hz."""
 
     def __init__(self, number, controller="velocity_controller"):
@@ -44,7 +44,7 @@ class Truth:
         return bool(self.path) and self.path[-1][2] > 0.7 * SPEED_M_S
 
     @property
-    def is_at_rest(self):
+    def is_stopped(self):
         """Whether it stood in the last five readings."""
         return len(self.path) > 5 and all(entry[2] < REST_M_S for entry in self.path[-5:])
 
@@ -61,13 +61,13 @@ def start_simulator(robots, port, *arguments, first_id=0):
     return Program(*map(str, command))
 
 
-def drive(truths):
+def drive(ground_truths):
     """Let all robots drive in circles; return when they do."""
-    for truth in truths:
-        truth.command.linear.x, truth.command.angular.z = SPEED_M_S, 0.5
-    wait_for(lambda: all(truth.is_moving for truth in truths), "all robots to move")
+    for ground_truth in ground_truths:
+        ground_truth.command.linear.x, ground_truth.command.angular.z = SPEED_M_S, 0.5
+    wait_for(lambda: all(ground_truth.is_moving for ground_truth in ground_truths), "all robots to move")
 
 
-def rest(truths):
+def wait_until_stopped(ground_truths):
     """Return when all robots stand, whatever they are told."""
-    wait_for(lambda: all(truth.is_at_rest for truth in truths), "all robots to stand")
+    wait_for(lambda: all(ground_truth.is_stopped for ground_truth in ground_truths), "all robots to stand")

@@ -1,4 +1,4 @@
-"""What shows that a driver serves a robot, for faults that must not touch it."""
+"""Checks that a driver still serves a robot that a fault must not affect."""
 
 import struct
 
@@ -12,19 +12,19 @@ from hero_driver.rosserial import packets
 from hero_msgs.msg import Encoder
 
 
-class Life:
-    """What shows that a driver serves one robot: messages, commands, the time."""
+class ServiceCheck:
+    """Messages, commands and time requests of one robot, checked on demand."""
 
     def __init__(self, driver, robot):
-        """Return when a program is connected to both ways."""
+        """Return when the robot's topics are connected in both directions."""
         self._driver = driver
         self._robot = robot
         driver.fleet.wait_ready(robot.namespace)
         self._encoders = Recorder(robot.namespace + "/encoder", Encoder)
         self._light = make_publisher(robot.namespace + "/led", ColorRGBA)
 
-    def show(self, count=1):
-        """Pass count messages each way, and let the robot ask for the time."""
+    def verify(self, count=1):
+        """Pass count messages in each direction, and let the robot ask for the time."""
         robot = self._robot
         messages, lights = len(self._encoders.messages), len(robot.payloads_on("led"))
         asked = len(robot.payloads_with_id(packets.ID_TIME))
@@ -33,8 +33,8 @@ class Life:
             self._light.publish(ColorRGBA(float(number), 0.0, 0.0, 0.0))
         ticks = [message.left_ticks for message in self._encoders.wait_count(messages + count)[messages:]]
         wait_payloads(robot, "led", lights + count)
-        colours = [struct.unpack("<f", payload[:4])[0] for payload in robot.payloads_on("led")[lights:]]
-        assert ticks == colours == [float(number) for number in range(count)]
+        colors = [struct.unpack("<f", payload[:4])[0] for payload in robot.payloads_on("led")[lights:]]
+        assert ticks == colors == [float(number) for number in range(count)]
         robot.send_bytes(TIME_PACKET)
         wait_packets(robot, packets.ID_TIME, asked + 1)
         assert robot.is_connected and self._driver.process.poll() is None

@@ -1,12 +1,12 @@
-"""Thousands of reconnects and power cuts: what the driver holds is the same at the end."""
+"""Thousands of reconnects and power cuts: the driver leaks nothing."""
 
 import struct
 
 import emulated_swarm
 from driver_case import list_driver_topics
 from fake_robot import FakeRobot
-from life_signs import Life
 from rig import EMULATED_NAMES, STOCK_NAMES, count_holdings, count_robots_names
+from service_check import ServiceCheck
 
 from hero_msgs.msg import Robot
 from hero_test.waiting import wait_for
@@ -97,10 +97,10 @@ def judge(record, fault, count, before, after):
     )
 
 
-def test_reconnects_leave_nothing_behind(start_driver, effort, record):
+def test_reconnects_leak_nothing(start_driver, effort, record):
     driver = start_driver(parameters={"grace_s": 3600.0})
     witness = FakeRobot(1).connect(driver.address)
-    life = Life(driver, witness)
+    service = ServiceCheck(driver, witness)
     swarm = Swarm(driver)
     rounds = effort.choose(300, 10000) // SWARM
 
@@ -109,26 +109,26 @@ def test_reconnects_leave_nothing_behind(start_driver, effort, record):
         swarm.leave()
 
     before, after = run_rounds(driver, swarm, rounds, act)
-    life.show(10)
+    service.verify(10)
     judge(record, "reconnects (FIN), %d robots at a time" % SWARM, rounds * SWARM, before, after)
     witness.close()
 
 
-def test_power_cuts_leave_nothing_behind(start_driver, effort, record):
+def test_power_cuts_leak_nothing(start_driver, effort, record):
     driver = start_driver(parameters={"grace_s": 3600.0})
     witness = FakeRobot(1).connect(driver.address)
-    life = Life(driver, witness)
+    service = ServiceCheck(driver, witness)
     swarm = Swarm(driver)
     rounds = effort.choose(20, 1000)
     before, after = run_rounds(driver, swarm, rounds, swarm.cut_power)
     wait_for(lambda: count_states(driver) == SWARM + 1, "all robots to be ready")
-    life.show(10)
+    service.verify(10)
     judge(record, "power cuts (no FIN) of a swarm of %d" % SWARM, rounds, before, after)
     swarm.leave()
     witness.close()
 
 
-def test_robots_that_leave_for_good_leave_nothing_behind(start_driver, effort, record):
+def test_departed_robots_leak_nothing(start_driver, effort, record):
     # So many new robots in so short a time are more than one address may have otherwise.
     driver = start_driver(parameters={"grace_s": 0.0, "max_connections_per_address": 5000})
     rounds = effort.choose(3, 100)
