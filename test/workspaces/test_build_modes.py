@@ -12,7 +12,6 @@ import subprocess
 import sys
 import textwrap
 from concurrent.futures import ThreadPoolExecutor
-from functools import lru_cache
 from pathlib import Path
 
 import pytest
@@ -21,7 +20,7 @@ from hero_test.processes import find_free_port
 
 ROOT = Path(__file__).resolve().parents[2]
 SCRATCH = ROOT / ".work" / "workspaces"
-BUILD_TIMEOUT_S = 600.0
+BUILD_TIMEOUT_S = 1800.0
 PROBE_TIMEOUT_S = 120.0
 NODE_START_S = 3
 LAUNCH_FILES = sorted(ROOT.glob("*/launch/*.launch"))
@@ -124,20 +123,14 @@ BUILDERS = {
 }
 
 
-@lru_cache(maxsize=None)
-def build(mode):
-    """Build a workspace, once."""
-    return BUILDERS[mode]()
-
-
-@pytest.fixture(params=sorted(BUILDERS))
+@pytest.fixture(scope="module", params=sorted(BUILDERS))
 def workspace(request):
-    """A workspace of each build mode."""
-    return build(request.param)
+    """A workspace of each build mode, built once."""
+    return BUILDERS[request.param]()
 
 
-def test_run_tests_runs_unit_tests_and_checks_launch_files():
-    workspace = build("catkin_build")
+@pytest.mark.parametrize("workspace", ["catkin_build"], indirect=True)
+def test_run_tests_runs_unit_tests_and_checks_launch_files(workspace):
     # roslaunch-check and rostest take the first python3 on PATH.
     path = f"{Path(sys.executable).parent}:$PATH"
     workspace.run(f"PATH={path} catkin run_tests --no-status --no-deps hero_description")
