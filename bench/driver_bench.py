@@ -258,9 +258,8 @@ def measure_all(options, commands):
     with use_master(options) as environment:
         for count in options.count:
             runs = {name: [] for name in commands}
-            for number in range(options.rounds):
-                # Every other round begins with the other server, so that none always follows the other.
-                for name, command in list(commands.items())[:: -1 if number % 2 else 1]:
+            for _ in range(options.rounds):
+                for name, command in commands.items():
                     runs[name].append(run_once(options, command, count, environment))
                     print_run(name, runs[name])
             results += [{"server": name, **take_medians(runs[name])} for name in commands]

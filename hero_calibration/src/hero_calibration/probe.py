@@ -14,7 +14,7 @@ from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 
-from hero_client.readings import yaw_of
+from hero_client.geometry import yaw_of
 from hero_msgs.msg import Encoder, Motor
 
 from .encoder_steps import Readings, count_steps

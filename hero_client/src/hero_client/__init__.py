@@ -1,17 +1,35 @@
-"""Building blocks of programs for HeRo robots: `from hero_client import Robot, Swarm`.
+"""The library for programs that use HeRo robots: `from hero_client import Robot, Swarm`.
 
-The two are fetched when asked for, so that the pure modules of this package work where there is no ROS.
+Public names are imported on first use (PEP 562), so that pure modules of this package work without ROS.
 """
 
+from importlib import import_module
 from typing import Any
 
-__all__ = ["Robot", "Swarm"]
+_MODULES = {
+    "CommonFrame": "frames",
+    "Drivers": "drivers",
+    "GoToGoalServer": "go_to_goal_server",
+    "GoalError": "robot",
+    "Obstacle": "readings",
+    "Pose": "geometry",
+    "Program": "program",
+    "ProgramError": "program",
+    "Robot": "robot",
+    "RobotError": "robot",
+    "RobotNotReadyError": "robot",
+    "StaleDataError": "robot",
+    "Swarm": "swarm",
+    "Velocity": "readings",
+    "open_swarm": "swarm",
+    "read_parameters": "parameters",
+    "run": "program",
+}
+
+__all__ = sorted(_MODULES)  # noqa: PLE0605
 
 
 def __getattr__(name: str) -> Any:
-    """Return Robot or Swarm (PEP 562)."""
-    if name not in __all__:
+    if name not in _MODULES:
         raise AttributeError("hero_client has no attribute %r" % name)
-    from . import robot, swarm
-
-    return getattr(robot if name == "Robot" else swarm, name)
+    return getattr(import_module("hero_client." + _MODULES[name]), name)

@@ -1,7 +1,7 @@
-"""Runs the main function of a command: an error becomes one line and an exit status, whatever happens to the output.
+"""Runs the main function of a command: an error becomes one line and an exit status, even if the output is closed.
 
-Exit status: 0 done, 1 failed (the line on stderr says why), 2 wrong arguments (argparse), 130 Ctrl-C, 141 nobody reads
-the output any more (what a shell reports of any program that a closed pipe ends). Knows neither ROS nor robots.
+Exit status: 0 done, 1 failed (the line on stderr says why), 2 wrong arguments (argparse), 130 Ctrl-C, 141 the reader of
+the output is gone (as shells report a program that ends by a closed pipe). Knows neither ROS nor robots.
 """
 
 import errno
@@ -20,7 +20,7 @@ OUTPUT_ERRORS = (errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO
 
 
 def run(main: Callable[[], Optional[int]], *errors: Type[Exception]) -> NoReturn:
-    """Call main and end the process with its exit status (None: 0); the text of errors is one line for people."""
+    """Call main and end the process with its exit status (None: 0); errors are printed as one line."""
     sys.exit(call(main, *errors))
 
 
@@ -33,32 +33,32 @@ def call(main: Callable[[], Optional[int]], *errors: Type[Exception]) -> int:
     try:
         status = main() or 0
     except errors as error:
-        complain(str(error))
+        print_error(str(error))
         status = FAILED
     except KeyboardInterrupt:
         status = INTERRUPTED
     except SystemExit as end:  # argparse: wrong arguments, or --help
         status = end.code if isinstance(end.code, int) else FAILED if end.code else 0
         if isinstance(end.code, str):
-            complain(end.code)
+            print_error(end.code)
     except OSError as error:
         if error.filename is not None or error.errno not in OUTPUT_ERRORS:
-            complain("%s%s" % ("%s: " % error.filename if error.filename else "", error.strerror or error))
+            print_error("%s%s" % ("%s: " % error.filename if error.filename else "", error.strerror or error))
             return FAILED
-        _drop(sys.stdout)
-        return _tell(error)
+        _discard(sys.stdout)
+        return _report(error)
     for stream in (sys.stderr, sys.stdout):
         try:
             if stream is not None:
                 stream.flush()
         except OSError as error:
-            _drop(stream)
-            status = status or _tell(error)
+            _discard(stream)
+            status = status or _report(error)
     return status
 
 
 def say(text: str, stream: Optional[IO[str]] = None, end: str = "\n") -> None:
-    """Write a line at once, to stdout unless stream is given; the program goes on where nobody reads it.
+    """Write a line at once, to stdout unless stream is given; the program continues even if nobody reads it.
 
     For work that must not end because of its output: a recording, robots that are being measured.
     """
@@ -70,31 +70,31 @@ def say(text: str, stream: Optional[IO[str]] = None, end: str = "\n") -> None:
         stream.write(text + end)
         stream.flush()
     except OSError as error:
-        _drop(stream)
-        _tell(error)
+        _discard(stream)
+        _report(error)
 
 
-def complain(text: str) -> None:
+def print_error(text: str) -> None:
     """Write a line with the program's name to stderr."""
     with suppress(OSError):
         print("%s: %s" % (os.path.basename(sys.argv[0]), make_printable(text)), file=sys.stderr, flush=True)
 
 
 def make_printable(text: str) -> str:
-    """Return the text without what would move the cursor: robots, files and other programs have a say in it."""
+    """Return text from robots, files or other programs without characters that would control the terminal."""
     return "".join(letter if letter.isprintable() else "?" for letter in text)
 
 
-def _tell(failure: OSError) -> int:
-    """Say why the output is lost, unless it is a pipe whose reader went; return the exit status."""
+def _report(failure: OSError) -> int:
+    """Print why the output is lost, unless it is a pipe whose reader has gone; return the exit status."""
     if isinstance(failure, BrokenPipeError):
         return PIPE_CLOSED
-    complain("the output cannot be written: %s" % failure.strerror)
+    print_error("the output cannot be written: %s" % failure.strerror)
     return FAILED
 
 
-def _drop(stream: IO[str]) -> None:
-    """Let a stream lead nowhere from now on: what it holds would fail again, in the end with a traceback."""
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, stream.fileno())
-    os.close(nowhere)
+def _discard(stream: IO[str]) -> None:
+    """Redirect a stream to /dev/null: what it buffers would fail again, at exit with a traceback."""
+    null_fd = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null_fd, stream.fileno())
+    os.close(null_fd)

@@ -1,30 +1,34 @@
 """All drivers under this ROS master as one: their robots in one list, a stop for all of them at once.
 
 Several PCs may have a driver each (docs/several_machines.md). That of the usual name is connected to at once; for
-others the master is asked every few seconds. Where the usual topic is remapped, that one driver is meant and no other.
+others the master is asked every few seconds. Where the usual topic is remapped, only that one driver is used.
 
-Threads: only the finder waits for the ROS master; only the asker sends requests. Neither a master nor a driver that
+Threads: only the finder waits for the ROS master; only the sender sends requests. Neither a master nor a driver that
 hangs delays a stop, because the topics to drivers are open before it is needed.
 """
 
+import math
 import threading
 import time
-from typing import Dict, List, Optional, Set
+from typing import Any, Dict, Iterable, List, Optional, Sequence, Set
 
 import rospy
+from std_msgs.msg import Bool
 
-from hero_msgs.msg import RobotArray
+from hero_msgs.msg import Robot, RobotArray
 
-from .driver_link import DriverLink
-from .driver_reports import PREFERENCE, SUFFIX, driver_of, find_drivers, merge
+from .program import ProgramError
 from .ros_node import NodeError, ask_master
 from .stop_status import TIME_LIMIT_S, DriverReply, StopRequest, StopStatus
 
+__all__ = ["STATES", "STOP_STATES", "USUAL_TOPIC", "Drivers"]
+
 USUAL_TOPIC = "/hero_driver/robots"
-LOOK_PERIOD_S = 3.0
-ASK_PERIOD_S = 0.1
+SUFFIX = "/robots"
+FIND_PERIOD_S = 3.0
+REPEAT_PERIOD_S = 0.1
 SETTLE_S = 1.5
-"""A driver that the master knows has reported by then, unless it died without a word."""
+"""A driver that the master knows has reported by then, unless it died without unregistering."""
 
 FORGET_S = 5.0
 """Reports come once per second. Robots of a driver that is silent for longer than the others are no longer listed."""
@@ -34,14 +38,144 @@ SILENT_S = 2.5
 
 POLL_PERIOD_S = 0.02
 
+STATES = {Robot.JOINING: "JOINING", Robot.READY: "READY", Robot.AWAY: "AWAY", Robot.REFUSED: "REFUSED"}
+STOP_STATES = {
+    Robot.NOT_STOPPED: "",
+    Robot.STOPPING: "stopping",
+    Robot.AT_REST: "at rest",
+    Robot.MOVING: "MOVING",
+    Robot.UNCONFIRMED: "unconfirmed",
+}
+"""As tables show them."""
+
+PREFERENCE = (Robot.READY, Robot.JOINING, Robot.AWAY)
+"""If a robot has moved from one driver to another, the entry that counts."""
+
+MAX_RATE = 1e9
+"""Messages or bytes per second; a larger number is invalid."""
+
+
+# ---------------------------------------------------------------------------------------------- reports
+
+
+def find_drivers(system_state: Any, topics: Iterable[str]) -> Set[str]:
+    """Return those of the topics that are reports of drivers.
+
+    A driver is a node that publishes NAME/robots and offers the service NAME/stop, where NAME is its own. A robot can
+    declare such topics and services, but they are those of its driver's node.
+
+    system_state: the ROS master's answer to getSystemState.
+    """
+    publishers, _, services = (dict(part) for part in system_state)
+    names = {topic: driver_of(topic) for topic in topics}
+    return {
+        topic
+        for topic, name in names.items()
+        if name in publishers.get(topic, ()) and name in services.get(name + "/stop", ())
+    }
+
+
+def driver_of(topic: str) -> str:
+    """Return the name of the driver that has this topic."""
+    return topic.rpartition("/")[0]
+
+
+def clean(report: RobotArray) -> RobotArray:
+    """Replace invalid numbers: rates by 0, clock offsets by NaN, which means unknown."""
+    for robot in report.robots:
+        robot.packets_per_s = robot.packets_per_s if 0.0 <= robot.packets_per_s <= MAX_RATE else 0.0
+        robot.bytes_per_s = robot.bytes_per_s if 0.0 <= robot.bytes_per_s <= MAX_RATE else 0.0
+        robot.clock_offset = robot.clock_offset if abs(robot.clock_offset) <= MAX_RATE else math.nan
+    return report
+
+
+def merge(reports: Sequence[RobotArray]) -> RobotArray:
+    """Return one report for several drivers: stopped if all of them are, and each robot once, by namespace."""
+    merged = RobotArray()
+    merged.header.stamp = max((report.header.stamp for report in reports), default=merged.header.stamp)
+    merged.listening = ", ".join(sorted(report.listening for report in reports if report.listening))
+    merged.stopped = all(report.stopped for report in reports)
+    by_name: Dict[str, Robot] = {}
+    for robot in (robot for report in reports for robot in report.robots):
+        # A refused or still unnamed robot is not the robot of that name.
+        own = robot.namespace if robot.namespace and robot.state in PREFERENCE else None
+        key = own or "%s at %s" % (robot.namespace, robot.address)
+        known = by_name.get(key)
+        if known is None or own is None or PREFERENCE.index(robot.state) < PREFERENCE.index(known.state):
+            by_name[key] = robot
+    merged.robots = sorted(by_name.values(), key=lambda robot: (robot.namespace, robot.address))
+    return merged
+
+
+# ---------------------------------------------------------------------------------------------- connections
+
+
+class _DriverLink:
+    """One driver: its newest report, and a way to ask for a stop that needs no ROS master."""
+
+    def __init__(self, driver: str, reports_topic: str) -> None:
+        """Open the topics; waits for the ROS master.
+
+        driver: the name of the node. Reports of any other node are ignored: a robot can declare topics, and a driver
+        publishes them under its own name.
+        """
+        self.driver = driver
+        self.count = 0
+        self.report: Optional[RobotArray] = None
+        self.arrival_s = -math.inf
+        self._lock = threading.Lock()
+        self._is_closed = False
+        # Not latched: a driver that starts later must not find an old request.
+        self._requests = rospy.Publisher(driver + "/stop_request", Bool, queue_size=1, tcp_nodelay=True)
+        self._reports = rospy.Subscriber(reports_topic, RobotArray, self._receive, queue_size=1, tcp_nodelay=True)
+
+    def _receive(self, report: RobotArray) -> None:
+        if report._connection_header.get("callerid") == self.driver:
+            clean(report)
+            with self._lock:
+                self.report, self.arrival_s = report, time.monotonic()
+                self.count += 1
+
+    def newest(self, since_s: float = -math.inf) -> Optional[RobotArray]:
+        """Return the newest report if it came after since_s."""
+        with self._lock:
+            return self.report if self.arrival_s > since_s else None
+
+    @property
+    def is_connected(self) -> bool:
+        """Whether a driver that has reported is still connected; it may hang all the same."""
+        with self._lock:
+            if self._is_closed or self.report is None:
+                return False
+            return self._reports.get_num_connections() > 0
+
+    def request_stop(self, stopped: bool) -> bool:
+        """Ask the driver to stop its robots, or to release them; return whether it is connected.
+
+        rospy sends on a thread per connection.
+        """
+        with self._lock:
+            if self._is_closed:
+                return False
+            is_connected = bool(self._requests.get_num_connections() > 0)
+            self._requests.publish(stopped)
+            return is_connected
+
+    def close(self) -> None:
+        """Close the topics; waits for the ROS master. Safe twice."""
+        with self._lock:
+            self._is_closed = True
+        self._requests.unregister()
+        self._reports.unregister()
+
 
 class Drivers:
-    """Connects to all drivers from now on; needs a node. All methods may be called on any thread, and none waits
-    for the ROS master."""
+    """Connections to all drivers. Methods are safe on any thread; none waits for the ROS master."""
 
     def __init__(self) -> None:
+        """Connect; needs a started node."""
         self._usual = rospy.resolve_name(USUAL_TOPIC)
-        self._links: Dict[str, DriverLink] = {}  # replaced, never changed: read on all threads
+        self._links: Dict[str, _DriverLink] = {}  # replaced, never changed: read on all threads
         self._listed: Set[str] = set()
         self._request: Optional[StopRequest] = None
         self._start_s = time.monotonic()
@@ -55,14 +189,14 @@ class Drivers:
     # -- finding them (a thread of its own) -----------------------------------------------------------------
 
     def _find(self) -> None:
-        self._links = {self._usual: DriverLink(driver_of(self._usual), self._usual)}
+        self._links = {self._usual: _DriverLink(driver_of(self._usual), self._usual)}
         while not self._end.is_set():
             if self._usual != USUAL_TOPIC:
                 self._listed = {self._usual}
             else:
                 self._look()
             self._has_looked.set()
-            self._end.wait(LOOK_PERIOD_S)
+            self._end.wait(FIND_PERIOD_S)
         if not rospy.core.is_shutdown_requested():  # else rospy closes all topics at once
             for link in self._links.values():
                 link.close()
@@ -75,7 +209,7 @@ class Drivers:
                 listed = (listed & self._listed) | find_drivers(ask_master("getSystemState"), listed - self._listed)
         except NodeError:
             return  # it may come back; what is known stays
-        new = {topic: DriverLink(driver_of(topic), topic) for topic in listed - set(self._links)}
+        new = {topic: _DriverLink(driver_of(topic), topic) for topic in listed - set(self._links)}
         # The usual driver may be started again at any time. Others come under any name, and are forgotten.
         gone = {
             topic: link
@@ -89,7 +223,7 @@ class Drivers:
 
     # -- what they report -----------------------------------------------------------------------------------
 
-    def _find_known(self) -> List[DriverLink]:
+    def _find_known(self) -> List[_DriverLink]:
         """Return the drivers that the master knows or that are connected."""
         return [link for topic, link in self._links.items() if topic in self._listed or link.is_connected]
 
@@ -164,9 +298,13 @@ class Drivers:
         self._wake.set()
 
     def stop_status(self) -> Optional[StopStatus]:
-        """Return what people must see of the last request; None before the first one."""
+        """Return the status of the last request; None before the first one."""
         request, now_s = self._request, time.monotonic()
-        return None if request is None else request.describe(self._read_replies(request, now_s), now_s)
+        if request is None:
+            return None
+        replies = self._read_replies(request, now_s)
+        reports = [reply.report for reply in replies if reply.report is not None]
+        return request.describe(replies, merge(reports).robots, now_s)
 
     def wait_for_stop(self, timeout_s: float = TIME_LIMIT_S) -> Optional[StopStatus]:
         """Return the status as soon as the outcome is known, or what is known after timeout_s."""
@@ -176,6 +314,15 @@ class Drivers:
             if status is None or status.is_final or time.monotonic() > deadline_s:
                 return status
             time.sleep(POLL_PERIOD_S)
+
+    def check_stop(self) -> None:
+        """Wait until the outcome of the last stop or release is known, 1.5 s at most; for the end of a program.
+
+        Raises: ProgramError with the robots and drivers that did not obey.
+        """
+        status = self.wait_for_stop()
+        if status is not None and status.level == "error":
+            raise ProgramError(status.text)
 
     def _read_replies(self, request: StopRequest, now_s: float) -> List[DriverReply]:
         since_s = max(request.made_s, now_s - SILENT_S)
@@ -191,7 +338,7 @@ class Drivers:
                 for link in self._links.values():
                     if request.is_open_to(link.driver) and link.request_stop(request.stopped):
                         request.note_asked(link.driver)
-            self._wake.wait(None if request is None or request.is_over else ASK_PERIOD_S)
+            self._wake.wait(None if request is None or request.is_over else REPEAT_PERIOD_S)
             self._wake.clear()
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""A formation, as read from YAML -> the places of its robots. Pure.
+"""Formations: read from YAML, placed in a frame, and assigned to robots. Pure.
 
     shape: circle           # or line, grid, points
     center: [0.0, 0.0]      # m, of the whole
@@ -9,7 +9,12 @@
 """
 
 import math
-from typing import Any, Dict, List, Tuple
+from typing import Any, Dict, List, Sequence, Tuple
+
+import yaml
+from scipy.optimize import linear_sum_assignment
+
+__all__ = ["FormationError", "Point", "assign_goals", "place_formation"]
 
 Point = Tuple[float, float]
 
@@ -25,13 +30,18 @@ class FormationError(ValueError):
 
 
 def place_formation(formation: Any, count: int, least_spacing_m: float) -> List[Point]:
-    """Return count places, m, in the frame in which center is given.
+    """Return count places [x, y], m, in the frame in which center is given.
 
-    least_spacing_m: nearer to each other robots would not get into their places.
+    formation: a table, or its text in YAML. least_spacing_m: closer together robots could not reach their places.
     Raises: FormationError.
     """
+    if isinstance(formation, str):
+        try:
+            formation = yaml.safe_load(formation)
+        except yaml.YAMLError as error:
+            raise FormationError("formation: not YAML: %s" % " ".join(str(error).split())) from None
     if not isinstance(formation, dict):
-        raise FormationError("a formation is a table with %s, not %r" % (", ".join(KEYS), formation))
+        raise FormationError("formation: must be a table with %s, not %r" % (", ".join(KEYS), formation))
     unknown = sorted(set(formation) - set(KEYS))
     if unknown:
         raise FormationError("formation: unknown key %r; known are: %s" % (unknown[0], ", ".join(KEYS)))
@@ -105,3 +115,16 @@ def _read_point(key: str, value: Any) -> Point:
     if not isinstance(value, (list, tuple)) or len(value) != 2:
         raise FormationError("formation: %s holds %r, but must hold [x, y] in m" % (key, value))
     return _read_number(key, value[0]), _read_number(key, value[1])
+
+
+def assign_goals(starts: Sequence[Point], goals: Sequence[Point]) -> List[int]:
+    """Return for each start the index of its goal, with the least sum of squared distances.
+
+    Then paths that are straight do not cross. Raises: ValueError if there are more starts than goals.
+    """
+    if len(starts) > len(goals):
+        raise ValueError("%d robots cannot take %d goals, one each" % (len(starts), len(goals)))
+    if not starts:
+        return []
+    costs_m2 = [[(sx - gx) ** 2 + (sy - gy) ** 2 for gx, gy in goals] for sx, sy in starts]
+    return [int(column) for column in linear_sum_assignment(costs_m2)[1]]

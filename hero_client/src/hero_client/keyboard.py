@@ -1,10 +1,9 @@
-"""A terminal -> single key presses, and the terminal back as it was, whatever ends the program.
+"""Single key presses of a terminal, whose settings are restored at the end. Knows no robot and no ROS.
 
-Knows no robot and no ROS. Sources: termios(3); ECMA-48 for the arrow keys.
+Sources: termios(3); ECMA-48 for the arrow keys.
 """
 
 import os
-import subprocess
 import sys
 import termios
 import tty
@@ -22,9 +21,6 @@ ARROWS = {
 }
 """What terminals send for the arrow keys, in normal and in application mode."""
 
-# Waits for a line from the program. The end of the pipe without one means that the program died.
-GUARD_SCRIPT = 'read -r line || stty "$1" <&1'
-
 
 class NoTerminalError(Exception):
     """There is no terminal to read keys from."""
@@ -33,20 +29,18 @@ class NoTerminalError(Exception):
 class Keyboard:
     """The keys of a terminal, one by one, without waiting for return and without showing them.
 
-    Ctrl-C still sends its signal. As a context manager it puts the terminal's settings back at the end. A guard, a
-    small process of its own, does so even when this program is killed or crashes.
+    Ctrl-C still sends its signal. As a context manager it restores the terminal's settings at the end, also after an
+    error or a signal that Program handles; after kill -9 the shell command `reset` does so.
     """
 
     def __init__(self) -> None:
         """Find the terminal. Raises: NoTerminalError."""
         self.file = open_terminal()
         self._settings: List[Any] = []
-        self._guard: Optional[subprocess.Popen[bytes]] = None
         self._unfinished = ""
 
     def __enter__(self) -> "Keyboard":
         self._settings = termios.tcgetattr(self.file)
-        self._guard = start_guard(self.file)
         tty.setcbreak(self.fileno(), termios.TCSANOW)
         settings = termios.tcgetattr(self.file)
         # Ctrl-Z would leave a program that neither reads keys nor stops the robot, so it is a key like any other.
@@ -59,19 +53,9 @@ class Keyboard:
             # FLUSH: keys that are still held down are not for the shell.
             termios.tcsetattr(self.file, termios.TCSAFLUSH, self._settings)
         except termios.error:
-            return  # the terminal is closed: nothing is left to put back
+            return  # the terminal is closed: nothing is left to restore
         finally:
-            self._end_guard()
             self.file.close()
-
-    def _end_guard(self) -> None:
-        """Tell the guard that the terminal is in order."""
-        if self._guard is not None and self._guard.stdin is not None:
-            try:
-                self._guard.communicate(b"done\n", timeout=1.0)
-            except subprocess.TimeoutExpired:
-                self._guard.kill()
-            self._guard = None
 
     def fileno(self) -> int:
         """Return what to wait on."""
@@ -134,17 +118,3 @@ def open_terminal() -> IO[bytes]:
 def _open_terminal_device(path: str) -> IO[bytes]:
     # NOCTTY: opening a terminal must not make it this session's own.
     return os.fdopen(os.open(path, os.O_RDONLY | os.O_NOCTTY), "rb", buffering=0)
-
-
-def start_guard(terminal: IO[bytes]) -> "subprocess.Popen[bytes]":
-    """Start the process that puts the terminal's present settings back when this one dies without a word."""
-    saved = subprocess.run(["stty", "-g"], stdin=terminal, stdout=subprocess.PIPE, check=True).stdout.decode().strip()
-    # A session of its own: signals to this program's group do not reach it, and a background process may set the
-    # terminal only if that is not its controlling one. The pipe is its input, so the terminal is its output.
-    return subprocess.Popen(
-        ["sh", "-c", GUARD_SCRIPT, "guard", saved],
-        stdin=subprocess.PIPE,
-        stdout=terminal,
-        stderr=subprocess.DEVNULL,
-        start_new_session=True,
-    )

@@ -1,8 +1,8 @@
-"""The life of a program that moves robots: start, parameters, sleep, and an end that leaves robots standing.
+"""The frame of a program that moves robots: start, rate, sleep, and an end that stops the robots.
 
-Signals, `rosnode kill` and a lost terminal become one flag that the program's loop looks at; the loop then ends, and
-`with` blocks stop the robots while the topics still work. (rospy's own signal handler closes the topics at the same
-time as user code runs.) This module knows no robot and no topic.
+Signals, `rosnode kill` and a lost terminal become one flag that the program's loop checks; the loop then ends, and
+`with` blocks stop the robots while the topics still work. (rospy's own signal handler closes the topics while user
+code still runs.) This module knows no robot and no topic.
 """
 
 import io
@@ -14,20 +14,19 @@ import sys
 import threading
 import time
 from types import FrameType
-from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple
+from typing import Callable, List, Optional, Sequence, Type
 
 import rospy
 
 from . import command_line
 from .ros_node import NodeError, start_ros_node
 
+__all__ = ["Program", "ProgramError", "run"]
+
 ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 SHUTDOWN_WAIT_S = 1.0
 """How long `rosnode kill` is held up while the loop ends and stops its robots; stopping takes about 0.2 s."""
-
-ALL_ROBOTS = "all"
-"""What a user writes instead of ids for every robot that the driver reports."""
 
 
 class ProgramError(Exception):
@@ -35,10 +34,10 @@ class ProgramError(Exception):
 
 
 class Program:
-    """A started ROS node with one question, `running`, and waits that end early when the answer becomes no.
+    """A started ROS node, whether it is `running`, and waits that end early when it is to end.
 
     Use as a context manager around everything that moves robots: leaving it tells ROS that the node ends.
-    Signals are taken over from the main thread only; they end the program after its loop has noticed.
+    Signals are taken over from the main thread only; they end the program once its loop has noticed.
     """
 
     def __init__(self, name: str, anonymous: bool = False) -> None:
@@ -82,7 +81,7 @@ class Program:
 
     @property
     def running(self) -> bool:
-        """Whether the program shall go on."""
+        """Whether the program is to continue."""
         return not self._ending
 
     def sleep(self, duration_s: float) -> bool:
@@ -91,10 +90,10 @@ class Program:
         return self.running
 
     def pace(self, period_s: float) -> bool:
-        """Wait until period_s after the end of the last such wait was due, or until the program is to end.
+        """Wait until period_s after the last such wait was due to end, or until the program is to end.
 
-        A loop of steps that take time keeps its rate so; a step that took longer than the period is not made up for.
-        Returns `running`.
+        This keeps the rate of a loop whose steps take time; a step that took longer than the period is not made up
+        for. Returns `running`.
         """
         now_s = time.monotonic()
         self._due_s = max(now_s, self._due_s + period_s) if now_s - self._due_s < 2.0 * period_s else now_s + period_s
@@ -116,87 +115,9 @@ class Program:
         rospy.signal_shutdown("the program ends")
 
 
-def run(main: Callable[[], Optional[int]]) -> None:
-    """Run main and end the process with its exit status, None: 0; a ProgramError becomes its line and status 1."""
-    command_line.run(main, ProgramError)
+def run(main: Callable[[], Optional[int]], *errors: Type[Exception]) -> None:
+    """Run main and end the process with its exit status, None: 0.
 
-
-def read_parameters(defaults: Dict[str, Any]) -> Dict[str, Any]:
-    """Return the node's private parameters, with defaults for those that are not set.
-
-    Raises: ProgramError for a parameter that is not in defaults, with the names that are.
+    A ProgramError, or one of errors, becomes one line and status 1.
     """
-    try:
-        given = rospy.get_param("~", {})
-    except KeyError:
-        given = {}
-    unknown = sorted(set(given) - set(defaults))
-    if unknown:
-        raise ProgramError(
-            "unknown parameter ~%s; known are: %s" % (unknown[0], ", ".join(sorted(defaults)))
-        )
-    return {**defaults, **given}
-
-
-def check_number(name: str, value: Any, low: float, high: float, unit: str = "") -> float:
-    """Return value as a float if it is a number in low..high.
-
-    Raises: ProgramError with the name, the value and the range.
-    """
-    allowed = "a number from %g to %g%s" % (low, high, " " + unit if unit else "")
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise ProgramError("~%s is %r, but must be %s" % (name, value, allowed))
-    if not (math.isfinite(value) and low <= value <= high):
-        raise ProgramError("~%s is %r, but must be %s" % (name, value, allowed))
-    return float(value)
-
-
-def check_flag(name: str, value: Any) -> bool:
-    """Return value if it is true or false.
-
-    Raises: ProgramError with the name and the value.
-    """
-    if not isinstance(value, bool):
-        raise ProgramError("~%s is %r, but must be true or false" % (name, value))
-    return value
-
-
-def parse_robot_ids(name: str, value: Any) -> Optional[List[int]]:
-    """Return the robot ids in value: a number, a list of numbers, or text such as "0 1 2" or "0,1,2" or "0-3".
-
-    None stands for all robots that there are: the word "all".
-
-    Raises: ProgramError for anything else, for a negative or repeated id, and for an empty list.
-    """
-    example = 'ids such as "0 1 2 3" or "0-3", or "all"'
-    words: List[Any]
-    if value == ALL_ROBOTS:
-        return None
-    if isinstance(value, str):
-        words = value.replace(",", " ").split()
-    elif isinstance(value, (list, tuple)):
-        words = list(value)
-    else:
-        words = [value]
-    ids: List[int] = []
-    for word in words:
-        first, last = _parse_id_range(word)
-        if first < 0 or last < first or last - first >= 1000:
-            raise ProgramError("~%s holds %r, but must hold robot %s" % (name, word, example))
-        ids.extend(range(first, last + 1))
-    if not ids:
-        raise ProgramError("~%s is empty, but must hold robot %s" % (name, example))
-    for robot_id in ids:
-        if ids.count(robot_id) > 1:
-            raise ProgramError("~%s names robot %d more than once" % (name, robot_id))
-    return ids
-
-
-def _parse_id_range(word: Any) -> Tuple[int, int]:
-    """Return first and last id of a word; (-1, -1) if it names none."""
-    if isinstance(word, int) and not isinstance(word, bool):
-        return word, word
-    first, dash, last = str(word).partition("-")
-    if not first.isdecimal() or (dash and not last.isdecimal()):
-        return -1, -1
-    return int(first), int(last if dash else first)
+    command_line.run(main, ProgramError, *errors)

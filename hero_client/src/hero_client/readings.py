@@ -1,33 +1,38 @@
-"""Messages of a robot -> what a program wants to know, and colours. Messages are read, never made; no ROS imports.
+"""Reads what robots send (poses, velocities, ranges) and rejects numbers that no robot can mean. Pure.
 
-Source of the ranges' meaning: REP 117.
+Messages are only read; their meaning: REP 105 (frames), REP 117 (ranges).
 """
 
 import math
-from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple, Union
+from typing import Any, List, NamedTuple, Optional, Sequence
 
-from .control_laws import wrap_angle
+from .geometry import Pose, wrap_angle, yaw_of
 
-COLORS: Dict[str, Tuple[float, float, float]] = {
-    "off": (0.0, 0.0, 0.0),
-    "red": (1.0, 0.0, 0.0),
-    "green": (0.0, 1.0, 0.0),
-    "blue": (0.0, 0.0, 1.0),
-    "yellow": (1.0, 1.0, 0.0),
-    "magenta": (1.0, 0.0, 1.0),
-    "cyan": (0.0, 1.0, 1.0),
-    "white": (1.0, 1.0, 1.0),
-    "orange": (1.0, 0.4, 0.0),
-}
+__all__ = [
+    "MAX_POSITION_M",
+    "MAX_RANGES",
+    "Obstacle",
+    "Velocity",
+    "find_nearest",
+    "finite",
+    "front_first",
+    "is_plausible",
+    "read_pose",
+    "read_ranges",
+]
 
-Color = Union[str, Sequence[float]]
+MAX_POSITION_M = 1000.0
+"""No robot drives so far; a position or range beyond is invalid."""
+
+MAX_RANGES = 64
+"""A robot has eight sensors; a scan with more ranges than this is invalid."""
 
 
 class Velocity(NamedTuple):
-    """How the robot moves, in its own frame."""
+    """How a robot moves, in its own frame hero_N/base_link."""
 
     linear_m_s: float
-    turn_rad_s: float
+    angular_rad_s: float
 
 
 class Obstacle(NamedTuple):
@@ -36,48 +41,56 @@ class Obstacle(NamedTuple):
     range_m: float
     """From the robot's centre."""
     bearing_rad: float
-    """Counter-clockwise from straight ahead, -pi..pi."""
+    """Counter-clockwise from the robot's front, -pi..pi."""
 
 
-def parse_color(color: Color) -> Tuple[float, float, float]:
-    """Return (red, green, blue), each 0..1.
-
-    Raises: ValueError with the names that are known.
-    """
-    if isinstance(color, str):
-        if color not in COLORS:
-            raise ValueError("no colour %r; there are: %s" % (color, ", ".join(COLORS)))
-        return COLORS[color]
-    values = [float(value) for value in color]
-    if len(values) != 3 or not all(0.0 <= value <= 1.0 for value in values):
-        raise ValueError("a colour is a name or three numbers 0..1, not %r" % (color,))
-    return values[0], values[1], values[2]
+def read_pose(message: Any) -> Optional[Pose]:
+    """Return the pose in the plane of a geometry_msgs/Pose; None if it is implausible."""
+    pose = Pose(message.position.x, message.position.y, yaw_of(message.orientation))
+    return pose if is_plausible(pose) else None
 
 
-def yaw_of(orientation: Any) -> float:
-    """Return the turn about z, -pi..pi, of a geometry_msgs/Quaternion; nan for what is no quaternion."""
-    return math.atan2(
-        2.0 * (orientation.w * orientation.z + orientation.x * orientation.y),
-        1.0 - 2.0 * (orientation.y * orientation.y + orientation.z * orientation.z),
-    )
+def is_plausible(pose: Pose) -> bool:
+    """Return whether a pose is finite and within MAX_POSITION_M."""
+    return abs(pose.x_m) <= MAX_POSITION_M and abs(pose.y_m) <= MAX_POSITION_M and math.isfinite(pose.yaw_rad)
+
+
+def read_ranges(scan: Any) -> Sequence[float]:
+    """Return the ranges of a sensor_msgs/LaserScan with NaN for invalid ones; empty if the whole scan is invalid."""
+    angles_are_finite = math.isfinite(scan.angle_min) and math.isfinite(scan.angle_increment)
+    if not angles_are_finite or len(scan.ranges) > MAX_RANGES:
+        return ()
+    return [
+        range_m if math.isinf(range_m) or 0.0 <= range_m <= MAX_POSITION_M else math.nan for range_m in scan.ranges
+    ]
 
 
 def front_first(scan: Any) -> List[float]:
-    """Return the ranges of a sensor_msgs/LaserScan starting straight ahead, with -inf (REP 117: too close) as 0.0."""
+    """Return the ranges of a sensor_msgs/LaserScan starting at the front, with -inf (too close) as 0.0."""
     count = len(scan.ranges)
     if count == 0 or scan.angle_increment <= 0.0:
         return []
     front = int(round(-scan.angle_min / scan.angle_increment))
-    return [
-        0.0 if scan.ranges[(front + index) % count] == -math.inf else scan.ranges[(front + index) % count]
-        for index in range(count)
+    ranges = [scan.ranges[(front + index) % count] for index in range(count)]
+    return [0.0 if range_m == -math.inf else range_m for range_m in ranges]
+
+
+def find_nearest(ranges_m: Sequence[float], angle_min_rad: float, increment_rad: float) -> Optional[Obstacle]:
+    """Return the nearest obstacle in ranges that go counter-clockwise from angle_min_rad; None if none is in range.
+
+    -inf (too close to measure) is nearer than any number.
+    """
+    seen = [
+        (range_m, index)
+        for index, range_m in enumerate(ranges_m)
+        if 0.0 <= range_m <= MAX_POSITION_M or range_m == -math.inf
     ]
-
-
-def nearest_obstacle(ranges: Sequence[float]) -> Optional[Obstacle]:
-    """Return the nearest of ranges that start straight ahead and go round counter-clockwise, None if all are free."""
-    seen = [(range_m, index) for index, range_m in enumerate(ranges) if math.isfinite(range_m)]
     if not seen:
         return None
     range_m, index = min(seen)
-    return Obstacle(range_m, wrap_angle(index * 2.0 * math.pi / len(ranges)))
+    return Obstacle(range_m, wrap_angle(angle_min_rad + index * increment_rad))
+
+
+def finite(value: float) -> Optional[float]:
+    """Return the value, or None (null in JSON, which has neither infinity nor NaN) if it is not finite."""
+    return value if math.isfinite(value) else None

@@ -1,4 +1,4 @@
-"""One robot as an object: methods become messages, the newest messages become properties.
+"""One robot as an object: methods send commands, properties return the newest data.
 
     from hero_client import Robot
 
@@ -7,9 +7,9 @@
         robot.drive(0.1, 0.0, duration_s=2.0)
         print(robot.pose, robot.nearest())
 
-Knows the topics under /hero_N only, so that simulated and real robots are the same to it. Units: metres, radians,
-seconds. Frames (REP 103, 105): poses are in hero_N/odom, velocities and ranges in hero_N/base_link: x ahead, y to
-the left, angles counter-clockwise from straight ahead.
+Uses only the topics under /hero_N, the same for simulated and real robots. Units: m, rad, s. Frames (REP 103, 105):
+poses are in hero_N/odom, velocities and ranges in hero_N/base_link: x to the front, y to the left, angles
+counter-clockwise from the front.
 """
 
 import math
@@ -28,16 +28,21 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import ColorRGBA
 
-from .control_laws import Pose
-from .goal_pursuit import DEFAULT_LAW, DEFAULT_TIMEOUT_S, DEFAULT_TOLERANCE_M, Goal, GoalPursuit, State
-from .readings import Color, Obstacle, Velocity, front_first, nearest_obstacle, parse_color, yaw_of
+from .colors import Color, parse_color
+from .controllers.go_to_goal import (
+    DEFAULT_LAW,
+    DEFAULT_TIMEOUT_S,
+    DEFAULT_TOLERANCE_M,
+    Goal,
+    GoToGoalController,
+    State,
+)
+from .geometry import Pose, clamp, yaw_of
+from .readings import Obstacle, Velocity, find_nearest, front_first
+from .robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
 from .ros_node import NodeError, start_ros_node
 
-MAX_LINEAR_M_S = 0.20
-"""The firmware clamps linear.x to this (config.h)."""
-
-MAX_TURN_RAD_S = 8.0
-"""The firmware clamps angular.z to this (config.h)."""
+__all__ = ["GoalError", "Robot", "RobotError", "RobotNotReadyError", "StaleDataError", "start_node", "stop_all"]
 
 STOP_GAP_S = 0.06
 """Between the two messages of a stop: the firmware drops a Twist that comes within 50 ms of the one before."""
@@ -54,6 +59,9 @@ FRESH_ODOM_S = 0.5
 FRESH_PROXIMITY_S = 1.0
 """Proximity comes about 5 times a second; older than this is stale."""
 
+LED_PERIOD_S = 2.0
+"""Between two messages of the same colour: the robot's light goes dark 15 s after the last one."""
+
 Sleep = Callable[[float], bool]
 """Waits for so many seconds and tells whether to go on; `Program.sleep` is one."""
 
@@ -62,11 +70,11 @@ POLL_PERIOD_S = 0.02
 
 
 class RobotError(Exception):
-    """A robot cannot do what it was asked for; the text says why and what to do."""
+    """A robot cannot do what it was told; the text says why and what to do."""
 
 
 class RobotNotReadyError(RobotError):
-    """The robot, or something of it, is not there."""
+    """The robot does not take commands or sends no data."""
 
 
 class StaleDataError(RobotError):
@@ -129,6 +137,8 @@ class Robot:
         self.name = "hero_%d" % robot_id
         self.namespace = "/" + self.name
         self.driven = False
+        self._kept_color: Optional[Color] = None
+        self._kept_s = -math.inf
         self._newest: Dict[str, Tuple[float, Any]] = {}
         self._cmd_vel = rospy.Publisher(
             self.namespace + "/velocity_controller/cmd_vel", Twist, queue_size=1
@@ -153,7 +163,7 @@ class Robot:
     def _receive_message(self, message: Any, topic: str) -> None:
         self._newest[topic] = (time.monotonic(), message)
 
-    # ------------------------------------------------------------------ what the robot says
+    # ------------------------------------------------------------------ data
 
     def age_s(self, topic: str) -> float:
         """Return the seconds since the last message of "odom" or "proximity" arrived; inf before the first."""
@@ -175,7 +185,7 @@ class Robot:
 
     @property
     def odometry(self) -> Odometry:
-        """The newest odometry message as it came. Raises: StaleDataError."""
+        """The newest odometry message. Raises: StaleDataError."""
         return self._read_fresh("odom", FRESH_ODOM_S)
 
     @property
@@ -192,7 +202,7 @@ class Robot:
 
     @property
     def proximity(self) -> List[float]:
-        """Eight ranges in metres from the robot's centre, straight ahead first, counter-clockwise, 45 degrees apart.
+        """Eight ranges in m from the robot's centre, front first, counter-clockwise, 45 degrees apart.
 
         inf: nothing in range (about 0.24 m); 0.0: too close to measure; nan: the sensor gives nothing usable.
         Raises: StaleDataError.
@@ -214,16 +224,17 @@ class Robot:
             return [math.nan] * 8
 
     def nearest(self) -> Optional[Obstacle]:
-        """Return the nearest thing that a sensor sees, None if there is none. Raises: StaleDataError."""
-        return nearest_obstacle(self.proximity)
+        """Return the nearest obstacle in range, None if there is none. Raises: StaleDataError."""
+        ranges = self.proximity
+        return find_nearest(ranges, 0.0, math.tau / max(1, len(ranges)))
 
     @property
     def connected(self) -> bool:
-        """Whether somebody takes the robot's commands: the driver, while the robot is known to it."""
+        """Whether the driver subscribes to the robot's commands, as it does while it knows the robot."""
         return self._cmd_vel.get_num_connections() > 0
 
     def missing(self) -> Optional[str]:
-        """Return what keeps the robot from being driven, in words; None if nothing does."""
+        """Return why the robot cannot be driven now, as text for users; None if it can."""
         if not self.connected:
             return "nobody takes %s: is the driver running, and has the robot joined it?" % self._cmd_vel.name
         for topic in self._subscribers:
@@ -244,40 +255,41 @@ class Robot:
             if time.monotonic() >= deadline_s or not sleep(POLL_PERIOD_S):
                 raise RobotNotReadyError("%s is not ready after %g s: %s" % (self.name, timeout_s, missing))
 
-    # ------------------------------------------------------------------ what the robot is told
+    # ------------------------------------------------------------------ commands
 
-    def drive(self, linear_m_s: float, turn_rad_s: float, duration_s: Optional[float] = None) -> None:
-        """Move with these speeds, which are cut to what the robot can do (0.20 m/s, 8 rad/s).
+    def drive(self, linear_m_s: float, angular_rad_s: float, duration_s: Optional[float] = None) -> None:
+        """Drive with these velocities, limited to 0.20 m/s and 8 rad/s.
 
-        linear_m_s: positive ahead. turn_rad_s: positive to the left. duration_s: keep it up for so long, then stop;
+        linear_m_s: positive forward. angular_rad_s: positive to the left. duration_s: drive for this time, then stop;
         None sends one command and returns: the robot obeys it until the next one, for about two seconds at most.
+        Raises: ValueError for velocities that are not finite.
         """
         if duration_s is None:
-            self._send_twist(linear_m_s, turn_rad_s)
+            self._send_twist(linear_m_s, angular_rad_s)
             return
         end_s = time.monotonic() + duration_s
         try:
             while not rospy.is_shutdown():
-                rest_s = end_s - time.monotonic()
-                if rest_s <= 0.0:
+                remaining_s = end_s - time.monotonic()
+                if remaining_s <= 0.0:
                     break
-                self._send_twist(linear_m_s, turn_rad_s)
-                time.sleep(min(REPEAT_PERIOD_S, rest_s))
+                self._send_twist(linear_m_s, angular_rad_s)
+                time.sleep(min(REPEAT_PERIOD_S, remaining_s))
         finally:
             self.stop()
 
-    def _send_twist(self, linear_m_s: float, turn_rad_s: float) -> None:
-        if not (math.isfinite(linear_m_s) and math.isfinite(turn_rad_s)):
-            raise ValueError("speeds must be finite, not %r m/s and %r rad/s" % (linear_m_s, turn_rad_s))
+    def _send_twist(self, linear_m_s: float, angular_rad_s: float) -> None:
+        if not (math.isfinite(linear_m_s) and math.isfinite(angular_rad_s)):
+            raise ValueError("speeds must be finite, not %r m/s and %r rad/s" % (linear_m_s, angular_rad_s))
         self.driven = True
         twist = Twist()
-        twist.linear.x = max(-MAX_LINEAR_M_S, min(MAX_LINEAR_M_S, linear_m_s))
-        twist.angular.z = max(-MAX_TURN_RAD_S, min(MAX_TURN_RAD_S, turn_rad_s))
+        twist.linear.x = clamp(linear_m_s, MAX_LINEAR_M_S)
+        twist.angular.z = clamp(angular_rad_s, MAX_ANGULAR_RAD_S)
         if not rospy.is_shutdown():
             self._cmd_vel.publish(twist)
 
     def stop(self) -> None:
-        """Stop, surely: returns when two stops, further apart than the robot's filter, are sent (about 0.2 s)."""
+        """Send two stops, further apart than the robot's filter; returns once they are sent, after 0.11 s."""
         stop_all([self])
 
     def go_to(
@@ -291,25 +303,25 @@ class Robot:
         avoid: bool = False,
         sleep: Sleep = sleep_unless_shutdown,
     ) -> None:
-        """Drive to a place in hero_N/odom, end in heading yaw_rad if given, and return when the robot stands there.
+        """Drive to a position in hero_N/odom, turn to yaw_rad if given, and return when the robot has stopped there.
 
-        law: see goal_pursuit.LAWS. avoid: go around what the proximity sensors see.
-        Raises: GoalError with the reason if it is not reached; the robot stands then, too.
+        law: see controllers.go_to_goal.LAWS. avoid: go around what the proximity sensors see.
+        Raises: GoalError with the reason if it is not reached; the robot is stopped then, too.
         """
-        pursuit = GoalPursuit(Goal(x_m, y_m, yaw_rad), time.monotonic(), tolerance_m, timeout_s, law)
+        controller = GoToGoalController(Goal(x_m, y_m, yaw_rad), time.monotonic(), tolerance_m, timeout_s, law)
         try:
-            while pursuit.state is State.ACTIVE:
+            while controller.state is State.ACTIVE:
                 ranges = self.fresh_proximity() if avoid else None
-                self.drive(*pursuit.step(self.fresh_pose(), ranges, time.monotonic()))
+                self.drive(*controller.step(self.fresh_pose(), ranges, time.monotonic()))
                 if not sleep(REPEAT_PERIOD_S):
                     raise GoalError("%s did not reach its goal: the program ends" % self.name)
         finally:
             self.stop()
-        if pursuit.state is State.FAILED:
-            raise GoalError("%s did not reach (%g, %g): %s" % (self.name, x_m, y_m, pursuit.reason))
+        if controller.state is State.FAILED:
+            raise GoalError("%s did not reach (%g, %g): %s" % (self.name, x_m, y_m, controller.reason))
 
     def start_go_to(self, x_m: float, y_m: float, **options: Any) -> "Future[None]":
-        """Begin go_to() on a thread of its own; the future is done, or holds the GoalError, when it ends.
+        """Start go_to() on another thread; the future is done, or holds the GoalError, when it ends.
 
         Several robots at once: start all, then ask each future for its result().
         """
@@ -328,10 +340,17 @@ class Robot:
             future.set_result(None)
 
     def led(self, color: Color) -> None:
-        """Show a colour: a name of readings.COLORS, or (red, green, blue) each 0..1. The robot goes dark 15 s later."""
+        """Show a colour: a name of colors.COLORS, or (red, green, blue) each 0..1. The robot goes dark 15 s later."""
         red, green, blue = parse_color(color)
         if not rospy.is_shutdown():
             self._led.publish(ColorRGBA(red, green, blue, 1.0))
+
+    def keep_led(self, color: Color) -> None:
+        """As led(), for every step of a loop: sends a change at once, and else repeats the colour every 2 s."""
+        now_s = time.monotonic()
+        if color != self._kept_color or now_s - self._kept_s >= LED_PERIOD_S:
+            self._kept_color, self._kept_s = color, now_s
+            self.led(color)
 
     # ------------------------------------------------------------------ end
 
@@ -360,7 +379,7 @@ class Robot:
 
 
 def stop_all(robots: Sequence[Robot]) -> None:
-    """Send every robot two stops, far enough apart that none is dropped, and wait until they are out."""
+    """Send every robot two stops, far enough apart that none is dropped, and wait until they are sent."""
     if not robots:
         return
     for robot in robots:

@@ -1,34 +1,101 @@
-"""Topics of one robot: rate, pose, distance driven, and what its proximity sensors see.
+"""What a table or a map shows of one robot: rate, pose, distance driven and nearest obstacle, from its topics.
 
-Numbers of robots are checked here, where they enter: what no robot can mean is shown as unknown.
+Unlike Robot it decodes messages only when asked: a swarm sends far more of them than anybody looks at.
 """
 
 import math
-from typing import Any, Optional, Sequence
+from collections import deque
+from typing import Any, Deque, Optional, Sequence, Tuple
 
+import genpy
+import rospy
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 
-from hero_client.newest_message import NewestMessage
-from hero_msgs.msg import Robot
+from .geometry import Pose, wrap_angle
+from .readings import Obstacle, find_nearest, is_plausible, read_pose, read_ranges
 
-from .fleet_state import Pose, RobotTrack, yaw_of_quaternion
+__all__ = ["NewestMessage", "RateMeter", "RobotListener", "RobotTrack"]
 
-FARTHEST_M = 1000.0
-"""No robot drives so far; a pose beyond is a mistake."""
+RATE_WINDOW_S = 3.0
+"""Long enough that 5 Hz reads steadily, short enough to see a robot fall silent."""
 
-MAX_RANGES = 64
-"""A robot has eight sensors; a scan with more than this is a mistake."""
 
-STATES = {Robot.JOINING: "JOINING", Robot.READY: "READY", Robot.AWAY: "AWAY", Robot.REFUSED: "REFUSED"}
-STOP_STATES = {
-    Robot.NOT_STOPPED: "",
-    Robot.STOPPING: "stopping",
-    Robot.AT_REST: "at rest",
-    Robot.MOVING: "MOVING",
-    Robot.UNCONFIRMED: "unconfirmed",
-}
-"""As tables show them."""
+class NewestMessage:
+    """A subscription of which only the newest message counts; it is kept as bytes until it is read."""
+
+    def __init__(self, topic: str, message_class: Any) -> None:
+        """Subscribe; messages of another layout than message_class's are ignored."""
+        self.count = 0
+        self._message_class = message_class
+        self._bytes: Optional[bytes] = None
+        self._subscriber = rospy.Subscriber(topic, rospy.AnyMsg, self._keep, queue_size=10)
+
+    def _keep(self, message: rospy.AnyMsg) -> None:
+        if message._connection_header["md5sum"] == self._message_class._md5sum:
+            self._bytes = message._buff
+            self.count += 1
+
+    def take(self) -> Any:
+        """Return the newest message; None if no readable one has arrived since the last call."""
+        kept, self._bytes = self._bytes, None
+        if kept is None:
+            return None
+        try:
+            return self._message_class().deserialize(kept)
+        except genpy.DeserializationError:
+            return None
+
+    def close(self) -> None:
+        """Unsubscribe; safe twice."""
+        self._subscriber.unregister()
+
+
+class RateMeter:
+    """Measures how often something arrived in the last RATE_WINDOW_S."""
+
+    def __init__(self) -> None:
+        self._counts: Deque[Tuple[float, int]] = deque()
+        self._total = 0
+
+    def count(self, more: int = 1) -> None:
+        """Add arrivals."""
+        self._total += more
+
+    def rate_hz(self, now_s: float) -> float:
+        """Return the rate since about RATE_WINDOW_S ago; call it more often than that."""
+        self._counts.append((now_s, self._total))
+        while len(self._counts) > 2 and self._counts[1][0] <= now_s - RATE_WINDOW_S:
+            self._counts.popleft()
+        (first_s, first), (last_s, last) = self._counts[0], self._counts[-1]
+        return (last - first) / (last_s - first_s) if last_s > first_s else 0.0
+
+
+class RobotTrack:
+    """What odometry and proximity of one robot have shown so far."""
+
+    def __init__(self) -> None:
+        self.odometry = RateMeter()
+        self.pose: Optional[Pose] = None
+        self.distance_m = 0.0
+        self.turned_rad = 0.0
+        self.proximity_seen = False
+        self.nearest: Optional[Obstacle] = None
+
+    def receive_pose(self, pose: Optional[Pose]) -> None:
+        """Take the newest pose and add to distance_m and turned_rad; an implausible pose counts as None."""
+        if pose is None or not is_plausible(pose):
+            self.pose = None
+            return
+        if self.pose is not None:
+            self.distance_m += math.hypot(pose.x_m - self.pose.x_m, pose.y_m - self.pose.y_m)
+            self.turned_rad += abs(wrap_angle(pose.yaw_rad - self.pose.yaw_rad))
+        self.pose = pose
+
+    def receive_proximity(self, ranges_m: Sequence[float], angle_min_rad: float, increment_rad: float) -> None:
+        """Take the newest proximity scan; one without finite angles counts as none."""
+        self.proximity_seen = math.isfinite(angle_min_rad) and math.isfinite(increment_rad)
+        self.nearest = find_nearest(ranges_m, angle_min_rad, increment_rad) if self.proximity_seen else None
 
 
 class RobotListener:
@@ -42,45 +109,19 @@ class RobotListener:
         self._counted = 0
 
     def read_newest(self) -> None:
-        """Read what came since the last call."""
+        """Read what arrived since the last call."""
         count = self._odometry.count
         self.track.odometry.count(count - self._counted)
         self._counted = count
         odometry = self._odometry.take()
         if odometry is not None:
-            pose = read_pose(odometry.pose.pose)
-            if pose is None:
-                self.track.pose = None
-            else:
-                self.track.receive_pose(pose)
+            self.track.receive_pose(read_pose(odometry.pose.pose))
         scan = self._proximity.take()
         if scan is not None:
             self.ranges_m = read_ranges(scan)
             self.track.receive_proximity(self.ranges_m, scan.angle_min, scan.angle_increment)
 
     def close(self) -> None:
-        """End the subscriptions."""
+        """Unsubscribe."""
         self._odometry.close()
         self._proximity.close()
-
-
-def read_pose(message: Any) -> Optional[Pose]:
-    """Return the pose in the plane of a geometry_msgs/Pose; None for one that no robot can have."""
-    place, turn = message.position, message.orientation
-    pose = Pose(place.x, place.y, yaw_of_quaternion(turn.x, turn.y, turn.z, turn.w))
-    return pose if is_on_map(pose) else None
-
-
-def is_on_map(pose: Pose) -> bool:
-    """Return whether a pose is finite and not absurdly far away."""
-    return abs(pose.x_m) <= FARTHEST_M and abs(pose.y_m) <= FARTHEST_M and math.isfinite(pose.yaw_rad)
-
-
-def read_ranges(message: Any) -> Sequence[float]:
-    """Return the ranges of a sensor_msgs/LaserScan, none if it is no scan of a robot; NaN for what is no distance."""
-    angles_are_finite = math.isfinite(message.angle_min) and math.isfinite(message.angle_increment)
-    if not angles_are_finite or len(message.ranges) > MAX_RANGES:
-        return ()
-    return [
-        range_m if math.isinf(range_m) or 0.0 <= range_m <= FARTHEST_M else math.nan for range_m in message.ranges
-    ]

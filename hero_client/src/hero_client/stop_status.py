@@ -1,4 +1,4 @@
-"""A request to stop all robots, or to release them: whom to ask again, and what people must see.
+"""A request to stop all robots, or to release them: which drivers to ask again, and the status that users see.
 
 Pure: knows neither topics nor a clock; times are monotonic.
 """
@@ -7,14 +7,14 @@ from typing import List, NamedTuple, Optional, Sequence, Set
 
 from hero_msgs.msg import Robot, RobotArray
 
-from .driver_reports import merge
+__all__ = ["TIME_LIMIT_S", "DriverReply", "StopRequest", "StopStatus", "paint"]
 
 TIME_LIMIT_S = 1.4
-"""Then people are told who did not stop, and see it on any screen within 1.5 s. A driver reports once per second, and
+"""Then users are told who did not stop, and see it on any screen within 1.5 s. A driver reports once per second, and
 each change within 0.1 s."""
 
 CROSSING_S = 0.15
-"""A report may cross the request on its way; by then a newer one has come."""
+"""A report may cross the request; after this time a newer one has arrived."""
 
 NAMES_SHOWN = 20
 
@@ -25,13 +25,13 @@ END_COLOUR = "\x1b[0m"
 
 
 class StopStatus(NamedTuple):
-    """What people must see of a request."""
+    """Status of a request, for users."""
 
     level: str
     """info, warn or error."""
     text: str
     is_final: bool
-    """Whether the outcome is known; until then it is asked for again and again."""
+    """Whether the outcome is known; until then the request is repeated."""
 
 
 class DriverReply(NamedTuple):
@@ -79,14 +79,14 @@ class StopRequest:
         return self.stopped or driver not in self._asked
 
     def note_asked(self, driver: str) -> None:
-        """A driver was asked, over a connection that stands."""
+        """A driver was asked, over an established connection."""
         self._asked.add(driver)
 
     def _is_late(self, now_s: float) -> bool:
         return now_s - self.made_s >= TIME_LIMIT_S
 
-    def describe(self, replies: Sequence[DriverReply], now_s: float) -> StopStatus:
-        """Return what people must see now."""
+    def describe(self, replies: Sequence[DriverReply], robots: Sequence[Robot], now_s: float) -> StopStatus:
+        """Return the status now; robots: those of all replies, each once."""
         if now_s - self.made_s < CROSSING_S:
             return StopStatus("warn", "stopping" if self.stopped else "releasing", False)
         failures = ["driver %s does not answer" % _show(reply.name) for reply in replies if reply.report is None]
@@ -100,7 +100,7 @@ class StopRequest:
             return StopStatus("warn", "another program has %s the robots of %s" % (how, ", ".join(changed)), True)
         if not self.stopped:
             return self._describe_release(failures, refusing, now_s)
-        return self._describe_stop(failures, refusing, find_robots(replies), now_s)
+        return self._describe_stop(failures, refusing, robots, now_s)
 
     def _describe_release(self, failures: List[str], refusing: List[str], now_s: float) -> StopStatus:
         failures = failures + ["driver %s is still stopped" % name for name in refusing]
@@ -113,7 +113,7 @@ class StopRequest:
     def _describe_stop(
         self, failures: List[str], refusing: List[str], robots: Sequence[Robot], now_s: float
     ) -> StopStatus:
-        connected = [robot for robot in robots if robot.state != Robot.AWAY]
+        connected = [robot for robot in robots if robot.state not in (Robot.AWAY, Robot.REFUSED)]
         moving = [robot for robot in connected if robot.stop_state == Robot.MOVING]
         unread = [robot for robot in connected if robot.stop_state == Robot.UNCONFIRMED]
         stopping = [robot for robot in connected if robot.stop_state in (Robot.NOT_STOPPED, Robot.STOPPING)]
@@ -136,14 +136,6 @@ class StopRequest:
             return StopStatus("warn", "stopped, but " + "; ".join(notes), True)
         text = "stopped, all wheels at rest" if connected else "stopped, no robot is connected"
         return StopStatus("info", text, True)
-
-
-def find_robots(replies: Sequence[DriverReply]) -> List[Robot]:
-    """Return the robots of all drivers that are connected or away, each once."""
-    reports = [reply.report for reply in replies if reply.report is not None]
-    if not reports:
-        return []
-    return [robot for robot in merge(reports).robots if robot.state != Robot.REFUSED]
 
 
 def _show(driver: str) -> str:

@@ -1,12 +1,15 @@
-"""Several robots as one object: see robot. Knows the topics of robots, and the drivers' lists of them."""
+"""Several robots as one object, and the lists of robots that the drivers publish: see robot."""
 
 import time
-from typing import Iterable, Iterator, List, Optional
+from typing import Dict, Iterable, Iterator, List, Mapping, Optional
+
+import rospy
 
 from hero_msgs.msg import RobotArray
 
+from .colors import Color
 from .drivers import USUAL_TOPIC, Drivers
-from .readings import Color
+from .program import Program, ProgramError
 from .robot import (
     POLL_PERIOD_S,
     Robot,
@@ -18,9 +21,17 @@ from .robot import (
 )
 from .stop_status import StopStatus
 
+__all__ = ["Swarm", "open_swarm"]
+
+REPORT_PERIOD_S = 5.0
+"""Between two lines on what is waited for."""
+
+FIRST_REPORT_S = 3.0
+"""Most robots answer within a second or two even when all starts at once: no line about those."""
+
 
 class Swarm:
-    """Several robots; iterate it, or take one by its number: swarm[3].
+    """Several robots; iterate over them, or take one by its id: swarm[3].
 
     Attributes:
         drivers: all drivers, connected so that a stop of all robots needs no ROS master.
@@ -29,9 +40,9 @@ class Swarm:
     def __init__(
         self, robot_ids: Iterable[int], odom: bool = True, proximity: bool = True, drivers: Optional[Drivers] = None
     ) -> None:
-        """Connect to the robots with these numbers; odom, proximity: see Robot; drivers: None makes new ones.
+        """Connect to the robots with these ids; odom, proximity: see Robot; drivers: None connects to them anew.
 
-        Raises: ValueError for what is no number of a robot, or comes twice.
+        Raises: ValueError for an invalid or repeated id.
         """
         numbers = list(robot_ids)
         for number in numbers:
@@ -41,6 +52,8 @@ class Swarm:
         start_node()
         self.drivers = drivers or Drivers()
         self._by_id = {robot.robot_id: robot for robot in self.robots}
+        self._reported: Dict[str, str] = {}
+        self._next_report_s = time.monotonic() + FIRST_REPORT_S
 
     @classmethod
     def discover(
@@ -83,14 +96,15 @@ class Swarm:
     def emergency_stop(self) -> StopStatus:
         """Stop all robots of all drivers, not only those of this swarm, until release_stop().
 
-        Returns what came of it as soon as that is known, after 1.5 s at most: status.level is "info" if all wheels are
-        at rest, "error" if status.text names who did not stop. These are asked again while the program runs.
+        Returns the outcome as soon as it is known, after 1.5 s at most: status.level is "info" if all wheels are at
+        rest, "error" if status.text names robots or drivers that did not stop. Those are asked again while the
+        program runs.
         """
         self.drivers.request_stop(True)
         return self.drivers.wait_for_stop()
 
     def release_stop(self) -> StopStatus:
-        """Let all robots of all drivers move again; returns what came of it, after 1.5 s at most."""
+        """Let all robots of all drivers move again; returns the outcome, after 1.5 s at most."""
         self.drivers.request_stop(False)
         return self.drivers.wait_for_stop()
 
@@ -98,6 +112,24 @@ class Swarm:
         """Show a colour on all robots."""
         for robot in self.robots:
             robot.led(color)
+
+    def report_missing(self, missing: Optional[Mapping[str, Optional[str]]] = None) -> None:
+        """Log which robots are waited for, every 5 s, and when they answer; call it in every step of a loop.
+
+        missing: robot's name -> what is missing, or None; without it, robot.missing() of each robot.
+        """
+        if missing is None:
+            missing = {robot.name: robot.missing() for robot in self.robots}
+        for name in [name for name in self._reported if missing.get(name) is None]:
+            rospy.loginfo("%s answers", name)
+            del self._reported[name]
+        if time.monotonic() < self._next_report_s:
+            return
+        self._next_report_s = time.monotonic() + REPORT_PERIOD_S
+        for name, reason in missing.items():
+            if reason is not None:
+                rospy.logwarn("%s: waiting: %s", name, reason)
+                self._reported[name] = reason
 
     def close(self) -> None:
         """Stop all robots that were driven from here, and leave their topics; safe twice."""
@@ -132,3 +164,21 @@ class Swarm:
 def ready_ids(robots: RobotArray) -> List[int]:
     """Return the numbers of the robots that can be driven now, sorted."""
     return sorted(robot.id for robot in robots.robots if robot.state == robot.READY and robot.id >= 0)
+
+
+def open_swarm(
+    program: Program, robot_ids: Optional[List[int]], odom: bool = True, proximity: bool = True
+) -> Swarm:
+    """Return the swarm of these robots; for None, of all that the drivers report, waiting for the first one.
+
+    Raises: ProgramError if the program is to end before there is any robot.
+    """
+    if robot_ids is not None:
+        return Swarm(robot_ids, odom, proximity)
+    while program.running:
+        try:
+            return Swarm.discover(REPORT_PERIOD_S, odom, proximity, program.sleep)
+        except RobotNotReadyError as error:
+            if program.running:
+                rospy.logwarn("waiting: %s", error)
+    raise ProgramError("ended before any robot was there")

@@ -78,7 +78,7 @@ class RobotApiTest(unittest.TestCase):
 
         def drives_back_and_turns():
             robot.drive(-0.05, 1.0)
-            is_told = robot.velocity.linear_m_s < -0.03 and robot.velocity.turn_rad_s > 0.7
+            is_told = robot.velocity.linear_m_s < -0.03 and robot.velocity.angular_rad_s > 0.7
             # The truth of one moment: the wheels' controller lets it swing.
             return is_told and self.speed(0) < -0.02
 

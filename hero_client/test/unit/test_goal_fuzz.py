@@ -7,14 +7,21 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hero_client.control_laws import STANDSTILL, Pose
-from hero_client.goal_pursuit import LAWS, SILENCE_S, Goal, GoalPursuit, State
-from hero_client.goal_reading import LARGEST_M, LONGEST_FRAME, GoalError, check_limits, read_goal
+from hero_client.controllers.go_to_goal import LAWS, SILENCE_S, Goal, GoToGoalController, State
+from hero_client.controllers.unicycle import STOP
+from hero_client.geometry import Pose
+from hero_client.go_to_goal_server import (
+    MAX_COORDINATE_M,
+    MAX_FRAME_LENGTH,
+    InvalidGoalError,
+    check_limits,
+    read_goal,
+)
 
 INF, NAN = math.inf, math.nan
 
 numbers = st.one_of(st.floats(), st.floats(-2.0, 2.0), st.sampled_from((0.0, -0.0, NAN, INF, -INF, 1e200, 5e-324)))
-good = st.floats(-LARGEST_M, LARGEST_M)
+good = st.floats(-MAX_COORDINATE_M, MAX_COORDINATE_M)
 poses = st.builds(Pose, good, good, st.floats(-1e4, 1e4))
 any_poses = st.one_of(poses, st.builds(Pose, numbers, numbers, numbers), st.none())
 eight = st.lists(st.sampled_from((NAN, INF, 0.0, 0.05, 0.2)), min_size=8, max_size=8)
@@ -34,7 +41,7 @@ messages = st.builds(
     make_message,
     st.tuples(numbers, numbers, numbers),
     st.tuples(numbers, numbers, numbers, numbers),
-    st.text(max_size=2 * LONGEST_FRAME),
+    st.text(max_size=2 * MAX_FRAME_LENGTH),
 )
 
 
@@ -43,14 +50,14 @@ messages = st.builds(
 def test_any_goal_message_is_finite_and_in_a_frame_or_refused_in_one_line(message, use_heading):
     try:
         goal, frame = read_goal(message, use_heading)
-    except GoalError as error:
+    except InvalidGoalError as error:
         assert str(error) and str(error).isprintable()
     else:
         assert all(math.isfinite(value) for value in goal if value is not None)
         assert use_heading or goal.yaw_rad is None
         assert frame == message.header.frame_id
         # What tf2 and a log line can take.
-        assert frame.isprintable() and len(frame.encode()) < 5 * LONGEST_FRAME
+        assert frame.isprintable() and len(frame.encode()) < 5 * MAX_FRAME_LENGTH
 
 
 @often
@@ -60,12 +67,12 @@ def test_any_goal_message_is_finite_and_in_a_frame_or_refused_in_one_line(messag
     steps=st.lists(st.tuples(any_poses, ranges), min_size=1, max_size=5),
 )
 def test_any_goal_that_was_taken_and_any_pose_make_commands_that_are_finite_and_slow(law, goal, steps):
-    pursuit = GoalPursuit(goal, 0.0, law=law)
+    controller = GoToGoalController(goal, 0.0, law=law)
     for index, (pose, seen) in enumerate(steps):
-        linear_m_s, turn_rad_s = pursuit.step(pose, seen, 0.1 * index)
-        assert abs(linear_m_s) <= 0.3 and abs(turn_rad_s) <= 4.0, (linear_m_s, turn_rad_s)
+        linear_m_s, angular_rad_s = controller.step(pose, seen, 0.1 * index)
+        assert abs(linear_m_s) <= 0.3 and abs(angular_rad_s) <= 4.0, (linear_m_s, angular_rad_s)
         if pose is None or not all(math.isfinite(value) for value in pose):
-            assert (linear_m_s, turn_rad_s) == STANDSTILL
+            assert (linear_m_s, angular_rad_s) == STOP
 
 
 @pytest.mark.parametrize(
@@ -83,7 +90,7 @@ def test_any_goal_that_was_taken_and_any_pose_make_commands_that_are_finite_and_
     ],
 )
 def test_a_goal_that_no_robot_can_be_sent_to_is_refused_with_the_reason(wrong, words):
-    with pytest.raises(GoalError, match=words):
+    with pytest.raises(InvalidGoalError, match=words):
         read_goal(make_message(**wrong), use_heading=True)
 
 
@@ -98,12 +105,12 @@ def test_limits_of_a_goal_are_positive_and_finite_or_refused(tolerance_m, timeou
     if 0.0 < tolerance_m < INF and 0.0 < timeout_s < INF:
         check_limits(tolerance_m, timeout_s)
     else:
-        with pytest.raises(GoalError, match="tolerance and timeout"):
+        with pytest.raises(InvalidGoalError, match="tolerance and timeout"):
             check_limits(tolerance_m, timeout_s)
 
 
 def test_a_robot_whose_odometry_is_not_finite_fails_and_stands():
-    pursuit = GoalPursuit(Goal(1.0, 0.0), 0.0)
-    assert pursuit.step(Pose(NAN, 0.0, 0.0), None, 0.1) == STANDSTILL
-    assert pursuit.step(Pose(0.0, 0.0, INF), None, SILENCE_S + 0.1) == STANDSTILL
-    assert pursuit.state is State.FAILED
+    controller = GoToGoalController(Goal(1.0, 0.0), 0.0)
+    assert controller.step(Pose(NAN, 0.0, 0.0), None, 0.1) == STOP
+    assert controller.step(Pose(0.0, 0.0, INF), None, SILENCE_S + 0.1) == STOP
+    assert controller.state is State.FAILED

@@ -1,21 +1,69 @@
-"""Messages -> ranges, nearest obstacle, colours; parameters -> ids, goals, start poses."""
+"""Numbers that robots send are checked where they enter; ranges, poses and colours."""
 
 import math
 from types import SimpleNamespace
 
 import pytest
+from geometry_msgs.msg import Point, Quaternion
+from geometry_msgs.msg import Pose as PoseMessage
+from sensor_msgs.msg import LaserScan
 
-from hero_client.readings import front_first, nearest_obstacle, parse_color
+from hero_client.colors import parse_color
+from hero_client.geometry import Pose, invert_pose, transform_pose
+from hero_client.readings import MAX_RANGES, find_nearest, front_first, read_pose, read_ranges
 
 INF = math.inf
+EIGHTH_RAD = math.pi / 4
 
 
 def make_scan(ranges):
-    return SimpleNamespace(ranges=ranges, angle_min=-math.pi, angle_increment=2.0 * math.pi / max(1, len(ranges)))
+    return SimpleNamespace(ranges=ranges, angle_min=-math.pi, angle_increment=math.tau / max(1, len(ranges)))
 
 
-def test_ranges_begin_straight_ahead_and_go_round_counter_clockwise():
+def make_pose(x_m, y_m, w=1.0):
+    return PoseMessage(Point(x_m, y_m, 0.0), Quaternion(0.0, 0.0, 0.0, w))
+
+
+def test_a_pose_is_read():
+    assert read_pose(make_pose(-1.0, 2.0)) == (-1.0, 2.0, 0.0)
+    turned = PoseMessage(Point(0.0, 0.0, 0.0), Quaternion(0.0, 0.0, math.sin(1.0), math.cos(1.0)))
+    assert read_pose(turned).yaw_rad == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize(
+    ("x_m", "y_m", "w"),
+    [(1e306, 0.0, 1.0), (0.0, -1e9, 1.0), (math.nan, 0.0, 1.0), (0.0, math.inf, 1.0), (0.0, 0.0, math.nan)],
+)
+def test_an_implausible_pose_is_none(x_m, y_m, w):
+    assert read_pose(make_pose(x_m, y_m, w)) is None
+
+
+def test_the_inverse_of_a_pose_leads_back_to_the_origin():
+    pose = Pose(0.3, -0.2, 1.1)
+    assert transform_pose(pose, invert_pose(pose)) == pytest.approx((0.0, 0.0, 0.0))
+
+
+def test_invalid_ranges_become_nan():
+    ranges = read_ranges(LaserScan(ranges=[0.1, math.inf, -math.inf, math.nan, 1e306, -0.5]))
+    assert ranges[:3] == [0.1, math.inf, -math.inf]
+    assert all(map(math.isnan, ranges[3:]))
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        LaserScan(ranges=[0.1] * (MAX_RANGES + 1)),
+        LaserScan(ranges=[0.1], angle_min=math.nan),
+        LaserScan(ranges=[0.1], angle_increment=math.inf),
+    ],
+)
+def test_an_invalid_scan_has_no_ranges(message):
+    assert list(read_ranges(message)) == []
+
+
+def test_ranges_begin_at_the_front_and_go_counter_clockwise():
     assert front_first(make_scan([0, 1, 2, 3, 4, 5, 6, 7])) == [4, 5, 6, 7, 0, 1, 2, 3]
+    assert front_first(make_scan([])) == []
 
 
 def test_too_close_is_zero_and_invalid_stays_invalid():
@@ -23,13 +71,22 @@ def test_too_close_is_zero_and_invalid_stays_invalid():
     assert ranges[0] == 0.0 and math.isnan(ranges[1])
 
 
-def test_an_empty_scan_has_no_ranges():
-    assert front_first(make_scan([])) == []
+@pytest.mark.parametrize(
+    ("index", "bearing_rad"), [(4, 0.0), (6, math.pi / 2), (2, -math.pi / 2), (5, EIGHTH_RAD), (0, -math.pi)]
+)
+def test_the_nearest_obstacle_has_the_bearing_of_its_beam(index, bearing_rad):
+    ranges_m = [0.2] * 8
+    ranges_m[index] = 0.1
+    nearest = find_nearest(ranges_m, -math.pi, EIGHTH_RAD)
+    assert nearest.range_m == 0.1
+    assert math.remainder(nearest.bearing_rad - bearing_rad, math.tau) == pytest.approx(0.0)
 
 
-def test_the_nearest_obstacle_has_its_bearing():
-    assert nearest_obstacle([INF, 0.2, INF, INF, INF, INF, INF, 0.1]) == pytest.approx((0.1, -math.pi / 4))
-    assert nearest_obstacle([INF] * 8) is None
+def test_infinite_and_invalid_ranges_are_no_obstacle_and_touch_is_the_nearest():
+    for ranges_m in ([], [INF] * 4 + [math.nan] * 4, [math.nan, 1e306, -1e306, INF]):
+        assert find_nearest(ranges_m, -math.pi, EIGHTH_RAD) is None
+    touching = [0.1, math.nan, -INF, 0.2, INF, INF, INF, INF]
+    assert find_nearest(touching, -math.pi, EIGHTH_RAD).range_m == -INF
 
 
 def test_colours_have_names_or_numbers():

@@ -1,44 +1,54 @@
-"""Numbers that robots send are checked where they enter."""
+"""What is received of a robot becomes a rate, a distance and the nearest obstacle."""
 
 import math
 
 import pytest
-from geometry_msgs.msg import Point, Quaternion
-from geometry_msgs.msg import Pose as PoseMessage
-from sensor_msgs.msg import LaserScan
 
-from hero_client.robot_listener import MAX_RANGES, read_pose, read_ranges
+from hero_client.geometry import Pose
+from hero_client.robot_listener import RateMeter, RobotTrack
 
 
-def make_pose(x_m, y_m, w=1.0):
-    return PoseMessage(Point(x_m, y_m, 0.0), Quaternion(0.0, 0.0, 0.0, w))
+def test_a_rate_is_the_count_divided_by_the_time():
+    meter = RateMeter()
+    assert meter.rate_hz(0.0) == 0.0
+    for tick in range(1, 11):
+        for _ in range(15):
+            meter.count()
+        rate_hz = meter.rate_hz(tick * 0.5)
+    assert rate_hz == pytest.approx(30.0)
 
 
-def test_a_pose_is_read():
-    assert read_pose(make_pose(-1.0, 2.0)) == (-1.0, 2.0, 0.0)
+def test_a_robot_that_falls_silent_is_at_zero_within_a_few_seconds():
+    meter = RateMeter()
+    for tick in range(10):
+        meter.count()
+        meter.rate_hz(tick * 0.5)
+    for tick in range(10, 20):
+        rate_hz = meter.rate_hz(tick * 0.5)
+    assert rate_hz == 0.0
 
 
-@pytest.mark.parametrize(
-    ("x_m", "y_m", "w"),
-    [(1e306, 0.0, 1.0), (0.0, -1e9, 1.0), (math.nan, 0.0, 1.0), (0.0, math.inf, 1.0), (0.0, 0.0, math.nan)],
-)
-def test_a_pose_that_no_robot_can_have_is_none(x_m, y_m, w):
-    assert read_pose(make_pose(x_m, y_m, w)) is None
+def test_distances_add_up_from_the_first_pose_on():
+    track = RobotTrack()
+    for pose in (Pose(5.0, 5.0, 3.0), Pose(5.3, 5.4, 3.0), Pose(5.0, 5.0, -3.0)):
+        track.receive_pose(pose)
+    assert track.distance_m == pytest.approx(1.0)
+    assert track.turned_rad == pytest.approx(math.tau - 6.0), "the short way round"
 
 
-def test_ranges_that_are_no_distances_say_nothing():
-    ranges = read_ranges(LaserScan(ranges=[0.1, math.inf, -math.inf, math.nan, 1e306, -0.5]))
-    assert ranges[:3] == [0.1, math.inf, -math.inf]
-    assert all(map(math.isnan, ranges[3:]))
+@pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf, 1e306])
+def test_an_implausible_pose_is_none_and_adds_no_distance(number):
+    track = RobotTrack()
+    for pose in (Pose(0.0, 0.0, 0.0), Pose(number, 0.0, 0.0), Pose(0.0, number, 0.0), Pose(0.0, 0.0, number)):
+        track.receive_pose(pose)
+        assert track.distance_m == 0.0
+    track.receive_pose(Pose(math.nan, 0.0, 0.0))
+    assert track.pose is None
 
 
-@pytest.mark.parametrize(
-    "message",
-    [
-        LaserScan(ranges=[0.1] * (MAX_RANGES + 1)),
-        LaserScan(ranges=[0.1], angle_min=math.nan),
-        LaserScan(ranges=[0.1], angle_increment=math.inf),
-    ],
-)
-def test_a_scan_that_no_robot_can_make_has_no_ranges(message):
-    assert list(read_ranges(message)) == []
+@pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf])
+def test_ranges_at_invalid_angles_are_not_seen(number):
+    track = RobotTrack()
+    for angle_min_rad, increment_rad in ((number, 0.8), (0.0, number)):
+        track.receive_proximity([0.1], angle_min_rad, increment_rad)
+        assert (track.proximity_seen, track.nearest) == (False, None)

@@ -2,6 +2,7 @@
 
 import pytest
 
+from hero_client.drivers import merge
 from hero_client.stop_status import CROSSING_S, NAMES_SHOWN, TIME_LIMIT_S, DriverReply, StopRequest
 from hero_msgs.msg import Robot, RobotArray
 
@@ -25,10 +26,15 @@ def silent(name):
     return DriverReply(name, None)
 
 
+def show(request, replies, now_s):
+    robots = merge([reply.report for reply in replies if reply.report]).robots
+    return request.describe(replies, robots, now_s)
+
+
 def describe(replies, now_s=LATE_S, stopped=True):
     request = StopRequest(stopped, 0.0)
     request.update(replies, True, now_s)
-    return request.describe(replies, now_s)
+    return show(request, replies, now_s)
 
 
 @pytest.mark.parametrize("now_s", [0.0, SOON_S, TIME_LIMIT_S - 0.01])
@@ -132,11 +138,11 @@ def test_a_release_that_is_not_taken_in_time_is_given_up_by_name():
     request = StopRequest(False, 0.0)
     replies = [silent(A), make_reply(B)]
     request.update(replies, True, LATE_S - 0.01)
-    assert request.describe(replies, LATE_S - 0.01) == ("warn", "releasing", False)
+    assert show(request, replies, LATE_S - 0.01) == ("warn", "releasing", False)
     assert request.is_open_to(A)
     request.update(replies, True, LATE_S)
     assert not request.is_open_to(A)
-    assert request.describe(replies, LATE_S) == (
+    assert show(request, replies, LATE_S) == (
         "error",
         "NOT RELEASED: driver hero_driver does not answer; driver hero_driver_b is still stopped",
         True,
@@ -147,14 +153,14 @@ def test_a_release_that_is_not_taken_in_time_is_given_up_by_name():
 def test_what_another_program_changed_later_is_told(stopped, how):
     request = StopRequest(stopped, 0.0)
     request.update([make_reply(A, stopped=stopped)], True, SOON_S)
-    status = request.describe([make_reply(A, stopped=not stopped)], LATE_S)
+    status = show(request, [make_reply(A, stopped=not stopped)], LATE_S)
     assert status == ("warn", "another program has %s the robots of hero_driver" % how, True)
 
 
 def test_a_driver_that_falls_silent_after_the_stop_is_named():
     request = StopRequest(True, 0.0)
     request.update([make_reply(A, rest(0))], True, SOON_S)
-    assert request.describe([silent(A)], LATE_S).text == "NOT STOPPED: driver hero_driver does not answer"
+    assert show(request, [silent(A)], LATE_S).text == "NOT STOPPED: driver hero_driver does not answer"
 
 
 @pytest.mark.parametrize(("stopped", "is_asked_again"), [(True, True), (False, False)])

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hero_client.control_laws import Pose
-from hero_client.reciprocal import AvoidanceLaw
-from hero_client.swarm_steering import SwarmSteering
+from hero_client.controllers.orca import AvoidanceLaw
+from hero_client.controllers.swarm_go_to import SwarmGoToController
+from hero_client.geometry import Pose
 from hero_sim.robot import declarations
 from hero_sim.robot_constants import BODY_RADIUS_M, TICK_M
 from hero_sim.world.kinematics import move_along_arc
@@ -36,7 +36,7 @@ class Swap:
         self.ranges = [[math.inf] * 8 for _ in range(ROBOTS)]
         self.counted_m = self.world.travels_m.copy()
         goals = [(-x_m, -y_m) for x_m, y_m, _ in self.poses]
-        self.steering = SwarmSteering(goals, AvoidanceLaw(), STEP_MS / 1000.0, seed)
+        self.steering = SwarmGoToController(goals, AvoidanceLaw(), STEP_MS / 1000.0, seed)
         self.least_gap_m = math.inf
 
     def step(self):

@@ -7,7 +7,7 @@ import threading
 
 import pytest
 
-from hero_driver.transport import EventLoop, LinkHandler, NoAnswerError, TransportSettings
+from hero_driver.transport import EventLoop, LinkHandler, TransportSettings
 
 DEADLINE_S = 20.0
 
@@ -92,17 +92,3 @@ def test_a_call_after_the_end_of_the_loop_does_no_harm(start):
     calls = []
     handler.loop.call_soon(lambda: calls.append("late"))
     assert calls == []
-
-
-def test_another_thread_that_asks_gets_what_the_loop_answers(start):
-    handler, far = start()
-    far.close()
-    thread = handler.loop.ask(lambda answer: answer(threading.current_thread()), DEADLINE_S)
-    assert thread is handler.thread
-
-
-def test_a_loop_that_does_not_answer_in_time_is_reported(start):
-    handler, far = start()
-    far.close()
-    with pytest.raises(NoAnswerError, match="did not answer within 0.0 s"):
-        handler.loop.ask(lambda answer: None, 0.01)

@@ -1,72 +1,41 @@
-"""Node follow: a chain of robots, each of which keeps behind the one before it; the first is led by anyone."""
-
-from typing import Dict, List, NamedTuple, Optional
+"""A chain of robots: each follows the one named before it. Drive the first one yourself."""
 
 import rospy
 
-from hero_client.common_frame import DEFAULT_FRAME, CommonFrame, parse_starts
-from hero_client.control_laws import STANDSTILL, FollowLaw, Pose, follow
-from hero_client.program import Program, ProgramError, check_number, parse_robot_ids, read_parameters, run
-from hero_client.robot import MAX_LINEAR_M_S
-from hero_client.swarm import Swarm
-from hero_client.swarm_start import WaitReport
-
-RATE_HZ = 10.0
+from hero_client import CommonFrame, Program, ProgramError, Swarm, read_parameters, run
+from hero_client.controllers.unicycle import STOP, FollowLaw, follow
+from hero_client.parameters import number, parse_poses, robot_ids
+from hero_client.robot_constants import MAX_LINEAR_M_S
 
 
-class Parameters(NamedTuple):
-    """The checked parameters of the node."""
-
-    robot_ids: List[int]
-    frame: str
-    starts: Optional[Dict[int, Pose]]
-    law: FollowLaw
-
-
-def load_parameters() -> Parameters:
-    """Return the node's private parameters. Raises: ProgramError."""
-    law = FollowLaw()
-    given = read_parameters(
-        {
-            "robots": "0 1",
-            "frame": DEFAULT_FRAME,
-            "starts": "",
-            "gap_m": law.gap_m,
-            "linear_m_s": law.max_linear_m_s,
-        }
-    )
-    robot_ids = parse_robot_ids("robots", given["robots"])
-    if robot_ids is None or len(robot_ids) < 2:
-        raise ProgramError("~robots is %r, but must name a leader and at least one follower" % (given["robots"],))
-    law = law._replace(
-        gap_m=check_number("gap_m", given["gap_m"], 0.10, 2.0, "m"),
-        max_linear_m_s=check_number("linear_m_s", given["linear_m_s"], 0.01, MAX_LINEAR_M_S, "m/s"),
-    )
-    return Parameters(robot_ids, str(given["frame"]), parse_starts(given["starts"], robot_ids), law)
-
-
-def follow_leader(program: Program, parameters: Parameters, swarm: Swarm) -> None:
-    """Let each robot but the first follow the one before it, until the program is to end."""
-    common = CommonFrame(parameters.frame, parameters.starts)
-    report = WaitReport()
-    rospy.loginfo("%s leads, and %s follow", swarm.robots[0].name, ", ".join(r.name for r in swarm.robots[1:]))
-    while program.pace(1.0 / RATE_HZ):
-        poses = [common.pose_of(robot) for robot in swarm]
-        for robot, pose, leader in zip(swarm.robots[1:], poses[1:], poses):
-            known = pose is not None and leader is not None
-            robot.drive(*(follow(pose, leader, parameters.law) if known else STANDSTILL))
-        report.update(common.missing)
-    common.close()
-
-
-def _main() -> None:
+def follow_leader():
     with Program("follow") as program:
-        parameters = load_parameters()
-        # The leader is never driven from here, so the swarm's end does not stop it: whoever leads it may go on.
-        with Swarm(parameters.robot_ids, proximity=False) as swarm:
-            follow_leader(program, parameters, swarm)
+        parameters = read_parameters(
+            {
+                "robots": robot_ids("0 1"),
+                "frame": "world",
+                "starts": "",
+                "gap_m": number(FollowLaw().gap_m, 0.10, 2.0, "m"),
+                "linear_m_s": number(FollowLaw().max_linear_m_s, 0.01, MAX_LINEAR_M_S, "m/s"),
+            }
+        )
+        ids = parameters["robots"]
+        if ids is None or len(ids) < 2:
+            raise ProgramError("~robots is %r, but must name a leader and at least one follower" % (ids or "all",))
+        law = FollowLaw(gap_m=parameters["gap_m"], max_linear_m_s=parameters["linear_m_s"])
+        common = CommonFrame(parameters["frame"], parse_poses("starts", parameters["starts"], ids))
+
+        # The leader is never driven from here, so leaving the swarm does not stop it.
+        with Swarm(ids, proximity=False) as swarm:
+            leader, *followers = swarm
+            rospy.loginfo("%s leads, and %s follow", leader.name, ", ".join(robot.name for robot in followers))
+            while program.pace(0.1):
+                poses = [common.pose_of(robot) for robot in swarm]
+                for robot, pose, leader_pose in zip(followers, poses[1:], poses):
+                    known = pose is not None and leader_pose is not None
+                    robot.drive(*(follow(pose, leader_pose, law) if known else STOP))
+                swarm.report_missing(common.missing)
 
 
-def main() -> None:
-    """Run the node."""
-    run(_main)
+def main():
+    run(follow_leader)

@@ -1,4 +1,4 @@
-"""Node joy_driver: becomes joy/joy_node where that is installed, and else says how to get it, in one line."""
+"""Runs joy/joy_node with the same arguments where it is installed, and else says how to get it, in one line."""
 
 import os
 import sys
@@ -7,7 +7,6 @@ import rospkg
 
 
 def main() -> None:
-    """Run joy_node in the place of this program, with the same arguments."""
     try:
         rospkg.RosPack().get_path("joy")
     except rospkg.ResourceNotFound:

@@ -1,141 +1,59 @@
-"""Node random_walk: proximity of any set of robots -> a random walk that avoids obstacles, one process for all."""
+"""Robots walk at random and avoid obstacles; their lights show green: walking, yellow: bending away, red: turning."""
 
 import math
 import random
 from functools import partial
-from typing import Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 import rospy
 
-from hero_client.control_laws import (
-    POTENTIAL,
-    STANDSTILL,
-    WANDER,
-    Command,
-    WanderMemory,
-    wander,
-    wander_in_potential,
-)
-from hero_client.program import Program, ProgramError, check_number, parse_robot_ids, read_parameters, run
-from hero_client.robot import MAX_LINEAR_M_S, Robot, StaleDataError
-from hero_client.swarm_start import WaitReport, open_swarm
+from hero_client import Program, open_swarm, read_parameters, run
+from hero_client.controllers import avoidance
+from hero_client.parameters import choice, number, robot_ids, whole_number
+from hero_client.robot_constants import MAX_LINEAR_M_S
 
-RATE_HZ = 10.0
-"""Commands per second and robot: the robot takes no more than about 19, and stops by itself after 2 s without."""
-
-LED_PERIOD_S = 2.0
-"""Between two messages of the same colour: the robot goes dark 15 s after the last one."""
-
-WALKING_COLOR = "green"
-BENDING_COLOR = "yellow"
-ESCAPING_COLOR = "red"
-WAITING_COLOR = "blue"
+RULES = {
+    "sectors": (avoidance.wander, avoidance.WanderLaw),
+    "potential": (avoidance.wander_in_potential, avoidance.PotentialLaw),
+}
 
 
-Rule = Callable[[Sequence[float], WanderMemory, float], Tuple[Command, WanderMemory]]
-"""Ranges, memory, chance -> command, memory: see control_laws.wander."""
+def walk():
+    with Program("random_walk") as program:
+        parameters = read_parameters(
+            {
+                "robots": robot_ids("0"),
+                "rule": choice("sectors", list(RULES)),
+                "linear_m_s": number(0.10, 0.0, MAX_LINEAR_M_S, "m/s"),
+                "angular_rad_s": number(1.5, 0.1, 4.0, "rad/s"),
+                "seed": whole_number(-1, -1, 2**31),
+            }
+        )
+        cruise_m_s, seed = parameters["linear_m_s"], parameters["seed"]
+        rule, law = RULES[parameters["rule"]]
+        rule = partial(rule, law=law(cruise_m_s, parameters["angular_rad_s"]))
 
-
-class Parameters(NamedTuple):
-    """The checked parameters of the node."""
-
-    robot_ids: Optional[List[int]]
-    """None for all that the driver reports."""
-    rule: Rule
-    linear_m_s: float
-    seed: Optional[int]
-
-
-def make_rule(name: str, linear_m_s: float, turn_rad_s: float) -> Rule:
-    """Return the rule of this name with these speeds. Raises: ProgramError with the names that are known."""
-    rules: Dict[str, Rule] = {
-        "sectors": partial(wander, law=WANDER._replace(cruise_m_s=linear_m_s, turn_rad_s=turn_rad_s)),
-        "potential": partial(
-            wander_in_potential, law=POTENTIAL._replace(cruise_m_s=linear_m_s, turn_rad_s=turn_rad_s)
-        ),
-    }
-    if name not in rules:
-        raise ProgramError("~rule is %r, but must be one of: %s" % (name, ", ".join(rules)))
-    return rules[name]
-
-
-def load_parameters() -> Parameters:
-    """Return the node's private parameters. Raises: ProgramError."""
-    given = read_parameters(
-        {"robots": "0", "rule": "sectors", "linear_m_s": WANDER.cruise_m_s, "turn_rad_s": WANDER.turn_rad_s, "seed": -1}
-    )
-    seed = given["seed"]
-    if isinstance(seed, bool) or not isinstance(seed, int):
-        raise ProgramError("~seed is %r, but must be a whole number; -1 draws one" % (seed,))
-    linear_m_s = check_number("linear_m_s", given["linear_m_s"], 0.0, MAX_LINEAR_M_S, "m/s")
-    rule = make_rule(given["rule"], linear_m_s, check_number("turn_rad_s", given["turn_rad_s"], 0.1, 4.0, "rad/s"))
-    return Parameters(parse_robot_ids("robots", given["robots"]), rule, linear_m_s, None if seed < 0 else seed)
-
-
-class Walker:
-    """The random walk of one robot."""
-
-    def __init__(self, robot: Robot, parameters: Parameters) -> None:
-        """Begin to walk; every robot draws from a seed of its own."""
-        self.robot = robot
-        self.waiting_for: Optional[str] = "the first proximity message"
-        self._rule = parameters.rule
-        self._cruise_m_s = parameters.linear_m_s
-        self._random = random.Random(None if parameters.seed is None else parameters.seed + robot.robot_id)
-        self._memory = WanderMemory()
-        self._color = ""
-        self._steps_since_color = 0
-
-    def step(self) -> None:
-        """Send the next command: a standstill while the robot's sensors are silent."""
-        try:
-            ranges = self.robot.proximity
-        except StaleDataError as error:
-            self.waiting_for = str(error)
-            self._memory = WanderMemory()
-            self.robot.drive(*STANDSTILL)
-            self._show(WAITING_COLOR)
-            return
-        if all(math.isnan(range_m) for range_m in ranges):
-            self.waiting_for = "usable ranges on %s/proximity: is its infrared calibration set?" % self.robot.namespace
-            self.robot.drive(*STANDSTILL)
-            self._show(WAITING_COLOR)
-            return
-        self.waiting_for = None
-        command, self._memory = self._rule(ranges, self._memory, self._random.random())
-        self.robot.drive(*command)
-        if self._memory.escape_sign:
-            self._show(ESCAPING_COLOR)
-        else:
-            self._show(WALKING_COLOR if command.linear_m_s >= self._cruise_m_s else BENDING_COLOR)
-
-    def _show(self, color: str) -> None:
-        self._steps_since_color += 1
-        if color != self._color or self._steps_since_color >= LED_PERIOD_S * RATE_HZ:
-            self.robot.led(color)
-            self._color = color
-            self._steps_since_color = 0
-
-
-def walk(program: Program, parameters: Parameters) -> None:
-    """Let the robots walk until the program is to end."""
-    with open_swarm(program, parameters.robot_ids, odom=False) as swarm:
-        walkers = [Walker(robot, parameters) for robot in swarm]
-        rospy.loginfo("random walk of %s", ", ".join(robot.name for robot in swarm))
-        report = WaitReport()
-        while program.pace(1.0 / RATE_HZ):
-            for walker in walkers:
-                walker.step()
-            report.update({walker.robot.name: walker.waiting_for for walker in walkers})
-        swarm.led("off")
+        with open_swarm(program, parameters["robots"], odom=False) as swarm:
+            rospy.loginfo("random walk of %s", ", ".join(robot.name for robot in swarm))
+            dice = {robot: random.Random(None if seed < 0 else seed + robot.robot_id) for robot in swarm}
+            memories = {robot: avoidance.WanderMemory() for robot in swarm}
+            missing = {}
+            while program.pace(0.1):
+                for robot in swarm:
+                    ranges = robot.fresh_proximity()
+                    missing[robot.name] = robot.missing()
+                    if all(map(math.isnan, ranges)):
+                        missing[robot.name] = missing[robot.name] or "no usable ranges: infrared calibration?"
+                        command, memories[robot], color = (0.0, 0.0), avoidance.WanderMemory(), "blue"
+                    else:
+                        command, memories[robot] = rule(ranges, memories[robot], dice[robot].random())
+                        color = "green" if command.linear_m_s >= cruise_m_s else "yellow"
+                        color = "red" if memories[robot].escape_sign else color
+                    robot.drive(*command)
+                    robot.keep_led(color)
+                swarm.report_missing(missing)
+            swarm.led("off")
     rospy.loginfo("random walk ended, robots stopped")
 
 
-def _main() -> None:
-    with Program("random_walk") as program:
-        walk(program, load_parameters())
-
-
-def main() -> None:
-    """Run the node."""
-    run(_main)
+def main():
+    run(walk)

@@ -13,7 +13,7 @@ import rospy
 from geometry_msgs.msg import PoseStamped, Twist
 
 from hero_client.drivers import Drivers
-from hero_client.fleet_state import Pose
+from hero_client.geometry import Pose
 
 from .background import Background
 from .dead_man import STOPS, DeadMan, Velocity

@@ -18,10 +18,10 @@ from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
 from hero_client.command_line import make_printable
-from hero_client.drivers import Drivers
-from hero_client.fleet_state import Pose, finite, yaw_of_quaternion
-from hero_client.newest_message import NewestMessage
-from hero_client.robot_listener import STATES, STOP_STATES, is_on_map, read_pose
+from hero_client.drivers import STATES, STOP_STATES, Drivers
+from hero_client.geometry import Pose, yaw_of
+from hero_client.readings import finite, is_plausible, read_pose
+from hero_client.robot_listener import NewestMessage
 from hero_client.stop_status import StopStatus
 from hero_msgs.msg import Robot
 
@@ -167,7 +167,7 @@ class FleetFeed:
             "packets": round(row.packets_per_s, 1),
             "bytes": round(row.bytes_per_s),
             "odom": None if track is None else round(track.odometry.rate_hz(time.monotonic()), 1),
-            "distance": None if track is None else finite(round(track.way_m, 2)),
+            "distance": None if track is None else finite(round(track.distance_m, 2)),
             "dropped": row.dropped_messages,
             "bad": row.bad_packets,
             "clock": finite(round(row.clock_offset, 4)),
@@ -194,8 +194,8 @@ class FleetFeed:
         if taken.get("/tf_static") is not None:
             for transform in taken["/tf_static"].transforms:
                 place, turn = transform.transform.translation, transform.transform.rotation
-                pose = Pose(place.x, place.y, yaw_of_quaternion(turn.x, turn.y, turn.z, turn.w))
-                if is_on_map(pose):
+                pose = Pose(place.x, place.y, yaw_of(turn))
+                if is_plausible(pose):
                     self.placement.receive_transform(transform.header.frame_id, transform.child_frame_id, pose)
             self.placement.set_robots(self.robots)
         if taken.get("/hero_sim/arena") is not None:

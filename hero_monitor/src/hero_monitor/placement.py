@@ -7,7 +7,7 @@ lies on the map. Robots without such a transform are drawn side by side, and the
 import math
 from typing import Dict, Iterable, List
 
-from hero_client.fleet_state import Pose
+from hero_client.geometry import Pose
 
 APART_M = 1.0
 """Between the origins of robots without a map transform: farther than a short drive."""

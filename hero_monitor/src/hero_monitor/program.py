@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING, Any, List, NamedTuple, Optional, Union
 
 import rospy
 
-from hero_client.fleet_state import Pose
-from hero_client.program import Program, ProgramError, check_flag, check_number, read_parameters, run
-from hero_client.robot import MAX_LINEAR_M_S, MAX_TURN_RAD_S
+from hero_client.geometry import Pose
+from hero_client.parameters import check_flag, check_number, read_parameters
+from hero_client.program import Program, ProgramError, run
+from hero_client.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
 
 from . import requests
 from .access import TOKEN_LENGTH_MIN, Access, is_loopback
@@ -223,7 +224,7 @@ class Monitor:
 
     def _receive(self, page: "PageSocket", text: Union[str, bytes]) -> None:
         try:
-            request = requests.read_request(text, MAX_LINEAR_M_S, MAX_TURN_RAD_S)
+            request = requests.read_request(text, MAX_LINEAR_M_S, MAX_ANGULAR_RAD_S)
         except requests.RequestError as error:
             page.tell("error", "invalid request (%s): reload the page" % error)
             return

@@ -6,9 +6,9 @@ from typing import Optional, Tuple
 from geometry_msgs.msg import PoseStamped
 from std_msgs.msg import ColorRGBA
 
-from hero_client.fleet_state import Pose
-from hero_client.newest_message import NewestMessage
-from hero_client.robot_listener import RobotListener, read_pose
+from hero_client.geometry import Pose
+from hero_client.readings import read_pose
+from hero_client.robot_listener import NewestMessage, RobotListener
 
 from .placement import Placement
 from .sections import encode_colour

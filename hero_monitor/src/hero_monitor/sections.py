@@ -10,7 +10,7 @@ from collections import deque
 from typing import Any, Deque, Dict, List, NamedTuple, Optional, Sequence
 
 from hero_client.command_line import make_printable
-from hero_client.fleet_state import Pose
+from hero_client.geometry import Pose
 
 LONGEST_LINE = 400
 LOG_LINES_KEPT = 500

@@ -5,7 +5,7 @@ import math
 
 import pytest
 
-from hero_client.fleet_state import Pose
+from hero_client.geometry import Pose
 from hero_monitor import requests
 from hero_monitor.placement import APART_M, Placement
 from hero_monitor.sections import (

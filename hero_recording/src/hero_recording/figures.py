@@ -13,11 +13,12 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from hero_client.robot_constants import BODY_RADIUS_M
+
 from . import analysis
 from .colors import MOST_NAMED, STATE_COLORS, Color, choose_colors
 from .observations import Observations, RobotObservations
 
-BODY_RADIUS_M = 0.0368
 WIDTH_IN = 9.0
 MOST_ROWS = 8
 """Up to this many robots have speed curves of their own; more share an image with a row for each."""

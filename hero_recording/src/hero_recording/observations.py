@@ -6,7 +6,7 @@ Times are the recorder's, seconds since 1970; stamps are the robot's clock, whic
 import math
 from typing import Any, Dict, Iterable, List, NamedTuple, Optional, Set, Tuple
 
-from hero_client.readings import yaw_of
+from hero_client.geometry import yaw_of
 
 from .series import Series
 from .topics import (

@@ -8,7 +8,7 @@ import math
 from operator import attrgetter
 from typing import Any, Callable, Dict, List, NamedTuple, Tuple
 
-from hero_client.readings import yaw_of
+from hero_client.geometry import yaw_of
 
 from . import topics
 from .observations import STATE_NAMES

@@ -19,14 +19,12 @@ from typing import Dict, List, Optional, Sequence, Set
 
 import rospy
 
-from hero_client.drivers import Drivers
-from hero_client.fleet_state import RobotTrack
+from hero_client.drivers import STATES, STOP_STATES, Drivers
 from hero_client.keyboard import Keyboard, NoTerminalError
 from hero_client.program import Program
 from hero_client.program import run as run_program
-from hero_client.robot_listener import STATES, STOP_STATES, RobotListener
+from hero_client.robot_listener import RobotListener, RobotTrack
 from hero_client.stop_status import StopStatus, paint
-from hero_client.swarm_start import check_stop
 from hero_msgs.msg import Robot
 from hero_msgs.srv import Disconnect
 
@@ -102,7 +100,7 @@ class FleetListener:
             packets_per_s=robot.packets_per_s,
             bytes_per_s=robot.bytes_per_s,
             pose=track.pose,
-            distance_m=track.way_m,
+            distance_m=track.distance_m,
             turned_rad=track.turned_rad,
             proximity_seen=track.proximity_seen,
             nearest=track.nearest,
@@ -277,7 +275,7 @@ class FleetProgram:
                     break
         if self._program.end_signal is None:
             self.print_fleet()
-        check_stop(self._fleet.drivers)
+        self._fleet.drivers.check_stop()
         return self.check_expected()
 
     def _make_screen(self, status: Optional[StopStatus]) -> List[str]:

@@ -3,7 +3,8 @@
 import math
 from typing import Dict, List, NamedTuple, Optional, Sequence
 
-from hero_client.fleet_state import Obstacle, Pose
+from hero_client.geometry import Pose
+from hero_client.readings import Obstacle
 
 ORDERS = ("id", "state", "nearest")
 

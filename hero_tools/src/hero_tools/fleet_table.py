@@ -8,7 +8,8 @@ import math
 from typing import Any, Dict, List, Optional, Sequence
 
 from hero_client.command_line import make_printable
-from hero_client.fleet_state import Obstacle, Pose, finite
+from hero_client.geometry import Pose
+from hero_client.readings import Obstacle, finite
 
 from .fleet_rows import RobotRow
 

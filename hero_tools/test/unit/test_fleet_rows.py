@@ -2,7 +2,8 @@
 
 import pytest
 
-from hero_client.fleet_state import Obstacle, Pose
+from hero_client.geometry import Pose
+from hero_client.readings import Obstacle
 from hero_tools.fleet_rows import RobotRow, find_missing, sort_rows
 
 

@@ -6,7 +6,8 @@ import math
 import pytest
 from test_fleet_rows import make_row
 
-from hero_client.fleet_state import Obstacle, Pose
+from hero_client.geometry import Pose
+from hero_client.readings import Obstacle
 from hero_tools.fleet_table import format_json, format_nearest, format_table, format_title
 
 

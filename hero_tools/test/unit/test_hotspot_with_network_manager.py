@@ -4,9 +4,11 @@ import os
 import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
+SOURCE = Path(__file__).resolve().parents[2] / "src"
 NEEDED = ("NetworkManager", "nmcli", "dbus-daemon", "unshare")
 PASSWORD = "pass word#with'quotes\"\\ and $`!~"
 
@@ -24,7 +26,7 @@ for _ in $(seq 200); do nmcli general >/dev/null 2>&1 && break; sleep 0.05; done
 "$@"
 """
 TRY = """
-import io, os, subprocess, sys
+import argparse, io, os, subprocess, sys
 from pathlib import Path
 from hero_tools import hotspot
 
@@ -58,11 +60,11 @@ pytestmark = pytest.mark.skipif(
 )
 
 
-def test_the_real_nmcli_stores_the_password_where_only_root_reads_it(tmp_path):
+def test_the_real_nmcli_takes_every_command_keeps_the_password_and_writes_it_nowhere_else(tmp_path):
     home = tmp_path / "home"
     home.mkdir()
     (tmp_path / "try.py").write_text(TRY)
-    environment = dict(os.environ, HOME=str(home), PYTHONPATH=os.pathsep.join(sys.path), PYTHONDONTWRITEBYTECODE="1")
+    environment = dict(os.environ, HOME=str(home), PYTHONPATH=str(SOURCE), PYTHONDONTWRITEBYTECODE="1")
     namespaces = ["unshare", "--net", "--mount", "--pid", "--fork", "--kill-child", "--mount-proc"]
     result = subprocess.run(
         [*namespaces, "bash", "-c", START, "bash", sys.executable, str(tmp_path / "try.py"), PASSWORD],

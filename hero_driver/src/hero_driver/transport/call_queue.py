@@ -17,7 +17,7 @@ class CallQueue:
 
     def __init__(self, length_max: int, wake: Call, on_error: Callable[[BaseException], None]) -> None:
         """wake() is called after each new call, on its sender's thread; on_error gets what a call raises."""
-        self.waiting: Deque[Call] = collections.deque()  # for the receiving thread to look whether there are any
+        self._calls: Deque[Call] = collections.deque()
         self._length_max = length_max
         self._wake = wake
         self._on_error = on_error
@@ -25,23 +25,26 @@ class CallQueue:
         self._closed = False
         self.refused = 0
 
+    def __len__(self) -> int:
+        return len(self._calls)
+
     def submit(self, call: Call, always: bool = False) -> bool:
         """Queue call; return False, and count it, if too many wait (unless always) or the queue is closed."""
         with self._lock:
-            if self._closed or (len(self.waiting) >= self._length_max and not always):
+            if self._closed or (len(self._calls) >= self._length_max and not always):
                 self.refused += 1
                 return False
-            self.waiting.append(call)
+            self._calls.append(call)
         self._wake()
         return True
 
     def make_calls(self) -> None:
         """Make the calls that wait now; what they submit in turn waits for the next time."""
-        for _ in range(len(self.waiting)):
+        for _ in range(len(self._calls)):
             with self._lock:
-                if not self.waiting:
+                if not self._calls:
                     return
-                call = self.waiting.popleft()
+                call = self._calls.popleft()
             try:
                 call()
             except BaseException as error:  # noqa: BLE001 - not even SystemExit may end the thread that serves all
@@ -54,5 +57,5 @@ class CallQueue:
         with self._lock:
             self._closed = True
             if not drain:
-                self.waiting.clear()
+                self._calls.clear()
         self._wake()

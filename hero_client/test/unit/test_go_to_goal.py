@@ -3,19 +3,20 @@
 import math
 
 import pytest
-from test_control_laws import STEP_S, Body, cast_in_box
+from test_unicycle import STEP_S, Body, cast_in_box
 
-from hero_client.control_laws import STANDSTILL, Pose
-from hero_client.goal_pursuit import LAWS, SILENCE_S, Goal, GoalPursuit, State
+from hero_client.controllers.go_to_goal import LAWS, SILENCE_S, Goal, GoToGoalController, State
+from hero_client.controllers.unicycle import STOP
+from hero_client.geometry import Pose
 
 HERE = Pose(0.0, 0.0, 0.0)
 
 
-def pursue(pursuit, body, longest_s=120.0, look=None):
-    """Return the seconds until the pursuit ends."""
+def drive(controller, body, longest_s=120.0, look=None):
+    """Return the seconds until the controller ends."""
     now_s = 0.0
-    while pursuit.state is State.ACTIVE and now_s < longest_s:
-        body.step(pursuit.step(body.pose, look(body.pose) if look else None, now_s))
+    while controller.state is State.ACTIVE and now_s < longest_s:
+        body.step(controller.step(body.pose, look(body.pose) if look else None, now_s))
         now_s += STEP_S
     return now_s
 
@@ -24,53 +25,53 @@ def pursue(pursuit, body, longest_s=120.0, look=None):
 def test_a_goal_is_reached_within_its_tolerance_and_at_rest(law):
     for x_m, y_m in ((0.3, 0.0), (-0.2, 0.1), (0.0, -0.3), (0.001, 0.001)):
         body = Body(HERE)
-        pursuit = GoalPursuit(Goal(x_m, y_m), 0.0, law=law)
-        pursue(pursuit, body)
-        assert pursuit.state is State.REACHED and pursuit.reason == ""
+        controller = GoToGoalController(Goal(x_m, y_m), 0.0, law=law)
+        drive(controller, body)
+        assert controller.state is State.REACHED and controller.reason == ""
         assert math.hypot(body.pose.x_m - x_m, body.pose.y_m - y_m) < 0.01
         assert abs(body.linear_m_s) < 1e-3
-        assert pursuit.step(body.pose, None, 1000.0) == STANDSTILL
+        assert controller.step(body.pose, None, 1000.0) == STOP
 
 
 def test_the_smooth_law_ends_in_the_heading():
     body = Body(HERE)
-    pursue(GoalPursuit(Goal(0.3, 0.2, -2.0), 0.0), body)
+    drive(GoToGoalController(Goal(0.3, 0.2, -2.0), 0.0), body)
     assert abs(math.remainder(body.pose.yaw_rad + 2.0, 2.0 * math.pi)) < 0.1
 
 
 def test_the_time_limit_fails_with_what_is_left():
-    pursuit = GoalPursuit(Goal(5.0, 0.0), 0.0, timeout_s=3.0)
-    assert pursue(pursuit, Body(HERE)) < 3.3
-    assert pursuit.state is State.FAILED
-    assert "not there after 3 s" in pursuit.reason and "are left" in pursuit.reason
+    controller = GoToGoalController(Goal(5.0, 0.0), 0.0, timeout_s=3.0)
+    assert drive(controller, Body(HERE)) < 3.3
+    assert controller.state is State.FAILED
+    assert "not there after 3 s" in controller.reason and "are left" in controller.reason
 
 
 def test_a_robot_that_falls_silent_fails_and_stands():
-    pursuit = GoalPursuit(Goal(1.0, 0.0), 0.0)
-    assert pursuit.step(HERE, None, 0.0) != STANDSTILL
-    assert pursuit.step(None, None, 0.1) == STANDSTILL
-    assert pursuit.state is State.ACTIVE
-    pursuit.step(None, None, SILENCE_S + 0.1)
-    assert pursuit.state is State.FAILED and "no odometry" in pursuit.reason
+    controller = GoToGoalController(Goal(1.0, 0.0), 0.0)
+    assert controller.step(HERE, None, 0.0) != STOP
+    assert controller.step(None, None, 0.1) == STOP
+    assert controller.state is State.ACTIVE
+    controller.step(None, None, SILENCE_S + 0.1)
+    assert controller.state is State.FAILED and "no odometry" in controller.reason
 
 
 def test_a_law_that_is_not_there_is_an_error_with_those_that_are():
     with pytest.raises(ValueError, match="tutorial, brisk, smooth"):
-        GoalPursuit(Goal(1.0, 0.0), 0.0, law="fast")
+        GoToGoalController(Goal(1.0, 0.0), 0.0, law="fast")
 
 
 def test_a_goal_behind_a_wall_fails_without_a_touch():
     half_m = 0.5
     for yaw_rad in (0.0, 0.4, 2.0):
         body = Body(Pose(0.0, 0.0, yaw_rad))
-        pursuit = GoalPursuit(Goal(1.0, 0.1), 0.0, timeout_s=30.0)
+        controller = GoToGoalController(Goal(1.0, 0.1), 0.0, timeout_s=30.0)
 
         def look(pose, body=body):
             assert max(abs(pose.x_m), abs(pose.y_m)) < half_m - 0.037
             return cast_in_box(pose, half_m)
 
-        pursue(pursuit, body, look=look)
-        assert pursuit.state is State.FAILED and "in the way" in pursuit.reason
+        drive(controller, body, look=look)
+        assert controller.state is State.FAILED and "in the way" in controller.reason
 
 
 def test_an_obstacle_on_the_way_is_gone_around():
@@ -93,6 +94,6 @@ def test_an_obstacle_on_the_way_is_gone_around():
         return ranges
 
     body = Body(HERE)
-    pursuit = GoalPursuit(Goal(0.7, 0.0), 0.0, timeout_s=60.0)
-    pursue(pursuit, body, look=look)
-    assert pursuit.state is State.REACHED, pursuit.reason
+    controller = GoToGoalController(Goal(0.7, 0.0), 0.0, timeout_s=60.0)
+    drive(controller, body, look=look)
+    assert controller.state is State.REACHED, controller.reason

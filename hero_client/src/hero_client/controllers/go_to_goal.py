@@ -1,36 +1,37 @@
-"""One goal, and what the robot knows step by step -> commands, and an end: reached, or failed with a reason. Pure.
+"""Drives one robot to one goal, until it is reached or has failed with a reason. Pure.
 
-Poses and the goal are in one frame, normally hero_N/odom; time enters as now_s.
+Poses and the goal are in one frame, normally hero_N/odom; now_s is any clock that never steps back.
 """
 
 import enum
 import math
 from typing import Callable, Dict, NamedTuple, Optional, Sequence
 
-from .control_laws import (
-    BRISK,
-    STANDSTILL,
-    Command,
-    GoToLaw,
-    GoToPoseLaw,
-    Pose,
-    bend_around,
-    go_to_point,
-    go_to_pose,
-    wrap_angle,
-)
+from ..geometry import Pose, wrap_angle
+from .avoidance import bend_around
+from .unicycle import BRISK, STOP, Command, GoToLaw, GoToPoseLaw, go_to_point, go_to_pose
+
+__all__ = [
+    "DEFAULT_LAW",
+    "DEFAULT_TIMEOUT_S",
+    "DEFAULT_TOLERANCE_M",
+    "LAWS",
+    "GoToGoalController",
+    "Goal",
+    "State",
+]
 
 SETTLE_S = 0.5
-"""A robot that has stood so long at its goal has reached it; it needs about 0.15 s to come to rest."""
+"""A robot stopped for so long at its goal has reached it; it needs about 0.15 s to come to rest."""
 
 AIM_SHARE = 0.7
-"""The robot stops at this share of the tolerance, so that it is still within after coming to rest."""
+"""The robot stops at this share of the tolerance, to be within it after coming to rest."""
 
 FREE_S = 1.5
-"""So long without an obstacle, and the next one may be passed on the other side."""
+"""After so long without an obstacle the next one may be passed on the other side."""
 
 SILENCE_S = 2.0
-"""So long without a pose, and the goal has failed: the robot has gone."""
+"""After so long without a pose the goal has failed: the robot is gone."""
 
 DEFAULT_TOLERANCE_M = 0.01
 
@@ -38,7 +39,7 @@ DEFAULT_TIMEOUT_S = 120.0
 
 
 class State(enum.Enum):
-    """How far a pursuit is."""
+    """State of a controller."""
 
     ACTIVE = "active"
     REACHED = "reached"
@@ -46,7 +47,7 @@ class State(enum.Enum):
 
 
 class Goal(NamedTuple):
-    """Where a robot shall go."""
+    """Where a robot is to drive."""
 
     x_m: float
     y_m: float
@@ -79,12 +80,12 @@ LAWS: Dict[str, Callable[[Pose, Goal, float], Command]] = {
 DEFAULT_LAW = "smooth"
 
 
-class GoalPursuit:
-    """The way of one robot to one goal.
+class GoToGoalController:
+    """Drives one robot to one goal.
 
     Attributes:
-        state: see State; once it is not ACTIVE it stays, and step() commands a standstill.
-        reason: why it failed, for people; empty otherwise.
+        state: see State; once it is not ACTIVE it stays, and step() returns STOP.
+        reason: why it failed, for users; empty otherwise.
         distance_m: from the goal at the last step; nan before the first pose.
     """
 
@@ -108,7 +109,7 @@ class GoalPursuit:
         self._law = LAWS[law]
         self._start_s = now_s
         self._last_pose_s = now_s
-        self._standing_since_s: Optional[float] = None
+        self._stopped_since_s: Optional[float] = None
         self._blocked_m = math.inf
         self._at_goal = False
         self._side = 0
@@ -121,30 +122,30 @@ class GoalPursuit:
         what they see; None: do not look.
         """
         if self.state is not State.ACTIVE:
-            return STANDSTILL
+            return STOP
         if now_s - self._start_s > self._timeout_s:
             return self._fail(self._tell_time_limit())
         if pose is None or not all(math.isfinite(value) for value in pose):
             if now_s - self._last_pose_s > SILENCE_S:
                 return self._fail("no odometry for %g s" % SILENCE_S)
-            return STANDSTILL
+            return STOP
         self._last_pose_s = now_s
         self.distance_m = math.hypot(self.goal.x_m - pose.x_m, self.goal.y_m - pose.y_m)
-        # Where it stops is inside the tolerance, and it stays until it is outside: no jumping to and fro at the rim.
+        # It stops well inside the tolerance and restarts only outside: hysteresis against chattering at the border.
         self._at_goal = self.distance_m < self._tolerance_m * (1.0 if self._at_goal else AIM_SHARE)
         command = self._arrive(pose) if self._at_goal else self._approach(pose, ranges, now_s)
-        if not self._at_goal or command != STANDSTILL:
-            self._standing_since_s = None
-        elif self._standing_since_s is None:
-            self._standing_since_s = now_s
-        elif now_s - self._standing_since_s >= SETTLE_S:
+        if not self._at_goal or command != STOP:
+            self._stopped_since_s = None
+        elif self._stopped_since_s is None:
+            self._stopped_since_s = now_s
+        elif now_s - self._stopped_since_s >= SETTLE_S:
             self.state = State.REACHED
         return command
 
     def _arrive(self, pose: Pose) -> Command:
         """Return the command at the goal: only the heading is left."""
         if self.goal.yaw_rad is None or self._law is not _smooth:
-            return STANDSTILL
+            return STOP
         target = Pose(self.goal.x_m, self.goal.y_m, self.goal.yaw_rad)
         return go_to_pose(pose, target, GoToPoseLaw(), at_goal=True)
 
@@ -166,7 +167,7 @@ class GoalPursuit:
     def _fail(self, reason: str) -> Command:
         self.state = State.FAILED
         self.reason = reason
-        return STANDSTILL
+        return STOP
 
     def _tell_time_limit(self) -> str:
         text = "not there after %g s" % self._timeout_s

@@ -4,9 +4,9 @@ Pure, numpy only. Each robot takes half of the change that keeps a pair apart fo
 gives a half plane of allowed velocities, and the robot takes the allowed one nearest to the one it wants.
 Source: J. van den Berg, S. Guy, M. Lin, D. Manocha, Reciprocal n-body collision avoidance, ISRR 2009.
 
-ORCA is made for discs that move any way at once. A robot with two wheels cannot move sideways, but a point `ahead_m`
-in front of its axle can: v = u . heading, w = u . left / ahead_m. So the disc is put around that point and made
-larger by ahead_m, which covers the body whatever way it turns (J. Snape et al., Smooth and collision-free
+ORCA is made for discs that move any way at once. A robot with two wheels cannot move sideways, but a point lookahead_m
+in front of its axle can: v = u . heading, w = u . left / lookahead_m. So the disc is put around that point and made
+larger by lookahead_m, which covers the body whatever way it turns (J. Snape et al., Smooth and collision-free
 navigation for multiple robots under differential-drive constraints, IROS 2010). ORCA was chosen over potential
 fields and priorities because it is symmetric (same rule for all, no order among robots), local, and does not swing.
 """
@@ -16,7 +16,9 @@ from typing import NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from .control_laws import Command, Pose
+from ..geometry import Pose
+from ..robot_constants import BODY_RADIUS_M
+from .unicycle import Command
 
 _TINY = 1e-9
 
@@ -27,52 +29,56 @@ _SLACK_HALVINGS = 12
 class AvoidanceLaw(NamedTuple):
     """How robots keep apart."""
 
-    body_m: float = 0.0369
-    """Radius of the body."""
-    ahead_m: float = 0.03
+    body_m: float = BODY_RADIUS_M
+    lookahead_m: float = 0.03
     """The point that is steered lies so far in front of the axle; small: quick turns, large: wide berth."""
     margin_m: float = 0.012
     """Added to the radius for late and wrong odometry and for wheels that lag."""
     horizon_s: float = 3.0
-    """Robots are kept apart for so long ahead."""
+    """Robots are kept apart for this time into the future."""
     neighbours: int = 6
     """So many of the nearest robots are looked at: more do not fit around one."""
     max_linear_m_s: float = 0.08
-    max_turn_rad_s: float = 2.5
-    look_m: float = 0.10
+    max_angular_rad_s: float = 2.5
+    sense_m: float = 0.10
     """What a proximity sensor sees nearer to the body than this counts, whatever odometry says."""
-    keep_off_m: float = 0.03
+    clearance_m: float = 0.03
     """So near to it the robot drives no further: as far as it rolls until a stop is measured, sent and obeyed."""
     closing_gain: float = 1.0
     """Largest speed towards it in m/s per metre that is left, 1/s."""
     back_off_m_s: float = 0.02
-    """Largest speed away from what is nearer than keep_off_m."""
+    """Largest speed away from what is nearer than clearance_m."""
 
     @property
     def radius_m(self) -> float:
         """Of the disc around the steered point."""
-        return self.body_m + self.ahead_m + self.margin_m
+        return self.body_m + self.lookahead_m + self.margin_m
+
+    @property
+    def min_spacing_m(self) -> float:
+        """Closer together robots do not reach their goals."""
+        return 2.0 * self.radius_m + 0.02
 
 
-def steered_point(pose: Pose, ahead_m: float) -> np.ndarray:
-    """Return the point (2,) ahead_m in front of the robot's axle."""
-    return np.array([pose.x_m + ahead_m * math.cos(pose.yaw_rad), pose.y_m + ahead_m * math.sin(pose.yaw_rad)])
+def steered_point(pose: Pose, lookahead_m: float) -> np.ndarray:
+    """Return the point (2,) lookahead_m in front of the robot's axle."""
+    return np.array([pose.x_m + lookahead_m * math.cos(pose.yaw_rad), pose.y_m + lookahead_m * math.sin(pose.yaw_rad)])
 
 
-def steered_velocity(pose: Pose, command: Command, ahead_m: float) -> np.ndarray:
+def steered_velocity(pose: Pose, command: Command, lookahead_m: float) -> np.ndarray:
     """Return the velocity (2,) of the steered point under command; the opposite of steer()."""
-    ahead = np.array([math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)])
-    left = np.array([-ahead[1], ahead[0]])
-    return command.linear_m_s * ahead + command.turn_rad_s * ahead_m * left
+    front = np.array([math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)])
+    left = np.array([-front[1], front[0]])
+    return command.linear_m_s * front + command.angular_rad_s * lookahead_m * left
 
 
 def steer(pose: Pose, velocity: np.ndarray, law: AvoidanceLaw) -> Command:
     """Return the command that moves the steered point with velocity (2,), or slower the same way."""
     cos, sin = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
     linear_m_s = float(velocity[0] * cos + velocity[1] * sin)
-    turn_rad_s = float(velocity[1] * cos - velocity[0] * sin) / law.ahead_m
-    excess = max(abs(linear_m_s) / law.max_linear_m_s, abs(turn_rad_s) / law.max_turn_rad_s, 1.0)
-    return Command(linear_m_s / excess, turn_rad_s / excess)
+    angular_rad_s = float(velocity[1] * cos - velocity[0] * sin) / law.lookahead_m
+    excess = max(abs(linear_m_s) / law.max_linear_m_s, abs(angular_rad_s) / law.max_angular_rad_s, 1.0)
+    return Command(linear_m_s / excess, angular_rad_s / excess)
 
 
 def half_plane(
@@ -117,7 +123,7 @@ def nearest_allowed(
     if found is not None:
         return found
     found = np.zeros(2)
-    low_m_s, high_m_s = 0.0, float(np.max(bounds))  # standing still needs no more than the largest bound
+    low_m_s, high_m_s = 0.0, float(np.max(bounds))  # stopping needs no more than the largest bound
     for _ in range(_SLACK_HALVINGS):
         slack_m_s = (low_m_s + high_m_s) / 2.0
         better = _best_corner(wanted, normals, bounds - slack_m_s, max_speed_m_s)
@@ -164,24 +170,24 @@ def _best_corner(
     return best
 
 
-def keep_off(
+def avoid_sensed(
     pose: Pose, ranges: Sequence[float], wanted: np.ndarray, law: AvoidanceLaw
 ) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return wanted (2,) turned to the right of what the sensors see near, and half planes that keep away from it.
 
     Odometry drifts by centimetres over a metre or two, so robots that avoid each other by odometry alone touch now and
-    then. Of two robots that meet where odometry expects none, each would stand before the other for ever: so what is
+    then. Of two robots that meet where odometry expects none, each would wait for the other for ever: so what is
     not allowed of the wanted velocity is driven to the right, as on a road. Half planes: normals (K, 2), bounds (K,),
     as in nearest_allowed(). ranges: as in control_laws; nan (not known) is left out, odometry must do then.
     """
     normals, bounds = [], []
     for index, range_m in enumerate(ranges):
         gap_m = range_m - law.body_m
-        if not gap_m < law.look_m:
+        if not gap_m < law.sense_m:
             continue
         angle_rad = pose.yaw_rad + index * 2.0 * math.pi / len(ranges)
         towards = np.array([math.cos(angle_rad), math.sin(angle_rad)])
-        limit_m_s = law.closing_gain * (gap_m - law.keep_off_m)
+        limit_m_s = law.closing_gain * (gap_m - law.clearance_m)
         excess_m_s = float(wanted @ towards) - limit_m_s
         if excess_m_s > 0.0:
             right = np.array([towards[1], -towards[0]])
@@ -205,7 +211,7 @@ def avoid_others(
 
     places, velocities, wanted: of the steered points of all robots, each (N, 2), in one common frame. step_s: time
     between two calls. robots: indices of those whose velocity is asked for. seen: for each of all robots half planes
-    of its own, normals and bounds, as keep_off() gives them.
+    of its own, normals and bounds, as avoid_sensed() gives them.
     """
     answers = np.zeros((len(robots), 2))
     for row, own in enumerate(robots):

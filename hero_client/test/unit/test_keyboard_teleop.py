@@ -1,8 +1,8 @@
 """Keys and the time -> commands."""
 
-from hero_client.control_laws import STANDSTILL
+from hero_client.controllers.unicycle import STOP
 from hero_client.keyboard import split_keys
-from hero_client.teleop_keys import FIRST_TIMEOUT_S, MOTIONS, REPEAT_TIMEOUT_S, STOP_KEYS, KeyDrive
+from hero_client.keyboard_teleop import FIRST_TIMEOUT_S, MOTIONS, REPEAT_TIMEOUT_S, STOP_KEYS, KeyDrive
 
 
 def test_a_single_press_drives_until_its_time_is_out():
@@ -10,7 +10,7 @@ def test_a_single_press_drives_until_its_time_is_out():
         drive = KeyDrive(0.1, 1.0)
         assert drive.press(key, 10.0)
         assert drive.command(10.0 + FIRST_TIMEOUT_S - 0.01) == (ahead * 0.1, left * 1.0)
-        assert drive.command(10.0 + FIRST_TIMEOUT_S) == STANDSTILL
+        assert drive.command(10.0 + FIRST_TIMEOUT_S) == STOP
 
 
 def test_a_held_key_drives_without_a_break_and_stops_soon_after():
@@ -20,7 +20,7 @@ def test_a_held_key_drives_without_a_break_and_stops_soon_after():
         drive.press("w", before_s)
         assert drive.command(next_s - 0.001).linear_m_s == 0.1
     drive.press("w", presses_s[-1])
-    assert drive.command(presses_s[-1] + REPEAT_TIMEOUT_S) == STANDSTILL
+    assert drive.command(presses_s[-1] + REPEAT_TIMEOUT_S) == STOP
 
 
 def test_every_stop_key_stops_at_once():
@@ -28,7 +28,7 @@ def test_every_stop_key_stops_at_once():
         drive = KeyDrive(0.1, 1.0)
         drive.press("q", 0.0)
         drive.press(key, 0.1)
-        assert drive.command(0.1) == STANDSTILL
+        assert drive.command(0.1) == STOP
 
 
 def test_two_keys_together_make_a_curve():
@@ -49,14 +49,14 @@ def test_speeds_stay_within_the_robots_limits():
     for key, limit in ((">", 4.0), ("<", 0.25)):
         for _ in range(50):
             drive.press(key, 0.0)
-        assert drive.turn_rad_s == limit
+        assert drive.angular_rad_s == limit
 
 
 def test_other_keys_mean_nothing():
     drive = KeyDrive(0.1, 1.0)
     for key in "yuiophjklvbnm#@\r":
         assert not drive.press(key, 0.0)
-    assert drive.command(0.0) == STANDSTILL
+    assert drive.command(0.0) == STOP
 
 
 def test_arrows_are_keys_whole_or_cut_in_two():

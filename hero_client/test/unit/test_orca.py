@@ -4,21 +4,21 @@ import math
 
 import numpy as np
 import pytest
-from test_control_laws import STEP_S, Body
+from test_unicycle import STEP_S, Body
 
-from hero_client.control_laws import STANDSTILL, Pose
-from hero_client.reciprocal import (
+from hero_client.controllers.orca import (
     AvoidanceLaw,
+    avoid_sensed,
     half_plane,
-    keep_off,
     nearest_allowed,
     steer,
     steered_point,
     steered_velocity,
 )
-from hero_client.swarm_steering import SwarmSteering
-
-BODY_M = 0.0369
+from hero_client.controllers.swarm_go_to import SwarmGoToController
+from hero_client.controllers.unicycle import STOP
+from hero_client.geometry import Pose
+from hero_client.robot_constants import BODY_RADIUS_M
 
 
 def test_steering_and_its_opposite_agree():
@@ -26,7 +26,7 @@ def test_steering_and_its_opposite_agree():
     for yaw_rad in np.linspace(-3.0, 3.0, 13):
         pose = Pose(0.3, -0.2, yaw_rad)
         velocity = np.array([0.03, -0.02])
-        np.testing.assert_allclose(steered_velocity(pose, steer(pose, velocity, law), law.ahead_m), velocity)
+        np.testing.assert_allclose(steered_velocity(pose, steer(pose, velocity, law), law.lookahead_m), velocity)
 
 
 def test_a_half_plane_holds_exactly_what_leads_to_a_meeting():
@@ -76,7 +76,7 @@ def swap(count, radius_m, seed):
     ]
     goals = [(-pose.x_m, -pose.y_m) for pose in poses]
     bodies = [Body(pose) for pose in poses]
-    steering = SwarmSteering(goals, AvoidanceLaw(), STEP_S, seed)
+    steering = SwarmGoToController(goals, AvoidanceLaw(), STEP_S, seed)
     least_m = math.inf
     for _ in range(1500):
         commands = steering.step([body.pose for body in bodies])
@@ -85,7 +85,7 @@ def swap(count, radius_m, seed):
         places = np.array([body.pose[:2] for body in bodies])
         apart = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1)) + np.eye(count)
         least_m = min(least_m, float(apart.min()))
-        if all(command == STANDSTILL for command in commands):
+        if all(command == STOP for command in commands):
             break
     return least_m, [body.pose for body in bodies], goals
 
@@ -94,7 +94,7 @@ def swap(count, radius_m, seed):
 def test_robots_swap_places_across_a_circle_without_touching(count, radius_m):
     for seed in range(4):
         least_m, poses, goals = swap(count, radius_m, seed)
-        assert least_m > 2.0 * BODY_M, (seed, least_m)
+        assert least_m > 2.0 * BODY_RADIUS_M, (seed, least_m)
         for pose, goal in zip(poses, goals):
             assert math.hypot(pose.x_m - goal[0], pose.y_m - goal[1]) < 0.02, seed
 
@@ -105,9 +105,9 @@ def test_what_is_seen_near_is_not_driven_at_but_passed_on_the_right():
     ahead = np.array([0.0, 0.08])
     for gap_m in (0.09, 0.05, 0.03, 0.01):
         ranges = [law.body_m + gap_m] + [math.inf] * 7
-        wanted, normals, bounds = keep_off(pose, ranges, ahead, law)
+        wanted, normals, bounds = avoid_sensed(pose, ranges, ahead, law)
         found = nearest_allowed(wanted, normals, bounds, law.max_linear_m_s)
-        limit_m_s = max(gap_m - law.keep_off_m, -law.back_off_m_s)
+        limit_m_s = max(gap_m - law.clearance_m, -law.back_off_m_s)
         assert found[1] <= limit_m_s + 1e-9
         assert found[0] > 0.0  # the right of a robot that looks along y
 
@@ -115,8 +115,8 @@ def test_what_is_seen_near_is_not_driven_at_but_passed_on_the_right():
 def test_what_is_far_or_not_known_changes_nothing():
     law = AvoidanceLaw()
     ahead = np.array([0.08, 0.0])
-    for range_m in (math.inf, math.nan, law.body_m + law.look_m + 0.01):
-        wanted, normals, bounds = keep_off(Pose(0.0, 0.0, 0.0), [range_m] * 8, ahead, law)
+    for range_m in (math.inf, math.nan, law.body_m + law.sense_m + 0.01):
+        wanted, normals, bounds = avoid_sensed(Pose(0.0, 0.0, 0.0), [range_m] * 8, ahead, law)
         assert wanted is ahead and normals.shape == (0, 2) and bounds.shape == (0,)
 
 

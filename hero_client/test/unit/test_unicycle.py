@@ -6,22 +6,15 @@ import random
 
 import pytest
 
-from hero_client.control_laws import (
-    BRISK,
-    STANDSTILL,
-    FollowLaw,
-    GoToLaw,
-    Pose,
+from hero_client.controllers.avoidance import (
     WanderLaw,
     WanderMemory,
-    follow,
-    go_to_point,
-    go_to_pose,
     split_sectors,
     wander,
     wander_in_potential,
-    wrap_angle,
 )
+from hero_client.controllers.unicycle import BRISK, STOP, FollowLaw, GoToLaw, follow, go_to_point, go_to_pose
+from hero_client.geometry import Pose, wrap_angle
 
 INF = math.inf
 FREE = [INF] * 8
@@ -36,19 +29,19 @@ class Body:
 
     def __init__(self, pose):
         self.pose = pose
-        self.linear_m_s = self.turn_rad_s = 0.0
+        self.linear_m_s = self.angular_rad_s = 0.0
 
     def step(self, command):
         for _ in range(10):
-            share = STEP_S / 10.0 / (0.05 if command == STANDSTILL else LAG_S)
+            share = STEP_S / 10.0 / (0.05 if command == STOP else LAG_S)
             self.linear_m_s += share * (command.linear_m_s - self.linear_m_s)
-            self.turn_rad_s += share * (command.turn_rad_s - self.turn_rad_s)
+            self.angular_rad_s += share * (command.angular_rad_s - self.angular_rad_s)
             x_m, y_m, yaw_rad = self.pose
             travel_m = self.linear_m_s * STEP_S / 10.0
             self.pose = Pose(
                 x_m + travel_m * math.cos(yaw_rad),
                 y_m + travel_m * math.sin(yaw_rad),
-                yaw_rad + self.turn_rad_s * STEP_S / 10.0,
+                yaw_rad + self.angular_rad_s * STEP_S / 10.0,
             )
 
 
@@ -73,9 +66,9 @@ def test_go_to_point_arrives_from_every_side_and_stays(law, longest_s):
         for index in range(int(longest_s / STEP_S)):
             command = go_to_point(body.pose, x_m, y_m, law)
             assert abs(command.linear_m_s) <= law.max_linear_m_s + 1e-12
-            assert abs(command.turn_rad_s) <= law.max_turn_rad_s + 1e-12
+            assert abs(command.angular_rad_s) <= law.max_angular_rad_s + 1e-12
             body.step(command)
-            if command == STANDSTILL:
+            if command == STOP:
                 arrived_s = index * STEP_S
                 break
         assert arrived_s is not None, (distance, bearing, heading, body.pose)
@@ -92,9 +85,9 @@ def test_a_goal_behind_is_approached_backwards():
 def test_the_tutorial_law_has_the_gains_and_limits_of_the_tutorial():
     assert go_to_point(Pose(0.0, 0.0, 0.0), 0.1, 0.0).linear_m_s == pytest.approx(0.1 * 4 / 20)
     assert go_to_point(Pose(0.0, 0.0, 0.0), 5.0, 0.0).linear_m_s == 0.07
-    assert go_to_point(Pose(0.0, 0.0, 0.1), 1.0, math.tan(0.2)).turn_rad_s == pytest.approx(0.1 * 8 / 20)
-    assert go_to_point(Pose(0.0, 0.0, 0.0), 0.0, 5.0).turn_rad_s == 0.1
-    assert go_to_point(Pose(0.0, 0.0, 0.0), 0.0099, 0.0) == STANDSTILL
+    assert go_to_point(Pose(0.0, 0.0, 0.1), 1.0, math.tan(0.2)).angular_rad_s == pytest.approx(0.1 * 8 / 20)
+    assert go_to_point(Pose(0.0, 0.0, 0.0), 0.0, 5.0).angular_rad_s == 0.1
+    assert go_to_point(Pose(0.0, 0.0, 0.0), 0.0099, 0.0) == STOP
 
 
 def test_go_to_pose_arrives_with_the_heading_from_every_side():
@@ -106,9 +99,9 @@ def test_go_to_pose_arrives_with_the_heading_from_every_side():
             at_goal = at_goal or distance_m(body.pose, goal.x_m, goal.y_m) < 0.01
             command = go_to_pose(body.pose, goal, at_goal=at_goal)
             body.step(command)
-            if command == STANDSTILL:
+            if command == STOP:
                 break
-        assert command == STANDSTILL, (distance, bearing, heading, goal_yaw, body.pose)
+        assert command == STOP, (distance, bearing, heading, goal_yaw, body.pose)
         assert distance_m(body.pose, goal.x_m, goal.y_m) < 0.02
         assert abs(wrap_angle(body.pose.yaw_rad - goal_yaw)) < 0.1
 
@@ -141,7 +134,7 @@ def test_each_beam_counts_for_its_sector():
 
 @pytest.mark.parametrize("law", [wander, wander_in_potential])
 def test_a_wanderer_without_ranges_stands_still(law):
-    assert law([], WanderMemory(), 0.5)[0] == STANDSTILL
+    assert law([], WanderMemory(), 0.5)[0] == STOP
 
 
 @pytest.mark.parametrize("law", [wander, wander_in_potential])
@@ -152,7 +145,7 @@ def test_a_wanderer_does_not_drive_into_what_is_right_ahead(law, blocked_m):
     for chance in (0.0, 0.9, 0.1, 0.5, 0.7):
         command, memory = law([blocked_m] + [INF] * 7, memory, chance)
         assert command.linear_m_s <= 0.0
-        turns.add(math.copysign(1.0, command.turn_rad_s) if command.turn_rad_s else 0.0)
+        turns.add(math.copysign(1.0, command.angular_rad_s) if command.angular_rad_s else 0.0)
     assert len(turns - {0.0}) == 1  # one side, and it keeps to it
 
 
@@ -160,8 +153,8 @@ def test_a_wanderer_does_not_drive_into_what_is_right_ahead(law, blocked_m):
 def test_a_wanderer_turns_away_from_the_nearer_side(law):
     left_near, right_near = list(FREE), list(FREE)
     left_near[1], right_near[7] = 0.12, 0.12
-    assert law(left_near, WanderMemory(), 0.5)[0].turn_rad_s < 0.0
-    assert law(right_near, WanderMemory(), 0.5)[0].turn_rad_s > 0.0
+    assert law(left_near, WanderMemory(), 0.5)[0].angular_rad_s < 0.0
+    assert law(right_near, WanderMemory(), 0.5)[0].angular_rad_s > 0.0
 
 
 def cast_in_box(pose, half_m):

@@ -1,25 +1,25 @@
-"""Poses and goals of a swarm -> one command each, without collisions: going to goals on top of ORCA. Pure."""
+"""Drives every robot of a swarm to its goal without collisions, by ORCA. Pure."""
 
 import math
 from typing import List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from .control_laws import BRISK, STANDSTILL, Command, GoToLaw, Pose, go_to_point
-from .reciprocal import AvoidanceLaw, avoid_others, keep_off, steer, steered_point
+from ..geometry import Pose
+from .orca import AvoidanceLaw, avoid_others, avoid_sensed, steer, steered_point
+from .unicycle import BRISK, STOP, Command, GoToLaw, go_to_point
 
 DOCKING_M = 0.05
-"""Nearer to its goal than this a robot steers its centre there, no longer the point ahead of the axle."""
+"""Nearer to its goal than this a robot steers its centre there, no longer the point in front of the axle."""
 
 SPEED_GAIN = 0.8
 """Wanted speed in m/s per metre to the goal, 1/s."""
 
-NUDGE = 0.05
-"""Largest random turn of the wanted velocity, rad: breaks the symmetry in which all robots wait."""
-
+NUDGE_RAD = 0.05
+"""Largest random turn of the wanted velocity: breaks the symmetry in which all robots wait."""
 
 PATIENCE_S = 4.0
-"""A robot that came no nearer to its goal for so long is in a jam: it goes aside, to a random side and angle."""
+"""A robot without progress for so long is in a jam: it moves aside, to a random side and angle."""
 
 ASIDE_S = 2.0
 """For so long, then it tries again."""
@@ -28,8 +28,8 @@ PROGRESS_M = 0.01
 """So much nearer counts as nearer."""
 
 
-class SwarmSteering:
-    """Brings every robot to its goal; a robot that has arrived stands, and gives way only by standing.
+class SwarmGoToController:
+    """Drives every robot to its goal; a robot that has arrived is stopped, and others drive around it.
 
     Poses and goals of all robots are in one frame.
     """
@@ -53,14 +53,20 @@ class SwarmSteering:
         self._velocities = np.zeros((len(self.goals), 2))
         self._jams = [_Jam() for _ in self.goals]
 
-    def step(self, poses: Sequence[Pose], ranges: Optional[Sequence[Sequence[float]]] = None) -> List[Command]:
-        """Return the next command of every robot.
+    def step(
+        self, poses: Sequence[Optional[Pose]], ranges: Optional[Sequence[Sequence[float]]] = None
+    ) -> List[Command]:
+        """Return the next command of every robot: stop while the pose of any robot is None, for it may be anywhere.
 
-        ranges: what the proximity sensors of each robot see, as in control_laws; None: go by the poses alone.
+        ranges: what the proximity sensors of each robot see, as in avoidance; None: go by the poses alone.
         """
-        places = np.array([steered_point(pose, self.law.ahead_m) for pose in poses])
+        known = [pose for pose in poses if pose is not None]
+        return self._steer(known, ranges) if len(known) == len(poses) else [STOP] * len(poses)
+
+    def _steer(self, poses: Sequence[Pose], ranges: Optional[Sequence[Sequence[float]]]) -> List[Command]:
+        places = np.array([steered_point(pose, self.law.lookahead_m) for pose in poses])
         if self._last_places is not None:
-            # What robots really do, not what they were told: their motors take half a second to follow.
+            # Measured, not commanded: the motors take half a second to follow.
             self._velocities = (places - self._last_places) / self.step_s
         self._last_places = places
         distances_m = [math.dist(goal, pose[:2]) for goal, pose in zip(self.goals, poses)]
@@ -71,11 +77,12 @@ class SwarmSteering:
         wanted = np.array([self._want(*item) for item in zip(self.goals, poses, distances_m, self._jams)])
         seen = []
         for index, pose in enumerate(poses):
-            wanted[index], *planes = keep_off(pose, [] if ranges is None else ranges[index], wanted[index], self.law)
-            seen.append((planes[0], planes[1]))
+            sensed = [] if ranges is None else ranges[index]
+            wanted[index], normals, bounds = avoid_sensed(pose, sensed, wanted[index], self.law)
+            seen.append((normals, bounds))
         moving = [index for index, done in enumerate(self.arrived) if not done]
         allowed = avoid_others(places, self._velocities, wanted, self.law, self.step_s, moving, seen)
-        commands = [STANDSTILL] * len(poses)
+        commands = [STOP] * len(poses)
         for velocity, index in zip(allowed, moving):
             free = float(np.hypot(*(velocity - wanted[index]))) < 0.25 * float(np.hypot(*wanted[index]))
             if distances_m[index] < DOCKING_M and free:
@@ -86,19 +93,19 @@ class SwarmSteering:
 
     def _want(self, goal: Tuple[float, float], pose: Pose, distance_m: float, jam: "_Jam") -> np.ndarray:
         """Return the velocity (2,) straight to the goal, with a small nudge; out of a jam, at an angle to that."""
-        way = np.array([goal[0] - pose.x_m, goal[1] - pose.y_m])
+        to_goal_m = np.array([goal[0] - pose.x_m, goal[1] - pose.y_m])
         speed_m_s = min(self.law.max_linear_m_s, SPEED_GAIN * distance_m)
-        straight = way * (speed_m_s / max(distance_m, 1e-9))
+        straight = to_goal_m * (speed_m_s / max(distance_m, 1e-9))
         side = np.array([-straight[1], straight[0]])
         if jam.look(distance_m, self.step_s):
             jam.turn_rad = self._random.uniform(0.5, 2.5) * self._random.choice((-1.0, 1.0))
-        turn_rad = jam.turn_rad if jam.aside else NUDGE * self._random.uniform(-1.0, 1.0)
+        turn_rad = jam.turn_rad if jam.aside else NUDGE_RAD * self._random.uniform(-1.0, 1.0)
         wanted: np.ndarray = straight * math.cos(turn_rad) + side * math.sin(turn_rad)
         return wanted
 
 
 class _Jam:
-    """Whether one robot makes way towards its goal."""
+    """Whether one robot makes progress towards its goal."""
 
     def __init__(self) -> None:
         self.turn_rad = 0.0

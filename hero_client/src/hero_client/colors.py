@@ -1,0 +1,32 @@
+"""Colours of a robot's light, by name or as numbers. Pure."""
+
+from typing import Dict, Sequence, Tuple, Union
+
+COLORS: Dict[str, Tuple[float, float, float]] = {
+    "off": (0.0, 0.0, 0.0),
+    "red": (1.0, 0.0, 0.0),
+    "green": (0.0, 1.0, 0.0),
+    "blue": (0.0, 0.0, 1.0),
+    "yellow": (1.0, 1.0, 0.0),
+    "magenta": (1.0, 0.0, 1.0),
+    "cyan": (0.0, 1.0, 1.0),
+    "white": (1.0, 1.0, 1.0),
+    "orange": (1.0, 0.4, 0.0),
+}
+
+Color = Union[str, Sequence[float]]
+
+
+def parse_color(color: Color) -> Tuple[float, float, float]:
+    """Return (red, green, blue), each 0..1.
+
+    Raises: ValueError with the names that are known.
+    """
+    if isinstance(color, str):
+        if color not in COLORS:
+            raise ValueError("no colour %r; there are: %s" % (color, ", ".join(COLORS)))
+        return COLORS[color]
+    values = [float(value) for value in color]
+    if len(values) != 3 or not all(0.0 <= value <= 1.0 for value in values):
+        raise ValueError("a colour is a name or three numbers 0..1, not %r" % (color,))
+    return values[0], values[1], values[2]

@@ -1,0 +1,223 @@
+"""Obstacle avoidance by the proximity sensors: pure functions from ranges to a command.
+
+Ranges in m from the robot's centre, the front first, counter-clockwise; inf: nothing in range, 0: too close to measure,
+nan: not known, which counts as an obstacle.
+"""
+
+import math
+from typing import NamedTuple, Sequence, Tuple
+
+from ..geometry import clamp, wrap_angle
+from .unicycle import STOP, Command
+
+__all__ = [
+    "DETOUR",
+    "POTENTIAL",
+    "WANDER",
+    "DetourLaw",
+    "PotentialLaw",
+    "WanderLaw",
+    "WanderMemory",
+    "bend_around",
+    "split_sectors",
+    "wander",
+    "wander_in_potential",
+]
+
+
+def split_sectors(ranges: Sequence[float]) -> Tuple[float, float, float]:
+    """Return the nearest range in the left, front and right sector, nan counted as 0.
+
+    With eight beams each sector is one beam: 45 degrees to the left, the front, 45 degrees to the right.
+    """
+    count = len(ranges)
+    sectors = [math.inf, math.inf, math.inf]
+    for index, range_m in enumerate(ranges):
+        bearing_rad = wrap_angle(index * 2.0 * math.pi / count)
+        if abs(bearing_rad) > 1.2:  # 67.5 degrees with a margin for rounding: beams to the side do not matter
+            continue
+        sector = 1 if abs(bearing_rad) < 0.39 else (0 if bearing_rad > 0.0 else 2)
+        sectors[sector] = min(sectors[sector], 0.0 if math.isnan(range_m) else range_m)
+    return sectors[0], sectors[1], sectors[2]
+
+
+class WanderLaw(NamedTuple):
+    """How a robot wanders. The distances suit beams that see about 0.24 m and come 5 times a second."""
+
+    cruise_m_s: float = 0.10
+    turn_rad_s: float = 1.5
+    """Turn on the spot, away from an obstacle."""
+    drift_rad_s: float = 0.6
+    """Largest turn on a free path: makes the walk random."""
+    stop_m: float = 0.10
+    """Nearer than this in a front sector: blocked (the body ends at 0.037 m)."""
+    free_m: float = 0.14
+    """A turn on the spot goes on until all front sectors see further than this."""
+    slow_m: float = 0.20
+    """From here on the robot slows down and bends away."""
+
+
+WANDER = WanderLaw()
+
+
+STOP_STEPS = 2
+"""At 10 Hz: the robot takes about 0.5 s to slow down to a lower speed, but 0.15 s to stop."""
+
+
+class WanderMemory(NamedTuple):
+    """What a wandering robot keeps from one step to the next."""
+
+    escape_sign: int = 0
+    """+1 or -1 while it turns on the spot, to the left or right; 0 while it walks."""
+    stop_steps: int = 0
+    """Steps for which it is still stopped before it turns on the spot."""
+    drift_rad_s: float = 0.0
+
+
+def wander(
+    ranges: Sequence[float], memory: WanderMemory, chance: float, law: WanderLaw = WANDER
+) -> Tuple[Command, WanderMemory]:
+    """Return the next command of a random walk with obstacle avoidance, and what to remember for the next call.
+
+    Three-sector rule: free sectors, walk on with a random drift; something near, slow down and bend away from the
+    nearer side; something too near, stop, then turn on the spot until all three sectors are free, and never change
+    the side meanwhile (else a corner would trap the robot). No ranges at all: stop.
+
+    ranges: see the module. chance: a random number 0..1 that the caller draws for this step.
+    """
+    if not ranges:
+        return STOP, WanderMemory()
+    left_m, front_m, right_m = split_sectors(ranges)
+    nearest_m = min(left_m, front_m, right_m)
+    escape_sign = memory.escape_sign
+    if nearest_m < (law.free_m if escape_sign else law.stop_m):
+        if not escape_sign:
+            if left_m == right_m:
+                escape_sign = 1 if chance < 0.5 else -1
+            else:
+                escape_sign = 1 if left_m > right_m else -1
+            return STOP, WanderMemory(escape_sign, STOP_STEPS - 1)
+        if memory.stop_steps:
+            return STOP, WanderMemory(escape_sign, memory.stop_steps - 1)
+        return Command(0.0, escape_sign * law.turn_rad_s), WanderMemory(escape_sign)
+    # The drift is a random walk itself that is pulled back to zero, so that arcs last some seconds.
+    drift_rad_s = clamp(0.95 * memory.drift_rad_s + (chance - 0.5) * law.drift_rad_s, law.drift_rad_s)
+    if nearest_m >= law.slow_m:
+        return Command(law.cruise_m_s, drift_rad_s), WanderMemory(drift_rad_s=drift_rad_s)
+    nearness = (law.slow_m - nearest_m) / (law.slow_m - law.stop_m)
+    if left_m == right_m:
+        away_sign = 1 if drift_rad_s >= 0.0 else -1
+    else:
+        away_sign = 1 if left_m > right_m else -1
+    speed_m_s = law.cruise_m_s * max(0.2, 1.0 - nearness)
+    turn_rad_s = away_sign * nearness * law.turn_rad_s
+    return Command(speed_m_s, turn_rad_s), WanderMemory(drift_rad_s=away_sign * abs(drift_rad_s))
+
+
+class PotentialLaw(NamedTuple):
+    """How a robot wanders in a potential field."""
+
+    cruise_m_s: float = 0.10
+    turn_rad_s: float = 2.0
+    """Largest turn."""
+    turn_gain: float = 2.5
+    """Turn in rad/s per rad between the heading and the direction of the field."""
+    influence_m: float = 0.22
+    """Obstacles nearer than this push."""
+    body_m: float = 0.05
+    """At this range the push of one beam is `push` times the pull to the front."""
+    push: float = 3.0
+    drift_rad: float = 0.5
+    """Largest angle between the pull and the front: makes the walk random."""
+
+
+POTENTIAL = PotentialLaw()
+
+
+def wander_in_potential(
+    ranges: Sequence[float], memory: WanderMemory, chance: float, law: PotentialLaw = POTENTIAL
+) -> Tuple[Command, WanderMemory]:
+    """Return the next command of a random walk down a potential field, and what to remember: see wander().
+
+    A constant force pulls to the front, a little to one side, and every beam that sees something pushes away from it,
+    harder the nearer it is. The robot turns towards the sum of forces, and drives faster the better it is aligned.
+    Source: O. Khatib, Real-time obstacle avoidance for manipulators and mobile robots, 1986.
+    """
+    if not ranges:
+        return STOP, WanderMemory()
+    drift_rad = clamp(0.95 * memory.drift_rad_s + (chance - 0.5) * law.drift_rad, law.drift_rad)
+    force_x, force_y = math.cos(drift_rad), math.sin(drift_rad)
+    for index, range_m in enumerate(ranges):
+        known_m = 0.0 if math.isnan(range_m) else range_m
+        if known_m < law.influence_m:
+            nearness = min(1.0, (law.influence_m - known_m) / (law.influence_m - law.body_m))
+            bearing_rad = index * 2.0 * math.pi / len(ranges)
+            force_x -= law.push * nearness**2 * math.cos(bearing_rad)
+            force_y -= law.push * nearness**2 * math.sin(bearing_rad)
+    towards_rad = math.atan2(force_y, force_x)
+    escape_sign = 0
+    if abs(towards_rad) > math.pi / 2.0:
+        # The free path is to the rear. Left and right are equal there: keep the side that was begun.
+        escape_sign = memory.escape_sign or (1 if towards_rad > 0.0 else -1)
+        if not memory.escape_sign:
+            return STOP, WanderMemory(escape_sign, drift_rad_s=drift_rad)
+        return Command(0.0, escape_sign * law.turn_rad_s), WanderMemory(escape_sign, drift_rad_s=drift_rad)
+    speed_m_s = law.cruise_m_s * max(0.0, math.cos(towards_rad)) * min(1.0, math.hypot(force_x, force_y))
+    command = Command(speed_m_s, clamp(law.turn_gain * towards_rad, law.turn_rad_s))
+    return command, WanderMemory(escape_sign, drift_rad_s=drift_rad)
+
+
+class DetourLaw(NamedTuple):
+    """How a robot drives around what its sensors see."""
+
+    influence_m: float = 0.18
+    """Obstacles nearer than this push."""
+    body_m: float = 0.05
+    """At this range one beam pushes `push` times as hard as the goal pulls."""
+    push: float = 1.5
+    swirl: float = 1.2
+    """Share of the push that acts sideways, so that the robot slides along a wall and does not stop before it."""
+    turn_gain: float = 2.0
+    max_linear_m_s: float = 0.08
+    max_angular_rad_s: float = 2.0
+
+
+DETOUR = DetourLaw()
+
+
+def bend_around(
+    command: Command,
+    bearing_rad: float,
+    distance_m: float,
+    ranges: Sequence[float],
+    side: int = 0,
+    law: DetourLaw = DETOUR,
+) -> Tuple[Command, int]:
+    """Return (command, 0), or what goes around an obstacle nearer than both the goal and law.influence_m, and a side.
+
+    bearing_rad, distance_m: of the goal, from the robot. Obstacles push away, and along themselves to one side: +1
+    passes them on their left, -1 on their right, 0 chooses the side on which the goal is. The caller gives the side
+    back until the path is free; else the robot would alternate in front of an obstacle.
+    """
+    seen = [
+        (index * 2.0 * math.pi / len(ranges), 0.0 if math.isnan(range_m) else range_m)
+        for index, range_m in enumerate(ranges)
+    ]
+    near = [(angle_rad, range_m) for angle_rad, range_m in seen if range_m < min(law.influence_m, distance_m)]
+    near = [item for item in near if abs(wrap_angle(item[0] - bearing_rad)) < math.radians(100.0)]
+    if not near:
+        return command, 0
+    if not side:
+        side = 1 if wrap_angle(bearing_rad - min(near, key=lambda item: item[1])[0]) >= 0.0 else -1
+    force_x, force_y = math.cos(bearing_rad), math.sin(bearing_rad)
+    for angle_rad, range_m in near:
+        strength = law.push * min(1.0, (law.influence_m - range_m) / (law.influence_m - law.body_m)) ** 2
+        force_x -= strength * (math.cos(angle_rad) + side * law.swirl * math.sin(angle_rad))
+        force_y -= strength * (math.sin(angle_rad) - side * law.swirl * math.cos(angle_rad))
+    towards_rad = math.atan2(force_y, force_x)
+    turn_rad_s = clamp(law.turn_gain * towards_rad, law.max_angular_rad_s)
+    # A detour is never driven backwards.
+    speed_m_s = law.max_linear_m_s * max(0.0, math.cos(towards_rad)) * min(1.0, math.hypot(force_x, force_y))
+    if split_sectors(ranges)[1] < law.body_m + 0.02:
+        speed_m_s = 0.0
+    return Command(speed_m_s, turn_rad_s), side

@@ -1,0 +1,158 @@
+"""Controllers of a robot with two wheels: pure functions from poses to a command, without clock, ROS or memory.
+
+Poses and goals are in one common frame, m and rad (REP 103).
+"""
+
+import math
+from typing import NamedTuple
+
+from ..geometry import Pose, clamp, wrap_angle
+
+__all__ = [
+    "BRISK",
+    "FOLLOW",
+    "SMOOTH",
+    "STOP",
+    "TUTORIAL",
+    "Command",
+    "FollowLaw",
+    "GoToLaw",
+    "GoToPoseLaw",
+    "follow",
+    "go_to_point",
+    "go_to_pose",
+]
+
+
+class Command(NamedTuple):
+    """Velocities for a robot."""
+
+    linear_m_s: float
+    """Positive forward."""
+    angular_rad_s: float
+    """Positive to the left."""
+
+
+STOP = Command(0.0, 0.0)
+
+
+class GoToLaw(NamedTuple):
+    """How a robot goes to a point. The values are those of the tutorial: slow and sure."""
+
+    linear_gain: float = 4.0 / 20.0
+    """kr: speed in m/s per metre of distance, 1/s."""
+    turn_gain: float = 8.0 / 20.0
+    """ka: turn in rad/s per radian of bearing, 1/s."""
+    max_linear_m_s: float = 0.07
+    max_angular_rad_s: float = 0.1
+    tolerance_m: float = 0.01
+    """Nearer than this the robot has arrived."""
+
+
+TUTORIAL = GoToLaw()
+
+
+BRISK = GoToLaw(linear_gain=0.8, turn_gain=1.5, max_linear_m_s=0.12, max_angular_rad_s=1.5)
+"""As quick as the robot's speed controller (0.5 s to a new speed) follows without swinging."""
+
+
+def go_to_point(pose: Pose, x_m: float, y_m: float, law: GoToLaw = TUTORIAL) -> Command:
+    """Return the command that drives a robot at pose towards the point; STOP where it has arrived.
+
+    Unicycle law: v = kr * distance * cos(a), w = ka * a with a the angle from the heading to the goal. A goal behind
+    is approached backwards (a is then measured from the back). pose and point are in the same frame.
+    """
+    distance_m = math.hypot(x_m - pose.x_m, y_m - pose.y_m)
+    if distance_m < law.tolerance_m:
+        return STOP
+    off_rad = wrap_angle(math.atan2(y_m - pose.y_m, x_m - pose.x_m) - pose.yaw_rad)
+    linear_m_s = clamp(law.linear_gain * distance_m * math.cos(off_rad), law.max_linear_m_s)
+    if abs(off_rad) > math.pi / 2.0:
+        off_rad = wrap_angle(off_rad + math.pi)
+    return Command(linear_m_s, clamp(law.turn_gain * off_rad, law.max_angular_rad_s))
+
+
+class GoToPoseLaw(NamedTuple):
+    """How a robot goes to a point and ends with a heading."""
+
+    k1: float = 1.0
+    """How early the robot bends towards the final heading."""
+    k2: float = 2.0
+    """How fast it comes onto that curve, against how fast it drives."""
+    slowing_m2: float = 0.003
+    """beta: how much it slows down in curves: to half where the curve has a radius of sqrt(beta)."""
+    linear_gain: float = 0.8
+    """Speed in m/s per metre of distance near the goal, 1/s."""
+    max_linear_m_s: float = 0.12
+    max_angular_rad_s: float = 1.5
+    heading_gain: float = 1.5
+    """Turn at the goal in rad/s per radian, 1/s."""
+    docking_m: float = 0.03
+    """Nearer than this straight to the place: the curve would be too tight for motors that lag 0.5 s."""
+    tolerance_m: float = 0.01
+    tolerance_rad: float = 0.05
+
+
+SMOOTH = GoToPoseLaw()
+
+
+def go_to_pose(pose: Pose, goal: Pose, law: GoToPoseLaw = SMOOTH, at_goal: bool = False) -> Command:
+    """Return the command of a smooth curve to goal that ends in its heading; STOP where it is reached.
+
+    at_goal: the place was reached already; only the heading counts, so that a millimetre of drift during the last
+    turn does not start a new approach. pose and goal are in the same frame.
+    Source: J. J. Park, B. Kuipers, A smooth control law for graceful motion of differential wheeled mobile robots
+    in 2D environment, ICRA 2011, equations 13 to 15.
+    """
+    distance_m = math.hypot(goal.x_m - pose.x_m, goal.y_m - pose.y_m)
+    if at_goal or distance_m < law.tolerance_m:
+        off_rad = wrap_angle(goal.yaw_rad - pose.yaw_rad)
+        if abs(off_rad) < law.tolerance_rad:
+            return STOP
+        return Command(0.0, clamp(law.heading_gain * off_rad, law.max_angular_rad_s))
+    if distance_m < law.docking_m:
+        docking = GoToLaw(
+            law.linear_gain, law.heading_gain, law.max_linear_m_s, law.max_angular_rad_s, law.tolerance_m
+        )
+        return go_to_point(pose, goal.x_m, goal.y_m, docking)
+    sight_rad = math.atan2(goal.y_m - pose.y_m, goal.x_m - pose.x_m)
+    goal_off_rad = wrap_angle(goal.yaw_rad - sight_rad)  # theta of the paper
+    own_off_rad = wrap_angle(pose.yaw_rad - sight_rad)  # delta of the paper
+    curvature_1_m = -(
+        law.k2 * (own_off_rad - math.atan(-law.k1 * goal_off_rad))
+        + (1.0 + law.k1 / (1.0 + (law.k1 * goal_off_rad) ** 2)) * math.sin(own_off_rad)
+    ) / distance_m
+    linear_m_s = law.max_linear_m_s / (1.0 + law.slowing_m2 * curvature_1_m**2)
+    linear_m_s = min(linear_m_s, law.linear_gain * distance_m)
+    angular_rad_s = curvature_1_m * linear_m_s
+    if abs(angular_rad_s) > law.max_angular_rad_s:  # the curve stays the same, only slower
+        linear_m_s *= law.max_angular_rad_s / abs(angular_rad_s)
+        angular_rad_s = math.copysign(law.max_angular_rad_s, angular_rad_s)
+    return Command(linear_m_s, angular_rad_s)
+
+
+class FollowLaw(NamedTuple):
+    """How a robot keeps behind another one."""
+
+    gap_m: float = 0.15
+    """Between the centres; two bodies touch at 0.074 m."""
+    linear_gain: float = 1.0
+    turn_gain: float = 2.0
+    max_linear_m_s: float = 0.15
+    max_angular_rad_s: float = 2.0
+
+
+FOLLOW = FollowLaw()
+
+
+def follow(pose: Pose, leader: Pose, law: FollowLaw = FOLLOW) -> Command:
+    """Return the command that keeps a robot at pose one gap away from leader and turned towards it.
+
+    It never drives backwards: a leader that comes nearer is waited for. pose and leader are in the same frame.
+    """
+    distance_m = math.hypot(leader.x_m - pose.x_m, leader.y_m - pose.y_m)
+    off_rad = wrap_angle(math.atan2(leader.y_m - pose.y_m, leader.x_m - pose.x_m) - pose.yaw_rad)
+    linear_m_s = max(0.0, law.linear_gain * (distance_m - law.gap_m)) * max(0.0, math.cos(off_rad))
+    return Command(
+        min(law.max_linear_m_s, linear_m_s), clamp(law.turn_gain * off_rad, law.max_angular_rad_s)
+    )

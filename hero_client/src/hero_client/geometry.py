@@ -1,0 +1,46 @@
+"""Poses and angles in the plane, in m and rad (REP 103). Pure."""
+
+import math
+from typing import Any, NamedTuple
+
+__all__ = ["Pose", "clamp", "invert_pose", "transform_pose", "wrap_angle", "yaw_of"]
+
+
+class Pose(NamedTuple):
+    """A position and a heading in the plane; the frame is that of its source."""
+
+    x_m: float
+    y_m: float
+    yaw_rad: float
+
+
+def transform_pose(origin: Pose, pose: Pose) -> Pose:
+    """Return pose in the frame of origin; pose is given in a frame whose origin is at origin."""
+    cos, sin = math.cos(origin.yaw_rad), math.sin(origin.yaw_rad)
+    return Pose(
+        origin.x_m + cos * pose.x_m - sin * pose.y_m,
+        origin.y_m + sin * pose.x_m + cos * pose.y_m,
+        origin.yaw_rad + pose.yaw_rad,
+    )
+
+
+def invert_pose(pose: Pose) -> Pose:
+    """Return the pose of the frame's origin as seen from pose."""
+    cos, sin = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
+    return Pose(-cos * pose.x_m - sin * pose.y_m, sin * pose.x_m - cos * pose.y_m, -pose.yaw_rad)
+
+
+def wrap_angle(angle_rad: float) -> float:
+    """Return the same direction within -pi..pi."""
+    return math.remainder(angle_rad, math.tau)
+
+
+def clamp(value: float, limit: float) -> float:
+    """Return value cut to -limit..limit."""
+    return max(-limit, min(limit, value))
+
+
+def yaw_of(orientation: Any) -> float:
+    """Return the turn about z, -pi..pi rad, of a geometry_msgs/Quaternion; nan for entries that are not finite."""
+    x, y, z, w = orientation.x, orientation.y, orientation.z, orientation.w
+    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))

@@ -1,0 +1,141 @@
+"""Drives robots with a joystick (sensor_msgs/Joy): only while the enable button is held and /joy is alive.
+
+Another button stops all robots of all drivers.
+"""
+
+import math
+import time
+from typing import NamedTuple, Optional
+
+import rospy
+from sensor_msgs.msg import Joy
+
+from .controllers.unicycle import STOP, Command
+from .drivers import Drivers
+from .program import Program, ProgramError
+from .swarm import REPORT_PERIOD_S, Swarm
+
+__all__ = ["JoystickMapping", "JoystickTeleop"]
+
+PERIOD_S = 0.1
+
+SILENCE_S = 0.5
+"""Without a message for this time the robot stops: joy_node repeats held axes by autorepeat_rate of the launch file."""
+
+STOP_REPEAT_S = 0.5
+"""Stops are sent for so long, then teleop is silent: other programs may drive the robot."""
+
+
+class JoystickMapping(NamedTuple):
+    """Indices of axes and buttons, and the velocities at full stick."""
+
+    linear_m_s: float
+    angular_rad_s: float
+    linear_axis: int
+    angular_axis: int
+    enable_button: int
+    stop_button: int
+
+    def read(self, joy: Joy) -> Command:
+        """Return the command of a message; STOP while the enable button is released or an axis is not finite.
+
+        Raises: ProgramError if the joystick lacks one of the axes or buttons.
+        """
+        has_axes = max(self.linear_axis, self.angular_axis) < len(joy.axes)
+        if not has_axes or max(self.enable_button, self.stop_button) >= len(joy.buttons):
+            raise ProgramError(
+                "the joystick has %d axes and %d buttons: set ~linear_axis, ~angular_axis, ~enable_button and"
+                " ~stop_button to some of them (counted from 0)" % (len(joy.axes), len(joy.buttons))
+            )
+        linear, angular = joy.axes[self.linear_axis], joy.axes[self.angular_axis]
+        if not math.isfinite(linear) or not math.isfinite(angular):
+            rospy.logwarn_once("the joystick sends numbers that are not finite: the robot is stopped meanwhile")
+            return STOP
+        if not joy.buttons[self.enable_button]:
+            return STOP
+        return Command(linear * self.linear_m_s, angular * self.angular_rad_s)
+
+
+class _Joystick:
+    """The newest message of the joystick."""
+
+    def __init__(self, stop_button: int, drivers: Drivers) -> None:
+        """Subscribe to /joy; a press of stop_button stops all robots of the drivers."""
+        self._stop_button = stop_button
+        self._drivers = drivers
+        self._is_stop_pressed = False
+        self._arrival_s = -math.inf
+        self.joy: Optional[Joy] = None
+        self._subscriber = rospy.Subscriber("/joy", Joy, self._receive, queue_size=10, tcp_nodelay=True)
+
+    def _receive(self, joy: Joy) -> None:
+        # Here, because a short press may be over at the program's next step.
+        is_pressed = self._stop_button < len(joy.buttons) and bool(joy.buttons[self._stop_button])
+        if is_pressed and not self._is_stop_pressed:
+            self._drivers.request_stop(True)
+        self._is_stop_pressed = is_pressed
+        self.joy, self._arrival_s = joy, time.monotonic()
+
+    @property
+    def alive(self) -> bool:
+        """Whether the newest message is recent enough to act upon."""
+        return time.monotonic() - self._arrival_s < SILENCE_S
+
+
+class JoystickTeleop:
+    """Sends the joystick's commands to all robots of a swarm."""
+
+    def __init__(self, swarm: Swarm, mapping: JoystickMapping) -> None:
+        """Subscribe to /joy."""
+        self._swarm = swarm
+        self._mapping = mapping
+        self._joystick = _Joystick(mapping.stop_button, swarm.drivers)
+        self._last_motion_s = -math.inf
+        self._next_warning_s = time.monotonic() + 2.0
+        self._reported_status = ""
+        self._has_reported_stopped = False
+
+    def run(self, program: Program) -> None:
+        """Drive until the program is to end.
+
+        Raises: ProgramError if the joystick lacks an axis or button, or a stop of all robots was not obeyed.
+        """
+        rospy.loginfo(
+            "hold button %d and move the stick; button %d stops all robots of all drivers",
+            self._mapping.enable_button,
+            self._mapping.stop_button,
+        )
+        while program.pace(PERIOD_S):
+            self.step(time.monotonic())
+        self._swarm.drivers.check_stop()
+
+    def step(self, now_s: float) -> None:
+        """Send the next command, and log what users must know. Raises: ProgramError; see JoystickMapping.read()."""
+        command = STOP
+        if self._joystick.alive:
+            command = self._mapping.read(self._joystick.joy)
+        elif now_s >= self._next_warning_s:
+            self._next_warning_s = now_s + REPORT_PERIOD_S
+            rospy.logwarn("nothing on /joy: is a joystick plugged in, and does its driver (package joy) run?")
+        if command != STOP:
+            self._last_motion_s = now_s
+        if now_s - self._last_motion_s < STOP_REPEAT_S:
+            for robot in self._swarm:
+                robot.drive(*command)
+        self._report_stop(command)
+        self._swarm.report_missing()
+
+    def _report_stop(self, command: Command) -> None:
+        """Log once what came of a stop of all robots, and that robots that are told to move cannot."""
+        drivers = self._swarm.drivers
+        status = drivers.stop_status()
+        if status is not None and status.text != self._reported_status:
+            self._reported_status = status.text
+            {"info": rospy.loginfo, "warn": rospy.logwarn, "error": rospy.logerr}[status.level](status.text)
+        stopped = [robot.name for robot in self._swarm if drivers.is_robot_stopped(robot.namespace)]
+        if stopped and command != STOP and not self._has_reported_stopped:
+            rospy.logwarn(
+                "all robots are stopped, so %s cannot move; release them: rosrun hero_tools fleet, key r",
+                ", ".join(stopped),
+            )
+        self._has_reported_stopped = bool(stopped) and (self._has_reported_stopped or command != STOP)

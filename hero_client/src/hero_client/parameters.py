@@ -1,0 +1,186 @@
+"""Parameters of a program: declared with a default and a check, read from the ROS parameter server.
+
+    parameters = read_parameters({"robots": robot_ids("0"), "linear_m_s": number(0.1, 0.0, 0.2, "m/s")})
+
+A wrong value ends the program with one line: the name, the value and what it must be.
+"""
+
+import math
+from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
+
+import rospy
+
+from .program import ProgramError
+
+__all__ = [
+    "Parameter",
+    "check_flag",
+    "check_number",
+    "choice",
+    "flag",
+    "number",
+    "parse_poses",
+    "parse_robot_ids",
+    "read_parameters",
+    "robot_ids",
+    "whole_number",
+]
+
+ALL_ROBOTS = "all"
+
+MAX_ROBOTS_IN_RANGE = 1000
+
+MAX_COORDINATE_M = 1e6
+
+
+class Parameter(NamedTuple):
+    """A parameter with a check."""
+
+    default: Any
+    check: Callable[[str, Any], Any]
+    """Name, value -> the checked value. Raises: ProgramError."""
+
+
+def number(default: float, low: float, high: float, unit: str = "") -> Parameter:
+    """Declare a number in low..high."""
+    return Parameter(default, lambda name, value: check_number(name, value, low, high, unit))
+
+
+def whole_number(default: int, low: int, high: int) -> Parameter:
+    """Declare a whole number in low..high."""
+
+    def check(name: str, value: Any) -> int:
+        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+            raise ProgramError("~%s is %r, but must be a whole number from %d to %d" % (name, value, low, high))
+        return value
+
+    return Parameter(default, check)
+
+
+def flag(default: bool) -> Parameter:
+    """Declare true or false."""
+    return Parameter(default, check_flag)
+
+
+def choice(default: str, choices: Sequence[str]) -> Parameter:
+    """Declare one of some words."""
+
+    def check(name: str, value: Any) -> str:
+        if value not in choices:
+            raise ProgramError("~%s is %r, but must be one of: %s" % (name, value, ", ".join(choices)))
+        return str(value)
+
+    return Parameter(default, check)
+
+
+def robot_ids(default: str) -> Parameter:
+    """Declare ids of robots; "all" becomes None. See parse_robot_ids()."""
+    return Parameter(default, parse_robot_ids)
+
+
+def read_parameters(declared: Mapping[str, Any]) -> Dict[str, Any]:
+    """Return the node's private parameters, checked, with defaults for those that are not set.
+
+    declared: name -> a Parameter, or a default that needs no check.
+    Raises: ProgramError for a value that fails its check, or a name that is not declared, with those that are.
+    """
+    try:
+        given = rospy.get_param("~", {})
+    except KeyError:
+        given = {}
+    unknown = sorted(set(given) - set(declared))
+    if unknown:
+        raise ProgramError("unknown parameter ~%s; known are: %s" % (unknown[0], ", ".join(sorted(declared))))
+    values = {}
+    for name, parameter in declared.items():
+        if isinstance(parameter, Parameter):
+            values[name] = parameter.check(name, given.get(name, parameter.default))
+        else:
+            values[name] = given.get(name, parameter)
+    return values
+
+
+def check_number(name: str, value: Any, low: float, high: float, unit: str = "") -> float:
+    """Return value as a float if it is a number in low..high.
+
+    Raises: ProgramError with the name, the value and the range.
+    """
+    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    if not (is_number and math.isfinite(value) and low <= value <= high):
+        allowed = "a number from %g to %g%s" % (low, high, " " + unit if unit else "")
+        raise ProgramError("~%s is %r, but must be %s" % (name, value, allowed))
+    return float(value)
+
+
+def check_flag(name: str, value: Any) -> bool:
+    """Return value if it is true or false. Raises: ProgramError with the name and the value."""
+    if not isinstance(value, bool):
+        raise ProgramError("~%s is %r, but must be true or false" % (name, value))
+    return value
+
+
+def parse_robot_ids(name: str, value: Any) -> Optional[List[int]]:
+    """Return the ids in value: a number, a list of numbers, or text such as "0 1 2", "0,1,2" or "0-3".
+
+    Returns None, which stands for all robots, for the word "all".
+    Raises: ProgramError for anything else, for a negative or repeated id, and for an empty list.
+    """
+    example = 'ids such as "0 1 2 3" or "0-3", or "all"'
+    if value == ALL_ROBOTS:
+        return None
+    if isinstance(value, str):
+        words: Sequence[Any] = value.replace(",", " ").split()
+    else:
+        words = value if isinstance(value, (list, tuple)) else [value]
+    ids: List[int] = []
+    for word in words:
+        first, last = _parse_id_range(word)
+        if first < 0 or last < first or last - first >= MAX_ROBOTS_IN_RANGE:
+            raise ProgramError("~%s holds %r, but must hold robot %s" % (name, word, example))
+        ids.extend(range(first, last + 1))
+    if not ids:
+        raise ProgramError("~%s is empty, but must hold robot %s" % (name, example))
+    for robot_id in ids:
+        if ids.count(robot_id) > 1:
+            raise ProgramError("~%s names robot %d more than once" % (name, robot_id))
+    return ids
+
+
+def _parse_id_range(word: Any) -> Tuple[int, int]:
+    """Return the first and last id of a word; (-1, -1) if it holds none."""
+    if isinstance(word, int) and not isinstance(word, bool):
+        return word, word
+    first, dash, last = str(word).partition("-")
+    if not first.isdecimal() or (dash and not last.isdecimal()):
+        return -1, -1
+    return int(first), int(last if dash else first)
+
+
+def parse_poses(
+    name: str, text: Any, ids: Optional[Sequence[int]], needs_heading: bool = True
+) -> Dict[int, Tuple[float, float, Optional[float]]]:
+    """Return id -> (x_m, y_m, yaw_rad) from text such as "0 0 0; 0.3 0 90" (m, degrees), in the order of the ids.
+
+    needs_heading: False allows "x y" alone; yaw_rad is then None. No text: no poses.
+    Raises: ProgramError for anything else, or another number of poses than of ids.
+    """
+    parts = [part.split() for part in str(text).split(";") if part.strip()]
+    if not parts:
+        return {}
+    form = '"x y heading"' if needs_heading else '"x y" or "x y heading"'
+    remedy = 'must hold %s for each robot, in m and degrees, separated by ";"' % form
+    if ids is None or len(parts) != len(ids):
+        count = ALL_ROBOTS if ids is None else str(len(ids))
+        raise ProgramError("~%s has %d poses for %s robots, but %s" % (name, len(parts), count, remedy))
+    poses: Dict[int, Tuple[float, float, Optional[float]]] = {}
+    for robot_id, part in zip(ids, parts):
+        try:
+            numbers = [float(word) for word in part]
+        except ValueError:
+            numbers = []
+        lengths = (3,) if needs_heading else (2, 3)
+        if len(numbers) not in lengths or not all(abs(entry) <= MAX_COORDINATE_M for entry in numbers):
+            raise ProgramError("~%s holds %r, but %s" % (name, " ".join(part), remedy))
+        yaw_rad = math.radians(numbers[2]) if len(numbers) == 3 else None
+        poses[robot_id] = (numbers[0], numbers[1], yaw_rad)
+    return poses

@@ -1,0 +1,10 @@
+"""What is true of every HeRo robot; source: the firmware's config.h and RangeSensor.ino."""
+
+BODY_RADIUS_M = 0.0368
+"""The firmware adds it to what its infrared sensors measure, so ranges count from the robot's centre."""
+
+MAX_LINEAR_M_S = 0.20
+"""The firmware clamps linear.x to this."""
+
+MAX_ANGULAR_RAD_S = 8.0
+"""The firmware clamps angular.z to this."""
