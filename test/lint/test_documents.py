@@ -63,8 +63,10 @@ def find_options(words):
 
 @lru_cache(maxsize=None)
 def read_words(package):
-    """Everything between backticks in the README of a package."""
+    """Everything between backticks in the README of a package; the topics of robots have a page of their own."""
     lines = documents.read_lines(sources.ROOT / package / "README.md")
+    if package == "hero_driver":
+        lines += documents.read_lines(sources.ROOT / "docs" / "robot_interface.md")
     return {word for line in lines for word in documents.INLINE.findall(line.text)}
 
 
