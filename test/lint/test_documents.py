@@ -180,7 +180,7 @@ def test_every_parameter_of_a_program_is_in_the_readme():
 
 
 def test_every_topic_and_service_of_a_program_is_in_the_readme():
-    for package in PACKAGES:
+    for package in set(PACKAGES) - {"hero_test"}:  # it holds no programs
         known = {re.split(r"[/~]", word)[-1] for word in read_words(package)}
         for path, call in calls_in(package, ("Publisher", "Subscriber", "Service")):
             # Of "/hero_%d/odom" % number, and of namespace + "/odom", the last part: the rest is often a variable.
