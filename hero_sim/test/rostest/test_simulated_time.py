@@ -49,14 +49,14 @@ class SimulatedTimeTest(unittest.TestCase):
             publisher.publish(twist)
             return abs(self.odom[-1].pose.pose.position.x - start_m) > 0.2
 
-        wait_for(is_there, "way of 0.2 m")
+        wait_for(is_there, "distance of 0.2 m")
         publisher.publish(Twist())
         wait_for(lambda: abs(self.odom[-1].twist.twist.linear.x) < 0.01, "stop")
 
     def test_a_pause_stops_the_clock(self):
         pause = rospy.ServiceProxy("/hero_sim/pause", SetBool)
         self.assertTrue(pause(True).success)
-        # What was under way when the pause began arrives; then nothing more does.
+        # What was in transit when the pause began arrives; then nothing more does.
         wait_for(lambda: is_quiet(self.clock), "clock that stands still")
         self.assertTrue(pause(False).success)
         before = len(self.clock)

@@ -132,7 +132,7 @@ class SimulatorTest(unittest.TestCase):
                 here = truth.message.pose.pose.position
                 return math.hypot(here.x - start.x, here.y - start.y) > 0.03
 
-            wait_for(driven, "way of the simulated robot")
+            wait_for(driven, "motion of the simulated robot")
             drives[1].publish(Twist())
         finally:
             other.send_signal(signal.SIGINT)
@@ -172,14 +172,14 @@ class SimulatorTest(unittest.TestCase):
         markers.wait(is_green, "green robot")
         Newest("/hero_sim/arena", MarkerArray).wait(lambda message: len(message.markers) == 4, "four walls")
 
-    def test_reset_carries_robots_home_and_pause_stops_them(self):
+    def test_reset_returns_robots_to_their_start_and_pause_stops_them(self):
         truth = Newest("/hero_5/ground_truth", Odometry)
         self.assertTrue(self.call_reset().success)
         truth.wait(lambda message: abs(message.twist.twist.linear.x) < 1e-6, "robot at rest")
         self.assertTrue(self.call_pause(True).success)
         time_of_pause = truth.message.header.stamp
         self.assertTrue(self.call_pause(False).success)
-        truth.wait(lambda message: message.header.stamp > time_of_pause, "truth after the pause")
+        truth.wait(lambda message: message.header.stamp > time_of_pause, "ground truth after the pause")
 
     def test_a_wrong_fault_is_refused_in_words(self):
         answer = self.call_fault("explode:robot=1")
@@ -225,7 +225,7 @@ class SimulatorTest(unittest.TestCase):
         before = self.find(4).bad_packets
         for fault in ("garbage", "half-packet", "bad-checksum", "bad-length", "long-packet", "foreign-id"):
             self.inject(fault + ":robot=4")
-        wait_for(lambda: self.find(4) and self.find(4).bad_packets >= before + 3, "bad frames of hero_4")
+        wait_for(lambda: self.find(4) and self.find(4).bad_packets >= before + 3, "bad packets of hero_4")
         for odom in odoms:
             odom.wait_for_more()
 
@@ -253,7 +253,7 @@ class SimulatorTest(unittest.TestCase):
         with self.assertRaises(rospy.ServiceException):
             rospy.ServiceProxy("/hero_7/set_odom", SetOdom)(0.0, 0.0, 0.0)
 
-    def test_what_a_stalled_radio_held_back_comes_afterwards(self):
+    def test_a_stalled_radio_delivers_everything_afterwards(self):
         odom = Newest("/hero_2/odom", Odometry)
         odom.wait()
         self.inject("stall:robot=2,for=1.5")

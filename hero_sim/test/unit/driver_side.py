@@ -24,7 +24,7 @@ class DriverSide:
     """Connects, requests topics, answers time requests and keeps what each robot sends.
 
     Attributes:
-        arrivals: per robot, every frame with the simulated time at which it was sent.
+        arrivals: per robot, every packet with the simulated time at which it was sent.
     """
 
     def __init__(self, *arguments, answer_time=True, connect=True):
@@ -59,9 +59,9 @@ class DriverSide:
         robot = self.swarm.robots[index]
         data = b"".join(robot.outbox)
         robot.outbox.clear()
-        for frame in self.readers[index].receive_bytes(data):
-            self.arrivals[index].append(Arrival(self.swarm.now_ms, frame.topic_id, frame.payload))
-            if frame.topic_id == packets.ID_TIME and self.answer_time:
+        for packet in self.readers[index].receive_bytes(data):
+            self.arrivals[index].append(Arrival(self.swarm.now_ms, packet.topic_id, packet.payload))
+            if packet.topic_id == packets.ID_TIME and self.answer_time:
                 self.send(index, packets.ID_TIME, payloads.encode_time(self.server_time()))
 
     def server_time(self):
@@ -93,7 +93,7 @@ class DriverSide:
             self.send_twist(index, linear_m_s, turn_rad_s, topic_id)
             self.run(100)
 
-    def list_frames(self, index, topic_id, since_ms=0):
+    def list_packets(self, index, topic_id, since_ms=0):
         return [
             arrival
             for arrival in self.arrivals[index]
@@ -103,7 +103,7 @@ class DriverSide:
     def list_logs(self, index):
         return [
             (arrival.at_ms, payloads.decode_log(arrival.payload).text)
-            for arrival in self.list_frames(index, 7)
+            for arrival in self.list_packets(index, 7)
         ]
 
     def true_pose(self, index):

@@ -16,23 +16,23 @@ def test_laser_enable_stops_and_starts_the_laser_and_a_restart_forgets_it():
     driver.run(100)
     since_ms = driver.swarm.now_ms
     driver.run(1000)
-    assert not driver.list_frames(0, ids.ID_LASER, since_ms)
+    assert not driver.list_packets(0, ids.ID_LASER, since_ms)
     driver.send(0, ids.ID_LASER_ENABLE, b"\x01")
     driver.run(1000)
-    assert len(driver.list_frames(0, ids.ID_LASER, since_ms)) >= 4
+    assert len(driver.list_packets(0, ids.ID_LASER, since_ms)) >= 4
 
 
-def test_the_laser_sees_the_wall_ahead():
+def test_the_laser_sees_the_wall_in_front():
     driver = DriverSide("--perfect")
     driver.start_streaming()
     driver.drive(0, 0.2, 0.0, 8000, ids.ID_POSITION_CMD_VEL)
-    _, ranges, counts = read_laser(driver.list_frames(0, ids.ID_LASER)[-1].payload)
+    _, ranges, counts = read_laser(driver.list_packets(0, ids.ID_LASER)[-1].payload)
     assert ranges[8] == pytest.approx(0.0368 + 0.021, abs=0.01)
     assert counts[8] > 900
     assert ranges[0] > 0.23
 
 
-def test_the_light_is_blue_after_the_start_then_as_told_and_dark_after_15_s():
+def test_the_light_is_blue_at_the_start_then_as_commanded_for_15_s():
     driver = DriverSide()
     robot = driver.swarm.robots[0]
 
@@ -65,17 +65,17 @@ def test_an_id_in_an_empty_slot_is_ignored():
     assert driver.swarm.robots[0].crash_reason is None
 
 
-def test_a_frame_in_two_pieces_is_lost_unless_both_come_before_the_robot_looks():
+def test_a_packet_in_two_pieces_is_lost_unless_both_arrive_in_one_spin():
     driver = DriverSide()
     driver.start_streaming()
-    frame = packets.encode_packet(ids.ID_LASER_ENABLE, b"\x00")
-    driver.send_bytes(0, frame[:5])
+    packet = packets.encode_packet(ids.ID_LASER_ENABLE, b"\x00")
+    driver.send_bytes(0, packet[:5])
     driver.run(60)
-    driver.send_bytes(0, frame[5:])
+    driver.send_bytes(0, packet[5:])
     driver.run(200)
     assert driver.swarm.robots[0].sensing.laser_enabled
-    driver.send_bytes(0, frame[:5])
-    driver.send_bytes(0, frame[5:])
+    driver.send_bytes(0, packet[:5])
+    driver.send_bytes(0, packet[5:])
     driver.run(200)
     assert not driver.swarm.robots[0].sensing.laser_enabled
 
@@ -105,6 +105,6 @@ def test_a_robot_survives_whatever_a_server_sends(sent, noise):
     driver.send(0, packets.ID_PUBLISHER)
     driver.run(400)
     if driver.swarm.robots[0].crash_reason is None:
-        assert driver.list_frames(0, packets.ID_PUBLISHER)
+        assert driver.list_packets(0, packets.ID_PUBLISHER)
     else:
         assert any(12 <= topic_id <= 99 or topic_id in (2, 3, 4, 5, 7, 8, 9, 1) for topic_id, _ in sent)

@@ -15,7 +15,7 @@ both_controllers = pytest.mark.parametrize(
 )
 
 
-def test_a_stop_of_transmission_leaves_log_lines_and_lets_a_moving_robot_run_away():
+def test_tx_stop_leaves_log_lines_and_a_moving_robot_runs_away():
     driver = DriverSide("--perfect")
     driver.start_streaming()
     driver.drive(0, 0.1, 0.0, 600)
@@ -139,7 +139,7 @@ def test_what_waited_beyond_the_receive_window_is_read_in_the_next_spin():
     assert driver.measure_speed(0) < 0.001
 
 
-def test_a_command_that_no_robot_could_compute_with_is_reported_and_changes_nothing():
+def test_a_command_that_is_not_finite_is_reported_and_changes_nothing():
     driver = DriverSide()
     driver.start_streaming()
     driver.send_twist(0, float("nan"), 0.0)
@@ -160,7 +160,7 @@ def test_odometry_loses_distance_while_the_velocity_controller_drives(controller
     driver.send_twist(0, 0.0, 0.0, controller)
     driver.run(1000)
     true_m = driver.true_pose(0)[0] - start_m
-    odom_m = read_odom(driver.list_frames(0, ids.ID_ODOM)[-1].payload)[2][0]
+    odom_m = read_odom(driver.list_packets(0, ids.ID_ODOM)[-1].payload)[2][0]
     assert true_m > 0.3
     assert least <= odom_m / true_m <= most
 
@@ -174,12 +174,12 @@ def test_exact_odometry_and_the_ticks_lose_nothing():
     driver.run(1000)
     true_m = driver.true_pose(0)[0] - start_m
     # Without slip and wheel errors only a tick may be missing.
-    assert read_odom(driver.list_frames(0, ids.ID_ODOM)[-1].payload)[2][0] == pytest.approx(true_m, abs=0.002)
-    encoder = read_encoder(driver.list_frames(0, ids.ID_ENCODER)[-1].payload)
+    assert read_odom(driver.list_packets(0, ids.ID_ODOM)[-1].payload)[2][0] == pytest.approx(true_m, abs=0.002)
+    encoder = read_encoder(driver.list_packets(0, ids.ID_ENCODER)[-1].payload)
     assert encoder[0] * 0.00053669 == pytest.approx(true_m, abs=0.002)
 
 
-def test_set_odom_sets_the_pose_and_zeroes_the_ticks_and_answers_in_its_time():
+def test_set_odom_sets_the_pose_zeroes_the_ticks_and_answers_in_time():
     driver = DriverSide("--perfect")
     driver.start_streaming()
     driver.drive(0, 0.1, 0.0, 1000)
@@ -188,16 +188,16 @@ def test_set_odom_sets_the_pose_and_zeroes_the_ticks_and_answers_in_its_time():
     called_ms = driver.swarm.now_ms
     driver.send(0, ids.ID_SET_ODOM, struct.pack("<3d", 1.0, 2.0, 0.5))
     driver.run(200)
-    (answer,) = driver.list_frames(0, ids.ID_SET_ODOM_ANSWER)
+    (answer,) = driver.list_packets(0, ids.ID_SET_ODOM_ANSWER)
     assert answer.payload == b"\x01\x15\x00\x00\x00Odometry was changed!"
     assert 42 <= answer.at_ms - called_ms <= 75 + 1
-    pose = read_odom(driver.list_frames(0, ids.ID_ODOM)[-1].payload)[2]
+    pose = read_odom(driver.list_packets(0, ids.ID_ODOM)[-1].payload)[2]
     assert pose == pytest.approx((1.0, 2.0, 0.247404, 0.968912), abs=1e-6)
-    assert read_encoder(driver.list_frames(0, ids.ID_ENCODER)[-1].payload)[:2] == (0.0, 0.0)
+    assert read_encoder(driver.list_packets(0, ids.ID_ENCODER)[-1].payload)[:2] == (0.0, 0.0)
     assert "[HERO] Odometry was changed!" in [text for _, text in driver.list_logs(0)]
 
 
-def test_a_server_that_does_not_read_stalls_the_whole_robot_and_its_watchdogs():
+def test_a_server_that_does_not_read_blocks_the_robot_and_its_watchdogs():
     driver = DriverSide("--perfect")
     driver.start_streaming()
     driver.drive(0, 0.1, 0.0, 1500)
@@ -206,14 +206,14 @@ def test_a_server_that_does_not_read_stalls_the_whole_robot_and_its_watchdogs():
     driver.swarm.reschedule(0)
     since_ms = driver.swarm.now_ms
     driver.run(4900)
-    assert not driver.list_frames(0, ids.ID_ODOM, since_ms + 1)
+    assert not driver.list_packets(0, ids.ID_ODOM, since_ms + 1)
     assert driver.measure_speed(0) > 0.05
     driver.run(4000)
     assert driver.measure_speed(0) < 0.002
-    assert driver.list_frames(0, ids.ID_ODOM, since_ms + 5000)
+    assert driver.list_packets(0, ids.ID_ODOM, since_ms + 5000)
 
 
-def test_a_frozen_robot_keeps_its_pulses_and_follows_its_last_command_again_afterwards():
+def test_a_frozen_robot_keeps_its_pulses_and_then_resumes_its_command():
     driver = DriverSide("--perfect")
     driver.start_streaming()
     driver.send_twist(0, 0.1, 0.0)
@@ -228,18 +228,18 @@ def test_a_frozen_robot_keeps_its_pulses_and_follows_its_last_command_again_afte
     assert driver.swarm.world.commands_m_s[0].tolist() != commands_m_s
 
 
-def test_the_yaw_of_a_robot_with_an_imu_comes_from_it_and_a_set_heading_is_lost():
+def test_a_robot_with_an_imu_takes_its_yaw_from_it_not_from_set_odom():
     driver = DriverSide("--imu-hat", "--perfect")
     driver.start_streaming()
     driver.drive(0, 0.0, 1.0, 2000)
     driver.send_twist(0, 0.0, 0.0)
     driver.send(0, ids.ID_SET_ODOM, struct.pack("<3d", 0.0, 0.0, -2.0))
     driver.run(1000)
-    _, _, _, turn_w = read_odom(driver.list_frames(0, ids.ID_ODOM)[-1].payload)[2]
+    _, _, _, turn_w = read_odom(driver.list_packets(0, ids.ID_ODOM)[-1].payload)[2]
     assert 2.0 * math.acos(turn_w) == pytest.approx(driver.true_pose(0)[2], abs=0.01)
 
 
-def test_what_the_imu_says_is_up_to_a_quarter_of_a_second_old():
+def test_imu_readings_are_up_to_a_quarter_of_a_second_old():
     hat = ImuHat(0.0)
     ages_s = [
         now_ms / 1000.0 - hat.read(now_ms, now_ms / 1000.0, 1.0).heading_rad for now_ms in range(0, 3000, 34)
@@ -248,7 +248,7 @@ def test_what_the_imu_says_is_up_to_a_quarter_of_a_second_old():
     assert min(ages_s) == pytest.approx(0.0, abs=0.035)
 
 
-def test_a_robots_odom_frame_stays_over_a_restart_follows_set_odom_and_is_carried_with_it():
+def test_the_odom_frame_survives_a_restart_and_follows_set_odom_and_reset():
     driver = DriverSide("--perfect", "--firmware-odometry", "exact")
     driver.start_streaming()
     robot = driver.swarm.robots[0]

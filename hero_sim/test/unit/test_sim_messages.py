@@ -13,7 +13,7 @@ ROOT = os.path.dirname(os.path.abspath(__file__)) + "/../../.."
 CAPTURES = os.environ.get("HERO_CAPTURES", os.path.join(ROOT, "..", "shared", "captures"))
 
 
-def read_frames(data):
+def read_packets(data):
     reader = packets.PacketReader()
     result = reader.receive_bytes(data)
     assert reader.bad_packets == 0 and reader.buffered_length == 0
@@ -26,18 +26,18 @@ def encode_cycle(name="hero_0", ticks=(0, 0)):
 
 
 def test_a_cycle_is_odom_then_five_transforms_then_the_encoder():
-    cycle = read_frames(encode_cycle())
-    assert [frame.topic_id for frame in cycle] == [130, 129, 129, 129, 129, 129, 128]
-    assert [len(frame.payload) + 8 for frame in cycle] == [735, 115, 126, 127, 119, 121, 126]
+    cycle = read_packets(encode_cycle())
+    assert [packet.topic_id for packet in cycle] == [130, 129, 129, 129, 129, 129, 128]
+    assert [len(packet.payload) + 8 for packet in cycle] == [735, 115, 126, 127, 119, 121, 126]
 
 
 def test_names_grow_with_the_id():
-    cycle = read_frames(encode_cycle("hero_12"))
-    assert [len(frame.payload) + 8 for frame in cycle] == [737, 117, 128, 129, 121, 123, 127]
+    cycle = read_packets(encode_cycle("hero_12"))
+    assert [len(packet.payload) + 8 for packet in cycle] == [737, 117, 128, 129, 121, 123, 127]
 
 
 def test_odom_holds_pose_and_twist_in_single_precision_and_no_covariance():
-    odom = read_frames(encode_cycle())[0].payload
+    odom = read_packets(encode_cycle())[0].payload
     stamp, ids, pose, twist = driver_side.read_odom(odom)
     assert struct.unpack_from("<I", odom)[0] == messages.SEQ_NEVER_COUNTED
     assert stamp == (7, 8)
@@ -50,16 +50,16 @@ def test_odom_holds_pose_and_twist_in_single_precision_and_no_covariance():
 
 def test_wheel_transforms_are_one_tick_ahead_and_turn_back_after_288():
     for ticks, angle_rad in ((0, 1), (287, 288), (288, 1), (-1, 0), (-288, 1)):
-        left = read_frames(encode_cycle(ticks=(ticks, 0)))[2].payload
+        left = read_packets(encode_cycle(ticks=(ticks, 0)))[2].payload
         quaternion = struct.unpack_from("<4d", left, len(left) - 32)
         half_rad = angle_rad * math.pi / 288
         assert quaternion == pytest.approx((0.0, math.sin(half_rad), 0.0, math.cos(half_rad)), abs=1e-7)
 
 
 def test_a_laser_has_sixteen_ranges_of_which_the_odd_ones_are_averages():
-    frame = read_frames(messages.LaserMessages("hero_0").encode(5, (1, 2), list(range(8)), [10.0] * 8))[0]
-    seq, ranges, counts = driver_side.read_laser(frame.payload)
-    assert (frame.topic_id, len(frame.payload) + 8, seq) == (125, 205, 5)
+    packet = read_packets(messages.LaserMessages("hero_0").encode(5, (1, 2), list(range(8)), [10.0] * 8))[0]
+    seq, ranges, counts = driver_side.read_laser(packet.payload)
+    assert (packet.topic_id, len(packet.payload) + 8, seq) == (125, 205, 5)
     assert ranges == (0, 0.5, 1, 1.5, 2, 2.5, 3, 3.5, 4, 4.5, 5, 5.5, 6, 6.5, 7, 3.5)
     assert counts == (10.0,) * 16
 
@@ -67,10 +67,10 @@ def test_a_laser_has_sixteen_ranges_of_which_the_odd_ones_are_averages():
 def test_declarations_have_the_stock_order_names_and_length():
     data = declarations.encode_declarations("hero_0")
     assert len(data) == 2469
-    declared = read_frames(data)
-    infos = [payloads.decode_topic_info(frame.payload) for frame in declared]
+    declared = read_packets(data)
+    infos = [payloads.decode_topic_info(packet.payload) for packet in declared]
     assert [info.topic_id for info in infos] == list(range(125, 137)) + list(range(100, 112))
-    assert [frame.topic_id for frame in declared] == [0, 2, 0, 0, 0, 0] + [2] * 6 + [
+    assert [packet.topic_id for packet in declared] == [0, 2, 0, 0, 0, 0] + [2] * 6 + [
         1,
         1,
         3,
@@ -112,14 +112,14 @@ def capture():
         return packets.PacketReader().receive_bytes(file.read())
 
 
-def test_the_stock_robots_own_cycles_are_rebuilt_byte_for_byte(capture):
+def test_the_stock_cycles_are_rebuilt_byte_for_byte(capture):
     encoder = messages.CycleMessages("hero_0")
     checked = 0
-    for start, frame in enumerate(capture):
+    for start, packet in enumerate(capture):
         cycle = capture[start : start + 7]
-        if frame.topic_id != 130 or len(cycle) < 7:
+        if packet.topic_id != 130 or len(cycle) < 7:
             continue
-        stamp, _, pose, twist = driver_side.read_odom(frame.payload)
+        stamp, _, pose, twist = driver_side.read_odom(packet.payload)
         theta_rad = 2.0 * math.atan2(pose[2], pose[3])
         ticks = []
         for transform in cycle[2:4]:
@@ -128,7 +128,7 @@ def test_the_stock_robots_own_cycles_are_rebuilt_byte_for_byte(capture):
         data = encoder.encode(
             stamp, Pose(pose[0], pose[1], theta_rad), twist, ticks, driver_side.read_encoder(cycle[6].payload)
         )
-        for ours, theirs in zip(read_frames(data), cycle):
+        for ours, theirs in zip(read_packets(data), cycle):
             assert ours.topic_id == theirs.topic_id
             # Angles went through atan2 here, so a last bit of their sines may differ.
             different = sum(a != b for a, b in zip(ours.payload, theirs.payload))
@@ -137,15 +137,15 @@ def test_the_stock_robots_own_cycles_are_rebuilt_byte_for_byte(capture):
     assert checked > 400
 
 
-def test_the_stock_robots_own_handshake_and_laser_are_rebuilt_byte_for_byte(capture):
-    declared = [frame for frame in capture if frame.topic_id < 4]
-    assert b"".join(packets.encode_packet(*frame) for frame in declared) == declarations.encode_declarations(
+def test_the_stock_handshake_and_laser_are_rebuilt_byte_for_byte(capture):
+    declared = [packet for packet in capture if packet.topic_id < 4]
+    assert b"".join(packets.encode_packet(*packet) for packet in declared) == declarations.encode_declarations(
         "hero_0"
     )
-    lasers = [frame for frame in capture if frame.topic_id == 125]
+    lasers = [packet for packet in capture if packet.topic_id == 125]
     encoder = messages.LaserMessages("hero_0")
-    for frame in lasers:
-        seq, stamp_s, stamp_ns = struct.unpack_from("<III", frame.payload)
-        _, ranges_m, counts = driver_side.read_laser(frame.payload)
+    for packet in lasers:
+        seq, stamp_s, stamp_ns = struct.unpack_from("<III", packet.payload)
+        _, ranges_m, counts = driver_side.read_laser(packet.payload)
         ours = encoder.encode(seq, (stamp_s, stamp_ns), ranges_m[::2], counts[::2])
-        assert read_frames(ours)[0] == frame
+        assert read_packets(ours)[0] == packet

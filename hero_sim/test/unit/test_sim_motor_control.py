@@ -35,7 +35,7 @@ def measure_mean_speed(driver, seconds=2):
     return ((driver.swarm.world.travels_m[0] - before) / seconds).tolist()
 
 
-# The ticks of both wheels that a complete stock firmware, built for a PC, counted on its way from rest under
+# The ticks of both wheels that a complete stock firmware, built for a PC, counted from rest under
 # velocity commands of 0.1 m/s, ten a second; the first column is the time since the first tick.
 STOCK_STEP = (
     (0.10, 5, 5),
@@ -70,7 +70,7 @@ def count_ticks_from_rest(driver):
 
 def test_the_pids_drive_a_motor_like_the_measured_one_as_the_firmware_did():
     counts = []
-    for delay_ms in range(0, 1000, 200):  # the robot's cycles meet in another way each time
+    for delay_ms in range(0, 1000, 200):  # the robot's cycles meet differently each time
         driver = start("--error", "left_gain=0.45,right_gain=0.45,lag_s=0.25")
         driver.run(delay_ms)
         counts.append(count_ticks_from_rest(driver))
@@ -78,18 +78,18 @@ def test_the_pids_drive_a_motor_like_the_measured_one_as_the_firmware_did():
         assert ticks == pytest.approx((left + right) / 2.0, abs=3.0, rel=0.05)
 
 
-def test_a_pulse_below_its_centre_drives_the_left_wheel_forward_and_one_above_the_right():
+def test_the_servos_are_mirrored_below_the_centre_is_forward_on_the_left():
     assert push(start(), 1400, 1600) == pytest.approx([70 * 0.25 / 220] * 2, rel=0.01)
 
 
 @pytest.mark.parametrize("beyond_us, stands", [(29, True), (-30, True), (31, False), (-32, False)])
-def test_a_wheel_stands_within_its_dead_zone_around_the_centre_that_was_set(beyond_us, stands):
+def test_a_wheel_rests_within_its_dead_zone_around_its_centre(beyond_us, stands):
     driver = start("--error", "robot=0,left_centre_us=1480,right_centre_us=1530")
     speeds_m_s = push(driver, 1480 + beyond_us, 1530 + beyond_us)
     assert [speed_m_s == 0.0 for speed_m_s in speeds_m_s] == [stands, stands]
 
 
-def test_a_robot_that_was_never_told_its_centres_creeps_and_motors_parameters_ends_that():
+def test_a_robot_without_calibrated_centres_creeps_until_they_are_set():
     driver = start("--motors", "factory", "--error", "left_centre_us=1440,right_centre_us=1540")
     world = driver.swarm.world
     set_velocity_gains(driver, 1e-3, 0.0, 0.0)
@@ -102,7 +102,7 @@ def test_a_robot_that_was_never_told_its_centres_creeps_and_motors_parameters_en
     assert world.speeds_m_s[0] == pytest.approx([0.0, 0.0], abs=1e-3)
 
 
-def test_the_proportional_gain_alone_leaves_the_error_that_control_theory_says():
+def test_the_proportional_gain_alone_leaves_the_error_of_control_theory():
     driver = start("--error", "dead_zone_us=0")
     for gain in (600.0, 1200.0):
         set_velocity_gains(driver, gain, 0.0, 0.0)
@@ -132,7 +132,7 @@ def test_each_wheel_has_gains_of_its_own():
     assert right_m_s == 0.0
 
 
-def test_a_stop_and_a_turn_back_make_the_controller_forget_its_integral():
+def test_a_stop_and_a_reversal_reset_the_integral():
     driver = start()
     driver.drive(0, 0.1, 0.0, 3000)
     (pid, _) = driver.swarm.robots[0].motors.velocity.pids
@@ -145,7 +145,7 @@ def test_a_stop_and_a_turn_back_make_the_controller_forget_its_integral():
     assert pid.output_us == 0
 
 
-def test_a_position_command_goes_as_far_as_its_speed_reaches_in_a_second():
+def test_a_position_command_drives_as_far_as_its_speed_in_one_second():
     driver = start("--firmware-odometry", "exact")
     driver.send_twist(0, 0.1, 0.0, ids.ID_POSITION_CMD_VEL)
     distances_m = []
@@ -219,7 +219,7 @@ def test_neutral_pulses_let_a_wheel_with_another_centre_creep_for_a_second():
     assert driver.measure_speed(0) < 0.001
 
 
-def test_until_3_s_of_uptime_the_position_controller_holds_the_robot():
+def test_until_3_s_of_uptime_the_position_controller_runs():
     driver = DriverSide("--perfect", "--motors", "factory", "--error", "left_centre_us=1540")
     driver.run(1900)
     driver.send(0, packets.ID_PUBLISHER)
@@ -234,11 +234,11 @@ def test_until_3_s_of_uptime_the_position_controller_holds_the_robot():
     assert 1 <= driver.swarm.world.travels_m[0, 0] / TICK_M < 10
 
 
-def test_the_encoders_see_what_the_wheels_do_not_what_they_should_do():
+def test_the_encoders_measure_the_wheels_not_the_commands():
     driver = start("--error", "right_gain=0.5", "--firmware-odometry", "exact")
     driver.send(0, ids.ID_CMD_MOTOR, struct.pack("<2h", 1400, 1600))
     driver.run(900)
-    left, right = read_encoder(driver.list_frames(0, ids.ID_ENCODER)[-1].payload)[:2]
+    left, right = read_encoder(driver.list_packets(0, ids.ID_ENCODER)[-1].payload)[:2]
     assert right / left == pytest.approx(0.5, abs=0.05)
 
 
@@ -270,7 +270,7 @@ tunings = st.tuples(
         st.tuples(st.integers(0, 4), st.one_of(twists, pulses, gains, tunings)), min_size=5, max_size=20
     ),
 )
-def test_whatever_robots_are_sent_they_stay_out_of_walls_and_each_other_and_stop_in_the_end(seed, sent):
+def test_no_commands_drive_robots_into_walls_or_keep_them_from_stopping(seed, sent):
     driver = DriverSide("--count", "5", "--arena", "obstacles", "--seed", str(seed))
     driver.start_streaming()
     world = driver.swarm.world

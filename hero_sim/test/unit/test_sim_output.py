@@ -25,7 +25,7 @@ PRINTING = (["--help"], ["--fault", "help"], ["--print-errors"], ["--port", "9",
 
 
 @pytest.mark.parametrize("arguments", PRINTING)
-def test_a_pipe_that_nobody_reads_ends_it_silently(arguments):
+def test_a_closed_pipe_ends_it_silently(arguments):
     read_end, write_end = os.pipe()
     os.close(read_end)
     with os.fdopen(write_end, "wb") as pipe:
@@ -33,7 +33,7 @@ def test_a_pipe_that_nobody_reads_ends_it_silently(arguments):
 
 
 @pytest.mark.parametrize("arguments", PRINTING)
-def test_an_output_that_is_full_is_told_in_one_line(arguments):
+def test_a_full_disk_is_reported_in_one_line(arguments):
     with open("/dev/full", "wb") as full:
         status, errors = run_simulator(*arguments, stdout=full)
     assert (status, errors) == (1, "hero_sim: the output cannot be written: No space left on device\n")

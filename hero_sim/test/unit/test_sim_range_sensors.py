@@ -83,7 +83,7 @@ def test_the_stock_capture_gives_the_stock_ranges():
     assert ranges.convert_to_ranges(counts, np.full(8, 0.5)) == pytest.approx(expected, abs=2e-7)
 
 
-def test_beams_go_counter_clockwise_from_behind_and_the_fifth_looks_ahead():
+def test_beams_go_counter_clockwise_from_the_rear_the_fifth_is_front():
     circle = np.array([[0.0, 0.15, 0.03]])  # to the left
     signals = measure(NO_WALLS, circle)
     assert int(np.argmax(signals)) == 6

@@ -4,7 +4,7 @@ from driver_side import parse_options
 
 from hero_sim.build import build_errors
 from hero_sim.errors import OptionError
-from hero_sim.world.robot_errors import KINDS, describe_errors
+from hero_sim.world.robot_errors import describe_errors
 
 
 def build(*arguments):
@@ -95,7 +95,3 @@ def test_a_wrong_file_gets_line_and_reason(tmp_path, content, reason):
 def test_a_file_that_is_not_there_is_named():
     with pytest.raises(OptionError, match=r"--errors /nowhere\.yaml cannot be read"):
         build("--errors", "/nowhere.yaml")
-
-
-def test_every_key_says_what_it_means():
-    assert all(kind.meaning and kind.least < kind.most for kind in KINDS.values())

@@ -61,7 +61,7 @@ def list_tuning_lines(driver, since_ms):
 @both_controllers
 def test_self_tuning_answers_without_success_and_floods_the_log(controller):
     driver = tune(start(), controller, 2000)
-    (answer,) = driver.list_frames(0, controller[2])
+    (answer,) = driver.list_packets(0, controller[2])
     assert answer.payload == b"\x00\x0f\x00\x00\x00PID Autotuning!"
     assert 45 <= len(list_tuning_lines(driver, driver.swarm.now_ms - 1000)) <= 48
 

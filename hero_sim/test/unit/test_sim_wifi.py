@@ -67,7 +67,7 @@ def test_a_narrow_network_delays_what_exceeds_its_bandwidth():
     assert arrived_ms == pytest.approx(1000 + 5, abs=2)
 
 
-def test_a_stall_holds_everything_and_then_lets_everything_through():
+def test_a_stall_delays_everything_and_then_delivers_everything():
     radio = Radio(PROFILES["ideal"], np.random.RandomState(0))
     radio.stall(100, 500)
     assert not radio.is_transparent(100)

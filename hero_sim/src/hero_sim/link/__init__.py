@@ -1,1 +1,1 @@
-"""The way from the robots to the driver: TCP connections, and the Wi-Fi in front of them."""
+"""The link between robots and driver: TCP connections behind simulated Wi-Fi."""
