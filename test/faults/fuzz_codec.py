@@ -45,7 +45,7 @@ def try_bytes(data):
             if type(event) is tuple:
                 topic, payload = event
                 message_type = TYPES.get(topic.info.message_type, topic.info.message_type)
-                cleaner.choose(topic.info.name, message_type)(payload, ARRIVAL_NS)
+                cleaner.handler_for(topic.info.name, message_type)(payload, ARRIVAL_NS)
             elif type(event) is LogReceived:
                 log_lines.read_log_line(event.log.text)
         session.poll(0.01 * index)

@@ -167,8 +167,6 @@ class Gateway(LinkHandler):
                 self._receive_event(peer, event, now_s)
                 if link.closed:
                     break
-        if not self._transforms.is_scheduled:
-            self._transforms.schedule()
 
     def poll_link(self, link: Link, now_s: float) -> None:
         """Let the session do what is due."""

@@ -71,7 +71,7 @@ class CorrectedRobot:
 
     def declare(self, types):
         """Declare topics, as at the start of a connection."""
-        self._clean = {name: self.corrections.choose(name, message_type) for name, message_type in types.items()}
+        self._clean = {name: self.corrections.handler_for(name, message_type) for name, message_type in types.items()}
 
     def reconnect(self, rebooted):
         """Begin a new connection with the stock topics."""

@@ -27,7 +27,7 @@ def clean(data, namespace, start_ns, **settings):
         for event in session.receive_bytes(data[start : start + 1000], 0.0, 0.0):
             if type(event) is TopicDeclared:
                 info = event.topic.info
-                event.topic.receive = corrections.choose(info.name, apply_aliases(info.message_type))
+                event.topic.receive = corrections.handler_for(info.name, apply_aliases(info.message_type))
             elif isinstance(event, MessageReceived):
                 topic, payload = event
                 if topic.info.name.endswith("/set_odom"):

@@ -65,7 +65,7 @@ def test_the_robots_own_odometry_is_there_unchanged_under_another_name():
     robot = CorrectedRobot()
     payload = build_odometry(NOW_NS, 1.0, 2.0, 0.5)
     assert robot.receive("/hero_0/odom", payload, NOW_NS) == [("/hero_0/odom_raw", payload)]
-    assert robot.corrections.find_derived("/hero_0/odom", "nav_msgs/Odometry") == {
+    assert robot.corrections.derive_topics("/hero_0/odom", "nav_msgs/Odometry") == {
         "/hero_0/odom_raw": "nav_msgs/Odometry"
     }
 

@@ -84,7 +84,7 @@ def test_the_stock_scan_passes_untouched_and_proximity_is_made_of_it():
         assert name == "/hero_0/proximity"
         assert (read_seq(proximity), read_stamp_ns(proximity)) == (number, stamp_ns)
         assert len(read_scan(proximity)[2]) == 8
-    assert robot.corrections.find_derived("/hero_0/laser", "sensor_msgs/LaserScan") == {
+    assert robot.corrections.derive_topics("/hero_0/laser", "sensor_msgs/LaserScan") == {
         "/hero_0/proximity": "sensor_msgs/LaserScan"
     }
 
@@ -116,14 +116,14 @@ def test_topics_that_nothing_is_known_of_pass_untouched():
     assert robot.receive("/hero_0/battery", b"\x00\x00\x80\x3f", NOW_NS) == [
         ("/hero_0/battery", b"\x00\x00\x80\x3f")
     ]
-    assert robot.corrections.find_derived("/hero_0/battery", "std_msgs/Float32") == {}
+    assert robot.corrections.derive_topics("/hero_0/battery", "std_msgs/Float32") == {}
 
 
 @pytest.mark.parametrize("name", TYPES)
 def test_a_known_name_with_another_type_passes_untouched(name):
     robot = CorrectedRobot({name: "std_msgs/String"})
     assert robot.receive(name, b"\x00\x00\x00\x00", NOW_NS) == [(name, b"\x00\x00\x00\x00")]
-    assert robot.corrections.find_derived(name, "std_msgs/String") == {}
+    assert robot.corrections.derive_topics(name, "std_msgs/String") == {}
     assert robot.corrections.refused == 0
 
 

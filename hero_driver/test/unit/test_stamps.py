@@ -124,11 +124,3 @@ def test_any_stamp_and_any_clock_give_a_stamp(stamps_ns, arrivals_ns):
     stamps = make_filter()
     for stamp_ns, arrival_ns in zip(stamps_ns, arrivals_ns):
         assert stamps.correct(TOPIC, stamp_ns, arrival_ns) >= 0
-
-
-def test_the_newest_stamp_of_each_topic_is_known_and_may_be_written():
-    stamps = make_filter()
-    stamps.correct("/a", NOW_NS, NOW_NS)
-    assert stamps.last_ns == {"/a": NOW_NS}
-    stamps.last_ns["/b"] = NOW_NS
-    assert stamps.correct("/b", NOW_NS, NOW_NS) == NOW_NS + STEP_NS

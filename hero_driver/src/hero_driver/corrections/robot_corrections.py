@@ -1,7 +1,6 @@
-"""What one robot sends -> what ROS programs should get: corrected odometry, proximity, stamps, own transforms.
+"""Corrects the messages of one robot: odometry from encoder ticks, proximity from its scan, stamps, transforms.
 
-Takes payloads and times of arrival, gives payloads to the sinks of their topics; knows no ROS and no socket.
-Everything that is not named here passes through untouched.
+Takes payloads and times of arrival, and publishes payloads. Topics that are not named here pass unchanged.
 """
 
 import collections
@@ -28,7 +27,7 @@ OFFSET_MAX_S = 86400.0
 OFFSET_SAMPLES = 64
 """Stamps over which the clock offset is a median: about two seconds of odometry."""
 
-HELD_MAX = 8
+WAITING_MAX = 8
 """Messages that may wait for the encoder reading of their own burst; a burst has two."""
 
 BURST_NS = 10 * 10**6
@@ -47,11 +46,11 @@ class Sink(Protocol):
 
 
 FindSink = Callable[[str], Sink]
-Clean = Callable[[bytes, int], None]
+Handler = Callable[[bytes, int], None]
 """Takes a payload and its arrival (ns)."""
 
 
-_Held = Tuple[Callable[[Any, bytes], None], Any, bytes]
+_Waiting = Tuple[Callable[[Any, bytes], None], Any, bytes]
 """Odometry, or its transform, that waits for the encoder reading of its burst: what writes it, and its arguments."""
 
 
@@ -84,7 +83,7 @@ class RobotCorrections:
         add_transform: AddTransform,
         wheels: WheelMotion,
     ) -> None:
-        """Clean the data of the robot in namespace.
+        """Correct the messages of the robot in namespace.
 
         find_sink(name) gives the sink of a topic that was chosen or derived; add_transform takes transforms of all
         robots; wheels is told of the encoder's readings, or of odometry where there is no encoder.
@@ -118,7 +117,7 @@ class RobotCorrections:
         self._encoder_follows = True
         self._encoder_stamp_ns = -BURST_NS
         self._odom_stamp_ns = -BURST_NS
-        self._held: List[_Held] = []
+        self._waiting: List[_Waiting] = []
 
     def restart(self, rebooted: bool) -> None:
         """A new connection begins; after a reboot the robot's counters begin anew too."""
@@ -126,7 +125,7 @@ class RobotCorrections:
         self._is_first_reading = True
         self._encoder_stamp_ns = self._odom_stamp_ns = -BURST_NS
         self._encoder_follows = True
-        self._held = []
+        self._waiting = []
         if rebooted:
             self.note_reboot()
 
@@ -159,7 +158,7 @@ class RobotCorrections:
         """Stamps that were replaced so far."""
         return self._stamps.corrected
 
-    def find_derived(self, name: str, message_type: str) -> Dict[str, str]:
+    def derive_topics(self, name: str, message_type: str) -> Dict[str, str]:
         """Return the topics, with types, that exist besides the one called name."""
         if name == self._odom_name and message_type == "nav_msgs/Odometry":
             return {self._raw_name: message_type}
@@ -167,26 +166,26 @@ class RobotCorrections:
             return {self._proximity_name: message_type}
         return {}
 
-    def choose(self, name: str, message_type: str) -> Clean:
+    def handler_for(self, name: str, message_type: str) -> Handler:
         """Return what takes the payloads of the topic called name."""
         if name == TRANSFORMS and message_type == "tf2_msgs/TFMessage":
-            return self.transforms.clean
+            return self.transforms.correct
         sink = self._find_sink(name)
         if name == self._odom_name and message_type == "nav_msgs/Odometry":
             self._odom_sink, self._raw_sink = sink, self._find_sink(self._raw_name)
-            return self._clean_odometry
+            return self._correct_odometry
         if name == self._namespace + "/encoder" and message_type == "hero_msgs/Encoder":
             self._hears_encoder = True
             self._has_encoder = self._uses_ticks
             self._uses_estimate = self._has_encoder and self.odometry.has_reading
-            return functools.partial(self._clean_encoder, name, sink)
+            return functools.partial(self._correct_encoder, name, sink)
         if name == self._namespace + "/laser" and message_type == "sensor_msgs/LaserScan":
-            return functools.partial(self._clean_laser, sink, self._find_sink(self._proximity_name))
+            return functools.partial(self._correct_laser, sink, self._find_sink(self._proximity_name))
         if name == self._namespace + "/imu" and message_type == "sensor_msgs/Imu":
-            return functools.partial(self._clean_stamped, name, sink)
+            return functools.partial(self._correct_stamped, name, sink)
         return lambda payload, _: sink.publish(payload)
 
-    def _clean_stamped(self, name: str, sink: Sink, payload: bytes, arrival_ns: int) -> None:
+    def _correct_stamped(self, name: str, sink: Sink, payload: bytes, arrival_ns: int) -> None:
         stamp_ns = message_layouts.read_stamp_ns(payload)
         if stamp_ns is None:
             self._refused += 1
@@ -194,7 +193,7 @@ class RobotCorrections:
         stamp_ns = self._stamps.correct(name, stamp_ns, arrival_ns)
         sink.publish(message_layouts.restamp(payload, next(self._seqs[name]), stamp_ns))
 
-    def _clean_laser(self, sink: Sink, proximity_sink: Sink, payload: bytes, arrival_ns: int) -> None:
+    def _correct_laser(self, sink: Sink, proximity_sink: Sink, payload: bytes, arrival_ns: int) -> None:
         stamp_ns = message_layouts.read_stamp_ns(payload)
         if stamp_ns is None:
             self._refused += 1
@@ -214,13 +213,12 @@ class RobotCorrections:
     # odom and its transform wait for the reading. Where none follows, because it was lost or because another
     # firmware has another order, nothing waits for longer than until the next odom.
 
-    def _clean_odometry(self, payload: bytes, arrival_ns: int) -> None:
+    def _correct_odometry(self, payload: bytes, arrival_ns: int) -> None:
         stamp_ns = message_layouts.read_stamp_ns(payload)
         if stamp_ns is None:
             self._refused += 1
             return
         self._offsets_ns.append(stamp_ns - arrival_ns)
-        self.transforms.passed_ns = 0  # another burst
         self._raw_sink.publish(payload)
         if not self._hears_encoder:
             velocity = message_layouts.read_odometry_velocity(payload)
@@ -228,16 +226,16 @@ class RobotCorrections:
                 self._wheels.read_velocity(*velocity)
         corrected_ns = self._stamps.correct(self._odom_name, stamp_ns, arrival_ns)
         if self._has_encoder:
-            if self._held:
+            if self._waiting:
                 self._release()
                 self._encoder_follows = False
             self._odom_stamp_ns = stamp_ns
             if self._encoder_follows and abs(stamp_ns - self._encoder_stamp_ns) > BURST_NS:
-                self._held.append((self._write_odometry, corrected_ns, payload))
+                self._waiting.append((self._write_odometry, corrected_ns, payload))
                 return
         self._write_odometry(corrected_ns, payload)
 
-    def _clean_encoder(self, name: str, sink: Sink, payload: bytes, arrival_ns: int) -> None:
+    def _correct_encoder(self, name: str, sink: Sink, payload: bytes, arrival_ns: int) -> None:
         reading = message_layouts.read_encoder(payload)
         if reading is None:
             self._refused += 1
@@ -257,13 +255,13 @@ class RobotCorrections:
             self._packed_pose = self._pack_pose()
         self._uses_estimate = self._has_encoder and self.odometry.has_reading
         if sink.is_wanted:
-            self._clean_stamped(name, sink, payload, arrival_ns)
-        if self._held:
+            self._correct_stamped(name, sink, payload, arrival_ns)
+        if self._waiting:
             self._release()
 
     def _release(self) -> None:
-        held, self._held = self._held, []
-        for write, start, data in held:
+        waiting, self._waiting = self._waiting, []
+        for write, start, data in waiting:
             write(start, data)
 
     def _pack_pose(self) -> bytes:
@@ -281,10 +279,10 @@ class RobotCorrections:
             self._odom_sink.publish(written)
 
     def _take_odom_transform(self, head: bytes, tail: bytes) -> None:
-        if not self._held:
+        if not self._waiting:
             self._write_odom_transform(head, tail)
-        elif len(self._held) < HELD_MAX:
-            self._held.append((self._write_odom_transform, head, tail))
+        elif len(self._waiting) < WAITING_MAX:
+            self._waiting.append((self._write_odom_transform, head, tail))
         else:
             self._refused += 1
 

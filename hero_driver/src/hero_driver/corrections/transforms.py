@@ -1,6 +1,6 @@
-"""Transforms of one robot -> those of its own frames, each with a stamp that can be trusted.
+"""Keeps the transforms of a robot's own frames and corrects their stamps.
 
-Takes payloads of tf2_msgs/TFMessage, gives single transforms; knows no ROS and no socket.
+Takes payloads of tf2_msgs/TFMessage, gives single transforms.
 """
 
 import re
@@ -31,8 +31,6 @@ class TransformCorrector:
     """The transforms of one robot; one per robot, kept over its reconnects.
 
     Attributes:
-        passed_ns: the stamp that was right last, so that it needs no other look for this burst's other transforms; to
-            be set to 0 when a burst begins.
         refused: transforms and messages that could not be used.
         foreign_frames: frames of transforms that are not the robot's own, by name, for the report.
     """
@@ -44,12 +42,10 @@ class TransformCorrector:
         add_transform: AddTransform,
         take_odom_transform: TakeOdomTransform,
     ) -> None:
-        """Clean the transforms of the robot in namespace; the one that tells its odometry goes its own way."""
-        self.passed_ns = 0
+        """Correct the transforms of the robot in namespace; take_odom_transform() takes the one of its odometry."""
         self.refused = 0
         self.foreign_frames: Set[str] = set()
         self._stamps = stamps
-        self._last_ns = stamps.last_ns
         self._add_transform = add_transform
         self._take_odom_transform = take_odom_transform
         self._frame_prefix = namespace.lstrip("/").encode() + b"/"
@@ -58,39 +54,27 @@ class TransformCorrector:
         )
         self._own_frames: Set[bytes] = set()
         self._known_foreign: Set[bytes] = set()
-        self._passed_start = b""  # of the transform that had passed_ns
 
-    def clean(self, payload: bytes, arrival_ns: int) -> None:
+    def correct(self, payload: bytes, arrival_ns: int) -> None:
         """Take a message of transforms that came at arrival_ns."""
         # Stock robots send one transform in a message, of frames that were seen before.
         frames = payload[message_layouts.TRANSFORM_FRAMES]
-        last_ns = self._last_ns.get(frames)
-        if last_ns is None:
-            self._clean_unknown(payload, arrival_ns)
-            return
-        # All transforms of a burst have one stamp: what passes for the first passes for the others too.
-        if (
-            last_ns < self.passed_ns
-            and payload[message_layouts.TRANSFORM_START] == self._passed_start
-            and frames != self._odom_frames
-        ):
-            self._last_ns[frames] = self.passed_ns
-            self._add_transform(payload[message_layouts.TRANSFORM])
+        if frames not in self._own_frames:
+            self._correct_unknown(payload, arrival_ns)
             return
         count, _, secs, nsecs = message_layouts.read_transforms_start(payload)
         if count != 1:
-            self._clean_unknown(payload, arrival_ns)
+            self._correct_unknown(payload, arrival_ns)
             return
         stamp_ns = secs * NS_PER_S + nsecs
         corrected_ns = self._stamps.correct(frames, stamp_ns, arrival_ns)
         if corrected_ns == stamp_ns and nsecs < NS_PER_S:
-            self._passed_start, self.passed_ns = payload[message_layouts.TRANSFORM_START], stamp_ns
             head = payload[message_layouts.TRANSFORM_HEAD]
         else:
             head = message_layouts.pack_transform_head(corrected_ns, frames)
         self._pass_on(frames, head, payload[message_layouts.TRANSFORM_TAIL])
 
-    def _clean_unknown(self, payload: bytes, arrival_ns: int) -> None:
+    def _correct_unknown(self, payload: bytes, arrival_ns: int) -> None:
         transforms = message_layouts.read_transforms(payload)
         if transforms is None:
             self.refused += 1

@@ -231,9 +231,9 @@ class RobotBridge:
             elif self.corrections is None:
                 topic.receive = self._pass_transforms
             else:
-                topic.receive = self.corrections.choose(name, ros_type)
+                topic.receive = self.corrections.handler_for(name, ros_type)
             return []
-        derived = {} if self.corrections is None else self.corrections.find_derived(name, ros_type)
+        derived = {} if self.corrections is None else self.corrections.derive_topics(name, ros_type)
         for publisher_name in (name, *derived):
             self._publishers.setdefault(publisher_name, RawPublisher(QUEUE_LENGTH, self._context.loop.call_later))
         if self.corrections is None:
@@ -241,7 +241,7 @@ class RobotBridge:
             receive = self._pass_odometry if ros_type == ODOMETRY_TYPE else self._pass_message
             topic.receive = functools.partial(receive, publisher)
         else:
-            topic.receive = self.corrections.choose(name, ros_type)
+            topic.receive = self.corrections.handler_for(name, ros_type)
         return [(publisher_name, self._publishers[publisher_name]) for publisher_name in (name, *derived)]
 
     @staticmethod
