@@ -1,4 +1,4 @@
-"""Commands that wait -> packets on their way: takes from the robots' command queues what may go out now.
+"""Sends pending commands: takes from each robot's command queue the commands that may be sent now.
 
 Runs on the thread of the sockets, except wake(). A robot that does not acknowledge is asked again later and
 delays no other.
@@ -24,16 +24,16 @@ class CommandSender:
         call_later: Callable[[float, Callable[[], None]], None],
         find_peer: Callable[[RobotBridge], Optional[Peer]],
         is_stopped: Callable[[], bool],
-        complain: Callable[[Peer, str], None],
+        warn_robot: Callable[[Peer, str], None],
     ) -> None:
-        """Take the loop's functions; find_peer gives a robot's connection, complain reports its trouble.
+        """Take the loop's functions; find_peer gives a robot's connection, warn_robot reports its trouble.
 
         is_stopped(): whether no robot may get anything but stops.
         """
         self._call_later = call_later
         self._find_peer = find_peer
         self._is_stopped = is_stopped
-        self._complain = complain
+        self._warn_robot = warn_robot
 
     def send_message(self, peer: Peer, topic_id: int, payload: bytes) -> None:
         """Send one message now, if the connection declared its id and it fits."""
@@ -42,17 +42,17 @@ class CommandSender:
         try:
             packet = peer.session.encode_message(topic_id, payload)
         except RosserialError as error:
-            self._complain(peer, str(error))
+            self._warn_robot(peer, str(error))
             return
         peer.link.send_packet(packet)
 
     def send_commands(self, bridge: RobotBridge) -> None:
-        """Send what waits for a robot and may go out; come back for the remainder."""
+        """Send the commands of a robot that may go out; come back for the remainder."""
         peer = self._find_peer(bridge)
         if peer is None:
             return
         if peer.send_due:
-            # A timer is set already for what has to wait; the rest need not.
+            # A timer is set already for commands that have to wait.
             self._send_ready(peer, time.monotonic())
         else:
             self._send_and_come_back(peer)
@@ -75,10 +75,10 @@ class CommandSender:
         if self._is_stopped():
             # What a thread of rospy's offered just before the stop.
             bridge.commands.discard_motion(now_s)
-        holds_motion = bridge.wheels.readings > 0 and now_s - peer.session.last_receive_s > HEARD_S
+        stops_only = bridge.wheels.readings > 0 and now_s - peer.session.last_receive_s > HEARD_S
         in_flight = link.read_unacknowledged_length()
         acknowledged = link.handed_length - in_flight >= peer.motion_mark
-        for name, payload in bridge.commands.take(in_flight, acknowledged, holds_motion, now_s):
+        for name, payload in bridge.commands.take(in_flight, acknowledged, stops_only, now_s):
             topic_id = bridge.find_id(name)
             if topic_id is None:
                 bridge.refused_commands += 1
@@ -87,4 +87,4 @@ class CommandSender:
             if bridge.is_motion(name):
                 peer.motion_mark = link.handed_length
                 acknowledged = False
-        return acknowledged and not holds_motion
+        return acknowledged and not stops_only

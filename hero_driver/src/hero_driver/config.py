@@ -12,6 +12,7 @@ from typing import Any, Dict, Mapping, Tuple
 
 from .corrections.tick_odometry import WheelGeometry
 from .fleet.admission import AdmissionLimits, Network
+from .robot_constants import TICKS_PER_TURN, WHEEL_DIAMETER_M, WHEEL_SEPARATION_M
 from .rosserial.session import SessionLimits
 from .transport import Address
 
@@ -85,9 +86,9 @@ class DriverConfig:
     odometry: str = _choice(
         "ticks", ("ticks", "robot"), "source of odom: encoder ticks, or the robot's own estimate"
     )
-    wheel_diameter_m: float = _number(0.0492, 0.001, 1.0, "m", "diameter of a wheel")
-    wheel_separation_m: float = _number(0.063, 0.001, 1.0, "m", "distance between the wheels")
-    ticks_per_turn: float = _number(288.0, 1.0, 1000000.0, "", "encoder ticks per revolution of a wheel")
+    wheel_diameter_m: float = _number(WHEEL_DIAMETER_M, 0.001, 1.0, "m", "diameter of a wheel")
+    wheel_separation_m: float = _number(WHEEL_SEPARATION_M, 0.001, 1.0, "m", "distance between the wheels")
+    ticks_per_turn: float = _number(TICKS_PER_TURN, 1.0, 1000000.0, "", "encoder ticks per revolution of a wheel")
     pose_covariance: Tuple[float, ...] = _plain(
         (1e-4, 1e-4, 1e-9, 1e-9, 1e-9, 1e-2),
         "diagonal of odom's pose covariance: x, y, z, roll, pitch, yaw",
@@ -116,7 +117,7 @@ class DriverConfig:
 
     @property
     def session_limits(self) -> SessionLimits:
-        """What one conversation may do."""
+        """Limits of one session."""
         return SessionLimits(
             self.max_payload_length,
             self.max_topics,
@@ -126,7 +127,7 @@ class DriverConfig:
 
     @property
     def admission_limits(self) -> AdmissionLimits:
-        """Who may connect."""
+        """Limits on connections."""
         return AdmissionLimits(
             self.allow,
             self.max_connections,
@@ -138,7 +139,7 @@ class DriverConfig:
 
     @property
     def wheel_geometry(self) -> WheelGeometry:
-        """What turns ticks into metres."""
+        """Converts ticks into metres."""
         return WheelGeometry(self.wheel_diameter_m, self.wheel_separation_m, self.ticks_per_turn)
 
 

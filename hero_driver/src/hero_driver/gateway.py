@@ -90,10 +90,10 @@ class Gateway(LinkHandler):
         """Begin to serve what loop brings."""
         self._loop = loop
         self._sender = CommandSender(
-            loop.call_later, self._find_peer, lambda: self.stopped, self._complain
+            loop.call_later, self._find_peer, lambda: self.stopped, self._warn_robot
         )
-        self._stops = StopDelivery(loop.call_later, lambda: self.stopped, self._on_change, self._complain)
-        self._requests = RobotRequests(self._config, self._log, loop.call_soon, self._complain)
+        self._stops = StopDelivery(loop.call_later, lambda: self.stopped, self._on_change, self._warn_robot)
+        self._requests = RobotRequests(self._config, self._log, loop.call_soon, self._warn_robot)
         self._transforms = TransformPublisher(self._config.transform_period_s, loop.call_later)
         self._context = BridgeContext(
             loop=loop,
@@ -252,11 +252,11 @@ class Gateway(LinkHandler):
         elif isinstance(event, ParameterRequested):
             self._requests.answer_parameter(peer, event.name)
         elif isinstance(event, Problem):
-            self._complain(peer, event.text)
+            self._warn_robot(peer, event.text)
         elif isinstance(event, SessionEnded):
             peer.link.close(event.reason)
 
-    def _complain(self, peer: Peer, text: str) -> None:
+    def _warn_robot(self, peer: Peer, text: str) -> None:
         if peer.record is not None:
             peer.record.dropped_messages += 1
             peer.record.last_error = text
@@ -285,7 +285,7 @@ class Gateway(LinkHandler):
         is_published = topic.kind is TopicKind.PUBLISHER
         refusal = self._names.find_refusal(info.name, info.message_type, is_published, identity)
         if refusal is not None:
-            self._complain(peer, "topic %s refused: %s" % (ascii(info.name), refusal))
+            self._warn_robot(peer, "topic %s refused: %s" % (ascii(info.name), refusal))
             return None
         return self._names.resolve(info.name, identity)
 
@@ -298,7 +298,7 @@ class Gateway(LinkHandler):
                 if topic.info.name in namespaces.TF_TOPICS:
                     peer.early_topics = [*peer.early_topics[-7:], topic]
                 else:
-                    self._complain(
+                    self._warn_robot(
                         peer,
                         "topic %s refused: not a name below /hero_N; for devices that are no HeRos set"
                         " ~namespace_policy to any" % ascii(topic.info.name),

@@ -1,4 +1,4 @@
-"""The state of the fleet -> ~robots (hero_msgs/RobotArray, latched) and /diagnostics (REP 107).
+"""Publishes the state of the fleet: ~robots (hero_msgs/RobotArray, latched) and /diagnostics (REP 107).
 
 Runs on the main thread of the node; gets the states as values from the thread of the sockets.
 """
@@ -20,7 +20,7 @@ LARGE_CLOCK_OFFSET_S = 0.5
 
 
 class FleetStatus(NamedTuple):
-    """What one report tells."""
+    """The state of one driver and its robots at one moment."""
 
     now_s: float  # monotonic, when it was put together
     listening: str
@@ -133,7 +133,7 @@ class Reporter:
     def _make_robot_task(self, namespace: str) -> Callable[[Any], Any]:
         def diagnose(stat: Any) -> Any:
             robot = self._known[namespace]
-            stat.summary(*_judge(robot))
+            stat.summary(*_assess(robot))
             packets_per_s, bytes_per_s = self._rates.get(namespace, (0.0, 0.0))
             for key, value in (
                 ("address", robot.address),
@@ -161,14 +161,14 @@ class Reporter:
         return diagnose
 
 
-def _judge(robot: RobotStatus) -> Tuple[int, str]:
+def _assess(robot: RobotStatus) -> Tuple[int, str]:
     """Return level and text of a robot's diagnostic status."""
     if robot.stop_state is StopState.MOVING:
         return DiagnosticStatus.ERROR, "its wheels turn although it was stopped"
     if robot.refused:
         return DiagnosticStatus.ERROR, robot.refused[0][1]
-    if robot.complaint:
-        return DiagnosticStatus.ERROR, robot.complaint
+    if robot.problem:
+        return DiagnosticStatus.ERROR, robot.problem
     if robot.state is RobotState.AWAY:
         return DiagnosticStatus.ERROR, "away: %s" % robot.last_error
     if robot.state is RobotState.JOINING:

@@ -1,4 +1,4 @@
-"""What robots log: versions at boot, uptime, self-tuning, and lines for /rosout. Thread of the sockets."""
+"""Reads log lines of robots (versions, uptime, self-tuning) and relays them to /rosout. On the event loop's thread."""
 
 from .fleet import log_lines
 from .fleet.registry import RobotRecord

@@ -1,4 +1,4 @@
-"""What is known of one robot, put together for reports. Thread of the sockets."""
+"""Collects the state of one robot for reports. Runs on the event loop's thread."""
 
 from dataclasses import dataclass
 from typing import List, Optional, Tuple
@@ -36,7 +36,7 @@ class RobotStatus:
     corrected_stamps: int
     odometry_resets: int
     last_error: str
-    complaint: str  # what is wrong now; empty if nothing is
+    problem: str  # what is wrong now; empty if nothing is
     foreign_frames: List[str]
     refused: List[Tuple[str, str]]  # address and reason of each duplicate that waits
 
@@ -51,10 +51,10 @@ def describe_robot(
     """Return the state of the robot that record tells of; bridge and peer are its own, where it has them."""
     corrections = None if bridge is None else bridge.corrections
     dropped = record.dropped_messages
-    complaint = ""
+    problem = ""
     if bridge is not None:
         dropped += bridge.refused_commands + bridge.commands.dropped
-        complaint = bridge.last_error
+        problem = bridge.last_error
     if corrections is not None:
         dropped += corrections.refused
     packets, bad_packets, received_length = record.packets, record.bad_packets, record.received_length
@@ -83,8 +83,8 @@ def describe_robot(
         clock_offset_s=0.0 if corrections is None else corrections.clock_offset_s,
         corrected_stamps=0 if corrections is None else corrections.corrected_stamps,
         odometry_resets=0 if corrections is None else corrections.odometry.resets,
-        last_error=complaint or record.last_error,
-        complaint=complaint,
+        last_error=problem or record.last_error,
+        problem=problem,
         foreign_frames=[] if corrections is None else sorted(corrections.transforms.foreign_frames),
         refused=sorted(record.refused.items())[:DUPLICATES_SHOWN],
     )

@@ -1,4 +1,4 @@
-"""How ROS programs stop all robots of the driver: the service ~stop, the topic ~stop_request, and what is kept.
+"""The emergency stop in ROS: the service ~stop, the topic ~stop_request, and the stop kept over restarts.
 
 Programs connect to ~stop_request at their start, so that it works while the ROS master is dead, hung or slow, and ask
 until ~robots says that the robots are stopped. Whether they are is kept on the parameter server (~stopped) for a driver

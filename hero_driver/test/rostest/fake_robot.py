@@ -123,12 +123,12 @@ class Velocity(NamedTuple):
     time_s: float
     name: str
     linear_m_s: float
-    turn_rad_s: float
+    angular_rad_s: float
 
     @property
     def is_zero(self) -> bool:
         """Whether it is a stop."""
-        return self.linear_m_s == 0.0 and self.turn_rad_s == 0.0
+        return self.linear_m_s == 0.0 and self.angular_rad_s == 0.0
 
 
 def encode_answer(success: bool, message: str) -> bytes:

@@ -105,9 +105,9 @@ def make_imu(name, stamp):
     return to_bytes(message)
 
 
-def make_twist(linear_m_s, turn_rad_s):
+def make_twist(linear_m_s, angular_rad_s):
     """Return the payload of a velocity command."""
-    return struct.pack("<6d", linear_m_s, 0.0, 0.0, 0.0, 0.0, turn_rad_s)
+    return struct.pack("<6d", linear_m_s, 0.0, 0.0, 0.0, 0.0, angular_rad_s)
 
 
 def send_burst(robot, left_ticks, right_ticks, stamp=None, x_m=0.0, yaw_rad=0.0):

@@ -185,7 +185,7 @@ class TestDriverCommands(DriverCase):
         robot = self.join(12)
         make_publisher("/hero_12/" + VELOCITY, Twist).publish(make_command(5.0, -50.0))
         wait_for(lambda: robot.velocities, "the command")
-        self.assertEqual((robot.velocities[0].linear_m_s, robot.velocities[0].turn_rad_s), (5.0, -50.0))
+        self.assertEqual((robot.velocities[0].linear_m_s, robot.velocities[0].angular_rad_s), (5.0, -50.0))
 
     def test_the_stop_service_halts_every_robot_and_holds_it_until_released(self):
         held = Recorder(NODE + "/stopped", Bool)

@@ -272,7 +272,7 @@ class TestDriverPolicy(OwnDriverCase):
         publisher = make_publisher("/hero_8/velocity_controller/cmd_vel", Twist)
         publisher.publish(stock_messages.from_bytes(Twist, stock_messages.make_twist(5.0, -50.0)))
         wait_for(lambda: robot.velocities, "the command")
-        self.assertEqual((robot.velocities[0].linear_m_s, robot.velocities[0].turn_rad_s), (0.20, -8.0))
+        self.assertEqual((robot.velocities[0].linear_m_s, robot.velocities[0].angular_rad_s), (0.20, -8.0))
 
 
 if __name__ == "__main__":

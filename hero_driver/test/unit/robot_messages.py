@@ -27,7 +27,7 @@ def build_encoder(stamp_ns, left_ticks, right_ticks, robot="hero_0"):
     return build_header(stamp_ns, robot + "/encoder") + struct.pack("<11d", *fields)
 
 
-def build_odometry(stamp_ns, x_m=0.0, y_m=0.0, yaw_rad=0.0, linear_m_s=0.0, turn_rad_s=0.0, robot="hero_0"):
+def build_odometry(stamp_ns, x_m=0.0, y_m=0.0, yaw_rad=0.0, linear_m_s=0.0, angular_rad_s=0.0, robot="hero_0"):
     """Return a nav_msgs/Odometry with covariances of zero."""
     return b"".join(
         (
@@ -35,7 +35,7 @@ def build_odometry(stamp_ns, x_m=0.0, y_m=0.0, yaw_rad=0.0, linear_m_s=0.0, turn
             build_text(robot + "/base_link"),
             struct.pack("<7d", x_m, y_m, 0.0, 0.0, 0.0, math.sin(yaw_rad / 2.0), math.cos(yaw_rad / 2.0)),
             bytes(36 * 8),
-            struct.pack("<6d", linear_m_s, 0.0, 0.0, 0.0, 0.0, turn_rad_s),
+            struct.pack("<6d", linear_m_s, 0.0, 0.0, 0.0, 0.0, angular_rad_s),
             bytes(36 * 8),
         )
     )

@@ -30,8 +30,8 @@ def offer(queue, name, twist, now_s):
     queue.offer_motion(name, twist, ZERO_TWIST, now_s)
 
 
-def take(queue, now_s, in_flight_length=0, motion_acknowledged=True, holds_motion=False):
-    return queue.take(in_flight_length, motion_acknowledged, holds_motion, now_s)
+def take(queue, now_s, in_flight_length=0, motion_acknowledged=True, stops_only=False):
+    return queue.take(in_flight_length, motion_acknowledged, stops_only, now_s)
 
 
 def test_an_empty_queue_is_idle_and_has_nothing_to_send():
@@ -166,7 +166,7 @@ def test_motion_is_held_for_a_robot_that_is_not_heard_and_stops_are_not():
     queue = make_queue()
     offer(queue, VELOCITY, FAST, 0.0)
     offer(queue, POSITION, ZERO_TWIST, 0.0)
-    assert take(queue, 0.0, holds_motion=True) == [(POSITION, ZERO_TWIST)]
+    assert take(queue, 0.0, stops_only=True) == [(POSITION, ZERO_TWIST)]
     assert queue.due_in_s(False, 0.0) >= RETRY_S
     assert take(queue, 1.0)[0] == (VELOCITY, FAST)
 

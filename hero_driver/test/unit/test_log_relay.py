@@ -80,5 +80,5 @@ def test_ever_new_complaints_about_one_robot_are_limited_and_those_about_others_
     relay.log_throttled("error", "other", "about another robot", group="hero_2")
     relay.close()
     assert len(texts) == GROUP_LINES_MAX + 2
-    assert "the rest is left out" in texts[GROUP_LINES_MAX][1]
+    assert "further ones are suppressed" in texts[GROUP_LINES_MAX][1]
     assert texts[-1] == ("ERROR", "about another robot")

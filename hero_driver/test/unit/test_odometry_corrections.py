@@ -74,9 +74,9 @@ def test_odometry_has_covariances_and_the_velocity_of_the_wheels():
     robot = CorrectedRobot()
     for number in range(10):
         robot.receive_burst(NOW_NS + number * PERIOD_NS, (-2.0 * number, 2.0 * number))
-    *_, linear_m_s, turn_rad_s, pose_covariance, twist_covariance = list_odometry(robot.outputs)[-1]
+    *_, linear_m_s, angular_rad_s, pose_covariance, twist_covariance = list_odometry(robot.outputs)[-1]
     assert linear_m_s == pytest.approx(0.0, abs=1e-9)
-    assert turn_rad_s == pytest.approx(4.0 * TICK_M / 0.063 / 0.034)
+    assert angular_rad_s == pytest.approx(4.0 * TICK_M / 0.063 / 0.034)
     assert pose_covariance[::7] == (1e-4, 1e-4, 1e-9, 1e-9, 1e-9, 1e-2)
     assert twist_covariance[::7] == (1e-4, 1e-9, 1e-9, 1e-9, 1e-9, 1e-2)
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hero_driver.commands.service_requests import find_request_fault, is_success, read_set_odom_pose
+from hero_driver.commands.service_requests import find_request_error, is_success, read_set_odom_pose
 from hero_driver.corrections.tick_odometry import Pose
 
 GOOD = {
@@ -21,7 +21,7 @@ GOOD = {
 @pytest.mark.parametrize("service_type", GOOD)
 def test_a_reasonable_request_may_go(service_type):
     layout, values = GOOD[service_type]
-    assert find_request_fault(service_type, struct.pack(layout, *values)) is None
+    assert find_request_error(service_type, struct.pack(layout, *values)) is None
 
 
 @pytest.mark.parametrize("service_type", GOOD)
@@ -30,7 +30,7 @@ def test_a_request_of_another_length_is_refused(service_type, change):
     layout, values = GOOD[service_type]
     request = struct.pack(layout, *values)
     request = request + bytes(change) if change > 0 else request[:change]
-    assert "not a " + service_type in find_request_fault(service_type, request)
+    assert "not a " + service_type in find_request_error(service_type, request)
 
 
 @pytest.mark.parametrize("service_type", ["hero_msgs/SetOdom", "hero_msgs/SetPID", "hero_msgs/SetIRCalibration"])
@@ -39,13 +39,13 @@ def test_an_absurd_number_anywhere_is_refused(service_type, value):
     layout, values = GOOD[service_type]
     for position in range(len(values)):
         changed = [*values[:position], value, *values[position + 1 :]]
-        assert find_request_fault(service_type, struct.pack(layout, *changed)) is not None
+        assert find_request_error(service_type, struct.pack(layout, *changed)) is not None
 
 
 @pytest.mark.parametrize("pulse_us", [-32768, 0, 999, 2001, 32767])
 def test_pulses_that_no_servo_knows_are_refused(pulse_us):
     for pulses_us in ((pulse_us, 1500), (1500, pulse_us)):
-        fault = find_request_fault("hero_msgs/SetMotor", struct.pack("<2h", *pulses_us))
+        fault = find_request_error("hero_msgs/SetMotor", struct.pack("<2h", *pulses_us))
         assert str(pulse_us) in fault
         assert "1000..2000 us" in fault
 
@@ -53,21 +53,21 @@ def test_pulses_that_no_servo_knows_are_refused(pulse_us):
 @pytest.mark.parametrize("gain", [0.0, -0.5])
 def test_gains_of_infrared_sensors_are_above_zero(gain):
     request = struct.pack("<8d", *(0.42,) * 7, gain)
-    assert "above 0" in find_request_fault("hero_msgs/SetIRCalibration", request)
+    assert "above 0" in find_request_error("hero_msgs/SetIRCalibration", request)
 
 
 @pytest.mark.parametrize("position", range(6))
 def test_a_negative_gain_of_a_controller_is_refused_with_what_it_would_do(position):
     gains = [200.0, 0.0, 1.5, 200.0, 0.0, 1.5]
     gains[position] = -0.001
-    fault = find_request_fault("hero_msgs/SetPID", struct.pack("<6f", *gains))
+    fault = find_request_error("hero_msgs/SetPID", struct.pack("<6f", *gains))
     assert "-0.001" in fault
     assert "uses none and stores all" in fault
 
 
 def test_services_without_a_rule_take_every_request():
-    assert find_request_fault("std_srvs/Trigger", b"") is None
-    assert find_request_fault("some_srvs/Other", b"\xff" * 100) is None
+    assert find_request_error("std_srvs/Trigger", b"") is None
+    assert find_request_error("some_srvs/Other", b"\xff" * 100) is None
 
 
 def test_the_pose_of_set_odom_has_its_angle_within_half_a_turn():
@@ -83,7 +83,7 @@ def test_the_first_byte_of_an_answer_tells_success():
 
 @given(service_type=st.sampled_from([*GOOD, "std_srvs/Trigger"]), request=st.binary(max_size=80))
 def test_any_request_may_go_or_is_refused_in_one_line(service_type, request):
-    fault = find_request_fault(service_type, request)
+    fault = find_request_error(service_type, request)
     assert fault is None or fault.isprintable()
     if fault is None and service_type == "hero_msgs/SetOdom":
         assert all(map(math.isfinite, read_set_odom_pose(request)))

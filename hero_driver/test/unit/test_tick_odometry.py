@@ -53,7 +53,7 @@ def test_the_first_reading_moves_nothing():
     odometry = make_odometry()
     odometry.integrate(12345.0, -678.0, START_S)
     assert (odometry.x_m, odometry.y_m, odometry.yaw_rad) == (0.0, 0.0, 0.0)
-    assert (odometry.linear_m_s, odometry.turn_rad_s) == (0.0, 0.0)
+    assert (odometry.linear_m_s, odometry.angular_rad_s) == (0.0, 0.0)
 
 
 def test_equal_wheels_go_straight_ahead():
@@ -61,7 +61,7 @@ def test_equal_wheels_go_straight_ahead():
     drive(odometry, 0.1, 0.1, 100)
     assert_pose(odometry, 0.34, 0.0, 0.0)
     assert odometry.linear_m_s == pytest.approx(0.1)
-    assert odometry.turn_rad_s == pytest.approx(0.0, abs=1e-9)
+    assert odometry.angular_rad_s == pytest.approx(0.0, abs=1e-9)
 
 
 def test_equal_wheels_backwards_go_straight_back():
@@ -76,21 +76,21 @@ def test_opposite_wheels_spin_on_the_spot_counter_clockwise_when_the_right_one_g
     drive(odometry, -0.05, 0.05, 100)
     assert_pose(odometry, 0.0, 0.0, 0.1 / SEPARATION_M * 3.4)
     assert odometry.linear_m_s == pytest.approx(0.0, abs=1e-9)
-    assert odometry.turn_rad_s == pytest.approx(0.1 / SEPARATION_M)
+    assert odometry.angular_rad_s == pytest.approx(0.1 / SEPARATION_M)
 
 
 def test_a_whole_circle_ends_where_it_began():
     odometry = make_odometry()
     radius_m, readings = 0.3, 200
-    turn_rad_s = 2.0 * math.pi / (readings * PERIOD_S)
+    angular_rad_s = 2.0 * math.pi / (readings * PERIOD_S)
     drive(
         odometry,
-        turn_rad_s * (radius_m - SEPARATION_M / 2.0),
-        turn_rad_s * (radius_m + SEPARATION_M / 2.0),
+        angular_rad_s * (radius_m - SEPARATION_M / 2.0),
+        angular_rad_s * (radius_m + SEPARATION_M / 2.0),
         readings,
     )
     assert_pose(odometry, 0.0, 0.0, 0.0)
-    assert odometry.turn_rad_s == pytest.approx(turn_rad_s)
+    assert odometry.angular_rad_s == pytest.approx(angular_rad_s)
 
 
 def test_a_quarter_circle_to_the_left_is_exact_even_in_one_step():
@@ -122,18 +122,18 @@ def test_legs_follow_one_another_in_the_direction_that_the_robot_has():
 
 @given(
     speed_m_s=st.floats(-0.2, 0.2),
-    turn_rad_s=st.floats(-8.0, 8.0),
+    angular_rad_s=st.floats(-8.0, 8.0),
     readings=st.integers(1, 100),
 )
-def test_any_arc_ends_where_geometry_says_whatever_the_number_of_readings(speed_m_s, turn_rad_s, readings):
+def test_any_arc_ends_where_geometry_says_whatever_the_number_of_readings(speed_m_s, angular_rad_s, readings):
     odometry = make_odometry()
-    left_m_s = speed_m_s - turn_rad_s * SEPARATION_M / 2.0
-    right_m_s = speed_m_s + turn_rad_s * SEPARATION_M / 2.0
+    left_m_s = speed_m_s - angular_rad_s * SEPARATION_M / 2.0
+    right_m_s = speed_m_s + angular_rad_s * SEPARATION_M / 2.0
     drive(odometry, left_m_s, right_m_s, readings)
     duration_s = readings * PERIOD_S
-    yaw_rad = turn_rad_s * duration_s
+    yaw_rad = angular_rad_s * duration_s
     if abs(yaw_rad) > 1e-3:
-        radius_m = speed_m_s / turn_rad_s
+        radius_m = speed_m_s / angular_rad_s
         x_m, y_m = radius_m * math.sin(yaw_rad), radius_m * (1.0 - math.cos(yaw_rad))
     else:
         x_m, y_m = speed_m_s * duration_s, speed_m_s * duration_s * yaw_rad / 2.0
@@ -180,7 +180,7 @@ def test_the_velocity_is_zero_again_after_a_window_of_rest():
     odometry = make_odometry()
     ticks = drive(odometry, 0.1, 0.2, 20)
     drive(odometry, 0.0, 0.0, TWIST_WINDOW, ticks, START_S + 21 * PERIOD_S)
-    assert (odometry.linear_m_s, odometry.turn_rad_s) == (0.0, 0.0)
+    assert (odometry.linear_m_s, odometry.angular_rad_s) == (0.0, 0.0)
 
 
 def test_single_ticks_are_averaged_over_the_window():
@@ -235,7 +235,7 @@ def test_a_reboot_keeps_the_pose_and_ends_the_velocity():
     drive(odometry, 0.1, 0.1, 100)
     odometry.expect_reset()
     assert_pose(odometry, 0.34, 0.0, 0.0)
-    assert (odometry.linear_m_s, odometry.turn_rad_s) == (0.0, 0.0)
+    assert (odometry.linear_m_s, odometry.angular_rad_s) == (0.0, 0.0)
     odometry.integrate(0.0, 0.0, 2.0)
     assert_pose(odometry, 0.34, 0.0, 0.0)
     drive(odometry, 0.1, 0.1, 100, start_s=2.0)
@@ -248,7 +248,7 @@ def test_counters_that_begin_anew_unannounced_move_nothing_and_are_counted():
     drive(odometry, 0.1, 0.1, 300)
     odometry.integrate(0.0, 0.0, START_S + 301 * PERIOD_S)
     assert_pose(odometry, 1.02, 0.0, 0.0)
-    assert (odometry.linear_m_s, odometry.turn_rad_s) == (0.0, 0.0)
+    assert (odometry.linear_m_s, odometry.angular_rad_s) == (0.0, 0.0)
     assert odometry.resets == 1
     odometry.integrate(10.0, 10.0, START_S + 302 * PERIOD_S)
     assert_pose(odometry, 1.02 + 10.0 * TICK_M, 0.0, 0.0)
@@ -278,7 +278,7 @@ def test_what_the_wheels_did_during_a_pause_of_the_connection_counts():
     odometry.integrate(1.0 / TICK_M, 1.0 / TICK_M, START_S + 5.0)
     assert_pose(odometry, 1.0, 0.0, 0.0)
     assert MAX_STEP_S < 5.0
-    assert (odometry.linear_m_s, odometry.turn_rad_s) == (0.0, 0.0)
+    assert (odometry.linear_m_s, odometry.angular_rad_s) == (0.0, 0.0)
 
 
 @given(
@@ -291,5 +291,5 @@ def test_any_readings_leave_a_finite_pose_and_velocity(readings):
     for left_ticks, right_ticks, stamp_ms in readings:
         odometry.integrate(left_ticks, right_ticks, stamp_ms / 1000.0)
         assert math.isfinite(odometry.x_m) and math.isfinite(odometry.y_m)
-        assert math.isfinite(odometry.linear_m_s) and math.isfinite(odometry.turn_rad_s)
+        assert math.isfinite(odometry.linear_m_s) and math.isfinite(odometry.angular_rad_s)
         assert -math.pi <= odometry.yaw_rad <= math.pi

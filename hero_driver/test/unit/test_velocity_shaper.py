@@ -19,8 +19,8 @@ FIRMWARE_GATE_S = 0.05
 FIRMWARE_READ_CYCLE_S = 0.051
 
 
-def make_twist(linear_m_s=0.0, turn_rad_s=0.0, others=(0.0, 0.0, 0.0, 0.0)):
-    return struct.pack("<6d", linear_m_s, *others, turn_rad_s)
+def make_twist(linear_m_s=0.0, angular_rad_s=0.0, others=(0.0, 0.0, 0.0, 0.0)):
+    return struct.pack("<6d", linear_m_s, *others, angular_rad_s)
 
 
 def make_motion(number):

@@ -76,13 +76,13 @@ class CommandQueue:
         return not self._waiting and all(shaper.is_idle for shaper in self._shapers.values())
 
     def take(
-        self, in_flight_length: int, motion_acknowledged: bool, holds_motion: bool, now_s: float
+        self, in_flight_length: int, motion_acknowledged: bool, stops_only: bool, now_s: float
     ) -> List[Command]:
         """Return what may be sent now.
 
         in_flight_length: bytes that the robot has not acknowledged; motion_acknowledged: whether the last
         motion command is not among them. Two velocities in flight could reach the robot together, and it would
-        take the older one. holds_motion: send stops only, motion waits.
+        take the older one. stops_only: send stops only, motion waits.
         """
         commands: List[Command] = []
         is_idle = motion_acknowledged
@@ -90,7 +90,7 @@ class CommandQueue:
             for name, shaper in self._shapers.items():
                 if now_s - self._offered_s.get(name, now_s) > self._max_age_s:
                     shaper.discard_motion()
-                payload = shaper.take(now_s, holds_motion)
+                payload = shaper.take(now_s, stops_only)
                 if payload is not None:
                     commands.append((name, payload))
                 is_idle = is_idle and shaper.is_idle

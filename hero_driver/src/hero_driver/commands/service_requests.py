@@ -9,6 +9,7 @@ import struct
 from typing import NamedTuple, Optional
 
 from ..corrections.tick_odometry import Pose
+from ..robot_constants import MOTOR_PULSES_US
 
 _SET_ODOM = struct.Struct("<3d")
 
@@ -28,14 +29,14 @@ _RULES = {
         1e6,
         "gains must be finite, from 0 to 1e6; of a set with a negative one the robot uses none and stores all",
     ),
-    "hero_msgs/SetMotor": _Rule(struct.Struct("<2h"), 1000, 2000, "pulses must lie within 1000..2000 us"),
+    "hero_msgs/SetMotor": _Rule(struct.Struct("<2h"), *MOTOR_PULSES_US, "pulses must lie within 1000..2000 us"),
     "hero_msgs/SetIRCalibration": _Rule(
         struct.Struct("<8d"), 1e-6, 1e3, "gains must be finite, above 0 and at most 1e3 counts m^2"
     ),
 }
 
 
-def find_request_fault(service_type: str, request: bytes) -> Optional[str]:
+def find_request_error(service_type: str, request: bytes) -> Optional[str]:
     """Return why a request to a service of service_type may not be sent, None if it may."""
     rule = _RULES.get(service_type)
     if rule is None:

@@ -79,7 +79,7 @@ class StopProgress:
 
         is_acknowledged: whether the robot's TCP has acknowledged the last stop.
         """
-        self._judge(is_acknowledged, now_s)
+        self._assess(is_acknowledged, now_s)
         if self.state is StopState.AT_REST or now_s < self._next_s:
             return False
         if self.state is StopState.UNCONFIRMED and (
@@ -110,7 +110,7 @@ class StopProgress:
             interval_s = max(interval_s, STUBBORN_INTERVAL_S)
         self._next_s = now_s + interval_s
 
-    def _judge(self, is_acknowledged: bool, now_s: float) -> None:
+    def _assess(self, is_acknowledged: bool, now_s: float) -> None:
         wheels = self._wheels
         if self.state is StopState.AT_REST:
             if wheels.still_readings < REST_READINGS:

@@ -10,24 +10,19 @@ import math
 import struct
 from typing import Optional
 
+from ..robot_constants import ANGULAR_LIMIT_RAD_S, LINEAR_LIMIT_M_S, MOTOR_CENTRE_US
+
 COMMAND_INTERVAL_S = 0.06
-"""Time between two commands to one controller: the firmware's 50 ms and some room for its 51 ms read cycle."""
+"""Time between two commands to one controller: the firmware drops one within 50 ms of the last accepted one."""
 
 STOP_REPEATS = 1
 """How often a stop is sent again."""
-
-LINEAR_LIMIT_M_S = 0.20
-"""The firmware's own limit (config.h:60)."""
-
-ANGULAR_LIMIT_RAD_S = 8.0
-"""The firmware's own limit (config.h:61)."""
 
 TWIST_LENGTH = 48
 _TWIST = struct.Struct("<6d")
 
 ZERO_TWIST = bytes(TWIST_LENGTH)
 
-MOTOR_CENTRE_US = 1500
 STOPPED_MOTORS = struct.pack("<hh", MOTOR_CENTRE_US, MOTOR_CENTRE_US)
 
 STOP_PAYLOADS = {"geometry_msgs/Twist": ZERO_TWIST, "hero_msgs/Motor": STOPPED_MOTORS}
@@ -101,7 +96,7 @@ class VelocityShaper:
             self._newest = payload
 
     def discard_motion(self) -> None:
-        """Forget what waits except stops."""
+        """Drop pending motion, but not stops."""
         self._newest = None
 
     def delay_until(self, next_s: float) -> None:
@@ -114,15 +109,15 @@ class VelocityShaper:
             return None
         return max(0.0, self._next_s - now_s)
 
-    def take(self, now_s: float, holds_motion: bool = False) -> Optional[bytes]:
-        """Return the payload to send now, if any; with holds_motion only a stop."""
+    def take(self, now_s: float, stops_only: bool = False) -> Optional[bytes]:
+        """Return the payload to send now, if any; with stops_only nothing but a stop."""
         if now_s < self._next_s:
             return None
         if self._stop_pending:
             payload = self._stop_payload
             self._stop_pending = False
             self._repeats_left = STOP_REPEATS
-        elif self._newest is not None and not holds_motion:
+        elif self._newest is not None and not stops_only:
             payload = self._newest
             self._newest = None
             self._repeats_left = 0

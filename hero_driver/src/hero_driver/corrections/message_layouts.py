@@ -8,6 +8,7 @@ import math
 import struct
 from typing import Callable, List, NamedTuple, Optional, Sequence, Tuple
 
+from ..robot_constants import BODY_RADIUS_M, FARTHEST_RANGE_M, NEAREST_RANGE_M, PROXIMITY_BEAMS, STOCK_BEAMS
 from .stamps import NS_PER_S
 
 _HEADER = struct.Struct("<IIII")  # seq, secs, nsecs, length of frame_id
@@ -35,11 +36,6 @@ TRANSFORM_TAIL_LENGTH = _POSE.size  # translation and rotation
 ODOMETRY_TAIL_LENGTH = _POSE.size + _COVARIANCE.size + _TWIST.size + _COVARIANCE.size
 ENCODER_TAIL_LENGTH = 11 * 8
 
-PROXIMITY_BEAMS = 8
-STOCK_BEAMS = 16
-BODY_RADIUS_M = 0.0368  # RangeSensor.ino:66; ranges count from the robot's centre
-NEAREST_M = 0.01  # RangeSensor.ino:123, the firmware's clamp, from the body's rim
-FARTHEST_M = 0.20  # what range_max of the firmware means; beyond it stands for nothing in range
 CLAMP_TOLERANCE_M = 1e-4
 
 
@@ -133,8 +129,8 @@ class OdometryWriter:
             if not math.isfinite(sum(_POSE.unpack(pose)) + sum(_TWIST.unpack(twist))):
                 return None
         else:
-            pose, linear_m_s, turn_rad_s = estimate
-            twist = _TWIST.pack(linear_m_s, 0.0, 0.0, 0.0, 0.0, turn_rad_s)
+            pose, linear_m_s, angular_rad_s = estimate
+            twist = _TWIST.pack(linear_m_s, 0.0, 0.0, 0.0, 0.0, angular_rad_s)
         secs, nsecs = divmod(stamp_ns, NS_PER_S)
         head = _SEQ_AND_STAMP.pack(seq & 0xFFFFFFFF, secs, nsecs)
         return b"".join((head, frames, pose, self._pose_covariance, twist, self._twist_covariance))
@@ -192,7 +188,7 @@ TRANSFORM_FRAMES = slice(TRANSFORM_START.stop, -TRANSFORM_TAIL_LENGTH)
 TRANSFORM_TAIL = slice(-TRANSFORM_TAIL_LENGTH, None)
 
 read_transforms_start: Callable[[bytes], Tuple[int, int, int, int]] = struct.Struct("<IIII").unpack_from
-"""TFMessage bytes, at least 16 -> how many transforms it holds, and seq, secs and nsecs of the first."""
+"""Returns the number of transforms in at least 16 bytes of a TFMessage, and seq, secs and nsecs of the first."""
 
 
 def split_frames(frames: bytes) -> Tuple[bytes, bytes]:
@@ -236,7 +232,7 @@ def make_proximity(payload: bytes, seq: int, stamp_ns: int, scan_time_s: float) 
     fields = _STOCK_SCAN_TAIL.unpack_from(payload, header.end)
     if fields[7] != STOCK_BEAMS or fields[24] != STOCK_BEAMS:
         return None
-    range_min_m, range_max_m = BODY_RADIUS_M + NEAREST_M, BODY_RADIUS_M + FARTHEST_M
+    range_min_m, range_max_m = BODY_RADIUS_M + NEAREST_RANGE_M, BODY_RADIUS_M + FARTHEST_RANGE_M
     ranges_m = []
     for range_m in fields[8:24:2]:
         if range_m >= range_max_m - CLAMP_TOLERANCE_M:

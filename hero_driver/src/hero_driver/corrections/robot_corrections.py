@@ -9,6 +9,7 @@ import itertools
 from dataclasses import dataclass
 from typing import Any, Callable, DefaultDict, Deque, Dict, Iterator, List, Protocol, Tuple
 
+from ..robot_constants import SCAN_TIME_S
 from . import message_layouts
 from .stamps import NS_PER_S, StampFilter
 from .tick_odometry import Pose, TickOdometry, WheelGeometry
@@ -17,9 +18,6 @@ from .wheel_motion import WheelMotion
 
 TRANSFORMS = "/tf"
 """Name under which single transforms are returned; they are collected over all robots."""
-
-STOCK_SCAN_TIME_S = 0.2
-"""The robot scans at 5 Hz (RangeSensor rate 5); it leaves scan_time zero."""
 
 OFFSET_MAX_S = 86400.0
 """A clock that is further off is shown as that far off: a robot may stamp what it likes."""
@@ -203,7 +201,7 @@ class RobotCorrections:
             return
         name = self._proximity_name
         stamp_ns = self._stamps.correct(name, stamp_ns, arrival_ns)
-        proximity = message_layouts.make_proximity(payload, next(self._seqs[name]), stamp_ns, STOCK_SCAN_TIME_S)
+        proximity = message_layouts.make_proximity(payload, next(self._seqs[name]), stamp_ns, SCAN_TIME_S)
         if proximity is None:
             self._refused += 1
         else:
@@ -270,7 +268,7 @@ class RobotCorrections:
     def _write_odometry(self, stamp_ns: int, payload: bytes) -> None:
         odometry = self.odometry
         estimate = (
-            (self._packed_pose, odometry.linear_m_s, odometry.turn_rad_s) if self._uses_estimate else None
+            (self._packed_pose, odometry.linear_m_s, odometry.angular_rad_s) if self._uses_estimate else None
         )
         written = self._writer.rewrite(payload, next(self._odom_seqs), stamp_ns, estimate)
         if written is None:

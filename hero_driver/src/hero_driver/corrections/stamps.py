@@ -1,4 +1,4 @@
-"""Robot stamps -> stamps that ROS programs can trust: not in the future, never backwards, not uptime.
+"""Corrects stamps of robots: not in the future, never backwards, not uptime.
 
 The robot's clock is set anew every 2.5 s and jumps then (node_handle.h:361); before the first answer it
 counts from boot. Pure: stamps are integers in nanoseconds since the epoch, time of arrival comes in.

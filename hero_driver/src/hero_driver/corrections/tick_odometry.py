@@ -1,4 +1,4 @@
-"""Wheel ticks -> pose and velocity: differential-drive odometry on exact arcs.
+"""Differential-drive odometry from wheel ticks, on exact arcs.
 
 The firmware's own integration loses a third and more of the distance while the velocity controller drives
 (VelocityControl.ino:112 overwrites what Odometry.ino:130 has not read yet); its tick counters stay right.
@@ -11,11 +11,10 @@ import math
 from dataclasses import dataclass
 from typing import Deque, NamedTuple, Optional, Tuple
 
+from ..robot_constants import MAX_WHEEL_SPEED_M_S, TICKS_PER_TURN, WHEEL_DIAMETER_M, WHEEL_SEPARATION_M
+
 TWIST_WINDOW = 6
 """Readings over which the velocity is taken: one tick per reading would be 16 mm/s of noise, six make 3 mm/s."""
-
-MAX_WHEEL_SPEED_M_S = 1.0
-"""Faster than any servo of the robot: a larger step is a reset counter or garbage, not motion."""
 
 RESET_TICKS = 5
 """A robot that has just booted stands: its counters are this close to zero (3 mm) when it is heard again."""
@@ -34,9 +33,9 @@ MAX_STEP_S = 1.0
 class WheelGeometry:
     """What turns ticks into metres."""
 
-    wheel_diameter_m: float = 0.0492
-    wheel_separation_m: float = 0.063
-    ticks_per_turn: float = 288.0
+    wheel_diameter_m: float = WHEEL_DIAMETER_M
+    wheel_separation_m: float = WHEEL_SEPARATION_M
+    ticks_per_turn: float = TICKS_PER_TURN
 
     @property
     def tick_m(self) -> float:
@@ -57,15 +56,15 @@ class TickOdometry:
 
     Attributes:
         x_m, y_m, yaw_rad: the pose in frame hero_N/odom.
-        linear_m_s, turn_rad_s: the velocity over the last TWIST_WINDOW readings, in frame hero_N/base_link; zero while
-            there are less than two.
+        linear_m_s, angular_rad_s: the velocity over the last TWIST_WINDOW readings, in frame hero_N/base_link; zero
+            while there are less than two.
         has_reading: whether there was one ever.
         resets: steps that were too large for a robot's motion.
     """
 
     def __init__(self, geometry: WheelGeometry) -> None:
         self.x_m = self.y_m = self.yaw_rad = 0.0
-        self.linear_m_s = self.turn_rad_s = 0.0
+        self.linear_m_s = self.angular_rad_s = 0.0
         self.resets = 0
         self.has_reading = False
         self._tick_m = geometry.tick_m
@@ -115,6 +114,7 @@ class TickOdometry:
         if is_moving:
             gap_s = MIN_GAP_S if elapsed_s <= MIN_GAP_S else min(elapsed_s, MAX_GAP_S)
             limit_m = MAX_WHEEL_SPEED_M_S * gap_s
+            # A larger step is a reset counter or garbage, not motion.
             if -limit_m <= left_m <= limit_m and -limit_m <= right_m <= limit_m:
                 self._move(left_m, right_m)
             else:
@@ -129,12 +129,12 @@ class TickOdometry:
             speed = self._tick_m / (stamp_s - first_s)
             left_m_s, right_m_s = (left_ticks - first_left) * speed, (right_ticks - first_right) * speed
             self.linear_m_s = (left_m_s + right_m_s) / 2.0
-            self.turn_rad_s = (right_m_s - left_m_s) / self._separation_m
+            self.angular_rad_s = (right_m_s - left_m_s) / self._separation_m
         return is_moving
 
     def _forget_velocity(self) -> None:
         self._window.clear()
-        self.linear_m_s = self.turn_rad_s = 0.0
+        self.linear_m_s = self.angular_rad_s = 0.0
 
     def _move(self, left_m: float, right_m: float) -> None:
         """Follow the arc that two wheels describe which run left_m and right_m at steady speeds."""

@@ -1,4 +1,4 @@
-"""Log lines of a robot -> clean text and what they tell about it: versions at boot, uptime once a second.
+"""Sanitises and parses log lines of robots: versions at boot, uptime once a second, self-tuning.
 
 The texts are the firmware's (ROSHandle.ino:92, 116). Log texts are untrusted: what could forge a line, move
 a cursor or colour a terminal is taken out. Pure.

@@ -1,4 +1,4 @@
-"""Who a robot is and which names it may use: namespace /hero_N, and nothing outside of it. Pure."""
+"""Identities of robots and the names that they may use: those within /hero_N. Pure."""
 
 import re
 from typing import NamedTuple, Optional
@@ -10,7 +10,7 @@ HERO_PREFIX = "hero"
 TF_TOPICS = frozenset(("/tf", "tf"))
 
 ROS_TOPICS = frozenset(("/rosout", "/rosout_agg", "/diagnostics", "/diagnostics_agg", "/clock", "/tf_static"))
-"""What programs read about all of ROS: no device may speak there."""
+"""Topics about all of ROS: no device may publish on them."""
 
 DRIVER_NAMES = frozenset(("robots", "stop", "stop_request", "stopped", "disconnect"))
 """Last parts of the names that drivers serve, by which programs find drivers, and stop robots."""
@@ -68,9 +68,9 @@ def resolve(topic_name: str, identity: Identity) -> Optional[str]:
 
 
 class NameRules:
-    """What the names that robots declare stand for, and which of them they may not use.
+    """Resolves declared names, and refuses those that robots may not use.
 
-    One robot may not speak for the fleet: neither publish, serve nor call what drivers serve.
+    No robot may act as a driver: neither publish, serve nor call what drivers serve.
     """
 
     def __init__(self, policy: str, node: str) -> None:

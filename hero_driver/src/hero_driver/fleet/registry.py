@@ -57,7 +57,7 @@ but what duplicates are shown as."""
 
 
 class Verdict(enum.Enum):
-    """What becomes of a connection that said who it is."""
+    """What becomes of a connection that claims an identity."""
 
     ARRIVED = "arrived"  # first time
     RETURNED = "returned"  # was away
@@ -101,7 +101,7 @@ class RobotRecord:
 
 @dataclass(frozen=True)
 class Decision:
-    """What FleetRegistry.claim_identity() says about a connection."""
+    """The answer of FleetRegistry.claim_identity()."""
 
     verdict: Verdict
     record: RobotRecord
@@ -165,7 +165,7 @@ class FleetRegistry:
         return refused_s is not None and record.last_heard_s > refused_s
 
     def leave(self, link: Any, reason: str, now_s: float) -> Optional[RobotRecord]:
-        """A connection is gone; return the robot that is away now, None if it was nobody's."""
+        """Handle the end of a connection; return the robot that is away now, None if it had none."""
         for record in self.robots.values():
             if record.link is link:
                 record.link = None

@@ -1,4 +1,4 @@
-"""Parameter requests of robots -> answers from the ROS parameter server, as rosserial gives them.
+"""Reads ROS parameters for robots, in the form that rosserial sends them.
 
 Integers and booleans, floats and texts, alone or in lists. A robot reads below its own namespace only,
 unless ~parameters_outside allows more. May block; runs on a worker.

@@ -30,13 +30,13 @@ class RobotRequests:
         config: DriverConfig,
         log: LogRelay,
         call_soon: Callable[[Call], None],
-        complain: Callable[[Peer, str], None],
+        warn_robot: Callable[[Peer, str], None],
     ) -> None:
-        """Take the loop's call_soon(); complain reports a robot's trouble."""
+        """Take the loop's call_soon(); warn_robot reports a robot's trouble."""
         self._may_leave = config.parameters_outside
         self._log = log
         self._call_soon = call_soon
-        self._complain = complain
+        self._warn_robot = warn_robot
         self._workers: Dict[str, Worker] = {}  # of the robots that have asked for anything
         self._services = ServiceClients(config.service_timeout_s)
 
@@ -85,7 +85,7 @@ class RobotRequests:
             if other.kind is TopicKind.CLIENT_ANSWERS and other.info.name == topic.info.name
         ]
         if not answers:
-            self._complain(peer, "calls service %s, whose answers it did not declare" % name)
+            self._warn_robot(peer, "calls service %s, whose answers it did not declare" % name)
             return
         answer_id = answers[0].info.topic_id
 
@@ -109,10 +109,10 @@ class RobotRequests:
                 lambda error: self._log.log_throttled("error", "requests", "%s: a request failed: %s" % (label, error)),
             )
         if not self._workers[label].submit(call):
-            self._complain(peer, "asks for too much at once: %d requests wait" % REQUESTS_WAITING_MAX)
+            self._warn_robot(peer, "asks for too much at once: %d requests wait" % REQUESTS_WAITING_MAX)
 
     def _send_parameter(self, peer: Peer, answer: ParameterAnswer) -> None:
         try:
             peer.link.send_packet(peer.session.encode_parameter_answer(*answer))
         except RosserialError as error:
-            self._complain(peer, str(error))
+            self._warn_robot(peer, str(error))

@@ -1,4 +1,4 @@
-"""Services that robots call: their requests -> ROS services -> answers. Blocks: it is called on workers."""
+"""Calls ROS services for robots. Blocks: it is called on workers."""
 
 from typing import Any, Dict, Tuple
 

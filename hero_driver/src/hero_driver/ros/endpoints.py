@@ -1,4 +1,4 @@
-"""Publishers, subscribers and services of one robot in ROS: what asks the ROS master, and so may block.
+"""Registers the publishers, subscribers and services of one robot with the ROS master, which may block.
 
 Everything here is a job of the registrar, except what says otherwise. A topic or service that a robot declares again
 with another type or md5 is taken down first: programs made for the one before must not reach the other.
@@ -40,10 +40,10 @@ class Endpoints:
 
     @property
     def last_error(self) -> str:
-        """The newest complaint about a declared topic that still holds, empty if there is none (any thread)."""
+        """The newest problem about a declared topic that still holds, empty if there is none (any thread)."""
         return next(reversed(list(self._errors.values())), "")
 
-    def complain(self, name: str, text: str) -> None:
+    def report_error(self, name: str, text: str) -> None:
         """Log once what is wrong with a topic or service (any thread)."""
         if self._errors.get(name) != text:
             self._errors.pop(name, None)
@@ -128,14 +128,14 @@ class Endpoints:
                 )
 
     def _find_class(self, kind: str, name: str, layout: Layout) -> Optional[Any]:
-        """Return the class of a topic or service; None, after one clear complaint, if it cannot be used."""
+        """Return the class of a topic or service; None, after one clear problem, if it cannot be used."""
         if self._closed:
             return None
         find = message_types.find_service_class if kind == "service" else message_types.find_message_class
         try:
             found = find(layout.message_type, *layout.md5sums)
         except MessageTypeError as error:
-            self.complain(name, "%s %s refused: %s" % (kind, name, error))
+            self.report_error(name, "%s %s refused: %s" % (kind, name, error))
             return None
         self._errors.pop(name, None)
         return found

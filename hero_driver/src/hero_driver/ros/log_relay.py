@@ -1,4 +1,4 @@
-"""Log lines to /rosout on a thread of their own, the same complaint at most once in a while.
+"""Log lines to /rosout on a thread of their own, the same problem at most once in a while.
 
 rospy writes to the terminal and a file when it logs; both can block, so the thread of the sockets hands
 lines over here. When too many wait they are dropped and the number is logged.
@@ -19,7 +19,7 @@ THROTTLE_S = 10.0
 KNOWN_KEYS_MAX = 1000
 
 GROUP_LINES_MAX = 20
-"""Different complaints about one robot in THROTTLE_S; a peer can make up as many as it likes."""
+"""Different messages about one robot in THROTTLE_S."""
 
 HOST_LINES_MAX = 300
 """Lines about what comes from one address in THROTTLE_S, however many robots it says that it is; a hundred
@@ -85,7 +85,8 @@ class LogRelay:
             self._groups.clear()
         self._groups[group] = (start_s, lines + 1)
         if lines == most:
-            self.log("warn", "%s: more complaints than %d, the rest is left out for a while" % (group, lines))
+            text = "%s: more than %d different messages; further ones are suppressed for a while"
+            self.log("warn", text % (group, lines))
         return lines < most
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""Type names on the wire -> ROS classes that carry message bytes unread, their md5 checked.
+"""Finds ROS message classes for declared types, checks their md5, and makes classes that carry raw bytes.
 
 The firmware speaks of hero_common, the package that this suite's hero_msgs replaces on the PC, and of the
 tf package of old; both have equals with the same md5.

@@ -1,4 +1,4 @@
-"""Message bytes -> all subscribers of a topic, written at once by the thread that has them.
+"""Publishes raw messages to all subscribers of a topic, without waiting for a slow one.
 
 rospy gives each subscriber a thread and a queue; waking one thread per message costs about as much as all
 the rest of the driver. Here the thread of the sockets writes to the subscribers' sockets itself and never
@@ -53,11 +53,11 @@ class RawPublisher:
 
     @property
     def is_wanted(self) -> bool:
-        """Whether somebody listens."""
+        """Whether there is a subscriber."""
         return bool(self._impl.connections)
 
     def publish(self, payload: bytes) -> None:
-        """Send payload to everybody who listens."""
+        """Send payload to all subscribers."""
         connections = self._impl.connections
         if not connections:
             return

@@ -1,4 +1,4 @@
-"""Messages of ROS programs -> payloads, read by the thread of the sockets.
+"""Subscribes to a topic and passes on raw messages, read by the event loop's thread.
 
 rospy reads each publisher of a topic on a thread of its own; waking it, and then the thread of the sockets,
 for every command costs several times what the command itself costs. Here rospy does the registration and the

@@ -11,7 +11,7 @@ import time
 from typing import Callable, Dict, List, NamedTuple, Optional, Set, Tuple
 
 from ..commands.command_queue import CommandQueue
-from ..commands.service_requests import find_request_fault, is_success, read_set_odom_pose
+from ..commands.service_requests import find_request_error, is_success, read_set_odom_pose
 from ..commands.velocity_shaper import (
     STOP_PAYLOADS,
     STOPPED_MOTORS,
@@ -25,6 +25,7 @@ from ..corrections.robot_corrections import TRANSFORMS, CorrectionSettings, Robo
 from ..corrections.transforms import split_transforms
 from ..corrections.wheel_motion import WheelMotion
 from ..fleet.namespaces import Identity
+from ..robot_constants import LONGEST_WATCHDOG_S
 from ..rosserial.session import Topic, TopicKind
 from ..transport import EventLoop
 from . import message_types
@@ -45,9 +46,6 @@ TRANSFORM_TYPE = "tf2_msgs/TFMessage"
 TWIST_TYPE = "geometry_msgs/Twist"
 CALIBRATION_SUFFIX = "/pid_calibration"
 SET_ODOM_TYPE = "hero_msgs/SetOdom"
-
-LONGEST_WATCHDOG_S = 4.0
-"""After this time without a command the robot stops by itself (PositionControl.ino:105, MotorDriver.ino:111)."""
 
 TUNING_HEARD_S = 1.0
 """A robot that tunes itself logs up to 47 lines per second (VelocityControl.ino:118)."""
@@ -148,7 +146,7 @@ class RobotBridge:
 
     @property
     def last_error(self) -> str:
-        """The newest complaint about a declared topic that still holds, empty if there is none."""
+        """The newest problem about a declared topic that still holds, empty if there is none."""
         return self._endpoints.last_error
 
     # From the robot.
@@ -159,7 +157,7 @@ class RobotBridge:
         if name not in self._names:
             if len(self._names) >= self._context.max_names:
                 text = "topic %s refused: more than %d names (2 * max_topics)" % (name, len(self._names))
-                self._endpoints.complain("names", text)
+                self._endpoints.report_error("names", text)
                 return
             self._names.add(name)
         ros_type = message_types.apply_aliases(info.message_type)
@@ -227,7 +225,8 @@ class RobotBridge:
             return []
         if name == TRANSFORMS:
             if ros_type != TRANSFORM_TYPE:
-                self._endpoints.complain(name, "topic /tf refused: its type is %s, not %s" % (ros_type, TRANSFORM_TYPE))
+                text = "topic /tf refused: its type is %s, not %s" % (ros_type, TRANSFORM_TYPE)
+                self._endpoints.report_error(name, text)
             elif self.corrections is None:
                 topic.receive = self._pass_transforms
             else:
@@ -265,7 +264,7 @@ class RobotBridge:
         if requests is None or answers is None:
             return
         if requests.info.message_type != answers.info.message_type:
-            self._endpoints.complain(
+            self._endpoints.report_error(
                 name,
                 "service %s refused: its halves are %s and %s"
                 % (name, requests.info.message_type, answers.info.message_type),
@@ -418,7 +417,7 @@ class RobotBridge:
 
     def _send_request(self, name: str, service_type: str, request: bytes) -> Optional[str]:
         """Send a service request; return why not, if so."""
-        fault = find_request_fault(service_type, request) if self.corrections is not None else None
+        fault = find_request_error(service_type, request) if self.corrections is not None else None
         if fault is not None:
             return fault
         if not self._connected or name not in self._ids:
@@ -447,7 +446,7 @@ class RobotBridge:
                 job()
 
         if not self._registrar.submit(run):
-            self._endpoints.complain("registrar", "too many topics wait for the ROS master; is it reachable?")
+            self._endpoints.report_error("registrar", "too many topics wait for the ROS master; is it reachable?")
 
 
 def _has_known_layout(layout: Layout) -> bool:

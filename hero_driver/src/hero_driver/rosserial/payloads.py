@@ -1,4 +1,4 @@
-"""Payloads of rosserial's own packets <-> Python values; payloads of topics are not looked at here.
+"""Encodes and decodes the payloads of rosserial's own packets; payloads of topics are not touched here.
 
 Field order is the wire of rosserial_msgs: TopicInfo (id, name, type, md5, buffer size), Log (level, text),
 RequestParam (name and the lists ints, floats, strings) and std_msgs/Time (seconds, nanoseconds).

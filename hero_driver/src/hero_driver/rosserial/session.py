@@ -353,7 +353,7 @@ class Session:
 
     def _declare(self, kind: TopicKind, payload: bytes) -> Optional[Event]:
         info = payloads.decode_topic_info(payload)
-        fault = self._find_fault(info)
+        fault = self._find_error(info)
         if fault is not None:
             return Problem("topic %s refused: %s" % (_shorten(info.name), fault))
         topic = Topic(info, kind)
@@ -383,7 +383,7 @@ class Session:
                 topics[info.topic_id] = topic
         return TopicDeclared(topic)
 
-    def _find_fault(self, info: TopicInfo) -> Optional[str]:
+    def _find_error(self, info: TopicInfo) -> Optional[str]:
         """Return what is wrong with a declaration, or None."""
         limit = self._limits.max_name_length
         if len(info.name) > limit:

@@ -1,0 +1,42 @@
+"""Dimensions, limits and times of the HeRo and its firmware, each once, with its source."""
+
+BODY_RADIUS_M = 0.0368
+"""RangeSensor.ino:66; ranges count from the robot's centre."""
+
+WHEEL_DIAMETER_M = 0.0492
+WHEEL_SEPARATION_M = 0.063
+TICKS_PER_TURN = 288.0
+"""Encoder ticks per turn of a wheel."""
+
+MAX_WHEEL_SPEED_M_S = 1.0
+"""Faster than any servo of the robot."""
+
+NEAREST_RANGE_M = 0.01
+"""The firmware's clamp, from the body's rim (RangeSensor.ino:123)."""
+
+FARTHEST_RANGE_M = 0.20
+"""The firmware's range_max, from the body's rim; ranges beyond it stand for nothing in range."""
+
+PROXIMITY_BEAMS = 8
+"""Infrared sensors, pi/4 apart."""
+
+STOCK_BEAMS = 16
+"""Ranges of a stock laser message; the odd ones are averages."""
+
+SCAN_TIME_S = 0.2
+"""RangeSensor's rate is 5 Hz; it leaves scan_time zero."""
+
+LINEAR_LIMIT_M_S = 0.20
+"""config.h:60."""
+
+ANGULAR_LIMIT_RAD_S = 8.0
+"""config.h:61."""
+
+MOTOR_CENTRE_US = 1500
+"""Servo pulse at which a wheel stops, up to the servo's own centre."""
+
+MOTOR_PULSES_US = (1000, 2000)
+"""Shortest and longest servo pulse."""
+
+LONGEST_WATCHDOG_S = 4.0
+"""After this time without a command the robot stops by itself (PositionControl.ino:105, MotorDriver.ino:111)."""
