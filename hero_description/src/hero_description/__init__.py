@@ -1,1 +1,1 @@
-"""The robot's model: its dimensions, and the URDF made of them."""
+"""RViz for a swarm of HeRo robots."""

@@ -1,15 +1,13 @@
-"""RViz's tools "Publish Point" and "2D Nav Goal" -> goals for the robot that was clicked.
+"""Sends RViz's goals to the robot that was clicked.
 
-RViz calls all its goal tools by one name, so one for each robot could not be told apart. Here a point on a robot
-chooses it, a disc below it shows that, and goals go to it, on /hero_N/goal. Who drives there is another program:
-go_to_goal of hero_examples.
+RViz gives all its goal tools one name, so one for each robot could not be told apart. Here "Publish Point" on a robot
+selects it, a disc below it shows that, and "2D Nav Goal" is for the selected robot, on /hero_N/goal. Another program
+drives there: go_to_goal of hero_examples.
 
-    rosrun hero_description goal_choice --robots 0-3
+    rosrun hero_description goal_choice _robots:=0-3
 """
 
-import argparse
 import math
-import sys
 from typing import Dict, List, Optional
 
 import rospy
@@ -18,16 +16,21 @@ from geometry_msgs.msg import PointStamped, PoseStamped
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-from .dimensions import BODY_DIAMETER_M, GROUND_Z_M
+from hero_client.parameters import read_parameters
+from hero_client.program import Program, run
+
+from .robots_parameter import given_robots
 from .rviz_config import CHOICE_TOPIC, GOAL_TOPIC, POINT_TOPIC
-from .start import start_node
-from .view import ROBOTS_HELP, read_names
 
 LISTEN_S = 0.5
-"""How long it listens to /tf after a click: a swarm's /tf is too much to be read for nothing."""
+"""How long it listens to /tf after a click; reading a swarm's /tf all the time would cost too much."""
 
 REACH_M = 0.15
-"""A click farther from a robot's middle is on none."""
+"""A click farther from a robot's center selects none."""
+
+DISC_DIAMETER_M = 0.11
+GROUND_Z_M = -0.00912
+"""Where the wheels touch the ground, in base_link (urdf/hero.urdf: axle height less wheel radius)."""
 
 CHOSEN = ColorRGBA(0.05, 0.45, 0.95, 0.7)
 
@@ -74,12 +77,12 @@ class GoalChoice:
         distances_m = {}
         for name in self._names:
             try:
-                place = buffer.lookup_transform(point.header.frame_id, name + "/base_link", rospy.Time(0))
+                transform = buffer.lookup_transform(point.header.frame_id, name + "/base_link", rospy.Time(0))
             except tf2_ros.TransformException as error:
-                rospy.logdebug("where %s is, is not known: %s", name, error)
+                rospy.logdebug("no transform to %s: %s", name, error)
                 continue
-            there = place.transform.translation
-            distances_m[name] = math.hypot(there.x - point.point.x, there.y - point.point.y)
+            position = transform.transform.translation
+            distances_m[name] = math.hypot(position.x - point.point.x, position.y - point.point.y)
         nearest = min(distances_m, key=lambda name: distances_m[name], default=None)
         return nearest if nearest is not None and distances_m[nearest] < REACH_M else None
 
@@ -88,22 +91,20 @@ class GoalChoice:
         disc.header.frame_id = self._chosen + "/base_link"
         disc.pose.position.z = GROUND_Z_M
         disc.pose.orientation.w = 1.0
-        disc.scale.x = disc.scale.y = 1.5 * BODY_DIAMETER_M
+        disc.scale.x = disc.scale.y = DISC_DIAMETER_M
         disc.scale.z = 0.001
         self._markers.publish(MarkerArray([disc]))
 
 
+def choose_robots() -> None:
+    """Run until the node is to end."""
+    with Program("goal_choice") as program:
+        robots = read_parameters({"robots": given_robots()})["robots"]
+        GoalChoice(["hero_%d" % robot_id for robot_id in robots])
+        while program.sleep(10.0):
+            pass
+
+
 def main() -> None:
-    """Run the node goal_choice."""
-    parser = argparse.ArgumentParser(
-        prog="goal_choice", description="RViz's goals, for the robot that was clicked."
-    )
-    parser.add_argument("--robots", default="0", help=ROBOTS_HELP)
-    options = parser.parse_args(rospy.myargv()[1:])
-    try:
-        names = read_names(options.robots)
-    except ValueError as error:
-        sys.exit("goal_choice: --robots %s: %s" % (options.robots, error))
-    start_node("goal_choice")
-    GoalChoice(names)
-    rospy.spin()
+    """Run the program goal_choice."""
+    run(choose_robots)

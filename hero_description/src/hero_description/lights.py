@@ -1,60 +1,56 @@
-"""Colours that robots are told to show -> spheres on their hats, for RViz.
+"""Shows the colors that robots were told to display as spheres on their hats, for RViz.
 
-    rosrun hero_description lights --robots 0-3
+    rosrun hero_description lights _robots:=0-3
 
-The robot does not report its light; what is shown is the last colour on /hero_N/led, for as long as the firmware
-shows it. Works with simulated and real robots.
+Robots do not report their light: it is the last color on /hero_N/led, for as long as the firmware displays it.
 """
-
-import argparse
-from typing import Any
 
 import rospy
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-from .dimensions import DECK_THICKNESS_M, LIGHT_DIAMETER_M
+from hero_client.parameters import read_parameters
+from hero_client.program import Program, run
+
+from .robots_parameter import given_robots
 from .rviz_config import LIGHTS_TOPIC
-from .start import start_node
-from .view import ROBOTS_HELP, read_names
 
 LIGHT_S = 15.0
-"""The firmware lets the light go dark so long after the last command (LEDStatus.ino:76)."""
+"""The firmware switches the light off this long after the last command (LEDStatus.ino:76)."""
 
-GROWTH = 1.6
-"""A lit sphere covers the model's dark one."""
+LIGHT_Z_M = 0.002
+LIT_DIAMETER_M = 0.019
+"""Covers the model's dark light in hat_link (urdf/hero.urdf)."""
 
 
-def make_marker(name: str, number: int, colour: ColorRGBA) -> Marker:
-    """Return the sphere of one robot; it follows the robot's frame, and vanishes when the light goes dark."""
-    marker = Marker(type=Marker.SPHERE, ns="lights", id=number, frame_locked=True)
-    marker.header.frame_id = name + "/hat_link"
-    lit = max(colour.r, colour.g, colour.b) > 0.0
-    marker.action = Marker.ADD if lit else Marker.DELETE
-    marker.pose.position.z = DECK_THICKNESS_M
+def make_marker(robot_id: int, color: ColorRGBA) -> Marker:
+    """Return the sphere of one robot; it follows the robot's frame, and disappears when the light goes out."""
+    marker = Marker(type=Marker.SPHERE, ns="lights", id=robot_id, frame_locked=True)
+    marker.header.frame_id = "hero_%d/hat_link" % robot_id
+    marker.action = Marker.ADD if max(color.r, color.g, color.b) > 0.0 else Marker.DELETE
+    marker.pose.position.z = LIGHT_Z_M
     marker.pose.orientation.w = 1.0
-    marker.scale.x = marker.scale.y = marker.scale.z = GROWTH * LIGHT_DIAMETER_M
-    marker.color = ColorRGBA(colour.r, colour.g, colour.b, 1.0)
+    marker.scale.x = marker.scale.y = marker.scale.z = LIT_DIAMETER_M
+    marker.color = ColorRGBA(color.r, color.g, color.b, 1.0)
     marker.lifetime = rospy.Duration(LIGHT_S)
     return marker
 
 
+def show_lights() -> None:
+    """Publish a sphere for each color."""
+    with Program("hero_lights") as program:
+        robots = read_parameters({"robots": given_robots()})["robots"]
+        publisher = rospy.Publisher(LIGHTS_TOPIC, MarkerArray, queue_size=len(robots) + 10)
+
+        def show(color: ColorRGBA, robot_id: int) -> None:
+            publisher.publish(MarkerArray([make_marker(robot_id, color)]))
+
+        for robot_id in robots:
+            rospy.Subscriber("/hero_%d/led" % robot_id, ColorRGBA, show, robot_id, queue_size=5)
+        while program.sleep(10.0):
+            pass
+
+
 def main() -> None:
-    """Run the node lights."""
-    parser = argparse.ArgumentParser(prog="lights", description="The robots' lights, for RViz.")
-    parser.add_argument("--robots", default="0", help=ROBOTS_HELP)
-    options = parser.parse_args(rospy.myargv()[1:])
-    try:
-        names = read_names(options.robots)
-    except ValueError as error:
-        parser.error("--robots %s: %s" % (options.robots, error))
-    start_node("hero_lights")
-    publisher = rospy.Publisher(LIGHTS_TOPIC, MarkerArray, queue_size=len(names) + 10)
-
-    def show(colour: ColorRGBA, robot: Any) -> None:
-        number, name = robot
-        publisher.publish(MarkerArray([make_marker(name, number, colour)]))
-
-    for robot in enumerate(names):
-        rospy.Subscriber("/%s/led" % robot[1], ColorRGBA, show, robot, queue_size=5)
-    rospy.spin()
+    """Run the program lights."""
+    run(show_lights)

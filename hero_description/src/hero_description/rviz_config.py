@@ -1,16 +1,14 @@
-"""Robots -> configuration of RViz that shows them all, as text. Pure.
+"""The configuration of RViz for a number of robots, as text. Pure.
 
-What only simulated robots have (arena, true poses) is in it always: with real robots nothing comes on those topics.
-
-Source of the format: what RViz 1.14 writes itself, cut down to what differs from its defaults. YAML is written by
-yaml, so that no name can break it.
+Displays of what only simulated robots have (arena, ground truth) are always included: with real robots nothing is
+published on their topics. Source of the format: files that RViz 1.14 writes, reduced to what differs from its defaults.
 """
 
 from typing import Any, Dict, List, Sequence
 
 import yaml
 
-COLOURS = ("230; 90; 30", "40; 120; 220", "40; 160; 80", "200; 60; 160", "220; 180; 30", "80; 180; 190")
+COLORS = ("230; 90; 30", "40; 120; 220", "40; 160; 80", "200; 60; 160", "220; 180; 30", "80; 180; 190")
 
 LIGHTS_TOPIC = "/hero_lights"
 # Between RViz and the node goal_choice.
@@ -19,12 +17,12 @@ POINT_TOPIC = "/hero_choice/point"
 GOAL_TOPIC = "/hero_choice/goal"
 ABOVE_PIXELS_PER_M = 400
 
-# From how far, from how high (pitch), from which side (yaw), and at what height above the fixed frame it looks.
+# Distance (m), pitch and yaw (rad) of the camera, height of the focal point above the fixed frame (m).
 VIEWS = {"orbit": (2.6, 1.0, 4.71, 0.0), "close": (0.27, 0.45, 0.6, 0.02), "above": (0.0, 0.0, 0.0, 0.0)}
 
 
-def make_robot_displays(name: str, colour: str) -> List[Dict[str, Any]]:
-    """Return what is shown of one robot: its model, the way it came, what its proximity sensors see."""
+def make_robot_displays(name: str, color: str) -> List[Dict[str, Any]]:
+    """Return the displays of one robot: model, path by odometry, proximity."""
     return [
         {
             "Class": "rviz/RobotModel",
@@ -36,7 +34,7 @@ def make_robot_displays(name: str, colour: str) -> List[Dict[str, Any]]:
         },
         {
             "Class": "rviz/Odometry",
-            "Name": name + " way",
+            "Name": name + " path",
             "Enabled": True,
             "Topic": "/%s/odom" % name,
             "Unreliable": False,
@@ -46,7 +44,7 @@ def make_robot_displays(name: str, colour: str) -> List[Dict[str, Any]]:
             "Covariance": {"Value": False},
             "Shape": {
                 "Value": "Arrow",
-                "Color": colour,
+                "Color": color,
                 "Alpha": 0.6,
                 "Shaft Length": 0.012,
                 "Shaft Radius": 0.002,
@@ -62,17 +60,17 @@ def make_robot_displays(name: str, colour: str) -> List[Dict[str, Any]]:
             "Style": "Spheres",
             "Size (m)": 0.012,
             "Color Transformer": "FlatColor",
-            "Color": colour,
+            "Color": color,
             "Decay Time": 0,
         },
     ]
 
 
-def make_truth_display(name: str) -> Dict[str, Any]:
-    """Return what is shown of where a simulated robot truly is: an arrow above the model."""
+def make_ground_truth_display(name: str) -> Dict[str, Any]:
+    """Return the display of a simulated robot's ground truth: an arrow above the model."""
     return {
         "Class": "rviz/Odometry",
-        "Name": name + " truth",
+        "Name": name + " ground truth",
         "Enabled": True,
         "Topic": "/%s/ground_truth" % name,
         "Keep": 1,
@@ -97,7 +95,7 @@ def make_marker_display(name: str, topic: str) -> Dict[str, Any]:
 
 
 def make_view(view: str) -> Dict[str, Any]:
-    """Return from where all is seen: one of VIEWS; "above" has x to the right and y up."""
+    """Return the camera of one of VIEWS; "above" has x to the right and y up."""
     if view == "above":
         return {
             "Class": "rviz/TopDownOrtho",
@@ -119,7 +117,7 @@ def make_view(view: str) -> Dict[str, Any]:
 
 
 def make_config(names: Sequence[str], fixed_frame: str, view: str = "orbit") -> str:
-    """Return the configuration for robots with these names (hero_0, ...), seen in fixed_frame; view: see make_view."""
+    """Return the configuration for robots with these names (hero_0, ...); view: one of VIEWS."""
     displays: List[Dict[str, Any]] = [
         {
             "Class": "rviz/Grid",
@@ -132,16 +130,16 @@ def make_config(names: Sequence[str], fixed_frame: str, view: str = "orbit") -> 
         },
         make_marker_display("arena (simulated)", "/hero_sim/arena"),
         make_marker_display("lights", LIGHTS_TOPIC),
-        make_marker_display("robot that goals are for", CHOICE_TOPIC),
+        make_marker_display("selected robot", CHOICE_TOPIC),
     ]
     for index, name in enumerate(names):
-        displays += make_robot_displays(name, COLOURS[index % len(COLOURS)])
+        displays += make_robot_displays(name, COLORS[index % len(COLORS)])
     displays.append(
         {
             "Class": "rviz/Group",
-            "Name": "true poses (simulated)",
+            "Name": "ground truth (simulated)",
             "Enabled": True,
-            "Displays": [make_truth_display(name) for name in names],
+            "Displays": [make_ground_truth_display(name) for name in names],
         }
     )
     config = {
@@ -162,7 +160,7 @@ def make_config(names: Sequence[str], fixed_frame: str, view: str = "orbit") -> 
                 {"Class": "rviz/Select"},
                 {"Class": "rviz/FocusCamera"},
                 {"Class": "rviz/Measure"},
-                # A point on a robot chooses it, a goal is for the chosen one: see goal_choice.
+                # See goal_choice.
                 {"Class": "rviz/PublishPoint", "Single click": True, "Topic": POINT_TOPIC},
                 {"Class": "rviz/SetGoal", "Topic": GOAL_TOPIC},
             ],

@@ -1,0 +1,50 @@
+"""What the configuration of RViz displays, and which robots it takes."""
+
+import pytest
+import yaml
+
+from hero_client.program import ProgramError
+from hero_description.robots_parameter import check_given
+from hero_description.rviz_config import GOAL_TOPIC, POINT_TOPIC, make_config
+
+
+def list_displays(displays):
+    """Return (class, topic or prefix) of displays, also of those in groups."""
+    for display in displays:
+        yield (
+            display["Class"],
+            display.get("TF Prefix") or display.get("Topic") or display.get("Marker Topic"),
+        )
+        yield from list_displays(display.get("Displays", []))
+
+
+def test_rviz_displays_robots_arena_and_lights():
+    config = yaml.safe_load(make_config(["hero_0", "hero_7"], "world"))
+    manager = config["Visualization Manager"]
+    assert manager["Global Options"]["Fixed Frame"] == "world"
+    shown = set(list_displays(manager["Displays"]))
+    for name in ("hero_0", "hero_7"):
+        assert ("rviz/RobotModel", name) in shown
+        assert ("rviz/Odometry", "/%s/odom" % name) in shown
+        assert ("rviz/Odometry", "/%s/ground_truth" % name) in shown
+        assert ("rviz/LaserScan", "/%s/proximity" % name) in shown
+    assert ("rviz/MarkerArray", "/hero_sim/arena") in shown
+    assert ("rviz/MarkerArray", "/hero_lights") in shown
+
+
+def test_rviz_has_tools_to_choose_a_robot_and_send_it_a_goal():
+    tools = yaml.safe_load(make_config(["hero_0"], "world"))["Visualization Manager"]["Tools"]
+    topics = {tool["Class"]: tool.get("Topic") for tool in tools}
+    assert topics["rviz/PublishPoint"] == POINT_TOPIC
+    assert topics["rviz/SetGoal"] == GOAL_TOPIC
+
+
+def test_the_view_above_looks_straight_down():
+    config = yaml.safe_load(make_config(["hero_0"], "world", "above"))
+    assert config["Visualization Manager"]["Views"]["Current"]["Class"] == "rviz/TopDownOrtho"
+
+
+@pytest.mark.parametrize("value", ["all", "1 x", "", "3-1"])
+def test_robots_must_be_given_by_their_ids(value):
+    with pytest.raises(ProgramError, match="~robots"):
+        check_given("robots", value)
