@@ -137,7 +137,7 @@ def is_ros_import(module: str) -> bool:
 
 
 def list_pure_modules() -> List[Path]:
-    """Modules below src/ that import nothing of ROS, neither themselves nor through others of ours; none of hero_test."""
+    """Modules below src/, without hero_test, that import nothing of ROS, directly or through others of ours."""
     modules = {name: path for name, path in list_source_modules().items() if package_of(path) != "hero_test"}
     imports = {name: {found.module for found in read_imports(path)} for name, path in modules.items()}
     impure = {name for name, imported in imports.items() if any(map(is_ros_import, imported))}
