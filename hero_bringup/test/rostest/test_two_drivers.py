@@ -14,6 +14,7 @@ from geometry_msgs.msg import Twist
 
 from hero_client.drivers import Drivers
 from hero_client.swarm import Swarm
+from hero_monitor.background import Background
 from hero_monitor.commander import Commander
 from hero_test.program_terminal import ProgramTerminal, run_fleet
 from hero_test.swarm_watch import SwarmWatch
@@ -109,7 +110,9 @@ class TwoDriversTest(unittest.TestCase):
         self.assertEqual(table.wait_for_end(), 0)
 
     def test_4_the_stop_of_the_page_reaches_both(self):
-        commander = Commander(self.drivers)
+        background = Background()
+        self.addCleanup(background.close)
+        commander = Commander(self.drivers, background)
         self.wait_until_all_move()
         commander.request_stop(True)
         self.assertFalse(commander.may_drive())

@@ -20,7 +20,7 @@ _MODULES = {
     "RobotNotReadyError": "robot",
     "StaleDataError": "robot",
     "Swarm": "swarm",
-    "Velocity": "readings",
+    "Velocity": "geometry",
     "open_swarm": "swarm",
     "read_parameters": "parameters",
     "run": "program",

@@ -1,9 +1,9 @@
-"""Poses and angles in the plane, in m and rad (REP 103). Pure."""
+"""Poses, velocities and angles in the plane, in m, rad and s (REP 103). Pure."""
 
 import math
 from typing import Any, NamedTuple
 
-__all__ = ["Pose", "clamp", "invert_pose", "transform_pose", "wrap_angle", "yaw_of"]
+__all__ = ["STOP", "Pose", "Velocity", "clamp", "invert_pose", "transform_pose", "wrap_angle", "yaw_of"]
 
 
 class Pose(NamedTuple):
@@ -12,6 +12,18 @@ class Pose(NamedTuple):
     x_m: float
     y_m: float
     yaw_rad: float
+
+
+class Velocity(NamedTuple):
+    """How a robot moves, or is to move, in its own frame hero_N/base_link."""
+
+    linear_m_s: float
+    """Positive forward."""
+    angular_rad_s: float
+    """Positive to the left."""
+
+
+STOP = Velocity(0.0, 0.0)
 
 
 def transform_pose(origin: Pose, pose: Pose) -> Pose:

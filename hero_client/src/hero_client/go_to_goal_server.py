@@ -22,9 +22,8 @@ from .controllers.go_to_goal import (
     GoToGoalController,
     State,
 )
-from .controllers.unicycle import STOP
 from .frames import FrameError, FrameListener, strip_slash
-from .geometry import Pose, transform_pose, yaw_of
+from .geometry import STOP, Pose, transform_pose, yaw_of
 from .robot import Robot
 
 __all__ = ["MAX_COORDINATE_M", "GoToGoalServer", "InvalidGoalError", "check_limits", "read_goal"]

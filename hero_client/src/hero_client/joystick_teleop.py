@@ -10,8 +10,8 @@ from typing import NamedTuple, Optional
 import rospy
 from sensor_msgs.msg import Joy
 
-from .controllers.unicycle import STOP, Command
 from .drivers import Drivers
+from .geometry import STOP, Velocity
 from .program import Program, ProgramError
 from .swarm import REPORT_PERIOD_S, Swarm
 
@@ -36,7 +36,7 @@ class JoystickMapping(NamedTuple):
     enable_button: int
     stop_button: int
 
-    def read(self, joy: Joy) -> Command:
+    def read(self, joy: Joy) -> Velocity:
         """Return the command of a message; STOP while the enable button is released or an axis is not finite.
 
         Raises: ProgramError if the joystick lacks one of the axes or buttons.
@@ -53,7 +53,7 @@ class JoystickMapping(NamedTuple):
             return STOP
         if not joy.buttons[self.enable_button]:
             return STOP
-        return Command(linear * self.linear_m_s, angular * self.angular_rad_s)
+        return Velocity(linear * self.linear_m_s, angular * self.angular_rad_s)
 
 
 class _Joystick:
@@ -125,7 +125,7 @@ class JoystickTeleop:
         self._report_stop(command)
         self._swarm.report_missing()
 
-    def _report_stop(self, command: Command) -> None:
+    def _report_stop(self, command: Velocity) -> None:
         """Log once what came of a stop of all robots, and that robots that are told to move cannot."""
         drivers = self._swarm.drivers
         status = drivers.stop_status()

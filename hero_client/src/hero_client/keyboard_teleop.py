@@ -11,7 +11,7 @@ import sys
 import time
 from typing import Dict, List, Tuple
 
-from .controllers.unicycle import STOP, Command
+from .geometry import STOP, Velocity
 from .keyboard import Keyboard
 from .program import Program
 from .robot import Robot, StaleDataError
@@ -120,11 +120,11 @@ class KeyDrive:
         self._forward = self._left = 0
         self._last_key = ""
 
-    def command(self, now_s: float) -> Command:
+    def command(self, now_s: float) -> Velocity:
         """Return the command for now."""
         forward = self._forward if now_s < self._forward_end_s else 0
         left = self._left if now_s < self._left_end_s else 0
-        return Command(forward * self.linear_m_s, left * self.angular_rad_s)
+        return Velocity(forward * self.linear_m_s, left * self.angular_rad_s)
 
 
 class KeyboardTeleop:
@@ -203,7 +203,7 @@ class KeyboardTeleop:
         if now_s - self._last_motion_s < STOP_REPEAT_S:
             self.send(command)
 
-    def send(self, command: Command) -> None:
+    def send(self, command: Velocity) -> None:
         """Send a command to the chosen robots."""
         for robot in self._chosen:
             robot.drive(*command)

@@ -12,7 +12,6 @@ __all__ = [
     "MAX_POSITION_M",
     "MAX_RANGES",
     "Obstacle",
-    "Velocity",
     "find_nearest",
     "finite",
     "front_first",
@@ -26,13 +25,6 @@ MAX_POSITION_M = 1000.0
 
 MAX_RANGES = 64
 """A robot has eight sensors; a scan with more ranges than this is invalid."""
-
-
-class Velocity(NamedTuple):
-    """How a robot moves, in its own frame hero_N/base_link."""
-
-    linear_m_s: float
-    angular_rad_s: float
 
 
 class Obstacle(NamedTuple):

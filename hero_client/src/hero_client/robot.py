@@ -37,8 +37,8 @@ from .controllers.go_to_goal import (
     GoToGoalController,
     State,
 )
-from .geometry import Pose, clamp, yaw_of
-from .readings import Obstacle, Velocity, find_nearest, front_first
+from .geometry import Pose, Velocity, clamp, yaw_of
+from .readings import Obstacle, find_nearest, front_first
 from .robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
 from .ros_node import NodeError, start_ros_node
 

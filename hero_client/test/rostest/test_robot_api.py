@@ -148,7 +148,7 @@ class RobotApiTest(unittest.TestCase):
         for robot_id, true_start in true_starts.items():
             self.assertAlmostEqual(0.1, math.dist(true_start[:2], self.watch.pose(robot_id)[:2]), delta=0.015)
 
-    def test_09_a_goal_that_is_too_far_for_its_time_is_an_error_with_what_is_left(self):
+    def test_09_a_goal_not_reached_in_time_is_an_error_with_the_distance_left(self):
         with self.assertRaisesRegex(GoalError, r"hero_0 did not reach .* not there after 1 s, [0-9.]+ m are left"):
             self.swarm[0].go_to(50.0, 0.0, timeout_s=1.0)
         self.watch.wait_until_stopped(0)

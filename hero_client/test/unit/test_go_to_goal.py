@@ -3,11 +3,10 @@
 import math
 
 import pytest
-from test_unicycle import STEP_S, Body, cast_in_box
+from test_controllers import STEP_S, Body, cast_in_box
 
 from hero_client.controllers.go_to_goal import LAWS, SILENCE_S, Goal, GoToGoalController, State
-from hero_client.controllers.unicycle import STOP
-from hero_client.geometry import Pose
+from hero_client.geometry import STOP, Pose
 
 HERE = Pose(0.0, 0.0, 0.0)
 

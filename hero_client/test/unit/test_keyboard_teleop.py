@@ -1,6 +1,6 @@
 """Keys and the time -> commands."""
 
-from hero_client.controllers.unicycle import STOP
+from hero_client.geometry import STOP
 from hero_client.keyboard import split_keys
 from hero_client.keyboard_teleop import FIRST_TIMEOUT_S, MOTIONS, REPEAT_TIMEOUT_S, STOP_KEYS, KeyDrive
 

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from test_unicycle import STEP_S, Body
+from test_controllers import STEP_S, Body
 
 from hero_client.controllers.orca import (
     AvoidanceLaw,
@@ -13,20 +13,24 @@ from hero_client.controllers.orca import (
     nearest_allowed,
     steer,
     steered_point,
-    steered_velocity,
 )
 from hero_client.controllers.swarm_go_to import SwarmGoToController
-from hero_client.controllers.unicycle import STOP
-from hero_client.geometry import Pose
+from hero_client.geometry import STOP, Pose
 from hero_client.robot_constants import BODY_RADIUS_M
 
 
-def test_steering_and_its_opposite_agree():
-    law = AvoidanceLaw()
+def test_the_steered_point_moves_with_the_velocity_that_is_asked_for():
+    law, velocity, step_s = AvoidanceLaw(), np.array([0.03, -0.02]), 1e-6
     for yaw_rad in np.linspace(-3.0, 3.0, 13):
         pose = Pose(0.3, -0.2, yaw_rad)
-        velocity = np.array([0.03, -0.02])
-        np.testing.assert_allclose(steered_velocity(pose, steer(pose, velocity, law), law.lookahead_m), velocity)
+        linear_m_s, angular_rad_s = steer(pose, velocity, law)
+        moved = Pose(
+            pose.x_m + linear_m_s * step_s * math.cos(yaw_rad),
+            pose.y_m + linear_m_s * step_s * math.sin(yaw_rad),
+            yaw_rad + angular_rad_s * step_s,
+        )
+        change_m = steered_point(moved, law.lookahead_m) - steered_point(pose, law.lookahead_m)
+        np.testing.assert_allclose(change_m / step_s, velocity, atol=1e-6)
 
 
 def test_a_half_plane_holds_exactly_what_leads_to_a_meeting():

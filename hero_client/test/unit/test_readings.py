@@ -82,7 +82,7 @@ def test_the_nearest_obstacle_has_the_bearing_of_its_beam(index, bearing_rad):
     assert math.remainder(nearest.bearing_rad - bearing_rad, math.tau) == pytest.approx(0.0)
 
 
-def test_infinite_and_invalid_ranges_are_no_obstacle_and_touch_is_the_nearest():
+def test_only_ranges_within_reach_are_obstacles_and_touch_is_nearest():
     for ranges_m in ([], [INF] * 4 + [math.nan] * 4, [math.nan, 1e306, -1e306, INF]):
         assert find_nearest(ranges_m, -math.pi, EIGHTH_RAD) is None
     touching = [0.1, math.nan, -INF, 0.2, INF, INF, INF, INF]

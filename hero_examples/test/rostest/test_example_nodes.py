@@ -141,7 +141,7 @@ class ExampleNodesTest(unittest.TestCase):
         self.assertRegex(program.text(), r"teleop_joy: the joystick has 1 axes and 1 buttons: set ~linear_axis")
         stick.unregister()
 
-    def test_5_without_a_joystick_driver_one_line_says_how_to_get_it_and_with_one_it_is_run(self):
+    def test_5_joy_driver_runs_the_joystick_driver_or_says_how_to_get_it(self):
         with tempfile.TemporaryDirectory() as folder:
             environment = dict(os.environ, ROS_PACKAGE_PATH=folder, CMAKE_PREFIX_PATH=folder)
             absent = ExampleProgram("joy_driver", environment=environment)

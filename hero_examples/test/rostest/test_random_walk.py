@@ -21,7 +21,7 @@ CELL_M = 0.2
 
 
 class RandomWalkTest(unittest.TestCase):
-    def test_walkers_touch_nothing_they_see_visit_most_cells_and_stop_at_the_end(self):
+    def test_walkers_touch_nothing_visit_most_cells_and_stop_at_the_end(self):
         watch = SwarmWatch(range(10))
         watch.wait_until_complete(60.0)
         start_s = rospy.get_time()

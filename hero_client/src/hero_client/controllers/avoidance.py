@@ -7,8 +7,7 @@ nan: not known, which counts as an obstacle.
 import math
 from typing import NamedTuple, Sequence, Tuple
 
-from ..geometry import clamp, wrap_angle
-from .unicycle import STOP, Command
+from ..geometry import STOP, Velocity, clamp, wrap_angle
 
 __all__ = [
     "DETOUR",
@@ -76,7 +75,7 @@ class WanderMemory(NamedTuple):
 
 def wander(
     ranges: Sequence[float], memory: WanderMemory, chance: float, law: WanderLaw = WANDER
-) -> Tuple[Command, WanderMemory]:
+) -> Tuple[Velocity, WanderMemory]:
     """Return the next command of a random walk with obstacle avoidance, and what to remember for the next call.
 
     Three-sector rule: free sectors, walk on with a random drift; something near, slow down and bend away from the
@@ -99,11 +98,11 @@ def wander(
             return STOP, WanderMemory(escape_sign, STOP_STEPS - 1)
         if memory.stop_steps:
             return STOP, WanderMemory(escape_sign, memory.stop_steps - 1)
-        return Command(0.0, escape_sign * law.turn_rad_s), WanderMemory(escape_sign)
+        return Velocity(0.0, escape_sign * law.turn_rad_s), WanderMemory(escape_sign)
     # The drift is a random walk itself that is pulled back to zero, so that arcs last some seconds.
     drift_rad_s = clamp(0.95 * memory.drift_rad_s + (chance - 0.5) * law.drift_rad_s, law.drift_rad_s)
     if nearest_m >= law.slow_m:
-        return Command(law.cruise_m_s, drift_rad_s), WanderMemory(drift_rad_s=drift_rad_s)
+        return Velocity(law.cruise_m_s, drift_rad_s), WanderMemory(drift_rad_s=drift_rad_s)
     nearness = (law.slow_m - nearest_m) / (law.slow_m - law.stop_m)
     if left_m == right_m:
         away_sign = 1 if drift_rad_s >= 0.0 else -1
@@ -111,7 +110,7 @@ def wander(
         away_sign = 1 if left_m > right_m else -1
     speed_m_s = law.cruise_m_s * max(0.2, 1.0 - nearness)
     turn_rad_s = away_sign * nearness * law.turn_rad_s
-    return Command(speed_m_s, turn_rad_s), WanderMemory(drift_rad_s=away_sign * abs(drift_rad_s))
+    return Velocity(speed_m_s, turn_rad_s), WanderMemory(drift_rad_s=away_sign * abs(drift_rad_s))
 
 
 class PotentialLaw(NamedTuple):
@@ -136,7 +135,7 @@ POTENTIAL = PotentialLaw()
 
 def wander_in_potential(
     ranges: Sequence[float], memory: WanderMemory, chance: float, law: PotentialLaw = POTENTIAL
-) -> Tuple[Command, WanderMemory]:
+) -> Tuple[Velocity, WanderMemory]:
     """Return the next command of a random walk down a potential field, and what to remember: see wander().
 
     A constant force pulls to the front, a little to one side, and every beam that sees something pushes away from it,
@@ -161,9 +160,9 @@ def wander_in_potential(
         escape_sign = memory.escape_sign or (1 if towards_rad > 0.0 else -1)
         if not memory.escape_sign:
             return STOP, WanderMemory(escape_sign, drift_rad_s=drift_rad)
-        return Command(0.0, escape_sign * law.turn_rad_s), WanderMemory(escape_sign, drift_rad_s=drift_rad)
+        return Velocity(0.0, escape_sign * law.turn_rad_s), WanderMemory(escape_sign, drift_rad_s=drift_rad)
     speed_m_s = law.cruise_m_s * max(0.0, math.cos(towards_rad)) * min(1.0, math.hypot(force_x, force_y))
-    command = Command(speed_m_s, clamp(law.turn_gain * towards_rad, law.turn_rad_s))
+    command = Velocity(speed_m_s, clamp(law.turn_gain * towards_rad, law.turn_rad_s))
     return command, WanderMemory(escape_sign, drift_rad_s=drift_rad)
 
 
@@ -186,13 +185,13 @@ DETOUR = DetourLaw()
 
 
 def bend_around(
-    command: Command,
+    command: Velocity,
     bearing_rad: float,
     distance_m: float,
     ranges: Sequence[float],
     side: int = 0,
     law: DetourLaw = DETOUR,
-) -> Tuple[Command, int]:
+) -> Tuple[Velocity, int]:
     """Return (command, 0), or what goes around an obstacle nearer than both the goal and law.influence_m, and a side.
 
     bearing_rad, distance_m: of the goal, from the robot. Obstacles push away, and along themselves to one side: +1
@@ -220,4 +219,4 @@ def bend_around(
     speed_m_s = law.max_linear_m_s * max(0.0, math.cos(towards_rad)) * min(1.0, math.hypot(force_x, force_y))
     if split_sectors(ranges)[1] < law.body_m + 0.02:
         speed_m_s = 0.0
-    return Command(speed_m_s, turn_rad_s), side
+    return Velocity(speed_m_s, turn_rad_s), side

@@ -7,9 +7,9 @@ import enum
 import math
 from typing import Callable, Dict, NamedTuple, Optional, Sequence
 
-from ..geometry import Pose, wrap_angle
+from ..geometry import STOP, Pose, Velocity, wrap_angle
 from .avoidance import bend_around
-from .unicycle import BRISK, STOP, Command, GoToLaw, GoToPoseLaw, go_to_point, go_to_pose
+from .unicycle import BRISK, GoToLaw, GoToPoseLaw, go_to_point, go_to_pose
 
 __all__ = [
     "DEFAULT_LAW",
@@ -55,22 +55,22 @@ class Goal(NamedTuple):
     """Heading at the end; None for any."""
 
 
-def _tutorial(pose: Pose, goal: Goal, tolerance_m: float) -> Command:
+def _tutorial(pose: Pose, goal: Goal, tolerance_m: float) -> Velocity:
     return go_to_point(pose, goal.x_m, goal.y_m, GoToLaw(tolerance_m=tolerance_m))
 
 
-def _brisk(pose: Pose, goal: Goal, tolerance_m: float) -> Command:
+def _brisk(pose: Pose, goal: Goal, tolerance_m: float) -> Velocity:
     return go_to_point(pose, goal.x_m, goal.y_m, BRISK._replace(tolerance_m=tolerance_m))
 
 
-def _smooth(pose: Pose, goal: Goal, tolerance_m: float) -> Command:
+def _smooth(pose: Pose, goal: Goal, tolerance_m: float) -> Velocity:
     if goal.yaw_rad is None:
         return _brisk(pose, goal, tolerance_m)
     target = Pose(goal.x_m, goal.y_m, goal.yaw_rad)
     return go_to_pose(pose, target, GoToPoseLaw(tolerance_m=tolerance_m))
 
 
-LAWS: Dict[str, Callable[[Pose, Goal, float], Command]] = {
+LAWS: Dict[str, Callable[[Pose, Goal, float], Velocity]] = {
     "tutorial": _tutorial,
     "brisk": _brisk,
     "smooth": _smooth,
@@ -115,7 +115,7 @@ class GoToGoalController:
         self._side = 0
         self._last_bent_s = -math.inf
 
-    def step(self, pose: Optional[Pose], ranges: Optional[Sequence[float]], now_s: float) -> Command:
+    def step(self, pose: Optional[Pose], ranges: Optional[Sequence[float]], now_s: float) -> Velocity:
         """Return the next command.
 
         pose: None while it is not known, and so is one that is not finite. ranges: as in control_laws, to go around
@@ -142,14 +142,14 @@ class GoToGoalController:
             self.state = State.REACHED
         return command
 
-    def _arrive(self, pose: Pose) -> Command:
+    def _arrive(self, pose: Pose) -> Velocity:
         """Return the command at the goal: only the heading is left."""
         if self.goal.yaw_rad is None or self._law is not _smooth:
             return STOP
         target = Pose(self.goal.x_m, self.goal.y_m, self.goal.yaw_rad)
         return go_to_pose(pose, target, GoToPoseLaw(), at_goal=True)
 
-    def _approach(self, pose: Pose, ranges: Optional[Sequence[float]], now_s: float) -> Command:
+    def _approach(self, pose: Pose, ranges: Optional[Sequence[float]], now_s: float) -> Velocity:
         command = self._law(pose, self.goal, AIM_SHARE * self._tolerance_m)
         if ranges is None:
             return command
@@ -164,7 +164,7 @@ class GoToGoalController:
             self._side, self._last_bent_s = side, now_s
         return bent
 
-    def _fail(self, reason: str) -> Command:
+    def _fail(self, reason: str) -> Velocity:
         self.state = State.FAILED
         self.reason = reason
         return STOP

@@ -16,9 +16,8 @@ from typing import NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from ..geometry import Pose
+from ..geometry import Pose, Velocity
 from ..robot_constants import BODY_RADIUS_M
-from .unicycle import Command
 
 _TINY = 1e-9
 
@@ -65,20 +64,13 @@ def steered_point(pose: Pose, lookahead_m: float) -> np.ndarray:
     return np.array([pose.x_m + lookahead_m * math.cos(pose.yaw_rad), pose.y_m + lookahead_m * math.sin(pose.yaw_rad)])
 
 
-def steered_velocity(pose: Pose, command: Command, lookahead_m: float) -> np.ndarray:
-    """Return the velocity (2,) of the steered point under command; the opposite of steer()."""
-    front = np.array([math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)])
-    left = np.array([-front[1], front[0]])
-    return command.linear_m_s * front + command.angular_rad_s * lookahead_m * left
-
-
-def steer(pose: Pose, velocity: np.ndarray, law: AvoidanceLaw) -> Command:
+def steer(pose: Pose, velocity: np.ndarray, law: AvoidanceLaw) -> Velocity:
     """Return the command that moves the steered point with velocity (2,), or slower the same way."""
     cos, sin = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
     linear_m_s = float(velocity[0] * cos + velocity[1] * sin)
     angular_rad_s = float(velocity[1] * cos - velocity[0] * sin) / law.lookahead_m
     excess = max(abs(linear_m_s) / law.max_linear_m_s, abs(angular_rad_s) / law.max_angular_rad_s, 1.0)
-    return Command(linear_m_s / excess, angular_rad_s / excess)
+    return Velocity(linear_m_s / excess, angular_rad_s / excess)
 
 
 def half_plane(

@@ -5,9 +5,9 @@ from typing import List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from ..geometry import Pose
+from ..geometry import STOP, Pose, Velocity
 from .orca import AvoidanceLaw, avoid_others, avoid_sensed, steer, steered_point
-from .unicycle import BRISK, STOP, Command, GoToLaw, go_to_point
+from .unicycle import BRISK, GoToLaw, go_to_point
 
 DOCKING_M = 0.05
 """Nearer to its goal than this a robot steers its centre there, no longer the point in front of the axle."""
@@ -55,7 +55,7 @@ class SwarmGoToController:
 
     def step(
         self, poses: Sequence[Optional[Pose]], ranges: Optional[Sequence[Sequence[float]]] = None
-    ) -> List[Command]:
+    ) -> List[Velocity]:
         """Return the next command of every robot: stop while the pose of any robot is None, for it may be anywhere.
 
         ranges: what the proximity sensors of each robot see, as in avoidance; None: go by the poses alone.
@@ -63,7 +63,7 @@ class SwarmGoToController:
         known = [pose for pose in poses if pose is not None]
         return self._steer(known, ranges) if len(known) == len(poses) else [STOP] * len(poses)
 
-    def _steer(self, poses: Sequence[Pose], ranges: Optional[Sequence[Sequence[float]]]) -> List[Command]:
+    def _steer(self, poses: Sequence[Pose], ranges: Optional[Sequence[Sequence[float]]]) -> List[Velocity]:
         places = np.array([steered_point(pose, self.law.lookahead_m) for pose in poses])
         if self._last_places is not None:
             # Measured, not commanded: the motors take half a second to follow.

@@ -6,15 +6,13 @@ Poses and goals are in one common frame, m and rad (REP 103).
 import math
 from typing import NamedTuple
 
-from ..geometry import Pose, clamp, wrap_angle
+from ..geometry import STOP, Pose, Velocity, clamp, wrap_angle
 
 __all__ = [
     "BRISK",
     "FOLLOW",
     "SMOOTH",
-    "STOP",
     "TUTORIAL",
-    "Command",
     "FollowLaw",
     "GoToLaw",
     "GoToPoseLaw",
@@ -22,18 +20,6 @@ __all__ = [
     "go_to_point",
     "go_to_pose",
 ]
-
-
-class Command(NamedTuple):
-    """Velocities for a robot."""
-
-    linear_m_s: float
-    """Positive forward."""
-    angular_rad_s: float
-    """Positive to the left."""
-
-
-STOP = Command(0.0, 0.0)
 
 
 class GoToLaw(NamedTuple):
@@ -56,7 +42,7 @@ BRISK = GoToLaw(linear_gain=0.8, turn_gain=1.5, max_linear_m_s=0.12, max_angular
 """As quick as the robot's speed controller (0.5 s to a new speed) follows without swinging."""
 
 
-def go_to_point(pose: Pose, x_m: float, y_m: float, law: GoToLaw = TUTORIAL) -> Command:
+def go_to_point(pose: Pose, x_m: float, y_m: float, law: GoToLaw = TUTORIAL) -> Velocity:
     """Return the command that drives a robot at pose towards the point; STOP where it has arrived.
 
     Unicycle law: v = kr * distance * cos(a), w = ka * a with a the angle from the heading to the goal. A goal behind
@@ -69,7 +55,7 @@ def go_to_point(pose: Pose, x_m: float, y_m: float, law: GoToLaw = TUTORIAL) -> 
     linear_m_s = clamp(law.linear_gain * distance_m * math.cos(off_rad), law.max_linear_m_s)
     if abs(off_rad) > math.pi / 2.0:
         off_rad = wrap_angle(off_rad + math.pi)
-    return Command(linear_m_s, clamp(law.turn_gain * off_rad, law.max_angular_rad_s))
+    return Velocity(linear_m_s, clamp(law.turn_gain * off_rad, law.max_angular_rad_s))
 
 
 class GoToPoseLaw(NamedTuple):
@@ -96,7 +82,7 @@ class GoToPoseLaw(NamedTuple):
 SMOOTH = GoToPoseLaw()
 
 
-def go_to_pose(pose: Pose, goal: Pose, law: GoToPoseLaw = SMOOTH, at_goal: bool = False) -> Command:
+def go_to_pose(pose: Pose, goal: Pose, law: GoToPoseLaw = SMOOTH, at_goal: bool = False) -> Velocity:
     """Return the command of a smooth curve to goal that ends in its heading; STOP where it is reached.
 
     at_goal: the place was reached already; only the heading counts, so that a millimetre of drift during the last
@@ -109,7 +95,7 @@ def go_to_pose(pose: Pose, goal: Pose, law: GoToPoseLaw = SMOOTH, at_goal: bool 
         off_rad = wrap_angle(goal.yaw_rad - pose.yaw_rad)
         if abs(off_rad) < law.tolerance_rad:
             return STOP
-        return Command(0.0, clamp(law.heading_gain * off_rad, law.max_angular_rad_s))
+        return Velocity(0.0, clamp(law.heading_gain * off_rad, law.max_angular_rad_s))
     if distance_m < law.docking_m:
         docking = GoToLaw(
             law.linear_gain, law.heading_gain, law.max_linear_m_s, law.max_angular_rad_s, law.tolerance_m
@@ -128,7 +114,7 @@ def go_to_pose(pose: Pose, goal: Pose, law: GoToPoseLaw = SMOOTH, at_goal: bool 
     if abs(angular_rad_s) > law.max_angular_rad_s:  # the curve stays the same, only slower
         linear_m_s *= law.max_angular_rad_s / abs(angular_rad_s)
         angular_rad_s = math.copysign(law.max_angular_rad_s, angular_rad_s)
-    return Command(linear_m_s, angular_rad_s)
+    return Velocity(linear_m_s, angular_rad_s)
 
 
 class FollowLaw(NamedTuple):
@@ -145,7 +131,7 @@ class FollowLaw(NamedTuple):
 FOLLOW = FollowLaw()
 
 
-def follow(pose: Pose, leader: Pose, law: FollowLaw = FOLLOW) -> Command:
+def follow(pose: Pose, leader: Pose, law: FollowLaw = FOLLOW) -> Velocity:
     """Return the command that keeps a robot at pose one gap away from leader and turned towards it.
 
     It never drives backwards: a leader that comes nearer is waited for. pose and leader are in the same frame.
@@ -153,6 +139,6 @@ def follow(pose: Pose, leader: Pose, law: FollowLaw = FOLLOW) -> Command:
     distance_m = math.hypot(leader.x_m - pose.x_m, leader.y_m - pose.y_m)
     off_rad = wrap_angle(math.atan2(leader.y_m - pose.y_m, leader.x_m - pose.x_m) - pose.yaw_rad)
     linear_m_s = max(0.0, law.linear_gain * (distance_m - law.gap_m)) * max(0.0, math.cos(off_rad))
-    return Command(
+    return Velocity(
         min(law.max_linear_m_s, linear_m_s), clamp(law.turn_gain * off_rad, law.max_angular_rad_s)
     )

@@ -1,4 +1,4 @@
-"""The control laws over grids of starts, goals and obstacles, on a body with the lags of the real one."""
+"""Controllers over grids of starts, goals and obstacles, on a body with the lags of the real one."""
 
 import itertools
 import math
@@ -13,8 +13,8 @@ from hero_client.controllers.avoidance import (
     wander,
     wander_in_potential,
 )
-from hero_client.controllers.unicycle import BRISK, STOP, FollowLaw, GoToLaw, follow, go_to_point, go_to_pose
-from hero_client.geometry import Pose, wrap_angle
+from hero_client.controllers.unicycle import BRISK, FollowLaw, GoToLaw, follow, go_to_point, go_to_pose
+from hero_client.geometry import STOP, Pose, wrap_angle
 
 INF = math.inf
 FREE = [INF] * 8

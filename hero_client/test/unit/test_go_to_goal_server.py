@@ -8,8 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hero_client.controllers.go_to_goal import LAWS, SILENCE_S, Goal, GoToGoalController, State
-from hero_client.controllers.unicycle import STOP
-from hero_client.geometry import Pose
+from hero_client.geometry import STOP, Pose
 from hero_client.go_to_goal_server import (
     MAX_COORDINATE_M,
     MAX_FRAME_LENGTH,
@@ -47,7 +46,7 @@ messages = st.builds(
 
 @often
 @given(message=messages, use_heading=st.booleans())
-def test_any_goal_message_is_finite_and_in_a_frame_or_refused_in_one_line(message, use_heading):
+def test_any_goal_message_is_accepted_or_rejected_in_one_line(message, use_heading):
     try:
         goal, frame = read_goal(message, use_heading)
     except InvalidGoalError as error:
@@ -66,7 +65,7 @@ def test_any_goal_message_is_finite_and_in_a_frame_or_refused_in_one_line(messag
     goal=st.builds(Goal, good, good, st.one_of(st.none(), st.floats(-math.pi, math.pi))),
     steps=st.lists(st.tuples(any_poses, ranges), min_size=1, max_size=5),
 )
-def test_any_goal_that_was_taken_and_any_pose_make_commands_that_are_finite_and_slow(law, goal, steps):
+def test_any_accepted_goal_and_any_pose_give_finite_slow_commands(law, goal, steps):
     controller = GoToGoalController(goal, 0.0, law=law)
     for index, (pose, seen) in enumerate(steps):
         linear_m_s, angular_rad_s = controller.step(pose, seen, 0.1 * index)
@@ -89,19 +88,19 @@ def test_any_goal_that_was_taken_and_any_pose_make_commands_that_are_finite_and_
         ({"frame": "x" * 300}, "frame_id"),
     ],
 )
-def test_a_goal_that_no_robot_can_be_sent_to_is_refused_with_the_reason(wrong, words):
+def test_an_invalid_goal_is_rejected_with_the_reason(wrong, words):
     with pytest.raises(InvalidGoalError, match=words):
         read_goal(make_message(**wrong), use_heading=True)
 
 
-def test_zeros_for_a_quaternion_are_no_heading_and_an_empty_frame_is_the_robots_own():
+def test_a_quaternion_of_zeros_means_no_heading():
     assert read_goal(make_message(turn=(0.0, 0.0, 0.0, 0.0), frame=""), True) == (Goal(0.1, 0.2, None), "")
     assert read_goal(make_message(turn=(0.0, 0.0, 1.0, 0.0)), True)[0].yaw_rad == pytest.approx(math.pi)
     assert read_goal(make_message(turn=(NAN, NAN, NAN, NAN)), False)[0].yaw_rad is None
 
 
 @given(tolerance_m=numbers, timeout_s=numbers)
-def test_limits_of_a_goal_are_positive_and_finite_or_refused(tolerance_m, timeout_s):
+def test_limits_of_a_goal_are_positive_and_finite_or_rejected(tolerance_m, timeout_s):
     if 0.0 < tolerance_m < INF and 0.0 < timeout_s < INF:
         check_limits(tolerance_m, timeout_s)
     else:
