@@ -29,6 +29,7 @@ from sensor_msgs.msg import LaserScan
 from std_msgs.msg import ColorRGBA
 
 from .colors import Color, parse_color
+from .command_line import print_error
 from .controllers.go_to_goal import (
     DEFAULT_LAW,
     DEFAULT_TIMEOUT_S,
@@ -63,10 +64,10 @@ LED_PERIOD_S = 2.0
 """Between two messages of the same colour: the robot's light goes dark 15 s after the last one."""
 
 Sleep = Callable[[float], bool]
-"""Waits for so many seconds and tells whether to go on; `Program.sleep` is one."""
+"""Waits for so many seconds and returns whether to continue; `Program.sleep` is one."""
 
 POLL_PERIOD_S = 0.02
-"""Between two looks at whether a robot is ready."""
+"""Between two checks whether a robot is ready."""
 
 
 class RobotError(Exception):
@@ -94,18 +95,28 @@ def sleep_unless_shutdown(duration_s: float) -> bool:
 def start_node(name: str = "hero_program") -> None:
     """Start a ROS node for a plain script, unless one runs already.
 
-    Ctrl-C raises KeyboardInterrupt as in every Python program, SIGTERM and SIGHUP raise SystemExit, so that `with`
-    blocks stop their robots before ROS goes down. Without a ROS master the script ends with one line and exit code 1.
+    Ctrl-C raises KeyboardInterrupt as in every Python program, SIGTERM and SIGHUP raise SystemExit: `with` blocks stop
+    their robots before ROS shuts down. Without a ROS master, or by a RobotError, the script ends with one line and exit
+    code 1.
     """
     if rospy.core.is_initialized():
         return
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, _raise_exit)
         signal.signal(signal.SIGHUP, _raise_exit)
+    sys.excepthook = _print_exception
     try:
         start_ros_node(name, anonymous=True)
     except NodeError as error:
         sys.exit("%s: %s" % (os.path.basename(sys.argv[0]), error))
+
+
+def _print_exception(kind: Type[BaseException], error: BaseException, traceback: Any) -> None:
+    """Print a RobotError as one line and Ctrl-C not at all; a mistake in the script keeps its traceback."""
+    if issubclass(kind, RobotError):
+        print_error(str(error))
+    elif not issubclass(kind, KeyboardInterrupt):
+        sys.__excepthook__(kind, error, traceback)
 
 
 def _raise_exit(number: int, frame: Optional[FrameType]) -> None:

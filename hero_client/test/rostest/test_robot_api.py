@@ -222,6 +222,13 @@ class RobotApiTest(unittest.TestCase):
             errors = script.communicate(timeout=DEADLINE_S)[1].decode()
             self.watch.wait_until_stopped(2)
             self.assertEqual(code, script.returncode, errors)
+            self.assertNotIn("Traceback", errors)
+
+    def test_15_a_plain_script_without_its_robot_ends_with_one_line(self):
+        code = "from hero_client import Robot; Robot(77).wait_until_ready(timeout_s=0.2)"
+        ended = subprocess.run([sys.executable, "-c", code], stderr=subprocess.PIPE, text=True, check=False)
+        self.assertEqual(1, ended.returncode)
+        self.assertRegex(ended.stderr, r"\A-c: hero_77 is not ready after 0.2 s: [^\n]*\n\Z")
 
 
 if __name__ == "__main__":

@@ -25,7 +25,7 @@ LAG_S = 0.5
 
 
 class Body:
-    """A robot on a plane: speeds follow commands with a lag, a standstill is quick."""
+    """A robot on a plane: speeds follow commands with a lag, stopping is quick."""
 
     def __init__(self, pose):
         self.pose = pose
@@ -133,13 +133,13 @@ def test_each_beam_counts_for_its_sector():
 
 
 @pytest.mark.parametrize("law", [wander, wander_in_potential])
-def test_a_wanderer_without_ranges_stands_still(law):
+def test_a_wanderer_without_ranges_stops(law):
     assert law([], WanderMemory(), 0.5)[0] == STOP
 
 
 @pytest.mark.parametrize("law", [wander, wander_in_potential])
 @pytest.mark.parametrize("blocked_m", [0.0, 0.05, math.nan])
-def test_a_wanderer_does_not_drive_into_what_is_right_ahead(law, blocked_m):
+def test_a_wanderer_does_not_drive_into_an_obstacle_in_front(law, blocked_m):
     memory = WanderMemory()
     turns = set()
     for chance in (0.0, 0.9, 0.1, 0.5, 0.7):

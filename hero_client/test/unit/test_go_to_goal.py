@@ -45,7 +45,7 @@ def test_the_time_limit_fails_with_what_is_left():
     assert "not there after 3 s" in controller.reason and "are left" in controller.reason
 
 
-def test_a_robot_that_falls_silent_fails_and_stands():
+def test_a_robot_that_falls_silent_fails_and_stops():
     controller = GoToGoalController(Goal(1.0, 0.0), 0.0)
     assert controller.step(HERE, None, 0.0) != STOP
     assert controller.step(None, None, 0.1) == STOP
@@ -74,7 +74,7 @@ def test_a_goal_behind_a_wall_fails_without_a_touch():
 
 
 def test_an_obstacle_on_the_way_is_gone_around():
-    """A round thing of the size of a robot stands between the robot and its goal."""
+    """A round obstacle of the size of a robot is between the robot and its goal."""
     thing, radius_m, body_m = (0.3, 0.01), 0.037, 0.037
 
     def look(pose):

@@ -108,7 +108,7 @@ def test_limits_of_a_goal_are_positive_and_finite_or_rejected(tolerance_m, timeo
             check_limits(tolerance_m, timeout_s)
 
 
-def test_a_robot_whose_odometry_is_not_finite_fails_and_stands():
+def test_a_robot_whose_odometry_is_not_finite_fails_and_stops():
     controller = GoToGoalController(Goal(1.0, 0.0), 0.0)
     assert controller.step(Pose(NAN, 0.0, 0.0), None, 0.1) == STOP
     assert controller.step(Pose(0.0, 0.0, INF), None, SILENCE_S + 0.1) == STOP

@@ -44,7 +44,7 @@ class WanderLaw(NamedTuple):
     """How a robot wanders. The distances suit beams that see about 0.24 m and come 5 times a second."""
 
     cruise_m_s: float = 0.10
-    turn_rad_s: float = 1.5
+    angular_rad_s: float = 1.5
     """Turn on the spot, away from an obstacle."""
     drift_rad_s: float = 0.6
     """Largest turn on a free path: makes the walk random."""
@@ -98,7 +98,7 @@ def wander(
             return STOP, WanderMemory(escape_sign, STOP_STEPS - 1)
         if memory.stop_steps:
             return STOP, WanderMemory(escape_sign, memory.stop_steps - 1)
-        return Velocity(0.0, escape_sign * law.turn_rad_s), WanderMemory(escape_sign)
+        return Velocity(0.0, escape_sign * law.angular_rad_s), WanderMemory(escape_sign)
     # The drift is a random walk itself that is pulled back to zero, so that arcs last some seconds.
     drift_rad_s = clamp(0.95 * memory.drift_rad_s + (chance - 0.5) * law.drift_rad_s, law.drift_rad_s)
     if nearest_m >= law.slow_m:
@@ -109,15 +109,15 @@ def wander(
     else:
         away_sign = 1 if left_m > right_m else -1
     speed_m_s = law.cruise_m_s * max(0.2, 1.0 - nearness)
-    turn_rad_s = away_sign * nearness * law.turn_rad_s
-    return Velocity(speed_m_s, turn_rad_s), WanderMemory(drift_rad_s=away_sign * abs(drift_rad_s))
+    angular_rad_s = away_sign * nearness * law.angular_rad_s
+    return Velocity(speed_m_s, angular_rad_s), WanderMemory(drift_rad_s=away_sign * abs(drift_rad_s))
 
 
 class PotentialLaw(NamedTuple):
     """How a robot wanders in a potential field."""
 
     cruise_m_s: float = 0.10
-    turn_rad_s: float = 2.0
+    angular_rad_s: float = 2.0
     """Largest turn."""
     turn_gain: float = 2.5
     """Turn in rad/s per rad between the heading and the direction of the field."""
@@ -160,9 +160,9 @@ def wander_in_potential(
         escape_sign = memory.escape_sign or (1 if towards_rad > 0.0 else -1)
         if not memory.escape_sign:
             return STOP, WanderMemory(escape_sign, drift_rad_s=drift_rad)
-        return Velocity(0.0, escape_sign * law.turn_rad_s), WanderMemory(escape_sign, drift_rad_s=drift_rad)
+        return Velocity(0.0, escape_sign * law.angular_rad_s), WanderMemory(escape_sign, drift_rad_s=drift_rad)
     speed_m_s = law.cruise_m_s * max(0.0, math.cos(towards_rad)) * min(1.0, math.hypot(force_x, force_y))
-    command = Velocity(speed_m_s, clamp(law.turn_gain * towards_rad, law.turn_rad_s))
+    command = Velocity(speed_m_s, clamp(law.turn_gain * towards_rad, law.angular_rad_s))
     return command, WanderMemory(escape_sign, drift_rad_s=drift_rad)
 
 
@@ -214,9 +214,9 @@ def bend_around(
         force_x -= strength * (math.cos(angle_rad) + side * law.swirl * math.sin(angle_rad))
         force_y -= strength * (math.sin(angle_rad) - side * law.swirl * math.cos(angle_rad))
     towards_rad = math.atan2(force_y, force_x)
-    turn_rad_s = clamp(law.turn_gain * towards_rad, law.max_angular_rad_s)
+    angular_rad_s = clamp(law.turn_gain * towards_rad, law.max_angular_rad_s)
     # A detour is never driven backwards.
     speed_m_s = law.max_linear_m_s * max(0.0, math.cos(towards_rad)) * min(1.0, math.hypot(force_x, force_y))
     if split_sectors(ranges)[1] < law.body_m + 0.02:
         speed_m_s = 0.0
-    return Velocity(speed_m_s, turn_rad_s), side
+    return Velocity(speed_m_s, angular_rad_s), side

@@ -118,7 +118,7 @@ class GoToGoalController:
     def step(self, pose: Optional[Pose], ranges: Optional[Sequence[float]], now_s: float) -> Velocity:
         """Return the next command.
 
-        pose: None while it is not known, and so is one that is not finite. ranges: as in control_laws, to go around
+        pose: None while it is not known, and so is one that is not finite. ranges: as in avoidance, to go around
         what they see; None: do not look.
         """
         if self.state is not State.ACTIVE:

@@ -1,4 +1,4 @@
-"""Where all robots are and want to go -> velocities with which they do not meet: reciprocal avoidance (ORCA).
+"""Reciprocal collision avoidance (ORCA): velocities at which robots that know each other's poses do not collide.
 
 Pure, numpy only. Each robot takes half of the change that keeps a pair apart for `horizon_s`; every other robot
 gives a half plane of allowed velocities, and the robot takes the allowed one nearest to the one it wants.
@@ -170,7 +170,7 @@ def avoid_sensed(
     Odometry drifts by centimetres over a metre or two, so robots that avoid each other by odometry alone touch now and
     then. Of two robots that meet where odometry expects none, each would wait for the other for ever: so what is
     not allowed of the wanted velocity is driven to the right, as on a road. Half planes: normals (K, 2), bounds (K,),
-    as in nearest_allowed(). ranges: as in control_laws; nan (not known) is left out, odometry must do then.
+    as in nearest_allowed(). ranges: as in avoidance; nan (not known) is ignored.
     """
     normals, bounds = [], []
     for index, range_m in enumerate(ranges):
