@@ -214,9 +214,11 @@ class MotorControl:
         self._reschedule(0)
 
     def _reschedule(self, now_ms: int) -> None:
-        candidates_ms = [controller.find_due(now_ms) for controller in (self.velocity, self.position)]
-        candidates_ms += [self.motors.stop_at_ms if self.motors.attached else None]
-        self.due_ms = min((due_ms for due_ms in candidates_ms if due_ms is not None), default=None)
+        self.due_ms = self.motors.stop_at_ms if self.motors.attached else None
+        for controller in (self.velocity, self.position):
+            due_ms = controller.find_due(now_ms)
+            if due_ms is not None and (self.due_ms is None or due_ms < self.due_ms):
+                self.due_ms = due_ms
 
     def receive_velocity(self, now_ms: int, linear_m_s: float, angular_rad_s: float) -> bool:
         """Receive a Twist for the velocity controller; return whether it was a zero that was accepted."""
