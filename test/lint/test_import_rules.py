@@ -4,7 +4,7 @@ import pytest
 import sources
 
 MODULES = {name: path for name, path in sources.list_source_modules().items() if not name.startswith("hero_test")}
-CLOCKS_AND_SOCKETS = {"asyncio", "logging", "select", "selectors", "socket", "ssl", "time"}
+NOT_IN_PURE_ROOMS = {"asyncio", "logging", "select", "selectors", "socket", "ssl", "threading", "time"}
 SOCKETS = {"asyncio", "socket", "socketserver", "ssl", "tornado"}
 # The robots' connections, on each side; the connections to subscribers and publishers that rospy has made; the program
 # check, which asks for the addresses of names; and the pages of the fleet monitor.
@@ -39,6 +39,7 @@ PURE_ROOMS = (
     "hero_driver.commands",
     "hero_sim.world",
     "hero_sim.robot",
+    "hero_sim.swarm",  # moves both through simulated time
 )
 
 
@@ -57,9 +58,9 @@ def part_of(module, package):
 
 
 @pytest.mark.parametrize("name", [name for room in PURE_ROOMS for name in modules_below(room)])
-def test_pure_rooms_know_no_ros_clock_or_socket(name):
+def test_pure_rooms_know_no_ros_clock_socket_or_thread(name):
     for found in imports_of(name):
-        assert found.top not in CLOCKS_AND_SOCKETS, f"line {found.line}"
+        assert found.top not in NOT_IN_PURE_ROOMS, f"line {found.line}"
         assert not sources.is_ros_import(found.module), f"line {found.line}"
 
 
