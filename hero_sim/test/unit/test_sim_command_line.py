@@ -1,5 +1,6 @@
 """The program as users start it: a process of its own, behind real sockets on loopback."""
 
+import contextlib
 import fcntl
 import os
 import re
@@ -20,6 +21,8 @@ from hero_sim import main
 from hero_sim.faults import KINDS
 from hero_sim.robot import declarations as ids
 from hero_sim.world.robot_errors import KINDS as ERROR_KINDS
+from hero_test.processes import find_free_port
+from hero_test.waiting import wait_for
 
 LIMIT_S = 20.0
 ROOT = os.path.abspath(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", ".."))
@@ -181,18 +184,15 @@ def test_robots_connect_declare_stream_and_drive(simulate, server):
 
 
 def test_robots_that_are_servers_accept_a_driver(simulate):
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = find_free_port()
     simulate("--count", "1", "--host", "127.0.0.1", "--serve", str(port))
     server = Server(port)
-    end_s = time.monotonic() + LIMIT_S
-    while not server.peers:
-        try:
-            server.add(socket.create_connection(("127.0.0.1", port)))
-        except ConnectionRefusedError:
-            assert time.monotonic() < end_s
-            time.sleep(0.05)
+
+    def connect():
+        with contextlib.suppress(ConnectionRefusedError):
+            return server.add(socket.create_connection(("127.0.0.1", port)))
+
+    wait_for(connect, "a robot that listens")
     request_when_ready(server, 1)
     # The driver goes and comes back: the robot waits for it.
     server.peers[0].socket.shutdown(socket.SHUT_RDWR)
@@ -323,9 +323,7 @@ def test_a_robot_that_is_sent_a_deadly_id_restarts(simulate, server):
 
 
 def test_a_server_that_comes_late_finds_the_robots_waiting(simulate):
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = find_free_port()
     process = simulate("--count", "2", "--port", str(port))
     assert "connecting" in process.stdout.readline()
     assert "no driver answers at 127.0.0.1:%d" % port in process.stdout.readline()
@@ -411,19 +409,7 @@ def test_the_documented_command_copies_all_that_is_needed(tmp_path):
     subprocess.run("(cd %s && %s) | (%s)" % (ROOT, pack, unpack), shell=True, check=True, cwd=str(tmp_path))
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
     result = subprocess.run(
-        [
-            sys.executable,
-            "-m",
-            "hero_sim",
-            "--count",
-            "3",
-            "--arena",
-            "maze",
-            "--port",
-            "9",
-            "--seconds",
-            "0.3",
-        ],
+        [sys.executable, "-m", "hero_sim", *"--count 3 --arena maze --port 9 --seconds 0.3".split()],
         cwd=str(tmp_path / "hero_sim_robots"),
         env=environment,
         capture_output=True,
