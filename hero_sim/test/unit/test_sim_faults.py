@@ -1,6 +1,8 @@
 import pytest
+from driver_side import parse_options
 
 from hero_sim import faults
+from hero_sim.build import build_simulator
 from hero_sim.errors import OptionError
 
 
@@ -33,3 +35,13 @@ def test_a_wrong_fault_is_refused_by_name(text, named):
     with pytest.raises(OptionError, match="fault") as caught:
         faults.parse_fault(text)
     assert named in str(caught.value)
+
+
+def test_every_kind_of_fault_can_be_injected():
+    reports = []
+    simulator, injector = build_simulator(parse_options("--port", "9"), reports.append)
+    for kind in faults.KINDS:
+        injector.add(faults.parse_fault(kind))
+        injector.run(0)
+    simulator.link.close_all()
+    assert reports[1:] == ["fault %s for hero_0" % kind for kind in faults.KINDS]
