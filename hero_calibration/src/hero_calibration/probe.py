@@ -6,7 +6,7 @@ Encoder readings are kept with their stamps and numbers: see encoder_steps.
 import threading
 import time
 from collections import deque
-from typing import Any, Deque, List, NamedTuple, Optional, Tuple
+from typing import Any, Deque, List, Optional, Tuple
 
 import numpy as np
 import rospy
@@ -14,7 +14,7 @@ from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 
-from hero_client.geometry import yaw_of
+from hero_client.geometry import Pose, yaw_of
 from hero_msgs.msg import Encoder, Motor
 
 from .encoder_steps import Readings, count_steps
@@ -28,14 +28,6 @@ STALE_S = 3.0
 """Wall time; encoder readings come 29 times a second, scans 5 times. Wi-Fi may stand still for a second or two."""
 
 SERVICE_WAIT_S = 5.0
-
-
-class Place(NamedTuple):
-    """Where a robot is by its odometry."""
-
-    x_m: float
-    y_m: float
-    yaw_rad: float
 
 
 class Probe:
@@ -56,7 +48,7 @@ class Probe:
         self._last_seq = 0
         self._count = 0
         self._scans: Deque[Tuple[List[float], List[float]]] = deque(maxlen=200)
-        self._place: Optional[Place] = None
+        self._pose: Optional[Pose] = None
         self._heard_s = {"encoder": 0.0, "laser": 0.0, "odom": 0.0}
         self._velocity = self._advertise("velocity_controller/cmd_vel", Twist)
         self._position = self._advertise("position_controller/cmd_vel", Twist)
@@ -94,7 +86,7 @@ class Probe:
         pose = message.pose.pose
         with self._lock:
             self._heard_s["odom"] = time.monotonic()
-            self._place = Place(pose.position.x, pose.position.y, yaw_of(pose.orientation))
+            self._pose = Pose(pose.position.x, pose.position.y, yaw_of(pose.orientation))
 
     # -- what was seen -------------------------------------------------------------------------------------
 
@@ -136,13 +128,13 @@ class Probe:
         signals, ranges_m = np.array(scans).transpose(1, 0, 2)
         return average(signals), average(ranges_m)
 
-    def read_place(self) -> Place:
+    def read_pose(self) -> Pose:
         """Return the newest pose. Raises: CalibrationError if none came lately."""
         with self._lock:
-            place, heard_s = self._place, self._heard_s["odom"]
-        if place is None or time.monotonic() - heard_s > STALE_S:
+            pose, heard_s = self._pose, self._heard_s["odom"]
+        if pose is None or time.monotonic() - heard_s > STALE_S:
             raise CalibrationError("nothing comes on /%s/odom any more: has the robot gone?" % self.name)
-        return place
+        return pose
 
     # -- what it is told -----------------------------------------------------------------------------------
 

@@ -12,12 +12,13 @@ from typing import Callable, Dict, List, Optional, Sequence, Tuple
 import numpy as np
 import rospy
 
+from hero_client.geometry import Pose
 from hero_client.program import Program
 from hero_msgs.srv import SetIRCalibration, SetMotor, SetPID
 
 from . import dead_zone, infrared, speed_response
 from .errors import CalibrationError
-from .probe import Place, Probe
+from .probe import Probe
 
 LEFT, RIGHT = 0, 1
 POLL_S = 0.02
@@ -289,17 +290,17 @@ class Session:
 
         samples: scans for each sensor; for the second turn as infrared.count_check_samples() says.
         """
-        places: Dict[int, Place] = {}
+        starts: Dict[int, Pose] = {}
         directions: Dict[int, float] = {}
         counts_m2: Dict[int, List[float]] = {}
-        first = self._go_round("infrared", samples, places, directions)
+        first = self._go_round("infrared", samples, starts, directions)
 
         def write(probe: Probe) -> None:
             counts_m2[probe.robot_id] = infrared.compute_calibration(first[probe.robot_id])
             probe.call("ir_calibration", SetIRCalibration, *counts_m2[probe.robot_id])
 
         self.each("infrared", write)
-        second = self._go_round("check of infrared", infrared.count_check_samples(samples), places, directions)
+        second = self._go_round("check of infrared", infrared.count_check_samples(samples), starts, directions)
         results = {}
         for probe in self.active:
             robot_id = probe.robot_id
@@ -311,9 +312,9 @@ class Session:
         return results
 
     def _go_round(
-        self, title: str, samples: int, places: Dict[int, Place], directions: Dict[int, float]
+        self, title: str, samples: int, starts: Dict[int, Pose], directions: Dict[int, float]
     ) -> Dict[int, List[infrared.Facing]]:
-        """Turn each sensor to the wall; places and directions of the wall are those of the first look."""
+        """Turn each sensor to the wall; starts and directions of the wall are those of the first look."""
         seen: Dict[int, List[infrared.Facing]] = {probe.robot_id: [] for probe in self.active}
         for step in range(infrared.BEAMS):
             sensor = (infrared.AHEAD - step) % infrared.BEAMS
@@ -326,13 +327,13 @@ class Session:
 
             def look(probe: Probe, sensor: int = sensor, angles_rad: Dict[int, float] = angles_rad) -> None:
                 counts, ranges_m = probe.read_scans()
-                place = probe.read_place()
-                start = places.setdefault(probe.robot_id, place)
+                pose = probe.read_pose()
+                start = starts.setdefault(probe.robot_id, pose)
                 facing = infrared.Facing(sensor, counts.tolist(), ranges_m.tolist(), 0.0)
                 turned_rad = infrared.estimate_turn_rad(facing)
-                direction_rad = directions.setdefault(probe.robot_id, place.yaw_rad - turned_rad)
-                moved_m = (place.x_m - start.x_m) * math.cos(direction_rad)
-                moved_m += (place.y_m - start.y_m) * math.sin(direction_rad)
+                direction_rad = directions.setdefault(probe.robot_id, pose.yaw_rad - turned_rad)
+                moved_m = (pose.x_m - start.x_m) * math.cos(direction_rad)
+                moved_m += (pose.y_m - start.y_m) * math.sin(direction_rad)
                 seen[probe.robot_id].append(facing._replace(moved_m=moved_m))
                 angles_rad[probe.robot_id] = infrared.BEAM_STEP_RAD - turned_rad
 
@@ -353,7 +354,7 @@ class Session:
         wanted_rad: Dict[int, float] = {}
 
         def plan(probe: Probe) -> None:
-            wanted_rad[probe.robot_id] = probe.read_place().yaw_rad + angles_rad[probe.robot_id]
+            wanted_rad[probe.robot_id] = probe.read_pose().yaw_rad + angles_rad[probe.robot_id]
 
         self.each(step, plan)
         for tolerance_rad in (0.0, *[TURN_TOLERANCE_RAD / 2.0] * (TURN_TRIES - 1)):
@@ -374,7 +375,7 @@ class Session:
 
         def check(probe: Probe) -> None:
             left_rad = self._left_rad(probe, wanted_rad)
-            probe.read_place()
+            probe.read_pose()
             if abs(left_rad) > TURN_TOLERANCE_RAD:
                 raise CalibrationError(
                     "could not turn on the spot: %.0f degrees are missing; calibrate its motors, or free its wheels"
@@ -387,7 +388,7 @@ class Session:
     def _left_rad(probe: Probe, wanted_rad: Dict[int, float]) -> float:
         """Return how far a robot still has to turn; nothing for one that cannot be heard, which check() finds."""
         try:
-            return math.remainder(wanted_rad[probe.robot_id] - probe.read_place().yaw_rad, 2.0 * math.pi)
+            return math.remainder(wanted_rad[probe.robot_id] - probe.read_pose().yaw_rad, 2.0 * math.pi)
         except CalibrationError:
             return 0.0
 
