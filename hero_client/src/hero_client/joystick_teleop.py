@@ -10,7 +10,6 @@ from typing import NamedTuple, Optional
 import rospy
 from sensor_msgs.msg import Joy
 
-from .drivers import Drivers
 from .geometry import STOP, Velocity
 from .program import Program, ProgramError
 from .swarm import REPORT_PERIOD_S, Swarm
@@ -56,44 +55,30 @@ class JoystickMapping(NamedTuple):
         return Velocity(linear * self.linear_m_s, angular * self.angular_rad_s)
 
 
-class _Joystick:
-    """The newest message of the joystick."""
-
-    def __init__(self, stop_button: int, drivers: Drivers) -> None:
-        """Subscribe to /joy; a press of stop_button stops all robots of the drivers."""
-        self._stop_button = stop_button
-        self._drivers = drivers
-        self._is_stop_pressed = False
-        self._arrival_s = -math.inf
-        self.joy: Optional[Joy] = None
-        self._subscriber = rospy.Subscriber("/joy", Joy, self._receive, queue_size=10, tcp_nodelay=True)
-
-    def _receive(self, joy: Joy) -> None:
-        # Here, because a short press may be over at the program's next step.
-        is_pressed = self._stop_button < len(joy.buttons) and bool(joy.buttons[self._stop_button])
-        if is_pressed and not self._is_stop_pressed:
-            self._drivers.request_stop(True)
-        self._is_stop_pressed = is_pressed
-        self.joy, self._arrival_s = joy, time.monotonic()
-
-    @property
-    def alive(self) -> bool:
-        """Whether the newest message is recent enough to act upon."""
-        return time.monotonic() - self._arrival_s < SILENCE_S
-
-
 class JoystickTeleop:
     """Sends the joystick's commands to all robots of a swarm."""
 
     def __init__(self, swarm: Swarm, mapping: JoystickMapping) -> None:
-        """Subscribe to /joy."""
+        """Subscribe to /joy; a press of the stop button stops all robots of the drivers."""
         self._swarm = swarm
         self._mapping = mapping
-        self._joystick = _Joystick(mapping.stop_button, swarm.drivers)
+        self._newest: Optional[Joy] = None
+        self._arrival_s = -math.inf
+        self._is_stop_pressed = False
         self._last_motion_s = -math.inf
         self._next_warning_s = time.monotonic() + 2.0
         self._reported_status = ""
         self._has_reported_stopped = False
+        self._subscriber = rospy.Subscriber("/joy", Joy, self._receive, queue_size=10, tcp_nodelay=True)
+
+    def _receive(self, joy: Joy) -> None:
+        # Here, because a short press may be over at the program's next step.
+        button = self._mapping.stop_button
+        is_pressed = button < len(joy.buttons) and bool(joy.buttons[button])
+        if is_pressed and not self._is_stop_pressed:
+            self._swarm.drivers.request_stop(True)
+        self._is_stop_pressed = is_pressed
+        self._newest, self._arrival_s = joy, time.monotonic()
 
     def run(self, program: Program) -> None:
         """Drive until the program is to end.
@@ -110,10 +95,13 @@ class JoystickTeleop:
         self._swarm.drivers.check_stop()
 
     def step(self, now_s: float) -> None:
-        """Send the next command, and log what users must know. Raises: ProgramError; see JoystickMapping.read()."""
+        """Send the next command, and log what users must know; now_s: monotonic.
+
+        Raises: ProgramError; see JoystickMapping.read().
+        """
         command = STOP
-        if self._joystick.alive:
-            command = self._mapping.read(self._joystick.joy)
+        if self._newest is not None and now_s - self._arrival_s < SILENCE_S:
+            command = self._mapping.read(self._newest)
         elif now_s >= self._next_warning_s:
             self._next_warning_s = now_s + REPORT_PERIOD_S
             rospy.logwarn("nothing on /joy: is a joystick plugged in, and does its driver (package joy) run?")
