@@ -31,6 +31,7 @@ ROOMS = {
     "hero_sim.world": SIM_GROUND,
     "hero_sim.robot": SIM_GROUND | {"world"},
     "hero_sim.link": SIM_GROUND,
+    "hero_client.controllers": {"geometry", "robot_constants"},
 }
 PURE_ROOMS = (
     "hero_driver.rosserial",
@@ -40,6 +41,10 @@ PURE_ROOMS = (
     "hero_sim.world",
     "hero_sim.robot",
     "hero_sim.swarm",  # moves both through simulated time
+    "hero_client.controllers",
+    "hero_client.formations",
+    "hero_client.geometry",
+    "hero_client.readings",
 )
 
 
@@ -73,7 +78,7 @@ def test_rooms_import_only_what_lies_below_them(room):
             assert part in ROOMS[room] | {own, None}, f"{name}, line {found.line}: {found.module}"
 
 
-@pytest.mark.parametrize("package", ("hero_driver", "hero_sim"))
+@pytest.mark.parametrize("package", ("hero_driver", "hero_sim", "hero_client"))
 def test_neither_rooms_nor_modules_import_each_other_in_a_circle(package):
     modules = set(modules_below(package)) - {package}
     by_module = {name: {found.module for found in imports_of(name)} & modules - {name} for name in modules}
