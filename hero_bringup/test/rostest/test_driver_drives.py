@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The main job with simulated robots: they dial in or are dialled, are driven, calibrated and stopped."""
+"""The main job with simulated robots: driven, calibrated and stopped, as clients or servers of the driver."""
 
 import math
 import re
@@ -21,8 +21,8 @@ from hero_msgs.srv import SetIRCalibration, SetMotor, SetOdom, SetPID
 from hero_test.waiting import wait_for
 
 DEADLINE_S = 30.0
-DIALLED_IN = (0, 1, 2)
-DIALLED = 9
+CLIENTS = (0, 1, 2)
+SERVER = 9
 SPEED_M_S = 0.1
 
 
@@ -92,8 +92,8 @@ class DriverDrivesTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.fleet = Watch("/hero_driver/robots", RobotArray)
-        cls.scans = {number: Watch("/hero_%d/proximity" % number, LaserScan) for number in DIALLED_IN}
-        numbers = {*DIALLED_IN, DIALLED}
+        cls.scans = {number: Watch("/hero_%d/proximity" % number, LaserScan) for number in CLIENTS}
+        numbers = {*CLIENTS, SERVER}
         wait_for(
             lambda: (
                 cls.fleet.newest
@@ -112,11 +112,11 @@ class DriverDrivesTest(unittest.TestCase):
         rospy.wait_for_service(name, DEADLINE_S)
         return rospy.ServiceProxy(name, service_class)(*arguments)
 
-    def drive_a_bit(self, robot, way_m=0.04):
+    def drive_a_bit(self, robot, distance_m=0.04):
         """Drive back and forth in the free space before the robot, and return how far odom and truth say."""
         start, odom_start = robot.position, robot.odom.newest.pose.pose.position
         robot.drive(SPEED_M_S)
-        wait_for(lambda: math.dist(robot.position, start) > way_m, "the robot to move")
+        wait_for(lambda: math.dist(robot.position, start) > distance_m, "the robot to move")
         robot.drive(0.0)
         wait_for(lambda: robot.is_at_rest, "the robot to stop")
         robot.truth.wait_more(2)
@@ -143,12 +143,12 @@ class DriverDrivesTest(unittest.TestCase):
         second.truth.wait_more(2)
         self.assertLess(math.dist(second.position, before), 0.001)
 
-    def test_a_robot_that_is_dialled_drives_like_the_others(self):
-        odom_m, truth_m = self.drive_a_bit(self.take(DIALLED))
+    def test_a_robot_that_is_a_server_drives_like_the_others(self):
+        odom_m, truth_m = self.drive_a_bit(self.take(SERVER))
         self.assertAlmostEqual(odom_m, truth_m, delta=0.1 * truth_m + 0.002)
 
-    def test_stop_halts_all_robots_although_commands_go_on(self):
-        robots = [self.take(number) for number in (0, 1, DIALLED)]
+    def test_stop_stops_all_robots_although_commands_continue(self):
+        robots = [self.take(number) for number in (0, 1, SERVER)]
         for robot in robots:
             robot.drive(0.0, 2.0)
         for robot in robots:
@@ -163,7 +163,7 @@ class DriverDrivesTest(unittest.TestCase):
             wait_for(lambda r=robot: r.truth.newest.twist.twist.angular.z > 1.0, "the robot to turn again")
 
     def test_three_robots_are_calibrated_and_driven_through_one_driver(self):
-        for number in DIALLED_IN:
+        for number in CLIENTS:
             namespace = "/hero_%d" % number
             calls = (
                 ("/ir_calibration", SetIRCalibration, [0.42] * 8),
@@ -173,7 +173,7 @@ class DriverDrivesTest(unittest.TestCase):
             for name, service_class, arguments in calls:
                 answer = self.call(namespace + name, service_class, *arguments)
                 self.assertTrue(answer.success, "%s: %s" % (namespace + name, answer.message))
-        robots = [self.take(number) for number in DIALLED_IN]
+        robots = [self.take(number) for number in CLIENTS]
         for robot in robots:
             wait_for(
                 lambda r=robot: math.hypot(r.odom.newest.pose.pose.position.x - 1.0, 0.0) < 0.01, "x = 1 m"
@@ -200,7 +200,7 @@ class DriverDrivesTest(unittest.TestCase):
         self.addCleanup(subscriber.unregister)
         expected = {
             "hero_%d/%s" % (number, link)
-            for number in (*DIALLED_IN, DIALLED)
+            for number in (*CLIENTS, SERVER)
             for link in ("base_link", "left_wheel_link", "right_wheel_link", "hat_link", "laser_link")
         }
         wait_for(lambda: expected <= frames, "all frames of all robots")

@@ -9,11 +9,12 @@ import rostest
 
 TIMEOUT_S = 120.0
 BAD_URIS = ("localhost", "http://", "http://localhost:99999", "ftp://localhost:11311", "http://[::1")
-NODES = (["record"], ["calibrate", "--yes", "motors"], ["hero_sim", "--flash-dir", "none"])
+NODES = (["record"], ["calibrate", "--yes", "motors"], ["fleet", "--once"], ["hero_sim", "--flash-dir", "none"])
 PRINTING = (
     ["calibrate", "--help"],
     ["check", "--json"],
     ["export", "--columns"],
+    ["fleet", "--help"],
     ["hotspot", "--help"],
     ["plot", "--help"],
     ["record", "--help"],
@@ -23,6 +24,7 @@ PACKAGES = {
     "calibrate": "hero_calibration",
     "check": "hero_tools",
     "export": "hero_recording",
+    "fleet": "hero_tools",
     "hero_sim": "hero_sim",
     "hotspot": "hero_tools",
     "plot": "hero_recording",

@@ -116,7 +116,7 @@ class RvizTest(unittest.TestCase):
             folder = Path(os.environ.get("ROS_TEST_RESULTS_DIR", "."))
             matplotlib.image.imsave(str(folder / name), self.picture)
 
-    def test_robots_are_drawn_in_the_arena_where_they_are_before_and_after_they_drive(self):
+    def test_robots_are_drawn_where_they_are_before_and_after_they_drive(self):
         self.wait_until_drawn_in_place("rviz_start.png")
         start = self.watch.pose(0)[:2]
         drive = rospy.Publisher("/hero_0/velocity_controller/cmd_vel", Twist, queue_size=1)

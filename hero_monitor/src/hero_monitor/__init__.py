@@ -11,6 +11,7 @@
 | commander | publishes stops, velocities and goals |
 | background | runs what may block on other threads |
 | server | HTTP and WebSocket (tornado) |
-| program | reads parameters and wires everything |
+| parameters | reads and checks the node's parameters |
+| program | wires everything |
 | web/ | the page |
 """

@@ -78,7 +78,7 @@ class PageTest(unittest.TestCase):
         self.assertNotIn("\u202e", self.page.text("#lines"))
         self.assertEqual(self.page.errors(), [])
 
-    def test_a_robot_drives_while_a_button_is_held_and_stops_when_it_is_let_go(self):
+    def test_a_robot_drives_while_a_button_is_held_and_stops_on_release(self):
         self.page.choose("hero_0")
         button = self.page.find("#pad [aria-label='forward']")
         self.page.actions().click_and_hold(button).perform()
@@ -129,7 +129,7 @@ class PageTest(unittest.TestCase):
         self.page.wait_for_text("#notices", "hero_1 has a new goal")
         wait_for(lambda: math.dist(self.watch.pose(1)[:2], start) > 0.05, "robot 1 to go")
 
-    def test_a_click_for_a_robot_that_nobody_brings_there_says_so(self):
+    def test_a_goal_that_no_program_takes_is_reported(self):
         self.page.choose("hero_0")
         self.click_on_map(30, 30)
         self.page.wait_for_text("#notices", "go_to_goal.launch")

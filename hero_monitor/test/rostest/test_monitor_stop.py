@@ -170,7 +170,7 @@ class StopTest(unittest.TestCase):
         finally:
             os.kill(pid, signal.SIGCONT)
 
-    def test_the_page_itself_says_that_the_monitor_does_not_answer(self):
+    def test_the_page_reports_that_the_monitor_does_not_answer(self):
         resume = self.suspend(find_pid("/hero_monitor"))
         self.page.click("#stop")
         self.assertEqual(self.page.banner(), (AMBER, "stopping"))

@@ -3,7 +3,6 @@
 
 import json
 import os
-import signal
 import socket
 import subprocess
 import unittest
@@ -26,7 +25,7 @@ class FleetTest(unittest.TestCase):
 
         wait_for(both_are_ready, "two robots that are ready")
 
-    def test_json_holds_state_address_rates_pose_and_nearest_obstacle_of_every_robot(self):
+    def test_json_holds_the_state_rates_and_pose_of_every_robot(self):
         code, output, errors = run_fleet("--once", "--json")
         self.assertEqual(code, 0, errors)
         fleet = json.loads(output)
@@ -113,36 +112,12 @@ class FleetTest(unittest.TestCase):
         self.assertIn(part, text)
         self.assertEqual(len(text.splitlines()), 1, text)
 
-    def test_a_ros_master_that_cannot_be_reached_is_told_in_one_line(self):
-        for uri in ("http://", "localhost", "http://localhost:99999", "http://localhost:port", ""):
-            code, _, errors = run_fleet("--once", env={**os.environ, "ROS_MASTER_URI": uri})
-            self.assertEqual(code, 1, uri)
-            self.assert_one_line(errors, "no ROS master at %r" % uri)
-
     def test_a_ros_master_that_hangs_is_told_in_one_line(self):
         with socket.create_server(("127.0.0.1", 0)) as silent:
             uri = "http://127.0.0.1:%d" % silent.getsockname()[1]
             code, _, errors = run_fleet("--once", env={**os.environ, "ROS_MASTER_URI": uri})
         self.assertEqual(code, 1)
         self.assert_one_line(errors, "no answer within 3 s")
-
-    def test_a_log_directory_that_is_a_file_is_told_in_one_line(self):
-        code, _, errors = run_fleet("--once", env={**os.environ, "ROS_LOG_DIR": __file__})
-        self.assertEqual(code, 1)
-        self.assert_one_line(errors, "ROS_LOG_DIR")
-
-    def test_an_output_that_is_full_is_told_in_one_line(self):
-        with open("/dev/full", "wb") as full:
-            code, _, errors = run_fleet("--once", stdout=full)
-        self.assertEqual(code, 1)
-        self.assert_one_line(errors, "the output cannot be written: No space left on device")
-
-    def test_a_pipe_that_is_closed_ends_fleet_without_a_word(self):
-        read_fd, write_fd = os.pipe()
-        os.close(read_fd)
-        code, _, errors = run_fleet("--once", stdout=write_fd)
-        os.close(write_fd)
-        self.assertEqual((code, errors), (128 + signal.SIGPIPE, ""))
 
 
 if __name__ == "__main__":

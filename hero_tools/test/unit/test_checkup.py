@@ -27,7 +27,7 @@ def test_a_point_that_hangs_or_breaks_fails_alone():
     assert "two lines" in findings["breaks"].text
 
 
-def test_a_port_that_nobody_holds_is_free_and_one_that_another_program_holds_is_named():
+def test_a_free_port_passes_and_one_of_another_program_is_named():
     with socket.socket() as holder:
         holder.bind(("127.0.0.1", 0))
         port = holder.getsockname()[1]
@@ -155,7 +155,7 @@ def test_a_clock_that_was_never_set_is_a_failure(monkeypatch):
     assert computer.check_clock().state == FAIL
 
 
-def test_a_disk_that_is_nearly_full_and_a_folder_that_cannot_be_written_are_found(monkeypatch, tmp_path):
+def test_a_full_disk_and_a_directory_without_write_access_are_found(monkeypatch, tmp_path):
     monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path / "not" / "made" / "yet"))
     assert computer.check_disk().state in (OK, WARN)
     monkeypatch.setattr(computer, "SMALL_DISK_BYTES", 1e30)

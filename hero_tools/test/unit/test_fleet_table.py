@@ -34,14 +34,14 @@ def test_the_chosen_row_is_marked_and_always_shown(chosen):
     assert len(lines) <= 10
 
 
-def test_columns_stand_below_their_headings():
+def test_columns_are_aligned_with_their_headings():
     heading, *lines = format_table([make_row(0), make_row(100, pose=Pose(-12.0, 3.0, math.pi))], 200, 10)
     for line in lines:
         assert line.index("READY") == heading.index("STATE")
         assert line.index("10.42") == heading.index("ADDRESS")
 
 
-def test_a_robots_texts_cannot_draw_on_the_terminal():
+def test_texts_of_robots_cannot_draw_on_the_terminal():
     row = make_row(0, namespace="/he\x1b[2Jro", address="a\rb", last_error="bell \x07 \x9b31m")
     text = "".join(format_table([row], 200, 10)) + format_title([row], "x\x1b[2J", False)
     assert text.isprintable()

@@ -1,0 +1,96 @@
+"""The private parameters of the node, read once and checked."""
+
+import os
+import re
+import socket
+import stat
+from typing import Any, List, NamedTuple, Optional
+
+from hero_client.parameters import check_flag, check_number, read_parameters
+from hero_client.program import ProgramError
+
+from .access import TOKEN_LENGTH_MIN, is_loopback
+
+TOKEN_REMEDY = (
+    "write one into a file that only you can read, and name it with token_file:=FILE: "
+    "(umask 077; python3 -c 'import secrets; print(secrets.token_urlsafe())' > FILE)"
+)
+
+
+class Parameters(NamedTuple):
+    """The checked parameters of the node."""
+
+    host: str
+    port: int
+    token: Optional[str]
+    host_names: List[str]
+    control: bool
+    rate_hz: float
+    map_frame: str
+    max_connections: int
+    max_connections_per_address: int
+
+
+def read_token(host: str, file: str) -> Optional[str]:
+    """Return the token in a file; None if none is needed. Raises: ProgramError."""
+    if not file:
+        if is_loopback(host):
+            return None
+        raise ProgramError(
+            "~host is %s, which other machines can reach: that needs a token; %s" % (host, TOKEN_REMEDY)
+        )
+    path = os.path.expanduser(file)
+    try:
+        with open(path, encoding="utf-8") as opened:
+            mode = os.fstat(opened.fileno()).st_mode
+            token = opened.read(1000).strip()
+    except (OSError, UnicodeDecodeError) as error:
+        raise ProgramError("~token_file %s cannot be read: %s; %s" % (path, error, TOKEN_REMEDY)) from None
+    if stat.S_ISREG(mode) and mode & (stat.S_IRWXG | stat.S_IRWXO):
+        raise ProgramError("~token_file %s can be read by others: chmod 600 %s" % (path, path))
+    if len(token) < TOKEN_LENGTH_MIN:
+        raise ProgramError(
+            "~token_file %s holds less than %d characters: %s" % (path, TOKEN_LENGTH_MIN, TOKEN_REMEDY)
+        )
+    return token
+
+
+def load_parameters() -> Parameters:
+    """Return the node's private parameters. Raises: ProgramError."""
+    given = read_parameters(
+        {
+            "host": "127.0.0.1",
+            "port": 8088,
+            "token_file": "",
+            "host_names": "",
+            "control": False,
+            "rate_hz": 10.0,
+            "map_frame": "world",
+            "max_connections": 400,
+            "max_connections_per_address": 50,
+        }
+    )
+    host = str(given["host"])
+    if not host:
+        raise ProgramError("~host is empty, but must be an address of this PC, such as 127.0.0.1")
+    names = re.split(r"[\s,]+", str(given["host_names"]).strip())
+    own_name = socket.gethostname()
+    return Parameters(
+        host,
+        check_whole_number("port", given["port"], 0, 65535),
+        read_token(host, str(given["token_file"])),
+        [name for name in [*names, own_name, own_name.partition(".")[0] + ".local", host] if name],
+        check_flag("control", given["control"]),
+        check_number("rate_hz", given["rate_hz"], 1.0, 30.0, "Hz"),
+        str(given["map_frame"]).lstrip("/"),
+        check_whole_number("max_connections", given["max_connections"], 10, 10000),
+        check_whole_number("max_connections_per_address", given["max_connections_per_address"], 5, 10000),
+    )
+
+
+def check_whole_number(name: str, value: Any, low: int, high: int) -> int:
+    """Return value if it is a whole number in low..high. Raises: ProgramError."""
+    number = check_number(name, value, low, high)
+    if number != int(number):
+        raise ProgramError("~%s is %r, but must be a whole number" % (name, value))
+    return int(number)
