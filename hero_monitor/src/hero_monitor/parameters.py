@@ -4,9 +4,9 @@ import os
 import re
 import socket
 import stat
-from typing import Any, List, NamedTuple, Optional
+from typing import List, NamedTuple, Optional
 
-from hero_client.parameters import check_flag, check_number, read_parameters
+from hero_client.parameters import flag, number, read_parameters, whole_number
 from hero_client.program import ProgramError
 
 from .access import TOKEN_LENGTH_MIN, is_loopback
@@ -60,14 +60,14 @@ def load_parameters() -> Parameters:
     given = read_parameters(
         {
             "host": "127.0.0.1",
-            "port": 8088,
+            "port": whole_number(8088, 0, 65535),
             "token_file": "",
             "host_names": "",
-            "control": False,
-            "rate_hz": 10.0,
+            "control": flag(False),
+            "rate_hz": number(10.0, 1.0, 30.0, "Hz"),
             "map_frame": "world",
-            "max_connections": 400,
-            "max_connections_per_address": 50,
+            "max_connections": whole_number(400, 10, 10000),
+            "max_connections_per_address": whole_number(50, 5, 10000),
         }
     )
     host = str(given["host"])
@@ -77,20 +77,12 @@ def load_parameters() -> Parameters:
     own_name = socket.gethostname()
     return Parameters(
         host,
-        check_whole_number("port", given["port"], 0, 65535),
+        given["port"],
         read_token(host, str(given["token_file"])),
         [name for name in [*names, own_name, own_name.partition(".")[0] + ".local", host] if name],
-        check_flag("control", given["control"]),
-        check_number("rate_hz", given["rate_hz"], 1.0, 30.0, "Hz"),
+        given["control"],
+        given["rate_hz"],
         str(given["map_frame"]).lstrip("/"),
-        check_whole_number("max_connections", given["max_connections"], 10, 10000),
-        check_whole_number("max_connections_per_address", given["max_connections_per_address"], 5, 10000),
+        given["max_connections"],
+        given["max_connections_per_address"],
     )
-
-
-def check_whole_number(name: str, value: Any, low: int, high: int) -> int:
-    """Return value if it is a whole number in low..high. Raises: ProgramError."""
-    number = check_number(name, value, low, high)
-    if number != int(number):
-        raise ProgramError("~%s is %r, but must be a whole number" % (name, value))
-    return int(number)

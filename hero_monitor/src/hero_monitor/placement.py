@@ -4,10 +4,9 @@ A robot knows only its pose in hero_N/odom. The simulator or a tracking system p
 lies on the map. Robots without such a transform are drawn side by side, and the page says so.
 """
 
-import math
 from typing import Dict, Iterable, List
 
-from hero_client.geometry import Pose
+from hero_client.geometry import Pose, invert_pose, transform_pose, wrap_angle
 
 APART_M = 1.0
 """Between the origins of robots without a map transform: farther than a short drive."""
@@ -46,21 +45,12 @@ class Placement:
 
     def to_map(self, robot: str, pose: Pose) -> Pose:
         """Return a pose in hero_N/odom as a pose on the map."""
-        anchor = self._anchor_of(robot)
-        cosine, sine = math.cos(anchor.yaw_rad), math.sin(anchor.yaw_rad)
-        return Pose(
-            anchor.x_m + cosine * pose.x_m - sine * pose.y_m,
-            anchor.y_m + sine * pose.x_m + cosine * pose.y_m,
-            math.remainder(anchor.yaw_rad + pose.yaw_rad, math.tau),
-        )
+        return _wrap(transform_pose(self._anchor_of(robot), pose))
 
     def to_odometry(self, robot: str, pose: Pose) -> Pose:
         """Return a pose on the map as a pose in hero_N/odom."""
-        anchor = self._anchor_of(robot)
-        cosine, sine = math.cos(anchor.yaw_rad), math.sin(anchor.yaw_rad)
-        x_m, y_m = pose.x_m - anchor.x_m, pose.y_m - anchor.y_m
-        return Pose(
-            cosine * x_m + sine * y_m,
-            cosine * y_m - sine * x_m,
-            math.remainder(pose.yaw_rad - anchor.yaw_rad, math.tau),
-        )
+        return _wrap(transform_pose(invert_pose(self._anchor_of(robot)), pose))
+
+
+def _wrap(pose: Pose) -> Pose:
+    return pose._replace(yaw_rad=wrap_angle(pose.yaw_rad))
