@@ -13,7 +13,7 @@ NODES = (["record"], ["calibrate", "--yes", "motors"], ["fleet", "--once"], ["he
 PRINTING = (
     ["calibrate", "--help"],
     ["check", "--json"],
-    ["export", "--columns"],
+    ["export", "--help"],
     ["fleet", "--help"],
     ["hotspot", "--help"],
     ["plot", "--help"],

@@ -348,5 +348,4 @@ def show(options: argparse.Namespace) -> int:
 
 def main() -> None:
     """Run the program fleet."""
-    options = parse_options(rospy.myargv()[1:])
-    run_program(lambda: show(options))
+    run_program(lambda: show(parse_options(rospy.myargv()[1:])))
