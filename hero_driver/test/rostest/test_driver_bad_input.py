@@ -79,7 +79,7 @@ class TestDriverBadInput(OwnDriverCase):
     def test_an_unknown_parameter_is_named_with_the_one_that_was_meant(self):
         self.assert_start_fails({"prot": 11411}, "~prot is not known", "did you mean ~port?")
 
-    def test_values_out_of_range_or_of_another_type_are_named_with_what_is_allowed(self):
+    def test_wrong_values_are_named_with_what_is_allowed(self):
         for name, value, allowed in (
             ("port", 70000, "0 to 65535"),
             ("grace_s", -1.0, "0 to 3600 (s)"),
@@ -113,7 +113,7 @@ class TestDriverBadInput(OwnDriverCase):
         payload = stock_messages.make_encoder(robot.name, rospy.Time.now(), ticks, ticks)
         return packets.encode_packet(128, payload)
 
-    def test_garbage_between_packets_is_counted_and_the_next_good_packet_is_read(self):
+    def test_garbage_between_packets_is_counted_and_the_next_is_read(self):
         driver, bad, good = self.start_pair()
         encoders = Recorder("/hero_1/encoder", Encoder)
         chance = random.Random(7)
@@ -152,7 +152,7 @@ class TestDriverBadInput(OwnDriverCase):
             bad.send_bytes(bytes([byte]))
         self.assertEqual(encoders.wait_count(1)[0].left_ticks, 3.0)
 
-    def test_a_robot_that_vanishes_in_the_middle_of_a_packet_harms_nobody_and_may_return(self):
+    def test_a_robot_that_vanishes_within_a_packet_may_return(self):
         driver, bad, good = self.start_pair()
         bad.send_bytes(self.make_encoder_frame(bad)[:40])
         bad.close()
@@ -223,7 +223,7 @@ class TestDriverBadInput(OwnDriverCase):
 
     # Programs that connect.
 
-    def test_half_open_connections_keep_no_program_out_and_cost_nothing_in_the_end(self):
+    def test_half_open_connections_keep_no_program_out(self):
         driver = self.start()
         robot = self.dial(driver, 1)
         stop = rospy.ServiceProxy(driver.node + "/stop", SetBool)

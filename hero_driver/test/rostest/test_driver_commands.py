@@ -102,7 +102,7 @@ class TestDriverCommands(DriverCase):
         wait_for(lambda: not robot.velocities[-1].is_zero, "the motion")
         self.assertEqual([velocity.linear_m_s for velocity in robot.velocities], [0.0, 0.0, 0.05])
 
-    def test_the_newest_of_many_commands_wins_and_the_robot_takes_all_that_are_sent(self):
+    def test_the_newest_of_many_commands_wins_and_none_sent_is_dropped(self):
         robot = self.join_stock(7)
         publisher = make_publisher("/hero_7/" + VELOCITY, Twist)
         for step in range(1, 51):
@@ -155,7 +155,7 @@ class TestDriverCommands(DriverCase):
         wait_for(lambda: robot.payloads_on("cmd_motor")[-2:] == [STOPPED_MOTORS] * 2, "the stop, twice")
         self.assertLess(len(robot.payloads_on("cmd_motor")), 10)
 
-    def test_cmd_vel_is_an_alias_of_the_velocity_controller_and_the_newest_command_wins(self):
+    def test_of_cmd_vel_and_the_velocity_controllers_the_newest_wins(self):
         robot = self.join_stock(20)
         alias = make_publisher("/hero_20/cmd_vel", Twist)
         controller = make_publisher("/hero_20/" + VELOCITY, Twist)
@@ -166,7 +166,7 @@ class TestDriverCommands(DriverCase):
         self.wait_stopped(robot)
         self.assertEqual({velocity.name.rpartition("hero_20/")[2] for velocity in robot.velocities}, {VELOCITY})
 
-    def test_velocities_that_are_not_finite_are_refused_counted_and_reported_once(self):
+    def test_non_finite_velocities_are_refused_and_reported_once(self):
         robot = self.join(11)
         publisher = make_publisher("/hero_11/" + VELOCITY, Twist)
         bad = [make_command(math.nan), make_command(0.1, math.inf), make_command(-math.inf)]
@@ -181,7 +181,7 @@ class TestDriverCommands(DriverCase):
         self.wait_log("hero_11: .*not finite")
         self.assertEqual(len(self.find_logs("hero_11: .*not finite")), 1)
 
-    def test_velocities_over_the_firmwares_limits_pass_as_they_are_unless_a_parameter_says_otherwise(self):
+    def test_velocities_over_the_limits_pass_unless_clamp_is_set(self):
         robot = self.join(12)
         make_publisher("/hero_12/" + VELOCITY, Twist).publish(make_command(5.0, -50.0))
         wait_for(lambda: robot.velocities, "the command")

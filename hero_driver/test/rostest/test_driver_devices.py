@@ -32,7 +32,7 @@ from hero_test.waiting import wait_for
 class TestDriverDevices(OwnDriverCase):
     """Devices that are no HeRos, with ~namespace_policy any."""
 
-    def test_a_generic_device_publishes_subscribes_serves_calls_and_reads_parameters(self):
+    def test_a_generic_device_can_do_all_that_rosserial_offers(self):
         rospy.Service("/add_dots", Trigger, lambda _: TriggerResponse(True, "..."))
         rospy.set_param("/limit", 12)
         rospy.set_param("/hidden/list", ["x", "y"])
@@ -129,7 +129,7 @@ class TestDriverDevices(OwnDriverCase):
         robot.send_packet(126, make_text("still here"))
         texts.wait_count(1)
 
-    def test_a_device_can_neither_call_nor_publish_nor_serve_what_drivers_serve(self):
+    def test_a_device_can_neither_call_nor_publish_nor_serve_driver_names(self):
         driver = self.start(namespace_policy="any")
         own = driver.node
         device = [

@@ -165,7 +165,7 @@ class TestDriverEndurance(OwnDriverCase):
             ),
         )
 
-    def test_robots_that_leave_for_good_leave_no_threads_sockets_or_topics_behind(self):
+    def test_robots_that_leave_for_good_leave_nothing_behind(self):
         driver = self.start(grace_s=0.0)
 
         def come_and_go(numbers):

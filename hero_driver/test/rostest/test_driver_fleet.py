@@ -145,7 +145,7 @@ class TestDriverFleet(DriverCase):
         self.assertEqual(old.payloads_on("led"), [])
         self.assertEqual(self.fleet.find("/hero_6", Robot.AWAY), None)
 
-    def test_a_robot_that_loses_its_connection_again_and_again_takes_over_each_time(self):
+    def test_a_robot_that_keeps_losing_its_connection_always_takes_over(self):
         robots = []
         for count in range(5):
             if robots:
@@ -157,7 +157,7 @@ class TestDriverFleet(DriverCase):
         self.assertIsNone(self.fleet.find("/hero_14", Robot.REFUSED))
         wait_for(lambda: all(robot.ended for robot in robots[:-1]), "the old connections to be closed")
 
-    def test_two_robots_with_one_id_behind_one_address_do_not_push_each_other_out_for_ever(self):
+    def test_duplicates_behind_one_address_stop_evicting_each_other(self):
         robots = [self.join(15, ready=False), self.join(15, ready=False)]
 
         def look():
@@ -172,7 +172,7 @@ class TestDriverFleet(DriverCase):
         self.assertLess(self.fleet.find("/hero_15", Robot.READY).reconnects, 20)
         self.assertIn("two robots", self.fleet.find("/hero_15", Robot.REFUSED).last_error)
 
-    def test_of_two_robots_with_one_id_the_first_stays_and_the_second_is_refused(self):
+    def test_of_two_robots_with_one_id_the_second_is_refused(self):
         first = self.join(7)
         encoders = Recorder("/hero_7/encoder", Encoder)
         light = make_publisher("/hero_7/led", ColorRGBA)
@@ -214,7 +214,7 @@ class TestDriverFleet(DriverCase):
         self.wait_log("hero_7 is gone")
         self.assertIsNone(self.fleet.find("/hero_7", Robot.REFUSED))
 
-    def test_a_refused_robot_that_dials_in_again_and_again_does_not_fill_the_log(self):
+    def test_a_refused_robot_that_keeps_dialling_does_not_fill_the_log(self):
         first = self.join(8)
         for _ in range(15):
             second = self.join(8, ready=False, source_host=OTHER_HOST)
@@ -233,7 +233,7 @@ class TestDriverFleet(DriverCase):
         wait_for(lambda: robot.ended, "the connection to be closed")
         self.wait_log("hero_9 left .*silent")
 
-    def test_a_dead_robots_id_is_free_for_another_robot_before_the_connection_is_given_up(self):
+    def test_a_dead_robots_id_is_free_before_its_connection_is_given_up(self):
         dead = self.join(10)
         dead.is_silent = True
         other = self.join(10, ready=False, source_host=OTHER_HOST)
@@ -247,7 +247,7 @@ class TestDriverFleet(DriverCase):
 
         wait_for(look, "the living robot to have the id")
 
-    def test_a_connection_that_declares_nothing_is_asked_again_and_then_closed_with_the_reason(self):
+    def test_a_connection_that_declares_nothing_is_asked_again_then_closed(self):
         robot = FakeRobot(11, declarations=[])
         self.addCleanup(robot.close)
         robot.connect(self.address)

@@ -45,7 +45,7 @@ class TestDriverLimits(OwnDriverCase):
         driver.fleet.wait("/hero_2", Robot.AWAY)
         self.dial(driver, 3)
 
-    def test_an_address_that_has_taken_all_places_makes_room_for_a_robot_of_another(self):
+    def test_an_address_with_all_connections_makes_room_for_another(self):
         driver = self.start(max_connections=4)
         robots = [self.dial(driver, number) for number in range(4)]
         other = self.dial(driver, 9, source_host="127.0.0.2")

@@ -261,7 +261,7 @@ class TestDriverMessages(DriverCase):
 
     # Stamps.
 
-    def test_uptime_stamps_after_boot_and_stamps_of_the_future_become_those_of_arrival(self):
+    def test_uptime_and_future_stamps_are_replaced_by_the_arrival(self):
         robot = self.join(17)
         encoders = Recorder("/hero_17/encoder", Encoder)
         odoms = Recorder("/hero_17/odom", Odometry)
@@ -336,7 +336,7 @@ class TestDriverMessages(DriverCase):
         self.assertEqual(set(list_received()), expected)
         self.assertLess(len(transforms.messages), len(expected) / 2)
 
-    def test_transforms_that_are_not_the_robots_own_are_dropped_counted_and_reported(self):
+    def test_foreign_transforms_are_dropped_counted_and_reported(self):
         robot = self.join(23)
         transforms = Recorder("/tf", TFMessage)
         diagnostics = Recorder("/diagnostics", DiagnosticArray)
@@ -383,7 +383,7 @@ class TestDriverMessages(DriverCase):
 
     # Parameters.
 
-    def test_the_robots_own_odometry_arrival_stamps_and_covariances_by_parameter(self):
+    def test_parameters_choose_odometry_stamps_and_covariances(self):
         parameters = {
             "odometry": "robot",
             "stamps": "arrival",

@@ -88,7 +88,7 @@ class TestDriverPolicy(OwnDriverCase):
             [],
         )
 
-    def test_a_wrong_md5_and_an_unknown_type_give_one_clear_error_each_and_other_topics_work(self):
+    def test_a_wrong_md5_and_an_unknown_type_give_one_clear_error_each(self):
         changed = [
             entry._replace(md5sum=WRONG_MD5)
             if entry.name in ("/{}/encoder", "/{}/led")
@@ -149,7 +149,7 @@ class TestDriverPolicy(OwnDriverCase):
             wait_payloads(robot, "led")
         self.assertEqual(len(robot.payloads_on("led")), int(is_reached))
 
-    def test_what_is_declared_with_another_md5_after_a_reconnect_gets_nothing_more(self):
+    def test_a_topic_redeclared_with_another_md5_gets_nothing_more(self):
         driver = self.start()
         robot = self.dial(driver, 11)
         robot.answers["set_odom"] = lambda request: encode_answer(True, "set")
@@ -172,7 +172,7 @@ class TestDriverPolicy(OwnDriverCase):
         rospy.wait_for_service("/hero_11/set_odom", 20.0)
         self.assertTrue(set_odom(0.0, 0.0, 0.0).success)
 
-    def test_what_is_declared_with_another_type_after_a_reconnect_gets_that_only(self):
+    def test_a_topic_redeclared_with_another_type_gets_that_only(self):
         driver = self.start()
         robot = self.dial(driver, 12)
         light = make_publisher("/hero_12/led", ColorRGBA)

@@ -110,7 +110,7 @@ class TestDriverShutdown(OwnDriverCase):
         self.assertEqual(driver.wait_end(), 0, driver.lines)
         self.assert_stopped(others)
 
-    def test_motors_that_are_driven_directly_and_position_control_are_stopped_too(self):
+    def test_direct_motor_commands_and_position_control_are_stopped_too(self):
         driver = self.start()
         robot = self.dial(driver, 1)
         make_publisher("/hero_1/cmd_motor", Motor).publish(Motor(1400, 1600))

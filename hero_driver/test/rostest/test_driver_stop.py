@@ -297,7 +297,7 @@ class TestDriverStop(OwnDriverCase):
         wait_for(lambda: robot.payloads_on("led"), "the next command")
         self.assertTrue(robot.motors.is_turning)
 
-    def test_the_end_of_a_program_on_cmd_vel_does_not_stop_one_that_drives_since(self):
+    def test_the_end_of_an_older_program_on_cmd_vel_stops_nobody(self):
         driver = self.start(orphan_stop_s=0.0)
         robot = self.dial_stock(driver, 43)
         older = make_publisher("/hero_43/cmd_vel", Twist)

@@ -178,7 +178,7 @@ class TestDriverTopics(DriverCase):
             self.assertLessEqual(earliest.to_nsec(), secs * 10**9 + nsecs)
             self.assertLessEqual(secs * 10**9 + nsecs, rospy.Time.now().to_nsec())
 
-    def test_a_robot_that_answers_the_first_request_without_topics_is_asked_again(self):
+    def test_a_robot_that_first_answers_without_topics_is_asked_again(self):
         robot = self.join(9, ready=False, declarations=[])
         wait_for(lambda: robot.requests == 1, "the first request")
         # Now it advertises, but believes that it is configured and streams ids that it never declared.
@@ -230,7 +230,7 @@ class TestDriverTopics(DriverCase):
         )
         self.fleet.wait("/hero_13", 1, "with uptime", lambda entry: 421 <= entry.uptime.to_sec() < 500)
 
-    def test_the_boot_line_before_the_request_gives_versions_and_reaches_the_log(self):
+    def test_an_early_boot_line_gives_versions_and_reaches_the_log(self):
         robot = FakeRobot(14)
         self.addCleanup(robot.close)
         robot.declares = False

@@ -61,7 +61,7 @@ def test_where_all_places_are_taken_the_address_with_the_most_gives_one_up():
     assert admission.find_eviction("10.0.1.1") is None, "it may not come anyway"
 
 
-def test_addresses_that_have_the_same_share_do_not_take_places_from_each_other():
+def test_addresses_with_equal_shares_do_not_evict_each_other():
     admission = make_admission(max_connections=4)
     for host in ("10.0.0.1", "10.0.0.1", "10.0.0.2", "10.0.0.2"):
         admission.admit(host)
@@ -86,7 +86,7 @@ def test_connections_that_say_nothing_are_limited():
     assert admission.admit("10.0.0.2") is None
 
 
-def test_where_too_many_say_nothing_the_address_with_the_most_of_them_makes_room():
+def test_at_the_unidentified_cap_the_largest_address_makes_room():
     admission = make_admission("10.0.0.0/24", max_unidentified=4)
     for host in ("10.0.0.1", "10.0.0.2", "10.0.0.2"):
         admission.admit(host)
@@ -181,7 +181,7 @@ def test_new_robot_names_are_rate_limited_per_address():
     assert [admission.admit_new_robot(ROBOT, 100.0) for _ in range(10)] == [None] * 10
 
 
-def test_a_hundred_simulated_robots_started_again_and_again_all_join_at_once():
+def test_a_hundred_simulated_robots_restarted_repeatedly_join_at_once():
     admission = make_admission(max_connections_per_address=400)
     for start in range(100):
         assert not any(admission.admit_new_robot("127.0.0.1", 30.0 * start) for _ in range(100))

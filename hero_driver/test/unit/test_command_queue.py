@@ -78,7 +78,7 @@ def test_a_full_queue_of_other_commands_does_not_hold_up_a_stop():
     assert take(queue, 0.0)[0] == (VELOCITY, ZERO_TWIST)
 
 
-def test_other_commands_wait_while_the_robot_has_not_acknowledged_its_window_and_a_stop_does_not():
+def test_unacknowledged_bytes_delay_other_commands_but_not_a_stop():
     queue = make_queue()
     queue.offer(LED, bytes(16))
     offer(queue, VELOCITY, ZERO_TWIST, 0.0)

@@ -65,7 +65,7 @@ def test_every_stamp_of_a_recording_grows(read_capture):
     assert len(last_ns) == 8
 
 
-def test_the_odometry_of_a_recording_has_the_whole_way_that_the_robots_own_lost(read_capture):
+def test_recorded_ticks_give_the_distance_that_robot_odometry_lost(read_capture):
     _, outputs = clean(read_capture("A.robot_to_server.bin"), "/hero_0", START_NS)
     x_m, y_m, yaw_rad = read_odometry([payload for name, payload in outputs if name == "/hero_0/odom"][-1])[
         2:5
@@ -80,7 +80,7 @@ def test_the_odometry_of_a_recording_has_the_whole_way_that_the_robots_own_lost(
     assert math.hypot(raw[2] - 1.0, raw[3] - 2.0) < 0.75 * distance_m
 
 
-def test_each_odometry_of_a_recording_has_the_transform_with_its_stamp_and_pose(read_capture):
+def test_recorded_odometry_and_transforms_agree_in_stamp_and_pose(read_capture):
     _, outputs = clean(read_capture("A.robot_to_server.bin"), "/hero_0", START_NS)
     odometry = {
         read_stamp_ns(payload): read_odometry(payload)[2:5]

@@ -72,7 +72,7 @@ def test_one_complaint_again_and_again_keeps_no_other_out(rosout):
     assert texts == [("ERROR", "the same complaint"), ("ERROR", "another complaint")]
 
 
-def test_ever_new_complaints_about_one_robot_are_limited_and_those_about_others_not(rosout):
+def test_different_messages_about_one_robot_are_limited(rosout):
     _, texts = rosout
     relay = LogRelay()
     for number in range(10 * GROUP_LINES_MAX):

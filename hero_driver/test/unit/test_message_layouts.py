@@ -108,7 +108,7 @@ def test_odometry_takes_another_estimate():
     assert read_odometry(written)[2:7] == pytest.approx((7.0, 8.0, -2.0, 0.2, 3.0))
 
 
-def test_odometry_that_is_cut_or_too_long_or_has_lengths_that_do_not_fit_is_refused():
+def test_odometry_of_a_wrong_length_is_refused():
     writer, payload = make_writer(), build_odometry(NOW_NS)
     broken = [payload[:length] for length in range(len(payload))] + [payload + b"\x00"]
     for offset in (12, 12 + 4 + len("hero_0/odom")):
@@ -232,7 +232,7 @@ def test_proximity_has_eight_beams_at_the_true_angles():
     assert len(ranges_m) == len(intensities) == 8
 
 
-def test_only_the_beams_that_were_measured_are_taken_and_straight_ahead_is_the_fifth():
+def test_only_measured_beams_are_taken_and_the_fifth_points_forward():
     stock = [0.10 + 0.005 * index for index in range(16)]
     readings = [float(index) for index in range(16)]
     _, _, ranges_m, intensities = read_scan(make_proximity(stock, readings))

@@ -76,7 +76,7 @@ def test_an_unknown_type_is_refused_with_the_package_to_install(type_name):
     assert "package " + type_name.split("/")[0] in str(caught.value)
 
 
-def test_a_robot_cannot_make_the_driver_import_a_module_that_is_no_package_of_messages(tmp_path, monkeypatch):
+def test_a_robot_cannot_make_the_driver_import_any_other_module(tmp_path, monkeypatch):
     (tmp_path / "module_of_somebody_else.py").write_text("raise SystemExit('imported')\n")
     monkeypatch.syspath_prepend(str(tmp_path))
     with pytest.raises(MessageTypeError):

@@ -33,7 +33,7 @@ def list_children(outputs):
 # The stock robot's order: odometry, transforms, encoder.
 
 
-def test_odometry_and_its_transform_wait_for_the_reading_of_their_own_burst():
+def test_odometry_and_its_transform_wait_for_their_bursts_reading():
     robot = CorrectedRobot()
     robot.receive_burst(NOW_NS, (0.0, 0.0))
     *first, (encoder_name, _, encoder) = build_burst(NOW_NS + PERIOD_NS, (10.0, 10.0))
@@ -90,7 +90,7 @@ def test_a_reading_stamped_a_millisecond_after_its_odometry_belongs_to_it():
         assert list_odometry(outputs)[0][2] == pytest.approx(5.0 * number * TICK_M)
 
 
-def test_a_transform_stamped_a_millisecond_after_its_odometry_belongs_to_the_same_burst():
+def test_a_transform_one_millisecond_after_odometry_is_of_its_burst():
     robot = CorrectedRobot()
     for number in range(5):
         stamp_ns = NOW_NS + number * PERIOD_NS
@@ -137,7 +137,7 @@ def test_one_lost_reading_does_not_end_the_waiting_for_good():
     assert list_odometry(outputs)[-1][2] == pytest.approx(290.0 * TICK_M)
 
 
-def test_a_robot_that_declares_an_encoder_and_never_reads_it_keeps_its_own_estimate():
+def test_a_declared_encoder_without_readings_keeps_the_robots_estimate():
     robot = CorrectedRobot()
     for number in range(5):
         stamp_ns = NOW_NS + number * PERIOD_NS
@@ -145,7 +145,7 @@ def test_a_robot_that_declares_an_encoder_and_never_reads_it_keeps_its_own_estim
     assert [odometry[2] for odometry in list_odometry(robot.outputs)][-1] == pytest.approx(0.4)
 
 
-def test_a_robot_without_an_encoder_keeps_its_own_estimate_and_nothing_waits():
+def test_without_an_encoder_the_robots_estimate_passes_at_once():
     robot = CorrectedRobot({name: TYPES[name] for name in ("/hero_0/odom", "/tf")})
     outputs = robot.receive("/hero_0/odom", build_odometry(NOW_NS, 1.0, 2.0, 0.5, 0.1, 0.2), NOW_NS)
     assert list_odometry(outputs)[0][2:7] == pytest.approx((1.0, 2.0, 0.5, 0.1, 0.2))
@@ -193,7 +193,7 @@ def test_the_pose_stays_where_it_was_when_the_robot_reboots():
     assert list_odometry(outputs)[0][2] == pytest.approx(110.0 * TICK_M)
 
 
-def test_a_reboot_that_is_noticed_after_the_topics_were_declared_does_not_lose_the_encoder():
+def test_a_reboot_noticed_after_the_declarations_keeps_the_encoder():
     robot = CorrectedRobot()
     robot.receive_burst(NOW_NS, (100.0, 100.0))
     robot.corrections.note_reboot()
@@ -202,7 +202,7 @@ def test_a_reboot_that_is_noticed_after_the_topics_were_declared_does_not_lose_t
     assert list_odometry(outputs)[0][2] == pytest.approx(10.0 * TICK_M)
 
 
-def test_messages_that_waited_when_the_connection_broke_are_not_sent_on_the_next_one():
+def test_pending_messages_are_not_sent_on_the_next_connection():
     robot = CorrectedRobot()
     robot.receive("/hero_0/odom", build_odometry(NOW_NS), NOW_NS)
     robot.reconnect(rebooted=False)
@@ -225,7 +225,7 @@ def test_a_set_pose_is_where_the_odometry_goes_on_from():
     bursts=st.lists(st.tuples(st.permutations(range(3)), st.sets(st.integers(0, 2))), max_size=20),
     jitter_ms=st.integers(0, 2),
 )
-def test_every_odometry_and_transform_comes_out_once_in_order_with_growing_stamps(bursts, jitter_ms):
+def test_odometry_and_transforms_come_out_once_with_growing_stamps(bursts, jitter_ms):
     robot = CorrectedRobot()
     sent = Counter()
     for number, (order, lost) in enumerate([*bursts, ((0, 1, 2), set()), ((0, 1, 2), set())]):
@@ -250,7 +250,7 @@ def test_every_odometry_and_transform_comes_out_once_in_order_with_growing_stamp
 
 @pytest.mark.parametrize("name", TYPES)
 @given(payload=st.binary(max_size=800))
-def test_arbitrary_bytes_never_raise_and_are_counted_where_they_cannot_be_used(name, payload):
+def test_arbitrary_bytes_never_raise_and_are_counted(name, payload):
     robot = CorrectedRobot()
     outputs = robot.receive(name, payload, NOW_NS)
     assert outputs or robot.corrections.refused == 1

@@ -157,7 +157,7 @@ def test_a_publisher_that_is_not_open_yet_drops_messages():
     assert publisher.release() == []
 
 
-def test_a_slow_subscriber_gets_whole_messages_the_oldest_of_those_that_wait_being_dropped(bench):
+def test_a_slow_subscriber_gets_whole_messages_and_loses_the_oldest(bench):
     subscriber = bench.subscribe()
     for number in range(100):
         bench.publisher.publish(make_message(number))

@@ -141,7 +141,7 @@ def test_messages_are_whole_and_in_order_however_they_are_cut(bench):
     assert bench.list_payloads()[before:] == messages
 
 
-def test_what_rospy_has_read_already_comes_first_and_a_begun_message_is_not_lost(bench):
+def test_what_rospy_has_read_comes_first_and_nothing_is_lost(bench):
     publisher, _, _ = bench.publish()
     stream = b"".join(frame(b"%d" % number) for number in range(10)) + frame(b"a message in two parts")
     publisher.sendall(stream[:-5])
@@ -189,7 +189,7 @@ def test_the_end_of_the_loop_lets_the_threads_of_rospy_go(bench):
     wait_until_ended(thread)
 
 
-def test_a_publisher_that_does_not_speak_tcpros_is_closed_and_the_others_go_on(bench):
+def test_a_publisher_that_does_not_speak_tcpros_is_closed_alone(bench):
     other, _, _ = bench.publish_adopted()
     publisher, _, thread = bench.publish_adopted()
     publisher.sendall(struct.pack("<I", MESSAGE_LENGTH_MAX + 1))
@@ -200,7 +200,7 @@ def test_a_publisher_that_does_not_speak_tcpros_is_closed_and_the_others_go_on(b
     assert bench.received[-1] == (b"still here", True)
 
 
-def test_a_message_that_cannot_be_taken_is_reported_and_ends_its_publisher_only(bench):
+def test_an_unusable_message_is_reported_and_ends_its_publisher_only(bench):
     other, _, _ = bench.publish_adopted()
     publisher, _, thread = bench.publish_adopted()
     bench.fails_on = b"bad"

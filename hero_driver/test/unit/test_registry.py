@@ -77,7 +77,7 @@ def test_a_robot_that_was_away_returns_from_any_address():
     assert (record.reconnects, record.joined_s) == (1, T0 + 12.0)
 
 
-def test_a_robot_stays_known_for_the_grace_period_and_is_forgotten_after_it():
+def test_a_robot_stays_known_for_exactly_the_grace_period():
     fleet = make_fleet()
     identify(fleet, 1, T0)
     identify(fleet, 2, T0, identity=OTHER)
@@ -153,7 +153,7 @@ def refuse_second(fleet, heard_s=None):
         fleet.robots["/hero_0"].last_heard_s = heard_s
 
 
-def test_the_id_of_a_robot_that_is_away_is_kept_from_the_second_one_with_it():
+def test_the_id_of_a_robot_that_is_away_is_kept_from_its_duplicate():
     fleet = make_fleet()
     refuse_second(fleet, heard_s=T0 + 1.1)
     fleet.leave(1, "closed", T0 + 2.0)
@@ -188,7 +188,7 @@ def test_a_connection_that_dies_does_not_give_the_id_to_the_second_robot():
     assert identify(fleet, 3, T0 + 1.1 + 2 * ALIVE_S, host="10.0.0.2").verdict is Verdict.REFUSED
 
 
-def test_a_robot_that_moved_to_another_address_is_let_in_when_its_old_connection_ends():
+def test_a_robot_at_a_new_address_joins_when_its_old_connection_ends():
     fleet = make_fleet()
     refuse_second(fleet)  # nothing came over the old connection any more
     assert not fleet.is_reserved(fleet.robots["/hero_0"], "10.0.0.2")
@@ -199,7 +199,7 @@ def test_a_robot_that_moved_to_another_address_is_let_in_when_its_old_connection
     assert decision.record.host == "10.0.0.2"
 
 
-def test_a_second_robot_behind_the_same_address_waits_for_the_grace_period_too():
+def test_a_duplicate_behind_the_same_address_waits_for_the_grace_period():
     fleet = make_fleet()
     identify(fleet, 1, T0)
     identify(fleet, 2, T0 + 1.0)
@@ -221,7 +221,7 @@ def test_the_addresses_of_duplicates_that_are_remembered_are_limited():
     assert len(fleet.robots["/hero_0"].rivals) == RIVALS_MAX
 
 
-def test_two_robots_behind_one_address_do_not_take_each_others_place_for_ever():
+def test_two_robots_behind_one_address_stop_taking_over_each_other():
     fleet = make_fleet()
     identify(fleet, 1, T0)
     verdicts = []
@@ -279,7 +279,7 @@ actions = st.lists(
 
 
 @given(script=actions)
-def test_a_robot_has_at_most_one_connection_and_each_belongs_to_at_most_one_robot(script):
+def test_robots_and_connections_belong_to_at_most_one_of_each_other(script):
     fleet, now_s, links = make_fleet(), T0, []
     for action, number, host, pause_s in script:
         now_s += pause_s

@@ -70,7 +70,7 @@ def publish(reporter, *records):
     return reporter._publisher.published[-1].robots
 
 
-def test_a_duplicate_has_a_row_with_its_own_address_and_nothing_of_the_other_robots(reporter):
+def test_a_duplicate_has_a_row_with_its_own_address_and_nothing_else(reporter):
     refused = {"10.0.0.2:1": "two robots call themselves /hero_7, says a text in any words"}
     rows = publish(reporter, make_record(firmware="v3.8", refused=refused))
     assert [(row.address, row.state, row.firmware) for row in rows] == [

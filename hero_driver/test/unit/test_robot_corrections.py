@@ -32,7 +32,7 @@ def test_messages_with_stamps_since_boot_get_the_time_of_their_arrival():
     assert robot.corrections.corrected_stamps >= 7
 
 
-def test_odometry_and_its_transform_have_one_stamp_before_and_after_the_robot_learns_the_time():
+def test_odometry_and_its_transform_share_one_stamp_from_boot_on():
     robot = CorrectedRobot()
     for number in range(10):
         arrival_ns = NOW_NS + number * 34 * MS

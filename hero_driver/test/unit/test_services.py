@@ -130,7 +130,7 @@ def test_a_late_answer_is_not_taken_for_that_of_the_next_call(robot):
     assert robot.answers[b"third"] == b"answer"
 
 
-def test_a_late_answer_that_never_comes_closes_the_service_only_for_as_long_again(robot):
+def test_a_missing_answer_closes_the_service_for_one_more_timeout(robot):
     robot.call(b"first")
     robot.advance(TIMEOUT_S)
     robot.advance(TIMEOUT_S)
@@ -167,7 +167,7 @@ def test_a_caller_that_had_to_wait_gets_half_of_the_time_limit(robot):
     assert robot.answers[b"second"] == "was not answered within 4.0 s (~service_timeout_s)"
 
 
-def test_a_caller_whose_turn_does_not_come_is_told_that_the_service_is_busy(robot):
+def test_a_waiting_caller_is_told_that_the_service_is_busy(robot):
     robot.call(b"first")
     robot.advance(0.5 * TIMEOUT_S)
     robot.call(b"second")

@@ -29,7 +29,7 @@ def test_a_stamp_outside_the_limits_is_replaced_by_its_arrival_and_counted(ahead
     assert stamps.corrected == 1
 
 
-def test_stamps_that_count_from_boot_are_replaced_until_the_robot_has_the_time():
+def test_stamps_since_boot_are_replaced_until_the_robot_has_the_time():
     stamps = make_filter()
     for message in range(9):
         arrival_ns = NOW_NS + message * 34 * MS
@@ -77,7 +77,7 @@ def test_stamps_follow_when_ros_time_begins_anew():
 
 @pytest.mark.parametrize("step_s", [0.2, 1, 4.9, 60])
 @pytest.mark.parametrize("use_arrival", [False, True])
-def test_stamps_are_not_in_the_future_when_the_clock_of_this_computer_was_set_back(step_s, use_arrival):
+def test_stamps_are_not_in_the_future_after_the_pcs_clock_is_set_back(step_s, use_arrival):
     stamps = make_filter(use_arrival)
     stamps.correct(TOPIC, NOW_NS, NOW_NS)
     back_ns = NOW_NS - int(step_s * NS_PER_S)

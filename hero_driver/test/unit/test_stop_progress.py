@@ -98,7 +98,7 @@ def test_a_robot_without_readings_is_told_for_two_cycles_and_unconfirmed():
     assert 2 * READ_CYCLE_S <= robot.sent_s[-1] < 0.2
 
 
-def test_a_robot_whose_readings_stopped_is_unconfirmed_until_they_come_again():
+def test_a_robot_without_new_readings_is_unconfirmed_until_they_come():
     robot = Robot(lambda now_s: 0.0, reads=False, warm_up=20)
     assert robot.run(REPORT_AFTER_S + 0.5) == [StopState.STOPPING, StopState.UNCONFIRMED]
     robot.reads = True

@@ -71,7 +71,7 @@ def test_equal_wheels_backwards_go_straight_back():
     assert odometry.linear_m_s == pytest.approx(-0.1)
 
 
-def test_opposite_wheels_spin_on_the_spot_counter_clockwise_when_the_right_one_goes_ahead():
+def test_opposite_wheels_spin_in_place():
     odometry = make_odometry()
     drive(odometry, -0.05, 0.05, 100)
     assert_pose(odometry, 0.0, 0.0, 0.1 / SEPARATION_M * 3.4)

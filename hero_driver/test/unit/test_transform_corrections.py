@@ -31,7 +31,7 @@ def test_transforms_between_the_robots_own_frames_pass_as_they_are(child):
     assert (robot.corrections.refused, robot.corrections.transforms.foreign_frames) == (0, set())
 
 
-def test_a_transform_that_comes_twice_with_one_stamp_gets_a_later_one_the_second_time():
+def test_a_repeated_transform_gets_a_later_stamp():
     robot = CorrectedRobot()
     hat, laser = ("hero_0/base_link", "hero_0/hat_link"), ("hero_0/base_link", "hero_0/laser_link")
     receive_transforms(robot, hat, stamp_ns=NOW_NS - NS_PER_S)
@@ -50,7 +50,7 @@ def test_a_stamp_that_passed_passes_for_nobody_elses_frames():
         assert receive_transforms(robot, ("map", "hero_0/odom"), stamp_ns=stamp_ns) == []
 
 
-def test_a_stamp_of_too_many_nanoseconds_comes_out_in_the_form_that_ros_takes():
+def test_a_stamp_of_too_many_nanoseconds_is_normalised():
     robot = CorrectedRobot()
     pair = ("hero_0/base_link", "hero_0/hat_link")
     receive_transforms(robot, pair, stamp_ns=NOW_NS - NS_PER_S)
@@ -86,7 +86,7 @@ def test_several_transforms_in_one_message_come_out_one_by_one():
         ("hero_0/base_link", "hero_0/" + 4000 * "x"),
     ],
 )
-def test_transforms_of_frames_that_are_not_the_robots_own_are_refused_counted_and_named(pair):
+def test_transforms_of_foreign_frames_are_refused_counted_and_named(pair):
     robot = CorrectedRobot()
     for _ in range(3):
         assert receive_transforms(robot, pair) == []
@@ -128,7 +128,7 @@ def test_a_broken_message_of_transforms_is_refused_whole():
     assert robot.corrections.refused == len(message) + 2
 
 
-def test_transforms_of_devices_that_are_no_heros_pass_one_by_one_whatever_their_frames():
+def test_transforms_of_other_devices_pass_whatever_their_frames():
     transforms = [build_transform(NOW_NS, "map", "rover"), build_transform(2 * NS_PER_S, "rover", "camera")]
     message = build_transform_message(*transforms)
     assert split_transforms(message) == transforms

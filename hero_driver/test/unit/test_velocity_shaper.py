@@ -91,7 +91,7 @@ def test_a_first_command_goes_out_at_once_and_unchanged():
     assert shaper.due_in_s(5.1) is None
 
 
-def test_the_newest_of_several_commands_goes_out_when_the_interval_has_passed():
+def test_the_newest_command_is_sent_when_the_interval_has_passed():
     shaper = VelocityShaper()
     shaper.offer(make_motion(1))
     assert shaper.take(0.0) == make_twist(1)
@@ -234,7 +234,7 @@ def test_motion_is_sent_in_the_order_in_which_it_was_offered(script):
 
 
 @given(script=steps, phase_ms=st.integers(0, 50))
-def test_a_robot_that_drops_commands_within_its_gate_ends_up_as_last_commanded(script, phase_ms):
+def test_a_robot_that_gates_commands_ends_up_as_last_commanded(script, phase_ms):
     offered, sent = run(script)
     state, accepted_s = None, -math.inf
     for sent_ms, number in sent:

@@ -50,7 +50,7 @@ def test_a_new_session_asks_for_topics_at_once_and_only_once():
     assert session.take_packets() == []
 
 
-def test_the_request_is_repeated_every_one_and_a_half_seconds_while_nothing_is_declared():
+def test_the_request_is_repeated_every_1_5_s_until_a_declaration():
     session = open_session(silence_timeout_s=60.0)
     request_times_s, events = poll_until(session, T0 + 0.05, T0 + 6.5)
     assert request_times_s == pytest.approx([T0 + 1.5, T0 + 3.0, T0 + 4.5, T0 + 6.0])
@@ -67,7 +67,7 @@ def test_nothing_is_asked_any_more_once_a_topic_is_declared():
     assert poll_until(session, T0 + 0.1, T0 + 5.0) == ([], [])
 
 
-def test_a_handshake_that_arrives_in_pieces_over_150_ms_is_not_asked_for_again():
+def test_a_handshake_in_pieces_over_150_ms_is_not_requested_again():
     session = open_session()
     receive(session, TIME_REQUEST, T0 + 0.05)
     assert poll_until(session, T0 + 0.05, T0 + 0.2)[0] == []
@@ -75,14 +75,14 @@ def test_a_handshake_that_arrives_in_pieces_over_150_ms_is_not_asked_for_again()
     assert poll_until(session, T0 + 0.2, T0 + 5.0)[0] == []
 
 
-def test_a_time_request_without_topics_is_the_zero_topic_handshake_and_is_asked_again_after_200_ms():
+def test_a_zero_topic_handshake_is_asked_again_after_200_ms():
     session = open_session()
     receive(session, TIME_REQUEST, T0 + 0.06)
     request_times_s, _ = poll_until(session, T0 + 0.06, T0 + 1.0, 0.01)
     assert request_times_s == pytest.approx([T0 + 0.26])
 
 
-def test_data_without_any_declared_topic_makes_the_session_ask_at_most_every_half_second():
+def test_undeclared_data_is_answered_by_at_most_two_requests_a_second():
     session = open_session()
     request_times_s = []
     for step in range(1, 200):
@@ -96,7 +96,7 @@ def test_data_without_any_declared_topic_makes_the_session_ask_at_most_every_hal
     assert isinstance(receive(session, ODOM_MESSAGE, T0 + 2.0)[0], MessageReceived)
 
 
-def test_a_robot_that_still_streams_on_a_new_connection_is_asked_at_once_if_nobody_asked_yet():
+def test_a_robot_that_streams_on_a_new_connection_is_asked_at_once():
     session = Session(SessionLimits(), T0)
     receive(session, ODOM_MESSAGE, T0 + 0.02)
     session.poll(T0 + 0.02)
@@ -112,7 +112,7 @@ def test_log_lines_before_any_topic_are_events_and_a_reason_to_ask_again():
     assert session.take_packets() == [REQUEST]
 
 
-def test_an_undeclared_id_beside_declared_topics_is_reported_and_asked_for_a_few_times_only():
+def test_an_undeclared_id_is_reported_and_asked_for_a_few_times_only():
     session = open_declared_session(silence_timeout_s=600.0)
     request_times_s, problems = [], []
     for step in range(2000):
@@ -127,7 +127,7 @@ def test_an_undeclared_id_beside_declared_topics_is_reported_and_asked_for_a_few
     assert session.undeclared_messages == 2000
 
 
-def test_a_robot_that_only_logs_after_it_was_declared_has_lost_its_configuration_and_is_asked_again():
+def test_a_declared_robot_that_only_logs_is_asked_for_topics_again():
     # After 11 s without an answer to its time requests (a PC that slept) a robot sends log lines and nothing
     # else, on the connection that it has; only a new request brings its data back.
     session = open_declared_session()
@@ -138,7 +138,7 @@ def test_a_robot_that_only_logs_after_it_was_declared_has_lost_its_configuration
     assert request_times_s
 
 
-def test_a_robot_that_lost_its_configuration_is_asked_at_most_every_half_second_until_it_answers():
+def test_an_unconfigured_robot_is_asked_at_most_every_half_second():
     session = open_declared_session()
     request_times_s = []
     for step in range(1, 500):
@@ -158,7 +158,7 @@ def test_a_robot_that_lost_its_configuration_is_asked_at_most_every_half_second_
     assert len(request_times_s) <= 1
 
 
-def test_a_robot_that_asks_for_the_time_or_sends_data_has_not_lost_its_configuration():
+def test_time_requests_and_data_show_that_the_robot_is_configured():
     for sign_of_life in (TIME_REQUEST, ODOM_MESSAGE):
         session = open_declared_session()
         for step in range(1, 200):
@@ -263,7 +263,7 @@ def test_a_parameter_longer_than_the_robots_buffer_is_never_encoded():
 
 @pytest.mark.parametrize("frame_id", [0, 1, 2, 3, 4, 5, 6, 7, 10])
 @pytest.mark.parametrize("payload", [b"", b"\x00", b"\xff" * 40], ids=["empty", "one byte", "noise"])
-def test_a_special_packet_with_a_broken_payload_is_a_problem_and_nothing_more(frame_id, payload):
+def test_a_broken_payload_of_a_special_packet_is_only_a_problem(frame_id, payload):
     session = open_declared_session()
     (problem,) = receive(session, build_packet(frame_id, payload))
     assert type(problem) is Problem

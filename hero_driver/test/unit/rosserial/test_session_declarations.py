@@ -80,7 +80,7 @@ def test_another_declaration_of_an_id_replaces_the_one_before():
     assert message[0].info.name == "/hero_0/other"
 
 
-def test_ids_that_become_something_else_again_and_again_are_refused_and_keep_their_last_name():
+def test_ids_redeclared_too_often_are_refused_and_keep_their_name():
     session = open_session(max_topics=3)
     events = []
     for count in range(10):
@@ -181,7 +181,7 @@ def test_topics_beyond_the_limit_are_refused_while_the_first_ones_work():
         session.encode_message(103, bytes(48))
 
 
-def test_an_id_may_be_declared_anew_when_there_are_as_many_topics_as_allowed():
+def test_an_id_may_be_declared_again_at_the_limit_of_topics():
     session = open_session(max_topics=1)
     receive(session, declare_twist(100, "/hero_0/a"))
     (event,) = receive(session, declare_twist(100, "/hero_0/b"))
