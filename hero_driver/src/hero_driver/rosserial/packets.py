@@ -70,6 +70,8 @@ ID_TX_STOP = 11
 FIRST_TOPIC_ID = 100
 
 _HEADER = struct.Struct("<2sHBH")
+_SYNC_NUMBER = int.from_bytes(SYNC, "little")
+_read_header = struct.Struct("<HHBH").unpack_from  # with the sync as a number, which costs less
 _EXACT_ADLER_LENGTH = 256
 """adler32 & 0xffff is (1 + sum of the bytes) mod 65521: exact up to this length, and much faster than sum()."""
 
@@ -79,6 +81,9 @@ class Packet(NamedTuple):
 
     topic_id: int
     payload: bytes
+
+
+_new_packet = functools.partial(tuple.__new__, Packet)  # at two thirds of the cost of Packet(...), 200 times per second
 
 
 def sum_bytes(data: Bytes) -> int:
@@ -142,20 +147,22 @@ class PacketReader:
         """Return the packets that data completes, in order. Never raises, whatever data holds."""
         buffer = self._remainder + bytes(data) if self._remainder else bytes(data)
         end = len(buffer)
+        last_start = end - HEADER_LENGTH
+        max_length = self._max_payload_length
         position = 0
         found: List[Packet] = []
-        while end - position >= HEADER_LENGTH:
-            sync, length, length_checksum, topic_id = _HEADER.unpack_from(buffer, position)
-            if sync != SYNC:
+        while position <= last_start:
+            sync, length, length_checksum, topic_id = _read_header(buffer, position)
+            if sync != _SYNC_NUMBER:
                 position = self._skip_to_sync(buffer, position)
                 continue
-            if (length + (length >> 8) + length_checksum) & 0xFF == 0xFF and length <= self._max_payload_length:
+            if (length + (length >> 8) + length_checksum) & 0xFF == 0xFF and length <= max_length:
                 packet_end = position + OVERHEAD_LENGTH + length
                 if packet_end > end:
                     break
-                checked = buffer[position + _CHECKED_OFFSET : packet_end]
-                if sum_bytes(checked) == 0xFF:
-                    found.append(Packet(topic_id, checked[2:-1]))
+                if sum_bytes(buffer[position + _CHECKED_OFFSET : packet_end]) == 0xFF:
+                    payload = buffer[position + HEADER_LENGTH : packet_end - 1]
+                    found.append(_new_packet((topic_id, payload)))
                     position = packet_end
                     continue
             self.bad_packets += 1

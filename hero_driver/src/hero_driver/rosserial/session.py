@@ -7,6 +7,7 @@ Source: ros_lib node_handle.h (negotiateTopics, requestSyncTime, spinOnce) and t
 """
 
 import enum
+import functools
 import re
 from dataclasses import dataclass, field
 from typing import Callable, Dict, List, NamedTuple, Optional, Sequence, Union
@@ -102,6 +103,9 @@ class MessageReceived(NamedTuple):
 
     topic: Topic
     payload: bytes
+
+
+_new_message = functools.partial(tuple.__new__, MessageReceived)  # as packets._new_packet
 
 
 class CallReceived(NamedTuple):
@@ -237,7 +241,7 @@ class Session:
         for topic_id, payload in self.reader.receive_bytes(data):
             topic = self._messages.get(topic_id)
             if topic is not None:
-                events.append(MessageReceived(topic, payload))
+                events.append(_new_message((topic, payload)))
                 self._last_configured_s = now_s
                 continue
             try:
