@@ -1,8 +1,8 @@
 """The private parameters of the node, read once and checked."""
 
 import os
+import platform
 import re
-import socket
 import stat
 from typing import List, NamedTuple, Optional
 
@@ -74,7 +74,7 @@ def load_parameters() -> Parameters:
     if not host:
         raise ProgramError("~host is empty, but must be an address of this PC, such as 127.0.0.1")
     names = re.split(r"[\s,]+", str(given["host_names"]).strip())
-    own_name = socket.gethostname()
+    own_name = platform.node()
     return Parameters(
         host,
         given["port"],

@@ -6,7 +6,7 @@ Parameters: the README of this package. Everything runs on tornado's thread, exc
 """
 
 import asyncio
-import socket
+import platform
 from typing import TYPE_CHECKING, Any, Union
 
 import rospy
@@ -74,7 +74,7 @@ class Monitor:
             ) from None
         host = "[%s]" % wanted.host if ":" in wanted.host else wanted.host
         if wanted.host in ("0.0.0.0", "::"):
-            host = socket.gethostname()
+            host = platform.node()
         hint = "" if wanted.control else " (view only; control:=true allows driving)"
         rospy.loginfo("fleet monitor: http://%s:%d%s", host, port, hint)
         self._end_check.start()
