@@ -1,61 +1,58 @@
-"""Speeds of a wheel at some servo pulses -> the dead zone of that servo, and its centre. Pure.
+"""Finds the dead zone of a servo, and its center, from the speeds of its wheel in a sweep of pulses. Pure.
 
-A continuous-rotation servo stands within some tens of microseconds around its centre. Its pulses are led up a
-staircase and down again; where the wheel begins to turn on either side is found from the slope beyond, so that the
-centre is known better than a step. A command that came late spoils some stairs and looks like any other, so the way up
-and the way down are judged alone and must agree; where the servo lags, they err in opposite ways. Pulses are absolute
-(cmd_motor): what the robot holds for its centres has no part in it.
+A continuous-rotation servo stops within some tens of microseconds around its center. Pulses are swept up and down in
+steps; the pulses at which the wheel starts to turn follow from the slope of the speeds beyond, more precisely than a
+step. A late command spoils some steps unnoticed, so the two sweeps are evaluated separately and must agree; a lag of
+the servo moves them in opposite directions. Pulses are absolute (cmd_motor): the centers in the robot do not matter.
 """
 
 from typing import List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
-from .encoder_steps import TICK_M, Readings
+from .encoder_readings import TICK_M, Readings
 from .errors import CalibrationError
 
-NOMINAL_CENTRE_US = 1500
+NOMINAL_CENTER_US = 1500
 REACH_US = 120
-"""How far from the nominal centre the staircase goes either way: far enough for a centre that is off by 60 us with a
-dead zone of 40 us."""
+"""Extent of the sweep to either side: enough for a center that is off by 60 us, and a dead zone of 40 us."""
 
 STEP_US = 6
 PULSE_S = 0.45
-"""Of each pulse of the staircase; the robot holds one for 1 s."""
+"""Duration of each step; the robot holds a pulse for 1 s."""
 
 SETTLE_S = 0.2
-"""Way of a command to the robot (up to 51 ms and the network) and the lag of its servos."""
+"""Delay of a command to the robot (up to 51 ms and the network) and the lag of its servos."""
 
 LATE_S = 0.03
-"""How long after a pulse a reading is still one of it: the next command is on its way so long."""
+"""Readings this long after the end of a step still belong to it: the next command takes so long."""
 
 SILENCE_S = 0.25
-"""Where nothing was heard for so long, what was sent meanwhile came as late, or was dropped: a robot that reads many
-commands at once takes the oldest."""
+"""Commands sent during a silence this long came as late, or were dropped: a robot that reads many commands at once
+takes the oldest."""
 
 DROPPED_S = 0.1
-"""How long after a silence a command may still be dropped; the robot drops what comes within 50 ms of another."""
+"""A command may still be dropped this long after a silence: the robot drops one within 50 ms of another."""
 
-LEAST_STEPS = 2
+LEAST_READINGS = 2
 MISSING_SHARE = 0.5
-"""So many stairs may be missed: with the simulated Wi-Fi of a PC that is the access point a third is. The edges follow
-from eight speeds on either side, wherever they are."""
+"""Of the steps; with the simulated Wi-Fi of a PC that is the access point a third is missing."""
 
-STANDING_M_S = 0.004
-"""Slower than this a wheel stands: two ticks (1.1 mm) in a step may be the servo that settles."""
+REST_M_S = 0.004
+"""A slower wheel is at rest: two ticks (1.1 mm) in a step may be the servo that settles."""
 
 FIT_POINTS = 8
 LEAST_POINTS = 3
-"""So many speeds beyond the dead zone give its edge; further ones say less of it, fewer are lost in noise."""
+"""Speeds beyond the dead zone that give its edge: further ones tell less of it, fewer are lost in noise."""
 
 AGREE_US = 8.0
-"""So far apart the centres of the way up and the way down may be. Half of it is left in their mean."""
+"""Largest difference of the centers of both sweeps. Half of it is left in their mean."""
 
 WIDEST_US = 200.0
 
 
 class DeadZone(NamedTuple):
-    """Where a wheel stands.
+    """Pulses at which a wheel is at rest.
 
     Attributes:
         low_us, high_us: edges.
@@ -67,98 +64,88 @@ class DeadZone(NamedTuple):
     gain_m_s_us: float
 
     @property
-    def centre_us(self) -> float:
+    def center_us(self) -> float:
         """The middle."""
         return (self.low_us + self.high_us) / 2.0
 
 
 def list_pulses() -> List[int]:
-    """Return the pulses of the staircase (us): as many rising, and the same falling."""
-    rising = list(range(NOMINAL_CENTRE_US - REACH_US, NOMINAL_CENTRE_US + REACH_US + 1, STEP_US))
+    """Return the pulses of a sweep (us): first rising, then the same falling."""
+    rising = list(range(NOMINAL_CENTER_US - REACH_US, NOMINAL_CENTER_US + REACH_US + 1, STEP_US))
     return rising + rising[::-1]
 
 
-def measure_stairs(readings: Readings, begins_s: Sequence[float]) -> np.ndarray:
-    """Return the speeds (m/s) of both wheels (2, stairs) at each stair of the staircase, which began at begins_s.
+def measure_sweep(readings: Readings, start_times_s: Sequence[float]) -> np.ndarray:
+    """Return the speeds (m/s) of both wheels (2, steps) at each step of a sweep, by their start times.
 
-    NaN for a stair of which too little was heard, or whose command may have come late. Raises: CalibrationError if
-    there are too many of those.
+    NaN for a step with too few readings, or whose command may have come late. Raises: CalibrationError if there are
+    too many of those.
     """
     is_silent = np.diff(readings.heard_s) > SILENCE_S
     silences_s = np.stack([readings.heard_s[:-1][is_silent], readings.heard_s[1:][is_silent]])
-    steps = np.diff([readings.counts, readings.left_ticks, readings.right_ticks])
-    speeds = np.full((2, len(begins_s)), np.nan)
-    for stair, begin_s in enumerate(begins_s):
-        is_seen = (readings.times_s[:-1] >= begin_s + SETTLE_S) & (
-            readings.times_s[1:] <= begin_s + PULSE_S + LATE_S
-        )
-        is_late = (silences_s[0] < begin_s + SETTLE_S) & (silences_s[1] > begin_s - DROPPED_S)
-        if is_late.any():
-            continue
-        kept = steps[:, is_seen & readings.is_even]
-        if kept.shape[1] >= LEAST_STEPS:
-            count, *ways_ticks = kept.sum(axis=1)
-            speeds[:, stair] = np.array(ways_ticks) * TICK_M / (count * readings.step_s)
+    changes = np.diff([readings.counts, readings.left_ticks, readings.right_ticks])
+    speeds = np.full((2, len(start_times_s)), np.nan)
+    for step, start_s in enumerate(start_times_s):
+        first_s, last_s = start_s + SETTLE_S, start_s + PULSE_S + LATE_S
+        is_seen = (readings.times_s[:-1] >= first_s) & (readings.times_s[1:] <= last_s)
+        is_late = (silences_s[0] < first_s) & (silences_s[1] > start_s - DROPPED_S)
+        kept = changes[:, is_seen & readings.is_even]
+        if kept.shape[1] >= LEAST_READINGS and not is_late.any():
+            count, *distances_ticks = kept.sum(axis=1)
+            speeds[:, step] = np.array(distances_ticks) * TICK_M / (count * readings.step_s)
     if np.isnan(speeds[0]).mean() > MISSING_SHARE:
         raise CalibrationError("too few encoder readings came: is the network busy? try again")
     return speeds
 
 
 def find_dead_zone(pulses_us: Sequence[float], speeds_m_s: Sequence[float]) -> DeadZone:
-    """Return the dead zone of a wheel from its speeds at the pulses of the staircase, NaN where it was not heard.
+    """Return the dead zone of a wheel from its speeds (NaN: unknown) at the pulses of list_pulses().
 
-    pulses_us: the first half rises, the second falls.
-
-    Raises: CalibrationError if the wheel does not stand somewhere and turn on both sides of it, or not at the same
-    pulses on the way up and on the way down.
+    Raises: CalibrationError if the wheel does not rest at some pulses and turn on both sides of them, or if the two
+    sweeps disagree.
     """
     pulses, speeds = np.asarray(pulses_us, dtype=float), np.asarray(speeds_m_s, dtype=float)
     half = len(pulses) // 2
     up = _find_zone(pulses[:half], speeds[:half])
     down = _find_zone(pulses[half:][::-1], speeds[half:][::-1])
-    if abs(up.centre_us - down.centre_us) > AGREE_US:
+    if abs(up.center_us - down.center_us) > AGREE_US:
         raise CalibrationError(
-            "stands around %.0f us with rising pulses and around %.0f us with falling ones: is the network busy? "
-            "try again" % (up.centre_us, down.centre_us)
+            "stops around %.0f us with rising pulses and around %.0f us with falling ones: is the network busy? "
+            "try again" % (up.center_us, down.center_us)
         )
     return DeadZone(*np.mean([up, down], axis=0).tolist())
 
 
 def _find_zone(pulses: np.ndarray, speeds: np.ndarray) -> DeadZone:
-    """Return the dead zone as one way, of rising pulses, shows it."""
+    """Return the dead zone as a sweep in one direction, sorted by pulse, shows it."""
     span = "%.0f to %.0f us" % (pulses[0], pulses[-1])
-    is_heard = np.isfinite(speeds)
-    pulses, speeds = pulses[is_heard], speeds[is_heard]
-    if not (np.abs(speeds) > STANDING_M_S).any():
+    is_known = np.isfinite(speeds)
+    pulses, speeds = pulses[is_known], speeds[is_known]
+    if not (np.abs(speeds) > REST_M_S).any():
         raise CalibrationError("does not turn at any pulse from %s: is its servo plugged in?" % span)
-    # The signs on both sides of the dead zone differ; which one is positive depends on how the servo is mounted.
-    rising = np.polyfit(pulses, speeds, 1)[0] > 0.0
-    ahead = speeds if rising else -speeds
-    below, above = np.flatnonzero(ahead < -STANDING_M_S), np.flatnonzero(ahead > STANDING_M_S)
+    # Which side of the dead zone is forward depends on how the servo is mounted.
+    speeds = speeds * np.sign(np.polyfit(pulses, speeds, 1)[0])
+    below, above = np.flatnonzero(speeds < -REST_M_S), np.flatnonzero(speeds > REST_M_S)
     if min(len(below), len(above)) < LEAST_POINTS or below[-1] >= above[0]:
         raise CalibrationError(
-            "does not stand between turning one way and the other at pulses from %s: is it blocked, or its servo worn?"
+            "does not stop between turning one way and the other at pulses from %s: is it blocked, or its servo worn?"
             % span
         )
-    low_us, low_slope = _find_edge(pulses[below[-FIT_POINTS:]], ahead[below[-FIT_POINTS:]])
-    high_us, high_slope = _find_edge(pulses[above[:FIT_POINTS]], ahead[above[:FIT_POINTS]])
+    low_us, low_slope = _find_edge(pulses[below[-FIT_POINTS:]], speeds[below[-FIT_POINTS:]])
+    high_us, high_slope = _find_edge(pulses[above[:FIT_POINTS]], speeds[above[:FIT_POINTS]])
     if not -STEP_US <= high_us - low_us <= WIDEST_US:
-        raise CalibrationError(
-            "stands from %.0f to %.0f us, which no servo does: measure again" % (low_us, high_us)
-        )
-    # Of a servo that hardly stands, noise may show the edges in the wrong order.
+        raise CalibrationError("stops from %.0f to %.0f us, which no servo does: try again" % (low_us, high_us))
+    # If the dead zone is narrow, noise may show the edges in the wrong order.
     return DeadZone(min(low_us, high_us), max(low_us, high_us), (low_slope + high_slope) / 2.0)
 
 
 def _find_edge(pulses_us: np.ndarray, speeds_m_s: np.ndarray) -> Tuple[float, float]:
-    """Return where a line through the speeds meets zero (us), and its slope (m/s per us).
+    """Return the pulse (us) at which a line through the speeds meets zero, and its slope (m/s per us).
 
-    The line has the median of all slopes between two points (Theil and Sen): a wrong speed or two do not bend it.
+    The slope is the median over all pairs of points (Theil and Sen): a wrong speed or two do not change it.
     """
     one, other = np.triu_indices(len(pulses_us), 1)
     slope = float(np.median((speeds_m_s[other] - speeds_m_s[one]) / (pulses_us[other] - pulses_us[one])))
     if slope <= 0.0:
-        raise CalibrationError(
-            "does not turn faster with a longer pulse: measure again, on a floor with grip"
-        )
+        raise CalibrationError("does not turn faster with a longer pulse: try again, on a floor with grip")
     return float(np.median(pulses_us - speeds_m_s / slope)), slope

@@ -1,5 +1,9 @@
-"""Why a calibration ends, for one robot or for all: one line with the thing, the value and the remedy."""
+"""The errors that end a calibration, of one robot or of all: one line with the thing, the value and the remedy."""
 
 
 class CalibrationError(Exception):
     """A robot cannot be calibrated, or a file cannot be used; the text says why and what to do."""
+
+
+class EndedError(Exception):
+    """The program was told to end in the middle of a procedure."""

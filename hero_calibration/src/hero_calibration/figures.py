@@ -1,82 +1,74 @@
-"""What was measured of one robot -> a picture: servos, wheels before and after, ranges before and after."""
+"""Draws the calibration of one robot: its servos, and its wheels and ranges before and after."""
 
-from typing import List, Optional
+from typing import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from . import dead_zone, infrared, speed_response
-from .procedures import InfraredResult, MotorResult, VelocityResult
+from .dead_zone import NOMINAL_CENTER_US
+from .infrared import InfraredResult
+from .infrared_model import BEAMS, name_beam
+from .motors import MotorResult
+from .step_response import STEP_M_S
+from .velocity import VelocityResult
 
 _LEFT, _RIGHT, _GREY = "#0072B2", "#D55E00", "0.55"  # two of Okabe and Ito's palette
+_WHEELS = (("left", _LEFT), ("right", _RIGHT))
 
 
-def draw_robot(
-    name: str,
-    motors: Optional[MotorResult],
-    velocity: Optional[VelocityResult],
-    ranges: Optional[InfraredResult],
-) -> Figure:
-    """Return the picture of a robot, with a diagram for each part that was measured."""
-    parts: List[object] = [part for part in (motors, velocity, ranges) if part is not None]
-    figure = Figure(figsize=(4.4 * max(1, len(parts)), 3.8), layout="constrained")
+def draw_robot(name: str, results: Sequence[object]) -> Figure:
+    """Return the figure of a robot, with a diagram for each result."""
+    figure = Figure(figsize=(4.4 * len(results), 3.8), constrained_layout=True)
     figure.suptitle(name, fontweight="bold")
-    for axes, part in zip(figure.subplots(1, max(1, len(parts)), squeeze=False)[0], parts):
+    for axes, result in zip(figure.subplots(1, len(results), squeeze=False)[0], results):
         axes.grid(color="0.9", linewidth=0.5)
-        if isinstance(part, MotorResult):
-            _draw_motors(axes, part)
-        elif isinstance(part, VelocityResult):
-            _draw_velocity(axes, part)
-        elif isinstance(part, InfraredResult):
-            _draw_ranges(axes, part)
+        if isinstance(result, MotorResult):
+            _draw_motors(axes, result)
+        elif isinstance(result, VelocityResult):
+            _draw_velocity(axes, result)
+        elif isinstance(result, InfraredResult):
+            _draw_ranges(axes, result)
         axes.legend(fontsize=7)
     return figure
 
 
 def _draw_motors(axes: Axes, result: MotorResult) -> None:
-    for speeds, zone, colour, wheel in zip(
-        result.speeds_m_s, result.zones, (_LEFT, _RIGHT), ("left", "right")
-    ):
-        axes.plot(result.pulses_us, speeds, ".-", color=colour, linewidth=0.8, markersize=4, label=wheel)
-        axes.axvspan(zone.low_us, zone.high_us, color=colour, alpha=0.12)
-        axes.axvline(zone.centre_us, color=colour, linewidth=1.2, label="centre %.0f us" % zone.centre_us)
-    axes.axvline(
-        dead_zone.NOMINAL_CENTRE_US,
-        color=_GREY,
-        linestyle=":",
-        label="nominal %d us" % dead_zone.NOMINAL_CENTRE_US,
-    )
-    axes.set_title("Servos: where the wheels stand", fontsize=9)
+    for speeds, zone, (wheel, color) in zip(result.speeds_m_s, result.zones, _WHEELS):
+        axes.plot(result.pulses_us, speeds, ".-", color=color, linewidth=0.8, markersize=4, label=wheel)
+        axes.axvspan(zone.low_us, zone.high_us, color=color, alpha=0.12)
+        axes.axvline(zone.center_us, color=color, linewidth=1.2, label="center %.0f us" % zone.center_us)
+    axes.axvline(NOMINAL_CENTER_US, color=_GREY, linestyle=":", label="nominal %d us" % NOMINAL_CENTER_US)
+    axes.set_title("Servos: dead zones", fontsize=9)
     axes.set_xlabel("pulse (us)")
     axes.set_ylabel("speed of the wheel (m/s)")
 
 
 def _draw_velocity(axes: Axes, result: VelocityResult) -> None:
     for responses, style, when in ((result.before, ":", "before"), (result.after, "-", "after")):
-        for response, colour, wheel in zip(responses, (_LEFT, _RIGHT), ("left", "right")):
-            for number, (times_s, speeds_m_s) in enumerate(response.curves):
-                label = "%s, %s: %.0f %% off" % (wheel, when, 100.0 * response.mean_error)
-                axes.plot(
-                    times_s, speeds_m_s, style, color=colour, linewidth=1.0, label=None if number else label
-                )
-    axes.axhline(speed_response.STEP_M_S, color=_GREY, linewidth=0.8)
-    axes.set_title("Wheels: speed after a start from rest", fontsize=9)
+        for response, (wheel, color) in zip(responses, _WHEELS):
+            label = "%s, %s: mean error %.0f %%" % (wheel, when, 100.0 * response.mean_error)
+            for times_s, speeds_m_s in response.curves:
+                axes.plot(times_s, speeds_m_s, style, color=color, linewidth=1.0, label=label)
+                label = ""
+    axes.axhline(STEP_M_S, color=_GREY, linewidth=0.8)
+    axes.set_title("Wheels: step response", fontsize=9)
     axes.set_xlabel("time since the command (s)")
     axes.set_ylabel("speed, both directions (m/s)")
 
 
 def _draw_ranges(axes: Axes, result: InfraredResult) -> None:
-    sensors = np.arange(infrared.BEAMS)
-    for errors_m, marker, colour, when in (
+    sensors = np.arange(BEAMS)
+    for errors_m, marker, color, label in (
         (result.before_m, "o", _GREY, "before"),
         (result.after_m, "D", _LEFT, "after"),
     ):
         known = np.isfinite(errors_m)
-        # A sensor without a calibration has no range; the legend says so.
-        label = when if known.any() else when + ": no calibration"
-        axes.plot(sensors[known], errors_m[known] * 1e3, marker, color=colour, markersize=5, label=label)
+        # A sensor without a calibration has no range.
+        label += "" if known.any() else ": no calibration"
+        axes.plot(sensors[known], errors_m[known] * 1e3, marker, color=color, markersize=5, label=label)
     axes.axhline(0.0, color=_GREY, linewidth=0.8)
-    axes.set_xticks(sensors, [infrared.name_beam(index).replace(" ", "\n") for index in sensors], fontsize=7)
-    axes.set_title("Infrared: error of the range at 10 cm", fontsize=9)
+    axes.set_xticks(sensors)
+    axes.set_xticklabels([name_beam(index).replace(" ", "\n") for index in sensors], fontsize=7)
+    axes.set_title("Infrared: range error at 10 cm", fontsize=9)
     axes.set_ylabel("range too far (mm)")

@@ -1,166 +1,153 @@
-"""Readings of eight infrared sensors, each turned to a wall in turn -> their constants. Pure.
-
-signal = alpha * cos(angle) / distance^2 + offset; the firmware takes range = sqrt(alpha / signal), so what it needs is
-alpha = signal * distance^2 at 10 cm, the offset included. A robot that does not face the wall quite straight reads
-less. By how much it is turned is seen from the two neighbours, at 45 degrees on both sides: turned to the left, the
-right one is nearer. Source of the model: measurements that the robot's authors published.
-"""
+"""Procedure infrared: turns each sensor of all robots to a wall, writes their constants, and checks them."""
 
 import math
-from typing import List, NamedTuple, Sequence
+from typing import Dict, List, NamedTuple
 
 import numpy as np
 
-from hero_client.robot_constants import BODY_RADIUS_M
+from hero_client.command_line import say
+from hero_client.control_laws import Pose
 
+from . import infrared_model as model
 from .errors import CalibrationError
+from .probe import Probe
+from .session import Session
 
-BEAMS = 8
-BEAM_STEP_RAD = math.pi / 4.0
-AHEAD = 4
-"""Sensors count counter-clockwise from straight behind."""
+TURN_S = 2.5
+"""For 45 degrees; the position controller ends 3 s after its command."""
 
-WALL_M = 0.10
-"""From the body to the wall."""
-
-NOMINAL_COUNTS_M2 = 0.42
-NEAR_COUNTS = 16.0
-"""A sensor that reads more has something within about 16 cm of the body: too near to turn or to measure beside."""
-
-WALL_COUNTS = (22.0, 110.0)
-"""What a sensor may read of a wall at 10 cm: 42 is usual."""
-
-CHECK_SAMPLES = 10
-"""Least scans of a sensor in the check: of ten, noise of 1.3 counts moves the range by 0.5 mm."""
-
-FAINT_COUNTS = 0.5
-NO_WALL_COUNTS = 4.0
-"""A neighbour that looks at the wall from 45 degrees reads 12; of two that see less than this none does."""
-
-LARGEST_TURN_RAD = math.radians(12.0)
-PLAUSIBLE_COUNTS_M2 = (0.15, 1.2)
+TURN_REACHED_RAD = math.radians(1.5)
+TURN_TOLERANCE_RAD = math.radians(10.0)
+TURN_TRIES = 3
+SCAN_TIMEOUT_S = 15.0
 
 
-class Facing(NamedTuple):
-    """What was seen while one sensor faced the wall.
+class InfraredResult(NamedTuple):
+    """Constants of one robot's sensors, and the errors of its ranges before and after (m)."""
 
-    Attributes:
-        sensor: index of the sensor.
-        counts: mean readings of all eight.
-        ranges_m: mean ranges of all eight as the robot has them (from its centre); NaN if it has no calibration.
-        moved_m: how much nearer to the wall the robot's centre had come since the first one.
-    """
+    counts_m2: List[float]
+    before_m: np.ndarray
+    after_m: np.ndarray
 
-    sensor: int
-    counts: Sequence[float]
-    ranges_m: Sequence[float]
-    moved_m: float
+    def to_file(self) -> Dict[str, List[float]]:
+        """Return what is kept in the robot's file."""
+        return {
+            "infrared_counts_m2": [round(value, 5) for value in self.counts_m2],
+            "range_errors_before_m": [round(float(error), 4) for error in self.before_m],
+            "range_errors_after_m": [round(float(error), 4) for error in self.after_m],
+        }
 
-
-def read_signals(intensities: Sequence[float]) -> List[float]:
-    """Return the eight readings in a LaserScan of the stock robot, whose odd values are averages."""
-    return [float(value) for value in intensities[::2]]
-
-
-def count_check_samples(samples: int) -> int:
-    """Return how many scans of each sensor the check takes, after a first turn that took samples."""
-    return max(CHECK_SAMPLES, samples // 3)
-
-
-def average(scans: np.ndarray) -> np.ndarray:
-    """Return the mean of scans (N, ...) without the highest and the lowest fifth.
-
-    A scan that the network held back is one of the robot while it still turned.
-    """
-    cut = len(scans) // 5
-    return np.asarray(np.sort(scans, axis=0)[cut : len(scans) - cut].mean(axis=0))
-
-
-def estimate_distance_m(counts: float) -> float:
-    """Return how far from the body something of these counts is, for a usual sensor; inf: nothing."""
-    return math.sqrt(NOMINAL_COUNTS_M2 / counts) if counts > 1.0 else math.inf
-
-
-def name_beam(sensor: int) -> str:
-    """Return where a sensor looks, in words."""
-    return ("behind", "behind right", "right", "ahead right", "ahead", "ahead left", "left", "behind left")[
-        sensor
-    ]
-
-
-def expected_brightness(angle_rad: float, wall_m: float) -> float:
-    """Return signal / alpha of a sensor that looks at angle_rad from the wall's normal (1/m^2).
-
-    wall_m: from the robot's centre to the wall.
-    """
-    distance_m = wall_m / math.cos(angle_rad) - BODY_RADIUS_M
-    return math.cos(angle_rad) / distance_m**2
-
-
-def estimate_turn_rad(facing: Facing) -> float:
-    """Return by how much the robot is turned too far to the left, from the neighbours of the sensor that faces.
-
-    Raises: CalibrationError if they see nothing or it is turned too far.
-    """
-    neighbours = ((facing.sensor + 1) % BEAMS, (facing.sensor - 1) % BEAMS)
-    left, right = (max(facing.counts[index], FAINT_COUNTS) for index in neighbours)
-    if max(left, right) <= NO_WALL_COUNTS:
-        raise CalibrationError(
-            "the sensors beside the one that looks %s see no wall: is it wider than 30 cm, and white?"
-            % name_beam(facing.sensor)
+    def describe(self) -> str:
+        """Return the result as a line of text."""
+        return "largest range error at 10 cm %s before, %s after" % (
+            format_largest(self.before_m),
+            format_largest(self.after_m),
         )
-    wall_m = WALL_M + BODY_RADIUS_M - facing.moved_m
-    step_rad = math.radians(1.0)
-    slope = (
-        2.0
-        * (
-            math.log(expected_brightness(BEAM_STEP_RAD - step_rad, wall_m))
-            - math.log(expected_brightness(BEAM_STEP_RAD, wall_m))
-        )
-        / step_rad
-    )
-    # Turned to the left, the right neighbour comes nearer to the wall's normal.
-    turn_rad = math.log(right / left) / slope
-    if abs(turn_rad) > LARGEST_TURN_RAD:
-        raise CalibrationError(
-            "stands %.0f degrees askew to the wall when it looks %s: place it straight, or clean its wheels"
-            % (abs(math.degrees(turn_rad)), name_beam(facing.sensor))
-        )
-    return turn_rad
 
 
-def compute_calibration(facings: Sequence[Facing]) -> List[float]:
-    """Return alpha of all sensors (counts m^2), by their index.
+def format_largest(errors_m: np.ndarray) -> str:
+    """Return the largest error as text."""
+    largest_m = np.abs(errors_m).max()
+    return "%.0f mm" % (1e3 * largest_m) if np.isfinite(largest_m) else "unknown (no calibration)"
 
-    Raises: CalibrationError if a sensor reads what no wall at 10 cm gives.
+
+class _Wall(NamedTuple):
+    """The wall as a robot saw it first, in its odom frame: the robot's pose, and the direction of the wall's normal."""
+
+    start: Pose
+    direction_rad: float
+
+    def distance_m(self, pose: Pose) -> float:
+        """Return how much closer to the wall a pose is than the first one."""
+        x_m, y_m = pose.x_m - self.start.x_m, pose.y_m - self.start.y_m
+        return x_m * math.cos(self.direction_rad) + y_m * math.sin(self.direction_rad)
+
+
+def calibrate_infrared(session: Session, samples: int) -> Dict[int, InfraredResult]:
+    """Calibrate all active robots, which face a wall; return the results by robot.
+
+    samples: scans of each sensor in the first round.
     """
-    alphas = [math.nan] * BEAMS
-    for facing in facings:
-        counts = facing.counts[facing.sensor]
-        if not WALL_COUNTS[0] <= counts <= WALL_COUNTS[1]:
+    say("infrared: about %.0f s" % (model.BEAMS * (2 * TURN_S + (samples + model.CHECK_SAMPLES) / 5.0)))
+    walls: Dict[int, _Wall] = {}
+    counts_m2: Dict[int, List[float]] = {}
+    first = _face_wall_with_each_sensor(session, "infrared", samples, walls)
+
+    def write(probe: Probe) -> None:
+        counts_m2[probe.robot_id] = model.compute_calibration(first[probe.robot_id])
+        probe.write("infrared_counts_m2", counts_m2[probe.robot_id])
+
+    session.for_each("infrared", write)
+    second = _face_wall_with_each_sensor(session, "check of infrared", model.CHECK_SAMPLES, walls)
+    return {
+        probe.robot_id: InfraredResult(
+            counts_m2[probe.robot_id],
+            model.range_errors_m(first[probe.robot_id]),
+            model.range_errors_m(second[probe.robot_id]),
+        )
+        for probe in session.active
+    }
+
+
+def _face_wall_with_each_sensor(
+    session: Session, title: str, samples: int, walls: Dict[int, _Wall]
+) -> Dict[int, List[model.Facing]]:
+    """Turn each sensor to the wall and collect its readings; walls are stored at the first one."""
+    facings: Dict[int, List[model.Facing]] = {probe.robot_id: [] for probe in session.active}
+    for step in range(model.BEAMS):
+        sensor = (model.FRONT - step) % model.BEAMS
+        say("%s: sensor %s, %d of %d" % (title, model.name_beam(sensor), step + 1, model.BEAMS))
+        for probe in session.active:
+            probe.forget_scans()
+        session.wait_for(
+            lambda: all(probe.count_scans() >= samples for probe in session.active),
+            max(SCAN_TIMEOUT_S, samples / 2.0),
+        )
+        angles_rad: Dict[int, float] = {}
+
+        def evaluate(probe: Probe, sensor: int = sensor, angles_rad: Dict[int, float] = angles_rad) -> None:
+            counts, ranges_m = probe.read_scans()
+            pose = probe.read_pose()
+            facing = model.Facing(sensor, counts.tolist(), ranges_m.tolist(), 0.0)
+            misalignment_rad = model.estimate_misalignment_rad(facing)
+            wall = walls.setdefault(probe.robot_id, _Wall(pose, pose.yaw_rad - misalignment_rad))
+            facings[probe.robot_id].append(facing._replace(moved_m=wall.distance_m(pose)))
+            angles_rad[probe.robot_id] = model.BEAM_STEP_RAD - misalignment_rad
+
+        session.for_each(title, evaluate)
+        _turn(session, title, angles_rad)
+    return facings
+
+
+def _turn(session: Session, title: str, angles_rad: Dict[int, float]) -> None:
+    """Turn every active robot to the left by its angle, on the spot, with further tries for the remainder."""
+    targets_rad: Dict[int, float] = {}
+
+    def set_target(probe: Probe) -> None:
+        targets_rad[probe.robot_id] = probe.read_pose().yaw_rad + angles_rad[probe.robot_id]
+
+    def remaining_rad(probe: Probe) -> float:
+        return math.remainder(targets_rad[probe.robot_id] - probe.pose.yaw_rad, 2.0 * math.pi)
+
+    def check(probe: Probe) -> None:
+        probe.read_pose()
+        if abs(remaining_rad(probe)) > TURN_TOLERANCE_RAD:
             raise CalibrationError(
-                "the sensor that looks %s reads %.0f counts; %.0f are usual for a white wall 10 cm away: place it anew"
-                % (name_beam(facing.sensor), counts, NOMINAL_COUNTS_M2 / WALL_M**2)
+                "could not turn on the spot: %.0f degrees are missing; calibrate its motors, or free its wheels"
+                % abs(math.degrees(remaining_rad(probe)))
             )
-        # What it would read straight ahead at 10 cm.
-        brightness = expected_brightness(estimate_turn_rad(facing), WALL_M + BODY_RADIUS_M - facing.moved_m)
-        alphas[facing.sensor] = counts / brightness
-    wrong = [
-        index
-        for index, alpha in enumerate(alphas)
-        if not PLAUSIBLE_COUNTS_M2[0] <= alpha <= PLAUSIBLE_COUNTS_M2[1]
-    ]
-    if wrong:
-        raise CalibrationError(
-            "the sensor that looks %s would get %.2f counts m^2, which no sensor has"
-            % (name_beam(wrong[0]), alphas[wrong[0]])
+
+    session.for_each(title, set_target)
+    for tolerance_rad in (0.0, *[TURN_TOLERANCE_RAD / 2.0] * (TURN_TRIES - 1)):
+        turning = [probe for probe in session.active if abs(remaining_rad(probe)) > tolerance_rad]
+        if not turning:
+            break
+        for probe in turning:
+            probe.turn(remaining_rad(probe))
+        session.pause(TURN_S / 4.0)
+        session.wait_for(
+            lambda turning=turning: all(abs(remaining_rad(probe)) <= TURN_REACHED_RAD for probe in turning),
+            TURN_S * 3.0 / 4.0,
         )
-    return alphas
-
-
-def range_errors_m(facings: Sequence[Facing]) -> np.ndarray:
-    """Return how much too far each sensor saw the wall that it faced, by its index; NaN if it saw none."""
-    errors = np.full(BEAMS, np.nan)
-    for facing in facings:
-        errors[facing.sensor] = facing.ranges_m[facing.sensor] - (WALL_M + BODY_RADIUS_M - facing.moved_m)
-    return errors
+        session.settle()
+    session.for_each(title, check)

@@ -1,12 +1,9 @@
-"""One robot on its topics and services, as a calibration needs it: raw readings, raw commands. Knows topics only.
-
-Encoder readings are kept with their stamps and numbers: see encoder_steps.
-"""
+"""The topics and services of one robot that a calibration needs: raw readings and raw commands."""
 
 import threading
 import time
 from collections import deque
-from typing import Any, Deque, List, Optional, Tuple
+from typing import Any, Deque, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 import rospy
@@ -14,20 +11,32 @@ from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 
-from hero_client.geometry import Pose, yaw_of
+from hero_client.control_laws import Pose
+from hero_client.readings import yaw_of
 from hero_msgs.msg import Encoder, Motor
+from hero_msgs.srv import SetIRCalibration, SetMotor, SetPID
 
-from .encoder_steps import Readings, count_steps
+from .encoder_readings import Readings, make_readings
 from .errors import CalibrationError
-from .infrared import BEAMS, average, read_signals
+from .infrared_model import BEAMS, average, read_signals
 
 KEPT_READINGS = 4000
 """Two minutes of encoder readings."""
 
+KEPT_SCANS = 200
+
 STALE_S = 3.0
-"""Wall time; encoder readings come 29 times a second, scans 5 times. Wi-Fi may stand still for a second or two."""
+"""Wall time; encoder readings come 29 times a second, scans 5 times. Wi-Fi may stall for a second or two."""
 
 SERVICE_WAIT_S = 5.0
+
+
+SETTINGS: Dict[str, Tuple[str, Any]] = {
+    "motor_centers_us": ("motors_parameters", SetMotor),
+    "velocity_gains": ("velocity_controller/pid_parameters", SetPID),
+    "infrared_counts_m2": ("ir_calibration", SetIRCalibration),
+}
+"""Services that write settings to the robot's flash, by key in its file."""
 
 
 class Probe:
@@ -35,7 +44,8 @@ class Probe:
 
     Attributes:
         robot_id, name: 3, "hero_3".
-        failure: why it takes no further part, in words; None while it does.
+        failure: why it takes no further part, as text; None while it does.
+        pose: the newest one by odometry.
     """
 
     def __init__(self, robot_id: int) -> None:
@@ -43,12 +53,12 @@ class Probe:
         self.robot_id = robot_id
         self.name = "hero_%d" % robot_id
         self.failure: Optional[str] = None
+        self.pose = Pose(0.0, 0.0, 0.0)
         self._lock = threading.Lock()
         self._encoder: Deque[Tuple[float, int, float, float, float]] = deque(maxlen=KEPT_READINGS)
         self._last_seq = 0
         self._count = 0
-        self._scans: Deque[Tuple[List[float], List[float]]] = deque(maxlen=200)
-        self._pose: Optional[Pose] = None
+        self._scans: Deque[Tuple[List[float], List[float]]] = deque(maxlen=KEPT_SCANS)
         self._heard_s = {"encoder": 0.0, "laser": 0.0, "odom": 0.0}
         self._velocity = self._advertise("velocity_controller/cmd_vel", Twist)
         self._position = self._advertise("position_controller/cmd_vel", Twist)
@@ -63,19 +73,17 @@ class Probe:
     def _advertise(self, topic: str, kind: Any) -> rospy.Publisher:
         return rospy.Publisher("/%s/%s" % (self.name, topic), kind, queue_size=2, tcp_nodelay=True)
 
-    # -- what comes in (threads of rospy) ------------------------------------------------------------------
+    # -- received data (threads of rospy) ------------------------------------------------------------------
 
     def _receive_encoder(self, message: Encoder) -> None:
         with self._lock:
             self._heard_s["encoder"] = time.monotonic()
-            # The driver numbers readings; a number is missing where this program was too slow.
+            # The driver numbers readings; a number is missing if this program was too slow.
             lost = message.header.seq - self._last_seq - 1
             self._count += 1 + (lost if 0 < lost < KEPT_READINGS else 0)
             self._last_seq = message.header.seq
             stamp_s = message.header.stamp.to_sec()
-            self._encoder.append(
-                (stamp_s, self._count, message.left_ticks, message.right_ticks, rospy.get_time())
-            )
+            self._encoder.append((stamp_s, self._count, message.left_ticks, message.right_ticks, rospy.get_time()))
 
     def _receive_scan(self, message: LaserScan) -> None:
         with self._lock:
@@ -83,38 +91,36 @@ class Probe:
             self._scans.append((read_signals(message.intensities), read_signals(message.ranges)))
 
     def _receive_odometry(self, message: Odometry) -> None:
-        pose = message.pose.pose
-        with self._lock:
-            self._heard_s["odom"] = time.monotonic()
-            self._pose = Pose(pose.position.x, pose.position.y, yaw_of(pose.orientation))
+        position = message.pose.pose.position
+        self.pose = Pose(position.x, position.y, yaw_of(message.pose.pose.orientation))
+        self._heard_s["odom"] = time.monotonic()
 
-    # -- what was seen -------------------------------------------------------------------------------------
+    # -- readings ------------------------------------------------------------------------------------------
 
     def find_silence(self) -> Optional[str]:
-        """Return what is missing of the robot, in words; None if all comes in."""
+        """Return what is missing of the robot, as text; None if all topics are alive."""
         for topic, heard_s in sorted(self._heard_s.items()):
             if time.monotonic() - heard_s > STALE_S:
-                return "nothing comes on /%s/%s: is the robot on and in reach?" % (self.name, topic)
+                return "nothing received on /%s/%s: is the robot on and in reach?" % (self.name, topic)
         for publisher in (self._motors, self._velocity, self._position):
             if not publisher.get_num_connections():
-                return "nobody takes %s: does the driver run?" % publisher.name
+                return "nothing subscribes to %s: is the driver running?" % publisher.name
         return None
 
     def read_wheels(self) -> Readings:
-        """Return the readings of the encoders of the last two minutes."""
+        """Return the encoder readings of the last two minutes."""
         with self._lock:
             table = np.array(self._encoder).reshape(-1, 5)
-        return count_steps(*table.T)
+        return make_readings(*table.T)
 
     def forget_scans(self) -> None:
-        """Begin to collect scans anew."""
+        """Start to collect scans again."""
         with self._lock:
             self._scans.clear()
 
     def count_scans(self) -> int:
-        """Return how many scans came since forget_scans()."""
-        with self._lock:
-            return len(self._scans)
+        """Return the number of scans since forget_scans()."""
+        return len(self._scans)
 
     def read_scans(self) -> Tuple[np.ndarray, np.ndarray]:
         """Return the eight readings (counts) and ranges (m), averages since forget_scans().
@@ -130,32 +136,31 @@ class Probe:
 
     def read_pose(self) -> Pose:
         """Return the newest pose. Raises: CalibrationError if none came lately."""
-        with self._lock:
-            pose, heard_s = self._pose, self._heard_s["odom"]
-        if pose is None or time.monotonic() - heard_s > STALE_S:
-            raise CalibrationError("nothing comes on /%s/odom any more: has the robot gone?" % self.name)
-        return pose
+        if time.monotonic() - self._heard_s["odom"] > STALE_S:
+            raise CalibrationError("nothing received on /%s/odom any more: is the robot gone?" % self.name)
+        return self.pose
 
-    # -- what it is told -----------------------------------------------------------------------------------
+    # -- commands ------------------------------------------------------------------------------------------
 
-    def drive(self, turn_rad_s: float) -> None:
-        """Turn on the spot with this speed, 0 stops; under the velocity controller."""
+    def drive(self, angular_rad_s: float) -> None:
+        """Turn on the spot under the velocity controller; 0 stops."""
         twist = Twist()
-        twist.angular.z = turn_rad_s
+        twist.angular.z = angular_rad_s
         self._velocity.publish(twist)
 
     def turn(self, angle_rad: float) -> None:
-        """Turn by an angle: the position controller goes as far as the speed reaches in a second."""
+        """Turn by an angle under the position controller, which goes as far as the speed reaches in a second."""
         twist = Twist()
         twist.angular.z = angle_rad
         self._position.publish(twist)
 
-    def push(self, pulse_us: int) -> None:
-        """Give both servos a pulse."""
+    def set_pulses(self, pulse_us: int) -> None:
+        """Set the pulse of both servos."""
         self._motors.publish(Motor(pulse_us, pulse_us))
 
-    def call(self, service: str, kind: Any, *values: float) -> None:
-        """Call a service of the robot. Raises: CalibrationError with the reason if it fails."""
+    def write(self, key: str, values: Sequence[float]) -> None:
+        """Write one of SETTINGS to the robot. Raises: CalibrationError with the reason if it fails."""
+        service, kind = SETTINGS[key]
         name = "/%s/%s" % (self.name, service)
         try:
             rospy.wait_for_service(name, SERVICE_WAIT_S)
@@ -163,4 +168,4 @@ class Probe:
         except (rospy.ServiceException, rospy.ROSException) as error:
             raise CalibrationError("%s: %s" % (name, " ".join(str(error).split()))) from error
         if not answer.success:
-            raise CalibrationError("%s: the robot says: %s" % (name, answer.message))
+            raise CalibrationError("%s: the robot answers: %s" % (name, answer.message))

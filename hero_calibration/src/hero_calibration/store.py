@@ -1,7 +1,4 @@
-"""What was measured of a robot -> a YAML file, and back. A file can be written into the robot again (restore).
-
-Pure but for the files.
-"""
+"""Keeps the calibration of a robot in a YAML file, from which it can be restored. Pure but for the files."""
 
 import math
 import os
@@ -12,9 +9,6 @@ from typing import Any, Dict, List, NamedTuple, Optional, Tuple
 
 import yaml
 
-from hero_sim.errors import OptionError
-from hero_sim.yaml_file import describe_node, fail_at, read_mapping, read_nodes
-
 from .errors import CalibrationError
 
 PREVIOUS = ".previous"
@@ -23,42 +17,32 @@ PREVIOUS = ".previous"
 DAMAGED = ".damaged"
 """The same for a file that could not be read when a new one was written."""
 
-RESULT_DEPTH = 2
-RESULT_LENGTH = 8
-"""Results are lists of at most one number per sensor, or one pair per wheel."""
+LONGEST_SHOWN = 60
 
-_RANGES: Dict[str, Tuple[int, float, float, str]] = {
-    "motor_centres_us": (2, 1200.0, 1800.0, "left, right"),
+Range = Tuple[int, float, float, str]
+
+SETTINGS: Dict[str, Range] = {
+    "motor_centers_us": (2, 1200.0, 1800.0, "left, right"),
     "velocity_gains": (6, 0.0, 1e5, "P I D of the left wheel, then of the right"),
     "infrared_counts_m2": (8, 1e-3, 100.0, "by index of proximity"),
 }
+"""What can be written to the robot: how many numbers, the lowest and the highest allowed, and their meaning."""
+
+RESULTS: Dict[str, Range] = {
+    "dead_zones_us": (4, 0.0, 3000.0, "edges of the left wheel, then of the right"),
+    "velocity_errors": (2, 0.0, 100.0, "before, after"),
+    "range_errors_before_m": (8, -10.0, 10.0, "by index of proximity"),
+    "range_errors_after_m": (8, -10.0, 10.0, "by index of proximity"),
+}
+"""The same for what the user may want to look up; a number may be .nan: unknown."""
 
 
 class Calibration(NamedTuple):
-    """What is kept of one robot; None for what was not measured.
-
-    Attributes:
-        robot_id: N of hero_N.
-        date: when, in words.
-        motor_centres_us: left, right.
-        velocity_gains: lkp lki lkd rkp rki rkd.
-        infrared_counts_m2: one per sensor.
-        results: how far off the robot was before and after, for people.
-    """
+    """The file of one robot: N of hero_N, date as text, and numbers by key of SETTINGS and RESULTS."""
 
     robot_id: int
-    date: str = ""
-    motor_centres_us: Optional[List[int]] = None
-    velocity_gains: Optional[List[float]] = None
-    infrared_counts_m2: Optional[List[float]] = None
-    results: Optional[Dict[str, Any]] = None
-
-    @property
-    def is_empty(self) -> bool:
-        """Whether it holds nothing that a robot could be given."""
-        return (
-            self.motor_centres_us is None and self.velocity_gains is None and self.infrared_counts_m2 is None
-        )
+    date: str
+    values: Dict[str, List[float]]
 
 
 def name_file(folder: str, robot_id: int) -> str:
@@ -66,52 +50,48 @@ def name_file(folder: str, robot_id: int) -> str:
     return os.path.join(folder, "hero_%d.yaml" % robot_id)
 
 
-def save(path: str, calibration: Calibration) -> Optional[str]:
-    """Write a file; what it held of other parts stays, and the old file is kept beside it.
+def list_files(folder: str) -> List[str]:
+    """Return the paths of all robots' files in a folder, which may not exist."""
+    names = sorted(os.listdir(folder)) if os.path.isdir(folder) else []
+    return [
+        os.path.join(folder, name)
+        for name in names
+        if name.endswith(".yaml") and PREVIOUS not in name and DAMAGED not in name
+    ]
 
-    A damaged old file does not keep the new one from being written; returned is the name under which it is kept,
-    None if there was none.
+
+def save(path: str, calibration: Calibration) -> Optional[str]:
+    """Write a file; values of the old file that were not measured again stay, and the old file is kept beside it.
+
+    A damaged old file does not prevent the new one; it is renamed, and the new name is returned, None otherwise.
 
     Raises: CalibrationError.
     """
     base, suffix = os.path.splitext(path)
     damaged = None
+    values = calibration.values
     try:
         if os.path.lexists(path):
             try:
-                calibration = _merge(load(path), calibration)
+                old = load(path)
+                if old.robot_id != calibration.robot_id:
+                    raise CalibrationError("it is a file of hero_%d" % old.robot_id)
+                values = {**old.values, **values}
                 with open(path, "rb") as file:
-                    _write_whole(base + PREVIOUS + suffix, file.read())
+                    _write_atomically(base + PREVIOUS + suffix, file.read())
             except CalibrationError:
                 damaged = base + DAMAGED + time.strftime("-%Y%m%d-%H%M%S") + suffix
                 os.rename(path, damaged)
-        content = {"robot": "hero_%d" % calibration.robot_id}
-        content.update(
-            {
-                key: value
-                for key, value in calibration._asdict().items()
-                if key != "robot_id" and value is not None
-            }
-        )
+        content = {"robot": "hero_%d" % calibration.robot_id, "date": calibration.date, **values}
         text: str = yaml.safe_dump(content, sort_keys=False, default_flow_style=None)
-        _write_whole(path, text.encode())
+        _write_atomically(path, text.encode())
     except OSError as error:
         raise CalibrationError("%s cannot be written: %s" % (path, error.strerror)) from error
     return damaged
 
 
-def _merge(old: Calibration, new: Calibration) -> Calibration:
-    if old.robot_id != new.robot_id:
-        raise CalibrationError("it is a file of hero_%d" % old.robot_id)
-    merged = {
-        key: value for key, value in old._asdict().items() if getattr(new, key) is None and value is not None
-    }
-    results = {**(old.results or {}), **(new.results or {})}
-    return new._replace(**merged)._replace(results=results or None)
-
-
-def _write_whole(path: str, content: bytes) -> None:
-    """Write a file so that path leads to the old one or the new one, whole, whenever power fails. Raises: OSError."""
+def _write_atomically(path: str, content: bytes) -> None:
+    """Write a file: whenever power fails, path is the old one or the new one, complete. Raises: OSError."""
     written = "%s.%d.new" % (path, os.getpid())
     try:
         with open(written, "wb") as file:
@@ -131,78 +111,85 @@ def _write_whole(path: str, content: bytes) -> None:
 
 
 def load(path: str) -> Calibration:
-    """Read a file. Raises: CalibrationError with file, line, reason and what is allowed."""
-    try:
-        return _read(path)
-    except OptionError as error:
-        raise CalibrationError("%s; correct the file, or move it away" % error) from error
-
-
-def _read(path: str) -> Calibration:
-    root = read_nodes(path, path, "is it a file of calibrate, readable by you?")
-    entries = read_mapping(path, root, "is no calibration: it must begin with robot: hero_N")
-    known = ("robot", "date", "results", *_RANGES)
-    for key, (key_node, _) in entries.items():
-        if key not in known:
-            raise fail_at(path, key_node, "unknown key %s; known are %s" % (describe_node(key_node), ", ".join(known)))
-    nodes = {key: value_node for key, (_, value_node) in entries.items()}
-    name = _read_text(path, nodes.get("robot", root), "robot must be hero_N")
-    match = re.fullmatch(r"hero_([0-9]{1,9})", name)
+    """Read a file. Raises: CalibrationError with file, line, value and what is allowed."""
+    root = _parse(path)
+    if root is None or root.id != "mapping":
+        raise _fail_at(path, root, "is no calibration: it must begin with robot: hero_N")
+    nodes: Dict[str, Any] = {}
+    known = {**SETTINGS, **RESULTS}
+    for key_node, value_node in root.value:
+        if key_node.value not in ("robot", "date", *known):
+            allowed = ", ".join(("robot", "date", *known))
+            raise _fail_at(path, key_node, "unknown key %s; known are %s" % (_describe(key_node), allowed))
+        if key_node.value in nodes:
+            raise _fail_at(path, key_node, "key %s is there twice" % _describe(key_node))
+        nodes[key_node.value] = value_node
+    robot = nodes.get("robot", root)
+    match = re.fullmatch(r"hero_([0-9]{1,9})", robot.value) if robot.id == "scalar" else None
     if match is None:
-        raise fail_at(path, nodes.get("robot", root), "robot must be hero_N, not %r" % name[:60])
-    values = {key: _read_numbers(path, key, nodes[key]) for key in _RANGES if key in nodes}
-    centres = values.get("motor_centres_us")
-    return Calibration(
-        int(match.group(1)),
-        _read_text(path, nodes["date"], "date must be one line of text") if "date" in nodes else "",
-        None if centres is None else [int(round(centre)) for centre in centres],
-        values.get("velocity_gains"),
-        values.get("infrared_counts_m2"),
-        _read_results(path, nodes["results"]) if "results" in nodes else None,
-    )
+        raise _fail_at(path, robot, "robot must be hero_N, not %s" % _describe(robot))
+    date = nodes.get("date")
+    if date is not None and (date.id != "scalar" or not date.value.isprintable()):  # it is printed in terminals
+        raise _fail_at(path, date, "date must be one line of text, not %s" % _describe(date))
+    values = {key: _read_numbers(path, key, nodes[key], known[key]) for key in known if key in nodes}
+    return Calibration(int(match.group(1)), date.value if date is not None else "", values)
 
 
-def _read_text(path: str, node: Any, what: str) -> str:
-    # It is printed in terminals.
-    if node.id != "scalar" or not str(node.value).isprintable():
-        raise fail_at(path, node, "%s, not %s" % (what, describe_node(node)))
-    return str(node.value)
-
-
-def _read_number(node: Any) -> float:
-    """Return the number that a node holds, NaN if it holds none."""
+def _parse(path: str) -> Any:
+    """Return the root node of a YAML file, None if it is empty; nodes know their lines."""
     try:
-        return float(node.value) if node.id == "scalar" else math.nan
-    except ValueError:
-        return math.nan
+        with open(path, encoding="utf-8") as file:
+            text = file.read()
+        return yaml.compose(text, Loader=yaml.SafeLoader)
+    except OSError as error:
+        raise CalibrationError("%s cannot be read: %s" % (path, error.strerror)) from error
+    except yaml.MarkedYAMLError as error:
+        raise _fail(path, error.problem_mark.line, str(error.problem)) from error
+    except yaml.reader.ReaderError as error:
+        reason = "the character U+%04X may not stand in a YAML file" % error.character
+        raise _fail(path, text.count("\n", 0, error.position), reason) from error
+    except (UnicodeDecodeError, RecursionError) as error:
+        raise _fail(path, 0, "is no text of a calibration: %s" % error) from error
 
 
-def _read_numbers(path: str, key: str, node: Any) -> List[float]:
-    count, low, high, meaning = _RANGES[key]
-    allowed = "%d numbers from %g to %g (%s)" % (count, low, high, meaning)
+def _read_numbers(path: str, key: str, node: Any, allowed: Range) -> List[float]:
+    count, low, high, meaning = allowed
+    text = "%d numbers from %g to %g (%s)" % (count, low, high, meaning)
     if node.id != "sequence" or len(node.value) != count:
-        raise fail_at(path, node, "%s must be %s" % (key, allowed))
-    numbers = [_read_number(item) for item in node.value]
-    for item, number in zip(node.value, numbers):
-        if not low <= number <= high:
-            raise fail_at(path, item, "%s holds %s, but must be %s" % (key, describe_node(item), allowed))
+        raise _fail_at(path, node, "%s must be %s" % (key, text))
+    numbers = []
+    for item in node.value:
+        number = _read_number(item)
+        if number is None or not (low <= number <= high or (math.isnan(number) and key in RESULTS)):
+            raise _fail_at(path, item, "%s holds %s, but must be %s" % (key, _describe(item), text))
+        numbers.append(number)
     return numbers
 
 
-def _read_results(path: str, node: Any) -> Dict[str, Any]:
-    what = "results must be keys with a number each, or a list of numbers"
-    results: Dict[str, Any] = {}
-    for key, (key_node, value_node) in read_mapping(path, node, what).items():
-        _read_text(path, key_node, what)
-        results[key] = _read_result(path, value_node, what, RESULT_DEPTH)
-    return results
+def _read_number(node: Any) -> Optional[float]:
+    """Return the number that a node holds, None if it holds none."""
+    if node.id != "scalar":
+        return None
+    if node.value == ".nan":
+        return math.nan
+    try:
+        return float(node.value)
+    except ValueError:
+        return None
 
 
-def _read_result(path: str, node: Any, what: str, depth: int) -> Any:
-    if node.id == "sequence" and depth and len(node.value) <= RESULT_LENGTH:
-        return [_read_result(path, item, what, depth - 1) for item in node.value]
-    number = _read_number(node)
-    # What could not be measured before is kept as .nan, which YAML spells with a dot and Python without.
-    if node.id != "scalar" or not (math.isfinite(number) or node.value == ".nan"):
-        raise fail_at(path, node, "%s, not %s" % (what, describe_node(node)))
-    return number
+def _describe(node: Any) -> str:
+    """Return the content of a node for an error; a list may even contain itself."""
+    if node.id != "scalar":
+        return "a " + str(node.id)
+    text = str(node.value)
+    return repr(text if len(text) <= LONGEST_SHOWN else text[:LONGEST_SHOWN] + "...")
+
+
+def _fail_at(path: str, node: Any, reason: str) -> CalibrationError:
+    return _fail(path, node.start_mark.line if node is not None else 0, reason)
+
+
+def _fail(path: str, line: int, reason: str) -> CalibrationError:
+    """Return the error of a line, counted from 0."""
+    return CalibrationError("%s:%d: %s; correct the file, or move it away" % (path, line + 1, reason))

@@ -1,6 +1,5 @@
-"""Files of calibrations: what was saved comes back; a damaged one is refused in one line, and costs no measurement."""
+"""Files of calibrations: saved values are loaded again; a damaged file is refused in one line, and never in the way."""
 
-import math
 import os
 import re
 
@@ -14,16 +13,19 @@ from hero_calibration.errors import CalibrationError
 WHOLE = store.Calibration(
     3,
     "2026-11-21 10:00:00",
-    [1511, 1489],
-    [700.0, 5000.0, 0.1] * 2,
-    [0.42] * 8,
-    {"error": 0.1, "zones": [[1, 2], [3, 4]], "before_m": [float("nan"), 0.1]},
+    {
+        "motor_centers_us": [1511, 1489],
+        "velocity_gains": [700.0, 5000.0, 0.1] * 2,
+        "velocity_errors": [0.3, 0.1],
+        "infrared_counts_m2": [0.42] * 8,
+        "range_errors_before_m": [float("nan"), *[0.1] * 7],
+    },
 )
-NEWER = store.Calibration(3, "later", [1520, 1480], results={"b": 2.0})
+NEWER = store.Calibration(3, "later", {"motor_centers_us": [1520, 1480], "dead_zones_us": [1500, 1540, 1460, 1500]})
 
 
 def save_whole(folder):
-    """Return the path of a file that holds all there is, and its content."""
+    """Return the path of a complete file, and its content."""
     path = store.name_file(str(folder), 3)
     store.save(path, WHOLE)
     with open(path, "rb") as file:
@@ -33,18 +35,18 @@ def save_whole(folder):
 def test_a_file_holds_what_was_saved(tmp_path):
     path, _ = save_whole(tmp_path)
     kept = store.load(path)
-    assert kept._replace(results=None) == WHOLE._replace(results=None)
-    assert kept.results["zones"] == [[1, 2], [3, 4]]
-    assert math.isnan(kept.results["before_m"][0])
+    assert (kept.robot_id, kept.date) == (3, WHOLE.date)
+    for key, values in WHOLE.values.items():
+        assert kept.values[key] == pytest.approx(values, nan_ok=True)
 
 
-def test_parts_that_were_not_measured_stay_and_the_old_file_is_kept(tmp_path):
+def test_values_that_were_not_measured_again_stay_and_the_old_file_is_kept(tmp_path):
     path, content = save_whole(tmp_path)
     assert store.save(path, NEWER) is None
     kept = store.load(path)
-    assert (kept.date, kept.motor_centres_us) == ("later", [1520, 1480])
-    assert (kept.velocity_gains, kept.infrared_counts_m2) == (WHOLE.velocity_gains, WHOLE.infrared_counts_m2)
-    assert kept.results["b"] == 2.0 and kept.results["error"] == 0.1
+    assert kept.date == "later"
+    assert {key: kept.values[key] for key in NEWER.values} == NEWER.values
+    assert set(kept.values) == {*WHOLE.values, *NEWER.values}
     assert (tmp_path / "hero_3.previous.yaml").read_bytes() == content
     assert len(os.listdir(str(tmp_path))) == 2
 
@@ -53,7 +55,7 @@ def test_parts_that_were_not_measured_stay_and_the_old_file_is_kept(tmp_path):
     "content",
     [b"", b"\xff\x00\x01", b"[" * 20000, b"robot: hero_3\nvelocity_gains: 2020-13-45\n", b"robot: hero_4"],
 )
-def test_a_damaged_old_file_is_kept_and_costs_no_measurement(tmp_path, content):
+def test_a_damaged_old_file_is_kept_beside_the_new_one(tmp_path, content):
     path = tmp_path / "hero_3.yaml"
     path.write_bytes(content)
     damaged = store.save(str(path), NEWER)
@@ -63,7 +65,7 @@ def test_a_damaged_old_file_is_kept_and_costs_no_measurement(tmp_path, content):
         assert file.read() == content
 
 
-def test_a_directory_in_place_of_a_file_costs_no_measurement(tmp_path):
+def test_a_directory_in_place_of_a_file_is_renamed(tmp_path):
     (tmp_path / "hero_3.yaml").mkdir()
     damaged = store.save(str(tmp_path / "hero_3.yaml"), NEWER)
     assert store.load(str(tmp_path / "hero_3.yaml")) == NEWER
@@ -81,7 +83,7 @@ def test_a_new_file_is_on_the_disk_before_it_takes_the_name(tmp_path, monkeypatc
     assert steps[-3:] == ["fsync " + written, "name " + path, "fsync " + str(tmp_path)]
 
 
-def test_a_disk_that_is_full_leaves_the_old_file_as_it_was(tmp_path, monkeypatch):
+def test_a_full_disk_leaves_the_old_file_as_it_was(tmp_path, monkeypatch):
     path, content = save_whole(tmp_path)
 
     def fail(fd):
@@ -96,14 +98,14 @@ def test_a_disk_that_is_full_leaves_the_old_file_as_it_was(tmp_path, monkeypatch
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ("motor_centres_us: [1511, 9000]", "motor_centres_us holds '9000', but must be 2 numbers from 1200 to 1800"),
-        ("motor_centres_us: [1511]", "motor_centres_us must be 2 numbers"),
-        ("motor_centres_us: 2026-11-21", "motor_centres_us must be 2 numbers"),
-        ("motor_centres_us: [2026-11-21, 1500]", "holds '2026-11-21'"),
-        ("motor_centres_us: [1%s, 1500]" % ("0" * 400), "holds '1000"),
-        ("motor_centres_us: [1%s, 1500]" % ("0" * 5000), "holds '1000"),
-        ("motor_centres_us: [true, 1500]", "holds 'true'"),
-        ("motor_centres_us: [1500, 1500]\nmotor_centres_us: [1501, 1500]", "is there twice"),
+        ("motor_centers_us: [1511, 9000]", "motor_centers_us holds '9000', but must be 2 numbers from 1200 to 1800"),
+        ("motor_centers_us: [1511]", "motor_centers_us must be 2 numbers"),
+        ("motor_centers_us: 2026-11-21", "motor_centers_us must be 2 numbers"),
+        ("motor_centers_us: [2026-11-21, 1500]", "holds '2026-11-21'"),
+        ("motor_centers_us: [1%s, 1500]" % ("0" * 400), "holds '1000"),
+        ("motor_centers_us: [1%s, 1500]" % ("0" * 5000), "holds '1000"),
+        ("motor_centers_us: [true, 1500]", "holds 'true'"),
+        ("motor_centers_us: [1500, 1500]\nmotor_centers_us: [1501, 1500]", "is there twice"),
         ("velocity_gains: [1e9, 1, 1, 1, 1, 1]", "velocity_gains holds '1e9'"),
         ("velocity_gains: [.nan, 1, 1, 1, 1, 1]", r"velocity_gains holds '\.nan'"),
         ("velocity_gains: [nan, 1, 1, 1, 1, 1]", "velocity_gains holds 'nan'"),
@@ -112,17 +114,15 @@ def test_a_disk_that_is_full_leaves_the_old_file_as_it_was(tmp_path, monkeypatch
         ("infrared_counts_m2: {a: 1}", "infrared_counts_m2 must be 8 numbers"),
         ("date: [2026]", "date must be one line of text"),
         ('date: "\\e[2J"', "date must be one line of text"),
-        ("results: 3", "results must be"),
-        ("results: {a: .inf}", "results must be"),
-        ("results: &a [*a]", "results must be"),
-        ("results: {a: &a [*a, *a]}", "results must be"),
+        ("velocity_errors: &a [*a, *a]", "velocity_errors holds a sequence"),
+        ("velocity_errors: [0.1, .inf]", "velocity_errors holds '.inf'"),
         ("colour: red", "unknown key 'colour'"),
-        ("? [a]\n: 1", "a key must be a word"),
+        ("? [a]\n: 1", "unknown key a sequence"),
         ("\x00", r"U\+0000 may not stand"),
         ("date: [", "expected"),
     ],
 )
-def test_a_wrong_file_is_refused_with_file_line_and_what_is_allowed(change, words, tmp_path):
+def test_a_wrong_file_is_refused_with_file_line_and_value(change, words, tmp_path):
     path = tmp_path / "hero_3.yaml"
     path.write_text("robot: hero_3\n" + change + "\n")
     with pytest.raises(CalibrationError, match=words) as caught:
@@ -138,7 +138,7 @@ def test_a_file_of_no_robot_is_refused(robot, tmp_path):
         store.load(str(tmp_path / "x.yaml"))
 
 
-def test_what_is_no_calibration_is_named(tmp_path):
+def test_a_file_that_is_no_calibration_is_refused(tmp_path):
     for content in ("- 1\n", "", "a\n"):
         (tmp_path / "x.yaml").write_text(content)
         with pytest.raises(CalibrationError, match=r"x\.yaml:1: is no calibration"):
@@ -158,7 +158,7 @@ PIECES = st.one_of(
 
 @settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(script=st.lists(st.tuples(st.integers(0, 330), st.integers(0, 6), PIECES), min_size=1, max_size=4))
-def test_any_file_is_read_or_refused_in_one_line_and_never_in_the_way(tmp_path, script):
+def test_any_file_is_read_or_refused_in_one_line_and_can_be_replaced(tmp_path, script):
     path, content = save_whole(tmp_path)
     for place, length, piece in script:
         content = content[:place] + piece + content[place + length :]
@@ -169,7 +169,8 @@ def test_any_file_is_read_or_refused_in_one_line_and_never_in_the_way(tmp_path, 
     except CalibrationError as error:
         assert str(error).startswith(path) and str(error).isprintable()
     else:
-        for values, (_, low, high, _) in zip(found[2:5], store._RANGES.values()):
-            assert values is None or all(low <= value <= high for value in values)
+        for key, (count, low, high, _) in store.SETTINGS.items():
+            values = found.values.get(key, [low] * count)
+            assert len(values) == count and all(low <= value <= high for value in values)
     store.save(path, NEWER)
-    assert store.load(path).motor_centres_us == NEWER.motor_centres_us
+    assert store.load(path).values["motor_centers_us"] == NEWER.values["motor_centers_us"]

@@ -1,36 +1,35 @@
-"""Ticks of a wheel after a command -> how well it follows; and the search for gains that make it follow better. Pure.
+"""Evaluates how a wheel follows a step of its speed, and searches for better gains. Pure.
 
-The robots turn on the spot, once to the left and once to the right, so that each wheel starts from rest both ways.
-Each wheel has a PID of its own and so a search of its own. What a robot had before cannot be asked for: the firmware
-has no service for it.
+The robots turn on the spot, once to each side: each wheel starts from rest in both directions. Each wheel has its own
+PID, and its own search. The firmware has no service that tells the gains of a robot.
 """
 
 from typing import Dict, List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
-from .encoder_steps import TICK_M, Readings
+from .encoder_readings import TICK_M, Readings
 from .errors import CalibrationError
 
 WHEEL_SEPARATION_M = 0.063
 STEP_M_S = 0.08
 """Speed of the wheels in a test."""
 
-TURN_RAD_S = 2.0 * STEP_M_S / WHEEL_SEPARATION_M
+ANGULAR_RAD_S = 2.0 * STEP_M_S / WHEEL_SEPARATION_M
 STEP_S = 1.5
-"""Length of a test: shorter than the 2 s after which the robot forgets a command, longer than it needs."""
+"""Duration of a test: shorter than the robot's watchdog of 2 s, longer than the response."""
 
 LATE_S = 1.0
-"""What a wheel does after this is steady."""
+"""Readings must reach at least 0.2 s beyond this."""
 
 REACHED = 0.9
-"""Share of the wanted speed that counts as reached."""
+"""Share of the target speed that counts as reached."""
 
 OVERSHOOT_WEIGHT = 0.3
-"""An overshoot by the whole speed is as bad as 30 % of mean error: it is soon over, but it shakes a robot."""
+"""An overshoot of 100 % weighs as much as 30 % of mean error: it is short, but it shakes the robot."""
 
 NOMINAL_GAIN_M_S_US = 0.25 / 220.0
-"""Speed of a servo of the usual kind per pulse beyond its dead zone (assumption of hero_sim)."""
+"""Speed per pulse beyond the dead zone of a common servo (assumption of hero_sim)."""
 
 DEFAULT_GAINS = (1200.0, 2300.0, 0.1)
 """P, I, D of an erased flash: us per m/s, us per m, us per m/s^2 (VelocityControl.ino:31-47)."""
@@ -40,49 +39,50 @@ INTEGRALS = (4000.0, 6000.0, 8500.0)
 PROPORTIONALS = (400.0, 900.0, 1400.0)
 FIRST_PROPORTIONAL = 650.0
 HIGHEST_GAIN = 30000.0
-"""The firmware prints gains into a buffer of 100 bytes and checks none."""
+"""The firmware prints gains into a buffer of 100 bytes without a check."""
 
 LEAST_SPEEDS = 20
-STANDING_STEPS = 4
-STANDING_TICKS = 3
-"""A wheel that made more ticks in so many readings before a test began was still turning from what was before."""
+APART = 3
+"""Readings between which a speed is measured: they come every 34 ms, and a tick is 0.5 mm."""
+
+REST_READINGS = 4
+REST_TICKS = 3
+"""A wheel that made more ticks in the readings before a test was not at rest."""
 
 Gains = Tuple[float, float, float]
 Curve = Tuple[np.ndarray, np.ndarray]
 
 
 class Response(NamedTuple):
-    """How a wheel followed a test.
+    """How a wheel followed a step.
 
     Attributes:
-        mean_error: mean distance from the wanted speed, as a share of it.
+        mean_error: mean deviation from the target speed, as a share of it.
         overshoot: highest speed beyond it, as a share.
-        reached_s: when 90 % were reached; the length of the test if never.
-        steady_error: of the mean speed in the end, as a share; negative: too slow.
-        curves: per direction, times s and speeds m/s, forward positive in the direction of the test.
+        reached_s: time to 90 %; the duration of the test if never reached.
+        curves: for each direction, times s and speeds m/s, positive in the direction of the test.
     """
 
     mean_error: float
     overshoot: float
     reached_s: float
-    steady_error: float
     curves: Tuple[Curve, ...]
 
     @property
     def score(self) -> float:
-        """What the search makes small."""
+        """The search minimizes it."""
         return self.mean_error + OVERSHOOT_WEIGHT * self.overshoot
 
 
 def find_start(readings: Readings, command_s: float, may_be_late: bool = False) -> int:
-    """Return at which reading a robot that stood got a command: the last one before either wheel turned.
+    """Return the index of the last reading before either wheel of a robot at rest turned.
 
-    The way of the command over the network, 0.03 to 0.3 s, is no fault of the controller. Of one that did not turn
-    soon, that is the reading at the command: a blocked wheel has no other.
+    This leaves out the delay of the command in the network, 0.03 to 0.3 s. If no wheel turned, it is the reading at the
+    command.
 
-    may_be_late: whether a robot that turned, but not soon, is one with a sluggish controller.
+    may_be_late: whether a late start is accepted as that of a sluggish controller.
 
-    Raises: CalibrationError if nothing was heard of the robot, or it turned late.
+    Raises: CalibrationError without readings, or for a late start.
     """
     if not len(readings.times_s):
         raise CalibrationError("no encoder readings came: is the network busy? try again")
@@ -101,57 +101,54 @@ def find_start(readings: Readings, command_s: float, may_be_late: bool = False) 
 
 
 def measure_speed(readings: Readings, ticks: np.ndarray, start: int, end_s: float) -> Curve:
-    """Return times since the reading start and a wheel's speed (m/s), each from ticks about 0.1 s apart.
+    """Return times since the reading start and the speeds of a wheel (m/s).
 
-    end_s: when the robot was told to stop, in ROS time; where its start came late, that is soon after.
+    end_s: when the robot was commanded to stop, in ROS time.
 
-    Raises: CalibrationError if the wheel did not stand before, or too little was heard of the robot.
+    Raises: CalibrationError if the wheel was not at rest before, or too few readings arrived.
     """
-    if abs(ticks[start] - ticks[max(0, start - STANDING_STEPS)]) > STANDING_TICKS:
-        raise CalibrationError("still turned when a test began: is the network busy? try again")
-    apart = 3  # readings come every 34 ms, and a tick is 0.5 mm
+    if abs(ticks[start] - ticks[max(0, start - REST_READINGS)]) > REST_TICKS:
+        raise CalibrationError("still turned when a test started: is the network busy? try again")
     times_s = (readings.counts - readings.counts[start]) * readings.step_s
     driven_s = min(STEP_S - 0.1, end_s - readings.times_s[start])
-    seen = (times_s[:-apart] >= -0.1) & (times_s[apart:] <= driven_s)
-    kept = np.flatnonzero(seen & readings.find_even(apart))
-    if len(kept) < LEAST_SPEEDS or times_s[kept[-1] + apart] < LATE_S + 0.2:
+    seen = (times_s[:-APART] >= -0.1) & (times_s[APART:] <= driven_s)
+    kept = np.flatnonzero(seen & readings.find_even(APART))
+    if len(kept) < LEAST_SPEEDS or times_s[kept[-1] + APART] < LATE_S + 0.2:
         raise CalibrationError(
             "only %d speeds could be measured in %.1f s: is the network busy? try again" % (len(kept), STEP_S)
         )
-    ways_m = (ticks[kept + apart] - ticks[kept]) * TICK_M
-    between_s = times_s[kept + apart] - times_s[kept]
-    return times_s[kept] + between_s / 2.0, ways_m / between_s
+    distances_m = (ticks[kept + APART] - ticks[kept]) * TICK_M
+    between_s = times_s[kept + APART] - times_s[kept]
+    return times_s[kept] + between_s / 2.0, distances_m / between_s
 
 
-def judge(curves: Sequence[Curve], wanted_m_s: float = STEP_M_S) -> Response:
+def evaluate_response(curves: Sequence[Curve]) -> Response:
     """Return how well a wheel followed, from its curves in both directions."""
-    errors, overshoots, reached, steady = [], [], [], []
+    errors, overshoots, reached = [], [], []
     for times_s, speeds_m_s in curves:
-        share = speeds_m_s / wanted_m_s
+        share = speeds_m_s / STEP_M_S
         within = times_s >= 0.0
         errors.append(np.abs(share[within] - 1.0).mean())
         overshoots.append(max(0.0, float(share.max()) - 1.0))
         fast = np.flatnonzero(within & (share >= REACHED))
         reached.append(float(times_s[fast[0]]) if len(fast) else STEP_S)
-        steady.append(float(share[times_s >= LATE_S].mean()) - 1.0)
     return Response(
         float(np.mean(errors)),
         float(np.mean(overshoots)),
         float(np.mean(reached)),
-        float(np.mean(steady)),
         tuple(curves),
     )
 
 
 class GainSearch:
-    """Looks for the gains of one wheel: first for the integral, then for the proportional one.
+    """Search for the gains of one wheel: first the integral gain, then the proportional one.
 
-    Ask next_gains(), let the robot try them, tell the response with receive(), until next_gains() is None.
+    count_rounds() times, next_gains() is tried and its response passed to receive(); best() is the result.
     """
 
     def __init__(self, servo_gain_m_s_us: float = NOMINAL_GAIN_M_S_US) -> None:
-        """Begin; gains are scaled to the servo, so that a weak one gets longer pulses."""
-        # A slope far from the usual one is taken for a wrong measurement rather than for a strange servo.
+        """Start; gains are scaled to the servo: a weak one needs longer pulses."""
+        # A slope far from the nominal one is rather a wrong measurement than an unusual servo.
         self._scale = float(np.clip(NOMINAL_GAIN_M_S_US / servo_gain_m_s_us, 0.5, 2.0))
         self._waiting: List[Gains] = [DEFAULT_GAINS]
         self._waiting += [self._make(FIRST_PROPORTIONAL, integral) for integral in INTEGRALS]
@@ -167,11 +164,11 @@ class GainSearch:
 
     @staticmethod
     def count_rounds() -> int:
-        """Return how many gains are tried."""
+        """Return how many sets of gains are tried."""
         return 1 + len(INTEGRALS) + len(PROPORTIONALS)
 
     def next_gains(self) -> Gains:
-        """Return what is to be tried next. Raises: IndexError after count_rounds()."""
+        """Return the gains to try next. Raises: IndexError after count_rounds()."""
         if not self._waiting and self._has_second_round:
             self._has_second_round = False
             integral = self.best()[0][1] / self._scale
@@ -179,9 +176,9 @@ class GainSearch:
         return self._waiting[0]
 
     def receive(self, response: Response) -> None:
-        """Take the response to what next_gains() said."""
+        """Store the response to next_gains()."""
         self.tried[self._waiting.pop(0)] = response
 
     def best(self) -> Tuple[Gains, Response]:
-        """Return the best gains so far, and how the wheel followed with them."""
+        """Return the best gains so far, and the response to them."""
         return min(self.tried.items(), key=lambda item: item[1].score)

@@ -1,0 +1,53 @@
+"""Finds the robots to calibrate in the reports of the drivers."""
+
+import time
+from typing import Dict, Optional, Sequence
+
+from hero_client.drivers import Drivers
+from hero_client.program import Program
+from hero_msgs.msg import Robot
+
+from .errors import CalibrationError
+
+TIMEOUT_S = 10.0
+
+
+def find_robots(program: Program, robot_ids: Optional[Sequence[int]]) -> Dict[int, Optional[str]]:
+    """Return for each robot why it cannot be calibrated, None if it can; robot_ids None: all that are ready.
+
+    Raises: CalibrationError without a driver, without a robot, or while all robots are stopped.
+    """
+    drivers = Drivers()
+    try:
+        states = _wait_for_robots(program, drivers, robot_ids)
+    finally:
+        drivers.close()
+    ready = {robot_id for robot_id, state in states.items() if state == Robot.READY}
+    wanted = sorted(ready if robot_ids is None else robot_ids)
+    for driver in sorted({drivers.find("/hero_%d" % robot_id) for robot_id in wanted}):
+        if drivers.is_stopped(driver):
+            raise CalibrationError("all robots are stopped; release them: rosservice call %s/stop false" % driver)
+    if not ready.intersection(wanted):
+        raise CalibrationError("no robot is ready: are they on, and connected to the driver?")
+    absent = "is not connected to the driver: is it on?"
+    return {robot_id: None if robot_id in ready else absent for robot_id in wanted}
+
+
+def _wait_for_robots(program: Program, drivers: Drivers, robot_ids: Optional[Sequence[int]]) -> Dict[int, int]:
+    """Return the states of all robots by id, as soon as those wanted are ready, or after TIMEOUT_S."""
+    report = None
+    states: Dict[int, int] = {}
+    deadline_s = time.monotonic() + TIMEOUT_S
+    while time.monotonic() < deadline_s:
+        if not program.sleep(0.05):
+            raise CalibrationError("ended before a robot was found")
+        report = drivers.read()
+        states = {robot.id: robot.state for robot in report.robots if robot.id >= 0} if report else {}
+        ready = {robot_id for robot_id, state in states.items() if state == Robot.READY}
+        if ready and (drivers.is_settled if robot_ids is None else ready.issuperset(robot_ids)):
+            break
+    if report is None:
+        raise CalibrationError(
+            "no driver: nothing on /hero_driver/robots; start roslaunch hero_bringup hero_bringup.launch"
+        )
+    return states
