@@ -194,35 +194,3 @@ def mean_in_bins(times_s: np.ndarray, values: np.ndarray, duration_s: float, bin
     counts = np.bincount(which, minlength=bins)
     sums = np.bincount(which, weights=values, minlength=bins)
     return np.where(counts > 0, sums / np.maximum(counts, 1), np.nan)
-
-
-class Summary(NamedTuple):
-    """One robot in numbers; None where the recording does not tell."""
-
-    distance_m: float
-    odometry_hz: Optional[float]
-    longest_gap_s: Optional[float]
-    message_delay_s: Optional[float]
-    slow_message_delay_s: Optional[float]
-    motion_delay_s: Optional[float]
-    error_m: Optional[float]
-    reconnects: Optional[int]
-
-
-def summarize(robot: RobotObservations) -> Summary:
-    """Return one robot in numbers; delays are medians, the slow one is the 99th percentile, the error is the last."""
-    path = read_path(robot)
-    delays = compute_message_delays(robot)
-    motion_delays = compute_motion_delays(robot)
-    errors = compute_errors(robot)
-    intervals = np.diff(path.times_s)
-    return Summary(
-        path.length_m,
-        float(1.0 / np.median(intervals)) if len(intervals) and np.median(intervals) > 0.0 else None,
-        float(intervals.max()) if len(intervals) else None,
-        float(np.median(delays)) if len(delays) else None,
-        float(np.percentile(delays, 99)) if len(delays) else None,
-        float(np.median(motion_delays)) if len(motion_delays) else None,
-        float(errors.position_m[-1]) if errors is not None else None,
-        robot.states[-1].reconnects if robot.states else None,
-    )

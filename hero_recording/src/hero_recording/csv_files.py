@@ -2,15 +2,13 @@
 
 import csv
 import os
-from typing import Any, Dict, List, Tuple
+from typing import Dict, List, Tuple
 
 from .errors import RecordingError
 from .tables import TABLES, Row
 
 BATCH_ROWS = 4096
 """Buffered rows of a table: 8 numbers take some 0.8 MB."""
-
-_TIME_COLUMNS = ("time_s", "stamp_s")
 
 
 class CsvFiles:
@@ -41,21 +39,14 @@ class CsvFiles:
     def _write(self, robot_id: int, kind: str) -> None:
         key = (robot_id, kind)
         rows = self._buffers.pop(key)
-        columns = ("time_s", *TABLES[kind])
-        is_time = [column in _TIME_COLUMNS for column in columns]
         path = os.path.join(self._folder, "hero_%d" % robot_id, kind + ".csv")
         try:
             os.makedirs(os.path.dirname(path), exist_ok=True)
             with open(path, "a", encoding="utf-8", newline="") as file:
                 writer = csv.writer(file)
                 if key not in self.rows:
-                    writer.writerow(columns)
-                writer.writerows(map(_format_value, row, is_time) for row in rows)
+                    writer.writerow(("time_s", *TABLES[kind]))
+                writer.writerows(rows)
         except OSError as error:
             raise RecordingError("%s cannot be written: %s" % (path, error.strerror or error)) from error
         self.rows[key] = self.rows.get(key, 0) + len(rows)
-
-
-def _format_value(value: Any, is_time: bool) -> Any:
-    """Return seconds since 1970 to the microsecond; csv writes other floats so that they are read back exactly."""
-    return "%.6f" % value if is_time else value

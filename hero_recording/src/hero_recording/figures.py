@@ -258,7 +258,7 @@ class Figures:
         handles = [patches.Patch(color=STATE_COLORS[key], label=key) for key in STATE_COLORS if key in seen]
         gap = "no odom for\nmore than %g s" % analysis.ODOMETRY_GAP_S
         handles.append(patches.Patch(facecolor="white", edgecolor=_GREY, label=gap))
-        if not self._seen.fleet_times_s:
+        if not self._seen.has_reports:
             text = "the driver's reports (/hero_driver/robots) were not recorded: lines show odometry"
             axes.set_title(text, fontsize=8)
         self._add_legend(axes, handles, with_robots=False)

@@ -81,7 +81,7 @@ class Observations:
         walls_m: segments x1 y1 x2 y2 of the arena.
         circles_m: round obstacles x y radius.
         shared_frame: frame of the origins; empty if none were recorded.
-        fleet_times_s: times of the driver's reports.
+        has_reports: whether a driver's reports were recorded.
     """
 
     def __init__(self, robot_ids: Optional[Set[int]] = None) -> None:
@@ -91,7 +91,7 @@ class Observations:
         self.walls_m: List[Tuple[float, float, float, float]] = []
         self.circles_m: List[Tuple[float, float, float]] = []
         self.shared_frame = ""
-        self.fleet_times_s: List[float] = []
+        self.has_reports = False
 
     def wants(self, topic: str, message_type: str) -> bool:
         """Return whether receive() uses a topic."""
@@ -143,7 +143,7 @@ class Observations:
             robot.commands.add(message.time_s, content.linear.x, content.angular.z)
 
     def _receive_fleet(self, message: Message) -> None:
-        self.fleet_times_s.append(message.time_s)
+        self.has_reports = True
         for robot in message.content.robots:
             if robot.id >= 0 and self._wants_robot(robot.id):
                 state = STATE_NAMES.get(robot.state, str(robot.state))

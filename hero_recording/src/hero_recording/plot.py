@@ -7,7 +7,9 @@ import argparse
 import importlib.util
 import os
 import sys
-from typing import List, Optional, Sequence
+from typing import Dict, List, Sequence
+
+import numpy as np
 
 from hero_client import command_line
 
@@ -20,18 +22,6 @@ from .options import list_of, robot_ids
 FIGURES = ("paths", "speeds", "delays", "connections", "errors")
 SHORTEST_DISTANCE_M = 0.05
 """An error is not given as a share of less than this."""
-
-HEADINGS = (
-    "ROBOT",
-    "DISTANCE",
-    "ODOM",
-    "LONGEST GAP",
-    "MESSAGE DELAY",
-    "99 %",
-    "COMMAND TO MOTION",
-    "RECONNECTS",
-    "FINAL ERROR",
-)
 
 
 def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
@@ -60,9 +50,6 @@ def observe(options: argparse.Namespace, bags: BagSet) -> Observations:
 
 def draw(options: argparse.Namespace, observations: Observations, bags: BagSet) -> List[str]:
     """Write the figures; return the paths of the files. Raises: RecordingError."""
-    import matplotlib
-
-    matplotlib.use("Agg")  # works without a display
     from matplotlib.backends.backend_pdf import PdfPages
 
     from .figures import Figures
@@ -96,8 +83,8 @@ def draw(options: argparse.Namespace, observations: Observations, bags: BagSet) 
 def format_table(observations: Observations) -> List[str]:
     """Return a line for each robot, with headings."""
     robots = sorted(observations.robots.items())
-    rows = [list(HEADINGS)]
-    rows += [["hero_%d" % robot_id, *format_summary(robot)] for robot_id, robot in robots]
+    described = [{"ROBOT": "hero_%d" % robot_id, **describe_robot(robot)} for robot_id, robot in robots]
+    rows = [list(described[0]), *(list(cells.values()) for cells in described)]
     widths = [max(map(len, column)) for column in zip(*rows)]
     lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths)).rstrip() for row in rows]
     for robot_id, robot in robots:
@@ -106,27 +93,28 @@ def format_table(observations: Observations) -> List[str]:
     return lines
 
 
-def format_summary(robot: RobotObservations) -> List[str]:
-    """Return the cells of a robot."""
-    summary = analysis.summarize(robot)
-    error = format_number("%.0f mm", summary.error_m, 1e3)
-    if summary.error_m is not None and summary.distance_m > SHORTEST_DISTANCE_M:
-        error += " (%.1f %% of the distance)" % (100.0 * summary.error_m / summary.distance_m)
-    return [
-        "%.2f m" % summary.distance_m,
-        format_number("%.1f Hz", summary.odometry_hz),
-        format_number("%.2f s", summary.longest_gap_s),
-        format_number("%.0f ms", summary.message_delay_s, 1e3),
-        format_number("%.0f ms", summary.slow_message_delay_s, 1e3),
-        format_number("%.0f ms", summary.motion_delay_s, 1e3),
-        format_number("%d", summary.reconnects),
-        error,
-    ]
-
-
-def format_number(text: str, value: Optional[float], factor: float = 1.0) -> str:
-    """Return a number as text, "-" for an unknown one."""
-    return "-" if value is None else text % (value * factor)
+def describe_robot(robot: RobotObservations) -> Dict[str, str]:
+    """Return the numbers of a robot by heading, "-" where the recording does not tell."""
+    path = analysis.read_path(robot)
+    intervals_s = np.diff(path.times_s)
+    delays_ms = analysis.compute_message_delays(robot) * 1e3
+    motion_delays_ms = analysis.compute_motion_delays(robot) * 1e3
+    errors = analysis.compute_errors(robot)
+    error = "-"
+    if errors is not None:
+        error = "%.0f mm" % (errors.position_m[-1] * 1e3)
+        if path.length_m > SHORTEST_DISTANCE_M:
+            error += " (%.1f %% of the distance)" % (100.0 * errors.position_m[-1] / path.length_m)
+    return {
+        "DISTANCE": "%.2f m" % path.length_m,
+        "ODOM": "%.1f Hz" % (1.0 / max(1e-6, np.median(intervals_s))) if len(intervals_s) else "-",
+        "LONGEST GAP": "%.2f s" % intervals_s.max() if len(intervals_s) else "-",
+        "MESSAGE DELAY": "%.0f ms" % np.median(delays_ms) if len(delays_ms) else "-",
+        "99 %": "%.0f ms" % np.percentile(delays_ms, 99) if len(delays_ms) else "-",
+        "COMMAND TO MOTION": "%.0f ms" % np.median(motion_delays_ms) if len(motion_delays_ms) else "-",
+        "RECONNECTS": "%d" % robot.states[-1].reconnects if robot.states else "-",
+        "FINAL ERROR": error,
+    }
 
 
 def run(options: argparse.Namespace) -> None:

@@ -104,7 +104,8 @@ class Recording:
         """Wait for the end; return the reason if the disk forced it."""
         next_report_s = start_s + SILENCE_S
         while self._end_signal is None:
-            if wait_for_exit(recorder, CHECK_PERIOD_S) is not None:
+            time.sleep(CHECK_PERIOD_S)
+            if recorder.poll() is not None:
                 return None
             reason = find_reason_to_stop(self._options.folder, self._options.min_free_mb)
             if reason is not None:
@@ -148,22 +149,12 @@ def format_size(size: float) -> str:
     return "%.1f GB" % (size / 1e9) if size >= 1e9 else "%.1f MB" % (size / 1e6)
 
 
-def wait_for_exit(process: "subprocess.Popen[bytes]", timeout_s: float) -> Optional[int]:
-    """Return the exit code of a process, None if it still runs after timeout_s."""
-    try:
-        return process.wait(timeout_s)
-    except subprocess.TimeoutExpired:
-        return None
-
-
 def end_process(process: "subprocess.Popen[bytes]") -> int:
     """End a process, by force if SIGINT does not, and return its exit code."""
     for number, timeout_s in ((signal.SIGINT, CLOSING_S), (signal.SIGTERM, 2.0)):
-        if process.poll() is None:
-            process.send_signal(number)
-        code = wait_for_exit(process, timeout_s)
-        if code is not None:
-            return code
+        process.send_signal(number)
+        with suppress(subprocess.TimeoutExpired):
+            return process.wait(timeout_s)
     process.kill()
     return process.wait()
 

@@ -6,7 +6,7 @@ columns are explained in docs/recording.md.
 
 import math
 from operator import attrgetter
-from typing import Any, Callable, Dict, List, NamedTuple, Tuple
+from typing import Any, Callable, Dict, List, Tuple
 
 from hero_client.geometry import yaw_of
 
@@ -24,8 +24,13 @@ BEAMS = ("rear", "rear_right", "right", "front_right", "front", "front_left", "l
 """Of /hero_N/proximity by index: counter-clockwise from the rear."""
 
 
-def _read_stamp(content: Any) -> float:
-    return float(content.header.stamp.to_sec())
+def _format_time(time_s: float) -> str:
+    """Return seconds since 1970 to the microsecond; csv writes other floats exactly."""
+    return "%.6f" % time_s
+
+
+def _read_stamp(content: Any) -> str:
+    return _format_time(content.header.stamp.to_sec())
 
 
 def _range_reader(index: int) -> Callable[[Any], Any]:
@@ -88,26 +93,19 @@ TABLES: Dict[str, Columns] = {
 """By kind, which is also the name of the file."""
 
 
-class RobotRow(NamedTuple):
-    """A row for a table of one robot."""
-
-    robot_id: int
-    kind: str
-    row: Row
-
-
 def is_exported(topic: str, message_type: str) -> bool:
     """Return whether read_rows() makes rows of a topic."""
     return topics.find_robot_topic(topic, message_type) is not None or topics.is_fleet_topic(topic, message_type)
 
 
-def read_rows(topic: str, message_type: str, content: Any, time_s: float) -> List[RobotRow]:
-    """Return the rows that a message adds."""
+def read_rows(topic: str, message_type: str, content: Any, time_s: float) -> List[Tuple[int, str, Row]]:
+    """Return the rows that a message adds, each with the id of the robot and the kind of the table."""
     found = topics.find_robot_topic(topic, message_type)
-    if found is not None:
-        return [_read_row(found.robot_id, found.kind, content, time_s)]
-    return [_read_row(robot.id, STATUS, robot, time_s) for robot in content.robots if robot.id >= 0]
-
-
-def _read_row(robot_id: int, kind: str, content: Any, time_s: float) -> RobotRow:
-    return RobotRow(robot_id, kind, (time_s, *(read(content) for read in TABLES[kind].values())))
+    if found is None:
+        sources = [(robot.id, STATUS, robot) for robot in content.robots if robot.id >= 0]
+    else:
+        sources = [(found.robot_id, found.kind, content)]
+    return [
+        (robot_id, kind, (_format_time(time_s), *(read(source) for read in TABLES[kind].values())))
+        for robot_id, kind, source in sources
+    ]

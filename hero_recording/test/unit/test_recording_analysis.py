@@ -115,13 +115,13 @@ def test_robots_can_be_selected(two_robots):
     assert sorted(observe(two_robots, {3}).robots) == [3]
 
 
-def test_a_summary_holds_rate_gaps_delays_and_error(two_robots):
-    summary = analysis.summarize(observe(two_robots).robots[3])
-    assert summary.odometry_hz == pytest.approx(1.0 / PERIOD_S, rel=0.01)
-    assert summary.longest_gap_s == pytest.approx(2.0, abs=0.05)
-    assert summary.message_delay_s == pytest.approx(DELAY_S, abs=1e-6)
-    assert summary.error_m == pytest.approx(ERROR_M, abs=1e-5)
-    assert summary.motion_delay_s == pytest.approx(MOTION_DELAY_S, abs=1.5 * PERIOD_S)
+def test_the_table_holds_rate_gaps_delays_and_error(two_robots):
+    cells = plot.describe_robot(observe(two_robots).robots[3])
+    assert cells["ODOM"] == "%.1f Hz" % (1.0 / PERIOD_S)
+    assert float(cells["LONGEST GAP"].split()[0]) == pytest.approx(2.0, abs=0.05)
+    assert cells["MESSAGE DELAY"] == cells["99 %"] == "%.0f ms" % (1e3 * DELAY_S)
+    assert cells["FINAL ERROR"].startswith("%.0f mm (" % (1e3 * ERROR_M))
+    assert float(cells["COMMAND TO MOTION"].split()[0]) == pytest.approx(1e3 * MOTION_DELAY_S, abs=1.5e3 * PERIOD_S)
 
 
 def test_without_an_origin_odometry_is_aligned_with_ground_truth(two_robots):
