@@ -23,7 +23,7 @@ from .discovery import find_robots
 from .errors import CalibrationError, EndedError
 from .infrared import calibrate_infrared
 from .motors import MotorResult, calibrate_motors
-from .placement import READY_TIMEOUT_S, place_robots
+from .placement import place_robots
 from .probe import Probe
 from .restore import restore
 from .session import Session
@@ -56,11 +56,6 @@ class Calibration:
         probes = self._session.probes
         ended = False
         try:
-            self._session.wait_for(
-                lambda: not any(probe.find_silence() for probe in self._session.active), READY_TIMEOUT_S
-            )
-            for probe in self._session.active:
-                probe.failure = probe.find_silence()
             self._calibrate()
         except EndedError:
             ended = True
@@ -101,10 +96,8 @@ class Calibration:
         values = {key: numbers for result in results for key, numbers in result.to_file().items()}
         date = time.strftime("%Y-%m-%d %H:%M:%S")
         try:
-            damaged = store.save(path, store.Calibration(probe.robot_id, date, values))
+            store.save(path, store.Calibration(probe.robot_id, date, values))
             self._files[probe.robot_id] = [path]
-            if damaged is not None:
-                say("%s: the existing file is damaged, and kept as %s" % (probe.name, damaged))
             if importlib.util.find_spec("matplotlib") is not None:
                 from .figures import draw_robot
 

@@ -106,8 +106,9 @@ def _face_wall_with_each_sensor(
         angles_rad: Dict[int, float] = {}
 
         def evaluate(probe: Probe, sensor: int = sensor, angles_rad: Dict[int, float] = angles_rad) -> None:
+            probe.check_alive()
             counts, ranges_m = probe.read_scans()
-            pose = probe.read_pose()
+            pose = probe.pose
             facing = model.Facing(sensor, counts.tolist(), ranges_m.tolist(), 0.0)
             misalignment_rad = model.estimate_misalignment_rad(facing)
             wall = walls.setdefault(probe.robot_id, _Wall(pose, pose.yaw_rad - misalignment_rad))
@@ -124,13 +125,13 @@ def _turn(session: Session, title: str, angles_rad: Dict[int, float]) -> None:
     targets_rad: Dict[int, float] = {}
 
     def set_target(probe: Probe) -> None:
-        targets_rad[probe.robot_id] = probe.read_pose().yaw_rad + angles_rad[probe.robot_id]
+        targets_rad[probe.robot_id] = probe.pose.yaw_rad + angles_rad[probe.robot_id]
 
     def remaining_rad(probe: Probe) -> float:
         return math.remainder(targets_rad[probe.robot_id] - probe.pose.yaw_rad, 2.0 * math.pi)
 
     def check(probe: Probe) -> None:
-        probe.read_pose()
+        probe.check_alive()
         if abs(remaining_rad(probe)) > TURN_TOLERANCE_RAD:
             raise CalibrationError(
                 "could not turn on the spot: %.0f degrees are missing; calibrate its motors, or free its wheels"

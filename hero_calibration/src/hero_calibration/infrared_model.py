@@ -98,14 +98,8 @@ def estimate_misalignment_rad(facing: Facing) -> float:
         )
     wall_m = WALL_M + BODY_RADIUS_M - facing.moved_m
     step_rad = math.radians(1.0)
-    slope = (
-        2.0
-        * (
-            math.log(expected_brightness(BEAM_STEP_RAD - step_rad, wall_m))
-            - math.log(expected_brightness(BEAM_STEP_RAD, wall_m))
-        )
-        / step_rad
-    )
+    at, beside = (math.log(expected_brightness(BEAM_STEP_RAD - turn_rad, wall_m)) for turn_rad in (0.0, step_rad))
+    slope = 2.0 * (beside - at) / step_rad
     # Turned to the left, the right neighbor comes closer to the wall's normal.
     turn_rad = math.log(right / left) / slope
     if abs(turn_rad) > LARGEST_MISALIGNMENT_RAD:

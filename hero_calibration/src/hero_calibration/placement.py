@@ -52,14 +52,13 @@ def check_places(session: Session, at_wall: bool) -> Dict[Probe, str]:
     session.wait_for(lambda: all(probe.count_scans() >= SCANS_TO_CHECK for probe in probes), READY_TIMEOUT_S)
     problems = {}
     for probe in probes:
-        reason = probe.find_silence()
-        if reason is None:
-            try:
-                reason = find_obstacle(probe.read_scans()[0], at_wall)
-            except CalibrationError as error:
-                reason = str(error)
-        if reason is not None:
-            problems[probe] = reason
+        try:
+            probe.check_alive()
+            obstacle = find_obstacle(probe.read_scans()[0], at_wall)
+        except CalibrationError as error:
+            obstacle = str(error)
+        if obstacle is not None:
+            problems[probe] = obstacle
     return problems
 
 

@@ -97,15 +97,14 @@ class Probe:
 
     # -- readings ------------------------------------------------------------------------------------------
 
-    def find_silence(self) -> Optional[str]:
-        """Return what is missing of the robot, as text; None if all topics are alive."""
+    def check_alive(self) -> None:
+        """Raise CalibrationError with what is missing, if the robot is silent or nothing subscribes to its commands."""
         for topic, heard_s in sorted(self._heard_s.items()):
             if time.monotonic() - heard_s > STALE_S:
-                return "nothing received on /%s/%s: is the robot on and in reach?" % (self.name, topic)
+                raise CalibrationError("nothing received on /%s/%s: is the robot on and in reach?" % (self.name, topic))
         for publisher in (self._motors, self._velocity, self._position):
             if not publisher.get_num_connections():
-                return "nothing subscribes to %s: is the driver running?" % publisher.name
-        return None
+                raise CalibrationError("nothing subscribes to %s: is the driver running?" % publisher.name)
 
     def read_wheels(self) -> Readings:
         """Return the encoder readings of the last two minutes."""
@@ -133,12 +132,6 @@ class Probe:
             raise CalibrationError("no infrared readings came on /%s/laser" % self.name)
         signals, ranges_m = np.array(scans).transpose(1, 0, 2)
         return average(signals), average(ranges_m)
-
-    def read_pose(self) -> Pose:
-        """Return the newest pose. Raises: CalibrationError if none came lately."""
-        if time.monotonic() - self._heard_s["odom"] > STALE_S:
-            raise CalibrationError("nothing received on /%s/odom any more: is the robot gone?" % self.name)
-        return self.pose
 
     # -- commands ------------------------------------------------------------------------------------------
 

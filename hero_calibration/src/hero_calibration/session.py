@@ -95,8 +95,9 @@ class Session:
                 try:
                     evaluate(probe, is_last)
                 except CalibrationError as error:
-                    if is_last or probe.find_silence():
+                    if is_last:
                         raise
+                    probe.check_alive()
                     say("%s once more: %s: %s" % (probe.name, step, error))
                     again.append(probe)
 

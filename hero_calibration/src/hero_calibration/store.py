@@ -3,7 +3,6 @@
 import math
 import os
 import re
-import time
 from contextlib import suppress
 from typing import Any, Dict, List, NamedTuple, Optional, Tuple
 
@@ -12,10 +11,7 @@ import yaml
 from .errors import CalibrationError
 
 PREVIOUS = ".previous"
-"""Goes before the suffix of the file that was there before."""
-
-DAMAGED = ".damaged"
-"""The same for a file that could not be read when a new one was written."""
+"""Goes before the suffix of the previous file."""
 
 LONGEST_SHOWN = 60
 
@@ -53,41 +49,30 @@ def name_file(folder: str, robot_id: int) -> str:
 def list_files(folder: str) -> List[str]:
     """Return the paths of all robots' files in a folder, which may not exist."""
     names = sorted(os.listdir(folder)) if os.path.isdir(folder) else []
-    return [
-        os.path.join(folder, name)
-        for name in names
-        if name.endswith(".yaml") and PREVIOUS not in name and DAMAGED not in name
-    ]
+    return [os.path.join(folder, name) for name in names if name.endswith(".yaml") and PREVIOUS not in name]
 
 
-def save(path: str, calibration: Calibration) -> Optional[str]:
-    """Write a file; values of the old file that were not measured again stay, and the old file is kept beside it.
+def save(path: str, calibration: Calibration) -> None:
+    """Write a file; the previous one is kept beside it, and its values that were not measured again stay.
 
-    A damaged old file does not prevent the new one; it is renamed, and the new name is returned, None otherwise.
+    A damaged previous file, or one of another robot, does not prevent the new one.
 
     Raises: CalibrationError.
     """
     base, suffix = os.path.splitext(path)
-    damaged = None
     values = calibration.values
     try:
-        if os.path.lexists(path):
-            try:
+        if os.path.exists(path):
+            with open(path, "rb") as file:
+                _write_atomically(base + PREVIOUS + suffix, file.read())
+            with suppress(CalibrationError):
                 old = load(path)
-                if old.robot_id != calibration.robot_id:
-                    raise CalibrationError("it is a file of hero_%d" % old.robot_id)
-                values = {**old.values, **values}
-                with open(path, "rb") as file:
-                    _write_atomically(base + PREVIOUS + suffix, file.read())
-            except CalibrationError:
-                damaged = base + DAMAGED + time.strftime("-%Y%m%d-%H%M%S") + suffix
-                os.rename(path, damaged)
+                values = {**old.values, **values} if old.robot_id == calibration.robot_id else values
         content = {"robot": "hero_%d" % calibration.robot_id, "date": calibration.date, **values}
         text: str = yaml.safe_dump(content, sort_keys=False, default_flow_style=None)
         _write_atomically(path, text.encode())
     except OSError as error:
         raise CalibrationError("%s cannot be written: %s" % (path, error.strerror)) from error
-    return damaged
 
 
 def _write_atomically(path: str, content: bytes) -> None:

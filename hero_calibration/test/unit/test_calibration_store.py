@@ -42,7 +42,7 @@ def test_a_file_holds_what_was_saved(tmp_path):
 
 def test_values_that_were_not_measured_again_stay_and_the_old_file_is_kept(tmp_path):
     path, content = save_whole(tmp_path)
-    assert store.save(path, NEWER) is None
+    store.save(path, NEWER)
     kept = store.load(path)
     assert kept.date == "later"
     assert {key: kept.values[key] for key in NEWER.values} == NEWER.values
@@ -55,21 +55,12 @@ def test_values_that_were_not_measured_again_stay_and_the_old_file_is_kept(tmp_p
     "content",
     [b"", b"\xff\x00\x01", b"[" * 20000, b"robot: hero_3\nvelocity_gains: 2020-13-45\n", b"robot: hero_4"],
 )
-def test_a_damaged_old_file_is_kept_beside_the_new_one(tmp_path, content):
+def test_a_damaged_previous_file_is_kept_beside_the_new_one(tmp_path, content):
     path = tmp_path / "hero_3.yaml"
     path.write_bytes(content)
-    damaged = store.save(str(path), NEWER)
+    store.save(str(path), NEWER)
     assert store.load(str(path)) == NEWER
-    assert re.fullmatch(r"hero_3\.damaged-[0-9-]+\.yaml", os.path.basename(damaged))
-    with open(damaged, "rb") as file:
-        assert file.read() == content
-
-
-def test_a_directory_in_place_of_a_file_is_renamed(tmp_path):
-    (tmp_path / "hero_3.yaml").mkdir()
-    damaged = store.save(str(tmp_path / "hero_3.yaml"), NEWER)
-    assert store.load(str(tmp_path / "hero_3.yaml")) == NEWER
-    assert os.path.isdir(damaged)
+    assert (tmp_path / "hero_3.previous.yaml").read_bytes() == content
 
 
 def test_a_new_file_is_on_the_disk_before_it_takes_the_name(tmp_path, monkeypatch):
