@@ -103,9 +103,9 @@ def _face_wall_with_each_sensor(
             lambda: all(probe.count_scans() >= samples for probe in session.active),
             max(SCAN_TIMEOUT_S, samples / 2.0),
         )
-        angles_rad: Dict[int, float] = {}
+        targets_rad: Dict[int, float] = {}
 
-        def evaluate(probe: Probe, sensor: int = sensor, angles_rad: Dict[int, float] = angles_rad) -> None:
+        def evaluate(probe: Probe, sensor: int = sensor, targets_rad: Dict[int, float] = targets_rad) -> None:
             probe.check_alive()
             counts, ranges_m = probe.read_scans()
             pose = probe.pose
@@ -113,19 +113,15 @@ def _face_wall_with_each_sensor(
             misalignment_rad = model.estimate_misalignment_rad(facing)
             wall = walls.setdefault(probe.robot_id, _Wall(pose, pose.yaw_rad - misalignment_rad))
             facings[probe.robot_id].append(facing._replace(moved_m=wall.distance_m(pose)))
-            angles_rad[probe.robot_id] = model.BEAM_STEP_RAD - misalignment_rad
+            targets_rad[probe.robot_id] = pose.yaw_rad - misalignment_rad + model.BEAM_STEP_RAD
 
         session.for_each(title, evaluate)
-        _turn(session, title, angles_rad)
+        _turn(session, title, targets_rad)
     return facings
 
 
-def _turn(session: Session, title: str, angles_rad: Dict[int, float]) -> None:
-    """Turn every active robot to the left by its angle, on the spot, with further tries for the remainder."""
-    targets_rad: Dict[int, float] = {}
-
-    def set_target(probe: Probe) -> None:
-        targets_rad[probe.robot_id] = probe.pose.yaw_rad + angles_rad[probe.robot_id]
+def _turn(session: Session, title: str, targets_rad: Dict[int, float]) -> None:
+    """Turn every active robot on the spot to its heading, with further tries for the remainder."""
 
     def remaining_rad(probe: Probe) -> float:
         return math.remainder(targets_rad[probe.robot_id] - probe.pose.yaw_rad, 2.0 * math.pi)
@@ -138,7 +134,6 @@ def _turn(session: Session, title: str, angles_rad: Dict[int, float]) -> None:
                 % abs(math.degrees(remaining_rad(probe)))
             )
 
-    session.for_each(title, set_target)
     for tolerance_rad in (0.0, *[TURN_TOLERANCE_RAD / 2.0] * (TURN_TRIES - 1)):
         turning = [probe for probe in session.active if abs(remaining_rad(probe)) > tolerance_rad]
         if not turning:

@@ -3,7 +3,7 @@
 import threading
 import time
 from collections import deque
-from typing import Any, Deque, Dict, List, Optional, Sequence, Tuple
+from typing import Any, Callable, Deque, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 import rospy
@@ -31,12 +31,12 @@ STALE_S = 3.0
 SERVICE_WAIT_S = 5.0
 
 
-SETTINGS: Dict[str, Tuple[str, Any]] = {
-    "motor_centers_us": ("motors_parameters", SetMotor),
-    "velocity_gains": ("velocity_controller/pid_parameters", SetPID),
-    "infrared_counts_m2": ("ir_calibration", SetIRCalibration),
+SETTINGS: Dict[str, Tuple[str, Any, Callable[[float], float]]] = {
+    "motor_centers_us": ("motors_parameters", SetMotor, round),
+    "velocity_gains": ("velocity_controller/pid_parameters", SetPID, float),
+    "infrared_counts_m2": ("ir_calibration", SetIRCalibration, float),
 }
-"""Services that write settings to the robot's flash, by key in its file."""
+"""Services that write settings to the robot's flash, and the type of their numbers, by key in its file."""
 
 
 class Probe:
@@ -153,11 +153,11 @@ class Probe:
 
     def write(self, key: str, values: Sequence[float]) -> None:
         """Write one of SETTINGS to the robot. Raises: CalibrationError with the reason if it fails."""
-        service, kind = SETTINGS[key]
+        service, kind, number = SETTINGS[key]
         name = "/%s/%s" % (self.name, service)
         try:
             rospy.wait_for_service(name, SERVICE_WAIT_S)
-            answer = rospy.ServiceProxy(name, kind)(*values)
+            answer = rospy.ServiceProxy(name, kind)(*map(number, values))
         except (rospy.ServiceException, rospy.ROSException) as error:
             raise CalibrationError("%s: %s" % (name, " ".join(str(error).split()))) from error
         if not answer.success:

@@ -97,6 +97,7 @@ def describe_robot(robot: RobotObservations) -> Dict[str, str]:
     """Return the numbers of a robot by heading, "-" where the recording does not tell."""
     path = analysis.read_path(robot)
     intervals_s = np.diff(path.times_s)
+    steady_s = intervals_s[intervals_s <= analysis.ODOMETRY_GAP_S]
     delays_ms = analysis.compute_message_delays(robot) * 1e3
     motion_delays_ms = analysis.compute_motion_delays(robot) * 1e3
     errors = analysis.compute_errors(robot)
@@ -107,7 +108,7 @@ def describe_robot(robot: RobotObservations) -> Dict[str, str]:
             error += " (%.1f %% of the distance)" % (100.0 * errors.position_m[-1] / path.length_m)
     return {
         "DISTANCE": "%.2f m" % path.length_m,
-        "ODOM": "%.1f Hz" % (1.0 / max(1e-6, np.median(intervals_s))) if len(intervals_s) else "-",
+        "ODOM": "%.1f Hz" % (len(steady_s) / steady_s.sum()) if steady_s.any() else "-",
         "LONGEST GAP": "%.2f s" % intervals_s.max() if len(intervals_s) else "-",
         "MESSAGE DELAY": "%.0f ms" % np.median(delays_ms) if len(delays_ms) else "-",
         "99 %": "%.0f ms" % np.percentile(delays_ms, 99) if len(delays_ms) else "-",
