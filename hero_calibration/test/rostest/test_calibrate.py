@@ -12,8 +12,8 @@ import shutil
 import signal
 import subprocess
 import tempfile
-import threading
 import unittest
+from concurrent.futures import ThreadPoolExecutor
 
 import rospy
 import rostest
@@ -25,7 +25,7 @@ from hero_sim.srv import InjectFault
 from hero_test.waiting import wait_for
 
 CALIBRATE = ["rosrun", "hero_calibration", "calibrate"]
-TIMEOUT_S = 120.0
+TIMEOUT_S = 250.0
 CENTER_BOUND_US = 4
 RANGE_BOUND_M = 0.004
 VELOCITY_BOUND = 0.22
@@ -90,17 +90,10 @@ class CalibrateTest(unittest.TestCase):
         watch = Watch(range(9))
         wait_for(lambda: watch.speeds[6] > 0.02, "motion of hero_6", TIMEOUT_S)
         rospy.ServiceProxy("/hero_sim/fault", InjectFault)("vanish:robot=6")
-        output = {}
-        readers = [
-            threading.Thread(target=lambda: output.update(floor=self.finish(open_floor))),
-            threading.Thread(target=lambda: output.update(wall=self.finish(wall))),
-        ]
-        for reader in readers:
-            reader.start()
-        for reader in readers:
-            reader.join()
-        self.check_floor(*output["floor"])
-        self.check_wall(*output["wall"])
+        with ThreadPoolExecutor() as pool:
+            outputs = list(pool.map(self.finish, (open_floor, wall)))
+        self.check_floor(*outputs[0])
+        self.check_wall(*outputs[1])
         wait_for(lambda: max(watch.speeds.values()) < 1e-3, "standstill", TIMEOUT_S)
 
     def check_floor(self, code, output):
