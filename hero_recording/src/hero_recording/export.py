@@ -1,25 +1,68 @@
 """Program export: writes what bags hold of the robots as CSV, a folder per robot and a file per kind of message.
 
-    rosrun hero_recording export hero_2026-11-21-10-00-00_0.bag
-
 The tables are in FOLDER.part until all of them are complete.
 """
 
 import argparse
+import csv
 import os
 import shutil
 import sys
-from typing import Optional, Sequence, Set
+from typing import Dict, List, Optional, Sequence, Set, Tuple
 
 from hero_client import command_line
 
-from . import tables
-from .bags import BagSet, Message
-from .csv_files import CsvFiles
+from .bags import BagSet
 from .errors import RecordingError
 from .options import list_of, robot_ids
+from .tables import TABLES, Row, is_exported, read_rows
+from .topics import Message
 
 PART_SUFFIX = ".part"
+
+BATCH_ROWS = 4096
+"""Buffered rows of a table: 8 numbers take some 0.8 MB."""
+
+
+class CsvFiles:
+    """All tables of an export, in a folder per robot.
+
+    Attributes:
+        rows: how many rows were written, by robot and kind.
+    """
+
+    def __init__(self, folder: str) -> None:
+        """Write to folder, which must exist."""
+        self.rows: Dict[Tuple[int, str], int] = {}
+        self._folder = folder
+        self._buffers: Dict[Tuple[int, str], List[Row]] = {}
+
+    def add(self, robot_id: int, kind: str, row: Row) -> None:
+        """Add a row. Raises: RecordingError if a file cannot be written."""
+        buffer = self._buffers.setdefault((robot_id, kind), [])
+        buffer.append(row)
+        if len(buffer) >= BATCH_ROWS:
+            self._write(robot_id, kind)
+
+    def flush(self) -> None:
+        """Write all buffered rows. Raises: RecordingError if a file cannot be written."""
+        for robot_id, kind in list(self._buffers):
+            self._write(robot_id, kind)
+
+    def _write(self, robot_id: int, kind: str) -> None:
+        key = (robot_id, kind)
+        rows = self._buffers.pop(key)
+        path = os.path.join(self._folder, "hero_%d" % robot_id, kind + ".csv")
+        try:
+            os.makedirs(os.path.dirname(path), exist_ok=True)
+            with open(path, "a", encoding="utf-8", newline="") as file:
+                writer = csv.writer(file)
+                if key not in self.rows:
+                    writer.writerow(("time_s", *TABLES[kind]))
+                writer.writerows(rows)
+        except OSError as error:
+            raise RecordingError("%s cannot be written: %s" % (path, error.strerror or error)) from error
+        self.rows[key] = self.rows.get(key, 0) + len(rows)
 
 
 def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
@@ -28,8 +71,8 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("bags", nargs="+", metavar="FILE.bag", help="the bags of one recording, in any order")
     parser.add_argument("--out", metavar="FOLDER", help="where the tables go (the first bag's name); must not exist")
     parser.add_argument("--robots", type=robot_ids, default="all", help="ids, e.g. '0 1 2' or 0-3 (all)")
-    every, text = ",".join(tables.TABLES), "which, separated by commas (%(default)s)"
-    parser.add_argument("--tables", type=list_of(tables.TABLES), default=every, metavar="LIST", help=text)
+    every, text = ",".join(TABLES), "which, separated by commas (%(default)s)"
+    parser.add_argument("--tables", type=list_of(TABLES), default=every, metavar="LIST", help=text)
     return parser.parse_args(arguments)
 
 
@@ -37,11 +80,11 @@ def write_tables(bags: BagSet, robot_ids: Optional[Set[int]], kinds: Set[str], f
     """Write all rows of these robots and kinds. Raises: RecordingError if there are none."""
 
     def receive(message: Message) -> None:
-        for robot_id, kind, row in tables.read_rows(*message):
+        for robot_id, kind, row in read_rows(*message):
             if kind in kinds and (robot_ids is None or robot_id in robot_ids):
                 files.add(robot_id, kind, row)
 
-    bags.read(tables.is_exported, receive)
+    bags.read(is_exported, receive)
     files.flush()
     if not files.rows:
         raise RecordingError(

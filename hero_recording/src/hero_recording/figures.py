@@ -7,7 +7,7 @@ cover each other, each robot has a row.
 from typing import Any, Dict, Optional, Sequence, Tuple
 
 import numpy as np
-from matplotlib import patches
+from matplotlib import patches, pyplot
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
@@ -16,7 +16,6 @@ from matplotlib.lines import Line2D
 from hero_client.robot_constants import BODY_RADIUS_M
 
 from . import analysis
-from .colors import MOST_NAMED, STATE_COLORS, Color, choose_colors
 from .observations import Observations, RobotObservations
 
 WIDTH_IN = 9.0
@@ -29,6 +28,22 @@ BINS_PER_S = 2.0
 DELAY_TICKS_MS = (-50, 0, 50, 100, 300, 1000, 3000, 10000)
 
 _GREY = "0.45"
+
+# Okabe and Ito's palette (2008) without its yellow, which is hard to see on white.
+_FEW = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+
+MOST_NAMED = len(_FEW)
+"""Up to this many robots have a color and a line in the legend; more have a shade and are labeled with their id."""
+
+STATE_COLORS = {"ready": "#009E73", "joining": "#56B4E9", "away": "#D55E00", "refused": "#000000"}
+
+
+def choose_colors(robot_ids: Sequence[int]) -> Dict[int, Any]:
+    """Return a color for each robot: distinct ones for few, a scale in order of their ids for many."""
+    if len(robot_ids) <= MOST_NAMED:
+        return dict(zip(robot_ids, _FEW))
+    # The bright end of the scale is hard to see on white.
+    return dict(zip(robot_ids, pyplot.get_cmap("viridis")(np.linspace(0.0, 0.85, len(robot_ids)))))
 
 
 class Figures:
@@ -229,7 +244,7 @@ class Figures:
         return figure
 
     @staticmethod
-    def _draw_delay_box(axes: Axes, row: int, delays_ms: np.ndarray, color: Color) -> None:
+    def _draw_delay_box(axes: Axes, row: int, delays_ms: np.ndarray, color: Any) -> None:
         low, quarter, median, three_quarters, high = np.percentile(delays_ms, [1, 25, 50, 75, 99])
         axes.plot([low, high], [row, row], color=color, linewidth=1.0)
         axes.barh(row, three_quarters - quarter, left=quarter, height=0.6, color=color, alpha=0.5)

@@ -4,7 +4,8 @@ Times are the recorder's, seconds since 1970; stamps are the robot's clock, whic
 """
 
 import math
-from typing import Any, Dict, Iterable, List, NamedTuple, Optional, Set, Tuple
+from collections import defaultdict
+from typing import Any, DefaultDict, Iterable, List, NamedTuple, Optional, Set, Tuple
 
 from hero_client.geometry import yaw_of
 
@@ -87,7 +88,7 @@ class Observations:
     def __init__(self, robot_ids: Optional[Set[int]] = None) -> None:
         """Start empty; robot_ids None: all robots."""
         self._robot_ids = robot_ids
-        self.robots: Dict[int, RobotObservations] = {}
+        self.robots: DefaultDict[int, RobotObservations] = defaultdict(RobotObservations)
         self.walls_m: List[Tuple[float, float, float, float]] = []
         self.circles_m: List[Tuple[float, float, float]] = []
         self.shared_frame = ""
@@ -108,14 +109,11 @@ class Observations:
     def _wants_robot(self, robot_id: int) -> bool:
         return self._robot_ids is None or robot_id in self._robot_ids
 
-    def _robot(self, robot_id: int) -> RobotObservations:
-        return self.robots.setdefault(robot_id, RobotObservations())
-
     def receive(self, message: Message) -> None:
         """Store a message of a topic that wants() accepts."""
         found = find_robot_topic(message.topic, message.type)
         if found is not None:
-            self._receive_robot_message(self._robot(found.robot_id), found.kind, message)
+            self._receive_robot_message(self.robots[found.robot_id], found.kind, message)
         elif is_fleet_topic(message.topic, message.type):
             self._receive_fleet(message)
         elif message.topic == STATIC_TRANSFORMS_TOPIC:
@@ -147,7 +145,7 @@ class Observations:
         for robot in message.content.robots:
             if robot.id >= 0 and self._wants_robot(robot.id):
                 state = STATE_NAMES.get(robot.state, str(robot.state))
-                self._robot(robot.id).states.append(StateReport(message.time_s, state, robot.reconnects))
+                self.robots[robot.id].states.append(StateReport(message.time_s, state, robot.reconnects))
 
     def _receive_transforms(self, message: Message) -> None:
         for transform in message.content.transforms:
@@ -160,7 +158,7 @@ class Observations:
             origin = Origin(message.time_s, translation.x, translation.y, yaw_of(transform.transform.rotation))
             if not all(map(math.isfinite, origin)):
                 continue
-            origins = self._robot(int(number)).origins
+            origins = self.robots[int(number)].origins
             # Latched messages are recorded again at the start of every file of a split.
             if not origins or origins[-1][1:] != origin[1:]:
                 origins.append(origin)

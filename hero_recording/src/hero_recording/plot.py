@@ -1,7 +1,4 @@
-"""Program plot: draws figures of all robots in bags, and prints a table.
-
-rosrun hero_recording plot hero_2026-11-21-10-00-00_0.bag
-"""
+"""Program plot: draws figures of all robots in bags, and prints a table."""
 
 import argparse
 import importlib.util

@@ -19,9 +19,8 @@ from synthetic_bag import (
 
 from hero_recording import analysis, plot
 from hero_recording.bags import BagSet
-from hero_recording.colors import MOST_NAMED, choose_colors
 from hero_recording.errors import RecordingError
-from hero_recording.figures import Figures
+from hero_recording.figures import MOST_NAMED, Figures, choose_colors
 from hero_recording.observations import Observations, RobotObservations, StateReport
 from hero_recording.topics import Message, find_robot_topic, is_fleet_topic, make_patterns
 
@@ -169,7 +168,7 @@ def test_a_command_that_is_not_repeated_ends_with_the_watchdog():
 
 def test_few_robots_have_distinct_colors_and_many_a_scale():
     assert len(set(choose_colors(range(MOST_NAMED)).values())) == MOST_NAMED
-    assert len(set(choose_colors(range(50)).values())) == 50
+    assert len(set(map(tuple, choose_colors(range(50)).values()))) == 50
     assert len(choose_colors([4])) == 1
 
 

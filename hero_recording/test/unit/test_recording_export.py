@@ -6,7 +6,7 @@ import math
 import pytest
 from synthetic_bag import DELAY_S, START_S, write_bag
 
-from hero_recording import export, tables
+from hero_recording import export
 from hero_recording.errors import RecordingError
 
 
@@ -72,14 +72,14 @@ def test_an_interrupted_export_leaves_nothing_behind(bag, tmp_path, capsys, monk
     def break_off(*arguments):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(tables, "read_rows", break_off)
+    monkeypatch.setattr(export, "read_rows", break_off)
     with pytest.raises(KeyboardInterrupt):
         run_export(capsys, bag, "--out", tmp_path / "out")
     assert not list(tmp_path.iterdir())
 
 
 def test_all_buffered_rows_are_written(bag, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("hero_recording.csv_files.BATCH_ROWS", 10)
+    monkeypatch.setattr("hero_recording.export.BATCH_ROWS", 10)
     run_export(capsys, bag, "--out", tmp_path / "out", "--tables", "odometry")
     assert len(read_csv(tmp_path / "out" / "hero_0" / "odometry.csv")) == 117
 
