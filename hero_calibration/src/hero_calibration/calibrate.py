@@ -45,11 +45,7 @@ class Calibration:
             raise CalibrationError("%s cannot be created: %s" % (options.folder, error.strerror)) from error
         self._results: Dict[int, Dict[str, Any]] = {}
         self._files: Dict[int, List[str]] = {}
-        probes = []
-        for robot_id, reason in find_robots(program, options.robots).items():
-            probes.append(Probe(robot_id))
-            probes[-1].failure = reason
-        self._session = Session(program, probes)
+        self._session = Session(program, find_robots(program, options.robots))
 
     def run(self) -> int:
         """Calibrate, save, and print a table; return the exit code. Raises: CalibrationError."""

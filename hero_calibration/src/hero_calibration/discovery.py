@@ -1,19 +1,20 @@
 """Finds the robots to calibrate in the reports of the drivers."""
 
 import time
-from typing import Dict, Optional, Sequence
+from typing import Dict, List, Optional, Sequence
 
 from hero_client.drivers import Drivers
 from hero_client.program import Program
 from hero_msgs.msg import Robot
 
 from .errors import CalibrationError
+from .probe import Probe
 
 TIMEOUT_S = 10.0
 
 
-def find_robots(program: Program, robot_ids: Optional[Sequence[int]]) -> Dict[int, Optional[str]]:
-    """Return for each robot why it cannot be calibrated, None if it can; robot_ids None: all that are ready.
+def find_robots(program: Program, robot_ids: Optional[Sequence[int]]) -> List[Probe]:
+    """Return the robots with these ids, None: all that are ready; those that are not connected have failed.
 
     Raises: CalibrationError without a driver, without a robot, or while all robots are stopped.
     """
@@ -29,8 +30,10 @@ def find_robots(program: Program, robot_ids: Optional[Sequence[int]]) -> Dict[in
             raise CalibrationError("all robots are stopped; release them: rosservice call %s/stop false" % driver)
     if not ready.intersection(wanted):
         raise CalibrationError("no robot is ready: are they on, and connected to the driver?")
-    absent = "is not connected to the driver: is it on?"
-    return {robot_id: None if robot_id in ready else absent for robot_id in wanted}
+    probes = [Probe(robot_id) for robot_id in wanted]
+    for probe in probes:
+        probe.failure = None if probe.robot_id in ready else "is not connected to the driver: is it on?"
+    return probes
 
 
 def _wait_for_robots(program: Program, drivers: Drivers, robot_ids: Optional[Sequence[int]]) -> Dict[int, int]:

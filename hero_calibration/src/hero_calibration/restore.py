@@ -1,7 +1,6 @@
 """Writes kept calibrations into their robots again."""
 
-from concurrent.futures import ThreadPoolExecutor
-from typing import List, Optional, Sequence
+from typing import Dict, List, Optional, Sequence
 
 from hero_client.command_line import say
 from hero_client.program import Program
@@ -10,6 +9,7 @@ from . import store
 from .discovery import find_robots
 from .errors import CalibrationError
 from .probe import SETTINGS, Probe
+from .session import Session
 
 
 def restore(program: Program, folder: str, files: Sequence[str], robot_ids: Optional[Sequence[int]]) -> int:
@@ -20,35 +20,24 @@ def restore(program: Program, folder: str, files: Sequence[str], robot_ids: Opti
     kept = load_files(files or store.list_files(folder), robot_ids)
     if not kept:
         raise CalibrationError("no calibration of these robots in %s" % (", ".join(files) or folder))
-    robots = find_robots(program, [calibration.robot_id for calibration in kept])
+    calibrations = {calibration.robot_id: calibration for calibration in kept}
+    session = Session(program, find_robots(program, list(calibrations)))
+    written: Dict[int, List[str]] = {probe.robot_id: [] for probe in session.probes}
 
-    def write(calibration: store.Calibration) -> Optional[str]:
-        """Write a calibration; return why it failed, None if it did not."""
-        failure = robots[calibration.robot_id]
-        if failure is not None:
-            return failure
-        probe = Probe(calibration.robot_id)
-        written: List[str] = []
-        try:
-            for key in settings_of(calibration):
-                probe.write(key, calibration.values[key])
-                written.append(key)
-        except CalibrationError as error:
-            return "%s (written: %s)" % (error, ", ".join(written) or "nothing")
-        return None
+    def write(probe: Probe) -> None:
+        values = calibrations[probe.robot_id].values
+        for key in SETTINGS:
+            if key in values:
+                probe.write(key, values[key])
+                written[probe.robot_id].append(key)
 
-    with ThreadPoolExecutor(min(32, len(kept))) as pool:
-        failures = list(pool.map(write, kept))
-    for calibration, failure in zip(kept, failures):
-        written = ", ".join(settings_of(calibration)) or "nothing"
-        text = "restored %s of %s" % (written, calibration.date or "an unknown day")
-        say("hero_%d: %s" % (calibration.robot_id, "FAILED: " + failure if failure else text))
-    return 1 if any(failures) else 0
-
-
-def settings_of(calibration: store.Calibration) -> List[str]:
-    """Return the keys of what can be written to the robot."""
-    return [key for key in SETTINGS if key in calibration.values]
+    session.for_each("restore", write)
+    for probe in session.probes:
+        keys = ", ".join(written[probe.robot_id]) or "nothing"
+        date = calibrations[probe.robot_id].date or "an unknown day"
+        failure = "FAILED: %s; " % probe.failure if probe.failure else ""
+        say("%s: %srestored %s of %s" % (probe.name, failure, keys, date))
+    return 1 if any(probe.failure for probe in session.probes) else 0
 
 
 def load_files(paths: Sequence[str], robot_ids: Optional[Sequence[int]]) -> List[store.Calibration]:

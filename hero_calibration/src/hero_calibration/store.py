@@ -167,8 +167,7 @@ def _describe(node: Any) -> str:
     """Return the content of a node for an error; a list may even contain itself."""
     if node.id != "scalar":
         return "a " + str(node.id)
-    text = str(node.value)
-    return repr(text if len(text) <= LONGEST_SHOWN else text[:LONGEST_SHOWN] + "...")
+    return repr(str(node.value)[:LONGEST_SHOWN])
 
 
 def _fail_at(path: str, node: Any, reason: str) -> CalibrationError:

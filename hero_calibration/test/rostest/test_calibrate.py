@@ -147,7 +147,7 @@ class CalibrateTest(unittest.TestCase):
         code, output = self.run_program("restore")
         self.assertEqual(code, 1, output)
         self.assertIn("hero_3: restored motor_centers_us, velocity_gains", output)
-        self.assertRegex(output, r"hero_4: FAILED: /hero_4/motors_parameters: .*not answered")
+        self.assertRegex(output, r"hero_4: FAILED: restore: /hero_4/motors_parameters: .*not answered")
 
     def test_2_results_before_an_early_end_replace_a_damaged_file(self):
         path = self.folder + "/hero_5.yaml"

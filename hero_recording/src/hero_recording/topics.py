@@ -21,6 +21,7 @@ ROBOT_TOPICS = {
     "ground_truth": (GROUND_TRUTH, "nav_msgs/Odometry"),
     "encoder": (ENCODER, "hero_msgs/Encoder"),
     "proximity": (PROXIMITY, "sensor_msgs/LaserScan"),
+    "cmd_vel": (VELOCITY_COMMAND, "geometry_msgs/Twist"),
     "velocity_controller/cmd_vel": (VELOCITY_COMMAND, "geometry_msgs/Twist"),
     "position_controller/cmd_vel": (POSITION_COMMAND, "geometry_msgs/Twist"),
     "cmd_motor": (MOTOR_COMMAND, "hero_msgs/Motor"),

@@ -52,6 +52,7 @@ def test_robots_that_join_later_are_recorded_and_other_topics_are_not():
             for name in ("odom", "proximity", "imu", "led")
         ),
         "/hero_4/velocity_controller/cmd_vel",
+        "/hero_4/cmd_vel",
         "/hero_4/ground_truth",
         *(
             "/tf",
