@@ -1,1 +1,1 @@
-"""Measurements on robots that stand before us -> parameters in their flash, and files that bring them back."""
+"""Calibrates robots, all at once: writes parameters to their flash, and keeps them in files for restoring."""

@@ -98,16 +98,16 @@ def estimate_misalignment_rad(facing: Facing) -> float:
         )
     wall_m = WALL_M + BODY_RADIUS_M - facing.moved_m
     step_rad = math.radians(1.0)
-    at, beside = (math.log(expected_brightness(BEAM_STEP_RAD - turn_rad, wall_m)) for turn_rad in (0.0, step_rad))
+    at, beside = (math.log(expected_brightness(BEAM_STEP_RAD - offset_rad, wall_m)) for offset_rad in (0.0, step_rad))
     slope = 2.0 * (beside - at) / step_rad
     # Turned to the left, the right neighbor comes closer to the wall's normal.
-    turn_rad = math.log(right / left) / slope
-    if abs(turn_rad) > LARGEST_MISALIGNMENT_RAD:
+    misalignment_rad = math.log(right / left) / slope
+    if abs(misalignment_rad) > LARGEST_MISALIGNMENT_RAD:
         raise CalibrationError(
             "misaligned by %.0f degrees when sensor %s faces the wall: place it straight, or clean its wheels"
-            % (abs(math.degrees(turn_rad)), name_beam(facing.sensor))
+            % (abs(math.degrees(misalignment_rad)), name_beam(facing.sensor))
         )
-    return turn_rad
+    return misalignment_rad
 
 
 def compute_calibration(facings: Sequence[Facing]) -> List[float]:
@@ -142,7 +142,7 @@ def range_errors_m(facings: Sequence[Facing]) -> np.ndarray:
 
 
 def find_obstacle(counts: Sequence[float], at_wall: bool) -> Optional[str]:
-    """Return what stands too close to a robot, as text; None if nothing does.
+    """Return what is too close to a robot, as text; None if nothing is.
 
     counts: raw readings: they work before the sensors are calibrated.
     at_wall: whether it should face a wall; otherwise it needs room on all sides.

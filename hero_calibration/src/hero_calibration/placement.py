@@ -1,4 +1,4 @@
-"""Asks the user to place the robots, and checks by their raw infrared readings that they stand well."""
+"""Asks the user to place the robots, and checks their places by their raw infrared readings."""
 
 import sys
 from typing import Dict
@@ -23,11 +23,11 @@ NOBODY = "nobody is there to answer: start it in a terminal, or with --yes"
 
 
 def place_robots(session: Session, at_wall: bool, ask_nothing: bool) -> None:
-    """Let the user place the robots, and check their places; those that stand badly fail.
+    """Let the user place the robots, and check their places; badly placed robots fail.
 
     Raises: EndedError if the user ends the program, CalibrationError where nobody can answer.
     """
-    question = "Enter when they stand, q to end: "
+    question = "Enter when they are placed, q to end: "
     if not ask_nothing:
         say("\n" + (WALL if at_wall else ROOM))
     while True:
@@ -45,11 +45,14 @@ def place_robots(session: Session, at_wall: bool, ask_nothing: bool) -> None:
 
 
 def check_places(session: Session, at_wall: bool) -> Dict[Probe, str]:
-    """Return the robots that are silent or stand badly, each with the reason."""
+    """Return the robots that are silent or badly placed, each with the reason."""
     probes = session.active
     for probe in probes:
         probe.forget_scans()
-    session.wait_for(lambda: all(probe.count_scans() >= SCANS_TO_CHECK for probe in probes), READY_TIMEOUT_S)
+    session.wait_for(
+        lambda: all(probe.count_scans() >= SCANS_TO_CHECK and not probe.find_silence() for probe in probes),
+        READY_TIMEOUT_S,
+    )
     problems = {}
     for probe in probes:
         try:

@@ -97,14 +97,21 @@ class Probe:
 
     # -- readings ------------------------------------------------------------------------------------------
 
-    def check_alive(self) -> None:
-        """Raise CalibrationError with what is missing, if the robot is silent or nothing subscribes to its commands."""
+    def find_silence(self) -> Optional[str]:
+        """Return what is missing of the robot, as text; None if all its topics are alive."""
         for topic, heard_s in sorted(self._heard_s.items()):
             if time.monotonic() - heard_s > STALE_S:
-                raise CalibrationError("nothing received on /%s/%s: is the robot on and in reach?" % (self.name, topic))
+                return "nothing received on /%s/%s: is the robot on and in reach?" % (self.name, topic)
         for publisher in (self._motors, self._velocity, self._position):
             if not publisher.get_num_connections():
-                raise CalibrationError("nothing subscribes to %s: is the driver running?" % publisher.name)
+                return "nothing subscribes to %s: is the driver running?" % publisher.name
+        return None
+
+    def check_alive(self) -> None:
+        """Raise CalibrationError with what is missing of the robot, if anything."""
+        silence = self.find_silence()
+        if silence is not None:
+            raise CalibrationError(silence)
 
     def read_wheels(self) -> Readings:
         """Return the encoder readings of the last two minutes."""

@@ -1,8 +1,7 @@
 #!/usr/bin/env python3
 """Calibrates simulated robots with known errors by the real program: accuracy, early ends, restoring.
 
-Robots 0 to 2 face a wall, 3 to 6 have room, 7 and 8 stand too close to each other. The simulator runs at twice real
-time; two programs run in parallel.
+Robots 0 to 2 face a wall, 3 to 6 have room, 7 and 8 are too close to each other. Two programs run in parallel.
 """
 
 import glob

@@ -1,1 +1,1 @@
-"""Robots on topics -> bags, and bags -> plots and tables."""
+"""Records robots into bags, plots recordings, and exports them to CSV."""

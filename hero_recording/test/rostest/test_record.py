@@ -79,7 +79,7 @@ class RecordTest(unittest.TestCase):
             "split_mb:=1",
             "compression:=none",
         ]
-        # As a shell does it: roslaunch's nodes run elsewhere, and know the folder by PWD.
+        # As a shell does: roslaunch's nodes run elsewhere, and know the folder by PWD.
         recording = self.start(*launch, cwd=self.folder, env=dict(os.environ, PWD=self.folder))
         wait_for(lambda: self.files("hero_*_0.bag.active"), "recording")
         late = self.start(
