@@ -16,7 +16,8 @@ import rospy
 
 from hero_client import command_line
 from hero_client.command_line import say
-from hero_client.program import Program, ProgramError, parse_robot_ids
+from hero_client.parameters import parse_robot_ids
+from hero_client.program import Program, ProgramError
 
 from . import store
 from .discovery import find_robots

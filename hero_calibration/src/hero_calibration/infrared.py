@@ -6,7 +6,7 @@ from typing import Dict, List, NamedTuple
 import numpy as np
 
 from hero_client.command_line import say
-from hero_client.control_laws import Pose
+from hero_client.geometry import Pose
 
 from . import infrared_model as model
 from .errors import CalibrationError

@@ -11,6 +11,8 @@ from typing import List, NamedTuple, Optional, Sequence
 
 import numpy as np
 
+from hero_client.robot_constants import BODY_RADIUS_M
+
 from .errors import CalibrationError
 
 BEAMS = 8
@@ -21,7 +23,6 @@ FRONT = 4
 WALL_M = 0.10
 """From the body to the wall."""
 
-BODY_RADIUS_M = 0.0368
 NOMINAL_COUNTS_M2 = 0.42
 NEAR_COUNTS = 16.0
 """A sensor reads more if something is within about 16 cm of the body: too close to turn or to measure beside."""

@@ -11,8 +11,7 @@ from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 
-from hero_client.control_laws import Pose
-from hero_client.readings import yaw_of
+from hero_client.geometry import Pose, yaw_of
 from hero_msgs.msg import Encoder, Motor
 from hero_msgs.srv import SetIRCalibration, SetMotor, SetPID
 

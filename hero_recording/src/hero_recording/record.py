@@ -93,10 +93,10 @@ class Recording:
             repaired = self._repair_leftovers()
         self._summarize(time.monotonic() - start_s)
         if reason is not None:
-            command_line.complain("stopped: " + reason)
+            command_line.print_error("stopped: " + reason)
             return 1
         if repaired or code not in (0, -signal.SIGINT, -signal.SIGTERM):
-            command_line.complain("rosbag's recorder failed (exit code %s); its last lines tell why" % code)
+            command_line.print_error("rosbag's recorder failed (exit code %s); its last lines tell why" % code)
             return 1
         return 0
 
@@ -132,7 +132,7 @@ class Recording:
             try:
                 say(repair_bag(path))
             except RecordingError as error:
-                command_line.complain(str(error))
+                command_line.print_error(str(error))
         return bool(leftovers)
 
     def _summarize(self, elapsed_s: float) -> None:
