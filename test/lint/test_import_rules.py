@@ -16,6 +16,7 @@ SOCKET_OWNERS = (
     "hero_sim.link.tcp_link",
     "hero_tools.checkup.network",
     "hero_monitor.server",
+    "hero_monitor.program",
 )
 
 # Each room, and what it may import of its package besides itself; what runs the rooms stands on top and may import all.

@@ -52,7 +52,7 @@ class PageTest(unittest.TestCase):
         wait_for(lambda: self.speed_of(robot_id) < 0.005, "robot %d to stand" % robot_id, 1.5)
 
     def test_the_table_shows_every_robot_with_address_rates_and_versions(self):
-        wait_for(lambda: all(row[7] == "v3.8" for row in self.page.rows()), "versions")
+        wait_for(lambda: all(row[7] == "v3.8" for row in self.page.rows()), self.page.rows)
         rows = self.page.rows()
         self.assertEqual([row[0] for row in rows], ["hero_0", "hero_1", "hero_2"])
         for row in rows:
