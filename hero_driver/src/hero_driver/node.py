@@ -1,6 +1,5 @@
 """main(): reads the parameters, wires everything, waits, and stops all robots at the end."""
 
-import contextlib
 import errno
 import functools
 import io
@@ -65,24 +64,20 @@ class EndFlag:
     """
 
     def __init__(self) -> None:
-        self._is_set = False
-        self._wakes: queue.SimpleQueue[None] = queue.SimpleQueue()
+        self._ends: queue.SimpleQueue[None] = queue.SimpleQueue()
 
     def set(self) -> None:
         """Set it; from any thread or signal handler."""
-        self._is_set = True
-        self._wakes.put(None)
-
-    def is_set(self) -> bool:
-        """Return whether it is set."""
-        return self._is_set
+        self._ends.put(None)
 
     def wait(self, timeout_s: float) -> bool:
         """Wait until it is set, at most for timeout_s; return whether it is."""
-        if not self._is_set:
-            with contextlib.suppress(queue.Empty):
-                self._wakes.get(timeout=timeout_s)
-        return self._is_set
+        try:
+            self._ends.get(timeout=timeout_s)
+        except queue.Empty:
+            return False
+        self._ends.put(None)  # it stays set
+        return True
 
 
 class DriverNode:
@@ -146,9 +141,8 @@ class DriverNode:
     def spin(self) -> int:
         """Report until end() is called; return the exit code."""
         next_report_s = time.monotonic()
-        while not self._ended.is_set():
-            # The first reports of a burst of changes may be put off a little, so that 50 robots make a few.
-            self._ended.wait(REPORT_CHECK_S)
+        # The first reports of a burst of changes may be put off a little, so that 50 robots make a few.
+        while not self._ended.wait(REPORT_CHECK_S):
             now_s = time.monotonic()
             is_due = now_s >= next_report_s
             if is_due or self._changed.is_set():

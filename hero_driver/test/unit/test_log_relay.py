@@ -4,7 +4,7 @@ import logging
 
 import pytest
 
-from hero_driver.ros.log_relay import GROUP_LINES_MAX, LogRelay
+from hero_driver.ros.log_relay import ROBOT_LINES_MAX, LogRelay
 
 
 class Lines(logging.Handler):
@@ -65,9 +65,9 @@ def test_a_level_that_is_set_later_counts(rosout):
 def test_one_complaint_again_and_again_keeps_no_other_out(rosout):
     _, texts = rosout
     relay = LogRelay()
-    for _ in range(10 * GROUP_LINES_MAX):
-        relay.log_throttled("error", "same", "the same complaint", group="hero_1", host="10.0.0.1")
-    relay.log_throttled("error", "other", "another complaint", group="hero_1", host="10.0.0.1")
+    for _ in range(10 * ROBOT_LINES_MAX):
+        relay.log_throttled("error", "same", "the same complaint", robot="hero_1", host="10.0.0.1")
+    relay.log_throttled("error", "other", "another complaint", robot="hero_1", host="10.0.0.1")
     relay.close()
     assert texts == [("ERROR", "the same complaint"), ("ERROR", "another complaint")]
 
@@ -75,10 +75,10 @@ def test_one_complaint_again_and_again_keeps_no_other_out(rosout):
 def test_different_messages_about_one_robot_are_limited(rosout):
     _, texts = rosout
     relay = LogRelay()
-    for number in range(10 * GROUP_LINES_MAX):
-        relay.log_throttled("error", "complaint %d" % number, "complaint %d" % number, group="hero_1")
-    relay.log_throttled("error", "other", "about another robot", group="hero_2")
+    for number in range(10 * ROBOT_LINES_MAX):
+        relay.log_throttled("error", "complaint %d" % number, "complaint %d" % number, robot="hero_1")
+    relay.log_throttled("error", "other", "about another robot", robot="hero_2")
     relay.close()
-    assert len(texts) == GROUP_LINES_MAX + 2
-    assert "further ones are suppressed" in texts[GROUP_LINES_MAX][1]
+    assert len(texts) == ROBOT_LINES_MAX + 2
+    assert texts[ROBOT_LINES_MAX] == ("WARNING", "hero_1: too many different messages; further ones are suppressed")
     assert texts[-1] == ("ERROR", "about another robot")

@@ -3,7 +3,9 @@
 import collections
 import ipaddress
 from dataclasses import dataclass
-from typing import Counter, Dict, Optional, Tuple, Union
+from typing import Counter, Optional, Tuple, Union
+
+from .token_bucket import TokenBucket, TokenBuckets
 
 __all__ = ["GARBAGE_BURST_LENGTH", "GARBAGE_PER_S", "NEW_ROBOTS_PER_S", "Admission", "AdmissionLimits", "RateLimit"]
 
@@ -19,52 +21,6 @@ GARBAGE_PER_S = 16384.0
 NEW_ROBOTS_PER_S = 5.0
 """New robots of one address for which topics are set up, after as many at once as it may have connections: each costs
 20 calls to the ROS master. One hundred simulated robots that are restarted every 30 s stay below it."""
-
-_BUCKETS_MAX = 1000
-
-
-class TokenBucket:
-    """Tokens for something limited: `burst` at once, and `per_s` per second after that."""
-
-    def __init__(self, burst: float, per_s: float, now_s: float) -> None:
-        self._burst = burst
-        self._per_s = per_s
-        self._tokens = burst
-        self._filled_s = now_s
-
-    def take(self, tokens: float, now_s: float) -> bool:
-        """Take tokens; return False, and take none, if there are not enough."""
-        self._tokens = self.count(now_s)
-        self._filled_s = now_s
-        if tokens > self._tokens:
-            return False
-        self._tokens -= tokens
-        return True
-
-    def count(self, now_s: float) -> float:
-        """Return how many tokens there are."""
-        return min(self._burst, self._tokens + self._per_s * (now_s - self._filled_s))
-
-    def is_full(self, now_s: float) -> bool:
-        """Return whether nothing was taken, or all of it has come back."""
-        return self.count(now_s) >= self._burst
-
-
-class _Buckets:
-    """One token bucket per address; those that are full again are forgotten."""
-
-    def __init__(self, burst: float, per_s: float) -> None:
-        self._burst = burst
-        self._per_s = per_s
-        self._buckets: Dict[str, TokenBucket] = {}
-
-    def take(self, host: str, tokens: float, now_s: float) -> bool:
-        bucket = self._buckets.get(host)
-        if bucket is None:
-            if len(self._buckets) >= _BUCKETS_MAX:
-                self._buckets = {key: kept for key, kept in self._buckets.items() if not kept.is_full(now_s)}
-            bucket = self._buckets[host] = TokenBucket(self._burst, self._per_s, now_s)
-        return bucket.take(tokens, now_s)
 
 
 @dataclass(frozen=True)
@@ -86,8 +42,8 @@ class Admission:
         self._limits = limits
         self._by_host: Counter[str] = collections.Counter()
         self._unidentified: Counter[str] = collections.Counter()
-        self._new_robots = _Buckets(limits.max_connections_per_address, NEW_ROBOTS_PER_S)
-        self._garbage = _Buckets(GARBAGE_BURST_LENGTH, GARBAGE_PER_S)
+        self._new_robots = TokenBuckets(limits.max_connections_per_address, NEW_ROBOTS_PER_S)
+        self._garbage = TokenBuckets(GARBAGE_BURST_LENGTH, GARBAGE_PER_S)
 
     def admit(self, host: str) -> Optional[str]:
         """Count a connection from host; return why it is refused, None if it may stay."""

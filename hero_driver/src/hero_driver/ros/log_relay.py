@@ -11,6 +11,7 @@ from typing import Dict, List, Tuple
 
 import rospy
 
+from ..fleet.token_bucket import TokenBuckets
 from .rospy_internals import ROSOUT_LOGGER, list_log_handlers
 from .worker import Worker
 
@@ -18,12 +19,12 @@ QUEUE_LENGTH = 2000
 THROTTLE_S = 10.0
 KNOWN_KEYS_MAX = 1000
 
-GROUP_LINES_MAX = 20
-"""Different messages about one robot in THROTTLE_S."""
+ROBOT_LINES_MAX = 20
+"""Different messages about one robot at once, and in each THROTTLE_S after that."""
 
 HOST_LINES_MAX = 300
-"""Lines about what comes from one address in THROTTLE_S, however many robots it says that it is; a hundred
-simulated robots that join at once are a hundred lines."""
+"""Lines about what comes from one address, likewise, however many robots it says that it is; a hundred simulated
+robots that join at once are a hundred lines."""
 
 _LEVELS = {
     "debug": (logging.DEBUG, rospy.logdebug),
@@ -40,7 +41,8 @@ class LogRelay:
     def __init__(self) -> None:
         self._worker = Worker("log relay", QUEUE_LENGTH, _report_to_terminal)
         self._last: Dict[str, Tuple[float, int]] = {}
-        self._groups: Dict[str, Tuple[float, int]] = {}
+        self._robots = TokenBuckets(ROBOT_LINES_MAX, ROBOT_LINES_MAX / THROTTLE_S)
+        self._hosts = TokenBuckets(HOST_LINES_MAX, HOST_LINES_MAX / THROTTLE_S)
         self._reported_drops = 0
         self._logger = logging.getLogger(ROSOUT_LOGGER)
 
@@ -56,11 +58,10 @@ class LogRelay:
         if self._worker.submit(lambda: write("%s", text)):
             self._reported_drops = dropped
 
-    def log_throttled(self, level: str, key: str, text: str, group: str = "", host: str = "") -> None:
+    def log_throttled(self, level: str, key: str, text: str, robot: str = "", host: str = "") -> None:
         """Log one line unless one with the same key was logged in the last THROTTLE_S; say how many were not.
 
-        Lines of one group, where one is given, are limited to GROUP_LINES_MAX in that time, those about one
-        host to HOST_LINES_MAX.
+        Lines about one robot and about one host, where they are given, are limited, too.
         """
         now_s = time.monotonic()
         last_s, suppressed = self._last.get(key, (None, 0))
@@ -68,26 +69,15 @@ class LogRelay:
             self._last[key] = (last_s, suppressed + 1)
             return
         # What is said again and again takes nothing of what else may be said.
-        if group and not self._admit(group, GROUP_LINES_MAX, now_s):
-            return
-        if host and not self._admit("address " + host, HOST_LINES_MAX, now_s):
-            return
+        for name, buckets in ((robot, self._robots), (host, self._hosts)):
+            if name and not buckets.take(name, 1.0, now_s):
+                text = "%s: too many different messages; further ones are suppressed" % name
+                self.log_throttled("warn", "suppressed " + name, text)
+                return
         if len(self._last) >= KNOWN_KEYS_MAX:
             self._last.clear()
         self._last[key] = (now_s, 0)
         self.log(level, "%s (and %d times more before)" % (text, suppressed) if suppressed else text)
-
-    def _admit(self, group: str, most: int, now_s: float) -> bool:
-        start_s, lines = self._groups.get(group, (now_s, 0))
-        if now_s - start_s >= THROTTLE_S:
-            start_s, lines = now_s, 0
-        if len(self._groups) >= KNOWN_KEYS_MAX:
-            self._groups.clear()
-        self._groups[group] = (start_s, lines + 1)
-        if lines == most:
-            text = "%s: more than %d different messages; further ones are suppressed for a while"
-            self.log("warn", text % (group, lines))
-        return lines < most
 
     def close(self) -> None:
         """Write what waits and end the thread."""

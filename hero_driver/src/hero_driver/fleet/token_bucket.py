@@ -1,0 +1,50 @@
+"""Token buckets, which limit how often something may happen. Pure."""
+
+from typing import Dict
+
+_BUCKETS_MAX = 1000
+
+
+class TokenBucket:
+    """Tokens for something limited: `burst` at once, and `per_s` per second after that."""
+
+    def __init__(self, burst: float, per_s: float, now_s: float) -> None:
+        self._burst = burst
+        self._per_s = per_s
+        self._tokens = burst
+        self._filled_s = now_s
+
+    def take(self, tokens: float, now_s: float) -> bool:
+        """Take tokens; return False, and take none, if there are not enough."""
+        self._tokens = self.count(now_s)
+        self._filled_s = now_s
+        if tokens > self._tokens:
+            return False
+        self._tokens -= tokens
+        return True
+
+    def count(self, now_s: float) -> float:
+        """Return how many tokens there are."""
+        return min(self._burst, self._tokens + self._per_s * (now_s - self._filled_s))
+
+    def is_full(self, now_s: float) -> bool:
+        """Return whether nothing was taken, or all of it has come back."""
+        return self.count(now_s) >= self._burst
+
+
+class TokenBuckets:
+    """One token bucket for each of many names; those that are full again are forgotten."""
+
+    def __init__(self, burst: float, per_s: float) -> None:
+        self._burst = burst
+        self._per_s = per_s
+        self._buckets: Dict[str, TokenBucket] = {}
+
+    def take(self, name: str, tokens: float, now_s: float) -> bool:
+        """Take tokens from the bucket of name; return False, and take none, if there are not enough."""
+        bucket = self._buckets.get(name)
+        if bucket is None:
+            if len(self._buckets) >= _BUCKETS_MAX:
+                self._buckets = {key: kept for key, kept in self._buckets.items() if not kept.is_full(now_s)}
+            bucket = self._buckets[name] = TokenBucket(self._burst, self._per_s, now_s)
+        return bucket.take(tokens, now_s)
