@@ -50,4 +50,4 @@ if __name__ == "__main__":
         set_clock(sys.argv[2])
     else:
         break_part(sys.argv[1], sys.argv[2])
-    node.run()
+    sys.exit(node.main())

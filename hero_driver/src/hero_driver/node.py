@@ -356,8 +356,3 @@ def _explain_bind_error(config: DriverConfig, error: OSError) -> str:
     if isinstance(error, HostNotFoundError):
         return "%s: %s; use an address that `ip address` shows, or 0.0.0.0" % (where, error)
     return "%s cannot be listened on: %s" % (where, os.strerror(error.errno) if error.errno else error)
-
-
-def run() -> None:
-    """Entry point of the script."""
-    sys.exit(main())
