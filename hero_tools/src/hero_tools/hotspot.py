@@ -27,7 +27,6 @@ FACTORY_SSID = "hero_network"
 FACTORY_PASSWORD = "s3cr3tp4ss"  # printed in the robots' documentation: known to everybody
 SSID_BYTES_MAX = 32  # IEEE 802.11
 PASSWORD_LENGTHS = (8, 63)  # a WPA2 passphrase
-NO_HOME = "/dev/null"
 TIMEOUT_S = 60.0
 NMCLI_NOT_RUNNING = 8  # exit status of nmcli(1)
 
@@ -46,7 +45,7 @@ class HotspotError(Exception):
 
 def run_nmcli(*arguments: str, typed: str = "") -> str:
     """Run nmcli and return its output; typed: lines for its editor. Raises: HotspotError."""
-    environment = dict(os.environ, LC_ALL="C", **({"HOME": NO_HOME} if typed else {}))
+    environment = dict(os.environ, LC_ALL="C", **({"HOME": "/dev/null"} if typed else {}))
     try:
         result = subprocess.run(
             ["nmcli", *arguments], input=typed.encode(), stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
