@@ -6,6 +6,7 @@ import re
 import sources
 
 LONGEST_FILE_LINES = 500
+LONGEST_TEST_NAME = 70
 LONGEST_PACE_S = 0.1
 SUFFIXES = ("", *".py .md .rst .launch .test .xml .yaml .yml .toml .txt .msg .srv .action .urdf".split())
 PYTHON = sources.list_python_files()
@@ -30,6 +31,13 @@ def test_nothing_is_left_to_do_in_a_text():
 def test_files_are_short():
     for path in PYTHON:
         assert len(path.read_text(encoding="utf-8").splitlines()) <= LONGEST_FILE_LINES, sources.name_of(path)
+
+
+def test_names_of_tests_are_short():
+    for path in TESTS:
+        for node in ast.walk(sources.parse(path)):
+            if isinstance(node, ast.FunctionDef) and node.name.startswith("test_"):
+                assert len(node.name) <= LONGEST_TEST_NAME, f"{sources.name_of(path)}: {node.name}"
 
 
 def test_names_of_modules_say_what_they_hold():

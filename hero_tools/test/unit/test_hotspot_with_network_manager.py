@@ -60,7 +60,7 @@ pytestmark = pytest.mark.skipif(
 )
 
 
-def test_the_real_nmcli_takes_every_command_keeps_the_password_and_writes_it_nowhere_else(tmp_path):
+def test_nmcli_takes_every_command_and_keeps_the_password_secret(tmp_path):
     home = tmp_path / "home"
     home.mkdir()
     (tmp_path / "try.py").write_text(TRY)
