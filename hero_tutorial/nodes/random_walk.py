@@ -10,7 +10,7 @@ from sensor_msgs.msg import LaserScan
 LINEAR_M_S = 0.08
 DRIFT_RAD_S = 0.5  # largest angular speed while driving forward
 TURN_RAD_S = 1.5  # angular speed while turning away from an obstacle
-NEAR_M = 0.14  # from the robot's centre; the body radius is 0.037 m
+NEAR_M = 0.14  # from the robot's center; the body radius is 0.037 m
 FRONT_RIGHT, FRONT, FRONT_LEFT = 3, 4, 5  # indices into the eight ranges
 
 
