@@ -75,7 +75,8 @@ class Simulator:
             if not self.paused:
                 for index in swarm.advance(target_ms if end_ms is None else min(target_ms, end_ms)):
                     self.serve_robot(index)
-            self._carry(swarm.now_ms)
+            if self._carrying:
+                self._carry(swarm.now_ms)
             for index in list(self._full):
                 self._limit_window(index)
             for event in self.link.poll(self._find_wait()):

@@ -121,7 +121,8 @@ class Radio:
 
     def is_transparent(self, now_ms: int) -> bool:
         """Return whether bytes pass at once, so that nobody needs to queue them."""
-        return self._air.is_ideal and now_ms >= self._air.stalled_until_ms and not self.is_carrying
+        air = self._air
+        return air.is_ideal and now_ms >= air.stalled_until_ms and not self.up.queue and not self.down.queue
 
     def stall(self, now_ms: int, for_ms: int) -> None:
         """Carry nothing for for_ms."""
