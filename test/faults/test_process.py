@@ -244,7 +244,7 @@ def test_a_driver_bug_in_one_connection_closes_only_that_one(
     trigger.write_text("")
     unlucky = FakeRobot(2).connect(driver.address)
     wait_for(lambda: unlucky.ended, "the unlucky one to be closed")
-    driver.wait_line("the driver made a mistake, please report it: RuntimeError")
+    driver.wait_line("bug in the driver, please report it: RuntimeError")
     service.verify()
     trigger.unlink()
     unlucky.close()

@@ -174,7 +174,7 @@ class Gateway(LinkHandler):
         for event in peer.session.poll(now_s):
             self._receive_event(peer, event, now_s)
         if peer.record is None and now_s - peer.session.opened_s > self._config.declare_timeout_s:
-            link.close("did not say within %.1f s which robot it is" % self._config.declare_timeout_s)
+            link.close("did not identify itself as a robot within %.1f s" % self._config.declare_timeout_s)
         if not link.closed:
             self._send_outgoing(peer)
 
@@ -201,7 +201,7 @@ class Gateway(LinkHandler):
             self._log.log_throttled(
                 "warn",
                 "nobody " + link.address.host + reason[:12],
-                "connection of %s, which never said which robot it is, ended: %s" % (link.address, reason),
+                "unidentified connection of %s ended: %s" % (link.address, reason),
             )
             return
         if peer.refused:
@@ -228,12 +228,12 @@ class Gateway(LinkHandler):
         self._admit_duplicates(record, lambda host: not self.fleet.is_reserved(record, host))
 
     def report_bug(self, error: Exception) -> None:
-        """Log a mistake of the driver itself, with the place; only the connection at hand is lost."""
+        """Log a bug of the driver itself, with the place; only the connection at hand is lost."""
         place = "".join(traceback.format_tb(error.__traceback__)[-2:]).replace("\n", " ")
         self._log.log_throttled(
             "fatal",
             "fault " + type(error).__name__,
-            "the driver made a mistake, please report it: %s: %s; %s" % (type(error).__name__, error, place),
+            "bug in the driver, please report it: %s: %s; %s" % (type(error).__name__, error, place),
         )
 
     def warn_network(self, text: str) -> None:

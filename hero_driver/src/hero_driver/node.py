@@ -133,8 +133,8 @@ class DriverNode:
         if listening is not None and listening.host in ("0.0.0.0", "::") and not self._config.allow:
             self._log.log(
                 "warn",
-                "robots are awaited on every address of this machine, and whoever reaches the port can say that it"
-                " is a robot: on a PC in another network too, set ~host to its address in the robots' network, or"
+                "listening for robots on all addresses of this machine: any host that reaches the port can pose as a"
+                " robot; if this PC is in another network too, set ~host to its address in the robots' network, or"
                 " ~allow to that network",
             )
 

@@ -57,7 +57,7 @@ class TestDriverBadInput(OwnDriverCase):
     def test_every_name_of_all_addresses_is_warned_about(self):
         for host in ("0", "0.0.0.0"):
             with self.subTest(host=host), DriverProcess({"host": host}) as driver:
-                driver.wait_line("robots are awaited on every address of this machine")
+                driver.wait_line("listening for robots on all addresses of this machine")
 
     def test_an_environment_in_which_ros_cannot_start_is_named_in_one_line(self):
         with tempfile.NamedTemporaryFile() as file:
@@ -183,15 +183,15 @@ class TestDriverBadInput(OwnDriverCase):
         for name in ("low", "tight", "negative"):
             driver.wait_line("topic '?/hero_3/%s'? refused" % name)
 
-    def test_a_program_that_does_not_speak_rosserial_is_shown_the_door(self):
+    def test_a_program_that_does_not_speak_rosserial_is_disconnected(self):
         driver, _, good = self.start_pair()
-        stranger = FakeRobot(9, declarations=[])
-        self.addCleanup(stranger.close)
-        stranger.is_silent = True
-        stranger.declares = False
-        stranger.connect(driver.address)
-        stranger.send_bytes(b"GET / HTTP/1.1\r\nHost: robot\r\n\r\n" * 4000)
-        wait_for(lambda: stranger.ended, "the end of the connection")
+        other_program = FakeRobot(9, declarations=[])
+        self.addCleanup(other_program.close)
+        other_program.is_silent = True
+        other_program.declares = False
+        other_program.connect(driver.address)
+        other_program.send_bytes(b"GET / HTTP/1.1\r\nHost: robot\r\n\r\n" * 4000)
+        wait_for(lambda: other_program.ended, "the end of the connection")
         driver.wait_line("127.0.0.1:.*does not speak rosserial")
         self.assert_alive(good)
 
@@ -202,7 +202,7 @@ class TestDriverBadInput(OwnDriverCase):
         self.assert_alive(good)
         late = self.dial(driver, 4)
         self.assert_alive(late)
-        self.assertLess(len(driver.find_lines("never said which robot")), 10)
+        self.assertLess(len(driver.find_lines("unidentified connection")), 10)
 
     def test_what_robots_send_by_chance_never_ends_the_driver(self):
         driver, _, good = self.start_pair()

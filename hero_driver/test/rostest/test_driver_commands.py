@@ -28,9 +28,9 @@ class TestDriverCommands(DriverCase):
     def setUp(self):
         self.call_stop(False)
 
-    def call_stop(self, held):
+    def call_stop(self, stopped):
         rospy.wait_for_service(NODE + "/stop", 20.0)
-        self.assertTrue(rospy.ServiceProxy(NODE + "/stop", SetBool)(held).success)
+        self.assertTrue(rospy.ServiceProxy(NODE + "/stop", SetBool)(stopped).success)
 
     def join_stock(self, number):
         """A robot that reads every 51 ms and drops velocities within 50 ms of the last one, as the firmware."""
@@ -187,8 +187,8 @@ class TestDriverCommands(DriverCase):
         wait_for(lambda: robot.velocities, "the command")
         self.assertEqual((robot.velocities[0].linear_m_s, robot.velocities[0].angular_rad_s), (5.0, -50.0))
 
-    def test_the_stop_service_halts_every_robot_and_holds_it_until_released(self):
-        held = Recorder(NODE + "/stopped", Bool)
+    def test_the_stop_service_stops_every_robot_until_released(self):
+        stopped = Recorder(NODE + "/stopped", Bool)
         robots = [self.join_stock(number) for number in (13, 14)]
         publishers = [make_publisher("%s/%s" % (robot.namespace, VELOCITY), Twist) for robot in robots]
         motor = make_publisher("/hero_13/cmd_motor", Motor)
@@ -199,7 +199,7 @@ class TestDriverCommands(DriverCase):
         self.call_stop(True)
         for robot in robots:
             self.wait_stopped(robot)
-        wait_for(lambda: held.messages and held.messages[-1].data, "the latched state")
+        wait_for(lambda: stopped.messages and stopped.messages[-1].data, "the latched state")
         wait_for(lambda: self.fleet.newest.stopped, "the report")
         for publisher in publishers:
             publisher.publish(make_command(0.1))
@@ -214,12 +214,12 @@ class TestDriverCommands(DriverCase):
             self.assertEqual([velocity.linear_m_s for velocity in motions], [0.1])
         self.assertEqual(set(robots[0].payloads_on("cmd_motor")), {STOPPED_MOTORS})
         self.call_stop(False)
-        wait_for(lambda: not held.messages[-1].data, "the latched state")
+        wait_for(lambda: not stopped.messages[-1].data, "the latched state")
         for publisher, robot in zip(publishers, robots):
             publisher.publish(make_command(0.07))
             wait_for(lambda r=robot: r.accepted[-1].linear_m_s == 0.07, "the motion")
 
-    def test_the_stop_holds_for_robots_that_join_later(self):
+    def test_the_stop_applies_to_robots_that_join_later(self):
         self.call_stop(True)
         robot = self.join_stock(15)
         publisher = make_publisher("/hero_15/" + VELOCITY, Twist)
@@ -230,7 +230,7 @@ class TestDriverCommands(DriverCase):
         publisher.publish(make_command(0.1))
         wait_for(lambda: any(not v.is_zero for v in list(robot.accepted)), "the motion")
 
-    def test_the_stop_halts_a_robot_that_returns_while_motion_is_held(self):
+    def test_the_stop_applies_to_a_robot_that_returns(self):
         robot = self.join_stock(16)
         publisher = make_publisher("/hero_16/" + VELOCITY, Twist)
         publisher.publish(make_command(0.1))
@@ -241,7 +241,7 @@ class TestDriverCommands(DriverCase):
         returned = self.join_stock(16)
         self.wait_stopped(returned)
 
-    def test_the_stop_halts_a_robot_that_is_driven_by_motor_commands(self):
+    def test_the_stop_stops_a_robot_driven_by_motor_commands(self):
         robot = self.join(17)
         make_publisher("/hero_17/cmd_motor", Motor).publish(Motor(1400, 1600))
         wait_payloads(robot, "cmd_motor")

@@ -253,7 +253,7 @@ class TestDriverFleet(DriverCase):
         robot.connect(self.address)
         wait_for(lambda: robot.ended, "the connection to be closed")
         self.assertGreaterEqual(robot.requests, 2)
-        self.wait_log("did not say within 4.0 s which robot it is")
+        self.wait_log("did not identify itself as a robot within 4.0 s")
         self.assertIsNone(self.fleet.find("/hero_11"))
 
     def test_an_unidentified_robot_that_says_nothing_is_closed_as_silent(self):
