@@ -60,7 +60,6 @@ class RobotObservations:
     """
 
     def __init__(self) -> None:
-        """Start empty."""
         self.odometry = Series(2, 5)
         self.ground_truth = Series(2, 5)
         self.encoder = Series(3, 0)  # ticks grow beyond seven digits in some hours

@@ -17,8 +17,6 @@ from tqdm import tqdm
 from .errors import RecordingError, explain_bag_errors
 
 ACTIVE_SUFFIX = ".active"
-DAMAGED_SUFFIX = ".damaged"
-
 CHUNK_MARK = b"\4\0\0\0op=\5"
 """In the header of each chunk (wiki.ros.org/Bags/Format/2.0)."""
 
@@ -35,8 +33,8 @@ def repair_bag(path: str) -> str:
     with explain_bag_errors("%s cannot be repaired" % path):
         damage = _find_damage(path)
         if damage is not None and _has_chunks_after(path, damage):
-            shutil.copyfile(path, target + DAMAGED_SUFFIX)
-            result += "; messages after the damage in its middle are only in " + target + DAMAGED_SUFFIX
+            shutil.copyfile(path, target + ".damaged")
+            result += "; messages after the damage in its middle are only in %s.damaged" % target
         with rosbag.Bag(path, "a", allow_unindexed=True) as bag:
             for _ in bag.reindex():
                 pass
