@@ -81,7 +81,7 @@ class Packet:
         self._sum = (topic_id & 0xFF) + (topic_id >> 8) + packets.sum_bytes(constant)
 
     def patch(self, changing):
-        """Put other bytes in and mend the checksum."""
+        """Put other bytes in and correct the checksum."""
         self.data[self._place] = changing
         self.data[-1] = 255 - (self._sum + sum(changing)) % 256
 

@@ -54,7 +54,7 @@ class Host:
         """Pull the cable: nothing is answered any more, and nobody is told."""
         run("ip link set %s0 down" % self.cable)
 
-    def mend(self):
+    def restore(self):
         run("ip link set %s0 up" % self.cable)
 
     def end(self):
@@ -240,7 +240,7 @@ def test_a_cut_cable_is_detected_and_all_robots_return(by_cable, effort, record)
     )
     noticed_s = time.monotonic() - start_s
     wait_for(lambda: time.monotonic() - start_s >= cut_s, "the end of the cut", cut_s + 5.0)
-    robots.mend()
+    robots.restore()
     back_s = watch.wait_all_heard("all robots after the cut")
     record(
         "the cable of %d robots is cut for %.0f s" % (ROBOTS, cut_s),
@@ -260,7 +260,7 @@ def test_robots_keep_their_identity_when_their_address_changes(lab, record):
     robots.run("ip address add %s/24 dev robots1" % OTHER_ROBOT_NET)
     robots.run("ip address del %s/24 dev robots1" % ROBOT_NET)
     robots.run("ip address replace %s/24 dev robots1" % OTHER_ROBOT_NET)
-    robots.mend()
+    robots.restore()
     start_s = time.monotonic()
     with start_robots(robots, PC, port):
 

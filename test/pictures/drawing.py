@@ -12,7 +12,7 @@ DPI = 90
 
 
 def color_of(index):
-    """Return the colour of a robot."""
+    """Return the color of a robot."""
     return pyplot.get_cmap("tab10")(index % 10)
 
 

@@ -28,10 +28,10 @@ WALL_SHARE = 0.6
 WALL_PIXELS = 4
 
 
-def find_blob(picture, colour):
-    """Return the middle (right, down) of what has a light's colour, None if there is too little of it."""
+def find_blob(picture, color):
+    """Return the middle (right, down) of what has a light's color, None if there is too little of it."""
     matches = np.ones(picture.shape[:2], dtype=bool)
-    for channel, share in enumerate(colour):
+    for channel, share in enumerate(color):
         matches &= picture[:, :, channel] > BRIGHT if share else picture[:, :, channel] < DIM
     down, right = np.nonzero(matches)
     return (float(np.median(right)), float(np.median(down))) if len(right) >= BLOB_PIXELS_MIN else None
@@ -78,8 +78,8 @@ class RvizTest(unittest.TestCase):
         cls.screen.close()
 
     def show_lights(self):
-        for robot_id, colour in LIGHTS.items():
-            self.lights[robot_id].publish(ColorRGBA(*colour, 1.0))
+        for robot_id, color in LIGHTS.items():
+            self.lights[robot_id].publish(ColorRGBA(*color, 1.0))
 
     def measure_errors(self):
         """Return how far (m) each robot is drawn from where it is; None while not all is on the screen."""
@@ -92,8 +92,8 @@ class RvizTest(unittest.TestCase):
         left, top = int(middle[0]) - reach, int(middle[1]) - reach
         inside = self.picture[top : top + 2 * reach, left : left + 2 * reach]
         errors = {}
-        for robot_id, colour in LIGHTS.items():
-            blob = find_blob(inside, colour)
+        for robot_id, color in LIGHTS.items():
+            blob = find_blob(inside, color)
             if blob is None:
                 return None
             x_m = (left + blob[0] - middle[0]) / ABOVE_PIXELS_PER_M

@@ -102,7 +102,7 @@ class CalibrateTest(unittest.TestCase):
             self.assertIn("hero_%d: ok" % robot_id, output)
             kept = self.load(robot_id)
             true = errors["hero_%d" % robot_id]
-            for found_us, key in zip(kept["motor_centers_us"], ("left_centre_us", "right_centre_us")):
+            for found_us, key in zip(kept["motor_centers_us"], ("left_center_us", "right_center_us")):
                 self.assertLessEqual(abs(found_us - true[key]), CENTER_BOUND_US, output)
             before, after = kept["velocity_errors"]
             self.assertLess(after, VELOCITY_BOUND, output)
@@ -161,7 +161,7 @@ class CalibrateTest(unittest.TestCase):
         self.assertEqual(code, 1, output)
         self.assertIn("nobody is there to answer", output)
         true = list_errors()["hero_5"]
-        for found_us, key in zip(self.load(5)["motor_centers_us"], ("left_centre_us", "right_centre_us")):
+        for found_us, key in zip(self.load(5)["motor_centers_us"], ("left_center_us", "right_center_us")):
             self.assertLessEqual(abs(found_us - true[key]), CENTER_BOUND_US, output)
         with open(self.folder + "/hero_5.previous.yaml", encoding="utf-8") as file:
             self.assertIn("2026-13-45", file.read())

@@ -107,7 +107,7 @@ def test_a_full_disk_leaves_the_old_file_as_it_was(tmp_path, monkeypatch):
         ('date: "\\e[2J"', "date must be one line of text"),
         ("velocity_errors: &a [*a, *a]", "velocity_errors holds a sequence"),
         ("velocity_errors: [0.1, .inf]", "velocity_errors holds '.inf'"),
-        ("colour: red", "unknown key 'colour'"),
+        ("color: red", "unknown key 'color'"),
         ("? [a]\n: 1", "unknown key a sequence"),
         ("\x00", r"U\+0000 may not stand"),
         ("date: [", "expected"),

@@ -1,4 +1,4 @@
-"""Colours of a robot's light, by name or as numbers. Pure."""
+"""Colors of a robot's light, by name or as numbers. Pure."""
 
 from typing import Dict, Sequence, Tuple, Union
 
@@ -24,9 +24,9 @@ def parse_color(color: Color) -> Tuple[float, float, float]:
     """
     if isinstance(color, str):
         if color not in COLORS:
-            raise ValueError("no colour %r; there are: %s" % (color, ", ".join(COLORS)))
+            raise ValueError("no color %r; there are: %s" % (color, ", ".join(COLORS)))
         return COLORS[color]
     values = [float(value) for value in color]
     if len(values) != 3 or not all(0.0 <= value <= 1.0 for value in values):
-        raise ValueError("a colour is a name or three numbers 0..1, not %r" % (color,))
+        raise ValueError("a color is a name or three numbers 0..1, not %r" % (color,))
     return values[0], values[1], values[2]

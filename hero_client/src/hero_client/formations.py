@@ -2,7 +2,7 @@
 
     shape: circle           # or line, grid, points
     center: [0.0, 0.0]      # m, of the whole
-    spacing_m: 0.25         # between neighbours
+    spacing_m: 0.25         # between neighbors
     turn_deg: 0.0           # of the whole, counter-clockwise
     columns: 4              # grid only; default: as square as it gets
     points: [[0, 0], [0.3, 0]]   # points only: m, relative to center
@@ -65,7 +65,7 @@ def place_formation(formation: Any, count: int, least_spacing_m: float) -> List[
 
 
 def _circle(count: int, spacing_m: float) -> List[Point]:
-    """Return places on a circle on which neighbours are spacing_m apart, as the crow flies."""
+    """Return places on a circle on which neighbors are spacing_m apart, as the crow flies."""
     if count == 1:
         return [(0.0, 0.0)]
     radius_m = spacing_m / (2.0 * math.sin(math.pi / count))

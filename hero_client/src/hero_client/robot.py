@@ -61,7 +61,7 @@ FRESH_PROXIMITY_S = 1.0
 """Proximity comes about 5 times a second; older than this is stale."""
 
 LED_PERIOD_S = 2.0
-"""Between two messages of the same colour: the robot's light goes dark 15 s after the last one."""
+"""Between two messages of the same color: the robot's light goes dark 15 s after the last one."""
 
 Sleep = Callable[[float], bool]
 """Waits for so many seconds and returns whether to continue; `Program.sleep` is one."""
@@ -213,7 +213,7 @@ class Robot:
 
     @property
     def proximity(self) -> List[float]:
-        """Eight ranges in m from the robot's centre, front first, counter-clockwise, 45 degrees apart.
+        """Eight ranges in m from the robot's center, front first, counter-clockwise, 45 degrees apart.
 
         inf: nothing in range (about 0.24 m); 0.0: too close to measure; nan: the sensor gives nothing usable.
         Raises: StaleDataError.
@@ -351,13 +351,13 @@ class Robot:
             future.set_result(None)
 
     def led(self, color: Color) -> None:
-        """Show a colour: a name of colors.COLORS, or (red, green, blue) each 0..1. The robot goes dark 15 s later."""
+        """Show a color: a name of colors.COLORS, or (red, green, blue) each 0..1. The robot goes dark 15 s later."""
         red, green, blue = parse_color(color)
         if not rospy.is_shutdown():
             self._led.publish(ColorRGBA(red, green, blue, 1.0))
 
     def keep_led(self, color: Color) -> None:
-        """As led(), for every step of a loop: sends a change at once, and else repeats the colour every 2 s."""
+        """As led(), for every step of a loop: sends a change at once, and else repeats the color every 2 s."""
         now_s = time.monotonic()
         if color != self._kept_color or now_s - self._kept_s >= LED_PERIOD_S:
             self._kept_color, self._kept_s = color, now_s

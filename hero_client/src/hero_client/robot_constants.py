@@ -1,7 +1,7 @@
 """What is true of every HeRo robot; source: the firmware's config.h and RangeSensor.ino."""
 
 BODY_RADIUS_M = 0.0368
-"""The firmware adds it to what its infrared sensors measure, so ranges count from the robot's centre."""
+"""The firmware adds it to what its infrared sensors measure, so ranges count from the robot's center."""
 
 MAX_LINEAR_M_S = 0.20
 """The firmware clamps linear.x to this."""

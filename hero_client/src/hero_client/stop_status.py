@@ -18,10 +18,10 @@ CROSSING_S = 0.15
 
 NAMES_SHOWN = 20
 
-COLOURS = {"info": "", "warn": "\x1b[33m", "error": "\x1b[1;31m"}
+COLORS = {"info": "", "warn": "\x1b[33m", "error": "\x1b[1;31m"}
 """Of terminals (ECMA-48): as usual, yellow, bold red."""
 
-END_COLOUR = "\x1b[0m"
+END_COLOR = "\x1b[0m"
 
 
 class StopStatus(NamedTuple):
@@ -153,5 +153,5 @@ def _tell(robots: Sequence[Robot], one: str, many: str) -> List[str]:
 
 
 def paint(level: str, text: str) -> str:
-    """Return a line for a terminal in the colour of its level."""
-    return COLOURS[level] + text + (END_COLOUR if COLOURS[level] else "")
+    """Return a line for a terminal in the color of its level."""
+    return COLORS[level] + text + (END_COLOR if COLORS[level] else "")

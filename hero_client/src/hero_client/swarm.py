@@ -109,7 +109,7 @@ class Swarm:
         return self.drivers.wait_for_stop()
 
     def led(self, color: Color) -> None:
-        """Show a colour on all robots."""
+        """Show a color on all robots."""
         for robot in self.robots:
             robot.led(color)
 

@@ -19,7 +19,7 @@ from hero_test.waiting import wait_for
 
 ROBOTS = 6
 CORNERED = 4
-"""hero_4 stands in the corner: a wall 0.12 m ahead of its centre, another 0.16 m to its left."""
+"""hero_4 stands in the corner: a wall 0.12 m ahead of its center, another 0.16 m to its left."""
 
 DEADLINE_S = 30.0
 
@@ -113,7 +113,7 @@ class RobotApiTest(unittest.TestCase):
         self.assertAlmostEqual(0.0, nearest.bearing_rad, places=6)
         self.assertIsNone(self.swarm[0].nearest())
 
-    def test_06_lights_show_the_colour_that_was_asked_for(self):
+    def test_06_lights_show_the_color_that_was_asked_for(self):
         lights = LightWatch()
         self.swarm[0].led("green")
         self.swarm[1].led((1.0, 0.0, 0.0))

@@ -72,7 +72,7 @@ def test_the_nearest_allowed_velocity_is_allowed_and_nearest():
 
 
 def swap(count, radius_m, seed):
-    """Return (least distance of two centres, poses, goals) of count robots that swap places across a circle."""
+    """Return (least distance of two centers, poses, goals) of count robots that swap places across a circle."""
     rng = np.random.RandomState(seed)
     angles = 2.0 * math.pi * np.arange(count) / count
     poses = [

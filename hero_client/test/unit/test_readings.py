@@ -1,4 +1,4 @@
-"""Numbers that robots send are checked where they enter; ranges, poses and colours."""
+"""Numbers that robots send are checked where they enter; ranges, poses and colors."""
 
 import math
 from types import SimpleNamespace
@@ -89,7 +89,7 @@ def test_only_ranges_within_reach_are_obstacles_and_touch_is_nearest():
     assert find_nearest(touching, -math.pi, EIGHTH_RAD).range_m == -INF
 
 
-def test_colours_have_names_or_numbers():
+def test_colors_have_names_or_numbers():
     assert parse_color("red") == (1.0, 0.0, 0.0)
     assert parse_color([0.1, 0.2, 0.3]) == (0.1, 0.2, 0.3)
     for wrong in ("pink-ish", [1, 2], [0, 0, 1.5]):

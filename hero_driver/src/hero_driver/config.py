@@ -139,7 +139,7 @@ class DriverConfig:
 
     @property
     def wheel_geometry(self) -> WheelGeometry:
-        """Converts ticks into metres."""
+        """Converts ticks into meters."""
         return WheelGeometry(self.wheel_diameter_m, self.wheel_separation_m, self.ticks_per_turn)
 
 

@@ -1,7 +1,7 @@
 """Dimensions, limits and times of the HeRo and its firmware, each once, with its source."""
 
 BODY_RADIUS_M = 0.0368
-"""RangeSensor.ino:66; ranges count from the robot's centre."""
+"""RangeSensor.ino:66; ranges count from the robot's center."""
 
 WHEEL_DIAMETER_M = 0.0492
 WHEEL_SEPARATION_M = 0.063
@@ -32,8 +32,8 @@ LINEAR_LIMIT_M_S = 0.20
 ANGULAR_LIMIT_RAD_S = 8.0
 """config.h:61."""
 
-MOTOR_CENTRE_US = 1500
-"""Servo pulse at which a wheel stops, up to the servo's own centre."""
+MOTOR_CENTER_US = 1500
+"""Servo pulse at which a wheel stops, up to the servo's own center."""
 
 MOTOR_PULSES_US = (1000, 2000)
 """Shortest and longest servo pulse."""

@@ -4,7 +4,7 @@ One stop is one write with a zero for every motion topic that the robot declared
 repeated until the robot's wheels are at rest, because the firmware drops a Twist that comes within 50 ms of the last
 one (VelocityControl.ino:159), and because only the wheels show what a robot has taken. The two controllers know nothing
 of each other, so each gets its zero. Servo pulses of 1500 us come in front of the first zeros only: they let a wheel
-creep whose servo has another centre, until a zero Twist takes the pulses away.
+creep whose servo has another center, until a zero Twist takes the pulses away.
 
 A robot that tunes itself (pid_calibration) drops every zero within 50 ms of its controller's last run, and that runs
 every 21 ms. Only a read that takes longer lets a zero through: TUNING_PULSES servo pulses (0.5 ms each) and the zeros

@@ -74,7 +74,7 @@ class FakeMotors:
                 controller.watchdog_s = now_s
 
     def take_led(self) -> None:
-        """Take a colour."""
+        """Take a color."""
         self._read_s += LED_HOLD_S
 
     def take_pulses(self, payload: bytes) -> None:

@@ -79,7 +79,7 @@ def make_transform(parent, child, stamp, x_m=0.0, yaw_rad=0.0):
 
 
 def make_laser(name, stamp, beams_m, seq=1):
-    """Return the stock scan of 16 ranges: the 8 beams_m, and between them means of their neighbours."""
+    """Return the stock scan of 16 ranges: the 8 beams_m, and between them means of their neighbors."""
     message = LaserScan()
     message.header.seq = seq
     message.header.stamp = stamp

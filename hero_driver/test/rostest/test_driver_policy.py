@@ -108,7 +108,7 @@ class TestDriverPolicy(OwnDriverCase):
         driver.wait_line("hero_4: topic /hero_4/battery refused: type hero_msgs/Battery .*hero_msgs")
         driver.wait_line("hero_4: topic /hero_4/alien refused: type alien_msgs/Saucer .*alien_msgs")
         raw = Recorder("/hero_4/odom_raw", rospy.AnyMsg)
-        robot.declare()  # again, and no second complaint
+        robot.declare()  # again, and no second warning
         robot.send("encoder", stock_messages.make_encoder("hero_4", rospy.Time.now(), 1.0, 1.0))
         robot.send("odom", stock_messages.make_odom("hero_4", rospy.Time.now()))
         raw.wait_count(1)

@@ -128,8 +128,8 @@ class TestDriverTopics(DriverCase):
             lights[first].publish(ColorRGBA(1.0, float(index), 0.0, 0.0))
             lights[second].publish(ColorRGBA(2.0, float(index), 0.0, 0.0))
         for red, robot in ((1.0, first), (2.0, second)):
-            colours = [struct.unpack("<4f", payload)[:2] for payload in wait_payloads(robot, "led", 10)]
-            self.assertEqual(colours, [(red, float(index)) for index in range(10)])
+            colors = [struct.unpack("<4f", payload)[:2] for payload in wait_payloads(robot, "led", 10)]
+            self.assertEqual(colors, [(red, float(index)) for index in range(10)])
 
     def test_a_robot_that_returns_with_other_ids_gets_only_those(self):
         robot = self.join(6)
@@ -209,7 +209,7 @@ class TestDriverTopics(DriverCase):
         self.assertEqual(encoders.subscriber.get_num_connections(), 1)
         self.assertEqual(self.fleet.find("/hero_11").reconnects, 0)
 
-    def test_log_lines_reach_rosout_with_level_and_name_and_without_colours(self):
+    def test_log_lines_reach_rosout_with_level_and_name_and_without_colors(self):
         robot = self.join(12)
         robot.log("\x1b[91m[hero_12] IMU is not working\x1b[0m", payloads.LOG_WARN)
         robot.log("Reseting PID...\n[FATAL] forged\x07line", payloads.LOG_INFO)

@@ -18,7 +18,7 @@ DIAGONALS = ["pose_covariance", "twist_covariance"]
 
 
 def refuse(name, value):
-    """Return the complaint about a parameter, and check that it is one line with the name and the value."""
+    """Return the error about a parameter, and check that it is one line with the name and the value."""
     with pytest.raises(ConfigError) as caught:
         read_config({name: value})
     text = str(caught.value)

@@ -60,7 +60,7 @@ def test_what_only_resembles_a_heartbeat_is_none(text):
         ("Left  Motor PID = [1.00, 2.00, 3.00]", "Left  Motor PID = [1.00, 2.00, 3.00]"),
     ],
 )
-def test_the_firmwares_texts_lose_colours_and_the_name_and_nothing_else(text, clean):
+def test_the_firmwares_texts_lose_colors_and_the_name_and_nothing_else(text, clean):
     assert read_log_line(text) == (clean, None, None, None, False)
 
 

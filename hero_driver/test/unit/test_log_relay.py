@@ -62,21 +62,21 @@ def test_a_level_that_is_set_later_counts(rosout):
     assert texts == [("DEBUG", "after")]
 
 
-def test_one_complaint_again_and_again_keeps_no_other_out(rosout):
+def test_one_warning_again_and_again_keeps_no_other_out(rosout):
     _, texts = rosout
     relay = LogRelay()
     for _ in range(10 * ROBOT_LINES_MAX):
-        relay.log_throttled("error", "same", "the same complaint", robot="hero_1", host="10.0.0.1")
-    relay.log_throttled("error", "other", "another complaint", robot="hero_1", host="10.0.0.1")
+        relay.log_throttled("error", "same", "the same warning", robot="hero_1", host="10.0.0.1")
+    relay.log_throttled("error", "other", "another warning", robot="hero_1", host="10.0.0.1")
     relay.close()
-    assert texts == [("ERROR", "the same complaint"), ("ERROR", "another complaint")]
+    assert texts == [("ERROR", "the same warning"), ("ERROR", "another warning")]
 
 
 def test_different_messages_about_one_robot_are_limited(rosout):
     _, texts = rosout
     relay = LogRelay()
     for number in range(10 * ROBOT_LINES_MAX):
-        relay.log_throttled("error", "complaint %d" % number, "complaint %d" % number, robot="hero_1")
+        relay.log_throttled("error", "warning %d" % number, "warning %d" % number, robot="hero_1")
     relay.log_throttled("error", "other", "about another robot", robot="hero_2")
     relay.close()
     assert len(texts) == ROBOT_LINES_MAX + 2

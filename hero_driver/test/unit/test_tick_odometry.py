@@ -45,7 +45,7 @@ def assert_pose(odometry, x_m, y_m, yaw_rad):
 # Motions.
 
 
-def test_a_tick_is_half_a_millimetre():
+def test_a_tick_is_half_a_millimeter():
     assert pytest.approx(0.000537, abs=1e-6) == STOCK.tick_m
 
 

@@ -97,7 +97,7 @@ def test_transforms_of_foreign_frames_are_refused_counted_and_named(pair):
     assert len(name) < 150
 
 
-def test_a_foreign_transform_does_not_take_its_neighbours_along():
+def test_a_foreign_transform_does_not_take_its_neighbors_along():
     own = ("hero_0/base_link", "hero_0/hat_link")
     robot = CorrectedRobot()
     for _ in range(2):

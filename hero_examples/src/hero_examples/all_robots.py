@@ -1,4 +1,4 @@
-"""Lets all robots turn on the spot, each in a colour of its own."""
+"""Lets all robots turn on the spot, each in a color of its own."""
 
 import colorsys
 import time

@@ -9,11 +9,10 @@ def main() -> None:
     with Robot(0) as robot:
         robot.wait_until_ready()
         while True:
-            front, left, *_, right = robot.proximity  # m from the robot's centre; inf: nothing in range
-            if min(front, left, right) > 0.15:
-                robot.drive(0.08, 0.0)
-            else:
-                robot.drive(0.0, 1.5 if left > right else -1.5)
+            front, left, *_, right = robot.proximity  # m from the robot's center; inf: nothing in range
+            is_blocked = min(front, left, right) < 0.15
+            angular_rad_s = 1.5 if left > right else -1.5
+            robot.drive(0.0 if is_blocked else 0.08, angular_rad_s if is_blocked else 0.0)
             time.sleep(0.1)
 
 

@@ -1,4 +1,4 @@
-"""Shows a pattern of colours that runs over the swarm."""
+"""Shows a pattern of colors that runs over the swarm."""
 
 import colorsys
 import time

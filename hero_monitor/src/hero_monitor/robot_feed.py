@@ -11,7 +11,7 @@ from hero_client.readings import read_pose
 from hero_client.robot_listener import NewestMessage, RobotListener
 
 from .placement import Placement
-from .sections import encode_colour
+from .sections import encode_color
 
 LIGHT_S = 15.0
 """The firmware switches the LED off this long after the last command (LEDStatus.ino:76)."""
@@ -36,9 +36,9 @@ class RobotFeed:
         """Read what arrived since the last call."""
         self.listener.read_newest()
         now_s = time.monotonic()
-        colour = self._led.take()
-        if colour is not None:
-            self.light = encode_colour(colour.r, colour.g, colour.b)
+        color = self._led.take()
+        if color is not None:
+            self.light = encode_color(color.r, color.g, color.b)
             self._light_end_s = now_s + LIGHT_S
         elif now_s > self._light_end_s:
             self.light = None

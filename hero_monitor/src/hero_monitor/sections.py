@@ -67,8 +67,8 @@ def encode_range(range_m: float) -> Optional[int]:
     return -1
 
 
-def encode_colour(red: float, green: float, blue: float) -> Optional[str]:
-    """Return a colour as #rrggbb; None for a dark light or an invalid colour."""
+def encode_color(red: float, green: float, blue: float) -> Optional[str]:
+    """Return a color as #rrggbb; None for a dark light or an invalid color."""
     parts = [red, green, blue]
     if not all(map(math.isfinite, parts)):
         return None

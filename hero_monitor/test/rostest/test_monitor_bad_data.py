@@ -84,12 +84,12 @@ class BadDataTest(unittest.TestCase):
         self.wait_for_pose("hero_1", "0.750")
         goal = self.advertise("/hero_1/goal", PoseStamped)
         scan = self.advertise("/hero_1/proximity", LaserScan)
-        colour = self.advertise("/hero_1/led", ColorRGBA)
+        color = self.advertise("/hero_1/led", ColorRGBA)
         for number, value in enumerate((1e38, -1e38, math.nan, math.inf)):
             goal.publish(make_goal(value * 1e260, value))
             scan.publish(LaserScan(ranges=[value] * 8))
             scan.publish(LaserScan(ranges=[0.1] * 10000, angle_increment=value))
-            colour.publish(ColorRGBA(value, value, value, value))
+            color.publish(ColorRGBA(value, value, value, value))
             self.check_that_others_are_shown(0.1 * number + 0.05)
 
     def find_source(self, node, text):

@@ -64,17 +64,17 @@ class StopTest(unittest.TestCase):
     def setUp(self):
         for publisher in (self.behave, *self.requests):
             wait_for(publisher.get_num_connections, "connections to the drivers")
-        self.set_behaviour()
+        self.set_behavior()
         for page in (self.page, self.other):
             page.open()
             page.wait_for_text("#ready", "6 of 7")
         self.release()
 
     def tearDown(self):
-        self.set_behaviour()
+        self.set_behavior()
         self.release()
 
-    def set_behaviour(self, moving=(), rest=True):
+    def set_behavior(self, moving=(), rest=True):
         self.behave.publish(json.dumps({"moving": moving, "rest": rest}))
 
     def release(self):
@@ -106,12 +106,12 @@ class StopTest(unittest.TestCase):
         return {row[0]: row[2] for row in page.rows() if row[1] != "REFUSED"}
 
     def test_all_pages_show_that_robots_are_stopping_and_at_rest(self):
-        self.set_behaviour(rest=False)
+        self.set_behavior(rest=False)
         self.page.click("#stop")
         self.assertEqual(self.page.banner(), (AMBER, "stopping"))
         wait_for(lambda: self.stop_states(self.page)["hero_0"] == "stopping", "a robot that stops")
         self.page.save("monitor_stopping.png")
-        self.set_behaviour()
+        self.set_behavior()
         self.wait_for_banner(GREEN, "stopped, all wheels at rest")
         self.page.save("monitor_at_rest.png")
         for page in (self.page, self.other):
@@ -119,14 +119,14 @@ class StopTest(unittest.TestCase):
             self.assertEqual(page.text("#stop"), "STOPPED")
 
     def test_a_robot_that_moves_though_stopped_is_named_in_red_until_it_stands(self):
-        self.set_behaviour(moving=[3])
+        self.set_behavior(moving=[3])
         self.page.click("#stop")
         self.wait_for_banner(RED, "NOT STOPPED: hero_3 moves")
         self.page.save("monitor_not_stopped.png")
         for page in (self.page, self.other):
             self.assertEqual(self.stop_states(page)["hero_3"], "MOVING")
             self.assertEqual(page.text("#stop"), "STOP ALL")
-        self.set_behaviour()
+        self.set_behavior()
         self.wait_for_banner(GREEN, "stopped, all wheels at rest")
 
     def test_a_robot_that_moves_after_the_stop_of_another_program_is_named(self):
@@ -134,7 +134,7 @@ class StopTest(unittest.TestCase):
             publisher.publish(True)
         self.wait_for_reports(True)
         self.page.wait_for_text("#stopping", "stopped")
-        self.set_behaviour(moving=[2])
+        self.set_behavior(moving=[2])
         wait_for(lambda: self.page.banner() == (RED, "NOT STOPPED: hero_2 moves"), self.page.banner)
 
     def test_a_page_drives_no_robot_until_all_are_released(self):

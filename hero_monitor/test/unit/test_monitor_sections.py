@@ -13,7 +13,7 @@ from hero_monitor.sections import (
     LOG_LINES_KEPT,
     Page,
     Sections,
-    encode_colour,
+    encode_color,
     encode_pose,
     encode_ranges,
 )
@@ -75,9 +75,9 @@ def test_numbers_are_integers_and_those_not_finite_have_a_code():
     assert encode_pose(Pose(0.1234, -1.0, math.pi)) == [123, -1000, 3142]
     assert encode_pose(Pose(math.nan, 0.0, 0.0)) is None
     assert encode_ranges([0.1, math.inf, -math.inf, math.nan]) == [100, None, 0, -1]
-    assert encode_colour(1.0, 0.5, 7.0) == "#ff80ff"
-    assert encode_colour(0.0, 0.0, 0.0) is None
-    assert encode_colour(math.nan, 1.0, 0.0) is None
+    assert encode_color(1.0, 0.5, 7.0) == "#ff80ff"
+    assert encode_color(0.0, 0.0, 0.0) is None
+    assert encode_color(math.nan, 1.0, 0.0) is None
 
 
 @pytest.mark.parametrize("pose", [(1e306, 0.0, 0.0), (0.0, -2e4, 0.0), (math.inf, 0.0, 0.0), (0.0, 0.0, math.nan)])

@@ -20,7 +20,7 @@ from .world.arena import build_default, place_robots
 from .world.arena_file import load_arena
 from .world.body import Body
 from .world.robot_errors import (
-    SERVO_CENTRE_US,
+    SERVO_CENTER_US,
     RobotErrors,
     describe_robot,
     draw_errors,
@@ -71,12 +71,12 @@ def _build_flash(options: argparse.Namespace, errors: RobotErrors, index: int) -
         "factory": [FACTORY_CALIBRATION_COUNTS_M2] * 8,
         "erased": [float("nan")] * 8,
     }[options.ir]
-    centres_us = {
-        "calibrated": np.rint(errors.servo_centre_us[index]).tolist(),
-        "factory": [SERVO_CENTRE_US] * 2,
+    centers_us = {
+        "calibrated": np.rint(errors.servo_center_us[index]).tolist(),
+        "factory": [SERVO_CENTER_US] * 2,
     }[options.motors]
     robot_id = options.first_id + index
-    flash = Flash(calibration_counts_m2, centres_us)
+    flash = Flash(calibration_counts_m2, centers_us)
     if not options.flash_dir:
         # Another seed or another --error makes another robot, which has its own flash.
         body = [*describe_robot(errors, index), options.ir, options.motors]

@@ -143,8 +143,8 @@ def _draw_arena(arena: Arena) -> List[Marker]:
         marker.scale.y, marker.scale.z = _WALL_THICKNESS_M, WALL_HEIGHT_M
         markers.append(marker)
     for index, (x_m, y_m, radius_m) in enumerate(arena.circles_m.tolist()):
-        centre = Pose(x_m, y_m, 0.0)
-        marker = _make_marker("obstacles", index, Marker.CYLINDER, _WALL_COLOR, centre, WALL_HEIGHT_M / 2.0)
+        center = Pose(x_m, y_m, 0.0)
+        marker = _make_marker("obstacles", index, Marker.CYLINDER, _WALL_COLOR, center, WALL_HEIGHT_M / 2.0)
         marker.scale.x = marker.scale.y = 2.0 * radius_m
         marker.scale.z = WALL_HEIGHT_M
         markers.append(marker)

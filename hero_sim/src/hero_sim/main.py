@@ -74,7 +74,7 @@ def _add_robot_options(group: "argparse._ArgumentGroup") -> None:
         action="append",
         default=[],
         metavar="KEY=VALUE,..[,robot=ID]",
-        help="a known error of a robot, or of all, e.g. robot=1,left_centre_us=1530; may be repeated; "
+        help="a known error of a robot, or of all, e.g. robot=1,left_center_us=1530; may be repeated; "
         "--error help lists the keys",
     )
     add("--errors", metavar="FILE", help="the same from a YAML file, as --print-errors writes it")
@@ -95,7 +95,7 @@ def _add_robot_options(group: "argparse._ArgumentGroup") -> None:
         "--motors",
         choices=("calibrated", "factory"),
         default="calibrated",
-        help="servo centres in the flash: the true ones, or 1500 (calibrated)",
+        help="servo centers in the flash: the true ones, or 1500 (calibrated)",
     )
     add(
         "--flash-dir",

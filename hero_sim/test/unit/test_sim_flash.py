@@ -10,19 +10,19 @@ from hero_sim.errors import OptionError
 from hero_sim.robot import declarations as ids
 from hero_sim.robot.flash import Flash
 
-CENTRES = struct.pack("<2h", 1490, 1512)
+CENTERS = struct.pack("<2h", 1490, 1512)
 
 
-def set_centres(*arguments):
+def set_centers(*arguments):
     driver = DriverSide(*arguments)
     driver.start_streaming()
-    driver.send(0, ids.ID_MOTORS_PARAMETERS, CENTRES)
+    driver.send(0, ids.ID_MOTORS_PARAMETERS, CENTERS)
     driver.run(200)
     return driver
 
 
-def read_centres(*arguments):
-    return DriverSide(*arguments).swarm.robots[0].flash.motor_centres_us
+def read_centers(*arguments):
+    return DriverSide(*arguments).swarm.robots[0].flash.motor_centers_us
 
 
 @pytest.fixture
@@ -33,7 +33,7 @@ def ros_home(tmp_path, monkeypatch):
 
 
 def test_all_parameters_are_kept_over_a_restart_of_the_simulator(tmp_path):
-    driver = set_centres("--flash-dir", str(tmp_path))
+    driver = set_centers("--flash-dir", str(tmp_path))
     for topic_id, payload in (
         (ids.ID_IR_CALIBRATION, struct.pack("<8d", *[0.4 + 0.01 * index for index in range(8)])),
         (ids.ID_VELOCITY_PID_PARAMETERS, struct.pack("<6f", 1, 2, 3, 4, 5, 6)),
@@ -46,24 +46,24 @@ def test_all_parameters_are_kept_over_a_restart_of_the_simulator(tmp_path):
     assert os.listdir(str(tmp_path)) == ["hero_0.json"]
     robot = DriverSide("--flash-dir", str(tmp_path)).swarm.robots[0]
     assert robot.flash.ir_calibration_counts_m2 == pytest.approx([0.4 + 0.01 * index for index in range(8)])
-    assert robot.motors.motors.centres_us == [1490, 1512]
+    assert robot.motors.motors.centers_us == [1490, 1512]
     assert [tuple(pid.gains) for pid in robot.motors.velocity.pids] == [(1, 2, 3), (4, 5, 6)]
     assert [tuple(pid.gains) for pid in robot.motors.position.pids] == [(7, 8, 9), (10, 11, 12)]
 
 
 def test_a_reboot_of_a_robot_keeps_what_was_set_without_any_folder():
-    driver = set_centres()
+    driver = set_centers()
     robot = driver.swarm.robots[0]
     robot.switch_on(driver.swarm.now_ms)
-    assert robot.motors.motors.centres_us == [1490, 1512]
+    assert robot.motors.motors.centers_us == [1490, 1512]
 
 
 def test_by_default_parameters_are_kept_in_ros_home_and_reported(ros_home):
-    driver = set_centres("--flash-dir", "")
+    driver = set_centers("--flash-dir", "")
     assert driver.reports == []
     assert len(os.listdir(str(ros_home / "hero_sim"))) == 1
     again = DriverSide("--flash-dir", "")
-    assert again.swarm.robots[0].flash.motor_centres_us == [1490.0, 1512.0]
+    assert again.swarm.robots[0].flash.motor_centers_us == [1490.0, 1512.0]
     assert len(again.reports) == 1 and again.reports[0].startswith("hero_0: with the parameters of an earlier run")
 
 
@@ -72,14 +72,14 @@ def test_by_default_parameters_are_kept_in_ros_home_and_reported(ros_home):
 )
 def test_a_robot_that_is_another_one_has_a_flash_of_its_own(ros_home, arguments):
     del ros_home
-    set_centres("--flash-dir", "")
-    assert read_centres("--flash-dir", "", *arguments) != [1490.0, 1512.0]
+    set_centers("--flash-dir", "")
+    assert read_centers("--flash-dir", "", *arguments) != [1490.0, 1512.0]
 
 
 def test_a_robot_is_the_same_one_in_a_larger_swarm(ros_home):
     del ros_home
-    set_centres("--flash-dir", "")
-    assert read_centres("--flash-dir", "", "--count", "5", "--arena", "empty") == [1490.0, 1512.0]
+    set_centers("--flash-dir", "")
+    assert read_centers("--flash-dir", "", "--count", "5", "--arena", "empty") == [1490.0, 1512.0]
 
 
 def test_nothing_is_written_until_something_is_set(ros_home):
@@ -89,16 +89,16 @@ def test_nothing_is_written_until_something_is_set(ros_home):
 
 def test_a_home_that_cannot_be_written_costs_no_robot_but_is_reported(ros_home):
     (ros_home / "hero_sim").write_text("a file where the folder should be")
-    driver = set_centres("--flash-dir", "")
+    driver = set_centers("--flash-dir", "")
     assert any("cannot be written" in report for report in driver.reports)
-    assert driver.swarm.robots[0].motors.motors.centres_us == [1490, 1512]
+    assert driver.swarm.robots[0].motors.motors.centers_us == [1490, 1512]
 
 
 def write_flash(**changes):
     """Return the text of a good file but for the changes."""
     content = {
         "ir_calibration_counts_m2": [0.5] * 7 + [math.nan],
-        "motor_centres_us": [1500, 1510],
+        "motor_centers_us": [1500, 1510],
         "velocity_pid": [-1.0] * 6,
         "position_pid": [-1.0] * 6,
     }
@@ -129,8 +129,8 @@ def test_a_directory_in_place_of_a_flash_file_is_named(tmp_path):
         ('{"ir_calibration_counts_m2": [1, 2]}', "must be a list of 8 finite numbers"),
         (write_flash(ir_calibration_counts_m2=["x"] * 8), "must be a list of 8 finite numbers"),
         (write_flash(ir_calibration_counts_m2=[math.inf] * 8), "must be a list of 8 finite numbers"),
-        (write_flash(motor_centres_us=[10**400, 1500]), "must be a list of 2 finite numbers"),
-        (write_flash(motor_centres_us=[math.nan, 1500]), "must be a list of 2 finite numbers"),
+        (write_flash(motor_centers_us=[10**400, 1500]), "must be a list of 2 finite numbers"),
+        (write_flash(motor_centers_us=[math.nan, 1500]), "must be a list of 2 finite numbers"),
         (write_flash(velocity_pid=[True] * 6), "must be a list of 6 finite numbers"),
     ],
 )

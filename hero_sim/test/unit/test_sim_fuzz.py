@@ -113,7 +113,7 @@ def test_any_file_of_errors_is_read_or_refused_with_file_line_and_reason(path, c
 FLASH = json.dumps(
     {
         "ir_calibration_counts_m2": [0.5] * 8,
-        "motor_centres_us": [1500, 1500],
+        "motor_centers_us": [1500, 1500],
         "velocity_pid": [-1.0] * 6,
         "position_pid": [-1.0] * 6,
     }
@@ -136,7 +136,7 @@ def test_any_flash_file_is_read_or_refused_with_file_and_remedy(path, script):
         flash.keep_in(str(path))
     except OptionError as error:
         assert re.fullmatch(r"flash file %s.*; delete it to begin anew.*" % re.escape(str(path)), str(error))
-    kept = (*flash.motor_centres_us, *flash.velocity_pid, *flash.position_pid)
+    kept = (*flash.motor_centers_us, *flash.velocity_pid, *flash.position_pid)
     assert all(map(math.isfinite, kept)) and not any(map(math.isinf, flash.ir_calibration_counts_m2))
 
 

@@ -52,6 +52,6 @@ def test_a_pose_and_its_inverse_cancel():
 
 
 def test_poses_are_joined_like_steps_on_a_floor():
-    # One metre forward, a quarter turn to the left, then one metre forward again.
+    # One meters forward, a quarter turn to the left, then one meters forward again.
     corner, side = kinematics.Pose(1.0, 0.0, math.pi / 2), kinematics.Pose(1.0, 0.0, 0.0)
     assert corner.compose(side) == pytest.approx((1.0, 1.0, math.pi / 2))

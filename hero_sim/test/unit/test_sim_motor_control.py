@@ -78,19 +78,19 @@ def test_the_pids_drive_a_motor_like_the_measured_one_as_the_firmware_did():
         assert ticks == pytest.approx((left + right) / 2.0, abs=3.0, rel=0.05)
 
 
-def test_the_servos_are_mirrored_below_the_centre_is_forward_on_the_left():
+def test_the_servos_are_mirrored_below_the_center_is_forward_on_the_left():
     assert push(start(), 1400, 1600) == pytest.approx([70 * 0.25 / 220] * 2, rel=0.01)
 
 
 @pytest.mark.parametrize("beyond_us, stands", [(29, True), (-30, True), (31, False), (-32, False)])
-def test_a_wheel_rests_within_its_dead_zone_around_its_centre(beyond_us, stands):
-    driver = start("--error", "robot=0,left_centre_us=1480,right_centre_us=1530")
+def test_a_wheel_rests_within_its_dead_zone_around_its_center(beyond_us, stands):
+    driver = start("--error", "robot=0,left_center_us=1480,right_center_us=1530")
     speeds_m_s = push(driver, 1480 + beyond_us, 1530 + beyond_us)
     assert [speed_m_s == 0.0 for speed_m_s in speeds_m_s] == [stands, stands]
 
 
-def test_a_robot_without_calibrated_centres_creeps_until_they_are_set():
-    driver = start("--motors", "factory", "--error", "left_centre_us=1440,right_centre_us=1540")
+def test_a_robot_without_calibrated_centers_creeps_until_they_are_set():
+    driver = start("--motors", "factory", "--error", "left_center_us=1440,right_center_us=1540")
     world = driver.swarm.world
     set_velocity_gains(driver, 1e-3, 0.0, 0.0)
     driver.drive(0, 0.1, 0.0, 1000)
@@ -212,15 +212,15 @@ def test_both_controllers_at_once_write_pulses_in_turn():
     assert {-1.0, 1.0} <= signs
 
 
-def test_neutral_pulses_let_a_wheel_with_another_centre_creep_for_a_second():
-    driver = start("--error", "left_centre_us=1540")
+def test_neutral_pulses_let_a_wheel_with_another_center_creep_for_a_second():
+    driver = start("--error", "left_center_us=1540")
     assert push(driver, 1500, 1500) == pytest.approx([10 * 0.25 / 220, 0.0], rel=0.05)
     driver.run(1000)
     assert driver.measure_speed(0) < 0.001
 
 
 def test_until_3_s_of_uptime_the_position_controller_runs():
-    driver = DriverSide("--perfect", "--motors", "factory", "--error", "left_centre_us=1540")
+    driver = DriverSide("--perfect", "--motors", "factory", "--error", "left_center_us=1540")
     driver.run(1900)
     driver.send(0, packets.ID_PUBLISHER)
     attached_ms = []

@@ -54,7 +54,7 @@ def test_the_signal_at_20_cm_is_that_of_the_published_table():
 
 
 @pytest.mark.parametrize("distance_m", np.arange(0.03, 0.191, 0.005))
-def test_ranges_err_less_than_half_a_centimetre_to_19_cm(distance_m):
+def test_ranges_err_less_than_half_a_centimeter_to_19_cm(distance_m):
     calibration = ranges.calibrate(ALPHA[0], BETA[0])
     range_m = ranges.convert_to_ranges(measure(wall_at(distance_m)), calibration)[4]
     assert range_m - BODY_RADIUS_M == pytest.approx(distance_m, abs=0.005)

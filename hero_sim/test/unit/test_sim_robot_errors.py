@@ -20,16 +20,16 @@ def test_the_same_seed_draws_the_same_robots_and_another_seed_others():
 def test_perfect_robots_are_all_alike():
     errors = build("--count", "5", "--perfect")
     assert all((np.ptp(array, axis=0) == 0).all() for array in errors)
-    assert (errors.servo_centre_us == 1500).all() and (errors.slip == 0).all()
+    assert (errors.servo_center_us == 1500).all() and (errors.slip == 0).all()
 
 
 def test_a_known_error_of_one_robot_leaves_the_others_as_drawn():
     drawn = build("--count", "3", "--first-id", "5")
     known = build(
-        "--count", "3", "--first-id", "5", "--error", "robot=6,left_centre_us=1533", "--error", "slip=0.01"
+        "--count", "3", "--first-id", "5", "--error", "robot=6,left_center_us=1533", "--error", "slip=0.01"
     )
-    assert known.servo_centre_us[1].tolist() == [1533, drawn.servo_centre_us[1, 1]]
-    assert (known.servo_centre_us[[0, 2]] == drawn.servo_centre_us[[0, 2]]).all()
+    assert known.servo_center_us[1].tolist() == [1533, drawn.servo_center_us[1, 1]]
+    assert (known.servo_center_us[[0, 2]] == drawn.servo_center_us[[0, 2]]).all()
     assert known.slip.tolist() == [[0.01]] * 3
 
 

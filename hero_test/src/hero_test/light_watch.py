@@ -5,7 +5,7 @@ from visualization_msgs.msg import MarkerArray
 
 
 class LightWatch:
-    """The newest colour of each robot, by its place in the simulator (its id, where the first is hero_0)."""
+    """The newest color of each robot, by its place in the simulator (its id, where the first is hero_0)."""
 
     def __init__(self):
         self.colors = {}
@@ -19,7 +19,7 @@ class LightWatch:
             self.rows.append((bodies[0].header.stamp.to_sec(), dict(self.colors)))
 
     def is_lit(self, robot_id, color):
-        """Return whether the robot shows this colour, each part 0..1."""
+        """Return whether the robot shows this color, each part 0..1."""
         shown = self.colors.get(robot_id)
         return shown is not None and max(abs(a - b) for a, b in zip(shown, color)) < 0.01
 

@@ -26,12 +26,12 @@ class ScriptedDriver:
         self.rate = float(rospy.get_param("~rate", "88"))
         self.requests = 0
         self.lock = threading.Lock()
-        self.behaviour = {"moving": [], "rest": True}
+        self.behavior = {"moving": [], "rest": True}
         self.stop_time_s = None
         self.publisher = rospy.Publisher("~robots", RobotArray, queue_size=5, latch=True)
         rospy.Service("~stop", SetBool, self.serve_stop)
         rospy.Subscriber("~stop_request", Bool, self.receive_stop, queue_size=10, tcp_nodelay=True)
-        rospy.Subscriber("~behave", String, self.receive_behaviour, queue_size=10)
+        rospy.Subscriber("~behave", String, self.receive_behavior, queue_size=10)
         rospy.Timer(rospy.Duration(REPORT_PERIOD_S), lambda event: self.report())
         self.report()
 
@@ -47,16 +47,16 @@ class ScriptedDriver:
         self.receive_stop(request)
         return SetBoolResponse(True, "")
 
-    def receive_behaviour(self, message):
-        self.behaviour = json.loads(message.data)
+    def receive_behavior(self, message):
+        self.behavior = json.loads(message.data)
         self.report()
 
     def find_stop_state(self, robot_id):
         if self.stop_time_s is None:
             return Robot.NOT_STOPPED
-        if rospy.get_time() < self.stop_time_s + REST_AFTER_S or not self.behaviour["rest"]:
+        if rospy.get_time() < self.stop_time_s + REST_AFTER_S or not self.behavior["rest"]:
             return Robot.STOPPING
-        return Robot.MOVING if robot_id in self.behaviour["moving"] else Robot.AT_REST
+        return Robot.MOVING if robot_id in self.behavior["moving"] else Robot.AT_REST
 
     def report(self):
         with self.lock:

@@ -12,8 +12,8 @@ import tempfile
 import numpy as np
 
 MISSING = [name for name in ("Xvfb", "rviz") if shutil.which(name) is None]
-HEADER_SIZE, WIDTH, HEIGHT, BITS_PER_PIXEL, BYTES_PER_LINE, COLOURS = 0, 4, 5, 11, 12, 19  # places of the numbers
-COLOUR_LENGTH = 12
+HEADER_SIZE, WIDTH, HEIGHT, BITS_PER_PIXEL, BYTES_PER_LINE, COLORS = 0, 4, 5, 11, 12, 19  # places of the numbers
+COLOR_LENGTH = 12
 
 
 class VirtualScreen:
@@ -42,7 +42,7 @@ class VirtualScreen:
             data = file.read()
         numbers = struct.unpack(">25I", data[:100])
         assert numbers[BITS_PER_PIXEL] == 32, "a screen of another kind than was asked for"
-        start = numbers[HEADER_SIZE] + numbers[COLOURS] * COLOUR_LENGTH
+        start = numbers[HEADER_SIZE] + numbers[COLORS] * COLOR_LENGTH
         lines = np.frombuffer(data, np.uint8, numbers[HEIGHT] * numbers[BYTES_PER_LINE], start)
         pixels = lines.reshape(numbers[HEIGHT], -1, 4)[:, : numbers[WIDTH]]
         return pixels[:, :, 2::-1].copy()

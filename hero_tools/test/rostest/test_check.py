@@ -131,7 +131,7 @@ class CheckTest(unittest.TestCase):
             self.assertIn(name, points["nodes"]["text"])
 
     def test_wrong_use_gets_one_line_and_exit_code_2(self):
-        for arguments, says in ((["--port", "0"], "1..65535"), (["--colour"], "--colour")):
+        for arguments, says in ((["--port", "0"], "1..65535"), (["--color"], "--color")):
             result = subprocess.run(
                 ["rosrun", "hero_tools", "check", *arguments],
                 capture_output=True,

@@ -102,7 +102,7 @@ class FleetTest(unittest.TestCase):
             code, _, errors = run_fleet(name, value)
             self.assertEqual(code, 2, name)
             self.assert_one_line(errors, name)
-        for arguments in (["--expect", "many"], ["--colour"]):
+        for arguments in (["--expect", "many"], ["--color"]):
             code, _, errors = run_fleet(*arguments)
             self.assertEqual(code, 2, arguments)
             self.assertNotIn("Traceback", errors)

@@ -21,7 +21,7 @@ def compute_motion():
     return module.compute_motion
 
 
-def test_the_corners_are_ten_metres_apart_and_the_square_is_closed(compute_motion):
+def test_the_corners_are_ten_meters_apart_and_the_square_is_closed(compute_motion):
     corners = [compute_motion(side * SIDE_S + 1e-6, SIDE_M)[:2] for side in range(5)]
     for found, right in zip(corners, [(0, 0), (10, 0), (10, 10), (0, 10), (0, 0)]):
         assert found == pytest.approx(right, abs=1e-5)

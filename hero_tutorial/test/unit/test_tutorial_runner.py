@@ -143,7 +143,7 @@ def test_replacements_apply_to_commands_and_expected_output(try_page):
     try_page(console("$ echo HERE", "HERE"), {"HERE": "there"})
 
 
-def test_colours_titles_and_overwritten_text_are_not_compared():
+def test_colors_titles_and_overwritten_text_are_not_compared():
     assert clean_output("\x1b[1mbold\x1b[0m\x1b]2;title\x07 \r\n10 %\r20 %\r\na\tb") == "bold\n20 %\na   b\n"
 
 

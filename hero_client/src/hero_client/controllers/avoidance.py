@@ -1,6 +1,6 @@
 """Obstacle avoidance by the proximity sensors: pure functions from ranges to a command.
 
-Ranges in m from the robot's centre, the front first, counter-clockwise; inf: nothing in range, 0: too close to measure,
+Ranges in m from the robot's center, the front first, counter-clockwise; inf: nothing in range, 0: too close to measure,
 nan: not known, which counts as an obstacle.
 """
 

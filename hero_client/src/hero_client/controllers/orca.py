@@ -22,7 +22,7 @@ from ..robot_constants import BODY_RADIUS_M
 _TINY = 1e-9
 
 _SLACK_HALVINGS = 12
-"""Of at most a few m/s: leaves less than a millimetre a second."""
+"""Of at most a few m/s: leaves less than a millimeter a second."""
 
 
 class AvoidanceLaw(NamedTuple):
@@ -35,7 +35,7 @@ class AvoidanceLaw(NamedTuple):
     """Added to the radius for late and wrong odometry and for wheels that lag."""
     horizon_s: float = 3.0
     """Robots are kept apart for this time into the future."""
-    neighbours: int = 6
+    neighbors: int = 6
     """So many of the nearest robots are looked at: more do not fit around one."""
     max_linear_m_s: float = 0.08
     max_angular_rad_s: float = 2.5
@@ -44,7 +44,7 @@ class AvoidanceLaw(NamedTuple):
     clearance_m: float = 0.03
     """So near to it the robot drives no further: as far as it rolls until a stop is measured, sent and obeyed."""
     closing_gain: float = 1.0
-    """Largest speed towards it in m/s per metre that is left, 1/s."""
+    """Largest speed towards it in m/s per meter that is left, 1/s."""
     back_off_m_s: float = 0.02
     """Largest speed away from what is nearer than clearance_m."""
 
@@ -167,7 +167,7 @@ def avoid_sensed(
 ) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return wanted (2,) turned to the right of what the sensors see near, and half planes that keep away from it.
 
-    Odometry drifts by centimetres over a metre or two, so robots that avoid each other by odometry alone touch now and
+    Odometry drifts by centimeters over a meter or two, so robots that avoid each other by odometry alone touch now and
     then. Of two robots that meet where odometry expects none, each would wait for the other for ever: so what is
     not allowed of the wanted velocity is driven to the right, as on a road. Half planes: normals (K, 2), bounds (K,),
     as in nearest_allowed(). ranges: as in avoidance; nan (not known) is ignored.
@@ -211,7 +211,7 @@ def avoid_others(
         distances_m = np.hypot(offsets[:, 0], offsets[:, 1])
         reach_m = 2.0 * (law.radius_m + law.max_linear_m_s * law.horizon_s)
         near = [i for i in np.argsort(distances_m, kind="stable") if i != own and distances_m[i] < reach_m]
-        near = near[: law.neighbours]
+        near = near[: law.neighbors]
         normals = np.zeros((len(near), 2))
         bounds = np.zeros(len(near))
         for index, other in enumerate(near):

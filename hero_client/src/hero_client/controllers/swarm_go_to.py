@@ -10,10 +10,10 @@ from .orca import AvoidanceLaw, avoid_others, avoid_sensed, steer, steered_point
 from .unicycle import BRISK, GoToLaw, go_to_point
 
 DOCKING_M = 0.05
-"""Nearer to its goal than this a robot steers its centre there, no longer the point in front of the axle."""
+"""Nearer to its goal than this a robot steers its center there, no longer the point in front of the axle."""
 
 SPEED_GAIN = 0.8
-"""Wanted speed in m/s per metre to the goal, 1/s."""
+"""Wanted speed in m/s per meter to the goal, 1/s."""
 
 NUDGE_RAD = 0.05
 """Largest random turn of the wanted velocity: breaks the symmetry in which all robots wait."""

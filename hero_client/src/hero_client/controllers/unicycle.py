@@ -26,7 +26,7 @@ class GoToLaw(NamedTuple):
     """How a robot goes to a point. The values are those of the tutorial: slow and sure."""
 
     linear_gain: float = 4.0 / 20.0
-    """kr: speed in m/s per metre of distance, 1/s."""
+    """kr: speed in m/s per meter of distance, 1/s."""
     turn_gain: float = 8.0 / 20.0
     """ka: turn in rad/s per radian of bearing, 1/s."""
     max_linear_m_s: float = 0.07
@@ -68,7 +68,7 @@ class GoToPoseLaw(NamedTuple):
     slowing_m2: float = 0.003
     """beta: how much it slows down in curves: to half where the curve has a radius of sqrt(beta)."""
     linear_gain: float = 0.8
-    """Speed in m/s per metre of distance near the goal, 1/s."""
+    """Speed in m/s per meter of distance near the goal, 1/s."""
     max_linear_m_s: float = 0.12
     max_angular_rad_s: float = 1.5
     heading_gain: float = 1.5
@@ -85,7 +85,7 @@ SMOOTH = GoToPoseLaw()
 def go_to_pose(pose: Pose, goal: Pose, law: GoToPoseLaw = SMOOTH, at_goal: bool = False) -> Velocity:
     """Return the command of a smooth curve to goal that ends in its heading; STOP where it is reached.
 
-    at_goal: the place was reached already; only the heading counts, so that a millimetre of drift during the last
+    at_goal: the place was reached already; only the heading counts, so that a millimeter of drift during the last
     turn does not start a new approach. pose and goal are in the same frame.
     Source: J. J. Park, B. Kuipers, A smooth control law for graceful motion of differential wheeled mobile robots
     in 2D environment, ICRA 2011, equations 13 to 15.
@@ -121,7 +121,7 @@ class FollowLaw(NamedTuple):
     """How a robot keeps behind another one."""
 
     gap_m: float = 0.15
-    """Between the centres; two bodies touch at 0.074 m."""
+    """Between the centers; two bodies touch at 0.074 m."""
     linear_gain: float = 1.0
     turn_gain: float = 2.0
     max_linear_m_s: float = 0.15

@@ -10,7 +10,7 @@ import math
 import struct
 from typing import Optional
 
-from ..robot_constants import ANGULAR_LIMIT_RAD_S, LINEAR_LIMIT_M_S, MOTOR_CENTRE_US
+from ..robot_constants import ANGULAR_LIMIT_RAD_S, LINEAR_LIMIT_M_S, MOTOR_CENTER_US
 
 COMMAND_INTERVAL_S = 0.06
 """Time between two commands to one controller: the firmware drops one within 50 ms of the last accepted one."""
@@ -23,7 +23,7 @@ _TWIST = struct.Struct("<6d")
 
 ZERO_TWIST = bytes(TWIST_LENGTH)
 
-STOPPED_MOTORS = struct.pack("<hh", MOTOR_CENTRE_US, MOTOR_CENTRE_US)
+STOPPED_MOTORS = struct.pack("<hh", MOTOR_CENTER_US, MOTOR_CENTER_US)
 
 STOP_PAYLOADS = {"geometry_msgs/Twist": ZERO_TWIST, "hero_msgs/Motor": STOPPED_MOTORS}
 """Message types that move a robot, and the payload of each that stops it."""

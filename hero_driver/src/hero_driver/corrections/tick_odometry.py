@@ -31,7 +31,7 @@ MAX_STEP_S = 1.0
 
 @dataclass(frozen=True)
 class WheelGeometry:
-    """What turns ticks into metres."""
+    """What turns ticks into meters."""
 
     wheel_diameter_m: float = WHEEL_DIAMETER_M
     wheel_separation_m: float = WHEEL_SEPARATION_M

@@ -1,7 +1,7 @@
 """Sanitises and parses log lines of robots: versions at boot, uptime once a second, self-tuning.
 
 The texts are the firmware's (ROSHandle.ino:92, 116). Log texts are untrusted: what could forge a line, move
-a cursor or colour a terminal is taken out. Pure.
+a cursor or color a terminal is taken out. Pure.
 """
 
 import re
@@ -40,7 +40,7 @@ class Heartbeat(NamedTuple):
 class LogLine(NamedTuple):
     """One log line, read."""
 
-    text: str  # without name, colours and control characters, of bounded length
+    text: str  # without name, colors and control characters, of bounded length
     boot: Optional[BootLine]
     heartbeat: Optional[Heartbeat]
     tunes: Optional[bool]  # True: a controller tunes itself; False: it has ended that; None: nothing of that

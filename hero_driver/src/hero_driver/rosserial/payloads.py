@@ -132,7 +132,7 @@ def encode_log(log: Log) -> bytes:
 
 
 def decode_log(payload: Bytes) -> Log:
-    """Return the log line in payload, colour codes and all.
+    """Return the log line in payload, color codes and all.
 
     Raises: PayloadError if it is cut short or longer than its fields.
     """

@@ -55,7 +55,7 @@ def test_every_declaration_of_the_stock_robot_is_read(topic):
     assert decode_topic_info(packet[7:-1]) == TopicInfo(*topic[1:], 4096)
 
 
-def test_a_log_line_is_read_with_its_colours():
+def test_a_log_line_is_read_with_its_colors():
     assert decode_log(LOG_BYTES) == Log(2, "\x1b[92m")
     assert encode_log(Log(2, "\x1b[92m")) == LOG_BYTES
 

@@ -110,7 +110,7 @@ BAD_DECLARATIONS = {
     "name with a space": (declare_twist(120, "/hero_0/a b"), "not a ROS name"),
     "name with a line break": (declare_twist(120, "/hero_0/a\nb"), "not a ROS name"),
     "name that ends in a line break": (declare_twist(120, "/hero_0/a\n"), "not a ROS name"),
-    "name with colours": (declare_twist(120, "/hero_0/\x1b[31m"), "not a ROS name"),
+    "name with colors": (declare_twist(120, "/hero_0/\x1b[31m"), "not a ROS name"),
     "name in other letters": (declare_twist(120, "/hero_0/größe"), "not a ROS name"),
     "name that begins with a digit": (declare_twist(120, "/0/x"), "not a ROS name"),
     "name with an empty part": (declare_twist(120, "/hero_0//x"), "not a ROS name"),

@@ -1,6 +1,6 @@
 // The table of robots. Cells change in place, which keeps selection, scrolling and screen readers undisturbed.
 
-import { colourOf } from "./colours.js";
+import { colorOf } from "./colors.js";
 
 export function spanOf(seconds) {
   if (seconds === null || seconds === undefined) return "-";
@@ -124,7 +124,7 @@ export class FleetTable {
     });
     row.tags[0].dataset.state = robot.state;
     row.tags[1].dataset.stop = robot.stop;
-    row.chip.style.background = colourOf(robot.id);
+    row.chip.style.background = colorOf(robot.id);
     row.line.classList.toggle("chosen", robot.name === chosen && robot.state !== "REFUSED");
   }
 }

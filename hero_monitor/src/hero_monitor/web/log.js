@@ -1,6 +1,6 @@
 // Log lines of nodes and robots, newest at the bottom.
 
-import { colourOf } from "./colours.js";
+import { colorOf } from "./colors.js";
 
 const LINES_MAX = 500;
 const LEVELS = { 1: "debug", 2: "info", 4: "warn", 8: "error", 16: "fatal" };
@@ -51,7 +51,7 @@ export class LogView {
       line.append(cell("time", time.toTimeString().slice(0, 8)), cell("level", LEVELS[level] || "?"));
       const source = cell("node", robot || node);
       source.title = node;
-      if (robot) source.style.color = colourOf(Number(robot.slice(robot.indexOf("_") + 1)));
+      if (robot) source.style.color = colorOf(Number(robot.slice(robot.indexOf("_") + 1)));
       line.append(source, cell("text", robot && text.startsWith(`${robot}: `) ? text.slice(robot.length + 2) : text));
       line.hidden = !this.admits(line.entry);
       this.list.append(line);

@@ -1,6 +1,6 @@
 // Paints the map: grid, arena, trails, goals, beams and robots. Lengths in mm, angles in mrad.
 
-import { colourOf, isDark } from "./colours.js";
+import { colorOf, isDark } from "./colors.js";
 
 export const BODY_MM = 36.85;
 export const TRAIL_MS = 60000;
@@ -103,7 +103,7 @@ export class MapPainter {
       piece.lineTo(x, y);
     });
     pieces.forEach((piece, index) => {
-      context.strokeStyle = colourOf(robot.id, TRAIL_INKS[index]);
+      context.strokeStyle = colorOf(robot.id, TRAIL_INKS[index]);
       context.stroke(piece);
     });
   }
@@ -130,7 +130,7 @@ export class MapPainter {
     if (!goal) return;
     const { context, view, state } = this;
     const pose = state.poses[robot.name];
-    context.strokeStyle = context.fillStyle = colourOf(robot.id);
+    context.strokeStyle = context.fillStyle = colorOf(robot.id);
     context.lineWidth = Math.max(3, 1.5 / view.scale);
     context.setLineDash([14, 12]);
     context.beginPath();
@@ -202,7 +202,7 @@ export class MapPainter {
         context.fillRect(-WHEEL_MM[0], side * WHEEL_MM[2] - WHEEL_MM[1] / 2, 2 * WHEEL_MM[0], WHEEL_MM[1]);
       }
       context.fillStyle = this.ink("--shell");
-      context.strokeStyle = colourOf(robot.id);
+      context.strokeStyle = colorOf(robot.id);
       context.lineWidth = Math.max(6, 1.6 / view.scale);
       if (!here) context.setLineDash([12, 9]);
       context.beginPath();
@@ -211,7 +211,7 @@ export class MapPainter {
       context.stroke();
       context.setLineDash([]);
       // An arrowhead marks the front.
-      context.fillStyle = colourOf(robot.id);
+      context.fillStyle = colorOf(robot.id);
       context.beginPath();
       context.moveTo(BODY_MM * 1.38, 0);
       context.lineTo(BODY_MM * 0.72, BODY_MM * 0.48);

@@ -4,7 +4,7 @@
 // button is released, the page is hidden or loses focus, or the network stalls. The monitor stops the robot on
 // "release", after 0.4 s of silence, or when the socket closes.
 
-import { colourOf } from "./colours.js";
+import { colorOf } from "./colors.js";
 import { healthOf, spanOf } from "./fleet.js";
 
 const HOLD_MS = 100;
@@ -125,7 +125,7 @@ export class RobotPanel {
       this.name = name;
       this.setGoing(false);
     }
-    document.querySelector("#robot .chip").style.background = robot ? colourOf(robot.id) : "transparent";
+    document.querySelector("#robot .chip").style.background = robot ? colorOf(robot.id) : "transparent";
     element("name").textContent = robot ? robot.name : "No robot is chosen";
     element("state").textContent = robot ? robot.state : "";
     element("state").dataset.state = robot ? robot.state : "";
@@ -142,13 +142,13 @@ export class RobotPanel {
   listFacts(robot, state) {
     const pose = state.poses[robot.name];
     const ranges = (state.ranges[robot.name] || []).filter((range) => range !== null && range >= 0);
-    const metres = (value) => (value / 1000).toFixed(3);
+    const meters = (value) => (value / 1000).toFixed(3);
     const facts = [
-      ["pose", pose ? `${metres(pose[0])} ${metres(pose[1])} m, ${((pose[2] / 1000) * (180 / Math.PI)).toFixed(0)}°` : "-"],
+      ["pose", pose ? `${meters(pose[0])} ${meters(pose[1])} m, ${((pose[2] / 1000) * (180 / Math.PI)).toFixed(0)}°` : "-"],
       ["stop", robot.stop || "-"],
       ["frame", robot.located ? "map" : "own odometry: position on the map unknown"],
       ["distance", robot.distance === null ? "-" : `${robot.distance.toFixed(2)} m since this view opened`],
-      ["nearest", ranges.length ? `${metres(Math.min(...ranges))} m` : "nothing in range"],
+      ["nearest", ranges.length ? `${meters(Math.min(...ranges))} m` : "nothing in range"],
       ["odometry", robot.odom === null ? "-" : `${robot.odom.toFixed(1)} Hz`],
       ["from robot", `${robot.packets.toFixed(0)} packets/s, ${(robot.bytes / 1000).toFixed(1)} kB/s`],
       ["address", robot.address],

@@ -1,6 +1,6 @@
 """Stamps from the server's time answers, as ros_lib's NodeHandle computes them in whole milliseconds.
 
-Pure. Source: setNow(), now() and syncTime() of ros_lib's node_handle.h, by their documented behaviour.
+Pure. Source: setNow(), now() and syncTime() of ros_lib's node_handle.h, by their documented behavior.
 """
 
 from typing import Tuple

@@ -1,6 +1,6 @@
 """What packets from the server do to a robot, and the answers of its services.
 
-Pure. Texts and behaviour are the firmware's (files named in messages and flash); ids as declared.
+Pure. Texts and behavior are the firmware's (files named in messages and flash); ids as declared.
 """
 
 from typing import Callable, Dict, List, Optional
@@ -106,9 +106,9 @@ class CommandTable:
         return _answer(ids.ID_SET_ODOM_ANSWER, True, "Odometry was changed!")
 
     def _set_motors(self, payload: bytes) -> bytes:
-        centres_us = messages.decode_motor(payload)
-        self._flash.motor_centres_us = [float(centre_us) for centre_us in centres_us]
-        self._motors.motors.centres_us = list(centres_us)
+        centers_us = messages.decode_motor(payload)
+        self._flash.motor_centers_us = [float(center_us) for center_us in centers_us]
+        self._motors.motors.centers_us = list(centers_us)
         return self._record(ids.ID_MOTORS_PARAMETERS_ANSWER, "Motor Parameters has been succesfully recorded!")
 
     def _record(self, answer_id: int, text: str) -> bytes:

@@ -13,7 +13,7 @@ from ..errors import CommandError, OptionError
 
 __all__ = ["NO_FLASH_DIR", "Flash", "check_folder", "find_flash_dir", "make_fingerprint"]
 
-_LENGTHS = {"ir_calibration_counts_m2": 8, "motor_centres_us": 2, "velocity_pid": 6, "position_pid": 6}
+_LENGTHS = {"ir_calibration_counts_m2": 8, "motor_centers_us": 2, "velocity_pid": 6, "position_pid": 6}
 
 _LARGEST = 3.4e38  # a float of 32 bits
 
@@ -42,21 +42,21 @@ def _is_storable(key: str, value: Any) -> bool:
 
 
 class Flash:
-    """The parameters of one robot: calibration of the sensors, centres of the servos, PID gains.
+    """The parameters of one robot: calibration of the sensors, centers of the servos, PID gains.
 
     Attributes:
         ir_calibration_counts_m2: one per sensor; NaN for a robot that was never calibrated.
-        motor_centres_us: servo pulse at which each wheel rests.
+        motor_centers_us: servo pulse at which each wheel rests.
         is_from_file: whether an earlier run set something.
         velocity_pid, position_pid: lkp lki lkd rkp rki rkd; -1 for a robot that was never tuned.
     """
 
     def __init__(
-        self, ir_calibration_counts_m2: Sequence[float], motor_centres_us: Sequence[float] = (1500.0, 1500.0)
+        self, ir_calibration_counts_m2: Sequence[float], motor_centers_us: Sequence[float] = (1500.0, 1500.0)
     ) -> None:
-        """Begin with this calibration and these centres, and keep changes in memory only."""
+        """Begin with this calibration and these centers, and keep changes in memory only."""
         self.ir_calibration_counts_m2 = [float(value) for value in ir_calibration_counts_m2]
-        self.motor_centres_us = list(motor_centres_us)
+        self.motor_centers_us = list(motor_centers_us)
         self.velocity_pid = list(_ERASED_PID)
         self.position_pid = list(_ERASED_PID)
         self.is_from_file = False

@@ -179,7 +179,7 @@ class LaserMessages:
     def encode(
         self, seq: int, stamp: Tuple[int, int], ranges_m: Sequence[float], counts: Sequence[float]
     ) -> bytes:
-        """Return the packet for the eight sensors: odd values are averages of their neighbours (quirk of the
+        """Return the packet for the eight sensors: odd values are averages of their neighbors (quirk of the
         firmware, RangeSensor.ino:167)."""
         data = self._template.data
         _HEADER.pack_into(data, self._start, seq & 0xFFFFFFFF, *stamp)

@@ -34,7 +34,7 @@ CONTROL_MS = 21
 """Between two runs of a controller, 47.6 Hz (VelocityControl.ino:112)."""
 
 _WHEEL_SIGNS = (-1, 1)
-"""The servos are mounted as mirror images: a pulse below the centre drives the left wheel forward."""
+"""The servos are mounted as mirror images: a pulse below the center drives the left wheel forward."""
 
 VELOCITY_TUNING_MS = (41000, 65000)
 POSITION_TUNING_MS = (11000, 49000)
@@ -51,16 +51,16 @@ class MotorDriver:
     """The servos' pulses and their watchdog.
 
     Attributes:
-        centres_us: the robot's calibration: the pulses at which its wheels should rest, left and right.
+        centers_us: the robot's calibration: the pulses at which its wheels should rest, left and right.
         attached: whether pulses go out.
         stop_at_ms: when the watchdog stops them.
     """
 
-    def __init__(self, body: Body, centres_us: Sequence[float]) -> None:
-        """Begin without pulses; centres that no servo has are taken for 1500, as of an erased flash."""
+    def __init__(self, body: Body, centers_us: Sequence[float]) -> None:
+        """Begin without pulses; centers that no servo has are taken for 1500, as of an erased flash."""
         low_us, high_us = PULSE_RANGE_US
         self._body = body
-        self.centres_us = [int(pulse_us) if low_us < pulse_us < high_us else 1500 for pulse_us in centres_us]
+        self.centers_us = [int(pulse_us) if low_us < pulse_us < high_us else 1500 for pulse_us in centers_us]
         self.attached = False
         self.stop_at_ms = 0
         self._pulses_us = (0, 0)
@@ -77,10 +77,10 @@ class MotorDriver:
         self._body.write_pulses(min(max(left_us, low_us), high_us), min(max(right_us, low_us), high_us))
 
     def drive(self, now_ms: int, outputs_us: Sequence[int]) -> None:
-        """Write the controllers' outputs beyond the centres, forward positive."""
+        """Write the controllers' outputs beyond the centers, forward positive."""
         pulses_us = [
-            centre_us + sign * output_us
-            for centre_us, sign, output_us in zip(self.centres_us, _WHEEL_SIGNS, outputs_us)
+            center_us + sign * output_us
+            for center_us, sign, output_us in zip(self.centers_us, _WHEEL_SIGNS, outputs_us)
         ]
         self.write(now_ms, *pulses_us)
 
@@ -200,7 +200,7 @@ class MotorControl:
         self._odometry = odometry
         self._rng = rng
         self._log = log
-        self.motors = motors = MotorDriver(body, flash.motor_centres_us)
+        self.motors = motors = MotorDriver(body, flash.motor_centers_us)
         self.velocity = _Controller(
             motors, VELOCITY_GAINS, flash.velocity_pid, VELOCITY_LIMIT_US, VELOCITY_WATCHDOG_MS
         )

@@ -1,6 +1,6 @@
-"""The firmware's PID of one wheel: from target and measurement to the servo pulse beyond its centre.
+"""The firmware's PID of one wheel: from target and measurement to the servo pulse beyond its center.
 
-Pure. Source: the gains and limits of VelocityControl.ino:31-47 and PositionControl.ino:31-47, and the behaviour of
+Pure. Source: the gains and limits of VelocityControl.ino:31-47 and PositionControl.ino:31-47, and the behavior of
 the PID library that the firmware brings: it counts its sample time in microseconds, so the 50000 that the
 firmware sets are 50 ms, and it computes at the first run after them; with a run every 21 ms that is every 63 ms.
 With a motor like that of the measured build, the distance of its wheels over 3 s of driving differs by up to 7 %.

@@ -24,7 +24,7 @@ def calibrate(alpha_counts_m2: np.ndarray, beta_counts: np.ndarray) -> np.ndarra
 
 
 def convert_to_ranges(counts: np.ndarray, calibration_counts_m2: np.ndarray) -> np.ndarray:
-    """Return the firmware's ranges (m from the robot's centre): NaN for a calibration that is erased.
+    """Return the firmware's ranges (m from the robot's center): NaN for a calibration that is erased.
 
     Nothing in range gives 0.2568 m, above the firmware's own range_max of 0.2368 m (RangeSensor.ino:123-125).
     """

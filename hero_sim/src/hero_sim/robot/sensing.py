@@ -83,7 +83,7 @@ class Sensing:
         self._light, self._light_until_ms = color, now_ms + LED_WATCHDOG_MS
 
     def show_light(self, now_ms: int) -> Color:
-        """Return the colour that people see."""
+        """Return the color that people see."""
         return self._light if now_ms <= self._light_until_ms else _DARK
 
     def read_encoders(self, millis: int, now_ms: int) -> None:

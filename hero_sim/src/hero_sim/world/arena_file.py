@@ -86,7 +86,7 @@ class _Reader:
         start = Pose(x_m, y_m, math.radians(heading_deg))
         if not is_free(start, others, arena, BODY_RADIUS_M):
             reason = "the start at (%g, %g) touches a wall, an obstacle or another start; " % (x_m, y_m)
-            raise self._fail(node, reason + "robots need %.3f m around their centre" % BODY_RADIUS_M)
+            raise self._fail(node, reason + "robots need %.3f m around their center" % BODY_RADIUS_M)
         return start
 
     def _read_bounds(self, node: Any, root: Any, segments: List[Segment]) -> Segment:

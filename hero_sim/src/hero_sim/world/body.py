@@ -65,14 +65,14 @@ class Body:
         return self._world.read_infrared(np.array([self.index]))[0]
 
     def write_pulses(self, left_us: int, right_us: int) -> None:
-        """Set the servos' pulses; below its centre the left wheel rolls forward."""
+        """Set the servos' pulses; below its center the left wheel rolls forward."""
         errors, index = self._world.errors, self.index
-        left_centre_us, right_centre_us = errors.servo_centre_us[index].tolist()
+        left_center_us, right_center_us = errors.servo_center_us[index].tolist()
         dead_zone_us = float(errors.dead_zone_us[index, 0])
         left_gain, right_gain = errors.servo_gain[index].tolist()
         self._world.commands_m_s[index] = (
-            _convert_pulse(left_centre_us - left_us, dead_zone_us, left_gain),
-            _convert_pulse(right_us - right_centre_us, dead_zone_us, right_gain),
+            _convert_pulse(left_center_us - left_us, dead_zone_us, left_gain),
+            _convert_pulse(right_us - right_center_us, dead_zone_us, right_gain),
         )
 
     def release(self) -> None:
@@ -85,6 +85,6 @@ class Body:
 
 
 def _convert_pulse(beyond_us: float, dead_zone_us: float, gain: float) -> float:
-    """Return the wheel speed (m/s) of a servo whose pulse lies so far beyond its centre, forward positive."""
+    """Return the wheel speed (m/s) of a servo whose pulse lies so far beyond its center, forward positive."""
     driven_us = max(abs(beyond_us) - dead_zone_us, 0.0)
     return math.copysign(min(driven_us * SERVO_GAIN_M_S_US * gain, MAX_WHEEL_M_S), beyond_us)

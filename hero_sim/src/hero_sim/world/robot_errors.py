@@ -13,16 +13,16 @@ from ..yaml_file import fail_at, read_mapping, read_nodes
 from .range_sensors import ALPHA_COUNTS_M2, BEAMS, BETA_COUNTS
 
 __all__ = [
-    "KINDS", "MAX_WHEEL_M_S", "SERVO_CENTRE_US", "SERVO_GAIN_M_S_US", "RobotErrors", "describe_errors",
+    "KINDS", "MAX_WHEEL_M_S", "SERVO_CENTER_US", "SERVO_GAIN_M_S_US", "RobotErrors", "describe_errors",
     "describe_keys", "describe_robot", "draw_errors", "load_known", "set_known",
 ]  # fmt: skip
 
-SERVO_CENTRE_US = 1500.0
+SERVO_CENTER_US = 1500.0
 SERVO_DEAD_ZONE_US = 30.0
 SERVO_FULL_M_S = 0.25
 SERVO_FULL_US = 250.0
 SERVO_GAIN_M_S_US = SERVO_FULL_M_S / (SERVO_FULL_US - SERVO_DEAD_ZONE_US)
-"""A wheel rests for pulses within the dead zone around its centre, and reaches the robot's published top speed
+"""A wheel rests for pulses within the dead zone around its center, and reaches the robot's published top speed
 of 0.25 m/s at the 250 us to which the firmware limits itself. The dead zone is an assumption; with it and the
 firmware's gains, one velocity command drives 0.13 to 0.17 m, as measured."""
 
@@ -53,9 +53,9 @@ class Kind(NamedTuple):
 _LEFT, _RIGHT, _ALL = slice(0, 1), slice(1, 2), slice(None)
 
 KINDS: Dict[str, Kind] = {
-    "left_centre_us": Kind("servo_centre_us", _LEFT, 1000, 2000, "pulse at which the left wheel rests"),
-    "right_centre_us": Kind("servo_centre_us", _RIGHT, 1000, 2000, "the same of the right wheel"),
-    "dead_zone_us": Kind("dead_zone_us", _ALL, 0, 200, "a wheel rests for pulses this close to its centre"),
+    "left_center_us": Kind("servo_center_us", _LEFT, 1000, 2000, "pulse at which the left wheel rests"),
+    "right_center_us": Kind("servo_center_us", _RIGHT, 1000, 2000, "the same of the right wheel"),
+    "dead_zone_us": Kind("dead_zone_us", _ALL, 0, 200, "a wheel rests for pulses this close to its center"),
     "left_gain": Kind("servo_gain", _LEFT, 0, 5, "speed of the left servo, 1 as drawn"),
     "right_gain": Kind("servo_gain", _RIGHT, 0, 5, "the same of the right servo"),
     "lag_s": Kind("servo_lag_s", _ALL, 0.001, 5, "time constant of the servos"),
@@ -75,7 +75,7 @@ for _index in range(BEAMS):
 class RobotErrors(NamedTuple):
     """The differences of all robots (N), each an array (N, columns); wheels are left, right."""
 
-    servo_centre_us: np.ndarray
+    servo_center_us: np.ndarray
     dead_zone_us: np.ndarray
     servo_gain: np.ndarray
     servo_lag_s: np.ndarray
@@ -95,7 +95,7 @@ def draw_errors(rngs: Sequence[np.random.RandomState], scale: float = 1.0) -> Ro
     drawn = np.array([rng.standard_normal(6 + BEAMS) for rng in rngs]) * scale
     same = np.ones((len(rngs), 1))
     return RobotErrors(
-        servo_centre_us=SERVO_CENTRE_US + np.rint(6.0 * drawn[:, 0:2]),
+        servo_center_us=SERVO_CENTER_US + np.rint(6.0 * drawn[:, 0:2]),
         dead_zone_us=same * SERVO_DEAD_ZONE_US,
         servo_gain=1.0 + 0.03 * drawn[:, 2:4],
         servo_lag_s=same * SERVO_LAG_S,

@@ -5,7 +5,7 @@ export function isDark() {
   return theme ? theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
 }
 
-export function colourOf(id, alpha = 1) {
+export function colorOf(id, alpha = 1) {
   const hue = (((id * 137.508 + 24) % 360) + 360) % 360;
   return `hsl(${hue.toFixed(0)} 70% ${isDark() ? 62 : 42}% / ${alpha})`;
 }
