@@ -12,6 +12,18 @@ import sys
 from contextlib import suppress
 from typing import IO, Callable, NoReturn, Optional, Type
 
+__all__ = [
+    "FAILED",
+    "INTERRUPTED",
+    "OUTPUT_ERRORS",
+    "PIPE_CLOSED",
+    "call",
+    "make_printable",
+    "print_error",
+    "run",
+    "say",
+]
+
 FAILED = 1
 INTERRUPTED = 128 + signal.SIGINT
 PIPE_CLOSED = 128 + signal.SIGPIPE

@@ -9,6 +9,8 @@ import termios
 import tty
 from typing import IO, Any, List, Optional, Tuple
 
+__all__ = ["ARROWS", "Keyboard", "NoTerminalError", "open_terminal", "split_keys"]
+
 ARROWS = {
     "\x1b[A": "up",
     "\x1b[B": "down",

@@ -1,5 +1,7 @@
 """What is true of every HeRo robot; source: the firmware's config.h and RangeSensor.ino."""
 
+__all__ = ["BODY_RADIUS_M", "MAX_ANGULAR_RAD_S", "MAX_LINEAR_M_S"]
+
 BODY_RADIUS_M = 0.0368
 """The firmware adds it to what its infrared sensors measure, so ranges count from the robot's center."""
 

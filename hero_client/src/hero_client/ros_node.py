@@ -15,6 +15,18 @@ import rosgraph.roslogging
 import rospy
 from rospy.impl.registration import RegManager, get_registration_listeners
 
+__all__ = [
+    "MASTER_TIMEOUT_S",
+    "SUCCESS",
+    "LimitedTransport",
+    "NodeError",
+    "NodeMaster",
+    "ask_master",
+    "check_master",
+    "end_without_delay",
+    "start_ros_node",
+]
+
 MASTER_TIMEOUT_S = 3.0
 """A master answers within milliseconds, under load within a second."""
 

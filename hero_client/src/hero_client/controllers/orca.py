@@ -19,6 +19,16 @@ import numpy as np
 from ..geometry import Pose, Velocity
 from ..robot_constants import BODY_RADIUS_M
 
+__all__ = [
+    "AvoidanceLaw",
+    "avoid_others",
+    "avoid_sensed",
+    "half_plane",
+    "nearest_allowed",
+    "steer",
+    "steered_point",
+]
+
 _TINY = 1e-9
 
 _SLACK_HALVINGS = 12

@@ -9,6 +9,16 @@ from ..geometry import STOP, Pose, Velocity
 from .orca import AvoidanceLaw, avoid_others, avoid_sensed, steer, steered_point
 from .unicycle import BRISK, GoToLaw, go_to_point
 
+__all__ = [
+    "ASIDE_S",
+    "DOCKING_M",
+    "NUDGE_RAD",
+    "PATIENCE_S",
+    "PROGRESS_M",
+    "SPEED_GAIN",
+    "SwarmGoToController",
+]
+
 DOCKING_M = 0.05
 """Nearer to its goal than this a robot steers its center there, no longer the point in front of the axle."""
 
