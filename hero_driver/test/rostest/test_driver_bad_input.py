@@ -238,7 +238,9 @@ class TestDriverBadInput(OwnDriverCase):
         # Answered, and heard, while all of them still wait.
         self.assertTrue(stop(False).success)
         self.assert_alive(robot)
-        self.assertGreaterEqual(len(list(files.iterdir())), before + len(waiting))
+        for connection in waiting:
+            with self.assertRaises(BlockingIOError):
+                connection.recv(1, socket.MSG_DONTWAIT)
         wait_for(lambda: len(list(files.iterdir())) <= before + 10, "the driver to close what waits")
         for connection in waiting:
             self.assertEqual(connection.recv(1), b"")
