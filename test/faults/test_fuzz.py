@@ -72,11 +72,11 @@ def test_invalid_service_requests_never_reach_a_robot(start_driver, record):
         for name in ("velocity_controller/pid_parameters", "position_controller/pid_parameters")
         for value in (float("nan"), float("inf"), -float("inf"), 1e30, -1e30, 3e38)
     ]
-    for name, service, values in requests:
+    for name, service_type, values in requests:
         full_name = "/hero_1/" + name
         rospy.wait_for_service(full_name, 20.0)
         with pytest.raises(rospy.ServiceException, match="finite"):
-            rospy.ServiceProxy(full_name, service)(*values)
+            rospy.ServiceProxy(full_name, service_type)(*values)
         refused += robot.payloads_on(name) == []
     assert rosservice.get_service_type("/hero_1/set_odom") == "hero_msgs/SetOdom"
     service.verify()
