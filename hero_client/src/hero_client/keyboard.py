@@ -66,10 +66,12 @@ class Keyboard:
     def read_keys(self) -> Optional[List[str]]:
         """Return the keys that were pressed since the last call; None if the terminal is gone.
 
-        A key is its character, or "up", "down", "left", "right" for an arrow. Call when the terminal can be read.
+        A key is its character, or "up", "down", "left", "right" for an arrow. Never waits.
         """
         try:
             data = os.read(self.file.fileno(), 1024)
+        except BlockingIOError:
+            return []
         except OSError:
             return None
         if not data:
@@ -118,5 +120,6 @@ def open_terminal() -> IO[bytes]:
 
 
 def _open_terminal_device(path: str) -> IO[bytes]:
-    # NOCTTY: opening a terminal must not make it this session's own.
-    return os.fdopen(os.open(path, os.O_RDONLY | os.O_NOCTTY), "rb", buffering=0)
+    # NOCTTY: opening a terminal must not make it this session's own. NONBLOCK: a terminal that could be read may be empty
+    # a moment later, because Ctrl-C discards what was typed; a read that waits would go on waiting after the signal.
+    return os.fdopen(os.open(path, os.O_RDONLY | os.O_NOCTTY | os.O_NONBLOCK), "rb", buffering=0)
