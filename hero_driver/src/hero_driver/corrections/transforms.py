@@ -68,11 +68,13 @@ class TransformCorrector:
             return
         stamp_ns = secs * NS_PER_S + nsecs
         corrected_ns = self._stamps.correct(frames, stamp_ns, arrival_ns)
-        if corrected_ns == stamp_ns and nsecs < NS_PER_S:
-            head = payload[message_layouts.TRANSFORM_HEAD]
-        else:
+        if corrected_ns != stamp_ns or nsecs >= NS_PER_S:
             head = message_layouts.pack_transform_head(corrected_ns, frames)
-        self._pass_on(frames, head, payload[message_layouts.TRANSFORM_TAIL])
+            self._pass_on(frames, head, payload[message_layouts.TRANSFORM_TAIL])
+        elif frames == self._odom_frames:
+            self._take_odom_transform(payload[message_layouts.TRANSFORM_HEAD], payload[message_layouts.TRANSFORM_TAIL])
+        else:
+            self._add_transform(payload[message_layouts.TRANSFORM])
 
     def _correct_unknown(self, payload: bytes, arrival_ns: int) -> None:
         transforms = message_layouts.read_transforms(payload)
