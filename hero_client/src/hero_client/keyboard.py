@@ -120,6 +120,6 @@ def open_terminal() -> IO[bytes]:
 
 
 def _open_terminal_device(path: str) -> IO[bytes]:
-    # NOCTTY: opening a terminal must not make it this session's own. NONBLOCK: a terminal that could be read may be empty
-    # a moment later, because Ctrl-C discards what was typed; a read that waits would go on waiting after the signal.
+    # NOCTTY: opening a terminal must not make it this session's own. NONBLOCK: a terminal that could be read may be
+    # empty a moment later, because Ctrl-C discards what was typed, and a read that waits would do so for ever.
     return os.fdopen(os.open(path, os.O_RDONLY | os.O_NOCTTY | os.O_NONBLOCK), "rb", buffering=0)

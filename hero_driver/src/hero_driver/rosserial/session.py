@@ -238,10 +238,10 @@ class Session:
         """Return the events that data causes, in order. Never raises, whatever data holds."""
         self.last_receive_s = now_s
         events: List[Event] = []
+        messages = self._messages
         for topic_id, payload in self.reader.receive_bytes(data):
-            topic = self._messages.get(topic_id)
-            if topic is not None:
-                events.append(_new_message((topic, payload)))
+            if topic_id in messages:
+                events.append(_new_message((messages[topic_id], payload)))
                 self._last_configured_s = now_s
                 continue
             try:
