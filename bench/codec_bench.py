@@ -66,8 +66,8 @@ def main():
             if isinstance(event, TopicDeclared) and event.topic.kind.is_from_robot:
                 info = event.topic.info
                 event.topic.receive = corrections.handler_for(info.name, apply_aliases(info.message_type))
-        for index, events in enumerate(messages):
-            for topic, payload in events:
+        for index, (received,) in enumerate(messages):
+            for topic, payload in received.messages:
                 topic.receive(payload, start_ns + index * BURST_NS)
 
     print_machine(measure_machine_us())

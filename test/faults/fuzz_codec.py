@@ -14,7 +14,7 @@ with atheris.instrument_imports():
     from hero_driver.corrections.wheel_motion import WheelMotion
     from hero_driver.fleet import log_lines
     from hero_driver.rosserial.packets import DEFAULT_MAX_PAYLOAD_LENGTH, OVERHEAD_LENGTH
-    from hero_driver.rosserial.session import LogReceived, Session, SessionLimits
+    from hero_driver.rosserial.session import LogReceived, MessagesReceived, Session, SessionLimits
 
 MAX_TOPICS = 64
 ARRIVAL_NS = 1795240942 * 10**9
@@ -35,24 +35,24 @@ class Sink:
 
 
 def try_bytes(data):
-    """Let one robot say data, cut where its first byte says, and clean what comes of it."""
+    """Let one robot send data, cut as its first byte says, and correct the messages in it."""
     session = Session(SessionLimits(max_topics=MAX_TOPICS), 0.0)
     sink = Sink()
-    cleaner = RobotCorrections("/hero_0", SETTINGS, lambda name: sink, sink.publish, WheelMotion())
+    corrections = RobotCorrections("/hero_0", SETTINGS, lambda name: sink, sink.publish, WheelMotion())
     step = 1 + (data[0] if data else 0)
     for index, start in enumerate(range(1, len(data), step)):
         for event in session.receive_bytes(data[start : start + step], 0.01 * index, 1795240942.0):
-            if type(event) is tuple:
-                topic, payload = event
-                message_type = TYPES.get(topic.info.message_type, topic.info.message_type)
-                cleaner.handler_for(topic.info.name, message_type)(payload, ARRIVAL_NS)
+            if isinstance(event, MessagesReceived):
+                for topic, payload in event.messages:
+                    message_type = TYPES.get(topic.info.message_type, topic.info.message_type)
+                    corrections.handler_for(topic.info.name, message_type)(payload, ARRIVAL_NS)
             elif type(event) is LogReceived:
                 log_lines.read_log_line(event.log.text)
         session.poll(0.01 * index)
     if len(session.topics) > MAX_TOPICS:
         raise AssertionError("more topics than allowed")
     if session.reader.buffered_length >= DEFAULT_MAX_PAYLOAD_LENGTH + OVERHEAD_LENGTH:
-        raise AssertionError("more bytes kept than one frame")
+        raise AssertionError("more bytes kept than one packet")
 
 
 if __name__ == "__main__":

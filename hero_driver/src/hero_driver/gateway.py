@@ -29,7 +29,7 @@ from .rosserial.session import (
     CallReceived,
     Event,
     LogReceived,
-    MessageReceived,
+    MessagesReceived,
     ParameterRequested,
     Problem,
     Session,
@@ -161,9 +161,9 @@ class Gateway(LinkHandler):
         if session.outgoing:
             self._send_outgoing(peer)
         for event in events:
-            if isinstance(event, MessageReceived):
-                topic, payload = event  # cheaper than by name, and this runs for every message
-                topic.receive(payload, arrival_ns)
+            if isinstance(event, MessagesReceived):
+                for topic, payload in event.messages:
+                    topic.receive(payload, arrival_ns)
             else:
                 self._receive_event(peer, event, now_s)
                 if link.closed:

@@ -11,7 +11,7 @@ from robot_messages import NOW_NS, read_odometry, read_stamp_ns, read_transform
 from hero_driver.corrections.robot_corrections import TRANSFORMS
 from hero_driver.corrections.tick_odometry import Pose
 from hero_driver.ros.message_types import apply_aliases
-from hero_driver.rosserial.session import MessageReceived, Session, SessionLimits, TopicDeclared
+from hero_driver.rosserial.session import MessagesReceived, Session, SessionLimits, TopicDeclared
 
 START_NS = 1795240942 * 10**9 + 831 * 10**6
 """When recording A was made; its server gave the robot this time."""
@@ -28,11 +28,11 @@ def clean(data, namespace, start_ns, **settings):
             if type(event) is TopicDeclared:
                 info = event.topic.info
                 event.topic.receive = corrections.handler_for(info.name, apply_aliases(info.message_type))
-            elif isinstance(event, MessageReceived):
-                topic, payload = event
-                if topic.info.name.endswith("/set_odom"):
-                    corrections.odometry.set_pose(Pose(1.0, 2.0, 0.5))
-                topic.receive(payload, arrival_ns)
+            elif isinstance(event, MessagesReceived):
+                for topic, payload in event.messages:
+                    if topic.info.name.endswith("/set_odom"):
+                        corrections.odometry.set_pose(Pose(1.0, 2.0, 0.5))
+                    topic.receive(payload, arrival_ns)
     return corrections, outputs
 
 

@@ -12,7 +12,7 @@ from hero_driver.config import ConfigError, DriverConfig, read_config
 from hero_driver.fleet.log_lines import LONGEST_TEXT, read_log_line
 from hero_driver.fleet.namespaces import identify
 from hero_driver.rosserial.packets import DEFAULT_MAX_PAYLOAD_LENGTH, OVERHEAD_LENGTH, PacketReader
-from hero_driver.rosserial.session import MessageReceived, SessionEnded
+from hero_driver.rosserial.session import MessagesReceived, SessionEnded
 
 MAX_TOPICS = 8
 
@@ -99,7 +99,8 @@ def test_what_one_robot_sends_never_changes_what_another_one_says(bad):
         together += good.receive_bytes(STREAM[start : start + 97], now_s, TIME_OF_DAY_S)
         together += good.poll(now_s)
     assert together == alone
-    assert sum(isinstance(event, MessageReceived) for event in together) == 6
+    messages = [message for event in together if isinstance(event, MessagesReceived) for message in event.messages]
+    assert len(messages) == 6
 
 
 @given(order=st.permutations(range(12)), ids=st.lists(st.integers(0, 65535), min_size=12, max_size=12))

@@ -7,10 +7,9 @@ Source: ros_lib node_handle.h (negotiateTopics, requestSyncTime, spinOnce) and t
 """
 
 import enum
-import functools
 import re
 from dataclasses import dataclass, field
-from typing import Callable, Dict, List, NamedTuple, Optional, Sequence, Union
+from typing import Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple, Union
 
 from . import packets, payloads
 from .errors import PacketTooLongError, PayloadError, TopicIdError
@@ -21,7 +20,7 @@ __all__ = [
     "CallReceived",
     "Event",
     "LogReceived",
-    "MessageReceived",
+    "MessagesReceived",
     "ParameterRequested",
     "Problem",
     "Session",
@@ -98,14 +97,13 @@ class Topic:
     receive: Callable[[bytes, int], None] = field(default=_ignore, compare=False, repr=False)
 
 
-class MessageReceived(NamedTuple):
-    """The robot sent a payload on a topic that it declared, or the answer of a service that it offers."""
+class MessagesReceived(NamedTuple):
+    """The robot sent payloads, one after the other, on topics that it declared or as answers of services it offers.
 
-    topic: Topic
-    payload: bytes
+    One event for all of them, because a robot sends 200 messages per second.
+    """
 
-
-_new_message = functools.partial(tuple.__new__, MessageReceived)  # as packets._new_packet
+    messages: List[Tuple[Topic, bytes]]
 
 
 class CallReceived(NamedTuple):
@@ -150,7 +148,7 @@ class SessionEnded(NamedTuple):
 
 
 Event = Union[
-    MessageReceived,
+    MessagesReceived,
     CallReceived,
     TopicDeclared,
     LogReceived,
@@ -238,11 +236,15 @@ class Session:
         """Return the events that data causes, in order. Never raises, whatever data holds."""
         self.last_receive_s = now_s
         events: List[Event] = []
-        messages = self._messages
+        messages: Optional[List[Tuple[Topic, bytes]]] = None
+        topics = self._messages
         for topic_id, payload in self.reader.receive_bytes(data):
-            if topic_id in messages:
-                events.append(_new_message((messages[topic_id], payload)))
-                self._last_configured_s = now_s
+            if topic_id in topics:
+                if messages is None:
+                    messages = []
+                    events.append(MessagesReceived(messages))
+                    self._last_configured_s = now_s
+                messages.append((topics[topic_id], payload))
                 continue
             try:
                 event = self._receive_special(topic_id, payload, now_s, time_of_day_s)
@@ -250,6 +252,7 @@ class Session:
                 event = Problem(str(error))
             if event is not None:
                 events.append(event)
+                messages = None
         return events
 
     def poll(self, now_s: float) -> List[Event]:

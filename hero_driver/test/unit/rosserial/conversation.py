@@ -2,7 +2,7 @@
 
 from vectors import HANDSHAKE, REQUEST
 
-from hero_driver.rosserial.session import Session, SessionLimits
+from hero_driver.rosserial.session import MessagesReceived, Session, SessionLimits
 
 T0 = 100.0
 """When sessions are opened in these tests; a clock need not begin at zero."""
@@ -29,6 +29,11 @@ def open_declared_session(**limits):
 def receive(session, data, now_s=T0 + 1.0):
     """Give data to session and return the events."""
     return session.receive_bytes(data, now_s, TIME_OF_DAY_S)
+
+
+def list_messages(events):
+    """Return the messages among events as (topic, payload)."""
+    return [message for event in events if isinstance(event, MessagesReceived) for message in event.messages]
 
 
 def list_requests(session):

@@ -1,7 +1,15 @@
 """One conversation with a robot: when the session asks, what it answers, when it gives up."""
 
 import pytest
-from conversation import T0, list_requests, open_declared_session, open_session, poll_until, receive
+from conversation import (
+    T0,
+    list_messages,
+    list_requests,
+    open_declared_session,
+    open_session,
+    poll_until,
+    receive,
+)
 from hypothesis import given
 from hypothesis import strategies as st
 from vectors import (
@@ -22,7 +30,7 @@ from vectors import (
 from hero_driver.rosserial.errors import PacketTooLongError, PayloadError
 from hero_driver.rosserial.session import (
     LogReceived,
-    MessageReceived,
+    MessagesReceived,
     ParameterRequested,
     Problem,
     Session,
@@ -93,7 +101,7 @@ def test_undeclared_data_is_answered_by_at_most_two_requests_a_second():
     assert request_times_s == pytest.approx([T0 + 0.5, T0 + 1.0, T0 + 1.5])
     assert session.undeclared_messages == 2 * 199
     receive(session, HANDSHAKE, T0 + 2.0)
-    assert isinstance(receive(session, ODOM_MESSAGE, T0 + 2.0)[0], MessageReceived)
+    assert isinstance(receive(session, ODOM_MESSAGE, T0 + 2.0)[0], MessagesReceived)
 
 
 def test_a_robot_that_streams_on_a_new_connection_is_asked_at_once():
@@ -221,17 +229,17 @@ def test_a_declared_session_does_not_end_while_the_robot_speaks():
 def test_a_message_comes_with_its_topic_in_the_order_of_the_wire():
     session = open_declared_session()
     events = receive(session, ODOM_MESSAGE + HEARTBEAT + ENCODER_MESSAGE)
-    assert [type(event) for event in events] == [MessageReceived, LogReceived, MessageReceived]
-    topic, payload = events[0]
+    assert [type(event) for event in events] == [MessagesReceived, LogReceived, MessagesReceived]
+    ((topic, payload),) = events[0].messages
     assert topic.info.name == "/hero_0/odom"
     assert topic.kind is TopicKind.PUBLISHER
     assert payload == ODOM_MESSAGE[7:-1]
-    assert events[2][0].info.name == "/hero_0/encoder"
+    assert [topic.info.name for topic, _ in events[2].messages] == ["/hero_0/encoder"]
 
 
 def test_the_answer_of_a_service_is_a_message_of_its_topic():
     session = open_declared_session()
-    ((topic, payload),) = receive(session, build_packet(131, b"\x01\x00\x00\x00\x00"))
+    ((topic, payload),) = list_messages(receive(session, build_packet(131, b"\x01\x00\x00\x00\x00")))
     assert topic.kind is TopicKind.SERVICE_ANSWERS
     assert topic.info.name == "/hero_0/set_odom"
     assert payload == b"\x01\x00\x00\x00\x00"
@@ -268,7 +276,7 @@ def test_a_broken_payload_of_a_special_packet_is_only_a_problem(frame_id, payloa
     (problem,) = receive(session, build_packet(frame_id, payload))
     assert type(problem) is Problem
     assert len(session.topics) == len(STOCK_TOPICS)
-    assert isinstance(receive(session, ODOM_MESSAGE)[0], MessageReceived)
+    assert isinstance(receive(session, ODOM_MESSAGE)[0], MessagesReceived)
 
 
 @pytest.mark.parametrize("topic_id", [8, 9, 11, 50, 99, 300, 65535])
@@ -276,13 +284,13 @@ def test_an_id_without_a_meaning_is_counted_and_does_no_harm(topic_id):
     session = open_declared_session()
     receive(session, build_packet(topic_id, b"abc") + TX_STOP)
     assert session.undeclared_messages == 2
-    assert isinstance(receive(session, ODOM_MESSAGE)[0], MessageReceived)
+    assert isinstance(receive(session, ODOM_MESSAGE)[0], MessagesReceived)
 
 
 def test_bad_packets_are_counted_by_the_reader_and_cost_nothing_else():
     session = open_declared_session()
     events = receive(session, ODOM_MESSAGE[:-1] + b"\x00" + ENCODER_MESSAGE)
-    assert [topic.info.topic_id for topic, _ in events] == [128]
+    assert [topic.info.topic_id for topic, _ in list_messages(events)] == [128]
     assert session.reader.bad_packets == 1
 
 
@@ -314,7 +322,12 @@ def test_any_cut_of_a_conversation_gives_the_same_events(cuts):
     positions = [0, *sorted(cuts), len(stream)]
     for start, end in zip(positions, positions[1:]):
         events += receive(session, stream[start:end])
-    assert events == whole
+    assert separate_messages(events) == separate_messages(whole)
+
+
+def separate_messages(events):
+    """Return events with each message by itself, as (topic, payload)."""
+    return [part for event in events for part in (event.messages if type(event) is MessagesReceived else [event])]
 
 
 def test_declarations_come_one_by_one_too():

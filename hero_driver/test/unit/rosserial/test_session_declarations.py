@@ -1,7 +1,7 @@
 """What a robot may declare, what is refused, and that nothing leaves that was not declared."""
 
 import pytest
-from conversation import T0, list_requests, open_declared_session, open_session, receive
+from conversation import T0, list_messages, list_requests, open_declared_session, open_session, receive
 from hypothesis import given
 from hypothesis import strategies as st
 from vectors import (
@@ -16,7 +16,7 @@ from vectors import (
 )
 
 from hero_driver.rosserial.errors import PacketTooLongError, TopicIdError
-from hero_driver.rosserial.session import MessageReceived, Problem, TopicDeclared, TopicKind
+from hero_driver.rosserial.session import MessagesReceived, Problem, TopicDeclared, TopicKind
 
 ODOM = next(topic for topic in STOCK_TOPICS if topic[1] == 130)
 CMD_VEL = next(topic for topic in STOCK_TOPICS if topic[1] == 109)
@@ -76,8 +76,8 @@ def test_another_declaration_of_an_id_replaces_the_one_before():
     session = open_declared_session()
     (event,) = receive(session, declare_twist(130, "/hero_0/other", frame_id=0))
     assert type(event) is TopicDeclared
-    (message,) = receive(session, ODOM_MESSAGE)
-    assert message[0].info.name == "/hero_0/other"
+    ((topic, _),) = list_messages(receive(session, ODOM_MESSAGE))
+    assert topic.info.name == "/hero_0/other"
 
 
 def test_ids_redeclared_too_often_are_refused_and_keep_their_name():
@@ -96,7 +96,7 @@ def test_an_id_that_changes_its_direction_changes_what_may_be_sent():
     receive(session, declare_twist(109, "/hero_0/twist", frame_id=0))
     with pytest.raises(TopicIdError):
         session.encode_message(109, bytes(48))
-    assert isinstance(receive(session, build_packet(109, bytes(48)))[0], MessageReceived)
+    assert isinstance(receive(session, build_packet(109, bytes(48)))[0], MessagesReceived)
     receive(session, declare_twist(130, "/hero_0/odom", frame_id=1))
     assert session.encode_message(130, bytes(48)) == build_packet(130, bytes(48))
 
@@ -155,7 +155,7 @@ def test_a_bad_declaration_is_a_problem_in_one_line_while_the_others_work(name):
     events = receive(
         session, build_declaration(*ODOM) + declaration + build_declaration(*CMD_VEL) + ODOM_MESSAGE
     )
-    assert [type(event) for event in events] == [TopicDeclared, Problem, TopicDeclared, MessageReceived]
+    assert [type(event) for event in events] == [TopicDeclared, Problem, TopicDeclared, MessagesReceived]
     assert words in events[1].text
     assert "refused" in events[1].text
     assert events[1].text.isprintable()
