@@ -239,8 +239,10 @@ class TestDriverBadInput(OwnDriverCase):
         self.assertTrue(stop(False).success)
         self.assert_alive(robot)
         for connection in waiting:
+            connection.setblocking(False)
             with self.assertRaises(BlockingIOError):
-                connection.recv(1, socket.MSG_DONTWAIT)
+                connection.recv(1)
+            connection.settimeout(20.0)
         wait_for(lambda: len(list(files.iterdir())) <= before + 10, "the driver to close what waits")
         for connection in waiting:
             self.assertEqual(connection.recv(1), b"")
