@@ -7,8 +7,6 @@ import argparse
 import asyncio
 import contextlib
 import json
-import os
-import signal
 import socket
 import sys
 import threading
@@ -32,6 +30,7 @@ from tornado.httpclient import HTTPRequest
 from tornado.websocket import websocket_connect
 
 from hero_client.drivers import Drivers
+from hero_test.processes import suspended
 
 HERE = Path(__file__).resolve().parent
 POLL_S = 0.02
@@ -140,25 +139,19 @@ def measure_row(suite, swarm, title, stop, presses):
 @contextlib.contextmanager
 def disturbed(suite, condition):
     """Let something hang."""
-    frozen = []
     with contextlib.ExitStack() as stack:
         if condition == "hung master":
-            frozen.append(rosgraph.Master("/bench").getPid())
+            stack.enter_context(suspended(rosgraph.Master("/bench").getPid()))
         elif condition == "hung driver":
-            frozen.append(suite.start_second_driver())
+            pid = suite.start_second_driver()
             time.sleep(SETTLE_S)
+            stack.enter_context(suspended(pid))
         elif condition == "half-open connections":
             uri = rosgraph.Master("/bench").lookupService("/hero_driver/stop")
             host, port = uri[len("rosrpc://") :].rstrip("/").rsplit(":", 1)
             for _ in range(HALF_OPEN):
                 stack.enter_context(socket.create_connection((host, int(port)))).sendall(b"\x10\x00")
-        for pid in frozen:
-            os.kill(pid, signal.SIGSTOP)
-        try:
-            yield
-        finally:
-            for pid in frozen:
-                os.kill(pid, signal.SIGCONT)
+        yield
 
 
 class StopSuite(RunningSuite):

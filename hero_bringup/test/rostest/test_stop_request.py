@@ -1,14 +1,11 @@
 #!/usr/bin/env python3
 """A stop of all robots while a driver hangs, while the ROS master hangs, and what people see of it."""
 
-import contextlib
 import json
 import math
-import os
 import signal
 import subprocess
 import unittest
-import xmlrpc.client
 
 import rosgraph
 import rospy
@@ -19,7 +16,7 @@ from hero_client.drivers import Drivers
 from hero_client.swarm import Swarm
 from hero_msgs.msg import Robot, RobotArray
 from hero_test.example_program import ExampleProgram
-from hero_test.processes import find_program
+from hero_test.processes import find_pid, find_program, suspended
 from hero_test.program_terminal import ProgramTerminal, run_fleet
 from hero_test.waiting import wait_for
 
@@ -47,24 +44,6 @@ class Reports:
         return int(self.newest.listening.rpartition(":")[2])
 
 
-def find_pid(node):
-    """Return the process of a node, or of the ROS master."""
-    uri = rosgraph.get_master_uri() if node is None else rosgraph.Master("/test").lookupNode(node)
-    return xmlrpc.client.ServerProxy(uri).getPid("/test")[2]
-
-
-@contextlib.contextmanager
-def hanging(*pids):
-    """Let processes hang for as long as the context lasts."""
-    for pid in pids:
-        os.kill(pid, signal.SIGSTOP)
-    try:
-        yield
-    finally:
-        for pid in pids:
-            os.kill(pid, signal.SIGCONT)
-
-
 def refuse_constant(name):
     raise AssertionError("%s is not JSON" % name)
 
@@ -77,7 +56,7 @@ class StopRequestTest(unittest.TestCase):
         cls.healthy = cls.reports["/hero_driver"]
         cls.drivers = Drivers()
         wait_for(lambda: len(cls.drivers.names()) == 2, "drivers that are found")
-        cls.master_pid, cls.hung_pid = find_pid(None), find_pid("/hero_driver_b")
+        cls.master_pid, cls.hung_pid = rosgraph.Master("/test").getPid(), find_pid("/hero_driver_b")
 
     def setUp(self):
         def release():
@@ -99,7 +78,7 @@ class StopRequestTest(unittest.TestCase):
         self.assertTrue(self.drivers.read().stopped)
 
     def test_a_hung_driver_is_named_and_stopped_when_it_goes_on(self):
-        with hanging(self.hung_pid):
+        with suspended(self.hung_pid):
             self.drivers.request_stop(True)
             self.assertIn("driver hero_driver_b does not answer", self.drivers.wait_for_stop().text)
             wait_for(lambda: self.drivers.stop_status() == HUNG, self.drivers.stop_status)
@@ -110,7 +89,7 @@ class StopRequestTest(unittest.TestCase):
 
     def test_a_driver_that_starts_while_another_is_asked_is_stopped_too(self):
         reports = Reports("/hero_driver_c")
-        with hanging(self.hung_pid):
+        with suspended(self.hung_pid):
             self.drivers.request_stop(True)
             self.assertIn("driver hero_driver_b does not answer", self.drivers.wait_for_stop().text)
             wait_for(lambda: self.drivers.stop_status() == HUNG, self.drivers.stop_status)
@@ -123,7 +102,7 @@ class StopRequestTest(unittest.TestCase):
                 driver.wait()
 
     def test_every_one_of_ten_presses_reaches_the_healthy_driver(self):
-        with hanging(self.hung_pid, self.master_pid):
+        with suspended(self.hung_pid, self.master_pid):
             for _ in range(10):
                 before = self.healthy.requests
                 self.drivers.request_stop(True)
@@ -133,7 +112,7 @@ class StopRequestTest(unittest.TestCase):
 
     def test_the_key_s_stops_though_the_master_and_a_driver_hang(self):
         table = self.open_table()
-        with hanging(self.hung_pid, self.master_pid):
+        with suspended(self.hung_pid, self.master_pid):
             table.press(b"s")
             wait_for(lambda: self.healthy.newest.stopped, "the stop of the healthy driver")
             table.wait_for(b"stopping")
@@ -150,7 +129,7 @@ class StopRequestTest(unittest.TestCase):
 
     def test_fleet_ends_while_the_master_hangs_and_names_who_is_not_stopped(self):
         table = self.open_table()
-        with hanging(self.hung_pid, self.master_pid):
+        with suspended(self.hung_pid, self.master_pid):
             table.press(b"sq")
             self.assertEqual(table.wait_for_end(), 1)
             table.wait_for(b"fleet: NOT STOPPED: driver hero_driver_b does not answer")
@@ -174,7 +153,7 @@ class StopRequestTest(unittest.TestCase):
         self.assertTrue(self.drivers.read().stopped)
         teleop.press(b"w")
         teleop.wait_for(b"all robots are stopped, so hero_0 cannot move: r releases them\r\n")
-        with hanging(self.hung_pid, self.master_pid):
+        with suspended(self.hung_pid, self.master_pid):
             teleop.press(b"\r")
             teleop.wait_for(b"\x1b[1;31mhero_0 | NOT STOPPED: driver hero_driver_b does not answer")
         teleop.press(b"r")

@@ -5,9 +5,7 @@ import json
 import os
 import signal
 import unittest
-import xmlrpc.client
 
-import rosgraph
 import rospy
 import rostest
 from geometry_msgs.msg import Twist
@@ -16,6 +14,7 @@ from hero_client.drivers import Drivers
 from hero_client.swarm import Swarm
 from hero_monitor.background import Background
 from hero_monitor.commander import Commander
+from hero_test.processes import find_pid, suspended
 from hero_test.program_terminal import ProgramTerminal, run_fleet
 from hero_test.swarm_watch import SwarmWatch
 from hero_test.waiting import wait_for
@@ -29,11 +28,6 @@ def read_fleet(*arguments):
     code, output, errors = run_fleet("--once", "--json", *arguments)
     assert code == 0, errors
     return json.loads(output)
-
-
-def find_pid(node):
-    """Return the process of a node."""
-    return xmlrpc.client.ServerProxy(rosgraph.Master("/test").lookupNode(node)).getPid("/test")[2]
 
 
 class TwoDriversTest(unittest.TestCase):
@@ -123,14 +117,10 @@ class TwoDriversTest(unittest.TestCase):
 
     def test_5_a_driver_that_hangs_keeps_no_other_from_its_stop(self):
         self.wait_until_all_move()
-        pid = find_pid("/hero_driver_b")
-        os.kill(pid, signal.SIGSTOP)
-        try:
+        with suspended(find_pid("/hero_driver_b")):
             self.drivers.request_stop(True)
             self.watch.wait_until_stopped(0, 1, act=self.drive)
             self.wait_for_status("error", "NOT STOPPED: driver hero_driver_b does not answer", False)
-        finally:
-            os.kill(pid, signal.SIGCONT)
         self.wait_for_status("info", "stopped, all wheels at rest", True)
         self.release()
 

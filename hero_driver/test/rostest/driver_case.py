@@ -1,9 +1,7 @@
 """What the rostests of the driver share: waiting for conditions, watching topics, and drivers with own parameters."""
 
-import contextlib
 import os
 import re
-import signal
 import unittest
 import xmlrpc.client
 
@@ -19,16 +17,6 @@ from hero_test.processes import Program, find_program
 from hero_test.waiting import wait_for
 
 NODE = "/hero_driver"
-
-
-@contextlib.contextmanager
-def frozen(pid):
-    """Stop a process for a while; it keeps its sockets but reads and answers nothing."""
-    os.kill(pid, signal.SIGSTOP)
-    try:
-        yield
-    finally:
-        os.kill(pid, signal.SIGCONT)
 
 
 def list_publishers(topic):

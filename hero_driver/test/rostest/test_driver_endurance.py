@@ -13,7 +13,6 @@ import stock_messages
 from driver_case import (
     OwnDriverCase,
     Recorder,
-    frozen,
     has_connection,
     list_driver_topics,
     make_publisher,
@@ -33,6 +32,7 @@ from std_srvs.srv import Trigger, TriggerResponse
 
 from hero_driver.rosserial import packets
 from hero_msgs.msg import Encoder, Robot
+from hero_test.processes import suspended
 from hero_test.waiting import wait_for
 
 TRIGGER_REQUEST_MD5 = "d41d8cd98f00b204e9800998ecf8427e"
@@ -61,7 +61,7 @@ class TestDriverEndurance(OwnDriverCase):
         robot = self.dial(driver, 1)
         encoders = Recorder("/hero_1/encoder", Encoder)
         light = make_publisher("/hero_1/led", ColorRGBA)
-        with frozen(rosgraph.Master("/test").getPid()):
+        with suspended(rosgraph.Master("/test").getPid()):
             newcomer = self.dial(driver, 2, ready=False)
             wait_for(lambda: newcomer.requests, "a request for the newcomer's topics")
             for count in range(1, 4):
@@ -92,7 +92,7 @@ class TestDriverEndurance(OwnDriverCase):
         encoders = Recorder("/hero_2/encoder", Encoder)
         # The socket buffers of the system hold some MB; this is more.
         payload = stock_messages.make_laser("hero_1", rospy.Time(3), [0.1] * 8) + bytes(3500)
-        with frozen(reader.pid):
+        with suspended(reader.pid):
             for count in range(1, 41):
                 for _ in range(100):
                     loud.send("laser", payload)

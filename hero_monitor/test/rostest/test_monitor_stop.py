@@ -2,10 +2,7 @@
 """STOP ALL in a real browser: what people see while robots stop, stand, move though stopped, or nobody answers."""
 
 import json
-import os
-import signal
 import unittest
-import xmlrpc.client
 
 import rosgraph
 import rospy
@@ -22,16 +19,12 @@ from monitor_process import (
 from std_msgs.msg import Bool, String
 
 from hero_msgs.msg import RobotArray
+from hero_test.processes import find_pid, suspended
 from hero_test.waiting import wait_for
 
 HOST = "127.0.0.1:21333"
 DRIVERS = ("hero_driver", "hero_driver_b")
 RED, AMBER, GREEN = "error", "warn", "info"
-
-
-def find_pid(node):
-    """Return the process of a node."""
-    return xmlrpc.client.ServerProxy(rosgraph.Master("/test").lookupNode(node)).getPid("/test")[2]
 
 
 @unittest.skipIf(MISSING, "not installed: %s (script/bootstrap --test)" % ", ".join(MISSING))
@@ -96,12 +89,6 @@ class StopTest(unittest.TestCase):
         for page in pages or (self.page, self.other):
             wait_for(lambda page=page: page.banner() == (level, text), lambda page=page: page.banner())
 
-    def suspend(self, pid):
-        """Suspend a process until the end of the test, or until what is returned is called."""
-        os.kill(pid, signal.SIGSTOP)
-        self.addCleanup(os.kill, pid, signal.SIGCONT)
-        return lambda: os.kill(pid, signal.SIGCONT)
-
     def stop_states(self, page):
         return {row[0]: row[2] for row in page.rows() if row[1] != "REFUSED"}
 
@@ -153,30 +140,24 @@ class StopTest(unittest.TestCase):
         self.page.actions().release().perform()
 
     def test_a_driver_that_hangs_is_named_and_the_other_one_stops(self):
-        resume = self.suspend(self.drivers[1].pid)
-        self.page.click("#stop")
-        wait_for(lambda: self.reports["hero_driver"].stopped, "the stop of the other driver")
-        self.wait_for_banner(RED, "NOT STOPPED: driver hero_driver_b does not answer")
-        resume()
+        with suspended(self.drivers[1].pid):
+            self.page.click("#stop")
+            wait_for(lambda: self.reports["hero_driver"].stopped, "the stop of the other driver")
+            self.wait_for_banner(RED, "NOT STOPPED: driver hero_driver_b does not answer")
         self.wait_for_banner(GREEN, "stopped, all wheels at rest")
 
     def test_a_stop_needs_no_ros_master(self):
-        pid = rosgraph.Master("/test").getPid()
-        os.kill(pid, signal.SIGSTOP)
-        try:
+        with suspended(rosgraph.Master("/test").getPid()):
             self.page.click("#stop")
             self.wait_for_reports(True)
             self.wait_for_banner(GREEN, "stopped, all wheels at rest")
-        finally:
-            os.kill(pid, signal.SIGCONT)
 
     def test_the_page_reports_that_the_monitor_does_not_answer(self):
-        resume = self.suspend(find_pid("/hero_monitor"))
-        self.page.click("#stop")
-        self.assertEqual(self.page.banner(), (AMBER, "stopping"))
-        self.wait_for_banner(RED, "NOT STOPPED: the monitor does not answer", self.page)
-        self.page.save("monitor_no_answer.png")
-        resume()
+        with suspended(find_pid("/hero_monitor")):
+            self.page.click("#stop")
+            self.assertEqual(self.page.banner(), (AMBER, "stopping"))
+            self.wait_for_banner(RED, "NOT STOPPED: the monitor does not answer", self.page)
+            self.page.save("monitor_no_answer.png")
         self.wait_for_reports(True)
         self.wait_for_banner(GREEN, "stopped, all wheels at rest")
 

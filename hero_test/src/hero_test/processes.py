@@ -1,11 +1,15 @@
 """Programs as processes of their own, what they print, and free ports for them. Knows nothing of ROS topics."""
 
+import contextlib
 import os
 import re
 import signal
 import socket
 import subprocess
 import threading
+import xmlrpc.client
+
+import rosgraph
 
 from hero_test.waiting import TIMEOUT_S, wait_for
 
@@ -21,6 +25,23 @@ def find_program(package, name):
     """Return the path of a program: rosrun is a shell around it, which would get the signals meant for it."""
     found = subprocess.check_output(["catkin_find", "--first-only", "--libexec", package, name])
     return found.decode().strip()
+
+
+def find_pid(node):
+    """Return the process of a node that runs."""
+    return xmlrpc.client.ServerProxy(rosgraph.Master("/test").lookupNode(node)).getPid("/test")[2]
+
+
+@contextlib.contextmanager
+def suspended(*pids):
+    """Suspend processes for as long as the context lasts: they keep their sockets, but read and answer nothing."""
+    for pid in pids:
+        os.kill(pid, signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        for pid in pids:
+            os.kill(pid, signal.SIGCONT)
 
 
 class Program:
