@@ -9,7 +9,7 @@ import time
 import pytest
 import rospy
 import stock_messages
-from driver_case import Recorder, frozen, make_publisher
+from driver_case import Recorder, make_publisher
 from fake_robot import TIME_PACKET, FakeRobot
 from geometry_msgs.msg import Twist
 from rig import HERE
@@ -19,7 +19,7 @@ from steady_time import StallWatch
 
 from hero_driver.rosserial import packets, payloads
 from hero_msgs.msg import Encoder
-from hero_test.processes import find_free_port
+from hero_test.processes import find_free_port, suspended
 from hero_test.waiting import wait_for
 
 ROBOTS = 3
@@ -86,7 +86,7 @@ def test_the_driver_ends_although_the_master_hangs(master, start_driver, record)
     # A number of its own: the master may go on to list what this driver could not take down.
     robot = FakeRobot(90).connect(driver.address)
     driver.fleet.wait_ready("/hero_90")
-    with frozen(master.pid):
+    with suspended(master.pid):
         driver.process.send_signal(signal.SIGTERM)
         code = driver.wait_end()
     robot.close()

@@ -8,7 +8,7 @@ import time
 
 import pytest
 import rospy
-from driver_case import frozen, has_connection, list_driver_topics, make_publisher
+from driver_case import has_connection, list_driver_topics, make_publisher
 from fake_robot import FakeRobot
 from geometry_msgs.msg import Twist
 from rig import STOCK_NAMES, count_holdings, start_python
@@ -18,6 +18,7 @@ from steady_time import StallWatch
 from stock_messages import make_laser
 
 from hero_msgs.srv import SetPID
+from hero_test.processes import suspended
 from hero_test.waiting import wait_for
 
 BACK_WITHIN_S = 10.0
@@ -48,7 +49,7 @@ def test_a_suspended_subscriber_affects_nobody_else(served, effort, record):
     scan = make_laser("hero_1", rospy.Time(3), [0.1] * 8) + bytes(3500)
     rounds = effort.choose(20, 200)
     before = count_holdings(driver)
-    with frozen(reader.pid):
+    with suspended(reader.pid):
         for _ in range(rounds):
             for _ in range(100):
                 robot.send("laser", scan)

@@ -9,7 +9,7 @@ import sys
 import pytest
 import rosgraph
 import rospy
-from driver_case import frozen, make_publisher
+from driver_case import make_publisher
 from fake_robot import READ_CYCLE_S, FakeRobot
 from geometry_msgs.msg import Twist
 from rig import HERE, Master, start_python
@@ -20,7 +20,7 @@ from std_srvs.srv import SetBool, Trigger
 from hero_client.drivers import Drivers
 from hero_msgs.msg import Robot
 from hero_sim.srv import InjectFault
-from hero_test.processes import find_free_port
+from hero_test.processes import find_free_port, suspended
 from hero_test.waiting import wait_for
 
 ROBOTS = 3
@@ -77,7 +77,7 @@ def test_a_stop_needs_no_master(field, master, record):
     driver, ground_truths = field
     requests = make_publisher(driver.node + "/stop_request", Bool)
     drive(ground_truths)
-    with frozen(master.pid):
+    with suspended(master.pid):
         requests.publish(Bool(True))
         wait_until_stopped(ground_truths)
         wait_for(lambda: is_confirmed(driver), "the driver's confirmation")
@@ -118,7 +118,7 @@ def test_a_hung_driver_does_not_delay_stops_of_others(field, start_driver, recor
     robot = FakeRobot(90, has_motors=True).connect(hung.address)
     hung.fleet.wait_ready("/hero_90")
     with asking(2) as drivers:
-        with frozen(hung.process.pid):
+        with suspended(hung.process.pid):
             for presses in (1, 10):
                 drive(ground_truths)
                 for _ in range(presses):

@@ -9,7 +9,7 @@ import subprocess
 import xml.etree.ElementTree as ElementTree
 from functools import lru_cache
 from pathlib import Path
-from typing import Dict, List, NamedTuple
+from typing import Dict, FrozenSet, List, NamedTuple
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -81,6 +81,23 @@ def name_of(path: Path) -> str:
 def parse(path: Path) -> ast.Module:
     """The syntax tree of a Python file."""
     return ast.parse(path.read_text(encoding="utf-8"), filename=str(path))
+
+
+@lru_cache(maxsize=None)
+def list_top_level_names(path: Path) -> FrozenSet[str]:
+    """The names that a module defines or imports, in branches of it too, but not in its functions and classes."""
+    names, waiting = set(), list(parse(path).body)
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, (ast.FunctionDef, ast.ClassDef)):
+            names.add(node.name)
+        elif isinstance(node, (ast.Import, ast.ImportFrom)):
+            names.update((alias.asname or alias.name).split(".")[0] for alias in node.names)
+        elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+            names.add(node.id)
+        else:
+            waiting += ast.iter_child_nodes(node)
+    return frozenset(names)
 
 
 def read_cmake(package: str) -> str:

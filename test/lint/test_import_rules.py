@@ -1,5 +1,7 @@
 """The borders between the layers, as ARCHITECTURE.md draws them: who may import what."""
 
+import ast
+
 import pytest
 import sources
 
@@ -120,6 +122,21 @@ def test_the_simulator_shares_only_packets_and_payloads_with_the_driver(name):
                 found.module == module or found.module.startswith(module + ".") for module in shared
             )
             assert allowed, f"line {found.line}: {found.module}"
+
+
+@pytest.mark.parametrize("path", sources.list_python_files(), ids=sources.name_of)
+def test_names_that_are_imported_from_our_modules_exist(path):
+    by_module = {}
+    for other in sources.list_python_files():  # a directory of tests is on the path: its modules go by their stem
+        by_module.setdefault(other.stem, set()).update(sources.list_top_level_names(other))
+    modules = sources.list_source_modules().items()
+    by_module.update((name, sources.list_top_level_names(other)) for name, other in modules)
+    for node in ast.walk(sources.parse(path)):
+        if isinstance(node, ast.ImportFrom) and not node.level and node.module in by_module:
+            for alias in node.names:
+                is_module = f"{node.module}.{alias.name}" in by_module
+                is_name = by_module[node.module] & {alias.name, "__getattr__"}
+                assert is_module or is_name, f"line {node.lineno}: {alias.name}"
 
 
 def test_the_rooms_and_modules_that_the_rules_name_exist():
