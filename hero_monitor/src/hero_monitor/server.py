@@ -43,7 +43,9 @@ WAITING_MAX = 5
 PING_INTERVAL_S = 3.0
 PING_TIMEOUT_S = 9.0
 LONGEST_REQUEST = 4096
-LISTEN_BACKLOG = 1024
+LISTEN_BACKLOG = 4096
+"""As many as the kernel keeps by default (net.core.somaxconn): a connection that finds the queue full may be reset."""
+
 EXPIRE_PERIOD_S = 1.0
 
 
