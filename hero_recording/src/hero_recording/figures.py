@@ -25,9 +25,13 @@ MOST_ROWS = 8
 BINS_PER_S = 2.0
 """Of the image of speeds: short enough to show a stop."""
 
+NO_COMMANDS = "no commands recorded:\nnothing on /hero_N/velocity_controller/cmd_vel"
+
 DELAY_TICKS_MS = (-50, 0, 50, 100, 300, 1000, 3000, 10000)
 
 _GREY = "0.45"
+_OBSTACLES = {"edgecolor": "black", "linewidth": 1.5}
+"""Walls and round obstacles alike."""
 
 # Okabe and Ito's palette (2008) without its yellow, which is hard to see on white.
 _FEW = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -102,9 +106,9 @@ class Figures:
         figure, grid = self._begin(8.0, "Paths by odometry")
         axes = grid[0][0]
         walls = [[(x1, y1), (x2, y2)] for x1, y1, x2, y2 in self._seen.walls_m]
-        axes.add_collection(LineCollection(walls, colors="black", linewidths=1.5))
+        axes.add_collection(LineCollection(walls, **_OBSTACLES))
         for x_m, y_m, radius_m in self._seen.circles_m:
-            axes.add_patch(patches.Circle((x_m, y_m), radius_m, color="0.75"))
+            axes.add_patch(patches.Circle((x_m, y_m), radius_m, fill=False, **_OBSTACLES))
         begin = {"marker": "o", "markerfacecolor": "white", "markersize": 4, "linestyle": ""}
         legend = [
             Line2D([], [], color=_GREY, label="start", **begin),
@@ -112,6 +116,8 @@ class Figures:
         ]
         if any(len(robot.ground_truth) and robot.origins for robot in drawn.values()):
             legend.append(Line2D([], [], color=_GREY, linewidth=2.2, alpha=0.4, label="ground truth"))
+        if self._seen.walls_m or self._seen.circles_m:
+            legend.append(Line2D([], [], color="black", linewidth=1.5, label="walls, obstacles"))
         for robot_id, robot in drawn.items():
             color = self._colors[robot_id]
             if robot.origins:
@@ -175,9 +181,10 @@ class Figures:
             axes.set_title(text, fontsize=9)
         for axes in grid[-1]:
             axes.set_xlabel("time (s)")
+        is_commanded = any(len(robot.commands) for robot in drawn.values())
         handles = [
             Line2D([], [], color="black", linewidth=0.8, label="odometry"),
-            Line2D([], [], color=_GREY, linewidth=0.8, label="commanded"),
+            Line2D([], [], color=_GREY, linewidth=0.8, label="commanded" if is_commanded else NO_COMMANDS),
         ]
         figure.legend(handles=handles, loc="upper right", fontsize=8, frameon=False, ncol=2)
         return figure
@@ -235,13 +242,20 @@ class Figures:
         motion_axes.set_title("each dot is one start, bar: median", fontsize=8)
         motion_axes.set_xlim(0.0, None if motion_axes.lines else 1.0)
         if not motion_axes.lines:
-            text = "no start from rest\nin this recording"
-            motion_axes.text(0.5, 0.5, text, transform=motion_axes.transAxes, ha="center")
+            motion_axes.text(0.5, 0.5, self._explain_no_motion(), transform=motion_axes.transAxes, ha="center")
         for axes in grid[0]:
             axes.grid(axis="x", color="0.9", linewidth=0.5)
             axes.set_axisbelow(True)
             axes.xaxis.label.set_fontsize(8)
         return figure
+
+    def _explain_no_motion(self) -> str:
+        """Return why there is no delay from a command to a motion."""
+        if not any(len(robot.commands) for robot in self._robots.values()):
+            return NO_COMMANDS
+        if not any(len(robot.encoder) for robot in self._robots.values()):
+            return "no encoder readings recorded:\nnothing on /hero_N/encoder"
+        return "no robot started from rest:\nstart recording before the program"
 
     @staticmethod
     def _draw_delay_box(axes: Axes, row: int, delays_ms: np.ndarray, color: Any) -> None:

@@ -16,7 +16,15 @@ from .errors import RecordingError
 from .observations import Observations, RobotObservations
 from .options import list_of, robot_ids
 
-FIGURES = ("paths", "speeds", "delays", "connections", "errors")
+FIGURES = {
+    "paths": "/hero_N/odom",
+    "speeds": "/hero_N/odom",
+    "delays": "/hero_N/odom",
+    "connections": "/hero_driver/robots",
+    "errors": "/hero_N/odom with /hero_N/ground_truth",
+}
+"""And the topics without which there is nothing to draw."""
+
 SHORTEST_DISTANCE_M = 0.05
 """An error is not given as a share of less than this."""
 
@@ -28,7 +36,7 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--robots", type=robot_ids, default="all", help="ids, e.g. '0 1 2' or 0-3 (all)")
     every, text = ",".join(FIGURES), "which, separated by commas (%(default)s)"
     parser.add_argument("--figures", type=list_of(FIGURES), default=every, metavar="LIST", help=text)
-    parser.add_argument("--format", choices=("png", "pdf"), default="png", help="a PNG for each, or one PDF (png)")
+    parser.add_argument("--format", choices=("png", "pdf"), default="png", help="of the files (png)")
     parser.add_argument("--out", metavar="PREFIX", help="prefix of the file names (the first bag's name)")
     return parser.parse_args(arguments)
 
@@ -46,35 +54,27 @@ def observe(options: argparse.Namespace, bags: BagSet) -> Observations:
 
 
 def draw(options: argparse.Namespace, observations: Observations, bags: BagSet) -> List[str]:
-    """Write the figures; return the paths of the files. Raises: RecordingError."""
-    from matplotlib.backends.backend_pdf import PdfPages
-
+    """Write the figures; return the path of each, or why there is none. Raises: RecordingError."""
     from .figures import Figures
 
     names = os.path.basename(bags.paths[0])
     if len(bags.paths) > 1:
         names += " and %d more" % (len(bags.paths) - 1)
     drawing = Figures(observations, bags.start_s, bags.end_s, names)
-    figures = [(name, getattr(drawing, "draw_" + name)()) for name in options.figures]
-    figures = [(name, figure) for name, figure in figures if figure is not None]
-    if not figures:
-        raise RecordingError("%s: nothing to draw of %s" % (names, ", ".join(options.figures)))
     prefix = options.out or os.path.splitext(bags.paths[0])[0]
-    try:
-        if options.format == "pdf":
-            paths = [prefix if prefix.endswith(".pdf") else prefix + ".pdf"]
-            with PdfPages(paths[0]) as pages:
-                for _, figure in figures:
-                    pages.savefig(figure)
-        else:
-            paths = ["%s_%s.png" % (prefix, name) for name, _ in figures]
-            for path, (_, figure) in zip(paths, figures):
-                figure.savefig(path, dpi=130)
-    except OSError as error:
-        raise RecordingError(
-            "%s cannot be written: %s; choose another --out" % (error.filename or prefix, error.strerror)
-        ) from error
-    return paths
+    lines = []
+    for name in options.figures:
+        path = "%s_%s.%s" % (prefix, name, options.format)
+        figure = getattr(drawing, "draw_" + name)()
+        if figure is None:
+            lines.append("no figure of %s: nothing of %s in the recording" % (name, FIGURES[name]))
+            continue
+        try:
+            figure.savefig(path, dpi=130)
+        except OSError as error:
+            raise RecordingError("%s cannot be written: %s; choose another --out" % (path, error.strerror)) from error
+        lines.append(path)
+    return lines
 
 
 def format_table(observations: Observations) -> List[str]:

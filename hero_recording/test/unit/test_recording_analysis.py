@@ -5,6 +5,7 @@ import re
 
 import numpy as np
 import pytest
+import rosbag
 import synthetic_bag
 from synthetic_bag import (
     ANGULAR_RAD_S,
@@ -213,16 +214,66 @@ def test_plot_writes_png_files_beside_the_bag_and_prints_a_table(two_robots, cap
         assert str(path) in output
 
 
-def test_plot_writes_a_pdf_with_a_page_for_each_figure(two_robots, tmp_path, capsys):
-    run_plot(capsys, two_robots, "--format", "pdf", "--out", tmp_path / "all", "--figures", "paths,delays")
-    content = (tmp_path / "all.pdf").read_bytes()
-    assert content.startswith(b"%PDF")
-    assert content.count(b"/Type /Page ") == 2
+def test_figures_can_be_chosen_and_written_as_pdf(two_robots, tmp_path, capsys):
+    run_plot(capsys, two_robots, "--format", "pdf", "--out", tmp_path / "my", "--figures", "paths,delays")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["my_delays.pdf", "my_paths.pdf"]
+    assert (tmp_path / "my_paths.pdf").read_bytes().startswith(b"%PDF")
+
+
+def write_parts(path, robot_ids, *kinds):
+    """Write a bag of synthetic robots that holds only topics that end in one of kinds."""
+    write_bag(path.parent / "whole.bag", robot_ids=robot_ids, seconds=3.0)
+    with rosbag.Bag(str(path.parent / "whole.bag")) as whole, rosbag.Bag(str(path), "w") as bag:
+        for topic, message, time in whole.read_messages():
+            if topic.endswith(kinds):
+                bag.write(topic, message, time)
+    return path
+
+
+def test_figures_for_which_a_topic_is_missing_are_named_with_it(tmp_path, capsys):
+    output = run_plot(capsys, write_parts(tmp_path / "part.bag", (0,), "/odom"))
+    assert "no figure of errors: nothing of /hero_N/odom with /hero_N/ground_truth" in output
+    output = run_plot(capsys, write_parts(tmp_path / "part.bag", (0,), "/robots"))
+    assert output.count("no figure of") == 4
+    assert "part_connections.png" in output
+
+
+@pytest.mark.parametrize(
+    ("kinds", "words"),
+    [
+        (("/odom", "/encoder"), "nothing on /hero_N/velocity_controller/cmd_vel"),
+        (("/odom", "/cmd_vel"), "nothing on /hero_N/encoder"),
+    ],
+)
+def test_an_empty_panel_names_the_topic_that_is_missing(kinds, words, tmp_path):
+    drawing = Figures(observe(write_parts(tmp_path / "part.bag", (0,), *kinds)), START_S, START_S + 3.0, "part.bag")
+    assert words in drawing.draw_delays().axes[1].texts[0].get_text()
+
+
+def test_a_recording_that_began_during_the_motion_says_when_to_begin(two_robots):
+    seen = observe(two_robots)
+    for robot in seen.robots.values():
+        first_s = robot.encoder.columns()[0][0] + 3.0
+        rows = [row for row in zip(*robot.encoder.columns()) if row[0] > first_s]
+        robot.encoder = type(robot.encoder)(3, 0)
+        for row in rows:
+            robot.encoder.add(*row)
+    axes = Figures(seen, START_S, START_S + 12.0, "two.bag").draw_delays().axes[1]
+    assert "start recording before the program" in axes.texts[0].get_text()
+
+
+def test_walls_and_round_obstacles_have_one_color_and_ground_truth_its_name(two_robots):
+    axes = Figures(observe(two_robots), START_S, START_S + 12.0, "two.bag").draw_paths().axes[0]
+    (walls,) = axes.collections
+    circle = next(patch for patch in axes.patches if patch.get_radius() == pytest.approx(0.1))
+    assert tuple(walls.get_edgecolor()[0]) == circle.get_edgecolor()
+    labels = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert {"ground truth", "walls, obstacles"} <= set(labels)
 
 
 def test_wrong_input_of_plot_is_refused_by_name(two_robots, tmp_path, capsys):
-    synthetic_bag.rosbag.Bag(str(tmp_path / "other.bag"), "w").close()
-    with synthetic_bag.rosbag.Bag(str(tmp_path / "other.bag"), "w") as bag:
+    rosbag.Bag(str(tmp_path / "other.bag"), "w").close()
+    with rosbag.Bag(str(tmp_path / "other.bag"), "w") as bag:
         bag.write("/chatter", synthetic_bag.ColorRGBA())
     for arguments, words in (
         ([tmp_path / "other.bag"], "no robot in it; its topics: /chatter"),
