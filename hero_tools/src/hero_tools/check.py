@@ -29,25 +29,22 @@ def run_check(port: int, interface: Optional[str]) -> Dict[str, Finding]:
     """Return the findings by point."""
     addresses = network.read_addresses()
     own = addresses or []
-    listeners = list(network.find_listeners(port))
+    listeners = network.find_listeners(port)
     points: Dict[str, Point] = {
         "python": computer.check_python,
         "packages": computer.check_packages,
         "messages": computer.check_messages,
-        "versions": computer.check_versions,
         "ros_environment": lambda: graph.check_variables(addresses),
         "own_name": lambda: graph.check_own_name(own),
-        "port": lambda: network.check_port(port),
-        "addresses": lambda: network.check_addresses(addresses, interface, port, listeners),
+        "port": lambda: network.check_port(port, listeners),
+        "addresses": lambda: network.check_addresses(addresses, interface, port, list(listeners)),
         "firewall": lambda: network.advise_firewall(interface or network.find_robot_interface(own), port),
-        "clock": computer.check_clock,
         "disk": computer.check_disk,
         "master": lambda: graph.check_master(own),
     }
     findings = run_points(points, FIRST_TIMEOUT_S)
     points = {
         "return_path": lambda: graph.as_node(graph.check_return_path),
-        "nodes": graph.check_nodes,
         "robots": lambda: graph.as_node(graph.check_robots),
     }
     if findings["master"].state == OK:

@@ -3,30 +3,27 @@
     rosrun hero_tools fleet                  a table like top, redrawn in place
     rosrun hero_tools fleet --once --json    the fleet as one line of JSON, for scripts
 
-Only listens, except for keys: s and r ask all drivers to stop and to release all robots, d calls the service
-disconnect. Messages of robots are decoded only when the table is drawn, which keeps fifty robots cheap. Only worker
-threads wait for the ROS master.
+Only listens, except for two keys that ask all drivers to stop and to release all robots. Messages of robots are decoded
+only when the table is drawn, which keeps fifty robots cheap. Only worker threads wait for the ROS master.
 """
 
 import argparse
 import contextlib
 import shutil
 import sys
-import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from typing import Dict, List, Optional, Sequence, Set
 
 import rospy
 
-from hero_client.drivers import STATES, STOP_STATES, Drivers
+from hero_client.drivers import Drivers
 from hero_client.keyboard import Keyboard, NoTerminalError
 from hero_client.program import Program
 from hero_client.program import run as run_program
 from hero_client.robot_listener import RobotListener, RobotTrack
 from hero_client.stop_status import StopStatus, paint
 from hero_msgs.msg import Robot
-from hero_msgs.srv import Disconnect
 
 from .fleet_rows import ORDERS, RobotRow, find_missing, sort_rows
 from .fleet_table import format_json, format_table, format_title
@@ -40,7 +37,8 @@ LEAVE_SCREEN = "\x1b[?25h\x1b[?1049l"
 HOME = "\x1b[H"
 CLEAR_LINE_END = "\x1b[K"
 CLEAR_SCREEN_END = "\x1b[J"
-KEYS_HELP = "q quit   s STOP ALL ROBOTS   r release them   o order   up, down choose   d disconnect the chosen robot"
+PRINT_PERIOD_S = 5.0  # without a terminal
+KEYS_HELP = "q quit   s STOP ALL ROBOTS   r release them   o order"
 MAX_OPTION = 1e6
 
 
@@ -90,38 +88,7 @@ class FleetListener:
         if listener is not None:
             listener.read_newest()
         track = listener.track if listener is not None else RobotTrack()
-        return RobotRow(
-            id=robot.id,
-            namespace=robot.namespace,
-            address=robot.address,
-            state=STATES.get(robot.state, str(robot.state)),
-            stop_state=STOP_STATES.get(robot.stop_state, str(robot.stop_state)),
-            odom_hz=track.odometry.rate_hz(now_s),
-            packets_per_s=robot.packets_per_s,
-            bytes_per_s=robot.bytes_per_s,
-            pose=track.pose,
-            distance_m=track.distance_m,
-            turned_rad=track.turned_rad,
-            proximity_seen=track.proximity_seen,
-            nearest=track.nearest,
-            reconnects=robot.reconnects,
-            clock_offset_s=robot.clock_offset,
-            firmware=robot.firmware,
-            last_error=robot.last_error,
-        )
-
-    def disconnect(self, robot: str, news: List[str]) -> None:
-        """Ask the robot's driver to close its connection; the outcome is added to news later."""
-        driver = self.drivers.find("/" + robot)
-        threading.Thread(target=call_disconnect, args=(driver, robot, news), daemon=True).start()
-
-
-def call_disconnect(driver: str, robot: str, news: List[str]) -> None:
-    """Call a driver's disconnect service and add the outcome to news."""
-    try:
-        news.append(rospy.ServiceProxy(driver + "/disconnect", Disconnect)(robot).message)
-    except (rospy.ServiceException, rospy.ROSException, OSError) as error:
-        news.append("%s is not disconnected: %s" % (robot, error))
+        return RobotRow(robot, track, track.odometry.rate_hz(now_s))
 
 
 class Screen:
@@ -161,10 +128,7 @@ class FleetProgram:
         self._program = program
         self._options = options
         self._fleet = FleetListener()
-        self._order = options.sort
-        self._chosen: Optional[str] = None
-        self._asks_disconnect = False
-        self._news: List[str] = []
+        self._order = ORDERS[0]
         self._start_s = time.monotonic()
         self._rows: List[RobotRow] = []
 
@@ -185,49 +149,17 @@ class FleetProgram:
             return [text[:width]]
         silent = self._fleet.drivers.find_silent()
         title = format_title(self._rows, self._fleet.listening, self._fleet.stopped, silent)
-        return [title[:width], *format_table(self._rows, width, max(2, height - 1), self._find_chosen())]
-
-    def _find_chosen(self) -> Optional[int]:
-        """Return the number of the chosen robot's row."""
-        names = [row.name for row in self._rows]
-        return names.index(self._chosen) if self._chosen in names else None
-
-    def _choose(self, step: int) -> None:
-        """Choose the next robot, or the one before."""
-        chosen = self._find_chosen()
-        if self._rows:
-            number = (0 if step > 0 else -1) if chosen is None else (chosen + step) % len(self._rows)
-            self._chosen = self._rows[number].name
-
-    def _disconnect(self) -> None:
-        """Disconnect the chosen robot at the second key in a row."""
-        if self._find_chosen() is None:
-            self._news = ["choose a robot first: up, down"]
-        elif not self._asks_disconnect:
-            self._asks_disconnect = True
-            self._news = ["d again disconnects %s" % self._chosen]
-            return
-        else:
-            self._news = ["disconnecting %s" % self._chosen]
-            self._fleet.disconnect(str(self._chosen), self._news)
-        self._asks_disconnect = False
+        return [title[:width], *format_table(self._rows, width, max(2, height - 1))]
 
     def _press(self, key: str) -> None:
         """Execute the command of a key."""
-        self._asks_disconnect = self._asks_disconnect and key == "d"
         if key == "o":
             self._order = ORDERS[(ORDERS.index(self._order) + 1) % len(ORDERS)]
-            self._news = ["order: %s" % self._order]
         elif key in ("s", "r"):
             self._fleet.drivers.request_stop(key == "s")
-        elif key in ("up", "down"):
-            self._choose(1 if key == "down" else -1)
-        elif key == "d":
-            self._disconnect()
 
     def print_fleet(self) -> None:
         """Print the fleet once, as lines or as JSON."""
-        self._chosen = None
         if self._options.json:
             print(format_json(self._rows, self._fleet.listening, self._fleet.stopped), flush=True)
         else:
@@ -248,12 +180,12 @@ class FleetProgram:
 
     def run_lines(self) -> int:
         """Print the fleet every few seconds until the time is over, and once more then."""
-        next_print_s = time.monotonic() + self._options.period
+        next_print_s = time.monotonic() + PRINT_PERIOD_S
         while self._going():
             self._program.sleep(max(0.0, min(DRAW_PERIOD_S, self._seconds_left())))
             self._read()
             if time.monotonic() >= next_print_s and self._seconds_left() > DRAW_PERIOD_S:
-                next_print_s += self._options.period
+                next_print_s += PRINT_PERIOD_S
                 self.print_fleet()
         self.print_fleet()
         return self.check_expected()
@@ -267,8 +199,6 @@ class FleetProgram:
                 screen.draw(self._make_screen(status))
                 period_s = DRAW_PERIOD_S if status is None or status.is_final else ASKING_DRAW_PERIOD_S
                 keys = screen.wait_for_keys(self._program, min(period_s, self._seconds_left()))
-                if keys:
-                    self._news = []
                 for key in keys or ():
                     self._press(key)
                 if keys is None or "q" in keys:
@@ -279,11 +209,11 @@ class FleetProgram:
         return self.check_expected()
 
     def _make_screen(self, status: Optional[StopStatus]) -> List[str]:
-        """Return all lines: the table, the state of a stop, and the keys or their outcome."""
+        """Return all lines: the table, the state of a stop, and the keys."""
         size = shutil.get_terminal_size()
         left_s = self._seconds_left()
         ending = "" if left_s == float("inf") else "   ends in %.0f s" % left_s
-        last = "".join(self._news[-1:]) or KEYS_HELP + ending
+        last = "%s (now by %s)%s" % (KEYS_HELP, self._order, ending)
         stop = "" if status is None else paint(status.level, status.text[: size.columns])
         return [*self._make_lines(size.columns, size.lines - 2), stop, last[: size.columns]]
 
@@ -308,21 +238,13 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     )
     parser.add_argument("--seconds", type=float, metavar="S", help="quit after S seconds")
     parser.add_argument(
-        "--period",
-        type=float,
-        default=5.0,
-        metavar="S",
-        help="seconds between two prints if the output is not a terminal (5)",
-    )
-    parser.add_argument("--sort", choices=ORDERS, default="id", help="order of the robots (id)")
-    parser.add_argument(
         "--expect",
         type=int,
         metavar="N",
         help="at the end list each of hero_0 to hero_(N-1) that did not join or move, and exit with 1",
     )
     options = parser.parse_args(arguments)
-    for name, lowest in (("seconds", 0.0), ("period", 0.1), ("expect", 0)):
+    for name, lowest in (("seconds", 0.0), ("expect", 0)):
         value = getattr(options, name)
         if value is not None and not lowest <= value <= MAX_OPTION:
             parser.exit(2, "fleet: --%s %s: must be from %g to %g\n" % (name, value, lowest, MAX_OPTION))

@@ -10,11 +10,11 @@ from typing import Any, Dict, List, Optional, Sequence
 from hero_client.command_line import make_printable
 from hero_client.geometry import Pose
 from hero_client.readings import Obstacle, finite
+from hero_msgs.msg import Robot
 
 from .fleet_rows import RobotRow
 
 HEADINGS = ("ROBOT", "ADDRESS", "STATE", "ODOM", "FROM ROBOT", "POSE x y yaw", "DISTANCE", "NEAREST", "")
-MARK, UNMARK = "\x1b[7m", "\x1b[27m"  # ECMA-48: the chosen row in reverse
 RIGHT_ALIGNED = {"ODOM", "FROM ROBOT", "POSE x y yaw", "DISTANCE"}
 DIRECTIONS = ("front", "front left", "left", "rear left", "rear", "rear right", "right", "front right")
 
@@ -38,42 +38,33 @@ def format_nearest(seen: bool, nearest: Optional[Obstacle]) -> str:
 
 def format_cells(row: RobotRow) -> List[str]:
     """Return one robot's cells, in the order of HEADINGS."""
-    notes = [row.last_error, "reconnected %dx" % row.reconnects if row.reconnects else ""]
+    robot, track = row.robot, row.track
+    notes = [robot.last_error, "reconnected %dx" % robot.reconnects if robot.reconnects else ""]
     return [
         make_printable(row.name),
-        make_printable(row.address),
+        make_printable(robot.address),
         ", ".join(filter(None, (row.state, row.stop_state))),
         "%.1f Hz" % row.odom_hz,
-        "%.1f kB/s" % (row.bytes_per_s / 1e3),
-        format_pose(row.pose),
-        "%.2f m" % row.distance_m,
-        format_nearest(row.proximity_seen, row.nearest),
+        "%.1f kB/s" % (robot.bytes_per_s / 1e3),
+        format_pose(track.pose),
+        "%.2f m" % track.distance_m,
+        format_nearest(track.proximity_seen, track.nearest),
         make_printable("; ".join(filter(None, notes))),
     ]
 
 
-def format_table(
-    rows: Sequence[RobotRow], width: int, height: int, chosen: Optional[int] = None
-) -> List[str]:
-    """Return heading and rows in at most height lines of at most width characters.
-
-    chosen: the number of the row that is marked and always shown.
-    """
-    shown, first = list(rows), 0
-    if len(shown) > height - 1:
-        count = max(0, height - 2)
-        first = 0 if chosen is None else min(max(0, chosen - count + 1), len(rows) - count)
-        shown = shown[first : first + count]
+def format_table(rows: Sequence[RobotRow], width: int, height: int) -> List[str]:
+    """Return heading and rows in at most height lines of at most width characters."""
+    shown = rows if len(rows) < height else rows[: max(0, height - 2)]
     table = [list(HEADINGS)] + [format_cells(row) for row in shown]
     widths = [max(len(cells[column]) for cells in table) for column in range(len(HEADINGS))]
     lines = []
-    for number, cells in enumerate(table, first - 1):
+    for cells in table:
         padded = [
             cell.rjust(size) if heading in RIGHT_ALIGNED else cell.ljust(size)
             for cell, size, heading in zip(cells, widths, HEADINGS)
         ]
-        line = "  ".join(padded).rstrip()[:width]
-        lines.append(MARK + line.ljust(width) + UNMARK if number == chosen else line)
+        lines.append("  ".join(padded).rstrip()[:width])
     if len(shown) < len(rows):
         lines.append(("... and %d more: make the terminal taller" % (len(rows) - len(shown)))[:width])
     return lines
@@ -81,7 +72,7 @@ def format_table(
 
 def format_title(rows: Sequence[RobotRow], listening: str, stopped: bool, silent: Sequence[str] = ()) -> str:
     """Return the line above the table; silent: names of drivers that do not answer."""
-    ready = sum(row.state == "READY" for row in rows)
+    ready = sum(row.robot.state == Robot.READY for row in rows)
     title = "%d of %d robots ready" % (ready, len(rows))
     if stopped:
         title += ", ALL STOPPED"  # not last: a narrow terminal cuts the end off
@@ -94,23 +85,24 @@ def format_title(rows: Sequence[RobotRow], listening: str, stopped: bool, silent
 
 def make_row_dict(row: RobotRow) -> Dict[str, Any]:
     """Return one robot for JSON. nearest is null if nothing is in range, its range_m null on contact."""
+    robot, track = row.robot, row.track
     return {
-        "id": row.id,
-        "namespace": row.namespace,
-        "address": row.address,
+        "id": robot.id,
+        "namespace": robot.namespace,
+        "address": robot.address,
         "state": row.state,
         "stop_state": row.stop_state,
         "odom_hz": round(row.odom_hz, 2),
-        "packets_per_s": round(row.packets_per_s, 2),
-        "bytes_per_s": round(row.bytes_per_s, 1),
-        "pose": row.pose and {name: finite(value) for name, value in row.pose._asdict().items()},
-        "distance_m": finite(row.distance_m),
+        "packets_per_s": round(robot.packets_per_s, 2),
+        "bytes_per_s": round(robot.bytes_per_s, 1),
+        "pose": track.pose and {name: finite(value) for name, value in track.pose._asdict().items()},
+        "distance_m": finite(track.distance_m),
         "moved": row.moved,
-        "nearest": row.nearest and {name: finite(value) for name, value in row.nearest._asdict().items()},
-        "reconnects": row.reconnects,
-        "clock_offset_s": finite(row.clock_offset_s),
-        "firmware": row.firmware,
-        "last_error": row.last_error,
+        "nearest": track.nearest and {name: finite(value) for name, value in track.nearest._asdict().items()},
+        "reconnects": robot.reconnects,
+        "clock_offset_s": finite(robot.clock_offset),
+        "firmware": robot.firmware,
+        "last_error": robot.last_error,
     }
 
 

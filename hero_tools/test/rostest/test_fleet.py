@@ -75,16 +75,8 @@ class FleetTest(unittest.TestCase):
         table.wait_for(b"2 of 2 robots ready")
         table.wait_for(b"hero_1")
         table.wait_for(b"\x1b[?1049h")
-        for keys, answer in (
-            (b"d", b"choose a robot first"),
-            (b"\x1b[B\x1b[B", b"\x1b[7mhero_1"),
-            (b"d", b"d again disconnects hero_1"),
-            (b"d", b"disconnected; it will dial again"),
-            (b"", b"reconnected 1x"),
-            (b"o", b"order: state"),
-        ):
-            table.press(keys)
-            table.wait_for(answer)
+        table.press(b"o")
+        table.wait_for(b"now by state")
         table.press(b"q")
         self.assertEqual(table.wait_for_end(), 0)
         table.wait_for(b"\x1b[?1049l")
@@ -95,8 +87,6 @@ class FleetTest(unittest.TestCase):
             ("--seconds", "-1"),
             ("--seconds", "inf"),
             ("--seconds", "nan"),
-            ("--period", "0"),
-            ("--period", "inf"),
             ("--expect", "2000000"),
         ):
             code, _, errors = run_fleet(name, value)

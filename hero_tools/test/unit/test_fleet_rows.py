@@ -4,30 +4,27 @@ import pytest
 
 from hero_client.geometry import Pose
 from hero_client.readings import Obstacle
+from hero_client.robot_listener import RobotTrack
+from hero_msgs.msg import Robot
 from hero_tools.fleet_rows import RobotRow, find_missing, sort_rows
 
 
-def make_row(robot_id, **changes):
-    row = RobotRow(
+def make_row(robot_id, nearest=None, pose=Pose(0.0, 0.0, 0.0), distance_m=1.0, turned_rad=0.0, **reported):
+    """Return the row of a robot that is ready and has moved; reported: other fields of hero_msgs/Robot."""
+    robot = Robot(
         id=robot_id,
         namespace="/hero_%d" % robot_id,
         address="10.42.0.%d:4000" % (robot_id + 10),
-        state="READY",
-        stop_state="",
-        odom_hz=29.3,
-        packets_per_s=211.0,
+        state=Robot.READY,
         bytes_per_s=44051.0,
-        pose=Pose(0.0, 0.0, 0.0),
-        distance_m=1.0,
-        turned_rad=0.0,
-        proximity_seen=True,
-        nearest=None,
-        reconnects=0,
-        clock_offset_s=0.0,
         firmware="v3.8",
-        last_error="",
     )
-    return row._replace(**changes)
+    for name, value in reported.items():
+        setattr(robot, name, value)
+    track = RobotTrack()
+    track.pose, track.nearest, track.proximity_seen = pose, nearest, True
+    track.distance_m, track.turned_rad = distance_m, turned_rad
+    return RobotRow(robot, track, odom_hz=29.3)
 
 
 def test_no_robot_is_missing_if_all_joined_and_moved():
@@ -38,7 +35,7 @@ def test_no_robot_is_missing_if_all_joined_and_moved():
     ("changes", "words"),
     [
         ({"id": 7, "namespace": "/hero_7"}, "did not join"),
-        ({"state": "REFUSED", "last_error": "second hero_0"}, "REFUSED: second hero_0"),
+        ({"state": Robot.REFUSED, "last_error": "second hero_0"}, "REFUSED: second hero_0"),
         ({"pose": None}, "no odometry"),
         ({"distance_m": 0.01}, "did not move"),
     ],
@@ -56,9 +53,9 @@ def test_a_robot_that_turned_on_the_spot_has_moved():
 def test_rows_are_sorted_by_id_state_or_nearest_obstacle():
     far = make_row(2, nearest=Obstacle(0.2, 0.0))
     near = make_row(10, nearest=Obstacle(0.1, 0.0))
-    away = make_row(3, state="AWAY")
-    nameless = make_row(-1, namespace="")
+    away = make_row(3, state=Robot.AWAY)
+    nameless = make_row(-1, namespace="", address="10.42.0.9:4000")
     rows = [near, nameless, away, far]
-    assert [row.id for row in sort_rows(rows, "id")] == [2, 3, 10, -1]
-    assert next(row.id for row in sort_rows(rows, "state")) == 3
-    assert [row.id for row in sort_rows(rows, "nearest")][:2] == [10, 2]
+    assert [row.robot.id for row in sort_rows(rows, "id")] == [2, 3, 10, -1]
+    assert next(row.robot.id for row in sort_rows(rows, "state")) == 3
+    assert [row.robot.id for row in sort_rows(rows, "nearest")][:2] == [10, 2]

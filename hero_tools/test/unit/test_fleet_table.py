@@ -8,6 +8,7 @@ from test_fleet_rows import make_row
 
 from hero_client.geometry import Pose
 from hero_client.readings import Obstacle
+from hero_msgs.msg import Robot
 from hero_tools.fleet_table import format_json, format_nearest, format_table, format_title
 
 
@@ -24,14 +25,6 @@ def test_rows_that_do_not_fit_are_counted():
     lines = format_table([make_row(robot_id) for robot_id in range(50)], 200, 10)
     assert "42 more" in lines[-1]
     assert lines[-2].startswith("hero_7 ")
-
-
-@pytest.mark.parametrize("chosen", [0, 25, 49])
-def test_the_chosen_row_is_marked_and_always_shown(chosen):
-    lines = format_table([make_row(robot_id) for robot_id in range(50)], 80, 10, chosen)
-    (marked,) = [line for line in lines if line.startswith("\x1b[7m")]
-    assert "hero_%d " % chosen in marked
-    assert len(lines) <= 10
 
 
 def test_columns_are_aligned_with_their_headings():
@@ -68,7 +61,7 @@ def test_free_is_shown_apart_from_no_scan_yet():
 
 
 def test_the_title_counts_ready_robots_and_shows_a_stop():
-    title = format_title([make_row(0), make_row(1, state="AWAY")], "0.0.0.0:11411", True)
+    title = format_title([make_row(0), make_row(1, state=Robot.AWAY)], "0.0.0.0:11411", True)
     assert "1 of 2 robots ready" in title
     assert "0.0.0.0:11411" in title
     assert "STOPPED" in title
@@ -76,7 +69,7 @@ def test_the_title_counts_ready_robots_and_shows_a_stop():
 
 def test_json_has_no_infinity():
     row = make_row(
-        0, nearest=Obstacle(-math.inf, 0.0), pose=Pose(math.nan, 1.0, 0.0), clock_offset_s=math.inf
+        0, nearest=Obstacle(-math.inf, 0.0), pose=Pose(math.nan, 1.0, 0.0), clock_offset=math.inf
     )
     (robot,) = json.loads(format_json([row], "", False))["robots"]
     assert robot["nearest"] == {"range_m": None, "bearing_rad": 0.0}
@@ -86,7 +79,7 @@ def test_json_has_no_infinity():
 
 
 def test_the_state_of_a_stop_stands_beside_the_robots_state():
-    row = make_row(3, stop_state="MOVING")
+    row = make_row(3, stop_state=Robot.MOVING)
     assert "READY, MOVING " in format_table([row], 200, 10)[1]
     assert json.loads(format_json([row], "", True))["robots"][0]["stop_state"] == "MOVING"
 

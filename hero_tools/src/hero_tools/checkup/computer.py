@@ -1,16 +1,15 @@
-"""Python, packages, messages, clock and disk of this PC."""
+"""Python, packages, messages and disk of this PC."""
 
 import importlib
 import os
 import platform
 import shutil
 import sys
-import time
 from pathlib import Path
 
 import rospkg
 
-from .points import NOT_THERE, Finding, ask_system, fail, ok, warn
+from .points import Finding, ask_system, fail, ok, warn
 
 SUITE = (
     "hero_bringup",
@@ -39,9 +38,7 @@ FIRMWARE_MD5 = {
 OLDEST_PYTHON = (3, 8)
 SMALL_DISK_BYTES = 1e9
 FULL_DISK_BYTES = 50e6
-FIRST_PLAUSIBLE_TIME_S = 1.7e9  # November 2023: a clock before it was never set
 SOURCE = "source the workspace in this terminal: source devel/setup.bash"
-SEVERAL_PCS = "this matters only if several PCs share a ROS master"
 
 
 def check_python() -> Finding:
@@ -64,7 +61,7 @@ def check_python() -> Finding:
     other = shutil.which("python3")
     if other and os.path.realpath(other) != os.path.realpath(sys.executable):
         look = "import importlib.util as i, sys; sys.exit(not i.find_spec('rospy'))"
-        if ask_system([other, "-c", look]).code != 0:
+        if ask_system([other, "-c", look]) is None:
             return warn(
                 "%s; the first python3 on PATH, %s, has no rospy" % (text, other),
                 "rosrun and roslaunch are not affected; your own scripts: %s FILE" % sys.executable,
@@ -111,25 +108,6 @@ def check_messages() -> Finding:
     return ok("%d types match those of firmware v3.8" % len(FIRMWARE_MD5))
 
 
-def check_clock() -> Finding:
-    """Check whether a time service runs; nodes on several PCs compare stamps."""
-    if time.time() < FIRST_PLAUSIBLE_TIME_S:
-        return fail("the clock shows %s" % time.strftime("%Y-%m-%d"), "sudo date --set '2030-01-31 12:00'")
-    chrony = ask_system(["chronyc", "-n", "tracking"])
-    if chrony.code == 0:
-        states = [line.split(":")[1].strip() for line in chrony.output.splitlines() if line.startswith("Leap status")]
-        if states == ["Normal"]:
-            return ok("synchronised by chrony")
-        return warn("chrony runs but is not synchronised", "chronyc sources shows why", SEVERAL_PCS)
-    systemd = ask_system(["timedatectl", "show", "--property=NTP", "--property=NTPSynchronized"])
-    if "NTPSynchronized=yes" in systemd.output:
-        return ok("synchronised (timedatectl)")
-    if systemd.code == 0:
-        return warn("not synchronised (timedatectl)", "sudo timedatectl set-ntp true, and a time server", SEVERAL_PCS)
-    missing = "neither chronyc nor timedatectl is installed: " if chrony.code == systemd.code == NOT_THERE else ""
-    return warn(missing + "unknown whether the clock is right", "sudo apt install chrony", SEVERAL_PCS)
-
-
 def check_disk() -> Finding:
     """Check the disk space where ROS writes its logs."""
     directory = Path(rospkg.get_log_dir())
@@ -145,17 +123,3 @@ def check_disk() -> Finding:
         return ok(text)
     remedy = "rosclean purge deletes old logs; export ROS_LOG_DIR=/another/disk moves them"
     return fail(text, remedy) if free_bytes < FULL_DISK_BYTES else warn(text, remedy)
-
-
-def check_versions() -> Finding:
-    """Print what runs here, for a report."""
-    release = Path("/etc/os-release")
-    lines = release.read_text().splitlines() if release.is_file() else []
-    names = [line.partition("=")[2].strip('"') for line in lines if line.startswith("PRETTY_NAME=")]
-    try:
-        ros = "rospy " + rospkg.RosPack().get_manifest("rospy").version
-    except rospkg.ResourceNotFound:
-        ros = "rospy not found"
-    system = (names or [platform.system()])[0]
-    distribution = os.environ.get("ROS_DISTRO") or "Debian's packages"
-    return ok("ROS: %s (%s); %s; Linux %s" % (distribution, ros, system, platform.release()))

@@ -4,12 +4,10 @@ The return path is tried: the node rosout runs beside the master and must connec
 """
 
 import functools
-import http.client
 import os
 import threading
 import time
 import urllib.parse
-import xmlrpc.client
 from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple
 
 import rosgraph
@@ -17,40 +15,17 @@ import rosgraph.roslogging
 import rospy
 from rosgraph_msgs.msg import Log
 
+from hero_client.drivers import STATES
+from hero_client.ros_node import NodeError, ask_master
 from hero_msgs.msg import Robot, RobotArray
 
 from .network import HOST_REMEDY, Address, find_source_address, is_loopback, is_own, resolve
 from .points import Finding, fail, ok, warn
 
-CALL_TIMEOUT_S = 0.6
 CONNECT_TIMEOUT_S = 0.8
 REPORT_TIMEOUT_S = 0.8
-NODES_ASKED = 30
 LINES_MAX = 10
-CALLER = "/hero_check"
-STATES = {Robot.JOINING: "joining", Robot.READY: "ready", Robot.AWAY: "away", Robot.REFUSED: "refused"}
-CALL_ERRORS = (OSError, http.client.HTTPException, xmlrpc.client.Error, ValueError, TypeError)
 CLEAN_UP = "did it end without a word? rosnode cleanup"
-
-
-class BoundedTransport(xmlrpc.client.Transport):
-    """Calls that end after CALL_TIMEOUT_S."""
-
-    def make_connection(self, host: Any) -> http.client.HTTPConnection:
-        """Connect with a time limit."""
-        return http.client.HTTPConnection(host, timeout=CALL_TIMEOUT_S)
-
-
-def call(uri: str, method: str, *arguments: Any) -> Any:
-    """Call the API of the master or of a node and return its value.
-
-    Raises: OSError, http.client.HTTPException, xmlrpc.client.Error.
-    """
-    proxy = xmlrpc.client.ServerProxy(uri, transport=BoundedTransport())
-    code, message, value = getattr(proxy, method)(CALLER, *arguments)
-    if code != 1:
-        raise OSError(message)
-    return value
 
 
 def read_master_host() -> str:
@@ -122,44 +97,12 @@ def check_master(own: Sequence[Address]) -> Finding:
             "or a line 'ADDRESS %s' in /etc/hosts" % host,
         )
     try:
-        call(uri, "getUri")
-    except CALL_ERRORS as error:
-        if any(is_own(address, own) for address in addresses):
-            return warn("no ROS master runs at " + uri, "roslaunch hero_bringup hero_bringup.launch starts one")
-        return fail(
-            "no ROS master answers at %s: %s" % (uri, " ".join(str(error).split())),
-            "is that PC on, is a master running there, is its port open? ping %s" % host,
-        )
+        ask_master("getPid")
+    except NodeError as error:
+        start = "roslaunch hero_bringup hero_bringup.launch starts one"
+        away = "is that PC on, is a master running there, is its port open? ping %s" % host
+        return fail(str(error), start if any(is_own(address, own) for address in addresses) else away)
     return ok("answers at " + uri)
-
-
-def check_nodes() -> Finding:
-    """Check whether the nodes that the master lists can be reached under the names they registered."""
-    uri = rosgraph.get_master_uri()
-    names = {name for group in call(uri, "getSystemState") for _, users in group for name in users}
-    nodes: Dict[str, str] = {}
-    for name in sorted(names)[:NODES_ASKED]:
-        try:
-            nodes[name] = call(uri, "lookupNode", name)
-        except OSError:  # it ended in between
-            continue
-    unknown, silent = [], []
-    for name, node_uri in nodes.items():
-        host = urllib.parse.urlsplit(node_uri).hostname or ""
-        if not resolve(host):
-            unknown.append("%s at %s" % (name, host))
-            continue
-        try:
-            call(node_uri, "getPid")
-        except CALL_ERRORS:
-            silent.append("%s at %s" % (name, node_uri))
-    if unknown:
-        text = "names that cannot be resolved here: " + ", ".join(unknown[:LINES_MAX])
-        return fail(text, "on the PC of that node: export ROS_IP=ITS_ADDRESS, and restart the node")
-    if silent:
-        text = "listed but not reached: " + ", ".join(silent[:LINES_MAX])
-        return warn(text, CLEAN_UP, "on another PC: its ROS_IP, its firewall")
-    return ok("%d of %d nodes asked, all answer" % (len(nodes), len(names)))
 
 
 class OwnNode:
@@ -169,11 +112,9 @@ class OwnNode:
         rospy.init_node("hero_check", anonymous=True, disable_signals=True, disable_rosout=True)
         self.publisher = rospy.Publisher("/rosout", Log, queue_size=1)
         self.reports: Dict[str, RobotArray] = {}
-        uri = rosgraph.get_master_uri()
-        types = dict(call(uri, "getTopicTypes"))
-        # The master keeps the types of topics whose publishers have ended.
-        published = [topic for topic, _ in call(uri, "getSystemState")[0]]
-        self.topics = sorted(topic for topic in published if types.get(topic) == RobotArray._type)
+        self.topics = sorted(
+            topic for topic, kind in ask_master("getPublishedTopics", "/") if kind == RobotArray._type
+        )
         for topic in self.topics:
             rospy.Subscriber(topic, RobotArray, self._receive, callback_args=topic, queue_size=1)
 
@@ -207,7 +148,7 @@ def check_return_path(node: OwnNode) -> Finding:
     """Check whether rosout, which runs beside the master, connects to this node."""
     if wait_until(lambda: node.publisher.get_num_connections() > 0, CONNECT_TIMEOUT_S):
         return ok("nodes beside the master can connect to nodes here")
-    subscribers = dict(call(rosgraph.get_master_uri(), "getSystemState")[1]).get("/rosout", [])
+    subscribers = dict(ask_master("getSystemState")[1]).get("/rosout", [])
     if not subscribers:
         return warn("not tried: no node rosout runs beside the master", "start the master with roscore or roslaunch")
     return fail(

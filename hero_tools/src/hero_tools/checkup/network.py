@@ -1,11 +1,11 @@
-"""Addresses that robots can connect to, the firewall's rules, the program on the driver's port, names that resolve.
+"""Addresses that robots can connect to, the firewall, the program on the driver's port, names that resolve.
 
-The listening ports are read from /proc (proc(5)): nothing is bound or connected.
+Read by ip(8) and ss(8) of iproute2: nothing is bound or connected.
 """
 
 import ipaddress
 import json
-import os
+import re
 import socket
 from pathlib import Path
 from typing import Dict, List, NamedTuple, Optional, Sequence, Set
@@ -17,8 +17,7 @@ HOTSPOT_ADDRESS = "10.42.0.1"
 
 HOST_REMEDY = "roslaunch hero_bringup hero_bringup.launch without host:=, or with host:=0.0.0.0, admits robots"
 
-EVERYWHERE = {"0.0.0.0", "::"}
-LISTENING = "0A"  # TCP_LISTEN in /proc/net/tcp
+EVERYWHERE = {"0.0.0.0", "::", "*"}
 DRIVER = "hero_driver"
 VIRTUAL = ("docker", "veth", "virbr", "br-", "lxc", "tun", "tap", "podman", "vnet")
 
@@ -33,11 +32,11 @@ class Address(NamedTuple):
 def read_addresses() -> Optional[List[Address]]:
     """Return this PC's IPv4 addresses without loopback; None if the command ip is missing."""
     answer = ask_system(["ip", "-j", "-4", "address", "show", "up"])
-    if answer.code != 0:
+    if answer is None:
         return None
     return [
         Address(link["ifname"], entry["local"])
-        for link in json.loads(answer.output or "[]")
+        for link in json.loads(answer or "[]")
         for entry in link.get("addr_info", [])
         if entry.get("family") == "inet" and not ipaddress.ip_address(entry["local"]).is_loopback
     ]
@@ -101,48 +100,21 @@ def advise_firewall(interface: Optional[str], port: int) -> Finding:
     )
 
 
-def find_listeners(port: int, proc: Path = Path("/proc")) -> Dict[str, str]:
-    """Return the address and socket number of each listener on a TCP port."""
+def find_listeners(port: int) -> Dict[str, Optional[int]]:
+    """Return the address of each listener on a TCP port, and its process; None: it belongs to another user."""
     found = {}
-    for name in ("tcp", "tcp6"):
-        table = proc / "net" / name
-        if not table.is_file():
-            continue
-        for line in table.read_text().splitlines()[1:]:
-            words = line.split()
-            local, _, local_port = words[1].rpartition(":")
-            if words[3] == LISTENING and int(local_port, 16) == port:
-                found[_read_address(local)] = words[9]
+    for line in (ask_system(["ss", "-Hltnp", "sport = :%d" % port]) or "").splitlines():
+        local = line.split()[3]
+        process = re.search(r"pid=([0-9]+)", line)
+        found[local.rpartition(":")[0].partition("%")[0].strip("[]")] = int(process.group(1)) if process else None
     return found
 
 
-def _read_address(text: str) -> str:
-    # Words of 32 bits, each in the byte order of a PC (little endian).
-    words = [bytes.fromhex(text[start : start + 8])[::-1] for start in range(0, len(text), 8)]
-    return str(ipaddress.ip_address(b"".join(words)))
-
-
-def find_process(socket_number: str, proc: Path = Path("/proc")) -> Optional[int]:
-    """Return the process that holds a socket; None if it belongs to another user."""
-    wanted = "socket:[%s]" % socket_number
-    for directory in proc.iterdir():
-        if not directory.name.isdigit():
-            continue
-        try:
-            if any(os.readlink(link.path) == wanted for link in os.scandir(directory / "fd")):
-                return int(directory.name)
-        except OSError:  # of another user, or it has ended
-            continue
-    return None
-
-
-def check_port(port: int) -> Finding:
+def check_port(port: int, listeners: Dict[str, Optional[int]]) -> Finding:
     """Check whether the port is free, held by our driver, or by another program."""
-    listeners = find_listeners(port)
     if not listeners:
         return ok("TCP port %d is free" % port)
-    address, number = next(iter(listeners.items()))
-    process = find_process(number)
+    address, process = next(iter(listeners.items()))
     if process is None:
         return warn(
             "TCP port %d on %s is held by a program of another user" % (port, address),
@@ -178,4 +150,4 @@ def is_own(address: str, own: Sequence[Address]) -> bool:
 def find_source_address(target: str) -> Optional[str]:
     """Return the own address from which packets to target leave."""
     answer = ask_system(["ip", "-j", "route", "get", target])
-    return str(json.loads(answer.output)[0].get("prefsrc") or "") or None if answer.output else None
+    return str(json.loads(answer)[0].get("prefsrc") or "") or None if answer else None

@@ -4,7 +4,7 @@ import os
 import subprocess
 import threading
 import time
-from typing import Callable, Dict, List, NamedTuple, Sequence
+from typing import Callable, Dict, List, NamedTuple, Optional, Sequence
 
 OK = "OK"
 WARN = "WARN"
@@ -12,7 +12,6 @@ FAIL = "FAIL"
 
 # Administration tools on Debian, which the PATH of a user does not contain.
 TOOL_PATH = "/usr/sbin:/sbin"
-NOT_THERE = 127
 
 
 class Finding(NamedTuple):
@@ -61,27 +60,18 @@ def run_points(points: Dict[str, Point], timeout_s: float) -> Dict[str, Finding]
     end_s = time.monotonic() + timeout_s
     for thread in threads:
         thread.join(max(0.0, end_s - time.monotonic()))
-    late = fail("no answer within %.1f s" % timeout_s, "a name server or a disk hangs; the other points are valid")
+    late = fail("no answer within %.1f s" % timeout_s, "the ROS master, a name server or a disk hangs; the other points are valid")
     return {name: found.get(name, late) for name in points}
 
 
-class Answer(NamedTuple):
-    """How a command ended; code NOT_THERE: there is no such command; -1: it did not end in time."""
-
-    code: int
-    output: str
-
-
-def ask_system(command: List[str], timeout_s: float = 0.9) -> Answer:
-    """Run a command that only reads, without a terminal and in English."""
+def ask_system(command: List[str], timeout_s: float = 0.9) -> Optional[str]:
+    """Return the output of a command that only reads; None if it is missing, fails, or does not end in time."""
     environment = dict(os.environ, LC_ALL="C", PATH="%s:%s" % (os.environ.get("PATH", ""), TOOL_PATH))
     try:
         result = subprocess.run(
             command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
-            env=environment, timeout=timeout_s, check=False,
+            env=environment, timeout=timeout_s, check=True,
         )  # fmt: skip
-    except OSError:
-        return Answer(NOT_THERE, "")
-    except subprocess.TimeoutExpired:
-        return Answer(-1, "")
-    return Answer(result.returncode, result.stdout.decode(errors="replace"))
+    except (OSError, subprocess.SubprocessError):
+        return None
+    return result.stdout.decode(errors="replace")
