@@ -9,7 +9,10 @@ from hero_msgs.msg import Robot
 from hero_tools.fleet_rows import RobotRow, find_missing, sort_rows
 
 
-def make_row(robot_id, nearest=None, pose=Pose(0.0, 0.0, 0.0), distance_m=1.0, turned_rad=0.0, **reported):
+ORIGIN = Pose(0.0, 0.0, 0.0)
+
+
+def make_row(robot_id, nearest=None, pose=ORIGIN, distance_m=1.0, turned_rad=0.0, **reported):
     """Return the row of a robot that is ready and has moved; reported: other fields of hero_msgs/Robot."""
     robot = Robot(
         id=robot_id,
