@@ -8,7 +8,6 @@ from hero_client.robot_listener import RobotTrack
 from hero_msgs.msg import Robot
 from hero_tools.fleet_rows import RobotRow, find_missing, sort_rows
 
-
 ORIGIN = Pose(0.0, 0.0, 0.0)
 
 

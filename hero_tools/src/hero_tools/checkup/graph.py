@@ -8,7 +8,7 @@ import os
 import threading
 import time
 import urllib.parse
-from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple
+from typing import Callable, Dict, List, Optional, Sequence, Tuple
 
 import rosgraph
 import rosgraph.roslogging
