@@ -38,6 +38,11 @@ class RobotRow(NamedTuple):
         return STOP_STATES.get(self.robot.stop_state, str(self.robot.stop_state))
 
     @property
+    def nearest_m(self) -> float:
+        """The distance of the nearest obstacle; inf without one, -inf on contact."""
+        return self.track.nearest.range_m if self.track.nearest else math.inf
+
+    @property
     def moved(self) -> bool:
         """Whether the robot has driven or turned more than noise could explain."""
         return self.track.distance_m >= MOVED_M or self.track.turned_rad >= MOVED_RAD
@@ -48,7 +53,7 @@ def sort_rows(rows: Sequence[RobotRow], order: str) -> List[RobotRow]:
     if order == "state":
         return sorted(rows, key=lambda row: (row.robot.state == Robot.READY, row.state, row.robot.id))
     if order == "nearest":
-        return sorted(rows, key=lambda row: (row.track.nearest.range_m if row.track.nearest else math.inf, row.robot.id))
+        return sorted(rows, key=lambda row: (row.nearest_m, row.robot.id))
     return sorted(rows, key=lambda row: (row.robot.id < 0, row.robot.id, row.name))
 
 

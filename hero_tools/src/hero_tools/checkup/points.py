@@ -60,7 +60,8 @@ def run_points(points: Dict[str, Point], timeout_s: float) -> Dict[str, Finding]
     end_s = time.monotonic() + timeout_s
     for thread in threads:
         thread.join(max(0.0, end_s - time.monotonic()))
-    late = fail("no answer within %.1f s" % timeout_s, "the ROS master, a name server or a disk hangs; the other points are valid")
+    remedy = "the ROS master, a name server or a disk hangs; the other points are valid"
+    late = fail("no answer within %.1f s" % timeout_s, remedy)
     return {name: found.get(name, late) for name in points}
 
 
