@@ -98,9 +98,12 @@ def check_master() -> None:
 def start_ros_node(name: str, anonymous: bool = False) -> None:
     """Start the node of this process; signals stay with the caller.
 
-    Raises: NodeError without a ROS master, without a directory for logs, or for wrong remappings.
+    Raises: NodeError without a ROS master, without a directory for logs, for wrong remappings, or if a node of this
+        name already runs, which ROS would end.
     """
     check_master()
+    if not anonymous:
+        _check_name(name)
     uri = rosgraph.get_master_uri()
     rospy.core._xmlrpc_cache[uri] = NodeMaster(uri, transport=LimitedTransport())
     try:
@@ -110,6 +113,17 @@ def start_ros_node(name: str, anonymous: bool = False) -> None:
     except (rospy.ROSInitException, OSError, ValueError) as error:
         raise NodeError(" ".join(str(error).split())) from None
     end_without_delay()
+
+
+def _check_name(default_name: str) -> None:
+    """Raise NodeError if a node that answers has the name of this one; a registration of a dead node does not count."""
+    name = rosgraph.names.resolve_name(rospy.names.get_mappings().get("__name", default_name), rospy.get_name())
+    try:
+        with xmlrpc.client.ServerProxy(ask_master("lookupNode", name), transport=LimitedTransport()) as node:
+            node.getPid(name)
+    except (NodeError, OSError, http.client.HTTPException, xmlrpc.client.Error, ExpatError):
+        return
+    raise NodeError("%s already runs: end it, or start this one with another __name:=" % name)
 
 
 def end_without_delay() -> None:

@@ -25,6 +25,7 @@ from .reports import FleetStatus, Reporter
 from .ros.log_relay import LogRelay, prepare_logging, tell_of_lost_log_lines
 from .ros.master_watch import MasterWatch
 from .ros.rospy_internals import call_before_shutdown, leave_topics_out_of_rosout, open_tcpros_server
+from .ros.running_node import find_running_node
 from .ros.worker import Worker
 from .stop_interface import PARAMETER, StopInterface
 from .transport import Address, EventLoop, HostNotFoundError, NoAnswerError, TransportSettings
@@ -44,9 +45,6 @@ MASTER_CHECK_S = 0.5
 
 LEAVE_WAIT_S = 3.0
 """How long the ROS master may take to forget this node; 50 robots take it 0.5 s."""
-
-PORT_WAIT_S = 2.0
-"""How long a port may be in use: a node that replaces one of the same name starts while that one still stops."""
 
 
 def make_ros_clock() -> Callable[[], int]:
@@ -119,7 +117,7 @@ class DriverNode:
 
     def open(self) -> None:
         """Listen, dial and serve. Raises: OSError if the port cannot be had."""
-        self._open_loop()
+        self._loop.open()
         self._gateway.open(self._loop)
         self._reporter = Reporter()
         self._stop_interface.open(self._starts_stopped)
@@ -182,17 +180,6 @@ class DriverNode:
         self._registrar.close()
         self._gateway.close()
         self._log.close()
-
-    def _open_loop(self) -> None:
-        deadline_s = time.monotonic() + PORT_WAIT_S
-        while True:
-            try:
-                self._loop.open()
-            except OSError as error:
-                if error.errno != errno.EADDRINUSE or time.monotonic() > deadline_s or self._ended.wait(0.1):
-                    raise
-            else:
-                return
 
     def _run_loop(self) -> None:
         try:
@@ -298,6 +285,12 @@ def _enter_ros(argv: Optional[List[str]], log: LogRelay) -> None:
         raise ConfigError(
             "ROS_MASTER_URI is %s: %s; it must be like http://localhost:11311" % (uri, error)
         ) from error
+    running = find_running_node(NODE_NAME)
+    if running:
+        raise ConfigError(
+            "a driver already runs as %s: end it, or start this one with another name:= and port:= (simulated robots"
+            " alone: roslaunch hero_sim hero_sim.launch)" % running
+        )
     prepare_logging()
     open_tcpros_server(lambda host, text: log.log_throttled("warn", "handshake " + host, text, host=host))
     try:
@@ -346,7 +339,7 @@ def _explain_bind_error(config: DriverConfig, error: OSError) -> str:
     where = "~host %s, ~port %d" % (config.host, config.port)
     if error.errno == errno.EADDRINUSE:
         return (
-            "%s is in use: end the other program (ss -ltnp 'sport = :%d' names it) or choose another ~port"
+            "%s is in use: end the other program (ss -ltnp 'sport = :%d' names it) or start the driver with another port:="
             % (where, config.port)
         )
     if error.errno == errno.EACCES:

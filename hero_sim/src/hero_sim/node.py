@@ -16,6 +16,8 @@ import rosgraph.roslogging
 import rospy
 from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse, Trigger, TriggerRequest, TriggerResponse
 
+from hero_driver.ros.running_node import find_running_node
+
 from . import main as command_line
 from . import output
 from .build import build_simulator
@@ -25,6 +27,8 @@ from .faults import describe_kinds, parse_fault
 from .ground_truth import GroundTruth
 from .simulator import Simulator
 from .srv import InjectFault, InjectFaultRequest, InjectFaultResponse
+
+NODE_NAME = "hero_sim"
 
 SERVICE_LIMIT_S = 2.0
 """A service call that the simulator's thread does not serve by then is answered with a failure."""
@@ -125,7 +129,10 @@ def _run() -> int:
         check_environment()
         # Until the master answers, init_node() waits for as long as it takes: let a signal end that.
         signal.signal(signal.SIGINT, signal.SIG_DFL)
-        rospy.init_node("hero_sim", disable_signals=True)
+        running = find_running_node(NODE_NAME)
+        if running:
+            raise OptionError("simulated robots already run as %s: end them, or give these another name:=" % running)
+        rospy.init_node(NODE_NAME, disable_signals=True)
     except OptionError as error:
         return output.fail(str(error))
     except rosgraph.roslogging.LoggingException as error:

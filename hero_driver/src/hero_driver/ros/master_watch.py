@@ -13,19 +13,12 @@ import rosgraph
 import rospy
 
 from .rospy_internals import list_registrations
+from .running_node import LimitedTransport
 
 CHECK_INTERVAL_S = 2.0
-MASTER_TIMEOUT_S = 5.0
 
 SUCCESS = 1
 """First part of an answer of the master (ROS Master API)."""
-
-
-class _PatientTransport(xmlrpc.client.Transport):
-    def make_connection(self, host: Any) -> Any:
-        connection = super().make_connection(host)
-        connection.timeout = MASTER_TIMEOUT_S
-        return connection
 
 
 class MasterWatch:
@@ -61,7 +54,7 @@ class MasterWatch:
                     )
 
     def _look(self) -> None:
-        with xmlrpc.client.ServerProxy(rosgraph.get_master_uri(), transport=_PatientTransport()) as master:
+        with xmlrpc.client.ServerProxy(rosgraph.get_master_uri(), transport=LimitedTransport()) as master:
             code, _, _ = master.lookupService(rospy.get_name(), self._sentinel)  # type: ignore[misc]
             if code == SUCCESS:
                 if self._is_away:
@@ -81,7 +74,7 @@ class MasterWatch:
         publications, subscriptions, services = list_registrations()
         for topic, ros_type in publications:
             master.registerPublisher(name, topic, ros_type, uri)
-        with xmlrpc.client.ServerProxy(uri, transport=_PatientTransport()) as own:
+        with xmlrpc.client.ServerProxy(uri, transport=LimitedTransport()) as own:
             for topic, ros_type in subscriptions:
                 code, _, publishers = master.registerSubscriber(name, topic, ros_type, uri)
                 if code == SUCCESS:
