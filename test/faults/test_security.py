@@ -43,13 +43,13 @@ def list_names(node):
 
 def test_a_default_bind_is_warned_about_with_the_remedy(start_driver, record):
     driver = start_driver()
-    line = driver.wait_line("all addresses of this machine")
+    line = driver.wait_line("can pose as a robot")
     assert "~host" in line and "~allow" in line
     quiet = start_driver(parameters={"host": "127.0.0.1"})
     quiet.wait_line("listening on 127.0.0.1")
     guarded = start_driver(parameters={"allow": ["127.0.0.0/8"]})
     guarded.wait_line("listening on 0.0.0.0")
-    assert not quiet.find_lines("all addresses") and not guarded.find_lines("all addresses")
+    assert not quiet.find_lines("can pose as a robot") and not guarded.find_lines("can pose as a robot")
     record("a default bind on all addresses, said with its remedy", 1, 1)
 
 

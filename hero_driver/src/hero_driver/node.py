@@ -131,9 +131,7 @@ class DriverNode:
         if listening is not None and listening.host in ("0.0.0.0", "::") and not self._config.allow:
             self._log.log(
                 "warn",
-                "listening for robots on all addresses of this machine: any host that reaches the port can pose as a"
-                " robot; if this PC is in another network too, set ~host to its address in the robots' network, or"
-                " ~allow to that network",
+                "any host in the networks of this PC can pose as a robot: ~host or ~allow limits them to the robots'",
             )
 
     def spin(self) -> int:
@@ -193,7 +191,7 @@ class DriverNode:
         parts = []
         if self._loop.listening is not None:
             parts.append(
-                "listening on %s, robots must dial this machine at that port" % (self._loop.listening,)
+                "listening on %s" % (self._loop.listening,)
             )
         if self._config.robots:
             parts.append("dialling %s" % ", ".join(str(address) for address in self._config.robots))
@@ -339,7 +337,7 @@ def _explain_bind_error(config: DriverConfig, error: OSError) -> str:
     where = "~host %s, ~port %d" % (config.host, config.port)
     if error.errno == errno.EADDRINUSE:
         return (
-            "%s is in use: end the other program (ss -ltnp 'sport = :%d' names it) or start the driver with another port:="
+            "%s is in use: end the other program (ss -ltnp 'sport = :%d' names it) or choose another ~port"
             % (where, config.port)
         )
     if error.errno == errno.EACCES:

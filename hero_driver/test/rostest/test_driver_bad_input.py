@@ -57,7 +57,7 @@ class TestDriverBadInput(OwnDriverCase):
     def test_every_name_of_all_addresses_is_warned_about(self):
         for host in ("0", "0.0.0.0"):
             with self.subTest(host=host), DriverProcess({"host": host}) as driver:
-                driver.wait_line("listening for robots on all addresses of this machine")
+                driver.wait_line("any host in the networks of this PC can pose as a robot")
 
     def test_an_environment_in_which_ros_cannot_start_is_named_in_one_line(self):
         with tempfile.NamedTemporaryFile() as file:

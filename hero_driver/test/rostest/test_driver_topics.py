@@ -211,12 +211,12 @@ class TestDriverTopics(DriverCase):
 
     def test_log_lines_reach_rosout_with_level_and_name_and_without_colors(self):
         robot = self.join(12)
-        robot.log("\x1b[91m[hero_12] IMU is not working\x1b[0m", payloads.LOG_WARN)
+        robot.log("\x1b[91m[hero_12] IMU hat detected!\x1b[0m", payloads.LOG_WARN)
         robot.log("Reseting PID...\n[FATAL] forged\x07line", payloads.LOG_INFO)
         robot.log("the end", payloads.LOG_ERROR)
         self.assertEqual(self.wait_log("the end").level, RosLog.ERROR)
         lines = {line.msg: line.level for line in self.find_logs("^hero_12: ")}
-        self.assertEqual(lines["hero_12: IMU is not working"], RosLog.WARN)
+        self.assertEqual(lines["hero_12: IMU hat detected!"], RosLog.WARN)
         self.assertEqual(lines["hero_12: Reseting PID... [FATAL] forged line"], RosLog.INFO)
         self.assertFalse([text for text in lines if "\x1b" in text or "\n" in text or "\x07" in text])
 

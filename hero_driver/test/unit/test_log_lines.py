@@ -53,7 +53,7 @@ def test_what_only_resembles_a_heartbeat_is_none(text):
         ("\x1b[92m[hero_0] IMU hat detected!\x1b[0m", "IMU hat detected!"),
         (
             "\x1b[91m[hero_0] IMU is not working or not connected! Error: 1\x1b[0m",
-            "IMU is not working or not connected! Error: 1",
+            "no IMU hat, so nothing on imu (IMU is not working or not connected! Error: 1)",
         ),
         ("[HERO] Odometry was changed!", "Odometry was changed!"),
         ("[/hero_0] Reseting PID... now", "Reseting PID... now"),

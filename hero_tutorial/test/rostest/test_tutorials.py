@@ -28,6 +28,7 @@ def make_changes():
         "$ roslaunch hero_bringup hero_bringup.launch": "$ roslaunch hero_bringup hero_bringup.launch"
         " host:=127.0.0.1 port:=%d" % port,
         "0.0.0.0:11411": "127.0.0.1:%d" % port,
+        "127.0.0.1:11411": "127.0.0.1:%d" % port,
         "sim:=true": "sim:=true port:=%d" % port,
     }
 

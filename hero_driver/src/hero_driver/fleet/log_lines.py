@@ -20,6 +20,7 @@ _BOOT = re.compile(
 _PID_RESET = "Reseting PID..."  # VelocityControl.ino, with each zero velocity: ten times a second while one is sent
 _TUNES = re.compile(r"^(Starting Motors Auto Tuning|Tunning Motor Set)")  # VelocityControl.ino:230, 118
 _TUNING_ENDED = re.compile(r"Tuning Failure|Best PID params")  # VelocityControl.ino:261-276
+_NO_IMU = "IMU is not working"  # IMUSensor.ino:99, at each start without the hat, which stock robots do not have
 _HEARTBEAT = re.compile(r"^Conn?ected at time (?P<millis>\d{1,10})$")
 
 
@@ -71,4 +72,6 @@ def read_log_line(text: str) -> LogLine:
         tunes = True
     elif _TUNING_ENDED.search(body) is not None:
         tunes = False
+    if body.startswith(_NO_IMU):
+        body = "no IMU hat, so nothing on imu (%s)" % body
     return LogLine(body, boot, heartbeat, tunes, heartbeat is not None or body == _PID_RESET)

@@ -1,0 +1,142 @@
+#!/usr/bin/env python3
+"""Launch files that are started twice: the second one ends with a clear line, and the first one's robots drive on."""
+
+import signal
+import unittest
+
+import rosgraph
+import rospy
+import rostest
+from geometry_msgs.msg import Twist
+
+from hero_msgs.msg import Robot, RobotArray
+from hero_test.processes import Program, find_free_port, find_pid, find_program
+from hero_test.swarm_watch import SwarmWatch
+from hero_test.waiting import wait_for
+
+IDS = [0, 1]
+DRIVER_REFUSED = "a driver already runs as /hero_driver: end it, or start this one with another name:= and port:="
+SIMULATOR_REFUSED = "simulated robots already run as /hero_sim: end them"
+
+
+class SecondLaunchTest(unittest.TestCase):
+    def setUp(self):
+        self.reports = {}
+        self.port = find_free_port()
+
+    def start(self, *command, environment=None):
+        """Start a program, which ends after the test."""
+        program = Program(*command, environment=environment)
+        self.addCleanup(program.end)
+        return program
+
+    def launch_fleet(self, *arguments, **options):
+        return self.start(
+            "roslaunch", "hero_bringup", "hero_bringup.launch", "port:=%d" % self.port, *arguments, **options
+        )
+
+    def watch_driver(self, name):
+        """Keep the newest report of a driver."""
+
+        def receive(report):
+            self.reports[name] = report
+
+        subscriber = rospy.Subscriber(name + "/robots", RobotArray, receive)
+        self.addCleanup(subscriber.unregister)
+
+    def find_reconnects(self, name):
+        """Return how often each robot that is ready came back to its driver."""
+        report = self.reports.get(name, RobotArray())
+        return {robot.id: robot.reconnects for robot in report.robots if robot.state == Robot.READY}
+
+    def wait_ready(self, name, *ids):
+        """Wait until exactly these robots are ready, and none was ever lost."""
+        wait_for(
+            lambda: self.find_reconnects(name) == dict.fromkeys(ids, 0),
+            lambda: "robots %s of %s, last: %s" % (ids, name, self.reports.get(name)),
+        )
+
+    def assert_fleet_refused(self, program):
+        program.wait_end()
+        for text in (DRIVER_REFUSED, SIMULATOR_REFUSED):
+            self.assertEqual(len(program.find_lines(text)), 1, program.lines)
+        self.assertEqual(program.find_lines("Traceback"), [])
+
+    def test_a_fleet_drives_on_when_its_launch_file_is_started_again(self):
+        self.watch_driver("/hero_driver")
+        first = self.launch_fleet("count:=2")
+        self.wait_ready("/hero_driver", *IDS)
+        pids = find_pid("/hero_driver"), find_pid("/hero_sim")
+        publishers = [rospy.Publisher("/hero_%d/cmd_vel" % number, Twist, queue_size=1) for number in IDS]
+        command = Twist()
+        command.linear.x = 0.05
+        for arguments in (), ("port:=%d" % find_free_port(),):
+            self.assert_fleet_refused(self.launch_fleet("count:=2", *arguments))
+            self.reports.clear()
+            self.wait_ready("/hero_driver", *IDS)
+            watch = SwarmWatch(IDS)
+
+            def all_drive(watch=watch):
+                for publisher in publishers:
+                    publisher.publish(command)
+                return all(rows and rows[-1][4] > 0.02 for rows in watch.rows.values())
+
+            wait_for(all_drive, "motion of both robots")
+            watch.close()
+        self.assertEqual((find_pid("/hero_driver"), find_pid("/hero_sim")), pids)
+        self.assertIsNone(first.process.poll())
+
+    def test_the_master_that_the_first_launch_started_goes_on(self):
+        uri = "http://localhost:%d" % find_free_port()
+        master = rosgraph.Master("/test", master_uri=uri)
+        environment = {"ROS_MASTER_URI": uri}
+        first = self.launch_fleet("count:=1", environment=environment)
+        first.wait_for_text("hero_0 arrived")
+        pid = master.getPid()
+        self.assert_fleet_refused(self.launch_fleet("count:=1", environment=environment))
+        self.assertEqual(master.getPid(), pid)
+        self.assertEqual(first.find_lines("hero_0 left|killing on exit|has died"), [])
+
+    def test_a_fleet_of_another_name_and_port_runs_beside_the_first(self):
+        for name in "/hero_driver", "/hero_driver_b":
+            self.watch_driver(name)
+        self.launch_fleet("count:=1")
+        self.wait_ready("/hero_driver", 0)
+        self.launch_fleet("name:=hero_driver_b", "port:=%d" % find_free_port(), "count:=2", "first_id:=10")
+        self.wait_ready("/hero_driver_b", 10, 11)
+        self.wait_ready("/hero_driver", 0)
+
+    def test_a_tutorial_with_its_own_robots_leaves_a_fleet_alone(self):
+        self.watch_driver("/hero_driver")
+        self.launch_fleet("count:=2")
+        self.wait_ready("/hero_driver", *IDS)
+        pids = find_pid("/hero_driver"), find_pid("/hero_sim")
+        tutorial = ("roslaunch", "hero_tutorial", "random_walk.launch", "sim:=true", "port:=%d" % find_free_port())
+        self.assert_fleet_refused(self.start(*tutorial))
+        self.assertEqual((find_pid("/hero_driver"), find_pid("/hero_sim")), pids)
+        self.reports.clear()
+        self.wait_ready("/hero_driver", *IDS)
+
+    def test_a_second_monitor_ends_and_the_first_one_goes_on(self):
+        monitor = ("roslaunch", "hero_bringup", "monitor.launch", "port:=0")
+        first = self.start(*monitor)
+        first.wait_for_text("fleet monitor: http://")
+        pid = find_pid("/hero_monitor")
+        second = self.start(*monitor)
+        second.wait_end()
+        self.assertEqual(len(second.find_lines("/hero_monitor already runs: end it")), 1, second.lines)
+        self.assertEqual(find_pid("/hero_monitor"), pid)
+        self.assertIsNone(first.process.poll())
+
+    def test_the_registration_of_a_dead_driver_hinders_no_start(self):
+        driver = (find_program("hero_driver", "hero_driver"), "_port:=%d" % self.port, "_host:=127.0.0.1")
+        dead = self.start(*driver)
+        dead.wait_for_text("listening on")
+        dead.end(signal.SIGKILL)
+        self.assertTrue(rosgraph.Master("/test").lookupNode("/hero_driver"))
+        self.start(*driver).wait_for_text("listening on")
+
+
+if __name__ == "__main__":
+    rospy.init_node("test_second_launch")
+    rostest.rosrun("hero_bringup", "second_launch", SecondLaunchTest)
