@@ -7,10 +7,12 @@ import unittest
 
 import rospy
 import rostest
+from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 
 from hero_msgs.msg import Robot, RobotArray
 from hero_test.processes import Program, find_free_port
+from hero_test.swarm_watch import SwarmWatch
 from hero_test.waiting import wait_for
 
 
@@ -64,6 +66,23 @@ class DriverRestartTest(unittest.TestCase):
     def test_simulated_robots_come_with_it(self):
         self.launch("count:=2")
         self.wait_ready([0, 1])
+
+    def test_ctrl_c_ends_moving_simulated_robots_without_a_warning(self):
+        program = self.launch("count:=2")
+        self.wait_ready([0, 1])
+        publisher = rospy.Publisher("/hero_0/cmd_vel", Twist, queue_size=1)
+        watch = SwarmWatch([0])
+        self.addCleanup(watch.close)
+        command = Twist()
+        command.linear.x = 0.1
+
+        def drives():
+            publisher.publish(command)
+            return watch.rows[0] and watch.rows[0][-1][4] > 0.05
+
+        wait_for(drives, "motion")
+        self.assertEqual(program.end(), 0)
+        self.assertEqual(program.find_lines(r"\[WARN\]|\[ERROR\]|Traceback| left "), [])
 
     def test_robots_are_back_when_the_driver_is_started_again(self):
         odoms = []

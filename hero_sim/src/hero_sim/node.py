@@ -33,6 +33,9 @@ NODE_NAME = "hero_sim"
 SERVICE_LIMIT_S = 2.0
 """A service call that the simulator's thread does not serve by then is answered with a failure."""
 
+LINGER_S = 2.5
+"""roslaunch ends all of its nodes at once; the driver takes up to 2 s to stop its robots."""
+
 Answer = Tuple[bool, str]
 
 
@@ -148,6 +151,8 @@ def _run() -> int:
     RequestQueue(simulator, injector)
     try:
         simulator.run(options.seconds)
+        if simulator.stopping and not rospy.is_shutdown():
+            simulator.linger(LINGER_S)
     finally:
         simulator.link.close_all()
     return 0

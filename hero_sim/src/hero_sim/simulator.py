@@ -65,22 +65,38 @@ class Simulator:
 
     def run(self, seconds: Optional[float] = None) -> None:
         """Run until stopping is set, or for so many simulated seconds."""
-        swarm = self.swarm
-        end_ms = None if seconds is None else swarm.now_ms + int(seconds * 1000)
+        end_ms = None if seconds is None else self.swarm.now_ms + int(seconds * 1000)
         self._anchor_clock()
-        while not self.stopping and (end_ms is None or swarm.now_ms < end_ms):
-            target_ms = self._find_target()
-            for call in self.before_advance:
-                call(swarm.now_ms)
-            if not self.paused:
-                for index in swarm.advance(target_ms if end_ms is None else min(target_ms, end_ms)):
-                    self.serve_robot(index)
-            if self._carrying:
-                self._carry(swarm.now_ms)
-            for index in list(self._full):
-                self._limit_window(index)
-            for event in self.link.poll(self._find_wait()):
-                self._handle_event(event)
+        while not self.stopping and (end_ms is None or self.swarm.now_ms < end_ms):
+            self._step(end_ms)
+
+    def linger(self, limit_s: float) -> None:
+        """Run on until the driver closes a connection or stopping is set again, at most for limit_s of wall clock.
+
+        A driver that ends at the same time then sees its robots stop before they are gone.
+        """
+        self.stopping = False
+        self._report = lambda text: None
+        deadline_s = time.monotonic() + limit_s
+        connected = self.link.count_open()
+        while connected and not self.stopping and time.monotonic() < deadline_s:
+            self._step(None)
+            if self.link.count_open() < connected:
+                return
+
+    def _step(self, end_ms: Optional[int]) -> None:
+        target_ms = self._find_target()
+        for call in self.before_advance:
+            call(self.swarm.now_ms)
+        if not self.paused:
+            for index in self.swarm.advance(target_ms if end_ms is None else min(target_ms, end_ms)):
+                self.serve_robot(index)
+        if self._carrying:
+            self._carry(self.swarm.now_ms)
+        for index in list(self._full):
+            self._limit_window(index)
+        for event in self.link.poll(self._find_wait()):
+            self._handle_event(event)
 
     def _anchor_clock(self) -> None:
         self._anchor_s, self._anchor_ms = time.monotonic(), self.swarm.now_ms

@@ -169,6 +169,10 @@ class TcpLink:
         """Return whether a robot has a connection."""
         return self._find_open(index) is not None
 
+    def count_open(self) -> int:
+        """Return how many robots have a connection."""
+        return sum(map(self.is_open, range(len(self._connections))))
+
     def send(self, index: int, data: bytes) -> None:
         """Send data for a robot, later if the driver does not read now (poll() then returns BLOCKED)."""
         connection = self._find_open(index)
