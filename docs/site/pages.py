@@ -12,7 +12,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = ROOT / ".work" / "docs_pages"
 LINK = re.compile(r"\]\(([^)#\s]+)[^)]*\)")
-STYLE = Path("docs/site/pages.css")
+SITE_FILES = {Path("docs/site/pages.css"), Path("docs/site/iframe-worker.js")}
 NOT_PAGES = {".work", ".git", "build", "devel", "install", "node_modules"}
 
 
@@ -83,6 +83,6 @@ def list_fixed(menu):
 def on_config(config):
     """Called by MkDocs before it reads the pages, and again before each new rendering."""
     pages = find_pages()
-    copy_changed({STYLE, *pages, *(path for page in pages for path in find_linked_files(page))})
+    copy_changed({*SITE_FILES, *pages, *(path for page in pages for path in find_linked_files(page))})
     config.nav = expand(config.nav, [page.as_posix() for page in pages], set(list_fixed(config.nav)))
     return config
