@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """Sets the odometry of a robot to zero."""
 
 import sys
@@ -10,7 +10,7 @@ from hero_msgs.srv import SetOdom
 
 def main():
     rospy.init_node("set_odom")
-    robot = "hero_%d" % rospy.get_param("~id", 3)
+    robot = "hero_" + str(rospy.get_param("~robot", 3)).replace("hero_", "")  # 3 or hero_3
     service = robot + "/set_odom"
     try:
         rospy.wait_for_service(service, timeout=5.0)

@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """Drives a robot to a goal in its odometry frame with a unicycle controller, then logs "arrived" and exits."""
 
 import math
@@ -23,7 +23,7 @@ class GoToGoal:
         self.goal_x_m, self.goal_y_m = goal_x_m, goal_y_m
         self.odometry = None
         self.publisher = rospy.Publisher(robot + "/velocity_controller/cmd_vel", Twist, queue_size=1)
-        rospy.Subscriber(robot + "/odom", Odometry, self.receive, queue_size=1)
+        self.subscriber = rospy.Subscriber(robot + "/odom", Odometry, self.receive, queue_size=1)
         self.timer = rospy.Timer(rospy.Duration(PERIOD_S), self.step)
         rospy.on_shutdown(self.stop)
 
@@ -32,7 +32,7 @@ class GoToGoal:
 
     def step(self, event):
         if self.odometry is None or (rospy.Time.now() - self.odometry.header.stamp).to_sec() > MAX_AGE_S:
-            rospy.logwarn_throttle(5.0, "waiting for odometry")
+            rospy.logwarn_throttle(5.0, "waiting for odometry on %s" % self.subscriber.name)
             self.publisher.publish(Twist())
             return
         pose = self.odometry.pose.pose
@@ -63,7 +63,7 @@ def clamp(value, limit):
 
 def main():
     rospy.init_node("go_to_goal")
-    robot = "hero_%d" % rospy.get_param("~id", 3)
+    robot = "hero_" + str(rospy.get_param("~robot", 3)).replace("hero_", "")  # 3 or hero_3
     GoToGoal(robot, rospy.get_param("~goal_x_m", 0.15), rospy.get_param("~goal_y_m", 0.0))
     rospy.spin()
 

@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """Simulates a robot driving a square: publishes odometry on odom and the transform from map to base_link."""
 
 import contextlib

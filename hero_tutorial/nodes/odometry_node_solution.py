@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """Publishes every tenth pose of odom as a nav_msgs/Path on path."""
 
 import rospy

@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """Logs a robot's pose estimate once a second."""
 
 import math
@@ -19,7 +19,7 @@ def print_pose(message):
 
 def main():
     rospy.init_node("odometry_reader")
-    robot = "hero_%d" % rospy.get_param("~id", 3)
+    robot = "hero_" + str(rospy.get_param("~robot", 3)).replace("hero_", "")  # 3 or hero_3
     rospy.Subscriber(robot + "/odom", Odometry, print_pose, queue_size=1)
     rospy.spin()
 

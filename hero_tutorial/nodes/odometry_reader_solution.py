@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """Logs once a second how far a robot has driven, along its path and in a straight line from the start."""
 
 import math
@@ -25,7 +25,7 @@ class DistanceMeter:
 
 def main():
     rospy.init_node("odometry_reader")
-    robot = "hero_%d" % rospy.get_param("~id", 3)
+    robot = "hero_" + str(rospy.get_param("~robot", 3)).replace("hero_", "")  # 3 or hero_3
     rospy.Subscriber(robot + "/odom", Odometry, DistanceMeter().receive, queue_size=1)
     rospy.spin()
 

@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """Plots the path in a bag of odometry: plot_path.py BAG TOPIC PICTURE."""
 
 import sys

@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """Plots the speed over time in a bag of odometry: plot_path_solution.py BAG TOPIC PICTURE."""
 
 import sys

@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """Logs a greeting once a second until Ctrl-C."""
 
 import contextlib

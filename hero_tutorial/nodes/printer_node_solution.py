@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """Logs a text at a rate, both set by parameters, until Ctrl-C."""
 
 import contextlib

@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """Publishes a counter on publisher_node_example ten times a second."""
 
 import contextlib

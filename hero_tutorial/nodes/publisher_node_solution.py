@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """Publishes a sine wave on sine; its phase comes from the clock, not from counting cycles."""
 
 import contextlib

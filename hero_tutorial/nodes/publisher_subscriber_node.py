@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """Doubles each number received on publisher_node_example and publishes it on publisher_subscriber."""
 
 import rospy

@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """Publishes the mean of the last ten numbers of publisher_node_example on mean_of_ten."""
 
 import collections

@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """Random walk: drive forward while nothing is near, otherwise turn on the spot until the path is clear."""
 
 import random
@@ -22,7 +22,7 @@ class RandomWalk:
         rospy.on_shutdown(self.stop)
 
     def walk(self, scan):
-        """Send one command per scan: if the scans stop, so do the commands, and the robot stops within 2 s."""
+        """Send one command per scan: if the scans stop, so do the commands, and the robot stops after 2 s."""
         command = Twist()
         # True for inf (nothing in range), false for nan (not calibrated).
         if all(range_m > NEAR_M for range_m in scan.ranges[FRONT_RIGHT : FRONT_LEFT + 1]):
@@ -43,7 +43,7 @@ class RandomWalk:
 
 def main():
     rospy.init_node("random_walk")
-    RandomWalk("hero_%d" % rospy.get_param("~id", 3))
+    RandomWalk("hero_" + str(rospy.get_param("~robot", 3)).replace("hero_", ""))  # 3 or hero_3
     rospy.spin()
 
 

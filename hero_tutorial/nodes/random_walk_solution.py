@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """Sets the robot's LED from its sensors: red while something is near, otherwise green."""
 
 import rospy
@@ -12,7 +12,7 @@ GREEN = ColorRGBA(0.0, 1.0, 0.0, 1.0)
 
 def main():
     rospy.init_node("led_from_proximity")
-    robot = "hero_%d" % rospy.get_param("~id", 3)
+    robot = "hero_" + str(rospy.get_param("~robot", 3)).replace("hero_", "")  # 3 or hero_3
     publisher = rospy.Publisher(robot + "/led", ColorRGBA, queue_size=1)
 
     def set_led(scan):

@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """Logs every number received on publisher_node_example."""
 
 import rospy

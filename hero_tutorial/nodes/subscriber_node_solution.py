@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """Logs once a second how many numbers were received on publisher_node_example, and how many are missing."""
 
 import rospy

@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """Drives a robot slowly forward, at 0.01 m/s, until Ctrl-C."""
 
 import contextlib
@@ -10,7 +10,7 @@ from rospy.core import is_shutdown_requested
 
 def main():
     rospy.init_node("tutorial")
-    robot = "hero_%d" % rospy.get_param("~id", 3)
+    robot = "hero_" + str(rospy.get_param("~robot", 3)).replace("hero_", "")  # 3 or hero_3
     publisher = rospy.Publisher(robot + "/velocity_controller/cmd_vel", Twist, queue_size=1)
 
     def stop():

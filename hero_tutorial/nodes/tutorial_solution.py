@@ -1,4 +1,4 @@
-#!/usr/bin/env python
+#!/usr/bin/env python3
 """Turns a robot left by about a quarter turn, then exits."""
 
 import contextlib
@@ -13,7 +13,7 @@ ANGULAR_RAD_S = 1.0
 
 def main():
     rospy.init_node("tutorial")
-    robot = "hero_%d" % rospy.get_param("~id", 3)
+    robot = "hero_" + str(rospy.get_param("~robot", 3)).replace("hero_", "")  # 3 or hero_3
     publisher = rospy.Publisher(robot + "/velocity_controller/cmd_vel", Twist, queue_size=1)
 
     def stop():

@@ -52,7 +52,7 @@ def odometry(picture):
 def walk(picture):
     """The plot that the tutorial on recording makes."""
     with RunningSuite(1, "first_id:=3") as stage, tempfile.TemporaryDirectory() as folder:
-        start_script(stage, "random_walk.py", "_id:=3")
+        start_script(stage, "random_walk.py", "_robot:=3")
         rospy.wait_for_message("/hero_3/odom", Odometry, timeout=30.0)
         bag = folder + "/walk.bag"
         subprocess.run(["rosbag", "record", "-O", bag, "--duration=%d" % WALK_S, "/hero_3/odom"], check=True)
