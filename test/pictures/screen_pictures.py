@@ -17,16 +17,18 @@ from picture_program import make_pictures
 ROOT = Path(__file__).resolve().parents[2]
 sys.path += [str(ROOT / "bench"), str(ROOT / "hero_monitor" / "test" / "rostest")]
 from measuring import find_free_port  # noqa: E402
-from monitor_page import MISSING as NO_BROWSER  # noqa: E402
 from monitor_page import MonitorPage  # noqa: E402
 from running_suite import RunningSuite  # noqa: E402
 
+from hero_test.browser import MISSING as NO_BROWSER  # noqa: E402
 from hero_test.virtual_screen import MISSING, VirtualScreen  # noqa: E402
 
 PICTURES_FOLDER = ROOT / "docs" / "pictures"
 WALK_S = 25.0
 SCREEN = (1200, 800)  # the size that the configuration of RViz gives its window
 VIEW = (slice(164, 768), slice(366, 1182))  # rows and columns of the arena in that window
+ROBOT = (slice(264, 668), slice(516, 1032))  # the part that shows one robot close up
+ROBOT_SHARE = 0.05  # of that part is dark as soon as the robot is drawn
 GROUND_SHARE = 0.5  # of the view is light ground as soon as RViz draws; its first window is dark
 DRAW_TIMEOUT_S = 60.0
 
@@ -62,6 +64,21 @@ def photograph_rviz(picture, robots, arena):
         screen.close()
 
 
+def photograph_robot(picture):
+    """Save the model of one robot, as the window of RViz shows it."""
+    screen = VirtualScreen(*SCREEN)
+    os.environ.update(screen.environment())
+    try:
+        with RunningSuite(1, "first_id:=1") as stage:
+            launch = ["roslaunch", "--no-summary", "hero_description", "display.launch"]
+            stage.start(launch, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            wait_until_drawn(screen, stage)
+            stage.wait_for(lambda: np.mean(screen.read()[ROBOT] < 80) > ROBOT_SHARE, "the robot", DRAW_TIMEOUT_S)
+            matplotlib.image.imsave(str(picture), screen.read()[ROBOT])
+    finally:
+        screen.close()
+
+
 def photograph_monitor(picture, robots, arena):
     """Let robots walk in an arena, and save the page of the fleet monitor, with one robot chosen."""
     port = find_free_port()
@@ -85,6 +102,7 @@ def is_open(port):
 
 
 PICTURES = {
+    "robot": photograph_robot,
     "monitor": lambda picture: photograph_monitor(picture, 10, "obstacles"),
     "rviz_swarm": lambda picture: photograph_rviz(picture, 4, "empty"),
     "rviz_obstacles": lambda picture: photograph_rviz(picture, 8, "obstacles"),

@@ -1,39 +1,25 @@
 """The fleet monitor's page in a real browser without a screen, for tests and pictures."""
 
 import os
-import shutil
 from pathlib import Path
 
+from hero_test.browser import open_browser, set_page_size
 from hero_test.waiting import wait_for
-
-MISSING = [name for name in ("chromedriver", "chromium") if shutil.which(name) is None]
 
 
 class MonitorPage:
     """Chromium, showing the page at an address."""
 
     def __init__(self, url):
-        # Here, because machines without a browser skip these tests.
-        from selenium import webdriver
-        from selenium.webdriver.chrome.service import Service
-
-        options = webdriver.ChromeOptions()
-        options.binary_location = shutil.which("chromium")
-        # No sandbox: it needs rights that containers lack, and only our own page is shown.
-        for argument in ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"):
-            options.add_argument(argument)
-        options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-        self.browser = webdriver.Chrome(service=Service(shutil.which("chromedriver")), options=options)
+        self.browser = open_browser(1440, 900)
         self.url = url
-        self.resize(1440, 900)
         self.open()
 
     def open(self):
         self.browser.get(self.url)
 
     def resize(self, width, height):
-        size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
-        self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+        set_page_size(self.browser, width, height)
 
     def find(self, selector):
         return self.browser.find_element("css selector", selector)

@@ -7,7 +7,7 @@ import unittest
 import rospy
 import rostest
 from geometry_msgs.msg import Twist
-from monitor_page import MISSING, MonitorPage
+from monitor_page import MonitorPage
 from monitor_process import HOST, OTHER_HOST, TIMEOUT_S, PageClient, end, start_monitor, wait_until_it_answers
 from rosgraph_msgs.msg import Log
 

@@ -7,7 +7,7 @@ import unittest
 import rospy
 import rostest
 from geometry_msgs.msg import Point, PoseStamped, Quaternion
-from monitor_page import MISSING, MonitorPage
+from monitor_page import MonitorPage
 from monitor_process import end, start_scripted_driver, wait_until_it_answers
 from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Log

@@ -8,7 +8,7 @@ import rosgraph
 import rospy
 import rostest
 from geometry_msgs.msg import Twist
-from monitor_page import MISSING, MonitorPage
+from monitor_page import MonitorPage
 from monitor_process import (
     OTHER_HOST,
     end,

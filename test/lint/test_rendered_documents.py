@@ -1,0 +1,105 @@
+"""The pages that script/docs renders, opened as files in a browser: links, search, what is copied, what fits.
+
+A broken link, or a page that is missing in the menu, fails the rendering.
+"""
+
+import subprocess
+import sys
+
+import pytest
+import sources
+
+sys.path.insert(0, str(sources.ROOT / "hero_test" / "src"))
+from hero_test.browser import MISSING, open_browser  # noqa: E402
+from hero_test.waiting import wait_for  # noqa: E402
+
+RENDERED = sources.ROOT / ".work" / "docs"
+TIMEOUT_S = 20.0
+NEXT_PAGE = "a.md-footer__link--next"
+
+FIND_CUT_LINES = """
+return [...document.querySelectorAll("pre > code")].filter(code => code.scrollWidth > code.clientWidth)
+    .map(code => code.innerText)"""
+
+# Lines may break at spaces, and where CSS allows it anyway: after hyphens and slashes.
+FIND_BROKEN_WORDS = r"""
+const broken = [];
+for (const cell of document.querySelectorAll("td, th")) {
+    const texts = document.createTreeWalker(cell, NodeFilter.SHOW_TEXT);
+    for (let text; text = texts.nextNode();)
+        for (const word of text.data.matchAll(/[^\s\/-]+/g)) {
+            const range = document.createRange();
+            range.setStart(text, word.index);
+            range.setEnd(text, word.index + word[0].length);
+            const lines = [...range.getClientRects()].filter(box => box.width > 0).map(box => Math.round(box.top));
+            if (new Set(lines).size > 1) broken.push(word[0]);
+        }
+}
+return broken;"""
+
+@pytest.fixture(scope="module")
+def pages():
+    """The address of the rendered pages."""
+    result = subprocess.run(
+        [sources.ROOT / "script" / "docs"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True
+    )
+    assert result.returncode == 0, result.stdout
+    return RENDERED.as_uri()
+
+
+@pytest.fixture(scope="module")
+def browser():
+    if MISSING:
+        pytest.skip("not installed: %s (script/bootstrap --test)" % ", ".join(MISSING))
+    browser = open_browser(1366, 768)
+    yield browser
+    browser.quit()
+
+
+def test_all_pages_render_without_a_warning(pages):
+    assert (RENDERED / "index.html").is_file()
+
+
+def test_search_finds_pages_without_a_server(pages, browser):
+    browser.get(pages + "/index.html")
+    browser.find_element("css selector", "input[name=query]").send_keys("odometry")
+    find_titles = "return [...document.querySelectorAll('.md-search-result__item h1')].map(title => title.innerText)"
+    wait_for(lambda: "8. Odometry" in browser.execute_script(find_titles), "the page is found", TIMEOUT_S)
+
+
+def test_the_copy_button_copies_commands_alone(pages, browser):
+    from selenium.webdriver.common.keys import Keys
+
+    browser.get(pages + "/docs/tutorial/ros_basics/05_subscriber.html")
+    block = browser.find_element("css selector", ".highlight:has(.gp)")
+    assert "$ rosrun" in block.text and "[build] Summary" in block.text
+    button = wait_for(lambda: block.find_elements("css selector", "button[data-clipboard-target]"), "it", TIMEOUT_S)[0]
+    browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", button)
+    button.click()
+    browser.execute_script("document.body.prepend(document.createElement('textarea'))")
+    field = browser.find_element("css selector", "textarea")
+    field.send_keys(Keys.CONTROL, "v")
+    assert field.get_property("value").splitlines() == [
+        "cd ~/catkin_ws/src/my_first_package",
+        "chmod +x scripts/subscriber_node.py",
+        "echo 'catkin_install_python(PROGRAMS scripts/subscriber_node.py"
+        " DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})' >> CMakeLists.txt",
+        "catkin build --this",
+        "rosrun my_first_package publisher_node.py",
+    ]
+
+
+def test_no_code_is_cut_and_no_word_in_a_table_is_broken(pages, browser):
+    for page in sorted(RENDERED.rglob("*.html")):
+        browser.get(page.as_uri())
+        name = page.relative_to(RENDERED)
+        assert not browser.execute_script(FIND_CUT_LINES), name
+        assert not browser.execute_script(FIND_BROKEN_WORDS), name
+
+
+def test_each_tutorial_leads_to_the_next(pages, browser):
+    course = sorted((sources.ROOT / "docs" / "tutorial" / "hero").glob("[0-9]*.md"))
+    browser.get("%s/docs/tutorial/hero/%s.html" % (pages, course[0].stem))
+    for page in course[1:]:
+        browser.get(browser.find_element("css selector", NEXT_PAGE).get_attribute("href"))
+        assert browser.current_url.endswith("/%s.html" % page.stem)
