@@ -41,7 +41,7 @@ return broken;"""
 def pages():
     """The address of the rendered pages."""
     result = subprocess.run(
-        [sources.ROOT / "script" / "docs"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True
+        [sources.ROOT / "script" / "docs"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
     )
     assert result.returncode == 0, result.stdout
     return RENDERED.as_uri()

@@ -27,8 +27,8 @@ PICTURES_FOLDER = ROOT / "docs" / "pictures"
 WALK_S = 25.0
 SCREEN = (1200, 800)  # the size that the configuration of RViz gives its window
 VIEW = (slice(164, 768), slice(366, 1182))  # rows and columns of the arena in that window
-ROBOT = (slice(264, 668), slice(516, 1032))  # the part that shows one robot close up
-ROBOT_SHARE = 0.05  # of that part is dark as soon as the robot is drawn
+ROBOT = (slice(250, 590), slice(560, 990))  # the part that shows one robot close up
+CLOSE_UP = ("view:=close", "fixed_frame:=hero_0/base_link")
 GROUND_SHARE = 0.5  # of the view is light ground as soon as RViz draws; its first window is dark
 DRAW_TIMEOUT_S = 60.0
 
@@ -48,33 +48,19 @@ def wait_while_they_walk(stage):
     stage.wait_for(lambda: time.monotonic() > end_s, "robots that walk", 2.0 * WALK_S)
 
 
-def photograph_rviz(picture, robots, arena):
-    """Let robots walk in an arena, and save the window of RViz."""
+def photograph_rviz(picture, robots, arena, *options, part=VIEW):
+    """Let robots walk in an arena, and save a part of the window of RViz, started with these options."""
     screen = VirtualScreen(*SCREEN)
     os.environ.update(screen.environment())
     try:
         with RunningSuite(robots, "arena:=" + arena) as stage:
             stage.start_example("random_walk", "_robots:=0-%d" % (robots - 1), "_seed:=4")
-            launch = ["roslaunch", "--no-summary", "hero_description", "swarm.launch", "robots:=0-%d" % (robots - 1)]
+            launch = ["roslaunch", "--no-summary", "hero_description", "swarm.launch"]
+            launch += ["robots:=0-%d" % (robots - 1), *options]
             stage.start(launch, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
             wait_until_drawn(screen, stage)
             wait_while_they_walk(stage)
-            matplotlib.image.imsave(str(picture), screen.read()[VIEW])
-    finally:
-        screen.close()
-
-
-def photograph_robot(picture):
-    """Save the model of one robot, as the window of RViz shows it."""
-    screen = VirtualScreen(*SCREEN)
-    os.environ.update(screen.environment())
-    try:
-        with RunningSuite(1, "first_id:=1") as stage:
-            launch = ["roslaunch", "--no-summary", "hero_description", "display.launch"]
-            stage.start(launch, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-            wait_until_drawn(screen, stage)
-            stage.wait_for(lambda: np.mean(screen.read()[ROBOT] < 80) > ROBOT_SHARE, "the robot", DRAW_TIMEOUT_S)
-            matplotlib.image.imsave(str(picture), screen.read()[ROBOT])
+            matplotlib.image.imsave(str(picture), screen.read()[part])
     finally:
         screen.close()
 
@@ -102,7 +88,7 @@ def is_open(port):
 
 
 PICTURES = {
-    "robot": photograph_robot,
+    "rviz_robot": lambda picture: photograph_rviz(picture, 1, "empty", *CLOSE_UP, part=ROBOT),
     "monitor": lambda picture: photograph_monitor(picture, 10, "obstacles"),
     "rviz_swarm": lambda picture: photograph_rviz(picture, 4, "empty"),
     "rviz_obstacles": lambda picture: photograph_rviz(picture, 8, "obstacles"),
