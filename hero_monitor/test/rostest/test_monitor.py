@@ -11,6 +11,7 @@ from monitor_page import MonitorPage
 from monitor_process import HOST, OTHER_HOST, TIMEOUT_S, PageClient, end, start_monitor, wait_until_it_answers
 from rosgraph_msgs.msg import Log
 
+from hero_test.browser import MISSING
 from hero_test.swarm_watch import SwarmWatch
 from hero_test.waiting import wait_for
 

@@ -14,6 +14,7 @@ from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import ColorRGBA
 
+from hero_test.browser import MISSING
 from hero_test.waiting import wait_for
 
 HOST = "127.0.0.1:21333"

@@ -19,6 +19,7 @@ from monitor_process import (
 from std_msgs.msg import Bool, String
 
 from hero_msgs.msg import RobotArray
+from hero_test.browser import MISSING
 from hero_test.processes import find_pid, suspended
 from hero_test.waiting import wait_for
 
