@@ -30,8 +30,7 @@ def list_cases(robots):
     everybody = "_robots:=0-%d" % (robots - 1)
     far = "; ".join(["30 0 90"] * robots)
     return {
-        "random_walk, sectors": ("random_walk", [everybody]),
-        "random_walk, potential": ("random_walk", [everybody, "_rule:=potential"]),
+        "random_walk": ("random_walk", [everybody]),
         "go_to_goal": ("go_to_goal", [everybody, "_goals:=" + far]),
         "go_to_goal, avoiding": ("go_to_goal", [everybody, "_goals:=" + far, "_avoid:=true"]),
         "go_to_goal, goals in world": ("go_to_goal", [everybody, "_goals:=" + far, "_frame:=world"]),

@@ -89,10 +89,9 @@ class Recording:
 
 
 def random_walk(picture):
-    """Ten robots for a minute, five by each rule."""
+    """Ten robots for a minute."""
     with Recording(10, "obstacles") as recording:
-        recording.stage.start_example("random_walk", "__name:=one", "_robots:=0-4", "_seed:=1")
-        recording.stage.start_example("random_walk", "__name:=two", "_robots:=5-9", "_seed:=1", "_rule:=potential")
+        recording.stage.start_example("random_walk", "_robots:=0-9", "_seed:=1")
         recording.go_on(60.0)
         draw_paths(picture, "random_walk: ten robots, one minute", recording.arena, recording.paths())
 

@@ -16,8 +16,9 @@ import rospy
 
 from hero_client import command_line
 from hero_client.command_line import say
+from hero_client.errors import ProgramError
 from hero_client.parameters import parse_robot_ids
-from hero_client.program import Program, ProgramError
+from hero_client.program import Program
 
 from . import store
 from .discovery import find_robots

@@ -7,23 +7,32 @@ from importlib import import_module
 from typing import Any
 
 _MODULES = {
-    "CommonFrame": "frames",
+    "BackgroundMotion": "background_motion",
+    "COLORS": "colors",
+    "CommonFrame": "common_frame",
     "Drivers": "drivers",
+    "FrameError": "errors",
     "GoToGoalServer": "go_to_goal_server",
-    "GoalError": "robot",
+    "GoalError": "errors",
+    "HeroError": "errors",
+    "NodeError": "errors",
     "Obstacle": "readings",
     "Pose": "geometry",
     "Program": "program",
-    "ProgramError": "program",
+    "ProgramError": "errors",
     "Robot": "robot",
-    "RobotError": "robot",
-    "RobotNotReadyError": "robot",
-    "StaleDataError": "robot",
+    "RobotError": "errors",
+    "RobotNotReadyError": "errors",
+    "StaleDataError": "errors",
+    "StopStatus": "stop_status",
+    "StoppedError": "errors",
     "Swarm": "swarm",
     "Velocity": "geometry",
     "open_swarm": "swarm",
+    "rate": "script",
     "read_parameters": "parameters",
     "run": "program",
+    "start_node": "script",
 }
 
 __all__ = sorted(_MODULES)  # noqa: PLE0605

@@ -10,18 +10,19 @@ hangs delays a stop, because the topics to drivers are open before it is needed.
 import math
 import threading
 import time
-from typing import Any, Dict, Iterable, List, Optional, Sequence, Set
+from functools import lru_cache
+from typing import Any, Dict, FrozenSet, Iterable, List, Optional, Sequence, Set
 
 import rospy
 from std_msgs.msg import Bool
 
 from hero_msgs.msg import Robot, RobotArray
 
-from .program import ProgramError
-from .ros_node import NodeError, ask_master
+from .errors import NodeError, ProgramError
+from .ros_node import ask_master
 from .stop_status import TIME_LIMIT_S, DriverReply, StopRequest, StopStatus
 
-__all__ = ["STATES", "STOP_STATES", "USUAL_TOPIC", "Drivers"]
+__all__ = ["STATES", "STOP_STATES", "USUAL_TOPIC", "Drivers", "share_drivers"]
 
 USUAL_TOPIC = "/hero_driver/robots"
 SUFFIX = "/robots"
@@ -37,6 +38,8 @@ SILENT_S = 2.5
 """A driver whose last report is older does not answer."""
 
 POLL_PERIOD_S = 0.02
+
+NAMES_SHOWN = 10
 
 STATES = {Robot.JOINING: "JOINING", Robot.READY: "READY", Robot.AWAY: "AWAY", Robot.REFUSED: "REFUSED"}
 STOP_STATES = {
@@ -123,6 +126,7 @@ class _DriverLink:
         self.count = 0
         self.report: Optional[RobotArray] = None
         self.arrival_s = -math.inf
+        self.stopped_robots: FrozenSet[str] = frozenset()
         self._lock = threading.Lock()
         self._is_closed = False
         # Not latched: a driver that starts later must not find an old request.
@@ -132,6 +136,8 @@ class _DriverLink:
     def _receive(self, report: RobotArray) -> None:
         if report._connection_header.get("callerid") == self.driver:
             clean(report)
+            stopped = [robot.namespace for robot in report.robots if robot.state in (Robot.READY, Robot.JOINING)]
+            self.stopped_robots = frozenset(stopped if report.stopped else ())
             with self._lock:
                 self.report, self.arrival_s = report, time.monotonic()
                 self.count += 1
@@ -167,6 +173,12 @@ class _DriverLink:
             self._is_closed = True
         self._requests.unregister()
         self._reports.unregister()
+
+
+@lru_cache(maxsize=None)
+def share_drivers() -> "Drivers":
+    """Return the connections that all Robot and Swarm objects of the program share; needs a started node."""
+    return Drivers()
 
 
 class Drivers:
@@ -284,8 +296,27 @@ class Drivers:
         return report is not None and bool(report.stopped)
 
     def is_robot_stopped(self, namespace: str) -> bool:
-        """Return whether a robot takes no motion because all robots of its driver are stopped."""
-        return self.is_stopped(self.find(namespace))
+        """Return whether a robot takes no motion because all robots of its driver are stopped.
+
+        Called for each command, so it only looks the robot up in what was prepared when the report arrived.
+        """
+        links = self._links.values()
+        limit_s = max((link.arrival_s for link in links), default=0.0) - FORGET_S
+        return any(namespace in link.stopped_robots and link.arrival_s > limit_s for link in links)
+
+    def explain_absence(self, namespace: str) -> str:
+        """Return why a robot takes no commands, as far as the drivers tell, for users."""
+        report = self.read()
+        if report is None:
+            return "no driver answers; start one: roslaunch hero_bringup hero_bringup.launch"
+        for robot in report.robots:
+            if robot.namespace == namespace and robot.state != Robot.READY:
+                reason = ": " + robot.last_error if robot.last_error else ""
+                return "the driver reports %s as %s%s" % (namespace.strip("/"), STATES[robot.state], reason)
+        names = [robot.namespace.strip("/") for robot in report.robots if robot.state == Robot.READY]
+        more = len(names) - NAMES_SHOWN
+        known = ", ".join(names[:NAMES_SHOWN]) + (" and %d more" % more if more > 0 else "")
+        return "connected are %s: is the robot on, and its id right?" % (known or "no robots")
 
     # -- stop requests --------------------------------------------------------------------------------------
 

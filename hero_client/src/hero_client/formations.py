@@ -14,6 +14,8 @@ from typing import Any, Dict, List, Sequence, Tuple
 import yaml
 from scipy.optimize import linear_sum_assignment
 
+from .errors import ProgramError
+
 __all__ = ["FormationError", "Point", "assign_goals", "place_formation"]
 
 Point = Tuple[float, float]
@@ -25,7 +27,7 @@ KEYS = ("shape", "center", "spacing_m", "turn_deg", "columns", "points")
 DEFAULT_SPACING_M = 0.25
 
 
-class FormationError(ValueError):
+class FormationError(ProgramError):
     """A formation that cannot be taken; the text names the key, the value and what it must be."""
 
 

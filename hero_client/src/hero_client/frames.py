@@ -1,28 +1,22 @@
-"""Poses of robots in a common frame, by tf2 or by measured start poses.
+"""Poses of frames by tf2, in the plane: heights and tilts are ignored.
 
-Odometry alone gives the pose relative to where the robot was switched on. The link to a common frame comes from tf
-(frame -> hero_N/odom: a tracking system, the simulator, a static transform), or from measured start poses. Works in
-the plane: heights and tilts of frames are ignored.
+Odometry alone gives the pose relative to where the robot was switched on. The link to another frame comes from tf
+(frame -> hero_N/odom): from a tracking system, the simulator, or a static transform.
 """
 
-from typing import Any, Dict, List, Mapping, Optional, Tuple
+import time
+from functools import lru_cache
+from typing import Any
 
 import rospy
 import tf2_ros
 
-from .geometry import Pose, invert_pose, transform_pose, yaw_of
-from .program import Program, ProgramError
-from .robot import Robot
-from .swarm import Swarm
+from .errors import FrameError
+from .geometry import Pose, yaw_of
 
-__all__ = ["CommonFrame", "FrameError", "FrameListener", "strip_slash"]
+__all__ = ["FrameListener", "share_frames", "strip_slash"]
 
-
-POLL_PERIOD_S = 0.1
-
-
-class FrameError(Exception):
-    """There is no transform between two frames now; the text names both."""
+POLL_PERIOD_S = 0.02
 
 
 class FrameListener:
@@ -56,55 +50,26 @@ class FrameListener:
         return Pose(found.translation.x, found.translation.y, yaw_of(found.rotation))
 
 
+    def wait_for_origin(self, frame: str, within: str, timeout_s: float) -> Pose:
+        """As origin_of(), but wait for the transform. Raises: FrameError after timeout_s."""
+        deadline_s = time.monotonic() + timeout_s
+        while True:
+            try:
+                return self.origin_of(frame, within)
+            except FrameError:
+                if time.monotonic() >= deadline_s or rospy.is_shutdown():
+                    raise
+            time.sleep(POLL_PERIOD_S)
+
+
+@lru_cache(maxsize=None)
+def share_frames() -> FrameListener:
+    """Return the listener that all Robot objects of the program share."""
+    return FrameListener()
+
+
 def strip_slash(frame: str) -> str:
     """Return the frame's name without the leading slash of tf's first version."""
     return frame.lstrip("/")
 
 
-class CommonFrame:
-    """One frame for all robots of a swarm.
-
-    Attributes:
-        missing: robot's name -> why its pose is not known, or None.
-    """
-
-    def __init__(self, frame: str, starts: Optional[Mapping[int, Tuple[float, float, float]]] = None) -> None:
-        """starts: robot's id -> its (x_m, y_m, yaw_rad) in frame at its first odometry from now on; none: use tf."""
-        self.frame = frame
-        self.missing: Dict[str, Optional[str]] = {}
-        self._starts = {robot_id: Pose(*start) for robot_id, start in (starts or {}).items()}
-        self._origins: Dict[int, Pose] = {}
-        self._listener = FrameListener()
-
-    def pose_of(self, robot: Robot) -> Optional[Pose]:
-        """Return the robot's pose in the frame; None while it is not known, `missing` then says why."""
-        pose = robot.fresh_pose()
-        self.missing[robot.name] = robot.missing()
-        if pose is None:
-            return None
-        if self._starts:
-            if robot.robot_id not in self._origins:
-                self._origins[robot.robot_id] = transform_pose(self._starts[robot.robot_id], invert_pose(pose))
-            return transform_pose(self._origins[robot.robot_id], pose)
-        try:
-            origin = self._listener.origin_of(strip_slash(robot.odometry.header.frame_id), self.frame)
-        except FrameError as error:
-            self.missing[robot.name] = "%s; start something that publishes it, or give ~starts" % error
-            return None
-        return transform_pose(origin, pose)
-
-    def wait_for_poses(self, program: Program, swarm: Swarm) -> List[Pose]:
-        """Return the poses of all robots as soon as all are known, and log which are waited for.
-
-        Raises: ProgramError if the program is to end before.
-        """
-        while program.pace(POLL_PERIOD_S):
-            poses = [pose for pose in map(self.pose_of, swarm) if pose is not None]
-            swarm.report_missing(self.missing)
-            if len(poses) == len(swarm):
-                return poses
-        raise ProgramError("ended before all robots were there")
-
-    def close(self) -> None:
-        """Unsubscribe from /tf; safe twice."""
-        self._listener.close()

@@ -12,6 +12,11 @@ class Pose(NamedTuple):
     x_m: float
     y_m: float
     yaw_rad: float
+    """Counter-clockwise from the x axis of the frame."""
+
+    def __repr__(self) -> str:
+        """Return the pose to a millimeter and a milliradian."""
+        return "Pose(x_m=%.3f, y_m=%.3f, yaw_rad=%.3f)" % self
 
 
 class Velocity(NamedTuple):
@@ -21,6 +26,10 @@ class Velocity(NamedTuple):
     """Positive forward."""
     angular_rad_s: float
     """Positive to the left."""
+
+    def __repr__(self) -> str:
+        """Return the velocity to a millimeter and a milliradian per second."""
+        return "Velocity(linear_m_s=%.3f, angular_rad_s=%.3f)" % self
 
 
 STOP = Velocity(0.0, 0.0)

@@ -14,15 +14,10 @@ from geometry_msgs.msg import PoseStamped
 
 from hero_msgs.msg import GoToAction, GoToFeedback, GoToResult
 
-from .controllers.go_to_goal import (
-    DEFAULT_LAW,
-    DEFAULT_TIMEOUT_S,
-    DEFAULT_TOLERANCE_M,
-    Goal,
-    GoToGoalController,
-    State,
-)
-from .frames import FrameError, FrameListener, strip_slash
+from .controllers.go_to_goal import DEFAULT_TOLERANCE_M, Goal, GoToGoalController
+from .controllers.motion import DEFAULT_TIMEOUT_S, State
+from .errors import FrameError, StoppedError
+from .frames import FrameListener, strip_slash
 from .geometry import STOP, Pose, transform_pose, yaw_of
 from .robot import Robot
 
@@ -113,19 +108,18 @@ class GoToGoalServer:
         frames: FrameListener,
         tolerance_m: float = DEFAULT_TOLERANCE_M,
         timeout_s: float = DEFAULT_TIMEOUT_S,
-        law: str = DEFAULT_LAW,
         avoid: bool = False,
     ) -> None:
         """Subscribe to the robot's goal topic and start its action server.
 
-        tolerance_m, timeout_s: of goals that do not give their own. law: a key of controllers.go_to_goal.LAWS.
-        avoid: whether to drive around obstacles that the proximity sensors see.
+        tolerance_m, timeout_s: of goals that do not give their own. avoid: whether to drive around obstacles that the
+        proximity sensors see; otherwise a goal fails before them.
         """
         self.robot = robot
         self.waiting_for: Optional[str] = None
         self.reached = False
         self._frames = frames
-        self._tolerance_m, self._timeout_s, self._law, self._avoid = tolerance_m, timeout_s, law, avoid
+        self._tolerance_m, self._timeout_s, self._avoid = tolerance_m, timeout_s, avoid
         self._requests: queue.Queue[_Request] = queue.Queue(MAX_QUEUED_GOALS)
         self._cancelled: queue.Queue[Any] = queue.Queue(MAX_QUEUED_GOALS)
         self._request: Optional[_Request] = None
@@ -210,7 +204,11 @@ class GoToGoalServer:
     def _drive(self, request: _Request, controller: GoToGoalController, now_s: float) -> None:
         """Send the next command towards the goal, or finish it."""
         try:
+            self.robot.check_not_stopped()
             pose = self._pose_in_goal_frame(request.frame)
+        except StoppedError as error:
+            self._finish(State.FAILED, str(error), now_s)
+            return
         except FrameError as error:
             # The controller is not asked: it would take this for a robot without odometry.
             self.robot.drive(*STOP)
@@ -225,8 +223,7 @@ class GoToGoalServer:
                 missing = self.waiting_for or "no odometry"
                 self._finish(State.FAILED, "not begun after %g s: %s" % (request.timeout_s, missing), now_s)
             return
-        ranges = self.robot.fresh_proximity() if self._avoid else None
-        self.robot.drive(*controller.step(pose, ranges, now_s))
+        self.robot.drive(*controller.step(pose, self.robot.fresh_proximity(), now_s))
         if controller.state is not State.ACTIVE:
             self._finish(controller.state, controller.reason, now_s)
         elif request.handle is not None and now_s >= self._next_feedback_s:
@@ -250,7 +247,7 @@ class GoToGoalServer:
         if frame == self.robot.name + "/odom":
             frame = ""
         self._request = request._replace(frame=frame)
-        self._controller = GoToGoalController(goal, now_s, request.tolerance_m, request.timeout_s, self._law)
+        self._controller = GoToGoalController(goal, now_s, request.tolerance_m, request.timeout_s, self._avoid)
         self._start_s = self._frame_known_s = now_s
         self.reached = False
         if request.handle is not None:

@@ -10,8 +10,9 @@ from typing import NamedTuple, Optional
 import rospy
 from sensor_msgs.msg import Joy
 
+from .errors import ProgramError
 from .geometry import STOP, Velocity
-from .program import Program, ProgramError
+from .program import Program
 from .swarm import REPORT_PERIOD_S, Swarm
 
 __all__ = ["JoystickMapping", "JoystickTeleop"]

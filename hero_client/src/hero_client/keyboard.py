@@ -9,6 +9,8 @@ import termios
 import tty
 from typing import IO, Any, List, Optional, Tuple
 
+from .errors import ProgramError
+
 __all__ = ["ARROWS", "Keyboard", "NoTerminalError", "open_terminal", "split_keys"]
 
 ARROWS = {
@@ -24,7 +26,7 @@ ARROWS = {
 """What terminals send for the arrow keys, in normal and in application mode."""
 
 
-class NoTerminalError(Exception):
+class NoTerminalError(ProgramError):
     """There is no terminal to read keys from."""
 
 

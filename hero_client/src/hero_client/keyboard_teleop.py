@@ -11,10 +11,11 @@ import sys
 import time
 from typing import Dict, List, Tuple
 
+from .errors import StaleDataError
 from .geometry import STOP, Velocity
 from .keyboard import Keyboard
 from .program import Program
-from .robot import Robot, StaleDataError
+from .robot import Robot
 from .robot_constants import MAX_LINEAR_M_S
 from .stop_status import paint
 from .swarm import Swarm

@@ -10,7 +10,7 @@ from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Seq
 
 import rospy
 
-from .program import ProgramError
+from .errors import ProgramError
 
 __all__ = [
     "Parameter",

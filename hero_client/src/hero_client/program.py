@@ -19,18 +19,15 @@ from typing import Callable, List, Optional, Sequence, Type
 import rospy
 
 from . import command_line
-from .ros_node import NodeError, start_ros_node
+from .errors import HeroError
+from .ros_node import start_ros_node
 
-__all__ = ["Program", "ProgramError", "run"]
+__all__ = ["Program", "run"]
 
 ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 SHUTDOWN_WAIT_S = 1.0
 """How long `rosnode kill` is held up while the loop ends and stops its robots; stopping takes about 0.2 s."""
-
-
-class ProgramError(Exception):
-    """The program cannot work as it was started; the text is one line that says why and what to do."""
 
 
 class Program:
@@ -43,7 +40,7 @@ class Program:
     def __init__(self, name: str, anonymous: bool = False) -> None:
         """Start the node name; anonymous adds a number so that several can run.
 
-        Raises: ProgramError without a ROS master, or for wrong remappings on the command line.
+        Raises: NodeError without a ROS master, or for wrong remappings on the command line.
         """
         self.end_signal: Optional[int] = None
         self._ending = False
@@ -56,10 +53,7 @@ class Program:
         if isinstance(sys.stdout, io.TextIOWrapper):
             # Into a pipe or file Python writes nothing before it has 8 kB, and rospy does not flush.
             sys.stdout.reconfigure(line_buffering=True)
-        try:
-            start_ros_node(name, anonymous)
-        except NodeError as error:
-            raise ProgramError(str(error)) from None
+        start_ros_node(name, anonymous)
         rospy.on_shutdown(self._await_finish)
 
     def _receive_signal(self, number: int, frame: Optional[FrameType]) -> None:
@@ -118,6 +112,6 @@ class Program:
 def run(main: Callable[[], Optional[int]], *errors: Type[Exception]) -> None:
     """Run main and end the process with its exit status, None: 0.
 
-    A ProgramError, or one of errors, becomes one line and status 1.
+    A HeroError, or one of errors, becomes one line and status 1.
     """
-    command_line.run(main, ProgramError, *errors)
+    command_line.run(main, HeroError, *errors)

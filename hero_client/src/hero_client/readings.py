@@ -35,6 +35,10 @@ class Obstacle(NamedTuple):
     bearing_rad: float
     """Counter-clockwise from the robot's front, -pi..pi."""
 
+    def __repr__(self) -> str:
+        """Return the obstacle to a millimeter and a milliradian."""
+        return "Obstacle(range_m=%.3f, bearing_rad=%.3f)" % self
+
 
 def read_pose(message: Any) -> Optional[Pose]:
     """Return the pose in the plane of a geometry_msgs/Pose; None if it is implausible."""

@@ -3,133 +3,64 @@
     from hero_client import Robot
 
     with Robot(0) as robot:
-        robot.wait_until_ready(timeout_s=10)
-        robot.drive(0.1, 0.0, duration_s=2.0)
+        robot.forward(0.2)
+        robot.turn(1.57)
         print(robot.pose, robot.nearest())
 
-Uses only the topics under /hero_N, the same for simulated and real robots. Units: m, rad, s. Frames (REP 103, 105):
-poses are in hero_N/odom, velocities and ranges in hero_N/base_link: x to the front, y to the left, angles
+Uses only topics and services under /hero_N, the same for simulated and real robots. Units: m, rad, s. Frames (REP 103,
+105): poses are in hero_N/odom, velocities and ranges in hero_N/base_link: x to the front, y to the left, angles
 counter-clockwise from the front.
 """
 
 import math
-import os
-import signal
-import sys
-import threading
 import time
-from concurrent.futures import Future
-from types import FrameType
-from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple, Type
+from functools import partial
+from typing import Callable, List, Optional
 
 import rospy
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
-from std_msgs.msg import ColorRGBA
 
-from .colors import Color, parse_color
-from .command_line import print_error
-from .controllers.go_to_goal import (
-    DEFAULT_LAW,
-    DEFAULT_TIMEOUT_S,
-    DEFAULT_TOLERANCE_M,
-    Goal,
-    GoToGoalController,
-    State,
-)
-from .geometry import Pose, Velocity, clamp, yaw_of
+from hero_msgs.msg import Encoder
+from hero_msgs.srv import SetOdom
+
+from .background_motion import BackgroundMotion, Sleep
+from .colors import Color
+from .controllers.go_to_goal import DEFAULT_TOLERANCE_M, Goal, GoToGoalController
+from .controllers.motion import DEFAULT_TIMEOUT_S, MotionController, State
+from .controllers.straight_and_turn import ForwardController, TurnController
+from .drivers import share_drivers
+from .errors import GoalError, RobotError, StaleDataError, StoppedError
+from .frames import share_frames
+from .geometry import Pose, Velocity, clamp, transform_pose, yaw_of
+from .group import READY_TIMEOUT_S, REPEAT_PERIOD_S, drive_all, send_stops, stop_all, wait_for_all
+from .light import Light
 from .readings import Obstacle, find_nearest, front_first
 from .robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
-from .ros_node import NodeError, start_ros_node
+from .robot_topics import CommandTopic, NewestMessages
+from .script import sleep_unless_shutdown, start_node
 
-__all__ = ["GoalError", "Robot", "RobotError", "RobotNotReadyError", "StaleDataError", "start_node", "stop_all"]
-
-STOP_GAP_S = 0.06
-"""Between the two messages of a stop: the firmware drops a Twist that comes within 50 ms of the one before."""
-
-SEND_TIME_S = 0.05
-"""rospy sends on threads of its own and does not say when it has; this is many times what a send takes."""
-
-REPEAT_PERIOD_S = 0.1
-"""Between the commands of a timed drive: well within the robot's watchdog of about 2 s."""
+__all__ = ["Robot"]
 
 FRESH_ODOM_S = 0.5
-"""Odometry comes about 29 times a second; older than this is stale. Wi-Fi gaps of 0.1 s are common."""
+"""Odometry and encoder come about 29 times a second; older than this is stale. Wi-Fi gaps of 0.1 s are common."""
 
 FRESH_PROXIMITY_S = 1.0
 """Proximity comes about 5 times a second; older than this is stale."""
 
-LED_PERIOD_S = 2.0
-"""Between two messages of the same color: the robot's light goes dark 15 s after the last one."""
+STOPPED_WARNING_PERIOD_S = 5.0
 
-Sleep = Callable[[float], bool]
-"""Waits for so many seconds and returns whether to continue; `Program.sleep` is one."""
-
-POLL_PERIOD_S = 0.02
-"""Between two checks whether a robot is ready."""
-
-
-class RobotError(Exception):
-    """A robot cannot do what it was told; the text says why and what to do."""
-
-
-class RobotNotReadyError(RobotError):
-    """The robot does not take commands or sends no data."""
-
-
-class StaleDataError(RobotError):
-    """The newest message is missing or too old to act upon."""
-
-
-class GoalError(RobotError):
-    """The robot did not reach its goal; the text says why."""
-
-
-def sleep_unless_shutdown(duration_s: float) -> bool:
-    """Wait for duration_s; return whether ROS still runs."""
-    time.sleep(duration_s)
-    return not rospy.is_shutdown()
-
-
-def start_node(name: str = "hero_program") -> None:
-    """Start a ROS node for a plain script, unless one runs already.
-
-    Ctrl-C raises KeyboardInterrupt as in every Python program, SIGTERM and SIGHUP raise SystemExit: `with` blocks stop
-    their robots before ROS shuts down. Without a ROS master, or by a RobotError, the script ends with one line and exit
-    code 1.
-    """
-    if rospy.core.is_initialized():
-        return
-    if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGTERM, _raise_exit)
-        signal.signal(signal.SIGHUP, _raise_exit)
-    sys.excepthook = _print_exception
-    try:
-        start_ros_node(name, anonymous=True)
-    except NodeError as error:
-        sys.exit("%s: %s" % (os.path.basename(sys.argv[0]), error))
-
-
-def _print_exception(kind: Type[BaseException], error: BaseException, traceback: Any) -> None:
-    """Print a RobotError as one line and Ctrl-C not at all; a mistake in the script keeps its traceback."""
-    if issubclass(kind, RobotError):
-        print_error(str(error))
-    elif not issubclass(kind, KeyboardInterrupt):
-        sys.__excepthook__(kind, error, traceback)
-
-
-def _raise_exit(number: int, frame: Optional[FrameType]) -> None:
-    for ending in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(ending, signal.SIG_IGN)  # a second one must not break off the stopping of the robots
-    sys.exit(128 + number)
+SERVICE_TIMEOUT_S = 2.0
 
 
 class Robot:
     """One robot by the number in its name: Robot(3) is /hero_3.
 
-    Data properties hand out the newest message only while it is fresh, else they raise StaleDataError. As a context
-    manager it stops the robot at the end, also after an error.
+    Data properties return the newest message only while it is fresh, else they raise StaleDataError. Methods that
+    drive until something is done (`drive` for a time, `forward`, `turn`, `go_to`) first wait up to 2 s for a robot that
+    is not ready, and raise an error if the robot could not do it. As a context manager a Robot stops at the end, also
+    after an error.
 
     Attributes:
         robot_id, name, namespace: 3, "hero_3", "/hero_3".
@@ -137,9 +68,12 @@ class Robot:
     """
 
     def __init__(self, robot_id: int, odom: bool = True, proximity: bool = True) -> None:
-        """Connect to the topics of /hero_{robot_id}; odom, proximity: whether to subscribe to these.
+        """Connect to the topics of /hero_{robot_id}. Returns at once: see wait_until_ready().
 
-        Starts a node if the program has none yet. Returns at once: see wait_until_ready().
+        odom, proximity: whether to subscribe to these; a program that does not need them saves their load. Starts a
+        ROS node if the program has none yet.
+
+        Raises: ValueError for a number that no robot can have. NodeError if no ROS master answers within 3 s.
         """
         if isinstance(robot_id, bool) or not isinstance(robot_id, int) or robot_id < 0:
             raise ValueError("a robot is named by its number, 0 or more, not by %r" % (robot_id,))
@@ -148,146 +82,184 @@ class Robot:
         self.name = "hero_%d" % robot_id
         self.namespace = "/" + self.name
         self.driven = False
-        self._kept_color: Optional[Color] = None
-        self._kept_s = -math.inf
-        self._newest: Dict[str, Tuple[float, Any]] = {}
-        self._cmd_vel = rospy.Publisher(
-            self.namespace + "/velocity_controller/cmd_vel", Twist, queue_size=1
-        )
-        self._led = rospy.Publisher(self.namespace + "/led", ColorRGBA, queue_size=1)
-        self._subscribers: Dict[str, rospy.Subscriber] = {}
+        self._drivers = share_drivers()
+        self._cmd_vel = CommandTopic(self.namespace + "/velocity_controller/cmd_vel", Twist, self._explain_absence)
+        self._light = Light(self.namespace, self._explain_absence)
+        self._data = NewestMessages(self.namespace)
+        self._motion: Optional[BackgroundMotion] = None
+        self._next_warning_s = -math.inf
         if odom:
-            self._subscribe("odom", Odometry)
+            self._data.subscribe("odom", Odometry)
         if proximity:
-            self._subscribe("proximity", LaserScan)
+            self._data.subscribe("proximity", LaserScan)
 
-    def _subscribe(self, topic: str, message_class: Type[Any]) -> None:
-        self._subscribers[topic] = rospy.Subscriber(
-            "%s/%s" % (self.namespace, topic),
-            message_class,
-            self._receive_message,
-            callback_args=topic,
-            queue_size=1,
-            tcp_nodelay=True,
-        )
-
-    def _receive_message(self, message: Any, topic: str) -> None:
-        self._newest[topic] = (time.monotonic(), message)
+    def _explain_absence(self) -> str:
+        return self._drivers.explain_absence(self.namespace)
 
     # ------------------------------------------------------------------ data
 
     def age_s(self, topic: str) -> float:
-        """Return the seconds since the last message of "odom" or "proximity" arrived; inf before the first."""
-        newest = self._newest.get(topic)
-        return math.inf if newest is None else time.monotonic() - newest[0]
+        """Return the seconds since the last message of "odom", "proximity" or "encoder" arrived.
 
-    def _read_fresh(self, topic: str, limit_s: float) -> Any:
-        newest = self._newest.get(topic)
-        if newest is None:
-            raise StaleDataError(
-                "no message on %s/%s yet: is the robot on, and does the driver run?" % (self.namespace, topic)
-            )
-        age_s = time.monotonic() - newest[0]
-        if age_s > limit_s:
-            raise StaleDataError(
-                "the last message on %s/%s came %.1f s ago: has the robot gone?" % (self.namespace, topic, age_s)
-            )
-        return newest[1]
+        inf before the first message.
+        """
+        return self._data.age_s(topic)
 
     @property
     def odometry(self) -> Odometry:
-        """The newest odometry message. Raises: StaleDataError."""
-        return self._read_fresh("odom", FRESH_ODOM_S)
+        """The newest nav_msgs/Odometry, with pose (hero_N/odom), velocity and covariances.
+
+        Raises: StaleDataError if it is older than 0.5 s.
+        """
+        return self._data.read("odom", FRESH_ODOM_S)
 
     @property
     def pose(self) -> Pose:
-        """Where the robot is, (x_m, y_m, yaw_rad) in the frame hero_N/odom. Raises: StaleDataError."""
+        """Where the robot is by its odometry, in the frame hero_N/odom: 0, 0, 0 where it was switched on.
+
+        Raises: StaleDataError if odometry is older than 0.5 s.
+        """
         pose = self.odometry.pose.pose
         return Pose(pose.position.x, pose.position.y, yaw_of(pose.orientation))
 
+    def pose_in(self, frame: str, timeout_s: float = 2.0) -> Pose:
+        """Return where the robot is in another frame of tf, such as "world", which simulated robots share.
+
+        The first call subscribes to /tf, which is a load with many robots, and waits up to timeout_s.
+
+        Raises: StaleDataError as `pose`. FrameError if tf does not connect frame with hero_N/odom.
+        """
+        return transform_pose(share_frames().wait_for_origin(self.name + "/odom", frame, timeout_s), self.pose)
+
     @property
     def velocity(self) -> Velocity:
-        """How the robot moves by its odometry. Raises: StaleDataError."""
+        """How the robot moves by its odometry, in hero_N/base_link. Raises: StaleDataError as `pose`."""
         twist = self.odometry.twist.twist
         return Velocity(twist.linear.x, twist.angular.z)
+
+    @property
+    def encoder(self) -> Encoder:
+        """The newest hero_msgs/Encoder: ticks, distances and speeds of both wheels.
+
+        The first use subscribes and waits up to 1 s. Raises: StaleDataError if it is older than 0.5 s.
+        """
+        self._data.subscribe("encoder", Encoder)
+        if self._data.age_s("encoder") == math.inf:
+            self._data.wait_for_next("encoder", 1.0)
+        return self._data.read("encoder", FRESH_ODOM_S)
 
     @property
     def proximity(self) -> List[float]:
         """Eight ranges in m from the robot's center, front first, counter-clockwise, 45 degrees apart.
 
-        inf: nothing in range (about 0.24 m); 0.0: too close to measure; nan: the sensor gives nothing usable.
-        Raises: StaleDataError.
+        Index 0 is the front, 2 left, 4 rear, 6 right. inf: nothing in range (0.24 m); 0.0: too close to measure (0.047
+        m); nan: not calibrated. The topic /hero_N/proximity has the same ranges rear first (index 4 is the front), and
+        -Inf for too close.
+
+        Raises: StaleDataError if they are older than 1 s.
         """
-        return front_first(self._read_fresh("proximity", FRESH_PROXIMITY_S))
+        return front_first(self._data.read("proximity", FRESH_PROXIMITY_S))
+
+    def wait_for_scan(self, timeout_s: float = 2.0) -> List[float]:
+        """Wait for the next scan, which comes 5 times a second, and return its ranges as `proximity` does.
+
+        Raises: StaleDataError if none comes within timeout_s.
+        """
+        self._data.subscribe("proximity", LaserScan)
+        return front_first(self._data.wait_for_next("proximity", timeout_s))
 
     def fresh_pose(self) -> Optional[Pose]:
-        """Return the pose, or None where `pose` would raise."""
+        """Return `pose`, or None where that would raise."""
         try:
             return self.pose
         except StaleDataError:
             return None
 
     def fresh_proximity(self) -> List[float]:
-        """Return the ranges, or eight times nan (not known) where `proximity` would raise."""
+        """Return `proximity`, or eight times nan (not known) where that would raise."""
         try:
             return self.proximity
         except StaleDataError:
             return [math.nan] * 8
 
     def nearest(self) -> Optional[Obstacle]:
-        """Return the nearest obstacle in range, None if there is none. Raises: StaleDataError."""
+        """Return range (m, from the robot's center) and bearing (rad) of the nearest obstacle; None if none is seen.
+
+        Raises: StaleDataError as `proximity`.
+        """
         ranges = self.proximity
         return find_nearest(ranges, 0.0, math.tau / max(1, len(ranges)))
+
+    # ------------------------------------------------------------------ state
 
     @property
     def connected(self) -> bool:
         """Whether the driver subscribes to the robot's commands, as it does while it knows the robot."""
-        return self._cmd_vel.get_num_connections() > 0
+        return self._cmd_vel.connected
+
+    @property
+    def is_stopped(self) -> bool:
+        """Whether the robot takes no motion because its driver has stopped all robots (emergency stop)."""
+        return self._drivers.is_robot_stopped(self.namespace)
 
     def missing(self) -> Optional[str]:
         """Return why the robot cannot be driven now, as text for users; None if it can."""
         if not self.connected:
-            return "nobody takes %s: is the driver running, and has the robot joined it?" % self._cmd_vel.name
-        for topic in self._subscribers:
-            if self.age_s(topic) > FRESH_PROXIMITY_S:
-                return "nothing comes on %s/%s: is the robot on and in reach?" % (self.namespace, topic)
+            return self._cmd_vel.describe_absence()
+        silent = self._data.find_silent(FRESH_PROXIMITY_S)
+        if silent is not None:
+            return "no message on %s/%s: is the robot on and in reach?" % (self.namespace, silent)
         return None
 
     def wait_until_ready(self, timeout_s: float = 10.0, sleep: Sleep = sleep_unless_shutdown) -> "Robot":
         """Wait until the robot takes commands and sends what was subscribed to; return the robot itself.
 
+        sleep: waits so many seconds and returns whether to continue, such as Program.sleep.
+
         Raises: RobotNotReadyError after timeout_s, saying what is missing.
         """
-        deadline_s = time.monotonic() + timeout_s
-        while True:
-            missing = self.missing()
-            if missing is None:
-                return self
-            if time.monotonic() >= deadline_s or not sleep(POLL_PERIOD_S):
-                raise RobotNotReadyError("%s is not ready after %g s: %s" % (self.name, timeout_s, missing))
+        wait_for_all([self], timeout_s, sleep)
+        return self
 
-    # ------------------------------------------------------------------ commands
+    def set_pose(self, x_m: float, y_m: float, yaw_rad: float) -> None:
+        """Set the odometry: from now on the robot is at this pose of hero_N/odom. Returns when `pose` says so.
+
+        Raises: RobotError if the robot does not answer or refuses. StaleDataError if no odometry follows.
+        """
+        name = self.namespace + "/set_odom"
+        try:
+            rospy.wait_for_service(name, SERVICE_TIMEOUT_S)
+            answer = rospy.ServiceProxy(name, SetOdom)(x_m, y_m, yaw_rad)
+        except (rospy.ServiceException, rospy.ROSException) as error:
+            raise RobotError("%s: %s" % (name, " ".join(str(error).split()))) from None
+        if not answer.success:
+            raise RobotError("%s: the robot answers: %s" % (name, answer.message))
+        self._data.subscribe("odom", Odometry)
+        self._data.wait_for_next("odom", 1.0, count=2)  # one may have been on its way before the answer
+
+    # ------------------------------------------------------------------ motions
 
     def drive(self, linear_m_s: float, angular_rad_s: float, duration_s: Optional[float] = None) -> None:
         """Drive with these velocities, limited to 0.20 m/s and 8 rad/s.
 
-        linear_m_s: positive forward. angular_rad_s: positive to the left. duration_s: drive for this time, then stop;
-        None sends one command and returns: the robot obeys it until the next one, for about two seconds at most.
-        Raises: ValueError for velocities that are not finite.
+        linear_m_s is positive forward, angular_rad_s positive to the left. With duration_s, drive for this time, then
+        stop. Without, send one command and return: the robot obeys it until the next one, for about 2 s at most.
+        A robot speeds up within about 0.5 s, so 0.1 m/s for 2 s is a little less than 0.2 m: see forward().
+
+        One command that cannot have an effect is logged: if nothing takes it, or all robots are stopped.
+
+        Raises: ValueError for velocities that are not finite. With duration_s also RobotNotReadyError if the robot is
+        not there within 2 s, and StoppedError if all robots are stopped.
         """
-        if duration_s is None:
-            self._send_twist(linear_m_s, angular_rad_s)
+        if duration_s is not None:
+            drive_all([self], linear_m_s, angular_rad_s, duration_s)
             return
-        end_s = time.monotonic() + duration_s
-        try:
-            while not rospy.is_shutdown():
-                remaining_s = end_s - time.monotonic()
-                if remaining_s <= 0.0:
-                    break
-                self._send_twist(linear_m_s, angular_rad_s)
-                time.sleep(min(REPEAT_PERIOD_S, remaining_s))
-        finally:
-            self.stop()
+        self._end_motion()
+        self._send_twist(linear_m_s, angular_rad_s)
+        now_s = time.monotonic()
+        if (linear_m_s or angular_rad_s) and now_s >= self._next_warning_s and self.is_stopped:
+            self._next_warning_s = now_s + STOPPED_WARNING_PERIOD_S
+            rospy.logerr(self._describe_stop())
 
     def _send_twist(self, linear_m_s: float, angular_rad_s: float) -> None:
         if not (math.isfinite(linear_m_s) and math.isfinite(angular_rad_s)):
@@ -296,107 +268,190 @@ class Robot:
         twist = Twist()
         twist.linear.x = clamp(linear_m_s, MAX_LINEAR_M_S)
         twist.angular.z = clamp(angular_rad_s, MAX_ANGULAR_RAD_S)
-        if not rospy.is_shutdown():
+        if linear_m_s or angular_rad_s:
             self._cmd_vel.publish(twist)
+        else:
+            self._cmd_vel.publish_if_connected(twist)
+
+    def _describe_stop(self) -> str:
+        driver = self._drivers.find(self.namespace)
+        return (
+            "%s does not move: the driver %s has stopped all robots. Release them with r in `rosrun hero_tools fleet`,"
+            " Swarm.release_stop(), or: rosservice call %s/stop false" % (self.name, driver.strip("/"), driver)
+        )
+
+    def check_not_stopped(self) -> None:
+        """Check that the driver lets the robot move: see is_stopped. Raises: StoppedError with how to release it."""
+        if self.is_stopped:
+            raise StoppedError(self._describe_stop())
 
     def stop(self) -> None:
-        """Send two stops, further apart than the robot's filter; returns once they are sent, after 0.11 s."""
+        """Stop the robot and cancel a motion from start_go_to(); returns once the stops are sent, after 0.11 s."""
         stop_all([self])
+
+    def forward(self, distance_m: float, linear_m_s: float = 0.1) -> None:
+        """Drive straight on by distance_m, backwards if it is negative, to within 5 mm by the robot's odometry.
+
+        linear_m_s: the speed, up to 0.2; the robot slows down before the end.
+
+        Raises: GoalError as go_to(). ValueError for a speed that is not positive. RobotNotReadyError. StoppedError.
+        """
+        _check_speed(distance_m, linear_m_s)
+        self._end_motion()
+        controller = ForwardController(distance_m, time.monotonic(), linear_m_s)
+        self._follow(controller, "drive %g m" % distance_m, self.fresh_pose, sleep_unless_shutdown)
+
+    def turn(self, angle_rad: float, angular_rad_s: float = 1.5) -> None:
+        """Turn on the spot by angle_rad, positive to the left, to within 0.03 rad by the robot's odometry.
+
+        angular_rad_s: the speed, up to 8; the robot slows down before the end. Angles beyond a full turn are driven.
+
+        Raises: GoalError if the wheels do not turn or odometry ends. ValueError for a speed that is not positive.
+        RobotNotReadyError. StoppedError.
+        """
+        _check_speed(angle_rad, angular_rad_s)
+        self._end_motion()
+        controller = TurnController(angle_rad, time.monotonic(), angular_rad_s)
+        self._follow(controller, "turn %g rad" % angle_rad, self.fresh_pose, sleep_unless_shutdown)
 
     def go_to(
         self,
         x_m: float,
         y_m: float,
         yaw_rad: Optional[float] = None,
+        frame: str = "odom",
+        avoid: bool = False,
         timeout_s: float = DEFAULT_TIMEOUT_S,
         tolerance_m: float = DEFAULT_TOLERANCE_M,
-        law: str = DEFAULT_LAW,
-        avoid: bool = False,
         sleep: Sleep = sleep_unless_shutdown,
     ) -> None:
-        """Drive to a position in hero_N/odom, turn to yaw_rad if given, and return when the robot has stopped there.
+        """Drive to a position, turn to yaw_rad if given, and return when the robot has stopped there.
 
-        law: see controllers.go_to_goal.LAWS. avoid: go around what the proximity sensors see.
-        Raises: GoalError with the reason if it is not reached; the robot is stopped then, too.
+        frame: "odom" for the robot's odometry (0, 0 where it was switched on), "robot" for its present pose (x to the
+        front, y to the left), or a frame of tf, such as "world". avoid: drive around what the proximity sensors see;
+        otherwise the robot stops before an obstacle that is in the way, and fails if it stays there for 2 s.
+        The default field of simulated robots is 1.5 m by 1.5 m with walls (larger for more than nine robots): a single
+        robot starts in its middle and reaches 0.7 m to each side.
+
+        What the sensors do not see (black, low or thin things) ends no motion: wheels that slip are counted as driven.
+
+        Raises: GoalError with the reason if the goal is not reached: an obstacle in the way and where it is, wheels
+        that do not turn, no odometry for 2 s, or timeout_s. RobotNotReadyError if the robot is not there within 2 s.
+        StoppedError if all robots are stopped. FrameError if tf does not know the frame. The robot is stopped then.
         """
-        controller = GoToGoalController(Goal(x_m, y_m, yaw_rad), time.monotonic(), tolerance_m, timeout_s, law)
+        self._end_motion()
+        self._go_to(Goal(x_m, y_m, yaw_rad), frame, avoid, timeout_s, tolerance_m, sleep)
+
+    def start_go_to(
+        self,
+        x_m: float,
+        y_m: float,
+        yaw_rad: Optional[float] = None,
+        frame: str = "odom",
+        avoid: bool = False,
+        timeout_s: float = DEFAULT_TIMEOUT_S,
+        tolerance_m: float = DEFAULT_TOLERANCE_M,
+    ) -> BackgroundMotion:
+        """Start go_to() on another thread, with the same arguments; return the motion.
+
+        motion.result() waits for its end, and raises what go_to() raises; motion.done() tells whether it has ended;
+        motion.cancel(), stop() or another motion of this robot ends it, and result() then raises GoalError. Several
+        robots at once: start all, then ask each motion for its result().
+        """
+        self._end_motion()
+        goal = Goal(x_m, y_m, yaw_rad)
+        self._motion = BackgroundMotion(partial(self._go_to, goal, frame, avoid, timeout_s, tolerance_m))
+        return self._motion
+
+    def _go_to(
+        self, goal: Goal, frame: str, avoid: bool, timeout_s: float, tolerance_m: float, sleep: Sleep
+    ) -> None:
+        text = "reach (%g, %g)%s" % (goal.x_m, goal.y_m, "" if frame == "odom" else " in the frame %s" % frame)
+        if avoid:
+            self._data.subscribe("proximity", LaserScan)
+        self._data.subscribe("odom", Odometry)
+        self.wait_until_ready(READY_TIMEOUT_S, sleep)
+        read_pose: Callable[[], Optional[Pose]] = self.fresh_pose
+        if frame == "robot":
+            place = transform_pose(self.pose, Pose(goal.x_m, goal.y_m, goal.yaw_rad or 0.0))
+            goal = Goal(place.x_m, place.y_m, None if goal.yaw_rad is None else place.yaw_rad)
+        elif frame not in ("odom", self.name + "/odom"):
+            read_pose = partial(self._fresh_pose_in, frame)
+        controller = GoToGoalController(goal, time.monotonic(), tolerance_m, timeout_s, avoid)
+        self._follow(controller, text, read_pose, sleep)
+
+    def _fresh_pose_in(self, frame: str) -> Optional[Pose]:
+        try:
+            return self.pose_in(frame)
+        except StaleDataError:
+            return None
+
+    def _follow(
+        self, controller: MotionController, text: str, read_pose: Callable[[], Optional[Pose]], sleep: Sleep
+    ) -> None:
+        """Drive as the controller says to its end. Raises: GoalError, StoppedError, RobotNotReadyError."""
+        self.wait_until_ready(READY_TIMEOUT_S, sleep)
         try:
             while controller.state is State.ACTIVE:
-                ranges = self.fresh_proximity() if avoid else None
-                self.drive(*controller.step(self.fresh_pose(), ranges, time.monotonic()))
+                self.check_not_stopped()
+                self._send_twist(*controller.step(read_pose(), self.fresh_proximity(), time.monotonic()))
                 if not sleep(REPEAT_PERIOD_S):
-                    raise GoalError("%s did not reach its goal: the program ends" % self.name)
+                    raise GoalError("%s did not %s: cancelled" % (self.name, text))
         finally:
-            self.stop()
+            send_stops([self])
         if controller.state is State.FAILED:
-            raise GoalError("%s did not reach (%g, %g): %s" % (self.name, x_m, y_m, controller.reason))
+            raise GoalError("%s did not %s: %s" % (self.name, text, controller.reason))
 
-    def start_go_to(self, x_m: float, y_m: float, **options: Any) -> "Future[None]":
-        """Start go_to() on another thread; the future is done, or holds the GoalError, when it ends.
+    def _end_motion(self) -> None:
+        """Cancel a motion in the background and wait until it has sent its stops."""
+        motion, self._motion = self._motion, None
+        if motion is not None:
+            motion.cancel_and_wait()
 
-        Several robots at once: start all, then ask each future for its result().
-        """
-        future: Future[None] = Future()
-        future.set_running_or_notify_cancel()
-        thread = threading.Thread(target=self._finish_go_to, args=(future, x_m, y_m, options), daemon=True)
-        thread.start()
-        return future
-
-    def _finish_go_to(self, future: "Future[None]", x_m: float, y_m: float, options: Dict[str, Any]) -> None:
-        try:
-            self.go_to(x_m, y_m, **options)
-        except (RobotError, ValueError, TypeError, rospy.ROSException) as error:
-            future.set_exception(error)
-        else:
-            future.set_result(None)
+    # ------------------------------------------------------------------ light
 
     def led(self, color: Color) -> None:
-        """Show a color: a name of colors.COLORS, or (red, green, blue) each 0..1. The robot goes dark 15 s later."""
-        red, green, blue = parse_color(color)
-        if not rospy.is_shutdown():
-            self._led.publish(ColorRGBA(red, green, blue, 1.0))
+        """Show a color: a name such as "red" (see colors.COLORS), or (red, green, blue), each 0..1.
+
+        The robot's light goes dark 15 s later: see keep_led(). Raises: ValueError for a color that is not known.
+        """
+        self._light.show(color)
 
     def keep_led(self, color: Color) -> None:
         """As led(), for every step of a loop: sends a change at once, and else repeats the color every 2 s."""
-        now_s = time.monotonic()
-        if color != self._kept_color or now_s - self._kept_s >= LED_PERIOD_S:
-            self._kept_color, self._kept_s = color, now_s
-            self.led(color)
+        self._light.keep(color)
+
+    def blink(self, color: Color, period_s: float = 1.0) -> None:
+        """Let the light blink, half of each period on, until led() or the end of the program; returns at once.
+
+        Raises: ValueError for a color that is not known, or a period of less than 0.2 s.
+        """
+        self._light.blink(color, period_s)
 
     # ------------------------------------------------------------------ end
 
     def close(self) -> None:
         """Stop the robot, if it was driven from here, and leave its topics; safe twice."""
-        self._stop_if_driven()
-        self._disconnect()
+        self._leave()
+        self._data.close()
 
-    def _stop_if_driven(self) -> None:
+    def _leave(self) -> None:
+        self._light.close()
         stop_all([self] if self.driven else [])
-
-    def _disconnect(self) -> None:
-        for subscriber in self._subscribers.values():
-            subscriber.unregister()
-        self._subscribers = {}
 
     def __enter__(self) -> "Robot":
         return self
 
     def __exit__(self, *error: object) -> None:
         # Topics are left to the end of the program: leaving them one by one takes 20 ms each.
-        self._stop_if_driven()
+        self._leave()
 
     def __repr__(self) -> str:
-        return "Robot(%d)" % self.robot_id
+        """Return the robot's name with its pose, or with why it is not ready."""
+        state = self.missing() or ("stopped" if self.is_stopped else "ready")
+        return "<%s: %s%s>" % (self.name, state, ", %r" % (self.fresh_pose(),) if self.fresh_pose() else "")
 
 
-def stop_all(robots: Sequence[Robot]) -> None:
-    """Send every robot two stops, far enough apart that none is dropped, and wait until they are sent."""
-    if not robots:
-        return
-    for robot in robots:
-        robot._send_twist(0.0, 0.0)
-    # The first stop may itself come within 50 ms of the last command, and then only the second one counts.
-    time.sleep(STOP_GAP_S)
-    for robot in robots:
-        robot._send_twist(0.0, 0.0)
-    time.sleep(SEND_TIME_S)
+def _check_speed(distance: float, speed: float) -> None:
+    if not (math.isfinite(distance) and 0.0 < speed < math.inf):
+        raise ValueError("the way must be finite and the speed positive, not %r and %r" % (distance, speed))

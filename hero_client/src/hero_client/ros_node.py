@@ -15,11 +15,12 @@ import rosgraph.roslogging
 import rospy
 from rospy.impl.registration import RegManager, get_registration_listeners
 
+from .errors import NodeError
+
 __all__ = [
     "MASTER_TIMEOUT_S",
     "SUCCESS",
     "LimitedTransport",
-    "NodeError",
     "NodeMaster",
     "ask_master",
     "check_master",
@@ -32,10 +33,6 @@ MASTER_TIMEOUT_S = 3.0
 
 SUCCESS = 1
 """First part of an answer of the master (ROS Master API)."""
-
-
-class NodeError(Exception):
-    """The node cannot start, or the ROS master does not answer; the text is one line that says why and what to do."""
 
 
 class LimitedTransport(xmlrpc.client.Transport):

@@ -5,7 +5,9 @@ import math
 import pytest
 from test_controllers import STEP_S, Body, cast_in_box
 
-from hero_client.controllers.go_to_goal import LAWS, SILENCE_S, Goal, GoToGoalController, State
+from hero_client.controllers.go_to_goal import PROGRESS_S, Goal, GoToGoalController
+from hero_client.controllers.motion import BLOCKED_S, SILENCE_S, STALL_S, State
+from hero_client.controllers.straight_and_turn import ForwardController, TurnController
 from hero_client.geometry import STOP, Pose
 
 HERE = Pose(0.0, 0.0, 0.0)
@@ -20,11 +22,10 @@ def drive(controller, body, longest_s=120.0, look=None):
     return now_s
 
 
-@pytest.mark.parametrize("law", sorted(LAWS))
-def test_a_goal_is_reached_within_its_tolerance_and_at_rest(law):
+def test_a_goal_is_reached_within_its_tolerance_and_at_rest():
     for x_m, y_m in ((0.3, 0.0), (-0.2, 0.1), (0.0, -0.3), (0.001, 0.001)):
         body = Body(HERE)
-        controller = GoToGoalController(Goal(x_m, y_m), 0.0, law=law)
+        controller = GoToGoalController(Goal(x_m, y_m), 0.0)
         drive(controller, body)
         assert controller.state is State.REACHED and controller.reason == ""
         assert math.hypot(body.pose.x_m - x_m, body.pose.y_m - y_m) < 0.01
@@ -32,7 +33,7 @@ def test_a_goal_is_reached_within_its_tolerance_and_at_rest(law):
         assert controller.step(body.pose, None, 1000.0) == STOP
 
 
-def test_the_smooth_law_ends_in_the_heading():
+def test_a_goal_with_a_heading_ends_in_it():
     body = Body(HERE)
     drive(GoToGoalController(Goal(0.3, 0.2, -2.0), 0.0), body)
     assert abs(math.remainder(body.pose.yaw_rad + 2.0, 2.0 * math.pi)) < 0.1
@@ -54,23 +55,19 @@ def test_a_robot_that_falls_silent_fails_and_stops():
     assert controller.state is State.FAILED and "no odometry" in controller.reason
 
 
-def test_a_law_that_is_not_there_is_an_error_with_those_that_are():
-    with pytest.raises(ValueError, match="tutorial, brisk, smooth"):
-        GoToGoalController(Goal(1.0, 0.0), 0.0, law="fast")
-
-
-def test_a_goal_behind_a_wall_fails_without_a_touch():
+@pytest.mark.parametrize("avoid", [False, True])
+def test_a_goal_behind_a_wall_fails_without_a_touch(avoid):
     half_m = 0.5
     for yaw_rad in (0.0, 0.4, 2.0):
         body = Body(Pose(0.0, 0.0, yaw_rad))
-        controller = GoToGoalController(Goal(1.0, 0.1), 0.0, timeout_s=30.0)
+        controller = GoToGoalController(Goal(1.0, 0.1), 0.0, avoid=avoid)
 
         def look(pose, body=body):
             assert max(abs(pose.x_m), abs(pose.y_m)) < half_m - 0.037
             return cast_in_box(pose, half_m)
 
-        drive(controller, body, look=look)
-        assert controller.state is State.FAILED and "in the way" in controller.reason
+        assert drive(controller, body, look=look) < (60.0 if avoid else 20.0)
+        assert controller.state is State.FAILED and "an obstacle is in the way" in controller.reason
 
 
 def test_an_obstacle_on_the_way_is_gone_around():
@@ -93,6 +90,77 @@ def test_an_obstacle_on_the_way_is_gone_around():
         return ranges
 
     body = Body(HERE)
-    controller = GoToGoalController(Goal(0.7, 0.0), 0.0, timeout_s=60.0)
+    controller = GoToGoalController(Goal(0.7, 0.0), 0.0, timeout_s=60.0, avoid=True)
     drive(controller, body, look=look)
     assert controller.state is State.REACHED, controller.reason
+
+
+def test_a_blocked_robot_stops_fails_and_tells_where_the_obstacle_is():
+    for x_m, index, degrees in ((1.0, 0, "+0"), (-1.0, 4, "180")):
+        controller = GoToGoalController(Goal(x_m, 0.0), 0.0)
+        ranges = [math.inf] * 8
+        ranges[index] = 0.06
+        assert controller.step(HERE, ranges, 0.0).linear_m_s == 0.0
+        controller.step(HERE, ranges, BLOCKED_S + 0.1)
+        assert controller.state is State.FAILED
+        assert "0.06 m" in controller.reason and "%s degrees" % degrees in controller.reason
+        assert "1.000 m are left" in controller.reason
+
+
+def test_an_obstacle_that_leaves_in_time_ends_no_motion():
+    controller = GoToGoalController(Goal(1.0, 0.0), 0.0)
+    near = [0.06] + [math.inf] * 7
+    assert controller.step(HERE, near, 0.0).linear_m_s == 0.0
+    assert controller.step(HERE, [math.inf] * 8, 1.0).linear_m_s > 0.0
+    controller.step(HERE, near, BLOCKED_S + 0.1)
+    assert controller.state is State.ACTIVE
+
+
+def test_a_goal_before_an_obstacle_or_beside_one_is_reached():
+    """The goal is 0.05 m from a wall, center to wall, and the way along another wall is 0.01 m from the body."""
+    half_m = 0.5
+    for start, goal in ((HERE, Goal(0.45, 0.0)), (Pose(0.0, 0.453, 0.0), Goal(0.3, 0.453))):
+        body = Body(start)
+        controller = GoToGoalController(goal, 0.0)
+        drive(controller, body, look=lambda pose: cast_in_box(pose, half_m))
+        assert controller.state is State.REACHED, controller.reason
+
+
+def test_wheels_that_do_not_turn_fail_the_motion():
+    for controller in (
+        GoToGoalController(Goal(1.0, 0.0), 0.0),
+        ForwardController(-0.2, 0.0, 0.1),
+        TurnController(1.0, 0.0, 1.5),
+    ):
+        for index in range(int(STALL_S / STEP_S) + 2):
+            controller.step(HERE, None, STEP_S * index)
+        assert controller.state is State.FAILED and "wheels do not turn" in controller.reason
+
+
+@pytest.mark.parametrize("way_m", [0.3, -0.2, 0.01])
+def test_forward_drives_its_distance_and_keeps_the_heading(way_m):
+    body = Body(Pose(0.1, 0.2, 0.7))
+    controller = ForwardController(way_m, 0.0, 0.1)
+    assert drive(controller, body) < 12.0
+    assert controller.state is State.REACHED
+    assert body.pose.x_m == pytest.approx(0.1 + way_m * math.cos(0.7), abs=0.006)
+    assert body.pose.y_m == pytest.approx(0.2 + way_m * math.sin(0.7), abs=0.006)
+    assert body.pose.yaw_rad == pytest.approx(0.7, abs=0.02)
+
+
+@pytest.mark.parametrize("angle_rad", [math.pi / 2.0, -1.0, 2.0 * math.pi, 0.05])
+def test_turn_turns_by_its_angle_on_the_spot(angle_rad):
+    body = Body(Pose(0.0, 0.0, 3.0))
+    controller = TurnController(angle_rad, 0.0, 1.5)
+    assert drive(controller, body) < 12.0
+    assert controller.state is State.REACHED
+    assert body.pose.yaw_rad - 3.0 == pytest.approx(angle_rad, abs=0.035)
+    assert math.hypot(body.pose.x_m, body.pose.y_m) < 1e-6
+
+
+def test_a_robot_in_a_dead_end_gives_up_when_it_comes_no_nearer():
+    controller = GoToGoalController(Goal(1.0, 0.0), 0.0, avoid=True)
+    for index in range(int(PROGRESS_S / STEP_S) + 2):
+        # It turns to and fro, so its wheels are not stuck.
+        controller.step(Pose(0.0, 0.0, 0.1 * (index % 2)), [0.06] * 8, STEP_S * index)
+    assert controller.state is State.FAILED and "no nearer" in controller.reason

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hero_client.controllers.go_to_goal import LAWS, SILENCE_S, Goal, GoToGoalController, State
+from hero_client.controllers.go_to_goal import Goal, GoToGoalController
+from hero_client.controllers.motion import SILENCE_S, State
 from hero_client.geometry import STOP, Pose
 from hero_client.go_to_goal_server import (
     MAX_COORDINATE_M,
@@ -61,12 +62,12 @@ def test_any_goal_message_is_accepted_or_rejected_in_one_line(message, use_headi
 
 @often
 @given(
-    law=st.sampled_from(sorted(LAWS)),
+    avoid=st.booleans(),
     goal=st.builds(Goal, good, good, st.one_of(st.none(), st.floats(-math.pi, math.pi))),
     steps=st.lists(st.tuples(any_poses, ranges), min_size=1, max_size=5),
 )
-def test_any_accepted_goal_and_any_pose_give_finite_slow_commands(law, goal, steps):
-    controller = GoToGoalController(goal, 0.0, law=law)
+def test_any_accepted_goal_and_any_pose_give_finite_slow_commands(avoid, goal, steps):
+    controller = GoToGoalController(goal, 0.0, avoid=avoid)
     for index, (pose, seen) in enumerate(steps):
         linear_m_s, angular_rad_s = controller.step(pose, seen, 0.1 * index)
         assert abs(linear_m_s) <= 0.3 and abs(angular_rad_s) <= 4.0, (linear_m_s, angular_rad_s)

@@ -10,8 +10,9 @@ import shutil
 import sys
 import tempfile
 
+from hero_client.errors import ProgramError
 from hero_client.parameters import choice, read_parameters
-from hero_client.program import Program, ProgramError, run
+from hero_client.program import Program, run
 
 from .robots_parameter import given_robots
 from .rviz_config import VIEWS, make_config

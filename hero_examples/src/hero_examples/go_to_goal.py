@@ -5,9 +5,10 @@ import time
 import rospy
 
 from hero_client import GoToGoalServer, Program, ProgramError, open_swarm, read_parameters, run
-from hero_client.controllers.go_to_goal import DEFAULT_LAW, DEFAULT_TIMEOUT_S, DEFAULT_TOLERANCE_M, LAWS, Goal
+from hero_client.controllers.go_to_goal import DEFAULT_TOLERANCE_M, Goal
+from hero_client.controllers.motion import DEFAULT_TIMEOUT_S
 from hero_client.frames import FrameListener
-from hero_client.parameters import choice, flag, number, parse_poses, robot_ids
+from hero_client.parameters import flag, number, parse_poses, robot_ids
 
 
 def serve_goals():
@@ -19,20 +20,19 @@ def serve_goals():
                 "frame": "",
                 "tolerance_m": number(DEFAULT_TOLERANCE_M, 0.002, 1.0, "m"),
                 "timeout_s": number(DEFAULT_TIMEOUT_S, 1.0, 3600.0, "s"),
-                "law": choice(DEFAULT_LAW, list(LAWS)),
                 "avoid": flag(False),
                 "once": flag(False),
             }
         )
-        ids, once, avoid = parameters["robots"], parameters["once"], parameters["avoid"]
+        ids, once = parameters["robots"], parameters["once"]
         goals = parse_poses("goals", parameters["goals"], ids, needs_heading=False)
         if once and not goals:
             raise ProgramError("~once is true, but ~goals is empty: there is nothing to do")
 
-        with open_swarm(program, ids, proximity=avoid) as swarm:
+        with open_swarm(program, ids) as swarm:
             frames = FrameListener()
-            options = [parameters[name] for name in ("tolerance_m", "timeout_s", "law")]
-            servers = [GoToGoalServer(robot, frames, *options, avoid=avoid) for robot in swarm]
+            options = [parameters[name] for name in ("tolerance_m", "timeout_s", "avoid")]
+            servers = [GoToGoalServer(robot, frames, *options) for robot in swarm]
             for server in servers:
                 if server.robot.robot_id in goals:
                     server.put_goal(Goal(*goals[server.robot.robot_id]), parameters["frame"])

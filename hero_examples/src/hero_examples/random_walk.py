@@ -2,19 +2,13 @@
 
 import math
 import random
-from functools import partial
 
 import rospy
 
 from hero_client import Program, open_swarm, read_parameters, run
 from hero_client.controllers import avoidance
-from hero_client.parameters import choice, number, robot_ids, whole_number
+from hero_client.parameters import number, robot_ids, whole_number
 from hero_client.robot_constants import MAX_LINEAR_M_S
-
-RULES = {
-    "sectors": (avoidance.wander, avoidance.WanderLaw),
-    "potential": (avoidance.wander_in_potential, avoidance.PotentialLaw),
-}
 
 
 def walk():
@@ -22,15 +16,13 @@ def walk():
         parameters = read_parameters(
             {
                 "robots": robot_ids("0"),
-                "rule": choice("sectors", list(RULES)),
                 "linear_m_s": number(0.10, 0.0, MAX_LINEAR_M_S, "m/s"),
                 "angular_rad_s": number(1.5, 0.1, 4.0, "rad/s"),
                 "seed": whole_number(-1, -1, 2**31),
             }
         )
         cruise_m_s, seed = parameters["linear_m_s"], parameters["seed"]
-        rule, law = RULES[parameters["rule"]]
-        rule = partial(rule, law=law(cruise_m_s, parameters["angular_rad_s"]))
+        law = avoidance.WanderLaw(cruise_m_s, parameters["angular_rad_s"])
 
         with open_swarm(program, parameters["robots"], odom=False) as swarm:
             rospy.loginfo("random walk of %s", ", ".join(robot.name for robot in swarm))
@@ -45,7 +37,7 @@ def walk():
                         missing[robot.name] = missing[robot.name] or "no usable ranges: infrared calibration?"
                         command, memories[robot], color = (0.0, 0.0), avoidance.WanderMemory(), "blue"
                     else:
-                        command, memories[robot] = rule(ranges, memories[robot], dice[robot].random())
+                        command, memories[robot] = avoidance.wander(ranges, memories[robot], dice[robot].random(), law)
                         color = "green" if command.linear_m_s >= cruise_m_s else "yellow"
                         color = "red" if memories[robot].escape_sign else color
                     robot.drive(*command)

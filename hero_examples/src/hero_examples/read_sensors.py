@@ -1,19 +1,18 @@
 """Turns robot 0 slowly on the spot for ten seconds and prints what its sensors see."""
 
-import time
-
-from hero_client import Robot
+from hero_client import Robot, rate
 
 
 def main() -> None:
     with Robot(0) as robot:
         robot.wait_until_ready()
-        for _ in range(20):
+        for time_s in rate(2):  # Hz
             robot.drive(0.0, 0.6)  # the robot obeys one command for about 2 s
-            time.sleep(0.5)
             print("pose: x %.2f m, y %.2f m, yaw %.2f rad" % robot.pose)
             print("ranges from the front, counter-clockwise, m:", ["%.2f" % range_m for range_m in robot.proximity])
             print("nearest:", robot.nearest())
+            if time_s > 9.0:
+                break
 
 
 if __name__ == "__main__":

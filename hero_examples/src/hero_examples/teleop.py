@@ -1,7 +1,7 @@
 """Drives robots with the keys of a terminal; the robot stops when no key comes."""
 
 from hero_client import Program, open_swarm, read_parameters, run
-from hero_client.keyboard import Keyboard, NoTerminalError
+from hero_client.keyboard import Keyboard
 from hero_client.keyboard_teleop import MAX_ANGULAR_RAD_S, MIN_ANGULAR_RAD_S, MIN_LINEAR_M_S, KeyboardTeleop
 from hero_client.parameters import number, robot_ids
 from hero_client.robot_constants import MAX_LINEAR_M_S
@@ -21,4 +21,4 @@ def drive():
 
 
 def main():
-    run(drive, NoTerminalError)
+    run(drive)

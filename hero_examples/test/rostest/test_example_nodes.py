@@ -29,11 +29,9 @@ WHITE, DARK, RED = (1.0, 1.0, 1.0), (0.15, 0.15, 0.15), (1.0, 0.0, 0.0)
 WRONG = {
     # program and argument: what the line must name
     ("random_walk", "_robots:=zero"): r"~robots .*'zero'.*0-3",
-    ("random_walk", "_rule:=zigzag"): r"~rule .*'zigzag'.* sectors, potential",
     ("random_walk", "_seed:=0.5"): r"~seed .*0.5.* whole number",
     ("random_walk", "_sped:=0.1"): r"sped.*linear_m_s",
     ("go_to_goal", "_goals:=1 2 3 4"): r"~goals .*'1 2 3 4'.*x y heading",
-    ("go_to_goal", "_law:=rash"): r"~law .*'rash'.* smooth",
     ("go_to_goal", "_once:=true"): r"~once .* ~goals is empty",
     ("swarm_go_to", "_formation:={shape: star}"): r"formation: shape is 'star'.* circle",
     ("swarm_go_to", "_tolerance_m:=3"): r"~tolerance_m .*3.* 0.1 m",

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Ten random walkers among obstacles for two minutes, five by each rule, judged by the simulator's ground truth."""
+"""Ten random walkers among obstacles for two minutes, judged by the simulator's ground truth."""
 
 import sys
 import unittest
@@ -26,7 +26,7 @@ class RandomWalkTest(unittest.TestCase):
         watch.wait_until_complete(60.0)
         start_s = rospy.get_time()
         wait_for(lambda: rospy.get_time() - start_s > WALK_S, "the end of the walk", 3.0 * WALK_S)
-        rosnode.kill_nodes(["/random_walk_by_sectors", "/random_walk_in_potential"])
+        rosnode.kill_nodes(["/random_walk"])
         ids = sorted(watch.rows)
 
         def all_rest():

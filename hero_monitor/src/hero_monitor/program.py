@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any, Union
 
 import rospy
 
+from hero_client.errors import ProgramError
 from hero_client.geometry import Pose
-from hero_client.program import Program, ProgramError, run
+from hero_client.program import Program, run
 from hero_client.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
 
 from . import requests

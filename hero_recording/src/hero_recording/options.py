@@ -3,8 +3,8 @@
 import argparse
 from typing import Callable, Collection, List, Optional
 
+from hero_client.errors import ProgramError
 from hero_client.parameters import parse_robot_ids
-from hero_client.program import ProgramError
 
 
 def robot_ids(text: str) -> Optional[List[int]]:

@@ -5,22 +5,22 @@ nan: not known, which counts as an obstacle.
 """
 
 import math
-from typing import NamedTuple, Sequence, Tuple
+from typing import NamedTuple, Optional, Sequence, Tuple
 
 from ..geometry import STOP, Velocity, clamp, wrap_angle
+from ..readings import Obstacle
+from ..robot_constants import BODY_RADIUS_M, MIN_RANGE_M
 
 __all__ = [
     "DETOUR",
-    "POTENTIAL",
     "WANDER",
     "DetourLaw",
-    "PotentialLaw",
     "WanderLaw",
     "WanderMemory",
     "bend_around",
+    "find_in_path",
     "split_sectors",
     "wander",
-    "wander_in_potential",
 ]
 
 
@@ -38,6 +38,27 @@ def split_sectors(ranges: Sequence[float]) -> Tuple[float, float, float]:
         sector = 1 if abs(bearing_rad) < 0.39 else (0 if bearing_rad > 0.0 else 2)
         sectors[sector] = min(sectors[sector], 0.0 if math.isnan(range_m) else range_m)
     return sectors[0], sectors[1], sectors[2]
+
+
+def find_in_path(ranges: Sequence[float], backward: bool = False) -> Tuple[float, Optional[Obstacle]]:
+    """Return how far, m, the body can drive straight on, or backward, and the obstacle that it would touch there.
+
+    (inf, None) if none is seen. nan counts as nothing: what is not known cannot be said to be in the way.
+    """
+    free_m, nearest = math.inf, None
+    for index, range_m in enumerate(ranges):
+        if not math.isfinite(range_m):
+            continue
+        bearing_rad = wrap_angle(index * math.tau / len(ranges))
+        off_rad = wrap_angle(bearing_rad - math.pi) if backward else bearing_rad
+        known_m = max(range_m, MIN_RANGE_M)
+        aside_m = known_m * abs(math.sin(off_rad))
+        if abs(off_rad) >= math.pi / 2.0 or aside_m >= BODY_RADIUS_M:
+            continue
+        touch_m = known_m * math.cos(off_rad) - math.sqrt(BODY_RADIUS_M**2 - aside_m**2)
+        if touch_m < free_m:
+            free_m, nearest = touch_m, Obstacle(range_m, bearing_rad)
+    return free_m, nearest
 
 
 class WanderLaw(NamedTuple):
@@ -111,59 +132,6 @@ def wander(
     speed_m_s = law.cruise_m_s * max(0.2, 1.0 - nearness)
     angular_rad_s = away_sign * nearness * law.angular_rad_s
     return Velocity(speed_m_s, angular_rad_s), WanderMemory(drift_rad_s=away_sign * abs(drift_rad_s))
-
-
-class PotentialLaw(NamedTuple):
-    """How a robot wanders in a potential field."""
-
-    cruise_m_s: float = 0.10
-    angular_rad_s: float = 2.0
-    """Largest turn."""
-    turn_gain: float = 2.5
-    """Turn in rad/s per rad between the heading and the direction of the field."""
-    influence_m: float = 0.22
-    """Obstacles nearer than this push."""
-    body_m: float = 0.05
-    """At this range the push of one beam is `push` times the pull to the front."""
-    push: float = 3.0
-    drift_rad: float = 0.5
-    """Largest angle between the pull and the front: makes the walk random."""
-
-
-POTENTIAL = PotentialLaw()
-
-
-def wander_in_potential(
-    ranges: Sequence[float], memory: WanderMemory, chance: float, law: PotentialLaw = POTENTIAL
-) -> Tuple[Velocity, WanderMemory]:
-    """Return the next command of a random walk down a potential field, and what to remember: see wander().
-
-    A constant force pulls to the front, a little to one side, and every beam that sees something pushes away from it,
-    harder the nearer it is. The robot turns towards the sum of forces, and drives faster the better it is aligned.
-    Source: O. Khatib, Real-time obstacle avoidance for manipulators and mobile robots, 1986.
-    """
-    if not ranges:
-        return STOP, WanderMemory()
-    drift_rad = clamp(0.95 * memory.drift_rad_s + (chance - 0.5) * law.drift_rad, law.drift_rad)
-    force_x, force_y = math.cos(drift_rad), math.sin(drift_rad)
-    for index, range_m in enumerate(ranges):
-        known_m = 0.0 if math.isnan(range_m) else range_m
-        if known_m < law.influence_m:
-            nearness = min(1.0, (law.influence_m - known_m) / (law.influence_m - law.body_m))
-            bearing_rad = index * 2.0 * math.pi / len(ranges)
-            force_x -= law.push * nearness**2 * math.cos(bearing_rad)
-            force_y -= law.push * nearness**2 * math.sin(bearing_rad)
-    towards_rad = math.atan2(force_y, force_x)
-    escape_sign = 0
-    if abs(towards_rad) > math.pi / 2.0:
-        # The free path is to the rear. Left and right are equal there: keep the side that was begun.
-        escape_sign = memory.escape_sign or (1 if towards_rad > 0.0 else -1)
-        if not memory.escape_sign:
-            return STOP, WanderMemory(escape_sign, drift_rad_s=drift_rad)
-        return Velocity(0.0, escape_sign * law.angular_rad_s), WanderMemory(escape_sign, drift_rad_s=drift_rad)
-    speed_m_s = law.cruise_m_s * max(0.0, math.cos(towards_rad)) * min(1.0, math.hypot(force_x, force_y))
-    command = Velocity(speed_m_s, clamp(law.turn_gain * towards_rad, law.angular_rad_s))
-    return command, WanderMemory(escape_sign, drift_rad_s=drift_rad)
 
 
 class DetourLaw(NamedTuple):

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..geometry import STOP, Pose, Velocity
 from .orca import AvoidanceLaw, avoid_others, avoid_sensed, steer, steered_point
-from .unicycle import BRISK, GoToLaw, go_to_point
+from .unicycle import GoToLaw, go_to_point
 
 __all__ = [
     "ASIDE_S",
@@ -57,7 +57,7 @@ class SwarmGoToController:
         self.law = law
         self.step_s = step_s
         self.arrived = [False] * len(self.goals)
-        self._dock_law: GoToLaw = BRISK._replace(tolerance_m=tolerance_m, max_linear_m_s=law.max_linear_m_s)
+        self._dock_law = GoToLaw(tolerance_m=tolerance_m, max_linear_m_s=law.max_linear_m_s)
         self._random = np.random.RandomState(seed)
         self._last_places: Optional[np.ndarray] = None
         self._velocities = np.zeros((len(self.goals), 2))

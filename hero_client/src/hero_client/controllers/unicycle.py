@@ -9,10 +9,9 @@ from typing import NamedTuple
 from ..geometry import STOP, Pose, Velocity, clamp, wrap_angle
 
 __all__ = [
-    "BRISK",
     "FOLLOW",
+    "GO_TO",
     "SMOOTH",
-    "TUTORIAL",
     "FollowLaw",
     "GoToLaw",
     "GoToPoseLaw",
@@ -23,26 +22,22 @@ __all__ = [
 
 
 class GoToLaw(NamedTuple):
-    """How a robot goes to a point. The values are those of the tutorial: slow and sure."""
+    """How a robot goes to a point: as quickly as its motors (0.5 s to a new speed) follow without swinging."""
 
-    linear_gain: float = 4.0 / 20.0
-    """kr: speed in m/s per meter of distance, 1/s."""
-    turn_gain: float = 8.0 / 20.0
-    """ka: turn in rad/s per radian of bearing, 1/s."""
-    max_linear_m_s: float = 0.07
-    max_angular_rad_s: float = 0.1
+    linear_gain: float = 0.8
+    """Speed in m/s per meter of distance, 1/s."""
+    turn_gain: float = 1.5
+    """Turn in rad/s per radian of bearing, 1/s."""
+    max_linear_m_s: float = 0.12
+    max_angular_rad_s: float = 1.5
     tolerance_m: float = 0.01
     """Nearer than this the robot has arrived."""
 
 
-TUTORIAL = GoToLaw()
+GO_TO = GoToLaw()
 
 
-BRISK = GoToLaw(linear_gain=0.8, turn_gain=1.5, max_linear_m_s=0.12, max_angular_rad_s=1.5)
-"""As quick as the robot's speed controller (0.5 s to a new speed) follows without swinging."""
-
-
-def go_to_point(pose: Pose, x_m: float, y_m: float, law: GoToLaw = TUTORIAL) -> Velocity:
+def go_to_point(pose: Pose, x_m: float, y_m: float, law: GoToLaw = GO_TO) -> Velocity:
     """Return the command that drives a robot at pose towards the point; STOP where it has arrived.
 
     Unicycle law: v = kr * distance * cos(a), w = ka * a with a the angle from the heading to the goal. A goal behind

@@ -1,0 +1,63 @@
+"""Poses of all robots of a swarm in one frame, by tf or by measured start poses."""
+
+from typing import Dict, List, Mapping, Optional, Tuple
+
+from .errors import FrameError, ProgramError
+from .frames import FrameListener, strip_slash
+from .geometry import Pose, invert_pose, transform_pose
+from .program import Program
+from .robot import Robot
+from .swarm import Swarm
+
+__all__ = ["CommonFrame"]
+
+POLL_PERIOD_S = 0.1
+
+
+class CommonFrame:
+    """One frame for all robots of a swarm.
+
+    Attributes:
+        missing: robot's name -> why its pose is not known, or None.
+    """
+
+    def __init__(self, frame: str, starts: Optional[Mapping[int, Tuple[float, float, float]]] = None) -> None:
+        """starts: robot's id -> its (x_m, y_m, yaw_rad) in frame at its first odometry from now on; none: use tf."""
+        self.frame = frame
+        self.missing: Dict[str, Optional[str]] = {}
+        self._starts = {robot_id: Pose(*start) for robot_id, start in (starts or {}).items()}
+        self._origins: Dict[int, Pose] = {}
+        self._listener = FrameListener()
+
+    def pose_of(self, robot: Robot) -> Optional[Pose]:
+        """Return the robot's pose in the frame; None while it is not known, `missing` then says why."""
+        pose = robot.fresh_pose()
+        self.missing[robot.name] = robot.missing()
+        if pose is None:
+            return None
+        if self._starts:
+            if robot.robot_id not in self._origins:
+                self._origins[robot.robot_id] = transform_pose(self._starts[robot.robot_id], invert_pose(pose))
+            return transform_pose(self._origins[robot.robot_id], pose)
+        try:
+            origin = self._listener.origin_of(strip_slash(robot.odometry.header.frame_id), self.frame)
+        except FrameError as error:
+            self.missing[robot.name] = "%s; start something that publishes it, or give ~starts" % error
+            return None
+        return transform_pose(origin, pose)
+
+    def wait_for_poses(self, program: Program, swarm: Swarm) -> List[Pose]:
+        """Return the poses of all robots as soon as all are known, and log which are waited for.
+
+        Raises: ProgramError if the program is to end before.
+        """
+        while program.pace(POLL_PERIOD_S):
+            poses = [pose for pose in map(self.pose_of, swarm) if pose is not None]
+            swarm.report_missing(self.missing)
+            if len(poses) == len(swarm):
+                return poses
+        raise ProgramError("ended before all robots were there")
+
+    def close(self) -> None:
+        """Unsubscribe from /tf; safe twice."""
+        self._listener.close()

@@ -1,0 +1,180 @@
+"""The frame of a motion with an end: it is reached, or fails with a reason. Pure.
+
+Two things are judged by what a stock robot knows. Its proximity sensors show an obstacle in the way; without them
+nothing would, because wheels that slip at a wall count on, and odometry with them. Its odometry shows wheels that do
+not turn. now_s is any clock that never steps back.
+"""
+
+import enum
+import math
+from typing import Optional, Sequence
+
+from ..geometry import STOP, Pose, Velocity, wrap_angle
+from ..readings import Obstacle
+from .avoidance import find_in_path
+
+__all__ = ["DEFAULT_TIMEOUT_S", "SILENCE_S", "MotionController", "State"]
+
+DEFAULT_TIMEOUT_S = 120.0
+
+SETTLE_S = 0.5
+"""A robot stopped for so long at its goal has reached it; it needs about 0.15 s to come to rest."""
+
+AIM_SHARE = 0.7
+"""The robot stops at this share of the tolerance, to be within it after coming to rest."""
+
+SILENCE_S = 2.0
+"""After so long without a pose the motion has failed: the robot is gone."""
+
+CLEARANCE_M = 0.02
+"""Free space kept between the body and an obstacle in the way."""
+
+APPROACH_GAIN = 0.8
+"""Largest speed towards an obstacle in the way, in m/s per meter; scans come 5 times a second."""
+
+BLOCKED_M_S = 0.01
+"""A robot that may not drive faster than this towards an obstacle is blocked by it."""
+
+BLOCKED_S = 2.0
+"""After so long behind an obstacle the motion has failed; one that drives on, such as a robot, is waited for."""
+
+STALL_S = 3.0
+"""After so long without motion of the wheels although they were told to move, the motion has failed."""
+
+STALL_LINEAR_M_S = 0.02
+STALL_ANGULAR_RAD_S = 0.2
+"""Commands below both may be too slow for the motors."""
+
+MOVED_M = 0.005
+MOVED_RAD = 0.05
+"""More than the noise of odometry (a tick is 0.5 mm and 0.017 rad)."""
+
+
+class State(enum.Enum):
+    """State of a motion."""
+
+    ACTIVE = "active"
+    REACHED = "reached"
+    FAILED = "failed"
+
+
+class MotionController:
+    """Drives one robot to the end of one motion; subclasses say which by _offset() and _approach().
+
+    Attributes:
+        state: see State; once it is not ACTIVE it stays, and step() returns STOP.
+        reason: why it failed, for users; empty otherwise.
+        distance_m: still to drive at the last step; nan before the first pose.
+    """
+
+    def __init__(self, now_s: float, timeout_s: float) -> None:
+        """Begin at now_s; after timeout_s the motion fails."""
+        self.state = State.ACTIVE
+        self.reason = ""
+        self.distance_m = math.nan
+        self._timeout_s = timeout_s
+        self._start_s = now_s
+        self._last_pose_s = now_s
+        self._stopped_since_s: Optional[float] = None
+        self._blocked_since_s: Optional[float] = None
+        self._patience_s = BLOCKED_S
+        self._obstacle: Optional[Obstacle] = None
+        self._moved_pose: Optional[Pose] = None
+        self._moved_s = now_s
+        self._at_goal = False
+
+    def step(self, pose: Optional[Pose], ranges: Optional[Sequence[float]], now_s: float) -> Velocity:
+        """Return the next command; call it 10 times per second.
+
+        pose: None while it is not known, and so is one that is not finite. ranges: as in avoidance; None: not known.
+        """
+        if self.state is not State.ACTIVE:
+            return STOP
+        if now_s - self._start_s > self._timeout_s:
+            return self._fail(self._describe_timeout())
+        if pose is None or not all(math.isfinite(value) for value in pose):
+            if now_s - self._last_pose_s > SILENCE_S:
+                return self._fail("no odometry for %g s" % SILENCE_S)
+            return STOP
+        self._last_pose_s = now_s
+        # It stops well inside the tolerance and restarts only outside: hysteresis against chattering at the border.
+        self._at_goal = self._offset(pose) < (1.0 if self._at_goal else AIM_SHARE)
+        command = self._arrive(pose) if self._at_goal else self._approach(pose, ranges or (), now_s)
+        if self._at_goal and command == STOP:
+            if self._stopped_since_s is None:
+                self._stopped_since_s = now_s
+            if now_s - self._stopped_since_s >= SETTLE_S:
+                self.state = State.REACHED
+            return STOP
+        self._stopped_since_s = None
+        command = self._slow_for_obstacle(command, ranges or (), now_s)
+        self._check_wheels(pose, command, now_s)
+        return command if self.state is State.ACTIVE else STOP
+
+    def _offset(self, pose: Pose) -> float:
+        """Update distance_m and return how far off the goal is, as a share of the tolerance."""
+        raise NotImplementedError
+
+    def _approach(self, pose: Pose, ranges: Sequence[float], now_s: float) -> Velocity:
+        """Return the command on the way."""
+        raise NotImplementedError
+
+    def _arrive(self, pose: Pose) -> Velocity:
+        """Return the command at the goal; STOP if nothing is left to do."""
+        return STOP
+
+    def _slow_for_obstacle(self, command: Velocity, ranges: Sequence[float], now_s: float) -> Velocity:
+        """Return the command, slower before an obstacle that is nearer than the goal; fail if it stays there."""
+        free_m, obstacle = find_in_path(ranges, backward=command.linear_m_s < 0.0)
+        limit_m_s = APPROACH_GAIN * max(0.0, free_m - CLEARANCE_M)
+        if obstacle is None or free_m >= self.distance_m or abs(command.linear_m_s) <= limit_m_s:
+            self._blocked_since_s = None
+            return command
+        if limit_m_s > BLOCKED_M_S:
+            self._blocked_since_s = None
+            return Velocity(math.copysign(limit_m_s, command.linear_m_s), command.angular_rad_s)
+        self._obstacle = obstacle
+        if self._blocked_since_s is None:
+            self._blocked_since_s = now_s
+        if now_s - self._blocked_since_s >= self._patience_s:
+            self._fail(self._describe_obstacle() + self._describe_distance())
+        return Velocity(0.0, command.angular_rad_s)
+
+    def _check_wheels(self, pose: Pose, command: Velocity, now_s: float) -> None:
+        """Fail if odometry stays the same although the wheels were told to move."""
+        is_told_to_move = (
+            abs(command.linear_m_s) >= STALL_LINEAR_M_S or abs(command.angular_rad_s) >= STALL_ANGULAR_RAD_S
+        )
+        last = self._moved_pose
+        if (
+            last is None
+            or not is_told_to_move
+            or math.hypot(pose.x_m - last.x_m, pose.y_m - last.y_m) > MOVED_M
+            or abs(wrap_angle(pose.yaw_rad - last.yaw_rad)) > MOVED_RAD
+        ):
+            self._moved_pose, self._moved_s = pose, now_s
+        elif now_s - self._moved_s >= STALL_S:
+            self._fail(
+                "its wheels do not turn: is something blocking them, is the battery empty, or does another program"
+                " stop the robot?"
+            )
+
+    def _fail(self, reason: str) -> Velocity:
+        self.state = State.FAILED
+        self.reason = reason
+        return STOP
+
+    def _describe_distance(self) -> str:
+        return "" if math.isnan(self.distance_m) else ", %.3f m are left" % self.distance_m
+
+    def _describe_timeout(self) -> str:
+        text = "not there after %g s" % self._timeout_s + self._describe_distance()
+        return text + ("; " + self._describe_obstacle() if self._obstacle else "")
+
+    def _describe_obstacle(self) -> str:
+        """Return the last obstacle in the way, for users; empty if there was none."""
+        if self._obstacle is None:
+            return ""
+        range_m, bearing_rad = self._obstacle
+        place = "%.2f m from the robot's center" % range_m if range_m > 0.0 else "too close to measure"
+        return "an obstacle is in the way, %s, at %+.0f degrees" % (place, math.degrees(bearing_rad))

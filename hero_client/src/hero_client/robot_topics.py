@@ -1,0 +1,124 @@
+"""The topics of one robot: the newest message of each, and commands that are not lost without a word."""
+
+import math
+import threading
+import time
+from typing import Any, Callable, Dict, Optional, Tuple, Type
+
+import rospy
+
+from .errors import StaleDataError
+
+__all__ = ["CommandTopic", "NewestMessages"]
+
+CONNECT_S = 1.0
+"""A driver that has the robot connects to a new publisher within this time; a command before would be lost."""
+
+POLL_PERIOD_S = 0.02
+"""Between two looks whether the driver has connected."""
+
+
+class NewestMessages:
+    """Subscriptions to a robot's topics, of which the newest message counts."""
+
+    def __init__(self, namespace: str) -> None:
+        self._namespace = namespace
+        self._newest: Dict[str, Tuple[float, Any]] = {}
+        self._counts: Dict[str, int] = {}
+        self._arrival = threading.Condition()
+        self._subscribers: Dict[str, rospy.Subscriber] = {}
+
+    def subscribe(self, topic: str, message_class: Type[Any]) -> None:
+        """Subscribe to a topic below the robot's namespace, unless that was done before."""
+        if topic not in self._subscribers:
+            self._subscribers[topic] = rospy.Subscriber(
+                "%s/%s" % (self._namespace, topic),
+                message_class,
+                self._receive_message,
+                callback_args=topic,
+                queue_size=1,
+                tcp_nodelay=True,
+            )
+
+    def _receive_message(self, message: Any, topic: str) -> None:
+        with self._arrival:
+            self._newest[topic] = (time.monotonic(), message)
+            self._counts[topic] = self._counts.get(topic, 0) + 1
+            self._arrival.notify_all()
+
+    def age_s(self, topic: str) -> float:
+        """Return the seconds since the last message arrived; inf before the first."""
+        newest = self._newest.get(topic)
+        return math.inf if newest is None else time.monotonic() - newest[0]
+
+    def read(self, topic: str, limit_s: float) -> Any:
+        """Return the newest message. Raises: StaleDataError if there is none, or it is older than limit_s."""
+        newest = self._newest.get(topic)
+        if newest is None:
+            raise StaleDataError(
+                "no message on %s/%s yet: is the robot on, and does the driver run?" % (self._namespace, topic)
+            )
+        age_s = time.monotonic() - newest[0]
+        if age_s > limit_s:
+            raise StaleDataError(
+                "the last message on %s/%s came %.1f s ago: has the robot gone?" % (self._namespace, topic, age_s)
+            )
+        return newest[1]
+
+    def wait_for_next(self, topic: str, timeout_s: float, count: int = 1) -> Any:
+        """Return the count-th message that arrives from now on. Raises: StaleDataError after timeout_s."""
+        with self._arrival:
+            wanted = self._counts.get(topic, 0) + count
+            if self._arrival.wait_for(lambda: self._counts.get(topic, 0) >= wanted, timeout_s):
+                return self._newest[topic][1]
+        raise StaleDataError("no message on %s/%s within %.1f s" % (self._namespace, topic, timeout_s))
+
+    def find_silent(self, limit_s: float) -> Optional[str]:
+        """Return the first topic without a message in the last limit_s; None if all have one."""
+        return next((topic for topic in self._subscribers if self.age_s(topic) > limit_s), None)
+
+    def close(self) -> None:
+        """Unsubscribe; safe twice."""
+        for subscriber in self._subscribers.values():
+            subscriber.unregister()
+        self._subscribers = {}
+
+
+class CommandTopic:
+    """A topic on which a robot takes commands."""
+
+    def __init__(self, name: str, message_class: Type[Any], explain_absence: Callable[[], str]) -> None:
+        """explain_absence: tells users why nobody subscribes to the topic."""
+        self.name = name
+        self._explain_absence = explain_absence
+        self._publisher = rospy.Publisher(name, message_class, queue_size=1)
+        self._connect_deadline_s = time.monotonic() + CONNECT_S
+        self._has_warned = False
+
+    @property
+    def connected(self) -> bool:
+        """Whether anything subscribes to the topic: the driver does while it knows the robot."""
+        return bool(self._publisher.get_num_connections() > 0)
+
+    def publish(self, message: Any) -> None:
+        """Send a command. One that nobody takes is warned about, once until commands are taken again.
+
+        The first command after the start waits for the driver's subscription, for CONNECT_S at most.
+        """
+        while not self.connected and time.monotonic() < self._connect_deadline_s and not rospy.is_shutdown():
+            time.sleep(POLL_PERIOD_S)
+        if self.connected:
+            self._has_warned = False
+        elif not self._has_warned and not rospy.is_shutdown():
+            self._has_warned = True
+            rospy.logwarn("a command is lost: %s", self.describe_absence())
+        self.publish_if_connected(message)
+
+    def publish_if_connected(self, message: Any) -> None:
+        """Send a command without waiting or warning: a stop, which a robot that is not there does not need."""
+        if not rospy.is_shutdown():
+            self._publisher.publish(message)
+
+    def describe_absence(self) -> str:
+        """Return why nobody takes commands here, for users."""
+        return "nothing subscribes to %s: %s" % (self.name, self._explain_absence())

@@ -1,0 +1,75 @@
+"""The frame of a plain script: a ROS node that starts by itself, errors as one line, a loop with a rate."""
+
+import signal
+import sys
+import threading
+import time
+from types import FrameType
+from typing import Any, Iterator, Optional, Type
+
+import rospy
+
+from .command_line import print_error
+from .errors import HeroError
+from .ros_node import check_master, start_ros_node
+
+__all__ = ["rate", "sleep_unless_shutdown", "start_node"]
+
+
+def rate(hz: float) -> Iterator[float]:
+    """Repeat the body of a `for` loop hz times per second, until Ctrl-C or the end of the ROS node.
+
+        for time_s in rate(10):
+            robot.drive(0.1, math.sin(time_s))
+
+    Yields the seconds since the start of the loop. A body that takes longer than its period is not made up for.
+
+    Raises: ValueError unless hz is more than 0.
+    """
+    if not hz > 0.0:
+        raise ValueError("a rate must be more than 0 Hz, not %r" % (hz,))
+    start_s = due_s = time.monotonic()
+    while not rospy.is_shutdown():
+        yield time.monotonic() - start_s
+        now_s = time.monotonic()
+        due_s = max(due_s + 1.0 / hz, now_s)
+        time.sleep(due_s - now_s)
+
+
+def sleep_unless_shutdown(duration_s: float) -> bool:
+    """Wait for duration_s; return whether ROS still runs."""
+    time.sleep(duration_s)
+    return not rospy.is_shutdown()
+
+
+def start_node(name: str = "hero_program") -> None:
+    """Start a ROS node for a plain script, unless one runs already; Robot and Swarm call this.
+
+    Ctrl-C raises KeyboardInterrupt as in every Python program, SIGTERM and SIGHUP raise SystemExit: `with` blocks stop
+    their robots before ROS shuts down. A HeroError that nobody catches is printed as one line, with exit status 1.
+
+    Raises: NodeError if no ROS master answers within 3 s, also for a node that runs already.
+    """
+    if sys.excepthook is sys.__excepthook__:
+        sys.excepthook = _print_exception
+    if rospy.core.is_initialized():
+        check_master()  # rospy itself would wait for a master for ever
+        return
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, _raise_exit)
+        signal.signal(signal.SIGHUP, _raise_exit)
+    start_ros_node(name, anonymous=True)
+
+
+def _print_exception(kind: Type[BaseException], error: BaseException, traceback: Any) -> None:
+    """Print a HeroError as one line and Ctrl-C not at all; a mistake in the script keeps its traceback."""
+    if issubclass(kind, HeroError):
+        print_error(str(error))
+    elif not issubclass(kind, KeyboardInterrupt):
+        sys.__excepthook__(kind, error, traceback)
+
+
+def _raise_exit(number: int, frame: Optional[FrameType]) -> None:
+    for ending in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(ending, signal.SIG_IGN)  # a second one must not break off the stopping of the robots
+    sys.exit(128 + number)

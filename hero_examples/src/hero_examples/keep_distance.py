@@ -1,0 +1,21 @@
+"""Drives robot 0 to 0.15 m from the nearest obstacle, and keeps that distance, until Ctrl-C."""
+
+import math
+
+from hero_client import Robot, rate
+
+
+def main() -> None:
+    with Robot(0) as robot:
+        robot.wait_until_ready()
+        for _ in rate(10):  # Hz
+            nearest = robot.nearest()
+            if nearest is None:
+                robot.drive(0.05, 0.0)  # the sensors see 0.24 m far
+            else:
+                error_m = nearest.range_m - 0.15  # from the robot's center
+                robot.drive(0.8 * error_m * math.cos(nearest.bearing_rad), 1.5 * nearest.bearing_rad)
+
+
+if __name__ == "__main__":
+    main()
