@@ -33,7 +33,7 @@ ROOMS = {
     "hero_sim.world": SIM_GROUND,
     "hero_sim.robot": SIM_GROUND | {"world"},
     "hero_sim.link": SIM_GROUND,
-    "hero_client.controllers": {"geometry", "robot_constants"},
+    "hero_client.controllers": {"geometry", "readings", "robot_constants"},
 }
 PURE_ROOMS = (
     "hero_driver.rosserial",

@@ -1,21 +1,19 @@
-"""Commands to several robots at once, of which one is a special case. Uses Robot's own parts: see robot."""
+"""Commands to several robots at once, of which one robot is a special case."""
 
 import time
-from typing import TYPE_CHECKING, Sequence
+from typing import Optional, Protocol, Sequence
 
 import rospy
 
-from .background_motion import Sleep
+from .background_motion import BackgroundMotion, Sleep
 from .errors import RobotNotReadyError
 from .script import sleep_unless_shutdown
-
-if TYPE_CHECKING:
-    from .robot import Robot
 
 __all__ = [
     "POLL_PERIOD_S",
     "READY_TIMEOUT_S",
     "REPEAT_PERIOD_S",
+    "Member",
     "drive_all",
     "send_stops",
     "stop_all",
@@ -40,7 +38,24 @@ POLL_PERIOD_S = 0.02
 NAMES_SHOWN = 10
 
 
-def wait_for_all(robots: Sequence["Robot"], timeout_s: float, sleep: Sleep = sleep_unless_shutdown) -> None:
+class Member(Protocol):
+    """What is used here of a Robot."""
+
+    name: str
+    _motion: Optional[BackgroundMotion]
+
+    def missing(self) -> Optional[str]:
+        """See Robot."""
+
+    def check_not_stopped(self) -> None:
+        """See Robot."""
+
+    def _end_motion(self) -> None: ...
+
+    def _send_twist(self, linear_m_s: float, angular_rad_s: float) -> None: ...
+
+
+def wait_for_all(robots: Sequence[Member], timeout_s: float, sleep: Sleep = sleep_unless_shutdown) -> None:
     """Wait until all robots are ready. Raises: RobotNotReadyError after timeout_s, saying what is missing."""
     deadline_s = time.monotonic() + timeout_s
     late = list(robots)
@@ -54,7 +69,7 @@ def wait_for_all(robots: Sequence["Robot"], timeout_s: float, sleep: Sleep = sle
             raise RobotNotReadyError("%s %s not ready after %.3g s: %s" % (names, verb, timeout_s, late[0].missing()))
 
 
-def drive_all(robots: Sequence["Robot"], linear_m_s: float, angular_rad_s: float, duration_s: float) -> None:
+def drive_all(robots: Sequence[Member], linear_m_s: float, angular_rad_s: float, duration_s: float) -> None:
     """Drive all robots with the same velocities for duration_s, then stop them; see Robot.drive()."""
     for robot in robots:
         robot._end_motion()
@@ -73,7 +88,7 @@ def drive_all(robots: Sequence["Robot"], linear_m_s: float, angular_rad_s: float
         send_stops(robots)
 
 
-def stop_all(robots: Sequence["Robot"]) -> None:
+def stop_all(robots: Sequence[Member]) -> None:
     """Cancel motions in the background and send every robot two stops; returns when they are sent."""
     for robot in robots:
         if robot._motion is not None:
@@ -81,7 +96,7 @@ def stop_all(robots: Sequence["Robot"]) -> None:
     send_stops(robots)
 
 
-def send_stops(robots: Sequence["Robot"]) -> None:
+def send_stops(robots: Sequence[Member]) -> None:
     """As stop_all(), but leave motions in the background, one of which may be the caller."""
     if not robots:
         return
