@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Runs the pages of one course with the simulator: real commands in real terminals."""
+"""Runs the pages of a course, or README and quick start, with the simulator: real commands in real terminals."""
 
 import os
 import sys
@@ -15,7 +15,12 @@ from tutorial_runner import Course
 from hero_test.processes import find_free_port
 
 PACKAGE = Path(__file__).resolve().parents[2]
-PAGES = PACKAGE.parent / "docs" / "tutorial"
+ROOT = PACKAGE.parent
+PAGES = {
+    "first_hour": [ROOT / "README.md", ROOT / "docs" / "quick_start.md"],
+    "hero": sorted((ROOT / "docs" / "tutorial" / "hero").glob("[0-9]*.md")),
+    "ros_basics": sorted((ROOT / "docs" / "tutorial" / "ros_basics").glob("[0-9]*.md")),
+}
 
 
 def make_changes():
@@ -24,7 +29,7 @@ def make_changes():
     return {
         "/usr/bin/python3": sys.executable,
         "~/hero/.work/ws/devel": os.environ["CMAKE_PREFIX_PATH"].split(":")[0],
-        "<the address of this repository>": str(PACKAGE.parent),
+        "<the address of this repository>": str(ROOT),
         "$ roslaunch hero_bringup hero_bringup.launch": "$ roslaunch hero_bringup hero_bringup.launch"
         " host:=127.0.0.1 port:=%d" % port,
         "0.0.0.0:11411": "127.0.0.1:%d" % port,
@@ -56,8 +61,8 @@ class TutorialsTest(unittest.TestCase):
 
 
 def add_pages(course):
-    """Add one test per page, in the order of the pages."""
-    for page in sorted((PAGES / course).glob("[0-9]*.md")):
+    """Add one test per page. Of pages without numbers, the order of the names is that of the pages, too."""
+    for page in PAGES[course]:
         name = "test_%s_works_as_shown" % page.stem
         setattr(TutorialsTest, name, lambda self, page=page: self.run_page(page))
 
