@@ -20,7 +20,7 @@ ROS_MODULES = (
 OTHER_PACKAGES = {
     # module that is imported: package to declare
     **{name: name for name in ROS_MODULES},
-    **{name: f"python3-{name}" for name in "matplotlib numpy pexpect rospkg scipy tornado tqdm yaml".split()},
+    **{name: f"python3-{name}" for name in "matplotlib numpy pexpect rospkg scipy selenium tornado tqdm yaml".split()},
 }
 
 

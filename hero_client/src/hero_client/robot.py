@@ -63,7 +63,9 @@ class Robot:
     after an error.
 
     Attributes:
-        robot_id, name, namespace: 3, "hero_3", "/hero_3".
+        robot_id: the number, 3.
+        name: "hero_3".
+        namespace: "/hero_3".
         driven: whether a command was sent from here; a robot that was only watched is not stopped at the end.
     """
 
