@@ -10,6 +10,7 @@ from driver_case import NODE, DriverCase, Recorder, make_command, make_publisher
 from fake_motors import VELOCITY_GATE_S
 from fake_robot import READ_CYCLE_S
 from geometry_msgs.msg import Twist
+from rosgraph_msgs.msg import Log as RosLog
 from std_msgs.msg import Bool, ColorRGBA
 from std_srvs.srv import SetBool
 from steady_time import in_steady_time
@@ -17,6 +18,7 @@ from steady_time import in_steady_time
 from hero_driver.commands.velocity_shaper import STOPPED_MOTORS
 from hero_msgs.msg import Motor, Robot
 from hero_msgs.srv import SetOdom
+from hero_test.processes import Program
 from hero_test.waiting import wait_for
 
 VELOCITY = "velocity_controller/cmd_vel"
@@ -165,6 +167,43 @@ class TestDriverCommands(DriverCase):
         controller.publish(make_command(0.0))
         self.wait_stopped(robot)
         self.assertEqual({velocity.name.rpartition("hero_20/")[2] for velocity in robot.velocities}, {VELOCITY})
+
+    def start_commander(self, robot, linear_m_s):
+        """Start a node that commands a robot until the test ends; return its name once the robot was sent a command."""
+        name = "/commander_of_" + robot.name
+        command = "{linear: {x: %s}}" % linear_m_s
+        topic = robot.namespace + "/cmd_vel"
+        program = Program(
+            "rostopic", "pub", "-r", "20", topic, "geometry_msgs/Twist", command, "__name:=" + name[1:]
+        )
+        self.addCleanup(program.end)
+        payload = struct.pack("<6d", linear_m_s, 0, 0, 0, 0, 0)
+        wait_for(lambda: payload in robot.payloads_on(VELOCITY), "a command of " + name)
+        return name
+
+    def test_two_programs_that_command_one_robot_are_both_named(self):
+        robot = self.join(31)
+        publisher = make_publisher("/hero_31/" + VELOCITY, Twist)
+        name = self.start_commander(robot, 0.05)
+
+        def find_warning():
+            publisher.publish(make_command(0.1))
+            return self.find_logs("hero_31 is commanded by")
+
+        line = wait_for(find_warning, "the warning")[0]
+        self.assertEqual(line.level, RosLog.WARN)
+        for part in (name, rospy.get_name(), "end one of them"):
+            self.assertIn(part, line.msg)
+
+    def test_programs_that_command_a_robot_one_after_another_are_fine(self):
+        robot = self.join(32)
+        publisher = make_publisher("/hero_32/" + VELOCITY, Twist)
+        publisher.publish(make_command(0.1))
+        wait_payloads(robot, VELOCITY)
+        self.start_commander(robot, 0.05)
+        robot.log("after the second program")
+        self.wait_log("after the second program")
+        self.assertEqual(self.find_logs("hero_32 is commanded by"), [])
 
     def test_non_finite_velocities_are_refused_and_reported_once(self):
         robot = self.join(11)

@@ -8,7 +8,7 @@ there again when the robot returns.
 import functools
 import math
 import time
-from typing import Callable, Dict, List, NamedTuple, Optional, Set, Tuple
+from typing import Any, Callable, Dict, List, NamedTuple, Optional, Set, Tuple
 
 from ..commands.command_queue import CommandQueue
 from ..commands.service_requests import find_request_error, is_success, read_set_odom_pose
@@ -32,6 +32,7 @@ from . import message_types
 from .endpoints import QUEUE_LENGTH, Endpoints, Layout
 from .raw_publisher import RawPublisher
 from .raw_subscriber import RawSubscriber
+from .rospy_internals import read_caller
 from .services import RobotService
 from .worker import Worker
 
@@ -46,6 +47,9 @@ TRANSFORM_TYPE = "tf2_msgs/TFMessage"
 TWIST_TYPE = "geometry_msgs/Twist"
 CALIBRATION_SUFFIX = "/pid_calibration"
 SET_ODOM_TYPE = "hero_msgs/SetOdom"
+
+TURNS_S = 1.0
+"""A program that commands again so soon after another one has not ended; robots stop 2 s after the last command."""
 
 TUNING_HEARD_S = 1.0
 """A robot that tunes itself logs up to 47 lines per second (VelocityControl.ino:118)."""
@@ -107,6 +111,9 @@ class RobotBridge:
         self._publisher_layouts: Dict[str, Layout] = {}  # and of what it sends
         # Motion topic -> when motion, not a stop, was last offered, and on which topic of ROS.
         self._commanded: Dict[str, Tuple[float, str]] = {}
+        self._subscribers: Dict[str, RawSubscriber] = {}
+        self._commander: Any = None  # connection of the newest motion command
+        self._superseded = ("", -math.inf)  # name of the node that commanded before, and until when
         self._tuning_heard_s = -math.inf
         self._names: Set[str] = set()
         self._subscribed_types: Dict[str, str] = {}
@@ -349,7 +356,9 @@ class RobotBridge:
     def _make_subscriber(self, name: str, source: str, ros_type: str) -> RawSubscriber:
         """Return the subscriber to source, which is name or an alias of it."""
         receive = self._choose_receiver(name, source, ros_type)
-        return RawSubscriber(receive, self._context.loop, functools.partial(self._lose_sender, name, source))
+        subscriber = RawSubscriber(receive, self._context.loop, functools.partial(self._lose_sender, name, source))
+        self._subscribers[source] = subscriber
+        return subscriber
 
     def _choose_receiver(self, name: str, source: str, ros_type: str) -> Callable[[bytes], None]:
         """Return what takes the messages of a topic that the robot subscribes to."""
@@ -386,6 +395,9 @@ class RobotBridge:
             self.refused_commands += 1
         else:
             now_s = time.monotonic()
+            sender = self._subscribers[source].last_sender
+            if sender is not self._commander:
+                self._change_commander(sender, now_s)
             if command != stop_payload:
                 self._commanded[name] = (now_s, source)
             else:
@@ -395,6 +407,21 @@ class RobotBridge:
             else:
                 self.commands.offer(name, command, is_motion=True)
             self._context.send_commands(self)
+
+    def _change_commander(self, sender: Any, now_s: float) -> None:
+        """Another connection brings the newest command: warn if two programs take turns, not one follows another."""
+        before, after = read_caller(self._commander), read_caller(sender)
+        self._commander = sender
+        if not before or not after or before == after:
+            return
+        if after == self._superseded[0] and now_s - self._superseded[1] < TURNS_S:
+            self._context.log(
+                "warn",
+                "two programs " + self.label,
+                "%s is commanded by %s and %s at once and obeys the newest command: end one of them"
+                % (self.label, *sorted((before, after))),
+            )
+        self._superseded = before, now_s
 
     def _lose_sender(self, name: str, source: str) -> None:
         """The program that sent the newest command on source has gone (thread of the sockets)."""

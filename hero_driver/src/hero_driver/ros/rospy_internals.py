@@ -131,6 +131,11 @@ def find_connection(subscriber: Any, message: Any) -> Any:
     return None
 
 
+def read_caller(connection: Any) -> str:
+    """Return the name of the node at the other end of a connection that find_connection() found; empty for None."""
+    return "" if connection is None else str(connection.header.get("callerid", ""))
+
+
 def replace_reading(connection: Any, read: Callable[[], List[Any]]) -> None:
     """Let rospy's thread call read() instead of its own, once it has passed on all that it has read.
 
