@@ -399,7 +399,7 @@ class Gateway(LinkHandler):
             peer: Optional[Peer] = record.link.peer if record.link is not None else None
             stop_state = self._stops.find_state(peer)
             statuses.append(describe_robot(record, bridge, peer, stop_state, now_s))
-        return sorted(statuses, key=lambda status: (status.number, status.namespace))
+        return sorted(statuses, key=lambda status: (status.message.id, status.message.namespace))
 
     # Stop.
 
@@ -417,26 +417,6 @@ class Gateway(LinkHandler):
         """Stop every robot; call then(robots not known to be at rest) when all rest, or at deadline_s (monotonic)."""
         self.set_stopped(True)
         self._stops.await_rest(self._list_stoppable(), deadline_s, then)
-
-    def disconnect(self, namespace: str, deadline_s: float, then: Callable[[bool], None]) -> None:
-        """Stop one robot and close its connection, then say whether there was one; on the thread of the sockets.
-
-        The robot dials again by itself; deadline_s (monotonic): until then it may take to come to rest.
-        """
-        bridge = self.bridges.get(namespace)
-        peer = None if bridge is None else self._find_peer(bridge)
-        if peer is None:
-            then(False)
-            return
-        link = peer.link
-        self._stops.begin(peer)
-
-        def close(_: List[Peer]) -> None:
-            if not link.closed:
-                link.close("disconnected on request")
-            then(True)
-
-        self._stops.await_rest([peer], deadline_s, close)
 
     def stop_without_loop(self) -> None:
         """Stop every robot although the loop that serves them has broken; blocks."""

@@ -1,7 +1,6 @@
 """main(): reads the parameters, wires everything, waits, and stops all robots at the end."""
 
 import errno
-import functools
 import io
 import os
 import queue
@@ -15,8 +14,6 @@ from typing import Any, Callable, List, Optional
 import rosgraph
 import rosgraph.roslogging
 import rospy
-
-from hero_msgs.srv import Disconnect, DisconnectResponse
 
 from .config import ConfigError, DriverConfig, read_config
 from .gateway import STOP_LIMIT_S, Gateway
@@ -54,30 +51,6 @@ def make_ros_clock() -> Callable[[], int]:
     return time.time_ns
 
 
-class EndFlag:
-    """As threading.Event, but one that a signal handler may set.
-
-    A handler runs on the main thread between any two steps: where that thread is just inside the lock of an
-    Event on which it waits, setting the Event would wait for itself for ever.
-    """
-
-    def __init__(self) -> None:
-        self._ends: queue.SimpleQueue[None] = queue.SimpleQueue()
-
-    def set(self) -> None:
-        """Set it; from any thread or signal handler."""
-        self._ends.put(None)
-
-    def wait(self, timeout_s: float) -> bool:
-        """Wait until it is set, at most for timeout_s; return whether it is."""
-        try:
-            self._ends.get(timeout=timeout_s)
-        except queue.Empty:
-            return False
-        self._ends.put(None)  # it stays set
-        return True
-
-
 class DriverNode:
     """The whole driver: open() until close()."""
 
@@ -85,7 +58,8 @@ class DriverNode:
         """was_stopped: whether the robots were stopped when a driver of this name ended."""
         self._config = config
         self._starts_stopped = {"as_before": was_stopped, "always": True, "never": False}[config.start_stopped]
-        self._ended = EndFlag()
+        # Not an Event: a signal handler that interrupts the waiting thread would wait for the Event's lock for ever.
+        self._ends: queue.SimpleQueue[None] = queue.SimpleQueue()
         self._changed = threading.Event()
         self._log = log
         self._registrar = Worker(
@@ -112,7 +86,6 @@ class DriverNode:
             lambda: self._gateway.list_robots(time.monotonic()),
             self._log,
         )
-        self._services: List[rospy.Service] = []
         self._master_watch = MasterWatch("~stop", self._stop_interface.keep, self._log.log)
 
     def open(self) -> None:
@@ -122,7 +95,6 @@ class DriverNode:
         self._reporter = Reporter()
         self._stop_interface.open(self._starts_stopped)
         self._stop_interface.keep()
-        self._services.append(rospy.Service("~disconnect", Disconnect, self._serve_disconnect))
         self._thread.start()
         self._master_watch.open()
         self._log.log("info", self._describe_start())
@@ -138,7 +110,7 @@ class DriverNode:
         """Report until end() is called; return the exit code."""
         next_report_s = time.monotonic()
         # The first reports of a burst of changes may be put off a little, so that 50 robots make a few.
-        while not self._ended.wait(REPORT_CHECK_S):
+        while not self._has_ended(REPORT_CHECK_S):
             now_s = time.monotonic()
             is_due = now_s >= next_report_s
             if is_due or self._changed.is_set():
@@ -153,7 +125,7 @@ class DriverNode:
 
     def end(self) -> None:
         """Let spin() return; from any thread or signal handler."""
-        self._ended.set()
+        self._ends.put(None)
 
     def close(self) -> None:
         """Stop all robots, then close their connections; safe to call twice."""
@@ -178,6 +150,14 @@ class DriverNode:
         self._registrar.close()
         self._gateway.close()
         self._log.close()
+
+    def _has_ended(self, timeout_s: float) -> bool:
+        """Wait for end(), at most for timeout_s; return whether it was called."""
+        try:
+            self._ends.get(timeout=timeout_s)
+        except queue.Empty:
+            return False
+        return True
 
     def _run_loop(self) -> None:
         try:
@@ -221,18 +201,6 @@ class DriverNode:
             self._gateway.last_refusal,
             self._gateway.list_robots(now_s),
         )
-
-    def _serve_disconnect(self, request: Any) -> DisconnectResponse:
-        namespace = "/" + request.robot.strip("/")
-        deadline_s = time.monotonic() + STOP_LIMIT_S
-        disconnect = functools.partial(self._gateway.disconnect, namespace, deadline_s)
-        try:
-            was_there = self._loop.ask(disconnect, STOP_LIMIT_S + 1.0)
-        except NoAnswerError as error:
-            return DisconnectResponse(False, str(error))
-        if not was_there:
-            return DisconnectResponse(False, "%s is not connected" % namespace)
-        return DisconnectResponse(True, "%s is disconnected; it will dial again" % namespace)
 
 
 def main(argv: Optional[List[str]] = None) -> int:

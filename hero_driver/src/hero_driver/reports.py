@@ -3,7 +3,8 @@
 Runs on the main thread of the node; gets the states as values from the thread of the sockets.
 """
 
-from typing import Any, Callable, Dict, List, NamedTuple, Tuple
+import functools
+from typing import Any, Dict, List, NamedTuple, Tuple
 
 import diagnostic_updater
 import rospy
@@ -51,73 +52,49 @@ class Reporter:
         message = RobotArray(listening=status.listening, stopped=status.stopped)
         message.header.stamp = ros_now
         for robot in status.robots:
-            message.robots.append(self._describe(robot, status.now_s, ros_now))
-            for address, reason in robot.refused:
-                message.robots.append(
-                    Robot(
-                        id=robot.number,
-                        namespace=robot.namespace,
-                        address=address,
-                        state=Robot.REFUSED,
-                        last_error=reason,
-                    )
-                )
+            row = robot.message
+            age = rospy.Duration.from_sec(status.now_s - robot.since_s)
+            row.since = ros_now - age if ros_now.to_sec() > age.to_sec() else rospy.Time(0)
+            row.packets_per_s, row.bytes_per_s = self._rates.get(row.namespace, (0.0, 0.0))
+            message.robots.append(row)
+            message.robots += [
+                Robot(id=row.id, namespace=row.namespace, address=address, state=Robot.REFUSED, last_error=reason)
+                for address, reason in robot.refused
+            ]
         self._publisher.publish(message)
 
     def measure_rates(self, status: FleetStatus) -> None:
         """Take the rates since the last call; once per report period."""
         for robot in status.robots:
-            last = self._last_counts.get(robot.namespace)
+            namespace = robot.message.namespace
+            last = self._last_counts.get(namespace)
             if last is not None and status.now_s > last[0]:
                 elapsed_s = status.now_s - last[0]
-                self._rates[robot.namespace] = (
+                self._rates[namespace] = (
                     (robot.packets - last[1]) / elapsed_s,
                     (robot.received_length - last[2]) / elapsed_s,
                 )
-            self._last_counts[robot.namespace] = (status.now_s, robot.packets, robot.received_length)
-        for namespace in set(self._last_counts) - {robot.namespace for robot in status.robots}:
+            self._last_counts[namespace] = (status.now_s, robot.packets, robot.received_length)
+        for namespace in set(self._last_counts) - {robot.message.namespace for robot in status.robots}:
             del self._last_counts[namespace]
             self._rates.pop(namespace, None)
 
     def diagnose(self) -> None:
         """Publish /diagnostics, where somebody listens."""
-        robots = {robot.namespace: robot for robot in self._status.robots}
-        for namespace in set(self._known) - set(robots):
-            self._updater.removeByName(namespace.lstrip("/"))
-        for namespace in sorted(set(robots) - set(self._known)):
-            self._updater.add(namespace.lstrip("/"), self._make_robot_task(namespace))
+        robots = {robot.name: robot for robot in self._status.robots}
+        for name in set(self._known) - set(robots):
+            self._updater.removeByName(name)
+        for name in sorted(set(robots) - set(self._known)):
+            self._updater.add(name, functools.partial(self._diagnose_robot, name))
         self._known = robots
         if self._updater.publisher.get_num_connections():
             self._updater.force_update()
 
-    def _describe(self, robot: RobotStatus, now_s: float, ros_now: rospy.Time) -> Robot:
-        packets_per_s, bytes_per_s = self._rates.get(robot.namespace, (0.0, 0.0))
-        age = rospy.Duration.from_sec(now_s - robot.since_s)
-        return Robot(
-            id=robot.number,
-            namespace=robot.namespace,
-            address=robot.address,
-            state=robot.state.value,
-            stop_state=robot.stop_state.value,
-            firmware=robot.firmware,
-            hardware=robot.hardware,
-            config=robot.config,
-            since=ros_now - age if ros_now.to_sec() > age.to_sec() else rospy.Time(0),
-            uptime=rospy.Duration.from_sec(robot.uptime_s),
-            reconnects=robot.reconnects,
-            packets_per_s=packets_per_s,
-            bytes_per_s=bytes_per_s,
-            dropped_messages=robot.dropped_messages,
-            bad_packets=robot.bad_packets,
-            clock_offset=robot.clock_offset_s,
-            last_error=robot.last_error,
-        )
-
     def _diagnose_driver(self, stat: Any) -> Any:
         status = self._status
-        ready = sum(robot.state is RobotState.READY for robot in status.robots)
+        ready = sum(robot.message.state == Robot.READY for robot in status.robots)
         text = "%d of %d robots ready" % (ready, len(status.robots))
-        moving = [robot.namespace.lstrip("/") for robot in status.robots if robot.stop_state is StopState.MOVING]
+        moving = [robot.name for robot in status.robots if robot.message.stop_state == Robot.MOVING]
         if moving:
             stat.summary(DiagnosticStatus.ERROR, "%s; moving though stopped: %s" % (text, ", ".join(moving)))
         elif status.stopped:
@@ -130,48 +107,46 @@ class Reporter:
         stat.add("last refusal", status.last_refusal)
         return stat
 
-    def _make_robot_task(self, namespace: str) -> Callable[[Any], Any]:
-        def diagnose(stat: Any) -> Any:
-            robot = self._known[namespace]
-            stat.summary(*_assess(robot))
-            packets_per_s, bytes_per_s = self._rates.get(namespace, (0.0, 0.0))
-            for key, value in (
-                ("address", robot.address),
-                ("state", robot.state.name),
-                ("stop", robot.stop_state.name),
-                ("firmware", robot.firmware),
-                ("hardware", robot.hardware),
-                ("config", robot.config),
-                ("uptime (s)", "%.0f" % robot.uptime_s),
-                ("reconnects", robot.reconnects),
-                ("packets per second", "%.1f" % packets_per_s),
-                ("bytes per second", "%.0f" % bytes_per_s),
-                ("dropped messages", robot.dropped_messages),
-                ("bad packets", robot.bad_packets),
-                ("clock offset (s)", "%.4f" % robot.clock_offset_s),
-                ("corrected stamps", robot.corrected_stamps),
-                ("odometry resets", robot.odometry_resets),
-                ("refused transforms", ", ".join(robot.foreign_frames)),
-                ("refused duplicates", "; ".join(reason for _, reason in robot.refused)),
-                ("last error", robot.last_error),
-            ):
-                stat.add(key, value)
-            return stat
-
-        return diagnose
+    def _diagnose_robot(self, name: str, stat: Any) -> Any:
+        robot = self._known[name]
+        row = robot.message
+        stat.summary(*_assess(robot))
+        for key, value in (
+            ("address", row.address),
+            ("state", RobotState(row.state).name),
+            ("stop", StopState(row.stop_state).name),
+            ("firmware", row.firmware),
+            ("hardware", row.hardware),
+            ("config", row.config),
+            ("uptime (s)", "%.0f" % row.uptime.to_sec()),
+            ("reconnects", row.reconnects),
+            ("packets per second", "%.1f" % row.packets_per_s),
+            ("bytes per second", "%.0f" % row.bytes_per_s),
+            ("dropped messages", row.dropped_messages),
+            ("bad packets", row.bad_packets),
+            ("clock offset (s)", "%.4f" % row.clock_offset),
+            ("corrected stamps", robot.corrected_stamps),
+            ("odometry resets", robot.odometry_resets),
+            ("refused transforms", ", ".join(robot.foreign_frames)),
+            ("refused duplicates", "; ".join(reason for _, reason in robot.refused)),
+            ("last error", row.last_error),
+        ):
+            stat.add(key, value)
+        return stat
 
 
 def _assess(robot: RobotStatus) -> Tuple[int, str]:
     """Return level and text of a robot's diagnostic status."""
-    if robot.stop_state is StopState.MOVING:
+    row = robot.message
+    if row.stop_state == Robot.MOVING:
         return DiagnosticStatus.ERROR, "its wheels turn although it was stopped"
     if robot.refused:
         return DiagnosticStatus.ERROR, robot.refused[0][1]
     if robot.problem:
         return DiagnosticStatus.ERROR, robot.problem
-    if robot.state is RobotState.AWAY:
-        return DiagnosticStatus.ERROR, "away: %s" % robot.last_error
-    if robot.state is RobotState.JOINING:
+    if row.state == Robot.AWAY:
+        return DiagnosticStatus.ERROR, "away: %s" % row.last_error
+    if row.state == Robot.JOINING:
         return DiagnosticStatus.WARN, "joining"
     if robot.tunes:
         return DiagnosticStatus.WARN, "tunes itself (pid_calibration) and spins; ~stop ends that"
@@ -179,6 +154,6 @@ def _assess(robot: RobotStatus) -> Tuple[int, str]:
         return DiagnosticStatus.WARN, "sends transforms that are not its own: %s" % ", ".join(
             robot.foreign_frames
         )
-    if abs(robot.clock_offset_s) > LARGE_CLOCK_OFFSET_S:
-        return DiagnosticStatus.WARN, "its clock is off by %.2f s" % robot.clock_offset_s
+    if abs(row.clock_offset) > LARGE_CLOCK_OFFSET_S:
+        return DiagnosticStatus.WARN, "its clock is off by %.2f s" % row.clock_offset
     return DiagnosticStatus.OK, "ready"

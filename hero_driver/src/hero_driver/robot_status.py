@@ -3,8 +3,12 @@
 from dataclasses import dataclass
 from typing import List, Optional, Tuple
 
+import rospy
+
+from hero_msgs.msg import Robot
+
 from .commands.stop_progress import StopState
-from .fleet.registry import RobotRecord, RobotState
+from .fleet.registry import RobotRecord
 from .peer import Peer
 from .ros.robot_bridge import RobotBridge
 
@@ -14,31 +18,23 @@ DUPLICATES_SHOWN = 8
 
 @dataclass(frozen=True)
 class RobotStatus:
-    """The state of one robot at one moment; counters count from its arrival, times are monotonic."""
+    """The state of one robot at one moment; counters count from its arrival."""
 
-    namespace: str
-    number: int
-    address: str
-    state: RobotState
-    stop_state: StopState
-    tunes: bool  # whether a controller of the robot tunes itself
-    firmware: str
-    hardware: str
-    config: str
-    since_s: float
-    uptime_s: float  # 0 while not known
-    reconnects: int
+    message: Robot  # as on ~robots, but without the rates and since
+    since_s: float  # monotonic
     packets: int
     received_length: int
-    dropped_messages: int
-    bad_packets: int
-    clock_offset_s: float
+    tunes: bool  # whether a controller of the robot tunes itself
+    problem: str  # what is wrong now; empty if nothing is
     corrected_stamps: int
     odometry_resets: int
-    last_error: str
-    problem: str  # what is wrong now; empty if nothing is
     foreign_frames: List[str]
     refused: List[Tuple[str, str]]  # address and reason of each duplicate that waits
+
+    @property
+    def name(self) -> str:
+        """The robot's name without slash, for people."""
+        return str(self.message.namespace).lstrip("/")
 
 
 def describe_robot(
@@ -63,28 +59,31 @@ def describe_robot(
         bad_packets += peer.session.reader.bad_packets
         dropped += peer.session.undeclared_messages
         received_length += peer.link.received_length
-    return RobotStatus(
+    message = Robot(
+        id=record.identity.number,
         namespace=record.identity.namespace,
-        number=record.identity.number,
         address=record.address,
-        state=record.state,
-        stop_state=stop_state,
-        tunes=bridge is not None and bridge.tunes(now_s),
+        state=record.state.value,
+        stop_state=stop_state.value,
         firmware=record.firmware,
         hardware=record.hardware,
         config=record.config,
-        since_s=record.since_s,
-        uptime_s=0.0 if record.booted_s is None or peer is None else now_s - record.booted_s,
+        uptime=rospy.Duration.from_sec(0.0 if record.booted_s is None or peer is None else now_s - record.booted_s),
         reconnects=record.reconnects,
-        packets=packets,
-        received_length=received_length,
         dropped_messages=dropped,
         bad_packets=bad_packets,
-        clock_offset_s=0.0 if corrections is None else corrections.clock_offset_s,
-        corrected_stamps=0 if corrections is None else corrections.corrected_stamps,
-        odometry_resets=0 if corrections is None else corrections.odometry.resets,
+        clock_offset=0.0 if corrections is None else corrections.clock_offset_s,
         last_error=problem or record.last_error,
-        problem=problem,
-        foreign_frames=[] if corrections is None else sorted(corrections.transforms.foreign_frames),
-        refused=sorted(record.refused.items())[:DUPLICATES_SHOWN],
+    )
+    return RobotStatus(
+        message,
+        record.since_s,
+        packets,
+        received_length,
+        bridge is not None and bridge.tunes(now_s),
+        problem,
+        0 if corrections is None else corrections.corrected_stamps,
+        0 if corrections is None else corrections.odometry.resets,
+        [] if corrections is None else sorted(corrections.transforms.foreign_frames),
+        sorted(record.refused.items())[:DUPLICATES_SHOWN],
     )

@@ -11,8 +11,8 @@ import rospy
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, SetBoolResponse
 
-from .commands.stop_progress import StopState
-from .fleet.registry import RobotState
+from hero_msgs.msg import Robot
+
 from .robot_status import RobotStatus
 from .ros.log_relay import LogRelay
 from .ros.worker import Worker
@@ -106,18 +106,17 @@ class StopInterface:
 def describe_stop(robots: List[RobotStatus]) -> str:
     """Return how far the stop of all robots has come, for people."""
     groups = (
-        ("still moving", (StopState.MOVING,)),
-        ("being stopped", (StopState.STOPPING,)),
-        ("not confirmed, they send no readings of their wheels", (StopState.UNCONFIRMED,)),
+        ("still moving", Robot.MOVING),
+        ("being stopped", Robot.STOPPING),
+        ("not confirmed, they send no readings of their wheels", Robot.UNCONFIRMED),
     )
-    connected = [robot for robot in robots if robot.state is not RobotState.AWAY]
-    resting = sum(robot.stop_state is StopState.AT_REST for robot in connected)
-    parts = ["%d at rest" % resting]
-    for text, states in groups:
-        names = [robot.namespace.lstrip("/") for robot in connected if robot.stop_state in states]
+    connected = [robot for robot in robots if robot.message.state != Robot.AWAY]
+    parts = ["%d at rest" % sum(robot.message.stop_state == Robot.AT_REST for robot in connected)]
+    for text, state in groups:
+        names = [robot.name for robot in connected if robot.message.stop_state == state]
         if names:
             parts.append("%d %s: %s" % (len(names), text, ", ".join(names)))
-    away = [robot.namespace.lstrip("/") for robot in robots if robot.state is RobotState.AWAY]
+    away = [robot.name for robot in robots if robot.message.state == Robot.AWAY]
     if away:
         parts.append("%d away, stopped when they return: %s" % (len(away), ", ".join(away)))
     return "; ".join(parts)

@@ -137,8 +137,8 @@ class TestDriverDevices(OwnDriverCase):
             Declaration(CLIENT_REQUESTS, 126, own + "/stop", "std_srvs/SetBool", SetBoolRequest._md5sum),
             Declaration(CLIENT_ANSWERS, 100, own + "/stop", "std_srvs/SetBool", ANSWER_MD5),
             Declaration(PUB, 127, own + "/stop_request", "std_msgs/Bool", Bool._md5sum),
-            Declaration(2, 128, "/other/disconnect", "std_srvs/Trigger", ANSWER_MD5),
-            Declaration(3, 101, "/other/disconnect", "std_srvs/Trigger", TRIGGER_REQUEST_MD5),
+            Declaration(2, 128, "/other/stop", "std_srvs/Trigger", ANSWER_MD5),
+            Declaration(3, 101, "/other/stop", "std_srvs/Trigger", TRIGGER_REQUEST_MD5),
             Declaration(PUB, 129, "/fleet", "hero_common/RobotArray", RobotArray._md5sum),
             Declaration(PUB, 130, "/clock", "rosgraph_msgs/Clock", Clock._md5sum),
         ]

@@ -26,7 +26,6 @@ from std_srvs.srv import SetBool, Trigger
 
 from hero_driver.commands.velocity_shaper import STOPPED_MOTORS
 from hero_msgs.msg import Motor, Robot
-from hero_msgs.srv import Disconnect
 from hero_test.waiting import wait_for
 
 VELOCITY = "velocity_controller"
@@ -147,15 +146,6 @@ class TestDriverStop(OwnDriverCase):
         self.assertEqual(set(motors), {STOPPED_MOTORS})
         self.assertGreater(len(motors), 110)
         self.assertLessEqual(max(by_read.values()), BURST_LENGTH_MAX)
-
-    def test_disconnecting_a_tuning_robot_ends_the_tuning_first(self):
-        driver = self.start(allow_self_tuning=True)
-        robot = self.dial_stock(driver)
-        self.start_tuning(driver, robot, POSITION)
-        answer = rospy.ServiceProxy(driver.node + "/disconnect", Disconnect)("hero_0")
-        self.assertTrue(answer.success, answer.message)
-        wait_for(lambda: robot.ended, "the end of the connection")
-        self.assertFalse(robot.motors.is_turning)
 
     def test_the_end_of_the_driver_ends_the_tuning_of_a_robot(self):
         driver = self.start(allow_self_tuning=True)

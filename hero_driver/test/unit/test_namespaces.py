@@ -121,7 +121,7 @@ def test_a_hero_among_devices_keeps_its_own_names():
         "/hero_driver_2/robots",
         "/hero_driver_2/stop_request",
         "stopped",
-        "/x/y/disconnect",
+        "/x/y/robots",
     ],
 )
 def test_what_drivers_serve_is_refused_under_any_name(name, is_published, identity):

@@ -12,7 +12,7 @@ TF_TOPICS = frozenset(("/tf", "tf"))
 ROS_TOPICS = frozenset(("/rosout", "/rosout_agg", "/diagnostics", "/diagnostics_agg", "/clock", "/tf_static"))
 """Topics about all of ROS: no device may publish on them."""
 
-DRIVER_NAMES = frozenset(("robots", "stop", "stop_request", "stopped", "disconnect"))
+DRIVER_NAMES = frozenset(("robots", "stop", "stop_request", "stopped"))
 """Last parts of the names that drivers serve, by which programs find drivers, and stop robots."""
 
 DRIVER_TYPES = frozenset(("hero_msgs/RobotArray", "hero_common/RobotArray"))
