@@ -45,14 +45,14 @@ class DriverConfig:
     namespace_policy: str = _choice(
         "robot",
         ("robot", "any"),
-        "names allowed. robot: HeRos only, each in /hero_N and /tf; any: all except those of drivers and of ROS",
+        "names of topics, services and parameters that robots may use. robot: HeRos only, each in /hero_N and /tf;"
+        " any: all except those of drivers and of ROS",
     )
     allow: Tuple[Network, ...] = _plain((), "networks (CIDR) that robots may connect from; empty: all")
     max_connections: int = _number(400, 1, 5000, "", "connections in total")
     max_connections_per_address: int = _number(400, 1, 5000, "", "connections per address")
     max_unidentified: int = _number(200, 1, 5000, "", "connections that have not identified themselves")
     max_topics: int = _number(64, 1, 1000, "", "topic ids that one robot may declare")
-    max_name_length: int = _number(128, 16, 1024, "characters", "longest name of a topic or type")
     max_payload_length: int = _number(4096, 64, 65535, "bytes", "longest payload of a packet from a robot")
     max_packets_per_s: int = _number(5000, 10, 1000000, "1/s", "packets per robot; stock robots send 211")
     max_bytes_per_s: int = _number(
@@ -62,12 +62,8 @@ class DriverConfig:
         20.0, 2.0, 600.0, "s", "time for a robot to declare a topic that identifies it; then it is disconnected"
     )
     silence_timeout_s: float = _number(6.0, 3.0, 600.0, "s", "silence after which a connection is closed")
-    quick_acknowledge: bool = _plain(
-        True, "acknowledge data at once; otherwise some TCP stacks delay the rest of each burst by 40 ms"
-    )
     grace_s: float = _number(10.0, 0.0, 3600.0, "s", "time that a robot's topics and id are kept after it disconnects")
     service_timeout_s: float = _number(5.0, 0.1, 600.0, "s", "time for a robot to answer a service call")
-    parameters_outside: bool = _plain(False, "allow robots to read parameters outside their namespace")
     clamp: bool = _plain(False, "limit velocities to those of the firmware (0.20 m/s, 8.0 rad/s)")
     command_max_age_s: float = _number(
         2.0, 0.1, 60.0, "s", "age at which a motion command that could not be sent is dropped; stops are kept"
@@ -119,10 +115,9 @@ class DriverConfig:
     def session_limits(self) -> SessionLimits:
         """Limits of one session."""
         return SessionLimits(
-            self.max_payload_length,
-            self.max_topics,
-            self.max_name_length,
-            self.silence_timeout_s,
+            max_payload_length=self.max_payload_length,
+            max_topics=self.max_topics,
+            silence_timeout_s=self.silence_timeout_s,
         )
 
     @property

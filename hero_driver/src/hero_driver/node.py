@@ -72,9 +72,7 @@ class DriverNode:
         self._gateway = Gateway(
             config, self._log, self._registrar, rospy.get_name(), make_ros_clock(), self._changed.set
         )
-        settings = TransportSettings(
-            config.host, config.port, config.robots, config.silence_timeout_s, config.quick_acknowledge
-        )
+        settings = TransportSettings(config.host, config.port, config.robots, config.silence_timeout_s)
         self._loop = EventLoop(settings, self._gateway)
         self._thread = threading.Thread(target=self._run_loop, name="sockets", daemon=True)
         self._crash: Optional[BaseException] = None

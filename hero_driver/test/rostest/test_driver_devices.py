@@ -45,7 +45,7 @@ class TestDriverDevices(OwnDriverCase):
             Declaration(CLIENT_REQUESTS, 127, "/add_dots", "std_srvs/Trigger", TRIGGER_REQUEST_MD5),
             Declaration(CLIENT_ANSWERS, 103, "/add_dots", "std_srvs/Trigger", ANSWER_MD5),
         ]
-        driver = self.start(namespace_policy="any", parameters_outside=True)
+        driver = self.start(namespace_policy="any")
         robot = self.dial(driver, ready=False, declarations=device)
         wait_for(lambda: driver.fleet.newest.robots, "the device in the report")
         self.assertEqual(driver.fleet.newest.robots[0].id, -1)
@@ -160,7 +160,7 @@ class TestDriverDevices(OwnDriverCase):
         self.assertTrue(driver.fleet.newest.stopped)
         self.assertEqual(list_publishers("/fleet") + list_publishers("/clock"), [])
 
-    def test_a_device_reads_parameters_outside_only_where_that_is_allowed(self):
+    def test_a_device_reads_parameters_below_its_own_name_and_of_others(self):
         rospy.set_param("/limit", 12)
         rospy.set_param("/arm_3/limit", 13)
         driver = self.start(namespace_policy="any")
@@ -168,8 +168,7 @@ class TestDriverDevices(OwnDriverCase):
         robot = self.dial(driver, declarations=device, ready=False)
         driver.fleet.wait_ready("/arm_3")
         self.assertEqual(ask_parameter(robot, "limit"), ([13], [], []))
-        self.assertEqual(ask_parameter(robot, "/limit"), ([], [], []))
-        driver.wait_line("arm_3: parameter '/limit' lies outside /arm_3; set ~parameters_outside")
+        self.assertEqual(ask_parameter(robot, "/limit"), ([12], [], []))
 
 
 if __name__ == "__main__":

@@ -82,6 +82,7 @@ class TestDriverFleet(DriverCase):
         command = make_publisher("/hero_3/velocity_controller/cmd_vel", Twist)
         rospy.wait_for_service("/hero_3/set_odom", 20.0)
         service = rospy.ServiceProxy("/hero_3/set_odom", SetOdom)
+        rospy.wait_for_service("/hero_3/velocity_controller/pid_calibration", 20.0)  # declared last
         topics = list_driver_topics("/hero_3")
         self.send_encoder(robot, 1.0)
         encoders.wait_count(1)

@@ -62,8 +62,8 @@ def make_yaml():
 
 
 GROUPS = {
-    "Connections": ("host", "port", "robots", "namespace_policy", "allow", "quick_acknowledge"),
-    "Limits": ("max_*", "parameters_outside"),
+    "Connections": ("host", "port", "robots", "namespace_policy", "allow"),
+    "Limits": ("max_*",),
     "Timeouts": ("*_timeout_s", "grace_s", "command_max_age_s"),
     "Commands": ("clamp", "orphan_stop_s", "start_stopped", "allow_self_tuning"),
     "Odometry": ("odometry", "wheel_*", "ticks_per_turn", "pose_covariance", "twist_covariance"),

@@ -48,7 +48,7 @@ def start():
 
     def start_loop():
         handler = Handler()
-        handler.loop = EventLoop(TransportSettings("127.0.0.1", 0, (), 1.0, True), handler)
+        handler.loop = EventLoop(TransportSettings("127.0.0.1", 0, (), 1.0), handler)
         handler.loop.open()
         thread = threading.Thread(target=handler.loop.run, daemon=True)
         thread.start()

@@ -39,7 +39,7 @@ class Bench:
 
     def __init__(self, monkeypatch):
         self.handler = Handler()
-        self.loop = EventLoop(TransportSettings("", 0, (), 1.0, True), self.handler)
+        self.loop = EventLoop(TransportSettings("", 0, (), 1.0), self.handler)
         self.loop.open()
         self.loop_thread = threading.Thread(target=self.loop.run, daemon=True)
         self.loop_thread.start()

@@ -1,7 +1,7 @@
 """Reads ROS parameters for robots, in the form that rosserial sends them.
 
 Integers and booleans, floats and texts, alone or in lists. A robot reads below its own namespace only,
-unless ~parameters_outside allows more. May block; runs on a worker.
+unless ~namespace_policy is any. May block; runs on a worker.
 """
 
 import xmlrpc.client
@@ -35,7 +35,7 @@ def resolve_parameter(name: str, namespace: str, may_leave: bool) -> str:
     if may_leave or name.startswith(namespace + "/"):
         return name
     raise ParameterRefusedError(
-        "parameter %s lies outside %s; set ~parameters_outside to allow it" % (ascii(name[:100]), namespace)
+        "parameter %s lies outside %s (~namespace_policy is robot)" % (ascii(name[:100]), namespace)
     )
 
 

@@ -33,7 +33,7 @@ class RobotRequests:
         warn_robot: Callable[[Peer, str], None],
     ) -> None:
         """Take the loop's call_soon(); warn_robot reports a robot's trouble."""
-        self._may_leave = config.parameters_outside
+        self._may_leave = config.namespace_policy == "any"
         self._log = log
         self._call_soon = call_soon
         self._warn_robot = warn_robot

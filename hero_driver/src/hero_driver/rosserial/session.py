@@ -394,7 +394,7 @@ class Session:
         """Return what is wrong with a declaration, or None."""
         limit = self._limits.max_name_length
         if len(info.name) > limit:
-            return "its name has %d characters, more than %d (max_name_length)" % (len(info.name), limit)
+            return "its name has %d characters, more than %d" % (len(info.name), limit)
         if not _NAME.match(info.name) or "//" in info.name or info.name.endswith("/"):
             return "its name is not a ROS name"
         if len(info.message_type) > limit or not _MESSAGE_TYPE.match(info.message_type):

@@ -59,8 +59,6 @@ class TransportSettings(NamedTuple):
     user_timeout_s: float
     """After this time without acknowledgement the kernel gives a connection up (TCP_USER_TIMEOUT)."""
 
-    acknowledges_at_once: bool
-    """A robot's TCP holds the rest of a burst back until its beginning is acknowledged (Nagle)."""
 
 
 class Reader:
@@ -206,7 +204,7 @@ class EventLoop(LinkOwner):
 
     def _add_link(self, sock: socket.socket, address: Address, on_close: Callable[[], None]) -> None:
         """Take over a connected socket; on_close() is called when it is closed again, which may be at once."""
-        link = Link(self, sock, address, self._settings.acknowledges_at_once, on_close)
+        link = Link(self, sock, address, on_close)
         try:
             self._set_options(sock)
         except OSError as error:

@@ -99,13 +99,9 @@ class Link:
         loop: LinkOwner,
         sock: socket.socket,
         address: Address,
-        acknowledges_at_once: bool,
         on_close: Callable[[], None] = lambda: None,
     ) -> None:
-        """acknowledges_at_once: what is read is acknowledged now, not within 40 ms as Linux would.
-
-        on_close() is called once, after the end.
-        """
+        """on_close() is called once, after the end."""
         self.address = address
         self.closed = False
         self.peer: Any = None  # the handler's own record of who is at the other end
@@ -114,9 +110,7 @@ class Link:
         self.on_close = on_close
         self._loop = loop
         self._socket = sock
-        self._acknowledge: Optional[Callable[[], None]] = None
-        if acknowledges_at_once:
-            self._acknowledge = functools.partial(sock.setsockopt, socket.IPPROTO_TCP, socket.TCP_QUICKACK, 1)
+        self._acknowledge = functools.partial(sock.setsockopt, socket.IPPROTO_TCP, socket.TCP_QUICKACK, 1)
         self._unsent: Deque[bytes] = collections.deque()
         self._unsent_length = 0
 
@@ -160,8 +154,9 @@ class Link:
         """Return what has come, nothing if there is nothing; close at the end of the stream and where it broke."""
         try:
             data = self._socket.recv(READ_LENGTH)
-            if data and self._acknowledge is not None:
-                # Holds for this acknowledgement only; the kernel falls back by itself (tcp(7)).
+            if data:
+                # At once, not within 40 ms: a robot's TCP holds the rest of a burst back until its beginning is
+                # acknowledged (Nagle). Holds for this time only; the kernel falls back by itself (tcp(7)).
                 self._acknowledge()
         except (BlockingIOError, InterruptedError):
             return b""
