@@ -61,7 +61,7 @@ class Span(NamedTuple):
 def read_path(robot: RobotObservations) -> Path:
     """Return the path of a robot by odometry, in the shared frame, or in its own if there is none."""
     arrival_s, _, x_m, y_m, yaw_rad, _, _ = robot.odometry.columns()
-    return transform_path(Path(arrival_s, x_m.astype(float), y_m.astype(float), yaw_rad.astype(float)), robot.origins)
+    return transform_path(Path(arrival_s, x_m, y_m, yaw_rad), robot.origins)
 
 
 def read_ground_truth(robot: RobotObservations) -> Path:
@@ -171,7 +171,7 @@ def find_gaps(times_s: np.ndarray) -> List[Tuple[float, float]]:
 def break_at_gaps(times_s: np.ndarray, values: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
     """Return a curve that is interrupted at gaps in the odometry."""
     gaps = np.flatnonzero(np.diff(times_s) > ODOMETRY_GAP_S) + 1
-    return np.insert(times_s, gaps, times_s[gaps]), np.insert(values.astype(float), gaps, np.nan)
+    return np.insert(times_s, gaps, times_s[gaps]), np.insert(values, gaps, np.nan)
 
 
 def end_commands(
@@ -186,11 +186,3 @@ def end_commands(
         np.insert(linear_m_s, ends + 1, 0.0),
         np.insert(angular_rad_s, ends + 1, 0.0),
     )
-
-
-def mean_in_bins(times_s: np.ndarray, values: np.ndarray, duration_s: float, bins: int) -> np.ndarray:
-    """Return the mean of the values in each of bins equal parts of the duration; NaN where there are none."""
-    which = np.clip((times_s / duration_s * bins).astype(int), 0, bins - 1)
-    counts = np.bincount(which, minlength=bins)
-    sums = np.bincount(which, weights=values, minlength=bins)
-    return np.where(counts > 0, sums / np.maximum(counts, 1), np.nan)

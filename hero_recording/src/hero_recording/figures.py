@@ -1,7 +1,6 @@
 """Draws the figures of a recording, for one robot or a hundred; writes no files.
 
-Up to seven robots have colors and a legend. More have shades and are labeled with their ids; where their lines would
-cover each other, each robot has a row.
+Up to seven robots have colors and a legend. More have shades, and are labeled with their ids where they end.
 """
 
 from typing import Any, Dict, Optional, Sequence, Tuple
@@ -19,11 +18,8 @@ from . import analysis
 from .observations import Observations, RobotObservations
 
 WIDTH_IN = 9.0
-MOST_ROWS = 8
-"""Up to this many robots have speed curves of their own; more share an image with a row for each."""
-
-BINS_PER_S = 2.0
-"""Of the image of speeds: short enough to show a stop."""
+SPEED_ROWS = 8
+"""Most robots whose speeds are drawn, in a row each; plot --robots chooses others."""
 
 NO_COMMANDS = "no commands recorded:\nnothing on /hero_N/velocity_controller/cmd_vel"
 
@@ -160,14 +156,13 @@ class Figures:
     # -- speeds --------------------------------------------------------------------------------------------
 
     def draw_speeds(self) -> Optional[Figure]:
-        """Draw the speeds of all robots: curves beside the commands, or for many robots an image."""
-        drawn = {key: robot for key, robot in self._robots.items() if len(robot.odometry)}
+        """Draw the speeds of up to SPEED_ROWS robots beside what was commanded."""
+        moving = [key for key, robot in self._robots.items() if len(robot.odometry)]
+        drawn = {key: self._robots[key] for key in moving[:SPEED_ROWS]}
         if not drawn:
             return None
-        return self._draw_speed_curves(drawn) if len(drawn) <= MOST_ROWS else self._draw_speed_image()
-
-    def _draw_speed_curves(self, drawn: Dict[int, RobotObservations]) -> Figure:
-        figure, grid = self._begin(1.2 + 1.5 * len(drawn), "Speeds", len(drawn), 2, sharex=True, sharey="col")
+        title = "Speeds" if len(drawn) == len(moving) else "Speeds of the first %d robots" % len(drawn)
+        figure, grid = self._begin(1.2 + 1.5 * len(drawn), title, len(drawn), 2, sharex=True, sharey="col")
         for row, (robot_id, robot) in zip(grid, drawn.items()):
             arrival_s, _, _, _, _, *speeds = robot.odometry.columns()
             command_s, *commands = analysis.end_commands(*robot.commands.columns())
@@ -189,26 +184,6 @@ class Figures:
         figure.legend(handles=handles, loc="upper right", fontsize=8, frameon=False, ncol=2)
         return figure
 
-    def _draw_speed_image(self) -> Figure:
-        figure, grid = self._begin(2.0 * self._row_height - 1.0, "Speeds by odometry", 2, 1, sharex=True)
-        bins = int(min(600, max(20, self._duration_s * BINS_PER_S)))
-        for axes, text, column, least in zip(grid[:, 0], ("linear (m/s)", "angular (rad/s)"), (5, 6), (0.05, 0.5)):
-            image = np.full((len(self._robots), bins), np.nan)
-            for row, robot in enumerate(self._robots.values()):
-                columns = robot.odometry.columns()
-                times_s = self._since_start(columns[0])
-                image[row] = analysis.mean_in_bins(times_s, columns[column], self._duration_s, bins)
-            highest = max(least, float(np.nanpercentile(np.abs(image), 99)))
-            extent = (0.0, self._duration_s, len(image) - 0.5, -0.5)
-            shown = axes.imshow(
-                image, aspect="auto", interpolation="nearest", extent=extent, cmap="PuOr", vmin=-highest, vmax=highest
-            )
-            axes.set_facecolor("0.8")
-            self._label_rows(axes)
-            figure.colorbar(shown, ax=axes, label=text, pad=0.01)
-        grid[-1][0].set_xlabel("time (s); grey: no odometry")
-        return figure
-
     # -- delays and connections ----------------------------------------------------------------------------
 
     def draw_delays(self) -> Optional[Figure]:
@@ -221,7 +196,12 @@ class Figures:
         for row, (robot_id, robot) in enumerate(self._robots.items()):
             color = self._colors[robot_id]
             if len(messages[robot_id]):
-                self._draw_delay_box(message_axes, row, messages[robot_id], color)
+                message_axes.boxplot(
+                    [messages[robot_id]], positions=[row], whis=(1, 99), vert=False, widths=0.6, showfliers=False,
+                    boxprops={"color": color}, whiskerprops={"color": color}, capprops={"color": color},
+                    medianprops={"color": "black"}, manage_ticks=False,
+                )  # fmt: skip
+                message_axes.plot(messages[robot_id].max(), row, "x", color=color, markersize=4)
             motions = analysis.compute_motion_delays(robot) * 1e3
             if len(motions):
                 motion_axes.plot(motions, np.full(len(motions), row), "o", color=color, markersize=3, alpha=0.5)
@@ -257,14 +237,6 @@ class Figures:
             return "no encoder readings recorded:\nnothing on /hero_N/encoder"
         return "no robot started from rest:\nstart recording before the program"
 
-    @staticmethod
-    def _draw_delay_box(axes: Axes, row: int, delays_ms: np.ndarray, color: Any) -> None:
-        low, quarter, median, three_quarters, high = np.percentile(delays_ms, [1, 25, 50, 75, 99])
-        axes.plot([low, high], [row, row], color=color, linewidth=1.0)
-        axes.barh(row, three_quarters - quarter, left=quarter, height=0.6, color=color, alpha=0.5)
-        axes.plot([median, median], [row - 0.3, row + 0.3], color="black", linewidth=1.2)
-        axes.plot(delays_ms.max(), row, "x", color=color, markersize=4)
-
     def draw_connections(self) -> Optional[Figure]:
         """Draw the state of each robot over time, and gaps in its odometry."""
         if not any(robot.states or len(robot.odometry) for robot in self._robots.values()):
@@ -287,7 +259,7 @@ class Figures:
         handles = [patches.Patch(color=STATE_COLORS[key], label=key) for key in STATE_COLORS if key in seen]
         gap = "no odom for\nmore than %g s" % analysis.ODOMETRY_GAP_S
         handles.append(patches.Patch(facecolor="white", edgecolor=_GREY, label=gap))
-        if not self._seen.has_reports:
+        if not seen:
             text = "the driver's reports (/hero_driver/robots) were not recorded: lines show odometry"
             axes.set_title(text, fontsize=8)
         self._add_legend(axes, handles, with_robots=False)
@@ -311,31 +283,13 @@ class Figures:
         yaw_axes.set_ylabel("heading error (degrees),\npositive: counter-clockwise")
         yaw_axes.set_xlabel("time (s)")
         yaw_axes.axhline(0.0, color=_GREY, linewidth=0.5)
-        median = Line2D([], [], color="black", linewidth=1.8, label="median")
-        self._add_legend(position_axes, [] if self._has_legend else [median])
+        self._add_legend(position_axes)
         return figure
 
     def _draw_error_curves(self, axes: Axes, times_s: Dict[int, Any], values: Dict[int, Any]) -> None:
-        """Draw a curve for each robot; for many robots also the median, and the ids of the extremes at the end."""
-        for key, color in self._colors.items():
-            if key in values:
-                curve_s, curve = analysis.break_at_gaps(times_s[key], values[key])
-                width = 1.0 if self._has_legend else 0.6
-                axes.plot(self._since_start(curve_s), curve, color=color, linewidth=width)
+        """Draw a curve for each robot."""
+        for key, curve in values.items():
+            curve_s, curve = analysis.break_at_gaps(times_s[key], curve)
+            width = 1.0 if self._has_legend else 0.6
+            axes.plot(self._since_start(curve_s), curve, color=self._colors[key], linewidth=width)
         self._set_time_axis(axes)
-        if self._has_legend:
-            return
-        ranked = sorted(values, key=lambda key: float(values[key][-1]))
-        for key in {*ranked[:1], *ranked[-3:]}:
-            end = (self._since_start(times_s[key][-1]), values[key][-1])
-            place = {"textcoords": "offset points", "xytext": (3, -2)}
-            axes.annotate(str(key), end, fontsize=7, annotation_clip=False, **place)
-        grid_s = np.linspace(0.0, self._duration_s, 200)
-        stacked = np.array(
-            [
-                np.interp(grid_s, self._since_start(times_s[key]), values[key], left=np.nan, right=np.nan)
-                for key in values
-            ]
-        )
-        known = np.isfinite(stacked).any(axis=0)
-        axes.plot(grid_s[known], np.nanmedian(stacked[:, known], axis=0), color="black", linewidth=1.8)

@@ -10,6 +10,7 @@ from typing import Any, DefaultDict, Iterable, List, NamedTuple, Optional, Set, 
 from hero_client.geometry import yaw_of
 
 from .series import Series
+from .tables import STATUS, TABLES, Row, read_rows
 from .topics import (
     ENCODER,
     GROUND_TRUTH,
@@ -24,11 +25,9 @@ from .topics import (
     is_fleet_topic,
 )
 
+KINDS = (ODOMETRY, GROUND_TRUTH, ENCODER, VELOCITY_COMMAND, POSITION_COMMAND)
 CUBE, CYLINDER = 1, 3
 """Types of visualization_msgs/Marker that walls and round obstacles are drawn with."""
-
-STATE_NAMES = {0: "joining", 1: "ready", 2: "away", 3: "refused"}
-"""Of hero_msgs/Robot."""
 
 
 class Origin(NamedTuple):
@@ -62,10 +61,22 @@ class RobotObservations:
     def __init__(self) -> None:
         self.odometry = Series(2, 5)
         self.ground_truth = Series(2, 5)
-        self.encoder = Series(3, 0)  # ticks grow beyond seven digits in some hours
+        self.encoder = Series(3, 0)  # ticks grow beyond any limit
         self.commands = Series(1, 2)
         self.origins: List[Origin] = []
         self.states: List[StateReport] = []
+
+    def add(self, kind: str, row: Row) -> None:
+        """Store a row of a table."""
+        if kind == STATUS:
+            columns = dict(zip(TABLES[STATUS], row[1:]))
+            self.states.append(StateReport(row[0], columns["state"], columns["reconnects"]))
+        elif kind == ENCODER:
+            time_s, _, left_ticks, right_ticks, *_ = row
+            self.encoder.add(time_s, left_ticks, right_ticks)
+        else:
+            series = {ODOMETRY: self.odometry, GROUND_TRUTH: self.ground_truth}.get(kind, self.commands)
+            series.add(*row)
 
     @property
     def skipped(self) -> int:
@@ -81,7 +92,6 @@ class Observations:
         walls_m: segments x1 y1 x2 y2 of the arena.
         circles_m: round obstacles x y radius.
         shared_frame: frame of the origins; empty if none were recorded.
-        has_reports: whether a driver's reports were recorded.
     """
 
     def __init__(self, robot_ids: Optional[Set[int]] = None) -> None:
@@ -91,14 +101,12 @@ class Observations:
         self.walls_m: List[Tuple[float, float, float, float]] = []
         self.circles_m: List[Tuple[float, float, float]] = []
         self.shared_frame = ""
-        self.has_reports = False
 
     def wants(self, topic: str, message_type: str) -> bool:
         """Return whether receive() uses a topic."""
         found = find_robot_topic(topic, message_type)
         if found is not None:
-            kinds = (ODOMETRY, GROUND_TRUTH, ENCODER, VELOCITY_COMMAND, POSITION_COMMAND)
-            return found.kind in kinds and self._wants_robot(found.robot_id)
+            return found.kind in KINDS and self._wants_robot(found.robot_id)
         return (
             is_fleet_topic(topic, message_type)
             or (topic == STATIC_TRANSFORMS_TOPIC and message_type in TRANSFORMS_TYPES)
@@ -110,41 +118,14 @@ class Observations:
 
     def receive(self, message: Message) -> None:
         """Store a message of a topic that wants() accepts."""
-        found = find_robot_topic(message.topic, message.type)
-        if found is not None:
-            self._receive_robot_message(self.robots[found.robot_id], found.kind, message)
-        elif is_fleet_topic(message.topic, message.type):
-            self._receive_fleet(message)
-        elif message.topic == STATIC_TRANSFORMS_TOPIC:
+        if message.topic == STATIC_TRANSFORMS_TOPIC:
             self._receive_transforms(message)
-        else:
+        elif is_arena_topic(message.topic, message.type):
             self._receive_arena(message.content.markers)
-
-    def _receive_robot_message(self, robot: RobotObservations, kind: str, message: Message) -> None:
-        content = message.content
-        if kind in (ODOMETRY, GROUND_TRUTH):
-            position, twist = content.pose.pose.position, content.twist.twist
-            series = robot.odometry if kind == ODOMETRY else robot.ground_truth
-            series.add(
-                message.time_s,
-                content.header.stamp.to_sec(),
-                position.x,
-                position.y,
-                yaw_of(content.pose.pose.orientation),
-                twist.linear.x,
-                twist.angular.z,
-            )
-        elif kind == ENCODER:
-            robot.encoder.add(message.time_s, content.left_ticks, content.right_ticks)
         else:
-            robot.commands.add(message.time_s, content.linear.x, content.angular.z)
-
-    def _receive_fleet(self, message: Message) -> None:
-        self.has_reports = True
-        for robot in message.content.robots:
-            if robot.id >= 0 and self._wants_robot(robot.id):
-                state = STATE_NAMES.get(robot.state, str(robot.state))
-                self.robots[robot.id].states.append(StateReport(message.time_s, state, robot.reconnects))
+            for robot_id, kind, row in read_rows(*message):
+                if self._wants_robot(robot_id):
+                    self.robots[robot_id].add(kind, row)
 
     def _receive_transforms(self, message: Message) -> None:
         for transform in message.content.transforms:

@@ -1,17 +1,17 @@
 """The tables of an export: where the value of each column is found in a message. Pure.
 
-Every table begins with time_s, when the recorder received the message; stamp_s is when the robot measured it. The
-columns are explained in docs/recording.md.
+Every table begins with time_s, when the recorder received the message; stamp_s is when the robot measured it, both in
+seconds since 1970. The columns are explained in docs/recording.md.
 """
 
 import math
 from operator import attrgetter
 from typing import Any, Callable, Dict, List, Tuple
 
+from hero_client.drivers import STATES
 from hero_client.geometry import yaw_of
 
 from . import topics
-from .observations import STATE_NAMES
 
 Row = Tuple[Any, ...]
 Columns = Dict[str, Callable[[Any], Any]]
@@ -24,13 +24,8 @@ BEAMS = ("rear", "rear_right", "right", "front_right", "front", "front_left", "l
 """Of /hero_N/proximity by index: counter-clockwise from the rear."""
 
 
-def _format_time(time_s: float) -> str:
-    """Return seconds since 1970 to the microsecond; csv writes other floats exactly."""
-    return "%.6f" % time_s
-
-
-def _read_stamp(content: Any) -> str:
-    return _format_time(content.header.stamp.to_sec())
+def _read_stamp(content: Any) -> float:
+    return float(content.header.stamp.to_sec())
 
 
 def _range_reader(index: int) -> Callable[[Any], Any]:
@@ -79,7 +74,7 @@ TABLES: Dict[str, Columns] = {
         **{"acceleration_raw_" + axis: attrgetter("linear_acceleration." + axis) for axis in "xyz"},
     },
     STATUS: {
-        "state": lambda robot: STATE_NAMES.get(robot.state, str(robot.state)),
+        "state": lambda robot: STATES.get(robot.state, str(robot.state)).lower(),
         "address": attrgetter("address"),
         "packets_per_s": attrgetter("packets_per_s"),
         "bytes_per_s": attrgetter("bytes_per_s"),
@@ -106,6 +101,6 @@ def read_rows(topic: str, message_type: str, content: Any, time_s: float) -> Lis
     else:
         sources = [(found.robot_id, found.kind, content)]
     return [
-        (robot_id, kind, (_format_time(time_s), *(read(source) for read in TABLES[kind].values())))
+        (robot_id, kind, (time_s, *(read(source) for read in TABLES[kind].values())))
         for robot_id, kind, source in sources
     ]
