@@ -17,7 +17,7 @@ import rospy
 from hero_client import command_line
 from hero_client.command_line import say
 from hero_client.errors import ProgramError
-from hero_client.parameters import parse_robot_ids
+from hero_client.parameters import robot_ids_option
 from hero_client.program import Program
 
 from . import store
@@ -81,7 +81,7 @@ class Calibration:
             self._store(VELOCITY, calibrate_velocity(session, motors))
         if INFRARED in parts and session.active:
             place_robots(session, at_wall=True, ask_nothing=self._options.yes)
-            self._store(INFRARED, calibrate_infrared(session, self._options.samples))
+            self._store(INFRARED, calibrate_infrared(session))
 
     def _store(self, part: str, results: Dict[int, Any]) -> None:
         for robot_id, result in results.items():
@@ -122,11 +122,10 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     )
     parts_help = "motors, velocity, infrared (all three); or: restore [FILE ...]"
     parser.add_argument("parts", nargs="*", metavar="PART", help=parts_help)
-    parser.add_argument("--robots", default="all", help="ids, e.g. '0 1 2' or 0-3 (all that are connected)")
+    robots_help = "ids, e.g. '0 1 2' or 0-3 (all that are connected)"
+    parser.add_argument("--robots", type=robot_ids_option, default="all", help=robots_help)
     parser.add_argument("--yes", action="store_true", help="ask nothing: the robots are placed already")
     parser.add_argument("--folder", default="~/hero_calibration", help="of files and pictures (%(default)s)")
-    samples_help = "infrared scans for each sensor, 5 a second (25)"
-    parser.add_argument("--samples", type=int, default=25, metavar="N", help=samples_help)
     options = parser.parse_args(arguments)
     options.restore = options.parts[:1] == [RESTORE]
     options.files = options.parts[1:] if options.restore else []
@@ -136,12 +135,6 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
             parser.error("%s: parts are %s; or: restore [FILE ...]" % (part, ", ".join(PARTS)))
     if options.yes and INFRARED in options.parts and len(options.parts) > 1:
         parser.error("--yes: motors and velocity need room around the robots, infrared a wall: name one or the other")
-    if not 3 <= options.samples <= 150:
-        parser.error("--samples %d: must be 3..150" % options.samples)
-    try:
-        options.robots = parse_robot_ids("robots", options.robots)
-    except ProgramError as error:
-        parser.error(str(error).replace("~", "--"))
     options.folder = os.path.abspath(os.path.expanduser(options.folder))
     return options
 

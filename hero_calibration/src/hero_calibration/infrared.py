@@ -63,15 +63,12 @@ class _Wall(NamedTuple):
         return x_m * math.cos(self.direction_rad) + y_m * math.sin(self.direction_rad)
 
 
-def calibrate_infrared(session: Session, samples: int) -> Dict[int, InfraredResult]:
-    """Calibrate all active robots, which face a wall; return the results by robot.
-
-    samples: scans of each sensor in the first round.
-    """
-    say("infrared: about %.0f s" % (model.BEAMS * (2 * TURN_S + (samples + model.CHECK_SAMPLES) / 5.0)))
+def calibrate_infrared(session: Session) -> Dict[int, InfraredResult]:
+    """Calibrate all active robots, which face a wall; return the results by robot."""
+    say("infrared: about %.0f s" % (model.BEAMS * (2 * TURN_S + (model.SAMPLES + model.CHECK_SAMPLES) / 5.0)))
     walls: Dict[int, _Wall] = {}
     counts_m2: Dict[int, List[float]] = {}
-    first = _face_wall_with_each_sensor(session, "infrared", samples, walls)
+    first = _face_wall_with_each_sensor(session, "infrared", model.SAMPLES, walls)
 
     def write(probe: Probe) -> None:
         counts_m2[probe.robot_id] = model.compute_calibration(first[probe.robot_id])
@@ -101,7 +98,7 @@ def _face_wall_with_each_sensor(
             probe.forget_scans()
         session.wait_for(
             lambda: all(probe.count_scans() >= samples for probe in session.active),
-            max(SCAN_TIMEOUT_S, samples / 2.0),
+            SCAN_TIMEOUT_S,
         )
         targets_rad: Dict[int, float] = {}
 

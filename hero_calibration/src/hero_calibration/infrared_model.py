@@ -30,8 +30,11 @@ NEAR_COUNTS = 16.0
 WALL_COUNTS = (22.0, 110.0)
 """Accepted readings of a wall at 10 cm: 42 is typical."""
 
+SAMPLES = 25
+"""Scans of each sensor in the first round, five a second."""
+
 CHECK_SAMPLES = 10
-"""Scans of each sensor in the check: noise of 1.3 counts then moves the range by 0.5 mm."""
+"""The same in the check: noise of 1.3 counts then moves the range by 0.5 mm."""
 
 FAINT_COUNTS = 0.5
 NO_WALL_COUNTS = 4.0

@@ -4,9 +4,12 @@ import math
 import os
 import re
 from contextlib import suppress
-from typing import Any, Dict, List, NamedTuple, Optional, Tuple
+from datetime import date
+from typing import Any, Dict, List, NamedTuple, Tuple
 
 import yaml
+
+from hero_client.command_line import make_printable
 
 from .errors import CalibrationError
 
@@ -96,84 +99,44 @@ def _write_atomically(path: str, content: bytes) -> None:
 
 
 def load(path: str) -> Calibration:
-    """Read a file. Raises: CalibrationError with file, line, value and what is allowed."""
-    root = _parse(path)
-    if root is None or root.id != "mapping":
-        raise _fail_at(path, root, "is no calibration: it must begin with robot: hero_N")
-    nodes: Dict[str, Any] = {}
-    known = {**SETTINGS, **RESULTS}
-    for key_node, value_node in root.value:
-        if key_node.value not in ("robot", "date", *known):
-            allowed = ", ".join(("robot", "date", *known))
-            raise _fail_at(path, key_node, "unknown key %s; known are %s" % (_describe(key_node), allowed))
-        if key_node.value in nodes:
-            raise _fail_at(path, key_node, "key %s is there twice" % _describe(key_node))
-        nodes[key_node.value] = value_node
-    robot = nodes.get("robot", root)
-    match = re.fullmatch(r"hero_([0-9]{1,9})", robot.value) if robot.id == "scalar" else None
-    if match is None:
-        raise _fail_at(path, robot, "robot must be hero_N, not %s" % _describe(robot))
-    date = nodes.get("date")
-    if date is not None and (date.id != "scalar" or not date.value.isprintable()):  # it is printed in terminals
-        raise _fail_at(path, date, "date must be one line of text, not %s" % _describe(date))
-    values = {key: _read_numbers(path, key, nodes[key], known[key]) for key in known if key in nodes}
-    return Calibration(int(match.group(1)), date.value if date is not None else "", values)
-
-
-def _parse(path: str) -> Any:
-    """Return the root node of a YAML file, None if it is empty; nodes know their lines."""
+    """Read a file. Raises: CalibrationError with file, key, value and what is allowed."""
     try:
         with open(path, encoding="utf-8") as file:
-            text = file.read()
-        return yaml.compose(text, Loader=yaml.SafeLoader)
+            content = yaml.safe_load(file)
     except OSError as error:
         raise CalibrationError("%s cannot be read: %s" % (path, error.strerror)) from error
-    except yaml.MarkedYAMLError as error:
-        raise _fail(path, error.problem_mark.line, str(error.problem)) from error
-    except yaml.reader.ReaderError as error:
-        reason = "the character U+%04X may not stand in a YAML file" % error.character
-        raise _fail(path, text.count("\n", 0, error.position), reason) from error
-    except (UnicodeDecodeError, RecursionError) as error:
-        raise _fail(path, 0, "is no text of a calibration: %s" % error) from error
+    except (yaml.YAMLError, ValueError, RecursionError) as error:  # ValueError: no UTF-8, no date, too many digits
+        raise _refuse(path, "is no calibration: " + " ".join(str(error).split())) from error
+    if not isinstance(content, dict) or "robot" not in content:
+        raise _refuse(path, "is no calibration: it needs a line robot: hero_N")
+    known = {**SETTINGS, **RESULTS}
+    for key in content:
+        if key not in ("robot", "date", *known):
+            raise _refuse(path, "unknown key %s; known are %s" % (_shorten(key), ", ".join(("robot", "date", *known))))
+    match = re.fullmatch(r"hero_([0-9]{1,9})", str(content["robot"]))
+    if match is None:
+        raise _refuse(path, "robot must be hero_N, not %s" % _shorten(content["robot"]))
+    values = {key: _read_numbers(path, key, content[key], allowed) for key, allowed in known.items() if key in content}
+    return Calibration(int(match.group(1)), make_printable(str(content.get("date", ""))), values)
 
 
-def _read_numbers(path: str, key: str, node: Any, allowed: Range) -> List[float]:
+def _read_numbers(path: str, key: str, found: Any, allowed: Range) -> List[float]:
     count, low, high, meaning = allowed
-    text = "%d numbers from %g to %g (%s)" % (count, low, high, meaning)
-    if node.id != "sequence" or len(node.value) != count:
-        raise _fail_at(path, node, "%s must be %s" % (key, text))
-    numbers = []
-    for item in node.value:
-        number = _read_number(item)
-        if number is None or not (low <= number <= high or (math.isnan(number) and key in RESULTS)):
-            raise _fail_at(path, item, "%s holds %s, but must be %s" % (key, _describe(item), text))
-        numbers.append(number)
-    return numbers
+    text = "%s must be %d numbers from %g to %g (%s)" % (key, count, low, high, meaning)
+    if not isinstance(found, list) or len(found) != count:
+        raise _refuse(path, "%s, not %s" % (text, _shorten(found)))
+    for number in found:
+        is_number = isinstance(number, (int, float)) and not isinstance(number, bool)
+        is_unknown = key in RESULTS and isinstance(number, float) and math.isnan(number)
+        if not (is_unknown or (is_number and low <= number <= high)):
+            raise _refuse(path, "%s, not %s" % (text, _shorten(number)))
+    return [float(number) for number in found]
 
 
-def _read_number(node: Any) -> Optional[float]:
-    """Return the number that a node holds, None if it holds none."""
-    if node.id != "scalar":
-        return None
-    if node.value == ".nan":
-        return math.nan
-    try:
-        return float(node.value)
-    except ValueError:
-        return None
+def _shorten(found: Any) -> str:
+    """Return what was found, for an error; a list may even contain itself."""
+    return repr(found)[:LONGEST_SHOWN] if isinstance(found, (str, int, float, date)) else "a " + type(found).__name__
 
 
-def _describe(node: Any) -> str:
-    """Return the content of a node for an error; a list may even contain itself."""
-    if node.id != "scalar":
-        return "a " + str(node.id)
-    return repr(str(node.value)[:LONGEST_SHOWN])
-
-
-def _fail_at(path: str, node: Any, reason: str) -> CalibrationError:
-    return _fail(path, node.start_mark.line if node is not None else 0, reason)
-
-
-def _fail(path: str, line: int, reason: str) -> CalibrationError:
-    """Return the error of a line, counted from 0."""
-    return CalibrationError("%s:%d: %s; correct the file, or move it away" % (path, line + 1, reason))
+def _refuse(path: str, reason: str) -> CalibrationError:
+    return CalibrationError("%s: %s; correct the file, or move it away" % (path, make_printable(reason)))

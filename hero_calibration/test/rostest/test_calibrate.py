@@ -85,7 +85,7 @@ class CalibrateTest(unittest.TestCase):
 
     def test_1_errors_are_below_their_bounds_though_one_robot_vanishes(self):
         open_floor = self.start("motors", "velocity", "--robots", "3-8", "--yes")
-        wall = self.start("infrared", "--robots", "0-2,42", "--yes", "--samples", "12")
+        wall = self.start("infrared", "--robots", "0-2,42", "--yes")
         watch = Watch(range(9))
         wait_for(lambda: watch.speeds[6] > 0.02, "motion of hero_6", TIMEOUT_S)
         rospy.ServiceProxy("/hero_sim/fault", InjectFault)("vanish:robot=6")

@@ -380,7 +380,6 @@ class TestInfrared:
     [
         (["dance"], "parts are motors, velocity, infrared"),
         (["--yes"], "name one or the other"),
-        (["--samples", "0"], "--samples 0"),
         (["--robots", "x"], "--robots"),
     ],
 )

@@ -5,6 +5,7 @@
 A wrong value ends the program with one line: the name, the value and what it must be.
 """
 
+import argparse
 import math
 from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
@@ -23,6 +24,7 @@ __all__ = [
     "parse_robot_ids",
     "read_parameters",
     "robot_ids",
+    "robot_ids_option",
     "whole_number",
 ]
 
@@ -144,6 +146,14 @@ def parse_robot_ids(name: str, value: Any) -> Optional[List[int]]:
         if ids.count(robot_id) > 1:
             raise ProgramError("~%s names robot %d more than once" % (name, robot_id))
     return ids
+
+
+def robot_ids_option(text: str) -> Optional[List[int]]:
+    """Return the ids in the value of a command line option, None for "all". Raises: argparse.ArgumentTypeError."""
+    try:
+        return parse_robot_ids("robots", text)
+    except ProgramError as error:
+        raise argparse.ArgumentTypeError(str(error).replace("~robots", "it")) from error
 
 
 def _parse_id_range(word: Any) -> Tuple[int, int]:

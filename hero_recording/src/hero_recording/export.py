@@ -11,10 +11,11 @@ import sys
 from typing import Dict, List, Optional, Sequence, Set, Tuple
 
 from hero_client import command_line
+from hero_client.parameters import robot_ids_option
 
 from .bags import BagSet
 from .errors import RecordingError
-from .options import list_of, robot_ids
+from .options import list_of
 from .tables import TABLES, Row, is_exported, read_rows
 from .topics import Message
 
@@ -70,7 +71,7 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="export", description="Export recordings of robots to CSV.")
     parser.add_argument("bags", nargs="+", metavar="FILE.bag", help="the bags of one recording, in any order")
     parser.add_argument("--out", metavar="FOLDER", help="where the tables go (the first bag's name); must not exist")
-    parser.add_argument("--robots", type=robot_ids, default="all", help="ids, e.g. '0 1 2' or 0-3 (all)")
+    parser.add_argument("--robots", type=robot_ids_option, default="all", help="ids, e.g. '0 1 2' or 0-3 (all)")
     every, text = ",".join(TABLES), "which, separated by commas (%(default)s)"
     parser.add_argument("--tables", type=list_of(TABLES), default=every, metavar="LIST", help=text)
     return parser.parse_args(arguments)

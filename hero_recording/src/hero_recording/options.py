@@ -1,18 +1,7 @@
-"""Types of command line options (argparse) that several programs share."""
+"""A type of command line options (argparse) that plot and export share."""
 
 import argparse
-from typing import Callable, Collection, List, Optional
-
-from hero_client.errors import ProgramError
-from hero_client.parameters import parse_robot_ids
-
-
-def robot_ids(text: str) -> Optional[List[int]]:
-    """Return the ids in text, None for "all". Raises: argparse.ArgumentTypeError."""
-    try:
-        return parse_robot_ids("robots", text)
-    except ProgramError as error:
-        raise argparse.ArgumentTypeError(str(error).replace("~robots", "it")) from error
+from typing import Callable, Collection, List
 
 
 def list_of(known: Collection[str]) -> Callable[[str], List[str]]:

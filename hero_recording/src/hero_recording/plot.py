@@ -9,12 +9,13 @@ from typing import Dict, List, Sequence
 import numpy as np
 
 from hero_client import command_line
+from hero_client.parameters import robot_ids_option
 
 from . import analysis
 from .bags import BagSet
 from .errors import RecordingError
 from .observations import Observations, RobotObservations
-from .options import list_of, robot_ids
+from .options import list_of
 
 FIGURES = {
     "paths": "/hero_N/odom",
@@ -33,7 +34,7 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(prog="plot", description="Plot recordings of robots.")
     parser.add_argument("bags", nargs="+", metavar="FILE.bag", help="the bags of one recording, in any order")
-    parser.add_argument("--robots", type=robot_ids, default="all", help="ids, e.g. '0 1 2' or 0-3 (all)")
+    parser.add_argument("--robots", type=robot_ids_option, default="all", help="ids, e.g. '0 1 2' or 0-3 (all)")
     every, text = ",".join(FIGURES), "which, separated by commas (%(default)s)"
     parser.add_argument("--figures", type=list_of(FIGURES), default=every, metavar="LIST", help=text)
     parser.add_argument("--format", choices=("png", "pdf"), default="png", help="of the files (png)")

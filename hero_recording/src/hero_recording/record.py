@@ -21,18 +21,17 @@ import roslib.packages
 
 from hero_client import command_line
 from hero_client.errors import NodeError
+from hero_client.parameters import robot_ids_option
 from hero_client.ros_node import ask_master, check_master
 
 from .disk_guard import MB, find_reason_to_stop, prepare_folder
 from .errors import RecordingError
-from .options import robot_ids
 from .repair import ACTIVE_SUFFIX, repair_bag
 from .topics import make_patterns
 
 CHECK_PERIOD_S = 0.5
 """Between two checks of the disk; fifty robots fill 3 MB in that time, uncompressed."""
 
-REPORT_PERIOD_S = 60.0
 SILENCE_S = 15.0
 """An empty recording is reported this long after the start."""
 
@@ -103,7 +102,7 @@ class Recording:
 
     def _watch(self, recorder: "subprocess.Popen[bytes]", start_s: float) -> Optional[str]:
         """Wait for the end; return the reason if the disk forced it."""
-        next_report_s = start_s + SILENCE_S
+        is_checked = False
         while self._end_signal is None:
             time.sleep(CHECK_PERIOD_S)
             if recorder.poll() is not None:
@@ -114,17 +113,11 @@ class Recording:
             now_s = time.monotonic()
             if self._options.seconds is not None and now_s - start_s >= self._options.seconds:
                 return None
-            if now_s >= next_report_s:
-                next_report_s = now_s + REPORT_PERIOD_S
-                self._report(now_s - start_s)
+            if not is_checked and now_s - start_s >= SILENCE_S:
+                is_checked = True
+                if sum(self._find_files().values()) <= EMPTY_BAG_BYTES:
+                    say("nothing received in %.0f s: is the driver running, has a robot joined?" % SILENCE_S)
         return None
-
-    def _report(self, elapsed_s: float) -> None:
-        sizes = self._find_files().values()
-        if sum(sizes) <= EMPTY_BAG_BYTES:
-            say("nothing received in %.0f s: is the driver running, has a robot joined?" % elapsed_s)
-        else:
-            say("%s in %d files after %.0f s" % (format_size(sum(sizes)), len(sizes), elapsed_s))
 
     def _repair_leftovers(self) -> bool:
         """Repair what the recorder could not close; return whether there was anything."""
@@ -207,7 +200,7 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     )
     parser.add_argument("--folder", default=".", help="where the bags go (here); created if missing")
     parser.add_argument("--name", default="hero", help="prefix of the file names, NAME_DATE_0.bag (hero)")
-    parser.add_argument("--robots", type=robot_ids, default="all", help="ids, e.g. '0 1 2' or 0-3 (all)")
+    parser.add_argument("--robots", type=robot_ids_option, default="all", help="ids, e.g. '0 1 2' or 0-3 (all)")
     parser.add_argument("--topics", default="", help="more topics: regular expressions separated by spaces")
     parser.add_argument("--raw", action="store_true", help="record odom_raw, laser and laser_enable too")
     parser.add_argument("--split-mb", type=int, default=256, metavar="MB", help="size of a file (256)")
