@@ -220,9 +220,12 @@ class Figures:
         message_axes.minorticks_off()
         motion_axes.set_xlabel("command to motion of a robot at rest (ms)")
         motion_axes.set_title("each dot is one start, bar: median", fontsize=8)
-        motion_axes.set_xlim(0.0, None if motion_axes.lines else 1.0)
-        if not motion_axes.lines:
-            motion_axes.text(0.5, 0.5, self._explain_no_motion(), transform=motion_axes.transAxes, ha="center")
+        if motion_axes.lines:
+            motion_axes.set_xlim(0.0, None)
+        else:
+            motion_axes.set_xticks([])
+            text = self._explain_no_motion()
+            motion_axes.text(0.5, 0.5, text, transform=motion_axes.transAxes, ha="center", fontsize=8)
         for axes in grid[0]:
             axes.grid(axis="x", color="0.9", linewidth=0.5)
             axes.set_axisbelow(True)
@@ -235,7 +238,10 @@ class Figures:
             return NO_COMMANDS
         if not any(len(robot.encoder) for robot in self._robots.values()):
             return "no encoder readings recorded:\nnothing on /hero_N/encoder"
-        return "no robot started from rest:\nstart recording before the program"
+        return (
+            "no start from rest was recorded: start recording before\nthe program, and let the program wait 2 s with its\n"
+            "topics open (a new topic is seen within a second)"
+        )
 
     def draw_connections(self) -> Optional[Figure]:
         """Draw the state of each robot over time, and gaps in its odometry."""

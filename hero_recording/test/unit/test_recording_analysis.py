@@ -259,7 +259,7 @@ def test_a_recording_that_began_during_the_motion_says_when_to_begin(two_robots)
         for row in rows:
             robot.encoder.add(*row)
     axes = Figures(seen, START_S, START_S + 12.0, "two.bag").draw_delays().axes[1]
-    assert "start recording before the program" in axes.texts[0].get_text()
+    assert "start recording before\nthe program" in axes.texts[0].get_text()
 
 
 def test_walls_and_round_obstacles_have_one_color_and_ground_truth_its_name(two_robots):

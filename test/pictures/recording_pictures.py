@@ -1,0 +1,92 @@
+"""Makes the pictures of recordings and calibrations as their pages say, by the programs themselves. For script/pictures.
+
+recording: ten robots in a hotspot's network, of which one loses its power and one its connection; fifty for the errors.
+calibration: the wheels of a robot with servos that are off, and the infrared sensors of another.
+"""
+
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import rospy
+from picture_program import make_pictures
+
+from hero_sim.srv import InjectFault
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.append(str(ROOT / "bench"))
+from running_suite import READY_TIMEOUT_S, RunningSuite  # noqa: E402
+
+PICTURES_FOLDER = ROOT / "docs" / "pictures"
+CALIBRATION_TEST = ROOT / "hero_calibration" / "test" / "rostest"
+RECORDED_S = 60
+REST_S = 3.0  # between two walks: the second one starts from rest, on topics that are recorded by then
+FAULTS = ((15.0, "vanish:robot=1,for=8"), (24.0, "leave:robot=2,for=3"))  # seconds after the start
+
+
+def record(stage, folder, faults=()):
+    """Record random walks of all robots, with a rest between; return the bag."""
+    recorder = stage.start(
+        ["rosrun", "hero_recording", "record", "--folder", folder, "--seconds", str(RECORDED_S)],
+        stdout=subprocess.DEVNULL,
+    )
+    stage.wait_for(lambda: list(Path(folder).glob("*.active")), "a recording")
+    start_s = time.monotonic()
+    walk = stage.start_example("random_walk", "_robots:=all", stdout=subprocess.DEVNULL)
+    for after_s, fault in faults:
+        time.sleep(max(0.0, start_s + after_s - time.monotonic()))
+        rospy.ServiceProxy("/hero_sim/fault", InjectFault)(fault)
+    time.sleep(max(0.0, start_s + RECORDED_S / 2 - time.monotonic()))
+    walk.send_signal(signal.SIGINT)
+    walk.wait(READY_TIMEOUT_S)
+    time.sleep(REST_S)
+    stage.start_example("random_walk", "_robots:=all", stdout=subprocess.DEVNULL)
+    recorder.wait(3 * RECORDED_S)
+    (bag,) = Path(folder).glob("*.bag")
+    return bag
+
+
+def plot(bag, prefix, *arguments):
+    """Plot a bag to files whose names begin with prefix."""
+    subprocess.run(["rosrun", "hero_recording", "plot", str(bag), "--out", str(prefix), *arguments], check=True)
+
+
+def record_ten(picture):
+    """Paths, speeds, delays and connections."""
+    with RunningSuite(10, "arena:=obstacles", "wifi:=hotspot") as stage, tempfile.TemporaryDirectory() as folder:
+        bag = record(stage, folder, FAULTS).rename(Path(folder) / "ten.bag")
+        prefix = picture.with_name("recording")
+        plot(bag, prefix, "--robots", "1 2 3 5", "--figures", "paths,speeds")
+        plot(bag, prefix, "--figures", "delays,connections")
+
+
+def record_fifty(picture):
+    """Errors of odometry."""
+    with RunningSuite(50, "arena:=empty") as stage, tempfile.TemporaryDirectory() as folder:
+        bag = record(stage, folder).rename(Path(folder) / "fifty.bag")
+        plot(bag, picture.with_name("recording"), "--figures", "errors")
+
+
+def calibrate(picture):
+    """Servos and wheels of hero_3, infrared sensors of hero_1, as the test of the calibration starts them."""
+    arena = CALIBRATION_TEST / "calibration_arena.yaml"
+    errors = CALIBRATION_TEST / "calibration_errors.yaml"
+    with RunningSuite(0) as stage, tempfile.TemporaryDirectory() as folder:
+        stage.start(
+            ["rosrun", "hero_sim", "hero_sim", "--count", "9", "--port", str(stage.port), "--arena", str(arena)]
+            + ["--flash-dir", "none", "--motors", "factory", "--ir", "factory", "--errors", str(errors), "--quiet"]
+        )
+        program = ["rosrun", "hero_calibration", "calibrate", "--folder", folder, "--yes"]
+        subprocess.run([*program, "infrared", "--robots", "1"], check=True)
+        shutil.move(folder + "/hero_1.png", str(picture.with_name("calibration_infrared.png")))
+        subprocess.run([*program, "motors", "velocity", "--robots", "3"], check=True)
+        shutil.move(folder + "/hero_3.png", str(picture.with_name("calibration_motors.png")))
+
+
+if __name__ == "__main__":
+    pictures = {"recording": record_ten, "recording_errors": record_fifty, "calibration": calibrate}
+    make_pictures(pictures, PICTURES_FOLDER, __doc__)
