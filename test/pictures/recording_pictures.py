@@ -1,7 +1,7 @@
 """Makes the pictures of recordings and calibrations as their pages say, by the programs themselves. For script/pictures.
 
-recording: ten robots in a hotspot's network, of which one loses its power and one its connection; fifty for the errors.
-calibration: the wheels of a robot with servos that are off, and the infrared sensors of another.
+recording_paths (with speeds, delays, connections, errors): ten robots in a hotspot's network, of which one loses its
+power and one its connection. calibration_motors (with infrared): robots whose servos and sensors are off.
 """
 
 import shutil
@@ -56,19 +56,12 @@ def plot(bag, prefix, *arguments):
 
 
 def record_ten(picture):
-    """Paths, speeds, delays and connections."""
+    """Paths, speeds, delays, connections and errors."""
     with RunningSuite(10, "arena:=obstacles", "wifi:=hotspot") as stage, tempfile.TemporaryDirectory() as folder:
         bag = record(stage, folder, FAULTS).rename(Path(folder) / "ten.bag")
         prefix = picture.with_name("recording")
         plot(bag, prefix, "--robots", "1 2 3 5", "--figures", "paths,speeds")
-        plot(bag, prefix, "--figures", "delays,connections")
-
-
-def record_fifty(picture):
-    """Errors of odometry."""
-    with RunningSuite(50, "arena:=empty") as stage, tempfile.TemporaryDirectory() as folder:
-        bag = record(stage, folder).rename(Path(folder) / "fifty.bag")
-        plot(bag, picture.with_name("recording"), "--figures", "errors")
+        plot(bag, prefix, "--figures", "delays,connections,errors")
 
 
 def calibrate(picture):
@@ -84,9 +77,9 @@ def calibrate(picture):
         subprocess.run([*program, "infrared", "--robots", "1"], check=True)
         shutil.move(folder + "/hero_1.png", str(picture.with_name("calibration_infrared.png")))
         subprocess.run([*program, "motors", "velocity", "--robots", "3"], check=True)
-        shutil.move(folder + "/hero_3.png", str(picture.with_name("calibration_motors.png")))
+        shutil.move(folder + "/hero_3.png", str(picture))
 
 
 if __name__ == "__main__":
-    pictures = {"recording": record_ten, "recording_errors": record_fifty, "calibration": calibrate}
+    pictures = {"recording_paths": record_ten, "calibration_motors": calibrate}
     make_pictures(pictures, PICTURES_FOLDER, __doc__)

@@ -7,8 +7,7 @@ that resolves to this PC (DNS rebinding: the server must check Host).
 
 import hmac
 import ipaddress
-from typing import FrozenSet, Iterable, Optional, Tuple
-from urllib.parse import urlsplit
+from typing import FrozenSet, Iterable, Optional
 
 TOKEN_LENGTH_MIN = 16
 """A shorter token could be guessed."""
@@ -20,17 +19,6 @@ def is_loopback(host: str) -> bool:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
         return host == "localhost"
-
-
-def split_host(header: str) -> Optional[Tuple[str, int]]:
-    """Return host (without brackets, lower case) and port of a Host header; None if it is invalid."""
-    try:
-        parts = urlsplit("//" + header)
-        if parts.hostname is None or parts.path or parts.query or parts.fragment or "@" in parts.netloc:
-            return None
-        return parts.hostname.rstrip("."), parts.port or 80
-    except ValueError:
-        return None
 
 
 class Access:
@@ -46,15 +34,13 @@ class Access:
         """Whether a browser has to give a token."""
         return self._token is not None
 
-    def admits_host(self, header: str) -> bool:
-        """Return whether a Host header names this PC; any address does, because DNS rebinding needs a name."""
-        host = split_host(header)
-        if host is None:
-            return False
-        if host[0] == "localhost" or host[0] in self._host_names:
+    def admits_host(self, name: str) -> bool:
+        """Return whether a Host header's name, without port, is this PC's; any address is: DNS rebinding needs names."""
+        name = name.lower().rstrip(".")
+        if name == "localhost" or name in self._host_names:
             return True
         try:
-            ipaddress.ip_address(host[0])
+            ipaddress.ip_address(name.strip("[]"))
         except ValueError:
             return False
         return True

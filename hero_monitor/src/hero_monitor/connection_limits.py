@@ -9,6 +9,10 @@ import ipaddress
 from collections import Counter
 from typing import Dict, NamedTuple, Protocol, Set
 
+CONNECTIONS_MAX = 400
+UNTRUSTED_PER_ADDRESS_MAX = 50
+"""Untrusted connections of one address. Each is served one request per turn of the loop, however many it sends."""
+
 UNTRUSTED_S = 10.0
 """An untrusted connection is closed after this time: a login takes one request, and the request one second."""
 
@@ -53,7 +57,7 @@ def group_address(address: str) -> str:
 class ConnectionLimits:
     """The open connections of one server."""
 
-    def __init__(self, connections_max: int, per_address_max: int) -> None:
+    def __init__(self, connections_max: int, per_address_max: int = UNTRUSTED_PER_ADDRESS_MAX) -> None:
         """per_address_max: of untrusted connections."""
         self._connections_max = connections_max
         self._per_address_max = per_address_max

@@ -27,8 +27,6 @@ class Parameters(NamedTuple):
     control: bool
     rate_hz: float
     map_frame: str
-    max_connections: int
-    max_connections_per_address: int
 
 
 def read_token(host: str, file: str) -> Optional[str]:
@@ -66,8 +64,6 @@ def load_parameters() -> Parameters:
             "control": flag(False),
             "rate_hz": number(10.0, 1.0, 30.0, "Hz"),
             "map_frame": "world",
-            "max_connections": whole_number(400, 10, 10000),
-            "max_connections_per_address": whole_number(50, 5, 10000),
         }
     )
     host = str(given["host"])
@@ -83,6 +79,4 @@ def load_parameters() -> Parameters:
         given["control"],
         given["rate_hz"],
         str(given["map_frame"]).lstrip("/"),
-        given["max_connections"],
-        given["max_connections_per_address"],
     )

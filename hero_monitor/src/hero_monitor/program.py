@@ -7,23 +7,22 @@ Parameters: the README of this package. Everything runs on tornado's thread, exc
 
 import asyncio
 import platform
-from typing import TYPE_CHECKING, Any, Union
+from typing import TYPE_CHECKING, Any, Dict, Union
 
 import rospy
 
 from hero_client.errors import ProgramError
 from hero_client.geometry import Pose
 from hero_client.program import Program, run
-from hero_client.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
 
-from . import requests
 from .access import Access
 from .background import Background
 from .commander import STOP_PERIOD_S, Commander
-from .connection_limits import ConnectionLimits
+from .connection_limits import CONNECTIONS_MAX, ConnectionLimits
 from .dead_man import Velocity
 from .feed import FleetFeed
 from .parameters import Parameters, load_parameters
+from .requests import RequestError, read_request
 from .sections import encode
 
 if TYPE_CHECKING:
@@ -54,8 +53,7 @@ class Monitor:
         self._loop = tornado.ioloop.IOLoop.current()
         actions = Actions(self._open_page, self._receive, self._close_page)
         # The other half of the files is for ROS: some per robot.
-        connections_max = min(parameters.max_connections, raise_file_limit() // 2)
-        limits = ConnectionLimits(connections_max, parameters.max_connections_per_address)
+        limits = ConnectionLimits(min(CONNECTIONS_MAX, raise_file_limit() // 2))
         self._server = Server(Access(parameters.token, parameters.host_names), limits, actions)
         self._tick = tornado.ioloop.PeriodicCallback(self._update_pages, 1000.0 / parameters.rate_hz)
         self._stops = tornado.ioloop.PeriodicCallback(self._step, 1000.0 * STOP_PERIOD_S)
@@ -138,46 +136,45 @@ class Monitor:
 
     def _receive(self, page: "PageSocket", text: Union[str, bytes]) -> None:
         try:
-            request = requests.read_request(text, MAX_LINEAR_M_S, MAX_ANGULAR_RAD_S)
-        except requests.RequestError as error:
+            request = read_request(text)
+        except RequestError as error:
             page.tell("error", "invalid request (%s): reload the page" % error)
             return
-        if isinstance(request, requests.Show):
-            page.ground_truth = request.ground_truth
-        elif isinstance(request, requests.Stop):
-            self._commander.request_stop(request.stop)
+        kind, robot = request["do"], request.get("robot")
+        if kind == "show":
+            page.ground_truth = request["ground_truth"]
+        elif kind == "stop":
+            self._commander.request_stop(request["stop"])
             self._feed.read_stop()
-            verb = "stop" if request.stop else "release"
+            verb = "stop" if request["stop"] else "release"
             page.acknowledge(verb)
             # After the acknowledgement has left.
             self._loop.add_callback(self._broadcast_updates)
             self._background.warn("a page requests to %s all robots" % verb)
-        elif isinstance(request, requests.Release):
-            self._commander.release(page.number, "/" + request.robot)
+        elif kind == "release":
+            self._commander.release(page.number, "/" + robot)
         elif not self._parameters.control:
             page.tell("error", "this monitor is view only: start it with control:=true to drive robots")
-        elif request.robot not in self._feed.robots:
-            page.tell("error", "%s is not connected" % request.robot)
+        elif robot not in self._feed.robots:
+            page.tell("error", "%s is not connected" % robot)
         elif self._feed.stopped or not self._commander.may_drive():
             page.tell("error", "all robots are stopped: release them first")
-        elif isinstance(request, requests.Drive):
-            velocity = Velocity("/" + request.robot, request.linear_m_s, request.angular_rad_s)
+        elif kind == "drive":
+            velocity = Velocity("/" + robot, float(request["linear"]), float(request["angular"]))
             if not self._commander.drive(page.number, velocity):
-                page.tell("error", "%s is driven from another page" % request.robot)
+                page.tell("error", "%s is driven from another page" % robot)
         elif self._pending_goals >= GOALS_AT_ONCE:
             page.tell("error", "too many goals at once")
         else:
             self._loop.add_callback(self._send_goal, page, request)
 
-    async def _send_goal(self, page: "PageSocket", request: requests.GoTo) -> None:
+    async def _send_goal(self, page: "PageSocket", request: Dict[str, Any]) -> None:
         """Send a goal in the background, and tell the page the outcome."""
-        goal = Pose(request.x_m, request.y_m, request.yaw_rad or 0.0)
-        goal = self._feed.placement.to_odometry(request.robot, goal)
+        robot, yaw_rad = request["robot"], request.get("yaw")
+        goal = self._feed.placement.to_odometry(robot, Pose(request["x"], request["y"], yaw_rad or 0.0))
         self._pending_goals += 1
         try:
-            sending = self._background.submit(
-                self._commander.send_goal, "/" + request.robot, goal, request.yaw_rad is not None
-            )
+            sending = self._background.submit(self._commander.send_goal, "/" + robot, goal, yaw_rad is not None)
             page.tell(*await asyncio.wrap_future(sending))
         finally:
             self._pending_goals -= 1

@@ -33,6 +33,11 @@ COOKIE = "hero_monitor"
 SESSION_DAYS = 0.5
 """How long a login lasts."""
 
+CONTENT_SECURITY_POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; "
+    "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+
 PAGES_MAX = 30
 SEND_BUFFER = 65536
 """Bytes that the kernel may buffer for one page: about a second of a large swarm."""
@@ -72,17 +77,7 @@ class BaseHandler(tornado.web.RequestHandler):
 
     def set_default_headers(self) -> None:
         """Restrict the page to its own files and its own socket."""
-        host = self.request.headers.get("Host", "")
-        # Browsers before 2022 do not count ws: as 'self'.
-        socket_host = host if self.access_admits(host) else ""
-        self.set_header(
-            "Content-Security-Policy",
-            "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; "
-            "connect-src 'self' ws://%s wss://%s; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
-            % (socket_host, socket_host)
-            if socket_host
-            else "default-src 'none'",
-        )
+        self.set_header("Content-Security-Policy", CONTENT_SECURITY_POLICY)
         self.set_header("X-Content-Type-Options", "nosniff")
         self.set_header("X-Frame-Options", "DENY")
         self.set_header("Referrer-Policy", "no-referrer")
@@ -90,15 +85,9 @@ class BaseHandler(tornado.web.RequestHandler):
         self.set_header("Cache-Control", "no-store")
         self.clear_header("Server")
 
-    def access_admits(self, host: str) -> bool:
-        """Whether the Host is ours; called before initialize() as well."""
-        access = getattr(self, "access", None)
-        return access is not None and access.admits_host(host)
-
     def prepare(self) -> Optional[Awaitable[None]]:
         """Refuse names that are not this PC's; trust the connection of a browser that is logged in."""
-        self.set_default_headers()
-        if not self.access.admits_host(self.request.headers.get("Host", "")):
+        if not self.access.admits_host(self.request.host_name):
             raise tornado.web.HTTPError(421)
         stream = getattr(self.request.connection, "stream", None)
         if self.is_logged_in and stream is not None:

@@ -3,8 +3,10 @@
 
 import resource
 import select
+import selectors
 import socket
 import tempfile
+import threading
 import unittest
 from pathlib import Path
 
@@ -122,6 +124,42 @@ class DoorsTest(unittest.TestCase):
         self.wait_until_stopped(True)
         self.open_page().send(do="stop", stop=False)
         self.wait_until_stopped(False)
+
+    def send_without_pause(self, address, end):
+        """Send requests on many connections, many at once, and read the answers, until end is set."""
+        chosen = selectors.DefaultSelector()
+        while not end.is_set():
+            while len(chosen.get_map()) < CONNECTIONS_MAX_PER_ADDRESS:
+                opened = socket.create_connection(("127.0.0.1", PORT), TIMEOUT_S, (address, 0))
+                opened.setblocking(False)
+                chosen.register(opened, selectors.EVENT_READ | selectors.EVENT_WRITE)
+            for key, events in chosen.select(TIMEOUT_S):
+                try:
+                    if events & selectors.EVENT_WRITE:
+                        key.fileobj.send(b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n" * 50)
+                    is_open = not events & selectors.EVENT_READ or key.fileobj.recv(65536)
+                except BlockingIOError:
+                    continue
+                except OSError:
+                    is_open = False
+                if not is_open:
+                    chosen.unregister(key.fileobj)
+                    key.fileobj.close()
+        for key in list(chosen.get_map().values()):
+            key.fileobj.close()
+
+    def test_requests_without_pause_keep_no_page_from_stopping_all_robots(self):
+        end = threading.Event()
+        flood = threading.Thread(target=self.send_without_pause, args=(STRANGER_ADDRESSES[0], end))
+        flood.start()
+        self.addCleanup(flood.join)
+        self.addCleanup(end.set)
+        page = self.open_page()
+        for _ in range(3):
+            page.send(do="stop", stop=True)
+            self.wait_until_stopped(True)
+            page.send(do="stop", stop=False)
+            self.wait_until_stopped(False)
 
     def test_a_connection_that_sends_no_request_is_closed(self):
         self.connect(STRANGER_ADDRESSES[0])

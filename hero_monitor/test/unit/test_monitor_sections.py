@@ -6,8 +6,8 @@ import math
 import pytest
 
 from hero_client.geometry import Pose
-from hero_monitor import requests
 from hero_monitor.placement import APART_M, Placement
+from hero_monitor.requests import RequestError, read_request
 from hero_monitor.sections import (
     LOG_LINES_AT_ONCE,
     LOG_LINES_KEPT,
@@ -115,16 +115,23 @@ def test_robots_without_a_map_transform_are_placed_side_by_side(placement):
 
 
 def read(**fields):
-    return requests.read_request(json.dumps(fields), 0.2, 8.0)
+    return read_request(json.dumps(fields))
 
 
-def test_requests_of_the_page_are_parsed():
-    assert read(do="stop", stop=True) == requests.Stop(True)
-    assert read(do="drive", robot="hero_1", linear=-0.2, angular=8) == requests.Drive("hero_1", -0.2, 8.0)
-    assert read(do="release", robot="hero_1") == requests.Release("hero_1")
-    assert read(do="goal", robot="hero_1", x=1, y=2) == requests.GoTo("hero_1", 1.0, 2.0, None)
-    assert read(do="goal", robot="hero_1", x=1, y=2, yaw=3).yaw_rad == 3.0
-    assert read(do="show", ground_truth=False) == requests.Show(False)
+@pytest.mark.parametrize(
+    "request_fields",
+    [
+        {"do": "stop", "stop": True},
+        {"do": "drive", "robot": "hero_1", "linear": -0.2, "angular": 8},
+        {"do": "release", "robot": "hero_1"},
+        {"do": "goal", "robot": "hero_1", "x": 1, "y": 2},
+        {"do": "goal", "robot": "hero_1", "x": 1, "y": 2, "yaw": 3},
+        {"do": "goal", "robot": "hero_1", "x": 1, "y": 2, "yaw": None},
+        {"do": "show", "ground_truth": False},
+    ],
+)
+def test_requests_of_the_page_are_parsed(request_fields):
+    assert read(**request_fields) == request_fields
 
 
 @pytest.mark.parametrize(
@@ -151,8 +158,9 @@ def test_requests_of_the_page_are_parsed():
         '{"do":"goal","robot":"","x":1,"y":1}',
         '{"do":"show"}',
         '{"do":"reboot"}',
+        '{"do":["stop"],"stop":true}',
     ],
 )
 def test_an_invalid_request_is_refused(text):
-    with pytest.raises(requests.RequestError):
-        requests.read_request(text, 0.2, 8.0)
+    with pytest.raises(RequestError):
+        read_request(text)

@@ -39,7 +39,6 @@ def run_check(port: int, interface: Optional[str]) -> Dict[str, Finding]:
         "port": lambda: network.check_port(port, listeners),
         "addresses": lambda: network.check_addresses(addresses, interface, port, list(listeners)),
         "firewall": lambda: network.advise_firewall(interface or network.find_robot_interface(own), port),
-        "disk": computer.check_disk,
         "master": lambda: graph.check_master(own),
     }
     findings = run_points(points, FIRST_TIMEOUT_S)

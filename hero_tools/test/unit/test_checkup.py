@@ -1,4 +1,4 @@
-"""Points of the check: findings in order whatever hangs or breaks, ports, names, addresses, disk."""
+"""Points of the check: findings in order whatever hangs or breaks, ports, names, addresses."""
 
 import socket
 import threading
@@ -127,27 +127,6 @@ def test_only_addresses_of_this_pc_are_its_own():
     assert network.is_own("127.0.1.1", [])
     assert network.is_own("10.42.0.1", [WIFI])
     assert not network.is_own("10.42.0.2", [WIFI])
-
-
-def test_a_full_disk_and_a_directory_without_write_access_are_found(monkeypatch, tmp_path):
-    monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path / "not" / "made" / "yet"))
-    assert computer.check_disk().state in (OK, WARN)
-    monkeypatch.setattr(computer, "SMALL_DISK_BYTES", 1e30)
-    assert computer.check_disk().state == WARN
-    monkeypatch.setattr(computer, "FULL_DISK_BYTES", 1e30)
-    assert computer.check_disk().state == FAIL
-    monkeypatch.setenv("ROS_LOG_DIR", "/proc/nowhere")
-    monkeypatch.setattr(computer.os, "access", lambda path, mode: False)
-    assert "cannot be written" in computer.check_disk().text
-
-
-def test_a_log_folder_that_is_a_file_or_below_one_is_found(monkeypatch, tmp_path):
-    (tmp_path / "file").write_text("")
-    for path in ("file", "file/log"):
-        monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path / path))
-        finding = computer.check_disk()
-        assert finding.state == FAIL
-        assert "%s is a file" % (tmp_path / "file") in finding.text
 
 
 def test_messages_of_another_layout_are_found(monkeypatch):

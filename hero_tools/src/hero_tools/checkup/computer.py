@@ -1,11 +1,10 @@
-"""Python, packages, messages and disk of this PC."""
+"""Python, packages and messages of this PC."""
 
 import importlib
 import os
 import platform
 import shutil
 import sys
-from pathlib import Path
 
 import rospkg
 
@@ -36,8 +35,6 @@ FIRMWARE_MD5 = {
     "hero_msgs.srv.SetPID": "69c16eccc66fd6b477afb5e5500b4b47",
 }
 OLDEST_PYTHON = (3, 8)
-SMALL_DISK_BYTES = 1e9
-FULL_DISK_BYTES = 50e6
 SOURCE = "source the workspace in this terminal: source devel/setup.bash"
 
 
@@ -106,20 +103,3 @@ def check_messages() -> Finding:
             "; ".join(wrong), "rebuild hero_msgs; another package of that name may hide it: rospack find hero_msgs"
         )
     return ok("%d types match those of firmware v3.8" % len(FIRMWARE_MD5))
-
-
-def check_disk() -> Finding:
-    """Check the disk space where ROS writes its logs."""
-    directory = Path(rospkg.get_log_dir())
-    existing = directory
-    while not existing.exists() and existing != existing.parent:
-        existing = existing.parent
-    if not existing.is_dir() or not os.access(existing, os.W_OK):
-        reason = "cannot be written" if existing.is_dir() else "cannot be created: %s is a file" % existing
-        return fail("log directory %s %s" % (directory, reason), "export ROS_LOG_DIR=/a/directory/of/yours")
-    free_bytes = shutil.disk_usage(existing).free
-    text = "%.1f GB free for logs in %s" % (free_bytes / 1e9, directory)
-    if free_bytes >= SMALL_DISK_BYTES:
-        return ok(text)
-    remedy = "rosclean purge deletes old logs; export ROS_LOG_DIR=/another/disk moves them"
-    return fail(text, remedy) if free_bytes < FULL_DISK_BYTES else warn(text, remedy)

@@ -131,8 +131,8 @@ def as_node(point: Callable[[OwnNode], Finding]) -> Finding:
     try:
         with _entry:
             node = _enter()
-    except rosgraph.roslogging.LoggingException:
-        return warn("skipped: no node starts without a log directory (point disk)")
+    except rosgraph.roslogging.LoggingException as error:
+        return fail("no node starts: %s" % error, "export ROS_LOG_DIR=/a/directory/of/yours")
     return point(node)
 
 
