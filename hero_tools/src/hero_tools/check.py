@@ -20,8 +20,7 @@ from hero_client.command_line import make_printable
 from .checkup import computer, graph, network
 from .checkup.points import FAIL, OK, WARN, Finding, Point, run_points, warn
 
-FIRST_TIMEOUT_S = 1.2  # what needs no ROS master: names, files, commands of the system
-SECOND_TIMEOUT_S = 1.2  # what needs one
+TIMEOUT_S = 1.0  # of the points that run at once: those that need no ROS master, the node, those that need it
 LEAVE_TIMEOUT_S = 0.3
 
 
@@ -41,15 +40,14 @@ def run_check(port: int, interface: Optional[str]) -> Dict[str, Finding]:
         "firewall": lambda: network.advise_firewall(interface or network.find_robot_interface(own), port),
         "master": lambda: graph.check_master(own),
     }
-    findings = run_points(points, FIRST_TIMEOUT_S)
-    points = {
-        "return_path": lambda: graph.as_node(graph.check_return_path),
-        "robots": lambda: graph.as_node(graph.check_robots),
-    }
-    if findings["master"].state == OK:
-        findings.update(run_points(points, SECOND_TIMEOUT_S))
-    else:
-        findings.update(dict.fromkeys(points, warn("skipped: there is no ROS master")))
+    node = graph.OwnNode()
+    later: Dict[str, Point] = {"return_path": node.check_return_path, "robots": node.check_robots}
+    findings = run_points(points, TIMEOUT_S)
+    for needed, more in (("master", {"node": node.start}), ("node", later)):
+        if findings[needed].state == OK:
+            findings.update(run_points(more, TIMEOUT_S))
+        else:
+            findings.update(dict.fromkeys(more, warn("skipped: needs the point " + needed)))
     return findings
 
 

@@ -85,9 +85,9 @@ class CheckTest(unittest.TestCase):
     def test_a_log_folder_that_is_a_file_is_found_and_the_rest_is_looked_at(self):
         code, points = run_check(ROS_LOG_DIR=__file__)
         self.assertEqual(code, 1)
-        for name in ("return_path", "robots"):
-            self.assert_point(points, name, "FAIL", "no node starts")
-            self.assertIn("ROS_LOG_DIR", points[name]["remedy"][0])
+        self.assert_point(points, "node", "FAIL", __file__)
+        self.assertIn("ROS_LOG_DIR", points["node"]["remedy"][0])
+        self.assertIn("skipped", points["robots"]["text"])
         self.assert_point(points, "master", "OK", "answers")
 
     def test_a_missing_master_is_a_failure_and_the_rest_is_looked_at(self):

@@ -3,9 +3,7 @@
 The return path is tried: the node rosout runs beside the master and must connect to a node here that has /rosout.
 """
 
-import functools
 import os
-import threading
 import time
 import urllib.parse
 from typing import Callable, Dict, List, Optional, Sequence, Tuple
@@ -109,31 +107,53 @@ class OwnNode:
     """This program as a node: a publisher on /rosout, and the newest report of every driver."""
 
     def __init__(self) -> None:
-        rospy.init_node("hero_check", anonymous=True, disable_signals=True, disable_rosout=True)
-        self.publisher = rospy.Publisher("/rosout", Log, queue_size=1)
-        self.reports: Dict[str, RobotArray] = {}
-        self.topics = sorted(
+        self._publisher: Any = None
+        self._topics: List[str] = []
+        self._reports: Dict[str, RobotArray] = {}
+
+    def start(self) -> Finding:
+        """Start the node, and listen to the drivers; the other points need it."""
+        try:
+            rospy.init_node("hero_check", anonymous=True, disable_signals=True, disable_rosout=True)
+        except rosgraph.roslogging.LoggingException as error:
+            return fail(str(error), "export ROS_LOG_DIR=/a/directory/of/yours")
+        self._publisher = rospy.Publisher("/rosout", Log, queue_size=1)
+        self._topics = sorted(
             topic for topic, kind in ask_master("getPublishedTopics", "/") if kind == RobotArray._type
         )
-        for topic in self.topics:
+        for topic in self._topics:
             rospy.Subscriber(topic, RobotArray, self._receive, callback_args=topic, queue_size=1)
+        return ok("started as " + rospy.get_name())
 
     def _receive(self, report: RobotArray, topic: str) -> None:
-        self.reports[topic] = report
+        self._reports[topic] = report
 
+    def check_return_path(self) -> Finding:
+        """Check whether rosout, which runs beside the master, connects to this node."""
+        if wait_until(lambda: self._publisher.get_num_connections() > 0, CONNECT_TIMEOUT_S):
+            return ok("nodes beside the master can connect to nodes here")
+        subscribers = dict(ask_master("getSystemState")[1]).get("/rosout", [])
+        if not subscribers:
+            return warn("not tried: no node rosout runs beside the master", "start the master by roscore or roslaunch")
+        return fail(
+            "%s lists this node but did not connect to it within %.1f s" % (subscribers[0], CONNECT_TIMEOUT_S),
+            "export ROS_IP=THE_ADDRESS_OF_THIS_PC (point own_name)",
+            "a firewall here may drop connections from that PC",
+        )
 
-_entry = threading.Lock()
-_enter = functools.lru_cache(maxsize=None)(OwnNode)
-
-
-def as_node(point: Callable[[OwnNode], Finding]) -> Finding:
-    """Run a point that needs a node; the first one starts it."""
-    try:
-        with _entry:
-            node = _enter()
-    except rosgraph.roslogging.LoggingException as error:
-        return fail("no node starts: %s" % error, "export ROS_LOG_DIR=/a/directory/of/yours")
-    return point(node)
+    def check_robots(self) -> Finding:
+        """Print which robots the drivers report."""
+        wait_until(lambda: len(self._reports) == len(self._topics), REPORT_TIMEOUT_S)
+        silent = [topic for topic in self._topics if topic not in self._reports]
+        if silent:
+            text = "nothing arrives on %s although it is listed" % ", ".join(silent)
+            return fail(text, CLEAN_UP, "points own_name and return_path say more")
+        if not self._topics:
+            return warn("no driver runs", "roslaunch hero_bringup hero_bringup.launch")
+        described = [describe_report(topic, self._reports[topic]) for topic in self._topics]
+        text = "; ".join(text for text, _ in described)
+        remedies = [line for _, lines in described for line in lines]
+        return warn(text, *remedies[:LINES_MAX]) if remedies else ok(text)
 
 
 def wait_until(condition: Callable[[], bool], timeout_s: float) -> bool:
@@ -142,35 +162,6 @@ def wait_until(condition: Callable[[], bool], timeout_s: float) -> bool:
     while not condition() and time.monotonic() < end_s:
         time.sleep(0.02)
     return condition()
-
-
-def check_return_path(node: OwnNode) -> Finding:
-    """Check whether rosout, which runs beside the master, connects to this node."""
-    if wait_until(lambda: node.publisher.get_num_connections() > 0, CONNECT_TIMEOUT_S):
-        return ok("nodes beside the master can connect to nodes here")
-    subscribers = dict(ask_master("getSystemState")[1]).get("/rosout", [])
-    if not subscribers:
-        return warn("not tried: no node rosout runs beside the master", "start the master with roscore or roslaunch")
-    return fail(
-        "%s lists this node but did not connect to it within %.1f s" % (subscribers[0], CONNECT_TIMEOUT_S),
-        "export ROS_IP=THE_ADDRESS_OF_THIS_PC (point own_name)",
-        "a firewall here may drop connections from that PC",
-    )
-
-
-def check_robots(node: OwnNode) -> Finding:
-    """Print which robots the drivers report."""
-    wait_until(lambda: len(node.reports) == len(node.topics), REPORT_TIMEOUT_S)
-    silent = [topic for topic in node.topics if topic not in node.reports]
-    if silent:
-        text = "nothing arrives on %s although it is listed" % ", ".join(silent)
-        return fail(text, CLEAN_UP, "points own_name and return_path say more")
-    if not node.topics:
-        return warn("no driver runs", "roslaunch hero_bringup hero_bringup.launch")
-    described = [describe_report(topic, node.reports[topic]) for topic in node.topics]
-    text = "; ".join(text for text, _ in described)
-    remedies = [line for _, lines in described for line in lines]
-    return warn(text, *remedies[:LINES_MAX]) if remedies else ok(text)
 
 
 def describe_report(topic: str, report: RobotArray) -> Tuple[str, List[str]]:
