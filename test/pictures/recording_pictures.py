@@ -1,4 +1,4 @@
-"""Makes the pictures of recordings and calibrations as their pages say, by the programs themselves. For script/pictures.
+"""Makes the pictures of recordings and calibrations as their pages say, by the programs themselves: script/pictures.
 
 recording_paths (with speeds, delays, connections, errors): ten robots in a hotspot's network, of which one loses its
 power and one its connection. calibration_motors (with infrared): robots whose servos and sensors are off.
@@ -60,7 +60,7 @@ def record_ten(picture):
     with RunningSuite(10, "arena:=obstacles", "wifi:=hotspot") as stage, tempfile.TemporaryDirectory() as folder:
         bag = record(stage, folder, FAULTS).rename(Path(folder) / "ten.bag")
         prefix = picture.with_name("recording")
-        plot(bag, prefix, "--robots", "1 2 3 5", "--figures", "paths,speeds")
+        plot(bag, prefix, "--robots", "1 2 3 6", "--figures", "paths,speeds")
         plot(bag, prefix, "--figures", "delays,connections,errors")
 
 

@@ -35,7 +35,7 @@ class Access:
         return self._token is not None
 
     def admits_host(self, name: str) -> bool:
-        """Return whether a Host header's name, without port, is this PC's; any address is: DNS rebinding needs names."""
+        """Return whether a Host header's name, without port, is this PC's; any address is: rebinding needs a name."""
         name = name.lower().rstrip(".")
         if name == "localhost" or name in self._host_names:
             return True

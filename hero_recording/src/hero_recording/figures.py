@@ -21,6 +21,9 @@ WIDTH_IN = 9.0
 SPEED_ROWS = 8
 """Most robots whose speeds are drawn, in a row each; plot --robots chooses others."""
 
+LABELED = 3
+"""Error curves with an id, of many robots."""
+
 NO_COMMANDS = "no commands recorded:\nnothing on /hero_N/velocity_controller/cmd_vel"
 
 DELAY_TICKS_MS = (-50, 0, 50, 100, 300, 1000, 3000, 10000)
@@ -239,7 +242,8 @@ class Figures:
         if not any(len(robot.encoder) for robot in self._robots.values()):
             return "no encoder readings recorded:\nnothing on /hero_N/encoder"
         return (
-            "no start from rest was recorded: start recording before\nthe program, and let the program wait 2 s with its\n"
+            "no start from rest was recorded: start recording before\n"
+            "the program, and let the program wait 2 s with its\n"
             "topics open (a new topic is seen within a second)"
         )
 
@@ -293,7 +297,11 @@ class Figures:
         return figure
 
     def _draw_error_curves(self, axes: Axes, times_s: Dict[int, Any], values: Dict[int, Any]) -> None:
-        """Draw a curve for each robot."""
+        """Draw a curve for each robot; without a legend, with the ids of the largest at their ends."""
+        ranked = sorted(values, key=lambda key: abs(float(values[key][-1])))
+        for key in [] if self._has_legend else ranked[-LABELED:]:
+            end, place = (self._since_start(times_s[key][-1]), values[key][-1]), {"textcoords": "offset points"}
+            axes.annotate(str(key), end, xytext=(3, -2), fontsize=7, annotation_clip=False, **place)
         for key, curve in values.items():
             curve_s, curve = analysis.break_at_gaps(times_s[key], curve)
             width = 1.0 if self._has_legend else 0.6

@@ -6,7 +6,7 @@ The return path is tried: the node rosout runs beside the master and must connec
 import os
 import time
 import urllib.parse
-from typing import Callable, Dict, List, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple
 
 import rosgraph
 import rosgraph.roslogging
