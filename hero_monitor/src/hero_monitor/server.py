@@ -257,10 +257,8 @@ class Server:
             [
                 (r"/live", PageSocket, {**shared, "actions": actions, "pages": self.pages}),
                 (r"/login", LoginHandler, {**shared, "attempts": TokenAttempts()}),
-                (r"/([a-z_.]*)", FileHandler, shared),
+                (r"/(.*)", FileHandler, shared),
             ],
-            default_handler_class=NotFoundHandler,
-            default_handler_args=shared,
             log_function=ignore_request,
             cookie_secret=secrets.token_urlsafe(32),
             websocket_ping_interval=PING_INTERVAL_S,
@@ -291,14 +289,6 @@ class Server:
         self._http.stop()
         for page in list(self.pages):
             page.close(1001, "the monitor ends")
-
-
-class NotFoundHandler(BaseHandler):
-    """Every other path."""
-
-    def get(self) -> None:
-        """Answer 404."""
-        raise tornado.web.HTTPError(404)
 
 
 def ignore_request(handler: tornado.web.RequestHandler) -> None:
