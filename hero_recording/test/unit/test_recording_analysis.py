@@ -262,7 +262,7 @@ def test_a_recording_that_began_during_the_motion_says_when_to_begin(two_robots)
     assert "start recording before\nthe program" in axes.texts[0].get_text()
 
 
-def test_walls_and_round_obstacles_have_one_color_and_ground_truth_its_name(two_robots):
+def test_all_obstacles_have_one_color_and_ground_truth_its_name(two_robots):
     axes = Figures(observe(two_robots), START_S, START_S + 12.0, "two.bag").draw_paths().axes[0]
     (walls,) = axes.collections
     circle = next(patch for patch in axes.patches if patch.get_radius() == pytest.approx(0.1))
