@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Sets the odometry of a robot to zero."""
 
+import contextlib
 import sys
 
 import rospy
@@ -21,4 +22,5 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    with contextlib.suppress(rospy.ROSInitException):  # Ctrl-C while no ROS master answers
+        main()

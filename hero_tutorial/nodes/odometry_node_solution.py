@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
 """Publishes every tenth pose of odom as a nav_msgs/Path on path."""
 
+import contextlib
+
 import rospy
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Odometry, Path
@@ -25,4 +27,5 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    with contextlib.suppress(rospy.ROSInitException):  # Ctrl-C while no ROS master answers
+        main()

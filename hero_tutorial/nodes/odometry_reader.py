@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Logs a robot's pose estimate once a second."""
 
+import contextlib
 import math
 
 import rospy
@@ -25,4 +26,5 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    with contextlib.suppress(rospy.ROSInitException):  # Ctrl-C while no ROS master answers
+        main()

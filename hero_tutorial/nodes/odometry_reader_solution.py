@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Logs once a second how far a robot has driven, along its path and in a straight line from the start."""
 
+import contextlib
 import math
 
 import rospy
@@ -31,4 +32,5 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    with contextlib.suppress(rospy.ROSInitException):  # Ctrl-C while no ROS master answers
+        main()

@@ -15,5 +15,6 @@ def main():
 
 
 if __name__ == "__main__":
-    with contextlib.suppress(rospy.ROSInterruptException):  # Ctrl-C during rate.sleep()
+    # Ctrl-C during rate.sleep(), or while no ROS master answers
+    with contextlib.suppress(rospy.ROSInterruptException, rospy.ROSInitException):
         main()

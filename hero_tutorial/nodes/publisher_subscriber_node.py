@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
 """Doubles each number received on publisher_node_example and publishes it on publisher_subscriber."""
 
+import contextlib
+
 import rospy
 from std_msgs.msg import Int32
 
@@ -18,4 +20,5 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    with contextlib.suppress(rospy.ROSInitException):  # Ctrl-C while no ROS master answers
+        main()

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Random walk: drive forward while nothing is near, otherwise turn on the spot until the path is clear."""
 
+import contextlib
 import random
 
 import rospy
@@ -48,4 +49,5 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    with contextlib.suppress(rospy.ROSInitException):  # Ctrl-C while no ROS master answers
+        main()

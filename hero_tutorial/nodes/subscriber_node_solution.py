@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
 """Logs once a second how many numbers were received on publisher_node_example, and how many are missing."""
 
+import contextlib
+
 import rospy
 from std_msgs.msg import Int32
 
@@ -26,4 +28,5 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    with contextlib.suppress(rospy.ROSInitException):  # Ctrl-C while no ROS master answers
+        main()
