@@ -200,7 +200,7 @@ class Gateway(LinkHandler):
             self._admission.note_identified(link.address.host)
             self.last_refusal = "%s: %s" % (link.address, reason)
             self._log.log_throttled(
-                "warn",
+                "debug" if reason == THE_DRIVER_ENDS else "warn",
                 "nobody " + link.address.host + reason[:12],
                 "unidentified connection of %s ended: %s" % (link.address, reason),
             )

@@ -2,6 +2,7 @@
 """The end of the driver: every robot takes a stop, and only then is its connection closed."""
 
 import signal
+import socket
 import struct
 import time
 
@@ -138,9 +139,11 @@ class TestDriverShutdown(OwnDriverCase):
     def test_a_driver_without_robots_ends_quietly(self):
         driver = self.start()
         driver.wait_line("listening on 0.0.0.0:")
-        driver.process.send_signal(signal.SIGINT)
-        self.assertEqual(driver.wait_end(), 0)
-        self.assertEqual(driver.find_lines("ERROR|FATAL|Traceback"), [])
+        with socket.create_connection(driver.address) as nobody:
+            self.assertTrue(nobody.recv(1))
+            driver.process.send_signal(signal.SIGINT)
+            self.assertEqual(driver.wait_end(), 0)
+        self.assertEqual(driver.find_lines("ERROR|FATAL|Traceback|unidentified"), [])
 
 
 if __name__ == "__main__":

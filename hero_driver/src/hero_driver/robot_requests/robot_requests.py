@@ -16,7 +16,7 @@ from .parameters import (
     read_parameter,
     resolve_parameter,
 )
-from .service_clients import ServiceClients
+from .service_clients import call_service
 
 REQUESTS_WAITING_MAX = 20
 """Of one robot: it waits for an answer before it asks again."""
@@ -38,7 +38,7 @@ class RobotRequests:
         self._call_soon = call_soon
         self._warn_robot = warn_robot
         self._workers: Dict[str, Worker] = {}  # of the robots that have asked for anything
-        self._services = ServiceClients(config.service_timeout_s)
+        self._service_timeout_s = config.service_timeout_s
 
     def close(self) -> None:
         """End the workers."""
@@ -50,7 +50,6 @@ class RobotRequests:
         worker = self._workers.pop(label, None)
         if worker is not None:
             worker.end()
-            self._services.forget(label)
 
     def answer_parameter(self, peer: Peer, name: str) -> None:
         """Send a robot the parameter that it calls name, or empty lists with the reason in the log."""
@@ -91,7 +90,7 @@ class RobotRequests:
 
         def call() -> None:
             try:
-                payload = self._services.call(peer.label, name, topic.info, answers[0].info, request)
+                payload = call_service(name, topic.info, answers[0].info, request, self._service_timeout_s)
             except Exception as error:  # noqa: BLE001 - the protocol has no error answer, so the robot gets nothing
                 text = "%s: call of service %s failed: %s" % (peer.label, name, error)
                 self._log.log_throttled("error", peer.label + name, text)
