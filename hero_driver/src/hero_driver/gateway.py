@@ -413,10 +413,15 @@ class Gateway(LinkHandler):
             self._stops.release()
         self._on_change()
 
-    def stop_and_wait(self, deadline_s: float, then: Callable[[List[Peer]], None]) -> None:
-        """Stop every robot; call then(robots not known to be at rest) when all rest, or at deadline_s (monotonic)."""
+    def stop_and_wait(self, answer: Callable[[None], None]) -> None:
+        """Stop every robot; say which may still move and call answer(None) when all rest, or after STOP_LIMIT_S."""
+
+        def finish(doubtful: List[Peer]) -> None:
+            self._report_doubtful(doubtful)
+            answer(None)
+
         self.set_stopped(True)
-        self._stops.await_rest(self._list_stoppable(), deadline_s, then)
+        self._stops.await_rest(self._list_stoppable(), time.monotonic() + STOP_LIMIT_S, finish)
 
     def stop_without_loop(self) -> None:
         """Stop every robot although the loop that serves them has broken; blocks."""
@@ -424,9 +429,9 @@ class Gateway(LinkHandler):
         doubtful = self._stops.stop_without_loop(
             self._list_stoppable(), time.monotonic() + STOP_LIMIT_S, self._read_without_loop
         )
-        self.report_doubtful(doubtful)
+        self._report_doubtful(doubtful)
 
-    def report_doubtful(self, peers: List[Peer]) -> None:
+    def _report_doubtful(self, peers: List[Peer]) -> None:
         """Say which robots may still move when the driver ends."""
         if peers:
             names = ", ".join("%s (%s)" % (peer.label, describe_doubt(peer)) for peer in peers)

@@ -17,7 +17,6 @@ import rospy
 
 from .config import ConfigError, DriverConfig, read_config
 from .gateway import STOP_LIMIT_S, Gateway
-from .peer import Peer
 from .reports import FleetStatus, Reporter
 from .ros.log_relay import LogRelay, prepare_logging, tell_of_lost_log_lines
 from .ros.master_watch import MasterWatch
@@ -128,17 +127,8 @@ class DriverNode:
     def close(self) -> None:
         """Stop all robots, then close their connections; safe to call twice."""
         if self._thread.is_alive():
-            deadline_s = time.monotonic() + STOP_LIMIT_S
-
-            def stop_robots(answer: Callable[[None], None]) -> None:
-                def finish(doubtful: List[Peer]) -> None:
-                    self._gateway.report_doubtful(doubtful)
-                    answer(None)
-
-                self._gateway.stop_and_wait(deadline_s, finish)
-
             try:
-                self._loop.ask(stop_robots, STOP_LIMIT_S + 0.3)
+                self._loop.ask(self._gateway.stop_and_wait, STOP_LIMIT_S + 0.3)
             except NoAnswerError:
                 self._log.log("error", "the driver ends, and could not stop the robots: its loop hangs")
             self._loop.stop()
