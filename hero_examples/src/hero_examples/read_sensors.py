@@ -7,12 +7,12 @@ def main() -> None:
     with Robot(0) as robot:
         robot.wait_until_ready()
         for time_s in rate(2):  # Hz
+            if time_s >= 10.0:
+                break
             robot.drive(0.0, 0.6)  # the robot obeys one command for about 2 s
             print("pose: x %.2f m, y %.2f m, yaw %.2f rad" % robot.pose)
             print("ranges from the front, counter-clockwise, m:", ["%.2f" % range_m for range_m in robot.proximity])
             print("nearest:", robot.nearest())
-            if time_s > 9.0:
-                break
 
 
 if __name__ == "__main__":
