@@ -173,7 +173,7 @@ class StopRequestTest(unittest.TestCase):
         teleop.wait_for_text("stopped, all wheels at rest")
         self.assertTrue(self.drivers.read().stopped)
         joystick.publish(Joy(axes=[0.0, 1.0], buttons=[0, 0, 0, 0, 1]))
-        teleop.wait_for_text("all robots are stopped, so hero_0 cannot move")
+        teleop.wait_for_text("hero_0 does not move: the driver hero_driver has stopped all robots")
         self.assertEqual(teleop.end(), 0)
         self.assertEqual(teleop.text().count("not finite"), 1, teleop.text())
 

@@ -2,8 +2,7 @@
 
 from typing import Dict, List, Mapping, Optional, Tuple
 
-from .errors import FrameError, ProgramError
-from .frames import FrameListener, strip_slash
+from .errors import FrameError, ProgramError, StaleDataError
 from .geometry import Pose, invert_pose, transform_pose
 from .program import Program
 from .robot import Robot
@@ -27,7 +26,6 @@ class CommonFrame:
         self.missing: Dict[str, Optional[str]] = {}
         self._starts = {robot_id: Pose(*start) for robot_id, start in (starts or {}).items()}
         self._origins: Dict[int, Pose] = {}
-        self._listener = FrameListener()
 
     def pose_of(self, robot: Robot) -> Optional[Pose]:
         """Return the robot's pose in the frame; None while it is not known, `missing` then says why."""
@@ -40,11 +38,12 @@ class CommonFrame:
                 self._origins[robot.robot_id] = transform_pose(self._starts[robot.robot_id], invert_pose(pose))
             return transform_pose(self._origins[robot.robot_id], pose)
         try:
-            origin = self._listener.origin_of(strip_slash(robot.odometry.header.frame_id), self.frame)
+            return robot.pose_in(self.frame, timeout_s=0.0)
+        except StaleDataError:
+            return None
         except FrameError as error:
             self.missing[robot.name] = "%s; start something that publishes it, or give ~starts" % error
             return None
-        return transform_pose(origin, pose)
 
     def wait_for_poses(self, program: Program, swarm: Swarm) -> List[Pose]:
         """Return the poses of all robots as soon as all are known, and log which are waited for.
@@ -57,7 +56,3 @@ class CommonFrame:
             if len(poses) == len(swarm):
                 return poses
         raise ProgramError("ended before all robots were there")
-
-    def close(self) -> None:
-        """Unsubscribe from /tf; safe twice."""
-        self._listener.close()

@@ -1,12 +1,14 @@
 """Serves goals of one robot: the topic /hero_N/goal and the action /hero_N/go_to, one process for any number of robots.
 
-A robot has one goal at a time: a new one, wherever it comes from, replaces the old one. Callbacks only queue requests;
-all decisions are made in step(), on the program's own loop.
+A robot has one goal at a time: a new one, wherever it comes from, replaces the old one. Callbacks only queue requests,
+because actionlib holds its lock meanwhile; a thread of each server drives the robot.
 """
 
 import math
 import queue
-from typing import Any, NamedTuple, Optional, Tuple
+import threading
+import time
+from typing import Any, NamedTuple, Tuple
 
 import actionlib
 import rospy
@@ -14,11 +16,10 @@ from geometry_msgs.msg import PoseStamped
 
 from hero_msgs.msg import GoToAction, GoToFeedback, GoToResult
 
-from .controllers.go_to_goal import DEFAULT_TOLERANCE_M, Goal, GoToGoalController
-from .controllers.motion import DEFAULT_TIMEOUT_S, State
-from .errors import FrameError, StoppedError
-from .frames import FrameListener, strip_slash
-from .geometry import STOP, Pose, transform_pose, yaw_of
+from .controllers.go_to_goal import DEFAULT_TOLERANCE_M, Goal
+from .controllers.motion import DEFAULT_TIMEOUT_S, MotionController
+from .errors import HeroError
+from .geometry import yaw_of
 from .robot import Robot
 
 __all__ = ["MAX_COORDINATE_M", "GoToGoalServer", "InvalidGoalError", "check_limits", "read_goal"]
@@ -26,14 +27,11 @@ __all__ = ["MAX_COORDINATE_M", "GoToGoalServer", "InvalidGoalError", "check_limi
 FEEDBACK_PERIOD_S = 0.5
 """Between two feedback messages of an action."""
 
-FRAME_TIMEOUT_S = 5.0
-"""The frame of a goal may be unknown for so long: listening to /tf begins with the goal, and takes a moment."""
-
-STOP_REPEAT_S = 0.5
-"""Stops are sent for so long after a goal; then the server is silent, and other programs may drive the robot."""
+CLOSE_TIMEOUT_S = 1.0
+"""Giving up a goal takes 0.2 s."""
 
 MAX_QUEUED_GOALS = 100
-"""Goals that callbacks hand to step(); more at once are rejected."""
+"""More goals at once are rejected."""
 
 MAX_COORDINATE_M = 1e6
 """The driver accepts poses within the same limit. Beyond it, sums lose precision."""
@@ -98,14 +96,12 @@ class GoToGoalServer:
     """Drives one robot to its goals.
 
     Attributes:
-        waiting_for: why a robot that has a goal cannot be driven now, or None.
         reached: whether the last goal was reached.
     """
 
     def __init__(
         self,
         robot: Robot,
-        frames: FrameListener,
         tolerance_m: float = DEFAULT_TOLERANCE_M,
         timeout_s: float = DEFAULT_TIMEOUT_S,
         avoid: bool = False,
@@ -116,23 +112,23 @@ class GoToGoalServer:
         proximity sensors see; otherwise a goal fails before them.
         """
         self.robot = robot
-        self.waiting_for: Optional[str] = None
         self.reached = False
-        self._frames = frames
         self._tolerance_m, self._timeout_s, self._avoid = tolerance_m, timeout_s, avoid
         self._requests: queue.Queue[_Request] = queue.Queue(MAX_QUEUED_GOALS)
-        self._cancelled: queue.Queue[Any] = queue.Queue(MAX_QUEUED_GOALS)
-        self._request: Optional[_Request] = None
-        self._controller: Optional[GoToGoalController] = None
-        self._start_s = self._frame_known_s = self._next_feedback_s = 0.0
-        self._silent_from_s = -math.inf
+        self._news = threading.Event()
+        self._cancelled: Any = None
+        self._is_closing = False
+        self._distance_m = math.nan
+        self._next_feedback_s = 0.0
         self._subscriber = rospy.Subscriber(
             robot.namespace + "/goal", PoseStamped, self._receive_goal, queue_size=1, tcp_nodelay=True
         )
         self._server = actionlib.ActionServer(
-            robot.namespace + "/go_to", GoToAction, self._receive_action, self._cancelled.put, auto_start=False
+            robot.namespace + "/go_to", GoToAction, self._receive_action, self._receive_cancel, auto_start=False
         )
         self._server.start()
+        self._thread = threading.Thread(target=self._serve, name="goals", daemon=True)
+        self._thread.start()
 
     # ---------------------------------------------------------------- callbacks, on ROS's threads
 
@@ -156,6 +152,10 @@ class GoToGoalServer:
         else:
             self._put(_Request(goal, frame, tolerance_m, timeout_s, handle))
 
+    def _receive_cancel(self, handle: Any) -> None:
+        self._cancelled = handle
+        self._news.set()
+
     def put_goal(self, goal: Goal, frame: str = "") -> None:
         """Accept a goal with the server's own tolerance and time limit; an empty frame means hero_N/odom."""
         self._put(_Request(goal, frame, self._tolerance_m, self._timeout_s, None))
@@ -165,122 +165,90 @@ class GoToGoalServer:
             self._requests.put_nowait(request)
         except queue.Full:
             self._reject("more than %d goals at once" % MAX_QUEUED_GOALS, request.handle)
+        self._news.set()
 
     def _reject(self, problem: str, handle: Any) -> None:
         rospy.logerr("%s: goal refused: %s", self.robot.name, problem)
         if handle is not None:
             handle.set_rejected(GoToResult(reason=problem))
 
-    # ---------------------------------------------------------------- the program's loop
+    # ---------------------------------------------------------------- the server's thread
 
     @property
     def busy(self) -> bool:
         """Whether there is a goal to drive to."""
-        return self._controller is not None or not self._requests.empty()
+        return self._requests.unfinished_tasks > 0
 
-    @property
-    def needs_frames(self) -> bool:
-        """Whether the goal is in a frame for which /tf is needed."""
-        return self._request is not None and self._request.frame != ""
+    def _serve(self) -> None:
+        while not self._is_closing:
+            self._news.wait()
+            self._news.clear()
+            while not self._requests.empty():
+                self._pursue(self._requests.get())
+                self._requests.task_done()
 
-    def step(self, now_s: float) -> None:
-        """Accept new goals, and send the next command if there is one; call it 10 times per second.
+    def _find_interruption(self, handle: Any) -> str:
+        """Return why the goal of this handle is to be given up; empty if it is not."""
+        if self._is_closing:
+            return "the program ends"
+        if handle is not None and self._cancelled == handle:
+            return "cancelled"
+        return "" if self._requests.empty() else "another goal came"
 
-        now_s: any clock that never steps back.
-        """
-        while not self._requests.empty():
-            self._begin(self._requests.get(), now_s)
-        while not self._cancelled.empty():
-            handle = self._cancelled.get()
-            if self._request is not None and handle == self._request.handle:
-                self._finish(State.FAILED, "cancelled", now_s, cancelled=True)
-        self.waiting_for = None
-        if self._controller is not None and self._request is not None:
-            self.waiting_for = self.robot.missing()
-            self._drive(self._request, self._controller, now_s)
-        elif now_s < self._silent_from_s:
-            self.robot.drive(*STOP)
-
-    def _drive(self, request: _Request, controller: GoToGoalController, now_s: float) -> None:
-        """Send the next command towards the goal, or finish it."""
-        try:
-            self.robot.check_not_stopped()
-            pose = self._pose_in_goal_frame(request.frame)
-        except StoppedError as error:
-            self._finish(State.FAILED, str(error), now_s)
-            return
-        except FrameError as error:
-            # The controller is not asked: it would take this for a robot without odometry.
-            self.robot.drive(*STOP)
-            if now_s - self._frame_known_s > FRAME_TIMEOUT_S:
-                self._finish(State.FAILED, str(error), now_s)
-            return
-        self._frame_known_s = now_s
-        if pose is None and math.isnan(controller.distance_m):
-            # A robot that has yet to join is waited for, within the time limit; one that falls silent has failed.
-            self.robot.drive(*STOP)
-            if now_s - self._start_s > request.timeout_s:
-                missing = self.waiting_for or "no odometry"
-                self._finish(State.FAILED, "not begun after %g s: %s" % (request.timeout_s, missing), now_s)
-            return
-        self.robot.drive(*controller.step(pose, self.robot.fresh_proximity(), now_s))
-        if controller.state is not State.ACTIVE:
-            self._finish(controller.state, controller.reason, now_s)
-        elif request.handle is not None and now_s >= self._next_feedback_s:
-            self._next_feedback_s = now_s + FEEDBACK_PERIOD_S
-            feedback = GoToFeedback(distance=controller.distance_m, elapsed=now_s - self._start_s)
-            if self.robot.fresh_pose() is not None:
-                feedback.pose = self.robot.odometry.pose.pose
-            request.handle.publish_feedback(feedback)
-
-    def _pose_in_goal_frame(self, frame: str) -> Optional[Pose]:
-        """Return the robot's pose in the goal's frame, None without odometry. Raises: FrameError without the frame."""
-        pose = self.robot.fresh_pose()
-        if pose is None or not frame:
-            return pose
-        return transform_pose(self._frames.origin_of(self.robot.name + "/odom", frame), pose)
-
-    def _begin(self, request: _Request, now_s: float) -> None:
-        if self._controller is not None:
-            self._finish(State.FAILED, "another goal came", now_s, cancelled=True)
-        goal, frame = request.goal, strip_slash(request.frame)
-        if frame == self.robot.name + "/odom":
-            frame = ""
-        self._request = request._replace(frame=frame)
-        self._controller = GoToGoalController(goal, now_s, request.tolerance_m, request.timeout_s, self._avoid)
-        self._start_s = self._frame_known_s = now_s
+    def _pursue(self, request: _Request) -> None:
+        """Drive to a goal, and tell the action's client and the log how it ended."""
+        goal, handle = request.goal, request.handle
+        start_s = time.monotonic()
         self.reached = False
-        if request.handle is not None:
-            request.handle.set_accepted()
-        rospy.loginfo("%s goes to (%.3f, %.3f) in %s", self.robot.name, goal.x_m, goal.y_m, frame or "odom")
+        self._distance_m = math.nan
+        frame = request.frame or "odom"
+        if handle is not None:
+            handle.set_accepted()
+        rospy.loginfo("%s goes to (%.3f, %.3f) in %s", self.robot.name, goal.x_m, goal.y_m, frame)
 
-    def _finish(self, state: State, reason: str, now_s: float, cancelled: bool = False) -> None:
-        """Stop the robot, and tell the action's client and the log how the goal ended."""
-        request, controller = self._request, self._controller
-        if request is None or controller is None:
-            return
-        self._request = self._controller = None
-        self._silent_from_s = now_s + STOP_REPEAT_S
-        self.reached = state is State.REACHED
-        elapsed_s, distance_m = now_s - self._start_s, controller.distance_m
-        self.robot.drive(*STOP)
+        def sleep(duration_s: float) -> bool:
+            self._news.wait(duration_s)
+            self._news.clear()
+            return not self._find_interruption(handle)
+
+        def send_feedback(controller: MotionController) -> None:
+            self._distance_m = controller.distance_m
+            if handle is not None and time.monotonic() >= self._next_feedback_s:
+                self._send_feedback(handle, time.monotonic() - start_s)
+
+        reason = interruption = ""
+        try:
+            # A robot that has yet to join is waited for as long as it then may drive.
+            self.robot.wait_until_ready(request.timeout_s, sleep)
+            self.robot.pursue(goal, frame, self._avoid, request.timeout_s, request.tolerance_m, sleep, send_feedback)
+            self.reached = True
+        except HeroError as error:
+            interruption = self._find_interruption(handle)
+            reason = interruption or str(error)
+        elapsed_s = time.monotonic() - start_s
+        result = GoToResult(reached=self.reached, distance=self._distance_m, elapsed=elapsed_s, reason=reason)
         if self.reached:
-            rospy.loginfo("%s is at its goal after %.1f s, %.3f m off", self.robot.name, elapsed_s, distance_m)
-        elif cancelled:
+            rospy.loginfo("%s is at its goal after %.1f s, %.3f m off", self.robot.name, elapsed_s, self._distance_m)
+            end = handle and handle.set_succeeded
+        elif interruption:
             rospy.loginfo("%s gives up its goal: %s", self.robot.name, reason)
+            end = handle and handle.set_canceled
         else:
-            rospy.logwarn("%s did not reach its goal: %s", self.robot.name, reason)
-        if request.handle is None:
-            return
-        result = GoToResult(reached=self.reached, distance=distance_m, elapsed=elapsed_s, reason=reason)
-        if self.reached:
-            request.handle.set_succeeded(result)
-        elif cancelled:
-            request.handle.set_canceled(result, reason)
-        else:
-            request.handle.set_aborted(result, reason)
+            rospy.logwarn("%s", reason)
+            end = handle and handle.set_aborted
+        if end:
+            end(result, reason)
 
-    def close(self, now_s: float) -> None:
+    def _send_feedback(self, handle: Any, elapsed_s: float) -> None:
+        self._next_feedback_s = time.monotonic() + FEEDBACK_PERIOD_S
+        feedback = GoToFeedback(distance=self._distance_m, elapsed=elapsed_s)
+        if self.robot.fresh_pose() is not None:
+            feedback.pose = self.robot.odometry.pose.pose
+        handle.publish_feedback(feedback)
+
+    def close(self) -> None:
         """Give up the goal and stop the action server; for the end of the program."""
-        self._finish(State.FAILED, "the program ends", now_s, cancelled=True)
+        self._is_closing = True
+        self._news.set()
+        self._thread.join(CLOSE_TIMEOUT_S)
         self._server.stop()

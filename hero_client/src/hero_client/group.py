@@ -7,6 +7,7 @@ import rospy
 
 from .background_motion import BackgroundMotion, Sleep
 from .errors import RobotNotReadyError
+from .light import Light
 from .script import sleep_unless_shutdown
 
 __all__ = [
@@ -15,6 +16,7 @@ __all__ = [
     "REPEAT_PERIOD_S",
     "Member",
     "drive_all",
+    "leave_all",
     "send_stops",
     "stop_all",
     "wait_for_all",
@@ -42,6 +44,8 @@ class Member(Protocol):
     """What is used here of a Robot."""
 
     name: str
+    driven: bool
+    _light: Light
     _motion: Optional[BackgroundMotion]
 
     def missing(self) -> Optional[str]:
@@ -94,6 +98,14 @@ def stop_all(robots: Sequence[Member]) -> None:
         if robot._motion is not None:
             robot._motion.cancel()
     send_stops(robots)
+
+
+def leave_all(robots: Sequence[Member]) -> None:
+    """Stop the robots that were driven from here, and end blinking; for the end of a program."""
+    for robot in robots:
+        robot._light.close()
+    stop_all([robot for robot in robots if robot.driven])
+    time.sleep(SEND_TIME_S)  # for a color that was asked for last
 
 
 def send_stops(robots: Sequence[Member]) -> None:

@@ -69,7 +69,6 @@ class JoystickTeleop:
         self._last_motion_s = -math.inf
         self._next_warning_s = time.monotonic() + 2.0
         self._reported_status = ""
-        self._has_reported_stopped = False
         self._subscriber = rospy.Subscriber("/joy", Joy, self._receive, queue_size=10, tcp_nodelay=True)
 
     def _receive(self, joy: Joy) -> None:
@@ -111,20 +110,12 @@ class JoystickTeleop:
         if now_s - self._last_motion_s < STOP_REPEAT_S:
             for robot in self._swarm:
                 robot.drive(*command)
-        self._report_stop(command)
+        self._report_stop()
         self._swarm.report_missing()
 
-    def _report_stop(self, command: Velocity) -> None:
-        """Log once what came of a stop of all robots, and that robots that are told to move cannot."""
-        drivers = self._swarm.drivers
-        status = drivers.stop_status()
+    def _report_stop(self) -> None:
+        """Log once what came of a stop of all robots."""
+        status = self._swarm.drivers.stop_status()
         if status is not None and status.text != self._reported_status:
             self._reported_status = status.text
             {"info": rospy.loginfo, "warn": rospy.logwarn, "error": rospy.logerr}[status.level](status.text)
-        stopped = [robot.name for robot in self._swarm if drivers.is_robot_stopped(robot.namespace)]
-        if stopped and command != STOP and not self._has_reported_stopped:
-            rospy.logwarn(
-                "all robots are stopped, so %s cannot move; release them: rosrun hero_tools fleet, key r",
-                ", ".join(stopped),
-            )
-        self._has_reported_stopped = bool(stopped) and (self._has_reported_stopped or command != STOP)

@@ -207,7 +207,8 @@ class KeyboardTeleop:
     def send(self, command: Velocity) -> None:
         """Send a command to the chosen robots."""
         for robot in self._chosen:
-            robot.drive(*command)
+            if not robot.is_stopped:  # that is shown here, once, and not logged over the live line
+                robot.drive(*command)
         self._sent = command
         if not self._find_stopped():
             self._has_reported_stopped = False
@@ -217,8 +218,7 @@ class KeyboardTeleop:
 
     def _find_stopped(self) -> str:
         """Return a line with the chosen robots that cannot move because all robots are stopped; empty if none."""
-        drivers = self._swarm.drivers
-        stopped = [robot.name for robot in self._chosen if drivers.is_robot_stopped(robot.namespace)]
+        stopped = [robot.name for robot in self._chosen if robot.is_stopped]
         return "all robots are stopped, so %s cannot move: r releases them" % ", ".join(stopped) if stopped else ""
 
     def _describe_stop(self) -> Tuple[str, str]:

@@ -1,4 +1,4 @@
-"""The light of one robot: a color, once or kept, or blinking."""
+"""The light of one robot: a color, or blinking."""
 
 import itertools
 import math
@@ -26,23 +26,22 @@ class Light:
     def __init__(self, namespace: str, explain_absence: Callable[[], str]) -> None:
         """explain_absence: see CommandTopic."""
         self._topic = CommandTopic(namespace + "/led", ColorRGBA, explain_absence)
-        self._kept_color: Optional[Color] = None
-        self._kept_s = -math.inf
+        self._color: Optional[Color] = None
+        self._sent_s = -math.inf
         self._lock = threading.Lock()
         self._blink_end: Optional[threading.Event] = None
 
     def show(self, color: Color) -> None:
-        """Show a color. Raises: ValueError for one that is not known."""
+        """Show a color; the same one again is sent every REPEAT_PERIOD_S only.
+
+        Raises: ValueError for a color that is not known.
+        """
         red, green, blue = parse_color(color)
         self._end_blinking()
-        self._topic.publish(ColorRGBA(red, green, blue, 1.0))
-
-    def keep(self, color: Color) -> None:
-        """Send a change at once, and else repeat the color every REPEAT_PERIOD_S; for every step of a loop."""
         now_s = time.monotonic()
-        if color != self._kept_color or now_s - self._kept_s >= REPEAT_PERIOD_S:
-            self._kept_color, self._kept_s = color, now_s
-            self.show(color)
+        if color != self._color or now_s - self._sent_s >= REPEAT_PERIOD_S or not self._topic.connected:
+            self._color, self._sent_s = color, now_s
+            self._topic.publish(ColorRGBA(red, green, blue, 1.0))
 
     def blink(self, color: Color, period_s: float) -> None:
         """Show the color for half of each period, on a thread of its own, until another color is asked for."""
@@ -50,6 +49,7 @@ class Light:
         if not period_s >= MIN_BLINK_PERIOD_S:
             raise ValueError("a period must be at least %g s, not %r" % (MIN_BLINK_PERIOD_S, period_s))
         self._end_blinking()
+        self._color = None
         self._blink_end = threading.Event()
         messages = (ColorRGBA(red, green, blue, 1.0), ColorRGBA(0.0, 0.0, 0.0, 1.0))
         threading.Thread(

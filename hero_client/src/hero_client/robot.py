@@ -34,7 +34,7 @@ from .drivers import share_drivers
 from .errors import GoalError, RobotError, StaleDataError, StoppedError
 from .frames import share_frames
 from .geometry import Pose, Velocity, clamp, transform_pose, yaw_of
-from .group import READY_TIMEOUT_S, REPEAT_PERIOD_S, drive_all, send_stops, stop_all, wait_for_all
+from .group import READY_TIMEOUT_S, REPEAT_PERIOD_S, drive_all, leave_all, send_stops, stop_all, wait_for_all
 from .light import Light
 from .readings import Obstacle, find_nearest, front_first
 from .robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
@@ -131,7 +131,7 @@ class Robot:
 
         Raises: StaleDataError as `pose`. FrameError if tf does not connect frame with hero_N/odom.
         """
-        return transform_pose(share_frames().wait_for_origin(self.name + "/odom", frame, timeout_s), self.pose)
+        return transform_pose(share_frames().find_origin(self.name + "/odom", frame.lstrip("/"), timeout_s), self.pose)
 
     @property
     def velocity(self) -> Velocity:
@@ -342,7 +342,7 @@ class Robot:
         StoppedError if all robots are stopped. FrameError if tf does not know the frame. The robot is stopped then.
         """
         self._end_motion()
-        self._go_to(Goal(x_m, y_m, yaw_rad), frame, avoid, timeout_s, tolerance_m, sleep)
+        self.pursue(Goal(x_m, y_m, yaw_rad), frame, avoid, timeout_s, tolerance_m, sleep)
 
     def start_go_to(
         self,
@@ -362,12 +362,20 @@ class Robot:
         """
         self._end_motion()
         goal = Goal(x_m, y_m, yaw_rad)
-        self._motion = BackgroundMotion(partial(self._go_to, goal, frame, avoid, timeout_s, tolerance_m))
+        self._motion = BackgroundMotion(partial(self.pursue, goal, frame, avoid, timeout_s, tolerance_m))
         return self._motion
 
-    def _go_to(
-        self, goal: Goal, frame: str, avoid: bool, timeout_s: float, tolerance_m: float, sleep: Sleep
+    def pursue(
+        self,
+        goal: Goal,
+        frame: str,
+        avoid: bool,
+        timeout_s: float,
+        tolerance_m: float,
+        sleep: Sleep,
+        on_step: Callable[[MotionController], None] = lambda controller: None,
     ) -> None:
+        """As go_to(), for programs with goals of their own; on_step is called after each command."""
         text = "reach (%g, %g)%s" % (goal.x_m, goal.y_m, "" if frame == "odom" else " in the frame %s" % frame)
         if avoid:
             self._data.subscribe("proximity", LaserScan)
@@ -377,10 +385,10 @@ class Robot:
         if frame == "robot":
             place = transform_pose(self.pose, Pose(goal.x_m, goal.y_m, goal.yaw_rad or 0.0))
             goal = Goal(place.x_m, place.y_m, None if goal.yaw_rad is None else place.yaw_rad)
-        elif frame not in ("odom", self.name + "/odom"):
+        elif frame.lstrip("/") not in ("odom", self.name + "/odom"):
             read_pose = partial(self._fresh_pose_in, frame)
         controller = GoToGoalController(goal, time.monotonic(), tolerance_m, timeout_s, avoid)
-        self._follow(controller, text, read_pose, sleep)
+        self._follow(controller, text, read_pose, sleep, on_step)
 
     def _fresh_pose_in(self, frame: str) -> Optional[Pose]:
         try:
@@ -389,7 +397,12 @@ class Robot:
             return None
 
     def _follow(
-        self, controller: MotionController, text: str, read_pose: Callable[[], Optional[Pose]], sleep: Sleep
+        self,
+        controller: MotionController,
+        text: str,
+        read_pose: Callable[[], Optional[Pose]],
+        sleep: Sleep,
+        on_step: Callable[[MotionController], None] = lambda controller: None,
     ) -> None:
         """Drive as the controller says to its end. Raises: GoalError, StoppedError, RobotNotReadyError."""
         self.wait_until_ready(READY_TIMEOUT_S, sleep)
@@ -397,6 +410,7 @@ class Robot:
             while controller.state is State.ACTIVE:
                 self.check_not_stopped()
                 self._send_twist(*controller.step(read_pose(), self.fresh_proximity(), time.monotonic()))
+                on_step(controller)
                 if not sleep(REPEAT_PERIOD_S):
                     raise GoalError("%s did not %s: cancelled" % (self.name, text))
         finally:
@@ -415,13 +429,10 @@ class Robot:
     def led(self, color: Color) -> None:
         """Show a color: a name such as "red" (see colors.COLORS), or (red, green, blue), each 0..1.
 
-        The robot's light goes dark 15 s later: see keep_led(). Raises: ValueError for a color that is not known.
+        The robot's light goes dark 15 s later, so call this in every step of a loop: what the robot shows already is
+        sent every 2 s only. Raises: ValueError for a color that is not known.
         """
         self._light.show(color)
-
-    def keep_led(self, color: Color) -> None:
-        """As led(), for every step of a loop: sends a change at once, and else repeats the color every 2 s."""
-        self._light.keep(color)
 
     def blink(self, color: Color, period_s: float = 1.0) -> None:
         """Let the light blink, half of each period on, until led() or the end of the program; returns at once.
@@ -434,19 +445,15 @@ class Robot:
 
     def close(self) -> None:
         """Stop the robot, if it was driven from here, and leave its topics; safe twice."""
-        self._leave()
+        leave_all([self])
         self._data.close()
-
-    def _leave(self) -> None:
-        self._light.close()
-        stop_all([self] if self.driven else [])
 
     def __enter__(self) -> "Robot":
         return self
 
     def __exit__(self, *error: object) -> None:
         # Topics are left to the end of the program: leaving them one by one takes 20 ms each.
-        self._leave()
+        leave_all([self])
 
     def __repr__(self) -> str:
         """Return the robot's name with its pose, or with why it is not ready."""

@@ -11,7 +11,7 @@ from .background_motion import BackgroundMotion, Sleep
 from .colors import Color
 from .drivers import USUAL_TOPIC, share_drivers
 from .errors import GoalError, HeroError, ProgramError, RobotNotReadyError
-from .group import POLL_PERIOD_S, drive_all, stop_all, wait_for_all
+from .group import POLL_PERIOD_S, drive_all, leave_all, stop_all, wait_for_all
 from .program import Program
 from .robot import Robot
 from .script import sleep_unless_shutdown, start_node
@@ -162,14 +162,9 @@ class Swarm:
 
     def close(self) -> None:
         """Stop all robots that were driven from here, and leave their topics; safe twice."""
-        self._leave()
+        leave_all(self.robots)
         for robot in self.robots:
             robot._data.close()
-
-    def _leave(self) -> None:
-        for robot in self.robots:
-            robot._light.close()
-        stop_all([robot for robot in self.robots if robot.driven])
 
     def __getitem__(self, robot_id: int) -> Robot:
         if robot_id not in self._by_id:
@@ -188,7 +183,7 @@ class Swarm:
 
     def __exit__(self, *error: object) -> None:
         # Topics are left to the end of the program: leaving them one by one takes 20 ms each.
-        self._leave()
+        leave_all(self.robots)
 
     def __repr__(self) -> str:
         """Return the robots' names, and how many are ready."""

@@ -1,13 +1,10 @@
 """Drives robots to goals from parameters, from the topics /hero_N/goal and from the actions /hero_N/go_to."""
 
-import time
-
 import rospy
 
 from hero_client import GoToGoalServer, Program, ProgramError, open_swarm, read_parameters, run
 from hero_client.controllers.go_to_goal import DEFAULT_TOLERANCE_M, Goal
 from hero_client.controllers.motion import DEFAULT_TIMEOUT_S
-from hero_client.frames import FrameListener
 from hero_client.parameters import flag, number, parse_poses, robot_ids
 
 
@@ -30,22 +27,17 @@ def serve_goals():
             raise ProgramError("~once is true, but ~goals is empty: there is nothing to do")
 
         with open_swarm(program, ids) as swarm:
-            frames = FrameListener()
             options = [parameters[name] for name in ("tolerance_m", "timeout_s", "avoid")]
-            servers = [GoToGoalServer(robot, frames, *options) for robot in swarm]
+            servers = [GoToGoalServer(robot, *options) for robot in swarm]
             for server in servers:
                 if server.robot.robot_id in goals:
                     server.put_goal(Goal(*goals[server.robot.robot_id]), parameters["frame"])
             rospy.loginfo("awaiting goals on %s", ", ".join(robot.namespace + "/goal" for robot in swarm))
 
-            while program.pace(0.1) and not (once and not any(server.busy for server in servers)):
-                for server in servers:
-                    server.step(time.monotonic())
-                swarm.report_missing({server.robot.name: server.waiting_for for server in servers})
-                if not any(server.needs_frames for server in servers):
-                    frames.close()
+            while program.sleep(0.1) and not (once and not any(server.busy for server in servers)):
+                swarm.report_missing({s.robot.name: s.robot.missing() if s.busy else None for s in servers})
             for server in servers:
-                server.close(time.monotonic())
+                server.close()
             return 1 if once and not all(server.reached for server in servers) else 0
 
 

@@ -41,7 +41,7 @@ def walk():
                         color = "green" if command.linear_m_s >= cruise_m_s else "yellow"
                         color = "red" if memories[robot].escape_sign else color
                     robot.drive(*command)
-                    robot.keep_led(color)
+                    robot.led(color)
                 swarm.report_missing(missing)
             swarm.led("off")
     rospy.loginfo("random walk ended, robots stopped")

@@ -45,7 +45,7 @@ def form():
                 commands = controller.step(poses, [robot.fresh_proximity() for robot in swarm])
                 for robot, command, arrived in zip(swarm, commands, controller.arrived):
                     robot.drive(*command)
-                    robot.keep_led("green" if arrived else "yellow")
+                    robot.led("green" if arrived else "yellow")
                 late = [robot.name for robot, arrived in zip(swarm, controller.arrived) if not arrived]
                 if not done and not late and None not in poses:
                     done = True

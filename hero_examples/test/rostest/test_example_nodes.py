@@ -173,7 +173,7 @@ class ExampleNodesTest(unittest.TestCase):
     def test_7_a_goal_that_cannot_be_reached_ends_with_the_reason(self):
         program = self.start("go_to_goal", "_robots:=2", "_goals:=50 0", "_timeout_s:=1", "_once:=true")
         self.assertEqual(1, program.wait_end())
-        self.assertRegex(program.text(), r"hero_2 did not reach its goal: not there after 1 s, 4\d\.\d+ m are left")
+        self.assertRegex(program.text(), r"hero_2 did not reach \(50, 0\): not there after 1 s, 4\d\.\d+ m are left")
         self.watch.wait_until_stopped(2)
 
     def test_8_a_wrong_parameter_gets_one_line_with_name_value_and_remedy(self):
