@@ -310,7 +310,7 @@ class Drivers:
         if report is None:
             return "no driver answers; start one: roslaunch hero_bringup hero_bringup.launch"
         for robot in report.robots:
-            if robot.namespace == namespace and robot.state != Robot.READY:
+            if robot.namespace == namespace:
                 reason = ": " + robot.last_error if robot.last_error else ""
                 return "the driver reports %s as %s%s" % (namespace.strip("/"), STATES[robot.state], reason)
         names = [robot.namespace.strip("/") for robot in report.robots if robot.state == Robot.READY]

@@ -191,7 +191,8 @@ class GoToGoalServer:
         """Return why the goal of this handle is to be given up; empty if it is not."""
         if self._is_closing:
             return "the program ends"
-        if handle is not None and self._cancelled == handle:
+        # A goal handle cannot be compared with None.
+        if handle is not None and self._cancelled is not None and handle == self._cancelled:
             return "cancelled"
         return "" if self._requests.empty() else "another goal came"
 
