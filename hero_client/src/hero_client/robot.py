@@ -248,7 +248,7 @@ class Robot:
         stop. Without, send one command and return: the robot obeys it until the next one, for about 2 s at most.
         A robot speeds up within about 0.5 s, so 0.1 m/s for 2 s is a little less than 0.2 m: see forward().
 
-        One command that cannot have an effect is logged: if nothing takes it, or all robots are stopped.
+        One command that cannot have an effect is logged: if nothing subscribes to it, or all robots are stopped.
 
         Raises: ValueError for velocities that are not finite. With duration_s also RobotNotReadyError if the robot is
         not there within 2 s, and StoppedError if all robots are stopped.
@@ -463,4 +463,4 @@ class Robot:
 
 def _check_speed(distance: float, speed: float) -> None:
     if not (math.isfinite(distance) and 0.0 < speed < math.inf):
-        raise ValueError("the way must be finite and the speed positive, not %r and %r" % (distance, speed))
+        raise ValueError("distance or angle must be finite, the speed positive, not %r and %r" % (distance, speed))

@@ -1,4 +1,4 @@
-"""The topics of one robot: the newest message of each, and commands that are not lost without a word."""
+"""The topics of one robot: the newest message of each, and commands that are not lost silently."""
 
 import math
 import threading
@@ -88,7 +88,7 @@ class CommandTopic:
     """A topic on which a robot takes commands."""
 
     def __init__(self, name: str, message_class: Type[Any], explain_absence: Callable[[], str]) -> None:
-        """explain_absence: tells users why nobody subscribes to the topic."""
+        """explain_absence: tells users why nothing subscribes to the topic."""
         self.name = name
         self._explain_absence = explain_absence
         self._publisher = rospy.Publisher(name, message_class, queue_size=1)
@@ -101,7 +101,7 @@ class CommandTopic:
         return bool(self._publisher.get_num_connections() > 0)
 
     def publish(self, message: Any) -> None:
-        """Send a command. One that nobody takes is warned about, once until commands are taken again.
+        """Send a command. One without a subscriber is warned about, once until there is one again.
 
         The first command after the start waits for the driver's subscription, for CONNECT_S at most.
         """
@@ -120,5 +120,5 @@ class CommandTopic:
             self._publisher.publish(message)
 
     def describe_absence(self) -> str:
-        """Return why nobody takes commands here, for users."""
+        """Return why there is no subscriber, for users."""
         return "nothing subscribes to %s: %s" % (self.name, self._explain_absence())

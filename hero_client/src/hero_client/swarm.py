@@ -93,7 +93,7 @@ class Swarm:
             robot.drive(linear_m_s, angular_rad_s)
 
     def go_to(self, x_m: float, y_m: float, yaw_rad: Optional[float] = None, **options: Any) -> None:
-        """Let every robot go to this place of its own frame, all at once; return when all have ended.
+        """Drive every robot to this place of its own frame, all at once; return when all have ended.
 
         options: as in Robot.go_to(). With frame="robot" all robots make the same move. For goals of each robot, use
         robot.start_go_to(); for goals in a common frame without collisions, controllers.swarm_go_to.

@@ -28,7 +28,7 @@ class ForwardController(MotionController):
     def __init__(
         self, length_m: float, now_s: float, linear_m_s: float, timeout_s: float = DEFAULT_TIMEOUT_S
     ) -> None:
-        """linear_m_s: the speed, positive also for a way back."""
+        """linear_m_s: the speed, also positive when driving backwards."""
         super().__init__(now_s, timeout_s)
         self._length_m = length_m
         self._linear_m_s = linear_m_s
@@ -59,7 +59,7 @@ class TurnController(MotionController):
     def __init__(
         self, angle_rad: float, now_s: float, angular_rad_s: float, timeout_s: float = DEFAULT_TIMEOUT_S
     ) -> None:
-        """angular_rad_s: the speed, positive also for a turn to the right."""
+        """angular_rad_s: the speed, also positive when turning to the right."""
         super().__init__(now_s, timeout_s)
         self._remaining_rad = angle_rad
         self._angular_rad_s = angular_rad_s
