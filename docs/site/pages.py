@@ -1,4 +1,4 @@
-"""The Markdown files of the repository and what they link to -> the folder that MkDocs renders (a hook of MkDocs).
+"""Gives MkDocs the Markdown files of the repository and what they link to (a hook of MkDocs).
 
 Files keep their places, so that a link holds in the repository and in the rendered pages alike.
 """
@@ -13,6 +13,8 @@ ROOT = Path(__file__).resolve().parents[2]
 PAGES = ROOT / ".work" / "docs_pages"
 LINK = re.compile(r"\]\(([^)#\s]+)[^)]*\)")
 SITE_FILES = {Path("docs/site/pages.css"), Path("docs/site/iframe-worker.js")}
+CONSOLE = re.compile(r"(<!-- tutorial: .* -->\n)?```console\n")
+TERMINAL = re.compile(r"<!-- tutorial: terminal (\d+)")
 NOT_PAGES = {".work", ".git", "build", "devel", "install", "node_modules"}
 
 
@@ -78,6 +80,18 @@ def list_fixed(menu):
             yield from list_fixed([below] if isinstance(below, str) else below)
         elif "*" not in entry:
             yield entry
+
+
+def on_page_markdown(markdown, **_):
+    """Called by MkDocs for each page: write over each console block in which terminal it is typed."""
+    if not TERMINAL.search(markdown):
+        return markdown  # one terminal is enough for this page
+
+    def add_title(block):
+        terminal = TERMINAL.search(block.group(1) or "")
+        return '```console title="Terminal %s"\n' % (terminal.group(1) if terminal else "1")
+
+    return CONSOLE.sub(add_title, markdown)
 
 
 def on_config(config):

@@ -101,6 +101,12 @@ def test_no_code_is_cut_and_no_word_in_a_table_is_broken(pages, browser):
         assert not browser.execute_script(FIND_BROKEN_WORDS), name
 
 
+def test_blocks_name_their_terminal_where_there_are_several(pages, browser):
+    browser.get(pages + "/docs/tutorial/ros_basics/03_node.html")
+    titles = [title.text for title in browser.find_elements("css selector", ".filename")]
+    assert titles[:4] == ["Terminal 1", "Terminal 2", "Terminal 2", "Terminal 3"]
+
+
 def test_each_tutorial_leads_to_the_next(pages, browser):
     course = sorted((sources.ROOT / "docs" / "tutorial" / "hero").glob("[0-9]*.md"))
     browser.get("%s/docs/tutorial/hero/%s.html" % (pages, course[0].stem))
