@@ -17,11 +17,11 @@ def color_of(index):
 
 
 def draw_arena(axes, arena):
-    """Draw walls and posts."""
+    """Draw walls and posts alike."""
     for x1_m, y1_m, x2_m, y2_m in arena.segments_m:
         axes.plot([x1_m, x2_m], [y1_m, y2_m], color="black", linewidth=1.5)
     for x_m, y_m, radius_m in arena.circles_m:
-        axes.add_patch(pyplot.Circle((x_m, y_m), radius_m, color="0.5"))
+        axes.add_patch(pyplot.Circle((x_m, y_m), radius_m, fill=False, edgecolor="black", linewidth=1.5))
 
 
 def draw_paths(picture, title, arena, paths, goals=None, only_m=None, size_inch=(6, 6)):
@@ -46,8 +46,8 @@ def draw_paths(picture, title, arena, paths, goals=None, only_m=None, size_inch=
         axes.set_ylim(*only_m[1])
     axes.set_aspect("equal")
     axes.set_title(title)
-    axes.set_xlabel("x in m")
-    axes.set_ylabel("y in m")
+    axes.set_xlabel("x (m), ground truth")
+    axes.set_ylabel("y (m)")
     figure.savefig(picture, dpi=DPI)
     pyplot.close(figure)
 

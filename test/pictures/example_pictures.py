@@ -98,7 +98,8 @@ def random_walk(picture):
 
 def go_to_goal(picture):
     """Ten robots, three goals each, from the topic."""
-    with Recording(10, arena_file("plots")) as recording:
+    arena = ROOT / "hero_examples" / "test" / "rostest" / "plots_arena.yaml"
+    with Recording(10, str(arena)) as recording:
         recording.stage.start_example("go_to_goal", "_robots:=0-9")
         publishers = [rospy.Publisher("/hero_%d/goal" % i, PoseStamped, queue_size=1) for i in range(10)]
         recording.stage.wait_for(lambda: all(p.get_num_connections() for p in publishers), "go_to_goal")

@@ -8,12 +8,13 @@ import math
 import time
 from typing import Dict, NamedTuple, Optional
 
-import rosgraph
 import rospy
 from geometry_msgs.msg import PoseStamped, Twist
 
 from hero_client.drivers import Drivers
+from hero_client.errors import NodeError
 from hero_client.geometry import Pose
+from hero_client.ros_node import ask_master
 
 from .background import Background
 from .dead_man import STOPS, DeadMan, Velocity
@@ -83,8 +84,8 @@ class Commander:
             if not self._has_listener(topic):
                 launch = "roslaunch hero_examples go_to_goal.launch robots:=%s" % name.rpartition("_")[2]
                 return Notice("error", "no program takes goals for %s: %s" % (name, launch))
-        except rosgraph.MasterException as error:
-            return Notice("error", "the ROS master does not answer: %s" % error)
+        except NodeError as error:
+            return Notice("error", str(error))
         message = PoseStamped()
         message.header.stamp = rospy.Time.now()
         message.header.frame_id = name + "/odom"
@@ -97,9 +98,8 @@ class Commander:
 
     def _has_listener(self, topic: str) -> bool:
         """Return whether another node subscribes to a topic, as soon as it is connected."""
-        own_name = rospy.get_name()
-        _, subscribed, _ = rosgraph.Master(own_name).getSystemState()
-        others = [node for name, nodes in subscribed if name == topic for node in nodes if node != own_name]
+        _, subscribed, _ = ask_master("getSystemState")
+        others = set(dict(subscribed).get(topic, [])) - {rospy.get_name()}
         if not others:
             return False
         if topic not in self._goals:
