@@ -55,7 +55,7 @@ def observe(options: argparse.Namespace, bags: BagSet) -> Observations:
 
 
 def draw(options: argparse.Namespace, observations: Observations, bags: BagSet) -> List[str]:
-    """Write the figures; return the path of each, or why there is none. Raises: RecordingError."""
+    """Write the figures; return the path of each, or why it is missing. Raises: RecordingError, also if all are."""
     from .figures import Figures
 
     names = os.path.basename(bags.paths[0])
@@ -63,19 +63,21 @@ def draw(options: argparse.Namespace, observations: Observations, bags: BagSet) 
         names += " and %d more" % (len(bags.paths) - 1)
     drawing = Figures(observations, bags.start_s, bags.end_s, names)
     prefix = options.out or os.path.splitext(bags.paths[0])[0]
-    lines = []
+    paths, missing = [], []
     for name in options.figures:
         path = "%s_%s.%s" % (prefix, name, options.format)
         figure = getattr(drawing, "draw_" + name)()
         if figure is None:
-            lines.append("no figure of %s: nothing of %s in the recording" % (name, FIGURES[name]))
+            missing.append("no figure of %s: nothing of %s in the recording" % (name, FIGURES[name]))
             continue
         try:
             figure.savefig(path, dpi=130)
         except OSError as error:
             raise RecordingError("%s cannot be written: %s; choose another --out" % (path, error.strerror)) from error
-        lines.append(path)
-    return lines
+        paths.append(path)
+    if not paths:
+        raise RecordingError("%s: %s" % (names, "; ".join(missing)))
+    return paths + missing
 
 
 def format_table(observations: Observations) -> List[str]:

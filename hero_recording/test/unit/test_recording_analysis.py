@@ -236,6 +236,8 @@ def test_figures_for_which_a_topic_is_missing_are_named_with_it(tmp_path, capsys
     output = run_plot(capsys, write_parts(tmp_path / "part.bag", (0,), "/robots"))
     assert output.count("no figure of") == 4
     assert "part_connections.png" in output
+    with pytest.raises(RecordingError, match=r"part\.bag: no figure of errors: nothing of /hero_N/odom"):
+        run_plot(capsys, tmp_path / "part.bag", "--figures", "errors")
 
 
 @pytest.mark.parametrize(
