@@ -100,7 +100,7 @@ def measure(robots: int, seconds: float) -> Measurement:
     """Run so many robots for so long behind a server of ours."""
     server = _Server()
     command = [sys.executable, "-m", "hero_sim", "--count", str(robots), "--port", str(server.port)]
-    process = start([*command, "--quiet", "--flash-dir", "none"], None)
+    process = start([*command, "--quiet"], None)
     try:
         server.run(_SETTLE_S)
         if len(server.peers) < robots or process.poll() is not None:
@@ -129,7 +129,7 @@ def measure_fastest(robots: int, simulated_ms: int = 5000) -> float:
     CPU time, so that what else runs on the machine matters little.
     """
     swarm = build_swarm(
-        build_parser().parse_args(["--count", str(robots), "--flash-dir", "none"]), [""] * robots, lambda text: None
+        build_parser().parse_args(["--count", str(robots)]), [""] * robots, lambda text: None
     )
 
     def run(until_ms: int) -> None:

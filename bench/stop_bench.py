@@ -77,7 +77,7 @@ class Swarm:
     def __init__(self, suite, robots):
         """Start them and what commands them; return when all move."""
         command = [sys.executable, str(HERE / "stopped_swarm.py"), "--count", str(robots), "--port", str(suite.port)]
-        command += ["--arena", "empty", "--flash-dir", "none", "--quiet"]
+        command += ["--arena", "empty", "--quiet"]
         self._process = suite.start(command, stdin=-1, stdout=-1)
         load = [sys.executable, str(HERE / "ros_load.py"), "command", "--speed", "0.1", "--count", str(robots)]
         suite.start(load, stdout=-1)

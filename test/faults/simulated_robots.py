@@ -57,7 +57,7 @@ class GroundTruth:
 def start_simulator(robots, port, *arguments, first_id=0):
     """Return a simulator whose robots dial a port of this machine; it ends with `with`."""
     command = ["rosrun", "hero_sim", "hero_sim", "--count", robots, "--first-id", first_id, "--port", port]
-    command += ["--arena", "empty", "--flash-dir", "none", "--quiet", *arguments]
+    command += ["--arena", "empty", "--quiet", *arguments]
     return Program(*map(str, command))
 
 

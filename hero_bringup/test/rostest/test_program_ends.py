@@ -9,7 +9,7 @@ import rostest
 
 TIMEOUT_S = 120.0
 BAD_URIS = ("localhost", "http://", "http://localhost:99999", "ftp://localhost:11311", "http://[::1")
-NODES = (["record"], ["calibrate", "--yes", "motors"], ["fleet", "--once"], ["hero_sim", "--flash-dir", "none"])
+NODES = (["record"], ["calibrate", "--yes", "motors"], ["fleet", "--once"], ["hero_sim"])
 PRINTING = (
     ["calibrate", "--help"],
     ["check", "--json"],

@@ -7,26 +7,18 @@ from typing import Callable, List, Tuple
 import numpy as np
 
 from .errors import OptionError
-from .fault_injector import FaultInjector
-from .faults import parse_fault
+from .faults import FaultInjector, parse_fault
 from .link.tcp_link import TcpLink
 from .link.wifi import PROFILES, Radio
-from .robot.firmware import Firmware, FirmwareOptions
-from .robot.flash import NO_FLASH_DIR, Flash, check_folder, find_flash_dir, make_fingerprint
+from .robot.firmware import Firmware
+from .robot.flash import Flash
 from .robot.ranges import FACTORY_CALIBRATION_COUNTS_M2, calibrate
 from .simulator import Simulator
 from .swarm import Swarm
 from .world.arena import build_default, place_robots
 from .world.arena_file import load_arena
 from .world.body import Body
-from .world.robot_errors import (
-    SERVO_CENTER_US,
-    RobotErrors,
-    describe_robot,
-    draw_errors,
-    load_known,
-    set_known,
-)
+from .world.robot_errors import SERVO_CENTER_US, RobotErrors, draw_errors, set_known
 from .world.world import World
 
 __all__ = ["build_errors", "build_simulator", "build_swarm"]
@@ -44,9 +36,9 @@ class _Rngs:
         def make(seed: int) -> np.random.RandomState:
             return np.random.RandomState(seed)
 
-        seeds = make(options.seed).randint(0, 2**31 - 1, size=4 + 2 * options.count)
-        self.places, self.world, self.boot, self.faults = map(make, seeds[:4])
-        self.robots, self.radios = list(map(make, seeds[4::2])), list(map(make, seeds[5::2]))
+        seeds = make(options.seed).randint(0, 2**31 - 1, size=3 + 2 * options.count)
+        self.places, self.world, self.boot = map(make, seeds[:3])
+        self.robots, self.radios = list(map(make, seeds[3::2])), list(map(make, seeds[4::2]))
 
 
 def build_errors(options: argparse.Namespace) -> RobotErrors:
@@ -58,8 +50,6 @@ def build_errors(options: argparse.Namespace) -> RobotErrors:
     ids = range(options.first_id, options.first_id + options.count)
     rngs = [np.random.RandomState([options.seed, robot_id % 2**32]) for robot_id in ids]
     errors = draw_errors(rngs, 0.0 if options.perfect else 1.0)
-    if options.errors is not None:
-        load_known(errors, options.first_id, options.errors)
     for text in options.error:
         set_known(errors, options.first_id, text)
     return errors
@@ -75,15 +65,9 @@ def _build_flash(options: argparse.Namespace, errors: RobotErrors, index: int) -
         "calibrated": np.rint(errors.servo_center_us[index]).tolist(),
         "factory": [SERVO_CENTER_US] * 2,
     }[options.motors]
-    robot_id = options.first_id + index
     flash = Flash(calibration_counts_m2, centers_us)
-    if not options.flash_dir:
-        # Another seed or another --error makes another robot, which has its own flash.
-        body = [*describe_robot(errors, index), options.ir, options.motors]
-        flash.keep_in(os.path.join(find_flash_dir(), "hero_%d-%s.json" % (robot_id, make_fingerprint(body))))
-    elif options.flash_dir != NO_FLASH_DIR:
-        check_folder(options.flash_dir)
-        flash.keep_in(os.path.join(options.flash_dir, "hero_%d.json" % robot_id))
+    if options.flash_dir is not None:
+        flash.keep_in(os.path.join(options.flash_dir, "hero_%d.json" % (options.first_id + index)))
     return flash
 
 
@@ -97,16 +81,11 @@ def build_swarm(options: argparse.Namespace, addresses: List[str], report: Repor
     poses = place_robots(arena, options.count, rngs.places)
     errors = build_errors(options)
     world = World(arena, poses, rngs.world, errors)
-    exact = options.firmware_odometry == "exact"
     robots: List[Firmware] = []
     for index, address in enumerate(addresses):
         body, flash = Body(world, index), _build_flash(options, errors, index)
-        firmware_options = FirmwareOptions(options.imu_hat, exact, address)
         robot_id = options.first_id + index
-        robots.append(Firmware(robot_id, body, flash, rngs.robots[index], firmware_options, report))
-    kept = ", ".join(robot.name for robot in robots if robot.flash.is_from_file)
-    if kept:
-        report("%s: with the parameters of an earlier run (--flash-dir none begins anew)" % kept)
+        robots.append(Firmware(robot_id, body, flash, rngs.robots[index], address, options.imu_hat, report))
     swarm = Swarm(world, robots)
     swarm.switch_on(rngs.boot, BOOT_SPREAD_MS)
     return swarm
@@ -136,7 +115,7 @@ def build_simulator(options: argparse.Namespace, report: Report) -> Tuple[Simula
         rngs = _Rngs(options)
         radios = [Radio(PROFILES[options.wifi], rng) for rng in rngs.radios]
         simulator = Simulator(swarm, link, radios, report, options.speed)
-        injector = FaultInjector(simulator, rngs.faults, report)
+        injector = FaultInjector(simulator, report)
         for text in options.fault:
             injector.add(parse_fault(text))
     except OptionError:

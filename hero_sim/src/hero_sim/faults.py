@@ -1,40 +1,98 @@
-"""What can go wrong with a robot on request: `KIND[@SECONDS][:key=value,...]`.
+"""What can go wrong with a robot on request: `KIND[@SECONDS][:robot=ID,key=value]`.
 
-Pure. The same text is used on the command line (--fault) and in the ROS service.
+The same text is used on the command line (--fault) and in the ROS service.
 """
 
-import math
-from typing import Dict, List, NamedTuple, Optional
+from typing import TYPE_CHECKING, Callable, Dict, List, NamedTuple, Optional, Tuple
 
 from .errors import OptionError
+from .key_values import parse_values
 
-__all__ = ["KINDS", "Fault", "describe_kinds", "parse_fault"]
+if TYPE_CHECKING:
+    from .simulator import Simulator
+
+__all__ = ["KINDS", "Fault", "FaultInjector", "describe_kinds", "parse_fault"]
+
+_LARGEST_ID = 2**31 - 1
+_LONGEST_S = 1e9
+_LIMITS = {
+    "robot": (0, _LARGEST_ID),
+    "for": (0, _LONGEST_S),
+    "by": (-_LONGEST_S, _LONGEST_S),
+    "of": (-1, _LARGEST_ID),
+    "bytes": (0, 65536),
+}
+"""Least and most of each key: ids, s, bytes."""
 
 
 class Kind(NamedTuple):
-    """One sort of fault: what happens, and its keys with their defaults (s, m/s, bytes, ids)."""
+    """One sort of fault: what happens, what does it to a robot with the value of its key, and the value's default."""
 
     meaning: str
-    defaults: Dict[str, float] = {}
+    act: Callable[["Simulator", int, float], None]
+    key: Optional[str] = None
+    default: float = 0.0
+
+
+def _vanish(simulator: "Simulator", index: int, for_s: float) -> None:
+    simulator.switch_off(index)
+    if for_s > 0:
+        simulator.reboot(index, after_ms=int(for_s * 1000))
+
+
+def _duplicate(simulator: "Simulator", index: int, robot_id: float) -> None:
+    simulator.reboot(index, int(robot_id) if robot_id >= 0 else simulator.swarm.robots[0].robot_id)
+
+
+def _declare_nothing(simulator: "Simulator", index: int, _: float) -> None:
+    simulator.reboot(index)
+    simulator.swarm.robots[index].zero_topics_next = True
+
+
+def _freeze(simulator: "Simulator", index: int, for_s: float) -> None:
+    simulator.swarm.robots[index].freeze(simulator.swarm.now_ms, int(for_s * 1000))
+    simulator.swarm.reschedule(index)
+
+
+def _stall(simulator: "Simulator", index: int, for_s: float) -> None:
+    simulator.radios[index].stall(simulator.swarm.now_ms, int(for_s * 1000))
+
+
+def _send_garbage(simulator: "Simulator", index: int, length: float) -> None:
+    robot = simulator.swarm.robots[index]
+    robot.send(b"\xff\xfe" + robot.rng.bytes(int(length)))
+    simulator.serve_robot(index)
+
+
+def _jump_clock(simulator: "Simulator", index: int, by_s: float) -> None:
+    simulator.swarm.robots[index].clock.jump(by_s)
+
+
+def _slow_services(simulator: "Simulator", index: int, by_s: float) -> None:
+    simulator.swarm.robots[index].answer_delay_ms = int(by_s * 1000)
 
 
 KINDS: Dict[str, Kind] = {
-    "reboot": Kind("restarts at once; the old connection gets no FIN"),
-    "vanish": Kind("power cut: no FIN, no acknowledgement; boots again after for (0: never)", {"for": 0.0}),
-    "leave": Kind("closes its connection (FIN) and connects again after for, still streaming", {"for": 3.0}),
-    "duplicate": Kind("restarts with the id of another robot (as one whose flash was erased)", {"of": -1.0}),
-    "zero-topics": Kind("restarts and answers the first request without declaring anything"),
-    "frozen": Kind("its program blocks for so long; connection and servo pulses stay", {"for": 5.0}),
-    "stall": Kind("its radio carries nothing for so long, then everything at once", {"for": 2.0}),
-    "garbage": Kind("sends random bytes between two packets", {"bytes": 200.0}),
-    "half-packet": Kind("sends the first half of a packet, and the next packet right behind it"),
-    "bad-checksum": Kind("sends a packet whose payload does not match its checksum"),
-    "bad-length": Kind("sends a header whose length does not match its checksum"),
-    "long-packet": Kind("sends a valid header that promises 65535 bytes, which never come"),
-    "clock-jump": Kind("its clock is wrong by so much until the next time answer", {"by": 60.0}),
-    "slow-service": Kind("answers service calls so much later, from now on", {"by": 5.0}),
-    "foreign-id": Kind("sends a packet with an id that it did not declare", {"id": 199.0}),
-    "push": Kind("is pushed forward by hand at speed; its wheels turn", {"for": 3.0, "speed": 0.1}),
+    "reboot": Kind("restarts at once; the old connection gets no FIN", lambda run, index, _: run.reboot(index)),
+    "vanish": Kind("power cut: no FIN, no acknowledgement; boots again after for (0: never)", _vanish, "for"),
+    "leave": Kind(
+        "closes its connection (FIN) and connects again after for, still streaming",
+        lambda run, index, for_s: run.leave(index, int(for_s * 1000)),
+        "for",
+        3.0,
+    ),
+    "duplicate": Kind(
+        "restarts with the id of another robot, as one whose flash was erased (-1: of the first robot)",
+        _duplicate,
+        "of",
+        -1.0,
+    ),
+    "zero-topics": Kind("restarts and answers the first request without declaring anything", _declare_nothing),
+    "frozen": Kind("its program blocks for so long; connection and servo pulses stay", _freeze, "for", 5.0),
+    "stall": Kind("its radio carries nothing for so long, then everything at once", _stall, "for", 2.0),
+    "garbage": Kind("sends the start of a packet and so many random bytes", _send_garbage, "bytes", 200.0),
+    "clock-jump": Kind("its clock is wrong by so much until the next time answer", _jump_clock, "by", 60.0),
+    "slow-service": Kind("answers service calls so much later, from now on", _slow_services, "by", 5.0),
 }
 
 
@@ -44,7 +102,7 @@ class Fault(NamedTuple):
     kind: str
     at_s: float  # simulated time; 0 is at once
     robot_id: Optional[int]  # None: every robot
-    values: Dict[str, float]
+    value: float  # of the kind's key
 
 
 def parse_fault(text: str) -> Fault:
@@ -52,40 +110,53 @@ def parse_fault(text: str) -> Fault:
 
     Raises: OptionError that names what is wrong and what would do.
     """
+    name = "fault %r" % text
     head, _, tail = text.partition(":")
-    kind, _, at_text = head.partition("@")
-    if kind not in KINDS:
-        raise OptionError("fault %r: unknown kind %r; known are %s" % (text, kind, ", ".join(sorted(KINDS))))
-    at_s = _read_number(text, "time after @", at_text) if at_text else 0.0
-    values = dict(KINDS[kind].defaults)
-    robot_id: Optional[int] = None
-    for pair in filter(None, tail.split(",")):
-        key, equals, value_text = pair.partition("=")
-        if not equals or key not in values and key != "robot":
-            known = ", ".join(["robot", *sorted(values)])
-            raise OptionError("fault %r: %r is not one of %s, as key=value" % (text, pair, known))
-        value = _read_number(text, key, value_text)
-        if key == "robot":
-            robot_id = int(value)
-        else:
-            values[key] = value
-    return Fault(kind, at_s, robot_id, values)
-
-
-def _read_number(text: str, what: str, number: str) -> float:
-    try:
-        value = float(number)
-    except ValueError as error:
-        raise OptionError("fault %r: %s must be a number, not %r" % (text, what, number)) from error
-    if not math.isfinite(value) or value < 0 and what != "by":
-        raise OptionError("fault %r: %s must be 0 or more, not %s" % (text, what, number))
-    return value
+    kind_name, _, at_s = head.partition("@")
+    kind = KINDS.get(kind_name)
+    if kind is None:
+        raise OptionError("%s: unknown kind %r; known are %s" % (name, kind_name, ", ".join(KINDS)))
+    at = parse_values(name, "SECONDS=" + at_s if at_s else "", {"SECONDS": (0, _LONGEST_S)})
+    values = parse_values(name, tail, {key: _LIMITS[key] for key in ("robot", kind.key) if key is not None})
+    robot_id = int(values["robot"]) if "robot" in values else None
+    return Fault(kind_name, at.get("SECONDS", 0.0), robot_id, values.get(kind.key or "", kind.default))
 
 
 def describe_kinds() -> List[str]:
-    """Return one line for each kind of fault, with its keys and their defaults."""
-    lines = ["KIND[@SECONDS][:robot=ID,key=value,...]; without robot it happens to every robot."]
-    for name, kind in sorted(KINDS.items()):
-        keys = " ".join("%s=%g" % item for item in sorted(kind.defaults.items()))
-        lines.append("  %-13s %s%s" % (name, kind.meaning, " (%s)" % keys if keys else ""))
+    """Return one line for each kind of fault, with its key and its default."""
+    lines = ["KIND[@SECONDS][:robot=ID,key=value]; without robot it happens to every robot."]
+    for name, kind in KINDS.items():
+        lines.append("  %-13s %s%s" % (name, kind.meaning, " (%s=%g)" % (kind.key, kind.default) if kind.key else ""))
     return lines
+
+
+class FaultInjector:
+    """Injects faults into one simulator, each at its time."""
+
+    def __init__(self, simulator: "Simulator", report: Callable[[str], None]) -> None:
+        """The simulator calls run() between its steps; report takes lines for people."""
+        self._simulator = simulator
+        self._report = report
+        self._waiting: List[Tuple[int, int, Fault]] = []  # time (ms) and robot of each, the next one first
+        simulator.before_advance.append(self.run)
+
+    def add(self, fault: Fault) -> str:
+        """Schedule a fault for its time, or at once if that is past; return what will happen, in words.
+
+        Raises: OptionError if it names a robot that is not here.
+        """
+        robots = self._simulator.swarm.robots
+        indices = [index for index, robot in enumerate(robots) if fault.robot_id in (None, robot.robot_id)]
+        if not indices:
+            here = ", ".join(str(robot.robot_id) for robot in robots)
+            raise OptionError("fault %s: robot %s is not simulated here (%s)" % (fault.kind, fault.robot_id, here))
+        self._waiting += [(int(fault.at_s * 1000), index, fault) for index in indices]
+        self._waiting.sort(key=lambda waiting: waiting[0])
+        return "%s: %s" % (", ".join(robots[index].name for index in indices), KINDS[fault.kind].meaning)
+
+    def run(self, now_ms: int) -> None:
+        """Inject what is due."""
+        while self._waiting and self._waiting[0][0] <= now_ms:
+            _, index, fault = self._waiting.pop(0)
+            self._report("fault %s for %s" % (fault.kind, self._simulator.swarm.robots[index].name))
+            KINDS[fault.kind].act(self._simulator, index, fault.value)

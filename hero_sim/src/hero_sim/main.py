@@ -1,17 +1,18 @@
 """The command line of the simulator. Needs Python, numpy and PyYAML; neither ROS nor a ROS master."""
 
 import argparse
+import contextlib
 import signal
-from typing import TYPE_CHECKING, List, Optional
+from typing import Callable, Iterator, Optional, Sequence, Tuple
 
 from . import output
-from .errors import OptionError, SimulatorError
-from .faults import describe_kinds, parse_fault
+from .build import build_errors, build_simulator
+from .errors import OptionError
+from .faults import FaultInjector, describe_kinds, parse_fault
+from .simulator import Simulator
+from .world.robot_errors import describe_errors, describe_keys
 
-if TYPE_CHECKING:
-    from .simulator import Simulator
-
-__all__ = ["build_parser", "check_options", "main"]
+__all__ = ["build_parser", "check_options", "main", "parse_options", "simulate"]
 
 DEFAULT_PORT = 11411
 """The port that stock robots connect to."""
@@ -22,12 +23,6 @@ LARGEST_ID = 2**31 - 1
 
 LONGEST_RUN_S = 1e9
 """Some thirty years."""
-
-_REMEDIES = {
-    "numpy": "numpy is missing; install it: apt install python3-numpy, or pip install numpy",
-    "yaml": "PyYAML is missing; install it: apt install python3-yaml, or pip install PyYAML",
-    "hero_driver": "the package hero_driver is missing; it lies beside hero_sim: add hero_driver/src to PYTHONPATH",
-}
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -59,7 +54,7 @@ def _add_link_options(group: "argparse._ArgumentGroup") -> None:
         "--fault",
         action="append",
         default=[],
-        metavar="KIND[@S][:key=value,..]",
+        metavar="KIND[@S][:key=value]",
         help="inject a fault S simulated seconds after the start, e.g. vanish@5:robot=1,for=3; may be repeated; "
         "--fault help lists all",
     )
@@ -77,14 +72,7 @@ def _add_robot_options(group: "argparse._ArgumentGroup") -> None:
         help="a known error of a robot, or of all, e.g. robot=1,left_center_us=1530; may be repeated; "
         "--error help lists the keys",
     )
-    add("--errors", metavar="FILE", help="the same from a YAML file, as --print-errors writes it")
-    add("--print-errors", action="store_true", help="print how the robots differ, and end")
-    add(
-        "--firmware-odometry",
-        choices=("stock", "exact"),
-        default="stock",
-        help="stock loses distance under velocity control as the firmware does (stock)",
-    )
+    add("--print-errors", action="store_true", help="print how the robots differ, as --error takes it, and end")
     add(
         "--ir",
         choices=("calibrated", "factory", "erased"),
@@ -100,7 +88,7 @@ def _add_robot_options(group: "argparse._ArgumentGroup") -> None:
     add(
         "--flash-dir",
         metavar="DIR",
-        help="folder of the robots' parameters, a file per robot; none keeps nothing (ROS_HOME/hero_sim)",
+        help="keep the robots' parameters in this folder, a file per robot (in memory)",
     )
 
 
@@ -127,29 +115,30 @@ def check_options(options: argparse.Namespace) -> None:
             parse_fault(text)
 
 
-def answer_question(options: argparse.Namespace) -> Optional[List[str]]:
-    """Return the lines that options ask for instead of a simulation, None if they ask for none.
+def parse_options(parser: argparse.ArgumentParser, arguments: Optional[Sequence[str]]) -> argparse.Namespace:
+    """Return the options of a run; wrong ones, and those that ask for a text instead, end the program.
 
-    Raises: OptionError for an error that cannot be set.
+    Raises: OptionError for an error of a robot that cannot be set.
     """
-    from .build import build_errors
-    from .world.robot_errors import describe_errors, describe_keys
-
+    options = parser.parse_args(arguments)
+    try:
+        check_options(options)
+    except OptionError as error:
+        parser.exit(output.WRONG_ARGUMENTS, "hero_sim: %s\n" % error)
+    lines = None
     if "help" in options.fault:
-        return describe_kinds()
-    if "help" in options.error:
-        return describe_keys()
-    if options.print_errors:
-        return describe_errors(build_errors(options), options.first_id)
-    return None
+        lines = describe_kinds()
+    elif "help" in options.error:
+        lines = describe_keys()
+    elif options.print_errors:
+        lines = describe_errors(build_errors(options), options.first_id)
+    if lines is not None:
+        print("\n".join(lines))
+        parser.exit()
+    return options
 
 
-def report(text: str) -> None:
-    """Print a line for people."""
-    print("hero_sim: " + text, flush=True)
-
-
-def stop_on_signals(simulator: "Simulator") -> None:
+def _stop_on_signals(simulator: Simulator) -> None:
     """End simulator.run() at Ctrl-C and SIGTERM."""
 
     def stop(signal_number: int, frame: object) -> None:
@@ -160,37 +149,31 @@ def stop_on_signals(simulator: "Simulator") -> None:
     signal.signal(signal.SIGTERM, stop)
 
 
-def main(arguments: Optional[List[str]] = None) -> int:
-    """Run the simulator; return the exit status."""
-    return output.call(lambda: _run(arguments))
+@contextlib.contextmanager
+def simulate(
+    options: argparse.Namespace, report: Callable[[str], None]
+) -> Iterator[Tuple[Simulator, FaultInjector]]:
+    """Hand out a simulator, which a signal ends, and its faults; close its connections afterwards.
 
-
-def _run(arguments: Optional[List[str]]) -> int:
-    options = build_parser().parse_args(arguments)
-    # Loading takes a moment: Ctrl-C in it ends the program like any other, without a stack trace.
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    Raises: OptionError for an option that cannot be used.
+    """
+    simulator, injector = build_simulator(options, (lambda text: None) if options.quiet else report)
+    _stop_on_signals(simulator)
     try:
-        from .build import build_simulator
-    except ModuleNotFoundError as error:
-        remedy = _REMEDIES.get((error.name or "").partition(".")[0])
-        if remedy is None:
-            raise
-        return output.fail(remedy)
-    try:
-        check_options(options)
-    except OptionError as error:
-        return output.fail(str(error), output.WRONG_ARGUMENTS)
-    try:
-        answer = answer_question(options)
-        if answer is not None:
-            print("\n".join(answer))
-            return 0
-        simulator, _ = build_simulator(options, (lambda text: None) if options.quiet else report)
-    except SimulatorError as error:
-        return output.fail(str(error))
-    stop_on_signals(simulator)
-    try:
-        simulator.run(options.seconds)
+        yield simulator, injector
     finally:
         simulator.link.close_all()
-    return 0
+
+
+def _report(text: str) -> None:
+    print("hero_sim: " + text, flush=True)
+
+
+def main(arguments: Optional[Sequence[str]] = None) -> int:
+    """Run the simulator; return the exit status."""
+    return output.call(lambda: _run(parse_options(build_parser(), arguments)))
+
+
+def _run(options: argparse.Namespace) -> None:
+    with simulate(options, _report) as (simulator, _):
+        simulator.run(options.seconds)

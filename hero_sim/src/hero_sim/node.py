@@ -14,16 +14,14 @@ import rosgraph
 import rosgraph.network
 import rosgraph.roslogging
 import rospy
-from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse, Trigger, TriggerRequest, TriggerResponse
+from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 
 from hero_driver.ros.running_node import find_running_node
 
 from . import main as command_line
 from . import output
-from .build import build_simulator
 from .errors import OptionError, SimulatorError
-from .fault_injector import FaultInjector
-from .faults import describe_kinds, parse_fault
+from .faults import FaultInjector, describe_kinds, parse_fault
 from .ground_truth import GroundTruth
 from .simulator import Simulator
 from .srv import InjectFault, InjectFaultRequest, InjectFaultResponse
@@ -48,7 +46,6 @@ class RequestQueue:
         self._requests: queue.Queue[Tuple[Callable[[], Answer], queue.Queue]] = queue.Queue(maxsize=100)
         simulator.before_advance.append(self._run)
         rospy.Service("~fault", InjectFault, self._serve_fault)
-        rospy.Service("~pause", SetBool, self._serve_pause)
         rospy.Service("~reset", Trigger, self._serve_reset)
 
     def _run(self, now_ms: int) -> None:
@@ -76,13 +73,6 @@ class RequestQueue:
         if request.fault == "help":
             return InjectFaultResponse(True, "\n".join(describe_kinds()))
         return InjectFaultResponse(*self._ask(inject))
-
-    def _serve_pause(self, request: SetBoolRequest) -> SetBoolResponse:
-        def pause() -> Answer:
-            self._simulator.paused = request.data
-            return True, "paused" if request.data else "running"
-
-        return SetBoolResponse(*self._ask(pause))
 
     def _serve_reset(self, request: TriggerRequest) -> TriggerResponse:
         del request
@@ -116,43 +106,24 @@ def main() -> None:
     os._exit(status)
 
 
-def _run() -> int:
+def _run() -> None:
     parser = command_line.build_parser()
     parser.add_argument("--clock", action="store_true", help="publish /clock: nodes with use_sim_time follow")
-    options = parser.parse_args(rospy.myargv(sys.argv)[1:])
+    options = command_line.parse_options(parser, rospy.myargv(sys.argv)[1:])
+    check_environment()
+    # Until the master answers, init_node() waits for as long as it takes: let a signal end that.
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
     try:
-        command_line.check_options(options)
-    except OptionError as error:
-        return output.fail(str(error), output.WRONG_ARGUMENTS)
-    try:
-        lines = command_line.answer_question(options)
-        if lines is not None:
-            print("\n".join(lines))
-            return 0
-        check_environment()
-        # Until the master answers, init_node() waits for as long as it takes: let a signal end that.
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
         running = find_running_node(NODE_NAME)
         if running:
             raise OptionError("simulated robots already run as %s: end them, or give these another name:=" % running)
         rospy.init_node(NODE_NAME, disable_signals=True)
-    except OptionError as error:
-        return output.fail(str(error))
     except rosgraph.roslogging.LoggingException as error:
-        return output.fail("%s: set ROS_LOG_DIR to a directory" % error)
-    try:
-        simulator, injector = build_simulator(options, (lambda text: None) if options.quiet else rospy.loginfo)
-    except OptionError as error:
-        rospy.logfatal("hero_sim: %s", error)
-        return output.FAILED
-    command_line.stop_on_signals(simulator)
-    rospy.on_shutdown(lambda: setattr(simulator, "stopping", True))
-    GroundTruth(simulator, options.clock)
-    RequestQueue(simulator, injector)
-    try:
+        raise OptionError("%s: set ROS_LOG_DIR to a directory" % error) from error
+    with command_line.simulate(options, rospy.loginfo) as (simulator, injector):
+        rospy.on_shutdown(lambda: setattr(simulator, "stopping", True))
+        GroundTruth(simulator, options.clock)
+        RequestQueue(simulator, injector)
         simulator.run(options.seconds)
         if simulator.stopping and not rospy.is_shutdown():
             simulator.linger(LINGER_S)
-    finally:
-        simulator.link.close_all()
-    return 0

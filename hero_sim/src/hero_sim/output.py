@@ -1,4 +1,4 @@
-"""The output of the simulator, which may be a closed pipe or a full disk, and its exit status."""
+"""The exit status of the simulator, and its output, which may be a closed pipe or a full disk."""
 
 import errno
 import os
@@ -6,7 +6,9 @@ import signal
 import sys
 from typing import Callable
 
-__all__ = ["WRONG_ARGUMENTS", "call", "fail"]
+from .errors import SimulatorError
+
+__all__ = ["FAILED", "WRONG_ARGUMENTS", "call", "fail"]
 
 FAILED = 1
 WRONG_ARGUMENTS = 2
@@ -18,23 +20,25 @@ PIPE_CLOSED = 128 + signal.SIGPIPE
 _OUTPUT_ERRORS = (errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 
-def fail(text: str, status: int = FAILED) -> int:
+def fail(text: str) -> int:
     """Print a line with the program's name to stderr; return the exit status."""
     print("hero_sim: " + text, file=sys.stderr)
-    return status
+    return FAILED
 
 
-def call(run: Callable[[], int]) -> int:
-    """Return the exit status of run(), which includes that of its output; exits by argparse count, too."""
+def call(run: Callable[[], None]) -> int:
+    """Return the exit status of run(), which may raise SimulatorError or exit as argparse does."""
+    status = 0
     try:
         try:
-            status = run()
+            run()
+        except SimulatorError as error:
+            return fail(str(error))
         except SystemExit as end:
             if not isinstance(end.code, int):
                 raise
             status = end.code
-        if sys.stdout is not None:
-            sys.stdout.flush()
+        sys.stdout.flush()
     except OSError as error:
         if error.filename is not None or error.errno not in _OUTPUT_ERRORS:
             raise

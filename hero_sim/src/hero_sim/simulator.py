@@ -33,7 +33,6 @@ class Simulator:
     Attributes:
         swarm, link, radios: what it joins.
         stopping: set from anywhere to end run().
-        paused: whether simulated time stands still.
         before_advance: called with the simulated time (ms) between two steps.
     """
 
@@ -50,7 +49,6 @@ class Simulator:
         self.link = link
         self.radios = radios
         self.stopping = False
-        self.paused = False
         self.before_advance: List[Callable[[int], None]] = []
         self._speed = speed
         self._anchor_s, self._anchor_ms = 0.0, 0
@@ -88,9 +86,8 @@ class Simulator:
         target_ms = self._find_target()
         for call in self.before_advance:
             call(self.swarm.now_ms)
-        if not self.paused:
-            for index in self.swarm.advance(target_ms if end_ms is None else min(target_ms, end_ms)):
-                self.serve_robot(index)
+        for index in self.swarm.advance(target_ms if end_ms is None else min(target_ms, end_ms)):
+            self.serve_robot(index)
         if self._carrying:
             self._carry(self.swarm.now_ms)
         for index in list(self._full):
@@ -106,9 +103,9 @@ class Simulator:
         now_ms = self.swarm.now_ms
         target_ms = self._anchor_ms + int((time.monotonic() - self._anchor_s) * 1000 * self._speed)
         late_s = (target_ms - now_ms) / 1000.0 / self._speed
-        if not self.paused and late_s <= _LATE_S:
+        if late_s <= _LATE_S:
             return target_ms
-        if not self.paused and not self._reported_late:
+        if not self._reported_late:
             self._reported_late = True
             self._report(
                 "this machine was busy or asleep for %.1f s; the robots stood still meanwhile (reported once; "
@@ -119,8 +116,6 @@ class Simulator:
 
     def _find_wait(self) -> float:
         """Return how long (s) to wait for the link until the swarm has to go on."""
-        if self.paused:
-            return _LONGEST_WAIT_S
         next_ms = min(self.swarm.next_due_ms, self.swarm.world.time_ms + STEP_MS)
         wait_s = (next_ms - self._anchor_ms) / 1000.0 / self._speed - (time.monotonic() - self._anchor_s)
         return min(max(wait_s, _SHORTEST_WAIT_S), _LONGEST_WAIT_S)
@@ -205,10 +200,10 @@ class Simulator:
         self.swarm.robots[index].switch_off()
         self.swarm.reschedule(index)
 
-    def reboot(self, index: int, robot_id: Optional[int] = None) -> None:
-        """Restart a robot at once; its old connection is left without a word, as by a real one."""
+    def reboot(self, index: int, robot_id: Optional[int] = None, after_ms: int = 0) -> None:
+        """Switch a robot off, and on again after_ms later; its old connection is left without a word, as by a real one."""
         self.switch_off(index)
-        self.swarm.robots[index].switch_on(self.swarm.now_ms, robot_id)
+        self.swarm.robots[index].switch_on(self.swarm.now_ms + after_ms, robot_id)
         self.swarm.reschedule(index)
 
     def leave(self, index: int, for_ms: int) -> None:

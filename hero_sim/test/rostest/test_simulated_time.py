@@ -2,7 +2,6 @@
 """The simulator drives /clock: everything runs faster than the wall clock, and stamps are simulated time."""
 
 import statistics
-import time
 import unittest
 
 import rospy
@@ -10,7 +9,6 @@ import rostest
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Clock
-from std_srvs.srv import SetBool
 
 from hero_test.waiting import wait_for
 
@@ -52,27 +50,6 @@ class SimulatedTimeTest(unittest.TestCase):
         wait_for(is_there, "distance of 0.2 m")
         publisher.publish(Twist())
         wait_for(lambda: abs(self.odom[-1].twist.twist.linear.x) < 0.01, "stop")
-
-    def test_a_pause_stops_the_clock(self):
-        pause = rospy.ServiceProxy("/hero_sim/pause", SetBool)
-        self.assertTrue(pause(True).success)
-        # What was in transit when the pause began arrives; then nothing more does.
-        wait_for(lambda: is_quiet(self.clock), "clock that stands still")
-        self.assertTrue(pause(False).success)
-        before = len(self.clock)
-        wait_for(lambda: len(self.clock) > before + 10, "clock that goes on")
-
-
-def is_quiet(messages):
-    """Return whether no message came for a quarter of a second, in which a running clock ticks a hundred
-    times."""
-    count = len(messages)
-    end_s = time.monotonic() + 0.25
-    while time.monotonic() < end_s:
-        if len(messages) != count:
-            return False
-        time.sleep(0.01)
-    return True
 
 
 if __name__ == "__main__":

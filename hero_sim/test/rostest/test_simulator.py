@@ -17,7 +17,7 @@ import rostest
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from std_msgs.msg import ColorRGBA
-from std_srvs.srv import SetBool, Trigger
+from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
@@ -56,7 +56,7 @@ class SimulatorTest(unittest.TestCase):
     def setUpClass(cls):
         rospy.init_node("test_simulator")
         cls.fleet = Newest("/hero_driver/robots", RobotArray)
-        for name, kind in (("fault", InjectFault), ("reset", Trigger), ("pause", SetBool)):
+        for name, kind in (("fault", InjectFault), ("reset", Trigger)):
             rospy.wait_for_service("/hero_sim/" + name, timeout=LIMIT_S)
             setattr(cls, "call_" + name, staticmethod(rospy.ServiceProxy("/hero_sim/" + name, kind)))
         wait_for(lambda: all(cls.is_ready(number) for number in range(8)), "eight ready robots")
@@ -172,14 +172,10 @@ class SimulatorTest(unittest.TestCase):
         markers.wait(is_green, "green robot")
         Newest("/hero_sim/arena", MarkerArray).wait(lambda message: len(message.markers) == 4, "four walls")
 
-    def test_reset_returns_robots_to_their_start_and_pause_stops_them(self):
+    def test_reset_returns_robots_to_their_start_at_rest(self):
         truth = Newest("/hero_5/ground_truth", Odometry)
         self.assertTrue(self.call_reset().success)
         truth.wait(lambda message: abs(message.twist.twist.linear.x) < 1e-6, "robot at rest")
-        self.assertTrue(self.call_pause(True).success)
-        time_of_pause = truth.message.header.stamp
-        self.assertTrue(self.call_pause(False).success)
-        truth.wait(lambda message: message.header.stamp > time_of_pause, "ground truth after the pause")
 
     def test_a_wrong_fault_is_refused_in_words(self):
         answer = self.call_fault("explode:robot=1")
@@ -223,8 +219,8 @@ class SimulatorTest(unittest.TestCase):
         for odom in odoms:
             odom.wait()
         before = self.find(4).bad_packets
-        for fault in ("garbage", "half-packet", "bad-checksum", "bad-length", "long-packet", "foreign-id"):
-            self.inject(fault + ":robot=4")
+        for _ in range(3):
+            self.inject("garbage:robot=4")
         wait_for(lambda: self.find(4) and self.find(4).bad_packets >= before + 3, "bad packets of hero_4")
         for odom in odoms:
             odom.wait_for_more()

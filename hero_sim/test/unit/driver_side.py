@@ -14,10 +14,7 @@ Arrival = collections.namedtuple("Arrival", "at_ms topic_id payload")
 
 
 def parse_options(*arguments):
-    """Read a command line; what an earlier run kept on this machine stays out of it."""
-    options = main.build_parser().parse_args(["--flash-dir", "none", *arguments])
-    main.check_options(options)
-    return options
+    return main.parse_options(main.build_parser(), arguments)
 
 
 class DriverSide:

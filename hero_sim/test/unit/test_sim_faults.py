@@ -7,15 +7,15 @@ from hero_sim.errors import OptionError
 
 
 def test_a_fault_is_read_with_time_robot_and_values():
-    assert faults.parse_fault("vanish@5:robot=1,for=3") == faults.Fault("vanish", 5.0, 1, {"for": 3.0})
+    assert faults.parse_fault("vanish@5:robot=1,for=3") == faults.Fault("vanish", 5.0, 1, 3.0)
 
 
 def test_what_is_left_out_has_its_default():
-    assert faults.parse_fault("garbage") == faults.Fault("garbage", 0.0, None, {"bytes": 200.0})
+    assert faults.parse_fault("garbage") == faults.Fault("garbage", 0.0, None, 200.0)
 
 
 def test_a_clock_may_jump_backwards():
-    assert faults.parse_fault("clock-jump:by=-30").values == {"by": -30.0}
+    assert faults.parse_fault("clock-jump:by=-30").value == -30.0
 
 
 @pytest.mark.parametrize(

@@ -146,7 +146,7 @@ def test_a_stop_and_a_reversal_reset_the_integral():
 
 
 def test_a_position_command_drives_as_far_as_its_speed_in_one_second():
-    driver = start("--firmware-odometry", "exact")
+    driver = start()
     driver.send_twist(0, 0.1, 0.0, ids.ID_POSITION_CMD_VEL)
     distances_m = []
     for _ in range(290):
@@ -235,7 +235,7 @@ def test_until_3_s_of_uptime_the_position_controller_runs():
 
 
 def test_the_encoders_measure_the_wheels_not_the_commands():
-    driver = start("--error", "right_gain=0.5", "--firmware-odometry", "exact")
+    driver = start("--error", "right_gain=0.5")
     driver.send(0, ids.ID_CMD_MOTOR, struct.pack("<2h", 1400, 1600))
     driver.run(900)
     left, right = read_encoder(driver.list_packets(0, ids.ID_ENCODER)[-1].payload)[:2]

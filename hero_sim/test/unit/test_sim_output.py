@@ -21,7 +21,7 @@ def run_simulator(*arguments, stdout):
     return process.returncode, errors
 
 
-PRINTING = (["--help"], ["--fault", "help"], ["--print-errors"], ["--port", "9", "--flash-dir", "none"])
+PRINTING = (["--help"], ["--fault", "help"], ["--print-errors"], ["--port", "9"])
 
 
 @pytest.mark.parametrize("arguments", PRINTING)

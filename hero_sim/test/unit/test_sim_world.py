@@ -32,18 +32,6 @@ def run(world, seconds):
         world.step()
 
 
-def test_a_push_turns_the_wheels_of_a_robot_at_rest_for_its_time():
-    world = build_world(robots=2)
-    start_m = world.poses[0, :2].copy()
-    Body(world, 0).push(0.1, 1000)
-    run(world, 0.5)
-    assert world.speeds_m_s.tolist() == [[0.1, 0.1], [0.0, 0.0]]
-    run(world, 2.0)
-    assert world.speeds_m_s.max() == 0.0
-    assert world.travels_m[0] == pytest.approx([0.1, 0.1], abs=0.015)
-    assert math.dist(world.poses[0, :2], start_m) == pytest.approx(0.1, abs=0.015)
-
-
 def test_a_wheel_answers_a_step_like_a_first_order_lag():
     world = build_world()
     command(world, 0, 0.1, 0.0)

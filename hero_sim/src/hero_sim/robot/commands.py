@@ -3,11 +3,14 @@
 Pure. Texts and behavior are the firmware's (files named in messages and flash); ids as declared.
 """
 
-from typing import Callable, Dict, List, Optional
+import struct
+from typing import Callable, Dict, Optional, Sequence, Tuple
 
 from hero_driver.rosserial import packets
 
 from ..errors import CommandError
+from ..robot_constants import LARGEST_PARAMETER
+from ..world.kinematics import Pose
 from . import declarations as ids
 from . import messages
 from .flash import Flash
@@ -22,6 +25,9 @@ PULSES_US = 500
 STOP_US = 1000
 LIGHT_US = 1000
 """The same for switching the motors off, and for setting the light."""
+
+
+_TWIST = "<d32xd"  # linear.x (m/s) and angular.z (rad/s); the firmware uses no other
 
 
 class CommandTable:
@@ -50,63 +56,72 @@ class CommandTable:
         self._millis = 0
         self._now_ms = 0
         self.blocked_us = 0
-        self._callbacks: Dict[int, Callable[[bytes], Optional[bytes]]] = {
-            ids.ID_LED: self._set_light,
-            ids.ID_LASER_ENABLE: self._enable_laser,
-            ids.ID_IR_CALIBRATION: self._calibrate_ir,
-            ids.ID_SET_ODOM: self._set_odom,
-            ids.ID_CMD_MOTOR: self._drive_motors,
-            ids.ID_MOTORS_PARAMETERS: self._set_motors,
-            ids.ID_POSITION_CMD_VEL: self._drive_position,
-            ids.ID_POSITION_PID_PARAMETERS: self._set_position_pid,
-            ids.ID_POSITION_PID_CALIBRATION: self._tune_position,
-            ids.ID_VELOCITY_CMD_VEL: self._drive_velocity,
-            ids.ID_VELOCITY_PID_PARAMETERS: self._set_velocity_pid,
-            ids.ID_VELOCITY_PID_CALIBRATION: self._tune_velocity,
+        self._callbacks: Dict[int, Tuple[str, Callable[..., Optional[bytes]]]] = {
+            # layout of the message or request, in the order of its fields, and what it does
+            ids.ID_LED: ("<4f", self._set_light),
+            ids.ID_LASER_ENABLE: ("<?", self._enable_laser),
+            ids.ID_IR_CALIBRATION: ("<8d", self._calibrate_ir),
+            ids.ID_SET_ODOM: ("<3d", self._set_odom),
+            ids.ID_CMD_MOTOR: ("<2h", self._drive_motors),
+            ids.ID_MOTORS_PARAMETERS: ("<2h", self._set_motors),
+            ids.ID_POSITION_CMD_VEL: (_TWIST, self._drive_position),
+            ids.ID_POSITION_PID_PARAMETERS: ("<6f", self._set_position_pid),
+            ids.ID_POSITION_PID_CALIBRATION: ("", self._tune_position),
+            ids.ID_VELOCITY_CMD_VEL: (_TWIST, self._drive_velocity),
+            ids.ID_VELOCITY_PID_PARAMETERS: ("<6f", self._set_velocity_pid),
+            ids.ID_VELOCITY_PID_CALIBRATION: ("", self._tune_velocity),
         }
 
     def receive(self, packet: packets.Packet, millis: int, now_ms: int) -> Optional[bytes]:
         """Execute packet at millis of the robot, now_ms of the world; return a service's answer, as a packet.
 
-        Raises: CommandError for a payload that is not the declared message.
+        Raises: CommandError for a payload that is not the declared message, or numbers that no robot computes with.
         """
         self._millis, self._now_ms = millis, now_ms
         self.blocked_us = 0
-        callback = self._callbacks.get(packet.topic_id)
-        # The slots without a subscriber are empty: the firmware ignores them.
-        return None if callback is None else callback(packet.payload)
+        if packet.topic_id not in self._callbacks:
+            return None  # The slots without a subscriber are empty: the firmware ignores them.
+        layout, callback = self._callbacks[packet.topic_id]
+        length, expected_length = len(packet.payload), struct.calcsize(layout)
+        if length != expected_length:
+            name = ids.find_type(packet.topic_id)
+            raise CommandError("%s has %d bytes instead of %d" % (name, length, expected_length))
+        values = struct.unpack(layout, packet.payload)
+        if not all(abs(value) < LARGEST_PARAMETER for value in values):
+            name = ids.find_type(packet.topic_id)
+            raise CommandError("%s with %s, with which a real robot would do anything" % (name, list(values)))
+        return callback(*values)
 
-    def _set_light(self, payload: bytes) -> None:
-        self._sensing.set_light(self._millis, messages.decode_color(payload))
+    def _set_light(self, *color: float) -> None:
+        self._sensing.set_light(self._millis, color)
         self.blocked_us = LIGHT_US
 
-    def _enable_laser(self, payload: bytes) -> None:
-        self._sensing.laser_enabled = messages.decode_bool(payload)
+    def _enable_laser(self, is_enabled: bool) -> None:
+        self._sensing.laser_enabled = is_enabled
 
-    def _drive_velocity(self, payload: bytes) -> None:
-        if self._motors.receive_velocity(self._millis, *messages.decode_twist(payload)):
+    def _drive_velocity(self, linear_m_s: float, angular_rad_s: float) -> None:
+        if self._motors.receive_velocity(self._millis, linear_m_s, angular_rad_s):
             self.blocked_us = STOP_US
 
-    def _drive_position(self, payload: bytes) -> None:
-        if self._motors.receive_position(self._millis, self._now_ms, *messages.decode_twist(payload)):
+    def _drive_position(self, linear_m_s: float, angular_rad_s: float) -> None:
+        if self._motors.receive_position(self._millis, self._now_ms, linear_m_s, angular_rad_s):
             self.blocked_us = STOP_US
 
-    def _drive_motors(self, payload: bytes) -> None:
-        self._motors.receive_pulses(self._millis, *messages.decode_motor(payload))
+    def _drive_motors(self, left_us: int, right_us: int) -> None:
+        self._motors.receive_pulses(self._millis, left_us, right_us)
         self.blocked_us = PULSES_US
 
-    def _calibrate_ir(self, payload: bytes) -> bytes:
-        self._flash.ir_calibration_counts_m2 = list(messages.decode_ir_calibration(payload))
+    def _calibrate_ir(self, *calibration_counts_m2: float) -> bytes:
+        self._flash.ir_calibration_counts_m2 = list(calibration_counts_m2)
         text = "IR calibration parameters have been successfully recorded!"
         return self._record(ids.ID_IR_CALIBRATION_ANSWER, text)
 
-    def _set_odom(self, payload: bytes) -> bytes:
-        self._sensing.set_odometry(messages.decode_set_odom(payload))
+    def _set_odom(self, x_m: float, y_m: float, theta_rad: float) -> bytes:
+        self._sensing.set_odometry(Pose(x_m, y_m, theta_rad))
         self._log("[HERO] Odometry was changed!")
         return _answer(ids.ID_SET_ODOM_ANSWER, True, "Odometry was changed!")
 
-    def _set_motors(self, payload: bytes) -> bytes:
-        centers_us = messages.decode_motor(payload)
+    def _set_motors(self, *centers_us: int) -> bytes:
         self._flash.motor_centers_us = [float(center_us) for center_us in centers_us]
         self._motors.motors.centers_us = list(centers_us)
         return self._record(ids.ID_MOTORS_PARAMETERS_ANSWER, "Motor Parameters has been succesfully recorded!")
@@ -116,17 +131,17 @@ class CommandTable:
         self._log(text)
         return _answer(answer_id, True, text)
 
-    def _set_position_pid(self, payload: bytes) -> bytes:
-        self._flash.position_pid = list(messages.decode_pid(payload))
-        self._motors.position.set_gains(self._flash.position_pid)
-        return self._record_pid(ids.ID_POSITION_PID_PARAMETERS_ANSWER, self._flash.position_pid)
+    def _set_position_pid(self, *gains: float) -> bytes:
+        self._flash.position_pid = list(gains)
+        self._motors.position.set_gains(gains)
+        return self._record_pid(ids.ID_POSITION_PID_PARAMETERS_ANSWER, gains)
 
-    def _set_velocity_pid(self, payload: bytes) -> bytes:
-        self._flash.velocity_pid = list(messages.decode_pid(payload))
-        self._motors.velocity.set_gains(self._flash.velocity_pid)
-        return self._record_pid(ids.ID_VELOCITY_PID_PARAMETERS_ANSWER, self._flash.velocity_pid)
+    def _set_velocity_pid(self, *gains: float) -> bytes:
+        self._flash.velocity_pid = list(gains)
+        self._motors.velocity.set_gains(gains)
+        return self._record_pid(ids.ID_VELOCITY_PID_PARAMETERS_ANSWER, gains)
 
-    def _record_pid(self, answer_id: int, gains: List[float]) -> bytes:
+    def _record_pid(self, answer_id: int, gains: Sequence[float]) -> bytes:
         text = "PID Parameters has been succesfully recorded!"
         self._log_green("Left  Motor PID = [%f, %f, %f]" % tuple(gains[:3]))
         self._log_green("Right Motor PID = [%f, %f, %f]" % tuple(gains[3:]))
@@ -145,12 +160,10 @@ class CommandTable:
     def _log_green(self, text: str) -> None:
         self._log("\x1b[92m[/%s] %s\x1b[0m" % (self._name, text))
 
-    def _tune_position(self, payload: bytes) -> bytes:
-        del payload
+    def _tune_position(self) -> bytes:
         return self._tune(ids.ID_POSITION_PID_CALIBRATION_ANSWER, of_velocity=False)
 
-    def _tune_velocity(self, payload: bytes) -> bytes:
-        del payload
+    def _tune_velocity(self) -> bytes:
         return self._tune(ids.ID_VELOCITY_PID_CALIBRATION_ANSWER, of_velocity=True)
 
     def _tune(self, answer_id: int, of_velocity: bool) -> bytes:

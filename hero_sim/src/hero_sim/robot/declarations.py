@@ -96,6 +96,11 @@ DECLARATIONS: Tuple[Tuple[int, int, str, str], ...] = (
 )
 
 
+def find_type(topic_id: int) -> str:
+    """Return the type of a declared topic or service."""
+    return next(message_type for _, declared_id, _, message_type in DECLARATIONS if declared_id == topic_id)
+
+
 def encode_declarations(name: str) -> bytes:
     """Return the packets with which the robot called name (hero_N) declares everything, in one burst."""
     burst = b""

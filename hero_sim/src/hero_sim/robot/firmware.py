@@ -7,7 +7,7 @@ Source: the firmware's files named at the constants, and measurements of the com
 """
 
 from collections import deque
-from typing import Callable, Deque, List, NamedTuple, Optional, Tuple
+from typing import Callable, Deque, List, Optional, Tuple
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from .flash import Flash
 from .motor_control import MotorControl
 from .sensing import Sensing
 
-__all__ = ["Firmware", "FirmwareOptions"]
+__all__ = ["Firmware"]
 
 VERSIONS = "Firmware: v3.8 | Hardware: v2.5 | Config: v2.3"
 
@@ -63,14 +63,6 @@ _PHASE_LOOP = "loop"
 _TIME_REQUEST = packets.encode_packet(packets.ID_TIME, bytes(8))
 
 
-class FirmwareOptions(NamedTuple):
-    """What is chosen for a robot at the start of the simulator."""
-
-    imu_hat: bool = False
-    exact_odometry: bool = False
-    address: str = "127.0.0.1"  # as the boot line names it
-
-
 class Firmware:
     """The program of one robot.
 
@@ -93,13 +85,13 @@ class Firmware:
         body: Body,
         flash: Flash,
         rng: np.random.RandomState,
-        options: FirmwareOptions,
+        address: str,
+        has_imu_hat: bool,
         report: Callable[[str], None],
     ) -> None:
-        """Build a robot that is switched off; report takes lines for people."""
+        """Build a robot that is switched off; address is for its boot line, report takes lines for people."""
         self.robot_id = robot_id
         self.name = "hero_%d" % robot_id
-        self.options = options
         self.flash = flash
         self.rng = rng
         self.body = body
@@ -108,6 +100,8 @@ class Firmware:
         self.due_ms = 0
         self.zero_topics_next = False
         self.answer_delay_ms = 0
+        self._address = address
+        self._has_imu_hat = has_imu_hat
         self._report = report
         self._phase = _PHASE_OFF
         self._booted_at_ms = 0
@@ -116,9 +110,9 @@ class Firmware:
 
     def _reset_memory(self) -> None:
         """Give everything that lives in RAM its first value."""
-        name, body, flash, options = self.name, self.body, self.flash, self.options
+        name, body, flash = self.name, self.body, self.flash
         self.clock = RobotClock()
-        self.sensing = Sensing(name, body, options.imu_hat, options.exact_odometry, flash)
+        self.sensing = Sensing(name, body, self._has_imu_hat, flash)
         self.motors = MotorControl(name, body, self.sensing.odometry, flash, self.rng, self.log)
         self._commands = CommandTable(name, self.sensing, self.motors, flash, self.log, self.warn)
         self._declarations = declarations.encode_declarations(name)
@@ -149,7 +143,6 @@ class Firmware:
         self.switch_off()
         self._booted_at_ms = now_ms
         self._phase = _PHASE_BOOT
-        self.sensing.show_searching()
         self.due_ms = now_ms + BOOT_MS
 
     def switch_off(self) -> None:
@@ -255,6 +248,7 @@ class Firmware:
     def _connect_first(self, now_ms: int) -> None:
         timeout_at_ms = self._booted_at_ms + BOOT_MS + CONNECT_TIMEOUT_MS
         if not self.connected and not self.wants_connection and now_ms < timeout_at_ms:
+            self.sensing.show_searching()
             self.wants_connection = True
             self.due_ms = timeout_at_ms
         else:
@@ -264,7 +258,7 @@ class Firmware:
     def _begin_setup(self, now_ms: int) -> None:
         """Go on with setup() after the attempt to connect (ROSHandle.ino:92-94, firmware.ino:114-140)."""
         self._phase = _PHASE_SETUP
-        self.log("\x1b[94m[/%s] %s | IP: %s \x1b[0m" % (self.name, VERSIONS, self.options.address))
+        self.log("\x1b[94m[/%s] %s | IP: %s \x1b[0m" % (self.name, VERSIONS, self._address))
         # The first spin comes before anything is advertised; a request that is in by then meets no topics.
         first_spin_ms = now_ms + int(self.rng.randint(0, 3))
         self._setup = [
@@ -289,7 +283,7 @@ class Firmware:
     def _log_imu(self, now_ms: int) -> None:
         del now_ms
         self._advertised = True
-        if self.options.imu_hat:
+        if self._has_imu_hat:
             self.log("\x1b[92m[%s] IMU hat detected!\x1b[0m" % self.name)
         else:
             self.log("\x1b[91m[%s] IMU is not working or not connected! Error: 1\x1b[0m" % self.name)

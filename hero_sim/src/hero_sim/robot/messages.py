@@ -1,4 +1,4 @@
-"""The robot's messages as the bytes of their packets, as the stock firmware writes and reads them.
+"""The robot's messages as the bytes of their packets, as the stock firmware writes them.
 
 Pure. A message is built once per robot as a template; afterwards only the fields that change are patched, so
 that a hundred robots cost little. float64 fields hold float32 values, because the robot's ros_lib computes in
@@ -12,7 +12,6 @@ from typing import List, Sequence, Tuple
 
 from hero_driver.rosserial import packets
 
-from ..errors import CommandError
 from ..robot_constants import TICKS_PER_TURN, WHEEL_SEPARATION_M
 from ..world.kinematics import Pose
 from . import declarations
@@ -227,52 +226,3 @@ class ImuMessages:
 def encode_answer(success: bool, text: str) -> bytes:
     """Return the payload of a service's response: bool success, string message."""
     return bytes((success,)) + _text(text)
-
-
-def _unpack(form: str, payload: bytes, what: str) -> Tuple:
-    if len(payload) != struct.calcsize(form):
-        raise CommandError("%s has %d bytes instead of %d" % (what, len(payload), struct.calcsize(form)))
-    return struct.unpack(form, payload)
-
-
-def _check_usable(values: Tuple, what: str) -> Tuple:
-    """Return values with which the firmware computes; what a real robot does with nan or inf nobody knows."""
-    if not all(abs(value) < 1e30 for value in values):
-        raise CommandError("%s with %s, with which a real robot would do anything" % (what, list(values)))
-    return values
-
-
-def decode_twist(payload: bytes) -> Tuple[float, float]:
-    """Return linear (m/s) and angular speed (rad/s) of a geometry_msgs/Twist. Raises: CommandError."""
-    values = _unpack("<6d", payload, "Twist")
-    return _check_usable((values[0], values[5]), "Twist")
-
-
-def decode_motor(payload: bytes) -> Tuple[int, int]:
-    """Return the servo pulses (us) of a Motor message or a SetMotor request. Raises: CommandError."""
-    return _unpack("<2h", payload, "Motor")
-
-
-def decode_color(payload: bytes) -> Tuple[float, float, float, float]:
-    """Return red, green, blue and alpha (0..1) of a ColorRGBA. Raises: CommandError."""
-    return _unpack("<4f", payload, "ColorRGBA")
-
-
-def decode_bool(payload: bytes) -> bool:
-    """Return a std_msgs/Bool. Raises: CommandError."""
-    return bool(_unpack("<B", payload, "Bool")[0])
-
-
-def decode_set_odom(payload: bytes) -> Pose:
-    """Return the pose of a SetOdom request. Raises: CommandError."""
-    return Pose(*_check_usable(_unpack("<3d", payload, "SetOdom"), "SetOdom"))
-
-
-def decode_pid(payload: bytes) -> Tuple[float, ...]:
-    """Return lkp lki lkd rkp rki rkd of a SetPID request. Raises: CommandError."""
-    return _check_usable(_unpack("<6f", payload, "SetPID"), "SetPID")
-
-
-def decode_ir_calibration(payload: bytes) -> Tuple[float, ...]:
-    """Return the eight constants (counts m^2) of a SetIRCalibration request. Raises: CommandError."""
-    return _unpack("<8d", payload, "SetIRCalibration")

@@ -48,14 +48,14 @@ class Sensing:
         odometry: the robot's own view of its wheels.
     """
 
-    def __init__(self, name: str, body: Body, imu_hat: bool, exact_odometry: bool, flash: Flash) -> None:
+    def __init__(self, name: str, body: Body, has_imu_hat: bool, flash: Flash) -> None:
         """Build the sensors of the robot called name (hero_N)."""
         self.due_ms = 0
         self.laser_enabled = True
-        self.odometry = WheelOdometry(exact_odometry, *body.travels_m)
+        self.odometry = WheelOdometry(*body.travels_m)
         self._body = body
         self._flash = flash
-        self._imu = ImuHat(body.true_pose.theta_rad) if imu_hat else None
+        self._imu = ImuHat(body.true_pose.theta_rad) if has_imu_hat else None
         self._cycle_messages = messages.CycleMessages(name)
         self._laser_messages = messages.LaserMessages(name)
         self._imu_messages = messages.ImuMessages(name)

@@ -44,15 +44,13 @@ class WheelOdometry:
         filtered_m_s: speeds of the left and right wheel, behind the filter, as last read.
     """
 
-    def __init__(self, exact: bool = False, left_m: float = 0.0, right_m: float = 0.0) -> None:
-        """Count from wheel travels left_m and right_m on; with exact, no interval is missed (a repaired firmware)."""
+    def __init__(self, left_m: float, right_m: float) -> None:
+        """Count from wheel travels left_m and right_m on."""
         self.pose = Pose(0.0, 0.0, 0.0)
         self.ticks = (0, 0)
         self.filtered_m_s = (0.0, 0.0)
-        self._exact = exact
         self._counted_ticks = (math.floor(left_m / TICK_M), math.floor(right_m / TICK_M))
         self._base_ticks = self._counted_ticks
-        self._integrated_ticks = (0, 0)
         self._diff_ticks = (0, 0)
         self._read_at_us = 0
         self._timestep_s = 0.0
@@ -82,9 +80,6 @@ class WheelOdometry:
     def integrate(self) -> None:
         """Add the last interval to the pose."""
         left, right = self._diff_ticks
-        if self._exact:
-            left, right = self.ticks[0] - self._integrated_ticks[0], self.ticks[1] - self._integrated_ticks[1]
-            self._integrated_ticks = self.ticks
         if left == right == 0:
             return
         travel_m, rotation_rad = join_wheels(left * TICK_M, right * TICK_M)
@@ -100,7 +95,7 @@ class WheelOdometry:
         """Begin anew at this pose; the tick counters go to zero (Odometry.ino:234)."""
         self.pose = pose
         self._base_ticks = self._counted_ticks
-        self.ticks = self._diff_ticks = self._integrated_ticks = (0, 0)
+        self.ticks = self._diff_ticks = (0, 0)
 
     def set_heading(self, theta_rad: float) -> None:
         """Overrule the heading, as the robot does when it has an IMU."""

@@ -19,8 +19,6 @@ START_GAP_M = 0.05
 
 _MOST_TRIES = 2000
 
-Segment = Tuple[float, float, float, float]  # x1 y1 x2 y2
-
 
 class Arena(NamedTuple):
     """Walls, obstacles and starts of one world.
@@ -30,7 +28,7 @@ class Arena(NamedTuple):
         segments_m: walls and the edges of polygons, shape (S, 4), x1 y1 x2 y2.
         circles_m: round obstacles, shape (C, 3), x y radius.
         starts: free poses of the first robots; the others are placed at random.
-        bounds_m: x min, y min, x max, y max of the area in which robots are placed.
+        bounds_m: x min, y min, x max, y max of the area in which robots are placed, shape (4,).
         polygons_m: the corners of each solid polygon, whose edges are among the segments.
     """
 
@@ -38,13 +36,13 @@ class Arena(NamedTuple):
     segments_m: np.ndarray
     circles_m: np.ndarray
     starts: Tuple[Pose, ...]
-    bounds_m: Segment
+    bounds_m: np.ndarray
     polygons_m: Tuple[np.ndarray, ...] = ()
 
 
-def outline(corners_m: List[Tuple[float, float]]) -> List[Segment]:
-    """Return the walls that close the polygon of corners_m."""
-    return [(*corner, *following) for corner, following in zip(corners_m, corners_m[1:] + corners_m[:1])]
+def outline(corners_m: np.ndarray) -> np.ndarray:
+    """Return the walls (S, 4) around the polygon of corners_m (S, 2)."""
+    return np.hstack((corners_m, np.roll(corners_m, -1, axis=0)))
 
 
 def build_rectangle(width_m: float, height_m: float, robots: int) -> Arena:
@@ -61,8 +59,9 @@ def build_rectangle(width_m: float, height_m: float, robots: int) -> Arena:
         start_x_m = -x_m + width_m * (column + 0.5) / columns
         start_y_m = -y_m + height_m * (row + 0.5) / rows
         starts.append(Pose(start_x_m, start_y_m, _find_tangent(start_x_m, start_y_m)))
-    walls = outline([(-x_m, -y_m), (x_m, -y_m), (x_m, y_m), (-x_m, y_m)])
-    return Arena("rectangle", np.array(walls), np.empty((0, 3)), tuple(starts), (-x_m, -y_m, x_m, y_m))
+    walls = outline(np.array([(-x_m, -y_m), (x_m, -y_m), (x_m, y_m), (-x_m, y_m)]))
+    bounds_m = np.array([-x_m, -y_m, x_m, y_m])
+    return Arena("rectangle", walls, np.empty((0, 3)), tuple(starts), bounds_m)
 
 
 def build_default(robots: int) -> Arena:
@@ -81,14 +80,16 @@ def _find_tangent(x_m: float, y_m: float) -> float:
     return math.remainder((wall + 1) * (math.pi / 2.0), 2.0 * math.pi)
 
 
+def list_obstacles(arena: Arena) -> Tuple[np.ndarray, np.ndarray]:
+    """Return all obstacles as segments (K, 4) with a radius (K,): walls have none, circles have no length."""
+    segments_m = np.vstack((arena.segments_m, arena.circles_m[:, [0, 1, 0, 1]]))
+    return segments_m, np.concatenate((np.zeros(len(arena.segments_m)), arena.circles_m[:, 2]))
+
+
 def measure_clearance(points_m: np.ndarray, arena: Arena) -> np.ndarray:
     """Return the distance (m) of each point (P, 2) to the nearest wall or obstacle, negative inside one."""
-    clearance_m = np.full(len(points_m), np.inf)
-    if len(arena.segments_m):
-        clearance_m = np.minimum(clearance_m, distance_to_segments(points_m, arena.segments_m)[0].min(axis=1))
-    if len(arena.circles_m):
-        apart_m = np.hypot(*(points_m[:, None, :] - arena.circles_m[:, :2]).transpose(2, 0, 1))
-        clearance_m = np.minimum(clearance_m, (apart_m - arena.circles_m[:, 2]).min(axis=1))
+    obstacles_m, radii_m = list_obstacles(arena)
+    clearance_m = (distance_to_segments(points_m, obstacles_m)[0] - radii_m).min(axis=1, initial=np.inf)
     for corners_m in arena.polygons_m:
         clearance_m = np.where(_lies_inside(points_m, corners_m), -np.abs(clearance_m), clearance_m)
     return clearance_m

@@ -1,15 +1,16 @@
-"""Arenas from YAML files; a wrong file is refused with file, line and reason. The format is in the README."""
+"""Arenas from YAML files; a wrong file is refused with its name, the key and the reason. The format is in the README."""
 
 import math
 import os
-from typing import Any, List, Tuple
+import reprlib
+from typing import Any, Dict, List
 
 import numpy as np
+import yaml
 
 from ..errors import OptionError
 from ..robot_constants import BODY_RADIUS_M
-from ..yaml_file import describe_node, fail_at, read_mapping, read_nodes
-from .arena import Arena, Segment, is_free, outline
+from .arena import Arena, is_free, outline
 from .kinematics import Pose
 
 __all__ = ["SHIPPED", "load_arena"]
@@ -24,106 +25,95 @@ _KEYS = ("name", "bounds_m", "walls_m", "circles_m", "polygons_m", "starts_m_deg
 def load_arena(name: str) -> Arena:
     """Return the arena of a shipped name or of the file at that path.
 
-    Raises: OptionError with file, line and reason.
+    Raises: OptionError with file and reason.
     """
     path = name
     if name in SHIPPED:
         path = os.path.join(os.path.dirname(os.path.abspath(__file__)), "arenas", name + ".yaml")
-    root = read_nodes(path, "arena " + path, "shipped are " + ", ".join(SHIPPED))
-    return _Reader(path).read(root)
+    content = _read_yaml(path)
+    try:
+        return _build_arena(content, os.path.basename(path))
+    except ValueError as error:
+        raise OptionError("arena %s: %s" % (path, error)) from error
 
 
-class _Reader:
-    """Reads the nodes of one file, which know their lines."""
+def _read_yaml(path: str) -> Any:
+    """Return what the file holds as mappings, lists and texts. Raises: OptionError."""
+    try:
+        with open(path, encoding="utf-8") as file:
+            # Numbers stay texts: what YAML takes for dates, booleans or objects has no meaning here.
+            return yaml.BaseLoader(file.read()).get_single_data()
+    except OSError as error:
+        raise OptionError(
+            "arena %s cannot be read: %s; shipped are %s" % (path, error.strerror, ", ".join(SHIPPED))
+        ) from error
+    except RecursionError as error:
+        raise OptionError("arena %s: lists within lists, deeper than can be read" % path) from error
+    except (UnicodeDecodeError, yaml.YAMLError) as error:
+        raise OptionError("arena %s: %s" % (path, " ".join(str(error).split()))) from error
 
-    def __init__(self, path: str) -> None:
-        self._path = path
 
-    def _fail(self, node: Any, reason: str) -> OptionError:
-        return fail_at(self._path, node, reason)
-
-    def read(self, root: Any) -> Arena:
-        known = ", ".join(_KEYS)
-        entries = read_mapping(self._path, root, "an arena is a mapping with the keys " + known)
-        for key, (key_node, _) in entries.items():
-            if key not in _KEYS:
-                raise self._fail(key_node, "unknown key %s; known are %s" % (describe_node(key_node), known))
-        nodes = {key: entries[key][1] if key in entries else None for key in _KEYS}
-        walls = [self._read_points(node, 2, "a wall") for node in self._list_items(nodes, "walls_m")]
-        polygons = [self._read_points(node, 3, "a polygon") for node in self._list_items(nodes, "polygons_m")]
-        circles = [self._read_circle(node) for node in self._list_items(nodes, "circles_m")]
-        segments = [(*start, *end) for points in walls for start, end in zip(points, points[1:])]
-        segments += [edge for corners in polygons for edge in outline(corners)]
-        arena = Arena(
-            self._read_name(nodes["name"]),
-            np.array(segments, dtype=float).reshape(-1, 4),
-            np.array(circles, dtype=float).reshape(-1, 3),
-            (),
-            self._read_bounds(nodes["bounds_m"], root, segments),
-            tuple(np.array(corners) for corners in polygons),
-        )
-        starts: List[Pose] = []
-        for node in self._list_items(nodes, "starts_m_deg"):
-            starts.append(self._read_start(node, starts, arena))
-        return arena._replace(starts=tuple(starts))
-
-    def _read_name(self, node: Any) -> str:
-        if node is None:
-            return os.path.basename(self._path)
-        # It is printed in terminals.
-        if node.id != "scalar" or not node.value.isprintable():
-            raise self._fail(node, "name must be one line of text, not %s" % describe_node(node))
-        return str(node.value)
-
-    def _read_circle(self, node: Any) -> List[float]:
-        circle = self._read_numbers(node, 3, "a circle: x, y, radius")
-        if circle[2] <= 0:
-            raise self._fail(node, "a circle's radius must be more than 0, not %g" % circle[2])
-        return circle
-
-    def _read_start(self, node: Any, others: List[Pose], arena: Arena) -> Pose:
-        x_m, y_m, heading_deg = self._read_numbers(node, 3, "a start: x, y, heading in degrees")
+def _build_arena(content: Any, file_name: str) -> Arena:
+    """Return the arena of a file's content. Raises: ValueError."""
+    if not isinstance(content, dict):
+        raise ValueError("must be a mapping with the keys " + ", ".join(_KEYS))
+    for key in content:
+        if key not in _KEYS:
+            raise ValueError("unknown key %s; known are %s" % (reprlib.repr(key), ", ".join(_KEYS)))
+    name = content.get("name", file_name)
+    if not isinstance(name, str) or not name.isprintable():  # it is printed in terminals
+        raise ValueError("name must be one line of text, not " + reprlib.repr(name))
+    walls_m = [_read_rows("walls_m", wall, 2, least=2) for wall in _list_items(content, "walls_m")]
+    polygons_m = [_read_rows("polygons_m", corners, 2, least=3) for corners in _list_items(content, "polygons_m")]
+    circles_m = _read_rows("circles_m", _list_items(content, "circles_m"), 3)
+    if not (circles_m[:, 2] > 0.0).all():
+        raise ValueError("circles_m: a radius must be more than 0")
+    edges_m = [np.hstack((points_m[:-1], points_m[1:])) for points_m in walls_m]
+    edges_m += [outline(corners_m) for corners_m in polygons_m]
+    segments_m = np.vstack([np.empty((0, 4)), *edges_m])
+    bounds_m = _read_bounds(content, segments_m)
+    arena = Arena(name, segments_m, circles_m, (), bounds_m, tuple(polygons_m))
+    starts: List[Pose] = []
+    for x_m, y_m, heading_deg in _read_rows("starts_m_deg", _list_items(content, "starts_m_deg"), 3).tolist():
         start = Pose(x_m, y_m, math.radians(heading_deg))
-        if not is_free(start, others, arena, BODY_RADIUS_M):
-            reason = "the start at (%g, %g) touches a wall, an obstacle or another start; " % (x_m, y_m)
-            raise self._fail(node, reason + "robots need %.3f m around their center" % BODY_RADIUS_M)
-        return start
+        if not is_free(start, starts, arena, BODY_RADIUS_M):
+            raise ValueError(
+                "the start at (%g, %g) touches a wall, an obstacle or another start; robots need %.3f m"
+                " around their center" % (x_m, y_m, BODY_RADIUS_M)
+            )
+        starts.append(start)
+    return arena._replace(starts=tuple(starts))
 
-    def _read_bounds(self, node: Any, root: Any, segments: List[Segment]) -> Segment:
-        if node is not None:
-            x_min, y_min, x_max, y_max = self._read_numbers(node, 4, "bounds_m: x min, y min, x max, y max")
-            if not (x_min < x_max and y_min < y_max):
-                raise self._fail(node, "bounds_m: the minimum must be less than the maximum")
-            return x_min, y_min, x_max, y_max
-        if not segments:
-            raise self._fail(root, "an arena without walls needs bounds_m: [x min, y min, x max, y max]")
-        ends_m = np.array(segments).reshape(-1, 2)
-        return (*ends_m.min(axis=0).tolist(), *ends_m.max(axis=0).tolist())
 
-    def _list_items(self, nodes: Any, key: str) -> List[Any]:
-        node = nodes[key]
-        if node is None or node.id == "scalar" and node.value in ("", "null", "~"):
-            return []
-        if node.id != "sequence":
-            raise self._fail(node, "%s must be a list" % key)
-        return list(node.value)
+def _read_bounds(content: Dict[str, Any], segments_m: np.ndarray) -> np.ndarray:
+    if "bounds_m" in content:
+        bounds_m = _read_rows("bounds_m", [content["bounds_m"]], 4)[0]
+        if not (bounds_m[:2] < bounds_m[2:]).all():
+            raise ValueError("bounds_m: the minimum must be less than the maximum")
+        return bounds_m
+    if not len(segments_m):
+        raise ValueError("an arena without walls needs bounds_m: [x min, y min, x max, y max]")
+    ends_m = segments_m.reshape(-1, 2)
+    return np.hstack((ends_m.min(axis=0), ends_m.max(axis=0)))
 
-    def _read_points(self, node: Any, least: int, what: str) -> List[Tuple[float, float]]:
-        if node.id != "sequence" or len(node.value) < least:
-            raise self._fail(node, "%s must be a list of at least %d points [x, y]" % (what, least))
-        points = [self._read_numbers(point, 2, "a point: x, y") for point in node.value]
-        return [(x_m, y_m) for x_m, y_m in points]
 
-    def _read_numbers(self, node: Any, count: int, what: str) -> List[float]:
-        if node.id != "sequence" or len(node.value) != count:
-            raise self._fail(node, "expected %d numbers for %s" % (count, what))
-        return [self._read_number(item, what) for item in node.value]
+def _list_items(content: Dict[str, Any], key: str) -> List[Any]:
+    items = content.get(key) or []
+    if not isinstance(items, list):
+        raise ValueError("%s must be a list, not %s" % (key, reprlib.repr(items)))
+    return items
 
-    def _read_number(self, node: Any, what: str) -> float:
-        try:
-            number = float(node.value)
-        except (TypeError, ValueError) as error:
-            raise self._fail(node, "%s is not a number (%s)" % (describe_node(node), what)) from error
-        if not abs(number) <= _LARGEST_M:
-            raise self._fail(node, "%s is not between -1000 and 1000 (%s)" % (describe_node(node), what))
-        return number
+
+def _read_rows(key: str, value: Any, columns: int, least: int = 0) -> np.ndarray:
+    """Return a list of lists of columns numbers as an array (rows, columns). Raises: ValueError."""
+    try:
+        rows = np.array(value, dtype=float).reshape(-1, columns) if value else np.empty((0, columns))
+    except (TypeError, ValueError):
+        rows = np.full((1, columns), np.nan)
+    nested = isinstance(value, list) and all(isinstance(row, list) and len(row) == columns for row in value)
+    if not nested or len(rows) < least or not (np.abs(rows) <= _LARGEST_M).all():
+        raise ValueError(
+            "%s: %s is not a list of %sentries of %d numbers, each from -1000 to 1000"
+            % (key, reprlib.repr(value), "at least %d " % least if least else "", columns)
+        )
+    return rows

@@ -79,10 +79,6 @@ class Body:
         """Stop the pulses: the wheels come to rest."""
         self._world.commands_m_s[self.index] = 0.0
 
-    def push(self, speed_m_s: float, for_ms: int) -> None:
-        """Push the robot forward by hand for so long, whatever the servos do; its wheels turn with it."""
-        self._world.pushes[self.index] = (speed_m_s, self._world.time_ms + for_ms)
-
 
 def _convert_pulse(beyond_us: float, dead_zone_us: float, gain: float) -> float:
     """Return the wheel speed (m/s) of a servo whose pulse lies so far beyond its center, forward positive."""

@@ -1,20 +1,19 @@
 """How each robot differs from the drawing: drawn from a seed, or set to known values.
 
-`KEY=VALUE,...[,robot=ID]` on the command line (--error), or a YAML file (--errors); the keys are those of KINDS.
-Pure but for the reading of that file. A robot's own calibration is in its flash, not here.
+`KEY=VALUE,...[,robot=ID]` on the command line (--error); the keys are those of KINDS. Pure. A robot's own
+calibration is in its flash, not here.
 """
 
-from typing import Any, Dict, List, NamedTuple, Sequence
+from typing import Dict, List, NamedTuple, Sequence
 
 import numpy as np
 
-from ..errors import OptionError
-from ..yaml_file import fail_at, read_mapping, read_nodes
+from ..key_values import parse_values
 from .range_sensors import ALPHA_COUNTS_M2, BEAMS, BETA_COUNTS
 
 __all__ = [
     "KINDS", "MAX_WHEEL_M_S", "SERVO_CENTER_US", "SERVO_GAIN_M_S_US", "RobotErrors", "describe_errors",
-    "describe_keys", "describe_robot", "draw_errors", "load_known", "set_known",
+    "describe_keys", "draw_errors", "set_known",
 ]  # fmt: skip
 
 SERVO_CENTER_US = 1500.0
@@ -112,78 +111,19 @@ def set_known(errors: RobotErrors, first_id: int, text: str) -> None:
 
     Raises: OptionError that names what is wrong and what would do.
     """
-    values: Dict[str, float] = {}
+    limits = {key: (kind.least, kind.most) for key, kind in KINDS.items()}
+    values = parse_values("--error " + text, text, {"robot": (first_id, first_id + len(errors.slip) - 1), **limits})
     rows = _ALL
-    for pair in text.split(","):
-        key, equals, value_text = (part.strip() for part in pair.partition("="))
-        try:
-            if not equals:
-                raise ValueError("%r is not KEY=VALUE" % pair)
-            if key == "robot":
-                rows = _find_rows(value_text, len(errors.slip), first_id)
-            else:
-                values[key] = _read_value(key, value_text)
-        except ValueError as error:
-            raise OptionError("--error %s: %s" % (text, error)) from error
-    _set_values(errors, rows, values)
-
-
-def load_known(errors: RobotErrors, first_id: int, path: str) -> None:
-    """Put the file at path over what was drawn: a mapping of all or hero_N to keys and values.
-
-    Raises: OptionError with file, line and reason.
-    """
-    root = read_nodes(path, "--errors " + path, "--print-errors writes such a file")
-    robots = read_mapping(path, root, "must map all, hero_0, hero_1, ... to keys and values")
-    # What holds for all comes first, so that single robots can differ from it.
-    for name in sorted(robots, key=lambda name: name != "all"):
-        node, entries_node = robots[name]
-        values: Dict[str, float] = {}
-        try:
-            robot_id = name[len("hero_") :] if name.startswith("hero_") else name
-            rows = _ALL if name == "all" else _find_rows(robot_id, len(errors.slip), first_id)
-            entries = read_mapping(path, entries_node, "%s must be a mapping of keys to numbers" % name)
-            for key, (_, node) in entries.items():
-                values[key] = _read_value(key, node.value if node.id == "scalar" else None)
-        except ValueError as error:
-            raise fail_at(path, node, str(error)) from error
-        _set_values(errors, rows, values)
-
-
-def _read_value(key: str, text: Any) -> float:
-    kind = KINDS.get(key)
-    if kind is None:
-        raise ValueError("unknown key %r; known are %s" % (key, ", ".join(KINDS)))
-    try:
-        number = float(text)
-    except (TypeError, ValueError) as error:
-        found = "a list or a mapping" if text is None else repr(text)
-        raise ValueError("%s must be a number, not %s" % (key, found)) from error
-    if not kind.least <= number <= kind.most:
-        raise ValueError("%s %g is not in %g..%g" % (key, number, kind.least, kind.most))
-    return number
-
-
-def _find_rows(text: str, count: int, first_id: int) -> slice:
-    try:
-        row = int(text) - first_id
-    except ValueError as error:
-        raise ValueError("robot %r is not a number" % text) from error
-    if not 0 <= row < count:
-        raise ValueError(
-            "robot %s is not simulated here (%d to %d)" % (text, first_id, first_id + count - 1)
-        )
-    return slice(row, row + 1)
-
-
-def _set_values(errors: RobotErrors, rows: slice, values: Dict[str, float]) -> None:
+    if "robot" in values:
+        row = int(values.pop("robot")) - first_id
+        rows = slice(row, row + 1)
     # A key for all sensors comes first, so that single ones can differ from it.
     for key in sorted(values, key=lambda key: KINDS[key].columns != _ALL):
         getattr(errors, KINDS[key].array)[rows, KINDS[key].columns] = values[key]
 
 
 def describe_keys() -> List[str]:
-    """Return one line for each key of --error and --errors."""
+    """Return one line for each key of --error."""
     lines = ["KEY=VALUE,...[,robot=ID]; without robot it holds for all robots."]
     for key, kind in KINDS.items():
         lines.append("  %-16s %s (%g..%g)" % (key, kind.meaning, kind.least, kind.most))
@@ -191,15 +131,10 @@ def describe_keys() -> List[str]:
 
 
 def describe_errors(errors: RobotErrors, first_id: int) -> List[str]:
-    """Return all differences as lines of a file for --errors."""
+    """Return all differences, a line for each robot, as --error takes it."""
     lines: List[str] = []
     for row in range(len(errors.slip)):
-        lines.append("hero_%d:" % (first_id + row))
-        lines.extend("  " + line for line in describe_robot(errors, row))
+        columns = {key: getattr(errors, kind.array)[row, kind.columns] for key, kind in KINDS.items()}
+        values = ["%s=%.6g" % (key, values[0]) for key, values in columns.items() if len(values) == 1]
+        lines.append(",".join(["robot=%d" % (first_id + row), *values]))
     return lines
-
-
-def describe_robot(errors: RobotErrors, row: int) -> List[str]:
-    """Return the differences of one robot, `KEY: VALUE` each."""
-    columns = {key: getattr(errors, kind.array)[row, kind.columns] for key, kind in KINDS.items()}
-    return ["%s: %.6g" % (key, values[0]) for key, values in columns.items() if len(values) == 1]

@@ -4,13 +4,13 @@ Pure: numpy only. Everything is an array over robots. The robots' bodies set ser
 nothing here knows about messages.
 """
 
-from typing import Dict, List, Tuple
+from typing import List
 
 import numpy as np
 
 from ..robot_constants import BODY_RADIUS_M
 from . import range_sensors
-from .arena import Arena, distance_to_segments
+from .arena import Arena, distance_to_segments, list_obstacles, measure_clearance
 from .kinematics import join_wheels, move_along_arc
 from .robot_errors import RobotErrors
 
@@ -34,7 +34,6 @@ class World:
         commands_m_s: the servos' commands (N, 2), as the wheel speeds they stand for, left and right.
         speeds_m_s, travels_m: of the wheels (N, 2).
         wheel_rows: travels and speeds of the wheels as lists: single reads are much faster than from arrays.
-        pushes: speed and end time of the robots that are pushed by hand, by index.
     """
 
     def __init__(
@@ -50,11 +49,12 @@ class World:
         self.speeds_m_s = np.zeros((count, 2))
         self.travels_m = np.zeros((count, 2))
         self.errors = errors
-        self.pushes: Dict[int, Tuple[float, int]] = {}
         self.wheel_rows: List[List[float]] = []
         # The share of the difference to its command by which a servo's speed changes in one step.
         self._servo_gain = -np.expm1(-STEP_MS / 1000.0 / errors.servo_lag_s)
         self._rng = rng
+        self._obstacles_m, radii_m = list_obstacles(arena)
+        self._free_m = radii_m + BODY_RADIUS_M
         self._update_rows()
 
     def _update_rows(self) -> None:
@@ -69,10 +69,6 @@ class World:
         reached_m_s = np.where(self.commands_m_s == 0.0, 0.0, self.commands_m_s + ripple_m_s)
         self.speeds_m_s += (reached_m_s - self.speeds_m_s) * self._servo_gain
         self.speeds_m_s[np.abs(self.speeds_m_s) < 1e-6] = 0.0
-        for index, (speed_m_s, until_ms) in list(self.pushes.items()):
-            self.speeds_m_s[index] = speed_m_s
-            if self.time_ms >= until_ms:
-                del self.pushes[index]
         self.time_ms += STEP_MS
         if rolled_m.any():
             self._move_bodies(rolled_m)
@@ -111,48 +107,22 @@ class World:
                 distance_m = np.sqrt(np.maximum(distance_m2[firsts, seconds], 1e-12))
                 push_m = apart_m[firsts, seconds] * ((BODY_RADIUS_M - distance_m / 2.0) / distance_m)[:, None]
                 np.add.at(positions_m, firsts, push_m)
-        return self._push_off_walls(positions_m) or self._push_off_circles(positions_m) or moved
-
-    def _push_off_walls(self, positions_m: np.ndarray) -> bool:
-        if not len(self.arena.segments_m):
-            return False
-        distance_m, near_x_m, near_y_m = distance_to_segments(positions_m, self.arena.segments_m)
-        robots, walls = np.nonzero(distance_m < BODY_RADIUS_M - _TOUCH_M)
-        for robot, wall in zip(robots, walls):
-            away_m = positions_m[robot] - (near_x_m[robot, wall], near_y_m[robot, wall])
+        distance_m, near_x_m, near_y_m = distance_to_segments(positions_m, self._obstacles_m)
+        robots, obstacles = np.nonzero(distance_m < self._free_m - _TOUCH_M)
+        for robot, obstacle in zip(robots, obstacles):
+            away_m = positions_m[robot] - (near_x_m[robot, obstacle], near_y_m[robot, obstacle])
             length_m = max(float(np.hypot(*away_m)), 1e-9)
-            if length_m < BODY_RADIUS_M:
-                positions_m[robot] += away_m * ((BODY_RADIUS_M - length_m) / length_m)
-        return len(robots) > 0
-
-    def _push_off_circles(self, positions_m: np.ndarray) -> bool:
-        circles_m = self.arena.circles_m
-        if not len(circles_m):
-            return False
-        apart_m = positions_m[:, None, :] - circles_m[:, :2]
-        distance_m = np.hypot(apart_m[..., 0], apart_m[..., 1])
-        robots, circles = np.nonzero(distance_m < circles_m[:, 2] + BODY_RADIUS_M - _TOUCH_M)
-        for robot, circle in zip(robots, circles):
-            length_m = max(float(distance_m[robot, circle]), 1e-9)
-            free_m = circles_m[circle, 2] + BODY_RADIUS_M
-            positions_m[robot] += apart_m[robot, circle] * ((free_m - length_m) / length_m)
-        return len(robots) > 0
+            if length_m < self._free_m[obstacle]:
+                positions_m[robot] += away_m * ((self._free_m[obstacle] - length_m) / length_m)
+        return moved or len(robots) > 0
 
     def find_overlaps(self) -> np.ndarray:
         """Return which robots (N,) reach more than 1 um into a wall, an obstacle or another robot."""
         positions_m = self.poses[:, :2]
-        overlaps = np.zeros(len(positions_m), dtype=bool)
-        if len(positions_m) > 1:
-            distance_m2 = ((positions_m[:, None, :] - positions_m) ** 2).sum(axis=2)
-            np.fill_diagonal(distance_m2, np.inf)
-            overlaps |= (distance_m2 < (2.0 * BODY_RADIUS_M - _OVERLAP_M) ** 2).any(axis=1)
-        if len(self.arena.segments_m):
-            distance_m, _, _ = distance_to_segments(positions_m, self.arena.segments_m)
-            overlaps |= (distance_m < BODY_RADIUS_M - _OVERLAP_M).any(axis=1)
-        for x_m, y_m, radius_m in self.arena.circles_m:
-            distance_m = np.hypot(positions_m[:, 0] - x_m, positions_m[:, 1] - y_m)
-            overlaps |= distance_m < radius_m + BODY_RADIUS_M - _OVERLAP_M
-        return overlaps
+        distance_m2 = ((positions_m[:, None, :] - positions_m) ** 2).sum(axis=2)
+        np.fill_diagonal(distance_m2, np.inf)
+        overlaps = (distance_m2 < (2.0 * BODY_RADIUS_M - _OVERLAP_M) ** 2).any(axis=1)
+        return overlaps | (measure_clearance(positions_m, self.arena) < BODY_RADIUS_M - _OVERLAP_M)
 
     def measure_body_speeds(self) -> np.ndarray:
         """Return linear (m/s) and angular speed (rad/s) of each robot (N, 2), as its wheels have it."""
