@@ -201,7 +201,7 @@ class Simulator:
         self.swarm.reschedule(index)
 
     def reboot(self, index: int, robot_id: Optional[int] = None, after_ms: int = 0) -> None:
-        """Switch a robot off, and on again after_ms later; its old connection is left without a word, as by a real one."""
+        """Switch a robot off, and on again after_ms; its old connection is left without a word, as by a real one."""
         self.switch_off(index)
         self.swarm.robots[index].switch_on(self.swarm.now_ms + after_ms, robot_id)
         self.swarm.reschedule(index)

@@ -1,4 +1,4 @@
-"""Arenas from YAML files; a wrong file is refused with its name, the key and the reason. The format is in the README."""
+"""Arenas from YAML files; a wrong file is refused with its name and the reason. The format is in the README."""
 
 import math
 import os
