@@ -22,7 +22,7 @@ SOCKET_OWNERS = (
 )
 
 # Each room, and what it may import of its package besides itself; what runs the rooms stands on top and may import all.
-SIM_GROUND = {"errors", "robot_constants", "yaml_file"}
+SIM_GROUND = {"errors", "key_values", "robot_constants"}
 ROOMS = {
     "hero_driver.rosserial": set(),
     "hero_driver.transport": set(),

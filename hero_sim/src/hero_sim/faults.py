@@ -11,15 +11,19 @@ from .key_values import parse_values
 if TYPE_CHECKING:
     from .simulator import Simulator
 
-__all__ = ["KINDS", "Fault", "FaultInjector", "describe_kinds", "parse_fault"]
+__all__ = ["KINDS", "LARGEST_ID", "LONGEST_S", "Fault", "FaultInjector", "describe_kinds", "parse_fault"]
 
-_LARGEST_ID = 2**31 - 1
-_LONGEST_S = 1e9
+LARGEST_ID = 2**31 - 1
+"""Of hero_msgs/Robot."""
+
+LONGEST_S = 1e9
+"""Some thirty years."""
+
 _LIMITS = {
-    "robot": (0, _LARGEST_ID),
-    "for": (0, _LONGEST_S),
-    "by": (-_LONGEST_S, _LONGEST_S),
-    "of": (-1, _LARGEST_ID),
+    "robot": (0, LARGEST_ID),
+    "for": (0, LONGEST_S),
+    "by": (-LONGEST_S, LONGEST_S),
+    "of": (-1, LARGEST_ID),
     "bytes": (0, 65536),
 }
 """Least and most of each key: ids, s, bytes."""
@@ -116,7 +120,7 @@ def parse_fault(text: str) -> Fault:
     kind = KINDS.get(kind_name)
     if kind is None:
         raise OptionError("%s: unknown kind %r; known are %s" % (name, kind_name, ", ".join(KINDS)))
-    at = parse_values(name, "SECONDS=" + at_s if at_s else "", {"SECONDS": (0, _LONGEST_S)})
+    at = parse_values(name, "SECONDS=" + at_s if at_s else "", {"SECONDS": (0, LONGEST_S)})
     values = parse_values(name, tail, {key: _LIMITS[key] for key in ("robot", kind.key) if key is not None})
     robot_id = int(values["robot"]) if "robot" in values else None
     return Fault(kind_name, at.get("SECONDS", 0.0), robot_id, values.get(kind.key or "", kind.default))

@@ -8,7 +8,7 @@ from typing import Callable, Iterator, Optional, Sequence, Tuple
 from . import output
 from .build import build_errors, build_simulator
 from .errors import OptionError
-from .faults import FaultInjector, describe_kinds, parse_fault
+from .faults import LARGEST_ID, LONGEST_S, FaultInjector, describe_kinds, parse_fault
 from .simulator import Simulator
 from .world.robot_errors import describe_errors, describe_keys
 
@@ -18,11 +18,6 @@ DEFAULT_PORT = 11411
 """The port that stock robots connect to."""
 
 MOST_ROBOTS = 1000
-LARGEST_ID = 2**31 - 1
-"""Of hero_msgs/Robot."""
-
-LONGEST_RUN_S = 1e9
-"""Some thirty years."""
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -33,7 +28,7 @@ def build_parser() -> argparse.ArgumentParser:
     add = parser.add_argument
     add("--count", type=int, default=1, metavar="N", help="number of robots (1)")
     add("--first-id", type=int, default=0, metavar="K", help="id of the first robot (0)")
-    add("--arena", metavar="FILE", help="YAML file, or empty, obstacles, maze (a plain field that fits)")
+    add("--arena", metavar="FILE", help="YAML file, or empty, obstacles, maze (a square of 1.5 x 1.5 m, larger from ten robots on)")
     add("--seed", type=int, default=0, help="seed of all random numbers (0)")
     add("--seconds", type=float, metavar="S", help="end after S simulated seconds")
     add("--speed", type=float, default=1.0, metavar="X", help="simulated seconds per second (%(default)s)")
@@ -104,8 +99,8 @@ def check_options(options: argparse.Namespace) -> None:
         name, port, last = ("--serve", serve, serve + count - 1)
     if not (port >= 1 and last <= 65535):
         raise OptionError("%s %d: ports must be 1..65535 (%d robots)" % (name, port, count))
-    if options.seconds is not None and not 0 < options.seconds <= LONGEST_RUN_S:
-        raise OptionError("--seconds %g: must be more than 0, and at most %g" % (options.seconds, LONGEST_RUN_S))
+    if options.seconds is not None and not 0 < options.seconds <= LONGEST_S:
+        raise OptionError("--seconds %g: must be more than 0, and at most %g" % (options.seconds, LONGEST_S))
     if not 0.01 <= options.speed <= 100:
         raise OptionError("--speed %g: must be 0.01..100" % options.speed)
     if not 0 <= options.seed < 2**32:

@@ -71,8 +71,11 @@ class Flash:
         for key, length in _LENGTHS.items():
             values = content.get(key) if isinstance(content, dict) else None
             may_be_erased = key == "ir_calibration_counts_m2"
-            is_list = isinstance(values, list) and len(values) == length
-            if not is_list or not all(_is_storable(value, may_be_erased) for value in values):
+            if (
+                not isinstance(values, list)
+                or len(values) != length
+                or not all(_is_storable(value, may_be_erased) for value in values)
+            ):
                 raise OptionError("flash file %s: %s must be a list of %d numbers; %s" % (path, key, length, _REMEDY))
             setattr(self, key, [float(value) for value in values])
 

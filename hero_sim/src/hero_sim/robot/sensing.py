@@ -31,7 +31,7 @@ LASER_READ_MS = 1
 BLUE_MS = 2000
 """How long the light is blue after the robot came up."""
 
-Color = Tuple[float, float, float, float]  # red, green, blue, alpha (0..1)
+Color = Tuple[float, ...]  # red, green, blue, alpha (0..1)
 
 _BLUE: Color = (0.0, 0.0, 1.0, 1.0)
 _RED: Color = (1.0, 0.0, 0.0, 1.0)
