@@ -15,8 +15,7 @@ import time
 import numpy as np
 
 from hero_driver.rosserial import packets
-from hero_sim.build import build_simulator
-from hero_sim.main import build_parser, stop_on_signals
+from hero_sim.main import build_parser, simulate
 from hero_sim.robot import declarations
 from hero_sim.robot_constants import TICK_M
 
@@ -74,20 +73,15 @@ class Watch:
 
 def main():
     """Run until a signal comes."""
-    options = build_parser().parse_args()
-    simulator, _ = build_simulator(options, lambda text: None)
-    stop_on_signals(simulator)
-    watch = Watch(simulator.swarm)
+    with simulate(build_parser().parse_args(), lambda text: None) as (simulator, _):
+        watch = Watch(simulator.swarm)
 
-    def serve():
-        for line in sys.stdin:
-            print(json.dumps(watch.answer(line.strip())), flush=True)
+        def serve():
+            for line in sys.stdin:
+                print(json.dumps(watch.answer(line.strip())), flush=True)
 
-    threading.Thread(target=serve, daemon=True).start()
-    try:
+        threading.Thread(target=serve, daemon=True).start()
         simulator.run()
-    finally:
-        simulator.link.close_all()
 
 
 if __name__ == "__main__":
