@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The main job with simulated robots: driven, calibrated and stopped, as clients or servers of the driver."""
+"""The main job with simulated robots: driven, calibrated and stopped; of the driver."""
 
 import math
 import re
@@ -21,8 +21,7 @@ from hero_msgs.srv import SetIRCalibration, SetMotor, SetOdom, SetPID
 from hero_test.waiting import wait_for
 
 DEADLINE_S = 30.0
-CLIENTS = (0, 1, 2)
-SERVER = 9
+ROBOTS = (0, 1, 2)
 SPEED_M_S = 0.1
 
 
@@ -92,8 +91,8 @@ class DriverDrivesTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.fleet = Watch("/hero_driver/robots", RobotArray)
-        cls.scans = {number: Watch("/hero_%d/proximity" % number, LaserScan) for number in CLIENTS}
-        numbers = {*CLIENTS, SERVER}
+        cls.scans = {number: Watch("/hero_%d/proximity" % number, LaserScan) for number in ROBOTS}
+        numbers = set(ROBOTS)
         wait_for(
             lambda: (
                 cls.fleet.newest
@@ -143,12 +142,8 @@ class DriverDrivesTest(unittest.TestCase):
         second.truth.wait_more(2)
         self.assertLess(math.dist(second.position, before), 0.001)
 
-    def test_a_robot_that_is_a_server_drives_like_the_others(self):
-        odom_m, truth_m = self.drive_a_bit(self.take(SERVER))
-        self.assertAlmostEqual(odom_m, truth_m, delta=0.1 * truth_m + 0.002)
-
     def test_stop_stops_all_robots_although_commands_continue(self):
-        robots = [self.take(number) for number in (0, 1, SERVER)]
+        robots = [self.take(number) for number in ROBOTS]
         for robot in robots:
             robot.drive(0.0, 2.0)
         for robot in robots:
@@ -163,7 +158,7 @@ class DriverDrivesTest(unittest.TestCase):
             wait_for(lambda r=robot: r.truth.newest.twist.twist.angular.z > 1.0, "the robot to turn again")
 
     def test_three_robots_are_calibrated_and_driven_through_one_driver(self):
-        for number in CLIENTS:
+        for number in ROBOTS:
             namespace = "/hero_%d" % number
             calls = (
                 ("/ir_calibration", SetIRCalibration, [0.42] * 8),
@@ -173,7 +168,7 @@ class DriverDrivesTest(unittest.TestCase):
             for name, service_class, arguments in calls:
                 answer = self.call(namespace + name, service_class, *arguments)
                 self.assertTrue(answer.success, "%s: %s" % (namespace + name, answer.message))
-        robots = [self.take(number) for number in CLIENTS]
+        robots = [self.take(number) for number in ROBOTS]
         for robot in robots:
             wait_for(
                 lambda r=robot: math.hypot(r.odom.newest.pose.pose.position.x - 1.0, 0.0) < 0.01, "x = 1 m"
@@ -200,7 +195,7 @@ class DriverDrivesTest(unittest.TestCase):
         self.addCleanup(subscriber.unregister)
         expected = {
             "hero_%d/%s" % (number, link)
-            for number in (*CLIENTS, SERVER)
+            for number in ROBOTS
             for link in ("base_link", "left_wheel_link", "right_wheel_link", "hat_link", "laser_link")
         }
         wait_for(lambda: expected <= frames, "all frames of all robots")

@@ -18,7 +18,7 @@ PRINTING = (
     ["hotspot", "--help"],
     ["plot", "--help"],
     ["record", "--help"],
-    ["hero_sim", "--fault", "help"],
+    ["hero_sim", "--print-errors"],
 )
 PACKAGES = {
     "calibrate": "hero_calibration",

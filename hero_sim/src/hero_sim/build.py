@@ -91,25 +91,12 @@ def build_swarm(options: argparse.Namespace, addresses: List[str], report: Repor
     return swarm
 
 
-def _describe_start(options: argparse.Namespace, host: str) -> str:
-    """Return what the robots are about to do, in one line."""
-    first, last = options.first_id, options.first_id + options.count - 1
-    who = "hero_%d" % first if first == last else "hero_%d .. hero_%d" % (first, last)
-    if options.serve is None:
-        return "%s: connecting to %s:%d" % (who, host, options.port)
-    last_port = options.serve + options.count - 1
-    ports = "%d" % last_port if first == last else "%d..%d" % (options.serve, last_port)
-    return "%s: awaiting a driver on %s, port %s" % (who, host, ports)
-
-
 def build_simulator(options: argparse.Namespace, report: Report) -> Tuple[Simulator, FaultInjector]:
     """Return the simulator that options describe, and the injector of its faults.
 
     Raises: OptionError for a host, port or arena that cannot be used.
     """
-    serve = options.serve is not None
-    host = options.host or ("0.0.0.0" if serve else "127.0.0.1")
-    link = TcpLink(options.count, host, options.serve if serve else options.port, serve, options.first_id)
+    link = TcpLink(options.count, options.host, options.port, options.first_id)
     try:
         swarm = build_swarm(options, link.own_addresses, report)
         rngs = _Rngs(options)
@@ -121,5 +108,7 @@ def build_simulator(options: argparse.Namespace, report: Report) -> Tuple[Simula
     except OptionError:
         link.close_all()
         raise
-    report(_describe_start(options, host))
+    names = [robot.name for robot in simulator.swarm.robots]
+    who = names[0] if len(names) == 1 else "%s .. %s" % (names[0], names[-1])
+    report("%s: connecting to %s:%d" % (who, options.host, options.port))
     return simulator, injector

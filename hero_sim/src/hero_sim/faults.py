@@ -11,7 +11,7 @@ from .key_values import parse_values
 if TYPE_CHECKING:
     from .simulator import Simulator
 
-__all__ = ["KINDS", "LARGEST_ID", "LONGEST_S", "Fault", "FaultInjector", "describe_kinds", "parse_fault"]
+__all__ = ["KINDS", "LARGEST_ID", "LONGEST_S", "Fault", "FaultInjector", "parse_fault"]
 
 LARGEST_ID = 2**31 - 1
 """Of hero_msgs/Robot."""
@@ -124,14 +124,6 @@ def parse_fault(text: str) -> Fault:
     values = parse_values(name, tail, {key: _LIMITS[key] for key in ("robot", kind.key) if key is not None})
     robot_id = int(values["robot"]) if "robot" in values else None
     return Fault(kind_name, at.get("SECONDS", 0.0), robot_id, values.get(kind.key or "", kind.default))
-
-
-def describe_kinds() -> List[str]:
-    """Return one line for each kind of fault, with its key and its default."""
-    lines = ["KIND[@SECONDS][:robot=ID,key=value]; without robot it happens to every robot."]
-    for name, kind in KINDS.items():
-        lines.append("  %-13s %s%s" % (name, kind.meaning, " (%s=%g)" % (kind.key, kind.default) if kind.key else ""))
-    return lines
 
 
 class FaultInjector:

@@ -8,9 +8,9 @@ from typing import Callable, Iterator, Optional, Sequence, Tuple
 from . import output
 from .build import build_errors, build_simulator
 from .errors import OptionError
-from .faults import LARGEST_ID, LONGEST_S, FaultInjector, describe_kinds, parse_fault
+from .faults import LARGEST_ID, LONGEST_S, FaultInjector, parse_fault
 from .simulator import Simulator
-from .world.robot_errors import describe_errors, describe_keys
+from .world.robot_errors import describe_errors
 
 __all__ = ["build_parser", "check_options", "main", "parse_options", "simulate"]
 
@@ -40,9 +40,8 @@ def build_parser() -> argparse.ArgumentParser:
 
 def _add_link_options(group: "argparse._ArgumentGroup") -> None:
     add = group.add_argument
-    add("--host", help="where the driver runs (127.0.0.1); with --serve: own address (0.0.0.0)")
+    add("--host", default="127.0.0.1", help="where the driver runs (%(default)s)")
     add("--port", type=int, default=DEFAULT_PORT, help="port of the driver (%(default)s)")
-    add("--serve", type=int, metavar="PORT", help="do not connect: robot i is a TCP server on PORT + i")
     profiles = ("ideal", "router", "hotspot", "bad")
     add("--wifi", choices=profiles, default="ideal", help="quality of the network (ideal)")
     add(
@@ -50,8 +49,7 @@ def _add_link_options(group: "argparse._ArgumentGroup") -> None:
         action="append",
         default=[],
         metavar="KIND[@S][:key=value]",
-        help="inject a fault S simulated seconds after the start, e.g. vanish@5:robot=1,for=3; may be repeated; "
-        "--fault help lists all",
+        help="inject a fault S simulated seconds after the start, e.g. vanish@5:robot=1,for=3; may be repeated",
     )
 
 
@@ -64,8 +62,7 @@ def _add_robot_options(group: "argparse._ArgumentGroup") -> None:
         action="append",
         default=[],
         metavar="KEY=VALUE,..[,robot=ID]",
-        help="a known error of a robot, or of all, e.g. robot=1,left_center_us=1530; may be repeated; "
-        "--error help lists the keys",
+        help="a known error of a robot, or of all, e.g. robot=1,left_center_us=1530; may be repeated",
     )
     add("--print-errors", action="store_true", help="print how the robots differ, as --error takes it, and end")
     add(
@@ -89,16 +86,13 @@ def _add_robot_options(group: "argparse._ArgumentGroup") -> None:
 
 def check_options(options: argparse.Namespace) -> None:
     """Raise OptionError for a value that cannot be used."""
-    count, serve = options.count, options.serve
+    count = options.count
     if not 1 <= count <= MOST_ROBOTS:
         raise OptionError("--count %d: must be 1..%d" % (count, MOST_ROBOTS))
     if not 0 <= options.first_id <= LARGEST_ID - count + 1:
         raise OptionError("--first-id %d: ids must be 0..%d (%d robots)" % (options.first_id, LARGEST_ID, count))
-    name, port, last = ("--port", options.port, options.port)
-    if serve is not None:
-        name, port, last = ("--serve", serve, serve + count - 1)
-    if not (port >= 1 and last <= 65535):
-        raise OptionError("%s %d: ports must be 1..65535 (%d robots)" % (name, port, count))
+    if not 1 <= options.port <= 65535:
+        raise OptionError("--port %d: must be 1..65535" % options.port)
     if options.seconds is not None and not 0 < options.seconds <= LONGEST_S:
         raise OptionError("--seconds %g: must be more than 0, and at most %g" % (options.seconds, LONGEST_S))
     if not 0.01 <= options.speed <= 100:
@@ -106,8 +100,7 @@ def check_options(options: argparse.Namespace) -> None:
     if not 0 <= options.seed < 2**32:
         raise OptionError("--seed %d: must be 0..4294967295" % options.seed)
     for text in options.fault:
-        if text != "help":
-            parse_fault(text)
+        parse_fault(text)
 
 
 def parse_options(parser: argparse.ArgumentParser, arguments: Optional[Sequence[str]]) -> argparse.Namespace:
@@ -120,15 +113,8 @@ def parse_options(parser: argparse.ArgumentParser, arguments: Optional[Sequence[
         check_options(options)
     except OptionError as error:
         parser.exit(output.WRONG_ARGUMENTS, "hero_sim: %s\n" % error)
-    lines = None
-    if "help" in options.fault:
-        lines = describe_kinds()
-    elif "help" in options.error:
-        lines = describe_keys()
-    elif options.print_errors:
-        lines = describe_errors(build_errors(options), options.first_id)
-    if lines is not None:
-        print("\n".join(lines))
+    if options.print_errors:
+        print("\n".join(describe_errors(build_errors(options), options.first_id)))
         parser.exit()
     return options
 

@@ -8,20 +8,19 @@ import queue
 import signal
 import sys
 import threading
-from typing import Callable, Tuple
+from typing import Tuple
 
 import rosgraph
 import rosgraph.network
 import rosgraph.roslogging
 import rospy
-from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 
 from hero_driver.ros.running_node import find_running_node
 
 from . import main as command_line
 from . import output
-from .errors import OptionError, SimulatorError
-from .faults import FaultInjector, describe_kinds, parse_fault
+from .errors import OptionError
+from .faults import FaultInjector, parse_fault
 from .ground_truth import GroundTruth
 from .simulator import Simulator
 from .srv import InjectFault, InjectFaultRequest, InjectFaultResponse
@@ -34,54 +33,34 @@ SERVICE_LIMIT_S = 2.0
 LINGER_S = 2.5
 """roslaunch ends all of its nodes at once; the driver takes up to 2 s to stop its robots."""
 
-Answer = Tuple[bool, str]
 
-
-class RequestQueue:
-    """Queues service calls from rospy's threads for the simulator's thread, and returns the answers."""
+class FaultService:
+    """The service ~fault: hands each fault from rospy's threads to the simulator's thread, and answers."""
 
     def __init__(self, simulator: Simulator, injector: FaultInjector) -> None:
-        self._simulator = simulator
+        """Offer the service; the simulator executes what was asked between its steps."""
         self._injector = injector
-        self._requests: queue.Queue[Tuple[Callable[[], Answer], queue.Queue]] = queue.Queue(maxsize=100)
+        self._requests: queue.Queue[Tuple[str, queue.Queue]] = queue.Queue(maxsize=100)
         simulator.before_advance.append(self._run)
-        rospy.Service("~fault", InjectFault, self._serve_fault)
-        rospy.Service("~reset", Trigger, self._serve_reset)
+        rospy.Service("~fault", InjectFault, self._serve)
 
     def _run(self, now_ms: int) -> None:
         """Execute the requests since the last step (simulator's thread)."""
         del now_ms
         while not self._requests.empty():
-            request, answer = self._requests.get()
-            answer.put(request())
+            text, answer = self._requests.get()
+            try:
+                answer.put(InjectFaultResponse(True, self._injector.add(parse_fault(text))))
+            except OptionError as error:
+                answer.put(InjectFaultResponse(False, str(error)))
 
-    def _ask(self, request: Callable[[], Answer]) -> Answer:
-        answer: queue.Queue[Answer] = queue.Queue()
+    def _serve(self, request: InjectFaultRequest) -> InjectFaultResponse:
+        answer: queue.Queue[InjectFaultResponse] = queue.Queue()
         try:
-            self._requests.put_nowait((request, answer))
+            self._requests.put_nowait((request.fault, answer))
             return answer.get(timeout=SERVICE_LIMIT_S)
         except (queue.Empty, queue.Full):
-            return False, "the simulator did not answer within %g s" % SERVICE_LIMIT_S
-
-    def _serve_fault(self, request: InjectFaultRequest) -> InjectFaultResponse:
-        def inject() -> Answer:
-            try:
-                return True, self._injector.add(parse_fault(request.fault))
-            except SimulatorError as error:
-                return False, str(error)
-
-        if request.fault == "help":
-            return InjectFaultResponse(True, "\n".join(describe_kinds()))
-        return InjectFaultResponse(*self._ask(inject))
-
-    def _serve_reset(self, request: TriggerRequest) -> TriggerResponse:
-        del request
-
-        def reset() -> Answer:
-            self._simulator.swarm.reset()
-            return True, "every robot is at its start; its own odometry does not know"
-
-        return TriggerResponse(*self._ask(reset))
+            return InjectFaultResponse(False, "the simulator did not answer within %g s" % SERVICE_LIMIT_S)
 
 
 def check_environment() -> None:
@@ -123,7 +102,7 @@ def _run() -> None:
     with command_line.simulate(options, rospy.loginfo) as (simulator, injector):
         rospy.on_shutdown(lambda: setattr(simulator, "stopping", True))
         GroundTruth(simulator, options.clock)
-        RequestQueue(simulator, injector)
+        FaultService(simulator, injector)
         simulator.run(options.seconds)
         if simulator.stopping and not rospy.is_shutdown():
             simulator.linger(LINGER_S)

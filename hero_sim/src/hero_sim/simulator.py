@@ -6,8 +6,7 @@ The only file that reads a clock. It lets the swarm catch up, carries bytes both
 import time
 from typing import Callable, List, Optional, Set
 
-from .link import tcp_link
-from .link.tcp_link import TcpLink
+from .link.tcp_link import LinkHandler, TcpLink
 from .link.wifi import Radio
 from .robot_constants import RECEIVE_WINDOW_LENGTH
 from .swarm import Swarm
@@ -27,7 +26,7 @@ _LATE_S = 1.0
 """Further behind the wall clock than this (a machine that slept), the time is skipped, not caught up."""
 
 
-class Simulator:
+class Simulator(LinkHandler):
     """Runs one swarm.
 
     Attributes:
@@ -47,6 +46,7 @@ class Simulator:
         """Join a swarm, its radios and their link; speed is simulated seconds per second of wall clock."""
         self.swarm = swarm
         self.link = link
+        link.handler = self
         self.radios = radios
         self.stopping = False
         self.before_advance: List[Callable[[int], None]] = []
@@ -92,8 +92,7 @@ class Simulator:
             self._carry(self.swarm.now_ms)
         for index in list(self._full):
             self._limit_window(index)
-        for event in self.link.poll(self._find_wait()):
-            self._handle_event(event)
+        self.link.poll(self._find_wait())
 
     def _anchor_clock(self) -> None:
         self._anchor_s, self._anchor_ms = time.monotonic(), self.swarm.now_ms
@@ -172,18 +171,14 @@ class Simulator:
     def _connect(self, index: int) -> None:
         robot = self.swarm.robots[index]
         now_ms = self.swarm.now_ms
-        if self.link.serve and self.link.is_open(index):
-            robot.connection_made(now_ms)
-        elif self.link.serve or now_ms < self._away_until_ms[index]:
+        if now_ms < self._away_until_ms[index]:
             robot.connection_failed(now_ms)
+            self.swarm.reschedule(index)
         elif self.link.is_connecting(index):
             # The firmware gave up after 5 s and tries again; the attempt under way serves as the new one.
             self._report_failure("no answer within 5 s")
-            return
         else:
             self.link.connect(index)
-            return
-        self.swarm.reschedule(index)
 
     def _drop_connection(self, index: int, orderly: bool) -> None:
         if orderly:
@@ -211,33 +206,35 @@ class Simulator:
         self._away_until_ms[index] = self.swarm.now_ms + for_ms
         self._drop_connection(index, orderly=True)
 
-    # -- what the link reports -------------------------------------------------------------------------------
+    # -- what the link tells ---------------------------------------------------------------------------------
 
-    def _handle_event(self, event: tcp_link.LinkEvent) -> None:
-        index, now_ms = event.robot_index, self.swarm.now_ms
-        robot = self.swarm.robots[index]
-        if event.kind == tcp_link.DATA:
-            self._receive(index, event.data)
-            return
-        if event.kind == tcp_link.MADE:
-            if robot.is_on:
-                robot.connection_made(now_ms)
-            self._report_connection(index)
-        elif event.kind == tcp_link.FAILED:
-            self._report_failure(event.reason)
-            robot.connection_failed(now_ms)
-        elif event.kind == tcp_link.LOST:
-            self.radios[index].clear()
-            robot.connection_lost()
-            self._report_loss(index, event.reason)
-        elif event.kind == tcp_link.BLOCKED:
-            robot.block_writing(now_ms)
-        else:
-            robot.unblock_writing(now_ms)
+    def connection_made(self, index: int) -> None:
+        """The driver accepted a robot."""
+        if self.swarm.robots[index].is_on:
+            self.swarm.robots[index].connection_made(self.swarm.now_ms)
         self.swarm.reschedule(index)
-        self.serve_robot(index)
+        self._reported_unreachable = False
+        if not self._reported_connected[index]:
+            self._reported_connected[index] = True
+            self._report("%s connected" % self.swarm.robots[index].name)
 
-    def _receive(self, index: int, data: bytes) -> None:
+    def connection_failed(self, index: int, reason: str) -> None:
+        """A robot found no driver."""
+        self._report_failure(reason)
+        self.swarm.robots[index].connection_failed(self.swarm.now_ms)
+        self.swarm.reschedule(index)
+
+    def connection_lost(self, index: int, reason: str) -> None:
+        """The driver, or the network, ended a robot's connection."""
+        self.radios[index].clear()
+        self.swarm.robots[index].connection_lost()
+        if self.swarm.now_ms >= self._quiet_until_ms[index]:
+            self._reported_connected[index] = False
+            self._quiet_until_ms[index] = self.swarm.now_ms + _FLAPPING_MS
+            self._report("%s lost its connection: %s" % (self.swarm.robots[index].name, reason))
+
+    def receive_bytes(self, index: int, data: bytes) -> None:
+        """Bytes for a robot came."""
         radio, now_ms = self.radios[index], self.swarm.now_ms
         if radio.is_transparent(now_ms):
             self.swarm.robots[index].receive_bytes(now_ms, data)
@@ -246,17 +243,15 @@ class Simulator:
             self._carrying.add(index)
         self._limit_window(index)
 
-    def _report_connection(self, index: int) -> None:
-        self._reported_unreachable = False
-        if not self._reported_connected[index]:
-            self._reported_connected[index] = True
-            self._report("%s connected" % self.swarm.robots[index].name)
+    def writing_blocked(self, index: int) -> None:
+        """The driver does not read."""
+        self.swarm.robots[index].block_writing(self.swarm.now_ms)
+        self.swarm.reschedule(index)
 
-    def _report_loss(self, index: int, reason: str) -> None:
-        if self.swarm.now_ms >= self._quiet_until_ms[index]:
-            self._reported_connected[index] = False
-            self._quiet_until_ms[index] = self.swarm.now_ms + _FLAPPING_MS
-            self._report("%s lost its connection: %s" % (self.swarm.robots[index].name, reason))
+    def writing_resumed(self, index: int) -> None:
+        """The driver reads again."""
+        self.swarm.robots[index].unblock_writing(self.swarm.now_ms)
+        self.swarm.reschedule(index)
 
     def _report_failure(self, reason: str) -> None:
         if not self._reported_unreachable:

@@ -66,15 +66,6 @@ class Swarm:
             if self.world.time_ms >= until_ms and not (queue and queue[0][0] <= until_ms):
                 return sorted(touched)
 
-    def reset(self) -> None:
-        """Put every robot back to its start, at rest, as if somebody carried it there."""
-        before = [robot.body.true_pose for robot in self.robots]
-        for robot in self.robots:
-            robot.motors.stop(robot.to_millis(self.now_ms))
-        self.world.reset()
-        for robot, pose in zip(self.robots, before):
-            robot.body.follow_carry(pose)
-
     @property
     def next_due_ms(self) -> int:
         """When the next robot has to run."""

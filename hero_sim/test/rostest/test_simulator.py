@@ -17,7 +17,6 @@ import rostest
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from std_msgs.msg import ColorRGBA
-from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
@@ -56,9 +55,8 @@ class SimulatorTest(unittest.TestCase):
     def setUpClass(cls):
         rospy.init_node("test_simulator")
         cls.fleet = Newest("/hero_driver/robots", RobotArray)
-        for name, kind in (("fault", InjectFault), ("reset", Trigger)):
-            rospy.wait_for_service("/hero_sim/" + name, timeout=LIMIT_S)
-            setattr(cls, "call_" + name, staticmethod(rospy.ServiceProxy("/hero_sim/" + name, kind)))
+        rospy.wait_for_service("/hero_sim/fault", timeout=LIMIT_S)
+        cls.call_fault = staticmethod(rospy.ServiceProxy("/hero_sim/fault", InjectFault))
         wait_for(lambda: all(cls.is_ready(number) for number in range(8)), "eight ready robots")
 
     @classmethod
@@ -171,11 +169,6 @@ class SimulatorTest(unittest.TestCase):
 
         markers.wait(is_green, "green robot")
         Newest("/hero_sim/arena", MarkerArray).wait(lambda message: len(message.markers) == 4, "four walls")
-
-    def test_reset_returns_robots_to_their_start_at_rest(self):
-        truth = Newest("/hero_5/ground_truth", Odometry)
-        self.assertTrue(self.call_reset().success)
-        truth.wait(lambda message: abs(message.twist.twist.linear.x) < 1e-6, "robot at rest")
 
     def test_a_wrong_fault_is_refused_in_words(self):
         answer = self.call_fault("explode:robot=1")

@@ -1,6 +1,5 @@
 """The program as users start it: a process of its own, behind real sockets on loopback."""
 
-import contextlib
 import fcntl
 import os
 import re
@@ -49,29 +48,28 @@ def simulate():
 
 
 class Server:
-    """Accepts robots, or connects to them; requests topics, answers the time, keeps every packet."""
+    """Accepts robots; requests topics, answers the time, keeps every packet."""
 
-    def __init__(self, port=None):
+    def __init__(self, port=0):
         self.peers = []
         self.selector = selectors.DefaultSelector()
-        if port is None:
-            self.listener = socket.socket()
-            self.listener.bind(("127.0.0.1", 0))
-            self.listener.listen(16)
-            self.port = self.listener.getsockname()[1]
-            self.selector.register(self.listener, selectors.EVENT_READ)
+        self.listener = socket.socket()
+        self.listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        self.listener.bind(("127.0.0.1", port))
+        self.listener.listen(16)
+        self.port = self.listener.getsockname()[1]
+        self.selector.register(self.listener, selectors.EVENT_READ)
 
-    def add(self, sock):
-        peer = Peer(sock)
+    def accept(self):
+        peer = Peer(self.listener.accept()[0])
         self.peers.append(peer)
-        self.selector.register(sock, selectors.EVENT_READ, peer)
-        return peer
+        self.selector.register(peer.socket, selectors.EVENT_READ, peer)
 
     def run_until(self, condition):
         def serve():
             for key, _ in self.selector.select(0.05):
                 if key.data is None:
-                    self.add(self.listener.accept()[0])
+                    self.accept()
                 elif not key.data.receive():
                     self.selector.unregister(key.data.socket)
             return condition()
@@ -81,8 +79,7 @@ class Server:
     def close(self):
         for peer in self.peers:
             peer.socket.close()
-        if hasattr(self, "listener"):
-            self.listener.close()
+        self.listener.close()
         self.selector.close()
 
 
@@ -165,25 +162,6 @@ def test_robots_connect_declare_stream_and_drive(simulate, server):
     server.run_until(moved)
     assert read_odom(server.peers[1].last(ids.ID_ODOM))[2][0] == 0.0
     assert all(peer.reader.bad_packets == 0 for peer in server.peers)
-
-
-def test_robots_that_are_servers_accept_a_driver(simulate):
-    port = find_free_port()
-    simulate("--count", "1", "--host", "127.0.0.1", "--serve", str(port))
-    server = Server(port)
-
-    def connect():
-        with contextlib.suppress(ConnectionRefusedError):
-            return server.add(socket.create_connection(("127.0.0.1", port)))
-
-    wait_for(connect, "a robot that listens")
-    request_when_ready(server, 1)
-    # The driver goes and comes back: the robot waits for it.
-    server.peers[0].socket.shutdown(socket.SHUT_RDWR)
-    server.run_until(lambda: server.peers[0].closed)
-    again = server.add(socket.create_connection(("127.0.0.1", port)))
-    server.run_until(lambda: again.count(ids.ID_ODOM) > 0)
-    server.close()
 
 
 def test_a_robot_that_vanishes_sends_no_end_and_its_successor_boots(simulate, server):
@@ -299,11 +277,6 @@ def test_a_server_that_comes_late_finds_the_robots_waiting(simulate):
     program.wait_line("connecting")
     program.wait_line("no driver answers at 127.0.0.1:%d" % port)
     server = Server(port)
-    server.listener = socket.socket()
-    server.listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-    server.listener.bind(("127.0.0.1", port))
-    server.listener.listen(8)
-    server.selector.register(server.listener, selectors.EVENT_READ)
     server.run_until(lambda: len(server.peers) == 2)
     server.close()
 
@@ -326,7 +299,6 @@ def test_a_signal_ends_it_quietly(simulate, server, number):
 @pytest.mark.parametrize(
     "arguments, named",
     [
-        (("--serve", "65530", "--count", "10"), "--serve 65530"),
         (("--host", "no such host"), "no such host"),
         (("--arena", "/nowhere.yaml"), "/nowhere.yaml"),
         (("--fault", "explode"), "explode"),
@@ -345,17 +317,6 @@ def test_a_wrong_option_gets_one_clear_line(arguments, named, capsys):
         code = end.code
     assert code in (1, 2)
     assert named in capsys.readouterr().err.strip().splitlines()[-1]
-
-
-def test_a_port_that_is_taken_is_named(simulate):
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        taken.listen(1)
-        port = taken.getsockname()[1]
-        program = simulate("--host", "127.0.0.1", "--serve", str(port))
-        assert program.wait_end() == 1
-    (line,) = program.lines
-    assert "127.0.0.1:%d" % port in line
 
 
 def read_readme():

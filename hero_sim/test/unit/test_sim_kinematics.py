@@ -45,13 +45,9 @@ def test_wheels_and_body_speeds_are_inverse():
     assert pytest.approx(0.000537, abs=1e-6) == TICK_M
 
 
-def test_a_pose_and_its_inverse_cancel():
-    pose = kinematics.Pose(0.3, -0.7, 2.1)
-    assert pose.compose(pose.invert()) == pytest.approx((0.0, 0.0, 0.0))
-    assert pose.invert().compose(pose) == pytest.approx((0.0, 0.0, 0.0))
-
-
-def test_poses_are_joined_like_steps_on_a_floor():
-    # One meters forward, a quarter turn to the left, then one meters forward again.
-    corner, side = kinematics.Pose(1.0, 0.0, math.pi / 2), kinematics.Pose(1.0, 0.0, 0.0)
-    assert corner.compose(side) == pytest.approx((1.0, 1.0, math.pi / 2))
+def test_a_frame_is_found_from_where_something_in_it_is_and_is_seen():
+    # A quarter turn to the left and one meter forward of a frame at (1, 0), which is turned to the left, too.
+    pose = kinematics.Pose(1.0, 1.0, math.pi)
+    frame = kinematics.find_frame(pose, kinematics.Pose(1.0, 0.0, math.pi / 2))
+    assert frame == pytest.approx((1.0, 0.0, math.pi / 2))
+    assert kinematics.find_frame(pose, kinematics.Pose(0.0, 0.0, 0.0)) == pytest.approx(pose)

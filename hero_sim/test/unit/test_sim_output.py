@@ -21,7 +21,7 @@ def run_simulator(*arguments, stdout):
     return process.returncode, errors
 
 
-PRINTING = (["--help"], ["--fault", "help"], ["--print-errors"], ["--port", "9"])
+PRINTING = (["--help"], ["--print-errors"], ["--port", "9"])
 
 
 @pytest.mark.parametrize("arguments", PRINTING)
@@ -46,7 +46,6 @@ def test_a_full_disk_is_reported_in_one_line(arguments):
         *(("--speed", value) for value in ("inf", "nan", "-1")),
         *(("--count", value) for value in ("-1", "0", "9" * 30)),
         *(("--port", value) for value in ("-1", "0", "99999", "9" * 30)),
-        *(("--serve", value) for value in ("-1", "99999")),
         *(("--seed", value) for value in ("-1", "9" * 30)),
         *(("--first-id", value) for value in ("-1", "2147483648", "9" * 30)),
         *(("--fault", value) for value in ("vanish@inf", "vanish@nan", "vanish:for=inf", "vanish:robot=1e400")),

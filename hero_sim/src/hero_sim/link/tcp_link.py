@@ -1,7 +1,6 @@
 """The robots' TCP connections to the driver: the only file of the simulator that touches sockets.
 
-One selector serves all robots. Robots connect to the driver as the firmware does, or, as servers, wait for it on
-one port each. Nothing here knows what the bytes mean.
+One selector serves all robots, which connect as the firmware does. Nothing here knows what the bytes mean.
 """
 
 import ctypes
@@ -11,19 +10,12 @@ import selectors
 import socket
 import struct
 import sys
-from typing import Dict, List, NamedTuple, Optional, Tuple
+from typing import List, Optional, Tuple
 
 from ..errors import OptionError
 from ..robot_constants import RECEIVE_WINDOW_LENGTH
 
-__all__ = ["BLOCKED", "DATA", "FAILED", "LOST", "MADE", "UNBLOCKED", "LinkEvent", "TcpLink"]
-
-MADE = "made"
-FAILED = "failed"
-LOST = "lost"
-DATA = "data"
-BLOCKED = "blocked"
-UNBLOCKED = "unblocked"
+__all__ = ["LinkHandler", "TcpLink"]
 
 _READ_LENGTH = 65536
 
@@ -42,13 +34,26 @@ _DROP_ALL = struct.pack("HBBI", 0x06, 0, 0, 0)
 (linux/filter.h: BPF_RET | BPF_K). Needs no privileges."""
 
 
-class LinkEvent(NamedTuple):
-    """What happened to the connection of one robot."""
+class LinkHandler:
+    """What happens to the connections, robot by robot; called in connect(), send() and poll()."""
 
-    robot_index: int
-    kind: str
-    data: bytes = b""  # received bytes
-    reason: str = ""  # of a failure or a loss
+    def connection_made(self, index: int) -> None:
+        """The driver accepted."""
+
+    def connection_failed(self, index: int, reason: str) -> None:
+        """A connect() had no success."""
+
+    def connection_lost(self, index: int, reason: str) -> None:
+        """The connection ended, and not by close()."""
+
+    def receive_bytes(self, index: int, data: bytes) -> None:
+        """Bytes came."""
+
+    def writing_blocked(self, index: int) -> None:
+        """The system takes no more bytes."""
+
+    def writing_resumed(self, index: int) -> None:
+        """The system took all bytes that waited."""
 
 
 class _Connection:
@@ -65,46 +70,24 @@ class TcpLink:
 
     Attributes:
         own_addresses: of each robot, as the driver sees it.
+        handler: is told what happens.
     """
 
-    def __init__(self, count: int, host: str, port: int, serve: bool = False, first_number: int = 0) -> None:
-        """Connect each of count robots to host:port, or, with serve, listen on port, port + 1, ...
+    def __init__(self, count: int, host: str, port: int, first_number: int = 0) -> None:
+        """Prepare connections of count robots to host:port; set handler before anything else.
 
         first_number tells the robots of several simulators on one machine apart.
 
-        Raises: OptionError for a host that cannot be resolved or a port that cannot be listened on.
+        Raises: OptionError for a host that cannot be resolved.
         """
         self.host = host
         self.port = port
-        self.serve = serve
+        self.handler = LinkHandler()
         self._selector = selectors.DefaultSelector()
         self._connections: List[Optional[_Connection]] = [None] * count
-        self._listeners: Dict[int, socket.socket] = {}
         self._abandoned: List[socket.socket] = []
-        self._events: List[LinkEvent] = []
         self._family, self._address = _resolve(host, port)
         self.own_addresses = [self._find_own_address(first_number + index) for index in range(count)]
-        if serve:
-            for index in range(count):
-                self._listen(index, port + index)
-
-    def _listen(self, index: int, port: int) -> None:
-        listener = socket.socket(self._family, socket.SOCK_STREAM)
-        self._listeners[index] = listener
-        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        # What is accepted inherits it.
-        listener.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_WINDOW_LENGTH)
-        try:
-            listener.bind((self._address[0], port, *self._address[2:]))
-            listener.listen(4)
-        except OSError as error:
-            self.close_all()
-            raise OptionError(
-                "cannot listen on %s:%d for robot %d: %s; choose another --serve PORT"
-                % (self.host, port, index, error.strerror)
-            ) from error
-        listener.setblocking(False)
-        self._selector.register(listener, selectors.EVENT_READ, index)
 
     def _find_own_address(self, number: int) -> str:
         """Return the address from which robot number connects, as its boot line names it.
@@ -115,7 +98,7 @@ class TcpLink:
         is_local = str(self._address[0]).startswith("127.")
         with socket.socket(self._family, socket.SOCK_DGRAM) as probe:
             try:
-                if is_local and not self.serve:
+                if is_local:
                     own = "127.0.%d.%d" % (1 + number // 250 % 250, 1 + number % 250)
                     probe.bind((own, 0))
                     return own
@@ -126,12 +109,12 @@ class TcpLink:
                 return "127.0.0.1" if is_local else "0.0.0.0"
 
     def connect(self, index: int) -> None:
-        """Begin to connect a robot; poll() returns the outcome."""
+        """Begin to connect a robot; the handler is told the outcome."""
         self.close(index)
         try:
             sock = self._begin_connect(self.own_addresses[index])
         except OSError as error:
-            self._events.append(LinkEvent(index, FAILED, reason=error.strerror or str(error)))
+            self.handler.connection_failed(index, error.strerror or str(error))
             return
         self._connections[index] = connection = _Connection(index, sock)
         self._selector.register(sock, selectors.EVENT_WRITE, connection)
@@ -165,16 +148,12 @@ class TcpLink:
         connection = self._connections[index]
         return connection if connection is not None and connection.is_open else None
 
-    def is_open(self, index: int) -> bool:
-        """Return whether a robot has a connection."""
-        return self._find_open(index) is not None
-
     def count_open(self) -> int:
         """Return how many robots have a connection."""
         return sum(map(self.is_open, range(len(self._connections))))
 
     def send(self, index: int, data: bytes) -> None:
-        """Send data for a robot, later if the driver does not read now (poll() then returns BLOCKED)."""
+        """Send data for a robot, later if the driver does not read now (writing_blocked())."""
         connection = self._find_open(index)
         if connection is None:
             return
@@ -186,7 +165,7 @@ class TcpLink:
         if sent is not None and sent < len(data):
             connection.unsent += data[sent:]
             self._watch(connection)
-            self._events.append(LinkEvent(index, BLOCKED))
+            self.handler.writing_blocked(index)
 
     def _try_send(self, connection: _Connection, data: bytes) -> Optional[int]:
         """Return how much of data the system took, None if the connection is lost."""
@@ -225,12 +204,9 @@ class TcpLink:
         if connection.socket in self._selector.get_map():
             self._selector.unregister(connection.socket)
 
-    def poll(self, timeout_s: float) -> List[LinkEvent]:
-        """Return what happened, after at most timeout_s."""
-        for key, mask in self._selector.select(0.0 if self._events else timeout_s):
-            if isinstance(key.data, int):
-                self._accept(key.data)
-                continue
+    def poll(self, timeout_s: float) -> None:
+        """Tell the handler what happened, after at most timeout_s."""
+        for key, mask in self._selector.select(timeout_s):
             connection: _Connection = key.data
             if not connection.is_open:
                 self._finish_connect(connection)
@@ -239,43 +215,24 @@ class TcpLink:
                 self._flush(connection)
             if mask & selectors.EVENT_READ and self._connections[connection.index] is connection:
                 self._receive(connection)
-        events, self._events = self._events, []
-        return events
-
-    def _accept(self, index: int) -> None:
-        try:
-            sock, _ = self._listeners[index].accept()
-        except OSError:
-            # The caller gave up before; the listener still works.
-            return
-        connection = self._connections[index]
-        if connection is not None:
-            # One client at a time. The newest wins: the older one may be dead without our knowledge.
-            self._lose(connection, "another client came")
-        self._open(_Connection(index, sock))
-
-    def _open(self, connection: _Connection) -> None:
-        connection.is_open = True
-        connection.socket.setblocking(False)
-        connection.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        connection.socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER_LENGTH)
-        self._connections[connection.index] = connection
-        self._watch(connection)
-        self._events.append(LinkEvent(connection.index, MADE))
 
     def _finish_connect(self, connection: _Connection) -> None:
         result = connection.socket.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
         if result:
             self.close(connection.index)
-            self._events.append(LinkEvent(connection.index, FAILED, reason=os.strerror(result)))
-        else:
-            self._open(connection)
+            self.handler.connection_failed(connection.index, os.strerror(result))
+            return
+        connection.is_open = True
+        connection.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        connection.socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER_LENGTH)
+        self._watch(connection)
+        self.handler.connection_made(connection.index)
 
     def _flush(self, connection: _Connection) -> None:
         del connection.unsent[: self._try_send(connection, connection.unsent) or 0]
         if self._connections[connection.index] is connection and not connection.unsent:
             self._watch(connection)
-            self._events.append(LinkEvent(connection.index, UNBLOCKED))
+            self.handler.writing_resumed(connection.index)
 
     def _receive(self, connection: _Connection) -> None:
         try:
@@ -286,13 +243,13 @@ class TcpLink:
             self._lose(connection, error.strerror or str(error))
             return
         if data:
-            self._events.append(LinkEvent(connection.index, DATA, data))
+            self.handler.receive_bytes(connection.index, data)
         else:
             self._lose(connection, "the driver closed")
 
     def _lose(self, connection: _Connection, reason: str) -> None:
         self.close(connection.index)
-        self._events.append(LinkEvent(connection.index, LOST, reason=reason))
+        self.handler.connection_lost(connection.index, reason)
 
     def close(self, index: int) -> None:
         """End a robot's connection, if it has one, in the orderly way (FIN)."""
@@ -323,9 +280,8 @@ class TcpLink:
         """End every connection; safe to call twice."""
         for index in range(len(self._connections)):
             self.close(index)
-        for sock in [*self._listeners.values(), *self._abandoned]:
+        for sock in self._abandoned:
             sock.close()
-        self._listeners.clear()
         self._abandoned.clear()
         self._selector.close()
 

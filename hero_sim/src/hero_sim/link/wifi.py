@@ -55,21 +55,9 @@ class _Outages:
         return self._end_ms if self._start_ms <= at_ms else at_ms
 
 
-class _Air:
-    """What both directions of a connection share."""
-
-    def __init__(self, profile: WifiProfile, rng: np.random.RandomState) -> None:
-        self.profile = profile
-        self.is_ideal = profile == PROFILES["ideal"]
-        self.rng = rng
-        self.stalled_until_ms = 0.0
-        kinds = ((profile.spike_every_ms, profile.spike_ms), (profile.stall_every_ms, profile.stall_ms))
-        self.outages = [_Outages(every_ms, length_ms, rng) for every_ms, length_ms in kinds if every_ms > 0]
-
-
 class _Direction:
-    def __init__(self, air: _Air) -> None:
-        self._air = air
+    def __init__(self, radio: "Radio") -> None:
+        self._radio = radio
         self._busy_ms = 0.0  # end of the transmission of the last bytes
         self.queue: Deque[Tuple[float, bytes]] = deque()
 
@@ -80,22 +68,17 @@ class _Direction:
 
     def put(self, now_ms: int, data: bytes) -> None:
         """Send bytes."""
-        air, profile = self._air, self._air.profile
-        at_ms = max(float(now_ms), air.stalled_until_ms)
-        if not air.is_ideal:
-            if profile.bytes_per_s:
-                at_ms = max(at_ms, self._busy_ms) + len(data) / profile.bytes_per_s * 1000.0
-                self._busy_ms = at_ms
-            at_ms += profile.base_ms + air.rng.exponential(profile.jitter_ms)
-            for outages in air.outages:
-                at_ms = outages.find_end(at_ms)
+        bytes_per_s = self._radio.profile.bytes_per_s
+        at_ms = max(float(now_ms), self._radio.stalled_until_ms)
+        if bytes_per_s:
+            at_ms = self._busy_ms = max(at_ms, self._busy_ms) + len(data) / bytes_per_s * 1000.0
         # What was sent later may be due earlier; it waits in the queue behind the other all the same.
-        self.queue.append((at_ms, data))
+        self.queue.append((self._radio.find_arrival(at_ms), data))
 
     def take(self, now_ms: int) -> bytes:
         """Return what has arrived by now."""
         parts = []
-        if now_ms >= self._air.stalled_until_ms:
+        if now_ms >= self._radio.stalled_until_ms:
             while self.queue and self.queue[0][0] <= now_ms:
                 parts.append(self.queue.popleft()[1])
         return b"".join(parts)
@@ -105,14 +88,21 @@ class Radio:
     """Both directions of one robot's connection.
 
     Attributes:
+        profile: how good it is.
+        stalled_until_ms: until when it carries nothing.
         up, down: from the robot to the driver, and back.
     """
 
     def __init__(self, profile: WifiProfile, rng: np.random.RandomState) -> None:
         """Delay bytes as profile says, with delays drawn from rng."""
-        self._air = _Air(profile, rng)
-        self.up = _Direction(self._air)
-        self.down = _Direction(self._air)
+        self.profile = profile
+        self.stalled_until_ms = 0
+        self._is_ideal = profile == PROFILES["ideal"]
+        self._rng = rng
+        kinds = ((profile.spike_every_ms, profile.spike_ms), (profile.stall_every_ms, profile.stall_ms))
+        self._outages = [_Outages(every_ms, length_ms, rng) for every_ms, length_ms in kinds if every_ms > 0]
+        self.up = _Direction(self)
+        self.down = _Direction(self)
 
     @property
     def is_carrying(self) -> bool:
@@ -121,12 +111,18 @@ class Radio:
 
     def is_transparent(self, now_ms: int) -> bool:
         """Return whether bytes pass at once, so that nobody needs to queue them."""
-        air = self._air
-        return air.is_ideal and now_ms >= air.stalled_until_ms and not self.up.queue and not self.down.queue
+        return self._is_ideal and now_ms >= self.stalled_until_ms and not self.is_carrying
+
+    def find_arrival(self, at_ms: float) -> float:
+        """Return when bytes arrive that leave at at_ms."""
+        at_ms += self.profile.base_ms + self._rng.exponential(self.profile.jitter_ms)
+        for outages in self._outages:
+            at_ms = outages.find_end(at_ms)
+        return at_ms
 
     def stall(self, now_ms: int, for_ms: int) -> None:
         """Carry nothing for for_ms."""
-        self._air.stalled_until_ms = now_ms + for_ms
+        self.stalled_until_ms = now_ms + for_ms
 
     def clear(self) -> None:
         """Drop what is on its way, as when a connection ends."""

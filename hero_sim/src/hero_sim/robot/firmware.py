@@ -166,18 +166,17 @@ class Firmware:
     def connection_made(self, now_ms: int) -> None:
         """The radio has a connection."""
         self.connected = True
-        self.wants_connection = False
         self._received.clear()
         self._pending.clear()
-        if self._phase == _PHASE_BOOT:
-            self._begin_setup(now_ms)
-        elif self._blocked_until_ms is not None:
-            self._unblock(now_ms)
+        self._end_connecting(now_ms)
 
     def connection_failed(self, now_ms: int) -> None:
         """Nobody answers; the next spin tries again."""
+        self._end_connecting(now_ms)
+
+    def _end_connecting(self, now_ms: int) -> None:
         self.wants_connection = False
-        if self._phase == _PHASE_BOOT and self.due_ms > now_ms:
+        if self._phase == _PHASE_BOOT:
             self._begin_setup(now_ms)
         elif self._blocked_until_ms is not None:
             self._unblock(now_ms)

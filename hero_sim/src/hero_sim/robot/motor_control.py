@@ -97,7 +97,6 @@ class _Controller:
         pids: of the left and right wheel.
         targets: of the left and right wheel (m/s or ticks).
         tuning: whether it tunes itself.
-        dropped: commands that came too early.
     """
 
     def __init__(
@@ -113,7 +112,6 @@ class _Controller:
         ]
         self.targets = [0.0, 0.0]
         self.tuning = False
-        self.dropped = 0
         self._tuning_end_ms = 0
         self._watchdog_ms = 0
         self._ran_ms = 0
@@ -129,10 +127,8 @@ class _Controller:
             pid.set_gains(Gains(*three))
 
     def is_too_early(self, now_ms: int) -> bool:
-        """Return whether a command at now_ms is dropped, and count it."""
-        early = now_ms - self._watchdog_ms < COMMAND_GAP_MS
-        self.dropped += early
-        return early
+        """Return whether a command at now_ms is dropped."""
+        return now_ms - self._watchdog_ms < COMMAND_GAP_MS
 
     def command(self, now_ms: int, targets: Sequence[float]) -> None:
         """Set targets for the wheels; a wheel that has to reverse starts its PID anew."""
@@ -309,13 +305,6 @@ class MotorControl:
 
     def _count_ticks_since(self, world_ms: int, start_ticks: Sequence[int]) -> List[int]:
         return [now - start for now, start in zip(self._count_ticks(world_ms), start_ticks)]
-
-    def stop(self, now_ms: int) -> None:
-        """Switch the motors off and forget all commands."""
-        self.velocity.stop()
-        self.position.stop()
-        self.motors.stop()
-        self._reschedule(now_ms)
 
 
 def _limit_to_wheels(linear_m_s: float, angular_rad_s: float) -> Tuple[float, float]:

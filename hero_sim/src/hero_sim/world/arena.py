@@ -51,33 +51,30 @@ def build_rectangle(width_m: float, height_m: float, robots: int) -> Arena:
     Each start is headed along the rim, counter-clockwise, so that nobody drives at a neighbor or a wall at once.
     """
     x_m, y_m = width_m / 2.0, height_m / 2.0
-    columns = max(1, int(math.ceil(math.sqrt(robots))))
-    rows = max(1, -(-robots // columns))
+    columns = _count_columns(robots)
+    rows = math.ceil(robots / columns)
     starts: List[Pose] = []
     for index in range(robots):
         row, column = divmod(index, columns)
-        start_x_m = -x_m + width_m * (column + 0.5) / columns
-        start_y_m = -y_m + height_m * (row + 0.5) / rows
-        starts.append(Pose(start_x_m, start_y_m, _find_tangent(start_x_m, start_y_m)))
+        start_x_m, start_y_m = width_m * ((column + 0.5) / columns - 0.5), height_m * ((row + 0.5) / rows - 0.5)
+        # On a diagonal two walls are equally near: the one that follows counter-clockwise counts.
+        wall = math.floor(math.atan2(start_y_m, start_x_m) / (math.pi / 2.0) + 0.5 + 1e-9)
+        at_center = math.hypot(start_x_m, start_y_m) < 1e-9
+        theta_rad = 0.0 if at_center else math.remainder((wall + 1) * (math.pi / 2.0), 2.0 * math.pi)
+        starts.append(Pose(start_x_m, start_y_m, theta_rad))
     walls = outline(np.array([(-x_m, -y_m), (x_m, -y_m), (x_m, y_m), (-x_m, y_m)]))
     bounds_m = np.array([-x_m, -y_m, x_m, y_m])
     return Arena("rectangle", walls, np.empty((0, 3)), tuple(starts), bounds_m)
 
 
 def build_default(robots: int) -> Arena:
-    """Return a square field: 1.5 m wide for up to four robots, wider for more so that they keep their distance."""
-    columns = max(1, int(math.ceil(math.sqrt(robots))))
-    side_m = max(1.5, 0.4 * columns)
+    """Return a square field: 1.5 m wide for up to nine robots, wider for more so that they keep their distance."""
+    side_m = max(1.5, 0.4 * _count_columns(robots))
     return build_rectangle(side_m, side_m, robots)
 
 
-def _find_tangent(x_m: float, y_m: float) -> float:
-    """Return the heading along the nearest wall, counter-clockwise around the origin; 0 at the origin."""
-    if abs(x_m) < 1e-9 and abs(y_m) < 1e-9:
-        return 0.0
-    # On a diagonal two walls are equally near: the one that follows counter-clockwise counts.
-    wall = math.floor(math.atan2(y_m, x_m) / (math.pi / 2.0) + 0.5 + 1e-9)
-    return math.remainder((wall + 1) * (math.pi / 2.0), 2.0 * math.pi)
+def _count_columns(robots: int) -> int:
+    return max(1, math.ceil(math.sqrt(robots)))
 
 
 def list_obstacles(arena: Arena) -> Tuple[np.ndarray, np.ndarray]:

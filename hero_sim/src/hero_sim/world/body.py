@@ -8,7 +8,7 @@ from typing import List
 
 import numpy as np
 
-from .kinematics import Pose, join_wheels
+from .kinematics import Pose, find_frame, join_wheels
 from .robot_errors import MAX_WHEEL_M_S, SERVO_GAIN_M_S_US
 from .world import World
 
@@ -48,11 +48,7 @@ class Body:
 
     def set_odometry(self, pose: Pose) -> None:
         """Place the odom frame where the robot's odometry is now pose."""
-        self.odom_origin = self.true_pose.compose(pose.invert())
-
-    def follow_carry(self, before: Pose) -> None:
-        """Move the odom frame along with the robot, which was carried here from before."""
-        self.odom_origin = self.true_pose.compose(before.invert().compose(self.odom_origin))
+        self.odom_origin = find_frame(self.true_pose, pose)
 
     def read_wheels(self, time_ms: int) -> List[float]:
         """Return the travel (m) of the left and right wheel, at a time within the running step."""

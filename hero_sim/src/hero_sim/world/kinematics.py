@@ -10,7 +10,7 @@ import numpy as np
 
 from ..robot_constants import WHEEL_SEPARATION_M
 
-__all__ = ["Pose", "join_wheels", "move_along_arc", "split_to_wheels"]
+__all__ = ["Pose", "find_frame", "join_wheels", "move_along_arc", "split_to_wheels"]
 
 # Below this rotation per step the arc is a straight line to within double precision.
 _STRAIGHT_RAD = 1e-9
@@ -25,20 +25,13 @@ class Pose(NamedTuple):
     y_m: float
     theta_rad: float
 
-    def compose(self, inner: "Pose") -> "Pose":
-        """Return inner, a pose relative to this one, in the frame that this one is given in."""
-        cosine, sine = math.cos(self.theta_rad), math.sin(self.theta_rad)
-        return Pose(
-            self.x_m + cosine * inner.x_m - sine * inner.y_m,
-            self.y_m + sine * inner.x_m + cosine * inner.y_m,
-            self.theta_rad + inner.theta_rad,
-        )
 
-    def invert(self) -> "Pose":
-        """Return the pose that undoes this one: their composition is the origin."""
-        cosine, sine = math.cos(self.theta_rad), math.sin(self.theta_rad)
-        x_m = -cosine * self.x_m - sine * self.y_m
-        return Pose(x_m, sine * self.x_m - cosine * self.y_m, -self.theta_rad)
+def find_frame(pose: Pose, seen: Pose) -> Pose:
+    """Return where a frame lies in which something at pose is seen at seen."""
+    theta_rad = pose.theta_rad - seen.theta_rad
+    cosine, sine = math.cos(theta_rad), math.sin(theta_rad)
+    x_m = pose.x_m - cosine * seen.x_m + sine * seen.y_m
+    return Pose(x_m, pose.y_m - sine * seen.x_m - cosine * seen.y_m, theta_rad)
 
 
 def split_to_wheels(linear_m_s: Number, angular_rad_s: Number) -> Tuple[Number, Number]:

@@ -1,6 +1,6 @@
 """How each robot differs from the drawing: drawn from a seed, or set to known values.
 
-`KEY=VALUE,...[,robot=ID]` on the command line (--error); the keys are those of KINDS. Pure. A robot's own
+`KEY=VALUE,...[,robot=ID]` on the command line (--error); the README says what each key means. Pure. A robot's own
 calibration is in its flash, not here.
 """
 
@@ -13,7 +13,7 @@ from .range_sensors import ALPHA_COUNTS_M2, BEAMS, BETA_COUNTS
 
 __all__ = [
     "KINDS", "MAX_WHEEL_M_S", "SERVO_CENTER_US", "SERVO_GAIN_M_S_US", "RobotErrors", "describe_errors",
-    "describe_keys", "draw_errors", "set_known",
+    "draw_errors", "set_known",
 ]  # fmt: skip
 
 SERVO_CENTER_US = 1500.0
@@ -39,36 +39,32 @@ class Kind(NamedTuple):
         array: the attribute of RobotErrors that holds it.
         columns: which columns of it (a wheel, a sensor; all of them for a key that means all).
         least, most: what can be computed with.
-        meaning: for people.
     """
 
     array: str
     columns: slice
     least: float
     most: float
-    meaning: str
 
 
 _LEFT, _RIGHT, _ALL = slice(0, 1), slice(1, 2), slice(None)
 
 KINDS: Dict[str, Kind] = {
-    "left_center_us": Kind("servo_center_us", _LEFT, 1000, 2000, "pulse at which the left wheel rests"),
-    "right_center_us": Kind("servo_center_us", _RIGHT, 1000, 2000, "the same of the right wheel"),
-    "dead_zone_us": Kind("dead_zone_us", _ALL, 0, 200, "a wheel rests for pulses this close to its center"),
-    "left_gain": Kind("servo_gain", _LEFT, 0, 5, "speed of the left servo, 1 as drawn"),
-    "right_gain": Kind("servo_gain", _RIGHT, 0, 5, "the same of the right servo"),
-    "lag_s": Kind("servo_lag_s", _ALL, 0.001, 5, "time constant of the servos"),
-    "left_wheel": Kind("wheel_scale", _LEFT, 0.5, 2, "travel of the left wheel per travel that its ticks show"),
-    "right_wheel": Kind("wheel_scale", _RIGHT, 0.5, 2, "the same of the right wheel"),
-    "slip": Kind("slip", _ALL, 0, 0.5, "sd of the share of its travel that a wheel loses in each step"),
-    "ripple_m_s": Kind("ripple_m_s", _ALL, 0, 0.1, "sd of a running servo's speed"),
-    "alpha_counts_m2": Kind("alpha_counts_m2", _ALL, 0.01, 10, "brightness of all infrared sensors"),
-    "beta_counts": Kind("beta_counts", _ALL, -20, 20, "offset of all infrared sensors"),
+    "left_center_us": Kind("servo_center_us", _LEFT, 1000, 2000),
+    "right_center_us": Kind("servo_center_us", _RIGHT, 1000, 2000),
+    "dead_zone_us": Kind("dead_zone_us", _ALL, 0, 200),
+    "left_gain": Kind("servo_gain", _LEFT, 0, 5),
+    "right_gain": Kind("servo_gain", _RIGHT, 0, 5),
+    "lag_s": Kind("servo_lag_s", _ALL, 0.001, 5),
+    "left_wheel": Kind("wheel_scale", _LEFT, 0.5, 2),
+    "right_wheel": Kind("wheel_scale", _RIGHT, 0.5, 2),
+    "slip": Kind("slip", _ALL, 0, 0.5),
+    "ripple_m_s": Kind("ripple_m_s", _ALL, 0, 0.1),
+    "alpha_counts_m2": Kind("alpha_counts_m2", _ALL, 0.01, 10),
+    "beta_counts": Kind("beta_counts", _ALL, -20, 20),
 }
 for _index in range(BEAMS):
-    KINDS["alpha%d_counts_m2" % _index] = Kind(
-        "alpha_counts_m2", slice(_index, _index + 1), 0.01, 10, "brightness of infrared sensor %d" % _index
-    )
+    KINDS["alpha%d_counts_m2" % _index] = Kind("alpha_counts_m2", slice(_index, _index + 1), 0.01, 10)
 
 
 class RobotErrors(NamedTuple):
@@ -120,14 +116,6 @@ def set_known(errors: RobotErrors, first_id: int, text: str) -> None:
     # A key for all sensors comes first, so that single ones can differ from it.
     for key in sorted(values, key=lambda key: KINDS[key].columns != _ALL):
         getattr(errors, KINDS[key].array)[rows, KINDS[key].columns] = values[key]
-
-
-def describe_keys() -> List[str]:
-    """Return one line for each key of --error."""
-    lines = ["KEY=VALUE,...[,robot=ID]; without robot it holds for all robots."]
-    for key, kind in KINDS.items():
-        lines.append("  %-16s %s (%g..%g)" % (key, kind.meaning, kind.least, kind.most))
-    return lines
 
 
 def describe_errors(errors: RobotErrors, first_id: int) -> List[str]:

@@ -44,7 +44,6 @@ class World:
         self.arena = arena
         self.time_ms = 0
         self.poses = np.array(poses, dtype=float).reshape(count, 3)
-        self._start_poses = self.poses.copy()
         self.commands_m_s = np.zeros((count, 2))
         self.speeds_m_s = np.zeros((count, 2))
         self.travels_m = np.zeros((count, 2))
@@ -142,10 +141,3 @@ class World:
         noisy = signals + self._rng.normal(0.0, range_sensors.NOISE_COUNTS, signals.shape)
         # Adding zero turns -0.0 into 0.0, whose inverse is the right infinity.
         return np.clip(np.rint(noisy), 0, 1023) + 0.0
-
-    def reset(self) -> None:
-        """Put every robot back to its start, at rest."""
-        self.poses[:] = self._start_poses
-        for motion in (self.commands_m_s, self.speeds_m_s):
-            motion[:] = 0.0
-        self._update_rows()
