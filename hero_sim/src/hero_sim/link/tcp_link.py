@@ -150,7 +150,7 @@ class TcpLink:
 
     def count_open(self) -> int:
         """Return how many robots have a connection."""
-        return sum(map(self.is_open, range(len(self._connections))))
+        return sum(self._find_open(index) is not None for index in range(len(self._connections)))
 
     def send(self, index: int, data: bytes) -> None:
         """Send data for a robot, later if the driver does not read now (writing_blocked())."""
