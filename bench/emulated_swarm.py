@@ -16,53 +16,20 @@ import threading
 import time
 
 from hero_driver.rosserial import packets, payloads
-from hero_driver.rosserial.payloads import TopicInfo
+from hero_sim.robot import declarations
 
 BURST_PERIOD_S = 0.034
 LASER_PERIOD_S = 0.201
 LOG_PERIOD_S = 1.02
 TIME_PERIOD_S = 2.53
 
-LASER, IMU, ENCODER, TRANSFORMS, ODOM = 125, 127, 128, 129, 130
-LED, LASER_ENABLE, MOTOR, POSITION, VELOCITY = 100, 101, 104, 106, 109
 ZERO = bytes(48)
-
-MD5 = {
-    "sensor_msgs/LaserScan": "90c7ef2dc6895d81024acba2ac42f369",
-    "sensor_msgs/Imu": "6a62c6daae103f4ff57a132d6f95cec2",
-    "hero_common/Encoder": "b5586cdbae9b740afc6a1f403a2d7dde",
-    "tf/tfMessage": "94810edda583a504dfda3829e70d7eec",
-    "nav_msgs/Odometry": "cd5e73d190d741a2f92e81eda573aca7",
-    "std_msgs/ColorRGBA": "a29a96539573343b1310c73607334b00",
-    "std_msgs/Bool": "8b94c1b53db61fb6aed406028ad6332a",
-    "hero_common/Motor": "44d4249d207ce6a89de3d72080e4d0b5",
-    "geometry_msgs/Twist": "9f195f881246fdfa2798d1d3eebca84a",
-}
 
 
 def declare(number):
     """Return the packets with which robot number declares its topics (services are left out)."""
-    prefix = "/hero_%d" % number
-    publishers = (
-        (LASER, prefix + "/laser", "sensor_msgs/LaserScan"),
-        (IMU, prefix + "/imu", "sensor_msgs/Imu"),
-        (ENCODER, prefix + "/encoder", "hero_common/Encoder"),
-        (TRANSFORMS, "/tf", "tf/tfMessage"),
-        (ODOM, prefix + "/odom", "nav_msgs/Odometry"),
-    )
-    subscribers = (
-        (LED, prefix + "/led", "std_msgs/ColorRGBA"),
-        (LASER_ENABLE, prefix[1:] + "/laser_enable", "std_msgs/Bool"),
-        (MOTOR, prefix + "/cmd_motor", "hero_common/Motor"),
-        (POSITION, prefix + "/position_controller/cmd_vel", "geometry_msgs/Twist"),
-        (VELOCITY, prefix + "/velocity_controller/cmd_vel", "geometry_msgs/Twist"),
-    )
-    parts = [packets.encode_packet(packets.ID_TIME, bytes(8))]
-    for frame_id, topics in ((packets.ID_PUBLISHER, publishers), (packets.ID_SUBSCRIBER, subscribers)):
-        for topic_id, name, kind in topics:
-            info = TopicInfo(topic_id, name, kind, MD5[kind], 4096)
-            parts.append(packets.encode_packet(frame_id, payloads.encode_topic_info(info)))
-    return b"".join(parts)
+    time_request = packets.encode_packet(packets.ID_TIME, bytes(8))
+    return time_request + declarations.encode_declarations("hero_%d" % number, with_services=False)
 
 
 def text(value):
@@ -103,12 +70,12 @@ class Templates:
         encoder_tail = self._encoder_frame + bytes(88)
         encoder_changes = slice(4, 12 + len(self._encoder_frame) + 16)
         no_header = b"\xff\xff\xff\xff" + bytes(8)
-        self._odom = Packet(ODOM, bytes(12) + odom_tail, slice(0, 12))
+        self._odom = Packet(declarations.ID_ODOM, bytes(12) + odom_tail, slice(0, 12))
         self._transforms = [
-            Packet(TRANSFORMS, b"\x01" + bytes(15) + tail, slice(8, 16)) for tail in transform_tails
+            Packet(declarations.ID_TF, b"\x01" + bytes(15) + tail, slice(8, 16)) for tail in transform_tails
         ]
-        self._encoder = Packet(ENCODER, no_header + encoder_tail, encoder_changes)
-        self._laser = Packet(LASER, bytes(12) + laser_tail, slice(4, 12))
+        self._encoder = Packet(declarations.ID_ENCODER, no_header + encoder_tail, encoder_changes)
+        self._laser = Packet(declarations.ID_LASER, bytes(12) + laser_tail, slice(4, 12))
 
     def make_burst(self, number, stamp):
         """Return the packets of one burst with stamp (8 bytes).
@@ -186,7 +153,7 @@ class EmulatedRobot:
             elif topic_id == packets.ID_TIME and self.synchronised_s is None:
                 self.synchronised_s = now_s
                 is_new = True
-            elif topic_id == VELOCITY and payload != ZERO:
+            elif topic_id == declarations.ID_VELOCITY_CMD_VEL and payload != ZERO:
                 # Zeros are the driver's own: it stops robots whose commander has gone.
                 self.commands += 1
                 if self._keeps_times:

@@ -4,7 +4,8 @@ Pure. Texts and behavior are the firmware's (files named in messages and flash);
 """
 
 import struct
-from typing import Callable, Dict, Optional, Sequence, Tuple
+from functools import partial
+from typing import Callable, Dict, Optional, Tuple
 
 from hero_driver.rosserial import packets
 
@@ -14,7 +15,7 @@ from ..world.kinematics import Pose
 from . import declarations as ids
 from . import messages
 from .flash import Flash
-from .motor_control import MotorControl
+from .motor_control import Controller, MotorControl
 from .sensing import Sensing
 
 __all__ = ["CommandTable"]
@@ -56,6 +57,7 @@ class CommandTable:
         self._millis = 0
         self._now_ms = 0
         self.blocked_us = 0
+        velocity, position = motors.velocity, motors.position
         self._callbacks: Dict[int, Tuple[str, Callable[..., Optional[bytes]]]] = {
             # layout of the message or request, in the order of its fields, and what it does
             ids.ID_LED: ("<4f", self._set_light),
@@ -64,13 +66,21 @@ class CommandTable:
             ids.ID_SET_ODOM: ("<3d", self._set_odom),
             ids.ID_CMD_MOTOR: ("<2h", self._drive_motors),
             ids.ID_MOTORS_PARAMETERS: ("<2h", self._set_motors),
-            ids.ID_POSITION_CMD_VEL: (_TWIST, self._drive_position),
-            ids.ID_POSITION_PID_PARAMETERS: ("<6f", self._set_position_pid),
-            ids.ID_POSITION_PID_CALIBRATION: ("", self._tune_position),
-            ids.ID_VELOCITY_CMD_VEL: (_TWIST, self._drive_velocity),
-            ids.ID_VELOCITY_PID_PARAMETERS: ("<6f", self._set_velocity_pid),
-            ids.ID_VELOCITY_PID_CALIBRATION: ("", self._tune_velocity),
-        }
+            ids.ID_POSITION_CMD_VEL: (_TWIST, partial(self._drive, position)),
+            ids.ID_POSITION_PID_PARAMETERS: (
+                "<6f", partial(self._set_gains, position, ids.ID_POSITION_PID_PARAMETERS_ANSWER)
+            ),
+            ids.ID_POSITION_PID_CALIBRATION: (
+                "", partial(self._tune, position, ids.ID_POSITION_PID_CALIBRATION_ANSWER)
+            ),
+            ids.ID_VELOCITY_CMD_VEL: (_TWIST, partial(self._drive, velocity)),
+            ids.ID_VELOCITY_PID_PARAMETERS: (
+                "<6f", partial(self._set_gains, velocity, ids.ID_VELOCITY_PID_PARAMETERS_ANSWER)
+            ),
+            ids.ID_VELOCITY_PID_CALIBRATION: (
+                "", partial(self._tune, velocity, ids.ID_VELOCITY_PID_CALIBRATION_ANSWER)
+            ),
+        }  # fmt: skip
 
     def receive(self, packet: packets.Packet, millis: int, now_ms: int) -> Optional[bytes]:
         """Execute packet at millis of the robot, now_ms of the world; return a service's answer, as a packet.
@@ -99,12 +109,8 @@ class CommandTable:
     def _enable_laser(self, is_enabled: bool) -> None:
         self._sensing.laser_enabled = is_enabled
 
-    def _drive_velocity(self, linear_m_s: float, angular_rad_s: float) -> None:
-        if self._motors.receive_velocity(self._millis, linear_m_s, angular_rad_s):
-            self.blocked_us = STOP_US
-
-    def _drive_position(self, linear_m_s: float, angular_rad_s: float) -> None:
-        if self._motors.receive_position(self._millis, self._now_ms, linear_m_s, angular_rad_s):
+    def _drive(self, controller: Controller, linear_m_s: float, angular_rad_s: float) -> None:
+        if self._motors.receive_twist(controller, self._millis, self._now_ms, linear_m_s, angular_rad_s):
             self.blocked_us = STOP_US
 
     def _drive_motors(self, left_us: int, right_us: int) -> None:
@@ -131,20 +137,11 @@ class CommandTable:
         self._log(text)
         return _answer(answer_id, True, text)
 
-    def _set_position_pid(self, *gains: float) -> bytes:
-        self._flash.position_pid = list(gains)
-        self._motors.position.set_gains(gains)
-        return self._record_pid(ids.ID_POSITION_PID_PARAMETERS_ANSWER, gains)
-
-    def _set_velocity_pid(self, *gains: float) -> bytes:
-        self._flash.velocity_pid = list(gains)
-        self._motors.velocity.set_gains(gains)
-        return self._record_pid(ids.ID_VELOCITY_PID_PARAMETERS_ANSWER, gains)
-
-    def _record_pid(self, answer_id: int, gains: Sequence[float]) -> bytes:
+    def _set_gains(self, controller: Controller, answer_id: int, *gains: float) -> bytes:
         text = "PID Parameters has been succesfully recorded!"
-        self._log_green("Left  Motor PID = [%f, %f, %f]" % tuple(gains[:3]))
-        self._log_green("Right Motor PID = [%f, %f, %f]" % tuple(gains[3:]))
+        controller.set_gains(gains)
+        self._log_green("Left  Motor PID = [%f, %f, %f]" % gains[:3])
+        self._log_green("Right Motor PID = [%f, %f, %f]" % gains[3:])
         self._log_green("Recording values in the flash... ")
         self._save_flash()
         self._log_green(text + " ")
@@ -160,14 +157,8 @@ class CommandTable:
     def _log_green(self, text: str) -> None:
         self._log("\x1b[92m[/%s] %s\x1b[0m" % (self._name, text))
 
-    def _tune_position(self) -> bytes:
-        return self._tune(ids.ID_POSITION_PID_CALIBRATION_ANSWER, of_velocity=False)
-
-    def _tune_velocity(self) -> bytes:
-        return self._tune(ids.ID_VELOCITY_PID_CALIBRATION_ANSWER, of_velocity=True)
-
-    def _tune(self, answer_id: int, of_velocity: bool) -> bytes:
-        self._motors.start_tuning(self._millis, self._now_ms, of_velocity)
+    def _tune(self, controller: Controller, answer_id: int) -> bytes:
+        self._motors.start_tuning(controller, self._millis, self._now_ms)
         self.blocked_us = PULSES_US
         # The firmware never sets success here (VelocityControl.ino:229-245).
         return _answer(answer_id, False, "PID Autotuning!")

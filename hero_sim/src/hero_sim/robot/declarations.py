@@ -101,10 +101,12 @@ def find_type(topic_id: int) -> str:
     return next(message_type for _, declared_id, _, message_type in DECLARATIONS if declared_id == topic_id)
 
 
-def encode_declarations(name: str) -> bytes:
+def encode_declarations(name: str, with_services: bool = True) -> bytes:
     """Return the packets with which the robot called name (hero_N) declares everything, in one burst."""
     burst = b""
     for kind, topic_id, pattern, message_type in DECLARATIONS:
+        if kind in (_ANS, _REQ) and not with_services:
+            continue
         md5sum = _ANSWER_MD5 if kind == _ANS else _TYPES[message_type]
         info = payloads.TopicInfo(topic_id, pattern.replace("%s", name), message_type, md5sum, BUFFER_LENGTH)
         burst += packets.encode_packet(kind, payloads.encode_topic_info(info))

@@ -28,7 +28,7 @@ from .flash import Flash
 from .motor_pid import POSITION_GAINS, VELOCITY_GAINS, Gains, MotorPid
 from .wheel_odometry import WheelOdometry
 
-__all__ = ["MotorControl"]
+__all__ = ["Controller", "MotorControl"]
 
 CONTROL_MS = 21
 """Between two runs of a controller, 47.6 Hz (VelocityControl.ino:112)."""
@@ -90,7 +90,7 @@ class MotorDriver:
         self._body.release()
 
 
-class _Controller:
+class Controller:
     """What velocity and position controller have in common.
 
     Attributes:
@@ -100,10 +100,11 @@ class _Controller:
     """
 
     def __init__(
-        self, motors: MotorDriver, default: Gains, stored: Sequence[float], limit_us: float, timeout_ms: int
+        self, motors: MotorDriver, default: Gains, stored: List[float], limit_us: float, timeout_ms: int
     ) -> None:
-        """Begin without a command; stored are six gains of the flash, limit_us holds for each output."""
+        """Begin without a command; stored are the six gains of the flash, limit_us holds for each output."""
         self._motors = motors
+        self._stored = stored
         self._timeout_ms = timeout_ms
         # A proportional gain that is not above zero is one of an erased flash.
         self.pids = [
@@ -122,7 +123,8 @@ class _Controller:
         return due_ms if due_ms - self._watchdog_ms < self._timeout_ms else None
 
     def set_gains(self, gains: Sequence[float]) -> None:
-        """Set lkp lki lkd rkp rki rkd."""
+        """Set lkp lki lkd rkp rki rkd, in the flash too."""
+        self._stored[:] = gains
         for pid, three in zip(self.pids, (gains[:3], gains[3:])):
             pid.set_gains(Gains(*three))
 
@@ -197,10 +199,10 @@ class MotorControl:
         self._rng = rng
         self._log = log
         self.motors = motors = MotorDriver(body, flash.motor_centers_us)
-        self.velocity = _Controller(
+        self.velocity = Controller(
             motors, VELOCITY_GAINS, flash.velocity_pid, VELOCITY_LIMIT_US, VELOCITY_WATCHDOG_MS
         )
-        self.position = _Controller(
+        self.position = Controller(
             motors, POSITION_GAINS, flash.position_pid, POSITION_LIMIT_US, POSITION_WATCHDOG_MS
         )
         self._start_ticks = [0, 0]
@@ -216,24 +218,19 @@ class MotorControl:
             if due_ms is not None and (self.due_ms is None or due_ms < self.due_ms):
                 self.due_ms = due_ms
 
-    def receive_velocity(self, now_ms: int, linear_m_s: float, angular_rad_s: float) -> bool:
-        """Receive a Twist for the velocity controller; return whether it was a zero that was accepted."""
-        if self.velocity.is_too_early(now_ms):
-            return False
-        return self._command(self.velocity, now_ms, _limit_to_wheels(linear_m_s, angular_rad_s))
+    def receive_twist(
+        self, controller: Controller, now_ms: int, world_ms: int, linear_m_s: float, angular_rad_s: float
+    ) -> bool:
+        """Receive a Twist for a controller; return whether it was a zero that was accepted.
 
-    def receive_position(self, now_ms: int, world_ms: int, linear_m_s: float, angular_rad_s: float) -> bool:
-        """Receive a Twist for the position controller, which drives as far as that speed reaches in a second.
-
-        Return whether it was a zero that was accepted; world_ms is the world's time of now_ms.
+        The position controller drives as far as that speed reaches in a second; world_ms is the world's time of now_ms.
         """
-        if self.position.is_too_early(now_ms):
+        if controller.is_too_early(now_ms):
             return False
-        self._start_ticks = self._count_ticks(world_ms)
-        wheels_m_s = _limit_to_wheels(linear_m_s, angular_rad_s)
-        return self._command(self.position, now_ms, [wheel_m_s / TICK_M for wheel_m_s in wheels_m_s])
-
-    def _command(self, controller: _Controller, now_ms: int, targets: Sequence[float]) -> bool:
+        targets = _limit_to_wheels(linear_m_s, angular_rad_s)
+        if controller is self.position:
+            self._start_ticks = self._count_ticks(world_ms)
+            targets = (targets[0] / TICK_M, targets[1] / TICK_M)
         stops = not any(targets)
         if stops:
             self._log("\x1b[93m[/%s] Reseting PID...\x1b[0m" % self._name)
@@ -249,15 +246,15 @@ class MotorControl:
         self.motors.write(now_ms, left_us, right_us)
         self._reschedule(now_ms)
 
-    def start_tuning(self, now_ms: int, world_ms: int, of_velocity: bool) -> None:
+    def start_tuning(self, controller: Controller, now_ms: int, world_ms: int) -> None:
         """Begin a controller's self-tuning, which ends by its own failure or by a Twist that is not dropped."""
         self._log("\x1b[94m[/%s] Starting Motors Auto Tuning! Wait... \x1b[0m" % self._name)
-        controller = self.velocity if of_velocity else self.position
-        limits_ms = VELOCITY_TUNING_MS if of_velocity else POSITION_TUNING_MS
+        is_position = controller is self.position
+        limits_ms = POSITION_TUNING_MS if is_position else VELOCITY_TUNING_MS
         controller.start_tuning(now_ms, int(self._rng.randint(*limits_ms)))
         self._tuning_start_ticks = self._count_ticks(world_ms)
         self._relay = [1, 1]
-        start_us = _TUNING_START_US if of_velocity else 0
+        start_us = 0 if is_position else _TUNING_START_US
         self.motors.drive(now_ms, (start_us, start_us))
         self._reschedule(now_ms)
 
@@ -290,7 +287,7 @@ class MotorControl:
         self._tune(self.position, now_ms, moved_ticks, [_TUNING_STEP_US * relay for relay in self._relay])
 
     def _tune(
-        self, controller: _Controller, now_ms: int, measured: Sequence[float], outputs_us: Sequence[int]
+        self, controller: Controller, now_ms: int, measured: Sequence[float], outputs_us: Sequence[int]
     ) -> None:
         if controller.continue_tuning(now_ms):
             for side in ("Left", "Right"):
