@@ -72,6 +72,9 @@ FIRST_TOPIC_ID = 100
 _HEADER = struct.Struct("<2sHBH")
 _SYNC_NUMBER = int.from_bytes(SYNC, "little")
 _read_header = struct.Struct("<HHBH").unpack_from  # with the sync as a number, which costs less
+_CHECKED_PAYLOAD = slice(HEADER_LENGTH - _CHECKED_OFFSET, -1)
+"""The payload among the bytes that are checked."""
+
 _EXACT_ADLER_LENGTH = 256
 """adler32 & 0xffff is (1 + sum of the bytes) mod 65521: exact up to this length, and much faster than sum()."""
 
@@ -81,9 +84,6 @@ class Packet(NamedTuple):
 
     topic_id: int
     payload: bytes
-
-
-_new_packet = functools.partial(tuple.__new__, Packet)  # at two thirds of the cost of Packet(...), 200 times per second
 
 
 def sum_bytes(data: Bytes) -> int:
@@ -145,12 +145,17 @@ class PacketReader:
 
     def receive_bytes(self, data: Bytes) -> List[Packet]:
         """Return the packets that data completes, in order. Never raises, whatever data holds."""
-        buffer = self._remainder + bytes(data) if self._remainder else bytes(data)
+        return list(map(Packet._make, self.receive_pairs(data)))
+
+    def receive_pairs(self, data: Bytes) -> List[Tuple[int, bytes]]:
+        """As receive_bytes(), but as plain tuples, which saves a sixth of the reading."""
+        buffer = self._remainder + data if self._remainder else bytes(data)
         end = len(buffer)
         last_start = end - HEADER_LENGTH
         max_length = self._max_payload_length
         position = 0
-        found: List[Packet] = []
+        found: List[Tuple[int, bytes]] = []
+        # Every call costs here, 200 times per robot and second: short packets are checked without sum_bytes().
         while position <= last_start:
             sync, length, length_checksum, topic_id = _read_header(buffer, position)
             if sync != _SYNC_NUMBER:
@@ -160,15 +165,19 @@ class PacketReader:
                 packet_end = position + OVERHEAD_LENGTH + length
                 if packet_end > end:
                     break
-                if sum_bytes(buffer[position + _CHECKED_OFFSET : packet_end]) == 0xFF:
-                    payload = buffer[position + HEADER_LENGTH : packet_end - 1]
-                    found.append(_new_packet((topic_id, payload)))
+                checked = buffer[position + _CHECKED_OFFSET : packet_end]
+                if len(checked) <= _EXACT_ADLER_LENGTH:
+                    is_good = adler32(checked) & 0xFF == 0
+                else:
+                    is_good = sum_bytes(checked) == 0xFF
+                if is_good:
+                    found.append((topic_id, checked[_CHECKED_PAYLOAD]))
                     position = packet_end
                     continue
             self.bad_packets += 1
             self.skipped_bytes += 1
             position += 1
-        self._remainder = buffer[self._skip_to_sync(buffer, position) :]
+        self._remainder = buffer[self._skip_to_sync(buffer, position) :] if position < end else b""
         self.packets += len(found)
         return found
 

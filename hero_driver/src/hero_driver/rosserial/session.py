@@ -235,16 +235,30 @@ class Session:
     def receive_bytes(self, data: Bytes, now_s: float, time_of_day_s: float) -> List[Event]:
         """Return the events that data causes, in order. Never raises, whatever data holds."""
         self.last_receive_s = now_s
+        received = self.reader.receive_pairs(data)
+        if not received:
+            return []
+        topics = self._messages
+        try:
+            # Most reads hold messages only.
+            messages = [(topics[topic_id], payload) for topic_id, payload in received]
+        except KeyError:
+            return self._receive_mixed(received, now_s, time_of_day_s)
+        self._last_configured_s = now_s
+        return [MessagesReceived(messages)]
+
+    def _receive_mixed(self, received: List[Tuple[int, bytes]], now_s: float, time_of_day_s: float) -> List[Event]:
         events: List[Event] = []
         messages: Optional[List[Tuple[Topic, bytes]]] = None
-        topics = self._messages
-        for topic_id, payload in self.reader.receive_bytes(data):
-            if topic_id in topics:
+        for topic_id, payload in received:
+            # What came before in this read may have declared it.
+            topic = self._messages.get(topic_id)
+            if topic is not None:
                 if messages is None:
                     messages = []
                     events.append(MessagesReceived(messages))
                     self._last_configured_s = now_s
-                messages.append((topics[topic_id], payload))
+                messages.append((topic, payload))
                 continue
             try:
                 event = self._receive_special(topic_id, payload, now_s, time_of_day_s)
