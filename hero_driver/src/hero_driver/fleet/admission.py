@@ -5,7 +5,7 @@ import ipaddress
 from dataclasses import dataclass
 from typing import Counter, Optional, Tuple, Union
 
-from .token_bucket import TokenBucket, TokenBuckets
+from .token_bucket import TokenBuckets
 
 __all__ = ["GARBAGE_BURST_LENGTH", "GARBAGE_PER_S", "NEW_ROBOTS_PER_S", "Admission", "AdmissionLimits", "RateLimit"]
 
@@ -132,18 +132,22 @@ def _decrement(counts: "Counter[str]", host: str) -> None:
 
 
 class RateLimit:
-    """What one connection may send per second."""
+    """What one connection may send per second.
+
+    Two token buckets of one second each, as the times up to which the permitted rates are used: one call per read.
+    """
 
     def __init__(self, max_packets_per_s: int, max_bytes_per_s: int, now_s: float) -> None:
         self._max_packets_per_s = max_packets_per_s
         self._max_bytes_per_s = max_bytes_per_s
-        self._packets = TokenBucket(max_packets_per_s, max_packets_per_s, now_s)
-        self._bytes = TokenBucket(max_bytes_per_s, max_bytes_per_s, now_s)
+        self._packets_until_s = self._bytes_until_s = now_s
 
     def admit(self, packets: int, length: int, now_s: float) -> Optional[str]:
         """Count what one read brought; return why it is too much, None if it is not."""
-        if not self._packets.take(packets, now_s):
+        self._packets_until_s = max(self._packets_until_s, now_s) + packets / self._max_packets_per_s
+        self._bytes_until_s = max(self._bytes_until_s, now_s) + length / self._max_bytes_per_s
+        if self._packets_until_s > now_s + 1.0:
             return "more than %d packets per second (~max_packets_per_s)" % self._max_packets_per_s
-        if not self._bytes.take(length, now_s):
+        if self._bytes_until_s > now_s + 1.0:
             return "more than %d bytes per second (~max_bytes_per_s)" % self._max_bytes_per_s
         return None
