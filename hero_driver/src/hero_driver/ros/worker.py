@@ -40,7 +40,7 @@ class Worker:
             self._thread.join(SHUTDOWN_WAIT_S)
 
     def _run(self) -> None:
-        while not self._ended or len(self._calls):
+        while not self._ended or self._calls.waiting:
             self._ready.wait()
             self._ready.clear()
             self._calls.make_calls()

@@ -13,11 +13,16 @@ Call = Callable[[], None]
 
 
 class CallQueue:
-    """Calls for one thread, from any other."""
+    """Calls for one thread, from any other.
+
+    Attributes:
+        waiting: the calls that wait; to be looked at only.
+        refused: calls that were refused.
+    """
 
     def __init__(self, length_max: int, wake: Call, on_error: Callable[[BaseException], None]) -> None:
         """wake() is called after each new call, on its sender's thread; on_error gets what a call raises."""
-        self._calls: Deque[Call] = collections.deque()
+        self.waiting: Deque[Call] = collections.deque()
         self._length_max = length_max
         self._wake = wake
         self._on_error = on_error
@@ -25,26 +30,23 @@ class CallQueue:
         self._closed = False
         self.refused = 0
 
-    def __len__(self) -> int:
-        return len(self._calls)
-
     def submit(self, call: Call, always: bool = False) -> bool:
         """Queue call; return False, and count it, if too many wait (unless always) or the queue is closed."""
         with self._lock:
-            if self._closed or (len(self._calls) >= self._length_max and not always):
+            if self._closed or (len(self.waiting) >= self._length_max and not always):
                 self.refused += 1
                 return False
-            self._calls.append(call)
+            self.waiting.append(call)
         self._wake()
         return True
 
     def make_calls(self) -> None:
         """Make the calls that wait now; what they submit in turn waits for the next time."""
-        for _ in range(len(self._calls)):
+        for _ in range(len(self.waiting)):
             with self._lock:
-                if not self._calls:
+                if not self.waiting:
                     return
-                call = self._calls.popleft()
+                call = self.waiting.popleft()
             try:
                 call()
             except BaseException as error:  # noqa: BLE001 - not even SystemExit may end the thread that serves all
@@ -57,5 +59,5 @@ class CallQueue:
         with self._lock:
             self._closed = True
             if not drain:
-                self._calls.clear()
+                self.waiting.clear()
         self._wake()

@@ -130,7 +130,8 @@ class EventLoop(LinkOwner):
 
     def _run_once(self) -> None:
         timeout_s = None
-        if len(self._calls):
+        waiting = self._calls.waiting
+        if waiting:
             timeout_s = 0.0
         elif self._timers:
             timeout_s = self._timers[0][0] - self._turned_s
@@ -143,7 +144,8 @@ class EventLoop(LinkOwner):
             serve = serves.get(descriptor)
             if serve is not None:
                 serve(mask)
-        self._calls.make_calls()
+        if waiting:
+            self._calls.make_calls()
         now_s = self._turned_s = time.monotonic()
         while self._timers and self._timers[0][0] <= now_s:
             self._call(heapq.heappop(self._timers)[2])
