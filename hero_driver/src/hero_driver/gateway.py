@@ -164,6 +164,8 @@ class Gateway(LinkHandler):
             if isinstance(event, MessagesReceived):
                 for topic, payload in event.messages:
                     topic.receive(payload, arrival_ns)
+                if not self._transforms.is_scheduled:
+                    self._transforms.schedule()
             else:
                 self._receive_event(peer, event, now_s)
                 if link.closed:

@@ -25,6 +25,8 @@ class StampFilter:
 
     Attributes:
         corrected: stamps that were replaced so far.
+        last_ns: the newest stamp of each topic. One that correct() has let through unchanged at this time of arrival
+            may be written here for other topics with older ones, without asking again.
     """
 
     def __init__(self, use_arrival: bool, max_future_s: float, max_age_s: float) -> None:
@@ -36,15 +38,15 @@ class StampFilter:
         self._max_future_ns = int(max_future_s * NS_PER_S)
         # Where the arrival is taken, no stamp is in the limits.
         self._lowest_ns = self._max_future_ns + 1 if use_arrival else -int(max_age_s * NS_PER_S)
-        self._last_ns: Dict[Topic, int] = {}
+        self.last_ns: Dict[Topic, int] = {}
         self.corrected = 0
 
     def correct(self, topic: Topic, stamp_ns: int, arrival_ns: int) -> int:
         """Return the stamp (ns) to publish on topic for a message stamped stamp_ns that came at arrival_ns."""
-        last_ns = self._last_ns.get(topic)
+        last_ns = self.last_ns.get(topic)
         ahead_ns = stamp_ns - arrival_ns
         if self._lowest_ns <= ahead_ns <= self._max_future_ns and (last_ns is None or stamp_ns > last_ns):
-            self._last_ns[topic] = stamp_ns
+            self.last_ns[topic] = stamp_ns
             return stamp_ns
         result_ns = stamp_ns
         if self._use_arrival:
@@ -56,9 +58,9 @@ class StampFilter:
             if last_ns - arrival_ns > self._max_future_ns + STEP_SLACK_NS:
                 # No stamp that was let through lies so far ahead of its arrival: ROS time itself went back
                 # (the clock was set, or a bag or simulation began anew).
-                self._last_ns.clear()
+                self.last_ns.clear()
             else:
                 result_ns = last_ns + STEP_NS
                 self.corrected += 1
-        self._last_ns[topic] = result_ns
+        self.last_ns[topic] = result_ns
         return result_ns

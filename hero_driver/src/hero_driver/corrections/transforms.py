@@ -7,6 +7,7 @@ import re
 from typing import Callable, List, Set
 
 from . import message_layouts
+from .message_layouts import TRANSFORM, TRANSFORM_FRAMES, TRANSFORM_HEAD, TRANSFORM_START, TRANSFORM_TAIL
 from .stamps import NS_PER_S, StampFilter
 
 FRAMES_MAX = 32
@@ -52,29 +53,40 @@ class TransformCorrector:
         self._odom_frames = message_layouts.join_frames(
             self._frame_prefix + b"odom", self._frame_prefix + b"base_link"
         )
+        self._last_ns = stamps.last_ns
+        self._passed_start = b""  # of the message whose stamp passed last
+        self._passed_ns = self._passed_arrival_ns = 0
         self._own_frames: Set[bytes] = set()
         self._known_foreign: Set[bytes] = set()
 
     def correct(self, payload: bytes, arrival_ns: int) -> None:
         """Take a message of transforms that came at arrival_ns."""
         # Stock robots send one transform in a message, of frames that were seen before.
-        frames = payload[message_layouts.TRANSFORM_FRAMES]
-        if frames not in self._own_frames:
+        frames = payload[TRANSFORM_FRAMES]
+        last_ns = self._last_ns.get(frames)
+        if last_ns is None:
             self._correct_unknown(payload, arrival_ns)
             return
-        count, _, secs, nsecs = message_layouts.read_transforms_start(payload)
-        if count != 1:
-            self._correct_unknown(payload, arrival_ns)
-            return
-        stamp_ns = secs * NS_PER_S + nsecs
-        corrected_ns = self._stamps.correct(frames, stamp_ns, arrival_ns)
-        if corrected_ns != stamp_ns or nsecs >= NS_PER_S:
-            head = message_layouts.pack_transform_head(corrected_ns, frames)
-            self._pass_on(frames, head, payload[message_layouts.TRANSFORM_TAIL])
-        elif frames == self._odom_frames:
-            self._take_odom_transform(payload[message_layouts.TRANSFORM_HEAD], payload[message_layouts.TRANSFORM_TAIL])
+        start = payload[TRANSFORM_START]
+        if start == self._passed_start and arrival_ns == self._passed_arrival_ns and last_ns < self._passed_ns:
+            # The transforms of a burst have one stamp, which was right for the first of them.
+            self._last_ns[frames] = self._passed_ns
         else:
-            self._add_transform(payload[message_layouts.TRANSFORM])
+            count, _, secs, nsecs = message_layouts.read_transforms_start(payload)
+            if count != 1:
+                self._correct_unknown(payload, arrival_ns)
+                return
+            stamp_ns = secs * NS_PER_S + nsecs
+            corrected_ns = self._stamps.correct(frames, stamp_ns, arrival_ns)
+            if corrected_ns != stamp_ns or nsecs >= NS_PER_S:
+                head = message_layouts.pack_transform_head(corrected_ns, frames)
+                self._pass_on(frames, head, payload[TRANSFORM_TAIL])
+                return
+            self._passed_start, self._passed_ns, self._passed_arrival_ns = start, stamp_ns, arrival_ns
+        if frames == self._odom_frames:
+            self._take_odom_transform(payload[TRANSFORM_HEAD], payload[TRANSFORM_TAIL])
+        else:
+            self._add_transform(payload[TRANSFORM])
 
     def _correct_unknown(self, payload: bytes, arrival_ns: int) -> None:
         transforms = message_layouts.read_transforms(payload)

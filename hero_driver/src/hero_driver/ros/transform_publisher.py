@@ -4,7 +4,7 @@ One message for each transform, as robots send them, would make every listener o
 per robot and second, and a small queue would lose most of them. Runs on the thread of the sockets.
 """
 
-from typing import List
+from typing import Callable, List
 
 from tf2_msgs.msg import TFMessage
 
@@ -20,7 +20,13 @@ TRANSFORMS_MAX = 500
 
 
 class TransformPublisher:
-    """The publisher of /tf."""
+    """The publisher of /tf.
+
+    Attributes:
+        add: takes the bytes of one geometry_msgs/TransformStamped, 150 times per robot and second, so it is the list's
+            own method; schedule() has to follow.
+        is_scheduled: whether what was added is going to be published already.
+    """
 
     def __init__(self, period_s: float, call_later: CallLater) -> None:
         """Collect for period_s; call_later(delay_s, call) runs call on the same thread."""
@@ -29,14 +35,17 @@ class TransformPublisher:
         self._publisher = RawPublisher(QUEUE_LENGTH, call_later)
         self._publisher.open("/tf", make_raw_class(TFMessage))
         self._transforms: List[bytes] = []
+        self.add: Callable[[bytes], None] = self._transforms.append
+        self.is_scheduled = False
 
-    def add(self, transform: bytes) -> None:
-        """Publish the bytes of one geometry_msgs/TransformStamped within the period."""
-        if not self._transforms:
+    def schedule(self) -> None:
+        """Publish what was added within the period; for after each read, unless is_scheduled."""
+        if self._transforms:
+            self.is_scheduled = True
             self._call_later(self._period_s, self._publish)
-        self._transforms.append(transform)
 
     def _publish(self) -> None:
+        self.is_scheduled = False
         if self._publisher.is_wanted:
             for start in range(0, len(self._transforms), TRANSFORMS_MAX):
                 part = self._transforms[start : start + TRANSFORMS_MAX]
