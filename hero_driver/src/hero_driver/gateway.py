@@ -178,7 +178,7 @@ class Gateway(LinkHandler):
             self._receive_event(peer, event, now_s)
         if peer.record is None and now_s - peer.session.opened_s > self._config.declare_timeout_s:
             link.close("did not identify itself as a robot within %.1f s" % self._config.declare_timeout_s)
-        if not link.closed:
+        if peer.session.outgoing and not link.closed:
             self._send_outgoing(peer)
 
     @staticmethod

@@ -97,7 +97,8 @@ class EventLoop(LinkOwner):
         self._wake_receiver, self._wake_sender = socket.socketpair()
         self._wake_receiver.setblocking(False)
         self._wake_sender.setblocking(False)
-        self._ended = threading.Event()
+        self._is_running = True
+        self._ended = threading.Event()  # for the diallers
         self._file_limit = _raise_file_limit()
         self.listening: Optional[Address] = None
 
@@ -120,7 +121,7 @@ class EventLoop(LinkOwner):
         self._thread_id = threading.get_ident()
         self._turned_s = time.monotonic()
         try:
-            while not self._ended.is_set():
+            while self._is_running:
                 self._run_once()
         except BaseException:
             self._handler.stop_without_loop()
@@ -152,7 +153,7 @@ class EventLoop(LinkOwner):
 
     def stop(self) -> None:
         """Let run() return; from any thread."""
-        self.call_soon(self._ended.set)
+        self.call_soon(self._end)
 
     def call_soon(self, call: Callable[[], None]) -> None:
         """Run call on the loop's thread, soon; from any thread. Dropped if CALLS_MAX others wait already."""
@@ -331,6 +332,9 @@ class EventLoop(LinkOwner):
         for link in list(self._links.values()):
             if not link.closed:
                 self._handler.poll_link(link, now_s)
+
+    def _end(self) -> None:
+        self._is_running = False
 
     def _close_all(self) -> None:
         self._ended.set()
