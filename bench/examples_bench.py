@@ -136,7 +136,7 @@ def main():
     machine_us = measure_machine_us()
     print_machine(machine_us)
     results = {}
-    with RunningSuite(options.count) as suite:
+    with RunningSuite(options.count, "arena:=empty") as suite:  # no walls before the goals
         commands = CommandCount(options.count)
         truth = SwarmWatch(range(options.count))
         truth.wait_until_complete()
