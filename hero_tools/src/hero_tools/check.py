@@ -20,7 +20,7 @@ from hero_client.command_line import make_printable
 from .checkup import computer, graph, network
 from .checkup.points import FAIL, OK, WARN, Finding, Point, run_points, warn
 
-TIMEOUT_S = 1.0  # of the points that run at once: those that need no ROS master, the node, those that need it
+TIMEOUT_S = 1.5  # of the points that run at once: those that need no ROS master, the node, those that need it
 LEAVE_TIMEOUT_S = 0.3
 
 
