@@ -10,7 +10,11 @@ function(hero_add_program name)
     set(module ${ARGV1})
   endif()
   set(program ${CMAKE_CURRENT_BINARY_DIR}/programs/${name})
-  file(WRITE ${program} "#!${PYTHON_EXECUTABLE}\nimport sys\n\nfrom ${PROJECT_NAME}.${module} import main\n\nsys.exit(main())\n")
+  # Modules load for a second or more: Ctrl-C then ends the program at once, without a traceback.
+  file(WRITE ${program} "#!${PYTHON_EXECUTABLE}\nimport signal\nimport sys\n\n"
+    "handler = signal.signal(signal.SIGINT, signal.SIG_DFL)\n"
+    "from ${PROJECT_NAME}.${module} import main\n\n"
+    "signal.signal(signal.SIGINT, handler)\nsys.exit(main())\n")
   install(PROGRAMS ${program} DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
   file(COPY ${program} DESTINATION ${CATKIN_DEVEL_PREFIX}/${CATKIN_PACKAGE_BIN_DESTINATION}
     FILE_PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)

@@ -2,10 +2,15 @@
 """How programs end where nothing works: one line and the right exit status, whatever their environment and output."""
 
 import os
+import signal
 import subprocess
+import tempfile
 import unittest
+from pathlib import Path
 
 import rostest
+
+from hero_test.processes import find_program
 
 TIMEOUT_S = 120.0
 BAD_URIS = ("localhost", "http://", "http://localhost:99999", "ftp://localhost:11311", "http://[::1")
@@ -49,6 +54,24 @@ class ProgramEndsTest(unittest.TestCase):
         """Return exit status and lines on stderr."""
         _, errors = process.communicate(timeout=TIMEOUT_S)
         return process.returncode, errors.splitlines()
+
+    def test_ctrl_c_while_modules_load_prints_nothing(self):
+        with tempfile.TemporaryDirectory() as folder:
+            for module in "rospy", "numpy":
+                slow = "import time; print('loading', flush=True); time.sleep(%g)\n" % TIMEOUT_S
+                Path(folder, module + ".py").write_text(slow)
+            environment = {**os.environ, "PYTHONPATH": "%s:%s" % (folder, os.environ["PYTHONPATH"])}
+            for package, program in (("hero_driver", "hero_driver"), ("hero_tools", "fleet"), ("hero_sim", "hero_sim")):
+                with self.subTest(program), subprocess.Popen(
+                    [find_program(package, program)],
+                    stdout=subprocess.PIPE,
+                    stderr=subprocess.PIPE,
+                    env=environment,
+                    text=True,
+                ) as process:
+                    self.assertEqual(process.stdout.readline(), "loading\n")
+                    process.send_signal(signal.SIGINT)
+                    self.assertEqual(self.end(process), (-signal.SIGINT, []))
 
     def test_a_master_uri_that_is_none_is_named_in_one_line(self):
         started = [(node, uri, start(node, ROS_MASTER_URI=uri)) for node in NODES for uri in BAD_URIS]
