@@ -25,5 +25,5 @@ def parse_values(name: str, text: str, limits: Mapping[str, Tuple[float, float]]
             raise OptionError("%s: %s must be a number, not %r" % (name, key, number)) from error
         least, most = limits[key]
         if not least <= values[key] <= most:
-            raise OptionError("%s: %s must be %s..%s, not %s" % (name, key, least, most, number))
+            raise OptionError("%s: %s must be %.10g..%.10g, not %s" % (name, key, least, most, number))
     return values
