@@ -10,6 +10,9 @@ from hero_sim.robot import declarations as ids
 
 SERVER_START_S = 1_700_000_000
 
+STOCK_SUBSCRIPTIONS = [1, 1, 3, 3, 1, 3, 1, 3, 3, 1, 3, 3]
+"""Ids of the packets by which a robot declares what it reads: topics 1, requests of services 3."""
+
 Arrival = collections.namedtuple("Arrival", "at_ms topic_id payload")
 
 

@@ -1,7 +1,7 @@
 import struct
 
 import pytest
-from driver_side import SERVER_START_S, DriverSide, read_odom
+from driver_side import SERVER_START_S, STOCK_SUBSCRIPTIONS, DriverSide, read_odom
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -39,20 +39,7 @@ def test_a_request_is_answered_by_a_time_request_and_all_declarations():
         for arrival in driver.arrivals[0]
         if arrival.topic_id < 7 or arrival.topic_id == packets.ID_TIME
     ]
-    assert [arrival.topic_id for arrival in burst[:25]] == [10, 0, 2, 0, 0, 0, 0] + [2] * 6 + [
-        1,
-        1,
-        3,
-        3,
-        1,
-        3,
-        1,
-        3,
-        3,
-        1,
-        3,
-        3,
-    ]
+    assert [arrival.topic_id for arrival in burst[:25]] == [10, 0, 2, 0, 0, 0, 0] + [2] * 6 + STOCK_SUBSCRIPTIONS
     assert len({arrival.at_ms for arrival in burst[:25]}) == 1
 
 

@@ -70,20 +70,7 @@ def test_declarations_have_the_stock_order_names_and_length():
     declared = read_packets(data)
     infos = [payloads.decode_topic_info(packet.payload) for packet in declared]
     assert [info.topic_id for info in infos] == list(range(125, 137)) + list(range(100, 112))
-    assert [packet.topic_id for packet in declared] == [0, 2, 0, 0, 0, 0] + [2] * 6 + [
-        1,
-        1,
-        3,
-        3,
-        1,
-        3,
-        1,
-        3,
-        3,
-        1,
-        3,
-        3,
-    ]
+    assert [packet.topic_id for packet in declared] == [0, 2, 0, 0, 0, 0] + [2] * 6 + driver_side.STOCK_SUBSCRIPTIONS
     assert infos[13].name == "hero_0/laser_enable"
     assert all(info.name.startswith("/") for info in infos if info.topic_id != 101)
     assert {info.buffer_length for info in infos} == {4096}
