@@ -247,9 +247,13 @@ class GoToGoalServer:
             feedback.pose = self.robot.odometry.pose.pose
         handle.publish_feedback(feedback)
 
-    def close(self) -> None:
-        """Give up the goal and stop the action server; for the end of the program."""
+    def give_up(self) -> None:
+        """End the goal and take no more, at once for many servers; the robot is stopped by the time close() returns."""
         self._is_closing = True
         self._news.set()
+
+    def close(self) -> None:
+        """Give up the goal and stop the action server; for the end of the program."""
+        self.give_up()
         self._thread.join(CLOSE_TIMEOUT_S)
         self._server.stop()

@@ -37,6 +37,8 @@ def serve_goals():
             while program.sleep(0.1) and not (once and not any(server.busy for server in servers)):
                 swarm.report_missing({s.robot.name: s.robot.missing() if s.busy else None for s in servers})
             for server in servers:
+                server.give_up()  # all robots stop at the same time
+            for server in servers:
                 server.close()
             return 1 if once and not all(server.reached for server in servers) else 0
 
