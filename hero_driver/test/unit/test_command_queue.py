@@ -23,7 +23,7 @@ FAST, SLOW = make_motion(0.2), make_motion(0.1)
 
 
 def make_queue():
-    return CommandQueue(max_age_s=2.0)
+    return CommandQueue(max_age_s=2.0, lock=threading.Lock())
 
 
 def offer(queue, name, twist, now_s):

@@ -5,7 +5,7 @@ are bounded: a motion command that waits is replaced by a newer one, of the rest
 """
 
 import collections
-from typing import Deque, Dict, List, Optional, Set, Tuple
+from typing import Any, ContextManager, Deque, Dict, List, Optional, Set, Tuple
 
 from .velocity_shaper import VelocityShaper
 
@@ -24,12 +24,16 @@ Command = Tuple[str, bytes]
 class CommandQueue:
     """What waits to be sent to one robot."""
 
-    def __init__(self, max_age_s: float) -> None:
-        """max_age_s: shaped motion commands older than this are dropped."""
+    def __init__(self, max_age_s: float, lock: ContextManager[Any]) -> None:
+        """max_age_s: shaped motion commands older than this are dropped.
+
+        lock: held while commands are added or removed: threads of rospy offer while the socket thread takes.
+        """
         self._max_age_s = max_age_s
         self._shapers: Dict[str, VelocityShaper] = {}
         self._offered_s: Dict[str, float] = {}
         self._waiting: Deque[Command] = collections.deque()
+        self._lock = lock
         self._unshaped: Set[str] = set()  # motion topics among the names that wait
         self._is_idle = True  # after the last take(), and nothing was offered since
         self.dropped = 0
@@ -47,10 +51,11 @@ class CommandQueue:
         """Take anything else; is_motion: it moves a device that takes all commands as they come."""
         if is_motion:
             self._unshaped.add(name)
-        if len(self._waiting) >= QUEUE_LENGTH:
-            self._waiting.popleft()
-            self.dropped += 1
-        self._waiting.append((name, payload))
+        with self._lock:
+            if len(self._waiting) >= QUEUE_LENGTH:
+                self._waiting.popleft()
+                self.dropped += 1
+            self._waiting.append((name, payload))
         self._is_idle = False
 
     def discard_motion(self, resume_s: float) -> None:
@@ -59,14 +64,16 @@ class CommandQueue:
             shaper.discard_motion()
             shaper.delay_until(resume_s)
         if self._unshaped:
-            self._waiting = collections.deque(
-                command for command in self._waiting if command[0] not in self._unshaped
-            )
+            with self._lock:
+                self._waiting = collections.deque(
+                    command for command in self._waiting if command[0] not in self._unshaped
+                )
 
     def clear(self) -> None:
         """Forget everything: the connection is gone."""
-        self.dropped += len(self._waiting)
-        self._waiting.clear()
+        with self._lock:
+            self.dropped += len(self._waiting)
+            self._waiting.clear()
         self._shapers.clear()
         self._offered_s.clear()
 
@@ -94,9 +101,11 @@ class CommandQueue:
                 if payload is not None:
                     commands.append((name, payload))
                 is_idle = is_idle and shaper.is_idle
-        while self._waiting and in_flight_length < IN_FLIGHT_MAX:
-            in_flight_length += len(self._waiting[0][1])
-            commands.append(self._waiting.popleft())
+        if self._waiting:
+            with self._lock:
+                while self._waiting and in_flight_length < IN_FLIGHT_MAX:
+                    in_flight_length += len(self._waiting[0][1])
+                    commands.append(self._waiting.popleft())
         self._is_idle = is_idle and not self._waiting
         return commands
 

@@ -7,6 +7,7 @@ there again when the robot returns.
 
 import functools
 import math
+import threading
 import time
 from typing import Any, Callable, Dict, List, NamedTuple, Optional, Set, Tuple
 
@@ -85,7 +86,7 @@ class RobotBridge:
         """correction_settings is None for devices that are no HeRos: their messages pass through as they are."""
         self.identity = identity
         self.label = identity.namespace.lstrip("/")
-        self.commands = CommandQueue(context.command_max_age_s)
+        self.commands = CommandQueue(context.command_max_age_s, threading.Lock())
         self.wheels = WheelMotion()
         self.refused_commands = 0
         self._context = context
