@@ -3,7 +3,7 @@
 import os
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hero_calibration import store
@@ -147,10 +147,15 @@ PIECES = st.one_of(
 )
 
 
-@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@pytest.fixture(scope="module")
+def directory(tmp_path_factory):
+    return tmp_path_factory.mktemp("any_file")
+
+
+@settings(max_examples=300, deadline=None)
 @given(script=st.lists(st.tuples(st.integers(0, 330), st.integers(0, 6), PIECES), min_size=1, max_size=4))
-def test_any_file_is_read_or_refused_in_one_line_and_can_be_replaced(tmp_path, script):
-    path, content = save_whole(tmp_path)
+def test_any_file_is_read_or_refused_in_one_line_and_can_be_replaced(directory, script):
+    path, content = save_whole(directory)
     for place, length, piece in script:
         content = content[:place] + piece + content[place + length :]
     with open(path, "wb") as file:

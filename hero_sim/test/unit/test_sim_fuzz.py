@@ -61,7 +61,8 @@ contents = st.one_of(
     changes.map(change).map(str.encode),
     mappings.map(json.dumps).map(str.encode),
 )
-often = settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+# Not a test of how fast the machine is.
+often = settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 
 
 @pytest.fixture(scope="module")
