@@ -3,7 +3,8 @@
 # hero_add_program(NAME [MODULE]): a program NAME for rosrun that calls main() of a module of the package (default: NAME).
 #
 # Its first line names the interpreter of the build, in the devel and the install space: catkin_install_python() would
-# write "env python3" for the install space, and the first python3 on PATH (pyenv, conda) may have no rospy.
+# write "env python3" for the install space, and the first python3 on PATH (pyenv, conda) may have no rospy. A module that is
+# not installed is named in one line. The rospy of Debian 11 calls Thread.isAlive(), which its Python 3.9 no longer has.
 function(hero_add_program name)
   set(module ${name})
   if(ARGC GREATER 1)
@@ -11,10 +12,23 @@ function(hero_add_program name)
   endif()
   set(program ${CMAKE_CURRENT_BINARY_DIR}/programs/${name})
   # Modules load for a second or more: Ctrl-C then ends the program at once, without a traceback.
-  file(WRITE ${program} "#!${PYTHON_EXECUTABLE}\nimport signal\nimport sys\n\n"
-    "handler = signal.signal(signal.SIGINT, signal.SIG_DFL)\n"
-    "from ${PROJECT_NAME}.${module} import main\n\n"
-    "signal.signal(signal.SIGINT, handler)\nsys.exit(main())\n")
+  file(WRITE ${program} "#!${PYTHON_EXECUTABLE}
+import signal
+import sys
+from threading import Thread
+
+if not hasattr(Thread, 'isAlive'):
+    Thread.isAlive = Thread.is_alive
+
+handler = signal.signal(signal.SIGINT, signal.SIG_DFL)
+try:
+    from ${PROJECT_NAME}.${module} import main
+except ModuleNotFoundError as error:
+    sys.exit('${name}: %s; script/bootstrap (or rosdep) installs what all programs need' % error)
+
+signal.signal(signal.SIGINT, handler)
+sys.exit(main())
+")
   install(PROGRAMS ${program} DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
   file(COPY ${program} DESTINATION ${CATKIN_DEVEL_PREFIX}/${CATKIN_PACKAGE_BIN_DESTINATION}
     FILE_PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)

@@ -147,7 +147,7 @@ def test_bootstrap_installs_the_python_packages_that_are_declared():
     listed = (sources.ROOT / "script" / "bootstrap").read_text(encoding="utf-8").split()
     for package in PACKAGES:
         for name in sources.read_dependencies(package):
-            assert not name.startswith("python3-") or name in listed, f"{name}: add to DEBIAN_PACKAGES"
+            assert not name.startswith("python3-") or name in listed, f"{name}: add to SUITE_PACKAGES"
 
 
 def test_every_program_has_a_module_with_a_main():

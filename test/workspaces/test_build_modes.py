@@ -126,6 +126,8 @@ BUILDERS = {
 @pytest.fixture(scope="module", params=sorted(BUILDERS))
 def workspace(request):
     """A workspace of each build mode, built once."""
+    if request.param != "catkin_make" and shutil.which("catkin") is None:
+        pytest.skip("catkin-tools is not installed")
     return BUILDERS[request.param]()
 
 
@@ -188,6 +190,15 @@ def test_programs_start_whatever_python3_is_first_on_path(workspace):
         assert "Couldn't find executable" not in output, output
 
     side_by_side(start, PROGRAMS)
+
+
+@pytest.mark.parametrize("workspace", ["install"], indirect=True)
+def test_a_module_that_is_not_installed_is_named_in_one_line(workspace):
+    missing = workspace.directory / "missing"
+    missing.mkdir()
+    (missing / "tqdm.py").write_text("raise ModuleNotFoundError(\"No module named 'tqdm'\")\n")
+    output = workspace.run(f"PYTHONPATH={missing}:$PYTHONPATH rosrun hero_recording export 2>&1 || true")
+    assert output.startswith("export: No module named 'tqdm'; script/bootstrap") and output.count("\n") == 1
 
 
 def test_tutorial_scripts_are_found_and_import(workspace):

@@ -52,7 +52,7 @@ def check_python() -> Finding:
     if missing:
         return fail(
             "Python %s (%s) lacks %s" % (version, sys.executable, ", ".join(missing)),
-            "Debian 12: script/bootstrap; elsewhere: rosdep install --from-paths src --ignore-src -y",
+            "Debian: script/bootstrap; elsewhere: rosdep install --from-paths src --ignore-src -y",
         )
     text = "Python %s (%s) has all modules" % (version, sys.executable)
     other = shutil.which("python3")
