@@ -13,8 +13,7 @@ def main() -> None:
             if nearest is None:
                 robot.drive(0.05, 0.0)  # the sensors see 0.24 m far
             else:
-                error_m = nearest.range_m - 0.15  # from the robot's center
-                robot.drive(0.8 * error_m * math.cos(nearest.bearing_rad), 1.5 * nearest.bearing_rad)
+                robot.drive(0.8 * (nearest.range_m - 0.15) * math.cos(nearest.bearing_rad), 1.5 * nearest.bearing_rad)
 
 
 if __name__ == "__main__":
