@@ -265,7 +265,7 @@ class Firmware:
             (now_ms + IMU_LOG_MS, self._log_imu),
             (now_ms + WELCOME_MS, self._enter_loop),
         ]
-        self.due_ms = first_spin_ms
+        self.due_ms = max(first_spin_ms, now_ms + 1)
 
     def _run_setup(self, now_ms: int) -> None:
         while self._setup and self._setup[0][0] <= now_ms:
