@@ -17,6 +17,8 @@ import struct
 import time
 
 import emulated_swarm
+from geometry_msgs.msg import Twist
+from nav_msgs.msg import Odometry
 
 from hero_driver.rosserial import packets, payloads
 from hero_driver.rosserial.payloads import TopicInfo
@@ -167,7 +169,7 @@ def huge_packets(peer):
     """The longest packets there are, and headers that promise more."""
     packet = packets.encode_packet(declarations.ID_LASER, bytes(4096))
     promise = b"\xff\xfe\xff\xff\x01\x7d\x00"
-    too_long = packets.encode_packet(emulated_swarm.LASER, bytes(65535))
+    too_long = packets.encode_packet(declarations.ID_LASER, bytes(65535))
     peer.flood(emulated_swarm.declare(OWN_NUMBER), repeat_piece(packet * 4 + promise + too_long))
 
 
@@ -220,11 +222,9 @@ def claims_topics(peer):
     """Declares another robot's topics beside its own, and sends on them."""
     victim = "/hero_%d" % peer.victim
     odometry, twist = "nav_msgs/Odometry", "geometry_msgs/Twist"
-    foreign = declare_topic(0, 140, victim + "/odom", odometry, emulated_swarm.MD5[odometry])
-    foreign += declare_topic(0, 141, victim + "/odom_raw", odometry, emulated_swarm.MD5[odometry])
-    foreign += declare_topic(
-        1, 120, victim + "/velocity_controller/cmd_vel", twist, emulated_swarm.MD5[twist]
-    )
+    foreign = declare_topic(0, 140, victim + "/odom", odometry, Odometry._md5sum)
+    foreign += declare_topic(0, 141, victim + "/odom_raw", odometry, Odometry._md5sum)
+    foreign += declare_topic(1, 120, victim + "/velocity_controller/cmd_vel", twist, Twist._md5sum)
     odom = make_burst(peer.victim)[0][packets.HEADER_LENGTH : -1]
     pieces = packets.encode_packet(140, odom) + packets.encode_packet(141, odom)
     peer.flood(emulated_swarm.declare(OWN_NUMBER) + foreign, repeat_piece(pieces), pause_s=0.001)
