@@ -31,6 +31,8 @@ REPEAT_PERIOD_S = 0.1
 SETTLE_S = 1.5
 """A driver that the master knows has reported by then, unless it died without unregistering."""
 
+SETTLE_POLL_S = 0.02
+
 FORGET_S = 5.0
 """Reports come once per second. Robots of a driver that is silent for longer than the others are no longer listed."""
 
@@ -245,6 +247,11 @@ class Drivers:
         if time.monotonic() > self._start_s + SETTLE_S:
             return True
         return self._has_looked.is_set() and all(link.report is not None for link in self._find_known())
+
+    def wait_until_settled(self) -> None:
+        """Wait until is_settled, for SETTLE_S after the start at most."""
+        while not self.is_settled and not self._end.wait(SETTLE_POLL_S):
+            pass
 
     def _read_fresh(self) -> Dict[str, RobotArray]:
         """Return the reports by driver, without those of drivers that are silent for longer than the others."""

@@ -201,7 +201,11 @@ class Robot:
 
     @property
     def is_stopped(self) -> bool:
-        """Whether the robot takes no motion because its driver has stopped all robots (emergency stop)."""
+        """Whether the robot takes no motion because its driver has stopped all robots (emergency stop).
+
+        At the start of a program it waits until the drivers have reported, for up to 1.5 s.
+        """
+        self._drivers.wait_until_settled()
         return self._drivers.is_robot_stopped(self.namespace)
 
     def missing(self) -> Optional[str]:
@@ -259,7 +263,8 @@ class Robot:
         self._end_motion()
         self._send_twist(linear_m_s, angular_rad_s)
         now_s = time.monotonic()
-        if (linear_m_s or angular_rad_s) and now_s >= self._next_warning_s and self.is_stopped:
+        is_motion = bool(linear_m_s or angular_rad_s)
+        if is_motion and now_s >= self._next_warning_s and self._drivers.is_robot_stopped(self.namespace):
             self._next_warning_s = now_s + STOPPED_WARNING_PERIOD_S
             rospy.logerr(self._describe_stop())
 
@@ -284,7 +289,7 @@ class Robot:
 
     def check_not_stopped(self) -> None:
         """Check that the driver lets the robot move: see is_stopped. Raises: StoppedError with how to release it."""
-        if self.is_stopped:
+        if self._drivers.is_robot_stopped(self.namespace):
             raise StoppedError(self._describe_stop())
 
     def stop(self) -> None:
@@ -457,6 +462,7 @@ class Robot:
 
     def __repr__(self) -> str:
         """Return the robot's name with its pose, or with why it is not ready."""
+        self._drivers.wait_until_settled()
         state = self.missing() or ("stopped" if self.is_stopped else "ready")
         return "<%s: %s%s>" % (self.name, state, ", %r" % (self.fresh_pose(),) if self.fresh_pose() else "")
 

@@ -157,6 +157,9 @@ class RobotMotionsTest(unittest.TestCase):
             with self.assertLogs("rosout", "ERROR") as log:
                 robot.drive(0.1, 0.0)
             self.assertRegex(log.output[0], STOPPED)
+            # A program that has just started knows it, too.
+            script = "import hero_client, sys; sys.exit(hero_client.Robot(0).is_stopped)"
+            self.assertEqual((1, ""), self.run_script(script))
         finally:
             self.swarm.release_stop()
         self.assertFalse(robot.is_stopped)
