@@ -126,18 +126,22 @@ def test_the_simulator_shares_only_packets_and_payloads_with_the_driver(name):
             assert allowed, f"line {found.line}: {found.module}"
 
 
-@pytest.mark.parametrize("path", sources.list_python_files(), ids=sources.name_of)
-def test_names_that_are_imported_from_our_modules_exist(path):
-    by_module = {}
-    for other in sources.list_python_files():  # a directory of tests is on the path: its modules go by their stem
-        by_module.setdefault(other.stem, set()).update(sources.list_top_level_names(other))
+@pytest.fixture(scope="module")
+def names_by_module():
+    names = {}
+    for path in sources.list_python_files():  # a directory of tests is on the path: its modules go by their stem
+        names.setdefault(path.stem, set()).update(sources.list_top_level_names(path))
     modules = sources.list_source_modules().items()
-    by_module.update((name, sources.list_top_level_names(other)) for name, other in modules)
+    return {**names, **{name: sources.list_top_level_names(path) for name, path in modules}}
+
+
+@pytest.mark.parametrize("path", sources.list_python_files(), ids=sources.name_of)
+def test_names_that_are_imported_from_our_modules_exist(path, names_by_module):
     for node in ast.walk(sources.parse(path)):
-        if isinstance(node, ast.ImportFrom) and not node.level and node.module in by_module:
+        if isinstance(node, ast.ImportFrom) and not node.level and node.module in names_by_module:
             for alias in node.names:
-                is_module = f"{node.module}.{alias.name}" in by_module
-                is_name = by_module[node.module] & {alias.name, "__getattr__"}
+                is_module = f"{node.module}.{alias.name}" in names_by_module
+                is_name = names_by_module[node.module] & {alias.name, "__getattr__"}
                 assert is_module or is_name, f"line {node.lineno}: {alias.name}"
 
 
