@@ -43,10 +43,18 @@ PURE_ROOMS = (
     "hero_sim.world",
     "hero_sim.robot",
     "hero_sim.swarm",  # moves both through simulated time
+    "hero_client.common_frame",
     "hero_client.controllers",
     "hero_client.formations",
     "hero_client.geometry",
     "hero_client.readings",
+    "hero_client.background_motion",
+    "hero_client.clock",
+    "hero_client.group",
+    "hero_client.light",
+    "hero_client.robot_base",
+    "hero_client.robot_link",
+    "hero_client.swarm_base",
 )
 
 

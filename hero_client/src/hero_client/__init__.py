@@ -8,7 +8,10 @@ from typing import Any
 
 _MODULES = {
     "BackgroundMotion": "background_motion",
+    "BaseRobot": "robot_base",
+    "BaseSwarm": "swarm_base",
     "COLORS": "colors",
+    "Clock": "clock",
     "CommonFrame": "common_frame",
     "Drivers": "drivers",
     "FrameError": "errors",

@@ -1,49 +1,47 @@
-"""A motion of a robot on a thread of its own, which can be waited for and cancelled. Knows no robot."""
+"""Motions as steps: one description for motions that are waited for, and for those in the background. Pure."""
 
-import threading
-from concurrent.futures import Future, wait
-from typing import Callable
+from abc import abstractmethod
+from concurrent.futures import Future
+from typing import Callable, Generator
 
-import rospy
-
-from .errors import HeroError
-
-__all__ = ["BackgroundMotion", "Sleep"]
+__all__ = ["BackgroundMotion", "Hold", "Sleep", "Steps", "run_steps"]
 
 Sleep = Callable[[float], bool]
-"""Waits for so many seconds and returns whether to continue; `Program.sleep` is one."""
+"""Waits for so many seconds and returns whether to continue; Clock.sleep is one."""
 
-END_TIMEOUT_S = 3.0
-"""A cancelled motion ends within 0.3 s; one that hangs must not hang its robot's next motion."""
+Steps = Generator[float, bool, None]
+"""Does a step, yields the seconds until the next one, and is sent whether to continue."""
 
 
-class BackgroundMotion(Future):  # type: ignore[type-arg]
+class Hold(float):
+    """A wait between steps that nothing cuts short, such as that between two stops."""
+
+
+def run_steps(steps: Steps, sleep: Sleep, hold: Sleep) -> None:
+    """Take all steps. What a wait raises, such as Ctrl-C, is raised in the steps, which then stop their robots.
+
+    hold: waits where sleep, which may be cut short, is not allowed to.
+    """
+    try:
+        wait_s = next(steps)
+        while True:
+            try:
+                is_to_continue = (hold if isinstance(wait_s, Hold) else sleep)(wait_s)
+            except BaseException as error:  # noqa: BLE001 - the steps raise it again
+                wait_s = steps.throw(error)
+            else:
+                wait_s = steps.send(is_to_continue)
+    except StopIteration:
+        return
+
+
+class BackgroundMotion(Future):
     """A motion that was started; as a concurrent.futures.Future, but cancel() also ends one that is on its way."""
 
-    def __init__(self, drive: Callable[[Sleep], None]) -> None:
-        """Start drive on another thread; it ends soon after the function that it is given returned False."""
-        super().__init__()
-        self._cancelled = threading.Event()
-        self.set_running_or_notify_cancel()
-        threading.Thread(target=self._run, args=(drive,), name="motion", daemon=True).start()
-
-    def _run(self, drive: Callable[[Sleep], None]) -> None:
-        try:
-            drive(self._sleep)
-        except (HeroError, ValueError, TypeError, rospy.ROSException) as error:
-            self.set_exception(error)
-        else:
-            self.set_result(None)
-
-    def _sleep(self, duration_s: float) -> bool:
-        return not self._cancelled.wait(duration_s) and not rospy.is_shutdown()
-
+    @abstractmethod
     def cancel(self) -> bool:
         """Let the robot stop; result() then raises GoalError. Returns False if the motion had ended already."""
-        self._cancelled.set()
-        return not self.done()
 
+    @abstractmethod
     def cancel_and_wait(self) -> None:
         """Cancel, and return when the robot's stops are sent."""
-        self.cancel()
-        wait([self], END_TIMEOUT_S)

@@ -1,12 +1,12 @@
-"""Poses of all robots of a swarm in one frame, by tf or by measured start poses."""
+"""Poses of all robots of a swarm in one frame, by tf or by measured start poses. Pure."""
 
 from typing import Dict, List, Mapping, Optional, Tuple
 
+from .clock import Clock
 from .errors import FrameError, ProgramError, StaleDataError
 from .geometry import Pose, invert_pose, transform_pose
-from .program import Program
-from .robot import Robot
-from .swarm import Swarm
+from .robot_base import BaseRobot
+from .swarm_base import AnyRobot, BaseSwarm
 
 __all__ = ["CommonFrame"]
 
@@ -27,7 +27,7 @@ class CommonFrame:
         self._starts = {robot_id: Pose(*start) for robot_id, start in (starts or {}).items()}
         self._origins: Dict[int, Pose] = {}
 
-    def pose_of(self, robot: Robot) -> Optional[Pose]:
+    def pose_of(self, robot: BaseRobot) -> Optional[Pose]:
         """Return the robot's pose in the frame; None while it is not known, `missing` then says why."""
         pose = robot.fresh_pose()
         self.missing[robot.name] = robot.missing()
@@ -45,12 +45,12 @@ class CommonFrame:
             self.missing[robot.name] = "%s; start something that publishes it, or give ~starts" % error
             return None
 
-    def wait_for_poses(self, program: Program, swarm: Swarm) -> List[Pose]:
+    def wait_for_poses(self, clock: Clock, swarm: BaseSwarm[AnyRobot]) -> List[Pose]:
         """Return the poses of all robots as soon as all are known, and log which are waited for.
 
         Raises: ProgramError if the program is to end before.
         """
-        while program.pace(POLL_PERIOD_S):
+        while clock.pace(POLL_PERIOD_S):
             poses = [pose for pose in map(self.pose_of, swarm) if pose is not None]
             swarm.report_missing(self.missing)
             if len(poses) == len(swarm):

@@ -1,26 +1,12 @@
-"""Commands to several robots at once, of which one robot is a special case."""
+"""What a robot and a swarm have in common: a robot is a group of one. Pure."""
 
-import time
-from typing import Optional, Protocol, Sequence
+from typing import Optional, Protocol, Sequence, TypeVar
 
-import rospy
-
-from .background_motion import BackgroundMotion, Sleep
+from .background_motion import BackgroundMotion, Hold, Sleep, Steps, run_steps
+from .clock import Clock
 from .errors import RobotNotReadyError
-from .light import Light
-from .script import sleep_unless_shutdown
 
-__all__ = [
-    "POLL_PERIOD_S",
-    "READY_TIMEOUT_S",
-    "REPEAT_PERIOD_S",
-    "Member",
-    "drive_all",
-    "leave_all",
-    "send_stops",
-    "stop_all",
-    "wait_for_all",
-]
+__all__ = ["REPEAT_PERIOD_S", "Group", "Member", "send_stops", "wait_for_all"]
 
 STOP_GAP_S = 0.06
 """Between the two messages of a stop: the firmware drops a Twist that comes within 50 ms of the one before."""
@@ -39,13 +25,14 @@ POLL_PERIOD_S = 0.02
 
 NAMES_SHOWN = 10
 
+Self = TypeVar("Self", bound="Group")
+
 
 class Member(Protocol):
-    """What is used here of a Robot."""
+    """What is used here of a robot."""
 
     name: str
     driven: bool
-    _light: Light
     _motion: Optional[BackgroundMotion]
 
     def missing(self) -> Optional[str]:
@@ -56,66 +43,110 @@ class Member(Protocol):
 
     def _end_motion(self) -> None: ...
 
-    def _send_twist(self, linear_m_s: float, angular_rad_s: float) -> None: ...
+    def _end_blinking(self) -> None: ...
+
+    def _send_velocity(self, linear_m_s: float, angular_rad_s: float) -> None: ...
 
 
-def wait_for_all(robots: Sequence[Member], timeout_s: float, sleep: Sleep = sleep_unless_shutdown) -> None:
+def wait_for_all(robots: Sequence[Member], clock: Clock, timeout_s: float = READY_TIMEOUT_S) -> Steps:
     """Wait until all robots are ready. Raises: RobotNotReadyError after timeout_s, saying what is missing."""
-    deadline_s = time.monotonic() + timeout_s
+    deadline_s = clock.now_s + timeout_s
     late = list(robots)
+    is_to_continue = True
     while True:
         late = [robot for robot in late if robot.missing() is not None]
         if not late:
             return
-        if time.monotonic() >= deadline_s or not sleep(POLL_PERIOD_S):
+        if clock.now_s >= deadline_s or not is_to_continue:
             names = ", ".join(robot.name for robot in late[:NAMES_SHOWN]) + ("..." if len(late) > NAMES_SHOWN else "")
             verb = "is" if len(late) == 1 else "are"
             raise RobotNotReadyError("%s %s not ready after %.3g s: %s" % (names, verb, timeout_s, late[0].missing()))
+        is_to_continue = yield POLL_PERIOD_S
 
 
-def drive_all(robots: Sequence[Member], linear_m_s: float, angular_rad_s: float, duration_s: float) -> None:
-    """Drive all robots with the same velocities for duration_s, then stop them; see Robot.drive()."""
-    for robot in robots:
-        robot._end_motion()
-    wait_for_all(robots, READY_TIMEOUT_S)
-    end_s = time.monotonic() + duration_s
-    try:
-        while not rospy.is_shutdown():
-            remaining_s = end_s - time.monotonic()
-            if remaining_s <= 0.0:
-                break
-            for robot in robots:
-                robot.check_not_stopped()
-                robot._send_twist(linear_m_s, angular_rad_s)
-            time.sleep(min(REPEAT_PERIOD_S, remaining_s))
-    finally:
-        send_stops(robots)
-
-
-def stop_all(robots: Sequence[Member]) -> None:
-    """Cancel motions in the background and send every robot two stops; returns when they are sent."""
-    for robot in robots:
-        if robot._motion is not None:
-            robot._motion.cancel()
-    send_stops(robots)
-
-
-def leave_all(robots: Sequence[Member]) -> None:
-    """Stop the robots that were driven from here, and end blinking; for the end of a program."""
-    for robot in robots:
-        robot._light.close()
-    stop_all([robot for robot in robots if robot.driven])
-    time.sleep(SEND_TIME_S)  # for a color that was asked for last
-
-
-def send_stops(robots: Sequence[Member]) -> None:
-    """As stop_all(), but leave motions in the background, one of which may be the caller."""
+def send_stops(robots: Sequence[Member]) -> Steps:
+    """Send every robot two stops; ends when they are sent."""
     if not robots:
         return
     for robot in robots:
-        robot._send_twist(0.0, 0.0)
+        robot._send_velocity(0.0, 0.0)
     # The first stop may itself come within 50 ms of the last command, and then only the second one counts.
-    time.sleep(STOP_GAP_S)
+    yield Hold(STOP_GAP_S)
     for robot in robots:
-        robot._send_twist(0.0, 0.0)
-    time.sleep(SEND_TIME_S)
+        robot._send_velocity(0.0, 0.0)
+    yield Hold(SEND_TIME_S)
+
+
+def drive_for(
+    robots: Sequence[Member], clock: Clock, linear_m_s: float, angular_rad_s: float, duration_s: float
+) -> Steps:
+    """Drive all robots with the same velocities for duration_s, then stop them."""
+    yield from wait_for_all(robots, clock)
+    end_s = clock.now_s + duration_s
+    is_to_continue = True
+    try:
+        while is_to_continue and clock.now_s < end_s:
+            for robot in robots:
+                robot.check_not_stopped()
+                robot._send_velocity(linear_m_s, angular_rad_s)
+            is_to_continue = yield min(REPEAT_PERIOD_S, end_s - clock.now_s)
+    finally:
+        yield from send_stops(robots)
+
+
+class Group(Clock):
+    """Robots that are waited for, driven and stopped together; as a context manager it stops them at the end."""
+
+    _clock: Clock
+    _members: Sequence[Member]
+
+    @property
+    def now_s(self) -> float:
+        """The robots' time: of simulated robots that are stepped, else of this machine."""
+        return self._clock.now_s
+
+    def sleep(self, duration_s: float) -> bool:
+        """Wait for duration_s of the robots' time; return whether the program is to continue."""
+        return self._clock.sleep(duration_s)
+
+    def _run(self, steps: Steps, sleep: Optional[Sleep] = None) -> None:
+        run_steps(steps, sleep or self._clock.sleep, self._clock.sleep)
+
+    def wait_until_ready(self: Self, timeout_s: float = 10.0, sleep: Optional[Sleep] = None) -> Self:
+        """Wait until every robot takes commands and sends what was subscribed to; return this object itself.
+
+        sleep: waits so many seconds and returns whether to continue, such as Program.sleep.
+
+        Raises: RobotNotReadyError after timeout_s, with the robots that are not and what is missing.
+        """
+        self._run(wait_for_all(self._members, self._clock, timeout_s), sleep)
+        return self
+
+    def _drive_for(self, linear_m_s: float, angular_rad_s: float, duration_s: float) -> None:
+        for robot in self._members:
+            robot._end_motion()
+        self._run(drive_for(self._members, self._clock, linear_m_s, angular_rad_s, duration_s))
+
+    def stop(self) -> None:
+        """Stop at once and cancel motions from start_go_to(); returns once the stops are sent, after 0.11 s."""
+        self._stop(self._members)
+
+    def _stop(self, robots: Sequence[Member]) -> None:
+        for robot in robots:
+            if robot._motion is not None:
+                robot._motion.cancel()
+        self._run(send_stops(robots))
+
+    def _leave(self) -> None:
+        """Stop the robots that were driven from here, and end blinking; for the end of a program."""
+        for robot in self._members:
+            robot._end_blinking()
+        self._stop([robot for robot in self._members if robot.driven])
+        self._clock.sleep(SEND_TIME_S)  # for a color that was asked for last
+
+    def __enter__(self: Self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        # Topics are left to the end of the program: leaving them one by one takes 20 ms each.
+        self._leave()

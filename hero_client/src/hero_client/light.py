@@ -1,15 +1,12 @@
-"""The light of one robot: a color, or blinking."""
+"""The light of one robot: a color, or blinking. Pure."""
 
 import itertools
 import math
-import threading
-import time
-from typing import Callable, Optional, Sequence
+from typing import Optional, Tuple
 
-from std_msgs.msg import ColorRGBA
-
-from .colors import Color, parse_color
-from .robot_topics import CommandTopic
+from .background_motion import BackgroundMotion, Steps
+from .colors import COLORS, Color, parse_color
+from .robot_link import RobotLink
 
 __all__ = ["Light"]
 
@@ -23,54 +20,47 @@ MIN_BLINK_PERIOD_S = 0.2
 class Light:
     """The light of one robot."""
 
-    def __init__(self, namespace: str, explain_absence: Callable[[], str]) -> None:
-        """explain_absence: see CommandTopic."""
-        self._topic = CommandTopic(namespace + "/led", ColorRGBA, explain_absence)
+    def __init__(self, link: RobotLink) -> None:
+        """Be the light of the robot at link."""
+        self._link = link
         self._color: Optional[Color] = None
         self._sent_s = -math.inf
-        self._lock = threading.Lock()
-        self._blink_end: Optional[threading.Event] = None
+        self._blinking: Optional[BackgroundMotion] = None
 
     def show(self, color: Color) -> None:
         """Show a color; the same one again is sent every REPEAT_PERIOD_S only.
 
         Raises: ValueError for a color that is not known.
         """
-        red, green, blue = parse_color(color)
+        rgb = parse_color(color)
         self._end_blinking()
-        now_s = time.monotonic()
-        if color != self._color or now_s - self._sent_s >= REPEAT_PERIOD_S or not self._topic.connected:
+        now_s = self._link.clock.now_s
+        if color != self._color or now_s - self._sent_s >= REPEAT_PERIOD_S or not self._link.connected:
             self._color, self._sent_s = color, now_s
-            self._topic.publish(ColorRGBA(red, green, blue, 1.0))
+            self._link.send_color(rgb)
 
     def blink(self, color: Color, period_s: float) -> None:
-        """Show the color for half of each period, on a thread of its own, until another color is asked for."""
-        red, green, blue = parse_color(color)
+        """Show the color for half of each period, in the background, until another color is asked for."""
+        rgb = parse_color(color)
         if not period_s >= MIN_BLINK_PERIOD_S:
             raise ValueError("a period must be at least %g s, not %r" % (MIN_BLINK_PERIOD_S, period_s))
         self._end_blinking()
         self._color = None
-        self._blink_end = threading.Event()
-        messages = (ColorRGBA(red, green, blue, 1.0), ColorRGBA(0.0, 0.0, 0.0, 1.0))
-        threading.Thread(
-            target=self._alternate, args=(messages, period_s, self._blink_end), name="blinking", daemon=True
-        ).start()
+        self._blinking = self._link.start(self._alternate(rgb, period_s))
 
-    def _alternate(self, messages: Sequence[ColorRGBA], period_s: float, end: threading.Event) -> None:
-        for message in itertools.cycle(messages):
-            with self._lock:  # else this could come after the color that ends the blinking
-                if end.is_set():
-                    return
-                self._topic.publish(message)
-            end.wait(period_s / 2.0)
+    def _alternate(self, rgb: Tuple[float, float, float], period_s: float) -> Steps:
+        for shown in itertools.cycle((rgb, COLORS["off"])):
+            self._link.send_color(shown)
+            if not (yield period_s / 2.0):
+                return
 
     def _end_blinking(self) -> None:
-        with self._lock:
-            if self._blink_end is not None:
-                self._blink_end.set()
-                self._blink_end = None
+        if self._blinking is not None:
+            # Its last color is not to come after the next one.
+            self._blinking.cancel_and_wait()
+            self._blinking = None
 
     def close(self) -> None:
         """Switch the light off if it blinks; safe twice."""
-        if self._blink_end is not None:
+        if self._blinking is not None:
             self.show("off")

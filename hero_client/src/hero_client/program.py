@@ -6,7 +6,6 @@ code still runs.) This module knows no robot and no topic.
 """
 
 import io
-import math
 import os
 import select
 import signal
@@ -19,6 +18,7 @@ from typing import Callable, List, Optional, Sequence, Type
 import rospy
 
 from . import command_line
+from .clock import Clock
 from .errors import HeroError
 from .ros_node import start_ros_node
 
@@ -30,7 +30,7 @@ SHUTDOWN_WAIT_S = 1.0
 """How long `rosnode kill` is held up while the loop ends and stops its robots; stopping takes about 0.2 s."""
 
 
-class Program:
+class Program(Clock):
     """A started ROS node, whether it is `running`, and waits that end early when it is to end.
 
     Use as a context manager around everything that moves robots: leaving it tells ROS that the node ends.
@@ -44,7 +44,6 @@ class Program:
         """
         self.end_signal: Optional[int] = None
         self._ending = False
-        self._due_s = -math.inf
         self._finished = threading.Event()
         self._wake_read_fd, self._wake_write_fd = os.pipe()
         os.set_blocking(self._wake_write_fd, False)
@@ -78,20 +77,15 @@ class Program:
         """Whether the program is to continue."""
         return not self._ending
 
+    @property
+    def now_s(self) -> float:
+        """This machine's monotonic time, s."""
+        return time.monotonic()
+
     def sleep(self, duration_s: float) -> bool:
         """Wait for duration_s, or less if the program is to end; return `running`."""
         self.wait_readable([], duration_s)
         return self.running
-
-    def pace(self, period_s: float) -> bool:
-        """Wait until period_s after the last such wait was due to end, or until the program is to end.
-
-        This keeps the rate of a loop whose steps take time; a step that took longer than the period is not made up
-        for. Returns `running`.
-        """
-        now_s = time.monotonic()
-        self._due_s = max(now_s, self._due_s + period_s) if now_s - self._due_s < 2.0 * period_s else now_s + period_s
-        return self.sleep(self._due_s - now_s)
 
     def wait_readable(self, fds: Sequence[int], timeout_s: float) -> List[int]:
         """Return those of fds that can be read, after at most timeout_s; none if the program is to end."""

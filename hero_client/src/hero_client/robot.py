@@ -7,67 +7,34 @@
         robot.turn(1.57)
         print(robot.pose, robot.nearest())
 
-Uses only topics and services under /hero_N, the same for simulated and real robots. Units: m, rad, s. Frames (REP 103,
-105): poses are in hero_N/odom, velocities and ranges in hero_N/base_link: x to the front, y to the left, angles
-counter-clockwise from the front.
+Uses only topics and services under /hero_N, the same for simulated and real robots. All that needs no ROS is in
+BaseRobot, which robots that are stepped in process (hero_sim.stepped) share.
 """
 
 import math
-import time
-from functools import partial
-from typing import Callable, List, Optional
+from typing import Any
 
-import rospy
-from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
-from sensor_msgs.msg import LaserScan
 
 from hero_msgs.msg import Encoder
-from hero_msgs.srv import SetOdom
 
-from .background_motion import BackgroundMotion, Sleep
-from .colors import Color
-from .controllers.go_to_goal import DEFAULT_TOLERANCE_M, Goal, GoToGoalController
-from .controllers.motion import DEFAULT_TIMEOUT_S, MotionController, State
-from .controllers.straight_and_turn import ForwardController, TurnController
-from .drivers import share_drivers
-from .errors import GoalError, RobotError, StaleDataError, StoppedError
-from .frames import share_frames
-from .geometry import Pose, Velocity, clamp, transform_pose, yaw_of
-from .group import READY_TIMEOUT_S, REPEAT_PERIOD_S, drive_all, leave_all, send_stops, stop_all, wait_for_all
-from .light import Light
-from .readings import Obstacle, find_nearest, front_first
-from .robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
-from .robot_topics import CommandTopic, NewestMessages
-from .script import sleep_unless_shutdown, start_node
+from .robot_base import FRESH_ODOM_S, BaseRobot, check_robot_id
+from .ros_link import RosLink
+from .script import start_node
 
 __all__ = ["Robot"]
 
-FRESH_ODOM_S = 0.5
-"""Odometry and encoder come about 29 times a second; older than this is stale. Wi-Fi gaps of 0.1 s are common."""
 
-FRESH_PROXIMITY_S = 1.0
-"""Proximity comes about 5 times a second; older than this is stale."""
-
-STOPPED_WARNING_PERIOD_S = 5.0
-
-SERVICE_TIMEOUT_S = 2.0
-
-
-class Robot:
+class Robot(BaseRobot):
     """One robot by the number in its name: Robot(3) is /hero_3.
 
     Data properties return the newest message only while it is fresh, else they raise StaleDataError. Methods that
     drive until something is done (`drive` for a time, `forward`, `turn`, `go_to`) first wait up to 2 s for a robot that
     is not ready, and raise an error if the robot could not do it. As a context manager a Robot stops at the end, also
     after an error.
-
-    Attributes:
-        robot_id: the number, 3.
-        name: "hero_3".
-        namespace: "/hero_3".
-        driven: whether a command was sent from here; a robot that was only watched is not stopped at the end.
     """
+
+    _link: RosLink
 
     def __init__(self, robot_id: int, odom: bool = True, proximity: bool = True) -> None:
         """Connect to the topics of /hero_{robot_id}. Returns at once: see wait_until_ready().
@@ -77,35 +44,13 @@ class Robot:
 
         Raises: ValueError for a number that no robot can have. NodeError if no ROS master answers within 3 s.
         """
-        if isinstance(robot_id, bool) or not isinstance(robot_id, int) or robot_id < 0:
-            raise ValueError("a robot is named by its number, 0 or more, not by %r" % (robot_id,))
+        check_robot_id(robot_id)
         start_node()
-        self.robot_id = robot_id
-        self.name = "hero_%d" % robot_id
-        self.namespace = "/" + self.name
-        self.driven = False
-        self._drivers = share_drivers()
-        self._cmd_vel = CommandTopic(self.namespace + "/velocity_controller/cmd_vel", Twist, self._explain_absence)
-        self._light = Light(self.namespace, self._explain_absence)
-        self._data = NewestMessages(self.namespace)
-        self._motion: Optional[BackgroundMotion] = None
-        self._next_warning_s = -math.inf
+        super().__init__(robot_id, RosLink("hero_%d" % robot_id))
         if odom:
-            self._data.subscribe("odom", Odometry)
+            self._link.subscribe("odom")
         if proximity:
-            self._data.subscribe("proximity", LaserScan)
-
-    def _explain_absence(self) -> str:
-        return self._drivers.explain_absence(self.namespace)
-
-    # ------------------------------------------------------------------ data
-
-    def age_s(self, topic: str) -> float:
-        """Return the seconds since the last message of "odom", "proximity" or "encoder" arrived.
-
-        inf before the first message.
-        """
-        return self._data.age_s(topic)
+            self._link.subscribe("proximity")
 
     @property
     def odometry(self) -> Odometry:
@@ -113,31 +58,7 @@ class Robot:
 
         Raises: StaleDataError if it is older than 0.5 s.
         """
-        return self._data.read("odom", FRESH_ODOM_S)
-
-    @property
-    def pose(self) -> Pose:
-        """Where the robot is by its odometry, in the frame hero_N/odom: 0, 0, 0 where it was switched on.
-
-        Raises: StaleDataError if odometry is older than 0.5 s.
-        """
-        pose = self.odometry.pose.pose
-        return Pose(pose.position.x, pose.position.y, yaw_of(pose.orientation))
-
-    def pose_in(self, frame: str, timeout_s: float = 2.0) -> Pose:
-        """Return where the robot is in another frame of tf, such as "world", which simulated robots share.
-
-        The first call subscribes to /tf, which is a load with many robots, and waits up to timeout_s.
-
-        Raises: StaleDataError as `pose`. FrameError if tf does not connect frame with hero_N/odom.
-        """
-        return transform_pose(share_frames().find_origin(self.name + "/odom", frame.lstrip("/"), timeout_s), self.pose)
-
-    @property
-    def velocity(self) -> Velocity:
-        """How the robot moves by its odometry, in hero_N/base_link. Raises: StaleDataError as `pose`."""
-        twist = self.odometry.twist.twist
-        return Velocity(twist.linear.x, twist.angular.z)
+        return self._read_message("odom")
 
     @property
     def encoder(self) -> Encoder:
@@ -145,328 +66,11 @@ class Robot:
 
         The first use subscribes and waits up to 1 s. Raises: StaleDataError if it is older than 0.5 s.
         """
-        self._data.subscribe("encoder", Encoder)
-        if self._data.age_s("encoder") == math.inf:
-            self._data.wait_for_next("encoder", 1.0)
-        return self._data.read("encoder", FRESH_ODOM_S)
+        self._link.subscribe("encoder")
+        if self.age_s("encoder") == math.inf:
+            self._link.wait_for_next("encoder", 1.0)
+        return self._read_message("encoder")
 
-    @property
-    def proximity(self) -> List[float]:
-        """Eight ranges in m from the robot's center, front first, counter-clockwise, 45 degrees apart.
-
-        Index 0 is the front, 2 left, 4 rear, 6 right. inf: nothing in range (0.24 m); 0.0: too close to measure (0.047
-        m); nan: not calibrated. The topic /hero_N/proximity has the same ranges rear first (index 4 is the front), and
-        -Inf for too close.
-
-        Raises: StaleDataError if they are older than 1 s.
-        """
-        return front_first(self._data.read("proximity", FRESH_PROXIMITY_S))
-
-    def wait_for_scan(self, timeout_s: float = 2.0) -> List[float]:
-        """Wait for the next scan, which comes 5 times a second, and return its ranges as `proximity` does.
-
-        Raises: StaleDataError if none comes within timeout_s.
-        """
-        self._data.subscribe("proximity", LaserScan)
-        return front_first(self._data.wait_for_next("proximity", timeout_s))
-
-    def fresh_pose(self) -> Optional[Pose]:
-        """Return `pose`, or None where that would raise."""
-        try:
-            return self.pose
-        except StaleDataError:
-            return None
-
-    def fresh_proximity(self) -> List[float]:
-        """Return `proximity`, or eight times nan (not known) where that would raise."""
-        try:
-            return self.proximity
-        except StaleDataError:
-            return [math.nan] * 8
-
-    def nearest(self) -> Optional[Obstacle]:
-        """Return range (m, from the robot's center) and bearing (rad) of the nearest obstacle; None if none is seen.
-
-        Raises: StaleDataError as `proximity`.
-        """
-        ranges = self.proximity
-        return find_nearest(ranges, 0.0, math.tau / max(1, len(ranges)))
-
-    # ------------------------------------------------------------------ state
-
-    @property
-    def connected(self) -> bool:
-        """Whether the driver subscribes to the robot's commands, as it does while it knows the robot."""
-        return self._cmd_vel.connected
-
-    @property
-    def is_stopped(self) -> bool:
-        """Whether the robot takes no motion because its driver has stopped all robots (emergency stop).
-
-        At the start of a program it waits until the drivers have reported, for up to 1.5 s.
-        """
-        self._drivers.wait_until_settled()
-        return self._drivers.is_robot_stopped(self.namespace)
-
-    def missing(self) -> Optional[str]:
-        """Return why the robot cannot be driven now, as text for users; None if it can."""
-        if not self.connected:
-            return self._cmd_vel.describe_absence()
-        silent = self._data.find_silent(FRESH_PROXIMITY_S)
-        if silent is not None:
-            return "no message on %s/%s: is the robot on and in reach?" % (self.namespace, silent)
-        return None
-
-    def wait_until_ready(self, timeout_s: float = 10.0, sleep: Sleep = sleep_unless_shutdown) -> "Robot":
-        """Wait until the robot takes commands and sends what was subscribed to; return the robot itself.
-
-        sleep: waits so many seconds and returns whether to continue, such as Program.sleep.
-
-        Raises: RobotNotReadyError after timeout_s, saying what is missing.
-        """
-        wait_for_all([self], timeout_s, sleep)
-        return self
-
-    def set_pose(self, x_m: float, y_m: float, yaw_rad: float) -> None:
-        """Set the odometry: from now on the robot is at this pose of hero_N/odom. Returns when `pose` says so.
-
-        Raises: RobotError if the robot does not answer or refuses. StaleDataError if no odometry follows.
-        """
-        name = self.namespace + "/set_odom"
-        try:
-            rospy.wait_for_service(name, SERVICE_TIMEOUT_S)
-            answer = rospy.ServiceProxy(name, SetOdom)(x_m, y_m, yaw_rad)
-        except (rospy.ServiceException, rospy.ROSException) as error:
-            raise RobotError("%s: %s" % (name, " ".join(str(error).split()))) from None
-        if not answer.success:
-            raise RobotError("%s: the robot answers: %s" % (name, answer.message))
-        self._data.subscribe("odom", Odometry)
-        self._data.wait_for_next("odom", 1.0, count=2)  # one may have been on its way before the answer
-
-    # ------------------------------------------------------------------ motions
-
-    def drive(self, linear_m_s: float, angular_rad_s: float, duration_s: Optional[float] = None) -> None:
-        """Drive with these velocities, limited to 0.20 m/s and 8 rad/s.
-
-        linear_m_s is positive forward, angular_rad_s positive to the left. With duration_s, drive for this time, then
-        stop. Without, send one command and return: the robot obeys it until the next one, for about 2 s at most.
-        A robot speeds up within about 0.5 s, so 0.1 m/s for 2 s is a little less than 0.2 m: see forward().
-
-        One command that cannot have an effect is logged: if nothing subscribes to it, or all robots are stopped.
-
-        Raises: ValueError for velocities that are not finite. With duration_s also RobotNotReadyError if the robot is
-        not there within 2 s, and StoppedError if all robots are stopped.
-        """
-        if duration_s is not None:
-            drive_all([self], linear_m_s, angular_rad_s, duration_s)
-            return
-        self._end_motion()
-        self._send_twist(linear_m_s, angular_rad_s)
-        now_s = time.monotonic()
-        is_motion = bool(linear_m_s or angular_rad_s)
-        if is_motion and now_s >= self._next_warning_s and self._drivers.is_robot_stopped(self.namespace):
-            self._next_warning_s = now_s + STOPPED_WARNING_PERIOD_S
-            rospy.logerr(self._describe_stop())
-
-    def _send_twist(self, linear_m_s: float, angular_rad_s: float) -> None:
-        if not (math.isfinite(linear_m_s) and math.isfinite(angular_rad_s)):
-            raise ValueError("speeds must be finite, not %r m/s and %r rad/s" % (linear_m_s, angular_rad_s))
-        self.driven = True
-        twist = Twist()
-        twist.linear.x = clamp(linear_m_s, MAX_LINEAR_M_S)
-        twist.angular.z = clamp(angular_rad_s, MAX_ANGULAR_RAD_S)
-        if linear_m_s or angular_rad_s:
-            self._cmd_vel.publish(twist)
-        else:
-            self._cmd_vel.publish_if_connected(twist)
-
-    def _describe_stop(self) -> str:
-        driver = self._drivers.find(self.namespace)
-        return (
-            "%s does not move: the driver %s has stopped all robots. Release them with r in `rosrun hero_tools fleet`,"
-            " Swarm.release_stop(), or: rosservice call %s/stop false" % (self.name, driver.strip("/"), driver)
-        )
-
-    def check_not_stopped(self) -> None:
-        """Check that the driver lets the robot move: see is_stopped. Raises: StoppedError with how to release it."""
-        if self._drivers.is_robot_stopped(self.namespace):
-            raise StoppedError(self._describe_stop())
-
-    def stop(self) -> None:
-        """Stop the robot and cancel a motion from start_go_to(); returns once the stops are sent, after 0.11 s."""
-        stop_all([self])
-
-    def forward(self, distance_m: float, linear_m_s: float = 0.1) -> None:
-        """Drive straight on by distance_m, backwards if it is negative, to within 5 mm by the robot's odometry.
-
-        linear_m_s: the speed, up to 0.2; the robot slows down before the end.
-
-        Raises: GoalError as go_to(). ValueError for a speed that is not positive. RobotNotReadyError. StoppedError.
-        """
-        _check_speed(distance_m, linear_m_s)
-        self._end_motion()
-        controller = ForwardController(distance_m, time.monotonic(), linear_m_s)
-        self._follow(controller, "drive %g m" % distance_m, self.fresh_pose, sleep_unless_shutdown)
-
-    def turn(self, angle_rad: float, angular_rad_s: float = 1.5) -> None:
-        """Turn on the spot by angle_rad, positive to the left, to within 0.03 rad by the robot's odometry.
-
-        angular_rad_s: the speed, up to 8; the robot slows down before the end. Angles beyond a full turn are driven.
-
-        Raises: GoalError if the wheels do not turn or odometry ends. ValueError for a speed that is not positive.
-        RobotNotReadyError. StoppedError.
-        """
-        _check_speed(angle_rad, angular_rad_s)
-        self._end_motion()
-        controller = TurnController(angle_rad, time.monotonic(), angular_rad_s)
-        self._follow(controller, "turn %g rad" % angle_rad, self.fresh_pose, sleep_unless_shutdown)
-
-    def go_to(
-        self,
-        x_m: float,
-        y_m: float,
-        yaw_rad: Optional[float] = None,
-        frame: str = "odom",
-        avoid: bool = False,
-        timeout_s: float = DEFAULT_TIMEOUT_S,
-        tolerance_m: float = DEFAULT_TOLERANCE_M,
-        sleep: Sleep = sleep_unless_shutdown,
-    ) -> None:
-        """Drive to a position, turn to yaw_rad if given, and return when the robot has stopped there.
-
-        frame: "odom" for the robot's odometry (0, 0 where it was switched on), "robot" for its present pose (x to the
-        front, y to the left), or a frame of tf, such as "world". avoid: drive around what the proximity sensors see;
-        otherwise the robot stops before an obstacle that is in the way, and fails if it stays there for 2 s.
-        The default field of simulated robots is 1.5 m by 1.5 m with walls (larger for more than nine robots): a single
-        robot starts in its middle and reaches 0.7 m to each side.
-
-        What the sensors do not see (black, low or thin things) ends no motion: wheels that slip are counted as driven.
-
-        Raises: GoalError with the reason if the goal is not reached: an obstacle in the way and where it is, wheels
-        that do not turn, no odometry for 2 s, or timeout_s. RobotNotReadyError if the robot is not there within 2 s.
-        StoppedError if all robots are stopped. FrameError if tf does not know the frame. The robot is stopped then.
-        """
-        self._end_motion()
-        self.pursue(Goal(x_m, y_m, yaw_rad), frame, avoid, timeout_s, tolerance_m, sleep)
-
-    def start_go_to(
-        self,
-        x_m: float,
-        y_m: float,
-        yaw_rad: Optional[float] = None,
-        frame: str = "odom",
-        avoid: bool = False,
-        timeout_s: float = DEFAULT_TIMEOUT_S,
-        tolerance_m: float = DEFAULT_TOLERANCE_M,
-    ) -> BackgroundMotion:
-        """Start go_to() on another thread, with the same arguments; return the motion.
-
-        motion.result() waits for its end, and raises what go_to() raises; motion.done() tells whether it has ended;
-        motion.cancel(), stop() or another motion of this robot ends it, and result() then raises GoalError. Several
-        robots at once: start all, then ask each motion for its result().
-        """
-        self._end_motion()
-        goal = Goal(x_m, y_m, yaw_rad)
-        self._motion = BackgroundMotion(partial(self.pursue, goal, frame, avoid, timeout_s, tolerance_m))
-        return self._motion
-
-    def pursue(
-        self,
-        goal: Goal,
-        frame: str,
-        avoid: bool,
-        timeout_s: float,
-        tolerance_m: float,
-        sleep: Sleep,
-        on_step: Callable[[MotionController], None] = lambda controller: None,
-    ) -> None:
-        """As go_to(), for programs with goals of their own; on_step is called after each command."""
-        text = "reach (%g, %g)%s" % (goal.x_m, goal.y_m, "" if frame == "odom" else " in the frame %s" % frame)
-        if avoid:
-            self._data.subscribe("proximity", LaserScan)
-        self._data.subscribe("odom", Odometry)
-        self.wait_until_ready(READY_TIMEOUT_S, sleep)
-        read_pose: Callable[[], Optional[Pose]] = self.fresh_pose
-        if frame == "robot":
-            place = transform_pose(self.pose, Pose(goal.x_m, goal.y_m, goal.yaw_rad or 0.0))
-            goal = Goal(place.x_m, place.y_m, None if goal.yaw_rad is None else place.yaw_rad)
-        elif frame.lstrip("/") not in ("odom", self.name + "/odom"):
-            read_pose = partial(self._fresh_pose_in, frame)
-        controller = GoToGoalController(goal, time.monotonic(), tolerance_m, timeout_s, avoid)
-        self._follow(controller, text, read_pose, sleep, on_step)
-
-    def _fresh_pose_in(self, frame: str) -> Optional[Pose]:
-        try:
-            return self.pose_in(frame)
-        except StaleDataError:
-            return None
-
-    def _follow(
-        self,
-        controller: MotionController,
-        text: str,
-        read_pose: Callable[[], Optional[Pose]],
-        sleep: Sleep,
-        on_step: Callable[[MotionController], None] = lambda controller: None,
-    ) -> None:
-        """Drive as the controller says to its end. Raises: GoalError, StoppedError, RobotNotReadyError."""
-        self.wait_until_ready(READY_TIMEOUT_S, sleep)
-        try:
-            while controller.state is State.ACTIVE:
-                self.check_not_stopped()
-                self._send_twist(*controller.step(read_pose(), self.fresh_proximity(), time.monotonic()))
-                on_step(controller)
-                if not sleep(REPEAT_PERIOD_S):
-                    raise GoalError("%s did not %s: cancelled" % (self.name, text))
-        finally:
-            send_stops([self])
-        if controller.state is State.FAILED:
-            raise GoalError("%s did not %s: %s" % (self.name, text, controller.reason))
-
-    def _end_motion(self) -> None:
-        """Cancel a motion in the background and wait until it has sent its stops."""
-        motion, self._motion = self._motion, None
-        if motion is not None:
-            motion.cancel_and_wait()
-
-    # ------------------------------------------------------------------ light
-
-    def led(self, color: Color) -> None:
-        """Show a color: a name such as "red" (see colors.COLORS), or (red, green, blue), each 0..1.
-
-        The robot's light goes dark 15 s later, so call this in every step of a loop: what the robot shows already is
-        sent every 2 s only. Raises: ValueError for a color that is not known.
-        """
-        self._light.show(color)
-
-    def blink(self, color: Color, period_s: float = 1.0) -> None:
-        """Let the light blink, half of each period on, until led() or the end of the program; returns at once.
-
-        Raises: ValueError for a color that is not known, or a period of less than 0.2 s.
-        """
-        self._light.blink(color, period_s)
-
-    # ------------------------------------------------------------------ end
-
-    def close(self) -> None:
-        """Stop the robot, if it was driven from here, and leave its topics; safe twice."""
-        leave_all([self])
-        self._data.close()
-
-    def __enter__(self) -> "Robot":
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        # Topics are left to the end of the program: leaving them one by one takes 20 ms each.
-        leave_all([self])
-
-    def __repr__(self) -> str:
-        """Return the robot's name with its pose, or with why it is not ready."""
-        self._drivers.wait_until_settled()
-        state = self.missing() or ("stopped" if self.is_stopped else "ready")
-        return "<%s: %s%s>" % (self.name, state, ", %r" % (self.fresh_pose(),) if self.fresh_pose() else "")
-
-
-def _check_speed(distance: float, speed: float) -> None:
-    if not (math.isfinite(distance) and 0.0 < speed < math.inf):
-        raise ValueError("distance or angle must be finite, the speed positive, not %r and %r" % (distance, speed))
+    def _read_message(self, topic: str) -> Any:
+        self._check_fresh(topic, FRESH_ODOM_S)
+        return self._link.messages.read(topic)

@@ -51,27 +51,16 @@ class NewestMessages:
         newest = self._newest.get(topic)
         return math.inf if newest is None else time.monotonic() - newest[0]
 
-    def read(self, topic: str, limit_s: float) -> Any:
-        """Return the newest message. Raises: StaleDataError if there is none, or it is older than limit_s."""
-        newest = self._newest.get(topic)
-        if newest is None:
-            raise StaleDataError(
-                "no message on %s/%s yet: is the robot on, and does the driver run?" % (self._namespace, topic)
-            )
-        age_s = time.monotonic() - newest[0]
-        if age_s > limit_s:
-            raise StaleDataError(
-                "the last message on %s/%s came %.1f s ago: has the robot gone?" % (self._namespace, topic, age_s)
-            )
-        return newest[1]
+    def read(self, topic: str) -> Any:
+        """Return the newest message of a topic that has one."""
+        return self._newest[topic][1]
 
-    def wait_for_next(self, topic: str, timeout_s: float, count: int = 1) -> Any:
-        """Return the count-th message that arrives from now on. Raises: StaleDataError after timeout_s."""
+    def wait_for_next(self, topic: str, timeout_s: float, count: int = 1) -> None:
+        """Wait for the count-th message from now on. Raises: StaleDataError after timeout_s."""
         with self._arrival:
             wanted = self._counts.get(topic, 0) + count
-            if self._arrival.wait_for(lambda: self._counts.get(topic, 0) >= wanted, timeout_s):
-                return self._newest[topic][1]
-        raise StaleDataError("no message on %s/%s within %.1f s" % (self._namespace, topic, timeout_s))
+            if not self._arrival.wait_for(lambda: self._counts.get(topic, 0) >= wanted, timeout_s):
+                raise StaleDataError("no message on %s/%s within %.1f s" % (self._namespace, topic, timeout_s))
 
     def find_silent(self, limit_s: float) -> Optional[str]:
         """Return the first topic without a message in the last limit_s; None if all have one."""

@@ -3,7 +3,6 @@
 import signal
 import sys
 import threading
-import time
 from types import FrameType
 from typing import Any, Iterator, Optional, Type
 
@@ -11,10 +10,10 @@ import rospy
 
 from .command_line import print_error
 from .errors import HeroError
+from .ros_clock import ROS_CLOCK
 from .ros_node import check_master, start_ros_node
 
-__all__ = ["rate", "sleep_unless_shutdown", "start_node"]
-
+__all__ = ["rate", "start_node"]
 
 def rate(hz: float) -> Iterator[float]:
     """Repeat the body of a `for` loop hz times per second, until Ctrl-C or the end of the ROS node.
@@ -26,20 +25,7 @@ def rate(hz: float) -> Iterator[float]:
 
     Raises: ValueError unless hz is more than 0.
     """
-    if not hz > 0.0:
-        raise ValueError("a rate must be more than 0 Hz, not %r" % (hz,))
-    start_s = due_s = time.monotonic()
-    while not rospy.is_shutdown():
-        yield time.monotonic() - start_s
-        now_s = time.monotonic()
-        due_s = max(due_s + 1.0 / hz, now_s)
-        time.sleep(due_s - now_s)
-
-
-def sleep_unless_shutdown(duration_s: float) -> bool:
-    """Wait for duration_s; return whether ROS still runs."""
-    time.sleep(duration_s)
-    return not rospy.is_shutdown()
+    return ROS_CLOCK.rate(hz)
 
 
 def start_node(name: str = "hero_program") -> None:

@@ -1,0 +1,400 @@
+"""One robot as an object, whatever connects it: see robot. Pure.
+
+Units: m, rad, s. Frames (REP 103, 105): poses are in hero_N/odom, velocities and ranges in hero_N/base_link: x to the
+front, y to the left, angles counter-clockwise from the front.
+"""
+
+import math
+from functools import partial
+from typing import Callable, List, Optional
+
+from .background_motion import BackgroundMotion, Sleep, Steps
+from .colors import Color
+from .controllers.go_to_goal import DEFAULT_TOLERANCE_M, Goal, GoToGoalController
+from .controllers.motion import DEFAULT_TIMEOUT_S, MotionController, State
+from .controllers.straight_and_turn import ForwardController, TurnController
+from .errors import GoalError, StaleDataError, StoppedError
+from .geometry import Pose, Velocity, clamp, transform_pose
+from .group import REPEAT_PERIOD_S, Group, send_stops, wait_for_all
+from .light import Light
+from .readings import Obstacle, find_nearest
+from .robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
+from .robot_link import RobotLink
+
+__all__ = ["BaseRobot", "check_robot_id"]
+
+FRESH_ODOM_S = 0.5
+"""Odometry and encoder come about 29 times a second; older than this is stale. Wi-Fi gaps of 0.1 s are common."""
+
+FRESH_PROXIMITY_S = 1.0
+"""Proximity comes about 5 times a second; older than this is stale."""
+
+STOPPED_WARNING_PERIOD_S = 5.0
+
+OnStep = Callable[[MotionController], None]
+
+
+def check_robot_id(robot_id: int) -> None:
+    """Raises: ValueError for a number that no robot can have."""
+    if isinstance(robot_id, bool) or not isinstance(robot_id, int) or robot_id < 0:
+        raise ValueError("a robot is named by its number, 0 or more, not by %r" % (robot_id,))
+
+
+class BaseRobot(Group):
+    """One robot: what Robot has that needs no ROS.
+
+    Attributes:
+        robot_id: the number, 3.
+        name: "hero_3".
+        namespace: "/hero_3".
+        driven: whether a command was sent from here; a robot that was only watched is not stopped at the end.
+    """
+
+    def __init__(self, robot_id: int, link: RobotLink) -> None:
+        """Be the robot with this number at link."""
+        self.robot_id = robot_id
+        self.name = "hero_%d" % robot_id
+        self.namespace = "/" + self.name
+        self.driven = False
+        self._link = link
+        self._clock = link.clock
+        self._members = (self,)
+        self._light = Light(link)
+        self._motion: Optional[BackgroundMotion] = None
+        self._next_warning_s = -math.inf
+
+    # ------------------------------------------------------------------ data
+
+    def age_s(self, topic: str) -> float:
+        """Return the seconds since the last message of "odom", "proximity" or "encoder" arrived.
+
+        inf before the first message.
+        """
+        return self._link.age_s(topic)
+
+    def _check_fresh(self, topic: str, limit_s: float) -> None:
+        age_s = self._link.age_s(topic)
+        if age_s <= limit_s:
+            return
+        name = "%s/%s" % (self.namespace, topic)
+        if age_s == math.inf:
+            raise StaleDataError("no message on %s yet: is the robot on, and does the driver run?" % name)
+        raise StaleDataError("the last message on %s came %.1f s ago: has the robot gone?" % (name, age_s))
+
+    @property
+    def pose(self) -> Pose:
+        """Where the robot is by its odometry, in the frame hero_N/odom: 0, 0, 0 where it was switched on.
+
+        Raises: StaleDataError if odometry is older than 0.5 s.
+        """
+        self._check_fresh("odom", FRESH_ODOM_S)
+        return self._link.read_pose()
+
+    def pose_in(self, frame: str, timeout_s: float = 2.0) -> Pose:
+        """Return where the robot is in another frame of tf, such as "world", which simulated robots share.
+
+        The first call subscribes to /tf, which is a load with many robots, and waits up to timeout_s.
+
+        Raises: StaleDataError as `pose`. FrameError if tf does not connect frame with hero_N/odom.
+        """
+        return transform_pose(self._link.find_origin(frame.lstrip("/"), timeout_s), self.pose)
+
+    @property
+    def velocity(self) -> Velocity:
+        """How the robot moves by its odometry, in hero_N/base_link. Raises: StaleDataError as `pose`."""
+        self._check_fresh("odom", FRESH_ODOM_S)
+        return self._link.read_velocity()
+
+    @property
+    def proximity(self) -> List[float]:
+        """Eight ranges in m from the robot's center, front first, counter-clockwise, 45 degrees apart.
+
+        Index 0 is the front, 2 left, 4 rear, 6 right. inf: nothing in range (0.24 m); 0.0: too close to measure (0.047
+        m); nan: not calibrated. The topic /hero_N/proximity has the same ranges rear first (index 4 is the front), and
+        -Inf for too close.
+
+        Raises: StaleDataError if they are older than 1 s.
+        """
+        self._check_fresh("proximity", FRESH_PROXIMITY_S)
+        return self._link.read_ranges()
+
+    def wait_for_scan(self, timeout_s: float = 2.0) -> List[float]:
+        """Wait for the next scan, which comes 5 times a second, and return its ranges as `proximity` does.
+
+        Raises: StaleDataError if none comes within timeout_s.
+        """
+        self._link.subscribe("proximity")
+        self._link.wait_for_next("proximity", timeout_s)
+        return self._link.read_ranges()
+
+    def fresh_pose(self) -> Optional[Pose]:
+        """Return `pose`, or None where that would raise."""
+        try:
+            return self.pose
+        except StaleDataError:
+            return None
+
+    def fresh_proximity(self) -> List[float]:
+        """Return `proximity`, or eight times nan (not known) where that would raise."""
+        try:
+            return self.proximity
+        except StaleDataError:
+            return [math.nan] * 8
+
+    def nearest(self) -> Optional[Obstacle]:
+        """Return range (m, from the robot's center) and bearing (rad) of the nearest obstacle; None if none is seen.
+
+        Raises: StaleDataError as `proximity`.
+        """
+        ranges = self.proximity
+        return find_nearest(ranges, 0.0, math.tau / max(1, len(ranges)))
+
+    # ------------------------------------------------------------------ state
+
+    @property
+    def connected(self) -> bool:
+        """Whether the driver subscribes to the robot's commands, as it does while it knows the robot."""
+        return self._link.connected
+
+    @property
+    def is_stopped(self) -> bool:
+        """Whether the robot takes no motion because its driver has stopped all robots (emergency stop).
+
+        At the start of a program it waits until the drivers have reported, for up to 1.5 s.
+        """
+        self._link.wait_until_settled()
+        return self._link.is_stopped
+
+    def missing(self) -> Optional[str]:
+        """Return why the robot cannot be driven now, as text for users; None if it can."""
+        return self._link.missing()
+
+    def set_pose(self, x_m: float, y_m: float, yaw_rad: float) -> None:
+        """Set the odometry: from now on the robot is at this pose of hero_N/odom. Returns when `pose` says so.
+
+        Raises: RobotError if the robot does not answer or refuses. StaleDataError if no odometry follows.
+        """
+        self._link.set_odometry(Pose(x_m, y_m, yaw_rad))
+        self._link.subscribe("odom")
+        self._link.wait_for_next("odom", 1.0, count=2)  # one may have been on its way before the answer
+
+    # ------------------------------------------------------------------ motions
+
+    def drive(self, linear_m_s: float, angular_rad_s: float, duration_s: Optional[float] = None) -> None:
+        """Drive with these velocities, limited to 0.20 m/s and 8 rad/s.
+
+        linear_m_s is positive forward, angular_rad_s positive to the left. With duration_s, drive for this time, then
+        stop. Without, send one command and return: the robot obeys it until the next one, for about 2 s at most.
+        A robot speeds up within about 0.5 s, so 0.1 m/s for 2 s is a little less than 0.2 m: see forward().
+
+        One command that cannot have an effect is logged: if nothing subscribes to it, or all robots are stopped.
+
+        Raises: ValueError for velocities that are not finite. With duration_s also RobotNotReadyError if the robot is
+        not there within 2 s, and StoppedError if all robots are stopped.
+        """
+        if duration_s is not None:
+            self._drive_for(linear_m_s, angular_rad_s, duration_s)
+            return
+        self._end_motion()
+        self._send_velocity(linear_m_s, angular_rad_s)
+        if (linear_m_s or angular_rad_s) and self._link.is_stopped and self.now_s >= self._next_warning_s:
+            self._next_warning_s = self.now_s + STOPPED_WARNING_PERIOD_S
+            self._link.log_error(self._describe_stop())
+
+    def _send_velocity(self, linear_m_s: float, angular_rad_s: float) -> None:
+        if not (math.isfinite(linear_m_s) and math.isfinite(angular_rad_s)):
+            raise ValueError("speeds must be finite, not %r m/s and %r rad/s" % (linear_m_s, angular_rad_s))
+        self.driven = True
+        self._link.send_velocity(clamp(linear_m_s, MAX_LINEAR_M_S), clamp(angular_rad_s, MAX_ANGULAR_RAD_S))
+
+    def _describe_stop(self) -> str:
+        return "%s does not move: %s" % (self.name, self._link.describe_stop())
+
+    def check_not_stopped(self) -> None:
+        """Check that the driver lets the robot move: see is_stopped. Raises: StoppedError with how to release it."""
+        if self._link.is_stopped:
+            raise StoppedError(self._describe_stop())
+
+    def forward(self, distance_m: float, linear_m_s: float = 0.1) -> None:
+        """Drive straight on by distance_m, backwards if it is negative, to within 5 mm by the robot's odometry.
+
+        linear_m_s: the speed, up to 0.2; the robot slows down before the end.
+
+        Raises: GoalError as go_to(). ValueError for a speed that is not positive. RobotNotReadyError. StoppedError.
+        """
+        _check_speed(distance_m, linear_m_s)
+        self._end_motion()
+        controller = ForwardController(distance_m, self.now_s, linear_m_s)
+        self._run(self._follow(controller, "drive %g m" % distance_m, self.fresh_pose))
+
+    def turn(self, angle_rad: float, angular_rad_s: float = 1.5) -> None:
+        """Turn on the spot by angle_rad, positive to the left, to within 0.03 rad by the robot's odometry.
+
+        angular_rad_s: the speed, up to 8; the robot slows down before the end. Angles beyond a full turn are driven.
+
+        Raises: GoalError if the wheels do not turn or odometry ends. ValueError for a speed that is not positive.
+        RobotNotReadyError. StoppedError.
+        """
+        _check_speed(angle_rad, angular_rad_s)
+        self._end_motion()
+        controller = TurnController(angle_rad, self.now_s, angular_rad_s)
+        self._run(self._follow(controller, "turn %g rad" % angle_rad, self.fresh_pose))
+
+    def go_to(
+        self,
+        x_m: float,
+        y_m: float,
+        yaw_rad: Optional[float] = None,
+        frame: str = "odom",
+        avoid: bool = False,
+        timeout_s: float = DEFAULT_TIMEOUT_S,
+        tolerance_m: float = DEFAULT_TOLERANCE_M,
+        sleep: Optional[Sleep] = None,
+    ) -> None:
+        """Drive to a position, turn to yaw_rad if given, and return when the robot has stopped there.
+
+        frame: "odom" for the robot's odometry (0, 0 where it was switched on), "robot" for its present pose (x to the
+        front, y to the left), or a frame of tf, such as "world". avoid: drive around what the proximity sensors see;
+        otherwise the robot stops before an obstacle that is in the way, and fails if it stays there for 2 s.
+        The default field of simulated robots is 1.5 m by 1.5 m with walls (larger for more than nine robots): a single
+        robot starts in its middle and reaches 0.7 m to each side.
+
+        What the sensors do not see (black, low or thin things) ends no motion: wheels that slip are counted as driven.
+
+        Raises: GoalError with the reason if the goal is not reached: an obstacle in the way and where it is, wheels
+        that do not turn, no odometry for 2 s, or timeout_s. RobotNotReadyError if the robot is not there within 2 s.
+        StoppedError if all robots are stopped. FrameError if tf does not know the frame. The robot is stopped then.
+        """
+        self._end_motion()
+        self.pursue(Goal(x_m, y_m, yaw_rad), frame, avoid, timeout_s, tolerance_m, sleep)
+
+    def start_go_to(
+        self,
+        x_m: float,
+        y_m: float,
+        yaw_rad: Optional[float] = None,
+        frame: str = "odom",
+        avoid: bool = False,
+        timeout_s: float = DEFAULT_TIMEOUT_S,
+        tolerance_m: float = DEFAULT_TOLERANCE_M,
+    ) -> BackgroundMotion:
+        """Start go_to() in the background, with the same arguments; return the motion.
+
+        motion.result() waits for its end, and raises what go_to() raises; motion.done() tells whether it has ended;
+        motion.cancel(), stop() or another motion of this robot ends it, and result() then raises GoalError. Several
+        robots at once: start all, then ask each motion for its result().
+        """
+        self._end_motion()
+        self._motion = self._link.start(self._pursue(Goal(x_m, y_m, yaw_rad), frame, avoid, timeout_s, tolerance_m))
+        return self._motion
+
+    def pursue(
+        self,
+        goal: Goal,
+        frame: str,
+        avoid: bool,
+        timeout_s: float,
+        tolerance_m: float,
+        sleep: Optional[Sleep] = None,
+        on_step: OnStep = lambda controller: None,
+    ) -> None:
+        """As go_to(), for programs with goals of their own; on_step is called after each command."""
+        self._run(self._pursue(goal, frame, avoid, timeout_s, tolerance_m, on_step), sleep)
+
+    def _pursue(
+        self,
+        goal: Goal,
+        frame: str,
+        avoid: bool,
+        timeout_s: float,
+        tolerance_m: float,
+        on_step: OnStep = lambda controller: None,
+    ) -> Steps:
+        text = "reach (%g, %g)%s" % (goal.x_m, goal.y_m, "" if frame == "odom" else " in the frame %s" % frame)
+        if avoid:
+            self._link.subscribe("proximity")
+        self._link.subscribe("odom")
+        yield from wait_for_all([self], self._clock)
+        read_pose: Callable[[], Optional[Pose]] = self.fresh_pose
+        if frame == "robot":
+            place = transform_pose(self.pose, Pose(goal.x_m, goal.y_m, goal.yaw_rad or 0.0))
+            goal = Goal(place.x_m, place.y_m, None if goal.yaw_rad is None else place.yaw_rad)
+        elif frame.lstrip("/") not in ("odom", self.name + "/odom"):
+            read_pose = partial(self._fresh_pose_in, frame)
+        controller = GoToGoalController(goal, self.now_s, tolerance_m, timeout_s, avoid)
+        yield from self._follow(controller, text, read_pose, on_step)
+
+    def _fresh_pose_in(self, frame: str) -> Optional[Pose]:
+        try:
+            return self.pose_in(frame)
+        except StaleDataError:
+            return None
+
+    def _follow(
+        self,
+        controller: MotionController,
+        text: str,
+        read_pose: Callable[[], Optional[Pose]],
+        on_step: OnStep = lambda controller: None,
+    ) -> Steps:
+        """Drive as the controller says to its end. Raises: GoalError, StoppedError, RobotNotReadyError."""
+        yield from wait_for_all([self], self._clock)
+        try:
+            while controller.state is State.ACTIVE:
+                self.check_not_stopped()
+                self._send_velocity(*controller.step(read_pose(), self.fresh_proximity(), self.now_s))
+                on_step(controller)
+                if not (yield REPEAT_PERIOD_S):
+                    raise GoalError("%s did not %s: cancelled" % (self.name, text))
+        finally:
+            yield from send_stops([self])
+        if controller.state is State.FAILED:
+            raise GoalError("%s did not %s: %s" % (self.name, text, controller.reason))
+
+    def _end_motion(self) -> None:
+        """Cancel a motion in the background and wait until it has sent its stops."""
+        motion, self._motion = self._motion, None
+        if motion is not None:
+            motion.cancel_and_wait()
+
+    # ------------------------------------------------------------------ light
+
+    def led(self, color: Color) -> None:
+        """Show a color: a name such as "red" (see colors.COLORS), or (red, green, blue), each 0..1.
+
+        The robot's light goes dark 15 s later, so call this in every step of a loop: what the robot shows already is
+        sent every 2 s only. Raises: ValueError for a color that is not known.
+        """
+        self._light.show(color)
+
+    def blink(self, color: Color, period_s: float = 1.0) -> None:
+        """Let the light blink, half of each period on, until led() or the end of the program; returns at once.
+
+        Raises: ValueError for a color that is not known, or a period of less than 0.2 s.
+        """
+        self._light.blink(color, period_s)
+
+    def _end_blinking(self) -> None:
+        self._light.close()
+
+    # ------------------------------------------------------------------ end
+
+    def close(self) -> None:
+        """Stop the robot, if it was driven from here, and leave its topics; safe twice."""
+        self._leave()
+        self.leave_topics()
+
+    def leave_topics(self) -> None:
+        """Receive nothing more, without stopping the robot; safe twice."""
+        self._link.close()
+
+    def __repr__(self) -> str:
+        """Return the robot's name with its pose, or with why it is not ready."""
+        is_stopped = self.is_stopped  # waits until it is known why a robot is missing, too
+        state = self.missing() or ("stopped" if is_stopped else "ready")
+        return "<%s: %s%s>" % (self.name, state, ", %r" % (self.fresh_pose(),) if self.fresh_pose() else "")
+
+
+def _check_speed(distance: float, speed: float) -> None:
+    if not (math.isfinite(distance) and 0.0 < speed < math.inf):
+        raise ValueError("distance or angle must be finite, the speed positive, not %r and %r" % (distance, speed))

@@ -1,0 +1,81 @@
+"""What a Robot needs of the robot that it drives: over ROS topics, or stepped in the same process. Pure."""
+
+from typing import List, Optional, Protocol, Tuple
+
+from .background_motion import BackgroundMotion, Steps
+from .clock import Clock
+from .geometry import Pose, Velocity
+
+__all__ = ["RobotLink"]
+
+
+class RobotLink(Protocol):
+    """One robot. Topics go by their names: "odom", "proximity"."""
+
+    @property
+    def clock(self) -> Clock:
+        """The time in which the robot lives."""
+
+    @property
+    def connected(self) -> bool:
+        """Whether something takes the robot's commands."""
+
+    def missing(self) -> Optional[str]:
+        """Return why the robot cannot be driven now, as text for users; None if it can."""
+
+    # -- data ---------------------------------------------------------------------------------------------
+
+    def subscribe(self, topic: str) -> None:
+        """Receive a topic from now on, if that was not so before."""
+
+    def age_s(self, topic: str) -> float:
+        """Return the seconds since the last message of a topic arrived; inf before the first."""
+
+    def wait_for_next(self, topic: str, timeout_s: float, count: int = 1) -> None:
+        """Wait for the count-th message from now on. Raises: StaleDataError after timeout_s."""
+
+    def read_pose(self) -> Pose:
+        """Return the pose in the newest odometry, of which there is one; in hero_N/odom."""
+
+    def read_velocity(self) -> Velocity:
+        """Return the velocity in the newest odometry, of which there is one."""
+
+    def read_ranges(self) -> List[float]:
+        """Return the newest proximity ranges, of which there are some: see Robot.proximity."""
+
+    def find_origin(self, frame: str, timeout_s: float) -> Pose:
+        """Return the pose of hero_N/odom in another frame. Raises: FrameError if it is not known."""
+
+    # -- commands -----------------------------------------------------------------------------------------
+
+    def send_velocity(self, linear_m_s: float, angular_rad_s: float) -> None:
+        """Send a velocity; a robot that is not there is warned about, unless it is a stop."""
+
+    def send_color(self, rgb: Tuple[float, float, float]) -> None:
+        """Send the color of the light, each part 0..1."""
+
+    def set_odometry(self, pose: Pose) -> None:
+        """Let the robot be at pose of hero_N/odom. Raises: RobotError if it does not answer or refuses."""
+
+    # -- stop of all robots -------------------------------------------------------------------------------
+
+    @property
+    def is_stopped(self) -> bool:
+        """Whether the robot takes no motion because all robots are stopped, as far as is known now."""
+
+    def describe_stop(self) -> str:
+        """Return what has stopped all robots and how to release them, for users."""
+
+    def wait_until_settled(self) -> None:
+        """Wait until is_stopped can be known; at the start of a program that takes a moment."""
+
+    # -- the program --------------------------------------------------------------------------------------
+
+    def start(self, steps: Steps) -> BackgroundMotion:
+        """Take steps in the background."""
+
+    def log_error(self, text: str) -> None:
+        """Tell users of an error that ends nothing."""
+
+    def close(self) -> None:
+        """Leave the robot; safe twice."""

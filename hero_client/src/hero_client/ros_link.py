@@ -1,0 +1,186 @@
+"""A robot over ROS: its topics and services under /hero_N, tf, and the drivers' reports; see robot_link."""
+
+import threading
+from concurrent.futures import wait
+from typing import List, Optional, Tuple
+
+import rospy
+from geometry_msgs.msg import Twist
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import LaserScan
+from std_msgs.msg import ColorRGBA
+
+from hero_msgs.msg import Encoder
+from hero_msgs.srv import SetOdom
+
+from .background_motion import BackgroundMotion, Steps, run_steps
+from .drivers import share_drivers
+from .errors import HeroError, RobotError
+from .frames import share_frames
+from .geometry import Pose, Velocity, yaw_of
+from .readings import front_first
+from .robot_topics import CommandTopic, NewestMessages
+from .ros_clock import ROS_CLOCK
+
+__all__ = ["RosLink"]
+
+SILENT_S = 1.0
+"""A topic without a message for so long makes a robot unready; proximity comes about 5 times a second."""
+
+SERVICE_TIMEOUT_S = 2.0
+
+END_TIMEOUT_S = 3.0
+"""A cancelled motion ends within 0.3 s; one that hangs must not hang its robot's next motion."""
+
+MESSAGE_CLASSES = {"odom": Odometry, "proximity": LaserScan, "encoder": Encoder}
+
+
+class ThreadMotion(BackgroundMotion):
+    """A motion on a thread of its own."""
+
+    def __init__(self, steps: Steps) -> None:
+        """Start it; it ends soon after a step was sent that it is not to continue."""
+        super().__init__()
+        self._cancelled = threading.Event()
+        self.set_running_or_notify_cancel()
+        threading.Thread(target=self._take_steps, args=(steps,), name="motion", daemon=True).start()
+
+    def _take_steps(self, steps: Steps) -> None:
+        try:
+            run_steps(steps, self._sleep, ROS_CLOCK.sleep)
+        except (HeroError, ValueError, TypeError, rospy.ROSException) as error:
+            self.set_exception(error)
+        else:
+            self.set_result(None)
+
+    def _sleep(self, duration_s: float) -> bool:
+        return not self._cancelled.wait(duration_s) and not rospy.is_shutdown()
+
+    def cancel(self) -> bool:
+        """See BackgroundMotion."""
+        self._cancelled.set()
+        return not self.done()
+
+    def cancel_and_wait(self) -> None:
+        """See BackgroundMotion."""
+        self.cancel()
+        wait([self], END_TIMEOUT_S)
+
+
+class RosLink:
+    """One robot over ROS; needs a started node.
+
+    Attributes:
+        messages: the newest message of each topic.
+    """
+
+    clock = ROS_CLOCK
+
+    def __init__(self, name: str) -> None:
+        """Advertise the commands to the robot with this name."""
+        self._name = name
+        self._namespace = "/" + name
+        self._drivers = share_drivers()
+        self._cmd_vel = CommandTopic(self._namespace + "/velocity_controller/cmd_vel", Twist, self._explain_absence)
+        self._led = CommandTopic(self._namespace + "/led", ColorRGBA, self._explain_absence)
+        self.messages = NewestMessages(self._namespace)
+
+    def _explain_absence(self) -> str:
+        return self._drivers.explain_absence(self._namespace)
+
+    @property
+    def connected(self) -> bool:
+        """Whether the driver subscribes to the robot's commands, as it does while it knows the robot."""
+        return self._cmd_vel.connected
+
+    def missing(self) -> Optional[str]:
+        """See RobotLink."""
+        if not self.connected:
+            return self._cmd_vel.describe_absence()
+        silent = self.messages.find_silent(SILENT_S)
+        if silent is not None:
+            return "no message on %s/%s: is the robot on and in reach?" % (self._namespace, silent)
+        return None
+
+    def subscribe(self, topic: str) -> None:
+        """See RobotLink."""
+        self.messages.subscribe(topic, MESSAGE_CLASSES[topic])
+
+    def age_s(self, topic: str) -> float:
+        """See RobotLink."""
+        return self.messages.age_s(topic)
+
+    def wait_for_next(self, topic: str, timeout_s: float, count: int = 1) -> None:
+        """See RobotLink."""
+        self.messages.wait_for_next(topic, timeout_s, count)
+
+    def read_pose(self) -> Pose:
+        """See RobotLink."""
+        pose = self.messages.read("odom").pose.pose
+        return Pose(pose.position.x, pose.position.y, yaw_of(pose.orientation))
+
+    def read_velocity(self) -> Velocity:
+        """See RobotLink."""
+        twist = self.messages.read("odom").twist.twist
+        return Velocity(twist.linear.x, twist.angular.z)
+
+    def read_ranges(self) -> List[float]:
+        """See RobotLink."""
+        return front_first(self.messages.read("proximity"))
+
+    def find_origin(self, frame: str, timeout_s: float) -> Pose:
+        """See RobotLink; the first call subscribes to /tf."""
+        return share_frames().find_origin(self._name + "/odom", frame, timeout_s)
+
+    def send_velocity(self, linear_m_s: float, angular_rad_s: float) -> None:
+        """See RobotLink."""
+        twist = Twist()
+        twist.linear.x, twist.angular.z = linear_m_s, angular_rad_s
+        if linear_m_s or angular_rad_s:
+            self._cmd_vel.publish(twist)
+        else:
+            self._cmd_vel.publish_if_connected(twist)
+
+    def send_color(self, rgb: Tuple[float, float, float]) -> None:
+        """See RobotLink."""
+        self._led.publish(ColorRGBA(*rgb, 1.0))
+
+    def set_odometry(self, pose: Pose) -> None:
+        """See RobotLink."""
+        name = self._namespace + "/set_odom"
+        try:
+            rospy.wait_for_service(name, SERVICE_TIMEOUT_S)
+            answer = rospy.ServiceProxy(name, SetOdom)(*pose)
+        except (rospy.ServiceException, rospy.ROSException) as error:
+            raise RobotError("%s: %s" % (name, " ".join(str(error).split()))) from None
+        if not answer.success:
+            raise RobotError("%s: the robot answers: %s" % (name, answer.message))
+
+    @property
+    def is_stopped(self) -> bool:
+        """See RobotLink."""
+        return self._drivers.is_robot_stopped(self._namespace)
+
+    def describe_stop(self) -> str:
+        """See RobotLink."""
+        driver = self._drivers.find(self._namespace)
+        return (
+            "the driver %s has stopped all robots. Release them with r in `rosrun hero_tools fleet`,"
+            " Swarm.release_stop(), or: rosservice call %s/stop false" % (driver.strip("/"), driver)
+        )
+
+    def wait_until_settled(self) -> None:
+        """See RobotLink; takes 1.5 s at most."""
+        self._drivers.wait_until_settled()
+
+    def start(self, steps: Steps) -> BackgroundMotion:
+        """Take steps on another thread."""
+        return ThreadMotion(steps)
+
+    def log_error(self, text: str) -> None:
+        """See RobotLink."""
+        rospy.logerr(text)
+
+    def close(self) -> None:
+        """Unsubscribe; safe twice."""
+        self.messages.close()

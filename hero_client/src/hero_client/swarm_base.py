@@ -1,0 +1,125 @@
+"""Several robots as one object, whatever connects them: see swarm. Pure."""
+
+from abc import abstractmethod
+from typing import Any, Dict, Generic, Iterator, List, Mapping, Optional, Sequence, TypeVar
+
+from .background_motion import BackgroundMotion
+from .clock import Clock
+from .colors import Color
+from .errors import GoalError, HeroError
+from .group import Group
+from .robot_base import BaseRobot
+
+__all__ = ["REPORT_PERIOD_S", "AnyRobot", "BaseSwarm"]
+
+REPORT_PERIOD_S = 5.0
+"""Between two lines on what is waited for."""
+
+FIRST_REPORT_S = 3.0
+"""Most robots answer within a second or two even when all starts at once: no line about those."""
+
+AnyRobot = TypeVar("AnyRobot", bound=BaseRobot)
+
+
+class BaseSwarm(Group, Generic[AnyRobot]):
+    """Several robots; iterate over them, or take one by its id: swarm[3] is hero_3, not the fourth robot.
+
+    A command to a swarm is given to each of its robots.
+
+    Attributes:
+        robots: list of the robots, in the order of the ids given.
+    """
+
+    def __init__(self, robots: Sequence[AnyRobot], clock: Clock) -> None:
+        """Hold these robots, which live in the time of clock."""
+        self.robots = list(robots)
+        self._clock = clock
+        self._members = self.robots
+        self._by_id = {robot.robot_id: robot for robot in self.robots}
+        self._reported: Dict[str, str] = {}
+        self._next_report_s = self.now_s + FIRST_REPORT_S
+
+    def drive(self, linear_m_s: float, angular_rad_s: float, duration_s: Optional[float] = None) -> None:
+        """Drive all robots with the same velocities: see Robot.drive()."""
+        if duration_s is not None:
+            self._drive_for(linear_m_s, angular_rad_s, duration_s)
+            return
+        for robot in self.robots:
+            robot.drive(linear_m_s, angular_rad_s)
+
+    def go_to(self, x_m: float, y_m: float, yaw_rad: Optional[float] = None, **options: Any) -> None:
+        """Drive every robot to this place of its own frame, all at once; return when all have ended.
+
+        options: as in Robot.go_to(). With frame="robot" all robots make the same move. For goals of each robot, use
+        robot.start_go_to(); for goals in a common frame without collisions, controllers.swarm_go_to.
+
+        Raises: as Robot.go_to(), for the robots that failed; the others reach their goals.
+        """
+        motions = self.start_go_to(x_m, y_m, yaw_rad, **options)
+        errors = [error for error in (motion.exception() for motion in motions) if error is not None]
+        if len(errors) > 1 and all(isinstance(error, HeroError) for error in errors):
+            raise GoalError("; ".join(map(str, errors)))
+        for error in errors:
+            raise error
+
+    def start_go_to(
+        self, x_m: float, y_m: float, yaw_rad: Optional[float] = None, **options: Any
+    ) -> List[BackgroundMotion]:
+        """Start go_to() of every robot, and return the motions in the order of the robots: see Robot.start_go_to()."""
+        return [robot.start_go_to(x_m, y_m, yaw_rad, **options) for robot in self.robots]
+
+    def led(self, color: Color) -> None:
+        """Show a color on all robots: see Robot.led()."""
+        for robot in self.robots:
+            robot.led(color)
+
+    def blink(self, color: Color, period_s: float = 1.0) -> None:
+        """Let all lights blink: see Robot.blink()."""
+        for robot in self.robots:
+            robot.blink(color, period_s)
+
+    def report_missing(self, missing: Optional[Mapping[str, Optional[str]]] = None) -> None:
+        """Log which robots are waited for, every 5 s, and when they answer; call it in every step of a loop.
+
+        missing: robot's name -> what is missing, or None; without it, robot.missing() of each robot.
+        """
+        if missing is None:
+            missing = {robot.name: robot.missing() for robot in self.robots}
+        for name in [name for name in self._reported if missing.get(name) is None]:
+            self._log("info", "%s answers" % name)
+            del self._reported[name]
+        if self.now_s < self._next_report_s:
+            return
+        self._next_report_s = self.now_s + REPORT_PERIOD_S
+        for name, reason in missing.items():
+            if reason is not None:
+                self._log("warn", "%s: waiting: %s" % (name, reason))
+                self._reported[name] = reason
+
+    @abstractmethod
+    def _log(self, level: str, text: str) -> None:
+        """Tell users; level is "info" or "warn"."""
+
+    def close(self) -> None:
+        """Stop all robots that were driven from here, and leave their topics; safe twice."""
+        self._leave()
+        for robot in self.robots:
+            robot.leave_topics()
+
+    def __getitem__(self, robot_id: int) -> AnyRobot:
+        if robot_id not in self._by_id:
+            names = ", ".join(robot.name for robot in self.robots)
+            raise KeyError("hero_%s is not in this swarm: %s" % (robot_id, names))
+        return self._by_id[robot_id]
+
+    def __iter__(self) -> Iterator[AnyRobot]:
+        return iter(self.robots)
+
+    def __len__(self) -> int:
+        return len(self.robots)
+
+    def __repr__(self) -> str:
+        """Return the robots' names, and how many are ready."""
+        ready = sum(robot.missing() is None for robot in self.robots)
+        names = ", ".join(robot.name for robot in self.robots)
+        return "<Swarm of %s: %d of %d ready>" % (names, ready, len(self.robots))

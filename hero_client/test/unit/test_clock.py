@@ -1,0 +1,84 @@
+"""The waits of a program: the rate of a loop, and steps that end as they must whatever a wait does."""
+
+import pytest
+
+from hero_client.background_motion import Hold, run_steps
+from hero_client.clock import Clock
+
+
+class Watch(Clock):
+    """Time that passes only in waits."""
+
+    def __init__(self, end_s=10.0):
+        self.time_s = 0.0
+        self.end_s = end_s
+
+    @property
+    def now_s(self):
+        return self.time_s
+
+    def sleep(self, duration_s):
+        assert duration_s >= 0.0
+        self.time_s += duration_s
+        return self.time_s < self.end_s
+
+
+def test_a_rate_yields_its_times_until_the_program_is_to_end():
+    assert list(Watch(0.35).rate(10)) == pytest.approx([0.0, 0.1, 0.2, 0.3])
+    with pytest.raises(ValueError, match="more than 0 Hz, not 0"):
+        next(Watch().rate(0))
+
+
+def test_a_slow_body_does_not_let_a_rate_run_faster_later():
+    watch, times_s = Watch(), []
+    for time_s in watch.rate(10):
+        times_s.append(time_s)
+        if len(times_s) == 2:
+            watch.time_s += 0.35
+        if len(times_s) == 4:
+            break
+    assert times_s == pytest.approx([0.0, 0.1, 0.45, 0.55])
+
+
+def test_pace_waits_for_the_rest_of_the_period_only():
+    watch = Watch()
+    watch.pace(0.1)
+    for begun_s in (0.2, 0.3):
+        watch.time_s += 0.07
+        watch.pace(0.1)
+        assert watch.now_s == pytest.approx(begun_s)
+    watch.time_s += 0.35  # this is not made up for
+    watch.pace(0.1)
+    at_s = watch.now_s
+    watch.pace(0.1)
+    assert watch.now_s == pytest.approx(at_s + 0.1)
+
+
+def take_notes(notes):
+    try:
+        while (yield 0.1):
+            notes.append("step")
+        notes.append("told to end")
+    finally:
+        notes.append("stop")
+        yield Hold(0.06)
+        notes.append("stop")
+
+
+def test_steps_are_told_when_a_wait_says_so_and_take_their_end():
+    watch, held_s, notes = Watch(0.25), [], []
+    run_steps(take_notes(notes), watch.sleep, held_s.append)
+    assert notes == ["step", "step", "told to end", "stop", "stop"]
+    assert held_s == [0.06]
+
+
+@pytest.mark.parametrize("error", (KeyboardInterrupt, SystemExit, RuntimeError))
+def test_what_ends_a_wait_is_raised_after_the_stops(error):
+    held_s, notes = [], []
+
+    def interrupt(duration_s):
+        raise error
+
+    with pytest.raises(error):
+        run_steps(take_notes(notes), interrupt, held_s.append)
+    assert notes == ["stop", "stop"] and held_s == [0.06]
