@@ -110,7 +110,9 @@ class CommandTable:
         self._sensing.laser_enabled = is_enabled
 
     def _drive(self, controller: Controller, linear_m_s: float, angular_rad_s: float) -> None:
-        if self._motors.receive_twist(controller, self._millis, self._now_ms, linear_m_s, angular_rad_s):
+        # The robot's ros_lib reads a float64 into single precision (deserializeAvrFloat64).
+        twist = messages.round_to_float32((linear_m_s, angular_rad_s))
+        if self._motors.receive_twist(controller, self._millis, self._now_ms, *twist):
             self.blocked_us = STOP_US
 
     def _drive_motors(self, left_us: int, right_us: int) -> None:

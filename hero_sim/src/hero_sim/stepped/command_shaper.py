@@ -1,0 +1,133 @@
+"""The driver's shaping of motion commands, for one motion topic of all robots.
+
+Pure: numpy only, arrays over robots (R); the rules of VelocityShaper in hero_driver/commands: the newest command wins,
+commands are 60 ms apart, a stop is never dropped and is sent twice. Whoever reads what was sent has to look
+more often than once in 60 ms.
+"""
+
+import math
+from typing import Any, Dict, NamedTuple, Sequence, Tuple, Union
+
+import numpy as np
+
+from hero_driver.commands.velocity_shaper import COMMAND_INTERVAL_S, STOP_REPEATS
+
+__all__ = ["CommandShaper", "Rows", "Sent", "Values"]
+
+Rows = Union[int, Sequence[int], np.ndarray]
+"""The row of one robot, or the rows of several (K,), each named once."""
+
+Values = Any  # a number for all these rows, or one for each: a sequence or an array (K,)
+
+INTERVAL_MS = round(COMMAND_INTERVAL_S * 1000)
+
+
+class Sent(NamedTuple):
+    """Commands that were sent to robots.
+
+    Attributes:
+        rows: to which robots (K,), each once.
+        values: the commands (K, 2).
+        at_ms: when (K,).
+    """
+
+    rows: np.ndarray
+    values: np.ndarray
+    at_ms: np.ndarray
+
+
+_NOTHING = Sent(np.empty(0, dtype=np.int64), np.empty((0, 2)), np.empty(0, dtype=np.int64))
+
+
+class CommandShaper:
+    """The pending commands; at most one stop and one later command wait for each robot."""
+
+    def __init__(self, rows: int, stop: float) -> None:
+        """Begin with nothing; stop is each value of the command that stops a robot."""
+        self._stop = stop
+        self._stop_waits = np.zeros(rows, dtype=bool)
+        self._newest_waits = np.zeros(rows, dtype=bool)
+        self._newest = np.zeros((rows, 2))
+        self._repeats = np.zeros(rows, dtype=np.int64)
+        self._next_ms = np.zeros(rows, dtype=np.int64)
+        self._is_sent = np.zeros(rows, dtype=bool)
+        self._sent = np.zeros((rows, 2))
+        self._sent_ms = np.zeros(rows, dtype=np.int64)
+        self._idle = True
+        self._collected: Dict[int, Tuple[float, float]] = {}
+        self._collected_ms = 0
+
+    def offer(self, now_ms: int, rows: Rows, first: Values, second: Values) -> None:
+        """Take the two values of a command at now_ms, for one robot or for several.
+
+        Raises: ValueError for values that are not finite, as the driver refuses them.
+        """
+        if now_ms != self._collected_ms or not isinstance(rows, int) or rows in self._collected:
+            self._shape_collected()
+            self._collected_ms = now_ms
+        if isinstance(rows, int):
+            if not (math.isfinite(first) and math.isfinite(second)):
+                raise ValueError("the command for robot row %d must be finite, not %r and %r" % (rows, first, second))
+            self._collected[rows] = (first, second)
+            return
+        rows = np.asarray(rows)
+        values = np.empty((rows.size, 2))
+        values[:, 0], values[:, 1] = first, second
+        if not np.isfinite(values).all():
+            wrong = rows[~np.isfinite(values).all(axis=1)]
+            raise ValueError("the commands for robot rows %s must be finite" % wrong.tolist())
+        self._shape(now_ms, rows.reshape(-1), values)
+
+    def _shape_collected(self) -> None:
+        """Shape the commands for single robots that came at one time, all together: that is much faster."""
+        if self._collected:
+            rows, values = np.array(list(self._collected)), np.array(list(self._collected.values()), dtype=float)
+            self._collected.clear()
+            self._shape(self._collected_ms, rows, values)
+
+    def _shape(self, now_ms: int, rows: np.ndarray, values: np.ndarray) -> None:
+        if not self._idle:
+            self._send_due(now_ms)
+        # What is offered to a robot that waits for nothing goes at once.
+        self._next_ms[rows] = np.maximum(self._next_ms[rows], now_ms)
+        stops = (values == self._stop).all(axis=1)
+        self._stop_waits[rows] |= stops
+        self._newest_waits[rows] = ~stops
+        self._newest[rows] = values.astype(np.float32)  # a robot computes in single precision
+        self._idle = False
+        self._send_due(now_ms)
+
+    def delay_until(self, rows: np.ndarray, next_ms: np.ndarray) -> None:
+        """Send nothing to the robots at rows (K,) before next_ms (K,)."""
+        self._next_ms[rows] = np.maximum(self._next_ms[rows], next_ms)
+
+    def _send_due(self, now_ms: int) -> None:
+        waits = self._stop_waits | self._newest_waits
+        waits |= self._repeats > 0
+        due = waits & (self._next_ms <= now_ms)
+        if not due.any():
+            self._idle = not waits.any() and not self._is_sent.any()
+            return
+        moves = due & self._newest_waits & ~self._stop_waits
+        stops = due & ~moves
+        repeats = np.where(self._stop_waits, STOP_REPEATS, self._repeats - 1)
+        np.copyto(self._repeats, repeats, where=stops)
+        self._repeats[moves] = 0
+        self._stop_waits[stops] = False
+        self._newest_waits[moves] = False
+        self._sent[stops] = self._stop
+        np.copyto(self._sent, self._newest, where=moves[:, None])
+        np.copyto(self._sent_ms, self._next_ms, where=due)
+        self._next_ms[due] += INTERVAL_MS
+        self._is_sent |= due
+
+    def take(self, now_ms: int) -> Sent:
+        """Return what was sent since the last call, up to now_ms."""
+        self._shape_collected()
+        if self._idle:
+            return _NOTHING
+        self._send_due(now_ms)
+        rows = np.flatnonzero(self._is_sent)
+        sent = Sent(rows, self._sent[rows], self._sent_ms[rows])
+        self._is_sent[rows] = False
+        return sent

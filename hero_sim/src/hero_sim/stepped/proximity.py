@@ -1,0 +1,32 @@
+"""Infrared readings of all robots as ranges: as the firmware sends them, and as the driver corrects them.
+
+Pure: numpy only; the corrections of make_proximity() in hero_driver's corrections/message_layouts.py.
+"""
+
+import numpy as np
+
+from hero_driver.corrections.message_layouts import CLAMP_TOLERANCE_M
+from hero_driver.robot_constants import BODY_RADIUS_M, FARTHEST_RANGE_M, NEAREST_RANGE_M
+
+from ..robot.ranges import convert_to_ranges
+
+__all__ = ["correct_ranges", "measure_ranges"]
+
+
+def measure_ranges(counts: np.ndarray, calibration_counts_m2: np.ndarray) -> np.ndarray:
+    """Return the ranges (R, 8) in /laser, m from the robot's center, rear first."""
+    return convert_to_ranges(counts, calibration_counts_m2).astype(np.float32).astype(float)
+
+
+def correct_ranges(ranges_m: np.ndarray) -> np.ndarray:
+    """Return ranges of /laser (R, 8) as programs see them, front first: inf for nothing in range, 0 for too close.
+
+    NaN for a sensor that is not calibrated stays.
+    """
+    corrected_m = np.roll(ranges_m, -(ranges_m.shape[1] // 2), axis=1)
+    with np.errstate(invalid="ignore"):  # comparisons with NaN
+        near = corrected_m <= BODY_RADIUS_M + NEAREST_RANGE_M + CLAMP_TOLERANCE_M
+        far = corrected_m >= BODY_RADIUS_M + FARTHEST_RANGE_M - CLAMP_TOLERANCE_M
+    corrected_m[near] = 0.0
+    corrected_m[far] = np.inf
+    return corrected_m

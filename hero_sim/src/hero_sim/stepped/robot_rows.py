@@ -1,0 +1,250 @@
+"""Many robots at once, advanced by call: the firmware's rules and the driver's corrections as arrays over robots.
+
+Pure: no bytes, sockets, threads, ROS or clock. Same world and calls, same bytes. The robots share the phases of their
+timers, which depend on the time alone, so that a world of a batch gives what it gives alone. Left out of the firmware:
+boot, self-tuning, the IMU hat, faults, and the millisecond for which a command blocks its loop.
+"""
+
+from typing import Callable, List, Sequence
+
+import numpy as np
+
+from hero_driver.robot_constants import MOTOR_CENTER_US
+
+from ..robot.firmware import SPIN_MS
+from ..robot.motor_control import CONTROL_MS
+from ..robot.motor_pid import POSITION_GAINS, VELOCITY_GAINS
+from ..robot.ranges import calibrate
+from ..robot.sensing import CYCLE_MS, LASER_GATE_MS, LASER_READ_MS
+from ..robot_constants import (
+    LED_WATCHDOG_MS,
+    MAX_ANGULAR_RAD_S,
+    MAX_LINEAR_M_S,
+    POSITION_LIMIT_US,
+    POSITION_WATCHDOG_MS,
+    TICK_M,
+    VELOCITY_LIMIT_US,
+    VELOCITY_WATCHDOG_MS,
+)
+from ..world.kinematics import split_to_wheels
+from ..world.world import STEP_MS, World
+from .command_shaper import CommandShaper, Rows, Values
+from .proximity import correct_ranges, measure_ranges
+from .servo_pulses import ServoPulses
+from .tick_odometry import TickOdometryRows
+from .wheel_controllers import WheelControllers
+from .wheel_encoders import WheelEncoders
+
+__all__ = ["Hook", "RobotRows"]
+
+Hook = Callable[[np.ndarray], None]
+"""Called with the rows (K,) of the robots whose data the program has just received."""
+
+
+class RobotRows:
+    """The robots of one or more worlds, one row each, calibrated, connected and at rest.
+
+    A program on arrays sends with index arrays, advances, and reads the arrays, which are updated in place:
+
+        robots.send_velocity(np.arange(1000), linear_m_s, angular_rad_s)  # (1000,) each
+        robots.advance(robots.now_ms + 100)
+        robots.odometry[:, :2], robots.proximity_m.min(axis=1)
+
+    Commands pass the driver's shaping and reach the firmware with its next read, 51 ms apart; the other
+    calls (light, odometry, gains, calibrations) work at once.
+
+    Attributes:
+        now_ms: how far everything has been advanced.
+        world: ground truth.
+        odometry: x m, y m, yaw rad in hero_N/odom (R, 3), as the driver computes it from the ticks.
+        velocities: linear m/s, angular rad/s in hero_N/base_link (R, 2), also from the ticks.
+        ticks: of both wheels since the odometry was last set (R, 2), whole numbers, read every 34 ms.
+        odometry_ms: when the program received these (R,).
+        proximity_m: ranges from the robot's center (R, 8), front first, counter-clockwise; inf nothing in
+            range, 0 too close, nan not calibrated.
+        counts, ranges_m: of the eight sensors (R, 8) as in /laser, rear first.
+        scan_ms: when the program received these (R,), every 205 ms.
+        on_cycle, on_scan: called for new odometry and ticks, and for new ranges.
+    """
+
+    def __init__(self, world: World) -> None:
+        """Take the robots of world, which are at rest, from the world's time on; first readings are there at once."""
+        rows = len(world.poses)
+        self.world = world
+        self.now_ms = now_ms = world.time_ms
+        self.ticks = np.zeros((rows, 2))
+        self.odometry_ms = np.full(rows, now_ms)
+        self.counts = np.zeros((rows, 8))
+        self.ranges_m = np.zeros((rows, 8))
+        self.proximity_m = np.zeros((rows, 8))
+        self.scan_ms = np.full(rows, now_ms)
+        self.on_cycle: List[Hook] = []
+        self.on_scan: List[Hook] = []
+        self._rows = np.arange(rows)
+        self._all = np.ones((rows, 1), dtype=bool)
+        self._lights = np.zeros((rows, 4), dtype=np.float32)
+        self._light_end_ms = np.zeros(rows, dtype=np.int64)
+        errors = world.errors
+        self._calibration_counts_m2 = calibrate(errors.alpha_counts_m2, errors.beta_counts)
+        self._encoders = WheelEncoders(world)
+        self._odometry = TickOdometryRows(rows)
+        self.odometry, self.velocities = self._odometry.poses, self._odometry.velocities
+        self._servos = ServoPulses(world, np.rint(errors.servo_center_us))
+        self._velocity = WheelControllers(rows, VELOCITY_GAINS, VELOCITY_LIMIT_US, VELOCITY_WATCHDOG_MS)
+        self._position = WheelControllers(rows, POSITION_GAINS, POSITION_LIMIT_US, POSITION_WATCHDOG_MS)
+        self._start_ticks = np.zeros((rows, 2))
+        self._velocity_commands = CommandShaper(rows, 0.0)
+        self._position_commands = CommandShaper(rows, 0.0)
+        self._pulse_commands = CommandShaper(rows, MOTOR_CENTER_US)
+        self._cycle_ms = now_ms
+        self._scan_ms = now_ms - LASER_GATE_MS - 1
+        self._run_cycle(now_ms)
+        # The first read is that of a robot that was configured a millisecond before its first cycle; a controller that
+        # is commanded in it runs a millisecond later.
+        self._read_ms = now_ms + SPIN_MS - 1
+        self._control_ms = now_ms + SPIN_MS - 2 * CONTROL_MS
+
+    # -- commands --------------------------------------------------------------------------------------------
+
+    def send_velocity(self, rows: Rows, linear_m_s: Values, angular_rad_s: Values) -> None:
+        """Send velocities to the velocity controller, as a program does through the driver.
+
+        One value for all rows, or one for each. Raises: ValueError for one that is not finite.
+        """
+        self._velocity_commands.offer(self.now_ms, rows, linear_m_s, angular_rad_s)
+
+    def send_position(self, rows: Rows, linear_m_s: Values, angular_rad_s: Values) -> None:
+        """Send velocities to the position controller, which drives as far as they reach in a second."""
+        self._position_commands.offer(self.now_ms, rows, linear_m_s, angular_rad_s)
+
+    def send_pulses(self, rows: Rows, left_us: Values, right_us: Values) -> None:
+        """Send servo pulses (whole microseconds), which the motors keep for one second."""
+        self._pulse_commands.offer(self.now_ms, rows, left_us, right_us)
+
+    def send_light(self, rows: Rows, rgba: Values) -> None:
+        """Show a color (4,), or one for each row (K, 4), red green blue alpha from 0 to 1, for 15 s."""
+        self._lights[rows] = rgba
+        self._light_end_ms[rows] = self.now_ms + LED_WATCHDOG_MS
+
+    @property
+    def lights(self) -> np.ndarray:
+        """The lights as people see them (R, 4), red green blue alpha; dark 15 s after the last command."""
+        return self._lights * (self.now_ms <= self._light_end_ms)[:, None]
+
+    def set_odometry(self, row: int, x_m: float, y_m: float, yaw_rad: float) -> None:
+        """Set the odometry of one robot, which also zeroes its tick counters."""
+        self._encoders.zero(row)
+        self._odometry.set_pose(row, x_m, y_m, yaw_rad)
+        self.ticks[row] = 0.0
+
+    def set_velocity_gains(self, row: int, gains: Sequence[float]) -> None:
+        """Set lkp lki lkd rkp rki rkd of one robot; a wheel's three with a negative one are ignored."""
+        self._velocity.set_gains(row, gains)
+
+    def set_motor_centers(self, row: int, centers_us: Sequence[int]) -> None:
+        """Set the pulses at which the left and right wheel of one robot should rest, from the next command on."""
+        self._servos.centers_us[row] = centers_us
+
+    def set_infrared_calibration(self, row: int, constants_counts_m2: Sequence[float]) -> None:
+        """Set the constants of the eight sensors of one robot, rear first; nan stands for not calibrated."""
+        self._calibration_counts_m2[row] = constants_counts_m2
+
+    # -- time passes -----------------------------------------------------------------------------------------
+
+    def advance(self, until_ms: int) -> None:
+        """Move everything on to until_ms."""
+        world, servos = self.world, self._servos
+        while True:
+            step_ms = world.time_ms + STEP_MS
+            now_ms = min(step_ms, self._cycle_ms, self._control_ms, self._read_ms, servos.check_ms)
+            if now_ms > until_ms:
+                break
+            self.now_ms = now_ms
+            if now_ms >= self._cycle_ms:
+                self._run_cycle(now_ms)
+                # Sending a cycle takes about a millisecond; controllers that are due, and then reads, wait for it.
+                if self._control_ms <= now_ms:
+                    self._control_ms = now_ms + 1
+                    self._read_ms = max(self._read_ms, now_ms + 1)
+                servos.check_ms = max(servos.check_ms, now_ms + 1)
+            else:
+                if now_ms >= self._control_ms:
+                    self._run_controllers(now_ms)
+                if now_ms >= servos.check_ms:
+                    servos.check_watchdog(now_ms)
+            if now_ms >= self._read_ms:
+                self._read_commands(now_ms)
+            if now_ms == step_ms:
+                world.step()
+        self.now_ms = until_ms
+
+    def _run_cycle(self, now_ms: int) -> None:
+        """Read the encoders, and the infrared sensors if their gate is open."""
+        scans = now_ms - self._scan_ms > LASER_GATE_MS
+        if scans:
+            self._scan_ms = now_ms
+            self.counts[:] = self.world.read_infrared(self._rows)
+            self.ranges_m[:] = measure_ranges(self.counts, self._calibration_counts_m2)
+            self.proximity_m[:] = correct_ranges(self.ranges_m)
+            self.scan_ms[:] = now_ms
+        self._encoders.read(now_ms, self._all)
+        self.ticks[:] = self._encoders.ticks
+        self._odometry.integrate(self.ticks, now_ms)
+        self.odometry_ms[:] = now_ms
+        self._cycle_ms = now_ms + CYCLE_MS
+        if self._cycle_ms - self._scan_ms > LASER_GATE_MS:
+            self._cycle_ms += LASER_READ_MS
+        for hook in self.on_cycle:
+            hook(self._rows)
+        if scans:
+            for hook in self.on_scan:
+                hook(self._rows)
+
+    def _run_controllers(self, now_ms: int) -> None:
+        self._control_ms = now_ms + CONTROL_MS
+        if now_ms < self._position.end_ms:
+            active = self._position.find_active(now_ms)
+            self._position.run(now_ms, self._encoders.count(now_ms) - self._start_ticks, active)
+            self._servos.drive(now_ms, self._position.outputs_us, active)
+        if now_ms < self._velocity.end_ms:
+            active = self._velocity.find_active(now_ms)
+            self._encoders.read(now_ms, active)
+            self._velocity.run(now_ms, self._encoders.filtered_m_s, active)
+            self._servos.drive(now_ms, self._velocity.outputs_us, active)
+
+    def _read_commands(self, now_ms: int) -> None:
+        self._read_ms = now_ms + SPIN_MS
+        for shaper, receive in (
+            (self._velocity_commands, self._receive_velocities),
+            (self._position_commands, self._receive_positions),
+            (self._pulse_commands, self._receive_pulses),
+        ):
+            sent = shaper.take(now_ms)
+            if len(sent.rows):
+                receive(now_ms, sent.rows, sent.values)
+
+    # -- what the firmware does with a command ---------------------------------------------------------------
+
+    def _receive_velocities(self, now_ms: int, rows: np.ndarray, values: np.ndarray) -> None:
+        accepted = self._velocity.find_accepted(now_ms, rows)
+        self._command(self._velocity, now_ms, rows[accepted], _limit_to_wheels(values[accepted]))
+
+    def _receive_positions(self, now_ms: int, rows: np.ndarray, values: np.ndarray) -> None:
+        accepted = self._position.find_accepted(now_ms, rows)
+        rows, values = rows[accepted], values[accepted]
+        self._start_ticks[rows] = self._encoders.count(now_ms)[rows]
+        self._command(self._position, now_ms, rows, _limit_to_wheels(values) / TICK_M)
+
+    def _command(self, controller: WheelControllers, now_ms: int, rows: np.ndarray, targets: np.ndarray) -> None:
+        self._servos.stop(controller.command(now_ms, rows, targets))
+
+    def _receive_pulses(self, now_ms: int, rows: np.ndarray, values: np.ndarray) -> None:
+        pulses_us, which = np.zeros_like(self.ticks), np.zeros_like(self._all)
+        pulses_us[rows], which[rows] = values, True
+        self._servos.write(now_ms, pulses_us, which)
+
+
+def _limit_to_wheels(twists: np.ndarray) -> np.ndarray:
+    """Return the wheels' speeds in m/s (K, 2) for Twists (K, 2) within the firmware's limits."""
+    limits = np.array([MAX_LINEAR_M_S, MAX_ANGULAR_RAD_S])
+    return np.column_stack(split_to_wheels(*np.maximum(np.minimum(twists, limits), -limits).T))

@@ -1,0 +1,104 @@
+"""The firmware's velocity and position controller with their PIDs, for all robots.
+
+Pure: numpy only, arrays over robots (R) and wheels (left, right); the rules of Controller in robot/motor_control.py and
+of robot/motor_pid.py.
+"""
+
+from typing import Sequence, Union
+
+import numpy as np
+
+from ..robot.motor_pid import SAMPLE_MS, Gains
+from ..robot_constants import COMMAND_GAP_MS
+
+__all__ = ["WheelControllers"]
+
+_LONG_AGO_MS = -(2**40)
+_SAMPLE_S = SAMPLE_MS / 1000.0
+
+
+class WheelControllers:
+    """One of the two controllers of each robot.
+
+    Attributes:
+        targets: of the wheels (R, 2), m/s or ticks.
+        outputs_us: last outputs (R, 2), whole microseconds beyond the centers, forward positive.
+        end_ms: when the last of them is stopped by its watchdog, unless commands come.
+    """
+
+    def __init__(self, rows: int, gains: Gains, limit_us: float, timeout_ms: int) -> None:
+        """Begin without a command; the outputs stay within limit_us either way."""
+        self.targets = np.zeros((rows, 2))
+        self.outputs_us = np.zeros((rows, 2))
+        self.end_ms = _LONG_AGO_MS
+        self._limit_us = limit_us
+        self._timeout_ms = timeout_ms
+        self._gains = np.tile(gains, (rows, 2, 1)).astype(float)
+        self._watchdog_ms = np.full((rows, 1), _LONG_AGO_MS, dtype=np.int64)
+        self._computed_ms = np.full((rows, 1), _LONG_AGO_MS, dtype=np.int64)
+        self._sums_us = np.zeros((rows, 2))
+        self._last_inputs = np.zeros((rows, 2))
+        self._scale_gains()
+
+    def _scale_gains(self) -> None:
+        self._proportional = self._gains[:, :, 0].copy()
+        self._integral_step = self._gains[:, :, 1] * _SAMPLE_S
+        self._derivative_step = self._gains[:, :, 2] / _SAMPLE_S
+
+    def set_gains(self, row: int, gains: Sequence[float]) -> None:
+        """Set lkp lki lkd rkp rki rkd of one robot; the firmware ignores a wheel's three with a negative one."""
+        for wheel, three in enumerate((gains[:3], gains[3:])):
+            if min(three) >= 0.0:
+                self._gains[row, wheel] = three
+        self._scale_gains()
+
+    def find_accepted(self, now_ms: int, rows: np.ndarray) -> np.ndarray:
+        """Return which of the robots at rows (K,) accept a command at now_ms (K,).
+
+        A command that comes within 50 ms of the last accepted motion is dropped, a zero too.
+        """
+        return now_ms - self._watchdog_ms[rows, 0] >= COMMAND_GAP_MS
+
+    def command(self, now_ms: int, rows: np.ndarray, targets: np.ndarray) -> np.ndarray:
+        """Set the targets (K, 2) of the robots at rows (K,), each named once; return those that zeros have stopped.
+
+        A wheel that has to reverse starts its PID anew.
+        """
+        moves = targets.any(axis=1)
+        stopped, rows, targets = rows[~moves], rows[moves], targets[moves]
+        self._watchdog_ms[stopped] = _LONG_AGO_MS
+        self._reset(stopped, slice(None))
+        if len(rows):
+            places, wheels = np.nonzero(targets * self.targets[rows] < 0.0)
+            self._reset(rows[places], wheels)
+            self.targets[rows] = targets
+            self._watchdog_ms[rows] = now_ms
+            self.end_ms = now_ms + self._timeout_ms
+        return stopped
+
+    def _reset(self, rows: np.ndarray, wheels: Union[slice, np.ndarray]) -> None:
+        for values in (self.outputs_us, self._sums_us, self._last_inputs):
+            values[rows, wheels] = 0.0
+
+    def find_active(self, now_ms: int) -> np.ndarray:
+        """Return which controllers run (R, 1)."""
+        return self._watchdog_ms > now_ms - self._timeout_ms
+
+    def run(self, now_ms: int, measured: np.ndarray, active: np.ndarray) -> None:
+        """Compute new outputs from what was measured (R, 2), for those robots of active (R, 1) for whom it is time."""
+        due = self._computed_ms <= now_ms - SAMPLE_MS
+        due &= active
+        if not due.any():
+            return
+        error = self.targets - measured
+        sums_us = self._limit(self._sums_us + self._integral_step * error)
+        damping_us = self._derivative_step * (measured - self._last_inputs)
+        outputs_us = np.trunc(self._limit(self._proportional * error + sums_us - damping_us))
+        np.copyto(self._sums_us, sums_us, where=due)
+        np.copyto(self._last_inputs, measured, where=due)
+        np.copyto(self.outputs_us, outputs_us, where=due)
+        np.copyto(self._computed_ms, now_ms, where=due)
+
+    def _limit(self, values_us: np.ndarray) -> np.ndarray:
+        np.minimum(values_us, self._limit_us, out=values_us)
+        return np.maximum(values_us, -self._limit_us, out=values_us)

@@ -1,0 +1,223 @@
+"""RobotRows against the originals of its rules: the scalar firmware's parts and the driver's, millisecond by
+millisecond."""
+
+import math
+import struct
+
+import numpy as np
+import pytest
+
+from hero_driver.commands.velocity_shaper import (
+    COMMAND_INTERVAL_S,
+    STOP_PAYLOADS,
+    VelocityShaper,
+    check_twist,
+)
+from hero_driver.corrections.message_layouts import make_proximity
+from hero_driver.corrections.tick_odometry import Pose, TickOdometry, WheelGeometry
+from hero_driver.rosserial import packets
+from hero_sim.robot import declarations as ids
+from hero_sim.robot.commands import CommandTable
+from hero_sim.robot.flash import Flash
+from hero_sim.robot.motor_control import MotorControl
+from hero_sim.robot.ranges import calibrate
+from hero_sim.robot.sensing import Sensing
+from hero_sim.stepped.robot_rows import RobotRows
+from hero_sim.world.arena import build_default, place_robots
+from hero_sim.world.body import Body
+from hero_sim.world.robot_errors import draw_errors
+from hero_sim.world.world import STEP_MS, World
+
+UPTIME_MS = 100000
+"""The scalar robots were switched on so long ago: in its first 3 s a position controller always runs."""
+
+SHAPED_TYPES = {
+    ids.ID_VELOCITY_CMD_VEL: "geometry_msgs/Twist",
+    ids.ID_POSITION_CMD_VEL: "geometry_msgs/Twist",
+    ids.ID_CMD_MOTOR: "hero_msgs/Motor",
+}
+
+
+def build_world(count, seed=0, scale=1.0):
+    arena = build_default(count)
+    poses = place_robots(arena, count, np.random.RandomState(seed))
+    errors = draw_errors([np.random.RandomState([seed, index]) for index in range(count)], scale)
+    return World(arena, poses, np.random.RandomState(seed), errors)
+
+
+def encode_twist(linear_m_s, angular_rad_s):
+    return struct.pack("<6d", linear_m_s, 0, 0, 0, 0, angular_rad_s)
+
+
+class ScalarRobot:
+    """One robot of the parts that the simulator behind sockets is made of, and its half of the driver."""
+
+    def __init__(self, world, index):
+        name, errors = "hero_%d" % index, world.errors
+        body = Body(world, index)
+        calibration = calibrate(errors.alpha_counts_m2[index], errors.beta_counts[index])
+        self.flash = flash = Flash(calibration.tolist(), np.rint(errors.servo_center_us[index]).tolist())
+        self.sensing = Sensing(name, body, False, flash)
+        rng = np.random.RandomState(0)
+        self.motors = MotorControl(name, body, self.sensing.odometry, flash, rng, lambda text: None)
+        self.table = CommandTable(name, self.sensing, self.motors, flash, lambda text: None, pytest.fail)
+        self.shapers = {
+            topic_id: VelocityShaper(STOP_PAYLOADS[kind], round(COMMAND_INTERVAL_S * 1000))
+            for topic_id, kind in SHAPED_TYPES.items()
+        }
+        self.odometry = TickOdometry(WheelGeometry())
+        self.inbox = []
+        self.ticks = (0.0, 0.0)
+
+    def offer(self, now_ms, topic_id, payload):
+        if SHAPED_TYPES[topic_id] == "geometry_msgs/Twist":
+            payload = check_twist(payload, clamp=False)
+        self.shapers[topic_id].offer(payload)
+        self.send(now_ms)  # the driver takes at once what may go
+
+    def call(self, topic_id, payload, now_ms):
+        self.table.receive(packets.Packet(topic_id, payload), UPTIME_MS + now_ms, now_ms)
+
+    def set_odometry(self, now_ms, *pose):
+        self.call(ids.ID_SET_ODOM, struct.pack("<3d", *pose), now_ms)
+        self.odometry.set_pose(Pose(*pose))
+        self.ticks = (0.0, 0.0)
+
+    def send(self, now_ms):
+        for topic_id, shaper in self.shapers.items():
+            payload = shaper.take(now_ms)
+            if payload is not None:
+                self.inbox.append((topic_id, payload))
+
+    def read_commands(self, now_ms):
+        inbox, self.inbox = sorted(self.inbox, key=lambda command: list(SHAPED_TYPES).index(command[0])), []
+        for command in inbox:
+            self.call(*command, now_ms)
+
+    def run_cycle(self, now_ms):
+        for packet in packets.PacketReader().receive_bytes(self.sensing.run_cycle(UPTIME_MS + now_ms, now_ms, (0, 0))):
+            if packet.topic_id == ids.ID_LASER:
+                header = len(packet.payload) - struct.calcsize("<7fI16fI16f")
+                self.counts = struct.unpack_from("<16f", packet.payload, header + 28 + 4 + 64 + 4)[::2]
+                scan = make_proximity(packet.payload, 0, 0, 0.2)
+                ranges_m = np.array(struct.unpack_from("<8f", scan, header + 28 + 4))
+                self.proximity = np.roll(np.where(ranges_m == -np.inf, 0.0, ranges_m), -4)
+            elif packet.topic_id == ids.ID_ENCODER:
+                self.ticks = struct.unpack_from("<2d", packet.payload, len(packet.payload) - 88)
+                self.odometry.integrate(*self.ticks, now_ms / 1000.0)
+
+    def run_motors(self, now_ms, control):
+        motors = self.motors.motors
+        if control or (motors.attached and UPTIME_MS + now_ms >= motors.stop_at_ms):
+            self.motors.run(UPTIME_MS + now_ms, now_ms, self.sensing.read_encoders)
+
+
+class ScalarRobots:
+    """The same robots, world and timers as RobotRows; what may differ is every rule."""
+
+    def __init__(self, world):
+        self.world = world
+        self.now_ms = -1
+        self.robots = [ScalarRobot(world, index) for index in range(len(world.poses))]
+        for robot in self.robots:
+            robot.sensing.begin(UPTIME_MS)
+        self._control_ms, self._read_ms = 9, 50
+        read_infrared, self._readings = world.read_infrared, {}
+
+        def read_all_at_once(which):  # so that the noise is drawn in the same order
+            if self.now_ms not in self._readings:
+                self._readings = {self.now_ms: read_infrared(np.arange(len(world.poses)))}
+            return self._readings[self.now_ms][which]
+
+        world.read_infrared = read_all_at_once
+
+    def advance(self, until_ms):
+        while self.now_ms < until_ms:
+            self.now_ms += 1
+            self._run_millisecond(self.now_ms)
+
+    def _run_millisecond(self, now_ms):
+        control = now_ms == self._control_ms
+        for robot in self.robots:
+            robot.send(now_ms)
+        if UPTIME_MS + now_ms == self.robots[0].sensing.due_ms:
+            for robot in self.robots:
+                robot.run_cycle(now_ms)
+            self._control_ms += control
+            self._read_ms += control and now_ms == self._read_ms
+        else:
+            self._control_ms += 21 * control
+            for robot in self.robots:
+                robot.run_motors(now_ms, control)
+        if now_ms == self._read_ms:
+            self._read_ms += 51
+            for robot in self.robots:
+                robot.read_commands(now_ms)
+        if now_ms == self.world.time_ms + STEP_MS:
+            self.world.step()
+
+
+def compare(rows, scalar):
+    robots, world, other = scalar.robots, rows.world, scalar.world
+    np.testing.assert_array_equal(world.commands_m_s, other.commands_m_s)
+    np.testing.assert_array_equal(world.poses, other.poses)
+    np.testing.assert_array_equal(rows.ticks, [robot.ticks for robot in robots])
+    np.testing.assert_array_equal(rows.counts, [robot.counts for robot in robots])
+    np.testing.assert_array_equal(rows.proximity_m, [robot.proximity for robot in robots])
+    odometry = [robot.odometry for robot in robots]
+    poses = [(each.x_m, each.y_m, math.remainder(each.yaw_rad, math.tau)) for each in odometry]
+    np.testing.assert_allclose(rows.odometry, poses, rtol=0, atol=1e-9)
+    velocities = [(each.linear_m_s, each.angular_rad_s) for each in odometry]
+    np.testing.assert_allclose(rows.velocities, velocities, rtol=0, atol=1e-9)
+
+
+def act_at_random(rng, rows, scalar):
+    """Do the same to one robot of both."""
+    now_ms, row = rows.now_ms, int(rng.randint(len(rows.ticks)))
+    robot = scalar.robots[row]
+    deed = rng.choice(
+        ["velocity", "position", "pulses", "stop", "stop position", "rest", "odometry", "gains", "centers", "infrared"],
+        p=[0.45, 0.1, 0.1, 0.1, 0.05, 0.02, 0.06, 0.04, 0.04, 0.04],
+    )
+    twist = (rng.uniform(-0.25, 0.25), rng.choice([0.0, rng.uniform(-9.0, 9.0)]))
+    if deed in ("velocity", "stop"):
+        twist = (0.0, 0.0) if deed == "stop" else twist
+        rows.send_velocity(row, *twist)
+        robot.offer(now_ms, ids.ID_VELOCITY_CMD_VEL, encode_twist(*twist))
+    elif deed in ("position", "stop position"):
+        twist = (0.0, 0.0) if deed == "stop position" else twist
+        rows.send_position(row, *twist)
+        robot.offer(now_ms, ids.ID_POSITION_CMD_VEL, encode_twist(*twist))
+    elif deed in ("pulses", "rest"):
+        pulses_us = (1500, 1500) if deed == "rest" else rng.randint(900, 2100, 2).tolist()
+        rows.send_pulses(row, *pulses_us)
+        robot.offer(now_ms, ids.ID_CMD_MOTOR, struct.pack("<2h", *pulses_us))
+    elif deed == "odometry":
+        pose = rng.uniform(-4.0, 4.0, 3).tolist()
+        rows.set_odometry(row, *pose)
+        robot.set_odometry(now_ms, *pose)
+    elif deed == "gains":
+        gains = np.float32(rng.uniform(-50.0, 2000.0, 6)).tolist()
+        rows.set_velocity_gains(row, gains)
+        robot.call(ids.ID_VELOCITY_PID_PARAMETERS, struct.pack("<6f", *gains), now_ms)
+    elif deed == "centers":
+        centers_us = rng.randint(1480, 1520, 2).tolist()
+        rows.set_motor_centers(row, centers_us)
+        robot.call(ids.ID_MOTORS_PARAMETERS, struct.pack("<2h", *centers_us), now_ms)
+    else:
+        constants = rng.choice([np.nan, 0.4, 0.5], 8).tolist()
+        rows.set_infrared_calibration(row, constants)
+        robot.flash.ir_calibration_counts_m2 = constants  # no call takes nan, a robot that was never calibrated has it
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_robot_rows_do_what_the_scalar_robots_and_the_driver_do(seed):
+    rng = np.random.RandomState(seed)
+    rows, scalar = RobotRows(build_world(3, seed)), ScalarRobots(build_world(3, seed))
+    while rows.now_ms < 12000:
+        for each in (rows, scalar):
+            each.advance(rows.now_ms)
+        compare(rows, scalar)
+        for _ in range(rng.randint(4)):
+            act_at_random(rng, rows, scalar)
+        rows.advance(rows.now_ms + int(rng.randint(1, 300)))
