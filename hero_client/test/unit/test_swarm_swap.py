@@ -12,7 +12,7 @@ from hero_client.controllers.swarm_go_to import SwarmGoToController
 from hero_client.geometry import Pose
 from hero_sim.robot import declarations
 from hero_sim.robot_constants import BODY_RADIUS_M, TICK_M
-from hero_sim.world.kinematics import move_along_arc
+from hero_sim.world.kinematics import find_heading, join_wheels, move_along_arc
 
 ROOT = Path(__file__).resolve().parents[3]
 sys.path.append(str(ROOT / "hero_sim" / "test" / "unit"))
@@ -43,7 +43,10 @@ class Swap:
         """Read odometry and sensors, and let the robots move on for one step."""
         rolled_m = np.round((self.world.travels_m - self.counted_m) / TICK_M) * TICK_M
         self.counted_m += rolled_m
-        self.poses = np.column_stack(move_along_arc(*self.poses.T, *rolled_m.T))
+        x_m, y_m, theta_rad = self.poses.T
+        travel_m, rotation_rad = join_wheels(*rolled_m.T)
+        x_m, y_m, *_ = move_along_arc(x_m, y_m, *find_heading(theta_rad), travel_m, rotation_rad)
+        self.poses = np.column_stack((x_m, y_m, theta_rad + rotation_rad))
         for robot_id, arrivals in enumerate(self.driver.arrivals):
             for arrival in arrivals:
                 if arrival.topic_id == declarations.ID_LASER:

@@ -80,7 +80,7 @@ def build_swarm(options: argparse.Namespace, addresses: List[str], report: Repor
     arena = load_arena(options.arena) if options.arena else build_default(options.count)
     poses = place_robots(arena, options.count, rngs.places)
     errors = build_errors(options)
-    world = World(arena, poses, rngs.world, errors)
+    world = World(arena, poses, [rngs.world], errors)
     robots: List[Firmware] = []
     for index, address in enumerate(addresses):
         body, flash = Body(world, index), _build_flash(options, errors, index)

@@ -7,37 +7,37 @@ from hero_sim.robot_constants import TICK_M
 from hero_sim.world import kinematics
 
 
-def test_equal_wheels_drive_straight():
-    x_m, y_m, theta_rad = kinematics.move_along_arc(0.0, 0.0, math.pi / 2, 0.25, 0.25)
-    assert (x_m, y_m, theta_rad) == pytest.approx((0.0, 0.25, math.pi / 2))
+def test_without_rotation_an_arc_is_a_straight_line():
+    assert kinematics.move_along_arc(0.0, 0.0, 0.6, 0.8, 0.25, 0.0) == pytest.approx((0.15, 0.2, 0.6, 0.8))
 
 
-def test_opposite_wheels_spin_on_the_spot():
-    x_m, y_m, theta_rad = kinematics.move_along_arc(1.0, 2.0, 0.0, -0.063 * math.pi / 2, 0.063 * math.pi / 2)
-    assert (x_m, y_m, theta_rad) == pytest.approx((1.0, 2.0, math.pi))
+def test_without_travel_an_arc_is_a_rotation_on_the_spot():
+    end = kinematics.move_along_arc(1.0, 2.0, 1.0, 0.0, 0.0, 0.1)
+    assert end == pytest.approx((1.0, 2.0, math.cos(0.1), math.sin(0.1)), abs=1e-12)
 
 
-@pytest.mark.parametrize("steps", [1, 7, 360])
+@pytest.mark.parametrize("steps", [70, 360, 100000])
 def test_a_full_circle_comes_back_whatever_the_step(steps):
-    radius_m = 0.2
-    left_m, right_m = kinematics.split_to_wheels(2 * math.pi * radius_m, 2 * math.pi)
-    pose = (0.3, -0.1, 0.4)
-    for _ in range(steps):
-        pose = kinematics.move_along_arc(*pose, left_m / steps, right_m / steps)
-    assert pose == pytest.approx((0.3, -0.1, 0.4 + 2 * math.pi))
-
-
-def test_half_a_circle_ends_two_radii_aside():
-    left_m, right_m = kinematics.split_to_wheels(math.pi * 0.5, math.pi)
-    assert kinematics.move_along_arc(0.0, 0.0, 0.0, left_m, right_m) == pytest.approx((0.0, 1.0, math.pi))
+    start = end = (0.3, -0.1, 0.6, 0.8)
+    for step in range(steps):
+        end = kinematics.move_along_arc(*end, 1.0 / steps, 2 * math.pi / steps)
+        if step == steps // 2 - 1:  # a diameter to the left
+            assert end == pytest.approx((0.3 - 0.8 / math.pi, -0.1 + 0.6 / math.pi, -0.6, -0.8), abs=1e-9)
+    assert end == pytest.approx(start, abs=1e-9)
 
 
 def test_arrays_move_like_single_robots():
     rng = np.random.RandomState(1)
-    start, wheels = rng.normal(size=(20, 3)), rng.normal(size=(20, 2))
-    together = np.column_stack(kinematics.move_along_arc(*start.T, *wheels.T))
-    alone = [kinematics.move_along_arc(*pose, *pair) for pose, pair in zip(start, wheels)]
-    assert np.allclose(together, alone)
+    values = rng.normal(scale=0.1, size=(20, 6))
+    together = np.column_stack(kinematics.move_along_arc(*values.T))
+    assert together.tolist() == [list(kinematics.move_along_arc(*row)) for row in values.tolist()]
+
+
+def test_headings_are_the_cosine_and_sine_of_any_angle():
+    angles_rad = np.concatenate((np.linspace(-10, 10, 2001), np.arange(-8, 9) * (math.pi / 4), [1e5, -1e5]))
+    cosine, sine = kinematics.find_heading(angles_rad)
+    assert cosine == pytest.approx(np.cos(angles_rad), abs=1e-15)
+    assert sine == pytest.approx(np.sin(angles_rad), abs=1e-15)
 
 
 def test_wheels_and_body_speeds_are_inverse():

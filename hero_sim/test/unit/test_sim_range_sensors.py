@@ -7,6 +7,7 @@ from hero_sim.robot import ranges
 from hero_sim.robot_constants import BODY_RADIUS_M
 from hero_sim.world import range_sensors
 from hero_sim.world.arena import build_default
+from hero_sim.world.kinematics import find_heading
 from hero_sim.world.robot_errors import draw_errors
 from hero_sim.world.world import World
 
@@ -23,8 +24,15 @@ def wall_at(distance_m):
 
 
 def measure(segments, circles=NO_CIRCLES, poses=((0.0, 0.0, 0.0),)):
+    arena = build_default(1)._replace(segments_m=segments, circles_m=circles)
     poses = np.array(poses, dtype=float)
-    return range_sensors.measure_signals(poses, np.array([0]), segments, circles, ALPHA, BETA)[0]
+    return measure_all(arena, poses, ALPHA, BETA, which=[0])[0]
+
+
+def measure_all(arena, poses, alpha, beta, which):
+    headings = np.column_stack(find_heading(poses[which, 2]))
+    everybody = np.repeat(poses[None, :, :2], len(which), axis=0)
+    return range_sensors.measure_signals(poses[which, :2], headings, everybody, arena, alpha, beta)
 
 
 @pytest.mark.parametrize("distance_m", [0.03, 0.05, 0.08, 0.10, 0.15, 0.18])
@@ -44,9 +52,10 @@ def test_a_slanted_wall_returns_less_light():
     across = np.array([math.cos(math.radians(30.0)), math.sin(math.radians(30.0))])
     middle = np.array([reach_m, 0.0])
     segment = np.concatenate((middle - across, middle + across))[None]
-    distance_m, cosine = range_sensors.cast_at_segments(np.zeros((1, 2)), np.zeros((1, 1)), segment)
-    assert distance_m[0, 0] == pytest.approx(reach_m)
-    assert cosine[0, 0] == pytest.approx(0.5)
+    hits = range_sensors.hit_segments(np.zeros((1, 2)), np.ones((1, 1)), np.zeros((1, 1)), segment)
+    assert hits.rays.tolist() == [0]
+    assert hits.distance_m == pytest.approx([reach_m])
+    assert hits.cosine == pytest.approx([0.5])
 
 
 def test_the_signal_at_20_cm_is_that_of_the_published_table():
@@ -108,22 +117,18 @@ def test_all_robots_at_once_read_what_each_reads_alone():
     rng = np.random.RandomState(3)
     poses = np.column_stack((rng.uniform(-0.6, 0.6, (9, 2)), rng.uniform(-3, 3, 9)))
     alpha = rng.normal(0.423, 0.01, (9, 8))
-    everybody = np.arange(9)
     beta = rng.normal(-0.93, 0.1, (9, 1))
-    together = range_sensors.measure_signals(poses, everybody, arena.segments_m, NO_CIRCLES, alpha, beta)
-    for index in everybody:
-        which = np.array([index])
-        alone = range_sensors.measure_signals(
-            poses, which, arena.segments_m, NO_CIRCLES, alpha[which], beta[which]
-        )
-        assert np.allclose(alone[0], together[index])
+    together = measure_all(arena, poses, alpha, beta, which=range(9))
+    for index in range(9):
+        alone = measure_all(arena, poses, alpha[[index]], beta[[index]], which=[index])
+        assert alone[0].tolist() == together[index].tolist()
 
 
 def test_readings_are_whole_counts_with_the_published_noise():
     arena = build_default(1)
     arena = arena._replace(segments_m=wall_at(0.10))
     rng = np.random.RandomState(0)
-    world = World(arena, np.zeros((1, 3)), rng, draw_errors([rng], 0.0))
+    world = World(arena, np.zeros((1, 3)), [rng], draw_errors([rng], 0.0))
     readings = np.array([world.read_infrared(np.array([0]))[0, 4] for _ in range(2000)])
     assert (readings == np.rint(readings)).all()
     assert readings.mean() == pytest.approx(0.423 / 0.01 - 0.93, abs=0.15)

@@ -19,7 +19,7 @@ def build_world(robots=1, arena=None, errors=0.0, poses=None, seed=0):
     if poses is None:
         poses = place_robots(arena, robots, np.random.RandomState(seed))
     drawn = draw_errors([np.random.RandomState([seed, index]) for index in range(robots)], errors)
-    return worlds.World(arena, np.array(poses, dtype=float), np.random.RandomState(seed), drawn)
+    return worlds.World(arena, np.array(poses, dtype=float), [np.random.RandomState(seed)], drawn)
 
 
 def command(world, index, linear_m_s, turn_rad_s):

@@ -115,7 +115,8 @@ def distance_to_segments(
     share = np.clip((to_x * along[:, 0] + to_y * along[:, 1]) / length_m2, 0.0, 1.0)
     near_x = start[:, 0] + share * along[:, 0]
     near_y = start[:, 1] + share * along[:, 1]
-    return np.hypot(points_m[:, 0, None] - near_x, points_m[:, 1, None] - near_y), near_x, near_y
+    off_x, off_y = points_m[:, 0, None] - near_x, points_m[:, 1, None] - near_y
+    return np.sqrt(off_x * off_x + off_y * off_y), near_x, near_y
 
 
 def place_robots(arena: Arena, robots: int, rng: np.random.RandomState) -> np.ndarray:
@@ -130,9 +131,11 @@ def place_robots(arena: Arena, robots: int, rng: np.random.RandomState) -> np.nd
 
 
 def _draw_place(arena: Arena, poses: List[Pose], rng: np.random.RandomState, robots: int) -> Pose:
-    x_min, y_min, x_max, y_max = arena.bounds_m
+    x_min, y_min, x_max, y_max = arena.bounds_m.tolist()
     for _ in range(_MOST_TRIES):
-        pose = Pose(rng.uniform(x_min, x_max), rng.uniform(y_min, y_max), rng.uniform(-math.pi, math.pi))
+        # Not rng.uniform(): whether it rounds once or twice depends on how numpy was compiled.
+        x_share, y_share, turn = rng.random_sample(3).tolist()
+        pose = Pose(x_min + x_share * (x_max - x_min), y_min + y_share * (y_max - y_min), (2.0 * turn - 1.0) * math.pi)
         if is_free(pose, poses, arena, BODY_RADIUS_M + START_GAP_M):
             return pose
     raise OptionError(
@@ -145,4 +148,8 @@ def is_free(pose: Pose, poses: Sequence[Pose], arena: Arena, radius_m: float) ->
     """Return whether a robot with radius_m fits at pose, beside stock robots at poses."""
     if measure_clearance(np.array([pose[:2]]), arena)[0] < radius_m:
         return False
-    return all(math.hypot(pose.x_m - x_m, pose.y_m - y_m) >= radius_m + BODY_RADIUS_M for x_m, y_m, _ in poses)
+    if not len(poses):
+        return True
+    apart_x_m, apart_y_m = np.array(poses)[:, 0] - pose.x_m, np.array(poses)[:, 1] - pose.y_m
+    least_m = radius_m + BODY_RADIUS_M
+    return bool((apart_x_m * apart_x_m + apart_y_m * apart_y_m).min() >= least_m * least_m)

@@ -3,13 +3,11 @@
 Pure: time is the world's, ms.
 """
 
-import math
 from typing import List
 
 import numpy as np
 
 from .kinematics import Pose, find_frame, join_wheels
-from .robot_errors import MAX_WHEEL_M_S, SERVO_GAIN_M_S_US
 from .world import World
 
 __all__ = ["Body"]
@@ -62,21 +60,8 @@ class Body:
 
     def write_pulses(self, left_us: int, right_us: int) -> None:
         """Set the servos' pulses; below its center the left wheel rolls forward."""
-        errors, index = self._world.errors, self.index
-        left_center_us, right_center_us = errors.servo_center_us[index].tolist()
-        dead_zone_us = float(errors.dead_zone_us[index, 0])
-        left_gain, right_gain = errors.servo_gain[index].tolist()
-        self._world.commands_m_s[index] = (
-            _convert_pulse(left_center_us - left_us, dead_zone_us, left_gain),
-            _convert_pulse(right_us - right_center_us, dead_zone_us, right_gain),
-        )
+        self._world.write_pulses(self.index, np.array((left_us, right_us)))
 
     def release(self) -> None:
         """Stop the pulses: the wheels come to rest."""
-        self._world.commands_m_s[self.index] = 0.0
-
-
-def _convert_pulse(beyond_us: float, dead_zone_us: float, gain: float) -> float:
-    """Return the wheel speed (m/s) of a servo whose pulse lies so far beyond its center, forward positive."""
-    driven_us = max(abs(beyond_us) - dead_zone_us, 0.0)
-    return math.copysign(min(driven_us * SERVO_GAIN_M_S_US * gain, MAX_WHEEL_M_S), beyond_us)
+        self._world.release(self.index)

@@ -1,19 +1,27 @@
-"""Exact kinematics of a differential drive, for one robot or for an array of them, and poses in the plane.
+"""Kinematics of a differential drive, for one robot or for an array of them, and poses in the plane.
 
 Pure: numbers and numpy only. Body frame as in REP 103: x forward, y left, angles counter-clockwise.
+What a simulated world is computed with uses only + - * / and rounding, which IEEE 754 defines to the last bit:
+numpy's sine and cosine differ between versions and processors.
 """
 
 import math
-from typing import Any, NamedTuple, Tuple
+from typing import Any, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
 from ..robot_constants import WHEEL_SEPARATION_M
 
-__all__ = ["Pose", "find_frame", "join_wheels", "move_along_arc", "split_to_wheels"]
+__all__ = ["Pose", "find_frame", "find_heading", "join_wheels", "move_along_arc", "split_to_wheels"]
 
-# Below this rotation per step the arc is a straight line to within double precision.
-_STRAIGHT_RAD = 1e-9
+# Half pi in two parts, of which the first, with 33 bits, gives exact products with small whole numbers.
+_HALF_PI_HIGH = float.fromhex("0x1.921fb544p+0")
+_HALF_PI_LOW = float.fromhex("0x1.0b4611a626331p-34")
+
+_SINE_TERMS = [(-1.0) ** n / math.factorial(2 * n + 1) for n in range(9)]
+_COSINE_TERMS = [(-1.0) ** n / math.factorial(2 * n) for n in range(9)]
+_HALF_TANGENT_TERMS = [1.0 / 2.0, 1.0 / 24.0, 1.0 / 240.0, 17.0 / 40320.0]
+"""Taylor series in the square of the angle; the last is that of tan(angle / 2), divided by the angle."""
 
 Number = Any  # a float or an array of float64; both work everywhere below
 
@@ -45,14 +53,40 @@ def join_wheels(left: Number, right: Number) -> Tuple[Number, Number]:
     return (left + right) / 2.0, (right - left) / WHEEL_SEPARATION_M
 
 
+def _sum_series(terms: Sequence[float], variable: Number) -> Number:
+    total = terms[-1]
+    for term in reversed(terms[:-1]):
+        total = total * variable + term
+    return total
+
+
+def find_heading(theta_rad: Number) -> Tuple[np.ndarray, np.ndarray]:
+    """Return cosine and sine of angles up to 1e6 rad, the same bits on every machine."""
+    quarters = np.rint(theta_rad * (2.0 / math.pi))
+    rest_rad = (theta_rad - quarters * _HALF_PI_HIGH) - quarters * _HALF_PI_LOW
+    square = rest_rad * rest_rad
+    sine, cosine = rest_rad * _sum_series(_SINE_TERMS, square), _sum_series(_COSINE_TERMS, square)
+    turn = quarters - 4.0 * np.floor(quarters / 4.0)
+    swapped, sign = (turn == 1.0) | (turn == 3.0), np.where(turn >= 2.0, -1.0, 1.0)
+    return sign * np.where(swapped, -sine, cosine), sign * np.where(swapped, cosine, sine)
+
+
 def move_along_arc(
-    x_m: Number, y_m: Number, theta_rad: Number, left_m: Number, right_m: Number
-) -> Tuple[Number, Number, Number]:
-    """Return the pose after the wheels have travelled left_m and right_m at a constant ratio."""
-    travel_m, rotation_rad = join_wheels(left_m, right_m)
-    half_rad = np.asarray(rotation_rad) / 2.0
-    straight = np.abs(half_rad) < _STRAIGHT_RAD
-    # The chord of an arc of length s and angle a is s * sin(a/2) / (a/2), at the heading half way.
-    chord_m = travel_m * np.where(straight, 1.0, np.sin(half_rad) / np.where(straight, 1.0, half_rad))
-    heading_rad = theta_rad + half_rad
-    return x_m + chord_m * np.cos(heading_rad), y_m + chord_m * np.sin(heading_rad), theta_rad + rotation_rad
+    x_m: Number, y_m: Number, cosine: Number, sine: Number, travel_m: Number, rotation_rad: Number
+) -> Tuple[Number, Number, Number, Number]:
+    """Return place and heading (cosine, sine) after an arc of length travel_m that turns by less than 0.5 rad.
+
+    A heading stays of length 1 whatever the number of steps.
+    """
+    ratio = _sum_series(_HALF_TANGENT_TERMS, rotation_rad * rotation_rad)
+    half_tangent = rotation_rad * ratio
+    # The direction of the chord, 1 / cos(rotation / 2) long.
+    chord_x, chord_y = cosine - half_tangent * sine, sine + half_tangent * cosine
+    shorten = 2.0 / (1.0 + half_tangent * half_tangent)
+    chord, rotation_sine = travel_m * ratio * shorten, half_tangent * shorten
+    return (
+        x_m + chord * chord_x,
+        y_m + chord * chord_y,
+        cosine - rotation_sine * chord_y,
+        sine + rotation_sine * chord_x,
+    )

@@ -1,15 +1,17 @@
 """The signals of each robot's eight infrared sensors, from poses, walls and obstacles; without noise.
 
-Pure: numpy only, over robots x beams x obstacles at once. Source of the infrared model: measurements published by
-the robot's authors (signal of a TCRT5000 against a white wall).
+Pure: numpy only, over robots x obstacles x rays at once, and the same bits on every machine. Source of the infrared
+model: measurements published by the robot's authors (signal of a TCRT5000 against a white wall).
 """
 
 import math
-from typing import Tuple
+from typing import NamedTuple, Sequence, Tuple
 
 import numpy as np
 
 from ..robot_constants import BODY_RADIUS_M
+from .arena import Arena
+from .kinematics import find_heading
 
 BEAMS = 8
 BEAM_ANGLES_RAD = -math.pi + np.arange(BEAMS) * (math.pi / 4.0)
@@ -22,7 +24,7 @@ cm)."""
 
 FIT_END_M = 0.18
 TABLE_END_M = 0.20
-TABLE_END_EXCESS_COUNTS = 12.0 - ALPHA_COUNTS_M2 / TABLE_END_M**2
+TABLE_END_EXCESS_COUNTS = 12.0 - ALPHA_COUNTS_M2 / (TABLE_END_M * TABLE_END_M)
 """The fit ends at 18 cm: the published table still has 12 counts at 20 cm, where the fit would give 9.6. Between
 the two the offset is interpolated, and beyond the table it fades with the light."""
 
@@ -35,84 +37,103 @@ NOISE_COUNTS = 1.3
 # The diode sees a cone, whose rim is modelled by two more rays of less weight. Half angle and weight are assumptions.
 _CONE_RAD = np.array([0.0, -0.21, 0.21])
 _CONE_WEIGHT = np.array([1.0, 0.7, 0.7])
+_RAYS = np.array(find_heading((BEAM_ANGLES_RAD[:, None] + _CONE_RAD).ravel()))
+"""Directions of all rays in the body frame, x and y (2, A)."""
 
 _FAR_M = 1e6
 
 
-def cast_at_segments(
-    origins_m: np.ndarray, angles_rad: np.ndarray, segments_m: np.ndarray
-) -> Tuple[np.ndarray, np.ndarray]:
-    """Return distance (m) and cosine of incidence of the first wall on each ray, both of shape (R, A).
+class Hits(NamedTuple):
+    """Where rays meet things: one entry for each thing that a ray meets; all arrays (H,).
 
-    origins_m (R, 2); angles_rad (R, A) in the world; segments_m (S, 4) as x1 y1 x2 y2. Far away: 1e6 m.
+    Attributes:
+        rays: number of the ray, counted over robots and directions.
+        distance_m: from the robot's center.
+        cosine: of the angle of incidence.
     """
-    if not len(segments_m):
-        return np.full(angles_rad.shape, _FAR_M), np.zeros(angles_rad.shape)
-    ray_x, ray_y = np.cos(angles_rad)[..., None], np.sin(angles_rad)[..., None]
-    start_x = segments_m[:, 0] - origins_m[:, 0, None, None]
-    start_y = segments_m[:, 1] - origins_m[:, 1, None, None]
-    along_x = segments_m[:, 2] - segments_m[:, 0]
-    along_y = segments_m[:, 3] - segments_m[:, 1]
+
+    rays: np.ndarray
+    distance_m: np.ndarray
+    cosine: np.ndarray
+
+
+def hit_segments(origins_m: np.ndarray, ray_x: np.ndarray, ray_y: np.ndarray, segments_m: np.ndarray) -> Hits:
+    """Return what rays from origins_m (R, 2) in directions ray_x, ray_y (R, A) meet of walls (S, 4), x1 y1 x2 y2."""
+    start_x = (segments_m[:, 0] - origins_m[:, 0, None])[..., None]
+    start_y = (segments_m[:, 1] - origins_m[:, 1, None])[..., None]
+    along_x = (segments_m[:, 2] - segments_m[:, 0])[:, None]
+    along_y = (segments_m[:, 3] - segments_m[:, 1])[:, None]
+    ray_x, ray_y = ray_x[:, None], ray_y[:, None]
     cross = ray_x * along_y - ray_y * along_x
-    parallel = np.abs(cross) < 1e-12
-    safe = np.where(parallel, 1.0, cross)
-    distance_m = (start_x * along_y - start_y * along_x) / safe
-    share = (start_x * ray_y - start_y * ray_x) / safe
-    hit = ~parallel & (distance_m >= 0.0) & (share >= 0.0) & (share <= 1.0)
-    distance_m = np.where(hit, distance_m, _FAR_M)
-    first = np.argmin(distance_m, axis=-1)[..., None]
-    cosine = np.abs(cross) / np.maximum(np.hypot(along_x, along_y), 1e-12)
-    return np.take_along_axis(distance_m, first, -1)[..., 0], np.take_along_axis(cosine, first, -1)[..., 0]
+    cross[np.abs(cross) < 1e-12] = np.nan  # parallel
+    share = (start_x * ray_y - start_y * ray_x) / cross
+    distance_m = (start_x * along_y - start_y * along_x) / cross
+    hit = (distance_m >= 0.0) & (share >= 0.0) & (share <= 1.0)
+    robots, segments, rays = np.nonzero(hit)
+    length_m = np.sqrt(along_x * along_x + along_y * along_y)[segments, 0]
+    return Hits(robots * ray_x.shape[2] + rays, distance_m[hit], np.abs(cross[hit]) / np.maximum(length_m, 1e-12))
 
 
-def cast_at_circles(
-    origins_m: np.ndarray, angles_rad: np.ndarray, circles_m: np.ndarray
-) -> Tuple[np.ndarray, np.ndarray]:
-    """Return distance (m) and cosine of incidence of the first circle on each ray, both of shape (R, A).
+def hit_circles(
+    to_x_m: np.ndarray, to_y_m: np.ndarray, radii_m: np.ndarray, ray_x: np.ndarray, ray_y: np.ndarray
+) -> Hits:
+    """Return what rays in directions ray_x, ray_y (R, A) meet of circles (C,) with centers at to_x_m, to_y_m (R, C).
 
-    circles_m (C, 3) as x y radius. A circle around the origin itself, the robot's own body, is not seen.
+    A circle around the origin itself, the robot's own body, is not seen.
     """
-    if not len(circles_m):
-        return np.full(angles_rad.shape, _FAR_M), np.zeros(angles_rad.shape)
-    ray_x, ray_y = np.cos(angles_rad)[..., None], np.sin(angles_rad)[..., None]
-    to_x = circles_m[:, 0] - origins_m[:, 0, None, None]
-    to_y = circles_m[:, 1] - origins_m[:, 1, None, None]
-    radius_m = circles_m[:, 2]
-    along_m = ray_x * to_x + ray_y * to_y
-    across_m = ray_x * to_y - ray_y * to_x
-    inside_m2 = radius_m**2 - across_m**2
-    hit = (inside_m2 > 0.0) & (along_m > 0.0)
-    depth_m = np.sqrt(np.where(hit, inside_m2, 0.0))
-    distance_m = np.where(hit, np.maximum(along_m - depth_m, 0.0), _FAR_M)
-    first = np.argmin(distance_m, axis=-1)[..., None]
-    cosine = depth_m / radius_m
-    return np.take_along_axis(distance_m, first, -1)[..., 0], np.take_along_axis(cosine, first, -1)[..., 0]
+    across_m = ray_x[:, None] * to_y_m[..., None] - ray_y[:, None] * to_x_m[..., None]
+    robots, circles, rays = np.nonzero(across_m * across_m < (radii_m * radii_m)[:, None])
+    along_m = ray_x[robots, rays] * to_x_m[robots, circles] + ray_y[robots, rays] * to_y_m[robots, circles]
+    ahead = along_m > 0.0
+    robots, circles, rays = robots[ahead], circles[ahead], rays[ahead]
+    across_m, radius_m = across_m[robots, circles, rays], radii_m[circles]
+    depth_m = np.sqrt(radius_m * radius_m - across_m * across_m)
+    distance_m = np.maximum(along_m[ahead] - depth_m, 0.0)
+    return Hits(robots * ray_x.shape[1] + rays, distance_m, depth_m / radius_m)
+
+
+def find_nearest(hits: Sequence[Hits], rays: int) -> Tuple[np.ndarray, np.ndarray]:
+    """Return distance (m) and cosine of incidence of the first thing on each of so many rays, both (rays,).
+
+    Rays that meet nothing: 1e6 m, 0.
+    """
+    distance_m, cosine = np.full(rays, _FAR_M), np.zeros(rays)
+    for hit in hits:
+        np.minimum.at(distance_m, hit.rays, hit.distance_m)
+    for hit in hits:
+        first = hit.distance_m == distance_m[hit.rays]
+        cosine[hit.rays[first]] = hit.cosine[first]
+    return distance_m, cosine
 
 
 def measure_signals(
-    poses: np.ndarray,
-    which: np.ndarray,
-    segments_m: np.ndarray,
-    circles_m: np.ndarray,
+    places_m: np.ndarray,
+    headings: np.ndarray,
+    bodies_m: np.ndarray,
+    arena: Arena,
     alpha_counts_m2: np.ndarray,
     beta_counts: np.ndarray,
 ) -> np.ndarray:
-    """Return the noiseless signal (counts) of the eight sensors of the robots which, shape (R, 8).
+    """Return the noiseless signal (counts) of the eight sensors of each robot, shape (R, 8).
 
-    poses (N, 3) of all robots, who see each other as round bodies; which (R,) indices into poses;
-    alpha_counts_m2 (R, 8) of each sensor, beta_counts (R, 1) of each robot.
+    places_m (R, 2) and headings (R, 2), cosine and sine, of the robots that look; bodies_m (R, N, 2) the places of
+    the robots that each could see, itself among them; alpha_counts_m2 (R, 8) of each sensor, beta_counts (R, 1) of
+    each robot.
     """
-    seen = poses[which]
-    rays = BEAM_ANGLES_RAD[:, None] + _CONE_RAD
-    angles_rad = (seen[:, 2, None, None] + rays).reshape(len(which), -1)
-    bodies_m = np.column_stack((poses[:, :2], np.full(len(poses), BODY_RADIUS_M)))
-    wall_m, wall_cosine = cast_at_segments(seen[:, :2], angles_rad, segments_m)
-    round_m, round_cosine = cast_at_circles(seen[:, :2], angles_rad, np.vstack((bodies_m, circles_m)))
-    nearer = round_m < wall_m
-    distance_m = np.where(nearer, round_m, wall_m) - BODY_RADIUS_M
-    cosine = np.where(nearer, round_cosine, wall_cosine)
-    bright = cosine / np.maximum(distance_m, 1e-3) ** 2
-    bright = (bright.reshape(len(which), BEAMS, len(_CONE_RAD)) * _CONE_WEIGHT).max(axis=-1)
+    cosine, sine = headings[:, :1], headings[:, 1:]
+    ray_x, ray_y = cosine * _RAYS[0] - sine * _RAYS[1], sine * _RAYS[0] + cosine * _RAYS[1]
+    circles = arena.circles_m
+    to_x_m = np.concatenate((bodies_m[..., 0] - places_m[:, :1], circles[:, 0] - places_m[:, :1]), axis=1)
+    to_y_m = np.concatenate((bodies_m[..., 1] - places_m[:, 1:], circles[:, 1] - places_m[:, 1:]), axis=1)
+    radii_m = np.concatenate((np.full(bodies_m.shape[1], BODY_RADIUS_M), circles[:, 2]))
+    hits = [
+        hit_segments(places_m, ray_x, ray_y, arena.segments_m),
+        hit_circles(to_x_m, to_y_m, radii_m, ray_x, ray_y),
+    ]
+    distance_m, incidence = find_nearest(hits, ray_x.size)
+    distance_m = np.maximum(distance_m - BODY_RADIUS_M, 1e-3)
+    bright = incidence / (distance_m * distance_m)
+    bright = (bright.reshape(len(places_m), BEAMS, len(_CONE_RAD)) * _CONE_WEIGHT).max(axis=-1)
     return np.minimum(alpha_counts_m2 * bright + _offset(bright, beta_counts), SATURATION_COUNTS)
 
 
@@ -120,5 +141,5 @@ def _offset(bright: np.ndarray, beta_counts: np.ndarray) -> np.ndarray:
     """Return the signal's part besides alpha * bright (counts); bright is cosine / distance^2."""
     distance_m = 1.0 / np.sqrt(np.maximum(bright, 1e-12))
     share = np.clip((distance_m - FIT_END_M) / (TABLE_END_M - FIT_END_M), 0.0, 1.0)
-    beyond = np.minimum(bright * TABLE_END_M**2, 1.0) * TABLE_END_EXCESS_COUNTS
+    beyond = np.minimum(bright * (TABLE_END_M * TABLE_END_M), 1.0) * TABLE_END_EXCESS_COUNTS
     return beta_counts + share * (beyond - beta_counts)

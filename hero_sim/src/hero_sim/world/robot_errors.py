@@ -9,6 +9,7 @@ from typing import Dict, List, NamedTuple, Sequence
 import numpy as np
 
 from ..key_values import parse_values
+from .noise import draw_normal
 from .range_sensors import ALPHA_COUNTS_M2, BEAMS, BETA_COUNTS
 
 __all__ = [
@@ -87,7 +88,7 @@ def draw_errors(rngs: Sequence[np.random.RandomState], scale: float = 1.0) -> Ro
     Sources: odometry off by 1.4 to 3.0 % of the path and alpha from 0.39 to 0.44 are published; that servos of
     one kind differ by some per cent and some microseconds is an assumption.
     """
-    drawn = np.array([rng.standard_normal(6 + BEAMS) for rng in rngs]) * scale
+    drawn = np.array([draw_normal(rng, (6 + BEAMS,)) for rng in rngs]) * scale
     same = np.ones((len(rngs), 1))
     return RobotErrors(
         servo_center_us=SERVO_CENTER_US + np.rint(6.0 * drawn[:, 0:2]),

@@ -1,143 +1,168 @@
-"""The physics of all robots: wheel travel, poses and collisions, one fixed step at a time.
+"""The physics of all robots: servos, wheel travel, poses and collisions, one fixed step at a time.
 
-Pure: numpy only. Everything is an array over robots. The robots' bodies set servo commands and read the wheels;
-nothing here knows about messages.
+Pure: numpy only. Everything is an array over robots: one row for each, world after world, all in one arena and with
+the same number of robots in each world. The robots' bodies set servo pulses and read the wheels; nothing here knows
+about messages. A world gives the same bytes alone, in any place of a batch, and on any machine: a step uses
+only operations that IEEE 754 defines to the last bit, and random numbers are rounded to single precision, in
+which the differences between mathematical libraries vanish.
 """
 
-from typing import List
+from typing import List, Optional, Sequence, Union
 
 import numpy as np
 
-from ..robot_constants import BODY_RADIUS_M
 from . import range_sensors
-from .arena import Arena, distance_to_segments, list_obstacles, measure_clearance
-from .kinematics import join_wheels, move_along_arc
-from .robot_errors import RobotErrors
+from .arena import Arena
+from .contacts import Contacts
+from .kinematics import find_heading, join_wheels, move_along_arc
+from .noise import draw_normal
+from .robot_errors import MAX_WHEEL_M_S, SERVO_GAIN_M_S_US, RobotErrors
 
 __all__ = ["STEP_MS", "World"]
 
 STEP_MS = 10
 """Length of a physics step; the fastest robot moves 3 mm in it, far less than its radius."""
 
-_CONTACT_PASSES = 4
-_TOUCH_M = 1e-9
-_OVERLAP_M = 1e-6
+_STEP_S = STEP_MS / 1000.0
+
+_BLOCK_STEPS = 32
+"""Steps for which random numbers are drawn at once."""
+
+_REST_M_S = 1e-6
+
+Rows = Union[int, np.ndarray]  # the number of one row, or an array of them
 
 
 class World:
-    """All robots in one arena.
+    """All robots in one arena, or in several worlds with the same arena.
 
     Attributes:
+        arena: walls and obstacles of each world.
+        worlds: how many there are.
         time_ms: end of the last step.
-        poses: true poses (N, 3): x m, y m, theta rad, frame world.
-        errors: how each robot differs from the drawing.
-        commands_m_s: the servos' commands (N, 2), as the wheel speeds they stand for, left and right.
-        speeds_m_s, travels_m: of the wheels (N, 2).
-        wheel_rows: travels and speeds of the wheels as lists: single reads are much faster than from arrays.
+        poses: true poses (R, 3), read only: x m, y m, theta rad, frame world.
+        errors: how each robot differs from the drawing; constant.
+        commands_m_s: the servos' commands (R, 2), as the wheel speeds they stand for, left and right, up to
+            MAX_WHEEL_M_S.
+        speeds_m_s, travels_m: of the wheels (R, 2).
     """
 
     def __init__(
-        self, arena: Arena, poses: np.ndarray, rng: np.random.RandomState, errors: RobotErrors
+        self, arena: Arena, poses: np.ndarray, rngs: Sequence[np.random.RandomState], errors: RobotErrors
     ) -> None:
-        """Place robots at poses; slip, ripple and sensor noise are drawn from rng."""
-        count = len(poses)
+        """Place robots at poses (R, 3); slip, ripple and sensor noise of each world are drawn from one of rngs."""
+        # Inside, quantities come first and robots last: whole rows of memory are computed with.
+        rows = len(poses)
         self.arena = arena
+        self.worlds = len(rngs)
         self.time_ms = 0
-        self.poses = np.array(poses, dtype=float).reshape(count, 3)
-        self.commands_m_s = np.zeros((count, 2))
-        self.speeds_m_s = np.zeros((count, 2))
-        self.travels_m = np.zeros((count, 2))
         self.errors = errors
-        self.wheel_rows: List[List[float]] = []
+        self._rngs = rngs
+        self._poses = np.array(poses, dtype=float).reshape(rows, 3).T.copy()
+        self._headings = np.array(find_heading(self._poses[2]))
+        self._commands = np.zeros((2, rows))
+        self._wheels = np.zeros((4, rows))  # travels, then speeds
+        self._wheel_rows: Optional[List[List[float]]] = None
+        self.poses = self._poses.T
+        self.poses.flags.writeable = False
+        self.commands_m_s = self._commands.T
+        self.travels_m, self.speeds_m_s = self._wheels[:2].T, self._wheels[2:].T
+        # Below its center the left wheel rolls forward.
+        self._servo_gains = errors.servo_gain * (-SERVO_GAIN_M_S_US, SERVO_GAIN_M_S_US)
         # The share of the difference to its command by which a servo's speed changes in one step.
-        self._servo_gain = -np.expm1(-STEP_MS / 1000.0 / errors.servo_lag_s)
-        self._rng = rng
-        self._obstacles_m, radii_m = list_obstacles(arena)
-        self._free_m = radii_m + BODY_RADIUS_M
-        self._update_rows()
+        self._servo_shares = -np.expm1(-_STEP_S / errors.servo_lag_s.T).astype(np.float32).astype(float)
+        self._block_step = _BLOCK_STEPS
+        self._contacts = Contacts(arena, self.worlds, rows)
+        self._gap_m = 0.0
 
-    def _update_rows(self) -> None:
-        self.wheel_rows = np.hstack((self.travels_m, self.speeds_m_s)).tolist()
+    @property
+    def wheel_rows(self) -> List[List[float]]:
+        """Travels and speeds of each robot's wheels as lists: single reads are much faster than from arrays."""
+        if self._wheel_rows is None:
+            self._wheel_rows = self._wheels.T.tolist()
+        return self._wheel_rows
+
+    def write_pulses(self, rows: Rows, pulses_us: np.ndarray) -> None:
+        """Set the servos' pulses, left and right (..., 2), of rows: one, or an array of them."""
+        dead_zone_us = self.errors.dead_zone_us[rows]
+        beyond_us = pulses_us - self.errors.servo_center_us[rows]
+        driven_us = beyond_us - np.minimum(np.maximum(beyond_us, -dead_zone_us), dead_zone_us)
+        speeds_m_s = driven_us * self._servo_gains[rows]
+        self.commands_m_s[rows] = np.minimum(np.maximum(speeds_m_s, -MAX_WHEEL_M_S), MAX_WHEEL_M_S)
+
+    def release(self, rows: Rows) -> None:
+        """Stop the pulses of rows: their wheels come to rest."""
+        self.commands_m_s[rows] = 0.0
 
     def step(self) -> None:
         """Move everything on by STEP_MS."""
+        if self._block_step == _BLOCK_STEPS:
+            self._begin_block()
+        travels_m, speeds_m_s = self._wheels[:2], self._wheels[2:]
         # Travel is taken with the speed of the step's start, so that reads within the step meet its end.
-        rolled_m = self.speeds_m_s * (STEP_MS / 1000.0)
-        self.travels_m += rolled_m
-        ripple_m_s = self._rng.standard_normal(self.speeds_m_s.shape) * self.errors.ripple_m_s
-        reached_m_s = np.where(self.commands_m_s == 0.0, 0.0, self.commands_m_s + ripple_m_s)
-        self.speeds_m_s += (reached_m_s - self.speeds_m_s) * self._servo_gain
-        self.speeds_m_s[np.abs(self.speeds_m_s) < 1e-6] = 0.0
+        travels_m += speeds_m_s * _STEP_S
+        ground_m = speeds_m_s * self._ground_s[self._block_step]
+        reached_m_s = self._commands + self._ripples_m_s[self._block_step]
+        reached_m_s[self._commands == 0.0] = 0.0
+        speeds_m_s += (reached_m_s - speeds_m_s) * self._servo_shares
+        self._wheel_rows = None
+        self._block_step += 1
         self.time_ms += STEP_MS
-        if rolled_m.any():
-            self._move_bodies(rolled_m)
-        self._update_rows()
+        self._move_bodies(ground_m)
 
-    def _move_bodies(self, rolled_m: np.ndarray) -> None:
-        slipped = np.abs(self._rng.standard_normal(rolled_m.shape)) * self.errors.slip
-        ground_m = rolled_m * self.errors.wheel_scale * (1.0 - slipped)
-        before_m = self.poses[:, :2].copy()
-        self.poses[:] = np.column_stack(move_along_arc(*self.poses.T, *ground_m.T))
-        self._separate(before_m)
+    def _begin_block(self) -> None:
+        """Draw what chance does in the next steps, and end the motion of wheels that hardly move."""
+        robots = len(self.poses) // self.worlds
+        noise = np.empty((_BLOCK_STEPS, 4, len(self.poses)))
+        for world, rng in enumerate(self._rngs):
+            noise[..., world * robots : (world + 1) * robots] = draw_normal(rng, (_BLOCK_STEPS, 4, robots))
+        self._ripples_m_s = noise[:, :2] * self.errors.ripple_m_s.T
+        # Way of a wheel's body over the ground for each m/s.
+        self._ground_s = (1.0 - np.abs(noise[:, 2:]) * self.errors.slip.T) * (self.errors.wheel_scale.T * _STEP_S)
+        self._block_step = 0
+        speeds_m_s = self._wheels[2:]
+        speeds_m_s[np.abs(speeds_m_s) < _REST_M_S] = 0.0
+        fastest_m_s = max(MAX_WHEEL_M_S + np.abs(self._ripples_m_s).max(), np.abs(speeds_m_s).max())
+        self._longest_step_m = float(fastest_m_s * np.abs(self._ground_s).max())
 
-    def _separate(self, before_m: np.ndarray) -> None:
-        """Push bodies out of walls, obstacles and each other; those that cannot get free stay where they were."""
-        for _ in range(_CONTACT_PASSES):
-            if not self._push_apart():
-                return
-        # Whatever still overlaps goes back to where it was free; that may block another, so look again.
-        positions_m = self.poses[:, :2]
-        while True:
-            stuck = self.find_overlaps() & (positions_m != before_m).any(axis=1)
-            if not stuck.any():
-                return
-            positions_m[stuck] = before_m[stuck]
-
-    def _push_apart(self) -> bool:
-        positions_m = self.poses[:, :2]
-        moved = False
-        if len(positions_m) > 1:
-            apart_m = positions_m[:, None, :] - positions_m
-            distance_m2 = (apart_m**2).sum(axis=2)
-            np.fill_diagonal(distance_m2, np.inf)
-            firsts, seconds = np.nonzero(distance_m2 < (2.0 * BODY_RADIUS_M) ** 2 - _TOUCH_M)
-            if len(firsts):
-                moved = True
-                distance_m = np.sqrt(np.maximum(distance_m2[firsts, seconds], 1e-12))
-                push_m = apart_m[firsts, seconds] * ((BODY_RADIUS_M - distance_m / 2.0) / distance_m)[:, None]
-                np.add.at(positions_m, firsts, push_m)
-        distance_m, near_x_m, near_y_m = distance_to_segments(positions_m, self._obstacles_m)
-        robots, obstacles = np.nonzero(distance_m < self._free_m - _TOUCH_M)
-        for robot, obstacle in zip(robots, obstacles):
-            away_m = positions_m[robot] - (near_x_m[robot, obstacle], near_y_m[robot, obstacle])
-            length_m = max(float(np.hypot(*away_m)), 1e-9)
-            if length_m < self._free_m[obstacle]:
-                positions_m[robot] += away_m * ((self._free_m[obstacle] - length_m) / length_m)
-        return moved or len(robots) > 0
+    def _move_bodies(self, ground_m: np.ndarray) -> None:
+        before_m = self._poses[:2].copy()
+        x_m, y_m, theta_rad = self._poses
+        cosine, sine = self._headings
+        travel_m, rotation_rad = join_wheels(*ground_m)
+        x_m[:], y_m[:], cosine[:], sine[:] = move_along_arc(x_m, y_m, cosine, sine, travel_m, rotation_rad)
+        theta_rad += rotation_rad
+        # Nobody is looked for until the fastest robots could have met.
+        self._gap_m -= self._longest_step_m
+        if self._gap_m < 0.0:
+            self._gap_m = self._contacts.separate(self._poses[:2], before_m)
 
     def find_overlaps(self) -> np.ndarray:
-        """Return which robots (N,) reach more than 1 um into a wall, an obstacle or another robot."""
-        positions_m = self.poses[:, :2]
-        distance_m2 = ((positions_m[:, None, :] - positions_m) ** 2).sum(axis=2)
-        np.fill_diagonal(distance_m2, np.inf)
-        overlaps = (distance_m2 < (2.0 * BODY_RADIUS_M - _OVERLAP_M) ** 2).any(axis=1)
-        return overlaps | (measure_clearance(positions_m, self.arena) < BODY_RADIUS_M - _OVERLAP_M)
+        """Return which robots (R,) reach more than 1 um into a wall, an obstacle or another robot."""
+        return self._contacts.find_overlaps(self._poses[:2])
 
     def measure_body_speeds(self) -> np.ndarray:
-        """Return linear (m/s) and angular speed (rad/s) of each robot (N, 2), as its wheels have it."""
-        return np.column_stack(join_wheels(*self.speeds_m_s.T))
+        """Return linear (m/s) and angular speed (rad/s) of each robot (R, 2), as its wheels have it."""
+        return np.column_stack(join_wheels(*self._wheels[2:]))
 
     def read_infrared(self, which: np.ndarray) -> np.ndarray:
-        """Return one noisy reading (whole counts, 0..1023) of the eight sensors of the robots which, (R, 8)."""
-        arena, errors = self.arena, self.errors
+        """Return one noisy reading (whole counts, 0..1023) of the eight sensors of the robots which, (K, 8).
+
+        which (K,): rows in ascending order.
+        """
+        robots = len(self.poses) // self.worlds
+        worlds = which // robots
         signals = range_sensors.measure_signals(
-            self.poses,
-            which,
-            arena.segments_m,
-            arena.circles_m,
-            errors.alpha_counts_m2[which],
-            errors.beta_counts[which],
+            self.poses[which, :2],
+            self._headings.T[which],
+            self.poses[:, :2].reshape(self.worlds, robots, 2)[worlds],
+            self.arena,
+            self.errors.alpha_counts_m2[which],
+            self.errors.beta_counts[which],
         )
-        noisy = signals + self._rng.normal(0.0, range_sensors.NOISE_COUNTS, signals.shape)
+        # Each world draws for its own robots.
+        counts = np.bincount(worlds, minlength=self.worlds)
+        shapes = [(world, (counts[world], range_sensors.BEAMS)) for world in np.nonzero(counts)[0]]
+        noise = np.concatenate([draw_normal(self._rngs[world], shape) for world, shape in shapes])
         # Adding zero turns -0.0 into 0.0, whose inverse is the right infinity.
-        return np.clip(np.rint(noisy), 0, 1023) + 0.0
+        return np.clip(np.rint(signals + noise * range_sensors.NOISE_COUNTS), 0, 1023) + 0.0
