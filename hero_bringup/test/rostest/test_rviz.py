@@ -59,7 +59,7 @@ class RvizTest(unittest.TestCase):
         cls.screen = VirtualScreen(1400, 1000)
         arena = Path(__file__).with_name("square_arena.yaml")
         cls.launch = subprocess.Popen(
-            ["roslaunch", "hero_bringup", "hero_bringup.launch", "host:=127.0.0.1", "port:=21341", "count:=3"]
+            ["roslaunch", "hero_bringup", "hero_bringup.launch", "host:=127.0.0.1", "port:=21342", "count:=3"]
             + ["arena:=%s" % arena, "rviz:=true", "rviz_view:=above"],
             env=cls.screen.environment(),
             start_new_session=True,

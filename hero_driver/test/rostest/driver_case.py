@@ -248,6 +248,22 @@ class DriverProcess(Program):
 class OwnDriverCase(unittest.TestCase):
     """Tests that start drivers with parameters of their own."""
 
+    @classmethod
+    def setUpClass(cls):
+        cls._shared = {}
+
+    @classmethod
+    def tearDownClass(cls):
+        for driver in cls._shared.values():
+            driver.__exit__()
+
+    def share(self, **parameters):
+        """Return the driver of all tests of the class with these parameters; each test has robots of its own."""
+        key = repr(sorted(parameters.items()))
+        if key not in self._shared:
+            self._shared[key] = DriverProcess(parameters)
+        return self._shared[key]
+
     def start(self, **parameters):
         """Return a driver, which ends after the test."""
         driver = DriverProcess(parameters)

@@ -82,17 +82,16 @@ class FakeMotors:
         self._read_s += PULSES_HOLD_S
         self._has_pulses = payload != NEUTRAL_PULSES
 
-    def take_velocity(self, name: str, is_zero: bool) -> bool:
-        """Take a Twist for the controller in a topic's name; return whether it is accepted."""
+    def take_velocity(self, name: str, is_zero: bool) -> None:
+        """Take a Twist for the controller in a topic's name, which may drop it."""
         controller = self._controllers[name.split("/")[-2]]
         if self._read_s - controller.watchdog_s < VELOCITY_GATE_S:
-            return False
+            return
         controller.is_tuning = False
         controller.is_driving = not is_zero
         controller.watchdog_s = _NEVER_S if is_zero else self._read_s
         if is_zero:
             self._has_pulses = False
-        return True
 
     def count_ticks(self, now_s: float) -> int:
         """Return the ticks of each wheel at now_s."""

@@ -109,18 +109,9 @@ STOCK_DECLARATIONS = (
 )
 
 
-class ReceivedPacket(NamedTuple):
-    """One packet from the driver."""
-
-    time_s: float  # monotonic, when the robot read it
-    topic_id: int
-    payload: bytes
-
-
 class Velocity(NamedTuple):
-    """One velocity command, as the robot takes it."""
+    """One velocity command."""
 
-    time_s: float
     name: str
     linear_m_s: float
     angular_rad_s: float
@@ -154,9 +145,9 @@ class FakeRobot:
     """One robot; connect() or serve() begin its one connection, and a test may begin another after its end.
 
     Attributes (read by tests, all in order of arrival):
-        received: packets from the driver; velocities: those with a Twist, whether the firmware took them or not;
-        accepted: those that it took; motors: what they make of its wheels; requests: how often topics were
-        asked for; ended: why the connection is over, empty while it stands.
+        received: packets from the driver; velocities: those with a Twist, whether the firmware takes them or not;
+        motors: what the firmware makes of them; requests: how often topics were asked for; ended: why the
+        connection is over, empty while it stands.
         answers: service name -> function of the request that returns the answer, or None for no answer.
         is_silent: says nothing of its own; is_stalled: does not read; declares: whether requests are answered.
     """
@@ -178,9 +169,8 @@ class FakeRobot:
         self.namespace = "/" + self.name
         chosen = STOCK_DECLARATIONS if declarations is None else declarations
         self.declarations = [entry._replace(name=entry.name.format(self.name)) for entry in chosen]
-        self.received: List[ReceivedPacket] = []
+        self.received: List[packets.Packet] = []
         self.velocities: List[Velocity] = []
-        self.accepted: List[Velocity] = []
         self.motors = FakeMotors()
         self.requests = 0
         self.ended = ""
@@ -365,8 +355,7 @@ class FakeRobot:
                 self._take(packet)
 
     def _take(self, packet: packets.Packet) -> None:
-        now_s = time.monotonic()
-        self.received.append(ReceivedPacket(now_s, packet.topic_id, packet.payload))
+        self.received.append(packet)
         if packet.topic_id == packets.ID_PUBLISHER:
             self.requests += 1
             if self.declares:
@@ -378,7 +367,7 @@ class FakeRobot:
             if entry.kind == REQUESTS:
                 self._serve(entry.name, packet.payload)
             elif entry.name.endswith("/cmd_vel") and len(packet.payload) == 48:
-                self._take_velocity(entry.name, packet.payload, now_s)
+                self._take_velocity(entry.name, packet.payload)
             elif entry.name.endswith("/cmd_motor"):
                 self.motors.take_pulses(packet.payload)
             elif entry.name.endswith("/led"):
@@ -395,9 +384,8 @@ class FakeRobot:
         if answer is not None:
             self.answer(short_name, answer)
 
-    def _take_velocity(self, name: str, payload: bytes, now_s: float) -> None:
+    def _take_velocity(self, name: str, payload: bytes) -> None:
         parts = struct.unpack("<6d", payload)
-        velocity = Velocity(now_s, name, parts[0], parts[5])
+        velocity = Velocity(name, parts[0], parts[5])
         self.velocities.append(velocity)
-        if self.motors.take_velocity(name, velocity.is_zero):
-            self.accepted.append(velocity)
+        self.motors.take_velocity(name, velocity.is_zero)

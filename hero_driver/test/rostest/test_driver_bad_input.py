@@ -54,22 +54,23 @@ class TestDriverBadInput(OwnDriverCase):
             with self.subTest(host=host):
                 self.assert_start_fails({"host": host}, "'%s' cannot be found" % host, "ip address")
 
-    def test_every_name_of_all_addresses_is_warned_about(self):
-        for host in ("0", "0.0.0.0"):
-            with self.subTest(host=host), DriverProcess({"host": host}) as driver:
-                driver.wait_line("any host in the networks of this PC can pose as a robot")
+    def test_another_name_of_all_addresses_is_warned_about_too(self):
+        self.start(host="0").wait_line("any host in the networks of this PC can pose as a robot")
 
     def test_an_environment_in_which_ros_cannot_start_is_named_in_one_line(self):
         with tempfile.NamedTemporaryFile() as file:
-            for name, value, part in (
-                ("ROS_MASTER_URI", "localhost:11311", "http://localhost:11311"),
-                ("ROS_MASTER_URI", "ftp://localhost:11311", "http://localhost:11311"),
-                ("ROS_MASTER_URI", "http://10.42.0..1:11311", "http://localhost:11311"),
-                ("ROS_LOG_DIR", file.name, "ROS_LOG_DIR"),
-                ("ROS_LOG_DIR", "/dev/null", "ROS_LOG_DIR"),
-            ):
-                with self.subTest(name=name, value=value):
-                    driver = DriverProcess(environment={name: value})
+            cases = [
+                (DriverProcess(environment={name: value}), value, part)
+                for name, value, part in (
+                    ("ROS_MASTER_URI", "localhost:11311", "http://localhost:11311"),
+                    ("ROS_MASTER_URI", "ftp://localhost:11311", "http://localhost:11311"),
+                    ("ROS_MASTER_URI", "http://10.42.0..1:11311", "http://localhost:11311"),
+                    ("ROS_LOG_DIR", file.name, "ROS_LOG_DIR"),
+                    ("ROS_LOG_DIR", "/dev/null", "ROS_LOG_DIR"),
+                )
+            ]
+            for driver, value, part in cases:
+                with self.subTest(value=value):
                     self.addCleanup(driver.fleet.close)
                     self.assertEqual(driver.wait_end(), USAGE_ERROR, driver.lines)
                     self.assertEqual(len(driver.lines), 1, driver.lines)
@@ -79,27 +80,15 @@ class TestDriverBadInput(OwnDriverCase):
     def test_an_unknown_parameter_is_named_with_the_one_that_was_meant(self):
         self.assert_start_fails({"prot": 11411}, "~prot is not known", "did you mean ~port?")
 
-    def test_wrong_values_are_named_with_what_is_allowed(self):
-        for name, value, allowed in (
-            ("port", 70000, "0 to 65535"),
-            ("grace_s", -1.0, "0 to 3600 (s)"),
-            ("namespace_policy", "all", "one of robot, any"),
-            ("clamp", "yes", "true or false"),
-            ("robots", [{"host": "a", "prot": 1}], "a list of {host"),
-            ("allow", ["10.0.0.0/99"], "networks such as"),
-        ):
-            with self.subTest(name=name, value=value):
-                self.assert_start_fails({name: value}, "parameter ~%s is " % name, allowed)
-
-    def test_neither_listening_nor_dialling_is_refused(self):
-        self.assert_start_fails({"host": ""}, "~host is empty and ~robots too")
+    def test_a_wrong_value_is_named_with_what_is_allowed(self):
+        self.assert_start_fails({"port": 70000}, "parameter ~port is ", "0 to 65535")
 
     # Bytes.
 
-    def start_pair(self):
+    def dial_pair(self, number):
         """A driver, a robot that will misbehave, and one that must not notice."""
-        driver = self.start()
-        bad, good = self.dial(driver, 1), self.dial(driver, 2)
+        driver = self.share()
+        bad, good = self.dial(driver, number), self.dial(driver, 2)
         return driver, bad, good
 
     def assert_alive(self, robot, ticks=5.0):
@@ -114,8 +103,8 @@ class TestDriverBadInput(OwnDriverCase):
         return packets.encode_packet(128, payload)
 
     def test_garbage_between_packets_is_counted_and_the_next_is_read(self):
-        driver, bad, good = self.start_pair()
-        encoders = Recorder("/hero_1/encoder", Encoder)
+        driver, bad, good = self.dial_pair(30)
+        encoders = Recorder("/hero_30/encoder", Encoder)
         chance = random.Random(7)
         for count in range(1, 21):
             garbage = bytes(chance.randrange(256) for _ in range(chance.randrange(1, 200)))
@@ -124,50 +113,50 @@ class TestDriverBadInput(OwnDriverCase):
             bad.send_bytes(self.make_encoder_frame(bad, float(count)))
         self.assertEqual([m.left_ticks for m in encoders.wait_count(20)], [float(n) for n in range(1, 21)])
         self.assertGreaterEqual(
-            driver.fleet.wait("/hero_1", Robot.READY, "counted", lambda e: e.bad_packets >= 20).bad_packets, 20
+            driver.fleet.wait("/hero_30", Robot.READY, "counted", lambda e: e.bad_packets >= 20).bad_packets, 20
         )
         self.assert_alive(good)
 
     def test_a_length_of_65535_swallows_nothing(self):
-        driver, bad, _ = self.start_pair()
-        encoders = Recorder("/hero_1/encoder", Encoder)
+        driver, bad, _ = self.dial_pair(31)
+        encoders = Recorder("/hero_31/encoder", Encoder)
         bad.send_bytes(b"\xff\xfe\xff\xff\x01\x80\x00" + self.make_encoder_frame(bad))
         encoders.wait_count(1)
-        driver.fleet.wait("/hero_1", Robot.READY, "counted", lambda e: e.bad_packets >= 1)
+        driver.fleet.wait("/hero_31", Robot.READY, "counted", lambda e: e.bad_packets >= 1)
 
     def test_wrong_checksums_are_counted_and_what_follows_is_read(self):
-        driver, bad, _ = self.start_pair()
-        encoders = Recorder("/hero_1/encoder", Encoder)
+        driver, bad, _ = self.dial_pair(32)
+        encoders = Recorder("/hero_32/encoder", Encoder)
         good_packet = self.make_encoder_frame(bad, 2.0)
         flipped = good_packet[:-1] + bytes([good_packet[-1] ^ 0x10])
         bad.send_bytes(flipped + good_packet + flipped)
         bad.send_bytes(good_packet)
         encoders.wait_count(2)
-        driver.fleet.wait("/hero_1", Robot.READY, "counted", lambda e: e.bad_packets >= 2)
+        driver.fleet.wait("/hero_32", Robot.READY, "counted", lambda e: e.bad_packets >= 2)
 
     def test_a_packet_that_comes_byte_by_byte_is_read(self):
-        _, bad, _ = self.start_pair()
-        encoders = Recorder("/hero_1/encoder", Encoder)
+        _, bad, _ = self.dial_pair(33)
+        encoders = Recorder("/hero_33/encoder", Encoder)
         for byte in self.make_encoder_frame(bad, 3.0):
             bad.send_bytes(bytes([byte]))
         self.assertEqual(encoders.wait_count(1)[0].left_ticks, 3.0)
 
     def test_a_robot_that_vanishes_within_a_packet_may_return(self):
-        driver, bad, good = self.start_pair()
+        driver, bad, good = self.dial_pair(34)
         bad.send_bytes(self.make_encoder_frame(bad)[:40])
         bad.close()
-        driver.fleet.wait("/hero_1", Robot.AWAY)
+        driver.fleet.wait("/hero_34", Robot.AWAY)
         self.assert_alive(good)
-        self.assert_alive(self.dial(driver, 1))
+        self.assert_alive(self.dial(driver, 34))
 
     def test_half_a_declaration_and_declarations_of_nonsense_are_reported(self):
-        driver, bad, good = self.start_pair()
+        driver, bad, good = self.dial_pair(35)
         burst = bad.encode_declarations()
         first = packets.PacketReader().receive_bytes(burst)[0].payload
         bad.send_packet(PUB, first[: len(first) // 2])
         bad.send_packet(PUB, first + b"more")
         bad.send_packet(PUB, struct.pack("<HI", 140, 0xFFFFFFFF) + b"name")
-        line = driver.wait_line("hero_1: TopicInfo: ")
+        line = driver.wait_line("hero_35: TopicInfo: ")
         self.assertNotIn("Traceback", line)
         self.assert_alive(bad)
         self.assert_alive(good)
@@ -178,13 +167,13 @@ class TestDriverBadInput(OwnDriverCase):
             Declaration(1, 115, "/{}/tight", "std_msgs/String", "992ce8a1687cec8c8bd883ec73ca41d1", 0),
             Declaration(1, 116, "/{}/negative", "std_msgs/String", "992ce8a1687cec8c8bd883ec73ca41d1", -5),
         ]
-        driver = self.start()
+        driver = self.share()
         self.dial(driver, 3, declarations=[*STOCK_DECLARATIONS, *odd])
         for name in ("low", "tight", "negative"):
             driver.wait_line("topic '?/hero_3/%s'? refused" % name)
 
     def test_a_program_that_does_not_speak_rosserial_is_disconnected(self):
-        driver, _, good = self.start_pair()
+        driver, _, good = self.dial_pair(36)
         other_program = FakeRobot(9, declarations=[])
         self.addCleanup(other_program.close)
         other_program.is_silent = True
@@ -196,7 +185,7 @@ class TestDriverBadInput(OwnDriverCase):
         self.assert_alive(good)
 
     def test_a_hundred_connections_that_end_at_once_leave_nothing_behind(self):
-        driver, _, good = self.start_pair()
+        driver, _, good = self.dial_pair(37)
         for _ in range(100):
             socket.create_connection(driver.address, 20.0).close()
         self.assert_alive(good)
@@ -205,7 +194,7 @@ class TestDriverBadInput(OwnDriverCase):
         self.assertLess(len(driver.find_lines("unidentified connection")), 10)
 
     def test_what_robots_send_by_chance_never_ends_the_driver(self):
-        driver, _, good = self.start_pair()
+        driver, _, good = self.dial_pair(38)
         chance = random.Random(11)
         for number in range(10, 16):
             robot = self.dial(driver, number)

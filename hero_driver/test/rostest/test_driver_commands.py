@@ -1,5 +1,9 @@
 #!/usr/bin/env python3
-"""Commands to robots that take them as the firmware does: a stop always arrives, an old command never does."""
+"""Commands to robots: a stop always arrives, twice, and an old command never does.
+
+That commands are far enough apart for the firmware is a matter of the driver's clock: see
+hero_driver/test/unit/test_command_sender.py.
+"""
 
 import math
 import struct
@@ -7,13 +11,10 @@ import struct
 import rospy
 import rostest
 from driver_case import NODE, DriverCase, Recorder, make_command, make_publisher, wait_payloads
-from fake_motors import VELOCITY_GATE_S
-from fake_robot import READ_CYCLE_S
 from geometry_msgs.msg import Twist
 from rosgraph_msgs.msg import Log as RosLog
 from std_msgs.msg import Bool, ColorRGBA
 from std_srvs.srv import SetBool
-from steady_time import in_steady_time
 
 from hero_driver.commands.velocity_shaper import STOPPED_MOTORS
 from hero_msgs.msg import Motor, Robot
@@ -25,7 +26,6 @@ VELOCITY = "velocity_controller/cmd_vel"
 POSITION = "position_controller/cmd_vel"
 
 
-@in_steady_time
 class TestDriverCommands(DriverCase):
     def setUp(self):
         self.call_stop(False)
@@ -34,69 +34,39 @@ class TestDriverCommands(DriverCase):
         rospy.wait_for_service(NODE + "/stop", 20.0)
         self.assertTrue(rospy.ServiceProxy(NODE + "/stop", SetBool)(stopped).success)
 
-    def join_stock(self, number):
-        """A robot that reads every 51 ms and drops velocities within 50 ms of the last one, as the firmware."""
-        return self.join(number, read_cycle_s=READ_CYCLE_S)
-
-    def burst(self, publisher, count, linear_m_s):
-        """Publish at 50 Hz, faster than the robot can take."""
-        rate = rospy.Rate(50)
-        for _ in range(count):
-            publisher.publish(make_command(linear_m_s))
-            rate.sleep()
-
-    def wait_stopped(self, robot, stops=2):
-        """Wait until a robot has got so many stops after its last motion; the last it took must be one."""
-
-        def look():
-            trailing = 0
-            for velocity in reversed(list(robot.velocities)):
-                if not velocity.is_zero:
-                    break
-                trailing += 1
-            return trailing >= stops
-
-        wait_for(look, lambda: "%d stops at %s, got %s" % (stops, robot.name, robot.velocities[-6:]))
-        self.assertTrue(robot.accepted[-1].is_zero)
+    def wait_stopped(self, robot):
+        """Wait until the last that a robot has got are two stops."""
+        wait_for(
+            lambda: [velocity.is_zero for velocity in robot.velocities[-2:]] == [True, True],
+            lambda: "two stops at %s, got %s" % (robot.name, robot.velocities[-6:]),
+        )
 
     def test_a_stop_right_after_a_burst_is_never_lost(self):
-        robots = [self.join_stock(number) for number in (1, 2, 3)]
+        robots = [self.join(number) for number in (1, 2, 3)]
         publishers = [make_publisher("%s/%s" % (robot.namespace, VELOCITY), Twist) for robot in robots]
         for _ in range(5):
-            rate = rospy.Rate(50)
             for _ in range(12):
                 for publisher in publishers:
                     publisher.publish(make_command(0.1))
-                rate.sleep()
             for publisher in publishers:
                 publisher.publish(make_command(0.0))
             for robot in robots:
                 self.wait_stopped(robot)
-        for robot in robots:
-            self.assertEqual(robot.accepted, robot.velocities, "the robot dropped a command")
-
-    def test_a_stop_in_the_same_moment_as_a_motion_arrives(self):
-        robot = self.join_stock(4)
-        publisher = make_publisher("/hero_4/" + VELOCITY, Twist)
-        for _ in range(5):
-            publisher.publish(make_command(0.1))
-            publisher.publish(make_command(0.0))
-            self.wait_stopped(robot)
-            del robot.velocities[:]
+                del robot.velocities[:]
 
     def test_a_motion_right_after_a_stop_does_not_swallow_the_stop(self):
-        robot = self.join_stock(5)
+        robot = self.join(5)
         publisher = make_publisher("/hero_5/" + VELOCITY, Twist)
         publisher.publish(make_command(0.1))
         publisher.publish(make_command(0.0))
         publisher.publish(make_command(0.2))
-        wait_for(lambda: any(v.linear_m_s == 0.2 for v in list(robot.accepted)), "the second motion")
-        speeds = [velocity.linear_m_s for velocity in robot.accepted]
+        wait_for(lambda: any(v.linear_m_s == 0.2 for v in list(robot.velocities)), "the second motion")
+        speeds = [velocity.linear_m_s for velocity in robot.velocities]
         self.assertIn(0.0, speeds)
         self.assertLess(speeds.index(0.0), speeds.index(0.2))
 
     def test_a_stop_is_repeated_once_and_then_there_is_silence(self):
-        robot = self.join_stock(6)
+        robot = self.join(6)
         publisher = make_publisher("/hero_6/" + VELOCITY, Twist)
         publisher.publish(make_command(0.0))
         self.wait_stopped(robot)
@@ -104,28 +74,16 @@ class TestDriverCommands(DriverCase):
         wait_for(lambda: not robot.velocities[-1].is_zero, "the motion")
         self.assertEqual([velocity.linear_m_s for velocity in robot.velocities], [0.0, 0.0, 0.05])
 
-    def test_the_newest_of_many_commands_wins_and_none_sent_is_dropped(self):
-        robot = self.join_stock(7)
+    def test_the_newest_of_many_commands_wins(self):
+        robot = self.join(7)
         publisher = make_publisher("/hero_7/" + VELOCITY, Twist)
         for step in range(1, 51):
             publisher.publish(make_command(step / 1000.0))
-        wait_for(lambda: robot.accepted and robot.accepted[-1].linear_m_s == 0.05, "the newest command")
+        wait_for(lambda: robot.velocities and robot.velocities[-1].linear_m_s == 0.05, "the newest command")
         self.assertLess(len(robot.velocities), 50)
-        self.assertEqual(robot.velocities, robot.accepted)
-
-    def test_commands_are_spaced_by_more_than_the_firmwares_gate(self):
-        robot = self.join(8)  # reads at once, so the times are those at which the driver sent
-        publisher = make_publisher("/hero_8/" + VELOCITY, Twist)
-        self.burst(publisher, 25, 0.1)
-        publisher.publish(make_command(0.0))
-        self.wait_stopped(robot)
-        times_s = [velocity.time_s for velocity in robot.velocities]
-        gaps_s = [later - earlier for earlier, later in zip(times_s, times_s[1:])]
-        self.assertGreaterEqual(min(gaps_s), VELOCITY_GATE_S)
-        self.assertGreater(len(gaps_s), 4)
 
     def test_velocity_and_position_control_are_shaped_each_on_its_own(self):
-        robot = self.join_stock(9)
+        robot = self.join(9)
         publishers = [make_publisher("/hero_9/" + name, Twist) for name in (VELOCITY, POSITION)]
         for publisher in publishers:
             publisher.publish(make_command(0.0))
@@ -149,7 +107,7 @@ class TestDriverCommands(DriverCase):
         self.assertEqual(wait_payloads(robot, "laser_enable", 20), [b"\x01", b"\x00"] * 10)
 
     def test_of_servo_pulses_the_newest_wins_and_the_stop_arrives(self):
-        robot = self.join_stock(22)
+        robot = self.join(22)
         motor = make_publisher("/hero_22/cmd_motor", Motor)
         for pulse_us in range(1400, 1450):
             motor.publish(Motor(pulse_us, 1500))
@@ -158,12 +116,14 @@ class TestDriverCommands(DriverCase):
         self.assertLess(len(robot.payloads_on("cmd_motor")), 10)
 
     def test_of_cmd_vel_and_the_velocity_controllers_the_newest_wins(self):
-        robot = self.join_stock(20)
+        robot = self.join(20)
         alias = make_publisher("/hero_20/cmd_vel", Twist)
         controller = make_publisher("/hero_20/" + VELOCITY, Twist)
         for publisher, linear_m_s in ((alias, 0.05), (controller, 0.1), (alias, 0.15)):
             publisher.publish(make_command(linear_m_s))
-            wait_for(lambda v=linear_m_s: robot.accepted and robot.accepted[-1].linear_m_s == v, "the newest command")
+            wait_for(
+                lambda v=linear_m_s: robot.velocities and robot.velocities[-1].linear_m_s == v, "the newest command"
+            )
         controller.publish(make_command(0.0))
         self.wait_stopped(robot)
         self.assertEqual({velocity.name.rpartition("hero_20/")[2] for velocity in robot.velocities}, {VELOCITY})
@@ -228,13 +188,13 @@ class TestDriverCommands(DriverCase):
 
     def test_the_stop_service_stops_every_robot_until_released(self):
         stopped = Recorder(NODE + "/stopped", Bool)
-        robots = [self.join_stock(number) for number in (13, 14)]
+        robots = [self.join(number) for number in (13, 14)]
         publishers = [make_publisher("%s/%s" % (robot.namespace, VELOCITY), Twist) for robot in robots]
         motor = make_publisher("/hero_13/cmd_motor", Motor)
         for publisher in publishers:
             publisher.publish(make_command(0.1))
         for robot in robots:
-            wait_for(lambda r=robot: r.accepted, "the motion")
+            wait_for(lambda r=robot: r.velocities, "the motion")
         self.call_stop(True)
         for robot in robots:
             self.wait_stopped(robot)
@@ -256,28 +216,28 @@ class TestDriverCommands(DriverCase):
         wait_for(lambda: not stopped.messages[-1].data, "the latched state")
         for publisher, robot in zip(publishers, robots):
             publisher.publish(make_command(0.07))
-            wait_for(lambda r=robot: r.accepted[-1].linear_m_s == 0.07, "the motion")
+            wait_for(lambda r=robot: r.velocities[-1].linear_m_s == 0.07, "the motion")
 
     def test_the_stop_applies_to_robots_that_join_later(self):
         self.call_stop(True)
-        robot = self.join_stock(15)
+        robot = self.join(15)
         publisher = make_publisher("/hero_15/" + VELOCITY, Twist)
         publisher.publish(make_command(0.1))
         self.fleet.wait("/hero_15", Robot.READY, "the refusal", lambda e: e.dropped_messages == 1)
         self.assertEqual([v for v in robot.velocities if not v.is_zero], [])
         self.call_stop(False)
         publisher.publish(make_command(0.1))
-        wait_for(lambda: any(not v.is_zero for v in list(robot.accepted)), "the motion")
+        wait_for(lambda: any(not v.is_zero for v in list(robot.velocities)), "the motion")
 
     def test_the_stop_applies_to_a_robot_that_returns(self):
-        robot = self.join_stock(16)
+        robot = self.join(16)
         publisher = make_publisher("/hero_16/" + VELOCITY, Twist)
         publisher.publish(make_command(0.1))
-        wait_for(lambda: robot.accepted, "the motion")
+        wait_for(lambda: robot.velocities, "the motion")
         robot.close()  # it drives on until its watchdog ends that
         self.fleet.wait("/hero_16", Robot.AWAY)
         self.call_stop(True)
-        returned = self.join_stock(16)
+        returned = self.join(16)
         self.wait_stopped(returned)
 
     def test_the_stop_stops_a_robot_driven_by_motor_commands(self):
@@ -289,31 +249,33 @@ class TestDriverCommands(DriverCase):
 
     def test_a_robot_that_does_not_read_gets_the_newest_command_and_no_backlog(self):
         stalled = self.join(19, receive_buffer_length=4096)
-        other = self.join(20)
+        other = self.join(24)
         drive = make_publisher("/hero_19/" + VELOCITY, Twist)
         light = make_publisher("/hero_19/led", ColorRGBA)
-        other_drive = make_publisher("/hero_20/" + VELOCITY, Twist)
-        other_light = make_publisher("/hero_20/led", ColorRGBA)
+        other_drive = make_publisher("/hero_24/" + VELOCITY, Twist)
+        other_light = make_publisher("/hero_24/led", ColorRGBA)
         stalled.is_stalled = True
-        rate = rospy.Rate(100)
-        for step in range(1, 201):
+
+        def is_full():
+            for _ in range(100):
+                light.publish(ColorRGBA(1.0, 0.0, 0.0, 0.0))
+            return self.fleet.find("/hero_19").dropped_messages > 0
+
+        wait_for(is_full, "drops: its TCP window and its queue to be full")
+        for step in range(1, 51):
             drive.publish(make_command(step / 1000.0))
-            for _ in range(3):
-                light.publish(ColorRGBA(float(step), 0.0, 0.0, 0.0))
             other_light.publish(ColorRGBA(float(step), 0.0, 0.0, 0.0))
-            rate.sleep()
-        # Nobody else is delayed: all that was published has passed before the other one is read again.
-        wait_payloads(other, "led", 200)
+            # Nobody else is delayed.
+            wait_payloads(other, "led", step)
         other_drive.publish(make_command(0.1))
         wait_for(lambda: other.velocities, "the other robot's command")
-        self.fleet.wait("/hero_19", Robot.READY, "with drops", lambda e: e.dropped_messages > 0)
         drive.publish(make_command(0.15))
         stalled.is_stalled = False
         wait_for(
             lambda: stalled.velocities and stalled.velocities[-1].linear_m_s == 0.15, "the newest command"
         )
-        # What its TCP window held may come out, the rest must not.
-        self.assertLess(len(stalled.velocities), 40)
+        # One may have been on its way, and no other follows before that one is acknowledged.
+        self.assertLessEqual(len(stalled.velocities), 2)
 
     def test_a_robot_that_returns_gets_no_command_of_before(self):
         robot = self.join(21)

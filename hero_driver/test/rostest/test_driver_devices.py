@@ -20,7 +20,6 @@ from geometry_msgs.msg import Twist
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Bool, Int32, String
 from std_srvs.srv import SetBool, SetBoolRequest, Trigger, TriggerResponse
-from steady_time import in_steady_time
 from text_messages import STRING_MD5, TRIGGER_REQUEST_MD5, WRONG_MD5, make_text
 from tf2_msgs.msg import TFMessage
 
@@ -28,7 +27,6 @@ from hero_msgs.msg import RobotArray
 from hero_test.waiting import wait_for
 
 
-@in_steady_time
 class TestDriverDevices(OwnDriverCase):
     """Devices that are no HeRos, with ~namespace_policy any."""
 
@@ -72,7 +70,7 @@ class TestDriverDevices(OwnDriverCase):
         self.assertEqual(ask_parameter(robot, "/hidden/list"), ([], [], ["x", "y"]))
 
     def test_transforms_of_devices_and_of_heros_pass_whole(self):
-        driver = self.start(namespace_policy="any")
+        driver = self.share(namespace_policy="any")
         tf_declaration = STOCK_DECLARATIONS[4]
         device = self.dial(driver, 50, ready=False, declarations=[tf_declaration])
         hero = self.dial(driver, 10)
@@ -91,20 +89,20 @@ class TestDriverDevices(OwnDriverCase):
         self.assertIn(("hero_10/base_link", "hero_10/hat_link"), list_frames())
 
     def test_a_hero_among_devices_is_a_hero(self):
-        driver = self.start(namespace_policy="any")
-        extra = [Declaration(PUB, 140, "/chatter", "std_msgs/String", STRING_MD5)]
-        robot = self.dial(driver, 9, declarations=[*STOCK_DECLARATIONS, *extra], read_cycle_s=0.051)
-        texts = Recorder("/chatter", String)
+        driver = self.share(namespace_policy="any")
+        extra = [Declaration(PUB, 140, "/gossip", "std_msgs/String", STRING_MD5)]
+        robot = self.dial(driver, 9, declarations=[*STOCK_DECLARATIONS, *extra])
+        texts = Recorder("/gossip", String)
         robot.send_packet(140, make_text("free"))
         texts.wait_count(1)
         Recorder("/hero_9/proximity", rospy.AnyMsg)
         drive = make_publisher("/hero_9/velocity_controller/cmd_vel", Twist)
         drive.publish(stock_messages.from_bytes(Twist, stock_messages.make_twist(0.1, 0.0)))
         drive.publish(Twist())
-        wait_for(lambda: len([v for v in robot.accepted if v.is_zero]) == 2, "the stop, twice")
+        wait_for(lambda: [v.is_zero for v in robot.velocities[-2:]] == [True, True], "the stop, twice")
 
     def test_two_devices_of_one_address_do_not_push_each_other_out(self):
-        driver = self.start(namespace_policy="any")
+        driver = self.share(namespace_policy="any")
         devices = []
         for name in ("left", "right"):
             declarations = [Declaration(PUB, 125, "/" + name, "std_msgs/String", STRING_MD5)]
@@ -116,16 +114,16 @@ class TestDriverDevices(OwnDriverCase):
             self.assertTrue(device.is_connected)
 
     def test_a_device_with_a_wrong_md5_gets_one_clear_error(self):
-        driver = self.start(namespace_policy="any")
+        driver = self.share(namespace_policy="any")
         declarations = [
-            Declaration(PUB, 125, "/chatter", "std_msgs/String", WRONG_MD5),
-            Declaration(PUB, 126, "/other", "std_msgs/String", STRING_MD5),
+            Declaration(PUB, 125, "/wrong", "std_msgs/String", WRONG_MD5),
+            Declaration(PUB, 126, "/right", "std_msgs/String", STRING_MD5),
         ]
         robot = self.dial(driver, ready=False, declarations=declarations)
-        line = driver.wait_line("topic /chatter refused")
+        line = driver.wait_line("topic /wrong refused")
         self.assertIn(WRONG_MD5, line)
         self.assertIn(STRING_MD5, line)
-        texts = Recorder("/other", String)
+        texts = Recorder("/right", String)
         robot.send_packet(126, make_text("still here"))
         texts.wait_count(1)
 
@@ -163,7 +161,7 @@ class TestDriverDevices(OwnDriverCase):
     def test_a_device_reads_parameters_below_its_own_name_and_of_others(self):
         rospy.set_param("/limit", 12)
         rospy.set_param("/arm_3/limit", 13)
-        driver = self.start(namespace_policy="any")
+        driver = self.share(namespace_policy="any")
         device = [Declaration(PUB, 125, "/arm_3/state", "std_msgs/String", STRING_MD5)]
         robot = self.dial(driver, declarations=device, ready=False)
         driver.fleet.wait_ready("/arm_3")

@@ -50,7 +50,7 @@ class TestDriverPolicy(OwnDriverCase):
             Declaration(PUB, 143, "chatter", "std_msgs/String", STRING_MD5),
             Declaration(PUB, 144, "/hero_1", "std_msgs/String", STRING_MD5),
         ]
-        driver = self.start()
+        driver = self.share()
         robot = self.dial(driver, 1, declarations=[*STOCK_DECLARATIONS, *foreign])
         for entry in foreign:
             line = driver.wait_line(r"hero_1: topic '%s' refused: outside /hero_1" % entry.name)
@@ -74,7 +74,7 @@ class TestDriverPolicy(OwnDriverCase):
             Declaration(PUB, 144, "/hero_3/md5", "std_msgs/String", "*"),
             Declaration(PUB, 145, "/hero_3/\xff\xfe", "std_msgs/String", STRING_MD5),
         ]
-        driver = self.start()
+        driver = self.share()
         self.dial(driver, 3, declarations=[*STOCK_DECLARATIONS, *evil])
         for text in ("not a ROS name", "more than 128", "package/Type", "hexadecimal"):
             driver.wait_line("hero_3: topic .* refused: .*" + text)
@@ -98,7 +98,7 @@ class TestDriverPolicy(OwnDriverCase):
         ]
         changed.append(Declaration(PUB, 140, "/{}/battery", "hero_common/Battery", WRONG_MD5))
         changed.append(Declaration(PUB, 141, "/{}/alien", "alien_msgs/Saucer", WRONG_MD5))
-        driver = self.start()
+        driver = self.share()
         robot = self.dial(driver, 4, declarations=changed)
         line = driver.wait_line("hero_4: topic /hero_4/encoder refused")
         for part in (WRONG_MD5, Encoder._md5sum, "package hero_msgs"):
@@ -150,7 +150,7 @@ class TestDriverPolicy(OwnDriverCase):
         self.assertEqual(len(robot.payloads_on("led")), int(is_reached))
 
     def test_a_topic_redeclared_with_another_md5_gets_nothing_more(self):
-        driver = self.start()
+        driver = self.share()
         robot = self.dial(driver, 11)
         robot.answers["set_odom"] = lambda request: encode_answer(True, "set")
         light = make_publisher("/hero_11/led", ColorRGBA)
@@ -173,7 +173,7 @@ class TestDriverPolicy(OwnDriverCase):
         self.assertTrue(set_odom(0.0, 0.0, 0.0).success)
 
     def test_a_topic_redeclared_with_another_type_gets_that_only(self):
-        driver = self.start()
+        driver = self.share()
         robot = self.dial(driver, 12)
         light = make_publisher("/hero_12/led", ColorRGBA)
         self.assert_reached(robot, light, True)
@@ -191,7 +191,7 @@ class TestDriverPolicy(OwnDriverCase):
             Declaration(PUB, 129, "/tf", "std_msgs/String", STRING_MD5) if entry.name == "/tf" else entry
             for entry in STOCK_DECLARATIONS
         ]
-        driver = self.start()
+        driver = self.share()
         evil, good = self.dial(driver, 20, declarations=wrong), self.dial(driver, 21)
         transforms = Recorder("/tf", TFMessage)
         for _ in range(5):
@@ -214,7 +214,7 @@ class TestDriverPolicy(OwnDriverCase):
         rospy.set_param("/hero_5/nested", {"a": {"b": 1}})
         rospy.set_param("/hero_55/speed", 9.0)
         rospy.set_param("/secret", 42)
-        driver = self.start()
+        driver = self.share()
         robot = self.dial(driver, 5)
         for name, answer in (
             ("/hero_5/speed", ([], [0.25], [])),
@@ -250,7 +250,7 @@ class TestDriverPolicy(OwnDriverCase):
             Declaration(CLIENT_REQUESTS, 141, "/launch_rocket", "std_srvs/Trigger", TRIGGER_REQUEST_MD5),
             Declaration(CLIENT_ANSWERS, 121, "/launch_rocket", "std_srvs/Trigger", ANSWER_MD5),
         ]
-        driver = self.start()
+        driver = self.share()
         robot = self.dial(driver, 7, declarations=[*STOCK_DECLARATIONS, *clients])
         driver.wait_line("hero_7: topic '/launch_rocket' refused")
         robot.send_packet(141, b"")

@@ -1,0 +1,171 @@
+"""One robot and the driver's way out to it, in the driver's own time: no socket, no thread, no machine to wait for.
+
+The driver's parts are the real ones from the bridge to the link; the link is a network with a delay, and at its other
+end is a robot that reads every 51 ms, by the firmware's rules (fake_motors).
+"""
+
+import contextlib
+import heapq
+import struct
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+from unittest import mock
+
+from hero_driver import command_sender, stop_delivery
+from hero_driver.commands.velocity_shaper import STOP_PAYLOADS
+from hero_driver.fleet.namespaces import identify
+from hero_driver.peer import Peer
+from hero_driver.ros import robot_bridge
+from hero_driver.rosserial import packets
+from hero_driver.rosserial.session import Session, SessionLimits
+
+sys.path.append(str(Path(__file__).parents[1] / "rostest"))
+from fake_motors import FakeMotors
+from fake_robot import (
+    ENCODER_INTERVAL_S,
+    READ_CYCLE_S,
+    STOCK_DECLARATIONS,
+    SUB,
+    WINDOW_LENGTH,
+    FakeRobot,
+)
+
+VELOCITY = "/hero_1/velocity_controller/cmd_vel"
+POSITION = "/hero_1/position_controller/cmd_vel"
+MOTORS = "/hero_1/cmd_motor"
+
+
+class Clock:
+    """The driver's time, and what it wants to do later."""
+
+    def __init__(self):
+        self.now_s = 100.0
+        self._due = []
+        self._count = 0
+
+    def monotonic(self):
+        return self.now_s
+
+    def call_later(self, delay_s, call):
+        self._count += 1
+        heapq.heappush(self._due, (self.now_s + delay_s, self._count, call))
+
+    def run(self, duration_s):
+        end_s = self.now_s + duration_s
+        while self._due and self._due[0][0] <= end_s:
+            self.now_s, _, call = heapq.heappop(self._due)
+            call()
+        self.now_s = end_s
+
+    @contextlib.contextmanager
+    def is_the_drivers(self):
+        """Let the driver's parts see this time."""
+        with contextlib.ExitStack() as stack:
+            for module in (command_sender, stop_delivery, robot_bridge):
+                stack.enter_context(mock.patch.object(module, "time", self))
+            yield self
+
+
+class CommandedRobot:
+    """The robot, the network to it, and the driver's parts that command it.
+
+    Attributes:
+        writes: (s, bytes), one for each time that the driver wrote to the socket.
+        taken: (s, topic name, payload), as the robot read them.
+        network_s: time from the driver to the robot's TCP; the acknowledgement takes as long again.
+    """
+
+    def __init__(self, clock, network_s=0.0, phase_s=0.0, has_readings=False):
+        self.clock = clock
+        self.network_s = network_s
+        self.writes = []
+        self.taken = []
+        self.motors = FakeMotors()
+        self.closed = False
+        self.handed_length = 0
+        self.warnings = []
+        self._acknowledged_length = 0
+        self._buffer = b""
+        self._reader = packets.PacketReader()
+        context = SimpleNamespace(
+            command_max_age_s=10.0, log=None, max_names=100, is_stopped=lambda: False, add_transform=None
+        )
+        registrar = SimpleNamespace(submit=lambda job, **_: True)  # nothing is registered with a master
+        self.bridge = robot_bridge.RobotBridge(identify("/hero_1/odom"), None, context, registrar)
+        self.bridge.attach()
+        self.peer = Peer(self, Session(SessionLimits(), clock.now_s), None, bridge=self.bridge)
+        self._names = {}
+        subscribed = FakeRobot(1, [entry for entry in STOCK_DECLARATIONS if entry.kind == SUB])
+        for event in self.peer.session.receive_bytes(subscribed.encode_declarations(), clock.now_s, 0.0):
+            self.bridge.declare(event.topic, event.topic.info.name)
+            self._names[event.topic.info.topic_id] = event.topic.info.name
+        self.sender = command_sender.CommandSender(
+            clock.call_later, lambda _: self.peer, lambda: False, self._warn
+        )
+        self.is_stopped = False
+        self.stops = stop_delivery.StopDelivery(
+            clock.call_later, lambda: self.is_stopped, lambda: None, self._warn
+        )
+        clock.call_later(phase_s, self._read)
+        if has_readings:
+            clock.call_later(phase_s, self._send_reading)
+
+    def _warn(self, _, text):
+        self.warnings.append(text)
+
+    # What the driver's parts know of a link.
+
+    def send_packet(self, data):
+        self.writes.append((self.clock.now_s, data))
+        self.handed_length += len(data)
+        handed_length = self.handed_length
+
+        def arrive():
+            self._buffer += data
+            self.clock.call_later(self.network_s, acknowledge)
+
+        def acknowledge():
+            self._acknowledged_length = handed_length
+
+        self.clock.call_later(self.network_s, arrive)
+
+    def read_unacknowledged_length(self):
+        return self.handed_length - self._acknowledged_length
+
+    # The robot.
+
+    def _read(self):
+        data, self._buffer = self._buffer[:WINDOW_LENGTH], self._buffer[WINDOW_LENGTH:]
+        now_s = self.clock.now_s
+        self.motors.begin_read(now_s)
+        for packet in self._reader.receive_bytes(data):
+            name = self._names[packet.topic_id]
+            self.taken.append((now_s, name, packet.payload))
+            if name == MOTORS:
+                self.motors.take_pulses(packet.payload)
+            else:
+                self.motors.take_velocity(name, not any(packet.payload))
+        self.clock.call_later(READ_CYCLE_S, self._read)
+
+    def _send_reading(self):
+        ticks = self.motors.count_ticks(self.clock.now_s)
+        self.peer.session.last_receive_s = self.clock.now_s
+        self.bridge.wheels.read_ticks(ticks, ticks)
+        self.clock.call_later(ENCODER_INTERVAL_S, self._send_reading)
+
+    # The program.
+
+    def command(self, name, payload):
+        """Offer a motion command, as the subscriber to its topic does."""
+        kind = "hero_msgs/Motor" if name == MOTORS else "geometry_msgs/Twist"
+        self.bridge.commands.offer_motion(name, payload, STOP_PAYLOADS[kind], self.clock.now_s)
+        self.sender.send_commands(self.bridge)
+
+    def drive(self, linear_m_s, name=VELOCITY):
+        """Offer a Twist."""
+        self.command(name, struct.pack("<6d", linear_m_s, 0.0, 0.0, 0.0, 0.0, 0.0))
+
+    def list_speeds(self, name=VELOCITY):
+        """Return (s, m/s) of each Twist that the robot read on a topic."""
+        return [(at_s, struct.unpack("<6d", payload)[0]) for at_s, topic, payload in self.taken if topic == name]
