@@ -13,11 +13,10 @@ from ..world.kinematics import Pose, join_wheels
 
 __all__ = ["WheelOdometry"]
 
-FILTER_MEASURE_ERROR = 1.0
 FILTER_FIRST_ERROR = 1.0
 FILTER_PROCESS_NOISE_S_M = 10.0
-"""Kalman filter in front of the speeds. Only the ratios count; they reproduce to five digits the decay of the
-speeds that the stock robot sends after a stop."""
+"""Kalman filter in front of the speeds, with errors in units of a measurement's. They reproduce to five digits the decay
+of the speeds that the stock robot sends after a stop."""
 
 
 class _SpeedFilter:
@@ -28,10 +27,10 @@ class _SpeedFilter:
         self._error = FILTER_FIRST_ERROR
 
     def update(self, speed_m_s: float) -> float:
-        gain = self._error / (self._error + FILTER_MEASURE_ERROR)
+        gain = self._error / (self._error + 1.0)
         change_m_s = gain * (speed_m_s - self.value_m_s)
         self.value_m_s += change_m_s
-        self._error = (1.0 - gain) * self._error + abs(change_m_s) * FILTER_PROCESS_NOISE_S_M
+        self._error = abs(change_m_s) * FILTER_PROCESS_NOISE_S_M + gain
         return self.value_m_s
 
 

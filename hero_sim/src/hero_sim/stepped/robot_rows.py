@@ -57,7 +57,6 @@ class RobotRows:
         now_ms: how far everything has been advanced.
         world: ground truth.
         odometry: x m, y m, yaw rad in hero_N/odom (R, 3), as the driver computes it from the ticks.
-        velocities: linear m/s, angular rad/s in hero_N/base_link (R, 2), also from the ticks.
         ticks: of both wheels since the odometry was last set (R, 2), whole numbers, read every 34 ms.
         odometry_ms: when the program received these (R,).
         proximity_m: ranges from the robot's center (R, 8), front first, counter-clockwise; inf nothing in
@@ -81,14 +80,13 @@ class RobotRows:
         self.on_cycle: List[Hook] = []
         self.on_scan: List[Hook] = []
         self._rows = np.arange(rows)
-        self._all = np.ones((rows, 1), dtype=bool)
         self._lights = np.zeros((rows, 4), dtype=np.float32)
         self._light_end_ms = np.zeros(rows, dtype=np.int64)
         errors = world.errors
         self._calibration_counts_m2 = calibrate(errors.alpha_counts_m2, errors.beta_counts)
         self._encoders = WheelEncoders(world)
         self._odometry = TickOdometryRows(rows)
-        self.odometry, self.velocities = self._odometry.poses, self._odometry.velocities
+        self.odometry = self._odometry.poses
         self._servos = ServoPulses(world, np.rint(errors.servo_center_us))
         self._velocity = WheelControllers(rows, VELOCITY_GAINS, VELOCITY_LIMIT_US, VELOCITY_WATCHDOG_MS)
         self._position = WheelControllers(rows, POSITION_GAINS, POSITION_LIMIT_US, POSITION_WATCHDOG_MS)
@@ -149,6 +147,11 @@ class RobotRows:
         """Set the constants of the eight sensors of one robot, rear first; nan stands for not calibrated."""
         self._calibration_counts_m2[row] = constants_counts_m2
 
+    @property
+    def velocities(self) -> np.ndarray:
+        """Linear m/s and angular rad/s in hero_N/base_link (R, 2), as the driver computes them from the ticks."""
+        return self._odometry.measure_velocities()
+
     # -- time passes -----------------------------------------------------------------------------------------
 
     def advance(self, until_ms: int) -> None:
@@ -187,7 +190,7 @@ class RobotRows:
             self.ranges_m[:] = measure_ranges(self.counts, self._calibration_counts_m2)
             self.proximity_m[:] = correct_ranges(self.ranges_m)
             self.scan_ms[:] = now_ms
-        self._encoders.read(now_ms, self._all)
+        self._encoders.read(now_ms, True)
         self.ticks[:] = self._encoders.ticks
         self._odometry.integrate(self.ticks, now_ms)
         self.odometry_ms[:] = now_ms
@@ -239,7 +242,7 @@ class RobotRows:
         self._servos.stop(controller.command(now_ms, rows, targets))
 
     def _receive_pulses(self, now_ms: int, rows: np.ndarray, values: np.ndarray) -> None:
-        pulses_us, which = np.zeros_like(self.ticks), np.zeros_like(self._all)
+        pulses_us, which = np.zeros_like(self.ticks), np.zeros((len(self.ticks), 1), dtype=bool)
         pulses_us[rows], which[rows] = values, True
         self._servos.write(now_ms, pulses_us, which)
 

@@ -9,6 +9,7 @@ import numpy as np
 from ..robot_constants import MOTOR_WATCHDOG_MS, PULSE_RANGE_US
 from ..world.robot_errors import MAX_WHEEL_M_S, SERVO_GAIN_M_S_US
 from ..world.world import World
+from .which import Which, assign
 
 __all__ = ["ServoPulses"]
 
@@ -38,22 +39,22 @@ class ServoPulses:
         self._stop_at_ms = np.zeros((rows, 1), dtype=np.int64)
         self._world = world
 
-    def write(self, now_ms: int, pulses_us: np.ndarray, which: np.ndarray) -> None:
-        """Write pulses (R, 2), limited to 1000..2000 us, to the robots which (R, 1, bool)."""
+    def write(self, now_ms: int, pulses_us: np.ndarray, which: Which) -> None:
+        """Write pulses (R, 2), limited to 1000..2000 us, to the robots which."""
         stop_at_ms = now_ms + MOTOR_WATCHDOG_MS + 1
-        np.copyto(self._stop_at_ms, stop_at_ms, where=which)
+        assign(self._stop_at_ms, stop_at_ms, which)
         self.check_ms = min(self.check_ms, stop_at_ms)
         changes = pulses_us != self.pulses_us
         changes |= ~self.attached
         changes &= which
         if not changes.any():
             return
-        np.copyto(self.pulses_us, pulses_us, where=which)
+        assign(self.pulses_us, pulses_us, which)
         self.attached |= which
-        np.copyto(self._world.commands_m_s, self._convert(np.clip(pulses_us, *PULSE_RANGE_US)), where=which)
+        assign(self._world.commands_m_s, self._convert(np.clip(pulses_us, *PULSE_RANGE_US)), which)
 
-    def drive(self, now_ms: int, outputs_us: np.ndarray, which: np.ndarray) -> None:
-        """Write outputs (R, 2) of a controller beyond the centers, forward positive, to the robots which (R, 1)."""
+    def drive(self, now_ms: int, outputs_us: np.ndarray, which: Which) -> None:
+        """Write outputs (R, 2) of a controller beyond the centers, forward positive, to the robots which."""
         self.write(now_ms, self.centers_us + _FORWARD * outputs_us, which)
 
     def stop(self, rows: np.ndarray) -> None:

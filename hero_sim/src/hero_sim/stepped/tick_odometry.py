@@ -12,7 +12,8 @@ import numpy as np
 
 from hero_driver.corrections.tick_odometry import TWIST_WINDOW
 
-from ..robot_constants import TICK_M, WHEEL_SEPARATION_M
+from ..robot_constants import TICK_M
+from ..world.kinematics import join_wheels
 
 __all__ = ["TickOdometryRows"]
 
@@ -26,13 +27,11 @@ class TickOdometryRows:
 
     Attributes:
         poses: x m, y m, yaw rad in frame hero_N/odom (R, 3).
-        velocities: linear m/s and angular rad/s over the last TWIST_WINDOW readings (R, 2).
     """
 
     def __init__(self, rows: int) -> None:
         """Begin at the origin, without a reading."""
         self.poses = np.zeros((rows, 3))
-        self.velocities = np.zeros((rows, 2))
         self._cosines, self._sines = np.ones(rows), np.zeros(rows)
         self._ticks = np.zeros((rows, 2))
         self._window_ticks = np.zeros((TWIST_WINDOW, rows, 2))
@@ -46,21 +45,18 @@ class TickOdometryRows:
         self.poses[row] = x_m, y_m, math.remainder(yaw_rad, 2.0 * math.pi)
         self._cosines[row], self._sines[row] = _find_direction(yaw_rad)
         self._ticks[row] = 0.0
-        self.velocities[row] = 0.0
         self._is_cleared[row] = self._any_cleared = True
 
     def integrate(self, ticks: np.ndarray, now_ms: int) -> None:
         """Take one reading of all counters (R, 2), with its stamp."""
         moved = ticks - self._ticks
         if moved.any():
-            self._move(moved[:, 0] * TICK_M, moved[:, 1] * TICK_M)
+            self._move(*join_wheels(*(moved * TICK_M).T))
         np.copyto(self._ticks, ticks)
-        self._measure_velocity(ticks, now_ms)
+        self._keep_reading(ticks, now_ms)
 
-    def _move(self, left_m: np.ndarray, right_m: np.ndarray) -> None:
-        """Follow the arcs that two wheels describe that run left_m and right_m at steady speeds."""
-        distance_m = (left_m + right_m) / 2.0
-        turn_rad = (right_m - left_m) / WHEEL_SEPARATION_M
+    def _move(self, distance_m: np.ndarray, turn_rad: np.ndarray) -> None:
+        """Follow arcs of these lengths and angles (R,)."""
         half_rad = turn_rad / 2.0
         # Two half turns; between them the robot is displaced along the chord.
         cosine, sine_by_angle = _turn_small(half_rad)
@@ -74,7 +70,7 @@ class TickOdometryRows:
         yaw_rad -= np.rint(yaw_rad / (2.0 * math.pi)) * (2.0 * math.pi)
         self.poses[:, 2] = yaw_rad
 
-    def _measure_velocity(self, ticks: np.ndarray, now_ms: int) -> None:
+    def _keep_reading(self, ticks: np.ndarray, now_ms: int) -> None:
         self._newest = (self._newest + 1) % TWIST_WINDOW
         self._window_ticks[self._newest], self._window_ms[self._newest] = ticks, now_ms
         if self._any_cleared:
@@ -82,12 +78,15 @@ class TickOdometryRows:
             self._window_ticks[:, self._is_cleared] = ticks[self._is_cleared]
             self._window_ms[:, self._is_cleared] = now_ms
             self._is_cleared[:] = self._any_cleared = False
+
+    def measure_velocities(self) -> np.ndarray:
+        """Return linear m/s and angular rad/s over the last TWIST_WINDOW readings (R, 2)."""
         oldest = (self._newest + 1) % TWIST_WINDOW
-        elapsed_s = np.maximum(now_ms - self._window_ms[oldest], 1) / 1000.0
-        speeds_m_s = (ticks - self._window_ticks[oldest]) * (TICK_M / elapsed_s)[:, None]
-        left_m_s, right_m_s = speeds_m_s[:, 0], speeds_m_s[:, 1]
-        self.velocities[:, 0] = (left_m_s + right_m_s) / 2.0
-        self.velocities[:, 1] = (right_m_s - left_m_s) / WHEEL_SEPARATION_M
+        elapsed_ms = np.maximum(self._window_ms[self._newest] - self._window_ms[oldest], 1)
+        rolled_m = (self._window_ticks[self._newest] - self._window_ticks[oldest]) * TICK_M
+        velocities = np.column_stack(join_wheels(*(rolled_m / (elapsed_ms / 1000.0)[:, None]).T))
+        velocities[self._is_cleared] = 0.0
+        return velocities
 
 
 def _turn_small(angle_rad: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:

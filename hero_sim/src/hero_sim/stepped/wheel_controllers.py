@@ -10,6 +10,7 @@ import numpy as np
 
 from ..robot.motor_pid import SAMPLE_MS, Gains
 from ..robot_constants import COMMAND_GAP_MS
+from .which import Which, assign, simplify
 
 __all__ = ["WheelControllers"]
 
@@ -80,24 +81,25 @@ class WheelControllers:
         for values in (self.outputs_us, self._sums_us, self._last_inputs):
             values[rows, wheels] = 0.0
 
-    def find_active(self, now_ms: int) -> np.ndarray:
-        """Return which controllers run (R, 1)."""
-        return self._watchdog_ms > now_ms - self._timeout_ms
+    def find_active(self, now_ms: int) -> Which:
+        """Return which controllers run."""
+        return simplify(self._watchdog_ms > now_ms - self._timeout_ms)
 
-    def run(self, now_ms: int, measured: np.ndarray, active: np.ndarray) -> None:
-        """Compute new outputs from what was measured (R, 2), for those robots of active (R, 1) for whom it is time."""
-        due = self._computed_ms <= now_ms - SAMPLE_MS
-        due &= active
-        if not due.any():
+    def run(self, now_ms: int, measured: np.ndarray, active: Which) -> None:
+        """Compute new outputs from what was measured (R, 2), for those active robots for whom it is time."""
+        is_due = self._computed_ms <= now_ms - SAMPLE_MS
+        is_due &= active
+        if not is_due.any():
             return
+        due = simplify(is_due)
         error = self.targets - measured
         sums_us = self._limit(self._sums_us + self._integral_step * error)
         damping_us = self._derivative_step * (measured - self._last_inputs)
         outputs_us = np.trunc(self._limit(self._proportional * error + sums_us - damping_us))
-        np.copyto(self._sums_us, sums_us, where=due)
-        np.copyto(self._last_inputs, measured, where=due)
-        np.copyto(self.outputs_us, outputs_us, where=due)
-        np.copyto(self._computed_ms, now_ms, where=due)
+        assign(self._sums_us, sums_us, due)
+        assign(self._last_inputs, measured, due)
+        assign(self.outputs_us, outputs_us, due)
+        assign(self._computed_ms, now_ms, due)
 
     def _limit(self, values_us: np.ndarray) -> np.ndarray:
         np.minimum(values_us, self._limit_us, out=values_us)

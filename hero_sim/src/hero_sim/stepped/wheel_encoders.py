@@ -5,9 +5,10 @@ Pure: numpy only, arrays over robots (R) and wheels (left, right); the rules of 
 
 import numpy as np
 
-from ..robot.wheel_odometry import FILTER_FIRST_ERROR, FILTER_MEASURE_ERROR, FILTER_PROCESS_NOISE_S_M
+from ..robot.wheel_odometry import FILTER_FIRST_ERROR, FILTER_PROCESS_NOISE_S_M
 from ..robot_constants import TICK_M
 from ..world.world import World
+from .which import Which, assign
 
 __all__ = ["WheelEncoders"]
 
@@ -39,24 +40,24 @@ class WheelEncoders:
         travels_m -= self._base_ticks
         return travels_m
 
-    def read(self, now_ms: int, which: np.ndarray) -> None:
-        """Read the counters and update the filtered speeds of the robots which (R, 1, bool)."""
+    def read(self, now_ms: int, which: Which) -> None:
+        """Read the counters and update the filtered speeds of the robots which."""
         ticks = self.count(now_ms)
         speeds_m_s = ticks - self.ticks
         speeds_m_s *= TICK_M
         speeds_m_s /= (now_ms - self._read_at_ms) / 1000.0
         # A one-dimensional Kalman filter whose process noise grows with each change of its own estimate.
-        gains = self._errors / (self._errors + FILTER_MEASURE_ERROR)
+        gains = self._errors / (self._errors + 1.0)
         changes_m_s = speeds_m_s
         changes_m_s -= self.filtered_m_s
         changes_m_s *= gains
-        errors = 1.0 - gains
-        errors *= self._errors
-        errors += np.abs(changes_m_s) * FILTER_PROCESS_NOISE_S_M
-        np.copyto(self.ticks, ticks, where=which)
-        np.copyto(self._errors, errors, where=which)
+        errors = np.abs(changes_m_s)
+        errors *= FILTER_PROCESS_NOISE_S_M
+        errors += gains
+        assign(self.ticks, ticks, which)
+        assign(self._errors, errors, which)
+        assign(self._read_at_ms, now_ms, which)
         np.add(self.filtered_m_s, changes_m_s, out=self.filtered_m_s, where=which)
-        np.copyto(self._read_at_ms, now_ms, where=which)
 
     def zero(self, row: int) -> None:
         """Zero the counters of one robot, as last read (Odometry.ino:234)."""

@@ -1,0 +1,23 @@
+"""Which robots take part in something: a mask over robots, or all of them, for which numpy is faster without a mask."""
+
+from typing import Union
+
+import numpy as np
+
+__all__ = ["Which", "assign", "simplify"]
+
+Which = Union[bool, np.ndarray]
+"""A mask (R, 1), or True for all robots."""
+
+
+def assign(target: np.ndarray, values: np.ndarray, which: Which) -> None:
+    """Copy values into target, both arrays over robots, for those that take part."""
+    if which is True:
+        target[...] = values
+    else:
+        np.copyto(target, values, where=which)
+
+
+def simplify(which: np.ndarray) -> Which:
+    """Return True instead of a mask of all robots."""
+    return True if which.all() else which
