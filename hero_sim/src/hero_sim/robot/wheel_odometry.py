@@ -15,8 +15,8 @@ __all__ = ["WheelOdometry"]
 
 FILTER_FIRST_ERROR = 1.0
 FILTER_PROCESS_NOISE_S_M = 10.0
-"""Kalman filter in front of the speeds, with errors in units of a measurement's. They reproduce to five digits the decay
-of the speeds that the stock robot sends after a stop."""
+"""Kalman filter in front of the speeds, with errors in units of a measurement's. They reproduce to five digits the
+decay of the speeds that the stock robot sends after a stop."""
 
 
 class _SpeedFilter:

@@ -1,8 +1,8 @@
 """The driver's shaping of motion commands, for one motion topic of all robots.
 
-Pure: numpy only, arrays over robots (R); the rules of VelocityShaper in hero_driver/commands: the newest command wins,
-commands are 60 ms apart, a stop is never dropped and is sent twice. Whoever reads what was sent has to look
-more often than once in 60 ms.
+Pure: numpy only, robots last in all arrays; the rules of VelocityShaper in hero_driver/commands: the newest command
+wins, commands are 60 ms apart, a stop is never dropped and is sent twice. What was sent has to be taken more often
+than once in 60 ms, as the robots' reads do, which are 51 ms apart.
 """
 
 import math
@@ -27,7 +27,7 @@ class Sent(NamedTuple):
 
     Attributes:
         rows: to which robots (K,), each once.
-        values: the commands (K, 2).
+        values: the commands (2, K).
         at_ms: when (K,).
     """
 
@@ -36,7 +36,7 @@ class Sent(NamedTuple):
     at_ms: np.ndarray
 
 
-_NOTHING = Sent(np.empty(0, dtype=np.int64), np.empty((0, 2)), np.empty(0, dtype=np.int64))
+_NOTHING = Sent(np.empty(0, dtype=np.int64), np.empty((2, 0)), np.empty(0, dtype=np.int64))
 
 
 class CommandShaper:
@@ -47,11 +47,11 @@ class CommandShaper:
         self._stop = stop
         self._stop_waits = np.zeros(rows, dtype=bool)
         self._newest_waits = np.zeros(rows, dtype=bool)
-        self._newest = np.zeros((rows, 2))
+        self._newest = np.zeros((2, rows))
         self._repeats = np.zeros(rows, dtype=np.int64)
         self._next_ms = np.zeros(rows, dtype=np.int64)
         self._is_sent = np.zeros(rows, dtype=bool)
-        self._sent = np.zeros((rows, 2))
+        self._sent = np.zeros((2, rows))
         self._sent_ms = np.zeros(rows, dtype=np.int64)
         self._idle = True
         self._collected: Dict[int, Tuple[float, float]] = {}
@@ -71,17 +71,17 @@ class CommandShaper:
             self._collected[rows] = (first, second)
             return
         rows = np.asarray(rows)
-        values = np.empty((rows.size, 2))
-        values[:, 0], values[:, 1] = first, second
+        values = np.empty((2, rows.size))
+        values[0], values[1] = first, second
         if not np.isfinite(values).all():
-            wrong = rows[~np.isfinite(values).all(axis=1)]
+            wrong = rows.reshape(-1)[~np.isfinite(values).all(axis=0)]
             raise ValueError("the commands for robot rows %s must be finite" % wrong.tolist())
         self._shape(now_ms, rows.reshape(-1), values)
 
     def _shape_collected(self) -> None:
         """Shape the commands for single robots that came at one time, all together: that is much faster."""
         if self._collected:
-            rows, values = np.array(list(self._collected)), np.array(list(self._collected.values()), dtype=float)
+            rows, values = np.array(list(self._collected)), np.array(list(self._collected.values()), dtype=float).T
             self._collected.clear()
             self._shape(self._collected_ms, rows, values)
 
@@ -90,10 +90,10 @@ class CommandShaper:
             self._send_due(now_ms)
         # What is offered to a robot that waits for nothing goes at once.
         self._next_ms[rows] = np.maximum(self._next_ms[rows], now_ms)
-        stops = (values == self._stop).all(axis=1)
+        stops = (values == self._stop).all(axis=0)
         self._stop_waits[rows] |= stops
         self._newest_waits[rows] = ~stops
-        self._newest[rows] = values.astype(np.float32)  # a robot computes in single precision
+        self._newest[:, rows] = values.astype(np.float32)  # a robot computes in single precision
         self._idle = False
         self._send_due(now_ms)
 
@@ -115,8 +115,8 @@ class CommandShaper:
         self._repeats[moves] = 0
         self._stop_waits[stops] = False
         self._newest_waits[moves] = False
-        self._sent[stops] = self._stop
-        np.copyto(self._sent, self._newest, where=moves[:, None])
+        self._sent[:, stops] = self._stop
+        np.copyto(self._sent, self._newest, where=moves)
         np.copyto(self._sent_ms, self._next_ms, where=due)
         self._next_ms[due] += INTERVAL_MS
         self._is_sent |= due
@@ -128,6 +128,6 @@ class CommandShaper:
             return _NOTHING
         self._send_due(now_ms)
         rows = np.flatnonzero(self._is_sent)
-        sent = Sent(rows, self._sent[rows], self._sent_ms[rows])
+        sent = Sent(rows, self._sent[:, rows], self._sent_ms[rows])
         self._is_sent[rows] = False
         return sent

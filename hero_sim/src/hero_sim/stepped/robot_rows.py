@@ -71,7 +71,8 @@ class RobotRows:
         rows = len(world.poses)
         self.world = world
         self.now_ms = now_ms = world.time_ms
-        self.ticks = np.zeros((rows, 2))
+        self._ticks = np.zeros((2, rows))
+        self.ticks = self._ticks.T
         self.odometry_ms = np.full(rows, now_ms)
         self.counts = np.zeros((rows, 8))
         self.ranges_m = np.zeros((rows, 8))
@@ -86,11 +87,11 @@ class RobotRows:
         self._calibration_counts_m2 = calibrate(errors.alpha_counts_m2, errors.beta_counts)
         self._encoders = WheelEncoders(world)
         self._odometry = TickOdometryRows(rows)
-        self.odometry = self._odometry.poses
-        self._servos = ServoPulses(world, np.rint(errors.servo_center_us))
+        self.odometry = self._odometry.poses.T
+        self._servos = ServoPulses(world, np.rint(errors.servo_center_us.T))
         self._velocity = WheelControllers(rows, VELOCITY_GAINS, VELOCITY_LIMIT_US, VELOCITY_WATCHDOG_MS)
         self._position = WheelControllers(rows, POSITION_GAINS, POSITION_LIMIT_US, POSITION_WATCHDOG_MS)
-        self._start_ticks = np.zeros((rows, 2))
+        self._start_ticks = np.zeros((2, rows))
         self._velocity_commands = CommandShaper(rows, 0.0)
         self._position_commands = CommandShaper(rows, 0.0)
         self._pulse_commands = CommandShaper(rows, MOTOR_CENTER_US)
@@ -141,7 +142,7 @@ class RobotRows:
 
     def set_motor_centers(self, row: int, centers_us: Sequence[int]) -> None:
         """Set the pulses at which the left and right wheel of one robot should rest, from the next command on."""
-        self._servos.centers_us[row] = centers_us
+        self._servos.centers_us[:, row] = centers_us
 
     def set_infrared_calibration(self, row: int, constants_counts_m2: Sequence[float]) -> None:
         """Set the constants of the eight sensors of one robot, rear first; nan stands for not calibrated."""
@@ -150,7 +151,7 @@ class RobotRows:
     @property
     def velocities(self) -> np.ndarray:
         """Linear m/s and angular rad/s in hero_N/base_link (R, 2), as the driver computes them from the ticks."""
-        return self._odometry.measure_velocities()
+        return self._odometry.measure_velocities().T
 
     # -- time passes -----------------------------------------------------------------------------------------
 
@@ -191,8 +192,8 @@ class RobotRows:
             self.proximity_m[:] = correct_ranges(self.ranges_m)
             self.scan_ms[:] = now_ms
         self._encoders.read(now_ms, True)
-        self.ticks[:] = self._encoders.ticks
-        self._odometry.integrate(self.ticks, now_ms)
+        self._ticks[:] = self._encoders.ticks
+        self._odometry.integrate(self._ticks, now_ms)
         self.odometry_ms[:] = now_ms
         self._cycle_ms = now_ms + CYCLE_MS
         if self._cycle_ms - self._scan_ms > LASER_GATE_MS:
@@ -230,24 +231,24 @@ class RobotRows:
 
     def _receive_velocities(self, now_ms: int, rows: np.ndarray, values: np.ndarray) -> None:
         accepted = self._velocity.find_accepted(now_ms, rows)
-        self._command(self._velocity, now_ms, rows[accepted], _limit_to_wheels(values[accepted]))
+        self._command(self._velocity, now_ms, rows[accepted], _limit_to_wheels(values[:, accepted]))
 
     def _receive_positions(self, now_ms: int, rows: np.ndarray, values: np.ndarray) -> None:
         accepted = self._position.find_accepted(now_ms, rows)
-        rows, values = rows[accepted], values[accepted]
-        self._start_ticks[rows] = self._encoders.count(now_ms)[rows]
-        self._command(self._position, now_ms, rows, _limit_to_wheels(values) / TICK_M)
+        rows = rows[accepted]
+        self._start_ticks[:, rows] = self._encoders.count(now_ms)[:, rows]
+        self._command(self._position, now_ms, rows, _limit_to_wheels(values[:, accepted]) / TICK_M)
 
     def _command(self, controller: WheelControllers, now_ms: int, rows: np.ndarray, targets: np.ndarray) -> None:
         self._servos.stop(controller.command(now_ms, rows, targets))
 
     def _receive_pulses(self, now_ms: int, rows: np.ndarray, values: np.ndarray) -> None:
-        pulses_us, which = np.zeros_like(self.ticks), np.zeros((len(self.ticks), 1), dtype=bool)
-        pulses_us[rows], which[rows] = values, True
+        pulses_us, which = np.zeros_like(self._ticks), np.zeros(len(self._rows), dtype=bool)
+        pulses_us[:, rows], which[rows] = values, True
         self._servos.write(now_ms, pulses_us, which)
 
 
 def _limit_to_wheels(twists: np.ndarray) -> np.ndarray:
-    """Return the wheels' speeds in m/s (K, 2) for Twists (K, 2) within the firmware's limits."""
-    limits = np.array([MAX_LINEAR_M_S, MAX_ANGULAR_RAD_S])
-    return np.column_stack(split_to_wheels(*np.maximum(np.minimum(twists, limits), -limits).T))
+    """Return the wheels' speeds in m/s (2, K) for Twists (2, K) within the firmware's limits."""
+    limits = np.array([[MAX_LINEAR_M_S], [MAX_ANGULAR_RAD_S]])
+    return np.array(split_to_wheels(*np.maximum(np.minimum(twists, limits), -limits)))

@@ -1,7 +1,7 @@
 """The firmware's velocity and position controller with their PIDs, for all robots.
 
-Pure: numpy only, arrays over robots (R) and wheels (left, right); the rules of Controller in robot/motor_control.py and
-of robot/motor_pid.py.
+Pure: numpy only, arrays (2, R), left wheels and right wheels; the rules of Controller in robot/motor_control.py and of
+robot/motor_pid.py.
 """
 
 from typing import Sequence, Union
@@ -22,35 +22,35 @@ class WheelControllers:
     """One of the two controllers of each robot.
 
     Attributes:
-        targets: of the wheels (R, 2), m/s or ticks.
-        outputs_us: last outputs (R, 2), whole microseconds beyond the centers, forward positive.
+        targets: of the wheels (2, R), m/s or ticks.
+        outputs_us: last outputs (2, R), whole microseconds beyond the centers, forward positive.
         end_ms: when the last of them is stopped by its watchdog, unless commands come.
     """
 
     def __init__(self, rows: int, gains: Gains, limit_us: float, timeout_ms: int) -> None:
         """Begin without a command; the outputs stay within limit_us either way."""
-        self.targets = np.zeros((rows, 2))
-        self.outputs_us = np.zeros((rows, 2))
+        self.targets = np.zeros((2, rows))
+        self.outputs_us = np.zeros((2, rows))
         self.end_ms = _LONG_AGO_MS
         self._limit_us = limit_us
         self._timeout_ms = timeout_ms
-        self._gains = np.tile(gains, (rows, 2, 1)).astype(float)
-        self._watchdog_ms = np.full((rows, 1), _LONG_AGO_MS, dtype=np.int64)
-        self._computed_ms = np.full((rows, 1), _LONG_AGO_MS, dtype=np.int64)
-        self._sums_us = np.zeros((rows, 2))
-        self._last_inputs = np.zeros((rows, 2))
+        self._gains = np.tile(np.reshape(gains, (3, 1, 1)), (1, 2, rows))
+        self._watchdog_ms = np.full(rows, _LONG_AGO_MS, dtype=np.int64)
+        self._computed_ms = np.full(rows, _LONG_AGO_MS, dtype=np.int64)
+        self._sums_us = np.zeros((2, rows))
+        self._last_inputs = np.zeros((2, rows))
         self._scale_gains()
 
     def _scale_gains(self) -> None:
-        self._proportional = self._gains[:, :, 0].copy()
-        self._integral_step = self._gains[:, :, 1] * _SAMPLE_S
-        self._derivative_step = self._gains[:, :, 2] / _SAMPLE_S
+        self._proportional = self._gains[0]
+        self._integral_step = self._gains[1] * _SAMPLE_S
+        self._derivative_step = self._gains[2] / _SAMPLE_S
 
     def set_gains(self, row: int, gains: Sequence[float]) -> None:
         """Set lkp lki lkd rkp rki rkd of one robot; the firmware ignores a wheel's three with a negative one."""
         for wheel, three in enumerate((gains[:3], gains[3:])):
             if min(three) >= 0.0:
-                self._gains[row, wheel] = three
+                self._gains[:, wheel, row] = three
         self._scale_gains()
 
     def find_accepted(self, now_ms: int, rows: np.ndarray) -> np.ndarray:
@@ -58,35 +58,35 @@ class WheelControllers:
 
         A command that comes within 50 ms of the last accepted motion is dropped, a zero too.
         """
-        return now_ms - self._watchdog_ms[rows, 0] >= COMMAND_GAP_MS
+        return now_ms - self._watchdog_ms[rows] >= COMMAND_GAP_MS
 
     def command(self, now_ms: int, rows: np.ndarray, targets: np.ndarray) -> np.ndarray:
-        """Set the targets (K, 2) of the robots at rows (K,), each named once; return those that zeros have stopped.
+        """Set the targets (2, K) of the robots at rows (K,), each named once; return those that zeros have stopped.
 
         A wheel that has to reverse starts its PID anew.
         """
-        moves = targets.any(axis=1)
-        stopped, rows, targets = rows[~moves], rows[moves], targets[moves]
+        moves = targets.any(axis=0)
+        stopped, rows, targets = rows[~moves], rows[moves], targets[:, moves]
         self._watchdog_ms[stopped] = _LONG_AGO_MS
-        self._reset(stopped, slice(None))
+        self._reset(slice(None), stopped)
         if len(rows):
-            places, wheels = np.nonzero(targets * self.targets[rows] < 0.0)
-            self._reset(rows[places], wheels)
-            self.targets[rows] = targets
+            wheels, places = np.nonzero(targets * self.targets[:, rows] < 0.0)
+            self._reset(wheels, rows[places])
+            self.targets[:, rows] = targets
             self._watchdog_ms[rows] = now_ms
             self.end_ms = now_ms + self._timeout_ms
         return stopped
 
-    def _reset(self, rows: np.ndarray, wheels: Union[slice, np.ndarray]) -> None:
+    def _reset(self, wheels: Union[slice, np.ndarray], rows: np.ndarray) -> None:
         for values in (self.outputs_us, self._sums_us, self._last_inputs):
-            values[rows, wheels] = 0.0
+            values[wheels, rows] = 0.0
 
     def find_active(self, now_ms: int) -> Which:
         """Return which controllers run."""
         return simplify(self._watchdog_ms > now_ms - self._timeout_ms)
 
     def run(self, now_ms: int, measured: np.ndarray, active: Which) -> None:
-        """Compute new outputs from what was measured (R, 2), for those active robots for whom it is time."""
+        """Compute new outputs from what was measured (2, R), for those active robots for whom it is time."""
         is_due = self._computed_ms <= now_ms - SAMPLE_MS
         is_due &= active
         if not is_due.any():

@@ -1,6 +1,6 @@
 """The wheel encoders of all robots, and the firmware's filtered wheel speeds.
 
-Pure: numpy only, arrays over robots (R) and wheels (left, right); the rules of robot/wheel_odometry.py.
+Pure: numpy only, arrays (2, R), left wheels and right wheels; the rules of robot/wheel_odometry.py.
 """
 
 import numpy as np
@@ -17,24 +17,24 @@ class WheelEncoders:
     """Counters and speed filters.
 
     Attributes:
-        ticks: counts (R, 2) since the odometry was last set, as last read.
-        filtered_m_s: speeds (R, 2) behind the filter, as last read.
+        ticks: counts (2, R) since the odometry was last set, as last read.
+        filtered_m_s: speeds (2, R) behind the filter, as last read.
     """
 
     def __init__(self, world: World) -> None:
         """Count from the present travel of the world's wheels, which are at rest."""
+        self._travels_m, self._speeds_m_s = world.travels_m.T, world.speeds_m_s.T
         self._world = world
-        self.ticks = np.zeros_like(world.travels_m)
-        self.filtered_m_s = np.zeros_like(world.travels_m)
-        self._base_ticks = np.floor(world.travels_m / TICK_M)
-        self._errors = np.full_like(world.travels_m, FILTER_FIRST_ERROR)
-        self._read_at_ms = np.full((len(world.travels_m), 1), world.time_ms - 1)
+        self.ticks = np.zeros_like(self._travels_m)
+        self.filtered_m_s = np.zeros_like(self._travels_m)
+        self._base_ticks = np.floor(self._travels_m / TICK_M)
+        self._errors = np.full_like(self._travels_m, FILTER_FIRST_ERROR)
+        self._read_at_ms = np.full(self._travels_m.shape[1], world.time_ms - 1)
 
     def count(self, now_ms: int) -> np.ndarray:
-        """Return the counters (R, 2) at now_ms, a time within the running physics step, without reading them."""
-        world = self._world
-        travels_m = world.speeds_m_s * ((now_ms - world.time_ms) / 1000.0)
-        travels_m += world.travels_m
+        """Return the counters (2, R) at now_ms, a time within the running physics step, without reading them."""
+        travels_m = self._speeds_m_s * ((now_ms - self._world.time_ms) / 1000.0)
+        travels_m += self._travels_m
         travels_m /= TICK_M
         np.floor(travels_m, out=travels_m)
         travels_m -= self._base_ticks
@@ -61,5 +61,5 @@ class WheelEncoders:
 
     def zero(self, row: int) -> None:
         """Zero the counters of one robot, as last read (Odometry.ino:234)."""
-        self._base_ticks[row] += self.ticks[row]
-        self.ticks[row] = 0.0
+        self._base_ticks[:, row] += self.ticks[:, row]
+        self.ticks[:, row] = 0.0

@@ -7,11 +7,11 @@ import numpy as np
 __all__ = ["Which", "assign", "simplify"]
 
 Which = Union[bool, np.ndarray]
-"""A mask (R, 1), or True for all robots."""
+"""A mask (R,), or True for all robots."""
 
 
-def assign(target: np.ndarray, values: np.ndarray, which: Which) -> None:
-    """Copy values into target, both arrays over robots, for those that take part."""
+def assign(target: np.ndarray, values: Union[int, np.ndarray], which: Which) -> None:
+    """Copy values into target, arrays with robots last, for those that take part."""
     if which is True:
         target[...] = values
     else:
