@@ -10,49 +10,21 @@ from .errors import OptionError
 from .faults import FaultInjector, parse_fault
 from .link.tcp_link import TcpLink
 from .link.wifi import PROFILES, Radio
+from .population import Rngs, build_world
 from .robot.firmware import Firmware
 from .robot.flash import Flash
 from .robot.ranges import FACTORY_CALIBRATION_COUNTS_M2, calibrate
 from .simulator import Simulator
 from .swarm import Swarm
-from .world.arena import build_default, place_robots
-from .world.arena_file import load_arena
 from .world.body import Body
-from .world.robot_errors import SERVO_CENTER_US, RobotErrors, draw_errors, set_known
-from .world.world import World
+from .world.robot_errors import SERVO_CENTER_US, RobotErrors
 
-__all__ = ["build_errors", "build_simulator", "build_swarm"]
+__all__ = ["build_simulator", "build_swarm"]
 
 BOOT_SPREAD_MS = 200
 """Robots that are started together come up within this time of each other."""
 
 Report = Callable[[str], None]
-
-
-class _Rngs:
-    """One stream of random numbers for each purpose, so that one more draw here does not change all others."""
-
-    def __init__(self, options: argparse.Namespace) -> None:
-        def make(seed: int) -> np.random.RandomState:
-            return np.random.RandomState(seed)
-
-        seeds = make(options.seed).randint(0, 2**31 - 1, size=3 + 2 * options.count)
-        self.places, self.world, self.boot = map(make, seeds[:3])
-        self.robots, self.radios = list(map(make, seeds[3::2])), list(map(make, seeds[4::2]))
-
-
-def build_errors(options: argparse.Namespace) -> RobotErrors:
-    """Return how the robots differ: drawn from the seed, then known errors put over it.
-
-    Raises: OptionError for an error that cannot be set.
-    """
-    # By id, so that a robot is the same one in any swarm.
-    ids = range(options.first_id, options.first_id + options.count)
-    rngs = [np.random.RandomState([options.seed, robot_id % 2**32]) for robot_id in ids]
-    errors = draw_errors(rngs, 0.0 if options.perfect else 1.0)
-    for text in options.error:
-        set_known(errors, options.first_id, text)
-    return errors
 
 
 def _build_flash(options: argparse.Namespace, errors: RobotErrors, index: int) -> Flash:
@@ -76,14 +48,11 @@ def build_swarm(options: argparse.Namespace, addresses: List[str], report: Repor
 
     Raises: OptionError for an arena in which the robots find no place.
     """
-    rngs = _Rngs(options)
-    arena = load_arena(options.arena) if options.arena else build_default(options.count)
-    poses = place_robots(arena, options.count, rngs.places)
-    errors = build_errors(options)
-    world = World(arena, poses, [rngs.world], errors)
+    rngs = Rngs(options)
+    world = build_world(options)
     robots: List[Firmware] = []
     for index, address in enumerate(addresses):
-        body, flash = Body(world, index), _build_flash(options, errors, index)
+        body, flash = Body(world, index), _build_flash(options, world.errors, index)
         robot_id = options.first_id + index
         robots.append(Firmware(robot_id, body, flash, rngs.robots[index], address, options.imu_hat, report))
     swarm = Swarm(world, robots)
@@ -99,7 +68,7 @@ def build_simulator(options: argparse.Namespace, report: Report) -> Tuple[Simula
     link = TcpLink(options.count, options.host, options.port, options.first_id)
     try:
         swarm = build_swarm(options, link.own_addresses, report)
-        rngs = _Rngs(options)
+        rngs = Rngs(options)
         radios = [Radio(PROFILES[options.wifi], rng) for rng in rngs.radios]
         simulator = Simulator(swarm, link, radios, report, options.speed)
         injector = FaultInjector(simulator, report)

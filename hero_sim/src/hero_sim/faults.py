@@ -7,14 +7,12 @@ from typing import TYPE_CHECKING, Callable, Dict, List, NamedTuple, Optional, Tu
 
 from .errors import OptionError
 from .key_values import parse_values
+from .robot_constants import LARGEST_ID
 
 if TYPE_CHECKING:
     from .simulator import Simulator
 
-__all__ = ["KINDS", "LARGEST_ID", "LONGEST_S", "Fault", "FaultInjector", "parse_fault"]
-
-LARGEST_ID = 2**31 - 1
-"""Of hero_msgs/Robot."""
+__all__ = ["KINDS", "LONGEST_S", "Fault", "FaultInjector", "parse_fault"]
 
 LONGEST_S = 1e9
 """Some thirty years."""

@@ -6,9 +6,10 @@ import signal
 from typing import Callable, Iterator, Optional, Sequence, Tuple
 
 from . import output
-from .build import build_errors, build_simulator
+from .build import build_simulator
 from .errors import OptionError
-from .faults import LARGEST_ID, LONGEST_S, FaultInjector, parse_fault
+from .faults import LONGEST_S, FaultInjector, parse_fault
+from .population import build_errors, check_population
 from .simulator import Simulator
 from .world.robot_errors import describe_errors
 
@@ -16,8 +17,6 @@ __all__ = ["build_parser", "check_options", "main", "parse_options", "simulate"]
 
 DEFAULT_PORT = 11411
 """The port that stock robots connect to."""
-
-MOST_ROBOTS = 1000
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -86,19 +85,13 @@ def _add_robot_options(group: "argparse._ArgumentGroup") -> None:
 
 def check_options(options: argparse.Namespace) -> None:
     """Raise OptionError for a value that cannot be used."""
-    count = options.count
-    if not 1 <= count <= MOST_ROBOTS:
-        raise OptionError("--count %d: must be 1..%d" % (count, MOST_ROBOTS))
-    if not 0 <= options.first_id <= LARGEST_ID - count + 1:
-        raise OptionError("--first-id %d: ids must be 0..%d (%d robots)" % (options.first_id, LARGEST_ID, count))
+    check_population(options)
     if not 1 <= options.port <= 65535:
         raise OptionError("--port %d: must be 1..65535" % options.port)
     if options.seconds is not None and not 0 < options.seconds <= LONGEST_S:
         raise OptionError("--seconds %g: must be more than 0, and at most %g" % (options.seconds, LONGEST_S))
     if not 0.01 <= options.speed <= 100:
         raise OptionError("--speed %g: must be 0.01..100" % options.speed)
-    if not 0 <= options.seed < 2**32:
-        raise OptionError("--seed %d: must be 0..4294967295" % options.seed)
     for text in options.fault:
         parse_fault(text)
 

@@ -2,6 +2,9 @@
 
 import math
 
+LARGEST_ID = 2**31 - 1
+"""Of hero_msgs/Robot."""
+
 WHEEL_DIAMETER_M = 0.0492
 WHEEL_SEPARATION_M = 0.063
 BODY_RADIUS_M = 0.036835

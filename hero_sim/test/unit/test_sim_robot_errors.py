@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from driver_side import parse_options
 
-from hero_sim.build import build_errors
 from hero_sim.errors import OptionError
+from hero_sim.population import build_errors
 from hero_sim.world.robot_errors import describe_errors
 
 

@@ -1,0 +1,82 @@
+"""Which robots a simulator has, from its options: their number, differences, arena and places. Pure.
+
+The same options give the same robots behind sockets and stepped in process.
+"""
+
+import argparse
+import copy
+import numbers
+from typing import List
+
+import numpy as np
+
+from .errors import OptionError
+from .robot_constants import LARGEST_ID
+from .world.arena import build_default, place_robots
+from .world.arena_file import load_arena
+from .world.robot_errors import RobotErrors, draw_errors, set_known
+from .world.world import World
+
+__all__ = ["Rngs", "build_errors", "build_world", "check_population"]
+
+MOST_ROBOTS = 1000
+
+
+class Rngs:
+    """One stream of random numbers for each purpose, so that one more draw here does not change all others."""
+
+    def __init__(self, options: argparse.Namespace) -> None:
+        """Derive all from options.seed."""
+
+        def make(seed: int) -> np.random.RandomState:
+            return np.random.RandomState(seed)
+
+        seeds = make(options.seed).randint(0, 2**31 - 1, size=3 + 2 * options.count)
+        self.places, self.world, self.boot = map(make, seeds[:3])
+        self.robots, self.radios = list(map(make, seeds[3::2])), list(map(make, seeds[4::2]))
+
+
+def check_population(options: argparse.Namespace, worlds: int = 1) -> None:
+    """Raise OptionError for a number of robots, an id or a seed that cannot be used; each world needs a seed."""
+    given = {"--count": options.count, "--first-id": options.first_id, "--seed": options.seed, "worlds": worlds}
+    for name, value in given.items():
+        if not isinstance(value, numbers.Integral) or isinstance(value, bool):
+            raise OptionError("%s %r: must be a whole number" % (name, value))
+    count = options.count
+    if not 1 <= count <= MOST_ROBOTS:
+        raise OptionError("--count %d: must be 1..%d" % (count, MOST_ROBOTS))
+    if not 0 <= options.first_id <= LARGEST_ID - count + 1:
+        raise OptionError("--first-id %d: ids must be 0..%d (%d robots)" % (options.first_id, LARGEST_ID, count))
+    if worlds < 1:
+        raise OptionError("worlds %d: must be 1 or more" % worlds)
+    if not 0 <= options.seed <= 2**32 - worlds:
+        raise OptionError("--seed %d: must be 0..%d" % (options.seed, 2**32 - worlds))
+
+
+def build_errors(options: argparse.Namespace) -> RobotErrors:
+    """Return how the robots differ: drawn from the seed, then known errors put over it.
+
+    Raises: OptionError for an error that cannot be set.
+    """
+    # By id, so that a robot is the same one in any swarm.
+    ids = range(options.first_id, options.first_id + options.count)
+    rngs = [np.random.RandomState([options.seed, robot_id % 2**32]) for robot_id in ids]
+    errors = draw_errors(rngs, 0.0 if options.perfect else 1.0)
+    for text in options.error:
+        set_known(errors, options.first_id, text)
+    return errors
+
+
+def build_world(options: argparse.Namespace, worlds: int = 1) -> World:
+    """Return the robots in their places: one world of the options' seed, or more worlds, of the seeds that follow.
+
+    Raises: OptionError for an arena that cannot be used, or in which the robots find no place.
+    """
+    arena = load_arena(options.arena) if options.arena else build_default(options.count)
+    each: List[argparse.Namespace] = [copy.copy(options) for _ in range(worlds)]
+    for index, one in enumerate(each):
+        one.seed = options.seed + index
+    rngs = list(map(Rngs, each))
+    poses = [place_robots(arena, options.count, rng.places) for rng in rngs]
+    errors = RobotErrors(*map(np.concatenate, zip(*map(build_errors, each))))
+    return World(arena, np.concatenate(poses), [rng.world for rng in rngs], errors)
