@@ -1,0 +1,126 @@
+"""A robot that is stepped in process, as a BaseRobot needs it: see hero_client.robot_link. Pure."""
+
+import sys
+from typing import List, Optional, Tuple
+
+from hero_client.background_motion import BackgroundMotion, Steps
+from hero_client.command_line import say
+from hero_client.errors import FrameError, StaleDataError
+from hero_client.geometry import Pose, Velocity
+
+from ..world.kinematics import Pose as WorldPose
+from ..world.kinematics import find_frame
+from .step_clock import StepClock, StepMotion
+
+__all__ = ["StepLink"]
+
+WORLD = "world"
+
+SILENT_S = 1.0
+"""A robot without ranges for so long is not ready."""
+
+
+class StepLink:
+    """One robot: a row of RobotRows.
+
+    Attributes:
+        clock: the robots' time.
+        row: which robot it is.
+        is_stopped: whether it takes no motion because all robots are stopped.
+    """
+
+    connected = True
+
+    def __init__(self, clock: StepClock, row: int, name: str) -> None:
+        """Be the robot at row, whose odometry begins where it is."""
+        self.clock = clock
+        self.row = row
+        self.is_stopped = False
+        self._name = name
+        self._rows = rows = clock.rows
+        self._arrivals_ms = {"odom": rows.odometry_ms, "encoder": rows.odometry_ms, "proximity": rows.scan_ms}
+        self._origin = self.true_pose
+
+    @property
+    def true_pose(self) -> Pose:
+        """Where the robot is in the world."""
+        return Pose(*self._rows.world.poses[self.row].tolist())
+
+    def missing(self) -> Optional[str]:
+        """See RobotLink."""
+        for topic in ("odom", "proximity"):
+            if self.age_s(topic) > SILENT_S:
+                return "no message on /%s/%s: is the robot on and in reach?" % (self._name, topic)
+        return None
+
+    def subscribe(self, topic: str) -> None:
+        """See RobotLink; everything arrives without."""
+
+    def age_s(self, topic: str) -> float:
+        """See RobotLink."""
+        rows = self._rows
+        return (rows.now_ms - self._arrivals_ms[topic].item(self.row)) / 1000.0
+
+    def wait_for_next(self, topic: str, timeout_s: float, count: int = 1) -> None:
+        """See RobotLink."""
+        arrivals_ms = self._arrivals_ms[topic]
+        deadline_s = self.clock.now_s + timeout_s
+        for _ in range(count):
+            last_ms = arrivals_ms[self.row]
+            while arrivals_ms[self.row] == last_ms:
+                if self.clock.now_s >= deadline_s:
+                    raise StaleDataError("no message on /%s/%s within %.1f s" % (self._name, topic, timeout_s))
+                self.clock.sleep(0.001)
+
+    def read_pose(self) -> Pose:
+        """See RobotLink."""
+        return Pose(*self._rows.odometry[self.row].tolist())
+
+    def read_velocity(self) -> Velocity:
+        """See RobotLink."""
+        return Velocity(*self._rows.velocities[self.row].tolist())
+
+    def read_ranges(self) -> List[float]:
+        """See RobotLink."""
+        ranges_m: List[float] = self._rows.proximity_m[self.row].tolist()
+        return ranges_m
+
+    def find_origin(self, frame: str, timeout_s: float) -> Pose:
+        """See RobotLink; known are "world" and the robot's own odometry."""
+        if frame == WORLD:
+            return self._origin
+        if frame == self._name + "/odom":
+            return Pose(0.0, 0.0, 0.0)
+        raise FrameError("no transform from %s/odom to %s: robots in process know only %s" % (self._name, frame, WORLD))
+
+    def send_velocity(self, linear_m_s: float, angular_rad_s: float) -> None:
+        """See RobotLink."""
+        if not self.is_stopped:
+            self._rows.send_velocity(self.row, linear_m_s, angular_rad_s)
+
+    def send_color(self, rgb: Tuple[float, float, float]) -> None:
+        """See RobotLink."""
+        self._rows.send_light(self.row, (*rgb, 1.0))
+
+    def set_odometry(self, pose: Pose) -> None:
+        """See RobotLink."""
+        self._rows.set_odometry(self.row, *pose)
+        self._origin = Pose(*find_frame(WorldPose(*self.true_pose), WorldPose(*pose)))
+
+    def describe_stop(self) -> str:
+        """See RobotLink."""
+        return "all robots are stopped. Release them with StepSwarm.release_stop()"
+
+    def wait_until_settled(self) -> None:
+        """See RobotLink; it is known at once."""
+
+    def start(self, steps: Steps) -> BackgroundMotion:
+        """Take steps while the program waits."""
+        return StepMotion(self.clock, steps)
+
+    def log_error(self, text: str) -> None:
+        """See RobotLink."""
+        say(text, sys.stderr)
+
+    def close(self) -> None:
+        """See RobotLink; there is nothing to leave."""

@@ -1,0 +1,43 @@
+"""One robot that is stepped in process: what a program uses of hero_client's Robot, and the ground truth. Pure."""
+
+from typing import Tuple
+
+from hero_client.geometry import Pose
+from hero_client.robot_base import BaseRobot
+
+from .link import StepLink
+from .step_clock import StepClock
+
+__all__ = ["StepRobot"]
+
+
+class StepRobot(BaseRobot):
+    """One robot of a StepSwarm; time passes while the program waits, in sleep() or in a motion."""
+
+    _link: StepLink
+
+    def __init__(self, robot_id: int, clock: StepClock, row: int) -> None:
+        """Be the robot at row of the clock's robots."""
+        super().__init__(robot_id, StepLink(clock, row, "hero_%d" % robot_id))
+
+    @property
+    def row(self) -> int:
+        """Its row in the swarm's arrays: StepSwarm.rows, log_poses()."""
+        return self._link.row
+
+    @property
+    def true_pose(self) -> Pose:
+        """Where the robot is, in the frame world."""
+        return self._link.true_pose
+
+    @property
+    def light(self) -> Tuple[float, float, float]:
+        """The color that the robot shows: red, green, blue, each 0..1."""
+        red, green, blue, _ = self._link.clock.rows.lights[self.row].tolist()
+        return red, green, blue
+
+    def set_stopped(self, stopped: bool) -> None:
+        """Let the robot take no motion, as after an emergency stop, or let it move again."""
+        if stopped:
+            self._link.send_velocity(0.0, 0.0)  # the driver's shaping repeats it
+        self._link.is_stopped = stopped
