@@ -262,4 +262,4 @@ class RobotMotionsTest(unittest.TestCase):
 
 if __name__ == "__main__":
     rospy.init_node("test_robot_motions")
-    rostest.rosrun("hero_client", "robot_motions", RobotMotionsTest, sys.argv)
+    rostest.rosrun("hero_bringup", "robot_motions", RobotMotionsTest, sys.argv)

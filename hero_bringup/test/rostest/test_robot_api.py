@@ -233,4 +233,4 @@ class RobotApiTest(unittest.TestCase):
 
 if __name__ == "__main__":
     rospy.init_node("test_robot_api")
-    rostest.rosrun("hero_client", "robot_api", RobotApiTest, sys.argv)
+    rostest.rosrun("hero_bringup", "robot_api", RobotApiTest, sys.argv)
