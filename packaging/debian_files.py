@@ -15,6 +15,8 @@ RECOMMENDED = {
     "message_runtime": "for programs in C++, with all of their headers",
 }
 
+OTHER_PROGRAMS = {"tf"}  # of Debian, which are not the ROS package of this name
+
 CONTROL = """\
 Source: ros-hero
 Section: misc
@@ -63,17 +65,17 @@ def make_name(ros_name):
 
 
 def find_debian_packages(key):
-    """Return Debian's packages of a rosdep key: its Python modules, its messages, or the package of this name."""
+    """Return Debian's packages of a rosdep key: Python modules, messages and programs, each in a package of their own."""
     name = key.replace("_", "-")
     known = [
         candidate
         for candidate in (f"python3-{name}", f"ros-{name}", name)
-        if call(["apt-cache", "show", candidate], stdout=DEVNULL, stderr=DEVNULL) == 0
+        if candidate not in OTHER_PROGRAMS
+        and call(["apt-cache", "show", candidate], stdout=DEVNULL, stderr=DEVNULL) == 0
     ]
     if not known:
         sys.exit(f"debian_files.py: Debian has no package for the dependency {key}")
-    # The package of this name is another program's where there are ROS's own.
-    return [candidate for candidate in known if candidate != name] or known
+    return known
 
 
 def join_dependencies(keys, own, version):

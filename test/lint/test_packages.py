@@ -7,6 +7,7 @@ import xml.etree.ElementTree as ElementTree
 
 import pytest
 import sources
+import yaml
 from catkin_pkg.changelog import get_changelog_from_path
 from catkin_pkg.package_version import get_forthcoming_label
 
@@ -141,6 +142,13 @@ def test_only_known_libraries_are_imported():
         for found in sources.read_imports(path):
             known = found.top in STANDARD_LIBRARY or found.top == package or needed_package(found.module, package)
             assert known, f"{path}:{found.line}: {found.module}: tell test/lint/sources.py which package it is in"
+
+
+def test_every_dependency_is_a_known_rosdep_key():
+    files = yaml.safe_load((sources.ROOT / "test" / "lint" / "rosdep_keys.yaml").read_text(encoding="utf-8"))
+    keys = {key for listed in files.values() for key in listed}
+    needed = {name for package in PACKAGES for name in sources.read_dependencies(package)} - set(PACKAGES)
+    assert needed == keys, f"not looked up: {needed - keys}; of no package: {keys - needed}"
 
 
 def test_bootstrap_installs_the_python_packages_that_are_declared():
