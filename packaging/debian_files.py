@@ -56,7 +56,9 @@ override_dh_auto_test:
 override_dh_auto_install:
 """
 
-INSTALL = "\tDESTDIR=$(CURDIR)/debian/{name} cmake -P obj-$(DEB_HOST_GNU_TYPE)/{ros_name}/cmake_install.cmake\n"
+INSTALL = (
+    "\tDESTDIR=$(CURDIR)/debian/{name} cmake -P obj-$(DEB_HOST_GNU_TYPE)/{ros_name}/cmake_install.cmake\n"
+)
 
 
 def make_name(ros_name):
@@ -64,30 +66,41 @@ def make_name(ros_name):
     return "ros-" + ros_name.replace("_", "-")
 
 
-def find_debian_packages(key):
-    """Return Debian's packages of a rosdep key: Python modules, messages and programs, each in a package of their own."""
-    name = key.replace("_", "-")
-    known = [
-        candidate
-        for candidate in (f"python3-{name}", f"ros-{name}", name)
-        if candidate not in OTHER_PROGRAMS
-        and call(["apt-cache", "show", candidate], stdout=DEVNULL, stderr=DEVNULL) == 0
+def find_known(key, *patterns):
+    """Return those of the patterns, such as python3-*, that make the name of a Debian package of a rosdep key."""
+    names = [pattern.replace("*", key.replace("_", "-")) for pattern in patterns]
+    return [
+        name
+        for name in names
+        if name not in OTHER_PROGRAMS
+        and call(["apt-cache", "show", name], stdout=DEVNULL, stderr=DEVNULL) == 0
     ]
-    if not known:
-        sys.exit(f"debian_files.py: Debian has no package for the dependency {key}")
-    return known
 
 
-def join_dependencies(keys, own, version):
-    """Return the relationship field of these rosdep keys; own are the suite's packages."""
-    names = []
-    for key in sorted(keys):
-        names += [f"{make_name(key)} (= {version})"] if key in own else find_debian_packages(key)
-    return ", ".join(names)
+def find_packages(key, *patterns):
+    """Return the Debian packages of a rosdep key; ends with one line if there are none."""
+    return find_known(key, *patterns) or sys.exit(
+        f"debian_files.py: Debian has no package for the dependency {key}"
+    )
+
+
+def find_relationships(package, own):
+    """Return what the .deb of a package depends on, and what it recommends; own are the suite's packages."""
+    depends, recommends = ["${misc:Depends}", "${python3:Depends}"], []
+    for key in sorted(dependency.name for dependency in package.exec_depends):
+        if key in own:
+            depends.append(f"{make_name(key)} (= {package.version})")
+            continue
+        # ros-* is a program where there is no Python, else message definitions, for rosmsg and C++.
+        definitions = find_known(key, "ros-*")
+        names = find_known(key, "python3-*", "*") or find_packages(key, "ros-*")
+        (recommends if key in RECOMMENDED else depends).extend(names)
+        recommends += [name for name in definitions if name not in names]
+    return depends, recommends
 
 
 def write_debian_dir(sources, directory):
-    """Write control, changelog, rules and the copyright."""
+    """Write control, changelog and rules."""
     packages = [package for _, package in topological_order(str(sources))]
     own = {package.name for package in packages}
     first = packages[0]
@@ -98,25 +111,24 @@ def write_debian_dir(sources, directory):
         for dependency in package.buildtool_depends + package.build_depends
         if dependency.name not in own
     }
+    build_depends = [
+        name for key in sorted(keys) for name in find_packages(key, "lib*-dev", "python3-*", "ros-*", "*")
+    ]
     control = CONTROL.format(
-        maintainer=maintainer,
-        build_depends=join_dependencies(keys, own, first.version),
-        homepage=first.urls[0].url,
+        maintainer=maintainer, build_depends=", ".join(build_depends), homepage=first.urls[0].url
     )
     rules = RULES
     for package in packages:
         name = make_name(package.name)
-        keys = {dependency.name for dependency in package.exec_depends}
+        depends, recommends = find_relationships(package, own)
         control += BINARY.format(
             name=name,
             ros_name=package.name,
-            depends="${misc:Depends}, ${python3:Depends}, "
-            + join_dependencies(keys - set(RECOMMENDED), own, package.version),
-            recommends=join_dependencies(keys & set(RECOMMENDED), own, package.version),
+            depends=", ".join(depends),
+            recommends=", ".join(recommends),
             description=package.description.rstrip("."),
         )
         rules += INSTALL.format(name=name, ros_name=package.name)
-        (directory / f"{name}.docs").write_text(f"src/{package.name}/CHANGELOG.rst\n")
     (directory / "control").write_text(control)
     (directory / "rules").write_text(rules)
     (directory / "rules").chmod(0o755)
