@@ -59,6 +59,7 @@ class _Direction:
     def __init__(self, radio: "Radio") -> None:
         self._radio = radio
         self._busy_ms = 0.0  # end of the transmission of the last bytes
+        self._last_ms = 0.0  # their arrival
         self.queue: Deque[Tuple[float, bytes]] = deque()
 
     @property
@@ -66,14 +67,24 @@ class _Direction:
         """How many bytes are on their way."""
         return sum(len(data) for _, data in self.queue)
 
-    def put(self, now_ms: int, data: bytes) -> None:
-        """Send bytes."""
+    def send(self, now_ms: int, length: int) -> float:
+        """Return when bytes arrive that are sent now (ms)."""
         bytes_per_s = self._radio.profile.bytes_per_s
         at_ms = max(float(now_ms), self._radio.stalled_until_ms)
         if bytes_per_s:
-            at_ms = self._busy_ms = max(at_ms, self._busy_ms) + len(data) / bytes_per_s * 1000.0
-        # What was sent later may be due earlier; it waits in the queue behind the other all the same.
-        self.queue.append((self._radio.find_arrival(at_ms), data))
+            at_ms = self._busy_ms = max(at_ms, self._busy_ms) + length / bytes_per_s * 1000.0
+        # What was sent later may be due earlier; it waits behind the other all the same.
+        self._last_ms = max(self._last_ms, self._radio.find_arrival(at_ms))
+        return self._last_ms
+
+    def put(self, now_ms: int, data: bytes) -> None:
+        """Send bytes, which take() then returns."""
+        self.queue.append((self.send(now_ms, len(data)), data))
+
+    def clear(self) -> None:
+        """Drop what is on its way."""
+        self.queue.clear()
+        self._last_ms = 0.0
 
     def take(self, now_ms: int) -> bytes:
         """Return what has arrived by now."""
@@ -126,5 +137,5 @@ class Radio:
 
     def clear(self) -> None:
         """Drop what is on its way, as when a connection ends."""
-        self.up.queue.clear()
-        self.down.queue.clear()
+        self.up.clear()
+        self.down.clear()

@@ -21,6 +21,9 @@ Values = Any  # a number for all these rows, or one for each: a sequence or an a
 
 INTERVAL_MS = round(COMMAND_INTERVAL_S * 1000)
 
+MAX_AGE_MS = 2000
+"""Motion that could not be sent for so long is dropped: the driver's command_max_age_s, unless it was set."""
+
 
 class Sent(NamedTuple):
     """Commands that were sent to robots.
@@ -48,6 +51,7 @@ class CommandShaper:
         self._stop_waits = np.zeros(rows, dtype=bool)
         self._newest_waits = np.zeros(rows, dtype=bool)
         self._newest = np.zeros((2, rows))
+        self._offered_ms = np.zeros(rows, dtype=np.int64)
         self._repeats = np.zeros(rows, dtype=np.int64)
         self._next_ms = np.zeros(rows, dtype=np.int64)
         self._is_sent = np.zeros(rows, dtype=bool)
@@ -94,14 +98,19 @@ class CommandShaper:
         self._stop_waits[rows] |= stops
         self._newest_waits[rows] = ~stops
         self._newest[:, rows] = values.astype(np.float32)  # a robot computes in single precision
+        self._offered_ms[rows] = now_ms
         self._idle = False
         self._send_due(now_ms)
 
     def delay_until(self, rows: np.ndarray, next_ms: np.ndarray) -> None:
-        """Send nothing to the robots at rows (K,) before next_ms (K,)."""
+        """Send nothing to the robots at rows (K,) before next_ms (K,): the last command is still on its way.
+
+        Two in flight could reach a robot together, which would take the older one.
+        """
         self._next_ms[rows] = np.maximum(self._next_ms[rows], next_ms)
 
     def _send_due(self, now_ms: int) -> None:
+        self._newest_waits &= self._offered_ms >= now_ms - MAX_AGE_MS
         waits = self._stop_waits | self._newest_waits
         waits |= self._repeats > 0
         due = waits & (self._next_ms <= now_ms)

@@ -11,6 +11,7 @@ import numpy as np
 
 from hero_driver.robot_constants import MOTOR_CENTER_US
 
+from ..link.wifi import Radio
 from ..robot.firmware import SPIN_MS
 from ..robot.motor_control import CONTROL_MS
 from ..robot.motor_pid import POSITION_GAINS, VELOCITY_GAINS
@@ -30,6 +31,8 @@ from ..world.kinematics import split_to_wheels
 from ..world.world import STEP_MS, World
 from .command_shaper import CommandShaper, Rows, Values
 from .proximity import correct_ranges, measure_ranges
+from .radio_rows import RadioRows
+from .readings import Readings
 from .servo_pulses import ServoPulses
 from .tick_odometry import TickOdometryRows
 from .wheel_controllers import WheelControllers
@@ -63,21 +66,21 @@ class RobotRows:
             range, 0 too close, nan not calibrated.
         counts, ranges_m: of the eight sensors (R, 8) as in /laser, rear first.
         scan_ms: when the program received these (R,), every 205 ms.
-        on_cycle, on_scan: called for new odometry and ticks, and for new ranges.
+        on_cycle, on_scan: called when the program has received odometry and ticks, and ranges.
     """
 
-    def __init__(self, world: World) -> None:
-        """Take the robots of world, which are at rest, from the world's time on; first readings are there at once."""
+    def __init__(self, world: World, radios: Sequence[Radio] = ()) -> None:
+        """Take the robots of world, which are at rest, from the world's time on; first readings are there at once.
+
+        radios: the Wi-Fi of each robot; without, readings and commands arrive at once.
+        """
         rows = len(world.poses)
         self.world = world
         self.now_ms = now_ms = world.time_ms
-        self._ticks = np.zeros((2, rows))
-        self.ticks = self._ticks.T
-        self.odometry_ms = np.full(rows, now_ms)
-        self.counts = np.zeros((rows, 8))
-        self.ranges_m = np.zeros((rows, 8))
-        self.proximity_m = np.zeros((rows, 8))
-        self.scan_ms = np.full(rows, now_ms)
+        self._radios = RadioRows(radios)
+        self._is_ideal = not radios
+        self._measured = Readings(rows)
+        self._received = received = self._measured if self._is_ideal else Readings(rows)
         self.on_cycle: List[Hook] = []
         self.on_scan: List[Hook] = []
         self._rows = np.arange(rows)
@@ -87,7 +90,10 @@ class RobotRows:
         self._calibration_counts_m2 = calibrate(errors.alpha_counts_m2, errors.beta_counts)
         self._encoders = WheelEncoders(world)
         self._odometry = TickOdometryRows(rows)
-        self.odometry = self._odometry.poses.T
+        self._measured.odometry = self._odometry.poses.T
+        self.odometry, self.ticks, self.odometry_ms = received.odometry, received.ticks, received.odometry_ms
+        self.counts, self.ranges_m = received.counts, received.ranges_m
+        self.proximity_m, self.scan_ms = received.proximity_m, received.scan_ms
         self._servos = ServoPulses(world, np.rint(errors.servo_center_us.T))
         self._velocity = WheelControllers(rows, VELOCITY_GAINS, VELOCITY_LIMIT_US, VELOCITY_WATCHDOG_MS)
         self._position = WheelControllers(rows, POSITION_GAINS, POSITION_LIMIT_US, POSITION_WATCHDOG_MS)
@@ -95,9 +101,16 @@ class RobotRows:
         self._velocity_commands = CommandShaper(rows, 0.0)
         self._position_commands = CommandShaper(rows, 0.0)
         self._pulse_commands = CommandShaper(rows, MOTOR_CENTER_US)
+        self._topics = (
+            (self._velocity_commands, self._receive_velocities),
+            (self._position_commands, self._receive_positions),
+            (self._pulse_commands, self._receive_pulses),
+        )
         self._cycle_ms = now_ms
-        self._scan_ms = now_ms - LASER_GATE_MS - 1
-        self._run_cycle(now_ms)
+        self._scanned_ms = now_ms - LASER_GATE_MS - 1
+        self._measure(now_ms)
+        received.receive_odometry(self._measured, self._rows, now_ms)
+        received.receive_scan(self._measured, self._rows, now_ms)
         # The first read is that of a robot that was configured a millisecond before its first cycle; a controller that
         # is commanded in it runs a millisecond later.
         self._read_ms = now_ms + SPIN_MS - 1
@@ -134,7 +147,9 @@ class RobotRows:
         """Set the odometry of one robot, which also zeroes its tick counters."""
         self._encoders.zero(row)
         self._odometry.set_pose(row, x_m, y_m, yaw_rad)
-        self.ticks[row] = 0.0
+        self._radios.drop_readings(row)
+        self._received.odometry[row] = self._measured.odometry[row]
+        self._received.velocities[row] = self._received.ticks[row] = 0.0
 
     def set_velocity_gains(self, row: int, gains: Sequence[float]) -> None:
         """Set lkp lki lkd rkp rki rkd of one robot; a wheel's three with a negative one are ignored."""
@@ -151,19 +166,21 @@ class RobotRows:
     @property
     def velocities(self) -> np.ndarray:
         """Linear m/s and angular rad/s in hero_N/base_link (R, 2), as the driver computes them from the ticks."""
-        return self._odometry.measure_velocities().T
+        return self._odometry.measure_velocities().T if self._is_ideal else self._received.velocities
 
     # -- time passes -----------------------------------------------------------------------------------------
 
     def advance(self, until_ms: int) -> None:
         """Move everything on to until_ms."""
-        world, servos = self.world, self._servos
+        world, servos, radios = self.world, self._servos, self._radios
         while True:
             step_ms = world.time_ms + STEP_MS
-            now_ms = min(step_ms, self._cycle_ms, self._control_ms, self._read_ms, servos.check_ms)
+            now_ms = min(step_ms, self._cycle_ms, self._control_ms, self._read_ms, servos.check_ms, radios.due_ms)
             if now_ms > until_ms:
                 break
             self.now_ms = now_ms
+            if now_ms >= radios.due_ms:
+                self._receive_readings(now_ms)
             if now_ms >= self._cycle_ms:
                 self._run_cycle(now_ms)
                 # Sending a cycle takes about a millisecond; controllers that are due, and then reads, wait for it.
@@ -183,26 +200,45 @@ class RobotRows:
         self.now_ms = until_ms
 
     def _run_cycle(self, now_ms: int) -> None:
-        """Read the encoders, and the infrared sensors if their gate is open."""
-        scans = now_ms - self._scan_ms > LASER_GATE_MS
-        if scans:
-            self._scan_ms = now_ms
-            self.counts[:] = self.world.read_infrared(self._rows)
-            self.ranges_m[:] = measure_ranges(self.counts, self._calibration_counts_m2)
-            self.proximity_m[:] = correct_ranges(self.ranges_m)
-            self.scan_ms[:] = now_ms
+        """Let the robots send their readings."""
+        has_scan = self._measure(now_ms)
+        if self._is_ideal:
+            self._call_hooks(self._rows, has_scan)
+        else:
+            self._measured.velocities = self._odometry.measure_velocities().T
+            self._radios.send_readings(now_ms, self._measured.copy(), has_scan)
+
+    def _measure(self, now_ms: int) -> bool:
+        """Read the encoders, and the infrared sensors if their gate is open; return whether it was."""
+        measured = self._measured
+        has_scan = now_ms - self._scanned_ms > LASER_GATE_MS
+        if has_scan:
+            self._scanned_ms = now_ms
+            measured.counts[:] = self.world.read_infrared(self._rows)
+            measured.ranges_m[:] = measure_ranges(measured.counts, self._calibration_counts_m2)
+            measured.proximity_m[:] = correct_ranges(measured.ranges_m)
+            measured.scan_ms[:] = now_ms
         self._encoders.read(now_ms, True)
-        self._ticks[:] = self._encoders.ticks
-        self._odometry.integrate(self._ticks, now_ms)
-        self.odometry_ms[:] = now_ms
+        measured.ticks[:] = self._encoders.ticks.T
+        measured.odometry_ms[:] = now_ms
+        self._odometry.integrate(self._encoders.ticks, now_ms)
         self._cycle_ms = now_ms + CYCLE_MS
-        if self._cycle_ms - self._scan_ms > LASER_GATE_MS:
+        if self._cycle_ms - self._scanned_ms > LASER_GATE_MS:
             self._cycle_ms += LASER_READ_MS
+        return has_scan
+
+    def _receive_readings(self, now_ms: int) -> None:
+        for readings, rows, has_scan in self._radios.receive_readings(now_ms):
+            self._received.receive_odometry(readings, rows, now_ms)
+            if has_scan:
+                self._received.receive_scan(readings, rows, now_ms)
+            self._call_hooks(rows, has_scan)
+
+    def _call_hooks(self, rows: np.ndarray, has_scan: bool) -> None:
         for hook in self.on_cycle:
-            hook(self._rows)
-        if scans:
-            for hook in self.on_scan:
-                hook(self._rows)
+            hook(rows)
+        for hook in self.on_scan if has_scan else ():
+            hook(rows)
 
     def _run_controllers(self, now_ms: int) -> None:
         self._control_ms = now_ms + CONTROL_MS
@@ -218,14 +254,15 @@ class RobotRows:
 
     def _read_commands(self, now_ms: int) -> None:
         self._read_ms = now_ms + SPIN_MS
-        for shaper, receive in (
-            (self._velocity_commands, self._receive_velocities),
-            (self._position_commands, self._receive_positions),
-            (self._pulse_commands, self._receive_pulses),
-        ):
+        for topic, (shaper, receive) in enumerate(self._topics):
             sent = shaper.take(now_ms)
-            if len(sent.rows):
-                receive(now_ms, sent.rows, sent.values)
+            if self._is_ideal:
+                if len(sent.rows):
+                    receive(now_ms, sent.rows, sent.values)
+                continue
+            shaper.delay_until(sent.rows, self._radios.send_commands(topic, sent))
+            for rows, values in self._radios.receive_commands(topic, now_ms):
+                receive(now_ms, rows, values)
 
     # -- what the firmware does with a command ---------------------------------------------------------------
 
@@ -243,7 +280,7 @@ class RobotRows:
         self._servos.stop(controller.command(now_ms, rows, targets))
 
     def _receive_pulses(self, now_ms: int, rows: np.ndarray, values: np.ndarray) -> None:
-        pulses_us, which = np.zeros_like(self._ticks), np.zeros(len(self._rows), dtype=bool)
+        pulses_us, which = np.zeros((2, len(self._rows))), np.zeros(len(self._rows), dtype=bool)
         pulses_us[:, rows], which[rows] = values, True
         self._servos.write(now_ms, pulses_us, which)
 

@@ -1,0 +1,101 @@
+"""The Wi-Fi of all robots: when readings reach the program, and commands the robots.
+
+Pure. The only loops over robots in a step are here, since each robot has a connection of its own.
+"""
+
+import heapq
+import itertools
+import math
+from typing import Dict, List, NamedTuple, Sequence, Tuple
+
+import numpy as np
+
+from ..link.wifi import Radio
+from .command_shaper import Sent
+from .readings import Readings
+
+__all__ = ["Arrival", "RadioRows"]
+
+CYCLE_LENGTH = 1469
+"""Bytes of an odometry, five transforms and an encoder reading."""
+
+SCAN_LENGTH = 205
+COMMAND_LENGTH = 56
+"""Bytes of a scan, and of a Twist (servo pulses have fewer)."""
+
+_NEVER_MS = 2**62
+
+
+class Arrival(NamedTuple):
+    """Readings that have arrived.
+
+    Attributes:
+        readings: of all robots, as they were sent.
+        rows: from which robots (K,).
+        has_scan: whether they include a scan.
+    """
+
+    readings: Readings
+    rows: np.ndarray
+    has_scan: bool
+
+
+class RadioRows:
+    """The connections.
+
+    Attributes:
+        due_ms: when the next readings arrive.
+    """
+
+    def __init__(self, radios: Sequence[Radio]) -> None:
+        """Take the radio of each robot."""
+        self._radios = radios
+        self._order = itertools.count()
+        self._up: List[Tuple[int, int, int, Readings, bool]] = []
+        self._down: Dict[int, List[Tuple[int, int, int, Tuple[float, float]]]] = {}
+        self.due_ms = _NEVER_MS
+
+    def send_readings(self, now_ms: int, readings: Readings, has_scan: bool) -> None:
+        """Send the readings of all robots, which must not change any more."""
+        length = CYCLE_LENGTH + SCAN_LENGTH * has_scan
+        for row, radio in enumerate(self._radios):
+            arrival_ms = math.ceil(radio.up.send(now_ms, length))
+            heapq.heappush(self._up, (arrival_ms, next(self._order), row, readings, has_scan))
+        self.due_ms = self._up[0][0]
+
+    def receive_readings(self, now_ms: int) -> List[Arrival]:
+        """Return what has arrived by now, in order."""
+        arrivals = []
+        while self._up and self._up[0][0] <= now_ms:
+            _, _, row, readings, has_scan = heapq.heappop(self._up)
+            arrivals.append(Arrival(readings, np.array([row]), has_scan))
+        self.due_ms = self._up[0][0] if self._up else _NEVER_MS
+        return arrivals
+
+    def drop_readings(self, row: int) -> None:
+        """Let no readings arrive that one robot has sent up to now."""
+        self._up = [sent for sent in self._up if sent[2] != row]
+        heapq.heapify(self._up)
+        self.due_ms = self._up[0][0] if self._up else _NEVER_MS
+
+    def send_commands(self, topic: int, sent: Sent) -> np.ndarray:
+        """Send commands to robots; return when they arrive, ms (K,)."""
+        queue = self._down.setdefault(topic, [])
+        arrivals_ms: List[int] = []
+        for row, at_ms, first, second in zip(sent.rows.tolist(), sent.at_ms.tolist(), *sent.values.tolist()):
+            arrivals_ms.append(math.ceil(self._radios[row].down.send(at_ms, COMMAND_LENGTH)))
+            heapq.heappush(queue, (arrivals_ms[-1], next(self._order), row, (first, second)))
+        return np.array(arrivals_ms, dtype=np.int64)
+
+    def receive_commands(self, topic: int, now_ms: int) -> List[Tuple[np.ndarray, np.ndarray]]:
+        """Return the commands that have arrived by now: rows (K,), each once, and values (2, K); in order."""
+        queue = self._down.get(topic, [])
+        rounds: List[Dict[int, Tuple[float, float]]] = []
+        while queue and queue[0][0] <= now_ms:
+            _, _, row, values = heapq.heappop(queue)
+            unused = next((commands for commands in rounds if row not in commands), None)
+            if unused is None:
+                rounds.append({row: values})
+            else:
+                unused[row] = values
+        return [(np.array(list(commands)), np.array(list(commands.values())).T) for commands in rounds]
