@@ -15,9 +15,10 @@ from hero_driver.commands.velocity_shaper import (
 )
 from hero_driver.corrections.message_layouts import make_proximity
 from hero_driver.corrections.tick_odometry import Pose, TickOdometry, WheelGeometry
-from hero_driver.rosserial import packets
+from hero_driver.rosserial import packets, payloads
 from hero_sim.robot import declarations as ids
 from hero_sim.robot.commands import CommandTable
+from hero_sim.robot.firmware import Firmware
 from hero_sim.robot.flash import Flash
 from hero_sim.robot.motor_control import MotorControl
 from hero_sim.robot.ranges import calibrate
@@ -28,7 +29,7 @@ from hero_sim.world.body import Body
 from hero_sim.world.robot_errors import draw_errors
 from hero_sim.world.world import STEP_MS, World
 
-UPTIME_MS = 100000
+READY_MS = 5000
 """The scalar robots were switched on so long ago: in its first 3 s a position controller always runs."""
 
 SHAPED_TYPES = {
@@ -38,11 +39,12 @@ SHAPED_TYPES = {
 }
 
 
-def build_world(count, seed=0, scale=1.0):
+def build_world(count, *seeds, scale=1.0):
+    """Return one world of count robots for each seed."""
     arena = build_default(count)
-    poses = place_robots(arena, count, np.random.RandomState(seed))
-    errors = draw_errors([np.random.RandomState([seed, index]) for index in range(count)], scale)
-    return World(arena, poses, [np.random.RandomState(seed)], errors)
+    poses = np.vstack([place_robots(arena, count, np.random.RandomState(seed)) for seed in seeds])
+    rngs = [np.random.RandomState([seed, index]) for seed in seeds for index in range(count)]
+    return World(arena, poses, [np.random.RandomState(seed) for seed in seeds], draw_errors(rngs, scale))
 
 
 def encode_twist(linear_m_s, angular_rad_s):
@@ -76,7 +78,7 @@ class ScalarRobot:
         self.send(now_ms)  # the driver takes at once what may go
 
     def call(self, topic_id, payload, now_ms):
-        self.table.receive(packets.Packet(topic_id, payload), UPTIME_MS + now_ms, now_ms)
+        self.table.receive(packets.Packet(topic_id, payload), READY_MS + now_ms, now_ms)
 
     def set_odometry(self, now_ms, *pose):
         self.call(ids.ID_SET_ODOM, struct.pack("<3d", *pose), now_ms)
@@ -95,7 +97,7 @@ class ScalarRobot:
             self.call(*command, now_ms)
 
     def run_cycle(self, now_ms):
-        for packet in packets.PacketReader().receive_bytes(self.sensing.run_cycle(UPTIME_MS + now_ms, now_ms, (0, 0))):
+        for packet in packets.PacketReader().receive_bytes(self.sensing.run_cycle(READY_MS + now_ms, now_ms, (0, 0))):
             if packet.topic_id == ids.ID_LASER:
                 header = len(packet.payload) - struct.calcsize("<7fI16fI16f")
                 self.counts = struct.unpack_from("<16f", packet.payload, header + 28 + 4 + 64 + 4)[::2]
@@ -108,8 +110,8 @@ class ScalarRobot:
 
     def run_motors(self, now_ms, control):
         motors = self.motors.motors
-        if control or (motors.attached and UPTIME_MS + now_ms >= motors.stop_at_ms):
-            self.motors.run(UPTIME_MS + now_ms, now_ms, self.sensing.read_encoders)
+        if control or (motors.attached and READY_MS + now_ms >= motors.stop_at_ms):
+            self.motors.run(READY_MS + now_ms, now_ms, self.sensing.read_encoders)
 
 
 class ScalarRobots:
@@ -120,7 +122,7 @@ class ScalarRobots:
         self.now_ms = -1
         self.robots = [ScalarRobot(world, index) for index in range(len(world.poses))]
         for robot in self.robots:
-            robot.sensing.begin(UPTIME_MS)
+            robot.sensing.begin(READY_MS)
         self._control_ms, self._read_ms = 9, 50
         read_infrared, self._readings = world.read_infrared, {}
 
@@ -140,7 +142,7 @@ class ScalarRobots:
         control = now_ms == self._control_ms
         for robot in self.robots:
             robot.send(now_ms)
-        if UPTIME_MS + now_ms == self.robots[0].sensing.due_ms:
+        if READY_MS + now_ms == self.robots[0].sensing.due_ms:
             for robot in self.robots:
                 robot.run_cycle(now_ms)
             self._control_ms += control
@@ -221,3 +223,57 @@ def test_robot_rows_do_what_the_scalar_robots_and_the_driver_do(seed):
         for _ in range(rng.randint(4)):
             act_at_random(rng, rows, scalar)
         rows.advance(rows.now_ms + int(rng.randint(1, 300)))
+
+
+class WholeFirmware:
+    """The whole firmware of one robot with its bytes, from its first cycle on, which is at 0 ms as in RobotRows."""
+
+    def __init__(self, world):
+        flash = Flash([0.5] * 8)
+        rng = np.random.RandomState(0)
+        self.world = world
+        self.firmware = Firmware(0, Body(world, 0), flash, rng, "127.0.0.1", False, pytest.fail)
+        self.firmware.switch_on(0)
+        while not self.has_sent(ids.ID_ODOM):
+            now_ms = self.firmware.due_ms
+            if now_ms >= READY_MS and not self.firmware.configured:
+                self.send(now_ms, packets.ID_PUBLISHER)
+            self.firmware.run(now_ms)
+            if self.firmware.wants_connection:
+                self.firmware.connection_made(now_ms)
+        self.start_ms = world.time_ms = now_ms
+
+    def has_sent(self, topic_id):
+        reader = packets.PacketReader()
+        sent = [packet.topic_id for data in self.firmware.outbox for packet in reader.receive_bytes(data)]
+        return topic_id in sent
+
+    def send(self, now_ms, topic_id, payload=b""):
+        self.firmware.receive_bytes(now_ms, packets.encode_packet(topic_id, payload))
+
+    def run_millisecond(self, now_ms):
+        self.firmware.outbox.clear()
+        self.firmware.run(self.start_ms + now_ms)
+        if self.start_ms + now_ms == self.world.time_ms + STEP_MS:
+            self.world.step()
+
+
+def test_the_timers_are_those_of_the_whole_firmware():
+    rows, whole = RobotRows(build_world(1, 0, scale=0.0)), WholeFirmware(build_world(1, 0, scale=0.0))
+    rng, command_ms, cycles, scans = np.random.RandomState(1), 0, [], []
+    rows.on_cycle.append(lambda which: cycles.append(rows.now_ms))
+    rows.on_scan.append(lambda which: scans.append(rows.now_ms))
+    for now_ms in range(1, 10000):
+        rows.advance(now_ms)
+        whole.run_millisecond(now_ms)
+        assert whole.has_sent(ids.ID_ODOM) == (cycles[-1:] == [now_ms])
+        assert whole.has_sent(ids.ID_LASER) == (scans[-1:] == [now_ms])
+        assert rows.world.commands_m_s.tolist() == whole.world.commands_m_s.tolist()
+        if now_ms >= command_ms:
+            # Never a zero, after which the firmware's controllers begin at another time than ours.
+            twist = (rng.uniform(0.05, 0.2), rng.uniform(-2.0, 2.0))
+            rows.send_velocity(0, *twist)
+            whole.send(whole.start_ms + now_ms, ids.ID_VELOCITY_CMD_VEL, encode_twist(*twist))
+            whole.send(whole.start_ms + now_ms, packets.ID_TIME, payloads.encode_time(payloads.split_seconds(1e9)))
+            command_ms = now_ms + int(rng.randint(60, 900))
+    assert rows.world.travels_m.tolist() == whole.world.travels_m.tolist()
