@@ -6,7 +6,7 @@ from .background_motion import BackgroundMotion, Hold, Sleep, Steps, run_steps
 from .clock import Clock
 from .errors import RobotNotReadyError
 
-__all__ = ["REPEAT_PERIOD_S", "Group", "Member", "send_stops", "wait_for_all"]
+__all__ = ["REPEAT_PERIOD_S", "Group", "Member", "stop_after", "wait_for_all"]
 
 STOP_GAP_S = 0.06
 """Between the two messages of a stop: the firmware drops a Twist that comes within 50 ms of the one before."""
@@ -22,6 +22,9 @@ READY_TIMEOUT_S = 2.0
 
 POLL_PERIOD_S = 0.02
 """Between two checks whether a robot is ready."""
+
+ROUNDING_S = 1e-6
+"""Sums of seconds are this exact."""
 
 NAMES_SHOWN = 10
 
@@ -77,21 +80,29 @@ def send_stops(robots: Sequence[Member]) -> Steps:
     yield Hold(SEND_TIME_S)
 
 
+def stop_after(steps: Steps, robots: Sequence[Member]) -> Steps:
+    """Take steps and then stop the robots, whatever ends the steps."""
+    try:
+        yield from steps
+    except GeneratorExit:
+        raise  # nobody takes steps any more: the program has dropped its stepped robots
+    except BaseException:
+        yield from send_stops(robots)
+        raise
+    yield from send_stops(robots)
+
+
 def drive_for(
     robots: Sequence[Member], clock: Clock, linear_m_s: float, angular_rad_s: float, duration_s: float
 ) -> Steps:
-    """Drive all robots with the same velocities for duration_s, then stop them."""
-    yield from wait_for_all(robots, clock)
+    """Drive all robots with the same velocities for duration_s."""
     end_s = clock.now_s + duration_s
     is_to_continue = True
-    try:
-        while is_to_continue and clock.now_s < end_s:
-            for robot in robots:
-                robot.check_not_stopped()
-                robot._send_velocity(linear_m_s, angular_rad_s)
-            is_to_continue = yield min(REPEAT_PERIOD_S, end_s - clock.now_s)
-    finally:
-        yield from send_stops(robots)
+    while is_to_continue and end_s - clock.now_s > ROUNDING_S:
+        for robot in robots:
+            robot.check_not_stopped()
+            robot._send_velocity(linear_m_s, angular_rad_s)
+        is_to_continue = yield min(REPEAT_PERIOD_S, end_s - clock.now_s)
 
 
 class Group(Clock):
@@ -125,7 +136,10 @@ class Group(Clock):
     def _drive_for(self, linear_m_s: float, angular_rad_s: float, duration_s: float) -> None:
         for robot in self._members:
             robot._end_motion()
-        self._run(drive_for(self._members, self._clock, linear_m_s, angular_rad_s, duration_s))
+        self._run(wait_for_all(self._members, self._clock))
+        self._run(
+            stop_after(drive_for(self._members, self._clock, linear_m_s, angular_rad_s, duration_s), self._members)
+        )
 
     def stop(self) -> None:
         """Stop at once and cancel motions from start_go_to(); returns once the stops are sent, after 0.11 s."""

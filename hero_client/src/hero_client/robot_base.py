@@ -15,7 +15,7 @@ from .controllers.motion import DEFAULT_TIMEOUT_S, MotionController, State
 from .controllers.straight_and_turn import ForwardController, TurnController
 from .errors import GoalError, StaleDataError, StoppedError
 from .geometry import Pose, Velocity, clamp, transform_pose
-from .group import REPEAT_PERIOD_S, Group, send_stops, wait_for_all
+from .group import REPEAT_PERIOD_S, Group, stop_after, wait_for_all
 from .light import Light
 from .readings import Obstacle, find_nearest
 from .robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
@@ -314,7 +314,7 @@ class BaseRobot(Group):
         if avoid:
             self._link.subscribe("proximity")
         self._link.subscribe("odom")
-        yield from wait_for_all([self], self._clock)
+        yield from wait_for_all(self._members, self._clock)
         read_pose: Callable[[], Optional[Pose]] = self.fresh_pose
         if frame == "robot":
             place = transform_pose(self.pose, Pose(goal.x_m, goal.y_m, goal.yaw_rad or 0.0))
@@ -338,18 +338,24 @@ class BaseRobot(Group):
         on_step: OnStep = lambda controller: None,
     ) -> Steps:
         """Drive as the controller says to its end. Raises: GoalError, StoppedError, RobotNotReadyError."""
-        yield from wait_for_all([self], self._clock)
-        try:
-            while controller.state is State.ACTIVE:
-                self.check_not_stopped()
-                self._send_velocity(*controller.step(read_pose(), self.fresh_proximity(), self.now_s))
-                on_step(controller)
-                if not (yield REPEAT_PERIOD_S):
-                    raise GoalError("%s did not %s: cancelled" % (self.name, text))
-        finally:
-            yield from send_stops([self])
+        yield from wait_for_all(self._members, self._clock)
+        yield from stop_after(self._obey(controller, text, read_pose, on_step), self._members)
         if controller.state is State.FAILED:
             raise GoalError("%s did not %s: %s" % (self.name, text, controller.reason))
+
+    def _obey(
+        self,
+        controller: MotionController,
+        text: str,
+        read_pose: Callable[[], Optional[Pose]],
+        on_step: OnStep,
+    ) -> Steps:
+        while controller.state is State.ACTIVE:
+            self.check_not_stopped()
+            self._send_velocity(*controller.step(read_pose(), self.fresh_proximity(), self.now_s))
+            on_step(controller)
+            if not (yield REPEAT_PERIOD_S):
+                raise GoalError("%s did not %s: cancelled" % (self.name, text))
 
     def _end_motion(self) -> None:
         """Cancel a motion in the background and wait until it has sent its stops."""

@@ -1,0 +1,276 @@
+"""Robots stepped in process have the interface of Robot and Swarm, and the same calls give the same bytes."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from driver_side import parse_options
+
+from hero_client import CommonFrame, Pose, StaleDataError
+from hero_client.controllers.avoidance import WanderMemory, wander
+from hero_sim import main
+from hero_sim.errors import OptionError
+from hero_sim.population import build_world
+from hero_sim.stepped.swarm import StepSwarm
+from hero_test.robot_program import go_around
+
+CORNER_ARENA = str(Path(__file__).resolve().parents[3] / "hero_test" / "arenas" / "examples_arena.yaml")
+CORNERED = 4
+"""hero_4 stands in the corner: a wall 0.12 m ahead of its center, another 0.16 m to its left."""
+
+
+def wander_about(swarm, seed, duration_s=8.0):
+    """Let robots walk at random, and one go to goals in the background; return the bytes of all their poses."""
+    log = swarm.log_poses()
+    dice = np.random.RandomState(seed)
+    memories = {robot: WanderMemory() for robot in swarm}
+    motion = swarm[0].start_go_to(0.1, 0.1, frame="robot")
+    swarm[0].blink("red", 0.4)
+    for time_s in swarm.rate(10):
+        if time_s > duration_s:
+            break
+        for robot in list(swarm)[1:]:
+            command, memories[robot] = wander(robot.proximity, memories[robot], dice.random_sample())
+            robot.drive(*command)
+        if motion.done():
+            motion = swarm[0].start_go_to(*swarm[0].pose[:2], yaw_rad=float(dice.random_sample()))
+    return np.array(log).tobytes()
+
+
+def test_the_same_seed_gives_the_same_bytes_and_another_seed_others():
+    first, again, other = (wander_about(StepSwarm(6, seed=seed), 1) for seed in (5, 5, 6))
+    assert len(first) > 200 * 6 * 7 * 8
+    assert first == again
+    assert first != other
+
+
+def test_each_world_of_a_batch_is_that_of_its_seed_alone():
+    batch = StepSwarm(3, seed=7, worlds=3)
+    log = batch.log_poses()
+    for world in batch.worlds:
+        world.start_go_to(0.15, 0.1, frame="robot")
+    batch.sleep(6.0)
+    for index in range(3):
+        alone = StepSwarm(3, seed=7 + index)
+        alone_log = alone.log_poses()
+        alone.start_go_to(0.15, 0.1, frame="robot")
+        alone.sleep(6.0)
+        assert np.array(log)[:, 3 * index : 3 * index + 3].tobytes() == np.array(alone_log).tobytes()
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_program_for_a_robot_runs_unchanged_in_process(seed):
+    swarm = StepSwarm(1, seed=seed)
+    start = swarm[0].true_pose
+    with swarm:
+        pose = go_around(swarm[0])
+        assert math.dist(pose[:2], (0.1, 0.0)) < 0.02
+        assert swarm[0].light == (1.0, 0.0, 0.0) or swarm[0].light == (0.0, 0.0, 0.0)
+    assert math.dist(swarm[0].true_pose[:2], start[:2]) == pytest.approx(0.1, abs=0.02)
+    assert swarm[0].light == (0.0, 0.0, 0.0)  # leaving ended the blinking
+    swarm.sleep(2.0)
+    assert swarm[0].light == (0.0, 0.0, 0.0)
+
+
+def test_robots_are_taken_by_their_ids_and_describe_themselves():
+    swarm = StepSwarm(3, first_id=100)
+    assert [robot.robot_id for robot in swarm] == [100, 101, 102] and len(swarm) == 3
+    assert (swarm[101].name, swarm[101].namespace) == ("hero_101", "/hero_101")
+    with pytest.raises(KeyError, match="hero_1 is not in this swarm: hero_100, hero_101, hero_102"):
+        swarm[1]
+    assert repr(swarm) == "<Swarm of hero_100, hero_101, hero_102: 3 of 3 ready>"
+    assert repr(swarm[100]) == "<hero_100: ready, Pose(x_m=0.000, y_m=0.000, yaw_rad=0.000)>"
+    assert swarm.wait_until_ready() is swarm
+
+
+def test_robots_of_a_batch_are_those_of_all_worlds():
+    batch = StepSwarm(2, worlds=3)
+    assert [robot.robot_id for robot in batch] == [0, 1] * 3
+    assert batch[1] is batch.worlds[0][1] and batch.worlds[2][1] is batch.robots[5]
+    assert [robot.row for robot in batch] == list(range(6))
+
+
+def test_robots_and_places_are_those_of_the_command_line():
+    swarm = StepSwarm(3, seed=4, error=["robot=1,left_center_us=1540"])
+    world = build_world(parse_options("--count", "3", "--seed", "4", "--error", "robot=1,left_center_us=1540"))
+    assert (swarm.rows.world.poses == world.poses).all()
+    assert (swarm.rows.world.errors.servo_center_us == world.errors.servo_center_us).all()
+    assert swarm.rows.world.errors.servo_center_us[1, 0] == 1540.0
+
+
+def test_proximity_begins_ahead_and_goes_round_to_the_left():
+    swarm = StepSwarm(6, arena=CORNER_ARENA)
+    robot = swarm[CORNERED]
+    for ranges in (robot.proximity, robot.wait_for_scan(), robot.fresh_proximity()):
+        assert len(ranges) == 8
+        assert ranges[0] == pytest.approx(0.12, abs=0.02) and ranges[2] == pytest.approx(0.16, abs=0.03)
+        assert ranges[4:7] == [math.inf] * 3  # behind, and to the right: free
+    assert robot.nearest().range_m == pytest.approx(0.12, abs=0.02)
+    assert robot.nearest().bearing_rad == pytest.approx(0.0)
+    assert swarm[0].nearest() is None
+
+
+def test_pose_and_velocity_follow_the_commands_and_speeds_are_cut():
+    swarm = StepSwarm(1)
+    robot = swarm[0]
+    for time_s in swarm.rate(10):
+        robot.drive(9.0, 1.0)
+        if time_s > 1.5:
+            break
+    assert robot.velocity.linear_m_s == pytest.approx(0.2, abs=0.03)
+    assert robot.velocity.angular_rad_s == pytest.approx(1.0, abs=0.4)
+    assert robot.pose.yaw_rad > 0.5
+    assert robot.age_s("odom") < 0.04 and robot.age_s("proximity") < 0.21
+    robot.stop()
+    robot.sleep(0.5)
+    assert robot.velocity == pytest.approx((0.0, 0.0), abs=0.1)
+
+
+def test_setting_the_odometry_moves_its_frame_and_not_the_robot():
+    swarm = StepSwarm(2)
+    robot, common = swarm[1], CommonFrame("world")
+    robot.forward(0.1)
+    before = robot.true_pose
+    robot.set_pose(1.0, -2.0, 0.5)
+    assert math.dist(robot.pose, (1.0, -2.0, 0.5)) < 1e-6
+    assert robot.true_pose == pytest.approx(before, abs=1e-6)
+    assert common.pose_of(robot)[:2] == pytest.approx(before[:2], abs=1e-6)
+    assert common.missing == {"hero_1": None}
+    starts = CommonFrame("arena", {1: (5.0, 5.0, 0.0)})
+    assert starts.pose_of(robot) == pytest.approx(Pose(5.0, 5.0, 0.0))
+    robot.turn(1.0)
+    assert starts.pose_of(robot).yaw_rad == pytest.approx(1.0, abs=0.05)
+
+
+def test_a_common_frame_that_nobody_knows_is_reported(capsys):
+    swarm, common = StepSwarm(1), CommonFrame("mars")
+    assert common.pose_of(swarm[0]) is None
+    assert "no transform from hero_0/odom to mars" in common.missing["hero_0"]
+    for _ in swarm.rate(10):
+        swarm.report_missing(common.missing)
+        if swarm.now_s > 9.0:
+            break
+    assert capsys.readouterr().err.count("hero_0: waiting: no transform") == 2
+    swarm.report_missing({"hero_0": None})
+    assert capsys.readouterr().err == "hero_0 answers\n"
+
+
+def test_lights_show_the_color_that_was_asked_for_and_blink():
+    swarm = StepSwarm(3)
+    swarm[0].led("green")
+    swarm[1].led((1.0, 0.0, 0.25))
+    assert [robot.light for robot in swarm] == [(0.0, 1.0, 0.0), (1.0, 0.0, 0.25), (0.0, 0.0, 0.0)]
+    swarm.blink("red", 0.4)
+    shown = []
+    for _ in range(8):
+        swarm.sleep(0.1)
+        shown.append(swarm[2].light[0])
+    assert shown == [1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0]
+    swarm.led("blue")
+    swarm.sleep(2.0)
+    assert {robot.light for robot in swarm} == {(0.0, 0.0, 1.0)}
+    with pytest.raises(ValueError, match=r"pink.*there are: .*green"):
+        swarm[0].led("pink")
+    with pytest.raises(ValueError, match=r"at least 0.2 s"):
+        swarm[0].blink("red", period_s=0.1)
+
+
+def test_leaving_a_with_block_stops_the_robots_also_after_an_error():
+    swarm = StepSwarm(2)
+
+    def drive_and_fail():
+        with swarm:
+            swarm[0].drive(0.1, 0.0)
+            swarm.sleep(1.0)
+            raise RuntimeError("a mistake in the user's program")
+
+    with pytest.raises(RuntimeError, match="mistake"):
+        drive_and_fail()
+    swarm.sleep(0.5)
+    before = swarm[0].true_pose
+    swarm.sleep(1.0)  # the robot's own watchdog would not have ended this yet
+    assert math.dist(swarm[0].true_pose, before) < 1e-4
+
+
+def test_robots_that_were_only_watched_are_not_stopped_at_the_end():
+    swarm = StepSwarm(1)
+    with swarm:
+        swarm.rows.send_velocity(0, 0.1, 0.0)  # another program
+        swarm.sleep(0.8)
+    swarm.rows.send_velocity(0, 0.1, 0.0)
+    swarm.sleep(0.3)
+    assert swarm[0].velocity.linear_m_s > 0.05
+    assert not swarm[0].driven
+
+
+def test_data_that_no_longer_come_are_refused_after_a_while():
+    swarm = StepSwarm(1)
+    robot = swarm[0]
+
+    def forget(_):
+        swarm.rows.odometry_ms[:] = swarm.rows.scan_ms[:] = 34
+
+    swarm.sleep(0.05)
+    swarm.rows.on_cycle.append(forget)
+    swarm.rows.on_scan.append(forget)
+    swarm.sleep(0.45)
+    assert robot.fresh_pose() is not None and robot.nearest() is None
+    swarm.sleep(0.2)
+    for read in (lambda: robot.pose, lambda: robot.velocity, lambda: robot.pose_in("world")):
+        with pytest.raises(StaleDataError, match="last message on /hero_0/odom came 0.7 s ago: has the robot gone"):
+            read()
+    assert robot.fresh_pose() is None and robot.missing() is None
+    swarm.sleep(0.5)
+    for read in (lambda: robot.proximity, robot.nearest):
+        with pytest.raises(StaleDataError, match=r"/hero_0/proximity came 1.2 s ago"):
+            read()
+    assert all(map(math.isnan, robot.fresh_proximity()))
+    assert robot.missing() == "no message on /hero_0/odom: is the robot on and in reach?"
+    with pytest.raises(StaleDataError, match="no message on /hero_0/proximity within 2.0 s"):
+        robot.wait_for_scan()
+
+
+OPTIONS = {"count": "--count", "first_id": "--first-id", "seed": "--seed", "arena": "--arena", "error": "--error"}
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"count": 0},
+        {"count": 1001},
+        {"first_id": -1},
+        {"count": 2, "first_id": 2**31 - 1},
+        {"seed": -1},
+        {"seed": 2**32},
+        {"arena": "nowhere.yaml"},
+        {"count": 500, "arena": "maze"},
+        {"error": "slip=2"},
+        {"error": "robot=9,slip=0"},
+    ],
+    ids=str,
+)
+def test_wrong_options_are_refused_in_the_words_of_the_command_line(wrong, capsys):
+    options = {name: [value] if name == "error" else value for name, value in wrong.items()}
+    with pytest.raises(OptionError) as refused:
+        StepSwarm(**{"count": 1, **options})
+    arguments = [OPTIONS[name] + "=" + str(value) for name, value in wrong.items()]
+    assert main.main(["--port", "9", *arguments]) in (1, 2)
+    assert capsys.readouterr().err.strip() == "hero_sim: %s" % refused.value
+
+
+def test_options_of_a_wrong_type_are_refused_in_one_line():
+    for wrong in ({"count": "3"}, {"count": 1, "seed": 0.5}, {"count": 1, "worlds": 0}, {"count": True}):
+        with pytest.raises(OptionError, match=r"(--count|--seed|worlds) .*: must be"):
+            StepSwarm(**wrong)
+    with pytest.raises(OptionError, match="--wifi 'good': must be one of ideal, router, hotspot, bad"):
+        StepSwarm(1, wifi="good")
+    assert len(StepSwarm(np.int64(2), seed=np.int64(3))) == 2
+
+
+def test_waits_take_whole_milliseconds_and_one_at_least():
+    swarm = StepSwarm(1)
+    for duration_s, taken_ms in ((0.1, 100), (0.0, 0), (1e-9, 1), (0.0301, 31), (0.1 + 0.2, 300), (-1.0, 0)):
+        before_ms = swarm.rows.now_ms
+        assert swarm.sleep(duration_s)
+        assert swarm.rows.now_ms - before_ms == taken_ms
