@@ -3,14 +3,18 @@
 from hero_client import Robot, rate
 
 
+def step(robot: Robot) -> None:
+    front, left, *_, right = robot.proximity  # m from the robot's center; inf: nothing in range
+    is_blocked = min(front, left, right) < 0.15
+    angular_rad_s = 1.5 if left > right else -1.5
+    robot.drive(0.0 if is_blocked else 0.08, angular_rad_s if is_blocked else 0.0)
+
+
 def main() -> None:
     with Robot(0) as robot:
         robot.wait_until_ready()
         for _ in rate(10):  # Hz
-            front, left, *_, right = robot.proximity  # m from the robot's center; inf: nothing in range
-            is_blocked = min(front, left, right) < 0.15
-            angular_rad_s = 1.5 if left > right else -1.5
-            robot.drive(0.0 if is_blocked else 0.08, angular_rad_s if is_blocked else 0.0)
+            step(robot)
 
 
 if __name__ == "__main__":

@@ -5,12 +5,16 @@ import math
 from hero_client import Robot
 
 
+def drive_a_square(robot: Robot) -> None:
+    robot.blink("green", period_s=0.5)
+    for _ in range(4):
+        robot.forward(0.2)
+        robot.turn(math.pi / 2.0)
+
+
 def main() -> None:
     with Robot(0) as robot:
-        robot.blink("green", period_s=0.5)
-        for _ in range(4):
-            robot.forward(0.2)
-            robot.turn(math.pi / 2.0)
+        drive_a_square(robot)
 
 
 if __name__ == "__main__":

@@ -9,6 +9,14 @@ from hero_client.parameters import number, parse_poses, robot_ids
 from hero_client.robot_constants import MAX_LINEAR_M_S
 
 
+def step(swarm, common, law):
+    """Send every robot but the first its next command; call it ten times per second."""
+    poses = [common.pose_of(robot) for robot in swarm]
+    for robot, pose, leader_pose in zip(swarm.robots[1:], poses[1:], poses):
+        known = pose is not None and leader_pose is not None
+        robot.drive(*(follow(pose, leader_pose, law) if known else STOP))
+
+
 def follow_leader():
     with Program("follow") as program:
         parameters = read_parameters(
@@ -31,10 +39,7 @@ def follow_leader():
             leader, *followers = swarm
             rospy.loginfo("%s leads, and %s follow", leader.name, ", ".join(robot.name for robot in followers))
             while program.pace(0.1):
-                poses = [common.pose_of(robot) for robot in swarm]
-                for robot, pose, leader_pose in zip(followers, poses[1:], poses):
-                    known = pose is not None and leader_pose is not None
-                    robot.drive(*(follow(pose, leader_pose, law) if known else STOP))
+                step(swarm, common, law)
                 swarm.report_missing(common.missing)
 
 

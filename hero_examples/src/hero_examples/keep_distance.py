@@ -5,15 +5,19 @@ import math
 from hero_client import Robot, rate
 
 
+def step(robot: Robot) -> None:
+    nearest = robot.nearest()
+    if nearest is None:
+        robot.drive(0.05, 0.0)  # the sensors see 0.24 m far
+    else:
+        robot.drive(0.8 * (nearest.range_m - 0.15) * math.cos(nearest.bearing_rad), 1.5 * nearest.bearing_rad)
+
+
 def main() -> None:
     with Robot(0) as robot:
         robot.wait_until_ready()
         for _ in rate(10):  # Hz
-            nearest = robot.nearest()
-            if nearest is None:
-                robot.drive(0.05, 0.0)  # the sensors see 0.24 m far
-            else:
-                robot.drive(0.8 * (nearest.range_m - 0.15) * math.cos(nearest.bearing_rad), 1.5 * nearest.bearing_rad)
+            step(robot)
 
 
 if __name__ == "__main__":

@@ -24,6 +24,13 @@ def blink(phase, share, lit):
 PATTERNS = {"rainbow": rainbow, "chase": chase, "blink": blink}
 
 
+def step(swarm, pattern, phase, brightness=1.0):
+    """Show every robot its color at a phase 0..1 of the pattern."""
+    for place, robot in enumerate(swarm):
+        color = pattern(phase, place / len(swarm), int(phase * len(swarm)) == place)
+        robot.led([part * brightness for part in color])
+
+
 def show_pattern():
     with Program("led_show") as program:
         parameters = read_parameters(
@@ -40,9 +47,7 @@ def show_pattern():
             start_s = time.monotonic()
             while program.pace(0.2):
                 phase = (time.monotonic() - start_s) / parameters["period_s"] % 1.0
-                for place, robot in enumerate(swarm):
-                    color = pattern(phase, place / len(swarm), int(phase * len(swarm)) == place)
-                    robot.led([part * parameters["brightness"] for part in color])
+                step(swarm, pattern, phase, parameters["brightness"])
                 swarm.report_missing()
             swarm.led("off")
 

@@ -3,11 +3,15 @@
 from hero_client import Robot
 
 
+def move(robot: Robot) -> None:
+    robot.wait_until_ready()
+    robot.drive(0.1, 0.0, duration_s=2.0)  # m/s forward, rad/s to the left
+    robot.drive(0.0, 1.5, duration_s=1.0)
+
+
 def main() -> None:
     with Robot(0) as robot:  # at the end, also after an error, the robot is stopped
-        robot.wait_until_ready()
-        robot.drive(0.1, 0.0, duration_s=2.0)  # m/s forward, rad/s to the left
-        robot.drive(0.0, 1.5, duration_s=1.0)
+        move(robot)
 
 
 if __name__ == "__main__":

@@ -6,9 +6,34 @@ import random
 import rospy
 
 from hero_client import Program, open_swarm, read_parameters, run
-from hero_client.controllers import avoidance
+from hero_client.controllers.avoidance import WanderLaw, WanderMemory, wander
+from hero_client.geometry import STOP
 from hero_client.parameters import number, robot_ids, whole_number
 from hero_client.robot_constants import MAX_LINEAR_M_S
+
+
+class Walker:
+    """One robot on its walk; call step() ten times per second."""
+
+    def __init__(self, robot, law, seed=None):
+        """seed: of the random numbers; None draws one."""
+        self.robot, self.law = robot, law
+        self.random = random.Random(seed)
+        self.memory = WanderMemory()
+
+    def step(self):
+        """Send the next command; return why the robot cannot walk, or None."""
+        ranges, missing = self.robot.fresh_proximity(), self.robot.missing()
+        if all(map(math.isnan, ranges)):
+            missing = missing or "no usable ranges: infrared calibration?"
+            command, self.memory, color = STOP, WanderMemory(), "blue"
+        else:
+            command, self.memory = wander(ranges, self.memory, self.random.random(), self.law)
+            color = "green" if command.linear_m_s >= self.law.cruise_m_s else "yellow"
+            color = "red" if self.memory.escape_sign else color
+        self.robot.drive(*command)
+        self.robot.led(color)
+        return missing
 
 
 def walk():
@@ -21,27 +46,14 @@ def walk():
                 "seed": whole_number(-1, -1, 2**31),
             }
         )
-        cruise_m_s, seed = parameters["linear_m_s"], parameters["seed"]
-        law = avoidance.WanderLaw(cruise_m_s, parameters["angular_rad_s"])
+        law = WanderLaw(parameters["linear_m_s"], parameters["angular_rad_s"])
+        seed = parameters["seed"]
 
         with open_swarm(program, parameters["robots"], odom=False) as swarm:
             rospy.loginfo("random walk of %s", ", ".join(robot.name for robot in swarm))
-            dice = {robot: random.Random(None if seed < 0 else seed + robot.robot_id) for robot in swarm}
-            memories = {robot: avoidance.WanderMemory() for robot in swarm}
-            missing = {}
+            walkers = [Walker(robot, law, None if seed < 0 else seed + robot.robot_id) for robot in swarm]
             while program.pace(0.1):
-                for robot in swarm:
-                    ranges = robot.fresh_proximity()
-                    missing[robot.name] = robot.missing()
-                    if all(map(math.isnan, ranges)):
-                        missing[robot.name] = missing[robot.name] or "no usable ranges: infrared calibration?"
-                        command, memories[robot], color = (0.0, 0.0), avoidance.WanderMemory(), "blue"
-                    else:
-                        command, memories[robot] = avoidance.wander(ranges, memories[robot], dice[robot].random(), law)
-                        color = "green" if command.linear_m_s >= cruise_m_s else "yellow"
-                        color = "red" if memories[robot].escape_sign else color
-                    robot.drive(*command)
-                    robot.led(color)
+                missing = {walker.robot.name: walker.step() for walker in walkers}
                 swarm.report_missing(missing)
             swarm.led("off")
     rospy.loginfo("random walk ended, robots stopped")

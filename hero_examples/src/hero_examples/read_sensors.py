@@ -3,16 +3,20 @@
 from hero_client import Robot, rate
 
 
+def step(robot: Robot) -> None:
+    robot.drive(0.0, 0.6)  # the robot obeys one command for about 2 s
+    print("pose: x %.2f m, y %.2f m, yaw %.2f rad" % robot.pose)
+    print("ranges from the front, counter-clockwise, m:", ["%.2f" % range_m for range_m in robot.proximity])
+    print("nearest:", robot.nearest())
+
+
 def main() -> None:
     with Robot(0) as robot:
         robot.wait_until_ready()
         for time_s in rate(2):  # Hz
             if time_s >= 10.0:
                 break
-            robot.drive(0.0, 0.6)  # the robot obeys one command for about 2 s
-            print("pose: x %.2f m, y %.2f m, yaw %.2f rad" % robot.pose)
-            print("ranges from the front, counter-clockwise, m:", ["%.2f" % range_m for range_m in robot.proximity])
-            print("nearest:", robot.nearest())
+            step(robot)
 
 
 if __name__ == "__main__":

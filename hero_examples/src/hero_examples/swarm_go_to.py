@@ -11,6 +11,35 @@ from hero_client.formations import assign_goals, place_formation
 from hero_client.parameters import flag, number, parse_poses, robot_ids, whole_number
 from hero_client.robot_constants import MAX_LINEAR_M_S
 
+STEP_S = 0.1
+
+
+class Formation:
+    """A swarm on its way to one goal for each robot; call step() every STEP_S.
+
+    Attributes:
+        done: whether all robots have been in place at once.
+    """
+
+    def __init__(self, swarm, common, goals, law, seed=0, tolerance_m=0.01, timeout_s=120.0):
+        self.swarm, self.common, self.timeout_s = swarm, common, timeout_s
+        self.controller = SwarmGoToController(goals, law, STEP_S, seed, tolerance_m)
+        self.done = False
+
+    def step(self, elapsed_s):
+        """Send every robot its next command; elapsed_s: since the start. Raises: ProgramError after timeout_s."""
+        poses = [self.common.pose_of(robot) for robot in self.swarm]
+        commands = self.controller.step(poses, [robot.fresh_proximity() for robot in self.swarm])
+        for robot, command, arrived in zip(self.swarm, commands, self.controller.arrived):
+            robot.drive(*command)
+            robot.led("green" if arrived else "yellow")
+        late = [robot.name for robot, arrived in zip(self.swarm, self.controller.arrived) if not arrived]
+        if not self.done and not late and None not in poses:
+            self.done = True
+            rospy.loginfo("formation complete after %.1f s", elapsed_s)
+        if not self.done and elapsed_s > self.timeout_s:
+            raise ProgramError("after %g s not in place: %s" % (self.timeout_s, ", ".join(late)))
+
 
 def form():
     with Program("swarm_go_to") as program:
@@ -28,31 +57,22 @@ def form():
                 "seed": whole_number(0, 0, 2**31),
             }
         )
-        ids, formation = parameters["robots"], parameters["formation"]
+        ids, wanted = parameters["robots"], parameters["formation"]
         law = AvoidanceLaw(max_linear_m_s=parameters["linear_m_s"])
-        place_formation(formation, len(ids or [0]), law.min_spacing_m)  # fails before robots are waited for
+        place_formation(wanted, len(ids or [0]), law.min_spacing_m)  # fails before robots are waited for
         common = CommonFrame(parameters["frame"], parse_poses("starts", parameters["starts"], ids))
         with open_swarm(program, ids) as swarm:
             poses = common.wait_for_poses(program, swarm)
-            goals = place_formation(formation, len(swarm), law.min_spacing_m)
+            goals = place_formation(wanted, len(swarm), law.min_spacing_m)
             if parameters["assign"]:
                 goals = [goals[index] for index in assign_goals([pose[:2] for pose in poses], goals)]
-            controller = SwarmGoToController(goals, law, 0.1, parameters["seed"], parameters["tolerance_m"])
-            start_s, done = time.monotonic(), False
-            while not (done and parameters["once"]) and program.pace(0.1):
-                poses = [common.pose_of(robot) for robot in swarm]
+            options = [parameters[name] for name in ("seed", "tolerance_m", "timeout_s")]
+            formation = Formation(swarm, common, goals, law, *options)
+            start_s = time.monotonic()
+            while not (formation.done and parameters["once"]) and program.pace(STEP_S):
+                formation.step(time.monotonic() - start_s)
                 swarm.report_missing(common.missing)
-                commands = controller.step(poses, [robot.fresh_proximity() for robot in swarm])
-                for robot, command, arrived in zip(swarm, commands, controller.arrived):
-                    robot.drive(*command)
-                    robot.led("green" if arrived else "yellow")
-                late = [robot.name for robot, arrived in zip(swarm, controller.arrived) if not arrived]
-                if not done and not late and None not in poses:
-                    done = True
-                    rospy.loginfo("formation complete after %.1f s", time.monotonic() - start_s)
-                if not done and time.monotonic() - start_s > parameters["timeout_s"]:
-                    raise ProgramError("after %g s not in place: %s" % (parameters["timeout_s"], ", ".join(late)))
-            return 1 if parameters["once"] and not done else 0
+            return 1 if parameters["once"] and not formation.done else 0
 
 
 def main():

@@ -1,5 +1,8 @@
 #!/usr/bin/env python3
-"""Runs the pages of a course, or README and quick start, with the simulator: real commands in real terminals."""
+"""Runs pages of a course, or README and quick start, with the simulator: real commands in real terminals.
+
+Usage: test_tutorials.py COURSE FIRST LAST, the numbers of the first and last page; those before are only prepared.
+"""
 
 import os
 import sys
@@ -39,16 +42,16 @@ def make_changes():
 
 
 class TutorialsTest(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        cls.home = tempfile.TemporaryDirectory(prefix="tutorials_")
-        cls.course = Course(Path(cls.home.name), PACKAGE, make_changes())
-        cls.failed = None
+    pages_before = ()
 
     @classmethod
-    def tearDownClass(cls):
-        cls.course.close()
-        cls.home.cleanup()
+    def setUpClass(cls):
+        home = tempfile.TemporaryDirectory(prefix="tutorials_")
+        cls.addClassCleanup(home.cleanup)
+        cls.course = Course(Path(home.name), PACKAGE, make_changes())
+        cls.addClassCleanup(cls.course.close)
+        cls.failed = None
+        cls.course.prepare(cls.pages_before)
 
     def run_page(self, page):
         if self.failed:
@@ -60,13 +63,15 @@ class TutorialsTest(unittest.TestCase):
             raise
 
 
-def add_pages(course):
+def add_pages(pages, first, last):
     """Add one test per page. Of pages without numbers, the order of the names is that of the pages, too."""
-    for page in PAGES[course]:
+    TutorialsTest.pages_before = pages[: first - 1]
+    for page in pages[first - 1 : last]:
         name = "test_%s_works_as_shown" % page.stem
         setattr(TutorialsTest, name, lambda self, page=page: self.run_page(page))
 
 
 if __name__ == "__main__":
-    add_pages(sys.argv[1])
-    rostest.rosrun("hero_tutorial", "tutorials_%s" % sys.argv[1], TutorialsTest, sys.argv)
+    course, first, last = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
+    add_pages(PAGES[course], first, last)
+    rostest.rosrun("hero_tutorial", "tutorials_%s_%d_to_%d" % (course, first, last), TutorialsTest, sys.argv)
