@@ -4,7 +4,11 @@ Public names are imported on first use (PEP 562), so that pure modules of this p
 """
 
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:  # of these mypy knows what programs may use of a robot, whatever connects it
+    from .robot_base import BaseRobot as BaseRobot  # noqa: PLC0414 - so that it counts as exported
+    from .swarm_base import BaseSwarm as BaseSwarm  # noqa: PLC0414
 
 _MODULES = {
     "BackgroundMotion": "background_motion",

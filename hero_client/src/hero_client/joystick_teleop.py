@@ -4,7 +4,6 @@ Another button stops all robots of all drivers.
 """
 
 import math
-import time
 from typing import NamedTuple, Optional
 
 import rospy
@@ -21,6 +20,9 @@ PERIOD_S = 0.1
 
 SILENCE_S = 0.5
 """Without a message for this time the robot stops: joy_node repeats held axes by autorepeat_rate of the launch file."""
+
+FIRST_WARNING_S = 2.0
+"""joy_node may start later."""
 
 STOP_REPEAT_S = 0.5
 """Stops are sent for so long, then teleop is silent: other programs may drive the robot."""
@@ -60,28 +62,28 @@ class JoystickTeleop:
     """Sends the joystick's commands to all robots of a swarm."""
 
     def __init__(self, swarm: Swarm, mapping: JoystickMapping) -> None:
-        """Subscribe to /joy; a press of the stop button stops all robots of the drivers."""
+        """Start stopped."""
         self._swarm = swarm
         self._mapping = mapping
         self._newest: Optional[Joy] = None
         self._arrival_s = -math.inf
         self._is_stop_pressed = False
         self._last_motion_s = -math.inf
-        self._next_warning_s = time.monotonic() + 2.0
+        self._next_warning_s = swarm.now_s + FIRST_WARNING_S
         self._reported_status = ""
-        self._subscriber = rospy.Subscriber("/joy", Joy, self._receive, queue_size=10, tcp_nodelay=True)
 
-    def _receive(self, joy: Joy) -> None:
+    def receive(self, joy: Joy) -> None:
+        """Take a message of the joystick; a press of the stop button stops all robots of the drivers."""
         # Here, because a short press may be over at the program's next step.
         button = self._mapping.stop_button
         is_pressed = button < len(joy.buttons) and bool(joy.buttons[button])
         if is_pressed and not self._is_stop_pressed:
             self._swarm.drivers.request_stop(True)
         self._is_stop_pressed = is_pressed
-        self._newest, self._arrival_s = joy, time.monotonic()
+        self._newest, self._arrival_s = joy, self._swarm.now_s
 
     def run(self, program: Program) -> None:
-        """Drive until the program is to end.
+        """Subscribe to /joy, and drive until the program is to end.
 
         Raises: ProgramError if the joystick lacks an axis or button, or a stop of all robots was not obeyed.
         """
@@ -90,12 +92,13 @@ class JoystickTeleop:
             self._mapping.enable_button,
             self._mapping.stop_button,
         )
+        rospy.Subscriber("/joy", Joy, self.receive, queue_size=10, tcp_nodelay=True)
         while program.pace(PERIOD_S):
-            self.step(time.monotonic())
+            self.step(self._swarm.now_s)
         self._swarm.drivers.check_stop()
 
     def step(self, now_s: float) -> None:
-        """Send the next command, and log what users must know; now_s: monotonic.
+        """Send the next command, and log what users must know; now_s: the robots' time.
 
         Raises: ProgramError; see JoystickMapping.read().
         """

@@ -8,7 +8,6 @@ before they repeat, and short once the key repeats (every 30..50 ms).
 import math
 import os
 import sys
-import time
 from typing import Dict, List, Tuple
 
 from .errors import StaleDataError
@@ -154,8 +153,8 @@ class KeyboardTeleop:
                 if keys is None or "\x04" in keys:  # Ctrl-D
                     break
                 for key in keys:
-                    self.press(key, time.monotonic())
-            now_s = time.monotonic()
+                    self.press(key, program.now_s)
+            now_s = program.now_s
             self.step(now_s)
             if now_s >= next_line_s:
                 show_live_line(*self.describe())

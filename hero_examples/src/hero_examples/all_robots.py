@@ -2,10 +2,10 @@
 
 import colorsys
 
-from hero_client import Swarm
+from hero_client import BaseSwarm, Swarm
 
 
-def turn_all(swarm: Swarm) -> None:
+def turn_all(swarm: BaseSwarm) -> None:
     swarm.wait_until_ready()
     for number, robot in enumerate(swarm):
         robot.led(colorsys.hsv_to_rgb(number / len(swarm), 1.0, 1.0))

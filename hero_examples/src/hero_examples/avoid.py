@@ -1,9 +1,9 @@
 """Drives robot 0 forward and turns it away from what it sees, until Ctrl-C."""
 
-from hero_client import Robot, rate
+from hero_client import BaseRobot, Robot, rate
 
 
-def step(robot: Robot) -> None:
+def step(robot: BaseRobot) -> None:
     front, left, *_, right = robot.proximity  # m from the robot's center; inf: nothing in range
     is_blocked = min(front, left, right) < 0.15
     angular_rad_s = 1.5 if left > right else -1.5

@@ -2,10 +2,10 @@
 
 import math
 
-from hero_client import Robot
+from hero_client import BaseRobot, Robot
 
 
-def drive_a_square(robot: Robot) -> None:
+def drive_a_square(robot: BaseRobot) -> None:
     robot.blink("green", period_s=0.5)
     for _ in range(4):
         robot.forward(0.2)

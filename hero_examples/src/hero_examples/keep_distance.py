@@ -2,10 +2,10 @@
 
 import math
 
-from hero_client import Robot, rate
+from hero_client import BaseRobot, Robot, rate
 
 
-def step(robot: Robot) -> None:
+def step(robot: BaseRobot) -> None:
     nearest = robot.nearest()
     if nearest is None:
         robot.drive(0.05, 0.0)  # the sensors see 0.24 m far

@@ -1,7 +1,6 @@
 """Shows a pattern of colors that runs over the swarm."""
 
 import colorsys
-import time
 
 import rospy
 
@@ -44,9 +43,9 @@ def show_pattern():
         pattern = PATTERNS[parameters["pattern"]]
         with open_swarm(program, parameters["robots"], odom=False, proximity=False) as swarm:
             rospy.loginfo("%s on %s", parameters["pattern"], ", ".join(robot.name for robot in swarm))
-            start_s = time.monotonic()
+            start_s = program.now_s
             while program.pace(0.2):
-                phase = (time.monotonic() - start_s) / parameters["period_s"] % 1.0
+                phase = (program.now_s - start_s) / parameters["period_s"] % 1.0
                 step(swarm, pattern, phase, parameters["brightness"])
                 swarm.report_missing()
             swarm.led("off")

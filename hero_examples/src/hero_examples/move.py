@@ -1,9 +1,9 @@
 """Drives robot 0 forward for two seconds, then turns it to the left."""
 
-from hero_client import Robot
+from hero_client import BaseRobot, Robot
 
 
-def move(robot: Robot) -> None:
+def move(robot: BaseRobot) -> None:
     robot.wait_until_ready()
     robot.drive(0.1, 0.0, duration_s=2.0)  # m/s forward, rad/s to the left
     robot.drive(0.0, 1.5, duration_s=1.0)

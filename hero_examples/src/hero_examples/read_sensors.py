@@ -1,9 +1,9 @@
 """Turns robot 0 slowly on the spot for ten seconds and prints what its sensors see."""
 
-from hero_client import Robot, rate
+from hero_client import BaseRobot, Robot, rate
 
 
-def step(robot: Robot) -> None:
+def step(robot: BaseRobot) -> None:
     robot.drive(0.0, 0.6)  # the robot obeys one command for about 2 s
     print("pose: x %.2f m, y %.2f m, yaw %.2f rad" % robot.pose)
     print("ranges from the front, counter-clockwise, m:", ["%.2f" % range_m for range_m in robot.proximity])

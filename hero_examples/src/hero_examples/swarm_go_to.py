@@ -1,7 +1,5 @@
 """Drives a swarm into a formation without collisions; lights are yellow on the way and green in place."""
 
-import time
-
 import rospy
 
 from hero_client import CommonFrame, Program, ProgramError, open_swarm, read_parameters, run
@@ -68,9 +66,9 @@ def form():
                 goals = [goals[index] for index in assign_goals([pose[:2] for pose in poses], goals)]
             options = [parameters[name] for name in ("seed", "tolerance_m", "timeout_s")]
             formation = Formation(swarm, common, goals, law, *options)
-            start_s = time.monotonic()
+            start_s = program.now_s
             while not (formation.done and parameters["once"]) and program.pace(STEP_S):
-                formation.step(time.monotonic() - start_s)
+                formation.step(program.now_s - start_s)
                 swarm.report_missing(common.missing)
             return 1 if parameters["once"] and not formation.done else 0
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hero_client.controllers.go_to_goal import Goal, GoToGoalController
 from hero_client.controllers.motion import SILENCE_S, State
 from hero_client.geometry import STOP, Pose
-from hero_client.go_to_goal_server import (
+from hero_client.goals import (
     MAX_COORDINATE_M,
     MAX_FRAME_LENGTH,
     InvalidGoalError,
