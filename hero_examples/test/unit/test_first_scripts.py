@@ -1,0 +1,91 @@
+"""The first scripts in virtual time: what each does, with the robots of many seeds."""
+
+import math
+import re
+
+import numpy as np
+import pytest
+import true_paths
+
+from hero_examples import all_robots, avoid, drive_a_square, keep_distance, move, read_sensors
+from hero_sim.stepped.swarm import StepSwarm
+from hero_sim.world.arena_file import load_arena
+
+pytest.importorskip("rospy", reason="the scripts' robots are on ROS")
+
+WORLDS = 20
+
+
+def step_all(swarm, step):
+    """Return a function that takes a script's step for each robot of all worlds."""
+
+    def step_each(time_s):
+        for robot in swarm:
+            step(robot)
+
+    return step_each
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_move_drives_forward_and_turns_left(seed):
+    with StepSwarm(1, seed=seed) as swarm:
+        before = swarm[0].true_pose
+        move.move(swarm[0])
+        after = swarm[0].true_pose
+    assert 0.12 < math.dist(before[:2], after[:2]) < 0.22
+    assert 0.5 < after.yaw_rad - before.yaw_rad < 1.6
+    assert true_paths.stop_within(swarm)
+
+
+def test_read_sensors_turns_and_prints_what_is_seen(capsys):
+    with StepSwarm(1) as swarm:
+        path = true_paths.run(swarm, step_all(swarm, read_sensors.step), 5.0, hz=2.0)[0]
+    assert path[-1, 0, 2] - path[0, 0, 2] == pytest.approx(0.6 * 5.0, abs=0.8)
+    text = capsys.readouterr().out
+    for pattern in (r"pose: x -?0.\d\d m, y ", r"ranges from the front, .*\['", r"nearest: (None|Obstacle)"):
+        assert len(re.findall(pattern, text)) == 10
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_the_square_is_closed_and_the_light_blinks(seed):
+    with StepSwarm(1, seed=seed) as swarm:
+        log = swarm.log_poses()
+        lights = []
+        swarm.rows.on_cycle.append(lambda rows: lights.append(swarm[0].light))
+        drive_a_square.drive_a_square(swarm[0])
+    offsets = true_paths.split_worlds(swarm, log)[0][:, 0, :2] - log[0][0, 4:6]
+    assert math.hypot(*offsets[-1]) < 0.05
+    assert np.hypot(*offsets.T).max() == pytest.approx(0.2 * math.sqrt(2.0), abs=0.03)
+    changes = sum(one != next_one for one, next_one in zip(lights, lights[1:]))
+    assert set(lights) == {(0.0, 0.0, 0.0), (0.0, 1.0, 0.0)} and changes > 50
+    assert lights[-1] == (0.0, 0.0, 0.0)
+
+
+def test_avoid_keeps_driving_and_touches_nothing_that_it_sees():
+    with StepSwarm(1, seed=1, arena="obstacles", worlds=WORLDS) as swarm:
+        paths = true_paths.run(swarm, step_all(swarm, avoid.step), 60.0)
+    for path in paths:
+        assert true_paths.list_touches(path, load_arena("obstacles")) == []
+        assert true_paths.measure_lengths(path).min() > 1.0
+
+
+def test_keep_distance_ends_facing_the_nearest_thing_at_its_distance():
+    with StepSwarm(1, seed=1, arena="obstacles", worlds=WORLDS) as swarm:
+        paths = true_paths.run(swarm, step_all(swarm, keep_distance.step), 60.0)
+        for path, robot in zip(paths, swarm):
+            assert true_paths.measure_wall_gaps(path, load_arena("obstacles")).min() > 0.05
+            assert robot.nearest().bearing_rad == 0.0
+            assert robot.nearest().range_m == pytest.approx(0.15, abs=0.01)
+
+
+def test_all_robots_turns_every_robot_in_a_color_of_its_own():
+    with StepSwarm(5) as swarm:
+        before = [robot.true_pose.yaw_rad for robot in swarm]
+        seen = set()
+        swarm.rows.on_cycle.append(lambda rows: seen.add(tuple(robot.light for robot in swarm)))
+        all_robots.turn_all(swarm)
+        swarm.sleep(0.2)
+        for robot, yaw_rad in zip(swarm, before):
+            assert robot.true_pose.yaw_rad - yaw_rad > 0.8
+            assert robot.light == (0.0, 0.0, 0.0)
+    assert any(len(set(lights)) == 5 for lights in seen)

@@ -1,0 +1,54 @@
+"""follow in virtual time: chains of robots behind a leader that drives a curve."""
+
+import numpy as np
+import pytest
+import true_paths
+
+from hero_client import CommonFrame
+from hero_client.controllers.unicycle import FollowLaw
+from hero_client.robot_constants import BODY_RADIUS_M
+from hero_sim.stepped.swarm import StepSwarm
+
+pytest.importorskip("rospy", reason="the program imports rospy")
+from hero_examples import follow
+
+ARENA = """
+bounds_m: [-2, -2, 2, 2]
+starts_m_deg: [[0, 0, 0], [-0.25, 0, 0], [-0.5, 0, 0]]
+"""
+STARTS = {0: (1.0, 1.0, 0.0), 1: (0.75, 1.0, 0.0), 2: (0.5, 1.0, 0.0)}
+"""In a frame of its own, in which the robots stand as in the arena."""
+
+GAP_M = 0.15
+LEADER_S = 30.0
+
+
+@pytest.mark.parametrize("starts", [{}, STARTS], ids=["tf", "starts"])
+def test_a_chain_follows_a_curve_keeps_its_gaps_and_stops_with_its_leader(tmp_path, starts):
+    arena = tmp_path / "row.yaml"
+    arena.write_text(ARENA)
+    with StepSwarm(3, seed=1, arena=str(arena), worlds=20) as swarm:
+        commons = [CommonFrame("world", starts) for _ in swarm.worlds]
+
+        def step(time_s):
+            for world, common in zip(swarm.worlds, commons):
+                if time_s < LEADER_S:
+                    world[0].drive(0.08, 0.25)
+                follow.step(world, common, FollowLaw(gap_m=GAP_M))
+
+        paths = true_paths.run(swarm, step, LEADER_S + 8.0)
+    for path in paths:
+        gaps_m = true_paths.measure_gaps(path)[:, [0, 1], [1, 2]] + 2.0 * BODY_RADIUS_M
+        assert true_paths.measure_lengths(path).min() > 1.5
+        assert true_paths.measure_gaps(path).min() > 0.01
+        assert gaps_m[len(path) // 3 :].max() < 0.3
+        assert np.abs(gaps_m[-1] - GAP_M).max() < 0.06
+        assert np.ptp(path[-15:, :, :2], axis=0).max() < true_paths.REST
+
+
+def test_a_follower_whose_leader_is_not_known_stops():
+    with StepSwarm(2) as swarm:
+        common = CommonFrame("nowhere")
+        true_paths.run(swarm, lambda time_s: follow.step(swarm, common, FollowLaw()), 1.0)
+        assert "nowhere" in common.missing["hero_1"]
+        assert swarm[1].velocity == (0.0, 0.0)

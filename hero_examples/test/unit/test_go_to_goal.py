@@ -1,0 +1,170 @@
+"""Goals in virtual time: reached within their tolerance with and without obstacles, replaced, cancelled, given up."""
+
+import math
+import random
+
+import numpy as np
+import pytest
+import true_paths
+
+from hero_client.controllers.go_to_goal import Goal
+from hero_client.goals import MAX_QUEUED_GOALS, GoalQueue, GoalRequest, InvalidGoalError
+from hero_sim.stepped.swarm import StepSwarm
+from hero_sim.world.arena_file import load_arena
+
+WORLDS = 30
+TOLERANCE_M = 0.01
+TRUE_TOLERANCE_M = 0.015
+"""With what odometry may be off."""
+
+ROUND_THE_POST = """
+walls_m: [[[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]]]
+circles_m: [[0, 0, 0.06]]
+starts_m_deg: [[-0.4, 0.02, 0]]
+"""
+
+
+def start_each(swarm, choose_goal, **options):
+    """Start a motion of each robot to a goal in world; return the motions and the goals."""
+    goals = [choose_goal(world) for world in range(len(swarm.robots))]
+    return [robot.start_go_to(*goal, frame="world", **options) for robot, goal in zip(swarm, goals)], goals
+
+
+def test_random_goals_are_reached_and_no_robot_swings_there():
+    rng = random.Random(5)
+    with StepSwarm(1, seed=1, arena="empty", perfect=True, worlds=WORLDS) as swarm:
+        log = swarm.log_poses()
+        motions, goals = start_each(
+            swarm, lambda world: (rng.uniform(-0.6, 0.6), rng.uniform(-0.6, 0.6), rng.uniform(-math.pi, math.pi))
+        )
+        for motion in motions:
+            motion.result()
+        for path, goal in zip(true_paths.split_worlds(swarm, log), goals):
+            distances_m = np.hypot(*(path[:, 0, :2] - goal[:2]).T)
+            assert distances_m[-1] < TRUE_TOLERANCE_M
+            assert abs(math.remainder(path[-1, 0, 2] - goal[2], math.tau)) < 0.12
+            arrived = np.argmax(distances_m < TOLERANCE_M)
+            assert distances_m[arrived:].max() < 2.0 * TRUE_TOLERANCE_M
+        assert true_paths.stop_within(swarm)
+
+
+@pytest.mark.parametrize("avoid", [True, False])
+def test_a_post_in_the_way_is_avoided_or_named_and_never_touched(tmp_path, avoid):
+    arena = tmp_path / "post.yaml"
+    arena.write_text(ROUND_THE_POST)
+    rng = random.Random(7)
+    with StepSwarm(1, seed=1, arena=str(arena), worlds=WORLDS) as swarm:
+        log = swarm.log_poses()
+        motions, goals = start_each(swarm, lambda world: (0.4, rng.uniform(-0.05, 0.05)), avoid=avoid)
+        errors = [motion.exception() for motion in motions]
+        for path, goal, error in zip(true_paths.split_worlds(swarm, log), goals, errors):
+            assert true_paths.measure_wall_gaps(path, load_arena(str(arena))).min() > 0.005
+            if avoid:
+                assert error is None and math.dist(path[-1, 0, :2], goal) < 0.05  # odometry has drifted
+            else:
+                assert "an obstacle is in the way" in str(error)
+        assert true_paths.stop_within(swarm)
+
+
+class Listener:
+    """What a server would tell clients and the log."""
+
+    def __init__(self):
+        self.accepted, self.progress, self.outcomes = [], [], []
+
+    def accept_goal(self, request):
+        self.accepted.append(request)
+
+    def show_progress(self, request, distance_m, elapsed_s):
+        self.progress.append(elapsed_s)
+
+    def end_goal(self, request, outcome):
+        self.outcomes.append(outcome)
+
+
+class Goals:
+    """The goals of one robot, and what happens while it drives."""
+
+    def __init__(self):
+        self.swarm = StepSwarm(1, arena="empty", perfect=True)
+        self.listener = Listener()
+        self.queue = GoalQueue(self.swarm[0], self.listener)
+        self.events = []
+
+    def put(self, *goal, timeout_s=60.0, frame="", handle=None):
+        self.queue.put(GoalRequest(Goal(*goal), frame, TOLERANCE_M, timeout_s, handle))
+
+    def drive(self):
+        """Drive to all goals; events, a list of (time s, function), happen meanwhile."""
+
+        def wait(duration_s):
+            self.swarm.sleep(duration_s)
+            while self.events and self.events[0][0] <= self.swarm.now_s:
+                self.events.pop(0)[1]()
+
+        while self.queue.drive_to_next(wait):
+            continue
+        assert true_paths.stop_within(self.swarm)
+
+
+@pytest.fixture()
+def goals():
+    return Goals()
+
+
+def test_a_goal_is_reported_on_the_way_and_at_its_end(goals):
+    goals.put(0.2, 0.0)
+    assert goals.queue.busy
+    goals.drive()
+    (outcome,) = goals.listener.outcomes
+    assert outcome.reached and outcome.reason == "" and outcome.distance_m < TOLERANCE_M
+    assert goals.queue.reached and not goals.queue.busy
+    assert np.diff(goals.listener.progress) == pytest.approx(0.5, abs=0.1) and len(goals.listener.progress) > 4
+
+
+def test_a_new_goal_replaces_the_old_one(goals):
+    goals.put(0.5, 0.0)
+    goals.events = [(1.0, lambda: goals.put(0.0, 0.1))]
+    goals.drive()
+    first, second = goals.listener.outcomes
+    assert not first.reached and first.gave_up and first.reason == "another goal came"
+    assert first.elapsed_s < 1.3
+    assert second.reached and goals.queue.reached
+    assert math.dist(goals.swarm[0].pose[:2], (0.0, 0.1)) < TRUE_TOLERANCE_M
+
+
+def test_a_cancelled_goal_ends_and_another_ones_cancellation_does_not(goals):
+    goals.put(0.5, 0.0, handle="mine")
+    goals.events = [(1.0, lambda: goals.queue.cancel("another")), (2.0, lambda: goals.queue.cancel("mine"))]
+    goals.drive()
+    (outcome,) = goals.listener.outcomes
+    assert outcome.gave_up and outcome.reason == "cancelled" and 2.0 <= outcome.elapsed_s < 2.3
+    goals.put(0.1, 0.0, handle="next")
+    goals.drive()
+    assert goals.queue.reached
+
+
+def test_the_end_of_the_program_gives_up_all_goals(goals):
+    goals.put(0.5, 0.0)
+    goals.events = [(1.0, goals.queue.close)]
+    goals.drive()
+    assert [outcome.reason for outcome in goals.listener.outcomes] == ["the program ends"]
+    goals.put(0.1, 0.0)
+    assert not goals.queue.drive_to_next(goals.swarm.sleep)
+
+
+def test_a_goal_out_of_reach_or_in_an_unknown_frame_fails_with_the_reason(goals):
+    goals.put(50.0, 0.0, timeout_s=1.0)
+    goals.drive()
+    goals.put(0.1, 0.0, frame="nowhere")
+    goals.drive()
+    late, lost = goals.listener.outcomes
+    assert not late.reached and not late.gave_up and "not there after 1 s" in late.reason
+    assert not lost.reached and "nowhere" in lost.reason and math.isnan(lost.distance_m)
+
+
+def test_goals_are_refused_when_too_many_wait(goals):
+    for _ in range(MAX_QUEUED_GOALS):
+        goals.put(0.1, 0.0)
+    with pytest.raises(InvalidGoalError, match="more than 100 goals"):
+        goals.put(0.1, 0.0)

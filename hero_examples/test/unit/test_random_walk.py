@@ -1,0 +1,63 @@
+"""random_walk in virtual time: the robots of twenty worlds, each with errors of its own."""
+
+import math
+
+import numpy as np
+import pytest
+import true_paths
+
+from hero_client.controllers.avoidance import WanderLaw
+from hero_sim.stepped.swarm import StepSwarm
+from hero_sim.world.arena_file import load_arena
+
+pytest.importorskip("rospy", reason="the program imports rospy")
+from hero_examples.random_walk import Walker
+
+WORLDS = 20
+ROBOTS = 10
+WALK_S = 60.0
+
+CELL_M = 0.2
+"""Side of a cell: what one robot with its sensors covers."""
+
+
+def walk(swarm, duration_s):
+    walkers = [Walker(robot, WanderLaw(), seed) for seed, robot in enumerate(swarm)]
+    lights = set()
+
+    def step(time_s):
+        for walker in walkers:
+            assert walker.step() is None
+        lights.update(robot.light for robot in swarm)
+
+    return true_paths.run(swarm, step, duration_s), lights
+
+
+def test_walkers_touch_nothing_that_they_see_and_visit_most_cells():
+    arena = load_arena("obstacles")
+    with StepSwarm(ROBOTS, seed=1, arena="obstacles", worlds=WORLDS) as swarm:
+        paths, lights = walk(swarm, WALK_S)
+    for path in paths:
+        assert true_paths.list_touches(path, arena) == []
+        assert true_paths.share_visited(path, arena, CELL_M) > 0.8
+        assert true_paths.measure_lengths(path).min() > 2.0
+    green, yellow, red = (0.0, 1.0, 0.0), (1.0, 1.0, 0.0), (1.0, 0.0, 0.0)
+    assert {green, yellow, red} <= lights
+    assert true_paths.stop_within(swarm)
+
+
+def test_the_same_seeds_give_the_same_walk():
+    paths = [walk(StepSwarm(4, seed=3), 10.0)[0][0] for _ in range(2)]
+    assert paths[0].tobytes() == paths[1].tobytes()
+
+
+def test_a_walker_without_usable_ranges_stops_and_says_why():
+    with StepSwarm(1) as swarm:
+        walker = Walker(swarm[0], WanderLaw())
+        true_paths.run(swarm, lambda time_s: walker.step(), 2.0)
+        assert swarm[0].velocity.linear_m_s > 0.05
+        swarm.rows.set_infrared_calibration(0, np.full(8, math.nan))
+        swarm.sleep(0.3)  # the next scan
+        path = true_paths.run(swarm, lambda time_s: "infrared calibration" not in walker.step(), 2.0)[0]
+        assert np.ptp(path[-20:], axis=0).max() == 0.0
+        assert swarm[0].light == (0.0, 0.0, 1.0)
