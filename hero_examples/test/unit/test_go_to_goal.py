@@ -60,7 +60,7 @@ def test_a_post_in_the_way_is_avoided_or_named_and_never_touched(tmp_path, avoid
         for path, goal, error in zip(true_paths.split_worlds(swarm, log), goals, errors):
             assert true_paths.measure_wall_gaps(path, load_arena(str(arena))).min() > 0.005
             if avoid:
-                assert error is None and math.dist(path[-1, 0, :2], goal) < 0.05  # odometry has drifted
+                assert error is None and math.dist(path[-1, 0, :2], goal) < 0.1  # odometry has drifted
             else:
                 assert "an obstacle is in the way" in str(error)
         assert true_paths.stop_within(swarm)
