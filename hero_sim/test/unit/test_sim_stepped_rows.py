@@ -6,6 +6,7 @@ import struct
 
 import numpy as np
 import pytest
+from stepped_worlds import build_world
 
 from hero_driver.commands.velocity_shaper import (
     COMMAND_INTERVAL_S,
@@ -24,10 +25,8 @@ from hero_sim.robot.motor_control import MotorControl
 from hero_sim.robot.ranges import calibrate
 from hero_sim.robot.sensing import Sensing
 from hero_sim.stepped.robot_rows import RobotRows
-from hero_sim.world.arena import build_default, place_robots
 from hero_sim.world.body import Body
-from hero_sim.world.robot_errors import draw_errors
-from hero_sim.world.world import STEP_MS, World
+from hero_sim.world.world import STEP_MS
 
 READY_MS = 5000
 """The scalar robots were switched on so long ago: in its first 3 s a position controller always runs."""
@@ -37,14 +36,6 @@ SHAPED_TYPES = {
     ids.ID_POSITION_CMD_VEL: "geometry_msgs/Twist",
     ids.ID_CMD_MOTOR: "hero_msgs/Motor",
 }
-
-
-def build_world(count, *seeds, scale=1.0):
-    """Return one world of count robots for each seed."""
-    arena = build_default(count)
-    poses = np.vstack([place_robots(arena, count, np.random.RandomState(seed)) for seed in seeds])
-    rngs = [np.random.RandomState([seed, index]) for seed in seeds for index in range(count)]
-    return World(arena, poses, [np.random.RandomState(seed) for seed in seeds], draw_errors(rngs, scale))
 
 
 def encode_twist(linear_m_s, angular_rad_s):

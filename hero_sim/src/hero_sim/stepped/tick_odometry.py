@@ -5,6 +5,7 @@ kept as an angle and as its cosine and sine, which give the same bytes on every 
 """
 
 import math
+from typing import Optional
 
 import numpy as np
 
@@ -35,6 +36,7 @@ class TickOdometryRows:
         self._newest = 0
         self._is_cleared = np.ones(rows, dtype=bool)
         self._any_cleared = True
+        self._velocities: Optional[np.ndarray] = None
 
     def set_pose(self, row: int, x_m: float, y_m: float, yaw_rad: float) -> None:
         """One robot's odometry was set, which zeroed its counters."""
@@ -42,6 +44,7 @@ class TickOdometryRows:
         self._headings[:, row] = find_heading(self.poses[2, row])
         self._ticks[:, row] = 0.0
         self._is_cleared[row] = self._any_cleared = True
+        self._velocities = None
 
     def integrate(self, ticks: np.ndarray, now_ms: int) -> None:
         """Take one reading of all counters (2, R), with its stamp."""
@@ -49,6 +52,7 @@ class TickOdometryRows:
         if moved_ticks.any():
             self._move(moved_ticks)
         self._ticks[:] = ticks
+        self._velocities = None
         self._newest = (self._newest + 1) % TWIST_WINDOW
         self._window_ticks[self._newest], self._window_ms[self._newest] = ticks, now_ms
         if self._any_cleared:
@@ -67,6 +71,11 @@ class TickOdometryRows:
 
     def measure_velocities(self) -> np.ndarray:
         """Return linear m/s and angular rad/s over the last TWIST_WINDOW readings (2, R)."""
+        if self._velocities is None:
+            self._velocities = self._compute_velocities()
+        return self._velocities
+
+    def _compute_velocities(self) -> np.ndarray:
         oldest = (self._newest + 1) % TWIST_WINDOW
         elapsed_ms = np.maximum(self._window_ms[self._newest] - self._window_ms[oldest], 1)
         rolled_m = (self._window_ticks[self._newest] - self._window_ticks[oldest]) * TICK_M

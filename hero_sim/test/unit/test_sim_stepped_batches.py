@@ -1,0 +1,174 @@
+"""RobotRows as programs use it: many robots and worlds at once, commands that cannot be used, figures, Wi-Fi."""
+
+import numpy as np
+import pytest
+from stepped_worlds import build_world
+
+from hero_sim.link.wifi import PROFILES, Radio
+from hero_sim.stepped.robot_rows import RobotRows
+
+
+def build_radios(profile, count):
+    return [Radio(PROFILES[profile], np.random.RandomState(row)) for row in range(count)]
+
+
+def wander(robots, seconds, rows=None):
+    """Drive the robots at rows, or all, anew ten times a second; return all readings as bytes."""
+    rows = np.arange(len(robots.ticks)) if rows is None else rows
+    log = []
+    for step in range(seconds * 10):
+        turns_rad_s = 2.0 * np.sin(step / 7.0 + np.arange(len(rows)) % 5)
+        robots.send_velocity(rows, np.where(robots.proximity_m[rows].min(axis=1) < 0.15, 0.0, 0.1), turns_rad_s)
+        robots.advance(robots.now_ms + 100)
+        readings = (robots.odometry, robots.velocities, robots.ticks, robots.proximity_m, robots.world.poses)
+        log.append(np.hstack(readings)[rows].tobytes())
+    return log
+
+
+@pytest.mark.parametrize("profile", [None, "hotspot"])
+def test_two_runs_give_the_same_bytes(profile):
+    logs = [
+        wander(RobotRows(build_world(4, 3), build_radios(profile, 4) if profile else ()), 10) for _ in range(2)
+    ]
+    assert logs[0] == logs[1]
+
+
+def test_a_world_of_a_batch_gives_the_same_bytes_as_alone():
+    def run(seeds, place):
+        """Drive one world of a batch; the robots of the others wake up earlier and are driven otherwise."""
+        robots = RobotRows(build_world(4, *seeds))
+        own = np.arange(4 * place, 4 * place + 4)
+        others = np.setdiff1d(np.arange(4 * len(seeds)), own)
+        robots.send_position(others, 0.1, 0.0)
+        robots.advance(3017)
+        robots.send_pulses(others, 1400, 1600)
+        return wander(robots, 8, own)
+
+    assert run([1, 2, 3], 1) == run([2], 0)
+
+
+def test_an_array_of_commands_does_what_single_ones_do():
+    together, single = RobotRows(build_world(3, 0)), RobotRows(build_world(3, 0))
+    speeds_m_s = np.array([0.1, 0.05, -0.1])
+    for _ in range(20):
+        together.send_velocity([0, 1, 2], speeds_m_s, 0.5)
+        for row, speed_m_s in enumerate(speeds_m_s.tolist()):
+            single.send_velocity(row, speed_m_s, 0.5)
+        for robots in (together, single):
+            robots.advance(robots.now_ms + 70)
+    assert together.ticks.tolist() == single.ticks.tolist() and together.ticks.any(axis=1).all()
+
+
+def test_commands_that_are_not_finite_are_refused_with_their_rows():
+    robots = RobotRows(build_world(3, 0))
+    with pytest.raises(ValueError, match="row 2 must be finite, not nan and 0.0"):
+        robots.send_velocity(2, np.nan, 0.0)
+    with pytest.raises(ValueError, match=r"rows \[1\] must be finite"):
+        robots.send_position([0, 1, 2], [0.1, np.inf, 0.1], 0.0)
+    robots.advance(1000)
+    assert not robots.ticks.any()
+
+
+def test_a_light_goes_out_15_s_after_its_last_command():
+    robots = RobotRows(build_world(2, 0))
+    robots.send_light(1, (1.0, 0.5, 0.0, 1.0))
+    robots.advance(15000)
+    assert robots.lights.tolist() == [[0.0] * 4, [1.0, 0.5, 0.0, 1.0]]
+    robots.advance(15001)
+    assert not robots.lights.any()
+
+
+def test_hooks_get_every_cycle_and_scan_with_its_readings():
+    robots, cycles, scans = RobotRows(build_world(2, 0)), [], []
+    robots.on_cycle.append(lambda rows: cycles.append((robots.now_ms, rows.tolist(), robots.odometry_ms.tolist())))
+    robots.on_scan.append(lambda rows: scans.append((robots.now_ms, rows.tolist(), robots.scan_ms.tolist())))
+    robots.advance(1000)
+    for calls in (cycles, scans):
+        assert all(call == (call[0], [0, 1], [call[0]] * 2) for call in calls)
+    assert [now_ms for now_ms, *_ in cycles[:7]] == [34, 68, 102, 136, 170, 205, 239]
+    assert [now_ms for now_ms, *_ in scans] == [205, 410, 615, 820]
+
+
+def test_sensors_that_are_not_calibrated_show_nan():
+    robots = RobotRows(build_world(2, 0))
+    robots.set_infrared_calibration(1, [np.nan] * 8)
+    robots.advance(300)
+    assert np.isnan(robots.proximity_m[1]).all() and not np.isnan(robots.proximity_m[0]).any()
+
+
+def measure_distance(send, wait_ms=0):
+    """Return how far one command drives a robot that is given it at a time within its cycles."""
+    robots = RobotRows(build_world(1, 0, scale=0.0))
+    robots.advance(1000 + wait_ms)
+    send(robots)
+    robots.advance(robots.now_ms + 4500)
+    return robots.world.travels_m.mean()
+
+
+def test_one_velocity_command_drives_as_far_as_the_stock_robot():
+    distances_m = [measure_distance(lambda robots: robots.send_velocity(0, 0.1, 0.0), 73 * wait) for wait in range(20)]
+    assert np.mean(distances_m) == pytest.approx(0.16, abs=0.01) and np.std(distances_m) < 0.03
+
+
+def test_one_position_command_drives_for_a_second_of_its_speed():
+    assert measure_distance(lambda robots: robots.send_position(0, 0.1, 0.0)) == pytest.approx(0.101, abs=0.002)
+
+
+def test_a_velocity_is_held_and_a_stop_takes_a_fifth_of_a_second():
+    robots = RobotRows(build_world(1, 0, scale=0.0))
+    for _ in range(30):
+        robots.send_velocity(0, 0.1, 0.0)
+        robots.advance(robots.now_ms + 100)
+    start_m, start_ms = robots.world.travels_m[0, 0], robots.now_ms
+    for _ in range(50):
+        robots.send_velocity(0, 0.1, 0.0)
+        robots.advance(robots.now_ms + 100)
+    driven_m, elapsed_s = robots.world.travels_m[0, 0] - start_m, (robots.now_ms - start_ms) / 1000.0
+    assert driven_m / elapsed_s == pytest.approx(0.102, abs=0.003)
+    robots.send_velocity(0, 0.0, 0.0)
+    while robots.world.commands_m_s.any():
+        robots.advance(robots.now_ms + 1)
+    speed_m_s, start_ms = robots.world.speeds_m_s[0, 0], robots.now_ms
+    while robots.world.speeds_m_s[0, 0] > 0.1 * speed_m_s:
+        robots.advance(robots.now_ms + 1)
+    assert 170 <= robots.now_ms - start_ms <= 210
+
+
+def test_wifi_delays_readings_but_changes_none_of_them():
+    ideal, delayed = RobotRows(build_world(2, 0)), RobotRows(build_world(2, 0), build_radios("bad", 2))
+    readings = [{}, {}]
+    for robots, found in zip((ideal, delayed), readings):
+
+        def note(rows, robots=robots, found=found):
+            for row in rows.tolist():
+                found.setdefault(row, []).append((*robots.odometry[row].tolist(), *robots.ticks[row].tolist()))
+
+        robots.on_cycle.append(note)
+        # Straight to the servos: a command would be late.
+        robots.world.write_pulses(np.arange(2), np.array([(1440, 1400), (1300, 1390)]))
+        robots.advance(20000)
+    for row, received in readings[1].items():
+        assert received == readings[0][row][: len(received)] and len(received) > 450
+
+
+def test_wifi_gaps_are_those_of_the_profile():
+    robots, times_ms = RobotRows(build_world(3, 0), build_radios("hotspot", 3)), [[], [], []]
+    robots.on_cycle.append(lambda rows: [times_ms[row].append(robots.now_ms) for row in rows.tolist()])
+    robots.advance(60000)
+    gaps_ms = np.concatenate([np.diff(times) for times in times_ms])
+    p50, p95, p99, longest = np.percentile(gaps_ms, [50, 95, 99, 100])
+    assert p50 == 34 and 43 <= p95 <= 50 and 50 <= p99 <= 70 and 400 <= longest <= 1300
+
+
+def test_a_stop_is_sent_through_wifi_that_stalls_and_motion_behind_it():
+    robots = RobotRows(build_world(1, 0, scale=0.0), build_radios("bad", 1))
+    moved = []
+    for _ in range(10):
+        for _ in range(20):
+            robots.send_velocity(0, 0.1, 0.0)
+            robots.advance(robots.now_ms + 50)
+        moved.append(robots.world.speeds_m_s.max())
+        robots.send_velocity(0, 0.0, 0.0)
+        robots.advance(robots.now_ms + 6000)
+        assert not robots.world.commands_m_s.any()
+    assert np.median(moved) > 0.07
