@@ -65,9 +65,9 @@ def test_a_program_for_a_robot_runs_unchanged_in_process(seed):
     start = swarm[0].true_pose
     with swarm:
         pose = go_around(swarm[0])
-        assert math.dist(pose[:2], (0.1, 0.0)) < 0.02
+        assert math.dist(pose[:2], (0.06, 0.0)) < 0.02
         assert swarm[0].light == (1.0, 0.0, 0.0) or swarm[0].light == (0.0, 0.0, 0.0)
-    assert math.dist(swarm[0].true_pose[:2], start[:2]) == pytest.approx(0.1, abs=0.02)
+    assert math.dist(swarm[0].true_pose[:2], start[:2]) == pytest.approx(0.06, abs=0.015)
     assert swarm[0].light == (0.0, 0.0, 0.0)  # leaving ended the blinking
     swarm.sleep(2.0)
     assert swarm[0].light == (0.0, 0.0, 0.0)
