@@ -8,12 +8,12 @@ from hero_client.program import Program
 from hero_msgs.msg import Robot
 
 from .errors import CalibrationError
-from .probe import Probe
+from .ros_probe import RosProbe
 
 TIMEOUT_S = 10.0
 
 
-def find_robots(program: Program, robot_ids: Optional[Sequence[int]]) -> List[Probe]:
+def find_robots(program: Program, robot_ids: Optional[Sequence[int]]) -> List[RosProbe]:
     """Return the robots with these ids, None: all that are ready; those that are not connected have failed.
 
     Raises: CalibrationError without a driver, without a robot, or while all robots are stopped.
@@ -30,7 +30,7 @@ def find_robots(program: Program, robot_ids: Optional[Sequence[int]]) -> List[Pr
             raise CalibrationError("all robots are stopped; release them: rosservice call %s/stop false" % driver)
     if not ready.intersection(wanted):
         raise CalibrationError("no robot is ready: are they on, and connected to the driver?")
-    probes = [Probe(robot_id) for robot_id in wanted]
+    probes = [RosProbe(robot_id) for robot_id in wanted]
     for probe in probes:
         probe.failure = None if probe.robot_id in ready else "is not connected to the driver: is it on?"
     return probes

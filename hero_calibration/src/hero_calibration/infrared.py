@@ -1,7 +1,8 @@
 """Procedure infrared: turns each sensor of all robots to a wall, writes their constants, and checks them."""
 
 import math
-from typing import Dict, List, NamedTuple
+from functools import partial
+from typing import Dict, List, NamedTuple, Sequence
 
 import numpy as np
 
@@ -103,7 +104,7 @@ def _face_wall_with_each_sensor(
         targets_rad: Dict[int, float] = {}
 
         def evaluate(probe: Probe, sensor: int = sensor, targets_rad: Dict[int, float] = targets_rad) -> None:
-            probe.check_alive()
+            probe.check_alive(session.now_s())
             counts, ranges_m = probe.read_scans()
             pose = probe.pose
             facing = model.Facing(sensor, counts.tolist(), ranges_m.tolist(), 0.0)
@@ -123,8 +124,11 @@ def _turn(session: Session, title: str, targets_rad: Dict[int, float]) -> None:
     def remaining_rad(probe: Probe) -> float:
         return math.remainder(targets_rad[probe.robot_id] - probe.pose.yaw_rad, 2.0 * math.pi)
 
+    def have_turned(turning: Sequence[Probe]) -> bool:
+        return all(abs(remaining_rad(probe)) <= TURN_REACHED_RAD for probe in turning)
+
     def check(probe: Probe) -> None:
-        probe.check_alive()
+        probe.check_alive(session.now_s())
         if abs(remaining_rad(probe)) > TURN_TOLERANCE_RAD:
             raise CalibrationError(
                 "could not turn on the spot: %.0f degrees are missing; calibrate its motors, or free its wheels"
@@ -138,9 +142,6 @@ def _turn(session: Session, title: str, targets_rad: Dict[int, float]) -> None:
         for probe in turning:
             probe.turn(remaining_rad(probe))
         session.pause(TURN_S / 4.0)
-        session.wait_for(
-            lambda turning=turning: all(abs(remaining_rad(probe)) <= TURN_REACHED_RAD for probe in turning),
-            TURN_S * 3.0 / 4.0,
-        )
+        session.wait_for(partial(have_turned, turning), TURN_S * 3.0 / 4.0)
         session.settle()
     session.for_each(title, check)

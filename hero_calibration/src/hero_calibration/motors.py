@@ -3,7 +3,6 @@
 from typing import Dict, List, NamedTuple, Sequence
 
 import numpy as np
-import rospy
 
 from hero_client.command_line import say
 
@@ -58,7 +57,7 @@ def calibrate_motors(session: Session) -> Dict[int, MotorResult]:
         for pulse_us in pulses_us:
             for probe in probes:
                 probe.set_pulses(pulse_us)
-            start_times_s.append(rospy.get_time())
+            start_times_s.append(session.now_s())
             session.pause(dead_zone.PULSE_S)
         session.settle()
 

@@ -1,17 +1,13 @@
 """Takes all robots through a procedure together: each step moves all of them, and the data of each is evaluated alone.
 
-A robot that fails is stopped, keeps its reason, and takes no further part; the others go on. Time is ROS time, which
-may be simulated.
+A robot that fails is stopped, keeps its reason, and takes no further part; the others go on. Knows neither ROS nor the
+clock of this computer: a subclass has the time (ros_session).
 """
 
-import time
-from concurrent.futures import ThreadPoolExecutor
+from abc import ABC, abstractmethod
 from typing import Callable, List, Optional, Sequence
 
-import rospy
-
 from hero_client.command_line import say
-from hero_client.program import Program
 
 from .errors import CalibrationError, EndedError
 from .probe import Probe
@@ -23,44 +19,63 @@ STOP_GAP_S = 0.15
 """Between two stops: the robot drops a command within 50 ms of another."""
 
 
-class Session:
+class Session(ABC):
     """The robots under calibration, and the clock.
 
     Attributes:
         probes: all robots, including those that failed.
     """
 
-    def __init__(self, program: Program, probes: Sequence[Probe]) -> None:
-        """Work with probes until program ends."""
-        self.program = program
+    def __init__(self, probes: Sequence[Probe]) -> None:
+        """Work with probes."""
         self.probes = list(probes)
+
+    # -- what the subclass has -----------------------------------------------------------------------------
+
+    @abstractmethod
+    def now_s(self) -> float:
+        """Return the time."""
+
+    @abstractmethod
+    def sleep(self, duration_s: float) -> None:
+        """Let about duration_s pass."""
+
+    @property
+    @abstractmethod
+    def is_ending(self) -> bool:
+        """Whether the program is to end."""
+
+    @abstractmethod
+    def map(self, work: Callable[[Probe], None], probes: Sequence[Probe]) -> None:
+        """Do work for probes, side by side where it waits for them."""
+
+    # -- time ----------------------------------------------------------------------------------------------
+
+    def pause(self, duration_s: float) -> None:
+        """Wait. Raises: EndedError if the program is to end."""
+        self.wait_for(lambda: False, duration_s)
+
+    def wait_for(self, condition: Callable[[], bool], timeout_s: float) -> None:
+        """Wait until condition holds, at most timeout_s. Raises: EndedError if the program is to end."""
+        end_s = self.now_s() + timeout_s
+        while not condition():
+            left_s = end_s - self.now_s()
+            if left_s <= 0.0:
+                return
+            if self.is_ending:
+                raise EndedError
+            self.sleep(min(left_s, POLL_S))
+
+    # -- robots --------------------------------------------------------------------------------------------
 
     @property
     def active(self) -> List[Probe]:
         """Robots that have not failed."""
         return [probe for probe in self.probes if probe.failure is None]
 
-    def pause(self, duration_s: float) -> None:
-        """Wait in ROS time. Raises: EndedError if the program is to end."""
-        end_s = rospy.get_time() + duration_s
-        while True:
-            left_s = end_s - rospy.get_time()
-            if left_s <= 0.0:
-                return
-            if not self.program.sleep(min(left_s, POLL_S)):
-                raise EndedError
-
-    def wait_for(self, condition: Callable[[], bool], timeout_s: float) -> None:
-        """Wait until condition holds, at most timeout_s in ROS time. Raises: EndedError if the program is to end."""
-        end_s = rospy.get_time() + timeout_s
-        while rospy.get_time() < end_s and not condition():
-            self.pause(POLL_S)
-
     def for_each(self, step: str, work: Callable[[Probe], None], probes: Optional[Sequence[Probe]] = None) -> None:
-        """Do work for robots (None: all active) in parallel; a CalibrationError fails that robot alone."""
+        """Do work for robots (None: all active) side by side; a CalibrationError fails that robot alone."""
         probes = self.active if probes is None else probes
-        if not probes:
-            return
 
         def work_on(probe: Probe) -> None:
             try:
@@ -68,8 +83,7 @@ class Session:
             except CalibrationError as error:
                 probe.failure = "%s: %s" % (step, error)
 
-        with ThreadPoolExecutor(min(32, len(probes))) as pool:
-            list(pool.map(work_on, probes))
+        self.map(work_on, probes)
         for probe in probes:
             if probe.failure is not None:
                 probe.drive(0.0)
@@ -97,7 +111,7 @@ class Session:
                 except CalibrationError as error:
                     if is_last:
                         raise
-                    probe.check_alive()
+                    probe.check_alive(self.now_s())
                     say("%s once more: %s: %s" % (probe.name, step, error))
                     again.append(probe)
 
@@ -112,7 +126,7 @@ class Session:
         for _ in range(2):
             for probe in self.probes:
                 probe.drive(0.0)
-            time.sleep(STOP_GAP_S)
+            self.sleep(STOP_GAP_S)
 
     def settle(self) -> None:
         """Stop all robots and wait until they are at rest."""

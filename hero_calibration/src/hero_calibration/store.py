@@ -49,6 +49,14 @@ def name_file(folder: str, robot_id: int) -> str:
     return os.path.join(folder, "hero_%d.yaml" % robot_id)
 
 
+def make_folder(folder: str) -> None:
+    """Create a folder unless it exists. Raises: CalibrationError."""
+    try:
+        os.makedirs(folder, exist_ok=True)
+    except OSError as error:
+        raise CalibrationError("%s cannot be created: %s" % (folder, error.strerror)) from error
+
+
 def list_files(folder: str) -> List[str]:
     """Return the paths of all robots' files in a folder, which may not exist."""
     names = sorted(os.listdir(folder)) if os.path.isdir(folder) else []

@@ -3,7 +3,6 @@
 from typing import Dict, List, NamedTuple, Sequence
 
 import numpy as np
-import rospy
 
 from hero_client.command_line import say
 
@@ -114,8 +113,8 @@ def _test(session: Session) -> Dict[int, List[Response]]:
         start_times_s.clear()
         for angular_rad_s in (ANGULAR_RAD_S, -ANGULAR_RAD_S):
             session.settle()
-            start_times_s.append(rospy.get_time())
-            while rospy.get_time() < start_times_s[-1] + STEP_S:
+            start_times_s.append(session.now_s())
+            while session.now_s() < start_times_s[-1] + STEP_S:
                 for probe in probes:
                     probe.drive(angular_rad_s)
                 session.pause(COMMAND_PERIOD_S)

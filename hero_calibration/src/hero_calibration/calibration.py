@@ -1,0 +1,98 @@
+"""Calibrates all robots of a session part by part, keeps what was measured, and prints a table. Knows no ROS."""
+
+import importlib.util
+import os
+import time
+from typing import Any, Dict, List, Optional, Sequence
+
+from hero_client.command_line import say
+
+from . import store
+from .errors import CalibrationError, EndedError
+from .infrared import calibrate_infrared
+from .motors import MotorResult, calibrate_motors
+from .placement import Ask, place_robots
+from .probe import Probe
+from .session import Session
+from .velocity import calibrate_velocity
+
+MOTORS, VELOCITY, INFRARED = "motors", "velocity", "infrared"
+PARTS = (MOTORS, VELOCITY, INFRARED)
+
+
+class Calibration:
+    """One run over all robots."""
+
+    def __init__(self, session: Session, parts: Sequence[str], folder: str, ask: Optional[Ask]) -> None:
+        """Calibrate parts of PARTS, with files in folder; ask: None if the robots are placed already."""
+        self._session = session
+        self._parts = parts
+        self._folder = folder
+        self._ask = ask
+        self._results: Dict[int, Dict[str, Any]] = {}
+        self._files: Dict[int, List[str]] = {}
+
+    def run(self) -> int:
+        """Calibrate, save, and print a table; return the exit code. Raises: CalibrationError."""
+        probes = self._session.probes
+        ended = False
+        try:
+            self._calibrate()
+        except EndedError:
+            ended = True
+        finally:
+            self._session.stop()
+            # Robots hold what was measured before the end, whatever caused it: the files must, too.
+            for probe in probes:
+                if probe.robot_id in self._results:
+                    self._save(probe)
+        say("\n" + "\n".join(line for probe in probes for line in self._describe(probe)))
+        if ended:
+            say("ended early: robots hold what the table shows, and keep the rest")
+            return 130
+        return 1 if any(probe.failure for probe in probes) else 0
+
+    def _calibrate(self) -> None:
+        session, parts = self._session, self._parts
+        motors: Dict[int, MotorResult] = {}
+        if MOTORS in parts or VELOCITY in parts:
+            place_robots(session, at_wall=False, ask=self._ask)
+        if MOTORS in parts and session.active:
+            motors = calibrate_motors(session)
+            self._store(MOTORS, motors)
+        if VELOCITY in parts and session.active:
+            self._store(VELOCITY, calibrate_velocity(session, motors))
+        if INFRARED in parts and session.active:
+            place_robots(session, at_wall=True, ask=self._ask)
+            self._store(INFRARED, calibrate_infrared(session))
+
+    def _store(self, part: str, results: Dict[int, Any]) -> None:
+        for robot_id, result in results.items():
+            self._results.setdefault(robot_id, {})[part] = result
+
+    def _save(self, probe: Probe) -> None:
+        results = self._results[probe.robot_id].values()
+        path = store.name_file(self._folder, probe.robot_id)
+        picture = os.path.splitext(path)[0] + ".png"
+        values = {key: numbers for result in results for key, numbers in result.to_file().items()}
+        date = time.strftime("%Y-%m-%d %H:%M:%S")
+        try:
+            store.save(path, store.Calibration(probe.robot_id, date, values))
+            self._files[probe.robot_id] = [path]
+            if importlib.util.find_spec("matplotlib") is not None:
+                from .figures import draw_robot
+
+                draw_robot(probe.name, list(results)).savefig(picture, dpi=120)
+                self._files[probe.robot_id].append(picture)
+        except CalibrationError as error:
+            probe.failure = probe.failure or str(error)
+        except OSError as error:
+            probe.failure = probe.failure or "%s cannot be written: %s" % (picture, error.strerror)
+
+    def _describe(self, probe: Probe) -> List[str]:
+        """Return the lines of a robot in the final table."""
+        return [
+            "%s: %s" % (probe.name, "FAILED: " + probe.failure if probe.failure else "ok"),
+            *("  %-9s %s" % (part, r.describe()) for part, r in self._results.get(probe.robot_id, {}).items()),
+            *("  " + path for path in self._files.get(probe.robot_id, [])),
+        ]

@@ -1,0 +1,32 @@
+"""Questions to the user in the terminal."""
+
+import sys
+
+from hero_client.command_line import say
+from hero_client.program import Program
+
+from .errors import CalibrationError, EndedError
+
+NOBODY = "nobody is there to answer: start it in a terminal, or with --yes"
+
+
+def ask(program: Program, question: str) -> str:
+    """Ask the user; return the answer in lower case.
+
+    Raises: EndedError if the program is to end meanwhile, CalibrationError where nobody can answer.
+    """
+    if sys.stdin is None:
+        raise CalibrationError(NOBODY)
+    say(question, end="")
+    # input() would go on waiting after Ctrl-C: signals only set a flag here.
+    while not program.wait_readable([sys.stdin.fileno()], 1.0):
+        if not program.running:
+            say("")
+            raise EndedError
+    try:
+        answer = sys.stdin.readline()
+    except UnicodeDecodeError:
+        return ""  # a key that is no letter, as Enter
+    if not answer:
+        raise CalibrationError(NOBODY)
+    return answer.strip().lower()

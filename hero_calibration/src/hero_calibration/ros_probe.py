@@ -1,0 +1,96 @@
+"""A robot under calibration over its topics and services."""
+
+from typing import Any, Callable, Dict, List, Optional, Tuple
+
+import rospy
+from geometry_msgs.msg import Twist
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import LaserScan
+
+from hero_client.geometry import Pose, yaw_of
+from hero_msgs.msg import Encoder, Motor
+from hero_msgs.srv import SetIRCalibration, SetMotor, SetPID
+
+from .errors import CalibrationError
+from .infrared_model import read_signals
+from .probe import Probe
+
+SERVICE_WAIT_S = 5.0
+
+SERVICES: Dict[str, Tuple[str, Any, Callable[[float], float]]] = {
+    "motor_centers_us": ("motors_parameters", SetMotor, round),
+    "velocity_gains": ("velocity_controller/pid_parameters", SetPID, float),
+    "infrared_counts_m2": ("ir_calibration", SetIRCalibration, float),
+}
+"""What writes each of store.SETTINGS, and the type of its numbers."""
+
+
+class RosProbe(Probe):
+    """One robot; times are ROS time."""
+
+    def __init__(self, robot_id: int) -> None:
+        """Connect to the topics of /hero_{robot_id}."""
+        super().__init__(robot_id)
+        self._velocity = self._advertise("velocity_controller/cmd_vel", Twist)
+        self._position = self._advertise("position_controller/cmd_vel", Twist)
+        self._motors = self._advertise("cmd_motor", Motor)
+        for topic, kind, receive in (
+            ("encoder", Encoder, self._take_encoder),
+            ("laser", LaserScan, self._take_scan),
+            ("odom", Odometry, self._take_odometry),
+        ):
+            rospy.Subscriber("/%s/%s" % (self.name, topic), kind, receive, queue_size=20, tcp_nodelay=True)
+
+    def _advertise(self, topic: str, kind: Any) -> rospy.Publisher:
+        return rospy.Publisher("/%s/%s" % (self.name, topic), kind, queue_size=2, tcp_nodelay=True)
+
+    def _take_encoder(self, message: Encoder) -> None:
+        header = message.header
+        self.receive_encoder(
+            rospy.get_time(), header.stamp.to_sec(), header.seq, message.left_ticks, message.right_ticks
+        )
+
+    def _take_scan(self, message: LaserScan) -> None:
+        self.receive_scan(rospy.get_time(), read_signals(message.intensities), read_signals(message.ranges))
+
+    def _take_odometry(self, message: Odometry) -> None:
+        position = message.pose.pose.position
+        self.receive_pose(rospy.get_time(), Pose(position.x, position.y, yaw_of(message.pose.pose.orientation)))
+
+    def find_silence(self, now_s: float) -> Optional[str]:
+        """Return what is missing of the robot or its driver, as text; None if all its topics are alive."""
+        silence = super().find_silence(now_s)
+        for publisher in (self._motors, self._velocity, self._position):
+            if silence is None and not publisher.get_num_connections():
+                silence = "nothing subscribes to %s: is the driver running?" % publisher.name
+        return silence
+
+    def drive(self, angular_rad_s: float) -> None:
+        """Turn on the spot under the velocity controller; 0 stops."""
+        self._velocity.publish(_make_turn(angular_rad_s))
+
+    def turn(self, angle_rad: float) -> None:
+        """Turn by an angle under the position controller."""
+        self._position.publish(_make_turn(angle_rad))
+
+    def set_pulses(self, pulse_us: int) -> None:
+        """Set the pulse of both servos."""
+        self._motors.publish(Motor(pulse_us, pulse_us))
+
+    def write(self, key: str, values: List[float]) -> None:
+        """Write a setting by its service. Raises: CalibrationError with the reason if it fails."""
+        service, kind, number = SERVICES[key]
+        name = "/%s/%s" % (self.name, service)
+        try:
+            rospy.wait_for_service(name, SERVICE_WAIT_S)
+            answer = rospy.ServiceProxy(name, kind)(*map(number, values))
+        except (rospy.ServiceException, rospy.ROSException) as error:
+            raise CalibrationError("%s: %s" % (name, " ".join(str(error).split()))) from error
+        if not answer.success:
+            raise CalibrationError("%s: the robot answers: %s" % (name, answer.message))
+
+
+def _make_turn(angular: float) -> Twist:
+    twist = Twist()
+    twist.angular.z = angular
+    return twist
