@@ -3,12 +3,12 @@
 
 import csv
 import glob
+import math
 import os
 import shutil
 import signal
 import subprocess
 import tempfile
-import time
 import unittest
 
 import rosbag
@@ -16,6 +16,7 @@ import rosgraph
 import rospy
 import rostest
 from geometry_msgs.msg import Twist, Vector3
+from nav_msgs.msg import Odometry
 
 from hero_test.waiting import wait_for
 
@@ -52,22 +53,32 @@ class RecordTest(unittest.TestCase):
         self.addCleanup(lambda: process.poll() is None and os.killpg(process.pid, signal.SIGKILL))
         return process
 
+    def start_recording(self, name, *arguments, **options):
+        """Start to record into a folder of this name; return the process."""
+        return self.start(*RECORD, "--folder", os.path.join(self.folder, name), *arguments, **options)
+
+    def finish(self, process):
+        """Wait for the end; return exit code and output."""
+        output = process.communicate(timeout=TIMEOUT_S)[0].decode()
+        self.assertNotIn("Traceback", output)
+        return process.returncode, output
+
     def end(self, process, number=signal.SIGINT):
         """Send a signal as Ctrl-C does, to all of the session; return exit code and output."""
         os.killpg(process.pid, number)
-        output = process.communicate(timeout=TIMEOUT_S)[0].decode()
-        return process.returncode, output
+        return self.finish(process)
 
     def files(self, pattern="*"):
-        return sorted(os.path.basename(path) for path in glob.glob(os.path.join(self.folder, pattern)))
+        return sorted(os.path.relpath(path, self.folder) for path in glob.glob(os.path.join(self.folder, pattern)))
 
-    def wait_for_data(self, least=1):
-        """Wait until this many bytes are on the disk; rosbag writes them in chunks."""
+    def wait_for_files(self, pattern):
+        """Wait until there are files, which the recorder has opened then; return them."""
+        return wait_for(lambda: self.files(pattern), pattern)
 
-        def has_grown():
-            return sum(os.path.getsize(path) for path in glob.glob(self.folder + "/*.bag*")) >= least
-
-        wait_for(has_grown, "recording of %d bytes in %s: %s" % (least, self.folder, self.files()))
+    def assert_one_closed_bag(self, name):
+        self.assertEqual(self.files(name + "/*.active"), [])
+        (bag,) = self.files(name + "/*.bag")
+        rosbag.Bag(os.path.join(self.folder, bag)).close()
 
     def test_robots_that_join_later_are_recorded_plotted_and_exported(self):
         launch = [
@@ -81,29 +92,13 @@ class RecordTest(unittest.TestCase):
         ]
         # As a shell does: roslaunch's nodes run elsewhere, and know the folder by PWD.
         recording = self.start(*launch, cwd=self.folder, env=dict(os.environ, PWD=self.folder))
-        wait_for(lambda: self.files("hero_*_0.bag.active"), "recording")
-        late = self.start(
-            *(
-                "rosrun",
-                "hero_sim",
-                "hero_sim",
-                "--port",
-                "21297",
-                "--first-id",
-                "7",
-                "--quiet",
-                "__name:=late_sim",
-            )
-        )
-        publisher = rospy.Publisher("/hero_7/velocity_controller/cmd_vel", Twist, queue_size=1)
-        wait_for(publisher.get_num_connections, "hero_7")
+        self.wait_for_files("hero_*_0.bag.active")
+        simulator = ["rosrun", "hero_sim", "hero_sim", "--port", "21297", "--first-id", "7", "--quiet"]
+        late = self.start(*simulator, "__name:=late_sim")
         # The recorder asks the ROS master for new topics once in a while; nobody else listens to these.
         wait_for(lambda: is_subscribed("/hero_7/"), "subscriptions to hero_7")
-        wait_for(lambda: self.files("hero_*_1.bag*"), "second file of a split")
-        for _ in range(15):
-            publisher.publish(Twist(angular=Vector3(0.0, 0.0, 2.0)))
-            time.sleep(0.1)
-        publisher.publish(Twist())
+        self.turn_hero_7()
+        self.wait_for_files("hero_*_1.bag*")
         code, output = self.end(recording)
         self.end(late)
         self.assertEqual(code, 0, output)
@@ -123,25 +118,36 @@ class RecordTest(unittest.TestCase):
         self.assertLessEqual(expected, topics)
         self.assertIn("/hero_7/velocity_controller/cmd_vel", topics)
         self.assertNotIn("/hero_0/laser", topics)
-        self.check_plot(bags)
-        self.check_export(bags)
+        self.check_programs(bags)
 
-    def check_plot(self, bags):
-        result = subprocess.run(
-            ["rosrun", "hero_recording", "plot", *bags, "--out", "drawn"],
-            cwd=self.folder,
-            capture_output=True,
-            check=False,
+    def turn_hero_7(self):
+        """Let it turn until its odometry shows that, and stop it, with commands that are recorded."""
+        publisher = rospy.Publisher("/hero_7/velocity_controller/cmd_vel", Twist, queue_size=1)
+        speeds = []
+        subscriber = rospy.Subscriber(
+            "/hero_7/odom", Odometry, lambda message: speeds.append(message.twist.twist.angular.z)
         )
-        self.assertEqual(result.returncode, 0, result.stderr)
-        self.assertEqual(len(self.files("drawn_*.png")), 5, result.stdout)
-        row = next(line for line in result.stdout.decode().splitlines() if line.startswith("hero_7"))
-        delay_ms = float(row.split()[7])
-        self.assertLess(abs(delay_ms), 100.0, row)
 
-    def check_export(self, bags):
-        command = ["rosrun", "hero_recording", "export", *bags, "--out", "tables"]
-        subprocess.run(command, cwd=self.folder, check=True, stdout=subprocess.PIPE)
+        wait_for(lambda: publisher.get_num_connections() == 2, "the driver and the recorder")
+
+        def is_turning():
+            publisher.publish(Twist(angular=Vector3(0.0, 0.0, 2.0)))
+            return max(speeds, default=0.0) > 1.0
+
+        wait_for(is_turning, "hero_7 to turn")
+        publisher.publish(Twist())
+        wait_for(lambda: speeds[-1] < 0.1, "hero_7 to stop")
+        subscriber.unregister()
+
+    def check_programs(self, bags):
+        """Let the other programs of this package read the bags."""
+        programs = ["plot", "--figures", "paths,delays", "--out", "drawn"], ["export", "--out", "tables"]
+        processes = [self.start("rosrun", "hero_recording", *program, *bags, cwd=self.folder) for program in programs]
+        (plot_code, plotted), (export_code, exported) = map(self.finish, processes)
+        self.assertEqual((plot_code, export_code), (0, 0), plotted + exported)
+        self.assertEqual(len(self.files("drawn_*.png")), 2, plotted)
+        (row,) = [line for line in plotted.splitlines() if line.startswith("hero_7")]
+        self.assertTrue(math.isfinite(float(row.split()[7])), row)
         with open(os.path.join(self.folder, "tables", "hero_7", "odometry.csv"), encoding="utf-8") as file:
             rows = list(csv.DictReader(file))
         self.assertGreater(max(float(row["angular_rad_s"]) for row in rows), 1.0)
@@ -149,93 +155,67 @@ class RecordTest(unittest.TestCase):
         self.assertEqual(times_s, sorted(times_s))
 
     def test_a_recording_whose_recorder_was_killed_is_repaired(self):
-        recording = self.start(*RECORD, "--folder", self.folder, "--compression", "none")
-        # The first chunk is whole as soon as the second one begins.
-        self.wait_for_data(900 * 1024)
+        recording = self.start_recording("killed", "--compression", "none")
+
+        def has_whole_chunk():
+            # The first chunk is whole as soon as the second one begins; rosbag writes them as they are.
+            return any(os.path.getsize(os.path.join(self.folder, path)) > 900 * 1024 for path in self.files("*/*.bag*"))
+
+        wait_for(has_whole_chunk, "900 kB")
         children = subprocess.run(["pgrep", "-P", str(recording.pid)], check=True, stdout=subprocess.PIPE)
         os.kill(int(children.stdout.split()[0]), signal.SIGKILL)
-        output = recording.communicate(timeout=TIMEOUT_S)[0].decode()
-        self.assertEqual(recording.returncode, 1, output)
+        code, output = self.finish(recording)
+        self.assertEqual(code, 1, output)
         self.assertIn("repaired", output)
-        self.assertEqual(self.files("*.active"), [])
-        with rosbag.Bag(glob.glob(self.folder + "/*.bag")[0]) as bag:
+        self.assertEqual(self.files("*/*.active"), [])
+        (path,) = self.files("*/*.bag")
+        with rosbag.Bag(os.path.join(self.folder, path)) as bag:
             self.assertGreater(bag.get_message_count("/hero_0/odom"), 10)
 
-    def fill_the_disk_while_recording(self, stdout=subprocess.PIPE):
-        """Record until the disk is full; return the recording and the limit (MB) at which it had to stop."""
-        free_mb = shutil.disk_usage(self.folder).free / 1e6
-        limit_mb = int(free_mb - DISK_STEP / 1e6 / 2)
-        recording = self.start(*RECORD, "--folder", self.folder, "--min-free-mb", str(limit_mb), stdout=stdout)
-        wait_for(lambda: self.files("hero_*.bag.active"), "recording")
-        self.assertIsNone(recording.poll())
-        with open(os.path.join(self.folder, "filler"), "wb") as filler:
-            os.posix_fallocate(filler.fileno(), 0, DISK_STEP)
-        return recording, limit_mb
-
-    def assert_one_closed_bag(self):
-        self.assertEqual(self.files("*.active"), [])
-        (name,) = self.files("*.bag")
-        rosbag.Bag(os.path.join(self.folder, name)).close()
-
-    def test_a_recording_stops_cleanly_when_the_disk_is_full(self):
-        recording, limit_mb = self.fill_the_disk_while_recording()
-        output = recording.communicate(timeout=TIMEOUT_S)[0].decode()
-        self.assertEqual(recording.returncode, 1, output)
-        self.assertRegex(output, r"stopped: only \d+ MB are left in .* less than the limit of %d MB" % limit_mb)
-        self.assert_one_closed_bag()
-
-    def test_the_disk_is_watched_with_a_closed_output(self):
+    def test_recordings_stop_on_a_full_disk_whatever_reads_their_output(self):
+        limit_mb = int(shutil.disk_usage(self.folder).free / 1e6 - DISK_STEP / 1e6 / 2)
         read_end, write_end = os.pipe()
         os.close(read_end)
-        with os.fdopen(write_end, "wb") as closed_pipe:
-            recording, _ = self.fill_the_disk_while_recording(closed_pipe)
-        self.assertEqual(recording.wait(TIMEOUT_S), 1)
-        self.assert_one_closed_bag()
-
-    def test_the_disk_is_watched_with_a_full_output(self):
-        with open("/dev/full", "wb") as full:
-            recording, _ = self.fill_the_disk_while_recording(full)
-        self.assertEqual(recording.wait(TIMEOUT_S), 1)
-        self.assert_one_closed_bag()
+        with os.fdopen(write_end, "wb") as closed, open("/dev/full", "wb") as full:
+            outputs = {"read": subprocess.PIPE, "closed": closed, "full": full}
+            recordings = {
+                name: self.start_recording(name, "--min-free-mb", str(limit_mb), stdout=stdout)
+                for name, stdout in outputs.items()
+            }
+        for name in recordings:
+            self.wait_for_files(name + "/hero_*.bag.active")
+        self.assertEqual([recording.poll() for recording in recordings.values()], [None] * 3)
+        with open(os.path.join(self.folder, "filler"), "wb") as filler:
+            os.posix_fallocate(filler.fileno(), 0, DISK_STEP)
+        code, output = self.finish(recordings["read"])
+        self.assertRegex(output, r"stopped: only \d+ MB are left in .* less than the limit of %d MB" % limit_mb)
+        for name, recording in recordings.items():
+            self.assertEqual(recording.wait(TIMEOUT_S), 1, name)
+            self.assert_one_closed_bag(name)
 
     def test_each_signal_ends_a_recording_with_closed_bags(self):
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            with self.subTest(number):
-                recording = self.start(*RECORD, "--folder", self.folder)
-                recording.stdout.close()
-                wait_for(lambda: self.files("hero_*.bag.active"), "recording")
-                # To record alone: roslaunch and service managers signal one process, and its recorder is its own.
-                os.kill(recording.pid, number)
-                self.assertEqual(recording.wait(TIMEOUT_S), 0)
-                self.assert_one_closed_bag()
-                os.remove(os.path.join(self.folder, self.files("*.bag")[0]))
+        numbers = {"int": signal.SIGINT, "term": signal.SIGTERM, "hup": signal.SIGHUP}
+        recordings = {name: self.start_recording(name, stdout=subprocess.DEVNULL) for name in numbers}
+        for name, recording in recordings.items():
+            self.wait_for_files(name + "/hero_*.bag.active")
+            # To record alone: roslaunch and service managers signal one process, and its recorder is its own.
+            os.kill(recording.pid, numbers[name])
+        for name, recording in recordings.items():
+            self.assertEqual(recording.wait(TIMEOUT_S), 0, name)
+            self.assert_one_closed_bag(name)
 
-    def test_wrong_options_are_refused_in_one_line(self):
-        environment = dict(os.environ, ROS_MASTER_URI="http://127.0.0.1:9")
-        for arguments, code, words, env in (
-            (["--min-free-mb", "1e9"], 1, "nothing is recorded", None),
-            (["--split-mb", "0"], 2, "must be 1..", None),
-            (["--name", "../x"], 2, "--name", None),
-            (["--topics", "("], 2, "not a regular expression", None),
-            (["--robots", "one"], 2, "--robots", None),
-            (["--seconds", "inf"], 2, "--seconds inf", None),
-            (["--seconds", "nan"], 2, "--seconds nan", None),
-            ([], 1, "no ROS master at", environment),
-        ):
-            result = subprocess.run(
-                [*RECORD, "--folder", self.folder, *arguments],
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.STDOUT,
-                timeout=TIMEOUT_S,
-                check=False,
-                env=env,
-            )
-            output = result.stdout.decode()
-            self.assertEqual(result.returncode, code, output)
+    def test_a_recording_that_cannot_start_says_why_and_leaves_no_files(self):
+        without_master = dict(os.environ, ROS_MASTER_URI="http://127.0.0.1:9")
+        cases = [
+            (self.start_recording("disk", "--min-free-mb", "1e9"), 1, "nothing is recorded"),
+            (self.start_recording("split", "--split-mb", "0"), 2, "must be 1.."),
+            (self.start_recording("master", env=without_master), 1, "no ROS master at"),
+        ]
+        for process, expected, words in cases:
+            code, output = self.finish(process)
+            self.assertEqual(code, expected, output)
             self.assertIn(words, output)
-            self.assertNotIn("Traceback", output)
-        self.assertEqual(self.files(), [])
+        self.assertEqual(self.files("**/*.bag*"), [])
 
 
 if __name__ == "__main__":

@@ -1,0 +1,25 @@
+"""Options of record that are wrong: each is refused by name."""
+
+import pytest
+
+from hero_recording import record
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "words"),
+    [
+        ("--split-mb", "0", "must be 1.."),
+        ("--min-free-mb", "-1", "must be 0.."),
+        ("--name", "../x", "must be letters"),
+        ("--topics", "(", "not a regular expression"),
+        ("--robots", "one", "'one'"),
+        ("--seconds", "inf", "must be more than 0"),
+        ("--seconds", "nan", "must be more than 0"),
+    ],
+)
+def test_a_wrong_option_is_refused_with_its_name_and_value(option, value, words, capsys):
+    with pytest.raises(SystemExit) as caught:
+        record.parse_options(["%s=%s" % (option, value)])
+    assert caught.value.code == 2
+    line = capsys.readouterr().err.splitlines()[-1]
+    assert option in line and value in line and words in line
