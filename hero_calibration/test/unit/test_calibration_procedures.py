@@ -1,0 +1,296 @@
+"""The procedures on simulated robots in virtual time, judged by the robots' known errors and by ground truth."""
+
+import math
+
+import numpy as np
+import pytest
+from stepped_session import StepSession
+
+from hero_calibration import infrared_model, store
+from hero_calibration.calibration import Calibration
+from hero_calibration.dead_zone import PULSE_S
+from hero_calibration.errors import CalibrationError, EndedError
+from hero_calibration.infrared import calibrate_infrared
+from hero_calibration.motors import calibrate_motors
+from hero_calibration.placement import place_robots
+from hero_calibration.restore import restore
+from hero_calibration.step_response import ANGULAR_RAD_S, STEP_M_S, STEP_S
+from hero_calibration.velocity import calibrate_velocity
+from hero_client.robot_constants import BODY_RADIUS_M
+from hero_sim.robot.ranges import FACTORY_CALIBRATION_COUNTS_M2, calibrate
+from hero_sim.stepped.robot_rows import RobotRows
+from hero_sim.world.arena import Arena
+from hero_sim.world.robot_errors import SERVO_CENTER_US, draw_errors, set_known
+from hero_sim.world.world import World
+
+SEEDS = (0, 1, 2)
+APART_M = 0.6
+WALL_Y_M = 1.0
+AT_WALL_Y_M = WALL_Y_M - infrared_model.WALL_M - BODY_RADIUS_M
+
+CENTER_BOUND_US = 3.0
+VELOCITY_BOUND = 0.2
+RANGE_BOUND_M = 0.003
+COUNTS_BOUND = 0.04
+
+
+def make_session(count=4, seed=0, at_wall=False, known=(), places_m_deg=None):
+    """Return a session of robots with factory settings and errors drawn from seed, in a row along a wall.
+
+    at_wall: whether they face it, 10 cm away and turned by up to 5 degrees; otherwise they have room.
+    known: errors that are set, as of --error; places_m_deg: of some robots by row.
+    """
+    rng = np.random.RandomState(seed)
+    errors = draw_errors([np.random.RandomState([seed, row]) for row in range(count)])
+    errors.servo_center_us[:] = SERVO_CENTER_US + rng.randint(-50, 51, (count, 2))
+    errors.servo_gain[:] = rng.uniform(0.8, 1.2, (count, 2))
+    errors.dead_zone_us[:] = rng.uniform(20.0, 40.0, (count, 1))
+    errors.alpha_counts_m2[:] = rng.uniform(0.36, 0.46, (count, 8))
+    for text in known:
+        set_known(errors, 0, text)
+    degrees = 90.0 + rng.uniform(-5.0, 5.0, count)
+    poses = np.column_stack([np.arange(count) * APART_M, np.full(count, AT_WALL_Y_M if at_wall else 0.0), degrees])
+    for row, place in (places_m_deg or {}).items():
+        poses[row] = place
+    poses[:, 2] = np.radians(poses[:, 2])
+    wall_m = np.array([[-1.0, WALL_Y_M, APART_M * count, WALL_Y_M]])
+    arena = Arena("wall", wall_m, np.empty((0, 3)), (), np.array([-1.0, -1.0, APART_M * count, WALL_Y_M]))
+    robots = RobotRows(World(arena, poses, rng, errors))
+    for row in range(count):
+        robots.set_motor_centers(row, [SERVO_CENTER_US] * 2)
+        robots.set_infrared_calibration(row, [FACTORY_CALIBRATION_COUNTS_M2] * 8)
+    return StepSession(robots)
+
+
+def place_and(procedure, session, at_wall=False):
+    """Return the results of a procedure with the robots that are well placed."""
+    place_robots(session, at_wall, ask=None)
+    return procedure(session)
+
+
+def velocity_alone(session):
+    return calibrate_velocity(session, {})
+
+
+def check_centers(session, results):
+    for row, result in results.items():
+        centers_us = [zone.center_us for zone in result.zones]
+        true_us = session.robots.world.errors.servo_center_us[row].tolist()
+        assert centers_us == pytest.approx(true_us, abs=CENTER_BOUND_US)
+        assert session.probes[row].written["motor_centers_us"] == [round(center_us) for center_us in centers_us]
+
+
+def is_moving(session):
+    return (np.abs(session.robots.world.speeds_m_s) > 1e-3).any(axis=1).tolist()
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+class TestAccuracy:
+    def test_centers_are_found_to_3_us_and_gains_improve_each_robot(self, seed):
+        session = make_session(count=16, seed=seed)
+        motors = place_and(calibrate_motors, session)
+        assert len(motors) == 16
+        check_centers(session, motors)
+        velocity = calibrate_velocity(session, motors)
+        assert len(velocity) == 16
+        for row, result in velocity.items():
+            before, after = result.to_file()["velocity_errors"]
+            assert after < min(VELOCITY_BOUND, 0.75 * before)
+            assert session.probes[row].written["velocity_gains"] == result.to_file()["velocity_gains"]
+        self.check_speeds(session, velocity)
+
+    def check_speeds(self, session, results):
+        """Compare the errors that were measured with those of the wheels in one more test."""
+        world, speeds_m_s = session.robots.world, []
+        session.settle()
+        end_s = session.now_s() + STEP_S
+        while session.now_s() < end_s:
+            for probe in session.probes:
+                probe.drive(ANGULAR_RAD_S)
+            session.pause(0.02)
+            speeds_m_s.append(world.speeds_m_s * (-1.0, 1.0))
+        errors = np.abs(np.array(speeds_m_s) / STEP_M_S - 1.0).mean(axis=(0, 2))
+        measured = [results[probe.robot_id].to_file()["velocity_errors"][1] for probe in session.probes]
+        assert measured == pytest.approx(errors.tolist(), abs=0.06)
+
+    def test_ranges_are_right_to_3_mm_and_constants_to_4_percent(self, seed):
+        session = make_session(count=16, seed=seed, at_wall=True)
+        results = place_and(calibrate_infrared, session, at_wall=True)
+        assert len(results) == 16
+        errors = session.robots.world.errors
+        true_counts_m2 = calibrate(errors.alpha_counts_m2, errors.beta_counts)
+        for row, result in results.items():
+            assert np.abs(result.before_m).max() > RANGE_BOUND_M
+            assert np.abs(result.after_m).max() < RANGE_BOUND_M
+            assert result.counts_m2 == pytest.approx(true_counts_m2[row].tolist(), rel=COUNTS_BOUND)
+            assert session.probes[row].written["infrared_counts_m2"] == result.counts_m2
+
+
+@pytest.mark.parametrize(
+    ("procedure", "at_wall"), [(calibrate_motors, False), (velocity_alone, False), (calibrate_infrared, True)]
+)
+class TestLostRobot:
+    def test_a_robot_that_is_lost_fails_alone_and_changes_no_other(self, procedure, at_wall):
+        whole, session = make_session(at_wall=at_wall), make_session(at_wall=at_wall)
+        session.events[8.0] = lambda: setattr(session.probes[1], "is_lost", True)
+        expected, found = place_and(procedure, whole, at_wall), place_and(procedure, session, at_wall)
+        assert sorted(found) == [0, 2, 3]
+        for row, result in found.items():
+            assert result.to_file() == expected[row].to_file()
+        assert "/hero_1/" in session.probes[1].failure or "not answered" in session.probes[1].failure
+        assert [probe.failure for probe in session.probes if probe.robot_id != 1] == [None] * 3
+
+    def test_a_network_that_stalls_for_2_s_changes_nothing(self, procedure, at_wall):
+        session = make_session(at_wall=at_wall)
+
+        def set_lost(is_lost):
+            for probe in session.probes:
+                probe.is_lost = is_lost
+
+        session.events.update({8.0: lambda: set_lost(True), 10.0: lambda: set_lost(False)})
+        assert sorted(place_and(procedure, session, at_wall)) == [0, 1, 2, 3]
+
+    def test_all_robots_stop_when_the_program_is_to_end(self, procedure, at_wall):
+        session = make_session(at_wall=at_wall)
+        session.end_s = 7.0
+        with pytest.raises(EndedError):
+            place_and(procedure, session, at_wall)
+        session.stop()
+        session.sleep(0.5)
+        assert is_moving(session) == [False] * 4
+        assert session.now_s() < session.end_s + 1.0
+
+
+class TestFaults:
+    def test_a_blocked_wheel_is_named_and_the_others_are_calibrated(self):
+        session = make_session(known=["robot=1,right_gain=0", "robot=3,left_gain=0"])
+        check_centers(session, place_and(calibrate_motors, session))
+        assert [probe.failure is None for probe in session.probes] == [True, False, True, False]
+        for row, wheel in ((1, "right"), (3, "left")):
+            assert session.probes[row].failure.startswith("motors: the %s wheel does not turn at any pulse" % wheel)
+        session.sleep(0.5)
+        assert is_moving(session) == [False] * 4
+
+    def test_a_center_outside_the_sweep_is_refused(self):
+        session = make_session(count=2, known=["robot=1,left_center_us=1650"])
+        assert list(place_and(calibrate_motors, session)) == [0]
+        assert "the left wheel does not stop between" in session.probes[1].failure
+
+    def test_a_robot_that_does_not_turn_from_the_wall_is_named(self):
+        session = make_session(at_wall=True, known=["robot=2,left_gain=0,right_gain=0"])
+        assert sorted(place_and(calibrate_infrared, session, at_wall=True)) == [0, 1, 3]
+        assert "could not turn on the spot: 45 degrees are missing" in session.probes[2].failure
+
+
+class TestPlacement:
+    def test_robots_too_close_to_something_are_named_and_fail(self):
+        session = make_session(places_m_deg={1: (0.12, 0.0, 90.0), 2: (1.2, AT_WALL_Y_M, 90.0)})
+        place_robots(session, at_wall=False, ask=None)
+        assert [probe.robot_id for probe in session.active] == [3]
+        for row, text in ((0, "5 cm from it, at sensor right"), (1, "5 cm from it, at sensor left"), (2, "front")):
+            assert session.probes[row].failure.startswith("place: something is about ")
+            assert text in session.probes[row].failure
+
+    def test_robots_that_face_no_wall_are_named_and_fail(self):
+        session = make_session(at_wall=True, places_m_deg={1: (0.6, 0.0, 90.0), 2: (1.2, WALL_Y_M - 0.18, 90.0)})
+        place_robots(session, at_wall=True, ask=None)
+        assert [probe.robot_id for probe in session.active] == [0, 3]
+        for row in (1, 2):
+            assert session.probes[row].failure.startswith("place: its front sensor reads ")
+
+    @pytest.mark.parametrize(("answers", "active"), [(["", "s"], [0, 2, 3]), (["", "", "s"], [0, 2, 3]), (["q"], None)])
+    def test_the_user_is_asked_again_until_all_is_well_or_he_decides(self, answers, active):
+        session, asked = make_session(places_m_deg={1: (0.6, AT_WALL_Y_M, 90.0)}), []
+
+        def ask(question):
+            asked.append(question)
+            return answers[len(asked) - 1]
+
+        if active is None:
+            with pytest.raises(EndedError):
+                place_robots(session, False, ask)
+        else:
+            place_robots(session, False, ask)
+            assert [probe.robot_id for probe in session.active] == active
+        assert len(asked) == len(answers)
+
+    def test_a_robot_that_is_silent_is_named(self):
+        session = make_session()
+        session.probes[3].is_lost = True
+        session.sleep(4.0)
+        place_robots(session, at_wall=False, ask=None)
+        assert session.probes[3].failure == (
+            "place: nothing received on /hero_3/encoder: is the robot on and in reach?"
+        )
+
+
+class TestCalibration:
+    """The whole program, without ROS."""
+
+    def run(self, session, tmp_path, *parts, ask=None):
+        return Calibration(session, parts, str(tmp_path), ask).run()
+
+    def load(self, tmp_path, robot_id):
+        return store.load(store.name_file(str(tmp_path), robot_id)).values
+
+    def test_results_are_saved_by_robot_and_printed_in_a_table(self, tmp_path, capsys):
+        session = make_session(count=2, known=["robot=1,left_gain=0"])
+        assert self.run(session, tmp_path, "motors", "velocity") == 1
+        assert set(self.load(tmp_path, 0)) == {
+            "motor_centers_us", "dead_zones_us", "velocity_gains", "velocity_errors",
+        }  # fmt: skip
+        assert self.load(tmp_path, 0)["motor_centers_us"] == session.probes[0].written["motor_centers_us"]
+        assert (tmp_path / "hero_0.png").read_bytes()[:4] == b"\x89PNG"
+        assert not (tmp_path / "hero_1.yaml").exists()
+        table = capsys.readouterr().out.split("\n\n")[-1]
+        assert "hero_0: ok\n  motors    centers" in table
+        assert "hero_1: FAILED: motors: the left wheel does not turn" in table
+
+    def test_what_was_measured_before_an_early_end_is_saved(self, tmp_path, capsys):
+        session = make_session(count=2)
+        session.end_s = 60.0
+        assert self.run(session, tmp_path, "motors", "velocity") == 130
+        assert set(self.load(tmp_path, 1)) == {"motor_centers_us", "dead_zones_us"}
+        assert "ended early" in capsys.readouterr().out
+        session.sleep(0.5)
+        assert is_moving(session) == [False] * 2
+
+    def test_nothing_is_saved_if_the_end_comes_before_a_result(self, tmp_path):
+        session = make_session(count=2)
+        session.end_s = 5.0
+        assert self.run(session, tmp_path, "motors") == 130
+        assert list(tmp_path.iterdir()) == []
+
+    def test_results_replace_a_damaged_file_where_a_question_fails(self, tmp_path):
+        (tmp_path / "hero_0.yaml").write_text("robot: hero_0\nvelocity_gains: 2026-13-45\n")
+        answers = [""]
+
+        def ask(question):
+            if not answers:
+                raise CalibrationError("nobody is there to answer")
+            return answers.pop()
+
+        with pytest.raises(CalibrationError, match="nobody"):
+            self.run(make_session(count=1), tmp_path, "motors", "infrared", ask=ask)
+        assert set(self.load(tmp_path, 0)) == {"motor_centers_us", "dead_zones_us"}
+        assert "2026-13-45" in (tmp_path / "hero_0.previous.yaml").read_text()
+
+    def test_the_same_seed_gives_the_same_results(self, tmp_path):
+        for name in ("first", "second"):
+            folder = tmp_path / name
+            folder.mkdir()
+            assert self.run(make_session(count=2, seed=7), folder, "motors", "velocity") == 0
+        first, second = (self.load(tmp_path / name, 1) for name in ("first", "second"))
+        assert first == second
+
+
+class TestRestore:
+    def test_all_settings_are_written_and_a_lost_robot_is_named(self, capsys):
+        session = make_session(count=2)
+        values = {"motor_centers_us": [1511, 1489], "velocity_gains": [7.0] * 6, "velocity_errors": [0.2, 0.1]}
+        session.probes[1].is_lost = True
+        assert restore(session, {row: store.Calibration(row, "today", values) for row in (0, 1)}) == 1
+        assert session.probes[0].written == {key: values[key] for key in ("motor_centers_us", "velocity_gains")}
+        output = capsys.readouterr().out
+        assert "hero_0: restored motor_centers_us, velocity_gains of today" in output
+        assert "hero_1: FAILED: restore: motor_centers_us is not answered; restored nothing of today" in output
