@@ -58,6 +58,16 @@ PURE_ROOMS = (
     "hero_client.robot_base",
     "hero_client.robot_link",
     "hero_client.swarm_base",
+    "hero_calibration.dead_zone",
+    "hero_calibration.encoder_readings",
+    "hero_calibration.infrared",
+    "hero_calibration.infrared_model",
+    "hero_calibration.motors",
+    "hero_calibration.placement",
+    "hero_calibration.restore",
+    "hero_calibration.session",
+    "hero_calibration.step_response",
+    "hero_calibration.velocity",
 )
 
 

@@ -117,7 +117,7 @@ class Probe(ABC):
 
     @abstractmethod
     def drive(self, angular_rad_s: float) -> None:
-        """Turn on the spot under the velocity controller; 0 stops."""
+        """Turn on the spot under the velocity controller."""
 
     @abstractmethod
     def turn(self, angle_rad: float) -> None:
@@ -126,6 +126,10 @@ class Probe(ABC):
     @abstractmethod
     def set_pulses(self, pulse_us: int) -> None:
         """Set the pulse of both servos."""
+
+    @abstractmethod
+    def stop(self) -> None:
+        """Stop, whichever controller drives: a zero for one leaves the other driving."""
 
     @abstractmethod
     def write(self, key: str, values: List[float]) -> None:

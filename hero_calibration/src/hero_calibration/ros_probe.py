@@ -66,7 +66,7 @@ class RosProbe(Probe):
         return silence
 
     def drive(self, angular_rad_s: float) -> None:
-        """Turn on the spot under the velocity controller; 0 stops."""
+        """Turn on the spot under the velocity controller."""
         self._velocity.publish(_make_turn(angular_rad_s))
 
     def turn(self, angle_rad: float) -> None:
@@ -76,6 +76,11 @@ class RosProbe(Probe):
     def set_pulses(self, pulse_us: int) -> None:
         """Set the pulse of both servos."""
         self._motors.publish(Motor(pulse_us, pulse_us))
+
+    def stop(self) -> None:
+        """Stop, whichever controller drives."""
+        self.drive(0.0)
+        self.turn(0.0)
 
     def write(self, key: str, values: List[float]) -> None:
         """Write a setting by its service. Raises: CalibrationError with the reason if it fails."""

@@ -86,7 +86,7 @@ class Session(ABC):
         self.map(work_on, probes)
         for probe in probes:
             if probe.failure is not None:
-                probe.drive(0.0)
+                probe.stop()
                 say("%s failed: %s" % (probe.name, probe.failure))
 
     def repeat(
@@ -125,12 +125,12 @@ class Session(ABC):
         """Stop all robots, including those that failed; works while the program ends."""
         for _ in range(2):
             for probe in self.probes:
-                probe.drive(0.0)
+                probe.stop()
             self.sleep(STOP_GAP_S)
 
     def settle(self) -> None:
         """Stop all robots and wait until they are at rest."""
         for _ in range(2):
             for probe in self.active:
-                probe.drive(0.0)
+                probe.stop()
             self.pause(SETTLE_S / 2.0)

@@ -29,6 +29,10 @@ class StepProbe(Probe):
     def set_pulses(self, pulse_us):
         self.send(self.robots.send_pulses, pulse_us, pulse_us)
 
+    def stop(self):
+        self.drive(0.0)
+        self.turn(0.0)
+
     def send(self, method, *values):
         if not self.is_lost:
             method(self.robot_id, *values)

