@@ -23,7 +23,7 @@ sys.path.append(str(ROOT / "bench"))
 from running_suite import RunningSuite  # noqa: E402
 
 PICTURES_FOLDER = ROOT / "docs" / "pictures"
-CALIBRATION_TEST = ROOT / "hero_calibration" / "test" / "rostest"
+CALIBRATION_ARENA = ROOT / "hero_calibration" / "test" / "rostest" / "calibration_arena.yaml"
 RECORDED_S = 60
 
 
@@ -76,19 +76,19 @@ def record_ten(picture):
 
 
 def calibrate(picture):
-    """Servos and wheels of hero_3, infrared sensors of hero_1, as the test of the calibration starts them."""
-    arena = CALIBRATION_TEST / "calibration_arena.yaml"
-    errors = CALIBRATION_TEST / "calibration_errors.yaml"
+    """Servos and wheels of hero_1, which has room, and infrared sensors of hero_0, which faces a wall."""
+    arena = ["--arena", str(CALIBRATION_ARENA), "--motors", "factory", "--ir", "factory"]
+    errors = ["--error", "robot=0,alpha_counts_m2=0.36,alpha6_counts_m2=0.46"]
+    errors += ["--error", "robot=1,left_center_us=1533,right_center_us=1478"]
     with RunningSuite(0) as stage, tempfile.TemporaryDirectory() as folder:
         stage.start(
-            ["rosrun", "hero_sim", "hero_sim", "--count", "9", "--port", str(stage.port), "--arena", str(arena)]
-            + ["--flash-dir", "none", "--motors", "factory", "--ir", "factory", "--errors", str(errors), "--quiet"]
+            ["rosrun", "hero_sim", "hero_sim", "--count", "2", "--port", str(stage.port), "--quiet", *arena, *errors]
         )
         program = ["rosrun", "hero_calibration", "calibrate", "--folder", folder, "--yes"]
-        subprocess.run([*program, "infrared", "--robots", "1"], check=True)
-        shutil.move(folder + "/hero_1.png", str(picture.with_name("calibration_infrared.png")))
-        subprocess.run([*program, "motors", "velocity", "--robots", "3"], check=True)
-        shutil.move(folder + "/hero_3.png", str(picture))
+        subprocess.run([*program, "infrared", "--robots", "0"], check=True)
+        shutil.move(folder + "/hero_0.png", str(picture.with_name("calibration_infrared.png")))
+        subprocess.run([*program, "motors", "velocity", "--robots", "1"], check=True)
+        shutil.move(folder + "/hero_1.png", str(picture))
     for path in picture.parent.glob("calibration_*.png"):
         shrink(path)
 

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Calibrates simulated robots with known errors by the real program: accuracy, early ends, restoring.
+"""The wiring of the calibration: topics, services, files, questions, signals. How well it measures: test/unit.
 
-Robots 0 to 2 face a wall, 3 to 6 have room, 7 and 8 are too close to each other. Two programs run in parallel.
+Robot 0 faces a wall, 1 has room, 2 and 3 are too close to each other, 4 vanishes.
 """
 
-import glob
+import json
 import os
 import pty
 import shutil
@@ -12,181 +12,199 @@ import signal
 import subprocess
 import tempfile
 import unittest
-from concurrent.futures import ThreadPoolExecutor
 
+import rospkg
 import rospy
 import rostest
 import yaml
+from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
-from sensor_msgs.msg import LaserScan
 
+from hero_calibration.errors import CalibrationError
+from hero_calibration.infrared_model import FRONT
+from hero_calibration.ros_probe import RosProbe
 from hero_sim.srv import InjectFault
+from hero_test.processes import Program, find_program
 from hero_test.waiting import wait_for
 
-CALIBRATE = ["rosrun", "hero_calibration", "calibrate"]
-TIMEOUT_S = 250.0
-CENTER_BOUND_US = 4
-RANGE_BOUND_M = 0.004
-VELOCITY_BOUND = 0.22
-"""Share of the target speed; a robot with factory settings is off by 30 % (hero_sim)."""
-
-TRUE_CENTERS_US = {3: (1533, 1478), 4: (1510, 1490), 5: (1480, 1520)}
-"""Of the left and right servo, as calibrate.test sets them."""
+CALIBRATE = find_program("hero_calibration", "calibrate")
+ARENA = rospkg.RosPack().get_path("hero_calibration") + "/test/rostest/calibration_arena.yaml"
+CENTERS_US = [1511, 1489]
+GAINS = [700.0, 5000.0, 0.5, 800.0, 6000.0, 0.25]
+COUNTS_M2 = [0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0, 1.125]
 
 
-class Watch:
-    """True speeds of robots."""
-
-    def __init__(self, robot_ids):
-        self.speeds = {robot_id: 0.0 for robot_id in robot_ids}
-        for robot_id in robot_ids:
-            topic = "/hero_%d/ground_truth" % robot_id
-            rospy.Subscriber(topic, Odometry, self.receive, robot_id, queue_size=5)
-
-    def receive(self, message, robot_id):
-        twist = message.twist.twist
-        self.speeds[robot_id] = abs(twist.linear.x) + 0.0315 * abs(twist.angular.z)
+def keep(folder, robot_id, **content):
+    """Write the file of a robot; return its path."""
+    path = "%s/hero_%d.yaml" % (folder, robot_id)
+    with open(path, "w", encoding="utf-8") as file:
+        yaml.safe_dump({"robot": "hero_%d" % robot_id, **content}, file)
+    return path
 
 
 class CalibrateTest(unittest.TestCase):
-    def setUp(self):
-        self.folder = tempfile.mkdtemp()
-        self.addCleanup(shutil.rmtree, self.folder)
-
-    def start(self, *arguments, **options):
-        process = subprocess.Popen(
-            [*CALIBRATE, "--folder", self.folder, *arguments],
-            stdin=options.pop("stdin", subprocess.DEVNULL),
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            start_new_session=True,
-            **options,
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.mkdtemp()
+        cls.simulator = Program(
+            find_program("hero_sim", "hero_sim"),
+            *("--count", "5", "--port", "21298", "--arena", ARENA, "--flash-dir", cls.folder + "/flash", "--quiet"),
+            *("--motors", "factory", "--ir", "factory"),
         )
-        self.addCleanup(process.stdout.close)
-        self.addCleanup(lambda: process.poll() is None and os.killpg(process.pid, signal.SIGKILL))
-        return process
+        cls.wheel_m_s = dict.fromkeys(range(5), 0.0)
+        for robot_id in cls.wheel_m_s:
+            rospy.Subscriber("/hero_%d/ground_truth" % robot_id, Odometry, cls.receive_motion, robot_id)
+        cls.probes = [RosProbe(robot_id) for robot_id in range(5)]
+        cls.start_to_restore()
+        for probe in cls.probes:
+            wait_for(lambda probe=probe: probe.find_silence(rospy.get_time()) is None, "all topics of " + probe.name)
 
-    def finish(self, process):
-        output = process.communicate(timeout=TIMEOUT_S)[0].decode()
-        self.assertNotIn("Traceback", output)
-        return process.returncode, output
+    @classmethod
+    def start_to_restore(cls):
+        """Robot 42 is waited for 10 s: meanwhile the other tests run."""
+        folder = tempfile.mkdtemp(dir=cls.folder)
+        for robot_id in (2, 42):
+            keep(
+                folder, robot_id, motor_centers_us=CENTERS_US, velocity_gains=GAINS, infrared_counts_m2=COUNTS_M2
+            )
+        cls.restoring = Program(CALIBRATE, "restore", "--folder", folder)
 
-    def run_program(self, *arguments):
-        return self.finish(self.start(*arguments))
+    @classmethod
+    def tearDownClass(cls):
+        cls.restoring.close()
+        cls.simulator.end()
+        shutil.rmtree(cls.folder)
 
-    def load(self, robot_id):
-        with open("%s/hero_%d.yaml" % (self.folder, robot_id), encoding="utf-8") as file:
-            return yaml.safe_load(file)
+    @classmethod
+    def receive_motion(cls, message, robot_id):
+        twist = message.twist.twist
+        cls.wheel_m_s[robot_id] = abs(twist.linear.x) + 0.0315 * abs(twist.angular.z)
 
-    def test_1_errors_are_below_their_bounds_though_one_robot_vanishes(self):
-        open_floor = self.start("motors", "velocity", "--robots", "3-8", "--yes")
-        wall = self.start("infrared", "--robots", "0-2,42", "--yes")
-        watch = Watch(range(9))
-        wait_for(lambda: watch.speeds[6] > 0.02, "motion of hero_6", TIMEOUT_S)
-        rospy.ServiceProxy("/hero_sim/fault", InjectFault)("vanish:robot=6")
-        with ThreadPoolExecutor() as pool:
-            outputs = list(pool.map(self.finish, (open_floor, wall)))
-        self.check_floor(*outputs[0])
-        self.check_wall(*outputs[1])
-        wait_for(lambda: max(watch.speeds.values()) < 1e-3, "standstill", TIMEOUT_S)
+    def setUp(self):
+        self.files = tempfile.mkdtemp(dir=self.folder)
 
-    def check_floor(self, code, output):
-        self.assertEqual(code, 1, output)
-        for robot_id in (3, 4, 5):
-            self.assertIn("hero_%d: ok" % robot_id, output)
-            kept = self.load(robot_id)
-            for found_us, true_us in zip(kept["motor_centers_us"], TRUE_CENTERS_US[robot_id]):
-                self.assertLessEqual(abs(found_us - true_us), CENTER_BOUND_US, output)
-            before, after = kept["velocity_errors"]
-            self.assertLess(after, VELOCITY_BOUND, output)
-            self.assertLess(after, 0.9 * before, output)
-            picture = "%s/hero_%d.png" % (self.folder, robot_id)
-            with open(picture, "rb") as file:
-                self.assertEqual(file.read(4), b"\x89PNG")
-        self.assertIn("hero_6: FAILED: motors", output)
-        for robot_id in (7, 8):
-            reason = r"hero_%d: FAILED: place: something is about [4-7] cm from it, at sensor front\n"
-            self.assertRegex(output, reason % robot_id)
-            self.assertFalse(os.path.exists("%s/hero_%d.yaml" % (self.folder, robot_id)))
+    def start(self, *arguments, stdin=subprocess.DEVNULL):
+        program = Program(CALIBRATE, "--folder", self.files, *arguments, stdin=stdin)
+        self.addCleanup(program.close)
+        return program
 
-    def check_wall(self, code, output):
-        self.assertEqual(code, 1, output)
-        self.assertIn("hero_42: FAILED: is not connected", output)
-        for robot_id in range(3):
-            self.assertIn("hero_%d: ok" % robot_id, output)
-            kept = self.load(robot_id)
-            self.assertLess(max(map(abs, kept["range_errors_after_m"])), RANGE_BOUND_M, output)
-            self.assertGreater(max(map(abs, kept["range_errors_before_m"])), RANGE_BOUND_M, output)
-        # The robot itself measures the distance of the wall, whichever sensor faces it now.
-        scan = rospy.wait_for_message("/hero_0/proximity", LaserScan, timeout=TIMEOUT_S)
-        self.assertAlmostEqual(min(scan.ranges), 0.1368, delta=0.008)
+    def finish(self, program, expected_code):
+        """Return what a program prints until its end."""
+        code = program.wait_end()
+        self.assertEqual(code, expected_code, program.text())
+        self.assertNotIn("Traceback", program.text())
+        return program.text()
 
-    def test_5_calibrations_are_restored_and_a_silent_robot_is_reported(self):
-        path = self.folder + "/hero_3.yaml"
-        content = {
-            "robot": "hero_3",
-            "motor_centers_us": [1511, 1489],
-            "velocity_gains": [700.0, 5000.0, 0.1] * 2,
-        }
-        with open(path, "w", encoding="utf-8") as file:
-            yaml.safe_dump(content, file)
-        code, output = self.run_program("restore")
-        self.assertEqual(code, 0, output)
-        self.assertIn("hero_3: restored motor_centers_us, velocity_gains", output)
-        rospy.ServiceProxy("/hero_sim/fault", InjectFault)("slow-service:robot=4,by=60")
-        with open(self.folder + "/hero_4.yaml", "w", encoding="utf-8") as file:
-            yaml.safe_dump({**content, "robot": "hero_4"}, file)
-        code, output = self.run_program("restore")
-        self.assertEqual(code, 1, output)
-        self.assertIn("hero_3: restored motor_centers_us, velocity_gains", output)
-        self.assertRegex(output, r"hero_4: FAILED: restore: /hero_4/motors_parameters: .*not answered")
+    def read_flash(self, robot_id):
+        with open("%s/flash/hero_%d.json" % (self.folder, robot_id), encoding="utf-8") as file:
+            return json.load(file)
 
-    def test_2_results_before_an_early_end_replace_a_damaged_file(self):
-        path = self.folder + "/hero_5.yaml"
-        with open(path, "w", encoding="utf-8") as file:
-            file.write("robot: hero_5\nvelocity_gains: 2026-13-45\n")
-        process = self.start("motors", "infrared", "--robots", "5", stdin=subprocess.PIPE)
-        # The first question is answered, the second is not.
-        process.stdin.write(b"\n")
-        process.stdin.close()
-        process.stdin = None
-        code, output = self.finish(process)
-        self.assertEqual(code, 1, output)
-        self.assertIn("nobody is there to answer", output)
-        for found_us, true_us in zip(self.load(5)["motor_centers_us"], TRUE_CENTERS_US[5]):
-            self.assertLessEqual(abs(found_us - true_us), CENTER_BOUND_US, output)
-        with open(self.folder + "/hero_5.previous.yaml", encoding="utf-8") as file:
-            self.assertIn("2026-13-45", file.read())
+    def wait_for_rest(self, robot_id):
+        wait_for(lambda: self.wheel_m_s[robot_id] < 1e-3, "hero_%d to stop" % robot_id)
 
-    def test_3_robots_stop_on_an_interrupt(self):
-        watch = Watch([3, 4])
-        process = self.start("motors", "--robots", "3,4", "--yes")
-        wait_for(lambda: min(watch.speeds.values()) > 0.03, "motion", TIMEOUT_S)
-        os.killpg(process.pid, signal.SIGINT)
-        code, output = self.finish(process)
-        self.assertEqual(code, 130, output)
-        self.assertIn("ended early", output)
-        wait_for(lambda: max(watch.speeds.values()) < 1e-3, "standstill", TIMEOUT_S)
-        self.assertEqual(glob.glob(self.folder + "/*"), [])
+    def turn_wheels(self, command):
+        """Send a command to robot 1 and stop it as soon as both wheels turn; return by how many ticks they did."""
+        probe = self.probes[1]
+        before = probe.read_wheels()
+        command(probe)
 
-    def test_4_q_and_ctrl_c_answer_the_question_before_anything_moves(self):
-        watch = Watch([3])
+        def read_ticks():
+            now = probe.read_wheels()
+            ticks = now.left_ticks[-1] - before.left_ticks[-1], now.right_ticks[-1] - before.right_ticks[-1]
+            return min(map(abs, ticks)) > 10 and ticks
+
+        ticks = wait_for(read_ticks, "wheels to turn")
+        probe.stop()
+        self.wait_for_rest(1)
+        return ticks
+
+    def test_each_kind_of_command_turns_the_robot_and_its_readings_show_that(self):
+        for command in (lambda probe: probe.drive(2.0), lambda probe: probe.turn(0.8)):
+            yaw_rad = self.probes[1].pose.yaw_rad
+            left, right = self.turn_wheels(command)
+            self.assertLess(left, 0)
+            self.assertGreater(right, 0)
+            self.assertNotEqual(self.probes[1].pose.yaw_rad, yaw_rad)
+        # The servos are mounted as mirror images.
+        left, right = self.turn_wheels(lambda probe: probe.set_pulses(1400))
+        self.assertGreater(left, 0)
+        self.assertLess(right, 0)
+        self.assertAlmostEqual(self.probes[1].read_wheels().step_s, 0.034, delta=0.01)
+
+    def test_a_stop_goes_to_both_controllers(self):
+        stops = {"velocity": [], "position": []}
+        for name, received in stops.items():
+            topic = "/hero_1/%s_controller/cmd_vel" % name
+            subscriber = rospy.Subscriber(topic, Twist, received.append)
+            wait_for(subscriber.get_num_connections, "connection to " + topic)
+        self.probes[1].stop()
+        wait_for(lambda: all(stops.values()), "two stops")
+        self.assertEqual([received[0] for received in stops.values()], [Twist()] * 2)
+
+    def test_scans_hold_counts_and_ranges_of_eight_sensors(self):
+        self.probes[0].forget_scans()
+        wait_for(lambda: self.probes[0].count_scans() >= 5, "scans")
+        counts, ranges_m = self.probes[0].read_scans()
+        self.assertEqual((int(counts.argmax()), int(ranges_m.argmin())), (FRONT, FRONT))
+        self.assertAlmostEqual(counts[FRONT], 42.0, delta=8.0)
+        self.assertAlmostEqual(ranges_m[FRONT], 0.147, delta=0.015)
+
+    def test_calibrations_are_restored_and_a_robot_that_is_away_is_named(self):
+        output = self.finish(self.restoring, 1)
+        self.assertIn("hero_2: restored motor_centers_us, velocity_gains, infrared_counts_m2", output)
+        self.assertIn("hero_42: FAILED: is not connected to the driver: is it on?; restored nothing", output)
+        flash = self.read_flash(2)
+        self.assertEqual(flash["motor_centers_us"], CENTERS_US)
+        self.assertEqual(flash["velocity_pid"], GAINS)
+        self.assertEqual(flash["ir_calibration_counts_m2"], COUNTS_M2)
+
+    def test_robots_at_a_wrong_place_are_named_in_the_table(self):
+        floor, wall = self.start("motors", "--robots", "2,3", "--yes"), self.start("infrared", "--robots", "1", "--yes")
+        output = self.finish(floor, 1)
+        for robot_id in (2, 3):
+            reason = "hero_%d: FAILED: place: something is about [4-7] cm from it, at sensor front\n" % robot_id
+            self.assertRegex(output, reason)
+        output = self.finish(wall, 1)
+        self.assertRegex(output, "hero_1: FAILED: place: its front sensor reads [0-4] counts; 42 are typical")
+
+    def test_robots_stop_on_an_interrupt_and_nothing_is_saved(self):
+        program = self.start("motors", "--robots", "1", "--yes")
+        wait_for(lambda: self.wheel_m_s[1] > 0.02, "hero_1 to move")
+        program.process.send_signal(signal.SIGINT)
+        self.assertIn("ended early", self.finish(program, 130))
+        self.wait_for_rest(1)
+        self.assertEqual(os.listdir(self.files), [])
+
+    def test_q_and_ctrl_c_answer_the_question(self):
         for answer in (b"q\n", signal.SIGINT):
             leader, follower = pty.openpty()
-            process = self.start("motors", "--robots", "3", stdin=follower)
+            program = self.start("motors", "--robots", "1", stdin=follower)
             os.close(follower)
-            output = b""
-            while b"q to end" not in output:
-                output += os.read(process.stdout.fileno(), 1000)
-            self.assertIn(b"20 cm of room", output)
+            program.wait_for_text("20 cm of room")
             if answer is signal.SIGINT:
-                os.killpg(process.pid, answer)
+                program.process.send_signal(answer)
             else:
                 os.write(leader, answer)
-            code, rest = self.finish(process)
+            self.finish(program, 130)
             os.close(leader)
-            self.assertEqual(code, 130, rest)
-        self.assertEqual(watch.speeds[3], 0.0)
+
+    def test_without_an_answer_or_with_bad_files_it_ends_with_the_reason(self):
+        file = keep(self.files, 1, motor_centers_us=[1511, 9000])
+        cases = [
+            (self.start("motors", "--robots", "1"), "nobody is there to answer"),
+            (self.start("restore"), "hero_1.yaml: motor_centers_us must be 2 numbers"),
+            (self.start("motors", "--folder", file), "hero_1.yaml cannot be created: File exists"),
+        ]
+        for program, reason in cases:
+            self.assertIn(reason, self.finish(program, 1))
+
+    def test_a_robot_that_has_vanished_is_silent_and_cannot_be_written(self):
+        rospy.ServiceProxy("/hero_sim/fault", InjectFault)("vanish:robot=4")
+        probe = self.probes[4]
+        silence = wait_for(lambda: probe.find_silence(rospy.get_time()), "silence of hero_4")
+        self.assertRegex(silence, "^nothing received on /hero_4/[a-z]+: is the robot on and in reach[?]$")
+        with self.assertRaisesRegex(CalibrationError, "^/hero_4/motors_parameters: "):
+            probe.write("motor_centers_us", CENTERS_US)
 
 
 if __name__ == "__main__":

@@ -47,12 +47,12 @@ def suspended(*pids):
 class Program:
     """A program in a session of its own, and the lines that it prints, errors among them."""
 
-    def __init__(self, *command, environment=None):
+    def __init__(self, *command, environment=None, stdin=subprocess.DEVNULL):
         """environment: variables besides ours."""
         self.process = subprocess.Popen(
             command,
             env={**os.environ, **(environment or {})},
-            stdin=subprocess.DEVNULL,
+            stdin=stdin,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             universal_newlines=True,
