@@ -17,6 +17,7 @@ from hero_calibration.restore import restore
 from hero_calibration.step_response import ANGULAR_RAD_S, STEP_M_S
 from hero_calibration.velocity import VelocityResult, calibrate_velocity
 from hero_client.robot_constants import BODY_RADIUS_M
+from hero_sim.link.wifi import PROFILES, Radio
 from hero_sim.robot.ranges import FACTORY_CALIBRATION_COUNTS_M2, calibrate
 from hero_sim.stepped.robot_rows import RobotRows
 from hero_sim.world.arena import Arena
@@ -37,11 +38,11 @@ RANGE_BOUND_M = 0.003
 COUNTS_BOUND = 0.04
 
 
-def make_session(count=4, seed=0, at_wall=False, known=(), places_m_deg=None):
+def make_session(count=4, seed=0, at_wall=False, known=(), places_m_deg=None, wifi=None):
     """Return a session of robots with factory settings and errors drawn from seed, in a row along a wall.
 
     at_wall: whether they face it, 10 cm away and turned by up to 5 degrees; otherwise they have room.
-    known: errors that are set, as of --error; places_m_deg: of some robots by row.
+    known: errors that are set, as of --error; places_m_deg: of some robots by row; wifi: a name of PROFILES.
     """
     rng = np.random.RandomState(seed)
     errors = draw_errors([np.random.RandomState([seed, row]) for row in range(count)])
@@ -58,7 +59,8 @@ def make_session(count=4, seed=0, at_wall=False, known=(), places_m_deg=None):
     poses[:, 2] = np.radians(poses[:, 2])
     wall_m = np.array([[-1.0, WALL_Y_M, APART_M * count, WALL_Y_M]])
     arena = Arena("wall", wall_m, np.empty((0, 3)), (), np.array([-1.0, -1.0, APART_M * count, WALL_Y_M]))
-    robots = RobotRows(World(arena, poses, [rng], errors))
+    radios = [Radio(PROFILES[wifi], np.random.RandomState([seed, 1, row])) for row in range(count)] if wifi else ()
+    robots = RobotRows(World(arena, poses, [rng], errors), radios)
     for row in range(count):
         robots.set_motor_centers(row, [SERVO_CENTER_US] * 2)
         robots.set_infrared_calibration(row, [FACTORY_CALIBRATION_COUNTS_M2] * 8)
@@ -75,7 +77,7 @@ def velocity_alone(session):
     return calibrate_velocity(session, {})
 
 
-def check_accuracy(session, results):
+def check_accuracy(session, results, range_bound_m=RANGE_BOUND_M):
     """Compare results with the known errors of the robots, and with what was written to them."""
     errors = session.robots.world.errors
     true_counts_m2 = calibrate(errors.alpha_counts_m2, errors.beta_counts)
@@ -90,7 +92,7 @@ def check_accuracy(session, results):
             assert after < min(VELOCITY_BOUND, 0.75 * before)
             assert written["velocity_gains"] == found["velocity_gains"]
         else:
-            assert np.abs(result.before_m).max() > RANGE_BOUND_M > np.abs(result.after_m).max()
+            assert np.abs(result.before_m).max() > range_bound_m > np.abs(result.after_m).max()
             assert result.counts_m2 == pytest.approx(true_counts_m2[row].tolist(), rel=COUNTS_BOUND)
             assert written["infrared_counts_m2"] == result.counts_m2
 
@@ -130,6 +132,32 @@ class TestAccuracy:
         results = place_and(calibrate_infrared, session, at_wall=True)
         check_accuracy(session, results)
         assert len(results) == 16
+
+
+class TestWifi:
+    def test_a_hotspot_changes_neither_centers_nor_gains(self):
+        session = make_session(count=6, wifi="hotspot")
+        motors = place_and(calibrate_motors, session)
+        velocity = calibrate_velocity(session, motors)
+        assert len(motors) == len(velocity) == 6
+        check_accuracy(session, motors)
+        check_accuracy(session, velocity)
+
+    def test_a_hotspot_changes_no_ranges(self):
+        session = make_session(count=6, at_wall=True, wifi="hotspot")
+        results = place_and(calibrate_infrared, session, at_wall=True)
+        assert len(results) == 6
+        check_accuracy(session, results)
+
+    def test_on_a_bad_network_robots_are_calibrated_well_or_fail_with_a_reason(self):
+        session = make_session(count=6, wifi="bad")
+        motors = place_and(calibrate_motors, session)
+        velocity = calibrate_velocity(session, motors)
+        check_accuracy(session, motors)
+        check_accuracy(session, velocity)
+        assert len(velocity) >= 3
+        for probe in session.probes:
+            assert probe.robot_id in velocity or re.search("is the network busy|is the robot on", probe.failure)
 
 
 @pytest.mark.parametrize(
