@@ -77,8 +77,6 @@ class Bench:
         connection.socket = ours
         connection.header = {"callerid": "/publisher"}
         connection.set_endpoint_id("http://publisher:%d/" % theirs.fileno())
-        # At the end of a connection rospy closes it, or connects again (1.15.9); here there is nobody to connect to.
-        connection._reconnect = connection.close
         assert self.impl.add_connection(connection)
         thread = threading.Thread(
             target=connection.receive_loop, args=(self.impl.receive_callback,), daemon=True

@@ -83,6 +83,8 @@ class RawSubscriber:
         stream.ended.wait()
         if stream.error is not None:
             raise TransportException("read failed: %s" % stream.error)
+        # rospy 1.15.9 (Debian 11) would for ever try to connect again to a publisher that has gone.
+        connection.close()
         raise TransportTerminated("closed")
 
 
