@@ -9,8 +9,7 @@ import numpy as np
 from .errors import OptionError
 from .faults import FaultInjector, parse_fault
 from .link.tcp_link import TcpLink
-from .link.wifi import PROFILES, Radio
-from .population import Rngs, build_world
+from .population import Rngs, build_radios, build_world
 from .robot.firmware import Firmware
 from .robot.flash import Flash
 from .robot.ranges import FACTORY_CALIBRATION_COUNTS_M2, calibrate
@@ -68,9 +67,7 @@ def build_simulator(options: argparse.Namespace, report: Report) -> Tuple[Simula
     link = TcpLink(options.count, options.host, options.port, options.first_id)
     try:
         swarm = build_swarm(options, link.own_addresses, report)
-        rngs = Rngs(options)
-        radios = [Radio(PROFILES[options.wifi], rng) for rng in rngs.radios]
-        simulator = Simulator(swarm, link, radios, report, options.speed)
+        simulator = Simulator(swarm, link, build_radios(options), report, options.speed)
         injector = FaultInjector(simulator, report)
         for text in options.fault:
             injector.add(parse_fault(text))

@@ -11,13 +11,14 @@ from typing import List
 import numpy as np
 
 from .errors import OptionError
+from .link.wifi import PROFILES, Radio
 from .robot_constants import LARGEST_ID
 from .world.arena import build_default, place_robots
 from .world.arena_file import load_arena
 from .world.robot_errors import RobotErrors, draw_errors, set_known
 from .world.world import World
 
-__all__ = ["Rngs", "build_errors", "build_world", "check_population"]
+__all__ = ["Rngs", "build_errors", "build_radios", "build_world", "check_population"]
 
 MOST_ROBOTS = 1000
 
@@ -73,10 +74,22 @@ def build_world(options: argparse.Namespace, worlds: int = 1) -> World:
     Raises: OptionError for an arena that cannot be used, or in which the robots find no place.
     """
     arena = load_arena(options.arena) if options.arena else build_default(options.count)
-    each: List[argparse.Namespace] = [copy.copy(options) for _ in range(worlds)]
-    for index, one in enumerate(each):
-        one.seed = options.seed + index
+    each = _list_worlds(options, worlds)
     rngs = list(map(Rngs, each))
     poses = [place_robots(arena, options.count, rng.places) for rng in rngs]
     errors = RobotErrors(*map(np.concatenate, zip(*map(build_errors, each))))
     return World(arena, np.concatenate(poses), [rng.world for rng in rngs], errors)
+
+
+def build_radios(options: argparse.Namespace, worlds: int = 1) -> List[Radio]:
+    """Return the Wi-Fi of each robot, world after world."""
+    rngs = [rng for one in _list_worlds(options, worlds) for rng in Rngs(one).radios]
+    return [Radio(PROFILES[options.wifi], rng) for rng in rngs]
+
+
+def _list_worlds(options: argparse.Namespace, worlds: int) -> List[argparse.Namespace]:
+    """Return the options of each world, which differ in their seeds."""
+    each = [copy.copy(options) for _ in range(worlds)]
+    for index, one in enumerate(each):
+        one.seed = options.seed + index
+    return each

@@ -15,17 +15,23 @@ from typing import List, Optional, Sequence
 
 import numpy as np
 
+from hero_client.background_motion import Steps
 from hero_client.command_line import say
 from hero_client.swarm_base import BaseSwarm
 
 from ..errors import OptionError
 from ..link.wifi import PROFILES
-from ..population import build_world, check_population
+from ..population import build_radios, build_world, check_population
 from .robot import StepRobot
 from .robot_rows import RobotRows
-from .step_clock import StepClock
+from .step_clock import StepClock, StepMotion
 
 __all__ = ["StepSwarm", "StepWorld"]
+
+LOG_PERIOD_S = 0.05
+
+IDEAL = "ideal"
+"""The network that adds nothing: no radio at all is faster."""
 
 
 class StepWorld(BaseSwarm[StepRobot]):
@@ -86,7 +92,7 @@ class StepSwarm(StepWorld):
         check_population(options, worlds)
         if wifi not in PROFILES:
             raise OptionError("--wifi %r: must be one of %s" % (wifi, ", ".join(PROFILES)))
-        self.rows = RobotRows(build_world(options, worlds))
+        self.rows = RobotRows(build_world(options, worlds), () if wifi == IDEAL else build_radios(options, worlds))
         clock = StepClock(self.rows)
         robots = [StepRobot(first_id + row % count, clock, row) for row in range(count * worlds)]
         super().__init__(robots, clock)
@@ -94,15 +100,16 @@ class StepSwarm(StepWorld):
         self._by_id = self.worlds[0]._by_id
 
     def log_poses(self) -> List[np.ndarray]:
-        """Return a list that from now on grows by an array (R, 7) with each odometry, 34 ms apart.
+        """Return a list that from now on grows by an array (R, 7) every 0.05 s in which the program waits.
 
-        Columns: time s; x m, y m, yaw rad by odometry; x m, y m, yaw rad in world.
+        Columns: time s; x m, y m, yaw rad in the newest odometry; x m, y m, yaw rad in world.
         """
         log: List[np.ndarray] = []
+        StepMotion(self._clock, self._note_poses(log))
+        return log
 
-        def note(rows: np.ndarray) -> None:
+    def _note_poses(self, log: List[np.ndarray]) -> Steps:
+        while True:
             times_s = np.full((len(self.robots), 1), self.now_s)
             log.append(np.hstack((times_s, self.rows.odometry, self.rows.world.poses)))
-
-        self.rows.on_cycle.append(note)
-        return log
+            yield LOG_PERIOD_S
