@@ -2,7 +2,7 @@
 
 Usage:
     results.py record DIR NAME EXIT_CODE    write the result of one check into DIR
-    results.py record-if-none DIR NAME      write a failure into DIR unless one is there
+    results.py record-if-none DIR NAME      write a failure into a group of DIR unless one is there
     results.py summary DIR                  print all results under DIR; exit 1 if anything failed
 """
 
@@ -93,7 +93,7 @@ def main(arguments):
         record(directory, arguments[2], arguments[3] != "0")
     elif command == "record-if-none":
         if not count_results(directory).failures:
-            record(directory, arguments[2], True)
+            record(Path(directory) / "script", arguments[2], True)
     elif command == "summary":
         return print_summary(directory)
     else:

@@ -1,31 +1,24 @@
 """Runs the families of the fault suite, each with its own ROS master, and prints one table.
 
 Usage: run.py RESULTS_DIR [--minutes N] [FAMILY ...]
-Without --minutes: the short form, two families at once. With it: the long form, one family after another, in
+Without --minutes: the short form, families side by side. With it: the long form, one family after another, in
 rounds until so many minutes are over, at least one; a round of `endurance` takes these minutes by itself. The
 workspace must be sourced.
 """
 
 import argparse
-import concurrent.futures
-import contextlib
 import json
-import os
-import signal
-import subprocess
 import sys
 import time
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-ROOT = HERE.parents[1]
-SHORT_TIMEOUT_S = 300.0
+SHORT_TIMEOUT_S = 900.0
 LONG_TIMEOUT_S = 4 * 3600.0
-SHORT_AT_ONCE = 2  # most of a fault is waiting
-NETWORK_FAMILY = "network"
+LOAD = 0.5  # most of a fault is waiting
 
 sys.path.insert(0, str(HERE.parent))
-from results import count_results, record  # noqa: E402
+from jobs import Job, count_cores, run_jobs  # noqa: E402
 
 
 def find_families():
@@ -35,49 +28,20 @@ def find_families():
     return [name for name in order if name in names] + [name for name in names if name not in order]
 
 
-def make_own_network():
-    """Return a command that gives a program a network of its own, empty where this system does not permit that."""
-    command = ["unshare", "--net", "sh", "-c", 'ip link set lo up && exec "$@"', "sh"]
-    try:
-        subprocess.run([*command, "true"], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    except (OSError, subprocess.CalledProcessError):
-        return []
-    return command
-
-
-def run_family(family, results_dir, table, arguments, timeout_s):
-    """Run one family; return its exit code and the end of its output."""
-    results_dir.mkdir(parents=True, exist_ok=True)
-    command = [sys.executable, "-m", "pytest", "-q", "-x" if "--long" in arguments else "--color=no"]
-    command += [str(HERE / ("test_%s.py" % family)), "-s", "--junitxml", str(results_dir / (family + ".xml"))]
-    command += ["--table", str(table), "-p", "no:cacheprovider", *arguments]
-    environment = dict(os.environ)
-    if family == NETWORK_FAMILY:
-        own_network = make_own_network()
-        command = own_network + command
-        environment["HERO_OWN_NETWORK"] = "yes" if own_network else "no"
-    log_path = results_dir / (family + ".log")
-    with open(log_path, "wb") as log:
-        process = subprocess.Popen(
-            command,
-            cwd=ROOT,
-            env=environment,
-            stdin=subprocess.DEVNULL,
-            stdout=log,
-            stderr=subprocess.STDOUT,
-            start_new_session=True,
-        )
-        try:
-            code = process.wait(timeout_s)
-        except subprocess.TimeoutExpired:
-            log.write(b"\nno end: killed\n")
-            code = -1
-        finally:
-            with contextlib.suppress(ProcessLookupError):
-                os.killpg(process.pid, signal.SIGKILL)
-    if code != 0 and not count_results(results_dir).failures:
-        record(results_dir, "%s ends without an error" % family, True)
-    return code, log_path.read_text(errors="replace").splitlines()[-60:]
+def make_jobs(results_dir, families, table, long_minutes=0.0):
+    """Return one job for each family, in its short form or, with minutes, in its long one."""
+    jobs = []
+    for family in families:
+        own_results = results_dir / family
+        command = [sys.executable, "-m", "pytest", "-q", str(HERE / ("test_%s.py" % family)), "-s"]
+        command += ["--junitxml", str(own_results / (family + ".xml"))]
+        command += ["--table", str(table), "-p", "no:cacheprovider"]
+        timeout_s = SHORT_TIMEOUT_S
+        if long_minutes:
+            command += ["-x", "--long", "--minutes", str(long_minutes)]
+            timeout_s = LONG_TIMEOUT_S + 60.0 * long_minutes
+        jobs.append(Job("faults: " + family, tuple(command), own_results, LOAD, timeout_s))
+    return jobs
 
 
 def read_rows(path):
@@ -114,9 +78,6 @@ def main():
     if unknown:
         parser.error("no such family: %s; there are: %s" % (", ".join(unknown), ", ".join(families)))
     chosen = options.families or families
-    is_long = options.minutes > 0.0
-    arguments = ["--long", "--minutes", str(options.minutes)] if is_long else []
-    failed = False
     end_s = time.monotonic() + 60.0 * options.minutes
     round_number = 0
     options.results.mkdir(parents=True, exist_ok=True)
@@ -125,27 +86,14 @@ def main():
         table.unlink()
     while True:
         round_number += 1
-        results_dir = options.results / ("round_%d" % round_number) if is_long else options.results
-        with concurrent.futures.ThreadPoolExecutor(1 if is_long else SHORT_AT_ONCE) as pool:
-            timeout_s = LONG_TIMEOUT_S + 60.0 * options.minutes if is_long else SHORT_TIMEOUT_S
-            runs = {
-                pool.submit(run_family, name, results_dir, table, arguments, timeout_s): name
-                for name in chosen
-            }
-            start_s = time.monotonic()
-            for run in concurrent.futures.as_completed(runs):
-                code, output = run.result()
-                failed = failed or code != 0
-                print(
-                    "faults: %s ... %s after %.1f s"
-                    % (runs[run], "FAILED" if code else "ok", time.monotonic() - start_s),
-                    flush=True,
-                )
-                if code:
-                    print("\n".join("    " + line for line in output), flush=True)
+        results_dir = options.results / ("round_%d" % round_number) if options.minutes else options.results
+        # One after another in the long form, whose figures are those of a machine that does nothing else.
+        passed = run_jobs(
+            make_jobs(results_dir, chosen, table, options.minutes), LOAD if options.minutes else count_cores()
+        )
         print_table(read_rows(table))
-        if failed or time.monotonic() >= end_s:
-            return int(failed)
+        if not passed or time.monotonic() >= end_s:
+            return int(not passed)
 
 
 if __name__ == "__main__":

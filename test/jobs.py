@@ -1,0 +1,142 @@
+"""Runs the programs of the test stages side by side, and judges each by its exit status and its JUnit files.
+
+A job says how many cores it keeps busy. Most tests wait more than they compute (for ROS, for robots that move in real
+time), so more of them run at once than there are cores. A job that leaves no results (it hung, or died) counts as one
+failure. Where the system permits it, each job has a network of its own: ports cannot collide, and no program outside
+reaches the robots of a test.
+"""
+
+import concurrent.futures
+import functools
+import os
+import signal
+import subprocess
+import threading
+import time
+from pathlib import Path
+from typing import Dict, List, NamedTuple, Set, Tuple
+
+from results import Counts, count_results, record
+
+LOG_LINES_SHOWN = 80
+
+
+_sessions: Set[int] = set()  # of the jobs that run
+
+
+class Job(NamedTuple):
+    """One program with tests."""
+
+    name: str  # as in the printed line
+    command: Tuple[str, ...]
+    results_dir: Path  # the job's own: its JUnit files, and its output as log.txt
+    load: float  # cores that it keeps busy, on average
+    timeout_s: float  # when it hangs; a busy machine needs its time
+    environment: Dict[str, str] = {}  # besides ours
+    has_own_network: bool = True
+
+
+@functools.lru_cache(maxsize=None)
+def make_own_network():
+    """Return a command that gives a program a network of its own, empty where this system does not permit that."""
+    command = ("unshare", "--net", "sh", "-c", 'ip link set lo up && exec "$@"', "sh")
+    try:
+        subprocess.run([*command, "true"], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    except (OSError, subprocess.CalledProcessError):
+        return ()
+    return command
+
+
+def run_command(job):
+    """Run a job; return whether it ended well, and its CPU time (s), where it waited for what it started."""
+    prefix = make_own_network() if job.has_own_network else ()
+    with open(job.results_dir / "log.txt", "wb") as log:
+        process = subprocess.Popen(
+            [*prefix, *job.command],
+            stdin=subprocess.DEVNULL,
+            stdout=log,
+            stderr=subprocess.STDOUT,
+            env={**os.environ, **job.environment, "HERO_OWN_NETWORK": "yes" if prefix else "no"},
+            start_new_session=True,
+        )
+        _sessions.add(process.pid)
+        ender = threading.Timer(job.timeout_s, kill_session, [process.pid])
+        ender.start()
+        _, status, usage = os.wait4(process.pid, 0)
+        ender.cancel()
+        process.returncode = status  # so that process looks for its child no more
+        kill_session(process.pid)
+        _sessions.discard(process.pid)
+        if os.WIFSIGNALED(status):
+            log.write(b"\nkilled by signal %d, after %d s at the latest\n" % (os.WTERMSIG(status), job.timeout_s))
+    return status == 0, usage.ru_utime + usage.ru_stime
+
+
+def kill_session(session_id):
+    """Kill what a job left behind."""
+    try:
+        os.killpg(session_id, signal.SIGKILL)
+    except ProcessLookupError:
+        return
+
+
+def drop_wrappers(results_dir):
+    """Remove rostest's own results where they only repeat that all tests of the file passed."""
+    for path in results_dir.rglob("rostest-*.xml"):
+        counts = Counts()
+        counts.add_file(path)
+        if not counts.failures:
+            path.unlink()
+
+
+def run_and_judge(job):
+    """Run a job; return whether it failed, and what to print."""
+    job.results_dir.mkdir(parents=True)
+    start_s = time.monotonic()
+    is_well, cpu_s = run_command(job)
+    drop_wrappers(job.results_dir)
+    counts = count_results(job.results_dir)
+    if not counts.failures and not (is_well and counts.passed + counts.skipped):
+        record(job.results_dir, f"{job.results_dir.name} ends without an error", True)
+        counts = count_results(job.results_dir)
+    verdict = "FAILED" if counts.failures else "ok"
+    lines = [
+        f"{job.name} ... {verdict}: {counts.passed} passed, {len(counts.failures)} failed,"
+        f" {time.monotonic() - start_s:.1f} s, {cpu_s:.1f} s of CPU"
+    ]
+    if counts.failures:
+        log = (job.results_dir / "log.txt").read_text(errors="replace").splitlines()
+        lines += ["    " + line for line in log[-LOG_LINES_SHOWN:]]
+    return bool(counts.failures), "\n".join(lines)
+
+
+def run_jobs(jobs: List[Job], cores: float) -> bool:
+    """Run all jobs, in order, as many at once as keep so many cores busy; return whether all passed."""
+    waiting, running = list(jobs), {}
+    passed = True
+    with concurrent.futures.ThreadPoolExecutor(max(1, len(waiting))) as pool:
+        try:
+            while waiting or running:
+                # The next that fits; one alone may be as large as it likes.
+                load = sum(job.load for job in running.values())
+                fitting = [job for job in waiting if not running or load + job.load <= cores]
+                if fitting:
+                    waiting.remove(fitting[0])
+                    running[pool.submit(run_and_judge, fitting[0])] = fitting[0]
+                    continue
+                ended, _ = concurrent.futures.wait(running, return_when=concurrent.futures.FIRST_COMPLETED)
+                for run in ended:
+                    del running[run]
+                    has_failed, text = run.result()
+                    passed = passed and not has_failed
+                    print(text, flush=True)
+        except KeyboardInterrupt:
+            for session_id in list(_sessions):
+                kill_session(session_id)
+            raise
+    return passed
+
+
+def count_cores() -> int:
+    """Return how many cores this process may use."""
+    return len(os.sched_getaffinity(0))
