@@ -125,7 +125,6 @@ class RvizTest(unittest.TestCase):
 
         def has_driven():
             drive.publish(command)
-            rospy.sleep(0.1)
             return np.hypot(*np.subtract(self.watch.pose(0)[:2], start)) > 0.2
 
         wait_for(has_driven, "robot 0 to drive")

@@ -96,7 +96,7 @@ class TwoDriversTest(unittest.TestCase):
         self.wait_until_all_move()
         table.press(b"s")
         # They are told to drive on, and stay.
-        self.watch.wait_until_stopped(*IDS, act=self.drive)
+        self.watch.wait_until_stopped_despite(self.drive, *IDS)
         table.wait_for(b"stopped, all wheels at rest")
         table.press(b"r")
         self.wait_until_all_move()
@@ -110,7 +110,7 @@ class TwoDriversTest(unittest.TestCase):
         self.wait_until_all_move()
         commander.request_stop(True)
         self.assertFalse(commander.may_drive())
-        self.watch.wait_until_stopped(*IDS, act=self.drive)
+        self.watch.wait_until_stopped_despite(self.drive, *IDS)
         self.wait_for_status("info", "stopped, all wheels at rest", True)
         commander.close()
         self.release()
@@ -119,7 +119,7 @@ class TwoDriversTest(unittest.TestCase):
         self.wait_until_all_move()
         with suspended(find_pid("/hero_driver_b")):
             self.drivers.request_stop(True)
-            self.watch.wait_until_stopped(0, 1, act=self.drive)
+            self.watch.wait_until_stopped_despite(self.drive, 0, 1)
             self.wait_for_status("error", "NOT STOPPED: driver hero_driver_b does not answer", False)
         self.wait_for_status("info", "stopped, all wheels at rest", True)
         self.release()

@@ -1,8 +1,6 @@
 #!/usr/bin/env python3
 """Who is here: arrival, return, power cycle, a second robot with the same id, silence, and the reports about it."""
 
-import time
-
 import rospy
 import rostest
 import stock_messages
@@ -60,18 +58,15 @@ class TestDriverFleet(DriverCase):
     def test_rates_bad_packets_and_clock_offset_are_counted(self):
         robot = self.join(2)
         ahead = rospy.Duration(1.5)
-        end_s = time.monotonic() + 20.0
         bad_packet = b"\xff\xfe\x01\x00\x00garbage"
         robot.send_bytes(bad_packet)
 
         def look():
-            self.assertLess(time.monotonic(), end_s, self.fleet.newest)
             stock_messages.send_burst(robot, 0.0, 0.0, rospy.Time.now() + ahead)
-            time.sleep(0.02)
             entry = self.fleet.find("/hero_2")
             return entry if entry.packets_per_s > 7 and entry.clock_offset > 1.0 and entry.bad_packets else None
 
-        entry = wait_for(look, "rates")
+        entry = wait_for(look, lambda: "rates, last: %s" % self.fleet.newest)
         self.assertGreater(entry.bytes_per_s, 100 * entry.packets_per_s)
         self.assertLess(entry.clock_offset, 1.6)
         self.wait_status("hero_2", DiagnosticStatus.WARN, "clock")

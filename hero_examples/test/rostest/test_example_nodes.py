@@ -130,7 +130,7 @@ class ExampleNodesTest(unittest.TestCase):
             return all(self.speed(robot_id) < -0.02 for robot_id in (0, 1))
 
         wait_for(lambda: drives(1), "both robots going back")
-        self.watch.wait_until_stopped(0, 1, act=lambda: push(0))
+        self.watch.wait_until_stopped_despite(lambda: push(0), 0, 1)
         self.assertGreater(min(row[4] for row in self.watch.rows[0][first[0] :]), -0.12)
         wait_for(lambda: drives(1), "both robots going back again")
         wait_for(lambda: self.watch.at_rest(0, 1), "rest after the joystick fell silent", 1.8)

@@ -22,8 +22,8 @@ SEEN_RAD = math.radians(60.0)
 REST_M_S = 0.005
 """Slower than this a robot has been stopped; its wheels take some tenths of a second more to come to exactly zero."""
 
-STOP_TIMEOUT_S = 1.5
-"""A stop takes about 0.2 s, and the robot's own watchdog, without one, 2 s."""
+WATCHDOG_S = 1.9
+"""A robot that nobody stops drives on for 2 s after its last command; a stop takes about 0.2 s."""
 
 STALL_S = 0.25
 RECOVERY_S = 1.5
@@ -76,14 +76,23 @@ class SwarmWatch:
         """Return whether these robots stand."""
         return all(abs(self.rows[robot_id][-1][4]) < REST_M_S for robot_id in robot_ids)
 
-    def wait_until_stopped(self, *robot_ids, act=lambda: None):
-        """Wait until these robots stand, sooner than their watchdogs would have it; act: what to do meanwhile."""
+    def wait_until_stopped(self, *robot_ids):
+        """Wait until these robots stand, by their own clocks sooner than their watchdogs would have it."""
+        begin_s = {robot_id: self.rows[robot_id][-1][0] for robot_id in robot_ids}
+        wait_for(lambda: self.at_rest(*robot_ids), "rest of %s" % (robot_ids,))
+        for robot_id in robot_ids:
+            moving_s = [row[0] for row in list(self.rows[robot_id]) if abs(row[4]) >= REST_M_S]
+            took_s = max(moving_s, default=0.0) - begin_s[robot_id]
+            assert took_s < WATCHDOG_S, "hero_%d went on for %.1f s" % (robot_id, took_s)
+
+    def wait_until_stopped_despite(self, act, *robot_ids):
+        """Wait until these robots stand although act(), called meanwhile, commands them to move."""
 
         def stopped():
             act()
             return self.at_rest(*robot_ids)
 
-        wait_for(stopped, "rest of %s" % (robot_ids,), STOP_TIMEOUT_S)
+        wait_for(stopped, "rest of %s" % (robot_ids,))
 
     def path(self, robot_id):
         """Return all rows as an array (T, 5)."""
