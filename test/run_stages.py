@@ -1,8 +1,7 @@
 """Runs the stages of script/test side by side, which starts it: tests that wait beside builds and checks that compute.
 
 Usage: run_stages.py RESULTS_DIR STAGE [STAGE ...] [--pattern PATTERN]
-The workspace must be sourced. For the stage noetic, HERO_NOETIC_PYTHON and HERO_NOETIC_PATH hold its interpreter and
-module path.
+The workspace must be sourced. HERO_PYTHON38 is the interpreter of the stage noetic, which is left out without one.
 """
 
 import argparse
@@ -23,43 +22,48 @@ sys.path.insert(0, str(ROOT / "test" / "faults"))
 import run as faults  # noqa: E402
 
 
-def make_pytest_job(name, python, arguments, results_dir, load, **environment):
-    command = (python, "-m", "pytest", "-q", "-p", "no:cacheprovider", *arguments)
+def make_pytest_job(name, arguments, results_dir, load):
+    """Return a job of pytest."""
+    command = (sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *arguments)
     junit = ("--junitxml", str(results_dir / "results.xml"))
-    return Job(name, (*command, *junit), results_dir, load, TIMEOUT_S, environment)
+    return Job(name, (*command, *junit), results_dir, load, TIMEOUT_S)
 
 
-def make_unit_jobs(stage, results_dir, python, **environment):
-    """One job for each package; with the seed, failures can be repeated."""
-    folders = [str(path.relative_to(ROOT)) for path in sorted(ROOT.glob("*/test/unit"))]
-    return [
-        make_pytest_job(
-            f"{stage}: {folder}",
-            python,
-            (str(ROOT / folder), "--hypothesis-seed=0"),
-            results_dir / folder.split("/")[0],
-            UNIT_LOAD,
-            **environment,
-        )
-        for folder in folders
-    ]
+def make_unit_jobs(results_dir):
+    """Return one job for each package; with the seed, failures can be repeated."""
+    jobs = []
+    for path in sorted(ROOT.glob("*/test/unit")):
+        package = path.parents[1].name
+        arguments = (str(path), "--hypothesis-seed=0")
+        jobs.append(make_pytest_job("unit: " + package, arguments, results_dir / package, UNIT_LOAD))
+    return jobs
 
 
 def make_workspace_jobs(results_dir):
-    """One job for each build mode, and one for each other file."""
+    """Return one job for each build mode, and one for each other file."""
     parts = [("test_build_modes.py", mode, BUILD_LOAD) for mode in ("catkin_build", "install", "catkin_make")]
     parts += [("test_demo.py", "", DEMO_LOAD), ("test_rosinstall.py", "", DEMO_LOAD)]
     jobs = []
     for file, mode, load in parts:
         arguments = (str(ROOT / "test" / "workspaces" / file), *(("-k", f"[{mode}]") if mode else ()))
         name = " ".join(["workspaces:", file, mode]).rstrip()
-        jobs.append(make_pytest_job(name, sys.executable, arguments, results_dir / (mode or file[:-3]), load))
+        jobs.append(make_pytest_job(name, arguments, results_dir / (mode or file[:-3]), load))
     return jobs
 
 
 def make_jobs(stages, results, pattern):
-    """All jobs of the stages, in the order in which they begin: what takes long first, what only computes last."""
+    """Return all jobs of the stages, in the order in which they begin: what takes long first."""
     jobs = []
+    # What these two install the first time comes from the network.
+    if "noetic" in stages and os.environ.get("HERO_PYTHON38"):
+        own_results = results / "noetic"
+        command = (str(ROOT / "test" / "noetic" / "run"), os.environ["HERO_PYTHON38"], str(own_results))
+        jobs.append(Job("noetic", command, own_results, UNIT_LOAD, TIMEOUT_S, has_own_network=False))
+    if "lint" in stages:
+        own_results = results / "lint"
+        environment = {"HERO_RESULTS": str(own_results)}
+        command = (str(ROOT / "script" / "lint"),)
+        jobs.append(Job("lint", command, own_results, LINT_LOAD, TIMEOUT_S, environment, has_own_network=False))
     if "workspaces" in stages:
         jobs += make_workspace_jobs(results / "workspaces")
     if "faults" in stages:
@@ -68,16 +72,7 @@ def make_jobs(stages, results, pattern):
     if "rostest" in stages:
         jobs += run_rostests.make_jobs(results / "rostest", pattern)
     if "unit" in stages:
-        jobs += make_unit_jobs("unit", results / "unit", sys.executable)
-    if "noetic" in stages and os.environ.get("HERO_NOETIC_PYTHON"):
-        jobs += make_unit_jobs(
-            "noetic", results / "noetic", os.environ["HERO_NOETIC_PYTHON"], PYTHONPATH=os.environ["HERO_NOETIC_PATH"]
-        )
-    if "lint" in stages:
-        environment = {"HERO_RESULTS": str(results / "lint")}
-        # It installs its tools the first time.
-        command = (str(ROOT / "script" / "lint"),)
-        jobs.append(Job("lint", command, results / "lint", LINT_LOAD, TIMEOUT_S, environment, has_own_network=False))
+        jobs += make_unit_jobs(results / "unit")
     return jobs
 
 
