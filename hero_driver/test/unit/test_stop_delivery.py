@@ -73,7 +73,7 @@ def test_the_stop_of_a_self_tuning_robot_fits_its_window_in_one_write():
     assert max(data.count(STOPPED_MOTORS) for _, data in robot.writes) > 110
 
 
-def test_wheels_that_turn_although_stopped_are_reported_and_stopped_for_ever():
+def test_wheels_that_turn_although_stopped_are_reported_and_stopped():
     with Clock().is_the_drivers() as clock:
         robot = CommandedRobot(clock, has_readings=True)
         robot.motors.is_pushed = True
