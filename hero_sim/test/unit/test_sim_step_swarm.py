@@ -188,6 +188,12 @@ def test_lights_show_the_color_that_was_asked_for_and_blink():
     swarm.led("blue")
     swarm.sleep(2.0)
     assert {robot.light for robot in swarm} == {(0.0, 0.0, 1.0)}
+    for _ in swarm.rate(10):  # the robot alone would go dark after 15 s
+        swarm[0].led("blue")
+        assert swarm[0].light == (0.0, 0.0, 1.0)
+        if swarm.now_s > 25.0:
+            break
+    assert swarm[1].light == (0.0, 0.0, 0.0)
     with pytest.raises(ValueError, match=r"pink.*there are: .*green"):
         swarm[0].led("pink")
     with pytest.raises(ValueError, match=r"at least 0.2 s"):
