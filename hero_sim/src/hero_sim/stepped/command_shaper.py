@@ -57,7 +57,8 @@ class CommandShaper:
         self._is_sent = np.zeros(rows, dtype=bool)
         self._sent = np.zeros((2, rows))
         self._sent_ms = np.zeros(rows, dtype=np.int64)
-        self._idle = True
+        self._is_idle = True
+        self._has_sent = False
         self._collected: Dict[int, Tuple[float, float]] = {}
         self._collected_ms = 0
 
@@ -90,8 +91,7 @@ class CommandShaper:
             self._shape(self._collected_ms, rows, values)
 
     def _shape(self, now_ms: int, rows: np.ndarray, values: np.ndarray) -> None:
-        if not self._idle:
-            self._send_due(now_ms)
+        self._send_due(now_ms)
         # What is offered to a robot that waits for nothing goes at once.
         self._next_ms[rows] = np.maximum(self._next_ms[rows], now_ms)
         stops = (values == self._stop).all(axis=0)
@@ -99,7 +99,7 @@ class CommandShaper:
         self._newest_waits[rows] = ~stops
         self._newest[:, rows] = values.astype(np.float32)  # a robot computes in single precision
         self._offered_ms[rows] = now_ms
-        self._idle = False
+        self._is_idle = False
         self._send_due(now_ms)
 
     def delay_until(self, rows: np.ndarray, next_ms: np.ndarray) -> None:
@@ -110,13 +110,22 @@ class CommandShaper:
         self._next_ms[rows] = np.maximum(self._next_ms[rows], next_ms)
 
     def _send_due(self, now_ms: int) -> None:
-        self._newest_waits &= self._offered_ms >= now_ms - MAX_AGE_MS
-        waits = self._stop_waits | self._newest_waits
-        waits |= self._repeats > 0
-        due = waits & (self._next_ms <= now_ms)
-        if not due.any():
-            self._idle = not waits.any() and not self._is_sent.any()
+        if self._is_idle:
             return
+        self._newest_waits &= self._offered_ms >= now_ms - MAX_AGE_MS
+        due = self._find_waiting()
+        due &= self._next_ms <= now_ms
+        if np.count_nonzero(due):
+            self._send(due)
+        self._is_idle = not np.count_nonzero(self._find_waiting())
+
+    def _find_waiting(self) -> np.ndarray:
+        waiting = self._repeats > 0
+        waiting |= self._stop_waits
+        waiting |= self._newest_waits
+        return waiting
+
+    def _send(self, due: np.ndarray) -> None:
         moves = due & self._newest_waits & ~self._stop_waits
         stops = due & ~moves
         repeats = np.where(self._stop_waits, STOP_REPEATS, self._repeats - 1)
@@ -129,14 +138,15 @@ class CommandShaper:
         np.copyto(self._sent_ms, self._next_ms, where=due)
         self._next_ms[due] += INTERVAL_MS
         self._is_sent |= due
+        self._has_sent = True
 
     def take(self, now_ms: int) -> Sent:
         """Return what was sent since the last call, up to now_ms."""
         self._shape_collected()
-        if self._idle:
-            return _NOTHING
         self._send_due(now_ms)
+        if not self._has_sent:
+            return _NOTHING
         rows = np.flatnonzero(self._is_sent)
         sent = Sent(rows, self._sent[:, rows], self._sent_ms[rows])
-        self._is_sent[rows] = False
+        self._is_sent[rows] = self._has_sent = False
         return sent

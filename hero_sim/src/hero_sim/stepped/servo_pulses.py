@@ -31,23 +31,21 @@ class ServoPulses:
         self.centers_us = np.array(centers_us, dtype=float)
         self.check_ms = _NEVER_MS
         self._world = world
-        self._pulses_us = np.zeros((2, rows))
-        self._attached = np.zeros(rows, dtype=bool)
-        self._stop_at_ms = np.zeros(rows, dtype=np.int64)
+        self._pulses_us = np.full((2, rows), np.nan)  # nan: no pulses go out
+        self._stop_at_ms = np.full(rows, _NEVER_MS)
 
     def write(self, now_ms: int, pulses_us: np.ndarray, which: Which) -> None:
         """Write pulses (2, R), limited to 1000..2000 us, to the robots which."""
         stop_at_ms = now_ms + MOTOR_WATCHDOG_MS + 1
         assign(self._stop_at_ms, stop_at_ms, which)
         self.check_ms = min(self.check_ms, stop_at_ms)
-        changes = (pulses_us != self._pulses_us).any(axis=0)
-        changes |= ~self._attached
+        changes = pulses_us != self._pulses_us
         changes &= which
-        rows = np.flatnonzero(changes)
-        if len(rows):
-            self._attached[rows] = True
+        if np.count_nonzero(changes):
+            rows = np.flatnonzero(changes.any(axis=0))
             written_us = self._pulses_us[:, rows] = pulses_us[:, rows]
-            self._world.write_pulses(rows, np.clip(written_us.T, *PULSE_RANGE_US))
+            least_us, most_us = PULSE_RANGE_US
+            self._world.write_pulses(rows, np.minimum(np.maximum(written_us.T, least_us), most_us))
 
     def drive(self, now_ms: int, outputs_us: np.ndarray, which: Which) -> None:
         """Write outputs (2, R) of a controller beyond the centers, forward positive, to the robots which."""
@@ -55,10 +53,11 @@ class ServoPulses:
 
     def stop(self, rows: np.ndarray) -> None:
         """Stop the pulses of the robots at rows (K,)."""
-        self._attached[rows] = False
+        self._pulses_us[:, rows] = np.nan
+        self._stop_at_ms[rows] = _NEVER_MS
         self._world.release(rows)
 
     def check_watchdog(self, now_ms: int) -> None:
         """Stop the pulses that were written too long ago, and set check_ms."""
-        self.stop(np.flatnonzero(self._attached & (self._stop_at_ms <= now_ms)))
-        self.check_ms = int(self._stop_at_ms.min(where=self._attached, initial=_NEVER_MS))
+        self.stop(np.flatnonzero(self._stop_at_ms <= now_ms))
+        self.check_ms = int(self._stop_at_ms.min())

@@ -49,7 +49,7 @@ class TickOdometryRows:
     def integrate(self, ticks: np.ndarray, now_ms: int) -> None:
         """Take one reading of all counters (2, R), with its stamp."""
         moved_ticks = ticks - self._ticks
-        if moved_ticks.any():
+        if np.count_nonzero(moved_ticks):
             self._move(moved_ticks)
         self._ticks[:] = ticks
         self._velocities = None

@@ -31,7 +31,7 @@ class WheelControllers:
         """Begin without a command; the outputs stay within limit_us either way."""
         self.targets = np.zeros((2, rows))
         self.outputs_us = np.zeros((2, rows))
-        self.end_ms = _LONG_AGO_MS
+        self.end_ms = self._all_end_ms = _LONG_AGO_MS
         self._limit_us = limit_us
         self._timeout_ms = timeout_ms
         self._gains = np.tile(np.reshape(gains, (3, 1, 1)), (1, 2, rows))
@@ -75,6 +75,7 @@ class WheelControllers:
             self.targets[:, rows] = targets
             self._watchdog_ms[rows] = now_ms
             self.end_ms = now_ms + self._timeout_ms
+        self._all_end_ms = int(self._watchdog_ms.min()) + self._timeout_ms
         return stopped
 
     def _reset(self, wheels: Union[slice, np.ndarray], rows: np.ndarray) -> None:
@@ -83,13 +84,13 @@ class WheelControllers:
 
     def find_active(self, now_ms: int) -> Which:
         """Return which controllers run."""
-        return simplify(self._watchdog_ms > now_ms - self._timeout_ms)
+        return now_ms < self._all_end_ms or self._watchdog_ms > now_ms - self._timeout_ms
 
     def run(self, now_ms: int, measured: np.ndarray, active: Which) -> None:
         """Compute new outputs from what was measured (2, R), for those active robots for whom it is time."""
         is_due = self._computed_ms <= now_ms - SAMPLE_MS
         is_due &= active
-        if not is_due.any():
+        if not np.count_nonzero(is_due):
             return
         due = simplify(is_due)
         error = self.targets - measured

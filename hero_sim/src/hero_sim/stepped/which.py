@@ -20,4 +20,4 @@ def assign(target: np.ndarray, values: Union[int, np.ndarray], which: Which) -> 
 
 def simplify(which: np.ndarray) -> Which:
     """Return True instead of a mask of all robots."""
-    return True if which.all() else which
+    return True if np.count_nonzero(which) == len(which) else which
