@@ -172,3 +172,64 @@ def test_a_stop_is_sent_through_wifi_that_stalls_and_motion_behind_it():
         robots.advance(robots.now_ms + 6000)
         assert not robots.world.commands_m_s.any()
     assert np.median(moved) > 0.07
+
+
+class FixedDelays:
+    """A radio whose delays (ms) are those given, and the last of them from then on."""
+
+    def __init__(self, up_ms, down_ms):
+        self.up, self.down = FixedDelay(up_ms), FixedDelay(down_ms)
+
+
+class FixedDelay:
+    def __init__(self, delays_ms):
+        self.delays_ms = list(delays_ms)
+
+    def send(self, now_ms, length):
+        return now_ms + (self.delays_ms.pop(0) if len(self.delays_ms) > 1 else self.delays_ms[0])
+
+
+def test_of_two_commands_in_one_read_the_later_is_dropped_but_a_stop_is_repeated():
+    robots = RobotRows(build_world(1, 0, scale=0.0), [FixedDelays([1], [58, 1])])
+    robots.send_velocity(0, 0.1, 0.0)
+    robots.advance(30)
+    robots.send_velocity(0, 0.0, 0.0)  # sent at 60 ms; both are read at 101 ms
+    robots.advance(140)
+    assert (robots.world.commands_m_s > 0.0).all()
+    robots.advance(160)
+    assert not robots.world.commands_m_s.any()
+
+
+def test_no_command_is_sent_while_another_is_on_its_way():
+    robots = RobotRows(build_world(1, 0, scale=0.0), [FixedDelays([1], [500, 30])])
+    robots.send_velocity(0, 0.1, 0.0)
+    robots.advance(100)
+    robots.send_velocity(0, -0.1, 0.0)
+    robots.advance(540)
+    assert (robots.world.commands_m_s > 0.0).all()
+    robots.advance(700)
+    assert (robots.world.commands_m_s < 0.0).all()
+
+
+def test_readings_from_before_odometry_was_set_are_not_received_after():
+    robots = RobotRows(build_world(1, 0, scale=0.0), [FixedDelays([100], [1])])
+    robots.world.write_pulses(np.arange(1), np.array([(1300, 1300)]))
+    robots.advance(1000)
+    assert abs(robots.odometry[0, 2]) > 0.5
+    robots.set_odometry(0, 1.0, 2.0, 0.5)
+    for _ in range(90):
+        assert robots.odometry[0].tolist() == [1.0, 2.0, 0.5] and not robots.velocities.any()
+        robots.advance(robots.now_ms + 1)
+    robots.advance(robots.now_ms + 100)
+    assert robots.odometry[0, 2] != 0.5 and robots.odometry[0, :2] == pytest.approx([1.0, 2.0], abs=0.01)
+
+
+def test_a_velocity_begins_anew_when_odometry_is_set():
+    robots = RobotRows(build_world(1, 0, scale=0.0))
+    robots.world.write_pulses(np.arange(1), np.array([(1300, 1700)]))
+    robots.advance(2000)
+    speed_m_s = robots.velocities[0, 0]
+    robots.set_odometry(0, 0.0, 0.0, 0.0)
+    assert not robots.velocities.any() and not robots.ticks.any()
+    robots.advance(2150)
+    assert robots.velocities[0, 0] == pytest.approx(speed_m_s, rel=0.05)
