@@ -10,12 +10,15 @@ import subprocess
 import threading
 import uuid
 
+import rospy
+
 from hero_test.processes import find_program
 from hero_test.waiting import wait_for
 
-TIMEOUT_S = 30.0
-HOST = "127.0.0.1:21331"
-OTHER_HOST = "127.0.0.1:21332"
+TIMEOUT_S = 60.0
+PORT = rospy.get_param("/hero_monitor/port")
+OTHER_PORT = PORT + 1  # two rostests may run side by side
+HOST, OTHER_HOST = ("127.0.0.1:%d" % port for port in (PORT, OTHER_PORT))
 UPGRADE = {
     "Connection": "Upgrade",
     "Upgrade": "websocket",
@@ -73,7 +76,7 @@ class PageClient:
 def start_monitor(*arguments, prefix=()):
     """Start a second monitor. Its name is new: private parameters outlive a node."""
     name = "__name:=monitor_" + uuid.uuid4().hex
-    port = "_port:=" + OTHER_HOST.rpartition(":")[2]
+    port = "_port:=%d" % OTHER_PORT
     return subprocess.Popen(
         [*prefix, "rosrun", "hero_monitor", "monitor", name, port, *arguments],
         stdout=subprocess.PIPE,

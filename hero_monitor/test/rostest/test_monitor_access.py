@@ -9,6 +9,7 @@ import rostest
 from monitor_process import (
     HOST,
     OTHER_HOST,
+    PORT,
     TIMEOUT_S,
     UPGRADE,
     ask,
@@ -31,7 +32,7 @@ class AccessTest(unittest.TestCase):
 
     def test_a_name_that_is_not_this_machines_is_refused(self):
         for path in ("/", "/live", "/main.js", "/nothing"):
-            status, headers, _ = ask(HOST, path, {"Host": "evil.example:21331"})
+            status, headers, _ = ask(HOST, path, {"Host": "evil.example:%d" % PORT})
             self.assertEqual(status, 421, path)
             self.assertIn("default-src 'none'", headers["Content-Security-Policy"])
 
@@ -61,6 +62,7 @@ class AccessTest(unittest.TestCase):
                 file.chmod(0o600)
             open_to_all.write_text(TOKEN)
             open_to_all.chmod(0o644)
+            started = []
             for arguments, reason in (
                 (["_host:=0.0.0.0"], "needs a token"),
                 (["_host:=0.0.0.0", "_token_file:=%s" % short], "less than 16"),
@@ -71,17 +73,18 @@ class AccessTest(unittest.TestCase):
                 (["_host:=nowhere.invalid", "_token_file:=%s" % good], "cannot listen"),
                 (["_host:=a..b", "_token_file:=%s" % good], "cannot listen"),
             ):
-                process = start_monitor(*arguments)
+                started.append((start_monitor(*arguments), reason))
+            for process, reason in started:
                 output = process.communicate(timeout=TIMEOUT_S)[0].decode()
                 self.assertEqual(process.returncode, 1, output)
                 self.assertIn(reason, output)
                 self.assertNotIn("Traceback", output)
 
     def test_a_port_that_is_taken_is_named(self):
-        process = start_monitor("_port:=21331")
+        process = start_monitor("_port:=%d" % PORT)
         output = process.communicate(timeout=TIMEOUT_S)[0].decode()
         self.assertEqual(process.returncode, 1)
-        self.assertIn("port 21331", output)
+        self.assertIn("port %d" % PORT, output)
 
     def test_with_a_token_only_those_who_know_it_see_the_fleet(self):
         with tempfile.TemporaryDirectory() as folder:

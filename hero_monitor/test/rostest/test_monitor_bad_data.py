@@ -8,7 +8,7 @@ import rospy
 import rostest
 from geometry_msgs.msg import Point, PoseStamped, Quaternion
 from monitor_page import MonitorPage
-from monitor_process import end, start_scripted_driver, wait_until_it_answers
+from monitor_process import HOST, end, start_scripted_driver, wait_until_it_answers
 from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import LaserScan
@@ -16,8 +16,6 @@ from std_msgs.msg import ColorRGBA
 
 from hero_test.browser import MISSING
 from hero_test.waiting import wait_for
-
-HOST = "127.0.0.1:21333"
 
 
 def make_odometry(x_m, y_m):

@@ -14,6 +14,7 @@ import rospy
 import rostest
 from monitor_process import (
     OTHER_HOST,
+    OTHER_PORT,
     TIMEOUT_S,
     PageClient,
     ask,
@@ -30,7 +31,6 @@ from hero_test.waiting import wait_for
 TOKEN = "correct-horse-battery-staple"
 STRANGERS = 1100
 STRANGER_ADDRESSES = ["127.0.0.%d" % number for number in range(2, 32)]
-PORT = int(OTHER_HOST.rpartition(":")[2])
 FILES = 1024  # a usual soft limit
 CONNECTIONS_MAX, CONNECTIONS_MAX_PER_ADDRESS = 400, 50  # the monitor's defaults
 
@@ -76,7 +76,7 @@ class DoorsTest(unittest.TestCase):
     def connect(self, address, count=1):
         """Connect as somebody who sends the begin of a request and nothing more."""
         for _ in range(count):
-            self.sockets.append(socket.create_connection(("127.0.0.1", PORT), TIMEOUT_S, (address, 0)))
+            self.sockets.append(socket.create_connection(("127.0.0.1", OTHER_PORT), TIMEOUT_S, (address, 0)))
             self.sockets[-1].sendall(b"GET / HTTP/1.1\r\nHost: ")
 
     def connect_strangers(self):
@@ -130,7 +130,7 @@ class DoorsTest(unittest.TestCase):
         chosen = selectors.DefaultSelector()
         while not end.is_set():
             while len(chosen.get_map()) < CONNECTIONS_MAX_PER_ADDRESS:
-                opened = socket.create_connection(("127.0.0.1", PORT), TIMEOUT_S, (address, 0))
+                opened = socket.create_connection(("127.0.0.1", OTHER_PORT), TIMEOUT_S, (address, 0))
                 opened.setblocking(False)
                 chosen.register(opened, selectors.EVENT_READ | selectors.EVENT_WRITE)
             for key, events in chosen.select(TIMEOUT_S):
@@ -167,7 +167,9 @@ class DoorsTest(unittest.TestCase):
 
     def test_wrong_tokens_of_one_address_keep_no_other_from_logging_in(self):
         stranger, owner = STRANGER_ADDRESSES[:2]
-        answers = [log_in(OTHER_HOST, "wrong", stranger)[0] for _ in range(20)]
+        answers = []
+        while not answers or answers[-1] == 403:
+            answers.append(log_in(OTHER_HOST, "wrong", stranger)[0])
         self.assertEqual((answers[0], answers[-1]), (403, 429))
         self.assertEqual(log_in(OTHER_HOST, TOKEN, stranger)[0], 429)
         status, cookie = log_in(OTHER_HOST, TOKEN, owner)

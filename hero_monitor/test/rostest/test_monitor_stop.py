@@ -10,6 +10,7 @@ import rostest
 from geometry_msgs.msg import Twist
 from monitor_page import MonitorPage
 from monitor_process import (
+    HOST,
     OTHER_HOST,
     end,
     start_monitor,
@@ -23,7 +24,6 @@ from hero_test.browser import MISSING
 from hero_test.processes import find_pid, suspended
 from hero_test.waiting import wait_for
 
-HOST = "127.0.0.1:21333"
 DRIVERS = ("hero_driver", "hero_driver_b")
 RED, AMBER, GREEN = "error", "warn", "info"
 
