@@ -5,6 +5,7 @@ import threading
 
 import pytest
 
+from hero_tools import check
 from hero_tools.checkup import computer, graph, network
 from hero_tools.checkup.network import Address
 from hero_tools.checkup.points import FAIL, OK, WARN, ask_system, ok, run_points
@@ -151,3 +152,11 @@ def test_a_command_that_is_missing_fails_or_hangs_is_no_error():
     assert ask_system(["false"]) is None
     assert ask_system(["sleep", "100"], timeout_s=0.1) is None
     assert ask_system(["echo", "yes"]) == "yes\n"
+
+
+@pytest.mark.parametrize(("option", "words"), [("--port=0", "1..65535"), ("--color", "--color")])
+def test_wrong_options_of_check_are_refused_by_name(option, words, capsys):
+    with pytest.raises(SystemExit) as caught:
+        check.parse_options([option])
+    assert caught.value.code == 2
+    assert words in capsys.readouterr().err

@@ -6,6 +6,7 @@ from hero_client.geometry import Pose
 from hero_client.readings import Obstacle
 from hero_client.robot_listener import RobotTrack
 from hero_msgs.msg import Robot
+from hero_tools import fleet
 from hero_tools.fleet_rows import RobotRow, find_missing, sort_rows
 
 ORIGIN = Pose(0.0, 0.0, 0.0)
@@ -61,3 +62,13 @@ def test_rows_are_sorted_by_id_state_or_nearest_obstacle():
     assert [row.robot.id for row in sort_rows(rows, "id")] == [2, 3, 10, -1]
     assert next(row.robot.id for row in sort_rows(rows, "state")) == 3
     assert [row.robot.id for row in sort_rows(rows, "nearest")][:2] == [10, 2]
+
+
+@pytest.mark.parametrize(
+    "option", ["--seconds=-1", "--seconds=inf", "--seconds=nan", "--expect=2000000", "--expect=many", "--color"]
+)
+def test_wrong_options_of_fleet_are_refused_by_name(option, capsys):
+    with pytest.raises(SystemExit) as caught:
+        fleet.parse_options([option])
+    assert caught.value.code == 2
+    assert option.partition("=")[0] in capsys.readouterr().err.splitlines()[-1]
