@@ -1,5 +1,8 @@
-#!/usr/bin/env python
-"""The five first scripts move simulated robots and leave them stopped, judged by the ground truth."""
+#!/usr/bin/env python3
+"""The first scripts as programs, all at once, each with a robot of its own: they move it and leave it stopped.
+
+What they do is tested in virtual time: see test/unit.
+"""
 
 import math
 import signal
@@ -9,63 +12,80 @@ import unittest
 import rospy
 import rostest
 
-from hero_client import Robot
+from hero_test.command_watch import CommandWatch
 from hero_test.example_program import ExampleProgram
 from hero_test.swarm_watch import SwarmWatch
 from hero_test.waiting import wait_for
+
+ROBOTS = range(10)
+SCRIPTS = ["move", "read_sensors", "drive_a_square", "avoid", "keep_distance"]
+"""Of robot 0; here each drives the robot of its place in this list."""
+
+TOPICS = ["odom", "proximity", "led", "velocity_controller/cmd_vel"]
 
 
 class FirstScriptsTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.watch = SwarmWatch([0, 1])
-        cls.watch.wait_until_complete()
-        for robot_id in (0, 1):
-            Robot(robot_id).wait_until_ready(timeout_s=30.0)
+        cls.watch, cls.commands = SwarmWatch(ROBOTS), CommandWatch(ROBOTS)
+        cls.watch.wait_until_complete(60.0)
+        cls.starts = {robot_id: cls.watch.pose(robot_id) for robot_id in ROBOTS}
+        cls.programs = {}
+        for robot_id, name in enumerate(SCRIPTS):
+            remappings = ["/hero_0/%s:=/hero_%d/%s" % (topic, robot_id, topic) for topic in TOPICS]
+            cls.programs[name] = ExampleProgram(name, *remappings)
+            cls.addClassCleanup(cls.programs[name].close)
 
-    def start(self, name):
-        program = ExampleProgram(name)
+    def wait_until_moved(self, robot_id):
+        x_m, y_m, yaw_rad = self.starts[robot_id]
+
+        def has_moved():
+            pose = self.watch.pose(robot_id)
+            turned_rad = abs(math.remainder(pose[2] - yaw_rad, math.tau))
+            return math.dist(pose[:2], (x_m, y_m)) > 0.03 or turned_rad > 0.3
+
+        wait_for(has_moved, "motion of hero_%d" % robot_id)
+
+    def wait_until_stopped(self, *robot_ids):
+        """Wait until the scripts have stopped their robots, themselves, and these are at rest."""
+        self.commands.wait_for_stops(*robot_ids)
+        self.watch.wait_until_stopped(*robot_ids)
+
+    def check_interrupted(self, name):
+        """A script moves its robot until Ctrl-C, and stops it then."""
+        robot_id = SCRIPTS.index(name)
+        self.wait_until_moved(robot_id)
+        self.assertNotEqual(0, self.programs[name].end(signal.SIGINT))
+        self.assertNotIn("Traceback", self.programs[name].text())
+        self.wait_until_stopped(robot_id)
+
+    def test_1_move_drives_and_ends_by_itself(self):
+        self.wait_until_moved(0)
+        self.assertEqual(0, self.programs["move"].wait_end(), self.programs["move"].text())
+        self.wait_until_stopped(0)
+
+    def test_1_read_sensors_prints_what_is_seen(self):
+        for text in ("pose: x ", "ranges from the front", "nearest: "):
+            self.programs["read_sensors"].wait_for_text(text)
+        self.check_interrupted("read_sensors")
+
+    def test_1_drive_a_square_drives_until_it_is_interrupted(self):
+        self.check_interrupted("drive_a_square")
+
+    def test_1_avoid_drives_until_it_is_interrupted(self):
+        self.check_interrupted("avoid")
+
+    def test_1_keep_distance_drives_until_it_is_interrupted(self):
+        self.check_interrupted("keep_distance")
+
+    def test_2_all_robots_turns_every_robot_and_ends_by_itself(self):
+        before = {robot_id: self.watch.pose(robot_id)[2] for robot_id in ROBOTS}
+        program = ExampleProgram("all_robots")
         self.addCleanup(program.close)
-        return program
-
-    def run_to_end(self, name):
-        program = self.start(name)
         self.assertEqual(0, program.wait_end(), program.text())
-        self.watch.wait_until_stopped(0, 1)
-        return program.text()
-
-    def test_move_drives_forward_and_turns_left(self):
-        before = self.watch.pose(0)
-        self.run_to_end("move")
-        after = self.watch.pose(0)
-        self.assertGreater(math.dist(before[:2], after[:2]), 0.1)
-        self.assertGreater(math.remainder(after[2] - before[2], math.tau), 0.5)
-
-    def test_read_sensors_turns_and_prints_what_is_seen(self):
-        before = self.watch.pose(0)
-        text = self.run_to_end("read_sensors")
-        self.assertNotEqual(before[2], self.watch.pose(0)[2])
-        for words in ("pose: x ", "ranges from the front", "nearest: "):
-            self.assertEqual(20, text.count(words), text)
-
-    def test_drive_a_square_returns_to_its_start(self):
-        before, first = self.watch.pose(0), len(self.watch.rows[0])
-        self.run_to_end("drive_a_square")
-        self.assertLess(math.dist(before[:2], self.watch.pose(0)[:2]), 0.05)
-        farthest_m = max(math.dist(before[:2], row[1:3]) for row in self.watch.rows[0][first:])
-        self.assertAlmostEqual(0.2 * math.sqrt(2.0), farthest_m, delta=0.05)
-
-    def test_avoid_drives_until_ctrl_c_and_stops(self):
-        program = self.start("avoid")
-        wait_for(lambda: self.watch.rows[0][-1][4] > 0.04, "motion")
-        self.assertNotEqual(0, program.end(signal.SIGINT))
-        self.watch.wait_until_stopped(0)
-
-    def test_all_robots_turns_every_robot(self):
-        before = [self.watch.pose(robot_id)[2] for robot_id in (0, 1)]
-        self.run_to_end("all_robots")
-        for robot_id, yaw_rad in enumerate(before):
-            self.assertGreater(abs(math.remainder(self.watch.pose(robot_id)[2] - yaw_rad, math.tau)), 0.5)
+        self.wait_until_stopped(*ROBOTS)
+        for robot_id, yaw_rad in before.items():
+            self.assertGreater(abs(math.remainder(self.watch.pose(robot_id)[2] - yaw_rad, math.tau)), 0.3)
 
 
 if __name__ == "__main__":

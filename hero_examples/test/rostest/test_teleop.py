@@ -8,39 +8,19 @@ import subprocess
 import sys
 import termios
 import threading
-import time
 import unittest
 
+import rosnode
 import rospy
 import rostest
-from geometry_msgs.msg import Twist
 
+from hero_test.command_watch import CommandWatch
+from hero_test.example_program import ExampleProgram
+from hero_test.processes import find_program
 from hero_test.waiting import wait_for
-
-DEADLINE_S = 30.0
 
 # The shell owns the terminal, as it does for a user, and keeps it open when teleop has ended.
 FOREGROUND_SHELL = 'trap : INT TERM HUP; "$@"; echo "status=$?="; cat >/dev/null'
-
-
-class Recorder:
-    """The commands that one robot got, with their times of arrival."""
-
-    def __init__(self, robot_id):
-        self.received = []
-        self.subscriber = rospy.Subscriber(
-            "/hero_%d/velocity_controller/cmd_vel" % robot_id, Twist, self.receive, tcp_nodelay=True
-        )
-
-    def receive(self, twist):
-        self.received.append((time.monotonic(), twist.linear.x, twist.angular.z))
-
-    def wait_for(self, condition, what):
-        """Wait for a message from now on that condition(linear, turn) likes."""
-        start = len(self.received)
-        return wait_for(
-            lambda: any(condition(linear, turn) for _, linear, turn in self.received[start:]), what
-        )
 
 
 def is_running(pid):
@@ -59,10 +39,10 @@ class Terminal:
         self.master_fd, self.slave_fd = pty.openpty()
         self.open_fds = [self.master_fd, self.slave_fd]
         self.before = termios.tcgetattr(self.slave_fd)
-        program = subprocess.check_output(["catkin_find", "--first-only", "--libexec", "hero_examples", "teleop"])
+        program = find_program("hero_examples", "teleop")
         self.shell = subprocess.Popen(
             # setsid --ctty makes the terminal the shell's own, so that Ctrl-C is a signal there.
-            ["setsid", "--ctty", "sh", "-c", FOREGROUND_SHELL, "sh", program.decode().strip(), *arguments],
+            ["setsid", "--ctty", "sh", "-c", FOREGROUND_SHELL, "sh", program, *arguments],
             stdin=self.slave_fd,
             stdout=self.slave_fd,
             stderr=self.slave_fd,
@@ -114,37 +94,27 @@ class Terminal:
 
 
 class TeleopTest(unittest.TestCase):
-    def setUp(self):
-        self.recorder = Recorder(0)
-
-    def tearDown(self):
-        self.recorder.subscriber.unregister()
-
-    def start(self, *arguments):
-        terminal = Terminal(*arguments)
+    def start(self, robot_id):
+        """Start a teleop of this robot in a terminal of its own; node teleop_N."""
+        terminal = Terminal("__name:=teleop_%d" % robot_id, "_robots:=%d" % robot_id)
         self.addCleanup(terminal.close)
-        wait_for(lambda: "Hold a key" in terminal.text or terminal.status() is not None, "the help text")
-        wait_for(lambda: self.recorder.subscriber.get_num_connections() > 0, "teleop's publisher")
         return terminal
 
-    def drive(self, terminal):
-        """Hold w until a command arrives: the first ones may come before the connection is up."""
+    def drive(self, terminal, commands, robot_id):
+        """Press w until a command arrives: the first ones may come before the connection is up."""
+        wait_for(lambda: "Hold a key" in terminal.text, lambda: "the help text, not %s" % terminal.text)
 
         def pressed_and_arrived():
             terminal.type("w")
-            return self.recorder.received and self.recorder.received[-1][1] > 0.0
+            return commands.commands[robot_id] and commands.commands[robot_id][-1][0] > 0.0
 
         wait_for(pressed_and_arrived, "a forward command")
 
-    def assert_last_two_are_stops(self):
-        last_two = self.recorder.received[-2:]
-        self.assertEqual([(0.0, 0.0)] * 2, [(linear, turn) for _, linear, turn in last_two])
-        self.assertGreater(last_two[1][0] - last_two[0][0], 0.051)
-
     def test_keys_drive_and_letting_go_stops(self):
-        terminal = self.start()
-        self.drive(terminal)
-        self.recorder.wait_for(lambda linear, turn: linear == turn == 0.0, "the stop after the last key")
+        commands = CommandWatch([0])
+        terminal = self.start(0)
+        self.drive(terminal, commands, 0)
+        commands.wait_for_stops(0)
         for keys, condition in (
             ("x", lambda linear, turn: linear < 0.0 and turn == 0.0),
             ("sa", lambda linear, turn: linear == 0.0 and turn > 0.0),
@@ -157,88 +127,46 @@ class TeleopTest(unittest.TestCase):
             ("s>a", lambda linear, turn: abs(turn - 1.75) < 1e-6),
         ):
             terminal.type(keys)
-            self.recorder.wait_for(condition, "the command of %r" % keys)
-
-    def test_a_stop_key_stops_at_once(self):
-        terminal = self.start()
-        for stop in ("s", " "):
-            self.drive(terminal)
-            terminal.type(stop)
-            self.recorder.wait_for(lambda linear, turn: linear == turn == 0.0, "the stop of %r" % stop)
-
-    def test_an_idle_teleop_is_silent(self):
-        terminal = self.start()
-        self.drive(terminal)
-        wait_for(
-            lambda: self.recorder.received and time.monotonic() - self.recorder.received[-1][0] > 1.0, "silence"
-        )
-        self.assertEqual((0.0, 0.0), self.recorder.received[-1][1:])
-
-    def test_keys_choose_the_robot_and_the_one_left_stops(self):
-        second = Recorder(1)
-        terminal = self.start("_robots:=0 1")
-        wait_for(lambda: second.subscriber.get_num_connections() > 0, "the second publisher")
-        self.drive(terminal)
-        terminal.type("1w")
-        second.wait_for(lambda linear, turn: linear > 0.0, "a command of the second robot")
-        wait_for(lambda: self.recorder.received[-1][1] == 0.0, "the stop of the first robot")
-        terminal.type("\tw")
-        self.recorder.wait_for(lambda linear, turn: linear > 0.0, "a command of the first robot after Tab")
-        terminal.type("gw")
-        second.wait_for(lambda linear, turn: linear > 0.0, "a command of all robots")
+            commands.wait_for(0, condition, "the command of %r" % keys)
         terminal.type("7")
         wait_for(lambda: "hero_7 is not among" in terminal.text, "a word about a robot that is not there")
-        second.subscriber.unregister()
 
-    def check_end(self, end, status):
-        terminal = self.start()
-        self.drive(terminal)
-        self.assertNotEqual(terminal.before, terminal.settings())
-        end(terminal)
-        wait_for(lambda: terminal.status() is not None, "the end of teleop")
-        self.assertEqual(status, terminal.status(), terminal.text)
-        wait_for(lambda: terminal.before == terminal.settings(), "the terminal as it was")
-        return terminal
-
-    def test_ctrl_c_stops_the_robot_and_restores_the_terminal(self):
-        self.check_end(lambda terminal: terminal.type("\x03"), 0)
-        self.assert_last_two_are_stops()
-
-    def test_ctrl_d_stops_the_robot_and_restores_the_terminal(self):
-        self.check_end(lambda terminal: terminal.type("\x04"), 0)
-        self.assert_last_two_are_stops()
-
-    def test_signals_stop_the_robot_and_restore_the_terminal(self):
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            self.check_end(lambda terminal, number=number: os.kill(terminal.teleop_pid(), number), 0)
-            self.assert_last_two_are_stops()
-
-    def test_rosnode_kill_stops_the_robot_and_restores_the_terminal(self):
-        self.check_end(lambda terminal: subprocess.check_call(["rosnode", "kill", "/teleop"]), 0)
-        self.assert_last_two_are_stops()
+    def test_every_end_stops_the_robot_and_restores_the_terminal(self):
+        ends = {
+            "Ctrl-C": lambda robot_id, terminal: terminal.type("\x03"),
+            "Ctrl-D": lambda robot_id, terminal: terminal.type("\x04"),
+            "SIGINT": lambda robot_id, terminal: os.kill(terminal.teleop_pid(), signal.SIGINT),
+            "SIGTERM": lambda robot_id, terminal: os.kill(terminal.teleop_pid(), signal.SIGTERM),
+            "SIGHUP": lambda robot_id, terminal: os.kill(terminal.teleop_pid(), signal.SIGHUP),
+            "rosnode kill": lambda robot_id, terminal: rosnode.kill_nodes(["/teleop_%d" % robot_id]),
+        }
+        commands = CommandWatch(range(len(ends)))
+        terminals = [self.start(robot_id) for robot_id in range(len(ends))]
+        for robot_id, (name, end) in enumerate(ends.items()):
+            terminal = terminals[robot_id]
+            with self.subTest(name):
+                self.drive(terminal, commands, robot_id)
+                self.assertNotEqual(terminal.before, terminal.settings())
+                end(robot_id, terminal)
+                wait_for(lambda t=terminal: t.status() is not None, "the end of teleop")
+                self.assertEqual(0, terminal.status(), terminal.text)
+                wait_for(lambda t=terminal: t.before == t.settings(), "the terminal as it was")
+                commands.wait_for_stops(robot_id)
 
     def test_a_closed_terminal_stops_the_robot(self):
-        terminal = self.start()
-        self.drive(terminal)
+        commands = CommandWatch([0])
+        terminal = self.start(0)
+        self.drive(terminal, commands, 0)
         pid = terminal.teleop_pid()
         terminal.hang_up()
-        wait_for(lambda: not os.path.exists("/proc/%d" % pid) or terminal.shell.poll() is not None, "the end")
-        wait_for(lambda: self.recorder.received[-1][1:] == (0.0, 0.0), "the stop")
-        wait_for(lambda: time.monotonic() - self.recorder.received[-1][0] > 0.5, "the last message")
-        self.assert_last_two_are_stops()
+        wait_for(lambda: not is_running(pid), "the end of teleop")
+        commands.wait_for_stops(0)
 
     def test_without_a_terminal_one_line_says_what_to_do(self):
-        done = subprocess.run(
-            ["rosrun", "hero_examples", "teleop"],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            start_new_session=True,
-            check=False,
-        )
-        self.assertEqual(1, done.returncode)
-        self.assertEqual(1, len(done.stdout.decode().strip().splitlines()), done.stdout.decode())
-        self.assertIn("plain terminal", done.stdout.decode())
+        program = ExampleProgram("teleop")
+        self.assertEqual(1, program.wait_end())
+        self.assertEqual(1, len(program.lines), program.lines)
+        self.assertIn("plain terminal", program.text())
 
 
 if __name__ == "__main__":

@@ -1,0 +1,77 @@
+"""swarm_go_to in virtual time: robots whose odometry drifts swap places and form up without touching."""
+
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import true_paths
+
+from hero_client import CommonFrame, ProgramError
+from hero_client.controllers.orca import AvoidanceLaw
+from hero_client.formations import assign_goals, place_formation
+from hero_sim.stepped.swarm import StepSwarm
+from hero_sim.world.arena_file import load_arena
+
+pytest.importorskip("rospy", reason="the program imports rospy")
+from hero_examples.swarm_go_to import STEP_S, Formation
+
+CIRCLE = str(Path(__file__).resolve().parents[3] / "hero_test" / "arenas" / "circle_arena.yaml")
+LAW = AvoidanceLaw()
+
+
+def form(swarm, goals, seed, **options):
+    """Drive to the goals; return the formation and the path."""
+    formation = Formation(swarm, CommonFrame("world"), goals, LAW, seed, **options)
+
+    def step(time_s):
+        formation.step(time_s)
+        return formation.done
+
+    return formation, true_paths.run(swarm, step, 130.0, hz=1.0 / STEP_S)[0]
+
+
+@pytest.mark.parametrize("seed", range(100, 110))
+def test_ten_robots_swap_places_across_a_circle_without_touching(seed):
+    with StepSwarm(10, seed=seed, arena=CIRCLE) as swarm:
+        goals = [(-robot.true_pose.x_m, -robot.true_pose.y_m) for robot in swarm]
+        formation, path = form(swarm, goals, seed)
+        drift_m = np.hypot(*(swarm.rows.world.poses[:, :2] - goals).T).max()
+        assert {robot.light for robot in swarm} == {(0.0, 1.0, 0.0)}
+    assert formation.done
+    assert drift_m > 0.03  # or this would try nothing
+    assert true_paths.measure_gaps(path).min() > 0.002
+    assert true_paths.stop_within(swarm)
+
+
+@pytest.mark.parametrize("shape", ["circle", "grid", "line"])
+def test_robots_take_their_places_in_a_formation(shape):
+    wanted = {"shape": shape, "spacing_m": 0.25}
+    with StepSwarm(8, seed=4, arena="empty", perfect=True) as swarm:
+        places = [robot.true_pose[:2] for robot in swarm]
+        goals = place_formation(wanted, len(swarm), LAW.min_spacing_m)
+        goals = [goals[index] for index in assign_goals(places, goals)]
+        formation, path = form(swarm, goals, 1)
+        assert formation.done
+        off_m = np.hypot(*(swarm.rows.world.poses[:, :2] - goals).T)
+    assert off_m.max() < 0.03
+    assert true_paths.measure_gaps(path).min() > 0.005
+    assert true_paths.measure_wall_gaps(path, load_arena("empty")).min() > 0.005
+
+
+def test_robots_that_are_not_in_place_in_time_are_named():
+    swarm = StepSwarm(2, arena="empty")
+    with pytest.raises(ProgramError, match="after 2 s not in place: hero_0, hero_1"):
+        form(swarm, [(0.0, 50.0), (50.0, 0.0)], 0, timeout_s=2.0)
+
+
+def test_all_robots_stop_while_the_pose_of_one_is_not_known():
+    with StepSwarm(2, arena="empty") as swarm:
+        common = CommonFrame("world")
+        formation = Formation(swarm, common, [(0.5, 0.5), (-0.5, -0.5)], LAW)
+        path = true_paths.run(swarm, formation.step, 2.0)[0]
+        assert true_paths.measure_lengths(path).min() > 0.03
+        common.frame = "nowhere"
+        true_paths.run(swarm, formation.step, 1.0)
+        assert true_paths.stop_within(swarm, 0.0)
+        assert not formation.done
