@@ -13,7 +13,6 @@ import time
 from pathlib import Path
 
 import rospy
-import yaml
 from drawing import draw_lights, draw_paths
 from geometry_msgs.msg import PoseStamped
 from picture_program import make_pictures
@@ -98,7 +97,7 @@ def random_walk(picture):
 
 def go_to_goal(picture):
     """Ten robots, three goals each, from the topic."""
-    arena = ROOT / "hero_examples" / "test" / "rostest" / "plots_arena.yaml"
+    arena = Path(__file__).with_name("plots_arena.yaml")
     with Recording(10, str(arena)) as recording:
         recording.stage.start_example("go_to_goal", "_robots:=0-9")
         publishers = [rospy.Publisher("/hero_%d/goal" % i, PoseStamped, queue_size=1) for i in range(10)]
@@ -124,10 +123,9 @@ def go_to_goal(picture):
 def swarm_go_to(picture):
     """Ten robots that swap places."""
     with Recording(10, arena_file("circle")) as recording:
-        text = (ROOT / "hero_examples" / "test" / "rostest" / "swap.yaml").read_text()
-        swap = json.dumps(yaml.safe_load(text))  # rospy ignores values of several lines
-        recording.stage.start_example("swarm_go_to", "_robots:=0-9", "_formation:=" + swap, "_assign:=false")
         goals = [(-x_m, -y_m) for x_m, y_m, _ in map(recording.watch.pose, range(10))]
+        swap = json.dumps({"shape": "points", "points": goals})
+        recording.stage.start_example("swarm_go_to", "_robots:=0-9", "_formation:=" + swap, "_assign:=false")
         recording.wait_until_all_are_at(goals, 0.3, 120.0)
         near = ((-0.85, 0.85), (-0.85, 0.85))
         draw_paths(picture, "swarm_go_to: ten robots swap places", recording.arena, recording.paths(), only_m=near)
