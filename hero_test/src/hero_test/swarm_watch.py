@@ -78,9 +78,3 @@ class SwarmWatch:
     def wait_until_complete(self, timeout_s=30.0):
         """Wait until every robot was heard of."""
         wait_for(lambda: all(self.rows.values()), "ground truth of %s" % sorted(self.rows), timeout_s)
-
-    def lengths_m(self):
-        """Return how far each robot drove."""
-        return {
-            robot_id: float(np.sum(np.hypot(*np.diff(self.path(robot_id)[:, 1:3], axis=0).T))) for robot_id in self.rows
-        }
