@@ -80,3 +80,13 @@ def test_commands_of_one_instant_for_one_robot_keep_their_order():
         shaper.offer(0, 0, value, 0.0)
     sent = [shaper.take(now_ms).values[0].tolist() for now_ms in (0, 60, 120, 180)]
     assert sent == [[np.float32(0.1)], [0.0], [np.float32(0.2)], []]
+
+
+def test_motion_that_waits_too_long_is_dropped_but_a_stop_is_sent():
+    shaper = CommandShaper(2, 0.0)
+    shaper.offer(0, [0, 1], 0.1, 0.1)
+    shaper.take(0)
+    shaper.delay_until(np.arange(2), np.array([10 + MAX_AGE_MS + 1] * 2))
+    shaper.offer(10, [0, 1], [0.2, 0.0], 0.0)
+    sent = shaper.take(10 + MAX_AGE_MS + 1)
+    assert sent.rows.tolist() == [1] and not sent.values.any()

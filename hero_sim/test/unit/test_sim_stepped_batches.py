@@ -69,6 +69,16 @@ def test_commands_that_are_not_finite_are_refused_with_their_rows():
     assert not robots.ticks.any()
 
 
+def test_a_row_that_no_robot_has_and_time_that_has_passed_are_refused():
+    robots = RobotRows(build_world(3, 0))
+    for row in (-1, 3):
+        with pytest.raises(IndexError, match="no robot row %d; rows are 0..2" % row):
+            robots.send_velocity(row, 0.1, 0.0)
+    robots.advance(100)
+    with pytest.raises(ValueError, match="100 ms already, later than 99 ms"):
+        robots.advance(99)
+
+
 def test_a_light_goes_out_15_s_after_its_last_command():
     robots = RobotRows(build_world(2, 0))
     robots.send_light(1, (1.0, 0.5, 0.0, 1.0))

@@ -65,7 +65,8 @@ class CommandShaper:
     def offer(self, now_ms: int, rows: Rows, first: Values, second: Values) -> None:
         """Take the two values of a command at now_ms, for one robot or for several.
 
-        Raises: ValueError for values that are not finite, as the driver refuses them.
+        Raises: ValueError for values that are not finite, as the driver refuses them. IndexError for a row that no
+        robot has.
         """
         if now_ms != self._collected_ms or not isinstance(rows, int) or rows in self._collected:
             self._shape_collected()
@@ -73,6 +74,8 @@ class CommandShaper:
         if isinstance(rows, int):
             if not (math.isfinite(first) and math.isfinite(second)):
                 raise ValueError("the command for robot row %d must be finite, not %r and %r" % (rows, first, second))
+            if not 0 <= rows < len(self._repeats):
+                raise IndexError("there is no robot row %d; rows are 0..%d" % (rows, len(self._repeats) - 1))
             self._collected[rows] = (first, second)
             return
         rows = np.asarray(rows)

@@ -53,7 +53,8 @@ class RobotRows:
         robots.advance(robots.now_ms + 100)
         robots.odometry[:, :2], robots.proximity_m.min(axis=1)
 
-    Commands pass the driver's shaping and reach the firmware with its next read, 51 ms apart; the other
+    Rows are numbers or index arrays, world after world: in a batch of worlds with N robots each, robot k of world e has
+    row e * N + k. Commands pass the driver's shaping and reach the firmware with its next read, 51 ms apart; the other
     calls (light, odometry, gains, calibrations) work at once.
 
     Attributes:
@@ -171,7 +172,9 @@ class RobotRows:
     # -- time passes -----------------------------------------------------------------------------------------
 
     def advance(self, until_ms: int) -> None:
-        """Move everything on to until_ms."""
+        """Move everything on to until_ms, which may not lie in the past."""
+        if until_ms < self.now_ms:
+            raise ValueError("it is %d ms already, later than %d ms" % (self.now_ms, until_ms))
         world, servos, radios = self.world, self._servos, self._radios
         while True:
             step_ms = world.time_ms + STEP_MS

@@ -54,7 +54,7 @@ class WheelControllers:
         self._scale_gains()
 
     def find_accepted(self, now_ms: int, rows: np.ndarray) -> np.ndarray:
-        """Return which of the robots at rows (K,) accept a command at now_ms (K,).
+        """Return for each of the robots at rows (K,) whether it accepts a command at now_ms.
 
         A command that comes within 50 ms of the last accepted motion is dropped, a zero too.
         """
