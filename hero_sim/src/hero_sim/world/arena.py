@@ -86,7 +86,11 @@ def list_obstacles(arena: Arena) -> Tuple[np.ndarray, np.ndarray]:
 def measure_clearance(points_m: np.ndarray, arena: Arena) -> np.ndarray:
     """Return the distance (m) of each point (P, 2) to the nearest wall or obstacle, negative inside one."""
     obstacles_m, radii_m = list_obstacles(arena)
-    clearance_m = (distance_to_segments(points_m, obstacles_m)[0] - radii_m).min(axis=1, initial=np.inf)
+    x_m, y_m = points_m.T[..., None]
+    near_x_m, near_y_m = find_nearest_points(x_m, y_m, obstacles_m)
+    apart_x_m, apart_y_m = x_m - near_x_m, y_m - near_y_m
+    distance_m = np.sqrt(apart_x_m * apart_x_m + apart_y_m * apart_y_m)
+    clearance_m = (distance_m - radii_m).min(axis=1, initial=np.inf)
     for corners_m in arena.polygons_m:
         clearance_m = np.where(_lies_inside(points_m, corners_m), -np.abs(clearance_m), clearance_m)
     return clearance_m
@@ -104,19 +108,17 @@ def _lies_inside(points_m: np.ndarray, corners_m: np.ndarray) -> np.ndarray:
     return (straddles & (points_m[:, 0, None] < cross_x_m)).sum(axis=1) % 2 == 1
 
 
-def distance_to_segments(
-    points_m: np.ndarray, segments_m: np.ndarray
-) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the distance (m) of each point to each segment and the nearest points' x and y, all (P, S)."""
-    start, along = segments_m[:, :2], segments_m[:, 2:] - segments_m[:, :2]
-    length_m2 = np.maximum((along**2).sum(axis=1), 1e-18)
-    to_x = points_m[:, 0, None] - start[:, 0]
-    to_y = points_m[:, 1, None] - start[:, 1]
-    share = np.clip((to_x * along[:, 0] + to_y * along[:, 1]) / length_m2, 0.0, 1.0)
-    near_x = start[:, 0] + share * along[:, 0]
-    near_y = start[:, 1] + share * along[:, 1]
-    off_x, off_y = points_m[:, 0, None] - near_x, points_m[:, 1, None] - near_y
-    return np.sqrt(off_x * off_x + off_y * off_y), near_x, near_y
+def find_nearest_points(x_m: np.ndarray, y_m: np.ndarray, segments_m: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+    """Return x and y of the nearest point of each segment (S, 4).
+
+    x_m and y_m (S,): one place for each segment, the result is (S,); (P, 1): for all places (P, S).
+    """
+    start_x_m, start_y_m, end_x_m, end_y_m = segments_m.T
+    along_x_m, along_y_m = end_x_m - start_x_m, end_y_m - start_y_m
+    length_m2 = np.maximum(along_x_m * along_x_m + along_y_m * along_y_m, 1e-18)
+    share = ((x_m - start_x_m) * along_x_m + (y_m - start_y_m) * along_y_m) / length_m2
+    share = np.minimum(np.maximum(share, 0.0), 1.0)
+    return start_x_m + share * along_x_m, start_y_m + share * along_y_m
 
 
 def place_robots(arena: Arena, robots: int, rng: np.random.RandomState) -> np.ndarray:

@@ -65,10 +65,11 @@ def hit_segments(origins_m: np.ndarray, ray_x: np.ndarray, ray_y: np.ndarray, se
     along_y = (segments_m[:, 3] - segments_m[:, 1])[:, None]
     ray_x, ray_y = ray_x[:, None], ray_y[:, None]
     cross = ray_x * along_y - ray_y * along_x
-    cross[np.abs(cross) < 1e-12] = np.nan  # parallel
+    parallel = np.abs(cross) < 1e-12
+    cross[parallel] = 1.0
     share = (start_x * ray_y - start_y * ray_x) / cross
     distance_m = (start_x * along_y - start_y * along_x) / cross
-    hit = (distance_m >= 0.0) & (share >= 0.0) & (share <= 1.0)
+    hit = (distance_m >= 0.0) & (share >= 0.0) & (share <= 1.0) & ~parallel
     robots, segments, rays = np.nonzero(hit)
     length_m = np.sqrt(along_x * along_x + along_y * along_y)[segments, 0]
     return Hits(robots * ray_x.shape[2] + rays, distance_m[hit], np.abs(cross[hit]) / np.maximum(length_m, 1e-12))

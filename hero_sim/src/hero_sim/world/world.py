@@ -42,8 +42,7 @@ class World:
         time_ms: end of the last step.
         poses: true poses (R, 3), read only: x m, y m, theta rad, frame world.
         errors: how each robot differs from the drawing; constant.
-        commands_m_s: the servos' commands (R, 2), as the wheel speeds they stand for, left and right, up to
-            MAX_WHEEL_M_S.
+        commands_m_s: the servos' commands (R, 2), as the wheel speeds they stand for, left and right.
         speeds_m_s, travels_m: of the wheels (R, 2).
     """
 
@@ -73,7 +72,6 @@ class World:
         self._servo_shares = -np.expm1(-_STEP_S / errors.servo_lag_s.T).astype(np.float32).astype(float)
         self._block_step = _BLOCK_STEPS
         self._contacts = Contacts(arena, self.worlds, rows)
-        self._gap_m = 0.0
 
     @property
     def wheel_rows(self) -> List[List[float]]:
@@ -122,8 +120,6 @@ class World:
         self._block_step = 0
         speeds_m_s = self._wheels[2:]
         speeds_m_s[np.abs(speeds_m_s) < _REST_M_S] = 0.0
-        fastest_m_s = max(MAX_WHEEL_M_S + np.abs(self._ripples_m_s).max(), np.abs(speeds_m_s).max())
-        self._longest_step_m = float(fastest_m_s * np.abs(self._ground_s).max())
 
     def _move_bodies(self, ground_m: np.ndarray) -> None:
         before_m = self._poses[:2].copy()
@@ -132,10 +128,7 @@ class World:
         travel_m, rotation_rad = join_wheels(*ground_m)
         x_m[:], y_m[:], cosine[:], sine[:] = move_along_arc(x_m, y_m, cosine, sine, travel_m, rotation_rad)
         theta_rad += rotation_rad
-        # Nobody is looked for until the fastest robots could have met.
-        self._gap_m -= self._longest_step_m
-        if self._gap_m < 0.0:
-            self._gap_m = self._contacts.separate(self._poses[:2], before_m)
+        self._contacts.separate(self._poses[:2], before_m, float(np.abs(travel_m).max()))
 
     def find_overlaps(self) -> np.ndarray:
         """Return which robots (R,) reach more than 1 um into a wall, an obstacle or another robot."""
