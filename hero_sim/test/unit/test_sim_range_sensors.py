@@ -6,7 +6,7 @@ import pytest
 from hero_sim.robot import ranges
 from hero_sim.robot_constants import BODY_RADIUS_M
 from hero_sim.world import range_sensors
-from hero_sim.world.arena import build_default
+from hero_sim.world.arena import Segments, build_default
 from hero_sim.world.kinematics import find_heading
 from hero_sim.world.robot_errors import draw_errors
 from hero_sim.world.world import World
@@ -32,7 +32,8 @@ def measure(segments, circles=NO_CIRCLES, poses=((0.0, 0.0, 0.0),)):
 def measure_all(arena, poses, alpha, beta, which):
     headings = np.column_stack(find_heading(poses[which, 2]))
     everybody = np.repeat(poses[None, :, :2], len(which), axis=0)
-    return range_sensors.measure_signals(poses[which, :2], headings, everybody, arena, alpha, beta)
+    walls = Segments.from_ends(arena.segments_m)
+    return range_sensors.measure_signals(poses[which, :2], headings, everybody, walls, arena.circles_m, alpha, beta)
 
 
 @pytest.mark.parametrize("distance_m", [0.03, 0.05, 0.08, 0.10, 0.15, 0.18])
@@ -52,10 +53,10 @@ def test_a_slanted_wall_returns_less_light():
     across = np.array([math.cos(math.radians(30.0)), math.sin(math.radians(30.0))])
     middle = np.array([reach_m, 0.0])
     segment = np.concatenate((middle - across, middle + across))[None]
-    hits = range_sensors.hit_segments(np.zeros((1, 2)), np.ones((1, 1)), np.zeros((1, 1)), segment)
-    assert hits.rays.tolist() == [0]
-    assert hits.distance_m == pytest.approx([reach_m])
-    assert hits.cosine == pytest.approx([0.5])
+    rays = range_sensors.Rays(np.ones((1, 1)), np.zeros((1, 1)))
+    rays.meet_walls(np.zeros((1, 1)), np.zeros((1, 1)), Segments.from_ends(segment))
+    assert rays.distance_m[0, 0] == pytest.approx(reach_m)
+    assert rays.cosine[0, 0] == pytest.approx(0.5)
 
 
 def test_the_signal_at_20_cm_is_that_of_the_published_table():

@@ -4,7 +4,7 @@ Pure: numpy only; files are read in arena_file. Frame `world`: x right, y up, m;
 """
 
 import math
-from typing import List, NamedTuple, Sequence, Tuple
+from typing import Any, List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
@@ -38,6 +38,38 @@ class Arena(NamedTuple):
     starts: Tuple[Pose, ...]
     bounds_m: np.ndarray
     polygons_m: Tuple[np.ndarray, ...] = ()
+
+
+class Segments(NamedTuple):
+    """Straight lines, each an entry of all arrays (S,): where it starts, and the way to its end."""
+
+    start_x_m: np.ndarray
+    start_y_m: np.ndarray
+    along_x_m: np.ndarray
+    along_y_m: np.ndarray
+    length_m2: np.ndarray
+
+    @classmethod
+    def from_ends(cls, ends_m: np.ndarray) -> "Segments":
+        """Return the segments with ends_m (S, 4), x1 y1 x2 y2."""
+        start_x_m, start_y_m, end_x_m, end_y_m = ends_m.T.copy()
+        along_x_m, along_y_m = end_x_m - start_x_m, end_y_m - start_y_m
+        length_m2 = np.maximum(along_x_m * along_x_m + along_y_m * along_y_m, 1e-18)
+        return cls(start_x_m, start_y_m, along_x_m, along_y_m, length_m2)
+
+    def take(self, which: Any) -> "Segments":
+        """Return the segments which, an index array or a slice."""
+        return Segments(*(array[which] for array in self))
+
+    def point_away(self, x_m: np.ndarray, y_m: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+        """Return x and y (m) from the nearest point of each segment to a place.
+
+        x_m and y_m (S,): one place for each segment, the result is (S,); (P, 1): for all places (P, S).
+        """
+        to_x_m, to_y_m = x_m - self.start_x_m, y_m - self.start_y_m
+        share = (to_x_m * self.along_x_m + to_y_m * self.along_y_m) / self.length_m2
+        share = np.minimum(np.maximum(share, 0.0), 1.0)
+        return to_x_m - share * self.along_x_m, to_y_m - share * self.along_y_m
 
 
 def outline(corners_m: np.ndarray) -> np.ndarray:
@@ -77,19 +109,18 @@ def _count_columns(robots: int) -> int:
     return max(1, math.ceil(math.sqrt(robots)))
 
 
-def list_obstacles(arena: Arena) -> Tuple[np.ndarray, np.ndarray]:
-    """Return all obstacles as segments (K, 4) with a radius (K,): walls have none, circles have no length."""
-    segments_m = np.vstack((arena.segments_m, arena.circles_m[:, [0, 1, 0, 1]]))
-    return segments_m, np.concatenate((np.zeros(len(arena.segments_m)), arena.circles_m[:, 2]))
+def list_obstacles(arena: Arena) -> Tuple[Segments, np.ndarray]:
+    """Return all obstacles as segments with a radius (S,): walls have none, circles have no length."""
+    ends_m = np.vstack((arena.segments_m, arena.circles_m[:, [0, 1, 0, 1]]))
+    return Segments.from_ends(ends_m), np.concatenate((np.zeros(len(arena.segments_m)), arena.circles_m[:, 2]))
 
 
 def measure_clearance(points_m: np.ndarray, arena: Arena) -> np.ndarray:
     """Return the distance (m) of each point (P, 2) to the nearest wall or obstacle, negative inside one."""
-    obstacles_m, radii_m = list_obstacles(arena)
+    obstacles, radii_m = list_obstacles(arena)
     x_m, y_m = points_m.T[..., None]
-    near_x_m, near_y_m = find_nearest_points(x_m, y_m, obstacles_m)
-    apart_x_m, apart_y_m = x_m - near_x_m, y_m - near_y_m
-    distance_m = np.sqrt(apart_x_m * apart_x_m + apart_y_m * apart_y_m)
+    away_x_m, away_y_m = obstacles.point_away(x_m, y_m)
+    distance_m = np.sqrt(away_x_m * away_x_m + away_y_m * away_y_m)
     clearance_m = (distance_m - radii_m).min(axis=1, initial=np.inf)
     for corners_m in arena.polygons_m:
         clearance_m = np.where(_lies_inside(points_m, corners_m), -np.abs(clearance_m), clearance_m)
@@ -106,19 +137,6 @@ def _lies_inside(points_m: np.ndarray, corners_m: np.ndarray) -> np.ndarray:
     share = (y_m - corners_m[:, 1]) / np.where(rise_m == 0.0, 1.0, rise_m)
     cross_x_m = corners_m[:, 0] + share * (following_m[:, 0] - corners_m[:, 0])
     return (straddles & (points_m[:, 0, None] < cross_x_m)).sum(axis=1) % 2 == 1
-
-
-def find_nearest_points(x_m: np.ndarray, y_m: np.ndarray, segments_m: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-    """Return x and y of the nearest point of each segment (S, 4).
-
-    x_m and y_m (S,): one place for each segment, the result is (S,); (P, 1): for all places (P, S).
-    """
-    start_x_m, start_y_m, end_x_m, end_y_m = segments_m.T
-    along_x_m, along_y_m = end_x_m - start_x_m, end_y_m - start_y_m
-    length_m2 = np.maximum(along_x_m * along_x_m + along_y_m * along_y_m, 1e-18)
-    share = ((x_m - start_x_m) * along_x_m + (y_m - start_y_m) * along_y_m) / length_m2
-    share = np.minimum(np.maximum(share, 0.0), 1.0)
-    return start_x_m + share * along_x_m, start_y_m + share * along_y_m
 
 
 def place_robots(arena: Arena, robots: int, rng: np.random.RandomState) -> np.ndarray:

@@ -3,12 +3,12 @@
 Pure: numpy only, over all robots of all worlds at once; robots of different worlds never meet.
 """
 
-from typing import Tuple
+from typing import Any, Tuple
 
 import numpy as np
 
 from ..robot_constants import BODY_RADIUS_M
-from .arena import Arena, find_nearest_points, list_obstacles, measure_clearance
+from .arena import Arena, list_obstacles, measure_clearance
 
 __all__ = ["Contacts"]
 
@@ -33,10 +33,12 @@ class Contacts:
         self._shape = (worlds, rows // worlds)
         # Of each two robots the earlier one is the first.
         self._ordered = np.triu(np.ones((self._shape[1], self._shape[1]), dtype=bool), k=1)
-        self._obstacles_m, radii_m = list_obstacles(arena)
+        self._obstacles, radii_m = list_obstacles(arena)
         self._free_m = radii_m + BODY_RADIUS_M
         self._reach_m = -np.inf  # how far all may still move until the lists are incomplete
-        self._firsts = self._seconds = self._beside = self._obstacles = np.empty(0, dtype=int)
+        # Two robots that are near each other; a robot, an obstacle near it, and how far away its center has to be.
+        self._firsts = self._seconds = self._beside = np.empty(0, dtype=int)
+        self._near, self._near_free_m = self._obstacles, self._free_m
 
     def separate(self, positions_m: np.ndarray, before_m: np.ndarray, moved_m: float) -> None:
         """Push bodies out of walls, obstacles and each other; those that cannot get free return to before_m.
@@ -81,10 +83,10 @@ class Contacts:
         self._reach_m = _MARGIN_M
         self._firsts, self._seconds = self._find_pairs(positions_m, 2.0 * (BODY_RADIUS_M + _MARGIN_M))
         x_m, y_m = positions_m[..., None]
-        near_x_m, near_y_m = find_nearest_points(x_m, y_m, self._obstacles_m)
-        apart_x_m, apart_y_m = x_m - near_x_m, y_m - near_y_m
+        away_x_m, away_y_m = self._obstacles.point_away(x_m, y_m)
         near_m = self._free_m + _MARGIN_M
-        self._beside, self._obstacles = np.nonzero(apart_x_m * apart_x_m + apart_y_m * apart_y_m < near_m * near_m)
+        self._beside, near = np.nonzero(away_x_m * away_x_m + away_y_m * away_y_m < near_m * near_m)
+        self._near, self._near_free_m = self._obstacles.take(near), self._free_m[near]
 
     def _push_apart(self, positions_m: np.ndarray) -> np.ndarray:
         """Move robots that touch each other apart, all at once and each half of the way; return their rows."""
@@ -113,27 +115,23 @@ class Contacts:
         self._list_neighbors(positions_m)
         if not len(self._beside):
             return self._beside
-        depth_m = self._measure_depths(positions_m, self._beside, self._obstacles)[0]
-        touching = np.nonzero(depth_m > _TOUCH_M)[0]
+        touching = np.nonzero(self._measure_depths(positions_m, slice(None))[0] > _TOUCH_M)[0]
         if not len(touching):
             return touching
-        rows, obstacles = self._beside[touching], self._obstacles[touching]
+        rows = self._beside[touching]
         turns = np.arange(len(rows)) - np.searchsorted(rows, rows)
         for turn in range(turns.max() + 1):
-            now = np.nonzero(turns == turn)[0]
-            depth_m, away_x, away_y = self._measure_depths(positions_m, rows[now], obstacles[now])
+            now = touching[turns == turn]
+            depth_m, away_x, away_y = self._measure_depths(positions_m, now)
             push_m = np.maximum(depth_m, 0.0)
-            positions_m[0, rows[now]] += away_x * push_m
-            positions_m[1, rows[now]] += away_y * push_m
+            positions_m[0, self._beside[now]] += away_x * push_m
+            positions_m[1, self._beside[now]] += away_y * push_m
             self._reach_m -= float(push_m.max())
         return rows
 
-    def _measure_depths(
-        self, positions_m: np.ndarray, rows: np.ndarray, obstacles: np.ndarray
-    ) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return how deep (m) each of rows is in its obstacle, and the direction out of it (x, y)."""
-        x_m, y_m = positions_m[0, rows], positions_m[1, rows]
-        near_x_m, near_y_m = find_nearest_points(x_m, y_m, self._obstacles_m[obstacles])
-        away_x_m, away_y_m = x_m - near_x_m, y_m - near_y_m
+    def _measure_depths(self, positions_m: np.ndarray, which: Any) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return how deep (m) robots are in obstacles near them, and the direction out (x, y); which: of the list."""
+        rows = self._beside[which]
+        away_x_m, away_y_m = self._near.take(which).point_away(positions_m[0, rows], positions_m[1, rows])
         distance_m = np.maximum(np.sqrt(away_x_m * away_x_m + away_y_m * away_y_m), 1e-9)
-        return self._free_m[obstacles] - distance_m, away_x_m / distance_m, away_y_m / distance_m
+        return self._near_free_m[which] - distance_m, away_x_m / distance_m, away_y_m / distance_m

@@ -5,12 +5,10 @@ model: measurements published by the robot's authors (signal of a TCRT5000 again
 """
 
 import math
-from typing import NamedTuple, Sequence, Tuple
-
 import numpy as np
 
 from ..robot_constants import BODY_RADIUS_M
-from .arena import Arena
+from .arena import Segments
 from .kinematics import find_heading
 
 BEAMS = 8
@@ -34,106 +32,101 @@ SATURATION_COUNTS = 950.0
 NOISE_COUNTS = 1.3
 """Standard deviation of one reading (published: 1 to 1.6 counts)."""
 
+REACH_M = 0.65
+"""Farther than this from a robot's center nothing is looked for: it adds less than the noise of one reading."""
+
 # The diode sees a cone, whose rim is modelled by two more rays of less weight. Half angle and weight are assumptions.
 _CONE_RAD = np.array([0.0, -0.21, 0.21])
 _CONE_WEIGHT = np.array([1.0, 0.7, 0.7])
-_RAYS = np.array(find_heading((BEAM_ANGLES_RAD[:, None] + _CONE_RAD).ravel()))
-"""Directions of all rays in the body frame, x and y (2, A)."""
+_RAYS_X, _RAYS_Y = find_heading((BEAM_ANGLES_RAD[:, None] + _CONE_RAD).ravel())
+"""Directions of all rays in the body frame (A,)."""
 
 _FAR_M = 1e6
 
 
-class Hits(NamedTuple):
-    """Where rays meet things: one entry for each thing that a ray meets; all arrays (H,).
+class Rays:
+    """The rays of some robots, A of each, in the world, and what they have met so far.
 
     Attributes:
-        rays: number of the ray, counted over robots and directions.
-        distance_m: from the robot's center.
-        cosine: of the angle of incidence.
+        x, y: directions (K, A).
+        distance_m: of the first thing on each ray from the robot's center (K, A); 1e6 if there is none.
+        cosine: of the angle of incidence on it (K, A).
     """
 
-    rays: np.ndarray
-    distance_m: np.ndarray
-    cosine: np.ndarray
+    def __init__(self, x: np.ndarray, y: np.ndarray) -> None:
+        """Begin with rays that have met nothing."""
+        self.x, self.y = x, y
+        self.distance_m, self.cosine = np.full(x.shape, _FAR_M), np.zeros(x.shape)
 
+    def meet_walls(self, x_m: np.ndarray, y_m: np.ndarray, walls: Segments) -> None:
+        """Let rays from x_m and y_m (K, 1), which have met nothing yet, end at walls."""
+        start_x, start_y = walls.start_x_m - x_m, walls.start_y_m - y_m
+        area_m2 = start_x * walls.along_y_m - start_y * walls.along_x_m
+        robots, seen = (area_m2 * area_m2 < (REACH_M * REACH_M) * walls.length_m2).nonzero()
+        if not len(robots):
+            return
+        ray_x, ray_y = self.x[robots], self.y[robots]
+        start_x, start_y, area_m2 = start_x[robots, seen, None], start_y[robots, seen, None], area_m2[robots, seen, None]
+        _, _, along_x, along_y, length_m2 = (array[:, None] for array in walls.take(seen))
+        cross = ray_x * along_y - ray_y * along_x
+        with np.errstate(divide="ignore", invalid="ignore"):  # parallel
+            share = (start_x * ray_y - start_y * ray_x) / cross
+            distance_m = area_m2 / cross
+            distance_m[~((distance_m >= 0.0) & (share >= 0.0) & (share <= 1.0))] = _FAR_M
+        # The walls that one robot sees follow each other.
+        first = np.concatenate(([True], robots[1:] != robots[:-1])).nonzero()[0]
+        self.distance_m[robots[first]] = np.minimum.reduceat(distance_m, first)
+        cosine = np.where(distance_m == self.distance_m[robots], np.abs(cross) / np.sqrt(length_m2), 0.0)
+        self.cosine[robots[first]] = np.maximum.reduceat(cosine, first)
 
-def hit_segments(origins_m: np.ndarray, ray_x: np.ndarray, ray_y: np.ndarray, segments_m: np.ndarray) -> Hits:
-    """Return what rays from origins_m (R, 2) in directions ray_x, ray_y (R, A) meet of walls (S, 4), x1 y1 x2 y2."""
-    start_x = (segments_m[:, 0] - origins_m[:, 0, None])[..., None]
-    start_y = (segments_m[:, 1] - origins_m[:, 1, None])[..., None]
-    along_x = (segments_m[:, 2] - segments_m[:, 0])[:, None]
-    along_y = (segments_m[:, 3] - segments_m[:, 1])[:, None]
-    ray_x, ray_y = ray_x[:, None], ray_y[:, None]
-    cross = ray_x * along_y - ray_y * along_x
-    parallel = np.abs(cross) < 1e-12
-    cross[parallel] = 1.0
-    share = (start_x * ray_y - start_y * ray_x) / cross
-    distance_m = (start_x * along_y - start_y * along_x) / cross
-    hit = (distance_m >= 0.0) & (share >= 0.0) & (share <= 1.0) & ~parallel
-    robots, segments, rays = np.nonzero(hit)
-    length_m = np.sqrt(along_x * along_x + along_y * along_y)[segments, 0]
-    return Hits(robots * ray_x.shape[2] + rays, distance_m[hit], np.abs(cross[hit]) / np.maximum(length_m, 1e-12))
+    def meet_circles(self, to_x_m: np.ndarray, to_y_m: np.ndarray, radii_m: np.ndarray) -> None:
+        """Let rays end at circles (C,) whose centers are to_x_m and to_y_m (K, C) from the robots'.
 
-
-def hit_circles(
-    to_x_m: np.ndarray, to_y_m: np.ndarray, radii_m: np.ndarray, ray_x: np.ndarray, ray_y: np.ndarray
-) -> Hits:
-    """Return what rays in directions ray_x, ray_y (R, A) meet of circles (C,) with centers at to_x_m, to_y_m (R, C).
-
-    A circle around the origin itself, the robot's own body, is not seen.
-    """
-    across_m = ray_x[:, None] * to_y_m[..., None] - ray_y[:, None] * to_x_m[..., None]
-    robots, circles, rays = np.nonzero(across_m * across_m < (radii_m * radii_m)[:, None])
-    along_m = ray_x[robots, rays] * to_x_m[robots, circles] + ray_y[robots, rays] * to_y_m[robots, circles]
-    ahead = along_m > 0.0
-    robots, circles, rays = robots[ahead], circles[ahead], rays[ahead]
-    across_m, radius_m = across_m[robots, circles, rays], radii_m[circles]
-    depth_m = np.sqrt(radius_m * radius_m - across_m * across_m)
-    distance_m = np.maximum(along_m[ahead] - depth_m, 0.0)
-    return Hits(robots * ray_x.shape[1] + rays, distance_m, depth_m / radius_m)
-
-
-def find_nearest(hits: Sequence[Hits], rays: int) -> Tuple[np.ndarray, np.ndarray]:
-    """Return distance (m) and cosine of incidence of the first thing on each of so many rays, both (rays,).
-
-    Rays that meet nothing: 1e6 m, 0.
-    """
-    distance_m, cosine = np.full(rays, _FAR_M), np.zeros(rays)
-    for hit in hits:
-        np.minimum.at(distance_m, hit.rays, hit.distance_m)
-    for hit in hits:
-        first = hit.distance_m == distance_m[hit.rays]
-        cosine[hit.rays[first]] = hit.cosine[first]
-    return distance_m, cosine
+        A circle around the robot's own center, its body, is not seen.
+        """
+        center_m2, reach_m = to_x_m * to_x_m + to_y_m * to_y_m, REACH_M + radii_m
+        robots, circles = ((center_m2 < reach_m * reach_m) & (center_m2 > 0.0)).nonzero()
+        if not len(robots):
+            return
+        x, y, radius_m = self.x[robots], self.y[robots], radii_m[circles]
+        to_x_m, to_y_m = to_x_m[robots, circles], to_y_m[robots, circles]
+        across_m = x * to_y_m[:, None] - y * to_x_m[:, None]
+        pairs, rays = (across_m * across_m < (radius_m * radius_m)[:, None]).nonzero()
+        along_m = x[pairs, rays] * to_x_m[pairs] + y[pairs, rays] * to_y_m[pairs]
+        front = along_m > 0.0
+        pairs, rays, along_m = pairs[front], rays[front], along_m[front]
+        across_m, radius_m, robots = across_m[pairs, rays], radius_m[pairs], robots[pairs]
+        depth_m = np.sqrt(radius_m * radius_m - across_m * across_m)
+        distance_m = np.maximum(along_m - depth_m, 0.0)
+        np.minimum.at(self.distance_m, (robots, rays), distance_m)
+        nearest = distance_m == self.distance_m[robots, rays]
+        self.cosine[robots[nearest], rays[nearest]] = (depth_m / radius_m)[nearest]
 
 
 def measure_signals(
     places_m: np.ndarray,
     headings: np.ndarray,
     bodies_m: np.ndarray,
-    arena: Arena,
+    walls: Segments,
+    circles_m: np.ndarray,
     alpha_counts_m2: np.ndarray,
     beta_counts: np.ndarray,
 ) -> np.ndarray:
-    """Return the noiseless signal (counts) of the eight sensors of each robot, shape (R, 8).
+    """Return the noiseless signal (counts) of the eight sensors of each robot, shape (K, 8).
 
-    places_m (R, 2) and headings (R, 2), cosine and sine, of the robots that look; bodies_m (R, N, 2) the places of
-    the robots that each could see, itself among them; alpha_counts_m2 (R, 8) of each sensor, beta_counts (R, 1) of
-    each robot.
+    places_m (K, 2) and headings (K, 2), cosine and sine, of the robots that look; bodies_m (K, N, 2) the places of
+    the robots that each could see, itself among them; circles_m (C, 3), x y radius; alpha_counts_m2 (K, 8) of each
+    sensor, beta_counts (K, 1) of each robot.
     """
     cosine, sine = headings[:, :1], headings[:, 1:]
-    ray_x, ray_y = cosine * _RAYS[0] - sine * _RAYS[1], sine * _RAYS[0] + cosine * _RAYS[1]
-    circles = arena.circles_m
-    to_x_m = np.concatenate((bodies_m[..., 0] - places_m[:, :1], circles[:, 0] - places_m[:, :1]), axis=1)
-    to_y_m = np.concatenate((bodies_m[..., 1] - places_m[:, 1:], circles[:, 1] - places_m[:, 1:]), axis=1)
-    radii_m = np.concatenate((np.full(bodies_m.shape[1], BODY_RADIUS_M), circles[:, 2]))
-    hits = [
-        hit_segments(places_m, ray_x, ray_y, arena.segments_m),
-        hit_circles(to_x_m, to_y_m, radii_m, ray_x, ray_y),
-    ]
-    distance_m, incidence = find_nearest(hits, ray_x.size)
-    distance_m = np.maximum(distance_m - BODY_RADIUS_M, 1e-3)
-    bright = incidence / (distance_m * distance_m)
+    rays = Rays(cosine * _RAYS_X - sine * _RAYS_Y, sine * _RAYS_X + cosine * _RAYS_Y)
+    x_m, y_m = places_m[:, :1], places_m[:, 1:]
+    rays.meet_walls(x_m, y_m, walls)
+    rays.meet_circles(bodies_m[..., 0] - x_m, bodies_m[..., 1] - y_m, np.full(bodies_m.shape[1], BODY_RADIUS_M))
+    if len(circles_m):
+        rays.meet_circles(circles_m[:, 0] - x_m, circles_m[:, 1] - y_m, circles_m[:, 2])
+    distance_m = np.maximum(rays.distance_m - BODY_RADIUS_M, 1e-3)
+    bright = rays.cosine / (distance_m * distance_m)
     bright = (bright.reshape(len(places_m), BEAMS, len(_CONE_RAD)) * _CONE_WEIGHT).max(axis=-1)
     return np.minimum(alpha_counts_m2 * bright + _offset(bright, beta_counts), SATURATION_COUNTS)
 
@@ -141,6 +134,6 @@ def measure_signals(
 def _offset(bright: np.ndarray, beta_counts: np.ndarray) -> np.ndarray:
     """Return the signal's part besides alpha * bright (counts); bright is cosine / distance^2."""
     distance_m = 1.0 / np.sqrt(np.maximum(bright, 1e-12))
-    share = np.clip((distance_m - FIT_END_M) / (TABLE_END_M - FIT_END_M), 0.0, 1.0)
+    share = np.minimum(np.maximum((distance_m - FIT_END_M) / (TABLE_END_M - FIT_END_M), 0.0), 1.0)
     beyond = np.minimum(bright * (TABLE_END_M * TABLE_END_M), 1.0) * TABLE_END_EXCESS_COUNTS
     return beta_counts + share * (beyond - beta_counts)

@@ -11,11 +11,11 @@ from typing import List, Optional, Sequence, Union
 
 import numpy as np
 
-from . import range_sensors
-from .arena import Arena
+from .arena import Arena, Segments
 from .contacts import Contacts
 from .kinematics import find_heading, join_wheels, move_along_arc
 from .noise import draw_normal
+from .range_sensors import BEAMS, NOISE_COUNTS, measure_signals
 from .robot_errors import MAX_WHEEL_M_S, SERVO_GAIN_M_S_US, RobotErrors
 
 __all__ = ["STEP_MS", "World"]
@@ -27,6 +27,9 @@ _STEP_S = STEP_MS / 1000.0
 
 _BLOCK_STEPS = 32
 """Steps for which random numbers are drawn at once."""
+
+_SCAN_ROWS = 200
+"""Robots whose sensors are computed at once: what they see fits the processor's cache."""
 
 _REST_M_S = 1e-6
 
@@ -54,6 +57,7 @@ class World:
         rows = len(poses)
         self.arena = arena
         self.worlds = len(rngs)
+        self._robots = rows // self.worlds  # of each
         self.time_ms = 0
         self.errors = errors
         self._rngs = rngs
@@ -71,6 +75,7 @@ class World:
         # The share of the difference to its command by which a servo's speed changes in one step.
         self._servo_shares = -np.expm1(-_STEP_S / errors.servo_lag_s.T).astype(np.float32).astype(float)
         self._block_step = _BLOCK_STEPS
+        self._walls = Segments.from_ends(arena.segments_m)
         self._contacts = Contacts(arena, self.worlds, rows)
 
     @property
@@ -110,10 +115,8 @@ class World:
 
     def _begin_block(self) -> None:
         """Draw what chance does in the next steps, and end the motion of wheels that hardly move."""
-        robots = len(self.poses) // self.worlds
-        noise = np.empty((_BLOCK_STEPS, 4, len(self.poses)))
-        for world, rng in enumerate(self._rngs):
-            noise[..., world * robots : (world + 1) * robots] = draw_normal(rng, (_BLOCK_STEPS, 4, robots))
+        drawn = [draw_normal(rng, (_BLOCK_STEPS, 4, self._robots)) for rng in self._rngs]
+        noise = np.concatenate(drawn, axis=2)
         self._ripples_m_s = noise[:, :2] * self.errors.ripple_m_s.T
         # Way of a wheel's body over the ground for each m/s.
         self._ground_s = (1.0 - np.abs(noise[:, 2:]) * self.errors.slip.T) * (self.errors.wheel_scale.T * _STEP_S)
@@ -141,21 +144,26 @@ class World:
     def read_infrared(self, which: np.ndarray) -> np.ndarray:
         """Return one noisy reading (whole counts, 0..1023) of the eight sensors of the robots which, (K, 8).
 
-        which (K,): rows in ascending order.
+        which (K,): rows in ascending order, at least one.
         """
-        robots = len(self.poses) // self.worlds
-        worlds = which // robots
-        signals = range_sensors.measure_signals(
-            self.poses[which, :2],
+        parts = [which[start : start + _SCAN_ROWS] for start in range(0, len(which), _SCAN_ROWS)]
+        signals = np.concatenate([self._measure_signals(part) for part in parts])
+        # Each world draws for its own robots.
+        counts = np.bincount(which // self._robots, minlength=self.worlds)
+        drawing = counts.nonzero()[0].tolist()
+        noise = np.concatenate([draw_normal(self._rngs[world], (counts[world], BEAMS)) for world in drawing])
+        counts_read = np.rint(signals + noise * NOISE_COUNTS)
+        # Adding zero turns -0.0 into 0.0, whose inverse is the right infinity.
+        return np.minimum(np.maximum(counts_read, 0.0), 1023.0) + 0.0
+
+    def _measure_signals(self, which: np.ndarray) -> np.ndarray:
+        places_m = self.poses[:, :2]
+        return measure_signals(
+            places_m[which],
             self._headings.T[which],
-            self.poses[:, :2].reshape(self.worlds, robots, 2)[worlds],
-            self.arena,
+            places_m.reshape(self.worlds, self._robots, 2)[which // self._robots],
+            self._walls,
+            self.arena.circles_m,
             self.errors.alpha_counts_m2[which],
             self.errors.beta_counts[which],
         )
-        # Each world draws for its own robots.
-        counts = np.bincount(worlds, minlength=self.worlds)
-        shapes = [(world, (counts[world], range_sensors.BEAMS)) for world in np.nonzero(counts)[0]]
-        noise = np.concatenate([draw_normal(self._rngs[world], shape) for world, shape in shapes])
-        # Adding zero turns -0.0 into 0.0, whose inverse is the right infinity.
-        return np.clip(np.rint(signals + noise * range_sensors.NOISE_COUNTS), 0, 1023) + 0.0
