@@ -3,8 +3,10 @@
 import hashlib
 
 import numpy as np
+import pytest
 
 from hero_sim.robot_constants import BODY_RADIUS_M
+from hero_sim.world import contacts
 from hero_sim.world.arena import place_robots
 from hero_sim.world.arena_file import load_arena
 from hero_sim.world.robot_errors import RobotErrors, draw_errors
@@ -15,7 +17,7 @@ STEPS = 6000
 COMMAND_STEPS = 40
 SCAN_STEPS = 20
 
-HASH = "d37811611dfe6d46"
+HASH = "4775311e7ae0f7d7887e5a9b6b26e3b88cf20e5c3b58352f7dfd931648bdee59"
 """Of seed 7, with numpy 1.17 to 2.2 and with and without AVX2, AVX-512 and FMA."""
 
 
@@ -27,13 +29,13 @@ def build_world(seeds):
     return World(arena, np.concatenate(poses), rngs, RobotErrors(*map(np.concatenate, zip(*errors))))
 
 
-def drive(*seeds):
-    """Drive each seed's robots for 60 s, all in one batch; return the hashes of their logs and how often they met."""
+def drive(*seeds, steps=STEPS):
+    """Drive each seed's robots for 60 s (or steps), all in one batch; return the hashes of their logs and how often they met."""
     world = build_world(seeds)
     everybody = np.arange(len(world.poses))
     rngs = [np.random.RandomState(seed) for seed in seeds]
     hashes, meetings = [hashlib.sha256() for _ in seeds], 0
-    for step in range(STEPS):
+    for step in range(steps):
         if step % COMMAND_STEPS == 0:
             # At random, and every fifth stops.
             world.write_pulses(everybody, np.concatenate([rng.randint(1250, 1751, (ROBOTS, 2)) for rng in rngs]))
@@ -63,6 +65,14 @@ def test_a_world_gives_the_same_bytes_on_every_machine():
 
 def test_a_world_in_a_batch_gives_the_same_bytes_as_alone():
     seeds = (3, 7, 5)
-    together, _ = drive(*seeds)
-    assert together == [drive(seed)[0][0] for seed in seeds]
+    together, _ = drive(*seeds, steps=3000)
+    assert together == [drive(seed, steps=3000)[0][0] for seed in seeds]
     assert len(set(together)) == len(seeds)
+
+
+@pytest.mark.parametrize("margin_m", [0.0, 0.2])
+def test_it_changes_nothing_how_seldom_neighbors_are_looked_up(monkeypatch, margin_m):
+    usual, meetings = drive(7, steps=2000)
+    monkeypatch.setattr(contacts, "_MARGIN_M", margin_m)
+    assert drive(7, steps=2000) == (usual, meetings)
+    assert meetings > 30

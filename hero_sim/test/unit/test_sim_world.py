@@ -11,7 +11,7 @@ from hero_sim.world.arena import build_default, build_rectangle, place_robots
 from hero_sim.world.arena_file import SHIPPED, load_arena
 from hero_sim.world.body import Body
 from hero_sim.world.kinematics import split_to_wheels
-from hero_sim.world.robot_errors import SERVO_LAG_S, draw_errors
+from hero_sim.world.robot_errors import MAX_WHEEL_M_S, SERVO_LAG_S, draw_errors
 
 
 def build_world(robots=1, arena=None, errors=0.0, poses=None, seed=0):
@@ -144,3 +144,15 @@ def test_reading_wheels_within_a_step_meets_the_end_of_the_step():
     foreseen_m = Body(world, 0).read_wheels(world.time_ms + worlds.STEP_MS)
     world.step()
     assert Body(world, 0).travels_m == pytest.approx(foreseen_m)
+
+
+def test_pulses_written_to_all_robots_at_once_give_what_each_would_get_alone():
+    together, alone = build_world(9, errors=1.0), build_world(9, errors=1.0)
+    pulses_us = np.random.RandomState(0).randint(1000, 2001, (9, 2))
+    together.write_pulses(np.arange(9), pulses_us)
+    for row in range(9):
+        Body(alone, row).write_pulses(*pulses_us[row].tolist())
+    assert together.commands_m_s.tolist() == alone.commands_m_s.tolist()
+    together.release(np.array([2, 5]))
+    assert np.nonzero((together.commands_m_s == 0.0).all(axis=1))[0].tolist() == [2, 5]
+    assert np.abs(together.commands_m_s).max() == MAX_WHEEL_M_S
