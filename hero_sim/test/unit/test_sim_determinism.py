@@ -30,7 +30,7 @@ def build_world(seeds):
 
 
 def drive(*seeds, steps=STEPS):
-    """Drive each seed's robots for 60 s (or steps), all in one batch; return the hashes of their logs and how often they met."""
+    """Drive each seed's robots, all in one batch; return the hashes of their logs and how often they met."""
     world = build_world(seeds)
     everybody = np.arange(len(world.poses))
     rngs = [np.random.RandomState(seed) for seed in seeds]
@@ -75,4 +75,4 @@ def test_it_changes_nothing_how_seldom_neighbors_are_looked_up(monkeypatch, marg
     usual, meetings = drive(7, steps=2000)
     monkeypatch.setattr(contacts, "_MARGIN_M", margin_m)
     assert drive(7, steps=2000) == (usual, meetings)
-    assert meetings > 30
+    assert meetings > 10

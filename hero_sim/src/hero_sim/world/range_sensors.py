@@ -5,6 +5,7 @@ model: measurements published by the robot's authors (signal of a TCRT5000 again
 """
 
 import math
+
 import numpy as np
 
 from ..robot_constants import BODY_RADIUS_M
@@ -66,7 +67,7 @@ class Rays:
         if not len(robots):
             return
         ray_x, ray_y = self.x[robots], self.y[robots]
-        start_x, start_y, area_m2 = start_x[robots, seen, None], start_y[robots, seen, None], area_m2[robots, seen, None]
+        start_x, start_y, area_m2 = (array[robots, seen, None] for array in (start_x, start_y, area_m2))
         _, _, along_x, along_y, length_m2 = (array[:, None] for array in walls.take(seen))
         cross = ray_x * along_y - ray_y * along_x
         with np.errstate(divide="ignore", invalid="ignore"):  # parallel
