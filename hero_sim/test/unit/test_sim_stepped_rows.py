@@ -21,9 +21,11 @@ from hero_sim.robot import declarations as ids
 from hero_sim.robot.commands import CommandTable
 from hero_sim.robot.firmware import Firmware
 from hero_sim.robot.flash import Flash
+from hero_sim.robot.messages import LaserMessages
 from hero_sim.robot.motor_control import MotorControl
-from hero_sim.robot.ranges import calibrate
+from hero_sim.robot.ranges import calibrate, convert_to_ranges
 from hero_sim.robot.sensing import Sensing
+from hero_sim.stepped.proximity import correct_ranges, measure_ranges
 from hero_sim.stepped.robot_rows import RobotRows
 from hero_sim.world.body import Body
 from hero_sim.world.world import STEP_MS
@@ -40,6 +42,12 @@ SHAPED_TYPES = {
 
 def encode_twist(linear_m_s, angular_rad_s):
     return struct.pack("<6d", linear_m_s, 0, 0, 0, 0, angular_rad_s)
+
+
+def read_proximity(laser_payload):
+    """Return the ranges of a laser message as the driver corrects them and hero_client's Robot.proximity shows them."""
+    ranges_m = np.array(struct.unpack_from("<8f", make_proximity(laser_payload, 0, 0, 0.2), -68))
+    return np.roll(np.where(ranges_m == -np.inf, 0.0, ranges_m), -4)
 
 
 class ScalarRobot:
@@ -92,9 +100,7 @@ class ScalarRobot:
             if packet.topic_id == ids.ID_LASER:
                 header = len(packet.payload) - struct.calcsize("<7fI16fI16f")
                 self.counts = struct.unpack_from("<16f", packet.payload, header + 28 + 4 + 64 + 4)[::2]
-                scan = make_proximity(packet.payload, 0, 0, 0.2)
-                ranges_m = np.array(struct.unpack_from("<8f", scan, header + 28 + 4))
-                self.proximity = np.roll(np.where(ranges_m == -np.inf, 0.0, ranges_m), -4)
+                self.proximity = read_proximity(packet.payload)
             elif packet.topic_id == ids.ID_ENCODER:
                 self.ticks = struct.unpack_from("<2d", packet.payload, len(packet.payload) - 88)
                 self.odometry.integrate(*self.ticks, now_ms / 1000.0)
@@ -137,7 +143,6 @@ class ScalarRobots:
             for robot in self.robots:
                 robot.run_cycle(now_ms)
             self._control_ms += control
-            self._read_ms += control and now_ms == self._read_ms
         else:
             self._control_ms += 21 * control
             for robot in self.robots:
@@ -214,6 +219,19 @@ def test_robot_rows_do_what_the_scalar_robots_and_the_driver_do(seed):
         for _ in range(rng.randint(4)):
             act_at_random(rng, rows, scalar)
         rows.advance(rows.now_ms + int(rng.randint(1, 300)))
+
+
+def test_ranges_of_all_counts_are_those_of_the_driver():
+    messages = LaserMessages("hero_0")
+    for constant in (np.nan, 0.5, 0.423, 0.05):
+        counts = np.arange(1024.0).reshape(-1, 8)
+        ranges_m = measure_ranges(counts, np.full(8, constant))
+        reader, seen = packets.PacketReader(), []
+        for row in convert_to_ranges(counts, np.full(8, constant)).tolist():
+            (packet,) = reader.receive_bytes(messages.encode(0, (0, 0), row, [0.0] * 8))
+            seen.append(read_proximity(packet.payload))
+        np.testing.assert_array_equal(correct_ranges(ranges_m), seen)
+    assert {0.0, np.inf} < set(np.ravel(seen))
 
 
 class WholeFirmware:

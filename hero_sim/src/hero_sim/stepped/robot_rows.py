@@ -186,10 +186,8 @@ class RobotRows:
                 self._receive_readings(now_ms)
             if now_ms >= self._cycle_ms:
                 self._run_cycle(now_ms)
-                # Sending a cycle takes about a millisecond; controllers that are due, and then reads, wait for it.
-                if self._control_ms <= now_ms:
-                    self._control_ms = now_ms + 1
-                    self._read_ms = max(self._read_ms, now_ms + 1)
+                # Sending a cycle takes about a millisecond; controllers that are due wait for it.
+                self._control_ms = max(self._control_ms, now_ms + 1)
                 servos.check_ms = max(servos.check_ms, now_ms + 1)
             else:
                 if now_ms >= self._control_ms:
