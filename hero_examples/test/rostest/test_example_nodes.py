@@ -95,7 +95,7 @@ class ExampleNodesTest(unittest.TestCase):
         self.assertEqual(1, program.wait_end(), program.text())
         # On a busy machine the second is over before its odometry has come.
         self.assertRegex(program.text(), r"hero_4 (did not reach \(50, 0\): not there|is not ready) after 1 s[,:] .+")
-        self.wait_until_stopped(4)
+        self.watch.wait_until_stopped(4)
 
     def test_walkers_walk_until_ctrl_c_and_their_lights_go_out(self):
         wait_for(lambda: min(self.distance_m(5), self.distance_m(6)) > 0.1, "walkers on their way")

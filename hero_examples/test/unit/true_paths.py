@@ -1,6 +1,6 @@
 """Where simulated robots truly were: gaps, touches, cells visited.
 
-A path is an array (T, N, 3) of one world: rows 34 ms apart, robots, and x m, y m, yaw rad.
+A path is an array (T, N, 3) of one world: rows 50 ms apart, robots, and x m, y m, yaw rad.
 """
 
 import numpy as np
@@ -17,8 +17,8 @@ SEEN_RAD = np.radians(60.0)
 REST = 0.001
 """A robot that moves less, in m and rad, within 0.5 s is at rest; the speed of a servo that stops fades out."""
 
-CREEP_M = 0.0003
-"""Of one row, 34 ms: a slower robot (0.01 m/s) does not run into anything; things run into it."""
+CREEP_M = 0.0005
+"""Of one row, 50 ms: a slower robot (0.01 m/s) does not run into anything; things run into it."""
 
 
 def run(swarm, step, duration_s, hz=10.0):

@@ -20,6 +20,7 @@ from hero_test.processes import find_free_port
 PACKAGE = Path(__file__).resolve().parents[2]
 ROOT = PACKAGE.parent
 PAGES = {
+    "in_process": [ROOT / "docs" / "in_process.md"],
     "first_hour": [ROOT / "README.md", ROOT / "docs" / "quick_start.md"],
     "hero": sorted((ROOT / "docs" / "tutorial" / "hero").glob("[0-9]*.md")),
     "ros_basics": sorted((ROOT / "docs" / "tutorial" / "ros_basics").glob("[0-9]*.md")),
