@@ -1,7 +1,8 @@
-"""What the simulator costs: CPU at real time behind real sockets, and the real-time factor it could reach.
+"""What the simulator costs: behind real sockets at real time, stepped by a program, and its physics alone.
 
-A small server in this process takes the driver's place: it requests topics, answers the time, and drives every robot
-in a circle ten times a second. Only the simulator's process is counted. Run it with script/bench sim.
+Behind sockets a small server in this process takes the driver's place: it requests topics, answers the time, and drives
+every robot in a circle ten times a second. Only the simulator's process is counted. The other figures are seconds of
+simulated time in a second of CPU time, so what else runs on the machine matters little. Run it with script/bench sim.
 """
 
 import argparse
@@ -12,16 +13,27 @@ import sys
 import time
 from typing import List, NamedTuple
 
+import numpy as np
 from measuring import measure_machine_us, print_machine, read_cpu_s, start, stop
 
 from hero_driver.rosserial import packets, payloads
 from hero_sim.build import build_swarm
 from hero_sim.main import build_parser
+from hero_sim.population import build_world
 from hero_sim.robot import declarations
+from hero_sim.stepped.swarm import StepSwarm
+from hero_sim.world.kinematics import split_to_wheels
+from hero_sim.world.world import STEP_MS
 
 _STOCK_ODOM_HZ = 29.27
-_TWIST = packets.encode_packet(declarations.ID_VELOCITY_CMD_VEL, struct.pack("<6d", 0.08, 0, 0, 0, 0, 0.6))
+_SPEEDS = (0.08, 0.6)
+_TWIST = packets.encode_packet(declarations.ID_VELOCITY_CMD_VEL, struct.pack("<6d", _SPEEDS[0], 0, 0, 0, 0, _SPEEDS[1]))
 _SETTLE_S = 4.0
+
+_SCAN_STEPS = 20
+"""Physics steps from one infrared reading to the next."""
+
+_PARTS = ("sockets", "steps", "physics")
 
 
 class Measurement(NamedTuple):
@@ -153,22 +165,60 @@ def measure_fastest(robots: int, simulated_ms: int = 5000) -> float:
     return simulated_ms / 1000.0 / (time.process_time() - start_s)
 
 
+def measure_steps(robots: int, simulated_s: float = 20.0) -> float:
+    """Return how many seconds a program that reads and commands each robot at 10 Hz simulates in a second of CPU."""
+    with StepSwarm(count=robots) as swarm:
+        swarm.sleep(1.0)  # until all have odometry and ranges
+        start_s = time.process_time()
+        for time_s in swarm.rate(10):
+            for robot in swarm:
+                _, ranges_m = robot.pose, robot.proximity
+                robot.drive(_SPEEDS[0], _SPEEDS[1] if min(ranges_m) > 0.1 else -_SPEEDS[1])
+            if time_s >= simulated_s:
+                break
+        return simulated_s / (time.process_time() - start_s)
+
+
+def measure_physics(robots: int, worlds: int, simulated_s: float = 10.0) -> float:
+    """Return how many seconds of worlds with so many driven robots each are simulated in a second of CPU."""
+    world = build_world(build_parser().parse_args(["--count", str(robots)]), worlds)
+    world.commands_m_s[:] = split_to_wheels(*_SPEEDS)
+    everybody = np.arange(robots * worlds)
+    start_s = time.process_time()
+    for step in range(round(simulated_s * 1000 / STEP_MS)):
+        world.step()
+        if step % _SCAN_STEPS == 0:
+            world.read_infrared(everybody)
+    return simulated_s / (time.process_time() - start_s)
+
+
 def main() -> None:
-    """Print the table."""
+    """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--count", type=int, nargs="+", default=[1, 10, 50, 100])
-    parser.add_argument("--seconds", type=float, default=10.0, help="measured time of each row")
+    parser.add_argument("--count", type=int, nargs="+", default=[1, 20, 50, 100])
+    parser.add_argument("--seconds", type=float, default=10.0, help="measured time of each row behind sockets")
+    parser.add_argument("--only", choices=_PARTS, nargs="+", default=_PARTS, help="parts to measure")
     options = parser.parse_args()
     print_machine(measure_machine_us())
-    print("| robots | CPU of one core | odoms of the stock rate | simulated s per s of CPU, no sockets |")
-    print("|---|---|---|---|")
-    for robots in options.count:
-        row = measure(robots, options.seconds)
-        print(
-            "| %d | %.1f %% | %.1f %% | %.1f |"
-            % (row.robots, row.cpu_percent, 100.0 * row.odom_share, row.fastest),
-            flush=True,
-        )
+    if "sockets" in options.only:
+        print("| behind sockets | CPU of one core | odoms of the stock rate | simulated s per s of CPU, no sockets |")
+        print("|---|---|---|---|")
+        for robots in options.count:
+            row = measure(robots, options.seconds)
+            print(
+                "| %d | %.1f %% | %.1f %% | %.1f |"
+                % (row.robots, row.cpu_percent, 100.0 * row.odom_share, row.fastest),
+                flush=True,
+            )
+    if "steps" in options.only:
+        print("\n| stepped, each robot read and commanded at 10 Hz | simulated s per s of CPU |\n|---|---|")
+        for robots in options.count:
+            print("| %d | %.0f |" % (robots, measure_steps(robots)), flush=True)
+    if "physics" in options.only:
+        print("\n| physics alone, worlds x robots | simulated s per s of CPU | robot-seconds |\n|---|---|---|")
+        for worlds, robots in [*((1, robots) for robots in options.count), (50, 20)]:
+            fastest = max(measure_physics(robots, worlds) for _ in range(3))
+            print("| %d x %d | %.0f | %.0f |" % (worlds, robots, fastest, fastest * worlds * robots), flush=True)
 
 
 if __name__ == "__main__":
