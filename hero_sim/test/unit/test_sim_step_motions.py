@@ -292,6 +292,14 @@ def test_motions_of_a_robot_that_fell_silent_end_and_no_new_one_begins():
     assert is_at_rest(swarm)
 
 
+def test_speeds_beyond_the_robot_are_cut_before_they_are_sent(monkeypatch):
+    swarm = StepSwarm(1)
+    sent = note_commands(swarm, monkeypatch)
+    swarm[0].drive(9.0, -99.0)
+    swarm[0].drive(-0.3, 1.0)
+    assert [velocity for _, _, *velocity in sent] == [[0.2, -8.0], [-0.2, 1.0]]
+
+
 def test_speeds_and_distances_that_mean_nothing_are_refused():
     robot = StepSwarm(1)[0]
     for speed in (0.0, -1.0, math.nan, math.inf):
