@@ -99,6 +99,10 @@ def test_goals_may_be_in_odometry_relative_or_in_the_world():
     assert all(travel_m(robot, pose) < 0.02 for robot, pose in zip(swarm, before))
     for robot in swarm:
         assert math.dist(robot.pose_in("/world")[:2], robot.true_pose[:2]) < 0.01
+    there = [robot.true_pose for robot in swarm]
+    swarm.go_to(0.08, 0.06, yaw_rad=1.0, frame="robot")
+    for robot, pose in zip(swarm, there):
+        assert find_motion(pose, robot.true_pose) == pytest.approx((0.08, 0.06, 1.0), abs=0.03)
     swarm.robots[0].go_to(1.0, 2.0)  # of its odometry: where it was before the last goal
     assert travel_m(swarm.robots[0], before[0]) == pytest.approx(0.1, abs=0.02)
     with pytest.raises(FrameError, match="no transform from hero_0/odom to nowhere"):
