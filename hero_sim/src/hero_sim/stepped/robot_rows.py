@@ -188,12 +188,10 @@ class RobotRows:
                 self._run_cycle(now_ms)
                 # Sending a cycle takes about a millisecond; controllers that are due wait for it.
                 self._control_ms = max(self._control_ms, now_ms + 1)
-                servos.check_ms = max(servos.check_ms, now_ms + 1)
-            else:
-                if now_ms >= self._control_ms:
-                    self._run_controllers(now_ms)
-                if now_ms >= servos.check_ms:
-                    servos.check_watchdog(now_ms)
+            if now_ms >= self._control_ms:
+                self._run_controllers(now_ms)
+            if now_ms >= servos.check_ms:
+                servos.check_watchdog(now_ms)
             if now_ms >= self._read_ms:
                 self._read_commands(now_ms)
             if now_ms == step_ms:
