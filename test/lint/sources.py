@@ -24,7 +24,7 @@ OTHER_PACKAGES = {
     **{name: f"python3-{name}" for name in "matplotlib numpy pexpect rospkg scipy selenium tornado tqdm yaml".split()},
 }
 
-FIT_A_PROTOCOL = ("hero_client.robot", "hero_client.ros_clock", "hero_client.ros_link")
+FIT_A_PROTOCOL = tuple(f"hero_client.{name}" for name in ("program", "robot", "ros_clock", "ros_link", "swarm"))
 """For mypy, what they take from ROS is Any."""
 
 

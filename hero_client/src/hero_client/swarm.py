@@ -76,13 +76,17 @@ class Swarm(BaseSwarm[Robot]):
         rest, "error" if status.text names robots or drivers that did not stop. Those are asked again while the
         program runs.
         """
-        self.drivers.request_stop(True)
-        return self.drivers.wait_for_stop()
+        return self._ask_drivers(True)
 
     def release_stop(self) -> StopStatus:
         """Let all robots of all drivers move again; returns the outcome as emergency_stop() does."""
-        self.drivers.request_stop(False)
-        return self.drivers.wait_for_stop()
+        return self._ask_drivers(False)
+
+    def _ask_drivers(self, stopped: bool) -> StopStatus:
+        self.drivers.request_stop(stopped)
+        status = self.drivers.wait_for_stop()
+        assert status is not None  # something was just requested
+        return status
 
     def _log(self, level: str, text: str) -> None:
         (rospy.loginfo if level == "info" else rospy.logwarn)(text)
