@@ -199,7 +199,7 @@ class FixedDelay:
         return now_ms + (self.delays_ms.pop(0) if len(self.delays_ms) > 1 else self.delays_ms[0])
 
 
-def test_of_two_commands_in_one_read_the_later_is_dropped_but_a_stop_is_repeated():
+def test_a_stop_read_with_a_motion_is_dropped_and_its_repeat_stops():
     robots = RobotRows(build_world(1, 0, scale=0.0), [FixedDelays([1], [58, 1])])
     robots.send_velocity(0, 0.1, 0.0)
     robots.advance(30)
