@@ -12,6 +12,8 @@ from hero_client.controllers.avoidance import WanderMemory, wander
 from hero_sim import main
 from hero_sim.errors import OptionError
 from hero_sim.population import build_world
+from hero_sim.stepped.robot_rows import RobotRows
+from hero_sim.stepped.step_clock import StepClock, StepMotion
 from hero_sim.stepped.swarm import StepSwarm
 from hero_test.robot_program import go_around
 
@@ -298,3 +300,17 @@ def test_waits_take_whole_milliseconds_and_one_at_least():
         before_ms = swarm.rows.now_ms
         assert swarm.sleep(duration_s)
         assert swarm.rows.now_ms - before_ms == taken_ms
+
+
+def test_motions_that_are_due_together_take_their_steps_in_order():
+    clock, taken = StepClock(RobotRows(build_world(parse_options()))), []
+
+    def note(name):
+        while True:
+            taken.append(name)
+            yield 0.1
+
+    motions = [StepMotion(clock, note(name)) for name in range(30)]
+    clock.sleep(0.25)
+    assert taken == [*range(30)] * 3
+    assert not any(motion.done() for motion in motions)
