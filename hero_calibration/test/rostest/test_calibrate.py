@@ -134,9 +134,9 @@ class CalibrateTest(unittest.TestCase):
     def test_a_stop_goes_to_both_controllers(self):
         stops = {"velocity": [], "position": []}
         for name, received in stops.items():
-            topic = "/hero_1/%s_controller/cmd_vel" % name
-            subscriber = rospy.Subscriber(topic, Twist, received.append)
-            wait_for(subscriber.get_num_connections, "connection to " + topic)
+            rospy.Subscriber("/hero_1/%s_controller/cmd_vel" % name, Twist, received.append)
+        for publisher in (self.probes[1]._velocity, self.probes[1]._position):
+            wait_for(lambda publisher=publisher: publisher.get_num_connections() == 2, "the driver and this test")
         self.probes[1].stop()
         wait_for(lambda: all(stops.values()), "two stops")
         self.assertEqual([received[0] for received in stops.values()], [Twist()] * 2)

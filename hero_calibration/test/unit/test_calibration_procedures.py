@@ -84,13 +84,12 @@ def check_accuracy(session, results, range_bound_m=RANGE_BOUND_M):
     for row, result in results.items():
         found, written = result.to_file(), session.probes[row].written
         if isinstance(result, MotorResult):
-            centers_us = [zone.center_us for zone in result.zones]
-            assert centers_us == pytest.approx(errors.servo_center_us[row].tolist(), abs=CENTER_BOUND_US)
-            assert written["motor_centers_us"] == found["motor_centers_us"]
+            true_us = pytest.approx(errors.servo_center_us[row].tolist(), abs=CENTER_BOUND_US)
+            assert written["motor_centers_us"] == found["motor_centers_us"] == true_us
         elif isinstance(result, VelocityResult):
             before, after = found["velocity_errors"]
             assert after < min(VELOCITY_BOUND, 0.75 * before)
-            assert written["velocity_gains"] == found["velocity_gains"]
+            assert written["velocity_gains"] == found["velocity_gains"] == [*result.gains[0], *result.gains[1]]
         else:
             assert np.abs(result.before_m).max() > range_bound_m > np.abs(result.after_m).max()
             assert result.counts_m2 == pytest.approx(true_counts_m2[row].tolist(), rel=COUNTS_BOUND)
