@@ -6,6 +6,12 @@ from pathlib import Path
 from hero_test.browser import open_browser, set_page_size
 from hero_test.waiting import wait_for
 
+KEEP_NOTICES = (
+    "window.notices = []; const keep = (one) => window.notices.push(one.textContent);"
+    "new MutationObserver((changes) => changes.forEach((change) => change.addedNodes.forEach(keep)))"
+    ".observe(document.getElementById('notices'), { childList: true })"
+)
+
 
 class MonitorPage:
     """Chromium, showing the page at an address."""
@@ -17,6 +23,7 @@ class MonitorPage:
 
     def open(self):
         self.browser.get(self.url)
+        self.run(KEEP_NOTICES)
 
     def resize(self, width, height):
         set_page_size(self.browser, width, height)
@@ -63,6 +70,13 @@ class MonitorPage:
 
     def wait_for_text(self, selector, text):
         wait_for(lambda: text in self.text(selector), "%r in %s" % (text, selector))
+
+    def wait_for_notice(self, text):
+        """Wait until a notice with this text was shown since the page was opened: notices vanish after some seconds."""
+        wait_for(lambda: any(text in notice for notice in self.notices()), lambda: "%r in %s" % (text, self.notices()))
+
+    def notices(self):
+        return self.run("return window.notices")
 
     def actions(self):
         from selenium.webdriver.common.action_chains import ActionChains

@@ -4,6 +4,7 @@
 import math
 import unittest
 
+import rosgraph
 import rospy
 import rostest
 from geometry_msgs.msg import Twist
@@ -143,17 +144,24 @@ class PageTest(unittest.TestCase):
         self.page.actions().move_to_element_with_offset(canvas, right_px, down_px).click().perform()
         self.page.click("#goto")
 
+    @staticmethod
+    def has_goal_program():
+        """Return whether a node takes goals for hero_1; the monitor shows them."""
+        subscribers = dict(rosgraph.Master("/test").getSystemState()[1]).get("/hero_1/goal", [])
+        return set(subscribers) - {"/hero_monitor"}
+
     def test_a_click_on_the_map_sends_a_robot_there_where_a_program_listens(self):
         self.page.choose("hero_1")
         start = self.watch.pose(1)[:2]
+        wait_for(self.has_goal_program, "go_to_goal")
         self.click_on_map(0, 0)
-        self.page.wait_for_text("#notices", "hero_1 has a new goal")
+        self.page.wait_for_notice("hero_1 has a new goal")
         wait_for(lambda: math.dist(self.watch.pose(1)[:2], start) > 0.05, "robot 1 to go")
 
     def test_a_goal_that_no_program_takes_is_reported(self):
         self.page.choose("hero_0")
         self.click_on_map(30, 30)
-        self.page.wait_for_text("#notices", "go_to_goal.launch")
+        self.page.wait_for_notice("go_to_goal.launch")
 
     def test_stop_all_stops_driven_robots_and_two_clicks_release_them(self):
         publisher = rospy.Publisher("/hero_2/velocity_controller/cmd_vel", Twist, queue_size=1)

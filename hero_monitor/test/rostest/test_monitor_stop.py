@@ -135,8 +135,10 @@ class StopTest(unittest.TestCase):
         # Pressed on another page, while the button is held.
         self.other.click("#stop")
         wait_for(lambda: commands[-1].linear.x == 0, "a stop")
-        self.page.wait_for_text("#notices", "all robots are stopped")
         self.wait_for_banner(GREEN, "stopped, all wheels at rest")
+        self.page.actions().release().perform()
+        self.page.actions().click_and_hold(button).perform()
+        self.page.wait_for_notice("all robots are stopped")
         self.assertEqual(commands[-1].linear.x, 0.0)
         self.page.actions().release().perform()
 
