@@ -128,4 +128,5 @@ def test_a_released_robot_is_not_stopped_any_more():
         robot.drive(0.1)
         clock.run(5.0)
     assert len(robot.writes) == written + 1
+    assert robot.writes[-1][0] - robot.writes[-2][0] > 0.05, "a motion within the firmware's gate of a stop"
     assert robot.motors.is_turning
