@@ -12,8 +12,8 @@ import signal
 import subprocess
 import tempfile
 import unittest
+from pathlib import Path
 
-import rospkg
 import rospy
 import rostest
 import yaml
@@ -28,7 +28,7 @@ from hero_test.processes import Program, find_program
 from hero_test.waiting import wait_for
 
 CALIBRATE = find_program("hero_calibration", "calibrate")
-ARENA = rospkg.RosPack().get_path("hero_calibration") + "/test/rostest/calibration_arena.yaml"
+ARENA = str(Path(__file__).resolve().with_name("calibration_arena.yaml"))
 CENTERS_US = [1511, 1489]
 GAINS = [700.0, 5000.0, 0.5, 800.0, 6000.0, 0.25]
 COUNTS_M2 = [0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0, 1.125]
