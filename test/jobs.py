@@ -112,6 +112,8 @@ def run_and_judge(job):
 
 def run_jobs(jobs: List[Job], cores: float) -> bool:
     """Run all jobs, in order, as many at once as keep so many cores busy; return whether all passed."""
+    # A background job of a shell ignores Ctrl-C, and so would all that it starts; the tests send Ctrl-C.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     waiting, running = list(jobs), {}
     passed = True
     with concurrent.futures.ThreadPoolExecutor(max(1, len(waiting))) as pool:
