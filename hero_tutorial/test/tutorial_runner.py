@@ -35,10 +35,10 @@ from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 import pexpect
 
-DEADLINE_S = 30.0
+DEADLINE_S = 120.0
 """For one command, or for the lines that it must print; generous, because it only ends what has failed."""
 
-ENDING_S = 20.0
+ENDING_S = 60.0
 """For the end of a program after Ctrl-C."""
 
 QUIET_S = 0.05

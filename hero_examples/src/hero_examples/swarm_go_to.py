@@ -32,7 +32,7 @@ class Formation:
             robot.drive(*command)
             robot.led("green" if arrived else "yellow")
         late = [robot.name for robot, arrived in zip(self.swarm, self.controller.arrived) if not arrived]
-        if not self.done and not late and None not in poses:
+        if not self.done and not late:
             self.done = True
             rospy.loginfo("formation complete after %.1f s", elapsed_s)
         if not self.done and elapsed_s > self.timeout_s:

@@ -69,6 +69,16 @@ def test_avoid_keeps_driving_and_touches_nothing_that_it_sees():
         assert true_paths.measure_lengths(path).min() > 1.0
 
 
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_avoid_turns_away_from_the_side_on_which_something_is(tmp_path, sign):
+    arena = tmp_path / "wall.yaml"
+    arena.write_text(f"walls_m: [[[-2, {0.2 * sign}], [2, {0.2 * sign}]]]\nstarts_m_deg: [[0, 0, {30.0 * sign}]]\n")
+    with StepSwarm(1, arena=str(arena), worlds=WORLDS) as swarm:
+        paths = true_paths.run(swarm, step_all(swarm, avoid.step), 6.0)
+    for path in paths:
+        assert (path[-1, 0, 2] - path[0, 0, 2]) * sign < -0.3
+
+
 def test_keep_distance_ends_facing_the_nearest_thing_at_its_distance():
     with StepSwarm(1, seed=1, arena="obstacles", worlds=WORLDS) as swarm:
         paths = true_paths.run(swarm, step_all(swarm, keep_distance.step), 60.0)

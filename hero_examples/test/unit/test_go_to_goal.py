@@ -85,10 +85,10 @@ class Listener:
 class Goals:
     """The goals of one robot, and what happens while it drives."""
 
-    def __init__(self):
-        self.swarm = StepSwarm(1, arena="empty", perfect=True)
+    def __init__(self, arena="empty", avoid=False):
+        self.swarm = StepSwarm(1, arena=arena, perfect=True)
         self.listener = Listener()
-        self.queue = GoalQueue(self.swarm[0], self.listener)
+        self.queue = GoalQueue(self.swarm[0], self.listener, avoid)
         self.events = []
 
     def put(self, *goal, timeout_s=60.0, frame="", handle=None):
@@ -120,6 +120,16 @@ def test_a_goal_is_reported_on_the_way_and_at_its_end(goals):
     assert outcome.reached and outcome.reason == "" and outcome.distance_m < TOLERANCE_M
     assert goals.queue.reached and not goals.queue.busy
     assert np.diff(goals.listener.progress) == pytest.approx(0.5, abs=0.1) and len(goals.listener.progress) > 4
+
+
+@pytest.mark.parametrize("avoid", [True, False])
+def test_a_goal_behind_a_post_is_reached_only_by_going_around_it(tmp_path, avoid):
+    arena = tmp_path / "post.yaml"
+    arena.write_text(ROUND_THE_POST)
+    goals = Goals(str(arena), avoid)
+    goals.put(0.8, 0.0)
+    goals.drive()
+    assert goals.queue.reached == avoid
 
 
 def test_a_new_goal_replaces_the_old_one(goals):

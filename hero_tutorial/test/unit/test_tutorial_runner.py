@@ -6,19 +6,17 @@ from pathlib import Path
 import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-import tutorial_runner
 from tutorial_runner import Course, PageError, TutorialError, clean_output, make_pattern, read_blocks
 
 
 @pytest.fixture()
-def try_page(tmp_path, monkeypatch):
+def try_page(tmp_path):
     """Writes a page with this text and runs it; returns the home directory."""
     home = tmp_path / "home"
     home.mkdir()
     package = tmp_path / "package"
     package.mkdir()
     (package / "one.py").write_text("print(1)\n", encoding="utf-8")
-    monkeypatch.setattr(tutorial_runner, "DEADLINE_S", 5.0)
 
     def run(text, changes=None):
         page = tmp_path / "05_page.md"
