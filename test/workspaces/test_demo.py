@@ -2,6 +2,7 @@
 
 import os
 import pty
+import re
 import signal
 import socket
 import subprocess
@@ -88,6 +89,16 @@ def test_an_interrupt_ends_everything(demo):
     output = read_to_end(process)
     assert process.returncode == 130, output
     assert not listens(port), "the driver still listens"
+
+
+def test_the_monitor_starts_with_the_demo_and_ends_with_it(demo):
+    process = demo("--count", "1", "--monitor", "--port", str(find_free_port()))
+    line = next(line for line in process.stdout if b"the monitor: " in line)
+    port = int(re.search(rb":(\d+)/", line).group(1))
+    wait_for(lambda: listens(port), "the monitor's page", TIMEOUT_S)
+    os.killpg(process.pid, signal.SIGINT)
+    read_to_end(process)
+    assert not listens(port), "the monitor still listens"
 
 
 def test_closing_the_terminal_ends_everything():
