@@ -146,7 +146,7 @@ def test_reading_wheels_within_a_step_meets_the_end_of_the_step():
     assert Body(world, 0).travels_m == pytest.approx(foreseen_m)
 
 
-def test_pulses_written_to_all_robots_at_once_give_what_each_would_get_alone():
+def test_pulses_written_to_all_robots_at_once_are_those_of_each_alone():
     together, alone = build_world(9, errors=1.0), build_world(9, errors=1.0)
     pulses_us = np.random.RandomState(0).randint(1000, 2001, (9, 2))
     together.write_pulses(np.arange(9), pulses_us)
