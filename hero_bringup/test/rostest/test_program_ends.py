@@ -12,7 +12,7 @@ import rostest
 
 from hero_test.processes import find_program
 
-TIMEOUT_S = 120.0
+TIMEOUT_S = 600.0
 BAD_URIS = ("localhost", "http://", "http://localhost:99999", "ftp://localhost:11311", "http://[::1")
 NODES = (["record"], ["calibrate", "--yes", "motors"], ["fleet", "--once"], ["hero_sim"])
 PRINTING = (
@@ -74,13 +74,15 @@ class ProgramEndsTest(unittest.TestCase):
                     self.assertEqual(self.end(process), (-signal.SIGINT, []))
 
     def test_a_master_uri_that_is_none_is_named_in_one_line(self):
-        started = [(node, uri, start(node, ROS_MASTER_URI=uri)) for node in NODES for uri in BAD_URIS]
-        for node, uri, process in started:
-            with self.subTest("%s %s" % (node[0], uri)):
-                status, lines = self.end(process)
-                self.assertEqual((status, len(lines)), (1, 1), lines)
-                self.assertTrue(lines[0].startswith(node[0] + ": "), lines)
-                self.assertIn(repr(uri), lines[0])
+        for node in NODES:
+            # Programs on hero_client share the check; the simulator has its own.
+            uris = BAD_URIS if node[0] in ("fleet", "hero_sim") else BAD_URIS[:1]
+            for uri, process in [(uri, start(node, ROS_MASTER_URI=uri)) for uri in uris]:
+                with self.subTest("%s %s" % (node[0], uri)):
+                    status, lines = self.end(process)
+                    self.assertEqual((status, len(lines)), (1, 1), lines)
+                    self.assertTrue(lines[0].startswith(node[0] + ": "), lines)
+                    self.assertIn(repr(uri), lines[0])
 
     def test_a_negative_number_of_simulated_robots_is_refused_by_the_simulator(self):
         for count, expected in (("-1", True), ("0", False)):
