@@ -51,7 +51,8 @@ RULES = """\
 %:
 \tdh $@ --sourcedirectory=src --buildsystem=cmake --with=python3
 override_dh_auto_configure:
-\tdh_auto_configure -- -DCATKIN_BUILD_BINARY_PACKAGE=ON -DCATKIN_ENABLE_TESTING=OFF -DPYTHON_EXECUTABLE=/usr/bin/python3
+\tdh_auto_configure -- -DCATKIN_BUILD_BINARY_PACKAGE=ON -DCATKIN_ENABLE_TESTING=OFF -DPYTHON_EXECUTABLE=/usr/bin/python3 \
+	  -DPython_EXECUTABLE=/usr/bin/python3
 override_dh_auto_test:
 override_dh_auto_install:
 """
