@@ -59,18 +59,23 @@ class FirstScriptsTest(unittest.TestCase):
         self.assertNotIn("Traceback", self.programs[name].text())
         self.wait_until_stopped(robot_id)
 
-    def test_1_move_drives_and_ends_by_itself(self):
-        self.wait_until_moved(0)
-        self.assertEqual(0, self.programs["move"].wait_end(), self.programs["move"].text())
-        self.wait_until_stopped(0)
+    def check_ended(self, name):
+        """A script moves its robot, ends by itself, and has stopped it then."""
+        robot_id = SCRIPTS.index(name)
+        self.wait_until_moved(robot_id)
+        self.assertEqual(0, self.programs[name].wait_end(), self.programs[name].text())
+        self.wait_until_stopped(robot_id)
 
-    def test_1_read_sensors_prints_what_is_seen(self):
+    def test_1_move_drives_and_ends_by_itself(self):
+        self.check_ended("move")
+
+    def test_1_read_sensors_prints_what_is_seen_and_ends_by_itself(self):
         for text in ("pose: x ", "ranges from the front", "nearest: "):
             self.programs["read_sensors"].wait_for_text(text)
-        self.check_interrupted("read_sensors")
+        self.check_ended("read_sensors")
 
-    def test_1_drive_a_square_drives_until_it_is_interrupted(self):
-        self.check_interrupted("drive_a_square")
+    def test_0_drive_a_square_drives_until_it_is_interrupted(self):
+        self.check_interrupted("drive_a_square")  # first: after four sides it would end by itself
 
     def test_1_avoid_drives_until_it_is_interrupted(self):
         self.check_interrupted("avoid")
