@@ -46,13 +46,18 @@ ros-hero ({version}) unstable; urgency=medium
 """
 
 # cmake installs each package of the workspace for itself.
-RULES = """\
+CMAKE_OPTIONS = (
+    "-DCATKIN_BUILD_BINARY_PACKAGE=ON",
+    "-DCATKIN_ENABLE_TESTING=OFF",
+    "-DPYTHON_EXECUTABLE=/usr/bin/python3",
+    "-DPython_EXECUTABLE=/usr/bin/python3",  # Debian 13's catkin takes this name only
+)
+RULES = f"""\
 #!/usr/bin/make -f
 %:
 \tdh $@ --sourcedirectory=src --buildsystem=cmake --with=python3
 override_dh_auto_configure:
-\tdh_auto_configure -- -DCATKIN_BUILD_BINARY_PACKAGE=ON -DCATKIN_ENABLE_TESTING=OFF -DPYTHON_EXECUTABLE=/usr/bin/python3 \
-	  -DPython_EXECUTABLE=/usr/bin/python3
+\tdh_auto_configure -- {" ".join(CMAKE_OPTIONS)}
 override_dh_auto_test:
 override_dh_auto_install:
 """
