@@ -12,6 +12,13 @@ KEEP_NOTICES = (
     ".observe(document.getElementById('notices'), { childList: true })"
 )
 
+RELEASE = (
+    "const done = arguments[0], button = document.getElementById('release'); button.click();"
+    "const again = () => button.textContent.includes('again') ? (button.click(), done()) : setTimeout(again, 20);"
+    "again()"
+)
+READ_BANNER = "const banner = document.getElementById('stopping'); return [banner.dataset.level, banner.textContent]"
+
 
 class MonitorPage:
     """Chromium, showing the page at an address."""
@@ -58,8 +65,15 @@ class MonitorPage:
 
     def banner(self):
         """Return level and text of what is shown about stopping."""
-        script = "const banner = document.getElementById('stopping'); return [banner.dataset.level, banner.textContent]"
-        return tuple(self.run(script))
+        return tuple(self.run(READ_BANNER))
+
+    def press_stop(self):
+        """Click on STOP ALL and return the banner in the same moment: an answer may follow."""
+        return tuple(self.run("document.getElementById('stop').click();" + READ_BANNER))
+
+    def press_release_twice(self):
+        """Click, and again once the page asks for that: the second click counts for some seconds only."""
+        self.browser.execute_async_script(RELEASE)
 
     def choose(self, robot):
         """Choose a robot in the table."""
@@ -89,7 +103,7 @@ class MonitorPage:
         self.browser.save_screenshot(str(folder / name))
 
     def errors(self):
-        """Return what the browser complained about."""
+        """Return what the browser complained about since the last call."""
         return [line["message"] for line in self.browser.get_log("browser") if line["level"] == "SEVERE"]
 
     def close(self):

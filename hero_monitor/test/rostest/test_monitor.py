@@ -88,6 +88,7 @@ class PageTest(unittest.TestCase):
         self.page.resize(1440, 900)
 
     def test_texts_from_outside_never_become_markup(self):
+        self.page.errors()  # those of a monitor that has ended
         publisher = rospy.Publisher("/rosout", Log, queue_size=5)
         wait_for(publisher.get_num_connections, "listeners to the log")
 
@@ -175,9 +176,7 @@ class PageTest(unittest.TestCase):
             self.wait_until_standing(2)
             self.page.wait_for_text("#stopping", "stopped, all wheels at rest")
             self.page.save("monitor_stopped.png")
-            self.page.click("#release")
-            self.page.wait_for_text("#release", "again")
-            self.page.click("#release")
+            self.page.press_release_twice()
             self.wait_until_moving(2)
         finally:
             timer.shutdown()

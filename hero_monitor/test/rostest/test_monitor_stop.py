@@ -95,8 +95,7 @@ class StopTest(unittest.TestCase):
 
     def test_all_pages_show_that_robots_are_stopping_and_at_rest(self):
         self.set_behavior(rest=False)
-        self.page.click("#stop")
-        self.assertEqual(self.page.banner(), (AMBER, "stopping"))
+        self.assertEqual(self.page.press_stop(), (AMBER, "stopping"))
         wait_for(lambda: self.stop_states(self.page)["hero_0"] == "stopping", "a robot that stops")
         self.page.save("monitor_stopping.png")
         self.set_behavior()
@@ -157,8 +156,7 @@ class StopTest(unittest.TestCase):
 
     def test_the_page_reports_that_the_monitor_does_not_answer(self):
         with suspended(find_pid("/hero_monitor")):
-            self.page.click("#stop")
-            self.assertEqual(self.page.banner(), (AMBER, "stopping"))
+            self.assertEqual(self.page.press_stop(), (AMBER, "stopping"))
             self.wait_for_banner(RED, "NOT STOPPED: the monitor does not answer", self.page)
             self.page.save("monitor_no_answer.png")
         self.wait_for_reports(True)
