@@ -58,6 +58,7 @@ class CalibrateTest(unittest.TestCase):
         cls.start_to_restore()
         for probe in cls.probes:
             wait_for(lambda probe=probe: probe.find_silence(rospy.get_time()) is None, "all topics of " + probe.name)
+        rospy.ServiceProxy("/hero_sim/fault", InjectFault)("vanish:robot=4")
 
     @classmethod
     def start_to_restore(cls):
@@ -176,17 +177,16 @@ class CalibrateTest(unittest.TestCase):
         self.assertEqual(os.listdir(self.files), [])
 
     def test_q_and_ctrl_c_answer_the_question(self):
-        for answer in (b"q\n", signal.SIGINT):
-            leader, follower = pty.openpty()
-            program = self.start("motors", "--robots", "1", stdin=follower)
-            os.close(follower)
+        leader, follower = pty.openpty()
+        self.addCleanup(os.close, leader)
+        quitted, interrupted = (self.start("motors", "--robots", "1", stdin=follower) for _ in range(2))
+        os.close(follower)
+        for program in (quitted, interrupted):
             program.wait_for_text("20 cm of room")
-            if answer is signal.SIGINT:
-                program.process.send_signal(answer)
-            else:
-                os.write(leader, answer)
-            self.finish(program, 130)
-            os.close(leader)
+        interrupted.process.send_signal(signal.SIGINT)
+        self.finish(interrupted, 130)
+        os.write(leader, b"q\n")
+        self.finish(quitted, 130)
 
     def test_without_an_answer_or_with_bad_files_it_ends_with_the_reason(self):
         file = keep(self.files, 1, motor_centers_us=[1511, 9000])
@@ -198,8 +198,7 @@ class CalibrateTest(unittest.TestCase):
         for program, reason in cases:
             self.assertIn(reason, self.finish(program, 1))
 
-    def test_a_robot_that_has_vanished_is_silent_and_cannot_be_written(self):
-        rospy.ServiceProxy("/hero_sim/fault", InjectFault)("vanish:robot=4")
+    def test_silence_and_failed_writing_show_that_a_robot_has_vanished(self):
         probe = self.probes[4]
         silence = wait_for(lambda: probe.find_silence(rospy.get_time()), "silence of hero_4")
         self.assertRegex(silence, "^nothing received on /hero_4/[a-z]+: is the robot on and in reach[?]$")
