@@ -1,7 +1,8 @@
 """A peer that misbehaves for a while, from its own address, and reconnects when it is disconnected.
 
 bad_peer.py KIND --port PORT [--source ADDRESS] [--victim N]
-It ends at SIGINT and prints one line of JSON: how often it connected, was thrown out, and how many bytes it sent.
+It prints a line when it is first connected. It ends at SIGINT with one line of JSON: how often it connected, was thrown
+out, and how many bytes it sent.
 """
 
 import argparse
@@ -64,6 +65,8 @@ class Peer:
         sock.settimeout(2.0)
         sock.connect(self.address)
         self.connects += 1
+        if self.connects == 1:
+            print("{}", flush=True)  # what the test waits for
         return sock
 
     def send(self, sock, data):
@@ -300,7 +303,6 @@ def main():
     peer = Peer(parser.parse_args())
     kind = KINDS[parser.parse_args().kind]
     signal.signal(signal.SIGINT, lambda *_: peer.end())
-    print("{}", flush=True)
     with contextlib.suppress(OSError):
         kind(peer)
     names = ("connects", "thrown_out", "refused", "sent_length")
