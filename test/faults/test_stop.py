@@ -62,11 +62,13 @@ def field(simulated):
         ground_truth.close()
     # rospy may miss a publisher that comes before the end of its predecessor in the same node is known.
     heard = ["/hero_%d/%s_controller/cmd_vel" % (n, kind) for n in range(ROBOTS) for kind in ("velocity", "position")]
-    wait_for(lambda: not any(reads_from_somebody(simulated.node, topic) for topic in heard), "the publishers to go")
-    rospy.ServiceProxy(simulated.node + "/stop", SetBool)(True)
-    wait_for(lambda: is_confirmed(simulated), "the driver's confirmation")
-    rospy.ServiceProxy(simulated.node + "/stop", SetBool)(False)
-    wait_for(lambda: not simulated.fleet.newest.stopped, "the release")
+    try:
+        wait_for(lambda: not any(reads_from_somebody(simulated.node, topic) for topic in heard), "the publishers to go")
+    finally:
+        rospy.ServiceProxy(simulated.node + "/stop", SetBool)(True)
+        wait_for(lambda: is_confirmed(simulated), "the driver's confirmation")
+        rospy.ServiceProxy(simulated.node + "/stop", SetBool)(False)
+        wait_for(lambda: not simulated.fleet.newest.stopped, "the release")
 
 
 def is_confirmed(driver):
