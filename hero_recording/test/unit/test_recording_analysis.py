@@ -22,7 +22,7 @@ from hero_recording import analysis, plot
 from hero_recording.bags import BagSet
 from hero_recording.errors import RecordingError
 from hero_recording.figures import MOST_NAMED, Figures, choose_colors
-from hero_recording.observations import Observations, RobotObservations, StateReport
+from hero_recording.observations import Observations, Origin, RobotObservations, StateReport
 from hero_recording.topics import Message, find_robot_topic, is_fleet_topic, make_patterns
 
 
@@ -110,6 +110,16 @@ def test_paths_are_in_the_shared_frame(two_robots):
     assert path.length_m == pytest.approx(RADIUS_M * ANGULAR_RAD_S * driven_s, rel=0.03)
     assert seen.walls_m == [(-1.0, 0.0, 1.0, 0.0)]
     assert seen.circles_m == [(0.5, 0.0, 0.1)]
+
+
+def test_a_path_is_moved_and_turned_with_the_origin_of_its_time():
+    times_s = np.array([0.0, 1.0, 2.0])
+    path = analysis.Path(times_s, np.array([1.0, 1.0, 0.0]), np.array([0.5, 0.5, 1.0]), np.array([0.0, 0.0, 3.0]))
+    origins = [Origin(0.5, 2.0, 0.0, math.pi / 2.0), Origin(1.5, -1.0, -1.0, math.pi)]
+    moved = analysis.transform_path(path, origins)
+    assert moved.x_m == pytest.approx([1.5, 1.5, -1.0])
+    assert moved.y_m == pytest.approx([1.0, 1.0, -2.0])
+    assert moved.yaw_rad == pytest.approx([math.pi / 2.0, math.pi / 2.0, 3.0 - math.pi])
 
 
 def test_robots_can_be_selected(two_robots):
