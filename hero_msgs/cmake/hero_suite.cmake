@@ -1,14 +1,32 @@
 # CMake functions for the packages of the suite. They are here because every package can find hero_msgs.
 
 # hero_add_program(NAME [MODULE]): a program NAME for rosrun that calls main() of a module of the package (default: NAME).
+# hero_add_node(NAME [MODULE]): one that takes ROS parameters only; --help prints the docstring of its module.
 #
 # Its first line names the interpreter of the build, in the devel and the install space: catkin_install_python() would
 # write "env python3" for the install space, and the first python3 on PATH (pyenv, conda) may have no rospy. A module that is
 # not installed is named in one line. The rospy of Debian 11 calls Thread.isAlive(), which its Python 3.9 no longer has.
 function(hero_add_program name)
+  _hero_write_program(${name} "" ${ARGN})
+endfunction()
+
+function(hero_add_node name)
+  _hero_write_program(${name} "import argparse
+
+argparse.ArgumentParser(
+    prog='${name}',
+    usage='rosrun ${PROJECT_NAME} ${name} [_PARAMETER:=VALUE ...] [TOPIC:=TOPIC ...]',
+    description=sys.modules[main.__module__].__doc__,
+    epilog='Parameters and topics: ${PROJECT_NAME}/README.md',
+    formatter_class=argparse.RawDescriptionHelpFormatter,
+).parse_args([word for word in sys.argv[1:] if ':=' not in word])
+" ${ARGN})
+endfunction()
+
+function(_hero_write_program name check_arguments)
   set(module ${name})
-  if(ARGC GREATER 1)
-    set(module ${ARGV1})
+  if(ARGC GREATER 2)
+    set(module ${ARGV2})
   endif()
   set(program ${CMAKE_CURRENT_BINARY_DIR}/programs/${name})
   # Modules load for a second or more: Ctrl-C then ends the program at once, without a traceback.
@@ -26,6 +44,7 @@ try:
 except ModuleNotFoundError as error:
     sys.exit('${name}: %s; script/bootstrap (or rosdep) installs what all programs need' % error)
 
+${check_arguments}
 signal.signal(signal.SIGINT, handler)
 sys.exit(main())
 ")
