@@ -1,0 +1,6 @@
+"""Python package of hero_localization, for catkin_python_setup(); not to be run by hand."""
+
+from catkin_pkg.python_setup import generate_distutils_setup
+from setuptools import setup
+
+setup(**generate_distutils_setup(packages=["hero_localization"], package_dir={"": "src"}))

@@ -1,0 +1,23 @@
+"""What can be wrong with a camera, its detector and its calibration, for people."""
+
+__all__ = ["CalibrationError", "DetectorError", "FrameSourceError", "LocalizationError", "SettingsError"]
+
+
+class LocalizationError(Exception):
+    """One line: the thing, its value, the remedy."""
+
+
+class DetectorError(LocalizationError):
+    """A detector that is not installed, or does not know the family."""
+
+
+class CalibrationError(LocalizationError):
+    """Readings from which nothing can be calibrated."""
+
+
+class FrameSourceError(LocalizationError):
+    """A camera or video that cannot be opened."""
+
+
+class SettingsError(LocalizationError):
+    """A camera's file that cannot be read or used."""

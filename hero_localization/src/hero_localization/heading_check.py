@@ -1,0 +1,54 @@
+"""Whether a tag's heading is its robot's: where it goes by the camera when it drives forward by its odometry. Pure."""
+
+import math
+from collections import deque
+from typing import Deque, Optional, Tuple
+
+from hero_client.geometry import Pose, invert_pose, transform_pose, wrap_angle
+
+__all__ = ["HeadingCheck", "is_upside_down"]
+
+LEAST_DRIVE_M = 0.04
+"""Poses are a millimeter off: over this distance, a direction is right to 2 degrees."""
+MOST_TURN_RAD = 0.15
+LEAST_SHARE = 0.5
+"""A robot that came less far than this share of what odometry counted was held, and shows no direction."""
+
+DRIVES = 3
+"""So many drives are averaged."""
+
+
+class HeadingCheck:
+    """Compares headings and drives of one robot."""
+
+    def __init__(self) -> None:
+        self._start: Optional[Tuple[Pose, Pose]] = None
+        self._errors_rad: Deque[float] = deque(maxlen=DRIVES)
+
+    def add(self, seen: Pose, odometry: Pose) -> None:
+        """Take a pose by the camera, of any frame, and that by odometry at the same time, of any frame."""
+        if self._start is not None:
+            start_seen, start = self._start
+            drive = transform_pose(invert_pose(start), odometry)
+            if abs(wrap_angle(drive.yaw_rad)) <= MOST_TURN_RAD:
+                driven_m = math.hypot(drive.x_m, drive.y_m)
+                if driven_m < LEAST_DRIVE_M:
+                    return
+                moved = transform_pose(invert_pose(start_seen), seen)
+                if math.hypot(moved.x_m, moved.y_m) >= LEAST_SHARE * driven_m:
+                    # Of a heading that exceeds the true one, the same drive leads to the right.
+                    error_rad = math.atan2(drive.y_m, drive.x_m) - math.atan2(moved.y_m, moved.x_m)
+                    self._errors_rad.append(error_rad)
+        self._start = seen, odometry
+
+    @property
+    def error_rad(self) -> Optional[float]:
+        """By how much the headings seen exceed the robot's own; None if it did not drive straight far enough yet."""
+        if len(self._errors_rad) < DRIVES:
+            return None
+        return math.atan2(sum(map(math.sin, self._errors_rad)), sum(map(math.cos, self._errors_rad)))
+
+
+def is_upside_down(heading_error_rad: float) -> bool:
+    """Return whether the tag's print points to the robot's rear."""
+    return abs(wrap_angle(heading_error_rad)) > math.radians(135.0)

@@ -1,0 +1,40 @@
+"""Maps as files that map_server and the simulator read: NAME.yaml and NAME.png. Source: wiki.ros.org/map_server."""
+
+import os
+
+import numpy as np
+import yaml
+from PIL import Image
+
+from .occupancy_grid import OccupancyGrid
+
+__all__ = ["save_map"]
+
+OCCUPIED, UNKNOWN, FREE = 0, 205, 254
+"""Gray of a pixel, as map_saver writes it."""
+
+OCCUPIED_SHARE, FREE_SHARE = 0.65, 0.196
+"""Thresholds between them, as map_saver writes them."""
+
+
+def save_map(path: str, grid: OccupancyGrid) -> str:
+    """Write the map to path, which ends in .yaml, and beside it the picture; return the picture's path.
+
+    Raises: OSError.
+    """
+    pixels = np.full(grid.log_odds.shape, UNKNOWN, dtype=np.uint8)
+    pixels[grid.free] = FREE
+    pixels[grid.occupied] = OCCUPIED
+    picture = os.path.splitext(path)[0] + ".png"
+    Image.fromarray(pixels[::-1]).save(picture)  # the first row of a picture is its upper one
+    content = {
+        "image": os.path.basename(picture),
+        "resolution": grid.cell_m,
+        "origin": [*grid.origin_m, 0.0],
+        "negate": 0,
+        "occupied_thresh": OCCUPIED_SHARE,
+        "free_thresh": FREE_SHARE,
+    }
+    with open(path, "w", encoding="utf-8") as file:
+        yaml.safe_dump(content, file, sort_keys=False)
+    return picture

@@ -1,0 +1,97 @@
+"""The odometry of one robot over the last seconds, without jumps, at any time between two readings. Pure.
+
+A robot that restarts begins again at 0, 0, 0, and a program may set its odometry; neither moves the robot. The history
+is continuous: it goes on from where it was.
+"""
+
+from typing import NamedTuple, Optional
+
+from hero_client.geometry import Pose, invert_pose, measure_distance, transform_pose, wrap_angle
+
+from .stamped_history import StampedHistory, interpolate_pose
+
+__all__ = ["Odometry", "OdometryHistory"]
+
+KEPT_S = 3.0
+"""Older poses than this come too late to be used: a camera with its driver delays by 0.05 to 0.3 s."""
+
+MAX_SPEED_M_S = 0.6
+MAX_TURN_RAD_S = 20.0
+"""Twice what wheels reach; a faster change is not a motion."""
+
+JUMP_MARGIN_M = 0.02
+JUMP_MARGIN_RAD = 0.3
+"""Readings arrive in bunches with stamps that are a few hundredths of a second off."""
+
+
+class Odometry(NamedTuple):
+    """What a robot has driven."""
+
+    pose: Pose
+    """In a frame that starts as hero_N/odom and never jumps."""
+    distance_m: float
+    turned_rad: float
+    """Length of the path, and of all turns, since the first reading."""
+
+
+class OdometryHistory:
+    """What a robot drove.
+
+    Attributes:
+        jumps: how often the robot's odometry jumped, by a restart or because a program set it.
+        raw_pose: the newest reading itself, in hero_N/odom; None before the first.
+    """
+
+    def __init__(self) -> None:
+        self.jumps = 0
+        self.raw_pose: Optional[Pose] = None
+        self._readings: StampedHistory[Odometry] = StampedHistory(KEPT_S, _interpolate)
+        self._offset = Pose(0.0, 0.0, 0.0)
+
+    @property
+    def newest_s(self) -> float:
+        """The stamp of the newest reading; -inf before the first."""
+        return self._readings.newest_s
+
+    def add(self, stamp_s: float, raw: Pose) -> None:
+        """Add a reading of /hero_N/odom; one that is not newer than the last is left out."""
+        if stamp_s <= self.newest_s:
+            return
+        pose, distance_m, turned_rad = transform_pose(self._offset, raw), 0.0, 0.0
+        if self._readings.newest is not None:
+            last, distance_m, turned_rad = self._readings.newest
+            step_m, step_rad = measure_distance(last, pose), _turn_between(last, pose)
+            if _is_jump(step_m, step_rad, stamp_s - self.newest_s):
+                self.jumps += 1
+                self._offset = transform_pose(last, invert_pose(raw))
+                pose, step_m, step_rad = last, 0.0, 0.0
+            distance_m += step_m
+            turned_rad += abs(step_rad)
+        self.raw_pose = raw
+        self._readings.add(stamp_s, Odometry(pose, distance_m, turned_rad))
+
+    def find(self, stamp_s: float) -> Optional[Odometry]:
+        """Return the odometry at stamp_s, interpolated between two readings; after the newest, that one.
+
+        None for a time before the history begins.
+        """
+        return self._readings.newest if stamp_s >= self._readings.newest_s else self._readings.find(stamp_s)
+
+
+def _interpolate(start: Odometry, end: Odometry, share: float) -> Odometry:
+    return Odometry(
+        interpolate_pose(start.pose, end.pose, share),
+        start.distance_m + share * (end.distance_m - start.distance_m),
+        start.turned_rad + share * (end.turned_rad - start.turned_rad),
+    )
+
+
+def _turn_between(start: Pose, end: Pose) -> float:
+    return wrap_angle(end.yaw_rad - start.yaw_rad)
+
+
+def _is_jump(step_m: float, step_rad: float, elapsed_s: float) -> bool:
+    return (
+        step_m > MAX_SPEED_M_S * elapsed_s + JUMP_MARGIN_M
+        or abs(step_rad) > MAX_TURN_RAD_S * elapsed_s + JUMP_MARGIN_RAD
+    )

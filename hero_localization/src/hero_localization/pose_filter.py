@@ -1,0 +1,282 @@
+"""Where one robot is in the frame `map`: its odometry, corrected by poses that are measured from outside. Pure.
+
+An extended Kalman filter of x, y and yaw. Odometry is the motion, not a measurement: between two measured poses the
+estimate follows it exactly, and grows less certain with each meter and radian. A measured pose counts at the time at
+which it was measured, not at which it arrived: the filter goes back there, and plays what it knew of the time since
+again. A robot that a wall holds turns its wheels in vain: a measured pose that odometry cannot explain may still be
+one to which the robot came with slipping wheels.
+
+Source: S. Thrun, W. Burgard, D. Fox, Probabilistic Robotics, chapters 3.3 and 5.4.
+"""
+
+import enum
+import math
+from typing import List, NamedTuple, Optional, Sequence
+
+import numpy as np
+
+from hero_client.geometry import Pose, invert_pose, measure_distance, transform_pose, wrap_angle
+
+from .odometry_history import OdometryHistory
+
+__all__ = ["Estimate", "Measurement", "Outcome", "PoseFilter", "make_covariance"]
+
+DISTANCE_VARIANCE_M2_M = 4e-4
+"""Along the path: 20 mm (standard deviation) after one meter; slip is 1 to 3 % and differs between robots."""
+
+YAW_VARIANCE_RAD2_M = 2.5e-3
+YAW_VARIANCE_RAD2_RAD = 5e-4
+"""Of the heading: 0.05 rad after a meter, 0.02 rad after a radian."""
+
+IDLE_VARIANCE_M2_S = 1e-8
+IDLE_VARIANCE_RAD2_S = 1e-7
+"""A robot at rest is pushed now and then: 0.1 mm and 0.02 degrees after one second."""
+
+SLIP_M, SLIP_RAD = 0.06, 0.6
+"""At most so much of what odometry counted since the last measured pose may be slip; what exceeds that was a jump."""
+
+HELD_S = (0.09, 0.5)
+HELD_SHARE, LEAST_SLIP_M = 0.4, 0.005
+"""A robot that came less far than this share of what odometry counted, over a time between these, is held."""
+
+GATE = 16.3
+"""A measured pose whose squared Mahalanobis distance is larger than this is an outlier: chi-squared, three degrees of
+freedom, one of 1,000 true ones."""
+
+MOVED_POSES = 4
+MOVED_S = 0.1
+"""So many outliers in a row, over so long, that agree with each other: the robot was carried to another place."""
+
+REPLAYED_S = 1.0
+"""Poses that arrive later than this after a newer one are left out."""
+
+
+class Measurement(NamedTuple):
+    """A pose of the robot in `map` that was measured from outside, and its covariance."""
+
+    stamp_s: float
+    pose: Pose
+    covariance: np.ndarray
+    """Of x, y and yaw, (3, 3), m and rad."""
+
+
+class Estimate(NamedTuple):
+    """Where the robot is in `map`."""
+
+    stamp_s: float
+    pose: Pose
+    covariance: np.ndarray
+    """Of x, y and yaw, (3, 3), m and rad."""
+
+
+class Outcome(enum.Enum):
+    """What became of a measured pose."""
+
+    FIRST = "first"
+    USED = "used"
+    OUTLIER = "outlier"
+    MOVED = "moved"
+    """Used as a new start: the robot was carried."""
+    TOO_LATE = "too late"
+    NO_ODOMETRY = "no odometry"
+
+
+class _Step(NamedTuple):
+    """An estimate, and the measured pose that led to it from the one before; None for a start."""
+
+    estimate: Estimate
+    measurement: Optional[Measurement]
+    is_held: bool = False
+    """Whether the wheels turn in vain: then odometry does not tell where the robot goes next."""
+
+
+class PoseFilter:
+    """Estimate of one robot.
+
+    Attributes:
+        odometry: what the robot drove by its own readings.
+        used_s: stamp of the newest measured pose that was used; -inf before the first.
+    """
+
+    def __init__(self) -> None:
+        self.odometry = OdometryHistory()
+        self.used_s = -math.inf
+        self._steps: List[_Step] = []
+        self._rejected: List[Measurement] = []
+
+    def add_odometry(self, stamp_s: float, pose: Pose) -> None:
+        """Follow a reading of /hero_N/odom."""
+        self.odometry.add(stamp_s, pose)
+        if self._steps and self._steps[-1].estimate.stamp_s < stamp_s - 2.0 * REPLAYED_S:
+            # Nothing was measured for a while: move the start on, for odometry is not kept for ever.
+            self._steps = [_Step(self._predict(self._steps[-1].estimate, stamp_s - REPLAYED_S), None)]
+
+    def add_measurement(self, measurement: Measurement) -> Outcome:
+        """Correct the estimate by a measured pose, which may be older than others that were used.
+
+        Raises: ValueError for numbers that are not finite, or a covariance that is none.
+        """
+        _check(measurement)
+        stamp_s = measurement.stamp_s
+        if self.odometry.find(stamp_s) is None:
+            return Outcome.NO_ODOMETRY
+        if not self._steps:
+            self._start(measurement)
+            return Outcome.FIRST
+        count = len(self._steps)
+        while count and self._steps[count - 1].estimate.stamp_s > stamp_s:
+            count -= 1
+        kept, later = self._steps[:count], self._steps[count:]
+        if not kept:
+            return Outcome.TOO_LATE
+        step = self._correct(kept, measurement)
+        if step is None:
+            self._rejected = [*self._rejected[1 - MOVED_POSES :], measurement]
+            if not self._was_moved():
+                return Outcome.OUTLIER
+            self._start(measurement)
+            return Outcome.MOVED
+        kept.append(step)
+        for newer in later:
+            replayed = self._correct(kept, newer.measurement) if newer.measurement else None
+            if replayed is not None:
+                kept.append(replayed)
+        self._rejected.clear()
+        self._keep(kept)
+        return Outcome.USED
+
+    def _correct(self, steps: Sequence[_Step], measurement: Measurement) -> Optional[_Step]:
+        """Return the step from the last of steps to a measured pose; None for an outlier."""
+        start = steps[-1].estimate
+        predicted = self._predict(start, measurement.stamp_s)
+        estimate = self._update(predicted, measurement)
+        if estimate is None:
+            driven_m = measure_distance(start.pose, predicted.pose)
+            turned_rad = abs(wrap_angle(predicted.pose.yaw_rad - start.pose.yaw_rad))
+            if driven_m <= SLIP_M and turned_rad <= SLIP_RAD:
+                slip = np.diag((driven_m**2, driven_m**2, turned_rad**2))
+                estimate = self._update(predicted._replace(covariance=predicted.covariance + slip), measurement)
+        return None if estimate is None else _Step(estimate, measurement, self._is_held(steps, measurement))
+
+    def _is_held(self, steps: Sequence[_Step], measurement: Measurement) -> bool:
+        """Return whether the robot came nowhere since a pose measured a moment ago, though its wheels turned."""
+        for step in reversed(steps):
+            since_s = measurement.stamp_s - step.estimate.stamp_s
+            if step.measurement is not None and since_s >= HELD_S[0]:
+                start, end = self.odometry.find(step.estimate.stamp_s), self.odometry.find(measurement.stamp_s)
+                if start is None or end is None or since_s > HELD_S[1]:
+                    return False
+                counted_m = measure_distance(start.pose, end.pose)
+                came_m = measure_distance(step.measurement.pose, measurement.pose)
+                return counted_m > LEAST_SLIP_M and came_m < HELD_SHARE * counted_m
+        return False
+
+    def _start(self, measurement: Measurement) -> None:
+        self._rejected.clear()
+        covariance = np.array(measurement.covariance, dtype=float)
+        self._keep([_Step(Estimate(measurement.stamp_s, measurement.pose, covariance), None)])
+
+    def _keep(self, steps: List[_Step]) -> None:
+        self.used_s = steps[-1].estimate.stamp_s
+        self._steps = [step for step in steps if step.estimate.stamp_s >= self.used_s - REPLAYED_S]
+
+    def _was_moved(self) -> bool:
+        """Return whether the last outliers agree with each other, so that the estimate must be wrong."""
+        last = [measurement for measurement in self._rejected if self.odometry.find(measurement.stamp_s) is not None]
+        if len(last) < MOVED_POSES or last[-1].stamp_s - last[0].stamp_s < MOVED_S:
+            return False
+        estimate = Estimate(last[0].stamp_s, last[0].pose, np.array(last[0].covariance, dtype=float))
+        for measurement in last[1:]:
+            if measurement.stamp_s < estimate.stamp_s:
+                return False
+            updated = self._update(self._predict(estimate, measurement.stamp_s), measurement)
+            if updated is None:
+                return False
+            estimate = updated
+        return True
+
+    def _predict(self, estimate: Estimate, stamp_s: float) -> Estimate:
+        """Return the estimate moved on to stamp_s by the odometry since."""
+        start, end = self.odometry.find(estimate.stamp_s), self.odometry.find(stamp_s)
+        if start is None or end is None:  # it drove nothing that is known
+            return estimate._replace(stamp_s=stamp_s)
+        pose = transform_pose(estimate.pose, transform_pose(invert_pose(start.pose), end.pose))
+        moved_x_m, moved_y_m = pose.x_m - estimate.pose.x_m, pose.y_m - estimate.pose.y_m
+        driven_m, turned_rad = end.distance_m - start.distance_m, end.turned_rad - start.turned_rad
+        elapsed_s = stamp_s - estimate.stamp_s
+        # A wrong heading at the start leads to a wrong place at the end.
+        lever = np.array(((1.0, 0.0, -moved_y_m), (0.0, 1.0, moved_x_m), (0.0, 0.0, 1.0)))
+        place_m2 = DISTANCE_VARIANCE_M2_M * driven_m + IDLE_VARIANCE_M2_S * elapsed_s
+        yaw_rad2 = YAW_VARIANCE_RAD2_M * driven_m + YAW_VARIANCE_RAD2_RAD * turned_rad
+        growth = np.diag((place_m2, place_m2, yaw_rad2 + IDLE_VARIANCE_RAD2_S * elapsed_s))
+        return Estimate(stamp_s, pose, lever @ estimate.covariance @ lever.T + growth)
+
+    @staticmethod
+    def _update(predicted: Estimate, measurement: Measurement) -> Optional[Estimate]:
+        """Return the estimate corrected by a measured pose of the same time; None for an outlier."""
+        seen, expected = measurement.pose, predicted.pose
+        innovation = np.array(
+            (seen.x_m - expected.x_m, seen.y_m - expected.y_m, wrap_angle(seen.yaw_rad - expected.yaw_rad))
+        )
+        weight = _invert(predicted.covariance + measurement.covariance)
+        if float(innovation @ weight @ innovation) > GATE:
+            return None
+        gain = predicted.covariance @ weight
+        change = gain @ innovation
+        pose = Pose(
+            expected.x_m + float(change[0]),
+            expected.y_m + float(change[1]),
+            wrap_angle(expected.yaw_rad + float(change[2])),
+        )
+        covariance = predicted.covariance - gain @ predicted.covariance
+        return Estimate(predicted.stamp_s, pose, (covariance + covariance.T) / 2.0)
+
+    def pose(self) -> Optional[Pose]:
+        """Return where the robot is at its newest odometry; None before the first measured pose."""
+        if not self._steps:
+            return None
+        newest = self._steps[-1].estimate
+        start, end = self.odometry.find(newest.stamp_s), self.odometry.find(self.odometry.newest_s)
+        if start is None or end is None or newest.stamp_s >= self.odometry.newest_s:
+            return newest.pose
+        pose = transform_pose(newest.pose, transform_pose(invert_pose(start.pose), end.pose))
+        return newest.pose._replace(yaw_rad=pose.yaw_rad) if self._steps[-1].is_held else pose
+
+    def estimate(self) -> Optional[Estimate]:
+        """Return pose() with its covariance; None before the first measured pose."""
+        pose = self.pose()
+        if pose is None:
+            return None
+        newest = self._steps[-1].estimate
+        return self._predict(newest, max(newest.stamp_s, self.odometry.newest_s))._replace(pose=pose)
+
+    def find_odom_origin(self, pose: Pose) -> Pose:
+        """Return where the frame hero_N/odom is in `map` if the robot is at pose, that of estimate()."""
+        assert self.odometry.raw_pose is not None, "no pose is measured before the first reading"
+        origin = transform_pose(pose, invert_pose(self.odometry.raw_pose))
+        return origin._replace(yaw_rad=wrap_angle(origin.yaw_rad))
+
+
+def make_covariance(position_sd_m: float, yaw_sd_rad: float) -> np.ndarray:
+    """Return the covariance of x, y and yaw, (3, 3), of independent errors; position_sd_m: in x and y each."""
+    return np.diag((position_sd_m**2, position_sd_m**2, yaw_sd_rad**2))
+
+
+def _invert(matrix: np.ndarray) -> np.ndarray:
+    """Return the inverse of a symmetric matrix (3, 3); LAPACK takes five times as long for one so small."""
+    (a, b, c), (_, d, e), (_, _, f) = matrix.tolist()
+    first, second, third = d * f - e * e, c * e - b * f, b * e - c * d
+    fourth, fifth, sixth = a * f - c * c, b * c - a * e, a * d - b * b
+    adjugate = ((first, second, third), (second, fourth, fifth), (third, fifth, sixth))
+    return np.array(adjugate) / (a * first + b * second + c * third)
+
+
+def _check(measurement: Measurement) -> None:
+    covariance = np.asarray(measurement.covariance, dtype=float)
+    if not all(map(math.isfinite, (measurement.stamp_s, *measurement.pose))):
+        raise ValueError("a measured pose must be finite, not %r" % (measurement.pose,))
+    if covariance.shape != (3, 3) or not np.isfinite(covariance).all() or not (covariance.diagonal() > 0.0).all():
+        raise ValueError("a covariance of x, y and yaw must be 3 by 3 with variances above 0")
+    (a, b, c), (_, d, e), (_, _, f) = covariance.tolist()
+    if a * d <= b * b or a * (d * f - e * e) <= b * (b * f - c * e) - c * (b * e - c * d):
+        raise ValueError("a covariance must be positive definite, not %s" % covariance.tolist())

@@ -1,0 +1,102 @@
+"""Localization of robots that are stepped in process: the filter of localize on a model of a camera. Pure.
+
+    with StepSwarm(count=10, seed=1) as swarm:
+        StepLocalization(swarm)
+        swarm[3].go_to(0.2, 0.1, frame="map")
+"""
+
+from collections import deque
+from functools import partial
+from typing import Deque, List, NamedTuple, Optional, Tuple
+
+import numpy as np
+
+from hero_client.errors import FrameError
+from hero_client.geometry import Pose
+from hero_sim.stepped.swarm import StepSwarm
+
+from .pose_filter import Estimate, Measurement, PoseFilter, make_covariance
+from .swarm_localizer import PUBLISH_RATE_HZ
+from .swarm_map import SwarmMap
+
+__all__ = ["CameraModel", "StepLocalization"]
+
+
+class CameraModel(NamedTuple):
+    """How well a camera measures robots; it takes a picture with each reading of odometry, 29 in a second."""
+
+    delay_s: float = 0.1
+    """From the picture to the measured pose."""
+    bias_sd_m: float = 0.001
+    bias_sd_rad: float = 0.005
+    """Of one robot always the same: calibration, and how its tag sits. In x and y each."""
+    noise_sd_m: float = 0.0005
+    noise_sd_rad: float = 0.005
+    """Of each picture anew."""
+
+
+CAMERA = CameraModel()
+
+
+class StepLocalization:
+    """Localizes all robots of a swarm from now on: they then take it for the frame map."""
+
+    def __init__(self, swarm: StepSwarm, camera: CameraModel = CAMERA, seed: int = 0) -> None:
+        """seed: of the camera's errors."""
+        self._rows = swarm.rows
+        self._camera = camera
+        self._random = np.random.RandomState(seed)
+        count = len(swarm.robots)
+        self._biases = self._random.normal(0.0, _list_sds(camera.bias_sd_m, camera.bias_sd_rad), (count, 3))
+        self._covariance = make_covariance(camera.noise_sd_m, camera.noise_sd_rad)
+        self._filters = [PoseFilter() for _ in swarm.robots]
+        self._pictures: List[Deque[Tuple[float, Pose]]] = [deque() for _ in swarm.robots]
+        self._published: List[Optional[Estimate]] = [None] * count
+        self._published_s = [0.0] * count
+        for robot in swarm.robots:
+            robot.localize_by(partial(self.find_pose, robot.row))
+        swarm.rows.on_cycle.append(self._receive)
+
+    def find_pose(self, row: int) -> Pose:
+        """Return where the robot at row is in map. Raises: FrameError before the first picture has come."""
+        estimate = self._published[row]
+        if estimate is None:
+            raise FrameError("the robot at row %d has no pose in the frame map yet" % row)
+        return estimate.pose
+
+    def feed_map(self, swarm_map: SwarmMap) -> None:
+        """Put the robots' scans into a map from now on, as map_arena does; its robots go by their rows."""
+
+        def add_poses(rows: np.ndarray) -> None:
+            for row in rows.tolist():
+                estimate = self._published[row]
+                if estimate is not None:
+                    swarm_map.add_pose(row, estimate.stamp_s, estimate.pose)
+
+        def add_scans(rows: np.ndarray) -> None:
+            for row in rows.tolist():
+                swarm_map.add_ranges(row, self._rows.scan_ms.item(row) / 1e3, self._rows.proximity_m[row].tolist())
+            swarm_map.update()
+
+        self._rows.on_cycle.append(add_poses)
+        self._rows.on_scan.append(add_scans)
+
+    def _receive(self, rows: np.ndarray) -> None:
+        now_s = self._rows.now_ms / 1e3
+        noise = self._random.normal(
+            0.0, _list_sds(self._camera.noise_sd_m, self._camera.noise_sd_rad), (len(rows), 3)
+        )
+        seen = self._rows.world.poses[rows] + self._biases[rows] + noise
+        for row, pose in zip(rows.tolist(), seen.tolist()):
+            pictures, pose_filter = self._pictures[row], self._filters[row]
+            pose_filter.add_odometry(now_s, Pose(*self._rows.odometry[row].tolist()))
+            pictures.append((now_s, Pose(*pose)))
+            while pictures and pictures[0][0] <= now_s - self._camera.delay_s:
+                taken_s, measured = pictures.popleft()
+                pose_filter.add_measurement(Measurement(taken_s, measured, self._covariance))
+            if now_s >= self._published_s[row] + 1.0 / PUBLISH_RATE_HZ:
+                self._published_s[row], self._published[row] = now_s, pose_filter.estimate()
+
+
+def _list_sds(position_sd_m: float, yaw_sd_rad: float) -> Tuple[float, float, float]:
+    return position_sd_m, position_sd_m, yaw_sd_rad

@@ -1,0 +1,183 @@
+"""Where all robots of a swarm are in one frame: a filter for each, and what people are told. Pure.
+
+now_s and stamps are ROS time.
+"""
+
+import enum
+import math
+from typing import Dict, Iterable, List, NamedTuple, Optional
+
+from hero_client.geometry import Pose, measure_distance, wrap_angle
+
+from .heading_check import HeadingCheck, is_upside_down
+from .pose_filter import Estimate, Measurement, Outcome, PoseFilter
+
+__all__ = ["PUBLISH_RATE_HZ", "LocalizedRobot", "RobotState", "SwarmLocalizer"]
+
+LOST_S = 1.0
+"""A robot whose pose was not measured for so long is lost: its pose follows its odometry alone."""
+
+ANNOUNCED_STEP_M = 0.02
+"""A correction that moves a robot by more than this is said."""
+
+WRONG_HEADING_RAD = 0.35
+"""A tag that is glued on by eye is right to a tenth of this."""
+
+SILENT_S = 1.0
+"""Odometry comes 29 times a second."""
+
+AHEAD_S = 0.2
+"""A simulated clock may go in steps of 0.1 s."""
+
+PUBLISH_RATE_HZ = 25.0
+"""How often localize publishes by default."""
+
+
+class RobotState(enum.IntEnum):
+    """How well a robot's place is known."""
+
+    UNKNOWN = 0
+    """Never measured."""
+    TRACKED = 1
+    LOST = 2
+    """Measured before: its pose follows its odometry."""
+
+
+class LocalizedRobot(NamedTuple):
+    """What is known of one robot now."""
+
+    robot_id: int
+    state: RobotState
+    estimate: Optional[Estimate]
+    odom_origin: Optional[Pose]
+    """Of the frame hero_N/odom in map."""
+    problem: str
+    """What is wrong, for people; empty if nothing is."""
+
+
+class _Robot:
+    """One robot, and what was said of it."""
+
+    def __init__(self) -> None:
+        self.filter = PoseFilter()
+        self.heading = HeadingCheck()
+        self.is_lost = False
+        self.outliers = 0
+        self.jumps = 0
+        self.measured_s = -math.inf
+        self.late_s: Optional[float] = None
+        """Stamp of the last measured pose if it was too old to be used."""
+
+
+class SwarmLocalizer:
+    """Filters of all robots."""
+
+    def __init__(self) -> None:
+        self._robots: Dict[int, _Robot] = {}
+        self._now_s = -math.inf
+
+    def add_robots(self, robot_ids: Iterable[int]) -> None:
+        """Expect these robots too."""
+        for robot_id in robot_ids:
+            self._robots.setdefault(robot_id, _Robot())
+
+    def add_odometry(self, robot_id: int, stamp_s: float, pose: Pose) -> List[str]:
+        """Follow a reading of /hero_N/odom; return lines for people."""
+        robot = self._robots[robot_id]
+        robot.filter.add_odometry(stamp_s, pose)
+        if robot.jumps == robot.filter.odometry.jumps:
+            return []
+        robot.jumps = robot.filter.odometry.jumps
+        return ["hero_%d: its odometry was set or it restarted; its place in the map stays" % robot_id]
+
+    def add_measurement(self, robot_id: int, measurement: Measurement) -> List[str]:
+        """Correct a robot by a measured pose; return lines for people.
+
+        Raises: KeyError for a robot that is not expected. ValueError as PoseFilter.add_measurement().
+        """
+        robot = self._robots[robot_id]
+        before = robot.filter.pose()
+        used_s = robot.filter.used_s
+        outcome = robot.filter.add_measurement(measurement)
+        is_late = outcome in (Outcome.TOO_LATE, Outcome.NO_ODOMETRY)
+        robot.late_s = measurement.stamp_s if is_late else None
+        odometry = robot.filter.odometry.find(measurement.stamp_s)
+        if odometry is not None and measurement.stamp_s > robot.measured_s:
+            robot.heading.add(measurement.pose, odometry.pose)
+        robot.measured_s = max(robot.measured_s, measurement.stamp_s)
+        if is_late or outcome is Outcome.OUTLIER:
+            robot.outliers += outcome is Outcome.OUTLIER
+            return []
+        robot.outliers = 0
+        was_lost, robot.is_lost = robot.is_lost, False
+        after = robot.filter.pose()
+        if before is None or after is None:
+            return ["hero_%d found at %s" % (robot_id, _describe_pose(measurement.pose))]
+        step_m = measure_distance(before, after)
+        step_deg = math.degrees(abs(wrap_angle(after.yaw_rad - before.yaw_rad)))
+        step = "%.0f mm and %.0f degrees" % (1e3 * step_m, step_deg)
+        if outcome is Outcome.MOVED:
+            return ["hero_%d was carried: set anew %s away, at %s" % (robot_id, step, _describe_pose(after))]
+        if was_lost:
+            unseen_s = measurement.stamp_s - used_s
+            return ["hero_%d found again after %.1f s, %s off its odometry" % (robot_id, unseen_s, step)]
+        return ["hero_%d corrected by %s" % (robot_id, step)] if step_m > ANNOUNCED_STEP_M else []
+
+    def find_lost(self, now_s: float) -> List[str]:
+        """Notice robots that are not measured any more; return lines for people. Call it some times a second.
+
+        If time has gone back, as when a recording is played again, all robots are to be found anew.
+        """
+        lines = []
+        if now_s < self._now_s - LOST_S:
+            lines.append("time went back by %.1f s: all robots are to be found anew" % (self._now_s - now_s))
+            self._robots = {robot_id: _Robot() for robot_id in self._robots}
+        self._now_s = now_s
+        for robot_id, robot in sorted(self._robots.items()):
+            if not robot.is_lost and -math.inf < robot.filter.used_s < now_s - LOST_S:
+                robot.is_lost = True
+                lines.append("hero_%d lost: its pose follows its odometry" % robot_id)
+        return lines
+
+    def list_robots(self, now_s: float) -> List[LocalizedRobot]:
+        """Return what is known of all robots, in the order of their ids."""
+        return [self._describe(robot_id, robot, now_s) for robot_id, robot in sorted(self._robots.items())]
+
+    def _describe(self, robot_id: int, robot: _Robot, now_s: float) -> LocalizedRobot:
+        estimate = robot.filter.estimate()
+        state = RobotState.TRACKED
+        if estimate is None:
+            state = RobotState.UNKNOWN
+        elif robot.is_lost:
+            state = RobotState.LOST
+        problem = self._find_problem(robot, state, now_s)
+        origin = None if estimate is None else robot.filter.find_odom_origin(estimate.pose)
+        return LocalizedRobot(robot_id, state, estimate, origin, problem)
+
+    @staticmethod
+    def _find_problem(robot: _Robot, state: RobotState, now_s: float) -> str:
+        newest_s = robot.filter.odometry.newest_s
+        if newest_s == -math.inf:
+            return "no odometry: is the robot on?"
+        if newest_s < now_s - SILENT_S:
+            return "no odometry for %.0f s: is the robot on and in reach?" % (now_s - newest_s)
+        if robot.measured_s == -math.inf:
+            return "its pose was never measured: is its tag in view?"
+        if robot.late_s is not None:
+            return "measured poses come with stamps %.1f s old: do the clocks agree?" % (now_s - robot.late_s)
+        if robot.measured_s > now_s + AHEAD_S:
+            return "measured poses come with stamps %.1f s ahead: do the clocks agree?" % (robot.measured_s - now_s)
+        if state is RobotState.LOST:
+            return "not measured for %.0f s: is its tag covered or out of view?" % (now_s - robot.filter.used_s)
+        error_rad = robot.heading.error_rad
+        if error_rad is not None and abs(error_rad) > WRONG_HEADING_RAD:
+            kind = "upside down" if is_upside_down(error_rad) else "turned"
+            text = "its measured heading is %.0f degrees off the way it drives: is its tag on %s?"
+            return text % (math.degrees(error_rad), kind) + " calibrate_camera robots measures it"
+        if robot.outliers:
+            return "%d measured poses in a row disagree with its odometry" % robot.outliers
+        return ""
+
+
+def _describe_pose(pose: Pose) -> str:
+    return "(%.3f, %.3f) m, %.0f degrees" % (pose.x_m, pose.y_m, math.degrees(pose.yaw_rad))

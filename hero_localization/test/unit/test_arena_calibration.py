@@ -1,0 +1,173 @@
+"""Where the camera hangs, from reference tags: right ones, misplaced ones, too few; and a camera that was moved."""
+
+import math
+
+import numpy as np
+import pytest
+
+cv2 = pytest.importorskip("cv2")
+
+from hero_client.geometry import Pose, transform_pose  # noqa: E402 - without OpenCV there is no calibration
+from hero_localization.arena_calibration import (  # noqa: E402
+    average_tags,
+    calibrate_arena,
+    find_moved_references,
+    measure_residuals,
+)
+from hero_localization.camera_model import Camera, Lens  # noqa: E402
+from hero_localization.errors import CalibrationError  # noqa: E402
+from hero_localization.tag_corners import TagCorners  # noqa: E402
+from hero_localization.tag_pose import ReferenceTag  # noqa: E402
+
+LENS = Lens(
+    1920,
+    1080,
+    np.array(((1390.0, 0.0, 955.0), (0.0, 1385.0, 545.0), (0.0, 0.0, 1.0))),
+    np.array((-0.1, 0.02, 0.001, 0.0, 0.0)),
+)
+PLACES = {
+    100: (-1.2, -0.65),
+    101: (1.2, -0.65),
+    102: (1.2, 0.65),
+    103: (-1.2, 0.65),
+    104: (0.0, -0.6),
+    105: (0.1, 0.6),
+}
+REFERENCES = {tag_id: ReferenceTag(Pose(*place, 0.0)) for tag_id, place in PLACES.items()}
+
+
+def hang(tilt_rad=(0.05, -0.03, 0.1), position_m=(0.04, -0.02, 2.2)):
+    rotation = cv2.Rodrigues(np.array(tilt_rad))[0] @ np.diag((1.0, -1.0, -1.0))
+    return Camera(LENS, rotation, np.array(position_m))
+
+
+CAMERA = hang()
+
+
+def see(tag_id, pose, size_m=0.1, camera=CAMERA, random=None):
+    half = size_m / 2.0
+    square = ((half, half), (half, -half), (-half, -half), (-half, half))
+    corners = [transform_pose(pose, Pose(x, y, 0.0)) for x, y in square]
+    pixels = camera.project(np.array([(corner.x_m, corner.y_m, 0.0) for corner in corners]))
+    return TagCorners(tag_id, pixels + (0.0 if random is None else random.normal(0.0, 0.06, (4, 2))))
+
+
+def see_all(shifts_m=None, camera=CAMERA, yaw_rad=0.0, ids=tuple(PLACES)):
+    random = np.random.RandomState(3)
+    tags = []
+    for tag_id in ids:
+        dx_m, dy_m = (shifts_m or {}).get(tag_id, (0.0, 0.0))
+        place = Pose(PLACES[tag_id][0] + dx_m, PLACES[tag_id][1] + dy_m, yaw_rad)
+        tags.append(see(tag_id, place, camera=camera, random=random))
+    return tags
+
+
+def place_error_m(camera):
+    """Return the worst error over the field of places at a robot's height."""
+    x, y = np.meshgrid(np.linspace(-1.2, 1.2, 9), np.linspace(-0.6, 0.6, 5))
+    points_m = np.column_stack((x.ravel(), y.ravel(), np.full(x.size, 0.076)))
+    found_m = camera.intersect(CAMERA.project(points_m), 0.076)
+    return np.linalg.norm(found_m - points_m[:, :2], axis=1).max()
+
+
+@pytest.mark.parametrize("count", [4, 6])
+def test_camera_is_found_from_reference_tags(count):
+    found = calibrate_arena(
+        LENS, see_all(ids=tuple(PLACES)[:count]), {k: REFERENCES[k] for k in tuple(PLACES)[:count]}
+    )
+    assert found.problems == [] and found.left_out == []
+    assert set(found.residuals_m) == set(tuple(PLACES)[:count])
+    assert found.rms_m < 0.0005
+    assert place_error_m(found.camera) < 0.001
+
+
+def test_yaw_of_reference_tags_need_not_be_measured():
+    found = calibrate_arena(LENS, see_all(yaw_rad=0.3), REFERENCES)
+    assert found.problems == [] and place_error_m(found.camera) < 0.001
+
+
+def test_places_measured_with_a_tape_do():
+    random = np.random.RandomState(1)
+    shifts_m = {tag_id: tuple(random.normal(0.0, 0.001, 2)) for tag_id in PLACES}
+    found = calibrate_arena(LENS, see_all(shifts_m), REFERENCES)
+    assert found.problems == []
+    assert 0.0002 < found.rms_m < 0.002 and place_error_m(found.camera) < 0.004
+
+
+def test_misplaced_tag_is_named_and_left_out():
+    found = calibrate_arena(LENS, see_all({102: (0.03, -0.01)}), REFERENCES)
+    assert found.left_out == [102]
+    assert found.residuals_m[102] == pytest.approx(math.hypot(0.03, 0.01), abs=0.003)
+    assert (
+        len(found.problems) == 1
+        and "tag 102" in found.problems[0]
+        and "mm from its place" in found.problems[0]
+    )
+    assert place_error_m(found.camera) < 0.002
+
+
+def test_misplaced_one_of_four_shows_in_the_residuals():
+    ids = (100, 101, 102, 103)
+    found = calibrate_arena(LENS, see_all({102: (0.05, 0.0)}, ids=ids), {k: REFERENCES[k] for k in ids})
+    assert found.problems and found.rms_m > 0.003
+
+
+def test_lens_that_was_calibrated_wrongly_shows_in_the_residuals():
+    wrong = LENS._replace(distortion=np.array((0.1, 0.0, 0.0, 0.0, 0.0)))
+    assert any("lens" in problem for problem in calibrate_arena(wrong, see_all(), REFERENCES).problems)
+
+
+def test_reference_tags_that_are_not_seen_are_named():
+    found = calibrate_arena(LENS, see_all(ids=(100, 101, 102, 103, 104)), REFERENCES)
+    assert found.problems == ["not seen: reference tags 105"]
+
+
+def test_too_few_reference_tags_are_refused():
+    with pytest.raises(CalibrationError, match="sees 3 of 6 reference tags, not 103, 104, 105"):
+        calibrate_arena(LENS, [*see_all(ids=(100, 101, 102)), see(7, Pose(0.0, 0.0, 0.0))], REFERENCES)
+
+
+def test_reference_tags_in_a_row_are_refused():
+    row = {tag_id: ReferenceTag(Pose(0.3 * tag_id, 0.1, 0.0)) for tag_id in range(4)}
+    with pytest.raises(CalibrationError, match="in a row"):
+        calibrate_arena(LENS, [see(tag_id, tag.pose) for tag_id, tag in row.items()], row)
+
+
+def test_average_leaves_out_tags_that_are_seen_rarely_or_twice():
+    random = np.random.RandomState(0)
+    frames = [[see(1, Pose(0.2, 0.1, 0.0), random=random)] for _ in range(10)]
+    frames[0].append(see(2, Pose(0.5, 0.1, 0.0)))
+    for frame in frames:
+        frame.extend((see(3, Pose(0.5, 0.1, 0.0)), see(3, Pose(0.7, 0.1, 0.0))))
+    (averaged,) = average_tags(frames)
+    assert averaged.tag_id == 1
+    assert np.abs(averaged.corners - see(1, Pose(0.2, 0.1, 0.0)).corners).max() < 0.08
+
+
+def see_poses(camera, seen_by):
+    """Return where reference tags are seen if the one camera's calibration is used for the other."""
+    residuals = {}
+    for tag in see_all(camera=seen_by):
+        center_m = camera.intersect(tag.corners, 0.0).mean(axis=0)
+        residuals[tag.tag_id] = Pose(float(center_m[0]), float(center_m[1]), 0.0)
+    return residuals
+
+
+def test_camera_that_was_moved_shows_at_all_reference_tags():
+    at_calibration = see_poses(CAMERA, CAMERA)
+    assert find_moved_references(see_poses(CAMERA, CAMERA), at_calibration) == {}
+    turned = hang(tilt_rad=(0.05, -0.03 + 0.004, 0.1))
+    moved_m = find_moved_references(see_poses(CAMERA, turned), at_calibration)
+    assert set(moved_m) == set(PLACES) and min(moved_m.values()) > 0.006
+
+
+def test_reference_tag_that_was_moved_is_told_from_a_camera_that_was():
+    at_calibration = see_poses(CAMERA, CAMERA)
+    seen = {**at_calibration, 101: at_calibration[101]._replace(x_m=at_calibration[101].x_m + 0.02)}
+    assert find_moved_references(seen, at_calibration) == pytest.approx({101: 0.02})
+
+
+def test_residuals_of_a_camera_are_those_of_the_places():
+    residuals_m = measure_residuals(CAMERA, see_all({100: (0.01, 0.0)}), REFERENCES)
+    assert residuals_m[100] == pytest.approx(0.01, abs=0.0005)
+    assert max(residual for tag_id, residual in residuals_m.items() if tag_id != 100) < 0.0005

@@ -1,0 +1,102 @@
+"""The camera model: known pixels, round trips, planes at a height, wrong camera information."""
+
+import numpy as np
+import pytest
+
+from hero_localization.camera_model import Camera, Lens
+
+MATRIX = np.array(((1390.0, 0.0, 955.0), (0.0, 1385.0, 545.0), (0.0, 0.0, 1.0)))
+DISTORTION = np.array((-0.12, 0.03, 0.0008, -0.0006, -0.002))
+DOWN = np.diag((1.0, -1.0, -1.0))
+"""Map's x axis to the right of the picture, its y axis up."""
+
+
+def overhead(distortion=DISTORTION, tilt_rad=0.0):
+    cos, sin = np.cos(tilt_rad), np.sin(tilt_rad)
+    tilt = np.array(((1.0, 0.0, 0.0), (0.0, cos, -sin), (0.0, sin, cos)))
+    return Camera(Lens(1920, 1080, MATRIX, distortion), tilt @ DOWN, np.array((0.1, -0.2, 2.2)))
+
+
+def grid(height_m):
+    x, y = np.meshgrid(np.linspace(-1.3, 1.5, 15), np.linspace(-0.9, 0.5, 9))
+    return np.column_stack((x.ravel(), y.ravel(), np.full(x.size, height_m)))
+
+
+def test_pinhole_gives_the_pixels_of_similar_triangles():
+    camera = overhead(np.zeros(5))
+    assert camera.project(np.array(((0.1, -0.2, 0.0),))) == pytest.approx(np.array(((955.0, 545.0),)))
+    # One meter to the right and half a meter up in the map, seen from 2.2 m.
+    seen = camera.project(np.array(((1.1, 0.3, 0.0),)))
+    assert seen == pytest.approx(np.array(((955.0 + 1390.0 / 2.2, 545.0 - 1385.0 * 0.5 / 2.2),)))
+
+
+def test_distortion_is_that_of_the_formula():
+    # By hand: x = 0.4, y = 0, r2 = 0.16: radial = 1 - 0.12 * 0.16 + 0.03 * 0.0256 - 0.002 * 0.004096.
+    seen = Lens(1920, 1080, MATRIX, DISTORTION).distort(np.array(((0.4, 0.0),)))
+    x = 0.4 * (1.0 - 0.0192 + 0.000768 - 8.192e-6) - 0.0006 * (0.16 + 2 * 0.16)
+    assert seen == pytest.approx(np.array(((955.0 + 1390.0 * x, 545.0 + 1385.0 * 0.0008 * 0.16),)))
+
+
+def test_projection_agrees_with_opencv():
+    cv2 = pytest.importorskip("cv2")
+    camera, points_m = overhead(tilt_rad=0.15), grid(0.076)
+    rotation, _ = cv2.Rodrigues(camera.rotation)
+    seen, _ = cv2.projectPoints(points_m, rotation, -camera.rotation @ camera.position_m, MATRIX, DISTORTION)
+    assert np.abs(camera.project(points_m) - seen[:, 0]).max() < 1e-6
+
+
+@pytest.mark.parametrize("tilt_rad", [0.0, 0.2, -0.35])
+@pytest.mark.parametrize("height_m", [0.0, 0.076, 0.3])
+def test_points_of_a_plane_are_found_again_from_their_pixels(tilt_rad, height_m):
+    camera, points_m = overhead(tilt_rad=tilt_rad), grid(height_m)
+    found_m = camera.intersect(camera.project(points_m), height_m)
+    assert np.abs(found_m - points_m[:, :2]).max() < 1e-6
+
+
+def test_a_tag_taken_for_lying_on_the_floor_is_52_mm_off():
+    """76 mm high at 1.5 m from the axis: what a homography of the floor alone gets wrong."""
+    camera = overhead(np.zeros(5))
+    pixel = camera.project(np.array(((1.6, -0.2, 0.076),)))
+    assert camera.intersect(pixel, 0.076) == pytest.approx(np.array(((1.6, -0.2),)))
+    floor_m = camera.intersect(pixel, 0.0)
+    assert floor_m[0, 0] - 1.6 == pytest.approx(1.5 * 0.076 / (2.2 - 0.076), abs=1e-9)
+
+
+def test_what_a_camera_cannot_see_is_nan():
+    camera = overhead()
+    assert np.isnan(camera.project(np.array(((0.0, 0.0, 2.5),)))).all()
+    upwards = camera._replace(rotation=np.eye(3))
+    assert np.isnan(upwards.intersect(np.array(((900.0, 500.0),)), 0.0)).all()
+
+
+def test_pixels_where_the_lens_folds_back_are_nan():
+    lens = Lens(1920, 1080, MATRIX, np.array((-0.5, 0.0, 0.0, 0.0, 0.0)))
+    assert np.isnan(lens.undistort(np.array(((955.0 + 1390.0 * 0.8, 545.0),)))).all()
+
+
+def test_each_pixel_may_have_a_height_of_its_own():
+    camera = overhead()
+    points_m = np.array(((0.5, 0.2, 0.0), (0.5, 0.2, 0.076), (-0.9, 0.4, 0.3)))
+    found_m = camera.intersect(camera.project(points_m), points_m[:, 2])
+    assert np.abs(found_m - points_m[:, :2]).max() < 1e-6
+
+
+def test_lens_is_read_from_camera_information():
+    lens = Lens.from_camera_info(1920, 1080, MATRIX.ravel().tolist(), "plumb_bob", DISTORTION.tolist())
+    assert (lens.matrix == MATRIX).all() and (lens.distortion == DISTORTION).all()
+    assert (Lens.from_camera_info(640, 480, MATRIX.ravel(), "", ()).distortion == 0.0).all()
+
+
+@pytest.mark.parametrize(
+    ("matrix", "model", "distortion", "words"),
+    [
+        ([0.0] * 9, "plumb_bob", [0.0] * 5, "not calibrated"),
+        ([1.0] * 8, "plumb_bob", [0.0] * 5, "not calibrated"),
+        (MATRIX.ravel(), "equidistant", [0.1] * 4, "equidistant"),
+        (MATRIX.ravel(), "rational_polynomial", [0.1] * 8, "with 8"),
+        (MATRIX.ravel(), "plumb_bob", [float("nan")] * 5, "finite"),
+    ],
+)
+def test_camera_information_that_does_not_fit_is_refused(matrix, model, distortion, words):
+    with pytest.raises(ValueError, match=words):
+        Lens.from_camera_info(1920, 1080, matrix, model, distortion)

@@ -1,0 +1,119 @@
+"""Both detectors: place, order of corners and heading of tags in rendered pictures."""
+
+import math
+import sys
+
+import numpy as np
+import pytest
+
+pytest.importorskip("cv2")
+
+from hero_localization.detectors import create_detector
+from hero_localization.errors import DetectorError
+from hero_localization.tag_corners import TagCorners
+from hero_sim.camera.renderer import CameraRenderer
+from hero_sim.camera.tag_images import draw_tag
+from hero_sim.camera.view import CameraOptions, PrintedTag, tag_corners
+from hero_sim.world.arena import build_rectangle
+
+OPTIONS = CameraOptions(width_px=640, height_px=480, center_px=(318.0, 242.0))
+ARENA = build_rectangle(2.0, 2.0, 0)
+HEADINGS = np.linspace(-math.pi, math.pi, 9)[:-1] + 0.02
+POSES = np.column_stack((np.tile(np.linspace(-0.35, 0.4, 4), 2), np.repeat((-0.2, 0.18), 4), HEADINGS))
+
+
+@pytest.fixture(params=["apriltag", "aruco"])
+def backend(request):
+    pytest.importorskip({"apriltag": "apriltag", "aruco": "cv2"}[request.param])
+    return request.param
+
+
+def render(family, options=OPTIONS):
+    tags = [PrintedTag(index, family=family) for index in range(len(POSES))]
+    renderer = CameraRenderer(options, ARENA, tags, seed=4)
+    true = [renderer.view.project(tag_corners(tag, POSES[[tag.tag_id]]))[0] for tag in tags]
+    return renderer.render(POSES), true
+
+
+def picture(tag_id, family="36h11", turns=0):
+    cells = np.rot90(draw_tag(family, tag_id), -turns)  # clockwise
+    return np.kron(np.pad(cells, 3, constant_values=255), np.ones((12, 12), np.uint8))
+
+
+@pytest.mark.parametrize("family", ["36h11", "16h5"])
+@pytest.mark.parametrize("decimate", [1.0, 2.0])
+def test_corners_and_headings_are_those_of_the_prints(backend, family, decimate):
+    image, true = render(family)
+    found = {tag.tag_id: tag for tag in create_detector(backend, family, decimate).detect(image)}
+    assert sorted(found) == list(range(len(POSES)))
+    errors = np.array([found[tag_id].corners - corners for tag_id, corners in enumerate(true)])
+    assert np.abs(errors).max() < 1.0, "a wrong order of the corners is 20 px off"
+    assert np.sqrt((errors**2).mean()) < {"apriltag": 0.1, "aruco": 0.25}[backend]
+    centers = np.array([found[tag_id].center - corners.mean(axis=0) for tag_id, corners in enumerate(true)])
+    assert np.abs(centers.mean(axis=0)).max() < 0.05, "half a pixel is the trap"
+    assert np.abs(centers).max() < 0.2
+
+
+@pytest.mark.parametrize("turns", [0, 1, 2, 3])
+@pytest.mark.parametrize("family", ["36h11", "16h5"])
+def test_first_corner_is_the_prints_upper_left_however_it_lies(backend, family, turns):
+    corners = create_detector(backend, family).detect(picture(5, family, turns))[0].corners
+    low, high = 36.0 - 0.5, 36.0 + 12.0 * len(draw_tag(family, 5)) - 0.5
+    square = np.array(((low, low), (high, low), (high, high), (low, high)))
+    assert np.abs(corners - np.roll(square, -turns, axis=0)).max() < 1.0
+
+
+def test_mirrored_prints_are_not_taken_for_tags(backend):
+    assert create_detector(backend).detect(np.ascontiguousarray(picture(5)[:, ::-1])) == []
+
+
+def test_corners_of_a_window_are_those_of_the_whole_picture(backend):
+    image, true = render("36h11")
+    left, top = np.floor(true[5].min(axis=0)).astype(int) - 20
+    found = create_detector(backend).detect(image[top : top + 72, left : left + 72], (left, top))
+    (tag,) = (tag for tag in found if tag.tag_id == 5)
+    assert np.abs(tag.corners - true[5]).max() < 1.0
+
+
+def test_tags_of_another_family_are_not_found(backend):
+    assert create_detector(backend, "16h5").detect(picture(5)) == []
+    assert create_detector(backend, "36h11").detect(picture(5, "16h5")) == []
+
+
+def test_nothing_is_found_in_noise_or_in_an_empty_picture(backend):
+    noise = np.random.RandomState(0).randint(0, 256, (480, 640)).astype(np.uint8)
+    for family in ("36h11", "16h5"):
+        detector = create_detector(backend, family)
+        assert detector.detect(np.full((480, 640), 120, np.uint8)) == []
+        assert detector.detect(noise) == []
+
+
+def test_center_is_where_the_diagonals_cross():
+    # Seen at a slant, the far half of a square is shorter than the near one.
+    tag = TagCorners(0, np.array(((10.0, 0.0), (20.0, 0.0), (30.0, 30.0), (0.0, 30.0))))
+    assert tag.center == pytest.approx((15.0, 7.5))
+    assert tag.side_px == pytest.approx(math.sqrt((10.0 + 30.0) / 2.0 * 30.0)), "the area of a trapezium"
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"backend": "zbar"}, "zbar.*apriltag, aruco"),
+        ({"family": "25h9"}, "25h9.*16h5, 36h11"),
+        ({"decimate": 0.5}, "decimation 0.5"),
+        ({"decimate": float("nan")}, "decimation nan"),
+    ],
+)
+def test_wrong_options_of_a_detector_are_named(given, words):
+    with pytest.raises(DetectorError, match=words):
+        create_detector(**given)
+
+
+def test_default_detector_is_installed():
+    assert [tag.tag_id for tag in create_detector().detect(picture(5))] == [5]
+
+
+def test_missing_library_is_named_with_its_package(monkeypatch):
+    monkeypatch.setitem(sys.modules, "apriltag", None)
+    with pytest.raises(DetectorError, match="apt install python3-apriltag"):
+        create_detector("apriltag")

@@ -1,0 +1,163 @@
+"""Pictures from topics and videos become gray; what cannot be used or opened is named; the newest picture counts."""
+
+import re
+
+import cv2
+import numpy as np
+import pytest
+import rospy
+from sensor_msgs.msg import CompressedImage, Image
+
+from hero_localization import frame_source
+from hero_localization.errors import FrameSourceError
+from hero_localization.frame_source import TopicSource, open_source
+
+RATE_HZ = 10.0
+SLOW_S = 2.5 / RATE_HZ
+SHADES = (40, 80, 120, 160)
+TIMEOUT_S = 30.0
+GRAY = np.arange(12, dtype=np.uint8).reshape(3, 4) * 20
+
+
+@pytest.fixture(autouse=True)
+def _ros_time():
+    rospy.rostime.set_rostime_initialized(True)
+
+
+@pytest.fixture
+def receivers(monkeypatch):
+    """Return what is called with the messages of each topic."""
+    found = {}
+    monkeypatch.setattr(rospy, "Subscriber", lambda topic, kind, receive, **options: found.update({topic: receive}))
+    return found
+
+
+@pytest.fixture
+def source(receivers):
+    source = TopicSource("/camera/image_raw")
+    source.receive = receivers["/camera/image_raw"]
+    return source
+
+
+def make_image(encoding, channels, padding=2):
+    rows = np.pad(np.repeat(GRAY, channels, axis=1), ((0, 0), (0, padding)))
+    image = Image(height=3, width=4, encoding=encoding, step=rows.shape[1], data=rows.tobytes())
+    image.header.stamp, image.header.seq = rospy.Time(7), 9
+    return image
+
+
+@pytest.mark.parametrize(("encoding", "channels"), [("mono8", 1), ("bgr8", 3), ("rgb8", 3), ("bgra8", 4)])
+def test_pictures_become_gray(source, encoding, channels):
+    source.receive(make_image(encoding, channels))
+    frame = source.poll(0.0)
+    assert (source.problem, frame.stamp_s, frame.number) == ("", 7.0, 9)
+    np.testing.assert_array_equal(frame.gray, GRAY)
+
+
+def test_unknown_encodings_are_named_until_a_usable_picture_comes(source):
+    source.receive(make_image("bayer_rggb8", 1))
+    assert source.poll(0.0) is None and "'bayer_rggb8', but must have one of mono8, " in source.problem
+    source.receive(make_image("mono8", 1))
+    assert source.poll(0.0) is not None and source.problem == ""
+
+
+@pytest.mark.parametrize("change", [{"data": b"\0" * 10}, {"step": 3}, {"width": 0}, {"height": 0}])
+def test_pictures_with_too_few_bytes_are_named(source, change):
+    image = make_image("mono8", 1)
+    for name, value in change.items():
+        setattr(image, name, value)
+    source.receive(image)
+    text = "pictures of %d x %d pixels come with %d bytes" % (image.width, image.height, len(image.data))
+    assert source.poll(0.0) is None and source.problem.startswith(text)
+
+
+def test_compressed_pictures_are_decoded_and_broken_ones_named(receivers):
+    source = TopicSource("/camera/image_raw/compressed")
+    receive = receivers["/camera/image_raw/compressed"]
+    for data in (b"", b"no picture"):
+        receive(CompressedImage(format="jpeg", data=data))
+        assert source.poll(0.0) is None and "of the format 'jpeg' cannot be decoded" in source.problem
+    message = CompressedImage(format="png", data=cv2.imencode(".png", GRAY)[1].tobytes())
+    message.header.stamp = rospy.Time(7)
+    receive(message)
+    np.testing.assert_array_equal(source.poll(0.0).gray, GRAY)
+    assert source.problem == ""
+
+
+def test_only_the_newest_picture_is_decoded_and_counts_once(source):
+    source.receive(make_image("bayer_rggb8", 1))
+    source.receive(make_image("mono8", 1))
+    assert source.poll(0.0) is not None and source.problem == ""
+    assert source.poll(0.0) is None
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    """Return the time of a clock that only goes on while somebody sleeps, as a list of one number."""
+    now_s = [100.0]
+
+    def sleep(duration_s):
+        now_s[0] += duration_s
+
+    monkeypatch.setattr(rospy, "get_time", lambda: now_s[0])
+    monkeypatch.setattr(frame_source.time, "sleep", sleep)
+    return now_s
+
+
+@pytest.fixture
+def video(clock, tmp_path, monkeypatch):
+    """Return a video of four shades in the home directory."""
+    monkeypatch.setenv("HOME", str(tmp_path))
+    writer = cv2.VideoWriter(str(tmp_path / "arena.avi"), cv2.VideoWriter_fourcc(*"MJPG"), RATE_HZ, (64, 48))
+    for shade in SHADES:
+        writer.write(np.full((48, 64, 3), shade, np.uint8))
+    writer.release()
+    source = open_source("", "~/arena.avi", "1920x1080", 30.0)
+    yield source
+    source.close()
+    source.close()
+
+
+def test_a_video_is_played_in_real_time_to_its_end(video, clock, tmp_path):
+    frames = [video.poll(TIMEOUT_S) for _ in SHADES]
+    assert [frame.gray.shape for frame in frames] == [(48, 64)] * len(SHADES)
+    assert np.allclose([frame.gray.mean() for frame in frames], SHADES, atol=3.0)
+    assert np.allclose(np.diff([frame.stamp_s for frame in frames]), 1.0 / RATE_HZ, atol=1e-4)
+    assert video.arrived_s == frames[-1].stamp_s == clock[0]
+    assert video.poll(TIMEOUT_S) is None
+    assert clock[0] == pytest.approx(frames[-1].stamp_s + TIMEOUT_S)
+    assert video.problem == "%s gives no more pictures: the video has ended" % (tmp_path / "arena.avi")
+
+
+def test_a_picture_of_a_video_that_is_due_later_comes_later(video, clock):
+    first_s = video.poll(TIMEOUT_S).stamp_s
+    assert video.poll(0.4 / RATE_HZ) is None
+    assert clock[0] == pytest.approx(first_s + 0.4 / RATE_HZ)
+    assert video.poll(TIMEOUT_S).stamp_s == pytest.approx(first_s + 1.0 / RATE_HZ, abs=1e-4)
+
+
+def test_a_video_waits_for_a_slow_program(video, clock):
+    stamps_s, numbers = [], []
+    for _ in SHADES:
+        frame = video.poll(TIMEOUT_S)
+        stamps_s.append(frame.stamp_s)
+        numbers.append(frame.number)
+        clock[0] += SLOW_S
+    assert numbers == list(range(len(SHADES)))
+    assert np.allclose(np.diff(stamps_s), SLOW_S)
+
+
+@pytest.mark.parametrize(
+    ("device", "reason"),
+    [
+        ("/dev/video-of-nobody", "does not exist; ls /dev/video* lists cameras"),
+        ("{folder}/arena.avi", "does not exist"),
+        ("{folder}", "is a folder, but must be a camera or a video"),
+        (__file__, "cannot be opened: no video that OpenCV can read"),
+        ("/dev/null", "cannot be opened: no camera, or another program uses it"),
+    ],
+)
+def test_what_cannot_be_opened_is_told_with_the_reason(tmp_path, device, reason):
+    device = device.format(folder=tmp_path)
+    with pytest.raises(FrameSourceError, match=re.escape("%s %s" % (device, reason))):
+        open_source("", device, "640x480", 30.0)

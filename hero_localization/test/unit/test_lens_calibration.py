@@ -1,0 +1,124 @@
+"""The lens from rendered pictures of a ChArUco board, and what too few or poor pictures are told."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("cv2")
+
+from hero_localization.errors import CalibrationError
+from hero_localization.lens_calibration import BoardView, calibrate_lens, find_board
+from hero_sim.camera.board_images import Board, BoardRenderer, list_board_corners
+from hero_sim.camera.view import CameraOptions, View
+
+OPTIONS = CameraOptions(
+    width_px=960,
+    height_px=540,
+    focal_px=(695.0, 692.0),
+    center_px=(474.0, 276.0),
+    distortion=(-0.1, 0.03, 0.001, -0.0005, 0),
+)
+BOARD = Board()
+
+
+def list_holds(count, tilt_rad, seed=0):
+    """Return turn and position of a board held all over the picture."""
+    random = np.random.RandomState(seed)
+    holds = []
+    for index in range(count):
+        u, v = 160.0 + 640.0 * (index % 3) / 2.0, 110.0 + 320.0 * (index // 3 % 3) / 2.0
+        distance_m = random.uniform(0.38, 0.5)
+        turn = (
+            *(tilt_rad * random.choice((-1.0, 1.0), 2) * random.uniform(0.5, 1.0, 2)),
+            random.uniform(-0.3, 0.3),
+        )
+        (fx, fy), (cx, cy) = OPTIONS.focal_px, OPTIONS.center_px
+        holds.append((turn, ((u - cx) / fx * distance_m, (v - cy) / fy * distance_m, distance_m)))
+    return holds
+
+
+@pytest.fixture(scope="module")
+def views():
+    random = np.random.RandomState(5)
+    renderer = BoardRenderer(OPTIONS, BOARD)
+    pictures = [renderer.render(*hold, random) for hold in list_holds(18, 0.55)]
+    found = [find_board(picture, BOARD) for picture in pictures]
+    assert sum(view is not None for view in found) >= 16
+    return [view for view in found if view is not None]
+
+
+def project(holds, noise_px=0.1, seed=0):
+    """Return views as exact as a good picture's, without rendering."""
+    import cv2
+
+    random, view = np.random.RandomState(seed), View(OPTIONS)
+    corners_m = list_board_corners(BOARD)
+    center_m = np.array((BOARD.columns * BOARD.square_m / 2.0, BOARD.rows * BOARD.square_m / 2.0, 0.0))
+    result = []
+    for turn, position_m in holds:
+        shift = np.array(position_m) - cv2.Rodrigues(np.array(turn))[0] @ center_m
+        pixels = cv2.projectPoints(corners_m, np.array(turn), shift, view.matrix, view.distortion)[0][:, 0]
+        inside = ((pixels > 0) & (pixels < (OPTIONS.width_px, OPTIONS.height_px))).all(axis=1)
+        noisy = pixels + random.normal(0.0, noise_px, pixels.shape)
+        result.append(BoardView(np.nonzero(inside)[0], noisy[inside].astype(np.float32)))
+    return result
+
+
+def calibrate(views):
+    return calibrate_lens(views, OPTIONS.width_px, OPTIONS.height_px, BOARD)
+
+
+def test_lens_is_found_from_rendered_pictures(views):
+    found = calibrate(views)
+    assert found.problems == []
+    assert found.rms_px < 0.3
+    assert (found.lens.matrix[0, 0], found.lens.matrix[1, 1]) == pytest.approx(OPTIONS.focal_px, rel=0.003)
+    axes = np.meshgrid(np.linspace(-0.6, 0.6, 9), np.linspace(-0.35, 0.35, 5))
+    rays = np.column_stack([axis.ravel() for axis in axes])
+    view = View(OPTIONS)
+    true = view.project(np.column_stack((rays, np.ones(len(rays)))) @ view.rotation + view.position_m)
+    shift = found.lens.distort(rays) - true
+    # A shift of the whole picture and a turn of the camera are one.
+    assert np.abs(shift - shift.mean(axis=0)).max() < 1.0
+
+
+def test_boards_corners_are_found_where_they_are(views):
+    exact = project(list_holds(18, 0.55), 0.0)
+    for found, true in zip(views, exact):
+        at = dict(zip(true.ids, true.pixels))
+        errors = [found.pixels[row] - at[corner] for row, corner in enumerate(found.ids) if corner in at]
+        assert np.sqrt(np.mean(np.square(errors))) < 0.3
+
+
+def test_picture_without_a_board_gives_none():
+    assert find_board(np.full((540, 960), 120, np.uint8), BOARD) is None
+
+
+def test_too_few_pictures_are_refused():
+    with pytest.raises(CalibrationError, match="found in 5 pictures; it takes 8"):
+        calibrate(project(list_holds(5, 0.5)))
+
+
+def test_board_that_is_never_tilted_is_told_to_be():
+    found = calibrate(project(list_holds(12, 0.01), noise_px=0.2))
+    assert any("tilted" in problem for problem in found.problems)
+
+
+def test_regions_without_a_board_are_named():
+    holds = [hold for hold in list_holds(36, 0.5) if hold[1][0] > -0.1]
+    problems = calibrate(project(holds)).problems
+    assert any("middle left" in problem and "middle right" not in problem for problem in problems)
+
+
+def test_blurred_pictures_are_told():
+    found = calibrate(project(list_holds(18, 0.5), noise_px=1.2))
+    assert any("sharp" in problem for problem in found.problems)
+
+
+def test_one_bad_picture_is_left_out():
+    views = project(list_holds(18, 0.5))
+    random = np.random.RandomState(0)
+    blurred = views[4].pixels + random.normal(0.0, 4.0, views[4].pixels.shape)
+    views[4] = views[4]._replace(pixels=blurred.astype(np.float32))
+    found = calibrate(views)
+    assert found.left_out == [4] and found.rms_px < 0.3
+    assert found.lens.matrix[0, 0] == pytest.approx(695.0, rel=0.003)

@@ -1,0 +1,132 @@
+"""Tag on its robot and delay of the camera, from a simulated drive on the spot and straight on."""
+
+import math
+
+import numpy as np
+import pytest
+
+from hero_client.geometry import Pose, transform_pose, wrap_angle
+from hero_localization.errors import CalibrationError
+from hero_localization.robot_calibration import calibrate_robot
+
+STEP_S = 0.01
+FULL = (
+    (6.5, 0.0, 1.2),
+    (0.5, 0.0, 0.0),
+    (6.5, 0.0, -1.2),
+    (0.5, 0.0, 0.0),
+    (2.0, 0.1, 0.0),
+    (2.0, -0.1, 0.0),
+)
+"""Turn left, turn right, forward, back: duration s, m/s, rad/s."""
+
+
+MOUNT = Pose(0.006, -0.003, 0.05)
+
+
+def drive(parts=FULL, mount=MOUNT, delay_s=0.08, seed=0, noise_m=0.0007, noise_rad=0.006):
+    """Return what the camera and odometry say; wheels slip by 2 % and the stamps are late."""
+    random = np.random.RandomState(seed)
+    true, counted, now_s = Pose(0.6, -0.3, 2.0), Pose(1.0, 2.0, -1.0), 10.0
+    slip = 1.0 + random.uniform(0.0, 0.03, 2)
+    ways, seen, odometry = [], [], []
+    for duration_s, linear_m_s, angular_rad_s in parts:
+        for _ in range(int(duration_s / STEP_S)):
+            true = transform_pose(true, Pose(linear_m_s * STEP_S, 0.0, angular_rad_s * STEP_S))
+            turned = angular_rad_s * STEP_S * slip[int(angular_rad_s > 0.0)]
+            counted = transform_pose(counted, Pose(linear_m_s * STEP_S * 1.015, 0.0, turned))
+            now_s += STEP_S
+            ways.append((now_s, true, counted))
+    for now_s, true, _ in ways[::3]:
+        tag = transform_pose(true, mount)
+        noise = random.normal(0.0, (noise_m, noise_m, noise_rad))
+        seen.append(
+            (
+                now_s + delay_s,
+                Pose(tag.x_m + noise[0], tag.y_m + noise[1], wrap_angle(tag.yaw_rad + noise[2])),
+            )
+        )
+    odometry = [
+        (now_s, counted._replace(yaw_rad=wrap_angle(counted.yaw_rad))) for now_s, _, counted in ways[::4]
+    ]
+    return seen, odometry
+
+
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("mount", [Pose(0.0, 0.0, 0.0), Pose(0.008, -0.005, 0.2), Pose(-0.01, 0.004, -1.6)])
+def test_place_and_yaw_of_the_tag_and_the_delay_are_found(mount, seed):
+    found = calibrate_robot(*drive(mount=mount, seed=seed))
+    assert found.problems == []
+    assert (found.x_m, found.y_m) == pytest.approx(mount[:2], abs=0.0005)
+    assert abs(wrap_angle(found.yaw_rad - mount.yaw_rad)) < 0.012
+    assert found.delay_s == pytest.approx(0.08, abs=0.003)
+    assert found.delay_error_s < 0.003 and found.rms_m < 0.0012
+
+
+@pytest.mark.parametrize("delay_s", [-0.03, 0.0, 0.25])
+def test_delays_of_all_sizes_are_found(delay_s):
+    found = calibrate_robot(*drive(delay_s=delay_s))
+    assert found.delay_s == pytest.approx(delay_s, abs=0.003)
+
+
+def test_error_of_the_delay_is_stated_as_large_as_it_is():
+    errors = [calibrate_robot(*drive(seed=seed)) for seed in range(12)]
+    spread_s = np.std([found.delay_s for found in errors])
+    stated_s = np.mean([found.delay_error_s for found in errors])
+    assert 0.3 * stated_s < spread_s < 3.0 * stated_s
+
+
+def test_tag_on_upside_down_is_named():
+    found = calibrate_robot(*drive(mount=Pose(0.002, 0.0, math.pi - 0.05)))
+    assert any("upside down" in problem for problem in found.problems)
+    assert abs(wrap_angle(found.yaw_rad - math.pi + 0.05)) < 0.012
+
+
+def test_tag_far_from_the_robots_center_is_named():
+    found = calibrate_robot(*drive(mount=Pose(0.03, 0.0, 0.0)))
+    assert any("30 mm from the robot's center" in problem for problem in found.problems)
+
+
+def test_loose_tag_is_named():
+    found = calibrate_robot(*drive(noise_m=0.004))
+    assert any("loosely" in problem for problem in found.problems)
+
+
+def test_steady_turning_does_not_show_the_delay():
+    steady = ((12.0, 0.0, 1.2), (2.0, 0.1, 0.0))
+    try:
+        found = calibrate_robot(*drive(steady, noise_rad=0.1))
+    except CalibrationError as error:
+        assert "clocks" in str(error)
+    else:
+        assert any("to and fro" in problem for problem in found.problems)
+
+
+@pytest.mark.parametrize(
+    ("parts", "words"),
+    [
+        ((*FULL[:4], (1.0, 0.02, 0.0)), "drove .* mm only"),
+        (FULL[4:], "turned by 0 degrees only"),
+        (((0.2, 0.0, 1.0),), "seen 0 times"),
+    ],
+)
+def test_drives_that_are_too_short_are_refused(parts, words):
+    with pytest.raises(CalibrationError, match=words):
+        calibrate_robot(*drive(parts))
+
+
+def test_robot_without_odometry_is_named():
+    seen, _ = drive()
+    with pytest.raises(CalibrationError, match="no odometry"):
+        calibrate_robot(seen, [])
+
+
+def test_tag_of_another_robot_is_named():
+    seen, odometry = drive()
+    still = [(stamp_s, Pose(0.1, 0.2, 0.3 + 1e-3 * math.sin(stamp_s))) for stamp_s, _ in seen]
+    try:
+        found = calibrate_robot(still, odometry)
+    except CalibrationError as error:
+        assert "clocks" in str(error)
+    else:
+        assert found.problems

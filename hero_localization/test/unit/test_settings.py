@@ -1,0 +1,130 @@
+"""The file of a camera: what calibrations write is what the tracker reads; wrong files are refused with a remedy."""
+
+import math
+
+import numpy as np
+import pytest
+import yaml
+
+from hero_client.geometry import Pose
+from hero_localization import settings
+from hero_localization.camera_model import Camera, Lens
+from hero_localization.detectors import DEFAULT_BACKEND
+from hero_localization.errors import SettingsError
+
+MATRIX = (1390.0, 0.0, 950.0, 0.0, 1391.0, 550.0, 0.0, 0.0, 1.0)
+LENS = Lens.from_camera_info(1920, 1080, MATRIX, "plumb_bob", (-0.1, 0.02, 0.0, 0.0))
+CAMERA = Camera(LENS, np.diag((1.0, -1.0, -1.0)), np.array((0.1, 0.2, 2.2)))
+
+LENS_TEXT = "lens: {width_px: 10, height_px: 10, matrix: [9, 0, 5, 0, 9, 5, 0, 0, 1], distortion: []}\n"
+
+
+@pytest.fixture
+def path(tmp_path):
+    return str(tmp_path / "new" / "camera.yaml")
+
+
+def write(path, text):
+    settings.update(path, {})
+    with open(path, "w", encoding="utf-8") as file:
+        file.write(text)
+
+
+def read(path):
+    with open(path, encoding="utf-8") as file:
+        return yaml.safe_load(file)
+
+
+def test_without_a_file_there_is_a_camera_that_nobody_calibrated(path):
+    found = settings.load(path)
+    assert found.lens is None and found.camera is None
+    assert (found.family, found.detector) == ("36h11", DEFAULT_BACKEND)
+    assert found.layout.find_robot(7) == 7
+    assert found.layout.default_mount.size_m == 0.04
+
+
+def test_what_calibrations_write_is_read_again(path):
+    settings.update(path, settings.describe_camera(CAMERA, {100: Pose(0.5, -0.5, math.pi / 2.0)}))
+    settings.update(path, {"delay_s": 0.07})
+    found = settings.load(path)
+    np.testing.assert_allclose(found.lens.matrix, LENS.matrix)
+    np.testing.assert_allclose(found.lens.distortion, LENS.distortion)
+    np.testing.assert_allclose(found.camera.rotation, CAMERA.rotation)
+    np.testing.assert_allclose(found.camera.position_m, CAMERA.position_m)
+    assert found.seen_references[100] == pytest.approx((0.5, -0.5, math.pi / 2.0))
+    assert found.delay_s == 0.07
+
+
+def test_what_people_wrote_stays_when_a_calibration_writes(path):
+    own = "family: 16h5\nreferences: {20: [0.5, 0.5, 90]}\nobjects: {9: box}\n"
+    write(path, own + "tag_robots: {3: 0}\nmounts: {3: [0.01, 0, 90]}\n")
+    settings.update(path, settings.describe_lens(LENS))
+    found = settings.load(path)
+    assert found.family == "16h5" and found.layout.objects == {9: "box"}
+    assert found.layout.find_robot(3) == 0 and found.layout.find_robot(9) is None
+    assert found.layout.find_mount(3).yaw_rad == pytest.approx(math.pi / 2.0)
+    assert found.layout.references[20].pose == pytest.approx((0.5, 0.5, math.pi / 2.0))
+
+
+def test_only_what_a_calibration_finds_changes_in_the_text(path):
+    before = "# camera over the long table\n\nfamily: 16h5  # old prints\n"
+    after = "\n# measured on Monday\nreferences:\n  20: [0.5, 0.5, 90]  # by the door\n"
+    write(path, before + "delay_s: 0.06\nmounts:\n  3:\n  - 0.01\n\n  - 0\n  - 90\n" + after.rstrip("\n"))
+    settings.update(path, {"delay_s": 0.07, "mounts": {3: [0.02, 0, 90]}, **settings.describe_lens(LENS)})
+    lens = yaml.safe_dump(settings.describe_lens(LENS), sort_keys=False, default_flow_style=None)
+    with open(path, encoding="utf-8") as file:
+        assert file.read() == before + "delay_s: 0.07\nmounts:\n  3: [0.02, 0, 90]\n" + after + lens
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '{"family": "16h5", "delay_s": 0.06}',
+        "family: 16h5\n'delay_s': 0.06\n...\n",
+        "family: &name 16h5\ndelay_s: {\n}\n",
+        "mounts: {3: &zero [0, 0, 0],\n# all of them\n}\nreferences: {20: *zero}\nfamily: 16h5\n",
+    ],
+)
+def test_yaml_of_any_form_keeps_its_values(path, text):
+    write(path, text)
+    settings.update(path, {"delay_s": 0.07, "mounts": {}})
+    assert {**yaml.safe_load(text), "delay_s": 0.07, "mounts": {}} == read(path)
+
+
+@pytest.mark.parametrize(
+    "text, reason",
+    [
+        ("family 36h11", "must hold keys and values"),
+        ("a: [", "is no YAML file"),
+        ("sizes: 3", "unknown key sizes; known are: detector, family"),
+        ("tag_size_m: large", "tag_size_m is 'large', but must be a number from 0.005 to 1"),
+        ("references: {100: [0.5]}", r"references must hold ID: \[x_m, y_m, yaw_deg\] for each tag"),
+        ("references: {100: '123'}", r"references must hold ID: \[x_m, y_m, yaw_deg\] for each tag"),
+        ("references: {1.5: [0, 0, 0]}", r"references must hold ID: \[x_m, y_m, yaw_deg\] for each tag"),
+        ("mounts: {0: [.nan, 0, 0]}", "mounts must hold ID: .* for each tag, not {0:"),
+        ("mounts: 0", "mounts must hold ID: .* for each tag, not 0"),
+        ("tag_robots: {17: 2.7}", "tag_robots must hold ID: the number of a robot for each tag, not {17: 2.7}"),
+        ("tag_robots: {17: -2}", "tag_robots must hold ID: the number of a robot"),
+        ("tag_robots: {17: 2, 18: 2}", "tag_robots names robot 2 more than once"),
+        ("objects: [box]", "objects must hold ID: a name"),
+        ("objects: {9: }", "objects must hold ID: a name for each tag, not {9: None}"),
+        ("lens: 5", "lens is 5, but must hold width_px, .*: calibrate the lens"),
+        ("lens: {width_px: 10}", "lens is {'width_px': 10}, but must hold width_px, .*: calibrate the lens"),
+        (LENS_TEXT + "camera:", "camera is None, but must hold rotation .*: calibrate the arena"),
+        (LENS_TEXT + "camera: {rotation: [1], position_m: [0, 0, 2]}", "must hold rotation .nine numbers"),
+        (LENS_TEXT + "camera: {rotation: [1, 0, 0, 0, 1, 0, 0, 0, -1], position_m: [0, 0, 2]}", "must hold rotation"),
+        ("camera: {rotation: [1, 0, 0, 0, 1, 0, 0, 0, 1], position_m: [0, 0, 2]}", "calibrate the lens, then"),
+        ("lens: {width_px: 10, height_px: 10, matrix: [0], distortion: []}", "not calibrated"),
+    ],
+)
+def test_a_wrong_file_is_refused_with_file_and_remedy(path, text, reason):
+    write(path, text)
+    with pytest.raises(SettingsError, match=reason) as error:
+        settings.load(path)
+    assert path in str(error.value)
+
+
+def test_a_file_that_cannot_be_written_is_an_error(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(SettingsError, match="cannot be"):
+        settings.update(str(tmp_path / "file" / "camera.yaml"), {})

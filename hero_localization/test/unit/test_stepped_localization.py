@@ -1,0 +1,53 @@
+"""Localized robots in virtual time: they reach places of the map by ground truth, and map what they see."""
+
+import numpy as np
+import pytest
+
+from hero_client.errors import FrameError
+from hero_localization.occupancy_grid import OccupancyGrid
+from hero_localization.stepped_localization import CameraModel, StepLocalization
+from hero_localization.swarm_map import SwarmMap
+from hero_sim.stepped.swarm import StepSwarm
+
+
+def test_goals_in_map_are_reached_to_10_mm_although_odometry_drifts():
+    with StepSwarm(1, seed=3, arena="empty", worlds=4) as swarm:
+        StepLocalization(swarm, seed=3)
+        swarm.sleep(0.5)
+        for goal in ((0.3, 0.2), (-0.3, 0.2), (0.0, -0.3)):
+            motions = [robot.start_go_to(*goal, frame="map") for robot in swarm.robots]
+            assert [motion.exception() for motion in motions] == [None] * 4
+            assert np.hypot(*(swarm.rows.world.poses[:, :2] - goal).T).max() < 0.01
+        drift_m = [np.hypot(robot.pose_in("world").x_m, robot.pose_in("world").y_m + 0.3) for robot in swarm.robots]
+        assert max(drift_m) > 0.015  # or this would try nothing
+
+
+def test_robots_are_not_localized_before_the_first_picture_has_come():
+    swarm = StepSwarm(2)
+    StepLocalization(swarm, CameraModel(delay_s=0.4))
+    with pytest.raises(FrameError, match="row 1 has no pose in the frame map yet"):
+        swarm[1].pose_in("map")
+    swarm.sleep(0.6)
+    poses = swarm.poses
+    assert list(poses) == [0, 1]
+    assert all(np.hypot(*np.subtract(poses[robot.robot_id], robot.true_pose)[:2]) < 0.006 for robot in swarm)
+
+
+def test_a_camera_without_delay_shows_robots_where_they_are():
+    with StepSwarm(1) as swarm:
+        StepLocalization(swarm, CameraModel(0.0, 0.0, 0.0, 1e-5, 1e-5))
+        swarm.sleep(0.5)
+        assert np.hypot(*np.subtract(swarm[0].pose_in("map"), swarm[0].true_pose)[:2]) < 1e-4
+
+
+def test_the_map_shows_the_walls_before_which_robots_turn():
+    grid = OccupancyGrid((-1.1, -1.1, 1.1, 1.1))
+    with StepSwarm(4, seed=1, arena="empty") as swarm:
+        StepLocalization(swarm, seed=1).feed_map(SwarmMap(grid))
+        swarm.sleep(0.5)
+        places = [(0.88, 0.5), (-0.88, -0.5), (0.5, -0.88), (-0.5, 0.88)]
+        motions = [robot.start_go_to(*place, frame="map") for robot, place in zip(swarm, places)]
+        assert [motion.exception() for motion in motions] == [None] * 4
+        swarm.drive(0.0, 1.0, duration_s=3.0)
+    walls_m = np.abs(np.abs(grid.centers_of(grid.occupied)).max(axis=1) - 1.0)
+    assert len(walls_m) > 40 and np.mean(walls_m < 0.016) > 0.9

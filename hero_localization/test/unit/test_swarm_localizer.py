@@ -1,0 +1,120 @@
+"""All robots together: what is known of each, and what people are told."""
+
+import numpy as np
+import pytest
+
+from hero_client.geometry import Pose
+from hero_localization.pose_filter import Measurement
+from hero_localization.swarm_localizer import RobotState, SwarmLocalizer
+
+COVARIANCE = np.diag((1e-6, 1e-6, 1e-4))
+PERIOD_S = 0.05
+
+
+class Swarm:
+    """Robots at rest, odometry and measured poses every 50 ms; `lines` collects what people are told."""
+
+    def __init__(self, *robot_ids):
+        self.localizer = SwarmLocalizer()
+        self.localizer.add_robots(robot_ids)
+        self.now_s = 100.0
+        self.lines = []
+
+    def run(self, duration_s, measured=None, odometry=(), robots=(0,)):
+        """measured: robot -> pose in map; odometry: pose of all robots by their odometry."""
+        pose = Pose(*(odometry or (0.0, 0.0, 0.0)))
+        for _ in range(round(duration_s / PERIOD_S)):
+            self.now_s += PERIOD_S
+            for robot_id in robots:
+                self.lines += self.localizer.add_odometry(robot_id, self.now_s, pose)
+            for robot_id, place in (measured or {}).items():
+                measurement = Measurement(self.now_s, Pose(*place), COVARIANCE)
+                self.lines += self.localizer.add_measurement(robot_id, measurement)
+            self.lines += self.localizer.find_lost(self.now_s)
+        return self
+
+    def __getitem__(self, robot_id):
+        return {robot.robot_id: robot for robot in self.localizer.list_robots(self.now_s)}[robot_id]
+
+
+def test_robots_are_found_once_and_then_tracked_silently():
+    swarm = Swarm(0, 1).run(1.0, {0: (1.0, 2.0, 0.0)}, robots=(0, 1))
+    assert swarm.lines == ["hero_0 found at (1.000, 2.000) m, 0 degrees"]
+    assert swarm[0].state is RobotState.TRACKED and swarm[0].problem == ""
+    assert swarm[0].odom_origin == pytest.approx((1.0, 2.0, 0.0))
+    assert swarm[1].state is RobotState.UNKNOWN and swarm[1].estimate is None
+    assert "tag" in swarm[1].problem
+
+
+def test_a_robot_out_of_view_is_lost_and_found_again():
+    swarm = Swarm(0).run(1.0, {0: (1.0, 2.0, 0.0)}).run(1.96)
+    assert swarm[0].state is RobotState.LOST and "not measured" in swarm[0].problem
+    assert swarm[0].estimate.pose == pytest.approx((1.0, 2.0, 0.0))
+    swarm.run(0.1, {0: (1.0, 2.0, 0.0)})
+    assert swarm[0].state is RobotState.TRACKED and swarm[0].problem == ""
+    assert swarm.lines[1:] == [
+        "hero_0 lost: its pose follows its odometry",
+        "hero_0 found again after 2.0 s, 0 mm and 0 degrees off its odometry",
+    ]
+
+
+def test_a_carried_robot_is_set_anew_and_said_to_be():
+    swarm = Swarm(0).run(1.0, {0: (1.0, 2.0, 0.0)}).run(0.5, {0: (1.3, 2.4, 0.0)})
+    assert swarm[0].estimate.pose == pytest.approx((1.3, 2.4, 0.0), abs=1e-3)
+    assert swarm.lines[1:] == ["hero_0 was carried: set anew 500 mm and 0 degrees away, at (1.300, 2.400) m, 0 degrees"]
+
+
+def test_single_outliers_are_a_problem_until_a_pose_fits_again():
+    swarm = Swarm(0).run(1.0, {0: (1.0, 2.0, 0.0)}).run(0.1, {0: (1.3, 2.4, 0.0)})
+    assert "2 measured poses in a row disagree" in swarm[0].problem
+    assert swarm.run(0.1, {0: (1.0, 2.0, 0.0)})[0].problem == ""
+
+
+def test_a_tag_that_is_on_upside_down_is_named_once_the_robot_drives():
+    swarm = Swarm(0)
+    for index in range(80):
+        forward_m = 0.004 * index
+        swarm.run(PERIOD_S, {0: (1.0 - forward_m, 2.0, 0.0)}, (forward_m, 0.0, 0.0))
+    assert "180 degrees off the way it drives: is its tag on upside down" in swarm[0].problem
+
+
+def test_a_restart_is_said_and_does_not_move_the_robot():
+    swarm = Swarm(0).run(1.0, {0: (1.0, 2.0, 0.0)}, (0.5, 0.0, 0.0)).run(0.2, None, (0.0, 0.0, 0.0))
+    assert swarm[0].estimate.pose == pytest.approx((1.0, 2.0, 0.0))
+    assert swarm[0].odom_origin == pytest.approx((1.0, 2.0, 0.0))
+    assert swarm.lines[1:] == ["hero_0: its odometry was set or it restarted; its place in the map stays"]
+
+
+def test_a_robot_that_is_off_or_falls_silent_is_named():
+    swarm = Swarm(0)
+    assert "is the robot on" in swarm[0].problem
+    swarm.run(1.0, {0: (1.0, 2.0, 0.0)})
+    swarm.now_s += 5.0
+    assert swarm[0].problem == "no odometry for 5 s: is the robot on and in reach?"
+
+
+def test_stamps_of_another_clock_are_named():
+    swarm = Swarm(0).run(2.0)
+    old = Measurement(swarm.now_s - 30.0, Pose(0.0, 0.0, 0.0), COVARIANCE)
+    assert swarm.localizer.add_measurement(0, old) == []
+    assert swarm[0].problem == "measured poses come with stamps 30.0 s old: do the clocks agree?"
+    ahead = old._replace(stamp_s=swarm.now_s + 5.0)
+    assert swarm.localizer.add_measurement(0, ahead) == ["hero_0 found at (0.000, 0.000) m, 0 degrees"]
+    assert swarm[0].problem == "measured poses come with stamps 5.0 s ahead: do the clocks agree?"
+
+
+def test_robots_are_found_anew_when_time_has_gone_back():
+    swarm = Swarm(0, 1).run(1.0, {0: (1.0, 2.0, 0.0)})
+    swarm.now_s -= 50.0
+    swarm.run(1.0, {0: (1.5, 2.0, 0.0)})
+    assert swarm.lines[1:] == [
+        "time went back by 50.0 s: all robots are to be found anew",
+        "hero_0 found at (1.500, 2.000) m, 0 degrees",
+    ]
+    assert swarm[0].problem == "" and swarm[0].estimate.pose == pytest.approx((1.5, 2.0, 0.0))
+    assert swarm[1].state is RobotState.UNKNOWN
+
+
+def test_a_pose_of_a_robot_that_is_not_expected_is_refused():
+    with pytest.raises(KeyError):
+        Swarm(0).localizer.add_measurement(7, Measurement(0.0, Pose(0.0, 0.0, 0.0), COVARIANCE))

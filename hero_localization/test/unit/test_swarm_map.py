@@ -1,0 +1,95 @@
+"""Scans of several robots on one map, each at the pose of its time; and the map's files."""
+
+import math
+
+import numpy as np
+import pytest
+
+from hero_client.geometry import Pose
+from hero_localization.map_files import save_map
+from hero_localization.occupancy_grid import OccupancyGrid
+from hero_localization.swarm_map import SwarmMap
+from hero_sim.world.arena import measure_clearance
+from hero_sim.world.arena_file import load_arena
+
+AHEAD = [0.1, *[math.inf] * 7]
+"""Something 0.1 m in front of the robot."""
+
+
+def make_map():
+    return SwarmMap(OccupancyGrid((-0.5, -0.5, 0.5, 0.5)))
+
+
+def occupied_center(swarm_map):
+    return swarm_map.grid.centers_of(swarm_map.grid.occupied).mean(axis=0)
+
+
+def test_a_scan_counts_where_its_robot_was_then():
+    swarm_map = make_map()
+    for step in range(12):
+        time_s = 0.1 * step
+        swarm_map.add_pose(0, time_s, Pose(0.01 * step - 0.2, 0.0, 0.0))
+        swarm_map.add_ranges(0, time_s + 0.05, AHEAD if step == 10 else [math.nan] * 8)
+    assert swarm_map.update() == 11  # the last one waits for a newer pose
+    np.testing.assert_allclose(occupied_center(swarm_map), (0.105 - 0.2 + 0.1, 0.0), atol=0.01)
+
+
+def test_a_scan_waits_for_the_pose_of_its_time():
+    swarm_map = make_map()
+    swarm_map.add_pose(0, 1.0, Pose(0.0, 0.0, 0.0))
+    swarm_map.add_ranges(0, 1.1, AHEAD)
+    assert swarm_map.update() == 0
+    swarm_map.add_pose(0, 1.2, Pose(0.0, 0.0, 0.0))
+    assert swarm_map.update() == 1
+
+
+def test_a_robot_without_poses_makes_no_map():
+    swarm_map = make_map()
+    for step in range(100):
+        swarm_map.add_ranges(0, 0.2 * step, AHEAD)
+    assert swarm_map.update() == 0
+    swarm_map.add_pose(0, 30.0, Pose(0.0, 0.0, 0.0))
+    assert swarm_map.update() == 0
+    assert swarm_map.grid.known_share == 0.0
+
+
+def test_robots_do_not_map_each_other():
+    swarm_map = make_map()
+    for step in range(10):
+        swarm_map.add_pose(0, 0.2 * step, Pose(0.0, 0.0, 0.0))
+        swarm_map.add_pose(1, 0.2 * step, Pose(0.13, 0.0, 0.0))
+        swarm_map.add_ranges(0, 0.2 * step, AHEAD)
+    assert swarm_map.update() == 10
+    assert not swarm_map.grid.occupied.any()
+
+
+def test_changes_are_told_once_and_cover_what_changed():
+    swarm_map = make_map()
+    before, _ = swarm_map.take_change()
+    assert (before == -1).all()
+    swarm_map.grid.add_scan(Pose(0.2, -0.2, 0.0), [math.inf] * 8, np.empty((0, 2)))
+    after, box = swarm_map.take_change()
+    outside = np.ones_like(after, dtype=bool)
+    outside[box.row : box.row_end, box.column : box.column_end] = False
+    assert (after[outside] == -1).all() and (after >= 0).any()
+    assert 0 < box.row < box.row_end < 60 and 50 < box.column < box.column_end <= 100
+    _, box = swarm_map.take_change()
+    assert box.row == box.row_end
+
+
+def test_a_saved_map_is_an_arena_of_the_simulator(tmp_path):
+    grid = OccupancyGrid((-0.5, -0.4, 0.5, 0.6))
+    grid.log_odds[:] = 0.0
+    grid.log_odds[20:80, 10:90] = -3.0
+    grid.log_odds[40:50, 40:50] = 3.0
+    save_map(str(tmp_path / "arena.yaml"), grid)
+    arena = load_arena(str(tmp_path / "arena.yaml"))
+    points_m = np.array([(0.0, 0.3), (-0.05, 0.05), (-0.45, 0.0)])
+    clearance_m = measure_clearance(points_m, arena)
+    assert clearance_m[0] == pytest.approx(0.1, abs=1e-6)
+    assert clearance_m[1] < 0.0 and clearance_m[2] < 0.0
+
+
+def test_a_map_that_cannot_be_written_is_an_error(tmp_path):
+    with pytest.raises(OSError):
+        save_map(str(tmp_path / "none" / "arena.yaml"), OccupancyGrid((0.0, 0.0, 1.0, 1.0)))

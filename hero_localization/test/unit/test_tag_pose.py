@@ -1,0 +1,184 @@
+"""Poses of robots, objects and reference tags from corners; tags that stand for nothing, come twice, or do not fit."""
+
+import math
+
+import numpy as np
+import pytest
+
+from hero_client.geometry import Pose, transform_pose, wrap_angle
+from hero_localization.camera_model import Camera, Lens
+from hero_localization.heading_check import HeadingCheck, is_upside_down
+from hero_localization.tag_corners import TagCorners
+from hero_localization.tag_pose import MountedTag, ReferenceTag, TagLayout, fit_squares, locate
+
+LENS = Lens(
+    1920,
+    1080,
+    np.array(((1390.0, 0.0, 955.0), (0.0, 1385.0, 545.0), (0.0, 0.0, 1.0))),
+    np.array((-0.1, 0.02, 0.001, 0, 0)),
+)
+TILT = np.array(((1.0, 0.0, 0.0), (0.0, math.cos(0.1), -math.sin(0.1)), (0.0, math.sin(0.1), math.cos(0.1))))
+CAMERA = Camera(LENS, TILT @ np.diag((1.0, -1.0, -1.0)), np.array((0.1, 0.0, 2.2)))
+
+
+def see(tag_id, pose, size_m=0.04, height_m=0.076, noise_px=None):
+    """Return the corners of a tag whose print points along its pose's yaw."""
+    half = size_m / 2.0
+    corners = [
+        transform_pose(pose, Pose(x, y, 0.0))
+        for x, y in ((half, half), (half, -half), (-half, -half), (-half, half))
+    ]
+    pixels = CAMERA.project(np.array([(corner.x_m, corner.y_m, height_m) for corner in corners]))
+    return TagCorners(tag_id, pixels if noise_px is None else pixels + noise_px)
+
+
+def assert_near(found, expected, tolerance=1e-6):
+    assert found[:2] == pytest.approx(expected[:2], abs=tolerance)
+    assert abs(wrap_angle(found.yaw_rad - expected.yaw_rad)) < tolerance
+
+
+@pytest.mark.parametrize("pose", [Pose(0.0, 0.0, 0.0), Pose(-1.2, 0.6, 3.1), Pose(1.3, -0.7, -1.2)])
+def test_robots_wear_the_tag_of_their_number(pose):
+    seen = locate(CAMERA, [see(12, pose)], TagLayout())
+    assert_near(seen.robots[12].pose, pose)
+    assert seen.robots[12].size_share == pytest.approx(1.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("yaw_rad", [0.0, 1.5, math.pi, -2.0])
+def test_robots_pose_is_that_of_its_center_not_of_the_tag(yaw_rad):
+    mount = MountedTag(0.05, 0.09, 0.012, -0.005, yaw_rad)
+    robot = Pose(0.7, 0.3, 2.0)
+    tag = transform_pose(robot, Pose(mount.x_m, mount.y_m, mount.yaw_rad))
+    seen = locate(CAMERA, [see(4, tag, 0.05, 0.09)], TagLayout(mounts={4: mount}))
+    assert_near(seen.robots[4].pose, robot)
+
+
+def test_covariance_holds_what_noise_of_the_corners_does():
+    random, pose = np.random.RandomState(0), Pose(0.9, -0.3, 1.0)
+    tags = [see(1, pose, noise_px=random.normal(0.0, 0.1, (4, 2))) for _ in range(2000)]
+    found = fit_squares(CAMERA, tags, [0.04] * 2000, [0.076] * 2000)
+    spread = np.std([fit.pose for fit in found], axis=0)
+    modelled = np.sqrt(np.diagonal(found[0].covariance) - np.array((0.001, 0.001, 0.004)) ** 2)
+    assert spread == pytest.approx(modelled, rel=0.2)
+
+
+def test_tag_off_the_robots_center_makes_its_place_depend_on_the_heading():
+    near, far = (
+        locate(CAMERA, [see(1, Pose(0.0, 0.0, 0.0))], TagLayout(default_mount=MountedTag(x_m=x_m)))
+        .robots[1]
+        .covariance
+        for x_m in (0.0, 0.1)
+    )
+    assert far[1, 1] - near[1, 1] == pytest.approx(0.1**2 * near[2, 2])
+    assert far[1, 2] == pytest.approx(-0.1 * near[2, 2])
+    assert (np.linalg.eigvalsh(far) > 0.0).all()
+
+
+def test_ids_are_looked_up_among_references_objects_and_robots():
+    layout = TagLayout(
+        tag_robots={40: 2},
+        objects={9: "box"},
+        references={1: ReferenceTag(Pose(1.0, 0.5, 0.0))},
+        mounts={9: MountedTag(0.06, 0.12)},
+    )
+    tags = [
+        see(0, Pose(0.1, 0.2, 0.3)),
+        see(40, Pose(0.5, 0.2, 0.3)),
+        see(1, Pose(1.0, 0.5, 0.0), 0.1, 0.0),
+        see(9, Pose(-0.5, 0.2, 0.3), 0.06, 0.12),
+    ]
+    seen = locate(CAMERA, tags, layout)
+    assert set(seen.robots) == {0, 2} and set(seen.objects) == {"box"} and set(seen.references) == {1}
+    assert_near(seen.robots[2].pose, Pose(0.5, 0.2, 0.3))
+    assert_near(seen.objects["box"].pose, Pose(-0.5, 0.2, 0.3))
+    assert_near(seen.references[1].pose, Pose(1.0, 0.5, 0.0))
+    assert not seen.unknown and not seen.doubled and not seen.misshapen
+
+
+@pytest.mark.parametrize("corner", [0.0, math.nan])
+def test_a_tag_whose_corners_are_no_square_counts_nowhere(corner):
+    seen = locate(CAMERA, [TagCorners(3, np.full((4, 2), corner))], TagLayout())
+    assert set(seen.misshapen) == {3} and not seen.robots
+
+
+def test_the_own_id_of_a_robot_that_wears_another_tag_is_unknown():
+    tags = [see(tag_id, Pose(0.2 * tag_id, 0.0, 0.0)) for tag_id in (0, 2)]
+    seen = locate(CAMERA, tags, TagLayout(tag_robots={40: 2}))
+    assert set(seen.robots) == {0} and seen.unknown == [2]
+
+
+def test_robots_wear_the_tag_of_their_id_unless_told_otherwise():
+    layout = TagLayout(tag_robots={40: 2, 3: 7}, objects={9: "box"}, references={1: ReferenceTag(Pose(1.0, 0.5, 0.0))})
+    assert layout.find_tags((0, 2, 7)) == {0: 0, 2: 40, 7: 3}
+    assert layout.find_tags((1, 3, 9)) == {}, "these tags stand for something else"
+
+
+def test_id_seen_twice_is_named_and_gives_no_pose():
+    tags = [see(3, Pose(0.0, 0.0, 0.0)), see(5, Pose(0.2, 0.0, 0.0)), see(3, Pose(0.5, 0.0, 0.0))]
+    seen = locate(CAMERA, tags, TagLayout())
+    assert seen.doubled == [3] and set(seen.robots) == {5}
+
+
+@pytest.mark.parametrize("size_m", [0.03, 0.05])
+def test_tag_of_another_size_is_named_and_gives_no_pose(size_m):
+    seen = locate(CAMERA, [see(3, Pose(0.0, 0.0, 0.0), size_m)], TagLayout())
+    assert not seen.robots and seen.misshapen == pytest.approx({3: size_m / 0.04}, rel=1e-6)
+
+
+def test_print_that_is_a_little_small_gives_the_same_pose():
+    """As printers make it that fit the page."""
+    seen = locate(CAMERA, [see(3, Pose(0.8, 0.4, 1.0), 0.0388)], TagLayout())
+    assert_near(seen.robots[3].pose, Pose(0.8, 0.4, 1.0))
+    assert seen.robots[3].size_share == pytest.approx(0.97, abs=1e-6)
+
+
+def test_picture_without_tags_shows_nothing():
+    assert locate(CAMERA, [], TagLayout()).robots == {}
+
+
+def drive(parts, heading_error_rad=0.0, speed=1.0):
+    """Return poses seen, with a heading that is wrong, and odometry, of a drive in parts (distance, turn)."""
+    true, odometry = Pose(0.5, 0.2, 2.0), Pose(0.0, 0.0, 0.0)
+    seen, counted = [], []
+    random = np.random.RandomState(1)
+    for distance_m, turn_rad in parts:
+        for _ in range(20):
+            step = Pose(distance_m / 20.0, 0.0, turn_rad / 20.0)
+            true, odometry = transform_pose(true, step), transform_pose(odometry, step)
+            noise = random.normal(0.0, 0.0005, 2)
+            seen.append(
+                Pose(true.x_m + noise[0], true.y_m + noise[1], wrap_angle(true.yaw_rad + heading_error_rad))
+            )
+            counted.append(odometry)
+    return seen, counted
+
+
+def find_heading_error(seen, odometry):
+    check = HeadingCheck()
+    for at, counted in zip(seen, odometry):
+        check.add(at, counted)
+    return check.error_rad
+
+
+@pytest.mark.parametrize("error_rad", [0.0, 0.1, -0.7, 3.0])
+@pytest.mark.parametrize("forward", [0.2, -0.2])
+def test_wrong_heading_of_a_tag_is_found_on_a_straight_drive(error_rad, forward):
+    found = find_heading_error(*drive([(forward, 0.0), (0.0, 1.5), (forward, 0.1)], error_rad))
+    assert abs(wrap_angle(found - error_rad)) < 0.02
+
+
+def test_heading_cannot_be_found_without_driving_straight():
+    assert find_heading_error(*drive([(0.0, 6.0)], 0.5)) is None
+    assert find_heading_error(*drive([(0.1, 0.0)], 0.5)) is None
+    assert find_heading_error([], []) is None
+
+
+def test_robot_that_a_wall_holds_shows_no_heading():
+    seen, odometry = drive([(0.4, 0.0)], 0.0)
+    assert find_heading_error(seen[:1] * len(odometry), odometry) is None
+
+
+def test_tag_on_upside_down_is_told_from_one_that_is_turned():
+    assert is_upside_down(find_heading_error(*drive([(0.2, 0.0)], math.pi)))
+    assert is_upside_down(-3.0)
+    assert not is_upside_down(math.pi / 2.0) and not is_upside_down(0.1)

@@ -1,0 +1,194 @@
+"""The search for tags over the frames of a drive: followed in windows, found anywhere, lost and found again."""
+
+import numpy as np
+import pytest
+
+from hero_localization.detectors import TagDetector
+from hero_localization.tag_corners import TagCorners
+from hero_localization.tag_search import TagSearch
+
+FRAME_S = 1.0 / 30.0
+WIDTH_PX, HEIGHT_PX = 1920, 1080
+FRAME = np.broadcast_to(np.uint8(0), (HEIGHT_PX, WIDTH_PX))
+SIDE_PX = 26.0
+FAST_PX_S = 140.0
+"""0.2 m/s, 2.2 m below the camera."""
+
+
+class SeenTags(TagDetector):
+    """Finds those of the tags given that lie in the window with their margin."""
+
+    def __init__(self):
+        self.tags, self.searched_px, self.windows = [], 0, []
+
+    def place(self, tags):
+        half = SIDE_PX / 2.0
+        square = half * np.array(((-1, -1), (1, -1), (1, 1), (-1, 1)))
+        self.tags = [TagCorners(tag_id, np.array(center) + square) for tag_id, center in tags]
+
+    def detect(self, gray, origin=(0, 0)):
+        height, width = gray.shape
+        self.searched_px += height * width
+        low, high = np.array(origin), np.array(origin) + (width, height)
+        margin = SIDE_PX / 6.0
+        return [
+            tag
+            for tag in self.tags
+            if (tag.corners >= low + margin).all() and (tag.corners <= high - margin).all()
+        ]
+
+
+class Watch:
+    """A search, and the number of the frame."""
+
+    def __init__(self):
+        self.detector, self.index = SeenTags(), -1
+        self.search = TagSearch(self.detector, WIDTH_PX, HEIGHT_PX)
+
+    def see(self, tags, expected=None, frames=1):
+        for _ in range(frames):
+            self.index += 1
+            self.detector.place(tags)
+            self.detector.searched_px = 0
+            found = self.search.search(FRAME, self.index * FRAME_S, expected)
+        return sorted(tag.tag_id for tag in found)
+
+    def count_searched_px(self):
+        """Return how many pixels are searched in two seconds without a tag."""
+        searched_px = 0
+        for _ in range(60):
+            self.see([])
+            searched_px += self.detector.searched_px
+        return searched_px
+
+
+def everywhere():
+    x, y = np.meshgrid(np.linspace(25.0, WIDTH_PX - 25.0, 25), np.linspace(25.0, HEIGHT_PX - 25.0, 16))
+    return list(enumerate(np.column_stack((x.ravel(), y.ravel()))))
+
+
+def test_tags_anywhere_are_found_within_the_first_frames():
+    watch = Watch()
+    assert watch.see(everywhere(), frames=7) == list(range(400))
+
+
+def test_new_tag_is_found_within_two_seconds():
+    watch = Watch()
+    watch.see([(1, (300.0, 300.0))], frames=60)
+    seen = [2 in watch.see([(1, (300.0, 300.0)), (2, (1500.0, 950.0))]) for _ in range(61)]
+    assert seen[-1]
+
+
+def test_known_tags_cost_windows_only():
+    watch = Watch()
+    tags = everywhere()[::8]
+    watch.see(tags, frames=30)
+    searched_px = []
+    for _ in range(60):
+        assert watch.see(tags) == [tag_id for tag_id, _ in tags]
+        searched_px.append(watch.detector.searched_px)
+    # 50 windows of 64 px, and the sweep: once in 60 frames, its tiles overlap.
+    assert np.mean(searched_px) < 50 * 66**2 + 1.7 * WIDTH_PX * HEIGHT_PX / 60.0
+
+
+def test_standing_tags_cost_little_more_when_most_frames_are_missing():
+    watch = Watch()
+    tags = everywhere()[::8]
+    watch.see(tags, frames=30)
+    for _ in range(4):
+        watch.index += 11
+        assert watch.see(tags) == [tag_id for tag_id, _ in tags]
+        # Two of the twelve tiles are due after so long.
+        assert watch.detector.searched_px < 50 * 80**2 + 2 * 1.7 * WIDTH_PX * HEIGHT_PX / 12.0
+
+
+@pytest.mark.parametrize("every", [1, 2, 3])
+def test_tag_that_starts_stops_and_turns_at_full_speed_is_never_lost(every):
+    """With every frame, and with frames missing."""
+    watch, center = Watch(), np.array((900.0, 500.0))
+    watch.see([(1, center)], frames=10)
+    random, velocity = np.random.RandomState(2), np.zeros(2)
+    for step in range(400):
+        if step % 12 == 0:
+            angle = random.uniform(0.0, 2.0 * np.pi)
+            velocity = FAST_PX_S * random.randint(2) * np.array((np.cos(angle), np.sin(angle)))
+        watch.index += every - 1
+        center = np.clip(center + velocity * every * FRAME_S, 60.0, 1000.0)
+        assert watch.see([(1, center)]) == [1], step
+
+
+def test_hidden_tag_is_found_near_its_place_in_the_first_frame():
+    watch = Watch()
+    watch.see([(1, (800.0, 500.0))], frames=40)
+    watch.see([], frames=20)
+    assert watch.see([(1, (830.0, 500.0))]) == [1]
+
+
+def test_tag_lost_for_long_is_found_at_once_where_it_is_expected():
+    watch = Watch()
+    watch.see([(1, (800.0, 500.0))], frames=40)
+    watch.see([], frames=300)
+    assert watch.see([(1, (1410.0, 720.0))], expected={1: (1400.0, 700.0)}) == [1]
+
+
+def test_tag_that_moved_on_unseen_is_found_anywhere_within_200_ms():
+    """After two seconds below a hand, and with nobody who knows where it is."""
+    watch = Watch()
+    watch.see([(1, (200.0, 900.0))], frames=40)
+    watch.see([], frames=60)
+    seen = [watch.see([(1, (1700.0, 100.0))]) for _ in range(round(0.2 / FRAME_S) + 1)]
+    assert seen[-1] == [1]
+
+
+def test_search_in_a_hurry_ends_when_a_tag_is_gone_for_good():
+    watch = Watch()
+    watch.see([(1, (200.0, 900.0))], frames=40)
+    watch.see([], frames=150)
+    assert watch.count_searched_px() < 1.7 * WIDTH_PX * HEIGHT_PX
+
+
+def test_flickering_tag_does_not_hurry_the_search():
+    watch = Watch()
+    watch.see([], frames=60)
+    searched_px = 0
+    for index in range(120):
+        watch.see([(1, (1900.0, 900.0))] if index % 3 else [])
+        searched_px += watch.detector.searched_px
+    assert searched_px < 2.5 * 1.7 * WIDTH_PX * HEIGHT_PX
+
+
+def test_id_seen_at_two_places_comes_twice_and_both_are_followed():
+    watch = Watch()
+    for index in range(60):
+        found = watch.see([(7, (400.0 + 4.0 * index, 400.0)), (7, (1200.0, 700.0))])
+        if index > 10:
+            assert found == [7, 7]
+
+
+def test_neighbors_in_one_window_come_once():
+    watch = Watch()
+    assert watch.see([(1, (600.0, 400.0)), (2, (632.0, 400.0))], frames=20) == [1, 2]
+
+
+def test_a_lost_tag_is_not_searched_in_a_hurry_after_time_has_gone_back():
+    watch = Watch()
+    watch.see([(1, (600.0, 400.0))], frames=300)
+    watch.see([], frames=10)
+    watch.index = 0
+    assert watch.count_searched_px() < 1.7 * WIDTH_PX * HEIGHT_PX
+
+
+def test_expected_places_out_of_the_picture_do_no_harm():
+    watch = Watch()
+    watch.see([(1, (600.0, 400.0))], frames=20)
+    places = {1: (-500.0, 4000.0), 2: (float("nan"), 0.0), 3: (600.0, 400.0)}
+    assert watch.see([], expected=places) == []
+
+
+def test_frames_with_old_or_equal_stamps_are_searched_in_windows_too():
+    watch = Watch()
+    watch.see([(1, (600.0, 400.0))], frames=20)
+    watch.index -= 2
+    assert watch.see([(1, (602.0, 400.0))]) == [1]
+    watch.index -= 1
+    assert watch.see([(1, (602.0, 400.0))]) == [1]

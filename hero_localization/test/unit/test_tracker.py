@@ -1,0 +1,130 @@
+"""What one camera's pictures show, where tags are expected, and what people are told of camera and tags."""
+
+import numpy as np
+import pytest
+
+from hero_client.geometry import Pose
+from hero_localization.camera_model import Camera, Lens
+from hero_localization.settings import Settings
+from hero_localization.tag_corners import TagCorners
+from hero_localization.tag_pose import MountedTag, ReferenceTag, TagLayout
+from hero_localization.tracker import Problem, Tracker
+
+MATRIX = (1390.0, 0.0, 960.0, 0.0, 1390.0, 540.0, 0.0, 0.0, 1.0)
+CAMERA = Camera(
+    Lens.from_camera_info(1920, 1080, MATRIX, "plumb_bob", ()), np.diag((1.0, -1.0, -1.0)), np.array((0.0, 0.0, 2.2))
+)
+REFERENCES = {100 + index: ReferenceTag(Pose(0.3 * index, 0.4, 0.0)) for index in range(3)}
+LAYOUT = TagLayout(
+    tag_robots={5: 1}, mounts={5: MountedTag(x_m=0.01)}, objects={9: "box"}, references=REFERENCES
+)
+SEEN = {tag_id: tag.pose for tag_id, tag in REFERENCES.items()}
+SQUARE = 0.5 * np.array(((-1.0, 1.0), (1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)))
+
+
+def make_tracker(**changes):
+    return Tracker(Settings(layout=LAYOUT, camera=CAMERA, seen_references=SEEN)._replace(**changes), CAMERA)
+
+
+def see(tag_id, x_m, y_m, size_m=0.04, height_m=0.076):
+    corners_m = np.column_stack((SQUARE * size_m + (x_m, y_m), np.full(4, height_m)))
+    return TagCorners(tag_id, CAMERA.project(corners_m))
+
+
+def see_references(moved_m, ids=REFERENCES):
+    places = {tag_id: REFERENCES[tag_id].pose for tag_id in ids}
+    return [see(tag_id, place.x_m + moved_m, place.y_m, 0.1, 0.0) for tag_id, place in places.items()]
+
+
+def test_tags_are_expected_where_their_robots_are():
+    places = make_tracker().project({0: Pose(0.2, 0.1, 1.0), 1: Pose(0.3, 0.0, 0.0), 9: Pose(0.0, 0.0, 0.0)})
+    assert set(places) == {0, 5}, "tag 9 is an object's"
+    assert places[0] == pytest.approx(see(0, 0.2, 0.1).center)
+    assert places[5] == pytest.approx(see(5, 0.31, 0.0).center)
+    assert make_tracker().project({}) == {}
+
+
+def test_a_tag_that_counts_for_nothing_is_named_for_a_while():
+    tracker = make_tracker()
+    tracker.take([see(1, 0.0, 0.0), see(3, 0.2, 0.0), see(3, 0.4, 0.0), see(4, 0.0, 0.3, size_m=0.03)], 10.0, 0)
+    names = {problem.name: problem.text for problem in tracker.list_problems()}
+    assert "stands for no robot" in names["tag 1"] and "more than once" in names["tag 3"]
+    assert "measures 75 % of its size" in names["tag 4"]
+    tracker.take([], 11.9, 1)
+    assert len(tracker.list_problems()) == 3
+    tracker.take([], 12.1, 2)
+    assert tracker.list_problems() == []
+
+
+def test_problems_of_a_recording_end_when_it_is_played_again():
+    tracker = make_tracker()
+    tracker.take([see(1, 0.0, 0.0)], 100.0, 0)
+    tracker.take([], 1.0, 0)
+    assert tracker.list_problems() == [] and tracker.rates_hz == (0.0, 0.0)
+
+
+def test_a_moved_camera_is_told_from_a_moved_reference_tag():
+    tracker = make_tracker()
+    for frame in range(20):
+        tracker.take(see_references(0.01), 0.1 * frame, frame)
+    assert [problem.name for problem in tracker.list_problems()] == ["camera"]
+    for frame in range(20, 40):
+        tracker.take(see_references(0.01, [101]) + see_references(0.0, [100, 102]), 0.1 * frame, frame)
+    assert [problem.name for problem in tracker.list_problems()] == ["tag 101"]
+
+
+@pytest.mark.parametrize(("shade", "word"), [(10, "dark"), (250, "bright"), (128, None)])
+def test_dark_and_bright_pictures_are_named(shade, word):
+    tracker = make_tracker()
+    tracker.measure_shade(np.full((48, 64), shade, np.uint8))
+    assert [word in problem.text for problem in tracker.list_problems()] == ([True] if word else [])
+
+
+@pytest.mark.parametrize(
+    ("changes", "remedy"),
+    [
+        ({"decimate": 2.0, "detector": "apriltag"}, "below 20: set decimate: 1, or hang the camera lower"),
+        ({"decimate": 1.0, "detector": "apriltag"}, "below 10: hang the camera lower"),
+        ({"decimate": 2.0, "detector": "aruco"}, "below 10: hang the camera lower"),
+    ],
+)
+def test_small_tags_are_named_with_a_remedy_that_is_left(changes, remedy):
+    tracker = make_tracker(**changes)
+    tracker.take([see(0, 0.0, 0.0, size_m=0.012)], 1.0, 0)
+    text = "tags measure 8 px, and get lost " + remedy
+    assert Problem("camera", text, False) in tracker.list_problems()
+
+
+def test_pictures_are_taken_before_their_stamps_but_not_before_time_began():
+    tracker = make_tracker(delay_s=0.07)
+    assert tracker.taken_s(10.0) == pytest.approx(9.93)
+    assert tracker.taken_s(0.05) == 0.0
+
+
+def test_pictures_that_are_left_out_are_told_as_a_rate():
+    tracker = make_tracker()
+    for number in range(0, 90, 3):
+        tracker.take(see_references(0.0), number / 30.0, number)
+    text = "10.0 of 30.0 pictures per second are used: this computer is busy, or too slow for more"
+    assert tracker.list_problems() == [Problem("camera", text, False)]
+    for number in range(90, 120):
+        tracker.take(see_references(0.0), number / 30.0, number)
+    assert tracker.list_problems() == [] and tracker.describe_rate() == "30.0 pictures per second"
+
+
+@pytest.mark.parametrize(
+    ("seen", "name", "text"),
+    [
+        ([100], "camera", "2 of 3 reference tags are not seen: is there light enough, and did the camera move?"),
+        ([100, 101], "tag 102", "this reference tag is not seen: is it covered, gone, or too dark?"),
+    ],
+)
+def test_reference_tags_that_are_not_seen_for_long_are_named(seen, name, text):
+    tracker = make_tracker()
+    for stamp_s in range(6):
+        tracker.take(see_references(0.0, seen), float(stamp_s), stamp_s)
+        assert tracker.list_problems() == []
+    tracker.take(see_references(0.0, seen), 6.0, 6)
+    assert tracker.list_problems() == [Problem(name, text, False)]
+    tracker.take(see_references(0.0), 6.1, 7)
+    assert tracker.list_problems() == []
