@@ -44,13 +44,13 @@ _NOSE_COLOR = ColorRGBA(1.0, 1.0, 1.0, 1.0)
 class GroundTruth:
     """The publishers of one simulator."""
 
-    def __init__(self, simulator: Simulator, with_clock: bool) -> None:
-        """Advertise everything; with_clock also drives /clock."""
+    def __init__(self, simulator: Simulator, with_clock: bool, with_tf: bool) -> None:
+        """Advertise everything; with_clock also drives /clock, with_tf places the odom frames in the world."""
         self._swarm = simulator.swarm
         self._clock = rospy.Publisher("/clock", Clock, queue_size=10) if with_clock else None
         self._markers = rospy.Publisher("~markers", MarkerArray, queue_size=2)
         self._arena = rospy.Publisher("~arena", MarkerArray, queue_size=1, latch=True)
-        self._static = rospy.Publisher("/tf_static", TFMessage, queue_size=1, latch=True)
+        self._static = rospy.Publisher("/tf_static", TFMessage, queue_size=1, latch=True) if with_tf else None
         self._poses = [
             rospy.Publisher("/%s/ground_truth" % robot.name, Odometry, queue_size=2) for robot in self._swarm.robots
         ]
@@ -68,7 +68,8 @@ class GroundTruth:
             stamp = rospy.Time.now()
         if time_ms % POSE_PERIOD_MS == 0:
             self._publish_poses(stamp)
-            self._publish_odom_frames(stamp)
+            if self._static is not None:
+                self._publish_odom_frames(self._static, stamp)
         if time_ms % MARKER_PERIOD_MS == 0 and self._markers.get_num_connections():
             markers = [marker for robot in self._swarm.robots for marker in self._draw_robot(robot, time_ms)]
             for marker in markers:
@@ -92,13 +93,13 @@ class GroundTruth:
             message.twist.twist.linear.x, message.twist.twist.angular.z = speeds[index]
             self._poses[index].publish(message)
 
-    def _publish_odom_frames(self, stamp: rospy.Time) -> None:
+    def _publish_odom_frames(self, publisher: rospy.Publisher, stamp: rospy.Time) -> None:
         """Place each robot's odom frame in the world, anew whenever its odometry was set."""
         robots = self._swarm.robots
         origins = [robot.body.odom_origin for robot in robots]
         if origins != self._odom_origins:
             self._odom_origins = origins
-            self._static.publish(TFMessage([_place_odom(robot, stamp) for robot in robots]))
+            publisher.publish(TFMessage([_place_odom(robot, stamp) for robot in robots]))
 
     @staticmethod
     def _draw_robot(robot: Firmware, time_ms: int) -> List[Marker]:

@@ -88,6 +88,7 @@ def main() -> None:
 def _run() -> None:
     parser = command_line.build_parser()
     parser.add_argument("--clock", action="store_true", help="publish /clock: nodes with use_sim_time follow")
+    parser.add_argument("--no-tf", action="store_true", help="leave the odom frames to a localization")
     options = command_line.parse_options(parser, rospy.myargv(sys.argv)[1:])
     check_environment()
     # Until the master answers, init_node() waits for as long as it takes: let a signal end that.
@@ -101,7 +102,7 @@ def _run() -> None:
         raise OptionError("%s: set ROS_LOG_DIR to a directory" % error) from error
     with command_line.simulate(options, rospy.loginfo) as (simulator, injector):
         rospy.on_shutdown(lambda: setattr(simulator, "stopping", True))
-        GroundTruth(simulator, options.clock)
+        GroundTruth(simulator, options.clock, not options.no_tf)
         FaultService(simulator, injector)
         simulator.run(options.seconds)
         if simulator.stopping and not rospy.is_shutdown():

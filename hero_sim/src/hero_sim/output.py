@@ -8,7 +8,7 @@ from typing import Callable
 
 from .errors import SimulatorError
 
-__all__ = ["FAILED", "WRONG_ARGUMENTS", "call", "fail"]
+__all__ = ["FAILED", "WRONG_ARGUMENTS", "call"]
 
 FAILED = 1
 WRONG_ARGUMENTS = 2
@@ -20,20 +20,17 @@ PIPE_CLOSED = 128 + signal.SIGPIPE
 _OUTPUT_ERRORS = (errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 
-def fail(text: str) -> int:
-    """Print a line with the program's name to stderr; return the exit status."""
-    print("hero_sim: " + text, file=sys.stderr)
-    return FAILED
+def call(run: Callable[[], None], program: str = "hero_sim") -> int:
+    """Return the exit status of run(), which may raise SimulatorError or exit as argparse does.
 
-
-def call(run: Callable[[], None]) -> int:
-    """Return the exit status of run(), which may raise SimulatorError or exit as argparse does."""
+    program: the name before what is printed to stderr.
+    """
     status = 0
     try:
         try:
             run()
         except SimulatorError as error:
-            return fail(str(error))
+            return _fail(program, str(error))
         except SystemExit as end:
             if not isinstance(end.code, int):
                 raise
@@ -46,5 +43,10 @@ def call(run: Callable[[], None]) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         if error.errno == errno.EPIPE:
             return PIPE_CLOSED
-        return fail("the output cannot be written: %s" % error.strerror)
+        return _fail(program, "the output cannot be written: %s" % error.strerror)
     return status
+
+
+def _fail(program: str, text: str) -> int:
+    print("%s: %s" % (program, text), file=sys.stderr)
+    return FAILED

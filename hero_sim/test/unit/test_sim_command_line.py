@@ -24,7 +24,7 @@ from hero_sim.world.robot_errors import KINDS as ERROR_KINDS
 from hero_test.processes import Program, find_free_port
 from hero_test.waiting import wait_for
 
-LIMIT_S = 20.0
+LIMIT_S = 60.0
 ROOT = os.path.abspath(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", ".."))
 
 

@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from hero_sim.errors import OptionError
@@ -72,6 +72,7 @@ def path(tmp_path_factory):
 
 @often
 @given(content=contents)
+@example(content=b": \xef\xbb\xbf")
 def test_any_arena_file_is_read_or_refused_with_file_and_reason(path, content):
     path.write_bytes(content)
     try:

@@ -6,31 +6,43 @@ import pytest
 from hero_sim.robot_constants import TICK_M
 from hero_sim.world import kinematics
 
+HEADING = np.array([[0.6], [0.8]])
+
 
 def test_without_rotation_an_arc_is_a_straight_line():
-    assert kinematics.move_along_arc(0.0, 0.0, 0.6, 0.8, 0.25, 0.0) == pytest.approx((0.15, 0.2, 0.6, 0.8))
+    ways_m, heading = kinematics.follow_arcs(HEADING, np.array([[0.25]]), np.array([[0.0]]))
+    assert ways_m[0] == pytest.approx(np.array([[0.15], [0.2]]))
+    assert heading.tolist() == HEADING.tolist()
 
 
 def test_without_travel_an_arc_is_a_rotation_on_the_spot():
-    end = kinematics.move_along_arc(1.0, 2.0, 1.0, 0.0, 0.0, 0.1)
-    assert end == pytest.approx((1.0, 2.0, math.cos(0.1), math.sin(0.1)), abs=1e-12)
+    ways_m, heading = kinematics.follow_arcs(np.array([[1.0], [0.0]]), np.array([[0.0]]), np.array([[0.1]]))
+    assert not ways_m.any()
+    assert heading == pytest.approx(np.array([[math.cos(0.1)], [math.sin(0.1)]]), abs=1e-12)
 
 
 @pytest.mark.parametrize("steps", [70, 360, 100000])
 def test_a_full_circle_comes_back_whatever_the_step(steps):
-    start = end = (0.3, -0.1, 0.6, 0.8)
-    for step in range(steps):
-        end = kinematics.move_along_arc(*end, 1.0 / steps, 2 * math.pi / steps)
-        if step == steps // 2 - 1:  # a diameter to the left
-            assert end == pytest.approx((0.3 - 0.8 / math.pi, -0.1 + 0.6 / math.pi, -0.6, -0.8), abs=1e-9)
-    assert end == pytest.approx(start, abs=1e-9)
+    half = np.full((steps // 2, 1), 1.0)
+    heading = HEADING
+    for sign in (1.0, -1.0):
+        ways_m, heading = kinematics.follow_arcs(heading, half / steps, half * (2 * math.pi / steps))
+        diameter_m = ways_m.sum(axis=0)
+        assert diameter_m == pytest.approx(sign * np.array([[-0.8], [0.6]]) / math.pi, abs=1e-9)  # to the left
+        assert heading == pytest.approx(-sign * HEADING, abs=1e-9)
 
 
-def test_arrays_move_like_single_robots():
+def test_several_arcs_of_several_robots_are_as_one_after_the_other():
     rng = np.random.RandomState(1)
-    values = rng.normal(scale=0.1, size=(20, 6))
-    together = np.column_stack(kinematics.move_along_arc(*values.T))
-    assert together.tolist() == [list(kinematics.move_along_arc(*row)) for row in values.tolist()]
+    (travels_m, rotations_rad), headings = rng.normal(scale=0.1, size=(2, 5, 20)), rng.normal(size=(2, 20))
+    together_m, ends = kinematics.follow_arcs(headings, travels_m, rotations_rad)
+    for robot in range(20):
+        heading = headings[:, robot, None]
+        for arc in range(5):
+            one = slice(arc, arc + 1), slice(robot, robot + 1)
+            ways_m, heading = kinematics.follow_arcs(heading, travels_m[one], rotations_rad[one])
+            assert ways_m[0, :, 0].tolist() == together_m[arc, :, robot].tolist()
+        assert heading[:, 0].tolist() == ends[:, robot].tolist()
 
 
 def test_headings_are_the_cosine_and_sine_of_any_angle():

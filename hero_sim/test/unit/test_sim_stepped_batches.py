@@ -234,6 +234,18 @@ def test_readings_from_before_odometry_was_set_are_not_received_after():
     assert robots.odometry[0, 2] != 0.5 and robots.odometry[0, :2] == pytest.approx([1.0, 2.0], abs=0.01)
 
 
+def test_odometry_does_not_depend_on_how_often_it_is_read():
+    often, seldom = RobotRows(build_world(3, 0)), RobotRows(build_world(3, 0))
+    often.on_cycle.append(lambda rows: often.odometry)
+    for step in range(25):
+        for robots in (often, seldom):
+            robots.send_velocity([0, 1], 0.1, [4.0, -1.0])
+            robots.advance(robots.now_ms + 100)
+            if step == 20:
+                robots.set_odometry(1, 1.0, 2.0, 0.5)
+    assert often.odometry.tolist() == seldom.odometry.tolist() and often.odometry[:2].all()
+
+
 def test_a_velocity_begins_anew_when_odometry_is_set():
     robots = RobotRows(build_world(1, 0, scale=0.0))
     robots.world.write_pulses(np.arange(1), np.array([(1300, 1700)]))

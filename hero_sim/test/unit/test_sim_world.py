@@ -70,6 +70,15 @@ def test_a_spin_stays_on_the_spot():
     assert world.poses[0, 2] == pytest.approx(3.0 * (3.0 - SERVO_LAG_S), abs=0.04)
 
 
+def test_robots_at_one_place_do_not_drive_through_each_other():
+    poses = np.zeros((2, 3))
+    world = build_world(robots=2, poses=poses)
+    for index in range(2):
+        command(world, index, 0.1, 0.0)
+    run(world, 1.0)
+    assert world.poses.tolist() == poses.tolist()
+
+
 def test_a_robot_stops_at_a_wall_and_its_wheels_keep_turning():
     world = build_world(arena=build_rectangle(1.0, 1.0, 1))
     command(world, 0, 0.2, 0.0)

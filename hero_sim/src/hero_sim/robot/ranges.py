@@ -30,5 +30,5 @@ def convert_to_ranges(counts: np.ndarray, calibration_counts_m2: np.ndarray) -> 
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         distance_m = np.sqrt(calibration_counts_m2 / np.asarray(counts, dtype=float))
-    # NaN goes through a clip unchanged, as through the firmware's constrain().
-    return BODY_RADIUS_M + np.clip(distance_m, MIN_DISTANCE_M, MAX_DISTANCE_M)
+    # NaN goes through unchanged, as through the firmware's constrain().
+    return BODY_RADIUS_M + np.minimum(np.maximum(distance_m, MIN_DISTANCE_M), MAX_DISTANCE_M)

@@ -89,7 +89,7 @@ class CommandShaper:
     def _shape_collected(self) -> None:
         """Shape the commands for single robots that came at one time, all together: that is much faster."""
         if self._collected:
-            rows, values = np.array(list(self._collected)), np.array(list(self._collected.values()), dtype=float).T
+            rows, values = np.array(list(self._collected)), np.array(list(zip(*self._collected.values())), dtype=float)
             self._collected.clear()
             self._shape(self._collected_ms, rows, values)
 
@@ -97,7 +97,7 @@ class CommandShaper:
         self._send_due(now_ms)
         # What is offered to a robot that waits for nothing goes at once.
         self._next_ms[rows] = np.maximum(self._next_ms[rows], now_ms)
-        stops = (values == self._stop).all(axis=0)
+        stops = np.logical_and(*(values == self._stop))
         self._stop_waits[rows] |= stops
         self._newest_waits[rows] = ~stops
         self._newest[:, rows] = values.astype(np.float32)  # a robot computes in single precision
@@ -131,12 +131,13 @@ class CommandShaper:
     def _send(self, due: np.ndarray) -> None:
         moves = due & self._newest_waits & ~self._stop_waits
         stops = due & ~moves
-        repeats = np.where(self._stop_waits, STOP_REPEATS, self._repeats - 1)
-        np.copyto(self._repeats, repeats, where=stops)
+        if np.count_nonzero(stops):
+            repeats = np.where(self._stop_waits, STOP_REPEATS, self._repeats - 1)
+            np.copyto(self._repeats, repeats, where=stops)
+            self._stop_waits[stops] = False
+            self._sent[:, stops] = self._stop
         self._repeats[moves] = 0
-        self._stop_waits[stops] = False
         self._newest_waits[moves] = False
-        self._sent[:, stops] = self._stop
         np.copyto(self._sent, self._newest, where=moves)
         np.copyto(self._sent_ms, self._next_ms, where=due)
         self._next_ms[due] += INTERVAL_MS
@@ -149,7 +150,7 @@ class CommandShaper:
         self._send_due(now_ms)
         if not self._has_sent:
             return _NOTHING
-        rows = np.flatnonzero(self._is_sent)
+        rows = self._is_sent.nonzero()[0]
         sent = Sent(rows, self._sent[:, rows], self._sent_ms[rows])
         self._is_sent[rows] = self._has_sent = False
         return sent

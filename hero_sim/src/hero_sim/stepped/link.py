@@ -1,12 +1,14 @@
 """A robot that is stepped in process, as a BaseRobot needs it: see hero_client.robot_link. Pure."""
 
 import sys
-from typing import List, Optional, Tuple
+from typing import Callable, List, Optional, Tuple
 
 from hero_client.background_motion import BackgroundMotion, Steps
 from hero_client.command_line import say
 from hero_client.errors import FrameError, StaleDataError
 from hero_client.geometry import Pose, Velocity
+from hero_client.readings import FRESH_S
+from hero_client.robot_link import MAP
 
 from ..world.kinematics import Pose as WorldPose
 from ..world.kinematics import find_frame
@@ -16,9 +18,6 @@ __all__ = ["StepLink"]
 
 WORLD = "world"
 
-SILENT_S = 1.0
-"""A robot without ranges for so long is not ready."""
-
 
 class StepLink:
     """One robot: a row of RobotRows.
@@ -27,6 +26,7 @@ class StepLink:
         clock: the robots' time.
         row: which robot it is.
         is_stopped: whether it takes no motion because all robots are stopped.
+        localize: returns where the robot is in the frame map; its ground truth, unless a program sets it.
     """
 
     connected = True
@@ -40,6 +40,7 @@ class StepLink:
         self._rows = rows = clock.rows
         self._arrivals_ms = {"odom": rows.odometry_ms, "encoder": rows.odometry_ms, "proximity": rows.scan_ms}
         self._origin = self.true_pose
+        self.localize: Callable[[], Pose] = lambda: self.true_pose
 
     @property
     def true_pose(self) -> Pose:
@@ -49,7 +50,7 @@ class StepLink:
     def missing(self) -> Optional[str]:
         """See RobotLink."""
         for topic in ("odom", "proximity"):
-            if self.age_s(topic) > SILENT_S:
+            if self.age_s(topic) > FRESH_S:
                 return "no message on /%s/%s: is the robot on and in reach?" % (self._name, topic)
         return None
 
@@ -85,13 +86,17 @@ class StepLink:
         ranges_m: List[float] = self._rows.proximity_m[self.row].tolist()
         return ranges_m
 
+    def find_localized(self, frame: str, timeout_s: float) -> Optional[Pose]:
+        """See RobotLink; there is always a localization."""
+        return self.localize() if frame == MAP else None
+
     def find_origin(self, frame: str, timeout_s: float) -> Pose:
         """See RobotLink; known are "world" and the robot's own odometry."""
         if frame == WORLD:
             return self._origin
         if frame == self._name + "/odom":
             return Pose(0.0, 0.0, 0.0)
-        raise FrameError("no transform from %s/odom to %s: robots in process know only %s" % (self._name, frame, WORLD))
+        raise FrameError("no transform from %s/odom to %s: robots in process know map and world" % (self._name, frame))
 
     def send_velocity(self, linear_m_s: float, angular_rad_s: float) -> None:
         """See RobotLink."""

@@ -9,8 +9,12 @@ from hero_driver.corrections.message_layouts import CLAMP_TOLERANCE_M
 from hero_driver.robot_constants import BODY_RADIUS_M, FARTHEST_RANGE_M, NEAREST_RANGE_M
 
 from ..robot.ranges import convert_to_ranges
+from ..world.range_sensors import BEAMS
 
 __all__ = ["correct_ranges", "measure_ranges"]
+
+
+_FRONT_FIRST = np.roll(np.arange(BEAMS), BEAMS // 2)
 
 
 def measure_ranges(counts: np.ndarray, calibration_counts_m2: np.ndarray) -> np.ndarray:
@@ -23,7 +27,7 @@ def correct_ranges(ranges_m: np.ndarray) -> np.ndarray:
 
     NaN for a sensor that is not calibrated stays.
     """
-    corrected_m = np.roll(ranges_m, -(ranges_m.shape[1] // 2), axis=1)
+    corrected_m = ranges_m.take(_FRONT_FIRST, axis=1)
     with np.errstate(invalid="ignore"):  # comparisons with NaN
         near = corrected_m <= BODY_RADIUS_M + NEAREST_RANGE_M + CLAMP_TOLERANCE_M
         far = corrected_m >= BODY_RADIUS_M + FARTHEST_RANGE_M - CLAMP_TOLERANCE_M

@@ -1,6 +1,6 @@
 """One robot that is stepped in process: what a program uses of hero_client's Robot, and the ground truth. Pure."""
 
-from typing import Tuple
+from typing import Callable, Tuple
 
 from hero_client.geometry import Pose
 from hero_client.robot_base import BaseRobot
@@ -29,6 +29,13 @@ class StepRobot(BaseRobot):
     def true_pose(self) -> Pose:
         """Where the robot is, in the frame world."""
         return self._link.true_pose
+
+    def localize_by(self, localize: Callable[[], Pose]) -> None:
+        """Let localize tell where the robot is in the frame map, instead of the ground truth.
+
+        localize: returns a pose, or raises FrameError or StaleDataError as Robot.pose_in() does.
+        """
+        self._link.localize = localize
 
     @property
     def light(self) -> Tuple[float, float, float]:

@@ -40,6 +40,8 @@ from .wheel_encoders import WheelEncoders
 
 __all__ = ["Hook", "RobotRows"]
 
+_LIMITS = np.array([[MAX_LINEAR_M_S], [MAX_ANGULAR_RAD_S]])
+
 Hook = Callable[[np.ndarray], None]
 """Called with the rows (K,) of the robots whose data the program has just received."""
 
@@ -47,7 +49,7 @@ Hook = Callable[[np.ndarray], None]
 class RobotRows:
     """The robots of one or more worlds, one row each, calibrated, connected and at rest.
 
-    A program on arrays sends with index arrays, advances, and reads the arrays, which are updated in place:
+    A program on arrays sends with index arrays, advances, and reads the arrays; those below are updated in place:
 
         robots.send_velocity(np.arange(1000), linear_m_s, angular_rad_s)  # (1000,) each
         robots.advance(robots.now_ms + 100)
@@ -60,7 +62,6 @@ class RobotRows:
     Attributes:
         now_ms: how far everything has been advanced.
         world: ground truth.
-        odometry: x m, y m, yaw rad in hero_N/odom (R, 3), as the driver computes it from the ticks.
         ticks: of both wheels since the odometry was last set (R, 2), whole numbers, read every 34 ms.
         odometry_ms: when the program received these (R,).
         proximity_m: ranges from the robot's center (R, 8), front first, counter-clockwise; inf nothing in
@@ -91,8 +92,7 @@ class RobotRows:
         self._calibration_counts_m2 = calibrate(errors.alpha_counts_m2, errors.beta_counts)
         self._encoders = WheelEncoders(world)
         self._odometry = TickOdometryRows(rows)
-        self._measured.odometry = self._odometry.poses.T
-        self.odometry, self.ticks, self.odometry_ms = received.odometry, received.ticks, received.odometry_ms
+        self.ticks, self.odometry_ms = received.ticks, received.odometry_ms
         self.counts, self.ranges_m = received.counts, received.ranges_m
         self.proximity_m, self.scan_ms = received.proximity_m, received.scan_ms
         self._servos = ServoPulses(world, np.rint(errors.servo_center_us.T))
@@ -149,7 +149,7 @@ class RobotRows:
         self._encoders.zero(row)
         self._odometry.set_pose(row, x_m, y_m, yaw_rad)
         self._radios.drop_readings(row)
-        self._received.odometry[row] = self._measured.odometry[row]
+        self._received.odometry[row] = self._odometry.poses[:, row]
         self._received.velocities[row] = self._received.ticks[row] = 0.0
 
     def set_velocity_gains(self, row: int, gains: Sequence[float]) -> None:
@@ -165,6 +165,11 @@ class RobotRows:
         self._calibration_counts_m2[row] = constants_counts_m2
 
     @property
+    def odometry(self) -> np.ndarray:
+        """x m, y m, yaw rad in hero_N/odom (R, 3), as the driver computes it from ticks. Ask anew after advance()."""
+        return self._odometry.poses.T if self._is_ideal else self._received.odometry
+
+    @property
     def velocities(self) -> np.ndarray:
         """Linear m/s and angular rad/s in hero_N/base_link (R, 2), as the driver computes them from the ticks."""
         return self._odometry.measure_velocities().T if self._is_ideal else self._received.velocities
@@ -177,8 +182,9 @@ class RobotRows:
             raise ValueError("it is %d ms already, later than %d ms" % (self.now_ms, until_ms))
         world, servos, radios = self.world, self._servos, self._radios
         while True:
-            step_ms = world.time_ms + STEP_MS
-            now_ms = min(step_ms, self._cycle_ms, self._control_ms, self._read_ms, servos.check_ms, radios.due_ms)
+            now_ms = min(self._cycle_ms, self._control_ms, self._read_ms, servos.check_ms, radios.due_ms)
+            while world.time_ms + STEP_MS < min(now_ms, until_ms + 1):
+                world.step()
             if now_ms > until_ms:
                 break
             self.now_ms = now_ms
@@ -194,7 +200,7 @@ class RobotRows:
                 servos.check_watchdog(now_ms)
             if now_ms >= self._read_ms:
                 self._read_commands(now_ms)
-            if now_ms == step_ms:
+            if now_ms == world.time_ms + STEP_MS:
                 world.step()
         self.now_ms = until_ms
 
@@ -204,6 +210,7 @@ class RobotRows:
         if self._is_ideal:
             self._call_hooks(self._rows, has_scan)
         else:
+            self._measured.odometry = self._odometry.poses.T
             self._measured.velocities = self._odometry.measure_velocities().T
             self._radios.send_readings(now_ms, self._measured.copy(), has_scan)
 
@@ -276,7 +283,9 @@ class RobotRows:
         self._command(self._position, now_ms, rows, _limit_to_wheels(values[:, accepted]) / TICK_M)
 
     def _command(self, controller: WheelControllers, now_ms: int, rows: np.ndarray, targets: np.ndarray) -> None:
-        self._servos.stop(controller.command(now_ms, rows, targets))
+        stopped = controller.command(now_ms, rows, targets)
+        if len(stopped):
+            self._servos.stop(stopped)
 
     def _receive_pulses(self, now_ms: int, rows: np.ndarray, values: np.ndarray) -> None:
         pulses_us, which = np.zeros((2, len(self._rows))), np.zeros(len(self._rows), dtype=bool)
@@ -286,5 +295,4 @@ class RobotRows:
 
 def _limit_to_wheels(twists: np.ndarray) -> np.ndarray:
     """Return the wheels' speeds in m/s (2, K) for Twists (2, K) within the firmware's limits."""
-    limits = np.array([[MAX_LINEAR_M_S], [MAX_ANGULAR_RAD_S]])
-    return np.array(split_to_wheels(*np.maximum(np.minimum(twists, limits), -limits)))
+    return np.array(split_to_wheels(*np.maximum(np.minimum(twists, _LIMITS), -_LIMITS)))

@@ -3,6 +3,8 @@
 Pure: numpy only, arrays (2, R), left wheels and right wheels; the rules of MotorDriver in robot/motor_control.py.
 """
 
+from typing import Union
+
 import numpy as np
 
 from ..robot_constants import MOTOR_WATCHDOG_MS, PULSE_RANGE_US
@@ -40,9 +42,10 @@ class ServoPulses:
         assign(self._stop_at_ms, stop_at_ms, which)
         self.check_ms = min(self.check_ms, stop_at_ms)
         changes = pulses_us != self._pulses_us
-        changes &= which
+        if which is not True:
+            changes &= which
         if np.count_nonzero(changes):
-            rows = np.flatnonzero(changes.any(axis=0))
+            rows: Union[slice, np.ndarray] = slice(None) if which is True else np.flatnonzero(which)
             written_us = self._pulses_us[:, rows] = pulses_us[:, rows]
             least_us, most_us = PULSE_RANGE_US
             self._world.write_pulses(rows, np.minimum(np.maximum(written_us.T, least_us), most_us))

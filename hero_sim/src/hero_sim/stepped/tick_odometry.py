@@ -5,32 +5,30 @@ kept as an angle and as its cosine and sine, which give the same bytes on every 
 """
 
 import math
-from typing import Optional
+from typing import List, Optional
 
 import numpy as np
 
 from hero_driver.corrections.tick_odometry import TWIST_WINDOW
 
 from ..robot_constants import TICK_M
-from ..world.kinematics import find_heading, join_wheels, move_along_arc
+from ..world.kinematics import find_heading, follow_arcs, join_wheels
 
 __all__ = ["TickOdometryRows"]
 
 _TURN_RAD = 2.0 * math.pi
 
+_MOST_WAITING = 32
+
 
 class TickOdometryRows:
-    """The odometry of all robots.
-
-    Attributes:
-        poses: x m, y m, yaw rad from -pi to pi in frame hero_N/odom (3, R).
-    """
+    """The odometry of all robots; it is computed when somebody looks, from several readings at once."""
 
     def __init__(self, rows: int) -> None:
         """Begin at the origin, without a reading."""
-        self.poses = np.zeros((3, rows))
+        self._poses = np.zeros((3, rows))
+        self._moved_ticks: List[np.ndarray] = []
         self._headings = np.array((np.ones(rows), np.zeros(rows)))
-        self._ticks = np.zeros((2, rows))
         self._window_ticks = np.zeros((TWIST_WINDOW, 2, rows))
         self._window_ms = np.zeros((TWIST_WINDOW, rows), dtype=np.int64)
         self._newest = 0
@@ -38,20 +36,28 @@ class TickOdometryRows:
         self._any_cleared = True
         self._velocities: Optional[np.ndarray] = None
 
+    @property
+    def poses(self) -> np.ndarray:
+        """x m, y m, yaw rad from -pi to pi in hero_N/odom (3, R). Ask anew after each reading."""
+        if self._moved_ticks:
+            self._move()
+        return self._poses
+
     def set_pose(self, row: int, x_m: float, y_m: float, yaw_rad: float) -> None:
         """One robot's odometry was set, which zeroed its counters."""
         self.poses[:, row] = x_m, y_m, math.remainder(yaw_rad, _TURN_RAD)
-        self._headings[:, row] = find_heading(self.poses[2, row])
-        self._ticks[:, row] = 0.0
+        self._headings[:, row] = find_heading(self._poses[2, row])
+        self._window_ticks[self._newest, :, row] = 0.0
         self._is_cleared[row] = self._any_cleared = True
         self._velocities = None
 
     def integrate(self, ticks: np.ndarray, now_ms: int) -> None:
         """Take one reading of all counters (2, R), with its stamp."""
-        moved_ticks = ticks - self._ticks
+        moved_ticks = ticks - self._window_ticks[self._newest]
         if np.count_nonzero(moved_ticks):
-            self._move(moved_ticks)
-        self._ticks[:] = ticks
+            self._moved_ticks.append(moved_ticks)
+            if len(self._moved_ticks) == _MOST_WAITING:
+                self._move()
         self._velocities = None
         self._newest = (self._newest + 1) % TWIST_WINDOW
         self._window_ticks[self._newest], self._window_ms[self._newest] = ticks, now_ms
@@ -61,13 +67,16 @@ class TickOdometryRows:
             self._window_ms[:, self._is_cleared] = now_ms
             self._is_cleared[:] = self._any_cleared = False
 
-    def _move(self, moved_ticks: np.ndarray) -> None:
-        x_m, y_m, yaw_rad = self.poses
-        cosine, sine = self._headings
-        distance_m, turn_rad = join_wheels(*(moved_ticks * TICK_M))
-        x_m[:], y_m[:], cosine[:], sine[:] = move_along_arc(x_m, y_m, cosine, sine, distance_m, turn_rad)
-        yaw_rad += turn_rad
-        yaw_rad -= np.rint(yaw_rad / _TURN_RAD) * _TURN_RAD
+    def _move(self) -> None:
+        moved_m = np.array(self._moved_ticks) * TICK_M
+        self._moved_ticks.clear()
+        distances_m, turns_rad = join_wheels(moved_m[:, 0], moved_m[:, 1])
+        ways_m, self._headings[:] = follow_arcs(self._headings, distances_m, turns_rad)
+        places_m, yaw_rad = self._poses[:2], self._poses[2]
+        for way_m, turn_rad in zip(ways_m, turns_rad):
+            places_m += way_m
+            yaw_rad += turn_rad
+            yaw_rad -= np.rint(yaw_rad / _TURN_RAD) * _TURN_RAD
 
     def measure_velocities(self) -> np.ndarray:
         """Return linear m/s and angular rad/s over the last TWIST_WINDOW readings (2, R)."""

@@ -37,6 +37,7 @@ class WheelControllers:
         self._gains = np.tile(np.reshape(gains, (3, 1, 1)), (1, 2, rows))
         self._watchdog_ms = np.full(rows, _LONG_AGO_MS, dtype=np.int64)
         self._computed_ms = np.full(rows, _LONG_AGO_MS, dtype=np.int64)
+        self._due_ms = _LONG_AGO_MS  # when the first of them computes again
         self._sums_us = np.zeros((2, rows))
         self._last_inputs = np.zeros((2, rows))
         self._scale_gains()
@@ -65,7 +66,7 @@ class WheelControllers:
 
         A wheel that has to reverse starts its PID anew.
         """
-        moves = targets.any(axis=0)
+        moves = np.logical_or(*targets)
         stopped, rows, targets = rows[~moves], rows[moves], targets[:, moves]
         self._watchdog_ms[stopped] = _LONG_AGO_MS
         self._reset(slice(None), stopped)
@@ -79,6 +80,8 @@ class WheelControllers:
         return stopped
 
     def _reset(self, wheels: Union[slice, np.ndarray], rows: np.ndarray) -> None:
+        if not len(rows):
+            return
         for values in (self.outputs_us, self._sums_us, self._last_inputs):
             values[wheels, rows] = 0.0
 
@@ -88,19 +91,26 @@ class WheelControllers:
 
     def run(self, now_ms: int, measured: np.ndarray, active: Which) -> None:
         """Compute new outputs from what was measured (2, R), for those active robots for whom it is time."""
-        is_due = self._computed_ms <= now_ms - SAMPLE_MS
-        is_due &= active
-        if not np.count_nonzero(is_due):
+        if now_ms < self._due_ms:
             return
-        due = simplify(is_due)
+        due = simplify((self._computed_ms <= now_ms - SAMPLE_MS) & active)
+        if due is False:
+            return
         error = self.targets - measured
-        sums_us = self._limit(self._sums_us + self._integral_step * error)
-        damping_us = self._derivative_step * (measured - self._last_inputs)
-        outputs_us = np.trunc(self._limit(self._proportional * error + sums_us - damping_us))
+        sums_us = self._integral_step * error
+        sums_us += self._sums_us
+        self._limit(sums_us)
+        damping_us = measured - self._last_inputs
+        damping_us *= self._derivative_step
+        outputs_us = np.multiply(self._proportional, error, out=error)
+        outputs_us += sums_us
+        outputs_us -= damping_us
+        np.trunc(self._limit(outputs_us), out=outputs_us)
         assign(self._sums_us, sums_us, due)
         assign(self._last_inputs, measured, due)
         assign(self.outputs_us, outputs_us, due)
         assign(self._computed_ms, now_ms, due)
+        self._due_ms = int(self._computed_ms.min()) + SAMPLE_MS
 
     def _limit(self, values_us: np.ndarray) -> np.ndarray:
         np.minimum(values_us, self._limit_us, out=values_us)

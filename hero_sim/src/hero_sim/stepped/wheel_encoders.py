@@ -3,12 +3,14 @@
 Pure: numpy only, arrays (2, R), left wheels and right wheels; the rules of robot/wheel_odometry.py.
 """
 
+from typing import Any
+
 import numpy as np
 
 from ..robot.wheel_odometry import FILTER_FIRST_ERROR, FILTER_PROCESS_NOISE_S_M
 from ..robot_constants import TICK_M
 from ..world.world import World
-from .which import Which, assign
+from .which import Which, choose
 
 __all__ = ["WheelEncoders"]
 
@@ -29,7 +31,7 @@ class WheelEncoders:
         self.filtered_m_s = np.zeros_like(self._travels_m)
         self._base_ticks = np.floor(self._travels_m / TICK_M)
         self._errors = np.full_like(self._travels_m, FILTER_FIRST_ERROR)
-        self._read_at_ms = np.full(self._travels_m.shape[1], world.time_ms - 1)
+        self._read_at_ms: Any = world.time_ms - 1  # of each robot (R,), or of all
 
     def count(self, now_ms: int) -> np.ndarray:
         """Return the counters (2, R) at now_ms, a time within the running physics step, without reading them."""
@@ -47,17 +49,18 @@ class WheelEncoders:
         speeds_m_s *= TICK_M
         speeds_m_s /= (now_ms - self._read_at_ms) / 1000.0
         # A one-dimensional Kalman filter whose process noise grows with each change of its own estimate.
-        gains = self._errors / (self._errors + 1.0)
+        gains = self._errors + 1.0
+        np.divide(self._errors, gains, out=gains)
         changes_m_s = speeds_m_s
         changes_m_s -= self.filtered_m_s
         changes_m_s *= gains
         errors = np.abs(changes_m_s)
         errors *= FILTER_PROCESS_NOISE_S_M
         errors += gains
-        assign(self.ticks, ticks, which)
-        assign(self._errors, errors, which)
-        assign(self._read_at_ms, now_ms, which)
-        np.add(self.filtered_m_s, changes_m_s, out=self.filtered_m_s, where=which)
+        self.ticks = choose(ticks, self.ticks, which)
+        self._errors = choose(errors, self._errors, which)
+        self._read_at_ms = choose(now_ms, self._read_at_ms, which)
+        self.filtered_m_s = choose(self.filtered_m_s + changes_m_s, self.filtered_m_s, which)
 
     def zero(self, row: int) -> None:
         """Zero the counters of one robot, as last read (Odometry.ino:234)."""

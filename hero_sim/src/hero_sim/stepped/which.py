@@ -1,13 +1,13 @@
 """Which robots take part in something: a mask over robots, or all of them, for which numpy is faster without a mask."""
 
-from typing import Union
+from typing import Any, Union
 
 import numpy as np
 
-__all__ = ["Which", "assign", "simplify"]
+__all__ = ["Which", "assign", "choose", "simplify"]
 
 Which = Union[bool, np.ndarray]
-"""A mask (R,), or True for all robots."""
+"""A mask (R,), or True for all robots, or False for none."""
 
 
 def assign(target: np.ndarray, values: Union[int, np.ndarray], which: Which) -> None:
@@ -18,6 +18,12 @@ def assign(target: np.ndarray, values: Union[int, np.ndarray], which: Which) -> 
         np.copyto(target, values, where=which)
 
 
+def choose(values: Any, others: Any, which: Which) -> Any:
+    """Return values for those that take part, and others for the others: numbers or arrays with robots last."""
+    return values if which is True else np.where(which, values, others)
+
+
 def simplify(which: np.ndarray) -> Which:
-    """Return True instead of a mask of all robots."""
-    return True if np.count_nonzero(which) == len(which) else which
+    """Return True or False instead of a mask of all robots or none."""
+    count = np.count_nonzero(which)
+    return which if 0 < count < len(which) else bool(count)

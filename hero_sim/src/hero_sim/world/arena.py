@@ -40,36 +40,40 @@ class Arena(NamedTuple):
     polygons_m: Tuple[np.ndarray, ...] = ()
 
 
-class Segments(NamedTuple):
-    """Straight lines, each an entry of all arrays (S,): where it starts, and the way to its end."""
+def square_length(ways_m: np.ndarray) -> np.ndarray:
+    """Return the squares of the lengths (...) of ways (2, ...)."""
+    squares_x_m2, squares_y_m2 = ways_m * ways_m
+    return squares_x_m2 + squares_y_m2
 
-    start_x_m: np.ndarray
-    start_y_m: np.ndarray
-    along_x_m: np.ndarray
-    along_y_m: np.ndarray
+
+class Segments(NamedTuple):
+    """Straight lines, each an entry of all arrays: where it starts (2, S), x and y, and the way to its end (2, S)."""
+
+    start_m: np.ndarray
+    along_m: np.ndarray
     length_m2: np.ndarray
 
     @classmethod
     def from_ends(cls, ends_m: np.ndarray) -> "Segments":
         """Return the segments with ends_m (S, 4), x1 y1 x2 y2."""
-        start_x_m, start_y_m, end_x_m, end_y_m = ends_m.T.copy()
-        along_x_m, along_y_m = end_x_m - start_x_m, end_y_m - start_y_m
-        length_m2 = np.maximum(along_x_m * along_x_m + along_y_m * along_y_m, 1e-18)
-        return cls(start_x_m, start_y_m, along_x_m, along_y_m, length_m2)
+        start_m, end_m = ends_m.T.reshape(2, 2, -1).copy()
+        along_m = end_m - start_m
+        return cls(start_m, along_m, np.maximum(square_length(along_m), 1e-18))
 
     def take(self, which: Any) -> "Segments":
         """Return the segments which, an index array or a slice."""
-        return Segments(*(array[which] for array in self))
+        return Segments(self.start_m[:, which], self.along_m[:, which], self.length_m2[which])
 
-    def point_away(self, x_m: np.ndarray, y_m: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-        """Return x and y (m) from the nearest point of each segment to a place.
+    def for_each_place(self) -> "Segments":
+        """Return the segments for point_away() of places (2, P, 1)."""
+        return Segments(self.start_m[:, None], self.along_m[:, None], self.length_m2)
 
-        x_m and y_m (S,): one place for each segment, the result is (S,); (P, 1): for all places (P, S).
-        """
-        to_x_m, to_y_m = x_m - self.start_x_m, y_m - self.start_y_m
-        share = (to_x_m * self.along_x_m + to_y_m * self.along_y_m) / self.length_m2
-        share = np.minimum(np.maximum(share, 0.0), 1.0)
-        return to_x_m - share * self.along_x_m, to_y_m - share * self.along_y_m
+    def point_away(self, places_m: np.ndarray) -> np.ndarray:
+        """Return the way (2, S), x and y in m, from the nearest point of each segment to its place (2, S)."""
+        to_m = places_m - self.start_m
+        along_x_m2, along_y_m2 = to_m * self.along_m
+        share = (along_x_m2 + along_y_m2) / self.length_m2
+        return to_m - np.minimum(np.maximum(share, 0.0), 1.0) * self.along_m
 
 
 def outline(corners_m: np.ndarray) -> np.ndarray:
@@ -118,9 +122,7 @@ def list_obstacles(arena: Arena) -> Tuple[Segments, np.ndarray]:
 def measure_clearance(points_m: np.ndarray, arena: Arena) -> np.ndarray:
     """Return the distance (m) of each point (P, 2) to the nearest wall or obstacle, negative inside one."""
     obstacles, radii_m = list_obstacles(arena)
-    x_m, y_m = points_m.T[..., None]
-    away_x_m, away_y_m = obstacles.point_away(x_m, y_m)
-    distance_m = np.sqrt(away_x_m * away_x_m + away_y_m * away_y_m)
+    distance_m = np.sqrt(square_length(obstacles.for_each_place().point_away(points_m.T[..., None])))
     clearance_m = (distance_m - radii_m).min(axis=1, initial=np.inf)
     for corners_m in arena.polygons_m:
         clearance_m = np.where(_lies_inside(points_m, corners_m), -np.abs(clearance_m), clearance_m)

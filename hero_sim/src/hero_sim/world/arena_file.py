@@ -1,4 +1,7 @@
-"""Arenas from YAML files; a wrong file is refused with its name and the reason. The format is in the README."""
+"""Arenas from YAML files, ours and those of maps; a wrong file is refused with its name and the reason.
+
+The README has the format.
+"""
 
 import math
 import os
@@ -12,6 +15,7 @@ from ..errors import OptionError
 from ..robot_constants import BODY_RADIUS_M
 from .arena import Arena, is_free, outline
 from .kinematics import Pose
+from .map_file import build_map_arena
 
 __all__ = ["SHIPPED", "load_arena"]
 
@@ -32,6 +36,8 @@ def load_arena(name: str) -> Arena:
         path = os.path.join(os.path.dirname(os.path.abspath(__file__)), "arenas", name + ".yaml")
     content = _read_yaml(path)
     try:
+        if isinstance(content, dict) and "image" in content:
+            return _build_from_map(content, path)
         return _build_arena(content, os.path.basename(path))
     except ValueError as error:
         raise OptionError("arena %s: %s" % (path, error)) from error
@@ -50,7 +56,24 @@ def _read_yaml(path: str) -> Any:
     except RecursionError as error:
         raise OptionError("arena %s: lists within lists, deeper than can be read" % path) from error
     except (UnicodeDecodeError, yaml.YAMLError) as error:
-        raise OptionError("arena %s: %s" % (path, " ".join(str(error).split()))) from error
+        # What cannot be printed becomes an escape sequence.
+        text = " ".join(str(error).split()).encode("ascii", "backslashreplace").decode()
+        raise OptionError("arena %s: %s" % (path, text)) from error
+
+
+def _build_from_map(content: Dict[str, Any], path: str) -> Arena:
+    """Return the arena of a map of map_server. Raises: ValueError."""
+    try:
+        from PIL import Image, UnidentifiedImageError
+    except ImportError:
+        raise ValueError("pictures of maps need python3-pil: install it") from None
+    picture = os.path.join(os.path.dirname(path), str(content["image"]))
+    try:
+        with Image.open(picture) as image:
+            gray = np.asarray(image.convert("L"), dtype=float)
+    except (OSError, UnidentifiedImageError, Image.DecompressionBombError) as error:
+        raise ValueError("its picture %s cannot be read: %s" % (picture, error)) from error
+    return build_map_arena(os.path.basename(path), content, gray)
 
 
 def _build_arena(content: Any, file_name: str) -> Arena:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..robot_constants import WHEEL_SEPARATION_M
 
-__all__ = ["Pose", "find_frame", "find_heading", "join_wheels", "move_along_arc", "split_to_wheels"]
+__all__ = ["Pose", "find_frame", "find_heading", "follow_arcs", "join_wheels", "split_to_wheels"]
 
 # Half pi in two parts, of which the first, with 33 bits, gives exact products with small whole numbers.
 _HALF_PI_HIGH = float.fromhex("0x1.921fb544p+0")
@@ -71,22 +71,24 @@ def find_heading(theta_rad: Number) -> Tuple[np.ndarray, np.ndarray]:
     return sign * np.where(swapped, -sine, cosine), sign * np.where(swapped, cosine, sine)
 
 
-def move_along_arc(
-    x_m: Number, y_m: Number, cosine: Number, sine: Number, travel_m: Number, rotation_rad: Number
-) -> Tuple[Number, Number, Number, Number]:
-    """Return place and heading (cosine, sine) after an arc of length travel_m that turns by less than 0.5 rad.
+def follow_arcs(
+    heading: np.ndarray, travels_m: np.ndarray, rotations_rad: np.ndarray
+) -> Tuple[np.ndarray, np.ndarray]:
+    """Return the ways (K, 2, R), x and y in m, along K arcs one after the other, and the heading (2, R) after them.
 
-    A heading stays of length 1 whatever the number of steps.
+    heading: cosine and sine (2, R) before them. It stays of length 1 whatever the number of arcs.
+    travels_m, rotations_rad: length and turn of each arc (K, R), turns of less than 0.5 rad. Several arcs at once are
+    faster: most of their shape depends on no other arc.
     """
-    ratio = _sum_series(_HALF_TANGENT_TERMS, rotation_rad * rotation_rad)
-    half_tangent = rotation_rad * ratio
-    # The direction of the chord, 1 / cos(rotation / 2) long.
-    chord_x, chord_y = cosine - half_tangent * sine, sine + half_tangent * cosine
-    shorten = 2.0 / (1.0 + half_tangent * half_tangent)
-    chord, rotation_sine = travel_m * ratio * shorten, half_tangent * shorten
-    return (
-        x_m + chord * chord_x,
-        y_m + chord * chord_y,
-        cosine - rotation_sine * chord_y,
-        sine + rotation_sine * chord_x,
-    )
+    ratios = _sum_series(_HALF_TANGENT_TERMS, rotations_rad * rotations_rad)
+    half_tangents = rotations_rad * ratios
+    shorten = 2.0 / (1.0 + half_tangents * half_tangents)
+    cosine, sine = heading
+    ways_m = np.empty((len(travels_m), *heading.shape))
+    for way_m, half_tangent, turn in zip(ways_m, half_tangents, half_tangents * shorten):
+        # The direction of the chord, 1 / cos(rotation / 2) long.
+        chord_x, chord_y = cosine - half_tangent * sine, sine + half_tangent * cosine
+        cosine, sine = cosine - turn * chord_y, sine + turn * chord_x
+        way_m[0], way_m[1] = chord_x, chord_y
+    ways_m *= (travels_m * ratios * shorten)[:, None]
+    return ways_m, np.array((cosine, sine))

@@ -37,10 +37,10 @@ REACH_M = 0.65
 """Farther than this from a robot's center nothing is looked for: it adds less than the noise of one reading."""
 
 # The diode sees a cone, whose rim is modelled by two more rays of less weight. Half angle and weight are assumptions.
-_CONE_RAD = np.array([0.0, -0.21, 0.21])
-_CONE_WEIGHT = np.array([1.0, 0.7, 0.7])
-_RAYS_X, _RAYS_Y = find_heading((BEAM_ANGLES_RAD[:, None] + _CONE_RAD).ravel())
-"""Directions of all rays in the body frame (A,)."""
+_CONE_RAD = np.array([[0.0], [-0.21], [0.21]])
+_CONE_WEIGHT = np.array([[1.0], [0.7], [0.7]])
+_RAYS_X, _RAYS_Y = find_heading((BEAM_ANGLES_RAD + _CONE_RAD).ravel())
+"""Directions of all rays in the body frame (A,): those of the cones' middles come first."""
 
 _FAR_M = 1e6
 
@@ -61,19 +61,20 @@ class Rays:
 
     def meet_walls(self, x_m: np.ndarray, y_m: np.ndarray, walls: Segments) -> None:
         """Let rays from x_m and y_m (K, 1), which have met nothing yet, end at walls."""
-        start_x, start_y = walls.start_x_m - x_m, walls.start_y_m - y_m
-        area_m2 = start_x * walls.along_y_m - start_y * walls.along_x_m
+        start_x, start_y = walls.start_m[0] - x_m, walls.start_m[1] - y_m
+        area_m2 = start_x * walls.along_m[1] - start_y * walls.along_m[0]
         robots, seen = (area_m2 * area_m2 < (REACH_M * REACH_M) * walls.length_m2).nonzero()
         if not len(robots):
             return
         ray_x, ray_y = self.x[robots], self.y[robots]
         start_x, start_y, area_m2 = (array[robots, seen, None] for array in (start_x, start_y, area_m2))
-        _, _, along_x, along_y, length_m2 = (array[:, None] for array in walls.take(seen))
+        along_x, along_y = walls.along_m[:, seen, None]
+        length_m2 = walls.length_m2[seen, None]
         cross = ray_x * along_y - ray_y * along_x
-        with np.errstate(divide="ignore", invalid="ignore"):  # parallel
-            share = (start_x * ray_y - start_y * ray_x) / cross
-            distance_m = area_m2 / cross
-            distance_m[~((distance_m >= 0.0) & (share >= 0.0) & (share <= 1.0))] = _FAR_M
+        crossing = cross != 0.0  # else parallel
+        share = np.divide(start_x * ray_y - start_y * ray_x, cross, out=np.zeros(cross.shape), where=crossing)
+        distance_m = np.divide(area_m2, cross, out=np.full(cross.shape, _FAR_M), where=crossing)
+        distance_m[(distance_m < 0.0) | (share < 0.0) | (share > 1.0)] = _FAR_M
         # The walls that one robot sees follow each other.
         first = np.concatenate(([True], robots[1:] != robots[:-1])).nonzero()[0]
         self.distance_m[robots[first]] = np.minimum.reduceat(distance_m, first)
@@ -128,7 +129,7 @@ def measure_signals(
         rays.meet_circles(circles_m[:, 0] - x_m, circles_m[:, 1] - y_m, circles_m[:, 2])
     distance_m = np.maximum(rays.distance_m - BODY_RADIUS_M, 1e-3)
     bright = rays.cosine / (distance_m * distance_m)
-    bright = (bright.reshape(len(places_m), BEAMS, len(_CONE_RAD)) * _CONE_WEIGHT).max(axis=-1)
+    bright = (bright.reshape(-1, len(_CONE_RAD), BEAMS) * _CONE_WEIGHT).max(axis=1)
     return np.minimum(alpha_counts_m2 * bright + _offset(bright, beta_counts), SATURATION_COUNTS)
 
 

@@ -12,8 +12,8 @@ from typing import List, Optional, Sequence, Union
 import numpy as np
 
 from .arena import Arena, Segments
-from .contacts import Contacts
-from .kinematics import find_heading, join_wheels, move_along_arc
+from .body_motion import BodyMotion
+from .kinematics import join_wheels
 from .noise import draw_normal
 from .range_sensors import BEAMS, NOISE_COUNTS, measure_signals
 from .robot_errors import MAX_WHEEL_M_S, SERVO_GAIN_M_S_US, RobotErrors
@@ -33,7 +33,7 @@ _SCAN_ROWS = 200
 
 _REST_M_S = 1e-6
 
-Rows = Union[int, np.ndarray]  # the number of one row, or an array of them
+Rows = Union[int, slice, np.ndarray]  # the number of one row, or several of them
 
 
 class World:
@@ -43,7 +43,6 @@ class World:
         arena: walls and obstacles of each world.
         worlds: how many there are.
         time_ms: end of the last step.
-        poses: true poses (R, 3), read only: x m, y m, theta rad, frame world.
         errors: how each robot differs from the drawing; constant.
         commands_m_s: the servos' commands (R, 2), as the wheel speeds they stand for, left and right.
         speeds_m_s, travels_m: of the wheels (R, 2).
@@ -61,22 +60,30 @@ class World:
         self.time_ms = 0
         self.errors = errors
         self._rngs = rngs
-        self._poses = np.array(poses, dtype=float).reshape(rows, 3).T.copy()
-        self._headings = np.array(find_heading(self._poses[2]))
+        self._bodies = BodyMotion(arena, self.worlds, np.array(poses, dtype=float).reshape(rows, 3).T.copy())
+        self._poses = self._bodies.poses.T
+        self._poses.flags.writeable = False
         self._commands = np.zeros((2, rows))
-        self._wheels = np.zeros((4, rows))  # travels, then speeds
+        self._wheels = np.zeros((4, rows))
+        self._travels, self._speeds = self._wheels[:2], self._wheels[2:]
         self._wheel_rows: Optional[List[List[float]]] = None
-        self.poses = self._poses.T
-        self.poses.flags.writeable = False
         self.commands_m_s = self._commands.T
-        self.travels_m, self.speeds_m_s = self._wheels[:2].T, self._wheels[2:].T
+        self.travels_m, self.speeds_m_s = self._travels.T, self._speeds.T
         # Below its center the left wheel rolls forward.
         self._servo_gains = errors.servo_gain * (-SERVO_GAIN_M_S_US, SERVO_GAIN_M_S_US)
         # The share of the difference to its command by which a servo's speed changes in one step.
-        self._servo_shares = -np.expm1(-_STEP_S / errors.servo_lag_s.T).astype(np.float32).astype(float)
-        self._block_step = _BLOCK_STEPS
+        shares = -np.expm1(-_STEP_S / errors.servo_lag_s.T).astype(np.float32)
+        self._servo_shares = np.tile(shares.astype(float), (2, 1))  # of each wheel: faster than broadcast in each step
+        # Of the steps in a block, those that the wheels have taken, and the bodies: these wait until somebody looks.
+        self._block_step = self._body_step = _BLOCK_STEPS
+        self._ground_m = np.empty((_BLOCK_STEPS, 2, rows))
         self._walls = Segments.from_ends(arena.segments_m)
-        self._contacts = Contacts(arena, self.worlds, rows)
+
+    @property
+    def poses(self) -> np.ndarray:
+        """True poses at time_ms (R, 3), read only: x m, y m, theta rad, frame world. Ask anew after each step."""
+        self._move_bodies()
+        return self._poses
 
     @property
     def wheel_rows(self) -> List[List[float]]:
@@ -86,7 +93,7 @@ class World:
         return self._wheel_rows
 
     def write_pulses(self, rows: Rows, pulses_us: np.ndarray) -> None:
-        """Set the servos' pulses, left and right (..., 2), of rows: one, or an array of them."""
+        """Set the servos' pulses, left and right (..., 2), of rows: one or several."""
         dead_zone_us = self.errors.dead_zone_us[rows]
         beyond_us = pulses_us - self.errors.servo_center_us[rows]
         driven_us = beyond_us - np.minimum(np.maximum(beyond_us, -dead_zone_us), dead_zone_us)
@@ -101,45 +108,43 @@ class World:
         """Move everything on by STEP_MS."""
         if self._block_step == _BLOCK_STEPS:
             self._begin_block()
-        travels_m, speeds_m_s = self._wheels[:2], self._wheels[2:]
+        step, speeds_m_s = self._block_step, self._speeds
         # Travel is taken with the speed of the step's start, so that reads within the step meet its end.
-        travels_m += speeds_m_s * _STEP_S
-        ground_m = speeds_m_s * self._ground_s[self._block_step]
-        reached_m_s = self._commands + self._ripples_m_s[self._block_step]
-        reached_m_s[self._commands == 0.0] = 0.0
-        speeds_m_s += (reached_m_s - speeds_m_s) * self._servo_shares
+        self._travels += speeds_m_s * _STEP_S
+        np.multiply(speeds_m_s, self._ground_s[step], out=self._ground_m[step])
+        reached_m_s = self._commands + self._ripples_m_s[step]
+        reached_m_s[np.logical_not(self._commands)] = 0.0
+        reached_m_s -= speeds_m_s
+        reached_m_s *= self._servo_shares
+        speeds_m_s += reached_m_s
         self._wheel_rows = None
         self._block_step += 1
         self.time_ms += STEP_MS
-        self._move_bodies(ground_m)
 
     def _begin_block(self) -> None:
         """Draw what chance does in the next steps, and end the motion of wheels that hardly move."""
+        self._move_bodies()
         drawn = [draw_normal(rng, (_BLOCK_STEPS, 4, self._robots)) for rng in self._rngs]
         noise = np.concatenate(drawn, axis=2)
         self._ripples_m_s = noise[:, :2] * self.errors.ripple_m_s.T
         # Way of a wheel's body over the ground for each m/s.
         self._ground_s = (1.0 - np.abs(noise[:, 2:]) * self.errors.slip.T) * (self.errors.wheel_scale.T * _STEP_S)
-        self._block_step = 0
-        speeds_m_s = self._wheels[2:]
-        speeds_m_s[np.abs(speeds_m_s) < _REST_M_S] = 0.0
+        self._block_step = self._body_step = 0
+        self._speeds[np.abs(self._speeds) < _REST_M_S] = 0.0
 
-    def _move_bodies(self, ground_m: np.ndarray) -> None:
-        before_m = self._poses[:2].copy()
-        x_m, y_m, theta_rad = self._poses
-        cosine, sine = self._headings
-        travel_m, rotation_rad = join_wheels(*ground_m)
-        x_m[:], y_m[:], cosine[:], sine[:] = move_along_arc(x_m, y_m, cosine, sine, travel_m, rotation_rad)
-        theta_rad += rotation_rad
-        self._contacts.separate(self._poses[:2], before_m, float(np.abs(travel_m).max()))
+    def _move_bodies(self) -> None:
+        """Let the bodies take the steps that the wheels have taken."""
+        if self._body_step < self._block_step:
+            self._bodies.roll(self._ground_m[self._body_step : self._block_step])
+            self._body_step = self._block_step
 
     def find_overlaps(self) -> np.ndarray:
         """Return which robots (R,) reach more than 1 um into a wall, an obstacle or another robot."""
-        return self._contacts.find_overlaps(self._poses[:2])
+        return self._bodies.contacts.find_overlaps(self.poses[:, :2].T)
 
     def measure_body_speeds(self) -> np.ndarray:
         """Return linear (m/s) and angular speed (rad/s) of each robot (R, 2), as its wheels have it."""
-        return np.column_stack(join_wheels(*self._wheels[2:]))
+        return np.column_stack(join_wheels(*self._speeds))
 
     def read_infrared(self, which: np.ndarray) -> np.ndarray:
         """Return one noisy reading (whole counts, 0..1023) of the eight sensors of the robots which, (K, 8).
@@ -160,7 +165,7 @@ class World:
         places_m = self.poses[:, :2]
         return measure_signals(
             places_m[which],
-            self._headings.T[which],
+            self._bodies.headings.T[which],
             places_m.reshape(self.worlds, self._robots, 2)[which // self._robots],
             self._walls,
             self.arena.circles_m,

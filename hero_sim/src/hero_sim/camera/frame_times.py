@@ -1,0 +1,31 @@
+"""When the camera takes its pictures, and when they arrive. Pure; deterministic by seed."""
+
+from typing import Iterator, NamedTuple
+
+import numpy as np
+
+from .view import CameraOptions
+
+__all__ = ["Frame", "list_frames"]
+
+
+class Frame(NamedTuple):
+    """One picture that arrives."""
+
+    stamp_s: float
+    """The middle of its exposure: what its header says."""
+    arrival_s: float
+
+
+def list_frames(options: CameraOptions, start_s: float = 0.0, seed: int = 0) -> Iterator[Frame]:
+    """Yield the pictures from start_s on, without end; dropped ones are left out. None overtakes another."""
+    random = np.random.RandomState(seed)
+    index, arrival_s = 0, -np.inf
+    while True:
+        stamp_s = start_s + index / options.rate_hz
+        late_s = random.random_sample() * options.delay_jitter_s
+        is_dropped = random.random_sample() < options.dropped_share
+        index += 1
+        if not is_dropped:
+            arrival_s = max(arrival_s, stamp_s + options.delay_s + late_s)
+            yield Frame(stamp_s, float(arrival_s))

@@ -1,0 +1,134 @@
+"""Where the simulated camera hangs, how it maps points to pixels, and what spoils its pictures. Pure.
+
+Frame `world` as in the arena. Pixels as in OpenCV: the center of the first one is (0, 0).
+"""
+
+from typing import List, NamedTuple, Tuple
+
+import cv2
+import numpy as np
+
+__all__ = ["CIRCLE", "CameraOptions", "PrintedTag", "View", "hand_outlines", "tag_corners"]
+
+_ANGLES_RAD = np.linspace(0.0, 2.0 * np.pi, 25)[:-1]
+CIRCLE = np.column_stack((np.cos(_ANGLES_RAD), np.sin(_ANGLES_RAD)))
+"""Points of the unit circle, (24, 2)."""
+
+HAND_HEIGHT_M = 0.25
+HAND_RADIUS_M = 0.06
+ARM_M = (0.08, 2.0)
+"""Width and length."""
+
+
+class CameraOptions(NamedTuple):
+    """The simulated camera; as it stands, a webcam 2.2 m above the floor that sees 3 m by 1.7 m."""
+
+    width_px: int = 1920
+    height_px: int = 1080
+    focal_px: Tuple[float, float] = (1390.0, 1390.0)
+    center_px: Tuple[float, float] = (948.0, 551.0)
+    distortion: Tuple[float, ...] = (-0.09, 0.02, 0.0006, -0.0004, 0.0)
+    """plumb_bob: k1, k2, p1, p2, k3."""
+    position_m: Tuple[float, float, float] = (0.03, -0.02, 2.2)
+    tilt_rad: Tuple[float, float, float] = (0.02, -0.015, 0.01)
+    """Rotation vector, in the optical frame, from looking straight down with world's x axis to the right."""
+    blur_px: float = 0.7
+    noise: float = 3.0
+    """Standard deviation, of 255."""
+    light_gradient: float = 0.35
+    """Share of the light that is missing at the darkest corner."""
+    exposure_s: float = 0.008
+    rate_hz: float = 30.0
+    delay_s: float = 0.07
+    """From the middle of the exposure to the picture's arrival."""
+    delay_jitter_s: float = 0.01
+    """Pictures are late by up to this much more."""
+    dropped_share: float = 0.02
+
+
+class PrintedTag(NamedTuple):
+    """A printed tag, on a robot (place in base_link) or in the arena (place in world)."""
+
+    tag_id: int
+    size_m: float = 0.040
+    """Side of the black square."""
+    height_m: float = 0.076
+    x_m: float = 0.0
+    y_m: float = 0.0
+    yaw_rad: float = 0.0
+    """Direction of the print's upper edge as seen from its center: 0 points to the front."""
+    family: str = "36h11"
+
+
+class View:
+    """The geometry of the camera.
+
+    Attributes:
+        matrix: focal lengths and principal point, (3, 3), px.
+        distortion: (5,).
+        rotation: (3, 3): turns a vector of world into the optical frame.
+        position_m: (3,).
+    """
+
+    def __init__(self, options: CameraOptions) -> None:
+        (fx, fy), (cx, cy) = options.focal_px, options.center_px
+        self.matrix = np.array(((fx, 0.0, cx), (0.0, fy, cy), (0.0, 0.0, 1.0)))
+        self.distortion = np.array(options.distortion)
+        self.rotation = cv2.Rodrigues(np.array(options.tilt_rad))[0] @ np.diag((1.0, -1.0, -1.0))
+        self.position_m = np.array(options.position_m)
+        self._turn = cv2.Rodrigues(self.rotation)[0]
+        self._shift = -self.rotation @ self.position_m
+
+    def project(self, points_m: np.ndarray) -> np.ndarray:
+        """Return the pixels (..., 2) of points (..., 3)."""
+        flat = np.ascontiguousarray(points_m, dtype=float).reshape(-1, 1, 3)
+        pixels, _ = cv2.projectPoints(flat, self._turn, self._shift, self.matrix, self.distortion)
+        return pixels.reshape(np.shape(points_m)[:-1] + (2,))
+
+    def list_rays(self, width_px: int, height_px: int) -> np.ndarray:
+        """Return the direction x / z, y / z of each pixel, (H, W, 2), single precision."""
+        u, v = np.meshgrid(np.arange(width_px, dtype=np.float32), np.arange(height_px, dtype=np.float32))
+        pixels = np.dstack((u, v)).reshape(-1, 1, 2)
+        criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 20, 1e-7)
+        undistort = getattr(cv2, "undistortPointsIter", cv2.undistortPoints)  # OpenCV 5 made them one
+        rays = undistort(pixels, self.matrix, self.distortion, R=np.eye(3), P=np.eye(3), criteria=criteria)
+        return rays.reshape(height_px, width_px, 2).astype(np.float32)
+
+    def plane_homography(self, height_m: float) -> np.ndarray:
+        """Return what turns directions (x / z, y / z, 1) into points of the plane z = height_m, (3, 3)."""
+        x_axis, y_axis, z_axis = self.rotation.T
+        depth_m = height_m - self.position_m[2]
+        return np.vstack(
+            (
+                self.position_m[0] * z_axis + depth_m * x_axis,
+                self.position_m[1] * z_axis + depth_m * y_axis,
+                z_axis,
+            )
+        )
+
+
+def tag_corners(tag: PrintedTag, poses: np.ndarray) -> np.ndarray:
+    """Return the corners (N, 4, 3) in world of one tag mounted at each of poses (N, 3).
+
+    Order: upper left, upper right, lower right, lower left of the upright print, seen from above.
+    """
+    half_m = tag.size_m / 2.0
+    # The print's upper edge looks along x, its left edge along y.
+    square_m = half_m * np.array(((1, 1), (1, -1), (-1, -1), (-1, 1)))
+    cos, sin = np.cos(tag.yaw_rad), np.sin(tag.yaw_rad)
+    on_robot_m = square_m @ np.array(((cos, sin), (-sin, cos))) + (tag.x_m, tag.y_m)
+    cos, sin = np.cos(poses[:, 2])[:, None], np.sin(poses[:, 2])[:, None]
+    x_m = poses[:, 0, None] + cos * on_robot_m[:, 0] - sin * on_robot_m[:, 1]
+    y_m = poses[:, 1, None] + sin * on_robot_m[:, 0] + cos * on_robot_m[:, 1]
+    return np.dstack((x_m, y_m, np.full(x_m.shape, tag.height_m)))
+
+
+def hand_outlines(hand_m: Tuple[float, float]) -> List[np.ndarray]:
+    """Return the outlines (K, 3) of a hand over the place hand_m, and of the arm, which comes from below."""
+    width_m, length_m = ARM_M
+    sides_m = np.array(((-width_m / 2.0, 0.0), (width_m / 2.0, 0.0)))
+    arm_m = np.vstack((sides_m, sides_m[::-1] - (0.0, length_m)))
+    return [
+        np.column_stack((hand_m + outline_m, np.full(len(outline_m), HAND_HEIGHT_M)))
+        for outline_m in (HAND_RADIUS_M * CIRCLE, arm_m)
+    ]

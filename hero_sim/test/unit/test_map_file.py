@@ -1,0 +1,88 @@
+"""Arenas from maps of map_server: what is solid, where robots start, wrong files."""
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from hero_sim.errors import OptionError
+from hero_sim.world.arena import measure_clearance, place_robots
+from hero_sim.world.arena_file import load_arena
+
+MAP = (
+    "image: room.png\nresolution: 0.01\norigin: [-0.6, -0.5, 0.0]\n"
+    "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
+)
+
+
+def draw_room():
+    """A room of 1 m by 0.8 m around the origin in unknown cells, with a solid block of which only the rim was seen."""
+    pixels = np.full((100, 120), 205, dtype=np.uint8)
+    pixels[10:90, 10:110] = 254
+    pixels[40:60, 80:100] = 205
+    pixels[40:60, [80, 99]] = 0
+    pixels[[40, 59], 80:100] = 0
+    pixels[10, 10:110] = pixels[89, 10:110] = 0
+    return pixels
+
+
+@pytest.fixture
+def write_map(tmp_path):
+    def write(text=MAP, pixels=None):
+        Image.fromarray(draw_room() if pixels is None else pixels).save(tmp_path / "room.png")
+        path = tmp_path / "room.yaml"
+        path.write_text(text)
+        return str(path)
+
+    return write
+
+
+def test_the_free_cells_of_a_map_are_a_room(write_map):
+    arena = load_arena(write_map())
+    points_m = np.array([(0.0, 0.0), (0.3, 0.0), (-0.45, 0.0), (0.0, 0.38), (0.0, -0.38), (0.55, 0.0)])
+    clearance_m = measure_clearance(points_m, arena)
+    np.testing.assert_allclose(clearance_m[[0, 2, 3, 4]], (0.2, 0.05, 0.01, 0.01), atol=1e-9)
+    assert clearance_m[1] < 0.0 and clearance_m[5] < 0.0
+    np.testing.assert_allclose(arena.bounds_m, (-0.5, -0.39, 0.5, 0.39), atol=1e-9)
+
+
+def test_straight_walls_are_one_segment_each(write_map):
+    assert len(load_arena(write_map()).segments_m) == 8
+
+
+def test_robots_start_only_where_it_is_free(write_map):
+    arena = load_arena(write_map())
+    poses = place_robots(arena, 12, np.random.RandomState(0))
+    assert (measure_clearance(poses[:, :2], arena) > 0.04).all()
+
+
+def test_the_upper_row_of_the_picture_is_up_in_the_arena(write_map):
+    pixels = np.full((10, 10), 254, dtype=np.uint8)
+    pixels[0] = 0
+    arena = load_arena(write_map("image: room.png\nresolution: 0.1\norigin: [0, 0, 0]\n", pixels))
+    np.testing.assert_allclose(arena.bounds_m, (0.0, 0.0, 1.0, 0.9), atol=1e-9)
+
+
+def test_a_negated_map_is_free_where_it_is_black(write_map):
+    arena = load_arena(write_map(MAP.replace("negate: 0", "negate: 1"), 255 - draw_room()))
+    np.testing.assert_allclose(arena.bounds_m, (-0.5, -0.39, 0.5, 0.39), atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "text, reason",
+    [
+        (MAP.replace("0.01", "none"), "resolution must be a number"),
+        (MAP.replace("0.01", "50"), "resolution must be from 0.001 to 1 m"),
+        (MAP.replace("0.0]", "0.5]"), "its yaw 0"),
+        (MAP.replace("[-0.6, -0.5, 0.0]", "here"), "origin must be x, y and yaw"),
+        (MAP.replace("room.png", "none.png"), "none.png cannot be read"),
+        (MAP.replace("room.png", "room.yaml"), "room.yaml cannot be read"),
+    ],
+)
+def test_a_wrong_map_is_refused_with_the_reason(write_map, text, reason):
+    with pytest.raises(OptionError, match=reason):
+        load_arena(write_map(text))
+
+
+def test_a_map_without_free_cells_is_refused(write_map):
+    with pytest.raises(OptionError, match="no free cell"):
+        load_arena(write_map(MAP, np.zeros((10, 10), dtype=np.uint8)))
