@@ -4,11 +4,16 @@ Public names are imported on first use (PEP 562), so that pure modules of this p
 """
 
 from importlib import import_module
+from threading import Thread
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # of these mypy knows what programs may use of a robot, whatever connects it
     from .robot_base import BaseRobot as BaseRobot  # noqa: PLC0414 - so that it counts as exported
     from .swarm_base import BaseSwarm as BaseSwarm  # noqa: PLC0414
+
+# The rospy of Debian 11 calls it when a script ends; its Python 3.9 no longer has it.
+if not hasattr(Thread, "isAlive"):
+    setattr(Thread, "isAlive", Thread.is_alive)  # noqa: B010 - mypy knows no such method
 
 _MODULES = {
     "BackgroundMotion": "background_motion",

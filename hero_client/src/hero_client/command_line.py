@@ -12,13 +12,14 @@ import sys
 from contextlib import suppress
 from typing import IO, Callable, NoReturn, Optional, Type
 
+from .texts import make_printable
+
 __all__ = [
     "FAILED",
     "INTERRUPTED",
     "OUTPUT_ERRORS",
     "PIPE_CLOSED",
     "call",
-    "make_printable",
     "print_error",
     "run",
     "say",
@@ -65,7 +66,8 @@ def call(main: Callable[[], Optional[int]], *errors: Type[Exception]) -> int:
                 stream.flush()
         except OSError as error:
             _discard(stream)
-            status = status or _report(error)
+            lost = _report(error)
+            status = status or lost
     return status
 
 
@@ -90,11 +92,6 @@ def print_error(text: str) -> None:
     """Write a line with the program's name to stderr."""
     with suppress(OSError):
         print("%s: %s" % (os.path.basename(sys.argv[0]), make_printable(text)), file=sys.stderr, flush=True)
-
-
-def make_printable(text: str) -> str:
-    """Return text from robots, files or other programs without characters that would control the terminal."""
-    return "".join(letter if letter.isprintable() else "?" for letter in text)
 
 
 def _report(failure: OSError) -> int:

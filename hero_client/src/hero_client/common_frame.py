@@ -1,4 +1,4 @@
-"""Poses of all robots of a swarm in one frame, by tf or by measured start poses. Pure."""
+"""Poses of all robots of a swarm in one frame: see Robot.pose_in(), or by measured start poses. Pure."""
 
 from typing import Dict, List, Mapping, Optional, Tuple
 
@@ -21,7 +21,10 @@ class CommonFrame:
     """
 
     def __init__(self, frame: str, starts: Optional[Mapping[int, Tuple[float, float, float]]] = None) -> None:
-        """starts: robot's id -> its (x_m, y_m, yaw_rad) in frame at its first odometry from now on; none: use tf."""
+        """starts: robot's id -> its (x_m, y_m, yaw_rad) in frame at its first odometry from now on.
+
+        None: see Robot.pose_in().
+        """
         self.frame = frame
         self.missing: Dict[str, Optional[str]] = {}
         self._starts = {robot_id: Pose(*start) for robot_id, start in (starts or {}).items()}
@@ -39,10 +42,8 @@ class CommonFrame:
             return transform_pose(self._origins[robot.robot_id], pose)
         try:
             return robot.pose_in(self.frame, timeout_s=0.0)
-        except StaleDataError:
-            return None
-        except FrameError as error:
-            self.missing[robot.name] = "%s; start something that publishes it, or give ~starts" % error
+        except (StaleDataError, FrameError) as error:
+            self.missing[robot.name] = str(error)
             return None
 
     def wait_for_poses(self, clock: Clock, swarm: BaseSwarm[AnyRobot]) -> List[Pose]:

@@ -28,8 +28,9 @@ USUAL_TOPIC = "/hero_driver/robots"
 SUFFIX = "/robots"
 FIND_PERIOD_S = 3.0
 REPEAT_PERIOD_S = 0.1
-SETTLE_S = 1.5
-"""A driver that the master knows has reported by then, unless it died without unregistering."""
+SETTLE_LOOKS = 3
+"""At the third look, 6 s after the first one, a driver that the master knows has reported, unless it hangs or died
+without unregistering. Looks, not seconds: a program that was kept from running has not heard anybody either."""
 
 SETTLE_POLL_S = 0.02
 
@@ -193,7 +194,8 @@ class Drivers:
         self._listed: Set[str] = set()
         self._request: Optional[StopRequest] = None
         self._start_s = time.monotonic()
-        self._has_looked = threading.Event()
+        self._looks = 0
+        self._has_found = False  # whether the master has told who the drivers are
         self._end = threading.Event()
         self._wake = threading.Event()
         rospy.on_shutdown(self.close)
@@ -207,9 +209,10 @@ class Drivers:
         while not self._end.is_set():
             if self._usual != USUAL_TOPIC:
                 self._listed = {self._usual}
+                self._has_found = True
             else:
                 self._look()
-            self._has_looked.set()
+            self._looks += 1
             self._end.wait(FIND_PERIOD_S)
         if not rospy.core.is_shutdown_requested():  # else rospy closes all topics at once
             for link in self._links.values():
@@ -232,6 +235,7 @@ class Drivers:
         }
         self._listed = listed
         self._links = {**{topic: link for topic, link in self._links.items() if topic not in gone}, **new}
+        self._has_found = True
         for link in gone.values():
             link.close()
 
@@ -244,14 +248,18 @@ class Drivers:
     @property
     def is_settled(self) -> bool:
         """Whether every driver that the master knows has reported, or had the time to."""
-        if time.monotonic() > self._start_s + SETTLE_S:
+        if self._looks >= SETTLE_LOOKS:
             return True
-        return self._has_looked.is_set() and all(link.report is not None for link in self._find_known())
+        return self._has_found and all(link.report is not None for link in self._find_known())
 
-    def wait_until_settled(self) -> None:
-        """Wait until is_settled, for SETTLE_S after the start at most."""
-        while not self.is_settled and not self._end.wait(SETTLE_POLL_S):
+    def wait_until_reported(self, namespace: str) -> None:
+        """Wait until a driver has reported the robot with this namespace, or is_settled."""
+        while not (self._is_reported(namespace) or self.is_settled or self._end.wait(SETTLE_POLL_S)):
             pass
+
+    def _is_reported(self, namespace: str) -> bool:
+        reports = [link.report for link in self._links.values() if link.report is not None]
+        return any(robot.namespace == namespace for report in reports for robot in report.robots)
 
     def _read_fresh(self) -> Dict[str, RobotArray]:
         """Return the reports by driver, without those of drivers that are silent for longer than the others."""
@@ -372,7 +380,7 @@ class Drivers:
         while not self._end.is_set():
             request, now_s = self._request, time.monotonic()
             if request is not None:
-                request.update(self._read_replies(request, now_s), self._has_looked.is_set(), now_s)
+                request.update(self._read_replies(request, now_s), self._has_found, now_s)
                 for link in self._links.values():
                     if request.is_open_to(link.driver) and link.request_stop(request.stopped):
                         request.note_asked(link.driver)

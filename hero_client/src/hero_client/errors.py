@@ -26,7 +26,7 @@ class NodeError(ProgramError):
 
 
 class FrameError(HeroError):
-    """tf knows no transform between two frames; the text names both."""
+    """No pose of a robot in a frame: it was never measured, or tf has no transform; the text names both."""
 
 
 class RobotError(HeroError):
@@ -46,4 +46,4 @@ class StoppedError(RobotError):
 
 
 class GoalError(RobotError):
-    """A motion ended before its goal: an obstacle, blocked wheels, no odometry, the time limit, or cancelled."""
+    """A motion ended before its goal: an obstacle, blocked wheels, no pose, the time limit, or cancelled."""

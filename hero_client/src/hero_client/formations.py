@@ -15,6 +15,7 @@ import yaml
 from scipy.optimize import linear_sum_assignment
 
 from .errors import ProgramError
+from .texts import one_line
 
 __all__ = ["FormationError", "Point", "assign_goals", "place_formation"]
 
@@ -41,7 +42,7 @@ def place_formation(formation: Any, count: int, least_spacing_m: float) -> List[
         try:
             formation = yaml.safe_load(formation)
         except yaml.YAMLError as error:
-            raise FormationError("formation: not YAML: %s" % " ".join(str(error).split())) from None
+            raise FormationError("formation: not YAML: %s" % one_line(error)) from None
     if not isinstance(formation, dict):
         raise FormationError("formation: must be a table with %s, not %r" % (", ".join(KEYS), formation))
     unknown = sorted(set(formation) - set(KEYS))

@@ -37,7 +37,10 @@ class FrameListener:
                 return Pose(found.translation.x, found.translation.y, yaw_of(found.rotation))
             except tf2_ros.TransformException as error:
                 if time.monotonic() >= deadline_s or rospy.is_shutdown():
-                    raise FrameError("no transform from %s to %s: %s" % (frame, within, error)) from None
+                    raise FrameError(
+                        "no transform from %s to %s (%s): start what publishes it, such as localize for map"
+                        % (frame, within, error)
+                    ) from None
             time.sleep(POLL_PERIOD_S)
 
 

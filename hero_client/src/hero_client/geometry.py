@@ -3,7 +3,17 @@
 import math
 from typing import Any, NamedTuple
 
-__all__ = ["STOP", "Pose", "Velocity", "clamp", "invert_pose", "transform_pose", "wrap_angle", "yaw_of"]
+__all__ = [
+    "STOP",
+    "Pose",
+    "Velocity",
+    "clamp",
+    "invert_pose",
+    "measure_distance",
+    "transform_pose",
+    "wrap_angle",
+    "yaw_of",
+]
 
 
 class Pose(NamedTuple):
@@ -49,6 +59,11 @@ def invert_pose(pose: Pose) -> Pose:
     """Return the pose of the frame's origin as seen from pose."""
     cos, sin = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
     return Pose(-cos * pose.x_m - sin * pose.y_m, sin * pose.x_m - cos * pose.y_m, -pose.yaw_rad)
+
+
+def measure_distance(start: Pose, end: Pose) -> float:
+    """Return the distance between two places, m."""
+    return math.hypot(end.x_m - start.x_m, end.y_m - start.y_m)
 
 
 def wrap_angle(angle_rad: float) -> float:

@@ -1,12 +1,13 @@
 """What a robot and a swarm have in common: a robot is a group of one. Pure."""
 
+import math
 from typing import Optional, Protocol, Sequence, TypeVar
 
 from .background_motion import BackgroundMotion, Hold, Sleep, Steps, run_steps
 from .clock import Clock
 from .errors import RobotNotReadyError
 
-__all__ = ["REPEAT_PERIOD_S", "Group", "Member", "stop_after", "wait_for_all"]
+__all__ = ["POLL_PERIOD_S", "READY_TIMEOUT_S", "REPEAT_PERIOD_S", "Group", "Member", "stop_after", "wait_for_all"]
 
 STOP_GAP_S = 0.06
 """Between the two messages of a stop: the firmware drops a Twist that comes within 50 ms of the one before."""
@@ -51,19 +52,21 @@ class Member(Protocol):
     def _send_velocity(self, linear_m_s: float, angular_rad_s: float) -> None: ...
 
 
-def wait_for_all(robots: Sequence[Member], clock: Clock, timeout_s: float = READY_TIMEOUT_S) -> Steps:
+def wait_for_all(robots: Sequence[Member], timeout_s: float = READY_TIMEOUT_S) -> Steps:
     """Wait until all robots are ready. Raises: RobotNotReadyError after timeout_s, saying what is missing."""
-    deadline_s = clock.now_s + timeout_s
+    # Polls, not a clock: a program that was kept from running has not heard its robots either.
+    polls = math.ceil(timeout_s / POLL_PERIOD_S)
     late = list(robots)
     is_to_continue = True
     while True:
         late = [robot for robot in late if robot.missing() is not None]
         if not late:
             return
-        if clock.now_s >= deadline_s or not is_to_continue:
+        if polls <= 0 or not is_to_continue:
             names = ", ".join(robot.name for robot in late[:NAMES_SHOWN]) + ("..." if len(late) > NAMES_SHOWN else "")
             verb = "is" if len(late) == 1 else "are"
             raise RobotNotReadyError("%s %s not ready after %.3g s: %s" % (names, verb, timeout_s, late[0].missing()))
+        polls -= 1
         is_to_continue = yield POLL_PERIOD_S
 
 
@@ -130,13 +133,13 @@ class Group(Clock):
 
         Raises: RobotNotReadyError after timeout_s, with the robots that are not and what is missing.
         """
-        self._run(wait_for_all(self._members, self._clock, timeout_s), sleep)
+        self._run(wait_for_all(self._members, timeout_s), sleep)
         return self
 
     def _drive_for(self, linear_m_s: float, angular_rad_s: float, duration_s: float) -> None:
         for robot in self._members:
             robot._end_motion()
-        self._run(wait_for_all(self._members, self._clock))
+        self._run(wait_for_all(self._members))
         self._run(
             stop_after(drive_for(self._members, self._clock, linear_m_s, angular_rad_s, duration_s), self._members)
         )

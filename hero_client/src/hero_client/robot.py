@@ -18,7 +18,7 @@ from nav_msgs.msg import Odometry
 
 from hero_msgs.msg import Encoder
 
-from .robot_base import FRESH_ODOM_S, BaseRobot, check_robot_id
+from .robot_base import NEXT_ODOM_S, BaseRobot, check_robot_id
 from .ros_link import RosLink
 from .script import start_node
 
@@ -46,7 +46,7 @@ class Robot(BaseRobot):
         """
         check_robot_id(robot_id)
         start_node()
-        super().__init__(robot_id, RosLink("hero_%d" % robot_id))
+        super().__init__(robot_id, RosLink(robot_id))
         if odom:
             self._link.subscribe("odom")
         if proximity:
@@ -56,7 +56,7 @@ class Robot(BaseRobot):
     def odometry(self) -> Odometry:
         """The newest nav_msgs/Odometry, with pose (hero_N/odom), velocity and covariances.
 
-        Raises: StaleDataError if it is older than 0.5 s.
+        Raises: StaleDataError if it is older than 1 s.
         """
         return self._read_message("odom")
 
@@ -64,13 +64,13 @@ class Robot(BaseRobot):
     def encoder(self) -> Encoder:
         """The newest hero_msgs/Encoder: ticks, distances and speeds of both wheels.
 
-        The first use subscribes and waits up to 1 s. Raises: StaleDataError if it is older than 0.5 s.
+        The first use subscribes and waits up to 5 s. Raises: StaleDataError if it is older than 1 s.
         """
         self._link.subscribe("encoder")
         if self.age_s("encoder") == math.inf:
-            self._link.wait_for_next("encoder", 1.0)
+            self._link.wait_for_next("encoder", NEXT_ODOM_S)
         return self._read_message("encoder")
 
     def _read_message(self, topic: str) -> Any:
-        self._check_fresh(topic, FRESH_ODOM_S)
+        self._check_fresh(topic)
         return self._link.messages.read(topic)

@@ -5,8 +5,9 @@ front, y to the left, angles counter-clockwise from the front.
 """
 
 import math
+from contextlib import suppress
 from functools import partial
-from typing import Callable, List, Optional
+from typing import Callable, Generator, List, Optional
 
 from .background_motion import BackgroundMotion, Sleep, Steps
 from .colors import Color
@@ -15,19 +16,16 @@ from .controllers.motion import DEFAULT_TIMEOUT_S, MotionController, State
 from .controllers.straight_and_turn import ForwardController, TurnController
 from .errors import GoalError, StaleDataError, StoppedError
 from .geometry import Pose, Velocity, clamp, transform_pose
-from .group import REPEAT_PERIOD_S, Group, stop_after, wait_for_all
+from .group import POLL_PERIOD_S, READY_TIMEOUT_S, REPEAT_PERIOD_S, Group, stop_after, wait_for_all
 from .light import Light
-from .readings import Obstacle, find_nearest
+from .readings import FRESH_S, Obstacle, find_nearest
 from .robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
 from .robot_link import RobotLink
 
 __all__ = ["BaseRobot", "check_robot_id"]
 
-FRESH_ODOM_S = 0.5
-"""Odometry and encoder come about 29 times a second; older than this is stale. Wi-Fi gaps of 0.1 s are common."""
-
-FRESH_PROXIMITY_S = 1.0
-"""Proximity comes about 5 times a second; older than this is stale."""
+NEXT_ODOM_S = 5.0
+"""The next odometry comes within 0.1 s, on a busy machine within a second."""
 
 STOPPED_WARNING_PERIOD_S = 5.0
 
@@ -72,9 +70,9 @@ class BaseRobot(Group):
         """
         return self._link.age_s(topic)
 
-    def _check_fresh(self, topic: str, limit_s: float) -> None:
+    def _check_fresh(self, topic: str) -> None:
         age_s = self._link.age_s(topic)
-        if age_s <= limit_s:
+        if age_s <= FRESH_S:
             return
         name = "%s/%s" % (self.namespace, topic)
         if age_s == math.inf:
@@ -85,24 +83,28 @@ class BaseRobot(Group):
     def pose(self) -> Pose:
         """Where the robot is by its odometry, in the frame hero_N/odom: 0, 0, 0 where it was switched on.
 
-        Raises: StaleDataError if odometry is older than 0.5 s.
+        Raises: StaleDataError if odometry is older than 1 s.
         """
-        self._check_fresh("odom", FRESH_ODOM_S)
+        self._check_fresh("odom")
         return self._link.read_pose()
 
     def pose_in(self, frame: str, timeout_s: float = 2.0) -> Pose:
-        """Return where the robot is in another frame of tf, such as "world", which simulated robots share.
+        """Return where the robot is in another frame, such as "map", which hero_localization gives all robots.
 
-        The first call subscribes to /tf, which is a load with many robots, and waits up to timeout_s.
+        A frame that localize does not know, such as "world" of simulated robots, is looked up in tf: the first such
+        call subscribes to /tf, which is a load with many robots. What is not known yet is waited for up to timeout_s.
 
-        Raises: StaleDataError as `pose`. FrameError if tf does not connect frame with hero_N/odom.
+        Raises: StaleDataError as `pose`, or if the robot drove on where nothing measures it. FrameError if the robot
+        was never measured, or tf does not connect frame with hero_N/odom.
         """
-        return transform_pose(self._link.find_origin(frame.lstrip("/"), timeout_s), self.pose)
+        frame = frame.lstrip("/")
+        localized = self._link.find_localized(frame, timeout_s)
+        return localized or transform_pose(self._link.find_origin(frame, timeout_s), self.pose)
 
     @property
     def velocity(self) -> Velocity:
         """How the robot moves by its odometry, in hero_N/base_link. Raises: StaleDataError as `pose`."""
-        self._check_fresh("odom", FRESH_ODOM_S)
+        self._check_fresh("odom")
         return self._link.read_velocity()
 
     @property
@@ -115,7 +117,7 @@ class BaseRobot(Group):
 
         Raises: StaleDataError if they are older than 1 s.
         """
-        self._check_fresh("proximity", FRESH_PROXIMITY_S)
+        self._check_fresh("proximity")
         return self._link.read_ranges()
 
     def wait_for_scan(self, timeout_s: float = 2.0) -> List[float]:
@@ -126,6 +128,9 @@ class BaseRobot(Group):
         self._link.subscribe("proximity")
         self._link.wait_for_next("proximity", timeout_s)
         return self._link.read_ranges()
+
+    def _read_pose(self) -> Pose:
+        return self.pose
 
     def fresh_pose(self) -> Optional[Pose]:
         """Return `pose`, or None where that would raise."""
@@ -160,7 +165,7 @@ class BaseRobot(Group):
     def is_stopped(self) -> bool:
         """Whether the robot takes no motion because its driver has stopped all robots (emergency stop).
 
-        At the start of a program it waits until the drivers have reported, for up to 1.5 s.
+        At the start of a program it waits until the robot's driver has reported, for about 6 s at most.
         """
         self._link.wait_until_settled()
         return self._link.is_stopped
@@ -176,7 +181,7 @@ class BaseRobot(Group):
         """
         self._link.set_odometry(Pose(x_m, y_m, yaw_rad))
         self._link.subscribe("odom")
-        self._link.wait_for_next("odom", 1.0, count=2)  # one may have been on its way before the answer
+        self._link.wait_for_next("odom", NEXT_ODOM_S, count=2)  # one may have been on its way before the answer
 
     # ------------------------------------------------------------------ motions
 
@@ -225,7 +230,7 @@ class BaseRobot(Group):
         _check_speed(distance_m, linear_m_s)
         self._end_motion()
         controller = ForwardController(distance_m, self.now_s, linear_m_s)
-        self._run(self._follow(controller, "drive %g m" % distance_m, self.fresh_pose))
+        self._run(self._follow(controller, "drive %g m" % distance_m, self._read_pose))
 
     def turn(self, angle_rad: float, angular_rad_s: float = 1.5) -> None:
         """Turn on the spot by angle_rad, positive to the left, to within 0.03 rad by the robot's odometry.
@@ -238,7 +243,7 @@ class BaseRobot(Group):
         _check_speed(angle_rad, angular_rad_s)
         self._end_motion()
         controller = TurnController(angle_rad, self.now_s, angular_rad_s)
-        self._run(self._follow(controller, "turn %g rad" % angle_rad, self.fresh_pose))
+        self._run(self._follow(controller, "turn %g rad" % angle_rad, self._read_pose))
 
     def go_to(
         self,
@@ -254,16 +259,18 @@ class BaseRobot(Group):
         """Drive to a position, turn to yaw_rad if given, and return when the robot has stopped there.
 
         frame: "odom" for the robot's odometry (0, 0 where it was switched on), "robot" for its present pose (x to the
-        front, y to the left), or a frame of tf, such as "world". avoid: drive around what the proximity sensors see;
-        otherwise the robot stops before an obstacle that is in the way, and fails if it stays there for 2 s.
+        front, y to the left), or another frame: see pose_in(). In "map" the place is one of the arena, which odometry
+        that drifts does not move.
+        avoid: drive around what the proximity sensors see; otherwise the robot stops before an obstacle that is in the
+        way, and fails if it stays there for 2 s.
         The default field of simulated robots is 1.5 m by 1.5 m with walls (larger for more than nine robots): a single
         robot starts in its middle and reaches 0.7 m to each side.
 
         What the sensors do not see (black, low or thin things) ends no motion: wheels that slip are counted as driven.
 
         Raises: GoalError with the reason if the goal is not reached: an obstacle in the way and where it is, wheels
-        that do not turn, no odometry for 2 s, or timeout_s. RobotNotReadyError if the robot is not there within 2 s.
-        StoppedError if all robots are stopped. FrameError if tf does not know the frame. The robot is stopped then.
+        that do not turn, no pose for 2 s, or timeout_s. RobotNotReadyError if the robot is not there within 2 s.
+        StoppedError if all robots are stopped. FrameError as pose_in(). The robot is stopped then.
         """
         self._end_motion()
         self.pursue(Goal(x_m, y_m, yaw_rad), frame, avoid, timeout_s, tolerance_m, sleep)
@@ -314,46 +321,57 @@ class BaseRobot(Group):
         if avoid:
             self._link.subscribe("proximity")
         self._link.subscribe("odom")
-        yield from wait_for_all(self._members, self._clock)
-        read_pose: Callable[[], Optional[Pose]] = self.fresh_pose
+        yield from wait_for_all(self._members)
+        read_pose = self._read_pose
         if frame == "robot":
-            place = transform_pose(self.pose, Pose(goal.x_m, goal.y_m, goal.yaw_rad or 0.0))
+            place = transform_pose((yield from self._wait_for_pose()), Pose(goal.x_m, goal.y_m, goal.yaw_rad or 0.0))
             goal = Goal(place.x_m, place.y_m, None if goal.yaw_rad is None else place.yaw_rad)
         elif frame.lstrip("/") not in ("odom", self.name + "/odom"):
-            read_pose = partial(self._fresh_pose_in, frame)
+            with suppress(StaleDataError):
+                self.pose_in(frame)  # waits for one that was never there, which the steps do not
+            read_pose = partial(self.pose_in, frame, timeout_s=0.0)
         controller = GoToGoalController(goal, self.now_s, tolerance_m, timeout_s, avoid)
         yield from self._follow(controller, text, read_pose, on_step)
 
-    def _fresh_pose_in(self, frame: str) -> Optional[Pose]:
-        try:
-            return self.pose_in(frame)
-        except StaleDataError:
-            return None
+    def _wait_for_pose(self) -> Generator[float, bool, Pose]:
+        """Return `pose`. Raises: StaleDataError if it is not fresh for READY_TIMEOUT_S, or at the end."""
+        for _ in range(math.ceil(READY_TIMEOUT_S / POLL_PERIOD_S)):
+            pose = self.fresh_pose()
+            if pose is not None or not (yield POLL_PERIOD_S):
+                break
+        return pose or self.pose
 
     def _follow(
         self,
         controller: MotionController,
         text: str,
-        read_pose: Callable[[], Optional[Pose]],
+        read_pose: Callable[[], Pose],
         on_step: OnStep = lambda controller: None,
     ) -> Steps:
         """Drive as the controller says to its end. Raises: GoalError, StoppedError, RobotNotReadyError."""
-        yield from wait_for_all(self._members, self._clock)
+        yield from wait_for_all(self._members)
         yield from stop_after(self._obey(controller, text, read_pose, on_step), self._members)
-        if controller.state is State.FAILED:
-            raise GoalError("%s did not %s: %s" % (self.name, text, controller.reason))
 
     def _obey(
         self,
         controller: MotionController,
         text: str,
-        read_pose: Callable[[], Optional[Pose]],
+        read_pose: Callable[[], Pose],
         on_step: OnStep,
     ) -> Steps:
-        while controller.state is State.ACTIVE:
+        while True:
             self.check_not_stopped()
-            self._send_velocity(*controller.step(read_pose(), self.fresh_proximity(), self.now_s))
+            pose, absence = None, ""
+            try:
+                pose = read_pose()
+            except StaleDataError as error:
+                absence = ": %s" % error
+            self._send_velocity(*controller.step(pose, self.fresh_proximity(), self.now_s))
             on_step(controller)
+            if controller.state is State.REACHED:
+                return
+            if controller.state is State.FAILED:
+                raise GoalError("%s did not %s: %s%s" % (self.name, text, controller.reason, absence))
             if not (yield REPEAT_PERIOD_S):
                 raise GoalError("%s did not %s: cancelled" % (self.name, text))
 

@@ -6,7 +6,10 @@ from .background_motion import BackgroundMotion, Steps
 from .clock import Clock
 from .geometry import Pose, Velocity
 
-__all__ = ["RobotLink"]
+__all__ = ["MAP", "RobotLink"]
+
+MAP = "map"
+"""The frame in which hero_localization gives poses (REP 105)."""
 
 
 class RobotLink(Protocol):
@@ -42,6 +45,12 @@ class RobotLink(Protocol):
 
     def read_ranges(self) -> List[float]:
         """Return the newest proximity ranges, of which there are some: see Robot.proximity."""
+
+    def find_localized(self, frame: str, timeout_s: float) -> Optional[Pose]:
+        """Return where hero_localization says that the robot is; None if that is in another frame, or does not run.
+
+        Raises: FrameError if the robot was not measured within timeout_s. StaleDataError if its pose is old.
+        """
 
     def find_origin(self, frame: str, timeout_s: float) -> Pose:
         """Return the pose of hero_N/odom in another frame. Raises: FrameError if it is not known."""

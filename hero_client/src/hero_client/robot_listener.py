@@ -12,7 +12,7 @@ import rospy
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 
-from .geometry import Pose, wrap_angle
+from .geometry import Pose, measure_distance, wrap_angle
 from .readings import Obstacle, find_nearest, is_plausible, read_pose, read_ranges
 
 __all__ = ["NewestMessage", "RateMeter", "RobotListener", "RobotTrack"]
@@ -88,7 +88,7 @@ class RobotTrack:
             self.pose = None
             return
         if self.pose is not None:
-            self.distance_m += math.hypot(pose.x_m - self.pose.x_m, pose.y_m - self.pose.y_m)
+            self.distance_m += measure_distance(self.pose, pose)
             self.turned_rad += abs(wrap_angle(pose.yaw_rad - self.pose.yaw_rad))
         self.pose = pose
 

@@ -11,8 +11,9 @@ from .errors import StaleDataError
 
 __all__ = ["CommandTopic", "NewestMessages"]
 
-CONNECT_S = 1.0
-"""A driver that has the robot connects to a new publisher within this time; a command before would be lost."""
+CONNECT_S = 3.0
+"""A driver that has the robot connects to a new publisher within this time, mostly within 0.1 s; a command before
+would be lost."""
 
 POLL_PERIOD_S = 0.02
 """Between two looks whether the driver has connected."""

@@ -18,14 +18,13 @@ from .drivers import share_drivers
 from .errors import HeroError, RobotError
 from .frames import share_frames
 from .geometry import Pose, Velocity, yaw_of
-from .readings import front_first
+from .localized_poses import share_poses
+from .readings import FRESH_S, front_first
 from .robot_topics import CommandTopic, NewestMessages
 from .ros_clock import ROS_CLOCK
+from .texts import one_line
 
 __all__ = ["RosLink"]
-
-SILENT_S = 1.0
-"""A topic without a message for so long makes a robot unready; proximity comes about 5 times a second."""
 
 SERVICE_TIMEOUT_S = 2.0
 
@@ -76,9 +75,10 @@ class RosLink:
 
     clock = ROS_CLOCK
 
-    def __init__(self, name: str) -> None:
-        """Advertise the commands to the robot with this name."""
-        self._name = name
+    def __init__(self, robot_id: int) -> None:
+        """Advertise the commands to the robot with this number."""
+        self._robot_id = robot_id
+        self._name = name = "hero_%d" % robot_id
         self._namespace = "/" + name
         self._drivers = share_drivers()
         self._cmd_vel = CommandTopic(self._namespace + "/velocity_controller/cmd_vel", Twist, self._explain_absence)
@@ -97,7 +97,7 @@ class RosLink:
         """See RobotLink."""
         if not self.connected:
             return self._cmd_vel.describe_absence()
-        silent = self.messages.find_silent(SILENT_S)
+        silent = self.messages.find_silent(FRESH_S)
         if silent is not None:
             return "no message on %s/%s: is the robot on and in reach?" % (self._namespace, silent)
         return None
@@ -128,6 +128,10 @@ class RosLink:
         """See RobotLink."""
         return front_first(self.messages.read("proximity"))
 
+    def find_localized(self, frame: str, timeout_s: float) -> Optional[Pose]:
+        """See RobotLink; the first call subscribes to /localization/poses, for all robots."""
+        return share_poses().find(self._robot_id, frame, timeout_s)
+
     def find_origin(self, frame: str, timeout_s: float) -> Pose:
         """See RobotLink; the first call subscribes to /tf."""
         return share_frames().find_origin(self._name + "/odom", frame, timeout_s)
@@ -152,7 +156,7 @@ class RosLink:
             rospy.wait_for_service(name, SERVICE_TIMEOUT_S)
             answer = rospy.ServiceProxy(name, SetOdom)(*pose)
         except (rospy.ServiceException, rospy.ROSException) as error:
-            raise RobotError("%s: %s" % (name, " ".join(str(error).split()))) from None
+            raise RobotError("%s: %s" % (name, one_line(error))) from None
         if not answer.success:
             raise RobotError("%s: the robot answers: %s" % (name, answer.message))
 
@@ -170,8 +174,8 @@ class RosLink:
         )
 
     def wait_until_settled(self) -> None:
-        """See RobotLink; takes 1.5 s at most."""
-        self._drivers.wait_until_settled()
+        """See RobotLink; takes about 6 s at most."""
+        self._drivers.wait_until_reported(self._namespace)
 
     def start(self, steps: Steps) -> BackgroundMotion:
         """Take steps on another thread."""

@@ -6,6 +6,7 @@ node wait for. rospy has no setting for either, so this file, and no other here,
 
 import errno
 import http.client
+import threading
 import xmlrpc.client
 from typing import Any
 from xml.parsers.expat import ExpatError
@@ -13,9 +14,11 @@ from xml.parsers.expat import ExpatError
 import rosgraph
 import rosgraph.roslogging
 import rospy
+from rospy.impl import tcpros_base
 from rospy.impl.registration import RegManager, get_registration_listeners
 
 from .errors import NodeError
+from .texts import one_line
 
 __all__ = [
     "MASTER_TIMEOUT_S",
@@ -103,13 +106,29 @@ def start_ros_node(name: str, anonymous: bool = False) -> None:
         _check_name(name)
     uri = rosgraph.get_master_uri()
     rospy.core._xmlrpc_cache[uri] = NodeMaster(uri, transport=LimitedTransport())
+    _serve_each_connection_by_itself()
     try:
         rospy.init_node(name, anonymous=anonymous, disable_signals=True)
     except rosgraph.roslogging.LoggingException as error:
         raise NodeError("%s: set ROS_LOG_DIR to a directory" % error) from None
     except (rospy.ROSInitException, OSError, ValueError) as error:
-        raise NodeError(" ".join(str(error).split())) from None
+        raise NodeError(one_line(error)) from None
     end_without_delay()
+
+
+def _serve_each_connection_by_itself() -> None:
+    """Let no program that connects delay another; for the time before rospy.init_node().
+
+    rospy reads the headers of connections on the thread that accepts them, without a time limit: a driver that hangs
+    while it connects would keep the next one from ever hearing of a stop.
+    """
+    server = tcpros_base.init_tcpros_server()
+    serve = server._tcp_server_callback
+
+    def serve_on_a_thread(*connection: Any) -> None:
+        threading.Thread(target=serve, args=connection, name="connection", daemon=True).start()
+
+    server._tcp_server_callback = serve_on_a_thread
 
 
 def _check_name(default_name: str) -> None:

@@ -15,6 +15,7 @@ from .ros_node import check_master, start_ros_node
 
 __all__ = ["rate", "start_node"]
 
+
 def rate(hz: float) -> Iterator[float]:
     """Repeat the body of a `for` loop hz times per second, until Ctrl-C or the end of the ROS node.
 

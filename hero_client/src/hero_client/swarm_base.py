@@ -7,8 +7,10 @@ from .background_motion import BackgroundMotion
 from .clock import Clock
 from .colors import Color
 from .errors import GoalError, HeroError
+from .geometry import Pose
 from .group import Group
 from .robot_base import BaseRobot
+from .robot_link import MAP
 
 __all__ = ["REPORT_PERIOD_S", "AnyRobot", "BaseSwarm"]
 
@@ -38,6 +40,14 @@ class BaseSwarm(Group, Generic[AnyRobot]):
         self._by_id = {robot.robot_id: robot for robot in self.robots}
         self._reported: Dict[str, str] = {}
         self._next_report_s = self.now_s + FIRST_REPORT_S
+
+    @property
+    def poses(self) -> Dict[int, Pose]:
+        """Where all robots are in the frame map, by their ids; needs hero_localization: see Robot.pose_in().
+
+        Raises: FrameError, StaleDataError as Robot.pose_in(), for the first robot whose pose is not known.
+        """
+        return {robot_id: robot.pose_in(MAP) for robot_id, robot in self._by_id.items()}
 
     def drive(self, linear_m_s: float, angular_rad_s: float, duration_s: Optional[float] = None) -> None:
         """Drive all robots with the same velocities: see Robot.drive()."""

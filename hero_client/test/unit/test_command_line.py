@@ -47,6 +47,11 @@ def test_a_full_disk_as_output_is_told_in_one_line(full_disk, printing):
     assert (status, errors) == (1, "-c: the output cannot be written: No space left on device\n")
 
 
+def test_a_full_disk_is_told_also_by_a_command_that_failed(full_disk):
+    status, errors = run_python("command_line.run(lambda: print('text') or 2)", full_disk)
+    assert (status, errors) == (2, "-c: the output cannot be written: No space left on device\n")
+
+
 def test_help_to_a_pipe_that_nobody_reads_ends_silently(closed_pipe):
     code = "import argparse; command_line.run(lambda: argparse.ArgumentParser().parse_args(['--help']))"
     assert run_python(code, closed_pipe) == (141, "")

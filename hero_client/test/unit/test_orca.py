@@ -94,13 +94,13 @@ def swap(count, radius_m, seed):
     return least_m, [body.pose for body in bodies], goals
 
 
+@pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("count, radius_m", [(2, 0.4), (3, 0.4), (10, 0.6)])
-def test_robots_swap_places_across_a_circle_without_touching(count, radius_m):
-    for seed in range(4):
-        least_m, poses, goals = swap(count, radius_m, seed)
-        assert least_m > 2.0 * BODY_RADIUS_M, (seed, least_m)
-        for pose, goal in zip(poses, goals):
-            assert math.hypot(pose.x_m - goal[0], pose.y_m - goal[1]) < 0.02, seed
+def test_robots_swap_places_across_a_circle_without_touching(count, radius_m, seed):
+    least_m, poses, goals = swap(count, radius_m, seed)
+    assert least_m > 2.0 * BODY_RADIUS_M
+    for pose, goal in zip(poses, goals):
+        assert math.hypot(pose.x_m - goal[0], pose.y_m - goal[1]) < 0.02
 
 
 def test_what_is_seen_near_is_not_driven_at_but_passed_on_the_right():

@@ -9,11 +9,11 @@ import enum
 import math
 from typing import Optional, Sequence
 
-from ..geometry import STOP, Pose, Velocity, wrap_angle
+from ..geometry import STOP, Pose, Velocity, measure_distance, wrap_angle
 from ..readings import Obstacle
 from .avoidance import find_in_path
 
-__all__ = ["DEFAULT_TIMEOUT_S", "SILENCE_S", "MotionController", "State"]
+__all__ = ["DEFAULT_TIMEOUT_S", "SILENT_STEPS", "MotionController", "State"]
 
 DEFAULT_TIMEOUT_S = 120.0
 
@@ -23,8 +23,9 @@ SETTLE_S = 0.5
 AIM_SHARE = 0.7
 """The robot stops at this share of the tolerance, to be within it after coming to rest."""
 
-SILENCE_S = 2.0
-"""After so long without a pose the motion has failed: the robot is gone."""
+SILENT_STEPS = 20
+"""After so many steps without a pose, 2 s, the motion has failed: the robot is gone. Steps, not seconds: a program that
+was kept from running has not heard the robot either."""
 
 CLEARANCE_M = 0.02
 """Free space kept between the body and an obstacle in the way."""
@@ -74,7 +75,7 @@ class MotionController:
         self.distance_m = math.nan
         self._timeout_s = timeout_s
         self._start_s = now_s
-        self._last_pose_s = now_s
+        self._silent_steps = 0
         self._stopped_since_s: Optional[float] = None
         self._blocked_since_s: Optional[float] = None
         self._patience_s = BLOCKED_S
@@ -93,10 +94,9 @@ class MotionController:
         if now_s - self._start_s > self._timeout_s:
             return self._fail(self._describe_timeout())
         if pose is None or not all(math.isfinite(value) for value in pose):
-            if now_s - self._last_pose_s > SILENCE_S:
-                return self._fail("no odometry for %g s" % SILENCE_S)
-            return STOP
-        self._last_pose_s = now_s
+            self._silent_steps += 1
+            return STOP if self._silent_steps < SILENT_STEPS else self._fail("no pose for 2 s")
+        self._silent_steps = 0
         # It stops well inside the tolerance and restarts only outside: hysteresis against chattering at the border.
         self._at_goal = self._offset(pose) < (1.0 if self._at_goal else AIM_SHARE)
         command = self._arrive(pose) if self._at_goal else self._approach(pose, ranges or (), now_s)
@@ -149,7 +149,7 @@ class MotionController:
         if (
             last is None
             or not is_told_to_move
-            or math.hypot(pose.x_m - last.x_m, pose.y_m - last.y_m) > MOVED_M
+            or measure_distance(last, pose) > MOVED_M
             or abs(wrap_angle(pose.yaw_rad - last.yaw_rad)) > MOVED_RAD
         ):
             self._moved_pose, self._moved_s = pose, now_s

@@ -6,6 +6,7 @@ from typing import List, Optional, Sequence, Tuple
 import numpy as np
 
 from ..geometry import STOP, Pose, Velocity
+from .motion import AIM_SHARE
 from .orca import AvoidanceLaw, avoid_others, avoid_sensed, steer, steered_point
 from .unicycle import GoToLaw, go_to_point
 
@@ -57,7 +58,8 @@ class SwarmGoToController:
         self.law = law
         self.step_s = step_s
         self.arrived = [False] * len(self.goals)
-        self._dock_law = GoToLaw(tolerance_m=tolerance_m, max_linear_m_s=law.max_linear_m_s)
+        self._tolerance_m = tolerance_m
+        self._dock_law = GoToLaw(tolerance_m=AIM_SHARE * tolerance_m, max_linear_m_s=law.max_linear_m_s)
         self._random = np.random.RandomState(seed)
         self._last_places: Optional[np.ndarray] = None
         self._velocities = np.zeros((len(self.goals), 2))
@@ -81,7 +83,7 @@ class SwarmGoToController:
         self._last_places = places
         distances_m = [math.dist(goal, pose[:2]) for goal, pose in zip(self.goals, poses)]
         self.arrived = [
-            done and distance_m < 2.0 * self._dock_law.tolerance_m or distance_m < self._dock_law.tolerance_m
+            distance_m < (self._tolerance_m if done else self._dock_law.tolerance_m)
             for done, distance_m in zip(self.arrived, distances_m)
         ]
         wanted = np.array([self._want(*item) for item in zip(self.goals, poses, distances_m, self._jams)])

@@ -6,7 +6,7 @@ Poses and goals are in one common frame, m and rad (REP 103).
 import math
 from typing import NamedTuple
 
-from ..geometry import STOP, Pose, Velocity, clamp, wrap_angle
+from ..geometry import STOP, Pose, Velocity, clamp, measure_distance, wrap_angle
 
 __all__ = [
     "FOLLOW",
@@ -85,7 +85,7 @@ def go_to_pose(pose: Pose, goal: Pose, law: GoToPoseLaw = SMOOTH, at_goal: bool 
     Source: J. J. Park, B. Kuipers, A smooth control law for graceful motion of differential wheeled mobile robots
     in 2D environment, ICRA 2011, equations 13 to 15.
     """
-    distance_m = math.hypot(goal.x_m - pose.x_m, goal.y_m - pose.y_m)
+    distance_m = measure_distance(pose, goal)
     if at_goal or distance_m < law.tolerance_m:
         off_rad = wrap_angle(goal.yaw_rad - pose.yaw_rad)
         if abs(off_rad) < law.tolerance_rad:
@@ -131,7 +131,7 @@ def follow(pose: Pose, leader: Pose, law: FollowLaw = FOLLOW) -> Velocity:
 
     It never drives backwards: a leader that comes nearer is waited for. pose and leader are in the same frame.
     """
-    distance_m = math.hypot(leader.x_m - pose.x_m, leader.y_m - pose.y_m)
+    distance_m = measure_distance(pose, leader)
     off_rad = wrap_angle(math.atan2(leader.y_m - pose.y_m, leader.x_m - pose.x_m) - pose.yaw_rad)
     linear_m_s = max(0.0, law.linear_gain * (distance_m - law.gap_m)) * max(0.0, math.cos(off_rad))
     return Velocity(

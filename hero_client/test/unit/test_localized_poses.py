@@ -1,0 +1,68 @@
+"""Poses from localize: which are given, and what is said of a robot whose pose is not known."""
+
+import math
+
+import pytest
+
+pytest.importorskip("hero_msgs.msg", reason="needs ROS")
+import rospy
+
+from hero_client.errors import FrameError, StaleDataError
+from hero_client.localized_poses import LocalizedPoses
+from hero_msgs.msg import RobotPose, RobotPoses
+
+SENT_S = 100.0
+"""By the clock of localize; that of the program says 7 s when the message comes."""
+
+
+def make_pose(robot_id, state=RobotPose.TRACKED, age_s=0.03, position_sd=0.001, x=1.0):
+    stamp = rospy.Time.from_sec(SENT_S - age_s)
+    return RobotPose(id=robot_id, state=state, stamp=stamp, x=x, y=2.0, yaw=0.5, position_sd=position_sd)
+
+
+def receive(*robots):
+    message = RobotPoses(robots=robots)
+    message.header.stamp, message.header.frame_id = rospy.Time.from_sec(SENT_S), "map"
+    poses = LocalizedPoses()
+    poses.receive(message, 7.0)
+    return poses
+
+
+def test_poses_of_all_robots_come_from_one_message():
+    poses = receive(make_pose(0), make_pose(3, RobotPose.LOST, x=4.0))
+    assert poses.frame == "map"
+    assert poses.find(0, 7.1) == (1.0, 2.0, 0.5)
+    assert poses.find(3, 7.1) == (4.0, 2.0, 0.5)  # covered for a moment: it follows its odometry
+
+
+@pytest.mark.parametrize(
+    ("robot", "text"),
+    [
+        (None, "hero_3 has no pose in the frame map: localize does not know it: name it in its ~robots"),
+        (make_pose(3, RobotPose.UNKNOWN, x=math.nan), "hero_3 has no pose in the frame map: .* is its tag in view"),
+        (make_pose(3, x=math.inf), "hero_3 has no pose in the frame map"),
+    ],
+)
+def test_a_robot_that_was_never_measured_is_named_with_a_remedy(robot, text):
+    with pytest.raises(FrameError, match=text):
+        receive(make_pose(0), *([robot] if robot else [])).find(3, 7.1)
+
+
+def test_nothing_that_localizes_is_named():
+    assert LocalizedPoses().frame is None
+    with pytest.raises(FrameError, match="hero_3 .* no message on /localization/poses yet, does localize run"):
+        LocalizedPoses().find(3, 7.0)
+
+
+@pytest.mark.parametrize(
+    ("robot", "now_s", "text"),
+    [
+        (make_pose(3), 8.2, "pose of hero_3 in the frame map is old: no message .* for 1.2 s: does localize still run"),
+        (make_pose(3, age_s=0.8), 7.3, "pose of hero_3 in the frame map is 1.1 s old, .* is the robot on and in reach"),
+        (make_pose(3, RobotPose.LOST, position_sd=0.07), 7.1, "hero_3 in the frame map is uncertain by 70 mm: .*tag"),
+        (make_pose(3, position_sd=math.nan), 7.1, "hero_3 .* uncertain"),
+    ],
+)
+def test_an_old_or_uncertain_pose_is_an_error_with_its_cause(robot, now_s, text):
+    with pytest.raises(StaleDataError, match=text):
+        receive(robot).find(3, now_s)
