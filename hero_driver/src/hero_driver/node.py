@@ -1,4 +1,10 @@
-"""main(): reads the parameters, wires everything, waits, and stops all robots at the end."""
+"""The driver of HeRo robots: connects any number of them to ROS, and stops them at its end.
+
+    rosrun hero_driver hero_driver                   robots connect to port 11411
+    rosrun hero_driver hero_driver _port:=11412      to another one
+
+main() reads the parameters, wires everything and waits.
+"""
 
 import errno
 import io
@@ -20,7 +26,12 @@ from .gateway import STOP_LIMIT_S, Gateway
 from .reports import FleetStatus, Reporter
 from .ros.log_relay import LogRelay, prepare_logging, tell_of_lost_log_lines
 from .ros.master_watch import MasterWatch
-from .ros.rospy_internals import call_before_shutdown, leave_topics_out_of_rosout, open_tcpros_server
+from .ros.rospy_internals import (
+    call_before_shutdown,
+    keep_publishers_connected,
+    leave_topics_out_of_rosout,
+    open_tcpros_server,
+)
 from .ros.running_node import find_running_node
 from .ros.worker import Worker
 from .stop_interface import PARAMETER, StopInterface
@@ -247,6 +258,7 @@ def _enter_ros(argv: Optional[List[str]], log: LogRelay) -> None:
         )
     prepare_logging()
     open_tcpros_server(lambda host, text: log.log_throttled("warn", "handshake " + host, text, host=host))
+    keep_publishers_connected()
     try:
         rospy.init_node(NODE_NAME, argv=argv, disable_signals=True)
     except (rosgraph.roslogging.LoggingException, NotADirectoryError, PermissionError) as error:

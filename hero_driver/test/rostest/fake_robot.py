@@ -195,7 +195,7 @@ class FakeRobot:
         sock = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         if self._receive_buffer_length:
             sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, self._receive_buffer_length)
-        sock.settimeout(20.0)
+        sock.settimeout(60.0)
         sock.bind((self._source_host, 0))
         sock.connect(address)
         self._begin(sock)
@@ -297,7 +297,7 @@ class FakeRobot:
         return [packet.payload for packet in list(self.received) if packet.topic_id == topic_id]
 
     def _begin(self, sock: socket.socket) -> None:
-        sock.settimeout(20.0)
+        sock.settimeout(60.0)
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self.address = "%s:%d" % sock.getsockname()[:2]
         self.ended = ""

@@ -2,20 +2,30 @@
 """What bad input gets: one clear line and an exit code from the node, a counter and nothing else from a robot."""
 
 import random
+import select
 import socket
 import struct
 import tempfile
+import time
 from pathlib import Path
 
 import rosgraph
 import rospy
 import rostest
 import stock_messages
-from driver_case import DriverProcess, OwnDriverCase, Recorder, make_publisher, wait_payloads
+from driver_case import (
+    DriverProcess,
+    OwnDriverCase,
+    Recorder,
+    list_driver_topics,
+    make_publisher,
+    wait_payloads,
+)
 from fake_robot import PUB, STOCK_DECLARATIONS, Declaration, FakeRobot
 from std_msgs.msg import ColorRGBA
 from std_srvs.srv import SetBool
 
+from hero_driver.ros.handshakes import HANDSHAKE_TIMEOUT_S
 from hero_driver.rosserial import packets
 from hero_msgs.msg import Encoder, Robot
 from hero_test.waiting import wait_for
@@ -51,8 +61,7 @@ class TestDriverBadInput(OwnDriverCase):
 
     def test_a_host_name_that_does_not_exist_is_named(self):
         for host in ("no-such-host.invalid", "10.42.0..1"):
-            with self.subTest(host=host):
-                self.assert_start_fails({"host": host}, "'%s' cannot be found" % host, "ip address")
+            self.assert_start_fails({"host": host}, "'%s' cannot be found" % host, "ip address")
 
     def test_another_name_of_all_addresses_is_warned_about_too(self):
         self.start(host="0").wait_line("any host in the networks of this PC can pose as a robot")
@@ -70,12 +79,11 @@ class TestDriverBadInput(OwnDriverCase):
                 )
             ]
             for driver, value, part in cases:
-                with self.subTest(value=value):
-                    self.addCleanup(driver.fleet.close)
-                    self.assertEqual(driver.wait_end(), USAGE_ERROR, driver.lines)
-                    self.assertEqual(len(driver.lines), 1, driver.lines)
-                    for text in ("hero_driver cannot start: ", value, part):
-                        self.assertIn(text, driver.lines[0])
+                self.addCleanup(driver.fleet.close)
+                self.assertEqual(driver.wait_end(), USAGE_ERROR, driver.lines)
+                self.assertEqual(len(driver.lines), 1, driver.lines)
+                for text in ("hero_driver cannot start: ", value, part):
+                    self.assertIn(text, driver.lines[0])
 
     def test_an_unknown_parameter_is_named_with_the_one_that_was_meant(self):
         self.assert_start_fails({"prot": 11411}, "~prot is not known", "did you mean ~port?")
@@ -187,7 +195,7 @@ class TestDriverBadInput(OwnDriverCase):
     def test_a_hundred_connections_that_end_at_once_leave_nothing_behind(self):
         driver, _, good = self.dial_pair(37)
         for _ in range(100):
-            socket.create_connection(driver.address, 20.0).close()
+            socket.create_connection(driver.address, 60.0).close()
         self.assert_alive(good)
         late = self.dial(driver, 4)
         self.assert_alive(late)
@@ -217,21 +225,21 @@ class TestDriverBadInput(OwnDriverCase):
         robot = self.dial(driver, 1)
         stop = rospy.ServiceProxy(driver.node + "/stop", SetBool)
         stop(False)
+        # Each topic that is still to be registered would be a file more.
+        wait_for(lambda: len(list_driver_topics("/hero_1", driver.node)) == 19, "all topics and services")
         files = Path("/proc/%d/fd" % driver.process.pid)
         before = len(list(files.iterdir()))
         uri = rosgraph.Master("/test").lookupService(driver.node + "/stop")
         port = rospy.core.parse_rosrpc_uri(uri)[1]
-        waiting = [socket.create_connection(("127.0.0.1", port), 20.0) for _ in range(100)]
+        start_s = time.monotonic()
+        waiting = [socket.create_connection(("127.0.0.1", port), 60.0) for _ in range(100)]
         for connection in waiting:
             connection.sendall(b"\x10\x00")
-        # Answered, and heard, while all of them still wait.
+        # Answered, and heard, while all of them still wait: none is closed before its time.
         self.assertTrue(stop(False).success)
         self.assert_alive(robot)
-        for connection in waiting:
-            connection.setblocking(False)
-            with self.assertRaises(BlockingIOError):
-                connection.recv(1)
-            connection.settimeout(20.0)
+        closed = select.select(waiting, [], [], 0.0)[0]
+        self.assertTrue(not closed or time.monotonic() - start_s > HANDSHAKE_TIMEOUT_S)
         wait_for(lambda: len(list(files.iterdir())) <= before + 10, "the driver to close what waits")
         for connection in waiting:
             self.assertEqual(connection.recv(1), b"")

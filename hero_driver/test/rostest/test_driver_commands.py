@@ -31,7 +31,7 @@ class TestDriverCommands(DriverCase):
         self.call_stop(False)
 
     def call_stop(self, stopped):
-        rospy.wait_for_service(NODE + "/stop", 20.0)
+        rospy.wait_for_service(NODE + "/stop", 60.0)
         self.assertTrue(rospy.ServiceProxy(NODE + "/stop", SetBool)(stopped).success)
 
     def wait_stopped(self, robot):
@@ -95,7 +95,7 @@ class TestDriverCommands(DriverCase):
         drive = make_publisher("/hero_10/" + VELOCITY, Twist)
         light = make_publisher("/hero_10/led", ColorRGBA)
         switch = make_publisher("/hero_10/laser_enable", Bool)
-        rospy.wait_for_service("/hero_10/set_odom", 20.0)
+        rospy.wait_for_service("/hero_10/set_odom", 60.0)
         for index in range(20):
             drive.publish(make_command(0.001 * index + 0.001))
             light.publish(ColorRGBA(float(index), 0.0, 0.0, 0.0))
@@ -259,7 +259,8 @@ class TestDriverCommands(DriverCase):
         def is_full():
             for _ in range(100):
                 light.publish(ColorRGBA(1.0, 0.0, 0.0, 0.0))
-            return self.fleet.find("/hero_19").dropped_messages > 0
+            # The first are dropped where an acknowledgement is late, while the window still has room.
+            return self.fleet.find("/hero_19").dropped_messages > 1000
 
         wait_for(is_full, "drops: its TCP window and its queue to be full")
         for step in range(1, 51):

@@ -60,7 +60,7 @@ class TestDriverDevices(OwnDriverCase):
         for payload in sent:
             drive.publish(stock_messages.from_bytes(Twist, payload))
         self.assertEqual(wait_packets(robot, 101, 10), sent)
-        rospy.wait_for_service("/blink", 20.0)
+        rospy.wait_for_service("/blink", 60.0)
         answer = rospy.ServiceProxy("/blink", Trigger)()
         self.assertEqual((answer.success, answer.message), (True, "/blink"))
         self.assertEqual(robot.payloads_with_id(102), [b""])
@@ -141,7 +141,7 @@ class TestDriverDevices(OwnDriverCase):
             Declaration(PUB, 130, "/clock", "rosgraph_msgs/Clock", Clock._md5sum),
         ]
         refused = [entry for entry in device if entry.name != "/chatter"]
-        rospy.wait_for_service(own + "/stop", 20.0)
+        rospy.wait_for_service(own + "/stop", 60.0)
         rospy.ServiceProxy(own + "/stop", SetBool)(True)
         robot = self.dial(driver, ready=False, declarations=device)
         for entry in refused:

@@ -1,9 +1,7 @@
 #!/usr/bin/env python3
 """Robots that are TCP servers: the driver dials them, and dials again while they are away."""
 
-import contextlib
 import socket
-import threading
 
 import rospy
 import rostest
@@ -13,7 +11,6 @@ from fake_robot import FakeRobot
 from std_msgs.msg import ColorRGBA
 
 from hero_msgs.msg import Encoder, Robot
-from hero_test.waiting import wait_for
 
 
 def listen(port=0):
@@ -22,7 +19,7 @@ def listen(port=0):
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     listener.bind(("127.0.0.1", port))
     listener.listen(5)
-    listener.settimeout(20.0)
+    listener.settimeout(60.0)
     return listener
 
 
@@ -80,23 +77,6 @@ class TestDriverDial(OwnDriverCase):
         robot = self.accept(self.listen(port), 1)
         driver.fleet.wait_ready(robot.namespace)
         self.assertEqual(len(driver.find_lines("cannot be reached")), 1)
-
-    def test_the_driver_backs_off_from_a_robot_that_hangs_up_at_once(self):
-        listener = self.listen()
-        self.start(robots=[{"host": "127.0.0.1", "port": port_of(listener)}])
-        times = []
-
-        def hang_up():
-            with contextlib.suppress(OSError):
-                while len(times) < 5:
-                    listener.accept()[0].close()
-                    times.append(rospy.get_time())
-
-        thread = threading.Thread(target=hang_up, daemon=True)
-        thread.start()
-        wait_for(lambda: len(times) >= 4, "four calls")
-        gaps_s = [later - earlier for earlier, later in zip(times, times[1:])]
-        self.assertGreater(gaps_s[2], 1.5 * gaps_s[0])
 
     def test_a_robot_that_cannot_be_looked_up_does_not_keep_others_waiting(self):
         listener = self.listen()

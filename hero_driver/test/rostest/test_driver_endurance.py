@@ -109,7 +109,7 @@ class TestDriverEndurance(OwnDriverCase):
         self.addCleanup(release.set)
 
         def hang(_):
-            release.wait(20.0)
+            release.wait(60.0)
             return TriggerResponse(True, "at last")
 
         for number in (1, 2):
@@ -151,8 +151,12 @@ class TestDriverEndurance(OwnDriverCase):
                 robot.close()
                 driver.fleet.wait("/hero_1", Robot.AWAY)
 
-        come_and_go(3)
+        # What waits for the ROS master is dropped when a robot leaves.
+        robot = self.dial(driver, 1)
         wait_for(lambda: len(list_driver_topics("/hero_1", driver.node)) == 19, "all topics and services")
+        robot.close()
+        driver.fleet.wait("/hero_1", Robot.AWAY)
+        come_and_go(3)
         topics = list_driver_topics("/hero_1", driver.node)
         before = count_resources(driver.process.pid)
         come_and_go(30)

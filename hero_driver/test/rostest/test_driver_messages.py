@@ -43,7 +43,7 @@ class TestDriverMessages(DriverCase):
         return odoms.wait_count(before + len(readings))[before:]
 
     def call_set_odom(self, robot, *pose):
-        rospy.wait_for_service(robot.namespace + "/set_odom", 20.0)
+        rospy.wait_for_service(robot.namespace + "/set_odom", 60.0)
         self.assertTrue(rospy.ServiceProxy(robot.namespace + "/set_odom", SetOdom)(*pose).success)
 
     # Scans.
@@ -171,7 +171,7 @@ class TestDriverMessages(DriverCase):
         odoms = Recorder("/hero_10/odom", Odometry)
         self.drive(robot, [(0.0, 0.0), (20.0, 20.0)], odoms=odoms)
         robot.answers["set_odom"] = lambda _: b"\x00\x00\x00\x00\x00"
-        rospy.wait_for_service("/hero_10/set_odom", 20.0)
+        rospy.wait_for_service("/hero_10/set_odom", 60.0)
         self.assertFalse(rospy.ServiceProxy("/hero_10/set_odom", SetOdom)(5.0, 5.0, 0.0).success)
         self.assert_pose(self.drive(robot, [(20.0, 20.0)], odoms=odoms)[0], 20 * TICK_M, 0.0, 0.0)
 
@@ -210,7 +210,7 @@ class TestDriverMessages(DriverCase):
         odoms = Recorder("/hero_27/odom", Odometry)
         self.drive(robot, [(0.0, 0.0), (50.0, 50.0)], odoms=odoms)
         robot.answers["set_odom"] = lambda _: None
-        rospy.wait_for_service("/hero_27/set_odom", 20.0)
+        rospy.wait_for_service("/hero_27/set_odom", 60.0)
         with self.assertRaisesRegex(rospy.ServiceException, "was not answered within"):
             rospy.ServiceProxy("/hero_27/set_odom", SetOdom)(3.0, 4.0, 0.0)
         robot.answer("set_odom", encode_answer(True, "late"))

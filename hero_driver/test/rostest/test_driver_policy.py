@@ -156,7 +156,7 @@ class TestDriverPolicy(OwnDriverCase):
         light = make_publisher("/hero_11/led", ColorRGBA)
         set_odom = rospy.ServiceProxy("/hero_11/set_odom", SetOdom)
         self.assert_reached(robot, light, True)
-        rospy.wait_for_service("/hero_11/set_odom", 20.0)
+        rospy.wait_for_service("/hero_11/set_odom", 60.0)
         self.assertTrue(set_odom(0.0, 0.0, 0.0).success)
         self.declare_anew(driver, robot, md5sum=WRONG_MD5)
         for what in ("topic /hero_11/led", "service /hero_11/set_odom"):
@@ -169,7 +169,7 @@ class TestDriverPolicy(OwnDriverCase):
         self.declare_anew(driver, robot)
         wait_for(lambda: light.get_num_connections() > 0, "the driver to listen again")
         self.assert_reached(robot, light, True)
-        rospy.wait_for_service("/hero_11/set_odom", 20.0)
+        rospy.wait_for_service("/hero_11/set_odom", 60.0)
         self.assertTrue(set_odom(0.0, 0.0, 0.0).success)
 
     def test_a_topic_redeclared_with_another_type_gets_that_only(self):

@@ -52,7 +52,7 @@ class TestDriverStop(OwnDriverCase):
 
     def call_stop(self, driver, stopped):
         """Call ~stop; return its answer."""
-        rospy.wait_for_service(driver.node + "/stop", 20.0)
+        rospy.wait_for_service(driver.node + "/stop", 60.0)
         answer = rospy.ServiceProxy(driver.node + "/stop", SetBool)(stopped)
         self.assertTrue(answer.success, answer.message)
         return answer.message
@@ -74,7 +74,7 @@ class TestDriverStop(OwnDriverCase):
     def start_tuning(self, driver, robot, controller):
         """Call pid_calibration of a controller."""
         name = "%s/%s/pid_calibration" % (robot.namespace, controller)
-        rospy.wait_for_service(name, 20.0)
+        rospy.wait_for_service(name, 60.0)
         self.assertEqual(rospy.ServiceProxy(name, Trigger)().message, "PID Autotuning!")
         self.assertTrue(robot.motors.is_tuning)
 
@@ -103,7 +103,7 @@ class TestDriverStop(OwnDriverCase):
         robot = self.dial_stock(driver, 51)
         for controller in (VELOCITY, POSITION):
             name = "/hero_51/%s/pid_calibration" % controller
-            rospy.wait_for_service(name, 20.0)
+            rospy.wait_for_service(name, 60.0)
             with self.assertRaisesRegex(rospy.ServiceException, "allow_self_tuning"):
                 rospy.ServiceProxy(name, Trigger)()
             self.assertEqual(robot.payloads_on(controller + "/pid_calibration"), [])
@@ -112,7 +112,7 @@ class TestDriverStop(OwnDriverCase):
         driver = self.share(allow_self_tuning=True)
         robot = self.dial_stock(driver, 52)
         self.call_stop(driver, True)
-        rospy.wait_for_service("/hero_52/velocity_controller/pid_calibration", 20.0)
+        rospy.wait_for_service("/hero_52/velocity_controller/pid_calibration", 60.0)
         with self.assertRaisesRegex(rospy.ServiceException, "all robots are stopped"):
             rospy.ServiceProxy("/hero_52/velocity_controller/pid_calibration", Trigger)()
         self.assertEqual(robot.payloads_on(VELOCITY + "/pid_calibration"), [])

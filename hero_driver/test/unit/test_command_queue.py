@@ -5,8 +5,9 @@ import threading
 
 import pytest
 
+from hero_driver.commands import command_queue
 from hero_driver.commands.command_queue import IN_FLIGHT_MAX, QUEUE_LENGTH, RETRY_S, CommandQueue
-from hero_driver.commands.velocity_shaper import STOPPED_MOTORS, ZERO_TWIST
+from hero_driver.commands.velocity_shaper import STOPPED_MOTORS, ZERO_TWIST, VelocityShaper
 
 VELOCITY = "/hero_0/velocity_controller/cmd_vel"
 POSITION = "/hero_0/position_controller/cmd_vel"
@@ -180,6 +181,19 @@ def test_clearing_forgets_everything_and_counts_what_waited():
     assert queue.is_idle
     assert queue.dropped == 2
     assert take(queue, 0.0) == []
+
+
+def test_first_command_on_a_topic_may_come_while_others_are_taken(monkeypatch):
+    class OfferingShaper(VelocityShaper):
+        def take(self, *arguments):
+            offer(queue, POSITION, FAST, 0.0)
+            return super().take(*arguments)
+
+    monkeypatch.setattr(command_queue, "VelocityShaper", OfferingShaper)
+    queue = make_queue()
+    offer(queue, VELOCITY, FAST, 0.0)
+    assert take(queue, 0.0) == [(VELOCITY, FAST)]
+    assert take(queue, 0.0) == [(POSITION, FAST)]
 
 
 def test_many_threads_may_offer_at_once_and_nothing_is_lost_uncounted():

@@ -9,7 +9,7 @@ import pytest
 
 from hero_driver.transport import EventLoop, LinkHandler, TransportSettings
 
-DEADLINE_S = 20.0
+DEADLINE_S = 60.0
 
 
 class Handler(LinkHandler):

@@ -9,7 +9,7 @@ import pytest
 
 from hero_driver.ros.handshakes import HEADER_LENGTH_MAX, HandshakeReader
 
-DEADLINE_S = 20.0
+DEADLINE_S = 60.0
 HEADER = struct.pack("<I", 9) + b"some text"
 
 

@@ -19,7 +19,7 @@ QUEUE_LENGTH = 10
 LARGE = 20000
 """Bytes of a message of which a subscriber's socket holds only a few."""
 
-DEADLINE_S = 20.0
+DEADLINE_S = 60.0
 
 
 class Publisher:

@@ -16,7 +16,7 @@ from hero_driver.ros.message_types import make_raw_class
 from hero_driver.ros.raw_subscriber import MESSAGE_LENGTH_MAX, RawSubscriber
 from hero_driver.transport import EventLoop, LinkHandler, TransportSettings
 
-DEADLINE_S = 20.0
+DEADLINE_S = 60.0
 RAW_CLASS = make_raw_class(String)
 
 

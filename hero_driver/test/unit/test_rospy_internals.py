@@ -12,7 +12,7 @@ from rospy.impl import rosout, tcpros_base
 from hero_driver.ros import rospy_internals
 from hero_driver.ros.rospy_internals import RosoutHandler, leave_topics_out_of_rosout, open_tcpros_server
 
-DEADLINE_S = 20.0
+DEADLINE_S = 60.0
 
 
 class TcprosServer:

@@ -8,7 +8,7 @@ import pytest
 from hero_driver.ros.worker import Worker
 from hero_driver.transport import CallQueue
 
-DEADLINE_S = 20.0
+DEADLINE_S = 60.0
 
 
 class Calls:

@@ -30,7 +30,7 @@ class CommandQueue:
         lock: held while commands are added or removed: threads of rospy offer while the socket thread takes.
         """
         self._max_age_s = max_age_s
-        self._shapers: Dict[str, VelocityShaper] = {}
+        self._shapers: Dict[str, VelocityShaper] = {}  # replaced, never changed: read on all threads
         self._offered_s: Dict[str, float] = {}
         self._waiting: Deque[Command] = collections.deque()
         self._lock = lock
@@ -42,7 +42,9 @@ class CommandQueue:
         """Take a checked motion command for the topic called name, which stop_payload stops."""
         shaper = self._shapers.get(name)
         if shaper is None:
-            shaper = self._shapers[name] = VelocityShaper(stop_payload)
+            with self._lock:
+                shaper = self._shapers.get(name) or VelocityShaper(stop_payload)
+                self._shapers = {**self._shapers, name: shaper}
         shaper.offer(payload)
         self._offered_s[name] = now_s
         self._is_idle = False
@@ -74,7 +76,7 @@ class CommandQueue:
         with self._lock:
             self.dropped += len(self._waiting)
             self._waiting.clear()
-        self._shapers.clear()
+            self._shapers = {}
         self._offered_s.clear()
 
     @property

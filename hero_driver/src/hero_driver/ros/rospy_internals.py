@@ -7,14 +7,20 @@ length before each connection header and each message.
 import logging
 import socket
 import threading
+import time
 import traceback
 from typing import Any, Callable, List, NamedTuple, Sequence, Tuple
 
 import rospy
 from rosgraph.network import decode_ros_handshake_header, write_ros_handshake_header
 from rosgraph_msgs.msg import Log
-from rospy.impl import rosout, tcpros_base
-from rospy.impl.registration import get_service_manager, get_topic_manager
+from rospy.impl import rosout, tcpros_base, tcpros_pubsub
+from rospy.impl.registration import (
+    RegManager,
+    get_registration_listeners,
+    get_service_manager,
+    get_topic_manager,
+)
 
 from .handshakes import HandshakeReader
 
@@ -25,6 +31,9 @@ cap it (net.core.somaxconn, 4096 on Linux)."""
 
 REASON_LENGTH_MAX = 300
 """rospy's reason to refuse a connection may list every topic of the node: 200 kB with 100 robots."""
+
+RECONNECT_PAUSE_S = 0.5
+"""As rospy waits before it connects again; a publisher that breaks each connection costs no more than this."""
 
 ROSOUT_LOGGER = "rosout"
 """The logger of rospy.loginfo() and the like."""
@@ -74,6 +83,32 @@ def _serve_connection(server: Any, sock: socket.socket, address: Any, data: byte
 
 
 # Publishers and subscribers.
+
+
+def keep_publishers_connected() -> None:
+    """Connect again to publishers that rospy would overlook for ever; call it before rospy.init_node().
+
+    rospy connects to a publisher that is announced unless it has a connection to that node. It keeps one that the
+    publisher refused because it had gone meanwhile, and does not look again when one ends whose publisher has been
+    replaced by another in the same program: every later publisher of that program would go unheard, its stops too.
+    """
+    connect = tcpros_pubsub.robust_connect_subscriber
+
+    def connect_and_look_again(connection: Any, *arguments: Any) -> None:
+        connect(connection, *arguments)
+        _, _, uri, _, topic = arguments
+        subscriber = get_topic_manager().get_subscriber_impl(topic)
+        if subscriber is None or rospy.is_shutdown():
+            return
+        if connection in subscriber.connections:
+            subscriber.remove_connection(connection)
+        time.sleep(RECONNECT_PAUSE_S)
+        if tcpros_pubsub.check_if_still_publisher(topic, uri):
+            for listener in get_registration_listeners().listeners:
+                if isinstance(listener, RegManager):
+                    listener.handler._connect_topic(topic, uri)
+
+    tcpros_pubsub.robust_connect_subscriber = connect_and_look_again
 
 
 class NoConnections(NamedTuple):

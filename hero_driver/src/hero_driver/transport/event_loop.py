@@ -60,7 +60,6 @@ class TransportSettings(NamedTuple):
     """After this time without acknowledgement the kernel gives a connection up (TCP_USER_TIMEOUT)."""
 
 
-
 class Reader:
     """Another socket that the loop reads besides the robots' connections."""
 

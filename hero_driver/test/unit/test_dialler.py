@@ -1,0 +1,48 @@
+"""How long the driver waits before it dials a robot again; the sockets themselves are tested by driver_dial.test."""
+
+import threading
+import types
+
+import pytest
+
+from hero_driver.transport import dialler
+from hero_driver.transport.dialler import BACKOFF_MAX_S, STABLE_S, start_dialler
+
+ADDRESS = ("127.0.0.1", 11411)
+CALLS = 8
+
+
+class Ended:
+    """An event that is set after some waits, which take no time."""
+
+    def __init__(self):
+        self.waits_s = []
+        self.is_over = threading.Event()
+
+    def is_set(self):
+        return self.is_over.is_set()
+
+    def wait(self, duration_s):
+        self.waits_s.append(duration_s)
+        if len(self.waits_s) == CALLS:
+            self.is_over.set()
+
+
+@pytest.mark.parametrize(
+    "lasts_s, expected_s",
+    [(0.0, [0.5, 1.0, 2.0, 4.0, 8.0] + 3 * [BACKOFF_MAX_S]), (STABLE_S, CALLS * [0.5])],
+    ids=["hangs up at once", "stays a while"],
+)
+def test_the_driver_backs_off_from_a_robot_that_hangs_up_at_once(monkeypatch, lasts_s, expected_s):
+    clock = types.SimpleNamespace(now_s=0.0)
+    monkeypatch.setattr(dialler, "time", types.SimpleNamespace(monotonic=lambda: clock.now_s))
+    monkeypatch.setattr(dialler, "_connect", lambda address: None)
+
+    def hand_over(sock, address, note_closed):
+        clock.now_s += lasts_s
+        note_closed()
+
+    ended = Ended()
+    start_dialler(ADDRESS, hand_over, lambda text: None, ended)
+    assert ended.is_over.wait(60.0)
+    assert ended.waits_s == expected_s
