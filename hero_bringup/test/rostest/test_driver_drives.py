@@ -20,7 +20,7 @@ from hero_msgs.msg import Robot, RobotArray
 from hero_msgs.srv import SetIRCalibration, SetMotor, SetOdom, SetPID
 from hero_test.waiting import wait_for
 
-DEADLINE_S = 30.0
+DEADLINE_S = 60.0
 ROBOTS = (0, 1, 2)
 SPEED_M_S = 0.1
 

@@ -17,7 +17,7 @@ BAD_URIS = ("localhost", "http://", "http://localhost:99999", "ftp://localhost:1
 NODES = (["record"], ["calibrate", "--yes", "motors"], ["fleet", "--once"], ["hero_sim"])
 PRINTING = (
     ["calibrate", "--help"],
-    ["check", "--json"],
+    ["check", "--help"],
     ["export", "--help"],
     ["fleet", "--help"],
     ["hotspot", "--help"],
@@ -40,7 +40,7 @@ PACKAGES = {
 def start(command, stdout=subprocess.PIPE, **environment):
     """Return the process of a program of the suite."""
     return subprocess.Popen(
-        ["rosrun", PACKAGES[command[0]], *command],
+        [find_program(PACKAGES[command[0]], command[0]), *command[1:]],
         stdin=subprocess.DEVNULL,
         stdout=stdout,
         stderr=subprocess.PIPE,
@@ -62,27 +62,26 @@ class ProgramEndsTest(unittest.TestCase):
                 Path(folder, module + ".py").write_text(slow)
             environment = {**os.environ, "PYTHONPATH": "%s:%s" % (folder, os.environ["PYTHONPATH"])}
             for package, program in (("hero_driver", "hero_driver"), ("hero_tools", "fleet"), ("hero_sim", "hero_sim")):
-                with self.subTest(program), subprocess.Popen(
+                with subprocess.Popen(
                     [find_program(package, program)],
                     stdout=subprocess.PIPE,
                     stderr=subprocess.PIPE,
                     env=environment,
                     text=True,
                 ) as process:
-                    self.assertEqual(process.stdout.readline(), "loading\n")
+                    self.assertEqual(process.stdout.readline(), "loading\n", program)
                     process.send_signal(signal.SIGINT)
-                    self.assertEqual(self.end(process), (-signal.SIGINT, []))
+                    self.assertEqual(self.end(process), (-signal.SIGINT, []), program)
 
     def test_a_master_uri_that_is_none_is_named_in_one_line(self):
         for node in NODES:
             # Programs on hero_client share the check; the simulator has its own.
             uris = BAD_URIS if node[0] in ("fleet", "hero_sim") else BAD_URIS[:1]
             for uri, process in [(uri, start(node, ROS_MASTER_URI=uri)) for uri in uris]:
-                with self.subTest("%s %s" % (node[0], uri)):
-                    status, lines = self.end(process)
-                    self.assertEqual((status, len(lines)), (1, 1), lines)
-                    self.assertTrue(lines[0].startswith(node[0] + ": "), lines)
-                    self.assertIn(repr(uri), lines[0])
+                status, lines = self.end(process)
+                self.assertEqual((status, len(lines)), (1, 1), (node, uri, lines))
+                self.assertTrue(lines[0].startswith(node[0] + ": "), lines)
+                self.assertIn(repr(uri), lines[0])
 
     def test_a_negative_number_of_simulated_robots_is_refused_by_the_simulator(self):
         for count, expected in (("-1", True), ("0", False)):
@@ -95,11 +94,10 @@ class ProgramEndsTest(unittest.TestCase):
     def test_a_log_directory_that_is_a_file_is_named_in_one_line(self):
         started = [(node, start(node, ROS_LOG_DIR=__file__)) for node in NODES if node[0] != "record"]
         for node, process in started:
-            with self.subTest(node[0]):
-                status, lines = self.end(process)
-                self.assertEqual((status, len(lines)), (1, 1), lines)
-                self.assertIn(__file__, lines[0])
-                self.assertIn("ROS_LOG_DIR", lines[0])
+            status, lines = self.end(process)
+            self.assertEqual((status, len(lines)), (1, 1), (node, lines))
+            self.assertIn(__file__, lines[0])
+            self.assertIn("ROS_LOG_DIR", lines[0])
 
     def test_a_pipe_that_nobody_reads_ends_programs_silently(self):
         read_end, write_end = os.pipe()
@@ -107,16 +105,14 @@ class ProgramEndsTest(unittest.TestCase):
         with os.fdopen(write_end, "wb") as pipe:
             started = [(command, start(command, pipe)) for command in PRINTING]
         for command, process in started:
-            with self.subTest(command[0]):
-                self.assertEqual(self.end(process), (141, []))
+            self.assertEqual(self.end(process), (141, []), command)
 
     def test_an_output_that_is_full_is_told_in_one_line(self):
         with open("/dev/full", "wb") as full:
             started = [(command, start(command, full)) for command in PRINTING]
         for command, process in started:
-            with self.subTest(command[0]):
-                line = command[0] + ": the output cannot be written: No space left on device"
-                self.assertEqual(self.end(process), (1, [line]))
+            line = command[0] + ": the output cannot be written: No space left on device"
+            self.assertEqual(self.end(process), (1, [line]), command)
 
 
 if __name__ == "__main__":

@@ -85,7 +85,7 @@ class RobotApiTest(unittest.TestCase):
         self.assertAlmostEqual(0.12, robot.nearest().range_m, delta=0.02)
         self.assertEqual("hero_4/odom", robot.odometry.header.frame_id)
         robot.drive(0.0, 1.0, duration_s=0.3)
-        self.assertNotEqual(0, robot.encoder.left_ticks)
+        wait_for(lambda: robot.encoder.left_ticks != 0, "ticks of wheels that turned")
         wait_for(lambda: robot.velocity == (0.0, 0.0), "rest")
         robot.set_pose(1.0, -2.0, 0.5)
         self.assertLess(math.dist((1.0, -2.0, 0.5), robot.pose), 0.02)
@@ -129,7 +129,7 @@ class RobotApiTest(unittest.TestCase):
 
     def test_data_of_a_robot_that_fell_silent_are_refused_until_it_is_back(self):
         robot = self.swarm[3]
-        answer = rospy.ServiceProxy("/hero_sim/fault", InjectFault)("vanish:robot=3,for=1")
+        answer = rospy.ServiceProxy("/hero_sim/fault", InjectFault)("vanish:robot=3,for=8")
         self.assertTrue(answer.success, answer.message)
         wait_for(lambda: robot.fresh_pose() is None, "a pose that is too old")
         with self.assertRaisesRegex(StaleDataError, r"/hero_3/odom came [0-9.]+ s ago: has the robot gone"):

@@ -14,6 +14,7 @@ import rostest
 from geometry_msgs.msg import Twist
 
 from hero_client import Drivers, NodeError, Robot
+from hero_test.fleet_report import wait_until_ready
 from hero_test.swarm_watch import SwarmWatch
 from hero_test.waiting import wait_for
 
@@ -51,6 +52,7 @@ class RobotScriptsTest(unittest.TestCase):
     def setUpClass(cls):
         cls.watch = SwarmWatch(range(ROBOTS))
         cls.watch.wait_until_complete(60.0)
+        wait_until_ready(*range(ROBOTS))
 
     def start(self, code, **environment):
         script = subprocess.Popen(
@@ -86,15 +88,13 @@ class RobotScriptsTest(unittest.TestCase):
 
     def test_a_script_that_has_just_started_knows_that_robots_are_stopped(self):
         drivers = Drivers()
+        self.addCleanup(drivers.request_stop, False)
         code = "import hero_client, sys; sys.exit(hero_client.Robot(3).is_stopped)"
         self.assertEqual((0, ""), self.end(self.start(code)))
-        drivers.request_stop(True)
-        self.assertEqual("info", drivers.wait_for_stop().level)
-        try:
-            self.assertEqual((1, ""), self.end(self.start(code)))
-        finally:
-            drivers.request_stop(False)
-            self.assertEqual("info", drivers.wait_for_stop().level)
+        for is_stopped in (True, False):
+            drivers.request_stop(is_stopped)
+            wait_for(lambda: drivers.stop_status().level == "info", drivers.stop_status)
+            self.assertEqual((int(is_stopped), ""), self.end(self.start(code)))
 
     def test_a_script_without_its_robot_ends_with_one_line(self):
         status, errors = self.end(self.start("from hero_client import *; Robot(77).wait_until_ready(timeout_s=0.2)"))

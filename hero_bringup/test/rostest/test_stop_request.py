@@ -4,8 +4,12 @@
 import json
 import math
 import signal
+import socket
 import subprocess
+import threading
 import unittest
+import xmlrpc.client
+from unittest import mock
 
 import rosgraph
 import rospy
@@ -13,6 +17,8 @@ import rostest
 from sensor_msgs.msg import Joy
 
 from hero_client.drivers import Drivers
+from hero_client.errors import NodeError
+from hero_client.ros_node import start_ros_node
 from hero_client.swarm import Swarm
 from hero_msgs.msg import Robot, RobotArray
 from hero_test.example_program import ExampleProgram
@@ -48,6 +54,15 @@ def refuse_constant(name):
     raise AssertionError("%s is not JSON" % name)
 
 
+def connect_without_header():
+    """Return a connection to this node's publishers by a program that hangs before it has sent its header."""
+    node = xmlrpc.client.ServerProxy(rospy.get_node_uri())
+    _, _, (_, host, port) = node.requestTopic("/test", "/rosout", [["TCPROS"]])
+    hung = socket.create_connection((host, port))
+    hung.sendall(b"\0\0")
+    return hung
+
+
 class StopRequestTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
@@ -65,22 +80,27 @@ class StopRequestTest(unittest.TestCase):
 
         wait_for(release, self.drivers.stop_status)
 
+    def wait_until_named(self, driver):
+        """Wait until who waits for the stop is told that this driver does not answer."""
+        wait_for(
+            lambda: "driver %s does not answer" % driver in self.drivers.wait_for_stop().text, self.drivers.stop_status
+        )
+
     def open_table(self):
         table = ProgramTerminal("hero_tools", "fleet")
         self.addCleanup(table.close)
         table.wait_for(b"2 of 2 robots ready")
         return table
 
-    def test_a_stop_of_all_is_told_as_stopping_and_then_at_rest(self):
+    def test_a_stop_of_all_is_told_as_at_rest(self):
         self.drivers.request_stop(True)
-        self.assertEqual(self.drivers.stop_status(), ("warn", "stopping", False))
         wait_for(lambda: self.drivers.stop_status() == AT_REST, self.drivers.stop_status)
         self.assertTrue(self.drivers.read().stopped)
 
     def test_a_hung_driver_is_named_and_stopped_when_it_goes_on(self):
         with suspended(self.hung_pid):
             self.drivers.request_stop(True)
-            self.assertIn("driver hero_driver_b does not answer", self.drivers.wait_for_stop().text)
+            self.wait_until_named("hero_driver_b")
             wait_for(lambda: self.drivers.stop_status() == HUNG, self.drivers.stop_status)
             self.assertTrue(self.healthy.newest.stopped)
             wait_for(self.drivers.find_silent, "the silence of the hung driver")
@@ -89,9 +109,9 @@ class StopRequestTest(unittest.TestCase):
 
     def test_a_driver_that_starts_while_another_is_asked_is_stopped_too(self):
         reports = Reports("/hero_driver_c")
-        with suspended(self.hung_pid):
+        with suspended(self.hung_pid), connect_without_header(), connect_without_header():
             self.drivers.request_stop(True)
-            self.assertIn("driver hero_driver_b does not answer", self.drivers.wait_for_stop().text)
+            self.wait_until_named("hero_driver_b")
             wait_for(lambda: self.drivers.stop_status() == HUNG, self.drivers.stop_status)
             program = find_program("hero_test", "scripted_driver")
             driver = subprocess.Popen([program, "__name:=hero_driver_c", "_ids:='[2]'"])
@@ -107,7 +127,7 @@ class StopRequestTest(unittest.TestCase):
                 before = self.healthy.requests
                 self.drivers.request_stop(True)
                 wait_for(lambda before=before: self.healthy.requests > before, "a request")
-            self.assertIn("driver hero_driver_b does not answer", self.drivers.wait_for_stop().text)
+            self.wait_until_named("hero_driver_b")
             wait_for(lambda: self.drivers.stop_status() == HUNG, self.drivers.stop_status)
 
     def test_the_key_s_stops_though_the_master_and_a_driver_hang(self):
@@ -201,6 +221,23 @@ class StopRequestTest(unittest.TestCase):
                 self.assertEqual([robot.id for robot in listener.read().robots], [0, 1])
         self.assertEqual(listener.names(), ["/hero_driver", "/hero_driver_b"])
 
+    def test_nobody_takes_drivers_for_known_before_the_master_has_answered(self):
+        known = set(threading.enumerate())
+        settled = []
+
+        def refuse(*arguments):
+            if threading.current_thread() not in known:
+                settled.append(listener.is_settled if settled else None)
+            raise NodeError("no ROS master")
+
+        with suspended(find_pid("/hero_driver")), mock.patch("hero_client.drivers.ask_master", refuse):
+            listener = Drivers()
+            self.addCleanup(listener.close)
+            wait_for(lambda: len(settled) >= 2, "a second look")
+        self.assertFalse(settled[1])
+        wait_for(lambda: listener.is_settled, "reports of both drivers")
+        self.assertEqual(listener.names(), ["/hero_driver", "/hero_driver_b"])
+
     def test_numbers_that_are_none_leave_the_json_valid(self):
         code, output, errors = run_fleet("--once", "--json")
         self.assertEqual(code, 0, errors)
@@ -209,5 +246,5 @@ class StopRequestTest(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    rospy.init_node("test_stop_request")
+    start_ros_node("test_stop_request")
     rostest.rosrun("hero_bringup", "test_stop_request", StopRequestTest)

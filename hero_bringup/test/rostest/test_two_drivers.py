@@ -20,7 +20,7 @@ from hero_test.swarm_watch import SwarmWatch
 from hero_test.waiting import wait_for
 
 IDS = [0, 1, 100, 101]
-TIMEOUT_S = 20.0
+TIMEOUT_S = 60.0
 
 
 def read_fleet(*arguments):

@@ -11,11 +11,11 @@ import sys
 import tempfile
 
 from hero_client.errors import ProgramError
-from hero_client.parameters import choice, read_parameters
+from hero_client.parameters import choice, flag, read_parameters
 from hero_client.program import Program, run
 
 from .robots_parameter import given_robots
-from .rviz_config import VIEWS, make_config
+from .rviz_config import FRAMES, make_config
 
 
 def start_rviz() -> None:
@@ -27,11 +27,16 @@ def start_rviz() -> None:
         raise ProgramError("no display: DISPLAY is not set")
     with Program("rviz", anonymous=True):
         parameters = read_parameters(
-            {"robots": given_robots(), "fixed_frame": "world", "view": choice("orbit", sorted(VIEWS))}
+            {
+                "robots": given_robots(),
+                "fixed_frame": "",
+                "view": choice("orbit", sorted(FRAMES)),
+                "picture": flag(False),
+            }
         )
     names = ["hero_%d" % robot_id for robot_id in parameters["robots"]]
     with tempfile.NamedTemporaryFile("w", prefix="hero_", suffix=".rviz", delete=False) as file:
-        file.write(make_config(names, str(parameters["fixed_frame"]), parameters["view"]))
+        file.write(make_config(names, str(parameters["fixed_frame"]), parameters["view"], parameters["picture"]))
     os.execv(rviz, [rviz, "-d", file.name, *sys.argv[1:]])
 
 

@@ -1,7 +1,8 @@
 """The configuration of RViz for a number of robots, as text. Pure.
 
-Displays of what only simulated robots have (arena, ground truth) are always included: with real robots nothing is
-published on their topics. Source of the format: files that RViz 1.14 writes, reduced to what differs from its defaults.
+Displays of what only simulated or localized robots have (arena, ground truth; poses, occupancy grid) are always
+included: with other robots nothing is published on their topics. Source of the format: files that RViz 1.14 writes,
+reduced to what differs from its defaults.
 """
 
 from typing import Any, Dict, List, Sequence
@@ -17,8 +18,11 @@ POINT_TOPIC = "/hero_choice/point"
 GOAL_TOPIC = "/hero_choice/goal"
 ABOVE_PIXELS_PER_M = 400
 
-# Distance (m), pitch and yaw (rad) of the camera, height of the focal point above the fixed frame (m).
-VIEWS = {"orbit": (2.6, 1.0, 4.71, 0.0), "close": (0.27, 0.45, 0.6, 0.02), "above": (0.0, 0.0, 0.0, 0.0)}
+ORBITS = {"orbit": (2.6, 1.0, 4.71, 0.0), "close": (0.27, 0.45, 0.6, 0.02)}
+"""Distance (m), pitch and yaw (rad) of the camera, height of the focal point above the fixed frame (m)."""
+
+FRAMES = {"orbit": "world", "close": "world", "above": "world", "map": "map"}
+"""Fixed frame of each view, unless another is given."""
 
 
 def make_robot_displays(name: str, color: str) -> List[Dict[str, Any]]:
@@ -89,14 +93,38 @@ def make_ground_truth_display(name: str) -> Dict[str, Any]:
     }
 
 
+def make_localization_displays(names: Sequence[str]) -> List[Dict[str, Any]]:
+    """Return the displays of what hero_localization publishes: occupancy grid, and poses with their errors."""
+    poses = [
+        {
+            "Class": "rviz/PoseWithCovariance",
+            "Name": name + " pose",
+            "Enabled": True,
+            "Topic": "/%s/pose" % name,
+            "Shape": "Axes",
+            "Axes Length": 0.06,
+            "Axes Radius": 0.003,
+            "Covariance": {"Value": True, "Orientation": {"Value": False}, "Position": {"Value": True, "Scale": 3}},
+        }
+        for name in names
+    ]
+    grid = {"Class": "rviz/Map", "Name": "occupancy grid", "Enabled": True, "Topic": "/map", "Alpha": 0.6}
+    return [grid, *poses]
+
+
+def make_picture_display() -> Dict[str, Any]:
+    """Return the display of the overhead camera's picture, which RViz enables even if its file says no."""
+    return {"Class": "rviz/Image", "Name": "camera's picture", "Enabled": True, "Image Topic": "/track/picture"}
+
+
 def make_marker_display(name: str, topic: str) -> Dict[str, Any]:
     """Return a display of a visualization_msgs/MarkerArray."""
     return {"Class": "rviz/MarkerArray", "Name": name, "Enabled": True, "Marker Topic": topic, "Queue Size": 10}
 
 
 def make_view(view: str) -> Dict[str, Any]:
-    """Return the camera of one of VIEWS; "above" has x to the right and y up."""
-    if view == "above":
+    """Return the camera of a view; "above" and "map" have x to the right and y up."""
+    if view not in ORBITS:
         return {
             "Class": "rviz/TopDownOrtho",
             "Scale": ABOVE_PIXELS_PER_M,
@@ -105,7 +133,7 @@ def make_view(view: str) -> Dict[str, Any]:
             "Angle": 0.0,
             "Target Frame": "<Fixed Frame>",
         }
-    distance_m, pitch_rad, yaw_rad, height_m = VIEWS[view]
+    distance_m, pitch_rad, yaw_rad, height_m = ORBITS[view]
     return {
         "Class": "rviz/Orbit",
         "Distance": distance_m,
@@ -116,8 +144,11 @@ def make_view(view: str) -> Dict[str, Any]:
     }
 
 
-def make_config(names: Sequence[str], fixed_frame: str, view: str = "orbit") -> str:
-    """Return the configuration for robots with these names (hero_0, ...); view: one of VIEWS."""
+def make_config(names: Sequence[str], fixed_frame: str = "", view: str = "orbit", picture: bool = False) -> str:
+    """Return the configuration for robots with these names (hero_0, ...).
+
+    view: one of FRAMES, which holds the fixed frame if none is given; picture: with that of the overhead camera.
+    """
     displays: List[Dict[str, Any]] = [
         {
             "Class": "rviz/Grid",
@@ -142,6 +173,15 @@ def make_config(names: Sequence[str], fixed_frame: str, view: str = "orbit") -> 
             "Displays": [make_ground_truth_display(name) for name in names],
         }
     )
+    displays.append(
+        {
+            "Class": "rviz/Group",
+            "Name": "localization",
+            "Enabled": view == "map",
+            "Displays": make_localization_displays(names),
+        }
+    )
+    displays += [make_picture_display()] if picture else []
     config = {
         "Panels": [
             {"Class": "rviz/Displays", "Name": "Displays"},
@@ -152,7 +192,7 @@ def make_config(names: Sequence[str], fixed_frame: str, view: str = "orbit") -> 
             "Displays": displays,
             "Global Options": {
                 "Background Color": "250; 250; 250",
-                "Fixed Frame": fixed_frame,
+                "Fixed Frame": fixed_frame or FRAMES[view],
                 "Frame Rate": 20,
             },
             "Tools": [

@@ -7,13 +7,15 @@ from hero_client.errors import ProgramError
 from hero_description.robots_parameter import check_given
 from hero_description.rviz_config import GOAL_TOPIC, POINT_TOPIC, make_config
 
+TOPIC_KEYS = ("TF Prefix", "Topic", "Marker Topic", "Image Topic")
+
 
 def list_displays(displays):
     """Return (class, topic or prefix) of displays, also of those in groups."""
     for display in displays:
         yield (
             display["Class"],
-            display.get("TF Prefix") or display.get("Topic") or display.get("Marker Topic"),
+            next((display[key] for key in TOPIC_KEYS if key in display), None),
         )
         yield from list_displays(display.get("Displays", []))
 
@@ -30,6 +32,22 @@ def test_rviz_displays_robots_arena_and_lights():
         assert ("rviz/LaserScan", "/%s/proximity" % name) in shown
     assert ("rviz/MarkerArray", "/hero_sim/arena") in shown
     assert ("rviz/MarkerArray", "/hero_lights") in shown
+
+
+def test_the_view_of_the_map_shows_poses_and_grid_and_on_request_a_picture():
+    manager = yaml.safe_load(make_config(["hero_0", "hero_7"], view="map"))["Visualization Manager"]
+    assert manager["Global Options"]["Fixed Frame"] == "map"
+    assert manager["Views"]["Current"]["Class"] == "rviz/TopDownOrtho"
+    localization = manager["Displays"][-1]
+    assert localization["Enabled"]
+    assert set(list_displays(localization["Displays"])) == {
+        ("rviz/Map", "/map"),
+        ("rviz/PoseWithCovariance", "/hero_0/pose"),
+        ("rviz/PoseWithCovariance", "/hero_7/pose"),
+    }
+    others = yaml.safe_load(make_config(["hero_0"], picture=True))["Visualization Manager"]["Displays"]
+    assert not others[-2]["Enabled"]
+    assert list(list_displays(others[-1:])) == [("rviz/Image", "/track/picture")]
 
 
 def test_rviz_has_tools_to_choose_a_robot_and_send_it_a_goal():

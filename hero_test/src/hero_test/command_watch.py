@@ -21,9 +21,10 @@ class CommandWatch:
     def receive(self, twist, robot_id):
         self.commands[robot_id].append((twist.linear.x, twist.angular.z))
 
-    def wait_for(self, robot_id, condition, what):
-        """Wait for a command from now on that condition(linear, angular) likes."""
+    def wait_for_answer(self, robot_id, act, condition, what):
+        """Do act() and wait for a command since then that condition(linear, angular) likes."""
         start = len(self.commands[robot_id])
+        act()
         wait_for(lambda: any(condition(*command) for command in self.commands[robot_id][start:]), what)
 
     def wait_for_stops(self, *robot_ids):

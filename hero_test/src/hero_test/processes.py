@@ -44,6 +44,15 @@ def suspended(*pids):
             os.kill(pid, signal.SIGCONT)
 
 
+def has_traceback(text):
+    """Return whether a program printed a traceback.
+
+    That with which roslaunch and rospy end on Debian 11 does not count: they are older than its Python, whose threads
+    have no isAlive.
+    """
+    return "Traceback" in re.sub(r"(?s)Traceback.*?has no attribute 'isAlive'", "", text)
+
+
 class Program:
     """A program in a session of its own, and the lines that it prints, errors among them."""
 

@@ -13,14 +13,14 @@ import threading
 from hero_test.processes import find_program
 from hero_test.waiting import wait_for
 
-FLEET = ["rosrun", "hero_tools", "fleet"]
 TIMEOUT_S = 60.0
 
 
 def run_fleet(*arguments, **options):
     """Run fleet; return its exit code, output and errors."""
     streams = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-    result = subprocess.run([*FLEET, *arguments], timeout=TIMEOUT_S, check=False, **{**streams, **options})
+    command = [find_program("hero_tools", "fleet"), *arguments]
+    result = subprocess.run(command, timeout=TIMEOUT_S, check=False, **{**streams, **options})
     return result.returncode, (result.stdout or b"").decode(), result.stderr.decode()
 
 
