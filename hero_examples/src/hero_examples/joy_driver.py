@@ -1,4 +1,4 @@
-"""Runs joy/joy_node with the same arguments where it is installed, and else says how to get it, in one line."""
+"""Runs joy/joy_node with the same parameters where it is installed, and else says how to get it, in one line."""
 
 import os
 import sys

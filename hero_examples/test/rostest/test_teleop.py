@@ -126,8 +126,9 @@ class TeleopTest(unittest.TestCase):
             ("s---W", lambda linear, turn: abs(linear - 0.08) < 1e-6),
             ("s>a", lambda linear, turn: abs(turn - 1.75) < 1e-6),
         ):
-            terminal.type(keys)
-            commands.wait_for(0, condition, "the command of %r" % keys)
+            commands.wait_for_answer(
+                0, lambda keys=keys: terminal.type(keys), condition, "the command of %r" % keys
+            )
         terminal.type("7")
         wait_for(lambda: "hero_7 is not among" in terminal.text, "a word about a robot that is not there")
 
@@ -142,16 +143,15 @@ class TeleopTest(unittest.TestCase):
         }
         commands = CommandWatch(range(len(ends)))
         terminals = [self.start(robot_id) for robot_id in range(len(ends))]
-        for robot_id, (name, end) in enumerate(ends.items()):
+        for robot_id, (name, end_it) in enumerate(ends.items()):
             terminal = terminals[robot_id]
-            with self.subTest(name):
-                self.drive(terminal, commands, robot_id)
-                self.assertNotEqual(terminal.before, terminal.settings())
-                end(robot_id, terminal)
-                wait_for(lambda t=terminal: t.status() is not None, "the end of teleop")
-                self.assertEqual(0, terminal.status(), terminal.text)
-                wait_for(lambda t=terminal: t.before == t.settings(), "the terminal as it was")
-                commands.wait_for_stops(robot_id)
+            self.drive(terminal, commands, robot_id)
+            self.assertNotEqual(terminal.before, terminal.settings())
+            end_it(robot_id, terminal)
+            wait_for(lambda t=terminal: t.status() is not None, "the end of teleop by " + name)
+            self.assertEqual(0, terminal.status(), "%s: %s" % (name, terminal.text))
+            wait_for(lambda t=terminal: t.before == t.settings(), "the terminal as it was")
+            commands.wait_for_stops(robot_id)
 
     def test_a_closed_terminal_stops_the_robot(self):
         commands = CommandWatch([0])

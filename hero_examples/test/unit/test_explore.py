@@ -1,0 +1,59 @@
+"""explore in virtual time: robots share out the places where the map ends, go there, and walk at random there."""
+
+import math
+
+import pytest
+import true_paths
+
+from hero_client import CommonFrame
+from hero_sim.stepped.swarm import StepSwarm
+
+pytest.importorskip("rospy", reason="the program imports rospy")
+from hero_examples.explore import NEAR_M, Explorer, explore_together
+
+GREEN, YELLOW = (0.0, 1.0, 0.0), (1.0, 1.0, 0.0)
+STARTS = """
+walls_m: [[[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]]]
+starts_m_deg: [[-0.1, 0, 90], [0.1, 0, 90]]
+"""
+LEFT, RIGHT = (-0.7, 0.0), (0.7, 0.1)
+
+
+@pytest.fixture()
+def swarm(tmp_path):
+    arena = tmp_path / "arena.yaml"
+    arena.write_text(STARTS)
+    with StepSwarm(2, seed=1, arena=str(arena)) as swarm:
+        yield swarm
+
+
+def explore(swarm, frontiers, duration_s, frame="map"):
+    """Explore while the map ends at these places; return the explorers and the robots' paths."""
+    explorers = [Explorer(robot, CommonFrame(frame), seed=robot.robot_id) for robot in swarm]
+    path = true_paths.run(swarm, lambda time_s: explore_together(explorers, frontiers, time_s), duration_s)[0]
+    return explorers, path
+
+
+def test_each_robot_takes_the_nearest_place_that_no_other_has(swarm):
+    explorers, _ = explore(swarm, [LEFT, RIGHT], 1.5)
+    assert [explorer.goal for explorer in explorers] == [LEFT, RIGHT]
+    assert {robot.light for robot in swarm} == {GREEN}
+
+
+def test_robots_get_to_where_the_map_ends_and_walk_at_random_there(swarm):
+    _, path = explore(swarm, [LEFT, RIGHT], 9.0)
+    for robot, place in zip(range(2), (LEFT, RIGHT)):
+        assert min(math.dist(pose[:2], place) for pose in path[:, robot]) < NEAR_M
+    assert {robot.light for robot in swarm} == {YELLOW}
+
+
+def test_a_single_place_is_one_robots_goal_and_the_other_walks(swarm):
+    explorers, path = explore(swarm, [LEFT], 1.5)
+    assert [explorer.goal for explorer in explorers] == [LEFT, None]
+    assert true_paths.measure_lengths(path)[1] > 0.05
+
+
+def test_robots_whose_place_is_not_known_stop_and_are_named(swarm):
+    explorers, path = explore(swarm, [LEFT, RIGHT], 1.0, frame="nowhere")
+    assert true_paths.measure_lengths(path).max() < 0.001
+    assert "nowhere" in explorers[0].common.missing["hero_0"]
