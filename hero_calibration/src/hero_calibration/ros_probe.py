@@ -8,6 +8,7 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 
 from hero_client.geometry import Pose, yaw_of
+from hero_client.texts import one_line
 from hero_msgs.msg import Encoder, Motor
 from hero_msgs.srv import SetIRCalibration, SetMotor, SetPID
 
@@ -90,7 +91,7 @@ class RosProbe(Probe):
             rospy.wait_for_service(name, SERVICE_WAIT_S)
             answer = rospy.ServiceProxy(name, kind)(*map(number, values))
         except (rospy.ServiceException, rospy.ROSException) as error:
-            raise CalibrationError("%s: %s" % (name, " ".join(str(error).split()))) from error
+            raise CalibrationError("%s: %s" % (name, one_line(error))) from error
         if not answer.success:
             raise CalibrationError("%s: the robot answers: %s" % (name, answer.message))
 

@@ -9,7 +9,7 @@ from typing import Any, Dict, List, NamedTuple, Tuple
 
 import yaml
 
-from hero_client.command_line import make_printable
+from hero_client.texts import make_printable, one_line
 
 from .errors import CalibrationError
 
@@ -114,7 +114,7 @@ def load(path: str) -> Calibration:
     except OSError as error:
         raise CalibrationError("%s cannot be read: %s" % (path, error.strerror)) from error
     except (yaml.YAMLError, ValueError, RecursionError) as error:  # ValueError: no UTF-8, no date, too many digits
-        raise _refuse(path, "is no calibration: " + " ".join(str(error).split())) from error
+        raise _refuse(path, "is no calibration: " + one_line(error)) from error
     if not isinstance(content, dict) or "robot" not in content:
         raise _refuse(path, "is no calibration: it needs a line robot: hero_N")
     known = {**SETTINGS, **RESULTS}
