@@ -4,7 +4,7 @@
 |---|---|
 | access | decides by token, Host and Origin who may see the page |
 | connection_limits | limits the connections and token attempts of untrusted clients |
-| feed, robot_feed, placement | read topics |
+| feed, robot_feed, camera_picture, placement | read topics |
 | sections | encodes the fleet as numbered sections of JSON, of which a page gets those that are new to it |
 | requests | parses what a page sends |
 | dead_man | drives a robot only while its button is held |

@@ -77,8 +77,8 @@ class Commander:
             namespace + "/velocity_controller/cmd_vel", Twist, queue_size=1, tcp_nodelay=True
         )
 
-    def send_goal(self, namespace: str, goal: Pose, with_heading: bool) -> Notice:
-        """Send a goal in hero_N/odom to the program that takes goals for this robot; may take seconds."""
+    def send_goal(self, namespace: str, frame: str, goal: Pose, with_heading: bool) -> Notice:
+        """Send a goal in a frame to the program that takes goals for this robot; may take seconds."""
         name, topic = namespace.strip("/"), namespace + "/goal"
         try:
             if not self._has_listener(topic):
@@ -88,7 +88,7 @@ class Commander:
             return Notice("error", str(error))
         message = PoseStamped()
         message.header.stamp = rospy.Time.now()
-        message.header.frame_id = name + "/odom"
+        message.header.frame_id = frame
         message.pose.position.x, message.pose.position.y = goal.x_m, goal.y_m
         if with_heading:
             message.pose.orientation.z = math.sin(goal.yaw_rad / 2.0)

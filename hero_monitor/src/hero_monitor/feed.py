@@ -4,6 +4,7 @@ While no page is open, only the drivers' reports and the log are subscribed to, 
 are subscribed to in the background, because the ROS master may block.
 """
 
+import math
 import re
 import time
 from collections import deque
@@ -13,25 +14,31 @@ from typing import Any, Callable, Deque, Dict, List, Optional, Sequence, Set
 import genpy
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PolygonStamped
 from rosgraph_msgs.msg import Log
+from sensor_msgs.msg import CompressedImage
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
-from hero_client.command_line import make_printable
 from hero_client.drivers import STATES, STOP_STATES, Drivers
 from hero_client.geometry import Pose, yaw_of
 from hero_client.readings import finite, is_plausible, read_pose
 from hero_client.robot_listener import NewestMessage
 from hero_client.stop_status import StopStatus
-from hero_msgs.msg import Robot
+from hero_client.texts import make_printable
+from hero_msgs.msg import Robot, RobotPose, RobotPoses
 
 from .background import Background
+from .camera_picture import CameraPicture
 from .placement import Placement
 from .robot_feed import RobotFeed
 from .sections import LOG_LINES_KEPT, Sections, encode_pose, encode_ranges, shorten
 
 DRIVER_SILENT_S = 5.0
 """The driver reports once a second; it is gone after this time without a report."""
+
+LOCALIZATION_SILENT_S = 3.0
+"""hero_localization reports 25 times a second; it is gone after this time without a report."""
 
 LOG_LINES_PER_READ = 40
 """Decoding a line takes about 0.05 ms; a swarm that tunes its motors logs thousands a second."""
@@ -41,6 +48,20 @@ UNREADABLE_PERIOD_S = 10.0
 
 ROBOTS_MAX = 1000
 """Rows of the table."""
+
+SCENE_TYPES = {
+    "/tf_static": TFMessage,
+    "/diagnostics": DiagnosticArray,
+    "/hero_sim/arena": MarkerArray,
+    "/hero_sim/markers": MarkerArray,
+    "/localization/poses": RobotPoses,
+    "/track/picture/compressed": CompressedImage,
+    "/track/picture/outline": PolygonStamped,
+}
+"""Topics of no single robot."""
+
+GROUND_TRUTH_TOPICS = {"/hero_sim/markers"}
+PICTURE_TOPICS = {"/track/picture/compressed", "/track/picture/outline"}
 
 MARKERS_MAX = 2000
 """Of the arena, or of ground truth."""
@@ -56,12 +77,13 @@ class FleetFeed:
         self._background = background
         self.sections = Sections()
         self.placement = Placement(map_frame)
+        self.picture = CameraPicture()
         self.robots: Dict[str, Robot] = {}
         self.stopped = False
-        self._map_frame = map_frame.lstrip("/")
         self._feeds: Dict[str, RobotFeed] = {}
         self._scene: Dict[str, NewestMessage] = {}
         self._fleet_s = 0.0
+        self._localized_s = -math.inf
         self._pending_reads = 0
         self._listening = ""
         self._rows: Sequence[Robot] = ()
@@ -81,24 +103,23 @@ class FleetFeed:
 
     # ---------------------------------------------------------------- subscriptions
 
-    def update_subscriptions(self, has_pages: bool, ground_truth: bool) -> None:
-        """Subscribe to robots only while a page is open, and to ground truth on request; returns at once."""
+    def update_subscriptions(self, has_pages: bool, ground_truth: bool, picture: bool) -> None:
+        """Subscribe to robots only while a page is open, to ground truth and picture on request; returns at once."""
         if self._change is not None and not self._change.done():
             return
         if self._change is not None:
             self._change.result()
         robots = {row.namespace for row in self._rows if row.namespace and row.state != Robot.REFUSED}
         namespaces = robots if has_pages else set()
-        scene = {"/tf_static", "/hero_sim/arena", "/diagnostics"} if has_pages else set()
-        if has_pages and ground_truth:
-            scene.add("/hero_sim/markers")
+        scene = set(SCENE_TYPES) if has_pages else set()
+        scene -= set() if ground_truth else GROUND_TRUTH_TOPICS
+        scene -= set() if picture else PICTURE_TOPICS
         if namespaces != set(self._feeds) or scene != set(self._scene):
             self._change = self._background.submit(self._change_subscriptions, namespaces, scene)
 
     def _change_subscriptions(self, namespaces: Set[str], scene: Set[str]) -> None:
-        classes = {"/tf_static": TFMessage, "/diagnostics": DiagnosticArray}
         for topic in scene - set(self._scene):
-            self._scene = {**self._scene, topic: NewestMessage(topic, classes.get(topic, MarkerArray))}
+            self._scene = {**self._scene, topic: NewestMessage(topic, SCENE_TYPES[topic])}
         for topic in set(self._scene) - scene:
             self._scene[topic].close()
             self._scene = {known: kept for known, kept in self._scene.items() if known != topic}
@@ -114,9 +135,9 @@ class FleetFeed:
         """Update the sections; a message that cannot be decoded affects no other."""
         self.read_stop()
         self._read(self._read_fleet)
-        self._read(self._read_scene)
         for feed in list(self._feeds.values()):
             self._read(feed.read_newest)
+        self._read(self._read_scene)
         self._put_robots()
         self._read(self._read_log)
 
@@ -143,6 +164,7 @@ class FleetFeed:
         stamp_s = None if message is None else message.header.stamp.to_sec()
         self.stopped = self.stopped and driver
         fleet = {"driver": driver, "listening": make_printable(self._listening), "stopped": self.stopped}
+        fleet["frame"] = shorten(self.placement.frame) if self.placement.is_localized else ""
         self.sections.put("fleet", {**fleet, "robots": [self._make_row(row, stamp_s) for row in self._rows]})
 
     def _make_row(self, row: Robot, stamp_s: Optional[float]) -> Dict[str, Any]:
@@ -205,10 +227,32 @@ class FleetFeed:
                 name = status.name.rpartition(": ")[2]
                 if name in self.robots:
                     self._health[name] = [status.level, shorten(status.message)]
+        now_s = time.monotonic()
+        if taken.get("/localization/poses") is not None:
+            self._localized_s = now_s
+            self._localize(taken["/localization/poses"])
+        elif now_s > self._localized_s + LOCALIZATION_SILENT_S:
+            self.placement.localize("", {})
+        if taken.get("/track/picture/outline") is not None:
+            self.picture.receive_outline(taken["/track/picture/outline"])
+        if taken.get("/track/picture/compressed") is not None:
+            self.picture.receive(taken["/track/picture/compressed"], now_s)
+        self.sections.put("picture", self.picture.describe(self.placement.frame, now_s))
         if taken.get("/hero_sim/markers") is not None:
             self.sections.put("ground_truth", find_true_poses(taken["/hero_sim/markers"]))
         elif "/hero_sim/markers" not in self._scene:
             self.sections.put("ground_truth", {})
+
+    def _localize(self, report: RobotPoses) -> None:
+        poses = {}
+        for robot in report.robots[:ROBOTS_MAX]:
+            name, pose = "hero_%d" % robot.id, Pose(robot.x, robot.y, robot.yaw)
+            feed = self._feeds.get("/" + name)
+            odom = None if feed is None else feed.listener.track.pose
+            if robot.state != RobotPose.UNKNOWN and odom is not None and is_plausible(pose):
+                poses[name] = pose, odom
+        self.placement.localize(report.header.frame_id, poses)
+        self.placement.set_robots(self.robots)
 
     def _put_robots(self) -> None:
         poses, ranges, lights, goals = {}, {}, {}, {}
@@ -219,7 +263,7 @@ class FleetFeed:
                 ranges[feed.name] = encode_ranges(feed.listener.ranges_m)
             if feed.light is not None:
                 lights[feed.name] = feed.light
-            goal = feed.find_goal(self.placement, self._map_frame)
+            goal = feed.find_goal(self.placement)
             if goal is not None:
                 goals[feed.name] = encode_pose(goal)
         for name, value in (("poses", poses), ("ranges", ranges), ("lights", lights), ("goals", goals)):

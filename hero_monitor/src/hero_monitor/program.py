@@ -2,7 +2,7 @@
 
     roslaunch hero_bringup monitor.launch
 
-Parameters: the README of this package. Everything runs on tornado's thread, except what may block (background).
+Everything runs on tornado's thread, except what may block (background).
 """
 
 import asyncio
@@ -51,7 +51,7 @@ class Monitor:
         self._feed = FleetFeed(parameters.map_frame, self._background)
         self._commander = Commander(self._feed.drivers, self._background)
         self._loop = tornado.ioloop.IOLoop.current()
-        actions = Actions(self._open_page, self._receive, self._close_page)
+        actions = Actions(self._open_page, self._receive, self._close_page, lambda: self._feed.picture.jpeg)
         # The other half of the files is for ROS: some per robot.
         limits = ConnectionLimits(min(CONNECTIONS_MAX, raise_file_limit() // 2))
         self._server = Server(Access(parameters.token, parameters.host_names), limits, actions)
@@ -109,11 +109,12 @@ class Monitor:
         self._leaving = None
         self._tick.stop()
         self._stops.stop()
-        self._feed.update_subscriptions(has_pages=False, ground_truth=False)
+        self._feed.update_subscriptions(has_pages=False, ground_truth=False, picture=False)
 
     def _update_pages(self) -> None:
         pages = self._server.pages
-        self._feed.update_subscriptions(True, any(page.ground_truth for page in pages))
+        ground_truth, picture = (any(getattr(page, name) for page in pages) for name in ("ground_truth", "picture"))
+        self._feed.update_subscriptions(True, ground_truth, picture)
         self._feed.read()
         self._broadcast_updates()
 
@@ -142,7 +143,7 @@ class Monitor:
             return
         kind, robot = request["do"], request.get("robot")
         if kind == "show":
-            page.ground_truth = request["ground_truth"]
+            page.ground_truth, page.picture = request["ground_truth"], request["picture"]
         elif kind == "stop":
             self._commander.request_stop(request["stop"])
             self._feed.read_stop()
@@ -171,10 +172,10 @@ class Monitor:
     async def _send_goal(self, page: "PageSocket", request: Dict[str, Any]) -> None:
         """Send a goal in the background, and tell the page the outcome."""
         robot, yaw_rad = request["robot"], request.get("yaw")
-        goal = self._feed.placement.to_odometry(robot, Pose(request["x"], request["y"], yaw_rad or 0.0))
+        frame, goal = self._feed.placement.to_goal(robot, Pose(request["x"], request["y"], yaw_rad or 0.0))
         self._pending_goals += 1
         try:
-            sending = self._background.submit(self._commander.send_goal, "/" + robot, goal, yaw_rad is not None)
+            sending = self._background.submit(self._commander.send_goal, "/" + robot, frame, goal, yaw_rad is not None)
             page.tell(*await asyncio.wrap_future(sending))
         finally:
             self._pending_goals -= 1

@@ -35,7 +35,7 @@ REQUESTS: Dict[str, Dict[str, Callable[[Any], bool]]] = {
     "drive": {"robot": _is_name, "linear": _is_number(MAX_LINEAR_M_S), "angular": _is_number(MAX_ANGULAR_RAD_S)},
     "release": {"robot": _is_name},
     "goal": {"robot": _is_name, "x": _is_number(FARTHEST_GOAL_M), "y": _is_number(FARTHEST_GOAL_M)},
-    "show": {"ground_truth": _is_flag},
+    "show": {"ground_truth": _is_flag, "picture": _is_flag},
 }
 """What a page can request, by its field "do", with the fields that it needs and their checks.
 

@@ -47,14 +47,14 @@ class RobotFeed:
             pose = read_pose(goal.pose)
             self._goal = None if pose is None else (goal.header.frame_id.lstrip("/"), pose)
 
-    def find_goal(self, placement: Placement, map_frame: str) -> Optional[Pose]:
+    def find_goal(self, placement: Placement) -> Optional[Pose]:
         """Return the robot's goal on the map; None if there is none, it is reached, or its frame is unknown."""
         if self._goal is None:
             return None
         frame, goal = self._goal
         if frame == self.name + "/odom":
             goal = placement.to_map(self.name, goal)
-        elif frame != map_frame:
+        elif frame != placement.frame:
             return None
         pose = self.listener.track.pose
         if pose is not None:

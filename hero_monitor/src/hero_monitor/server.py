@@ -60,6 +60,7 @@ class Actions(NamedTuple):
     open_page: Callable[["PageSocket"], None]
     receive: Callable[["PageSocket", Union[str, bytes]], None]
     close_page: Callable[["PageSocket"], None]
+    read_picture: Callable[[], bytes]
 
 
 class BaseHandler(tornado.web.RequestHandler):
@@ -128,6 +129,22 @@ class FileHandler(BaseHandler):
         self.finish(path.read_bytes())
 
 
+class PictureHandler(BaseHandler):
+    """The camera's newest picture, for browsers that are logged in."""
+
+    actions: Actions
+
+    def get(self) -> None:
+        """Send the picture."""
+        if not self.is_logged_in:
+            raise tornado.web.HTTPError(403)
+        picture = self.actions.read_picture()
+        if not picture:
+            raise tornado.web.HTTPError(404)
+        self.set_header("Content-Type", "image/jpeg")
+        self.finish(picture)
+
+
 class LoginHandler(BaseHandler):
     """Exchanges the token for a signed cookie."""
 
@@ -181,7 +198,7 @@ class PageSocket(tornado.websocket.WebSocketHandler, BaseHandler):
         """Register a page."""
         self.number = next(PageSocket.numbers)
         self.seen = Page()
-        self.ground_truth = False
+        self.ground_truth = self.picture = False
         self._sending: Optional[Awaitable[None]] = None
         self._waiting: Deque[str] = deque(maxlen=WAITING_MAX)
         self.set_nodelay(True)
@@ -257,6 +274,7 @@ class Server:
             [
                 (r"/live", PageSocket, {**shared, "actions": actions, "pages": self.pages}),
                 (r"/login", LoginHandler, {**shared, "attempts": TokenAttempts()}),
+                (r"/picture", PictureHandler, {**shared, "actions": actions}),
                 (r"/(.*)", FileHandler, shared),
             ],
             log_function=ignore_request,

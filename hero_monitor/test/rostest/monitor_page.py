@@ -95,7 +95,7 @@ class MonitorPage:
     def actions(self):
         from selenium.webdriver.common.action_chains import ActionChains
 
-        return ActionChains(self.browser, duration=50)
+        return ActionChains(self.browser)
 
     def save(self, name):
         """Save a picture beside the test's results."""

@@ -142,7 +142,7 @@ class PageTest(unittest.TestCase):
     def click_on_map(self, right_px, down_px):
         self.page.click("#goto")
         canvas = self.page.find("#canvas")
-        self.page.actions().move_to_element_with_offset(canvas, right_px, down_px).click().perform()
+        self.page.actions().move_to_element(canvas).move_by_offset(right_px, down_px).click().perform()
         self.page.click("#goto")
 
     @staticmethod

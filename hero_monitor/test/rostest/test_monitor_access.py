@@ -98,6 +98,7 @@ class AccessTest(unittest.TestCase):
                 wait_until_it_answers(host)
                 self.assertIn("login.js", ask(host)[2])
                 self.assertEqual(self.open_socket(host, **own), 403)
+                self.assertEqual(ask(host, "/picture", own)[0], 403)
                 wrong = ask(host, "/login", own, "POST", '{"token": "wrong"}')
                 self.assertEqual((wrong[0], wrong[1]["Set-Cookie"]), (403, None))
                 self.assertEqual(ask(host, "/login", (), "POST", '{"token": "%s"}' % TOKEN)[0], 403)
@@ -107,6 +108,7 @@ class AccessTest(unittest.TestCase):
                 self.assertIn("SameSite=Strict", headers["Set-Cookie"])
                 cookie = headers["Set-Cookie"].partition(";")[0]
                 self.assertIn("main.js", ask(host, "/", {"Cookie": cookie})[2])
+                self.assertEqual(ask(host, "/picture", {"Cookie": cookie})[0], 404)  # no camera
                 self.assertEqual(self.open_socket(host, Cookie=cookie, **own), 101)
                 self.assertEqual(self.open_socket(host, Cookie=cookie, Origin="http://evil.example"), 403)
             finally:

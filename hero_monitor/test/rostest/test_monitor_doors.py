@@ -29,8 +29,8 @@ from hero_msgs.msg import RobotArray
 from hero_test.waiting import wait_for
 
 TOKEN = "correct-horse-battery-staple"
-STRANGERS = 1100
-STRANGER_ADDRESSES = ["127.0.0.%d" % number for number in range(2, 32)]
+PEERS = 1100
+PEER_ADDRESSES = ["127.0.0.%d" % number for number in range(2, 32)]
 SILENT_ADDRESS = "127.0.0.99"
 FILES = 1024  # a usual soft limit
 CONNECTIONS_MAX, CONNECTIONS_MAX_PER_ADDRESS = 400, 50  # the monitor's defaults
@@ -81,9 +81,9 @@ class DoorsTest(unittest.TestCase):
         self.sockets = []
         self.addCleanup(lambda: [opened.close() for opened in self.sockets])
 
-    def connect_strangers(self, *addresses):
+    def connect_peers(self, *addresses):
         """Connect 1100 times, from these addresses in turn."""
-        for number in range(STRANGERS):
+        for number in range(PEERS):
             self.sockets.append(connect(addresses[number % len(addresses)]))
 
     def wait_for_evictions(self, left):
@@ -102,8 +102,8 @@ class DoorsTest(unittest.TestCase):
     def wait_until_stopped(self, stopped):
         wait_for(lambda: list(self.stopped.values()) == [stopped] * 2, "stopped: %s" % stopped)
 
-    def test_a_page_opened_among_1100_strangers_stops_all_robots(self):
-        self.connect_strangers(*STRANGER_ADDRESSES)
+    def test_a_page_opened_among_1100_untrusted_peers_stops_all_robots(self):
+        self.connect_peers(*PEER_ADDRESSES)
         self.wait_for_evictions(CONNECTIONS_MAX)
         page = self.open_page()
         page.send(do="stop", stop=True)
@@ -111,18 +111,18 @@ class DoorsTest(unittest.TestCase):
         page.send(do="stop", stop=False)
         self.wait_until_stopped(False)
 
-    def test_a_page_that_is_open_stays_when_1100_strangers_come(self):
+    def test_a_page_that_is_open_stays_when_1100_untrusted_peers_come(self):
         page = self.open_page()
-        self.connect_strangers(*STRANGER_ADDRESSES)
+        self.connect_peers(*PEER_ADDRESSES)
         page.send(do="stop", stop=True)
         self.wait_until_stopped(True)
         page.send(do="stop", stop=False)
         self.wait_until_stopped(False)
 
     def test_1100_connections_of_one_address_leave_others_alone(self):
-        self.connect_strangers(STRANGER_ADDRESSES[0])
+        self.connect_peers(PEER_ADDRESSES[0])
         self.wait_for_evictions(CONNECTIONS_MAX_PER_ADDRESS)
-        self.assertEqual(ask(OTHER_HOST, source=STRANGER_ADDRESSES[1])[0], 200)
+        self.assertEqual(ask(OTHER_HOST, source=PEER_ADDRESSES[1])[0], 200)
         self.open_page().send(do="stop", stop=True)
         self.wait_until_stopped(True)
         self.open_page().send(do="stop", stop=False)
@@ -153,7 +153,7 @@ class DoorsTest(unittest.TestCase):
 
     def test_requests_without_pause_keep_no_page_from_stopping_all_robots(self):
         end = threading.Event()
-        flood = threading.Thread(target=self.send_without_pause, args=(STRANGER_ADDRESSES[0], end))
+        flood = threading.Thread(target=self.send_without_pause, args=(PEER_ADDRESSES[0], end))
         flood.start()
         self.addCleanup(flood.join)
         self.addCleanup(end.set)
@@ -168,16 +168,16 @@ class DoorsTest(unittest.TestCase):
         self.assertEqual(self.silent.recv(1), b"")
 
     def test_wrong_tokens_of_one_address_keep_no_other_from_logging_in(self):
-        stranger, owner = STRANGER_ADDRESSES[:2]
+        peer, owner = PEER_ADDRESSES[:2]
         answers = []
         while not answers or answers[-1] == 403:
-            answers.append(log_in(OTHER_HOST, "wrong", stranger)[0])
+            answers.append(log_in(OTHER_HOST, "wrong", peer)[0])
         self.assertEqual((answers[0], answers[-1]), (403, 429))
-        self.assertEqual(log_in(OTHER_HOST, TOKEN, stranger)[0], 429)
+        self.assertEqual(log_in(OTHER_HOST, TOKEN, peer)[0], 429)
         status, cookie = log_in(OTHER_HOST, TOKEN, owner)
         self.assertEqual(status, 204)
         # Who is logged in gets in from anywhere.
-        self.assertIn("main.js", ask(OTHER_HOST, "/", {"Cookie": cookie}, source=stranger)[2])
+        self.assertIn("main.js", ask(OTHER_HOST, "/", {"Cookie": cookie}, source=peer)[2])
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ from hero_monitor.connection_limits import (
     group_address,
 )
 
-OWNER, STRANGER = "10.0.0.1", "10.0.0.2"
+OWNER, UNTRUSTED = "10.0.0.1", "10.0.0.2"
 
 
 class FakeConnection:
@@ -39,7 +39,7 @@ def count_open(connections):
 
 def test_an_address_with_too_many_connections_loses_its_oldest():
     limits = ConnectionLimits(100, 5)
-    connections = connect(limits, STRANGER, 7)
+    connections = connect(limits, UNTRUSTED, 7)
     assert [connection.closed() for connection in connections] == [True] * 2 + [False] * 5
 
 
@@ -54,7 +54,7 @@ def test_trusted_connections_do_not_count_for_their_address():
 
 def test_where_all_places_are_taken_the_address_with_the_most_loses_one():
     limits = ConnectionLimits(10, 8)
-    own, others = connect(limits, OWNER, 2), connect(limits, STRANGER, 8)
+    own, others = connect(limits, OWNER, 2), connect(limits, UNTRUSTED, 8)
     own += connect(limits, OWNER)
     assert count_open(own) == 3
     assert [connection.closed() for connection in others] == [True] + [False] * 7
@@ -81,15 +81,15 @@ def test_a_new_connection_is_refused_only_where_all_are_trusted():
 
 def test_closed_connections_make_room():
     limits = ConnectionLimits(10, 3)
-    first = connect(limits, STRANGER, 3)
+    first = connect(limits, UNTRUSTED, 3)
     first[2].close()
-    connect(limits, STRANGER)
+    connect(limits, UNTRUSTED)
     assert count_open(first) == 2
 
 
 def test_a_connection_without_a_login_is_closed_after_a_while():
     limits = ConnectionLimits(10, 10)
-    silent, own = connect(limits, STRANGER, 2, now_s=5.0)
+    silent, own = connect(limits, UNTRUSTED, 2, now_s=5.0)
     limits.trust(own)
     limits.expire(5.0 + UNTRUSTED_S)
     assert not silent.closed()
@@ -120,21 +120,21 @@ def use_up(attempts, address, now_s=0.0):
 
 def test_after_too_many_wrong_tokens_an_address_has_to_wait():
     attempts = TokenAttempts()
-    use_up(attempts, STRANGER, 100.0)
-    assert not attempts.admits(STRANGER, 99.9 + TOKEN_PERIOD_S)
-    assert attempts.admits(STRANGER, 100.1 + TOKEN_PERIOD_S)
+    use_up(attempts, UNTRUSTED, 100.0)
+    assert not attempts.admits(UNTRUSTED, 99.9 + TOKEN_PERIOD_S)
+    assert attempts.admits(UNTRUSTED, 100.1 + TOKEN_PERIOD_S)
 
 
 def test_wrong_tokens_of_one_address_keep_no_other_from_trying():
     attempts = TokenAttempts()
-    use_up(attempts, STRANGER)
+    use_up(attempts, UNTRUSTED)
     assert attempts.admits(OWNER, 0.0)
 
 
 def test_the_addresses_that_are_remembered_are_bounded():
     attempts = TokenAttempts()
-    use_up(attempts, STRANGER)
+    use_up(attempts, UNTRUSTED)
     for number in range(2 * ADDRESSES_MAX):
         attempts.count_wrong("10.%d.%d.1" % divmod(number, 256), 0.0)
-    assert not attempts.admits(STRANGER, 0.0)
+    assert not attempts.admits(UNTRUSTED, 0.0)
     assert len(attempts._full_again_s) <= ADDRESSES_MAX

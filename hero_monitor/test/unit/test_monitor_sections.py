@@ -4,8 +4,11 @@ import json
 import math
 
 import pytest
+from geometry_msgs.msg import Point32, Polygon, PolygonStamped
+from sensor_msgs.msg import CompressedImage
 
 from hero_client.geometry import Pose
+from hero_monitor.camera_picture import BYTES_MAX, SILENT_S, CameraPicture
 from hero_monitor.placement import APART_M, Placement
 from hero_monitor.requests import RequestError, read_request
 from hero_monitor.sections import (
@@ -103,7 +106,9 @@ def test_a_pose_on_the_map_and_back_is_the_same(placement):
     pose = Pose(0.3, -0.2, 0.5)
     on_map = placement.to_map("hero_0", pose)
     assert on_map == pytest.approx((1.2, 2.3, 0.5 + math.pi / 2))
-    assert placement.to_odometry("hero_0", on_map) == pytest.approx(pose)
+    frame, goal = placement.to_goal("hero_0", on_map)
+    assert frame == "hero_0/odom"
+    assert goal == pytest.approx(pose)
 
 
 def test_robots_without_a_map_transform_are_placed_side_by_side(placement):
@@ -112,6 +117,59 @@ def test_robots_without_a_map_transform_are_placed_side_by_side(placement):
     origin = Pose(0.0, 0.0, 0.0)
     one, other = placement.to_map("hero_1", origin), placement.to_map("hero_2", origin)
     assert (one.x_m, other.x_m) == (-APART_M / 2, APART_M / 2)
+
+
+def test_localized_robots_are_placed_in_one_frame_and_others_side_by_side(placement):
+    odom, pose = Pose(0.3, 0.0, 0.0), Pose(4.0, -1.0, math.pi / 2)
+    placement.localize("/map", {"hero_1": (pose, odom)})
+    placement.set_robots(["hero_0", "hero_1"])
+    assert (placement.frame, placement.is_localized) == ("map", True)
+    assert placement.knows("hero_1") and not placement.knows("hero_0")
+    assert placement.to_map("hero_1", odom) == pytest.approx(pose)
+    assert placement.to_map("hero_1", Pose(0.4, 0.0, 0.0)) == pytest.approx((4.0, -0.9, math.pi / 2))
+    assert placement.to_goal("hero_1", Pose(1.0, 2.0, 3.0)) == ("map", Pose(1.0, 2.0, 3.0))
+    assert placement.to_goal("hero_0", Pose(0.5, 0.0, 0.0)) == ("hero_0/odom", Pose(0.5, 0.0, 0.0))
+
+
+def test_without_localization_the_map_is_as_before_it(placement):
+    placement.localize("map", {"hero_1": (Pose(4.0, -1.0, 0.0), Pose(0.0, 0.0, 0.0))})
+    placement.localize("", {})
+    assert (placement.frame, placement.is_localized) == ("world", False)
+    assert placement.knows("hero_0") and not placement.knows("hero_1")
+
+
+JPEG = b"\xff\xd8picture"
+
+
+def make_outline(*corners, frame="map"):
+    outline = PolygonStamped(polygon=Polygon([Point32(x, y, 0.0) for x, y in corners]))
+    outline.header.frame_id = frame
+    return outline
+
+
+def test_a_picture_lies_on_the_map_of_its_frame_and_elsewhere_beside_it():
+    picture = CameraPicture()
+    assert picture.describe("map", 0.0) is None
+    picture.receive(CompressedImage(data=JPEG), 10.0)
+    assert picture.jpeg == JPEG
+    assert picture.describe("map", 10.1) == {"number": 1, "box": None}
+    picture.receive(CompressedImage(data=JPEG), 10.15)  # sooner than pages fetch pictures
+    picture.receive_outline(make_outline((-1.0, -0.5), (1.0, -0.5), (1.0, 0.5), (-1.0, 0.5)))
+    picture.receive(CompressedImage(data=JPEG), 10.2)
+    assert picture.describe("map", 10.3) == {"number": 2, "box": [-1000, -500, 1000, 500]}
+    assert picture.describe("world", 10.3) == {"number": 2, "box": None}
+    picture.receive_outline(make_outline((0.0, 0.0), (math.nan, 1.0), (1.0, 1.0), (1e30, 0.0)))
+    assert picture.describe("map", 10.3) == {"number": 2, "box": None}
+
+
+def test_a_picture_that_is_old_or_none_is_not_shown():
+    picture = CameraPicture()
+    picture.receive(CompressedImage(data=b"\x89PNG"), 10.0)
+    picture.receive(CompressedImage(data=JPEG + bytes(BYTES_MAX)), 10.0)
+    assert picture.describe("map", 10.0) is None
+    picture.receive(CompressedImage(data=JPEG), 10.0)
+    assert picture.describe("map", 10.0 + SILENT_S + 0.1) is None
+    assert picture.jpeg == b""
 
 
 def read(**fields):
@@ -127,7 +185,7 @@ def read(**fields):
         {"do": "goal", "robot": "hero_1", "x": 1, "y": 2},
         {"do": "goal", "robot": "hero_1", "x": 1, "y": 2, "yaw": 3},
         {"do": "goal", "robot": "hero_1", "x": 1, "y": 2, "yaw": None},
-        {"do": "show", "ground_truth": False},
+        {"do": "show", "ground_truth": False, "picture": True},
     ],
 )
 def test_requests_of_the_page_are_parsed(request_fields):
@@ -157,6 +215,7 @@ def test_requests_of_the_page_are_parsed(request_fields):
         '{"do":"goal","robot":"hero_0","x":1,"y":1,"yaw":"north"}',
         '{"do":"goal","robot":"","x":1,"y":1}',
         '{"do":"show"}',
+        '{"do":"show","ground_truth":true}',
         '{"do":"reboot"}',
         '{"do":["stop"],"stop":true}',
     ],

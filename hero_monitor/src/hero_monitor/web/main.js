@@ -23,6 +23,7 @@ const state = {
   lights: {},
   goals: {},
   ground_truth: {},
+  picture: null,
   arena: { boxes: [], circles: [] },
   chosen: null,
 };
@@ -73,12 +74,13 @@ const stop = new StopPanel({ send, isOpen, releaseRobot: () => panel.release(), 
 function showHead() {
   const open = isOpen();
   const link = element("link");
-  const { driver, robots, listening } = state.fleet;
+  const { driver, robots, listening, frame } = state.fleet;
   link.textContent = !open ? "no connection to the monitor" : driver ? "live" : "no driver";
   link.className = "pill " + (open && driver ? "good" : "bad");
   const ready = robots.filter((robot) => robot.state === "READY").length;
   element("ready").textContent = `${ready} of ${robots.length} ready`;
   element("listening").textContent = driver && listening ? `driver on ${listening}` : "";
+  element("frame").textContent = frame ? `frame ${frame}, by localization` : "";
   document.body.classList.toggle("stale", !open);
   const empty = element("empty");
   empty.hidden = open && robots.length > 0;
@@ -90,7 +92,7 @@ function showHead() {
 }
 
 function receive(updates) {
-  for (const name of ["hello", "fleet", "poses", "ranges", "lights", "goals", "ground_truth", "arena"]) {
+  for (const name of ["hello", "fleet", "poses", "ranges", "lights", "goals", "ground_truth", "picture", "arena"]) {
     if (name in updates) state[name] = updates[name];
   }
   stop.receive(updates);
@@ -114,7 +116,7 @@ function connect() {
     lastMs = Date.now();
     log.clear();
     stop.open();
-    map.requestGroundTruth();
+    map.requestShown();
     showHead();
   });
   own.addEventListener("message", (event) => {

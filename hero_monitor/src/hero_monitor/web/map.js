@@ -1,5 +1,6 @@
 // The map, seen from above: x to the right, y up, as in ROS. Lengths in mm, angles in mrad.
 
+import { CameraPicture } from "./picture.js";
 import { BODY_MM, MapPainter, TRAIL_MS } from "./painter.js";
 
 const TRAIL_STEP_MM = 8;
@@ -18,7 +19,9 @@ export class FleetMap {
     this.notice = notice;
     this.canvas = element("canvas");
     this.painter = new MapPainter(this);
-    this.shows = { trails: true, beams: true, names: true, ground_truth: localStorage.getItem("ground_truth") === "true" };
+    this.shows = { trails: true, beams: true, names: true, ground_truth: false, picture: false };
+    this.shows.ground_truth = localStorage.getItem("ground_truth") === "true";
+    this.picture = new CameraPicture(() => this.update({}));
     this.view = { x: 0, y: 0, scale: 0.3 };
     this.pinned = false; // then the view stays until Fit is pressed
     this.trails = new Map();
@@ -43,16 +46,15 @@ export class FleetMap {
   toggle(name) {
     this.shows[name] = !this.shows[name];
     element(name).setAttribute("aria-pressed", String(this.shows[name]));
-    if (name === "ground_truth") {
-      localStorage.setItem("ground_truth", String(this.shows.ground_truth));
-      this.requestGroundTruth();
-    }
+    if (name === "ground_truth") localStorage.setItem("ground_truth", String(this.shows.ground_truth));
+    this.requestShown();
+    this.picture.show(this.shows.picture, this.state.picture);
     this.draw();
   }
 
-  /** Subscribe to ground truth or not; to be repeated on each connection. */
-  requestGroundTruth() {
-    this.send({ do: "show", ground_truth: this.shows.ground_truth });
+  /** Subscribe to ground truth and picture or not; to be repeated on each connection. */
+  requestShown() {
+    this.send({ do: "show", ground_truth: this.shows.ground_truth, picture: this.shows.picture });
   }
 
   setGoing(going) {
@@ -190,6 +192,11 @@ export class FleetMap {
       ys.push(y - (length * sine + width * cosine) / 2, y + (length * sine + width * cosine) / 2);
     }
     for (const [x, y, radius] of this.state.arena.circles) add(x, y, radius);
+    if (this.picture.box) {
+      const [left, low, right, high] = this.picture.box;
+      xs.push(left, right);
+      ys.push(low, high);
+    }
     if (!xs.length) return false;
     const [left, right, low, high] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
     const room = 1 - MARGIN;
@@ -219,6 +226,7 @@ export class FleetMap {
 
   update(updates) {
     if ("poses" in updates) this.keepTrails();
+    if ("picture" in updates) this.picture.show(this.shows.picture, this.state.picture);
     const count = Object.keys(this.state.poses).length;
     if (!this.pinned && this.fittedFor !== this.sceneKey(count) && this.fit()) this.fittedFor = this.sceneKey(count);
     this.draw();
@@ -226,7 +234,7 @@ export class FleetMap {
 
   /** What there is to see: when it changes, the view fits it again. */
   sceneKey(count) {
-    return `${count} ${this.state.arena.boxes.length} ${this.state.fleet.robots.filter((robot) => robot.located).length}`;
+    return `${count} ${this.state.fleet.frame} ${this.picture.box} ${this.state.arena.boxes.length} ${this.state.fleet.robots.filter((robot) => robot.located).length}`;
   }
 
   keepTrails() {

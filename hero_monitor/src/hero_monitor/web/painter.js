@@ -26,6 +26,7 @@ export class MapPainter {
     context.translate(this.width / 2, this.height / 2);
     context.scale(view.scale, -view.scale);
     context.translate(-view.x, -view.y);
+    if (map.picture.box) this.paintPicture(map.picture);
     this.paintGrid();
     this.paintArena();
     const robots = state.fleet.robots.filter((robot) => robot.state !== "REFUSED" && state.poses[robot.name]);
@@ -46,6 +47,15 @@ export class MapPainter {
     context.translate(pose[0], pose[1]);
     context.rotate(pose[2] / 1000);
     paint(context);
+    context.restore();
+  }
+
+  paintPicture({ image, box: [left, low, right, high] }) {
+    const { context } = this;
+    context.save();
+    context.translate(left, high);
+    context.scale(1, -1);
+    context.drawImage(image, 0, 0, right - left, high - low);
     context.restore();
   }
 

@@ -146,7 +146,7 @@ export class RobotPanel {
     const facts = [
       ["pose", pose ? `${meters(pose[0])} ${meters(pose[1])} m, ${((pose[2] / 1000) * (180 / Math.PI)).toFixed(0)}°` : "-"],
       ["stop", robot.stop || "-"],
-      ["frame", robot.located ? "map" : "own odometry: position on the map unknown"],
+      ["frame", robot.located ? state.fleet.frame || "map" : "own odometry: position on the map unknown"],
       ["distance", robot.distance === null ? "-" : `${robot.distance.toFixed(2)} m since this view opened`],
       ["nearest", ranges.length ? `${meters(Math.min(...ranges))} m` : "nothing in range"],
       ["odometry", robot.odom === null ? "-" : `${robot.odom.toFixed(1)} Hz`],
@@ -162,7 +162,7 @@ export class RobotPanel {
     ];
     const truth = state.ground_truth[robot.name];
     if (pose && truth) {
-      facts.splice(1, 0, ["odometry error", `${Math.hypot(pose[0] - truth[0], pose[1] - truth[1]).toFixed(0)} mm`]);
+      facts.splice(1, 0, [state.fleet.frame ? "error of the pose" : "odometry error", `${Math.hypot(pose[0] - truth[0], pose[1] - truth[1]).toFixed(0)} mm`]);
     }
     return facts;
   }

@@ -1,0 +1,61 @@
+"""The camera's picture as the tracker of hero_localization publishes it, from straight above. Pure.
+
+It lies under the robots if the map is in its frame; otherwise the page shows it beside them.
+"""
+
+import math
+from typing import Any, Dict, List, Optional
+
+from .sections import FARTHEST_M
+
+JPEG_START = b"\xff\xd8"
+BYTES_MAX = 2000000
+"""Of a picture; the tracker's have some 100 kB."""
+
+PERIOD_S = 0.2
+"""Between two pictures that pages fetch, however many are published."""
+
+SILENT_S = 3.0
+"""The tracker publishes five pictures a second; an older one shows no robot where it is."""
+
+
+class CameraPicture:
+    """The newest picture.
+
+    Attributes:
+        jpeg: the picture; empty without one.
+    """
+
+    def __init__(self) -> None:
+        self.jpeg = b""
+        self._number = 0
+        self._received_s = -math.inf
+        self._frame = ""
+        self._box_mm: Optional[List[int]] = None
+
+    def receive(self, picture: Any, now_s: float) -> None:
+        """Take a sensor_msgs/CompressedImage, unless it comes too soon, or is none that a browser can show."""
+        if now_s < self._received_s + PERIOD_S:
+            return
+        data = bytes(picture.data)
+        if data.startswith(JPEG_START) and len(data) <= BYTES_MAX:
+            self.jpeg = data
+            self._number += 1
+            self._received_s = now_s
+
+    def receive_outline(self, outline: Any) -> None:
+        """Take the places of the picture's corners: a geometry_msgs/PolygonStamped."""
+        xs, ys = ([getattr(point, axis) for point in outline.polygon.points] for axis in "xy")
+        is_known = len(xs) == 4 and all(abs(value) <= FARTHEST_M for value in xs + ys)
+        self._box_mm = [round(1e3 * value) for value in (min(xs), min(ys), max(xs), max(ys))] if is_known else None
+        self._frame = outline.header.frame_id.lstrip("/")
+
+    def describe(self, map_frame: str, now_s: float) -> Optional[Dict[str, Any]]:
+        """Return the picture's number and box, None without a picture.
+
+        box: x min, y min, x max, y max in mm; None if its place on this map is unknown.
+        """
+        if now_s > self._received_s + SILENT_S:
+            self.jpeg = b""
+            return None
+        return {"number": self._number, "box": self._box_mm if self._frame == map_frame else None}

@@ -1,0 +1,56 @@
+// The camera's picture: each that the monitor announces is fetched while it is shown, one at a time.
+
+const HINT = "no picture: roslaunch hero_localization camera.launch";
+
+const element = (id) => document.getElementById(id);
+
+export class CameraPicture {
+  /** redraw: is called when the map has another picture, or none. */
+  constructor(redraw) {
+    this.redraw = redraw;
+    this.box = null; // of the picture on the map, mm; null: it is shown in a panel, or not at all
+    this.image = null;
+    this.wanted = null; // as the monitor describes it: number, and box on the map
+    this.number = null;
+    this.fetching = false;
+  }
+
+  /** Show the picture that the monitor describes (null: it has none), or no picture. */
+  show(isShown, picture) {
+    this.isShown = isShown;
+    this.wanted = isShown ? picture : null;
+    if (this.wanted === null) {
+      this.image = this.box = this.number = null;
+      this.place();
+    } else this.fetch();
+  }
+
+  fetch() {
+    if (this.fetching || this.wanted === null || this.wanted.number === this.number) return;
+    this.fetching = true;
+    const { number, box } = this.wanted;
+    const image = new Image();
+    const end = () => {
+      this.fetching = false;
+      this.number = number;
+      this.fetch();
+    };
+    image.addEventListener("error", end);
+    image.addEventListener("load", () => {
+      if (this.wanted !== null) {
+        [this.image, this.box] = [image, box];
+        this.place();
+      }
+      end();
+    });
+    image.src = `picture?${number}`;
+  }
+
+  /** Put a picture without a place on the map into the panel. */
+  place() {
+    const beside = this.isShown && this.box === null ? [this.image || HINT] : [];
+    element("panel").hidden = beside.length === 0;
+    element("panel").replaceChildren(...beside);
+    this.redraw();
+  }
+}
