@@ -8,6 +8,7 @@ from typing import List, NamedTuple, Optional, Sequence, Tuple
 import numpy as np
 
 from .observations import Origin, RobotObservations, StateReport
+from .series import Series
 
 STANDSTILL_S = 0.5
 """A robot whose wheels have not turned for this long is at rest."""
@@ -60,13 +61,21 @@ class Span(NamedTuple):
 
 def read_path(robot: RobotObservations) -> Path:
     """Return the path of a robot by odometry, in the shared frame, or in its own if there is none."""
-    arrival_s, _, x_m, y_m, yaw_rad, _, _ = robot.odometry.columns()
-    return transform_path(Path(arrival_s, x_m, y_m, yaw_rad), robot.origins)
+    return transform_path(_read_series(robot.odometry), robot.origins)
+
+
+def read_localized_path(robot: RobotObservations) -> Path:
+    """Return the path of a robot by localization, in the frame of its poses; empty without localization."""
+    return _read_series(robot.poses)
 
 
 def read_ground_truth(robot: RobotObservations) -> Path:
     """Return the true path of a robot; empty without ground truth."""
-    arrival_s, _, x_m, y_m, yaw_rad, _, _ = robot.ground_truth.columns()
+    return _read_series(robot.ground_truth)
+
+
+def _read_series(series: Series) -> Path:
+    arrival_s, _, x_m, y_m, yaw_rad, *_ = series.columns()
     return Path(arrival_s, x_m, y_m, yaw_rad)
 
 

@@ -3,7 +3,7 @@
 Up to seven robots have colors and a legend. More have shades, and are labeled with their ids where they end.
 """
 
-from typing import Any, Dict, Optional, Sequence, Tuple
+from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 from matplotlib import patches, pyplot
@@ -47,6 +47,11 @@ def choose_colors(robot_ids: Sequence[int]) -> Dict[int, Any]:
         return dict(zip(robot_ids, _FEW))
     # The bright end of the scale is hard to see on white.
     return dict(zip(robot_ids, pyplot.get_cmap("viridis")(np.linspace(0.0, 0.85, len(robot_ids)))))
+
+
+def _has_comparable_truth(robot: RobotObservations) -> bool:
+    """Return whether a robot has ground truth, and its path is in a frame that robots share."""
+    return len(robot.ground_truth) > 0 and bool(robot.origins or len(robot.poses))
 
 
 class Figures:
@@ -99,10 +104,15 @@ class Figures:
 
     def draw_paths(self) -> Optional[Figure]:
         """Draw the paths of all robots in the arena."""
-        drawn = {key: robot for key, robot in self._robots.items() if len(robot.odometry) or len(robot.ground_truth)}
+        drawn = {
+            key: robot
+            for key, robot in self._robots.items()
+            if len(robot.odometry) or len(robot.ground_truth) or len(robot.poses)
+        }
         if not drawn:
             return None
-        figure, grid = self._begin(8.0, "Paths by odometry")
+        is_localized = any(len(robot.poses) for robot in drawn.values())
+        figure, grid = self._begin(8.0, "Paths by localization" if is_localized else "Paths by odometry")
         axes = grid[0][0]
         walls = [[(x1, y1), (x2, y2)] for x1, y1, x2, y2 in self._seen.walls_m]
         axes.add_collection(LineCollection(walls, **_OBSTACLES))
@@ -113,16 +123,16 @@ class Figures:
             Line2D([], [], color=_GREY, label="start", **begin),
             Line2D([], [], color=_GREY, marker="o", markersize=9, linestyle="", label="end"),
         ]
-        if any(len(robot.ground_truth) and robot.origins for robot in drawn.values()):
+        if any(map(_has_comparable_truth, drawn.values())):
             legend.append(Line2D([], [], color=_GREY, linewidth=2.2, alpha=0.4, label="ground truth"))
         if self._seen.walls_m or self._seen.circles_m:
             legend.append(Line2D([], [], color="black", linewidth=1.5, label="walls, obstacles"))
         for robot_id, robot in drawn.items():
             color = self._colors[robot_id]
-            if robot.origins:
+            if _has_comparable_truth(robot):
                 true_path = analysis.read_ground_truth(robot)
                 axes.plot(true_path.x_m, true_path.y_m, color=color, linewidth=2.2, alpha=0.3, zorder=2)
-            path = analysis.read_path(robot)
+            path = analysis.read_localized_path(robot) if len(robot.poses) else analysis.read_path(robot)
             if len(path.x_m):
                 axes.plot(path.x_m, path.y_m, color=color, linewidth=0.9, zorder=3)
                 axes.plot(path.x_m[0], path.y_m[0], color=color, zorder=4, **begin)
@@ -138,12 +148,19 @@ class Figures:
         return figure
 
     def _describe_frames(self, drawn: Dict[int, RobotObservations]) -> str:
-        unplaced = ["hero_%d" % key for key, robot in drawn.items() if not robot.origins]
-        if not unplaced:
-            return "frame " + self._seen.shared_frame
-        if len(unplaced) < len(drawn):
-            return "frame %s; %s: own odom frame" % (self._seen.shared_frame, ", ".join(unplaced))
-        return "each robot in its own odom frame: no transforms on /tf_static" if len(drawn) > 1 else ""
+        """Return the frame of most robots, and those whose frame is another."""
+        robots: Dict[str, List[str]] = {}
+        for key, robot in drawn.items():
+            frame = self._seen.pose_frame if len(robot.poses) else self._seen.shared_frame if robot.origins else ""
+            robots.setdefault("frame " + frame if frame else "own odom frame", []).append("hero_%d" % key)
+        if list(robots) == ["own odom frame"]:
+            return "each robot in its own odom frame: no transforms on /tf_static" if len(drawn) > 1 else ""
+        first, *others = sorted(robots, key=lambda frame: (frame.startswith("own"), -len(robots[frame])))
+        texts = [first] + ["%s: %s" % (", ".join(robots[frame]), frame) for frame in others]
+        true_frame = self._seen.true_frame
+        if true_frame and "frame " + true_frame != first and any(map(_has_comparable_truth, drawn.values())):
+            texts.append("ground truth: frame " + true_frame)
+        return "; ".join(texts)
 
     def _draw_robot(self, axes: Axes, robot_id: int, path: analysis.Path) -> None:
         """Draw a robot at the end of its path with a line to its front, and its id if there is no legend."""

@@ -15,6 +15,7 @@ from .topics import (
     ENCODER,
     GROUND_TRUTH,
     ODOMETRY,
+    POSE,
     POSITION_COMMAND,
     STATIC_TRANSFORMS_TOPIC,
     TRANSFORMS_TYPES,
@@ -25,7 +26,7 @@ from .topics import (
     is_fleet_topic,
 )
 
-KINDS = (ODOMETRY, GROUND_TRUTH, ENCODER, VELOCITY_COMMAND, POSITION_COMMAND)
+KINDS = (ODOMETRY, GROUND_TRUTH, POSE, ENCODER, VELOCITY_COMMAND, POSITION_COMMAND)
 CUBE, CYLINDER = 1, 3
 """Types of visualization_msgs/Marker that walls and round obstacles are drawn with."""
 
@@ -52,6 +53,7 @@ class RobotObservations:
 
     Attributes:
         odometry, ground_truth: rows of arrival s, stamp s, x m, y m, yaw rad, linear m/s, angular rad/s.
+        poses: rows of arrival s, stamp s, x m, y m, yaw rad, by localization.
         encoder: rows of arrival s, left ticks, right ticks.
         commands: rows of arrival s, linear m/s, angular rad/s, of both controllers.
         origins: poses of its odom frame in the frame that all robots share.
@@ -61,6 +63,7 @@ class RobotObservations:
     def __init__(self) -> None:
         self.odometry = Series(2, 5)
         self.ground_truth = Series(2, 5)
+        self.poses = Series(2, 3)
         self.encoder = Series(3, 0)  # ticks grow beyond any limit
         self.commands = Series(1, 2)
         self.origins: List[Origin] = []
@@ -74,6 +77,8 @@ class RobotObservations:
         elif kind == ENCODER:
             time_s, _, left_ticks, right_ticks, *_ = row
             self.encoder.add(time_s, left_ticks, right_ticks)
+        elif kind == POSE:
+            self.poses.add(*row[:5])
         else:
             series = {ODOMETRY: self.odometry, GROUND_TRUTH: self.ground_truth}.get(kind, self.commands)
             series.add(*row)
@@ -81,7 +86,7 @@ class RobotObservations:
     @property
     def skipped(self) -> int:
         """Number of messages with absurd numbers."""
-        return sum(series.skipped for series in (self.odometry, self.ground_truth, self.commands))
+        return sum(series.skipped for series in (self.odometry, self.ground_truth, self.poses, self.commands))
 
 
 class Observations:
@@ -92,6 +97,7 @@ class Observations:
         walls_m: segments x1 y1 x2 y2 of the arena.
         circles_m: round obstacles x y radius.
         shared_frame: frame of the origins; empty if none were recorded.
+        pose_frame, true_frame: frames of poses and ground truth; empty if none were recorded.
     """
 
     def __init__(self, robot_ids: Optional[Set[int]] = None) -> None:
@@ -100,7 +106,7 @@ class Observations:
         self.robots: DefaultDict[int, RobotObservations] = defaultdict(RobotObservations)
         self.walls_m: List[Tuple[float, float, float, float]] = []
         self.circles_m: List[Tuple[float, float, float]] = []
-        self.shared_frame = ""
+        self.shared_frame = self.pose_frame = self.true_frame = ""
 
     def wants(self, topic: str, message_type: str) -> bool:
         """Return whether receive() uses a topic."""
@@ -126,6 +132,10 @@ class Observations:
             for robot_id, kind, row in read_rows(*message):
                 if self._wants_robot(robot_id):
                     self.robots[robot_id].add(kind, row)
+                    if kind == POSE:
+                        self.pose_frame = message.content.header.frame_id.strip("/")
+                    elif kind == GROUND_TRUTH:
+                        self.true_frame = message.content.header.frame_id.strip("/")
 
     def _receive_transforms(self, message: Message) -> None:
         for transform in message.content.transforms:

@@ -32,19 +32,29 @@ def _range_reader(index: int) -> Callable[[Any], Any]:
     return lambda content: content.ranges[index] if index < len(content.ranges) else math.nan
 
 
-_POSE: Columns = {
+_PLACE: Columns = {
     "stamp_s": _read_stamp,
     "x_m": attrgetter("pose.pose.position.x"),
     "y_m": attrgetter("pose.pose.position.y"),
     "yaw_rad": lambda content: yaw_of(content.pose.pose.orientation),
+}
+_ODOMETRY: Columns = {
+    **_PLACE,
     "linear_m_s": attrgetter("twist.twist.linear.x"),
     "angular_rad_s": attrgetter("twist.twist.angular.z"),
 }
 _TWIST: Columns = {"linear_m_s": attrgetter("linear.x"), "angular_rad_s": attrgetter("angular.z")}
 
 TABLES: Dict[str, Columns] = {
-    topics.ODOMETRY: _POSE,
-    topics.GROUND_TRUTH: _POSE,
+    topics.ODOMETRY: _ODOMETRY,
+    topics.GROUND_TRUTH: _ODOMETRY,
+    topics.POSE: {
+        **_PLACE,
+        # Of x, y and yaw in the covariance of x, y, z and rotations about x, y, z.
+        "x_sd_m": lambda content: math.sqrt(abs(content.pose.covariance[0])),
+        "y_sd_m": lambda content: math.sqrt(abs(content.pose.covariance[7])),
+        "yaw_sd_rad": lambda content: math.sqrt(abs(content.pose.covariance[35])),
+    },
     topics.ENCODER: {
         "stamp_s": _read_stamp,
         "left_ticks": attrgetter("left_ticks"),

@@ -8,6 +8,7 @@ from typing import Any, List, NamedTuple, Optional, Sequence
 
 ODOMETRY = "odometry"
 GROUND_TRUTH = "ground_truth"
+POSE = "pose"
 ENCODER = "encoder"
 PROXIMITY = "proximity"
 VELOCITY_COMMAND = "velocity_command"
@@ -19,6 +20,7 @@ IMU = "imu"
 ROBOT_TOPICS = {
     "odom": (ODOMETRY, "nav_msgs/Odometry"),
     "ground_truth": (GROUND_TRUTH, "nav_msgs/Odometry"),
+    "pose": (POSE, "geometry_msgs/PoseWithCovarianceStamped"),
     "encoder": (ENCODER, "hero_msgs/Encoder"),
     "proximity": (PROXIMITY, "sensor_msgs/LaserScan"),
     "cmd_vel": (VELOCITY_COMMAND, "geometry_msgs/Twist"),
@@ -45,8 +47,12 @@ SHARED_PATTERNS = (
     "/diagnostics",
     "/hero_driver[^/]*/(robots|stopped)",
     "/(.*/)?arena",
+    "/localization/poses",
+    "/track/(measured_poses|objects)",
+    "/map(_updates)?",
 )
-"""Topics of no single robot: frames, log lines, the robots of all drivers (docs/several_machines.md), walls."""
+"""Topics of no single robot: frames, log lines, the robots of all drivers (docs/several_machines.md), walls,
+what hero_localization publishes of all robots."""
 
 _FLEET_TOPIC = re.compile(r"/hero_driver[^/]*/robots")
 _ROBOT_TOPIC = re.compile(r"/hero_([0-9]{1,9})/(.+)")

@@ -18,9 +18,10 @@ import rostest
 from geometry_msgs.msg import Twist, Vector3
 from nav_msgs.msg import Odometry
 
+from hero_test.processes import find_program, has_traceback
 from hero_test.waiting import wait_for
 
-RECORD = ["rosrun", "hero_recording", "record"]
+RECORD = find_program("hero_recording", "record")
 TIMEOUT_S = 60.0
 ROBOT_TOPICS = ("odom", "encoder", "proximity", "ground_truth")
 MOST_TAKEN = 4 * 10**9
@@ -56,12 +57,12 @@ class RecordTest(unittest.TestCase):
 
     def start_recording(self, name, *arguments, **options):
         """Start to record into a folder of this name; return the process."""
-        return self.start(*RECORD, "--folder", os.path.join(self.folder, name), *arguments, **options)
+        return self.start(RECORD, "--folder", os.path.join(self.folder, name), *arguments, **options)
 
     def finish(self, process):
         """Wait for the end; return exit code and output."""
         output = process.communicate(timeout=TIMEOUT_S)[0].decode()
-        self.assertNotIn("Traceback", output)
+        self.assertFalse(has_traceback(output), output)
         return process.returncode, output
 
     def end(self, process, number=signal.SIGINT):
@@ -94,7 +95,7 @@ class RecordTest(unittest.TestCase):
         # As a shell does: roslaunch's nodes run elsewhere, and know the folder by PWD.
         recording = self.start(*launch, cwd=self.folder, env=dict(os.environ, PWD=self.folder))
         self.wait_for_files("hero_*_0.bag.active")
-        simulator = ["rosrun", "hero_sim", "hero_sim", "--port", "21297", "--first-id", "7", "--quiet"]
+        simulator = [find_program("hero_sim", "hero_sim"), "--port", "21297", "--first-id", "7", "--quiet"]
         late = self.start(*simulator, "__name:=late_sim")
         # The recorder asks the ROS master for new topics once in a while; nobody else listens to these.
         wait_for(lambda: is_subscribed("/hero_7/"), "subscriptions to hero_7")
@@ -142,8 +143,11 @@ class RecordTest(unittest.TestCase):
 
     def check_programs(self, bags):
         """Let the other programs of this package read the bags."""
-        programs = ["plot", "--figures", "paths,delays", "--out", "drawn"], ["export", "--out", "tables"]
-        processes = [self.start("rosrun", "hero_recording", *program, *bags, cwd=self.folder) for program in programs]
+        calls = ("plot", "--figures", "paths,delays", "--out", "drawn"), ("export", "--out", "tables")
+        processes = [
+            self.start(find_program("hero_recording", name), *arguments, *bags, cwd=self.folder)
+            for name, *arguments in calls
+        ]
         (plot_code, plotted), (export_code, exported) = map(self.finish, processes)
         self.assertEqual((plot_code, export_code), (0, 0), plotted + exported)
         self.assertEqual(len(self.files("drawn_*.png")), 2, plotted)

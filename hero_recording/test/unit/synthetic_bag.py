@@ -3,7 +3,7 @@
 import math
 
 import rosbag
-from geometry_msgs.msg import Quaternion, TransformStamped, Twist
+from geometry_msgs.msg import PoseWithCovarianceStamped, Quaternion, TransformStamped, Twist
 from nav_msgs.msg import Odometry
 from rospy import Time
 from sensor_msgs.msg import LaserScan
@@ -36,11 +36,21 @@ def make_quaternion(yaw_rad):
     return Quaternion(0.0, 0.0, math.sin(yaw_rad / 2.0), math.cos(yaw_rad / 2.0))
 
 
-def make_pose(stamp_s, x_m, y_m, yaw_rad, speed_m_s=0.0):
-    message = Odometry()
-    message.header.stamp = Time.from_sec(stamp_s)
+def place(message, frame, stamp_s, x_m, y_m, yaw_rad):
+    message.header.frame_id, message.header.stamp = frame, Time.from_sec(stamp_s)
     message.pose.pose.position.x, message.pose.pose.position.y = x_m, y_m
     message.pose.pose.orientation = make_quaternion(yaw_rad)
+    return message
+
+
+def make_localized(stamp_s, x_m, y_m, yaw_rad):
+    message = place(PoseWithCovarianceStamped(), "map", stamp_s, x_m, y_m, yaw_rad)
+    message.pose.covariance = [4e-6 if index in (0, 7) else 0.0 for index in range(36)]
+    return message
+
+
+def make_pose(frame, stamp_s, x_m, y_m, yaw_rad, speed_m_s=0.0):
+    message = place(Odometry(), frame, stamp_s, x_m, y_m, yaw_rad)
     message.twist.twist.linear.x = speed_m_s
     message.twist.twist.angular.z = speed_m_s / RADIUS_M
     return message
@@ -100,9 +110,9 @@ def write_bag(path, robot_ids=(0,), seconds=5.0, start_s=START_S, pause=None, co
             for robot_id in robot_ids:
                 name = "/hero_%d/" % robot_id
                 stamp_s = start_s + time_s
-                write(name + "odom", make_pose(stamp_s, x_m, y_m, yaw_rad, speed_m_s), time_s + DELAY_S)
+                write(name + "odom", make_pose(name + "odom", stamp_s, x_m, y_m, yaw_rad, speed_m_s), time_s + DELAY_S)
                 true_x_m = x_m + ORIGIN_X_M * robot_id + ERROR_M
-                write(name + "ground_truth", make_pose(stamp_s, true_x_m, y_m, yaw_rad), time_s)
+                write(name + "ground_truth", make_pose("world", stamp_s, true_x_m, y_m, yaw_rad), time_s)
                 encoder = Encoder(left_ticks=round(driven_s * 200.0), right_ticks=round(driven_s * 200.0))
                 encoder.header.stamp = Time.from_sec(stamp_s)
                 write(name + "encoder", encoder, time_s)

@@ -55,6 +55,7 @@ def test_robots_that_join_later_are_recorded_and_other_topics_are_not():
         "/hero_4/velocity_controller/cmd_vel",
         "/hero_4/cmd_vel",
         "/hero_4/ground_truth",
+        "/hero_4/pose",
         *(
             "/tf",
             "/tf_static",
@@ -64,6 +65,9 @@ def test_robots_that_join_later_are_recorded_and_other_topics_are_not():
             "/hero_driver_b/robots",
             "/hero_sim/arena",
             "/arena",
+            "/localization/poses",
+            "/track/measured_poses",
+            "/map",
             "/mine",
         ),
     ):
@@ -75,6 +79,7 @@ def test_robots_that_join_later_are_recorded_and_other_topics_are_not():
         "/hero_x/odom",
         "/rosout_agg",
         "/minefield",
+        "/track/picture/compressed",
     ):
         assert not is_recorded(topic), topic
 
@@ -122,6 +127,26 @@ def test_a_path_is_moved_and_turned_with_the_origin_of_its_time():
     assert moved.yaw_rad == pytest.approx([math.pi / 2.0, math.pi / 2.0, 3.0 - math.pi])
 
 
+def test_localized_robots_are_drawn_in_map_and_others_are_named(tmp_path):
+    path = tmp_path / "localized.bag"
+    write_bag(path, robot_ids=(0, 3, 5), seconds=3.0)
+    with rosbag.Bag(str(path), "a") as bag:
+        for robot_id in (0, 3):
+            for step in range(3):
+                pose = synthetic_bag.make_localized(START_S + step, robot_id + 0.1 * step, -2.0, 0.5)
+                bag.write("/hero_%d/pose" % robot_id, pose, pose.header.stamp)
+    seen = observe(path)
+    axes = Figures(seen, START_S, START_S + 3.0, "localized.bag").draw_paths().axes[0]
+    assert axes.get_title() == "frame map; hero_5: frame world; ground truth: frame world"
+    assert axes.figure._suptitle.get_text().strip() == "Paths by localization"
+    drawn = [tuple(line.get_xdata()) for line in axes.lines]
+    assert pytest.approx((3.0, 3.1, 3.2)) in drawn
+    assert analysis.read_path(seen.robots[3]).x_m[0] == pytest.approx(3.0 * synthetic_bag.ORIGIN_X_M, abs=1e-6)
+    del seen.robots[5]
+    seen.true_frame = "map"
+    assert Figures(seen, START_S, START_S + 3.0, "localized.bag").draw_paths().axes[0].get_title() == "frame map"
+
+
 def test_robots_can_be_selected(two_robots):
     assert sorted(observe(two_robots, {3}).robots) == [3]
 
@@ -154,7 +179,7 @@ def test_commands_to_a_moving_robot_have_no_motion_delay():
 def test_messages_with_absurd_numbers_are_skipped_and_counted():
     observations = Observations()
     for x_m in (0.0, math.nan, math.inf, 1e30, 0.1):
-        pose = synthetic_bag.make_pose(1.0, x_m, 0.0, 0.0)
+        pose = synthetic_bag.make_pose("odom", 1.0, x_m, 0.0, 0.0)
         observations.receive(Message("/hero_0/odom", "nav_msgs/Odometry", pose, 1.0))
     assert analysis.read_path(observations.robots[0]).length_m == pytest.approx(0.1)
     assert plot.format_table(observations)[-1].startswith("hero_0: skipped 3 messages")
@@ -184,8 +209,8 @@ def test_few_robots_have_distinct_colors_and_many_a_scale():
     assert len(choose_colors([4])) == 1
 
 
-@pytest.mark.parametrize("count", [1, 50])
-def test_figures_of_one_and_of_fifty_robots_have_titles_units_and_ids(count, tmp_path):
+@pytest.mark.parametrize("count", [1, 2 * MOST_NAMED])
+def test_figures_of_one_and_of_many_robots_have_titles_units_and_ids(count, tmp_path):
     path = tmp_path / "fleet.bag"
     write_bag(path, robot_ids=range(count), seconds=1.5)
     drawing = Figures(observe(path), START_S, START_S + 1.5, "fleet.bag")

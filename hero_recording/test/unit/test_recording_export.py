@@ -4,7 +4,8 @@ import csv
 import math
 
 import pytest
-from synthetic_bag import DELAY_S, START_S, write_bag
+import rosbag
+from synthetic_bag import DELAY_S, START_S, make_localized, write_bag
 
 from hero_recording import export
 from hero_recording.errors import RecordingError
@@ -54,6 +55,16 @@ def test_rows_hold_what_was_recorded_with_time_and_stamp(bag, tmp_path, capsys):
     assert float(scan["right_m"]) == -math.inf
     assert math.isnan(float(scan["front_right_m"]))
     assert read_csv(tmp_path / "out" / "hero_3" / "status.csv")[0]["state"] == "ready"
+
+
+def test_poses_by_localization_have_a_table_with_their_deviations(tmp_path, capsys):
+    with rosbag.Bag(str(tmp_path / "poses.bag"), "w") as bag:
+        pose = make_localized(START_S, 1.5, -0.5, 0.25)
+        bag.write("/hero_3/pose", pose, pose.header.stamp)
+    run_export(capsys, tmp_path / "poses.bag", "--out", tmp_path / "out")
+    (row,) = read_csv(tmp_path / "out" / "hero_3" / "pose.csv")
+    assert [float(row[name]) for name in ("stamp_s", "x_m", "y_m", "yaw_rad")] == [START_S, 1.5, -0.5, 0.25]
+    assert float(row["x_sd_m"]) == float(row["y_sd_m"]) == pytest.approx(0.002)
 
 
 def test_robots_and_tables_can_be_selected(bag, tmp_path, capsys):
