@@ -15,9 +15,9 @@ from typing import Dict, List, Optional, Sequence
 import rospy
 
 from hero_client import command_line
-from hero_client.command_line import make_printable
+from hero_client.texts import make_printable
 
-from .checkup import computer, graph, network
+from .checkup import computer, graph, localization, network
 from .checkup.points import FAIL, OK, WARN, Finding, Point, run_points, warn
 
 TIMEOUT_S = 1.5  # of the points that run at once: those that need no ROS master, the node, those that need it
@@ -33,6 +33,8 @@ def run_check(port: int, interface: Optional[str]) -> Dict[str, Finding]:
         "python": computer.check_python,
         "packages": computer.check_packages,
         "messages": computer.check_messages,
+        "camera": localization.check_camera,
+        "tags": localization.check_detectors,
         "ros_environment": lambda: graph.check_variables(addresses),
         "own_name": lambda: graph.check_own_name(own),
         "port": lambda: network.check_port(port, listeners),
@@ -41,7 +43,11 @@ def run_check(port: int, interface: Optional[str]) -> Dict[str, Finding]:
         "master": lambda: graph.check_master(own),
     }
     node = graph.OwnNode()
-    later: Dict[str, Point] = {"return_path": node.check_return_path, "robots": node.check_robots}
+    later: Dict[str, Point] = {
+        "return_path": node.check_return_path,
+        "robots": node.check_robots,
+        "localization": localization.check_nodes,
+    }
     findings = run_points(points, TIMEOUT_S)
     for needed, more in (("master", {"node": node.start}), ("node", later)):
         if findings[needed].state == OK:

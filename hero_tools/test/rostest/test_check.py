@@ -12,6 +12,7 @@ import rospy
 import rostest
 
 from hero_test.fleet_report import wait_until_ready
+from hero_test.processes import find_program
 
 DEADLINE_S = 60.0  # check itself ends after 3 s; a machine that is busy may take longer
 PORT = "21310"
@@ -22,7 +23,7 @@ def run_check(*arguments, **environment):
     """Return the exit code and the findings by point; an environment variable that is None is not there."""
     variables = {**os.environ, **environment}
     result = subprocess.run(
-        ["rosrun", "hero_tools", "check", "--json", "--port", PORT, *arguments],
+        [find_program("hero_tools", "check"), "--json", "--port", PORT, *arguments],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         env={name: value for name, value in variables.items() if value is not None},
@@ -53,6 +54,7 @@ class CheckTest(unittest.TestCase):
         self.assert_point(points, "addresses", "WARN", "open on 127.0.0.1 only")
         self.assert_point(points, "packages", "OK", "all of version")
         self.assert_point(points, "messages", "OK", "match")
+        self.assert_point(points, "localization", "OK", "not running; roslaunch hero_localization")
 
     def test_a_name_that_others_cannot_resolve_closes_the_return_path(self):
         code, points = run_check(ROS_HOSTNAME=NO_SUCH_NAME)

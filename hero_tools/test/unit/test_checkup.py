@@ -4,9 +4,10 @@ import socket
 import threading
 
 import pytest
+from diagnostic_msgs.msg import DiagnosticStatus
 
 from hero_tools import check
-from hero_tools.checkup import computer, graph, network
+from hero_tools.checkup import computer, graph, localization, network
 from hero_tools.checkup.network import Address
 from hero_tools.checkup.points import FAIL, OK, WARN, ask_system, ok, run_points
 
@@ -145,6 +146,57 @@ def test_packages_that_are_not_on_the_path_are_named(monkeypatch):
     assert finding.state == FAIL
     assert "hero_nowhere" in finding.text
     assert "source" in finding.remedy[0]
+
+
+def test_a_camera_that_this_user_may_not_open_is_named(tmp_path, monkeypatch):
+    pattern = str(tmp_path / "video*")
+    assert localization.check_camera(pattern).state == OK
+    (tmp_path / "video0").touch()
+    assert localization.check_camera(pattern) == (OK, str(tmp_path / "video0"), ())
+    monkeypatch.setattr(localization.os, "access", lambda path, mode: not path.endswith("video1"))
+    (tmp_path / "video1").touch()
+    finding = localization.check_camera(pattern)
+    assert finding.state == WARN
+    assert finding.text.endswith("may not open %s" % (tmp_path / "video1"))
+
+
+@pytest.mark.parametrize(
+    ("installed", "state", "says"),
+    [
+        (("cv2", "apriltag"), OK, "detectors apriltag and aruco"),
+        (("cv2",), WARN, "detector aruco (OpenCV) only"),
+        (("apriltag",), WARN, "OpenCV is missing"),
+    ],
+)
+def test_the_installed_detectors_of_tags_are_named(installed, state, says, monkeypatch):
+    monkeypatch.setattr(localization.importlib.util, "find_spec", lambda name: name if name in installed else None)
+    finding = localization.check_detectors()
+    assert finding.state == state
+    assert says in finding.text
+    assert bool(finding.remedy) == (state != OK)
+
+
+def test_what_tracker_and_filter_report_is_told():
+    rate = DiagnosticStatus(name="track: camera", message="29.9 pictures per second, 2 tags")
+    robots = [DiagnosticStatus(name="localization: hero_%d" % number, message="tracked") for number in (0, 1)]
+    other = DiagnosticStatus(name="hero_driver: hero_0", level=DiagnosticStatus.ERROR, message="no bytes")
+    finding = localization.describe_nodes(["track", "localization"], [rate, *robots, other])
+    text = "track: 29.9 pictures per second, 2 tags; localization: 2 of 2 robots without a problem"
+    assert finding == (OK, text, ())
+    robots[1].level, robots[1].message = DiagnosticStatus.WARN, "not measured for 3 s"
+    rate.level, rate.message = DiagnosticStatus.ERROR, "pictures are too dark"
+    finding = localization.describe_nodes(["track", "localization"], [rate, *robots])
+    assert (finding.state, finding.text) == (
+        WARN,
+        "track: no usable pictures; localization: 1 of 2 robots without a problem",
+    )
+    assert finding.remedy == ("track: camera: pictures are too dark", "localization: hero_1: not measured for 3 s")
+
+
+def test_a_tracker_that_reports_nothing_is_named():
+    finding = localization.describe_nodes(["track"], [])
+    assert finding.state == WARN
+    assert "rosnode ping track" in finding.remedy[0]
 
 
 def test_a_command_that_is_missing_fails_or_hangs_is_no_error():

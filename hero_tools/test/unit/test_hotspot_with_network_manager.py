@@ -33,6 +33,7 @@ from hero_tools import hotspot
 hotspot.choose_device = lambda wanted: ("wlan0", "")  # the namespace has no radio
 kept = Path("/etc/NetworkManager/system-connections/hero_hotspot.nmconnection")
 
+
 def look(*arguments, **options):
     if "up" in arguments:
         text = kept.read_text()

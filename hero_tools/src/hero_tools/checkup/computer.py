@@ -17,6 +17,7 @@ SUITE = (
     "hero_description",
     "hero_driver",
     "hero_examples",
+    "hero_localization",
     "hero_monitor",
     "hero_msgs",
     "hero_recording",
@@ -62,7 +63,7 @@ def check_python() -> Finding:
             return warn(
                 "%s; the first python3 on PATH, %s, has no rospy" % (text, other),
                 "rosrun and roslaunch are not affected; your own scripts: %s FILE" % sys.executable,
-                "build with -DPYTHON_EXECUTABLE=%s" % sys.executable,
+                "build with -DPYTHON_EXECUTABLE=%s; Debian 13: -DPython_EXECUTABLE" % sys.executable,
             )
     return ok(text)
 

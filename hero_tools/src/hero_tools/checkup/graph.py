@@ -4,9 +4,8 @@ The return path is tried: the node rosout runs beside the master and must connec
 """
 
 import os
-import time
 import urllib.parse
-from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple
+from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import rosgraph
 import rosgraph.roslogging
@@ -19,7 +18,7 @@ from hero_client.ros_node import ask_master
 from hero_msgs.msg import Robot, RobotArray
 
 from .network import HOST_REMEDY, Address, find_source_address, is_loopback, is_own, resolve
-from .points import Finding, fail, ok, warn
+from .points import Finding, fail, ok, wait_until, warn
 
 CONNECT_TIMEOUT_S = 0.8
 REPORT_TIMEOUT_S = 0.8
@@ -155,14 +154,6 @@ class OwnNode:
         text = "; ".join(text for text, _ in described)
         remedies = [line for _, lines in described for line in lines]
         return warn(text, *remedies[:LINES_MAX]) if remedies else ok(text)
-
-
-def wait_until(condition: Callable[[], bool], timeout_s: float) -> bool:
-    """Return as soon as a condition holds, or whether it does after timeout_s."""
-    end_s = time.monotonic() + timeout_s
-    while not condition() and time.monotonic() < end_s:
-        time.sleep(0.02)
-    return condition()
 
 
 def describe_report(topic: str, report: RobotArray) -> Tuple[str, List[str]]:

@@ -6,6 +6,8 @@ import threading
 import time
 from typing import Callable, Dict, List, NamedTuple, Optional, Sequence
 
+from hero_client.texts import one_line
+
 OK = "OK"
 WARN = "WARN"
 FAIL = "FAIL"
@@ -51,7 +53,7 @@ def run_points(points: Dict[str, Point], timeout_s: float) -> Dict[str, Finding]
         try:
             found[name] = point()
         except Exception as error:  # noqa: BLE001  a point that broke must not hide the others
-            text = "%s: %s" % (type(error).__name__, " ".join(str(error).split()))
+            text = "%s: %s" % (type(error).__name__, one_line(error))
             found[name] = fail("this point broke: %s" % text, "please report it")
 
     threads = [threading.Thread(target=run, args=item, daemon=True) for item in points.items()]
@@ -63,6 +65,14 @@ def run_points(points: Dict[str, Point], timeout_s: float) -> Dict[str, Finding]
     remedy = "the ROS master, a name server or a disk hangs; the other points are valid"
     late = fail("no answer within %.1f s" % timeout_s, remedy)
     return {name: found.get(name, late) for name in points}
+
+
+def wait_until(condition: Callable[[], bool], timeout_s: float) -> bool:
+    """Return as soon as a condition holds, or whether it does after timeout_s."""
+    end_s = time.monotonic() + timeout_s
+    while not condition() and time.monotonic() < end_s:
+        time.sleep(0.02)
+    return condition()
 
 
 def ask_system(command: List[str], timeout_s: float = 0.9) -> Optional[str]:

@@ -1,0 +1,88 @@
+"""What finding robots by a camera needs: a device, a detector of tags, and what its nodes report."""
+
+import glob
+import importlib.util
+import os
+from typing import Dict, List, Sequence
+
+import rospy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+
+from hero_client.ros_node import ask_master
+
+from .points import Finding, ok, wait_until, warn
+
+DIAGNOSTICS_TOPIC = "/diagnostics"
+TRACKER, LOCALIZER = "track", "localization"
+"""Nodes of hero_localization; track_2 is that of a second camera. Their statuses are called NODE: SUBJECT."""
+
+REPORT_TIMEOUT_S = 1.3
+"""They report once a second."""
+
+LINES_MAX = 10
+
+
+def check_camera(pattern: str = "/dev/video*") -> Finding:
+    """List the camera devices of this PC, and whether this user may open them."""
+    devices = sorted(glob.glob(pattern))
+    if not devices:
+        return ok("no %s: pictures must come on a topic; without tags no camera is needed" % pattern)
+    closed = [device for device in devices if not os.access(device, os.R_OK | os.W_OK)]
+    if closed:
+        text = "this user may not open %s" % ", ".join(closed)
+        return warn(text, "sudo usermod -aG video $USER, and log in again")
+    return ok(", ".join(devices))
+
+
+def check_detectors() -> Finding:
+    """Check which detectors of tags are installed."""
+    if importlib.util.find_spec("cv2") is None:
+        return warn("OpenCV is missing: robots cannot be found by their tags", "sudo apt install python3-opencv")
+    if importlib.util.find_spec("apriltag") is None:
+        return warn(
+            "detector aruco (OpenCV) only, which is less accurate: write 'detector: aruco' into the camera's file",
+            "sudo apt install python3-apriltag",
+        )
+    return ok("detectors apriltag and aruco (OpenCV)")
+
+
+def check_nodes() -> Finding:
+    """Print what tracker and filter report, such as the rate of pictures and robots that are lost."""
+    publishers = dict(ask_master("getSystemState")[0]).get(DIAGNOSTICS_TOPIC, [])
+    names = sorted(name.lstrip("/") for name in publishers)
+    running = [name for name in names if name.partition("_")[0] == TRACKER]
+    running += [name for name in names if name == LOCALIZER]
+    if not running:
+        return ok("not running; roslaunch hero_localization camera.launch starts it")
+    statuses: Dict[str, DiagnosticStatus] = {}
+
+    def keep(report: DiagnosticArray) -> None:
+        statuses.update({status.name: status for status in report.status})
+
+    subscriber = rospy.Subscriber(DIAGNOSTICS_TOPIC, DiagnosticArray, keep)
+    wait_until(lambda: all(list_statuses(name, list(statuses.values())) for name in running), REPORT_TIMEOUT_S)
+    subscriber.unregister()
+    return describe_nodes(running, list(statuses.values()))
+
+
+def list_statuses(name: str, statuses: Sequence[DiagnosticStatus]) -> List[DiagnosticStatus]:
+    """Return the statuses of a node."""
+    return [status for status in statuses if status.name.startswith(name + ": ")]
+
+
+def describe_nodes(running: Sequence[str], statuses: Sequence[DiagnosticStatus]) -> Finding:
+    """Return one line on tracker and filter, and a line for each problem that they report."""
+    texts, remedies = [], []
+    for name in running:
+        own = list_statuses(name, statuses)
+        good = [status for status in own if status.level == DiagnosticStatus.OK]
+        if name == LOCALIZER:
+            texts.append("%s: %d of %d robots without a problem" % (name, len(good), len(own)))
+        else:
+            camera = [status for status in own if status.name == name + ": camera"]
+            is_usable = camera and camera[0].level < DiagnosticStatus.ERROR
+            texts.append("%s: %s" % (name, camera[0].message if is_usable else "no usable pictures"))
+        if not own:
+            remedies.append("%s sends no diagnostics: rosnode ping %s tells whether it hangs" % (name, name))
+        remedies += ["%s: %s" % (status.name, status.message) for status in own if status not in good]
+    return warn("; ".join(texts), *remedies[:LINES_MAX]) if remedies else ok("; ".join(texts))
