@@ -51,6 +51,8 @@ PREPARING_COMMAND = re.compile("(cd|mkdir|chmod|echo|source|catkin config|catkin
 BUILD_COMMAND = "catkin build"
 
 PROMPT_PATTERN = re.compile("\x02([0-9]+)\x03")
+SHOWN_LINES = 30
+"""Of a wrong output, at its beginning and at its end."""
 COLUMNS = 400  # so that nothing wraps
 CONTROL_SEQUENCE = re.compile(r"\x1b\][^\x07\x1b]*(?:\x07|\x1b\\)|\x1b\[[0-9;?]*[A-Za-z]|\x1b[=>]|\x07")
 
@@ -434,6 +436,9 @@ class Course:
             missing = "%s:%d: %s" % (page.name, step.line + 1 + count, step.expected[count])
         else:
             missing = "no more lines, and the right exit status"
+        lines = output.splitlines()
+        if len(lines) > 2 * SHOWN_LINES:
+            lines[SHOWN_LINES:-SHOWN_LINES] = ["..."]
         state = "still running" if terminal.is_busy else "ended with exit status %d" % terminal.exit_code
         raise TutorialError(
             "%s:%d: $ %s\n  expected: %s\n  got (%s):\n%s"
@@ -443,7 +448,7 @@ class Course:
                 "^C" if step.command is None else step.command or "(the program that was left running)",
                 missing,
                 state,
-                "".join("    %s\n" % line for line in output.splitlines()[-60:]),
+                "".join("    %s\n" % line for line in lines),
             )
         )
 
