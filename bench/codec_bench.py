@@ -12,7 +12,7 @@ from hero_driver.corrections.tick_odometry import WheelGeometry
 from hero_driver.corrections.wheel_motion import WheelMotion
 from hero_driver.ros.message_types import apply_aliases
 from hero_driver.rosserial import packets
-from hero_driver.rosserial.session import Session, SessionLimits, TopicDeclared
+from hero_driver.rosserial.session import MessagesReceived, Session, SessionLimits, TopicDeclared
 
 BURSTS = 3000
 REPEATS = 5
@@ -58,7 +58,8 @@ def main():
         for burst in bursts:
             session.receive_bytes(burst, 1.0, 1.0)
 
-    messages = [session.receive_bytes(burst, 1.0, 1.0) for burst in bursts]
+    received = [event for burst in bursts for event in session.receive_bytes(burst, 1.0, 1.0)]
+    messages = [event.messages for event in received if isinstance(event, MessagesReceived)]
 
     def correct():
         corrections = RobotCorrections("/hero_0", settings, lambda name: NoSink(), NoSink().publish, WheelMotion())
@@ -66,8 +67,8 @@ def main():
             if isinstance(event, TopicDeclared) and event.topic.kind.is_from_robot:
                 info = event.topic.info
                 event.topic.receive = corrections.handler_for(info.name, apply_aliases(info.message_type))
-        for index, (received,) in enumerate(messages):
-            for topic, payload in received.messages:
+        for index, of_burst in enumerate(messages):
+            for topic, payload in of_burst:
                 topic.receive(payload, start_ns + index * BURST_NS)
 
     print_machine(measure_machine_us())

@@ -15,10 +15,10 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Dict, List
 
 import rosgraph
 from measuring import (
-    find_free_port,
     find_tree,
     measure_machine_us,
     percentile_ms,
@@ -32,6 +32,8 @@ from measuring import (
     wait_for_port,
     write_report,
 )
+
+from hero_test.processes import find_free_port
 
 LISTENING = "0A"  # state of a socket in /proc/net/tcp, TCP_LISTEN of the kernel
 HERE = Path(__file__).resolve().parent
@@ -219,7 +221,7 @@ def append_history(path, results, machine_us):
     with path.open("a+", newline="") as file:
         file.seek(0)
         known = next(csv.reader(file), None)
-        if known not in (None, columns):
+        if known is not None and known != columns:
             raise SystemExit("bench: %s has other columns (%s); give another file" % (path, ", ".join(known)))
         writer = csv.writer(file, lineterminator="\n")
         if known is None:
@@ -257,7 +259,7 @@ def measure_all(options, commands):
     results = []
     with use_master(options) as environment:
         for count in options.count:
-            runs = {name: [] for name in commands}
+            runs: Dict[str, List[dict]] = {name: [] for name in commands}
             for _ in range(options.rounds):
                 for name, command in commands.items():
                     runs[name].append(run_once(options, command, count, environment))

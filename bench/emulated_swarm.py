@@ -14,6 +14,7 @@ import socket
 import struct
 import threading
 import time
+from typing import List, Tuple
 
 from hero_driver.rosserial import packets, payloads
 from hero_sim.robot import declarations
@@ -174,7 +175,7 @@ def run(
     selector = selectors.DefaultSelector()
     for robot in robots:
         selector.register(robot.socket, selectors.EVENT_READ, robot)
-    due = []
+    due: List[Tuple[float, int, str, EmulatedRobot]] = []
     order = 0
     all_joined_s = None
     measure_end_s = started_s + seconds + 30.0
@@ -192,9 +193,11 @@ def run(
                     heapq.heappush(due, (time.monotonic() + phase_s, order, kind, robot))
             if robot.closed:
                 selector.unregister(robot.socket)
-        if all_joined_s is None and all(robot.synchronised_s is not None for robot in robots):
-            all_joined_s = max(robot.synchronised_s for robot in robots)
-            measure_end_s = time.monotonic() + seconds
+        if all_joined_s is None:
+            joined_s = [robot.synchronised_s for robot in robots if robot.synchronised_s is not None]
+            if len(joined_s) == len(robots):
+                all_joined_s = max(joined_s)
+                measure_end_s = time.monotonic() + seconds
         now_s = time.monotonic()
         while due and due[0][0] <= now_s:
             due_s, _, kind, robot = heapq.heappop(due)

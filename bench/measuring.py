@@ -9,6 +9,7 @@ import subprocess
 import time
 import timeit
 from pathlib import Path
+from typing import Dict, List
 
 from hero_test.processes import find_free_port
 
@@ -44,7 +45,7 @@ def read_one_cpu_s(pid):
 
 def find_tree(pid):
     """Return pid and all its descendants."""
-    children = {}
+    children: Dict[int, List[int]] = {}
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit():
             try:

@@ -11,7 +11,6 @@ import subprocess
 import time
 
 from measuring import (
-    find_free_port,
     measure_machine_us,
     print_machine,
     read_cpu_s,
@@ -24,6 +23,8 @@ from measuring import (
 )
 from tornado.httpclient import HTTPRequest
 from tornado.websocket import websocket_connect
+
+from hero_test.processes import find_free_port
 
 SETTLE_S = 5.0
 JOIN_TIMEOUT_S = 60.0

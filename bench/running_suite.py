@@ -3,12 +3,14 @@
 import os
 import subprocess
 import time
+from typing import List
 
 import rosgraph
 import rospy
-from measuring import find_free_port, start, stop
+from measuring import start, stop
 
 from hero_msgs.msg import RobotArray
+from hero_test.processes import find_free_port
 
 READY_TIMEOUT_S = 60.0
 
@@ -29,7 +31,7 @@ class RunningSuite:
         try:
             self.wait_for(rosgraph.is_master_online, "a ROS master")
             rospy.init_node("running_suite", disable_signals=True)
-            newest = []
+            newest: List[RobotArray] = []
             subscriber = rospy.Subscriber("/hero_driver/robots", RobotArray, newest.append, queue_size=1)
             self.wait_for(
                 lambda: newest and sum(robot.state == robot.READY for robot in newest[-1].robots) == robots,
@@ -56,10 +58,14 @@ class RunningSuite:
         self.processes.append(process)
         return process
 
-    def start_example(self, name, *arguments, **options):
-        """Start a node of hero_examples, itself and not roslaunch or rosrun around it."""
-        found = subprocess.check_output(["catkin_find", "--first-only", "--libexec", "hero_examples", name], text=True)
+    def start_program(self, package, name, *arguments, **options):
+        """Start a program of a package, itself and not roslaunch or rosrun around it."""
+        found = subprocess.check_output(["catkin_find", "--first-only", "--libexec", package, name], text=True)
         return self.start([found.strip(), *arguments], **options)
+
+    def start_example(self, name, *arguments, **options):
+        """Start a program of hero_examples."""
+        return self.start_program("hero_examples", name, *arguments, **options)
 
     def close(self):
         """End everything, the last first; safe twice."""

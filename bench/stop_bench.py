@@ -16,7 +16,6 @@ from pathlib import Path
 import rosgraph
 import rospy
 from measuring import (
-    find_free_port,
     measure_machine_us,
     percentile_ms,
     print_machine,
@@ -30,7 +29,7 @@ from tornado.httpclient import HTTPRequest
 from tornado.websocket import websocket_connect
 
 from hero_client.drivers import Drivers
-from hero_test.processes import suspended
+from hero_test.processes import find_free_port, suspended
 
 HERE = Path(__file__).resolve().parent
 POLL_S = 0.02

@@ -11,6 +11,7 @@ import json
 import sys
 import threading
 import time
+from typing import List, Optional
 
 import numpy as np
 
@@ -31,7 +32,7 @@ class Watch:
         """Look at the bytes that robots receive, and at their wheels after each step of the world."""
         self._swarm = swarm
         count = len(swarm.robots)
-        self._zero_s = [None] * count
+        self._zero_s: List[Optional[float]] = [None] * count
         self._travels = []  # pairs: time, of all wheels (m), since the mark
         for index, robot in enumerate(swarm.robots):
             robot.receive_bytes = self._wrap(index, robot.receive_bytes)

@@ -1,0 +1,406 @@
+"""Accuracy and cost of the overhead camera on rendered pictures, beside what the stock method makes of them.
+
+The camera is calibrated as a user does it: by pictures of the board, by reference tags whose places are a little wrong,
+and by robots that turn and drive. Then robots stand all over the field, drive straight, and drive circles. The stock
+method has the same tags and the same lens: a homography of the floor, or the pose of the single tag; stamps of arrival;
+and tags that sit exactly in the robots' centers. The nodes are measured by localization_nodes. Run it with script/bench
+localization.
+"""
+
+import argparse
+import itertools
+import math
+import tempfile
+from typing import Callable, Dict, List, NamedTuple, Sequence, Tuple, Union
+
+import cv2
+import numpy as np
+from localization_nodes import measure_nodes
+from measuring import measure_machine_us, print_machine
+
+from hero_client.geometry import Pose, measure_distance, wrap_angle
+from hero_localization.arena_calibration import average_tags, calibrate_arena
+from hero_localization.camera_model import Camera, Lens
+from hero_localization.detectors import create_detector
+from hero_localization.lens_calibration import calibrate_lens, find_board
+from hero_localization.pose_filter import Estimate, Measurement
+from hero_localization.robot_calibration import CALIBRATION_DRIVE, calibrate_robot
+from hero_localization.swarm_localizer import SwarmLocalizer
+from hero_localization.tag_corners import TagCorners
+from hero_localization.tag_pose import MountedTag, ReferenceTag, TagLayout, fit_squares, locate
+from hero_localization.tag_search import TagSearch
+from hero_sim.camera.board_images import Board, BoardRenderer, list_board_places
+from hero_sim.camera.renderer import CameraRenderer
+from hero_sim.camera.view import CameraOptions, PrintedTag
+from hero_sim.stepped.swarm import StepSwarm
+from hero_sim.world.arena_file import load_arena
+
+OPTIONS = CameraOptions()
+DELAY_S = OPTIONS.delay_s + OPTIONS.delay_jitter_s / 2.0
+FRAME_S = 1.0 / OPTIONS.rate_hz
+FIELD_M = (2.5, 1.4)
+GRID = (4, 3)
+REFERENCES_M = ((-1.3, -0.7), (1.3, -0.7), (1.3, 0.7), (-1.3, 0.7), (0.0, -0.72), (0.0, 0.72))
+BOARD_PICTURES = 24
+PLACEMENTS = 20
+COVERED_S = 2.0
+FOUND_AGAIN_S = 0.2
+METHODS = ("plane", "filter", "floor homography", "single-tag pose")
+PARTS = ("accuracy", "nodes")
+
+
+class Measured(NamedTuple):
+    """Errors of one method in one situation: distance (m) and yaw (rad) of each pose."""
+
+    distances_m: List[float]
+    yaws_rad: List[float]
+
+    def add(self, found: Sequence[float], true: Union[Sequence[float], np.ndarray]) -> None:
+        """Take one pose that was found (x, y, yaw), and the true one."""
+        self.distances_m.append(math.hypot(found[0] - true[0], found[1] - true[1]))
+        self.yaws_rad.append(wrap_angle(found[2] - true[2]))
+
+    def describe(self) -> str:
+        """Return rms and worst distance (mm), and yaw (degrees rms)."""
+        if not self.distances_m:
+            return "%26s" % "-"
+        distances_mm, yaws_deg = 1e3 * np.array(self.distances_m), np.degrees(self.yaws_rad)
+        return "%7.2f %7.1f %10.2f" % (_rms(distances_mm), distances_mm.max(), _rms(yaws_deg))
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def describe_arena() -> str:
+    """Return an arena whose robots start on a grid, far enough from each other for what they drive."""
+    x_m, y_m = FIELD_M[0] / 2.0, FIELD_M[1] / 2.0
+    corners = [[-x_m, -y_m], [x_m, -y_m], [x_m, y_m], [-x_m, y_m], [-x_m, -y_m]]
+    lines = ["walls_m: [%s]" % corners, "starts_m_deg:"]
+    for row_m in np.linspace(-0.4, 0.35, GRID[1]):
+        lines += ["  - [%.3f, %.3f, 0]" % (column_m, row_m) for column_m in np.linspace(-0.7, 0.9, GRID[0])]
+    return "\n".join(lines)
+
+
+class Scene:
+    """Simulated robots below a simulated camera, and a search for their tags in its pictures."""
+
+    def __init__(self, seed: int, tape_m: float) -> None:
+        random = np.random.RandomState(seed)
+        count = GRID[0] * GRID[1]
+        errors = random.normal(0.0, (0.002, 0.002, 0.03), (count, 3))
+        self.mounts = [PrintedTag(index, 0.04, 0.076, *error) for index, error in enumerate(errors)]
+        floor = [PrintedTag(100 + index, 0.1, 0.0, *place) for index, place in enumerate(REFERENCES_M)]
+        measured = [np.array((tag.x_m, tag.y_m)) + random.normal(0.0, tape_m, 2) for tag in floor]
+        self.references = {
+            tag.tag_id: ReferenceTag(Pose(float(x_m), float(y_m), 0.0)) for tag, (x_m, y_m) in zip(floor, measured)
+        }
+        with tempfile.NamedTemporaryFile("w", suffix=".yaml") as file:
+            file.write(describe_arena())
+            file.flush()
+            self.swarm = StepSwarm(count=count, seed=seed, arena=file.name)
+            self.renderer = CameraRenderer(OPTIONS, load_arena(file.name), self.mounts, floor, seed)
+        self.search = TagSearch(create_detector(), OPTIONS.width_px, OPTIONS.height_px)
+        self.odometry: List[List[Tuple[float, Pose]]] = [[] for _ in range(count)]
+        self.true_at: List[Dict[float, np.ndarray]] = [{} for _ in range(count)]
+        self.swarm.rows.on_cycle.append(self._note_odometry)
+
+    def _note_odometry(self, rows: np.ndarray) -> None:
+        for row in rows:
+            stamp_s = float(self.swarm.rows.odometry_ms[row]) / 1e3
+            self.odometry[row].append((stamp_s, Pose(*map(float, self.swarm.rows.odometry[row]))))
+            self.true_at[row][stamp_s] = self.true[row].copy()
+
+    @property
+    def true(self) -> np.ndarray:
+        """True poses (N, 3) at the present: the world is up to one step behind."""
+        world = self.swarm.rows.world
+        speeds = world.measure_body_speeds()
+        since_s = (self.swarm.rows.now_ms - world.time_ms) / 1e3
+        moved_m, turned_rad = since_s * speeds.T
+        headings_rad = world.poses[:, 2] + turned_rad / 2.0
+        step = (moved_m * np.cos(headings_rad), moved_m * np.sin(headings_rad), turned_rad)
+        return world.poses + np.column_stack(step)
+
+    def drive(
+        self,
+        parts: Sequence[Tuple[float, float, float]],
+        see: Callable[[float, List[TagCorners]], object],
+        is_covered: bool = False,
+    ) -> None:
+        """Let all robots drive (duration s, m/s, rad/s), and see each picture; is_covered: it shows no robot."""
+        for duration_s, linear_m_s, angular_rad_s in parts:
+            end_s = self.swarm.now_s + duration_s
+            while self.swarm.now_s < end_s:
+                for robot in self.swarm.robots:
+                    robot.drive(linear_m_s, angular_rad_s)
+                self.swarm.sleep(FRAME_S)
+                # Pictures are taken at whole milliseconds, as all happens here.
+                stamp_s = self.swarm.rows.now_ms / 1e3
+                shown = slice(0, 0) if is_covered else slice(None)
+                speeds = self.swarm.rows.world.measure_body_speeds()
+                image = self.renderer.render(self.true[shown], speeds[shown])
+                see(stamp_s, self.search.search(image, stamp_s))
+
+
+def find_lens(random: np.random.RandomState) -> Lens:
+    """Calibrate the lens by pictures of the board all over the picture."""
+    board, views = Board(), []
+    renderer = BoardRenderer(OPTIONS, board)
+    for turn_rad, place_m in itertools.islice(list_board_places(OPTIONS, random), BOARD_PICTURES):
+        view = find_board(renderer.render(turn_rad, place_m, random), board)
+        if view is not None:
+            views.append(view)
+    result = calibrate_lens(views, OPTIONS.width_px, OPTIONS.height_px, board)
+    verdict = "; ".join(result.problems) or "good"
+    found_px, true_px = result.lens.matrix[0, 0], OPTIONS.focal_px[0]
+    text = "lens: %d pictures, %.2f px rms, focal length %.1f px (true %.1f); %s"
+    print(text % (len(views), result.rms_px, found_px, true_px, verdict))
+    return result.lens
+
+
+def find_camera(scene: Scene, lens: Lens) -> Camera:
+    """Calibrate the camera's place by the reference tags."""
+    detector = create_detector(decimate=1.0)
+    frames = [detector.detect(scene.renderer.render(scene.true)) for _ in range(5)]
+    result = calibrate_arena(lens, average_tags(frames), scene.references)
+    off_mm = 1e3 * np.linalg.norm(result.camera.position_m - scene.renderer.view.position_m)
+    verdict = "; ".join(result.problems) or "good"
+    print("arena: %.2f mm rms, camera %.1f mm off; %s" % (1e3 * result.rms_m, off_mm, verdict))
+    return result.camera
+
+
+def find_layout(scene: Scene, camera: Camera) -> Tuple[TagLayout, float]:
+    """Calibrate the robots' tags, and the delay of the camera."""
+    seen: Dict[int, List[Tuple[float, Pose]]] = {tag.tag_id: [] for tag in scene.mounts}
+
+    def see(stamp_s: float, tags: List[TagCorners]) -> None:
+        ours = [tag for tag in tags if tag.tag_id in seen]
+        mount = MountedTag()
+        for fit in fit_squares(camera, ours, [mount.size_m] * len(ours), [mount.height_m] * len(ours)):
+            seen[fit.tag_id].append((stamp_s, fit.pose))
+
+    scene.drive(CALIBRATION_DRIVE, see)
+    mounts, delays_s, off = {}, [], Measured([], [])
+    for tag in scene.mounts:
+        result = calibrate_robot(seen[tag.tag_id], scene.odometry[tag.tag_id])
+        mounts[tag.tag_id] = MountedTag(x_m=result.x_m, y_m=result.y_m, yaw_rad=result.yaw_rad)
+        delays_s.append(result.delay_s)
+        off.add((result.x_m, result.y_m, result.yaw_rad), (tag.x_m, tag.y_m, tag.yaw_rad))
+        if result.problems:
+            print("hero_%d: %s" % (tag.tag_id, "; ".join(result.problems)))
+    delay_s = float(np.median(delays_s))
+    print("robots: delay %.1f ms; tags off by (mm rms, worst, deg rms) %s" % (1e3 * delay_s, off.describe()))
+    return TagLayout(mounts=mounts, references=scene.references), delay_s
+
+
+class StockMethod:
+    """The stock suite's two ways from tags to poses."""
+
+    def __init__(self, scene: Scene, camera: Camera, tags: Sequence[TagCorners]) -> None:
+        self._camera = camera
+        known = [tag for tag in tags if tag.tag_id in scene.references]
+        rays = camera.lens.undistort(np.array([tag.center for tag in known]))
+        places_m = np.array([scene.references[tag.tag_id].pose[:2] for tag in known])
+        self._floor = cv2.findHomography(rays, places_m)[0]
+
+    def locate(self, method: str, tag: TagCorners) -> Tuple[float, float, float]:
+        """Return x, y (m) and yaw (rad) of a tag, which the stock method takes for the robot's."""
+        if method == "floor homography":
+            rays = self._camera.lens.undistort(tag.corners)
+            corners_m = cv2.perspectiveTransform(rays[:, None], self._floor)[:, 0]
+            center, up = corners_m.mean(axis=0), corners_m[:2].sum(axis=0) - corners_m[2:].sum(axis=0)
+            return float(center[0]), float(center[1]), math.atan2(up[1], up[0])
+        half_m = MountedTag().size_m / 2.0
+        square = half_m * np.array(((-1, 1, 0), (1, 1, 0), (1, -1, 0), (-1, -1, 0)), dtype=float)
+        lens = self._camera.lens
+        _, turn, shift = cv2.solvePnP(
+            square, tag.corners.copy(), lens.matrix, lens.distortion, flags=cv2.SOLVEPNP_IPPE_SQUARE
+        )
+        place_m = self._camera.rotation.T @ shift.ravel() + self._camera.position_m
+        up = self._camera.rotation.T @ cv2.Rodrigues(turn)[0][:, 1]
+        return float(place_m[0]), float(place_m[1]), math.atan2(up[1], up[0])
+
+
+def measure_standing(
+    scene: Scene, camera: Camera, layout: TagLayout, stock: StockMethod, seed: int
+) -> Dict[str, Measured]:
+    """Place robots all over the field, and compare."""
+    random = np.random.RandomState(seed + 1000)
+    errors = {method: Measured([], []) for method in METHODS}
+    detector = create_detector()
+    for _ in range(PLACEMENTS):
+        places = draw_places(random, len(scene.mounts))
+        tags = detector.detect(scene.renderer.render(places))
+        for robot, sighting in locate(camera, tags, layout).robots.items():
+            errors["plane"].add(sighting.pose, places[robot])
+        for tag in tags:
+            if tag.tag_id < len(places):
+                for method in METHODS[2:]:
+                    errors[method].add(stock.locate(method, tag), places[tag.tag_id])
+    print(
+        "standing: %d of %d tags found" % (len(errors["plane"].distances_m), PLACEMENTS * len(scene.mounts))
+    )
+    return errors
+
+
+def draw_places(random: np.random.RandomState, count: int) -> np.ndarray:
+    """Return poses (N, 3) in the field, far enough apart that no robot hides another."""
+    places: List[np.ndarray] = []
+    while len(places) < count:
+        place = np.append(
+            random.uniform(-0.5, 0.5, 2) * (np.array(FIELD_M) - 0.1), random.uniform(-math.pi, math.pi)
+        )
+        if all(math.hypot(*(place[:2] - other[:2])) > 0.16 for other in places):
+            places.append(place)
+    return np.array(places)
+
+
+class Localization:
+    """What localize makes of odometry and of pictures that arrive late.
+
+    Attributes:
+        errors: of each pose at the present, half a second after the start or later.
+        unannounced_m: the largest step of a pose that no line for people tells.
+    """
+
+    def __init__(self, scene: Scene, camera: Camera, layout: TagLayout, delay_s: float) -> None:
+        self.errors = Measured([], [])
+        self.unannounced_m = 0.0
+        self._settled_s = scene.swarm.now_s + 0.5
+        self._scene, self._camera, self._layout, self._delay_s = scene, camera, layout, delay_s
+        self._localizer = SwarmLocalizer()
+        self._localizer.add_robots(range(len(scene.mounts)))
+        self._fed = [len(readings) for readings in scene.odometry]
+        self._waiting: List[Tuple[float, Sequence[TagCorners]]] = []
+
+    def see(self, stamp_s: float, tags: Sequence[TagCorners]) -> List[Sequence[TagCorners]]:
+        """Take a picture, and the odometry up to it; return the tags of the pictures that arrive now."""
+        for robot, readings in enumerate(self._scene.odometry):
+            for odometry_s, pose in readings[self._fed[robot] :]:
+                self._localizer.add_odometry(robot, odometry_s, pose)
+            self._fed[robot] = len(readings)
+        self._waiting.append((stamp_s, tags))
+        arrived = []
+        while self._waiting and self._waiting[0][0] + DELAY_S <= stamp_s:
+            taken_s, found = self._waiting.pop(0)
+            arrived.append(found)
+            self._correct(stamp_s, taken_s, found)
+        self._localizer.find_lost(stamp_s)
+        for robot, estimate in self._list_estimates(stamp_s).items():
+            true = self._scene.true_at[robot].get(estimate.stamp_s)
+            if stamp_s > self._settled_s and true is not None:
+                self.errors.add(estimate.pose, true)
+        return arrived
+
+    def _list_estimates(self, now_s: float) -> Dict[int, Estimate]:
+        robots = self._localizer.list_robots(now_s)
+        return {robot.robot_id: robot.estimate for robot in robots if robot.estimate is not None}
+
+    def _correct(self, now_s: float, taken_s: float, tags: Sequence[TagCorners]) -> None:
+        before = self._list_estimates(now_s)
+        lines: Dict[int, List[str]] = {}
+        for robot, sighting in locate(self._camera, tags, self._layout).robots.items():
+            measurement = Measurement(taken_s - self._delay_s, sighting.pose, sighting.covariance)
+            lines[robot] = self._localizer.add_measurement(robot, measurement)
+        for robot, (_, after, _) in self._list_estimates(now_s).items():
+            if robot in before and not lines.get(robot):
+                step_m = measure_distance(before[robot].pose, after)
+                self.unannounced_m = max(self.unannounced_m, step_m)
+
+
+def measure_driving(
+    scene: Scene,
+    camera: Camera,
+    layout: TagLayout,
+    delay_s: float,
+    stock: StockMethod,
+    parts: Sequence[Tuple[float, float, float]],
+) -> Dict[str, Measured]:
+    """Let robots drive, and compare measured poses at their time, all others at the present."""
+    errors = {method: Measured([], []) for method in METHODS}
+    localization = Localization(scene, camera, layout, delay_s)
+    errors["filter"] = localization.errors
+
+    def see(stamp_s: float, tags: List[TagCorners]) -> None:
+        for robot, sighting in locate(camera, tags, layout).robots.items():
+            errors["plane"].add(sighting.pose, scene.true[robot])
+        for tag in itertools.chain(*localization.see(stamp_s, tags)):
+            if tag.tag_id < len(scene.mounts):
+                for method in METHODS[2:]:
+                    errors[method].add(stock.locate(method, tag), scene.true[tag.tag_id])
+
+    scene.drive(parts, see)
+    return errors
+
+
+def measure_occlusion(
+    scene: Scene, camera: Camera, layout: TagLayout, delay_s: float, speed: Tuple[float, float]
+) -> Tuple[Measured, Measured, float]:
+    """Let robots drive forward, back and forward again (m/s, rad/s), all covered while they drive back.
+
+    Returns: errors while they are covered; from FOUND_AGAIN_S after it on; the largest step that is not said, m.
+    """
+    localization = Localization(scene, camera, layout, delay_s)
+    counted = []
+    for duration_s, direction, is_covered, is_counted in (
+        (1.0, 1.0, False, False),
+        (COVERED_S, -1.0, True, True),
+        (FOUND_AGAIN_S, 1.0, False, False),
+        (1.0, 1.0, False, True),
+    ):
+        localization.errors = Measured([], [])
+        scene.drive([(duration_s, direction * speed[0], direction * speed[1])], localization.see, is_covered)
+        if is_counted:
+            counted.append(localization.errors)
+    return counted[0], counted[1], localization.unannounced_m
+
+
+def measure_accuracy(seed: int, tape_m: float) -> None:
+    """Calibrate, measure, print."""
+    scene = Scene(seed, tape_m)
+    camera = find_camera(scene, find_lens(np.random.RandomState(seed)))
+    layout, delay_s = find_layout(scene, camera)
+    stock = StockMethod(
+        scene, camera, create_detector(decimate=1.0).detect(scene.renderer.render(scene.true))
+    )
+    straight = ((1.0, 0.2, 0.0), (1.0, -0.2, 0.0)) * 3
+    circles = ((3.0, 0.2, 2.0), (3.0, 0.2, -2.0))
+    table = {
+        "standing, whole field": measure_standing(scene, camera, layout, stock, seed),
+        "0.2 m/s to and fro": measure_driving(scene, camera, layout, delay_s, stock, straight),
+        "0.2 m/s in circles": measure_driving(scene, camera, layout, delay_s, stock, circles),
+    }
+    print("\n%-22s %-18s %7s %7s %10s" % ("", "method", "mm rms", "worst", "deg rms"))
+    for name, errors in table.items():
+        for method in METHODS:
+            print("%-22s %-18s %s" % (name, method, errors[method].describe()))
+    print("\ncovered for %g s while driving 0.2 m/s" % COVERED_S)
+    for name, speed in (("straight", (0.2, 0.0)), ("in circles", (0.2, 2.0))):
+        covered, after, step_m = measure_occlusion(scene, camera, layout, delay_s, speed)
+        print("%-22s %-18s %s" % (name, "covered", covered.describe()))
+        print("%-22s %-18s %s" % ("", "from %g s after" % FOUND_AGAIN_S, after.describe()))
+        print("%-22s largest step that is not reported: %.1f mm" % ("", 1e3 * step_m))
+
+
+def main() -> None:
+    """Measure what the command line asks for."""
+    parser = argparse.ArgumentParser(description="Accuracy and cost of the overhead camera, on rendered pictures.")
+    parser.add_argument("--only", nargs="+", choices=PARTS, default=PARTS)
+    parser.add_argument("--seed", type=int, default=0)
+    text = "error of the reference tags' places, mm (%(default)s)"
+    parser.add_argument("--tape-mm", type=float, default=1.0, help=text)
+    parser.add_argument("--count", type=int, default=50, help="robots that the nodes track (%(default)s)")
+    parser.add_argument("--seconds", type=float, default=20.0, help="for so long (%(default)s)")
+    parser.add_argument("--rounds", type=int, default=1, help="of the nodes (%(default)s)")
+    options = parser.parse_args()
+    cv2.setNumThreads(1)
+    print_machine(measure_machine_us())
+    if "accuracy" in options.only:
+        measure_accuracy(options.seed, options.tape_mm / 1e3)
+    if "nodes" in options.only:
+        measure_nodes(options.count, options.seconds, options.rounds)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,168 @@
+"""CPU of the nodes track and localize, and the age of their poses, for robots that turn on the spot.
+
+The nodes run as launched; this process stands for camera and driver. It renders one turn of the robots beforehand, and
+publishes pictures and odometry at the times at which a camera and a driver would.
+"""
+
+import bisect
+import contextlib
+import math
+import os
+import subprocess
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+import rospy
+from measuring import read_cpu_s, start, start_master, stop
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import Image
+
+from hero_localization.camera_model import Camera, Lens
+from hero_localization.settings import describe_camera, update
+from hero_msgs.msg import RobotPose, RobotPoses
+from hero_sim.camera.renderer import CameraRenderer
+from hero_sim.camera.view import CameraOptions, PrintedTag, View
+from hero_sim.world.arena import build_rectangle
+
+OPTIONS = CameraOptions()
+ARENA_M = (2.5, 1.4)
+ROWS = 5
+TURN_FRAMES = 90
+TURN_RAD_S = 2.0 * math.pi * OPTIONS.rate_hz / TURN_FRAMES
+DELAY_S = OPTIONS.delay_s + OPTIONS.delay_jitter_s / 2.0
+ODOMETRY_GROUPS = 5
+"""Each robot sends as often as the camera, in as many groups between two pictures."""
+SETTLE_S = 5.0
+START_S = 60.0
+
+
+def place_robots(count):
+    """Return poses (N, 3) in a grid."""
+    across_m, up_m = np.meshgrid(np.linspace(-1.1, 1.1, math.ceil(count / ROWS)), np.linspace(-0.56, 0.56, ROWS))
+    return np.column_stack((across_m.ravel(), up_m.ravel(), np.zeros(across_m.size)))[:count]
+
+
+def render_turn(poses):
+    """Return the pictures (H, W) of one turn of all robots."""
+    renderer = CameraRenderer(OPTIONS, build_rectangle(*ARENA_M, 0), [PrintedTag(index) for index in range(len(poses))])
+    speeds = np.column_stack((np.zeros(len(poses)), np.full(len(poses), TURN_RAD_S)))
+    turns_rad = 2.0 * math.pi * np.arange(TURN_FRAMES) / TURN_FRAMES
+    return [renderer.render(poses + (0.0, 0.0, turn_rad), speeds) for turn_rad in turns_rad]
+
+
+def write_camera_file(path):
+    """Write where the rendered camera hangs."""
+    view = View(OPTIONS)
+    lens = Lens(OPTIONS.width_px, OPTIONS.height_px, view.matrix, view.distortion)
+    update(path, describe_camera(Camera(lens, view.rotation, view.position_m), {}))
+
+
+class CameraAndDriver:
+    """Publishers of pictures and odometry, and what came of them."""
+
+    def __init__(self, pictures, count):
+        self.arrivals_s, self.measured_s, self.published_s, self.tracked = {}, {}, [], 0
+        self._pictures, self._index, self._start_s = pictures, 0, rospy.get_time()
+        self._image = rospy.Publisher("/camera/image_raw", Image, queue_size=1)
+        self._odometry = [
+            rospy.Publisher("/hero_%d/odom" % index, Odometry, queue_size=5, tcp_nodelay=True) for index in range(count)
+        ]
+        rospy.Subscriber("/track/measured_poses", RobotPoses, self._note_measured, queue_size=50, tcp_nodelay=True)
+        rospy.Subscriber("/localization/poses", RobotPoses, self._note_published, queue_size=50, tcp_nodelay=True)
+
+    def _note_measured(self, report):
+        self.measured_s[report.header.stamp.to_nsec()] = rospy.get_time()
+
+    def _note_published(self, report):
+        self.published_s.append((report.header.stamp.to_sec(), rospy.get_time()))
+        self.tracked = sum(robot.state == RobotPose.TRACKED for robot in report.robots)
+
+    def run(self, is_done):
+        """Publish until is_done(), from where the last call ended."""
+        frame_s, late_frames = 1.0 / OPTIONS.rate_hz, math.floor(DELAY_S * OPTIONS.rate_hz)
+        while not is_done():
+            frame_start_s = self._start_s + self._index * frame_s
+            for group in range(ODOMETRY_GROUPS):
+                now_s = frame_start_s + group * frame_s / ODOMETRY_GROUPS
+                _sleep_until(now_s)
+                self._send_odometry(self._odometry[group::ODOMETRY_GROUPS], now_s)
+            taken_s = frame_start_s - late_frames * frame_s
+            _sleep_until(taken_s + DELAY_S)
+            self._send_picture(self._index - late_frames, taken_s)
+            self._index += 1
+
+    def _send_odometry(self, publishers, now_s):
+        message, yaw_rad = Odometry(), TURN_RAD_S * (now_s - self._start_s)
+        message.header.stamp = rospy.Time.from_sec(now_s)
+        message.pose.pose.orientation.z = math.sin(yaw_rad / 2.0)
+        message.pose.pose.orientation.w = math.cos(yaw_rad / 2.0)
+        for publisher in publishers:
+            publisher.publish(message)
+
+    def _send_picture(self, index, taken_s):
+        gray = self._pictures[index % TURN_FRAMES]
+        message = Image(height=gray.shape[0], width=gray.shape[1], encoding="mono8", step=gray.shape[1])
+        message.header.stamp = rospy.Time.from_sec(taken_s)
+        message.data = gray.tobytes()
+        self.arrivals_s[message.header.stamp.to_nsec()] = rospy.get_time()
+        self._image.publish(message)
+
+    def list_ages_s(self, from_s):
+        """Return for how long each picture was under way in track, and until localize published the poses after it."""
+        stamps_s = [stamp_s for stamp_s, _ in self.published_s]
+        ages_s = []
+        for stamp_ns, measured_s in sorted(self.measured_s.items()):
+            next_report = bisect.bisect_left(stamps_s, measured_s)
+            if stamp_ns * 1e-9 >= from_s and next_report < len(stamps_s):
+                arrival_s = self.arrivals_s[stamp_ns]
+                ages_s.append((measured_s - arrival_s, self.published_s[next_report][1] - arrival_s))
+        return np.array(ages_s)
+
+
+def _sleep_until(time_s):
+    time.sleep(max(0.0, time_s - rospy.get_time()))
+
+
+def measure_nodes(count, seconds, rounds):
+    """Print CPU (of one core) of track and localize, and the ages of pictures and poses, in each of some rounds."""
+    pictures = render_turn(place_robots(count))
+    with contextlib.ExitStack() as stack:
+        environment = stack.enter_context(start_master())
+        os.environ["ROS_MASTER_URI"] = environment["ROS_MASTER_URI"]
+        path = str(Path(stack.enter_context(tempfile.TemporaryDirectory())) / "camera.yaml")
+        write_camera_file(path)
+        rospy.init_node("camera_and_driver", disable_signals=True)
+        source = CameraAndDriver(pictures, count)
+
+        def start_node(program, *arguments):
+            command = ["catkin_find", "--first-only", "--libexec", "hero_localization", program]
+            found = subprocess.check_output(command, text=True, env=environment).strip()
+            process = start([found, *arguments], environment, stdout=subprocess.DEVNULL)
+            stack.callback(stop, process)
+            return process.pid
+
+        pids = start_node("track", "_file:=" + path), start_node("localize", "_robots:=0-%d" % (count - 1))
+        deadline_s = time.monotonic() + START_S
+        source.run(lambda: source.tracked == count or time.monotonic() > deadline_s)
+        if source.tracked < count:
+            raise SystemExit("bench: %d of %d robots are tracked after %.0f s" % (source.tracked, count, START_S))
+        settled_s = rospy.get_time() + SETTLE_S
+        source.run(lambda: rospy.get_time() > settled_s)
+        for _ in range(rounds):
+            measure_round(source, pids, seconds)
+
+
+def measure_round(source, pids, seconds):
+    """Print CPU and ages of the next seconds; pids: of track and localize."""
+    from_s, before_s = rospy.get_time(), [read_cpu_s(pid) for pid in pids]
+    source.run(lambda: rospy.get_time() > from_s + seconds)
+    cpu = [(read_cpu_s(pid) - cpu_s) / seconds for pid, cpu_s in zip(pids, before_s)]
+    ages_ms = 1e3 * source.list_ages_s(from_s)
+    sent = sum(stamp_ns * 1e-9 >= from_s for stamp_ns in source.arrivals_s)
+    print("\n%d robots, load %.1f: used %d of %d pictures" % (source.tracked, os.getloadavg()[0], len(ages_ms), sent))
+    print("CPU of track %.0f %%, of localize %.0f %% of a core" % (100.0 * cpu[0], 100.0 * cpu[1]))
+    for name, ages in zip(("track publishes", "localize publishes"), ages_ms.T):
+        text = "from a picture's arrival until %s: %.0f ms on average, 99 %% within %.0f ms, at most %.0f ms"
+        print(text % (name, ages.mean(), np.percentile(ages, 99), ages.max()))
