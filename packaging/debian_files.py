@@ -12,6 +12,7 @@ from catkin_pkg.topological_order import topological_order
 
 RECOMMENDED = {
     "rviz": "started only on request, and as large as everything else",
+    "python3-opencv": "for the overhead camera only, and as large",
     "message_runtime": "for programs in C++, with all of their headers",
 }
 

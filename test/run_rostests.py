@@ -6,20 +6,23 @@ The workspace must be sourced.
 
 import os
 import re
+import shlex
+import shutil
+import subprocess
 import sys
 from pathlib import Path
 
 from jobs import Job, count_cores, run_jobs
 
 ROOT = Path(__file__).resolve().parents[1]
-TIMEOUT_S = 1200.0  # of one .test file; each <test> in it has its own, shorter time-limit
-LOAD = 0.35  # most of a rostest is waiting
+TIMEOUT_S = 3600.0  # of one .test file; each <test> in it has its own, shorter time-limit
+LOAD = 0.25  # most of a rostest is waiting
 TIME_LIMIT = re.compile(r'time-limit="([0-9.]+)"')
 
 
 def read_time_limit_s(path):
-    """Return how long a .test file may take at most, by its own word."""
-    return max(map(float, TIME_LIMIT.findall(path.read_text())))
+    """Return how long the tests of a .test file may take at most, one after another, by its own word."""
+    return sum(map(float, TIME_LIMIT.findall(path.read_text())))
 
 
 def find_rostests(pattern):
@@ -29,31 +32,47 @@ def find_rostests(pattern):
     return sorted(chosen, key=read_time_limit_s, reverse=True)
 
 
-def make_python_path(results_dir):
-    """Return a PATH on which python is this interpreter: test scripts start with "env python"."""
+def write_program(path, script):
+    """Write a program for the shell."""
+    path.write_text("#!/bin/sh\n" + script)
+    path.chmod(0o755)
+
+
+def make_program_path(results_dir):
+    """Return a PATH on which python is this interpreter: test scripts start with "env python".
+
+    Every roslaunch asks rosversion twice, which takes two Pythons: its answers are kept.
+    """
     programs = Path(results_dir) / "bin"
     programs.mkdir(parents=True)
     for name in ("python", "python3"):
-        (programs / name).symlink_to(sys.executable)
+        # Not a link: from a link, Python does not find the libraries of a virtual environment.
+        write_program(programs / name, f'exec {sys.executable} "$@"\n')
+    cases = ""
+    for what in ("-d", "roslaunch"):
+        answer = subprocess.check_output(["rosversion", what], text=True).strip()
+        cases += f"{what}) echo {shlex.quote(answer)} ;;\n"
+    write_program(programs / "rosversion", f"case $1 in\n{cases}*) exit 1 ;;\nesac\n")
     return f"{programs.resolve()}:{os.environ['PATH']}"
 
 
 def make_jobs(results_dir, pattern=""):
     """Return one job for each rostest."""
-    path_of_python = make_python_path(results_dir)
+    program_path = make_program_path(results_dir)
     jobs = []
     for path in find_rostests(pattern):
         package_dir = path.parents[2]
         own_results = Path(results_dir) / package_dir.name / path.stem
         command = (
-            "rostest",
+            sys.executable,
+            shutil.which("rostest"),
             f"--package={package_dir.name}",
             f"--pkgdir={package_dir}",
             f"--results-base-dir={own_results}",
             f"--results-filename={path.stem}.xml",
             str(path),
         )
-        environment = {"PATH": path_of_python, "ROS_TEST_RESULTS_DIR": str(own_results)}
+        environment = {"PATH": program_path, "ROS_TEST_RESULTS_DIR": str(own_results)}
         jobs.append(Job(str(path.relative_to(ROOT)), command, own_results, LOAD, TIMEOUT_S, environment))
     return jobs
 

@@ -1,7 +1,8 @@
 """Runs the stages of script/test side by side, which starts it: tests that wait beside builds and checks that compute.
 
 Usage: run_stages.py RESULTS_DIR STAGE [STAGE ...] [--pattern PATTERN]
-The workspace must be sourced. HERO_PYTHON38 is the interpreter of the stage noetic, which is left out without one.
+The workspace must be sourced. HERO_PYTHON38 is the interpreter of the stages noetic and noetic_rostest; without one,
+they are left out.
 """
 
 import argparse
@@ -14,9 +15,8 @@ from jobs import Job, count_cores, run_jobs
 
 ROOT = Path(__file__).resolve().parents[1]
 TIMEOUT_S = 1800.0
-LINT_LOAD = UNIT_LOAD = 1.0
-BUILD_LOAD = 1.0
-DEMO_LOAD = 0.5
+COMPUTING_LOAD = 1.0
+WAITING_LOAD = 0.25
 
 sys.path.insert(0, str(ROOT / "test" / "faults"))
 import run as faults  # noqa: E402
@@ -30,50 +30,61 @@ def make_pytest_job(name, arguments, results_dir, load):
 
 
 def make_unit_jobs(results_dir):
-    """Return one job for each package; with the seed, failures can be repeated."""
+    """Return one job for each package, that with most files first; with the seed, failures can be repeated."""
     jobs = []
-    for path in sorted(ROOT.glob("*/test/unit")):
+    for path in sorted(ROOT.glob("*/test/unit"), key=lambda path: -len(list(path.iterdir()))):
         package = path.parents[1].name
         arguments = (str(path), "--hypothesis-seed=0")
-        jobs.append(make_pytest_job("unit: " + package, arguments, results_dir / package, UNIT_LOAD))
+        jobs.append(make_pytest_job("unit: " + package, arguments, results_dir / package, COMPUTING_LOAD))
     return jobs
 
 
 def make_workspace_jobs(results_dir):
     """Return one job for each build mode, and one for each other file."""
-    parts = [("test_build_modes.py", mode, BUILD_LOAD) for mode in ("catkin_build", "install", "catkin_make")]
-    parts += [("test_demo.py", "", DEMO_LOAD), ("test_rosinstall.py", "", DEMO_LOAD)]
+    parts = [("test_build_modes.py", mode, COMPUTING_LOAD) for mode in ("catkin_build", "install")]
+    parts += [("test_demo.py", "", WAITING_LOAD), ("test_rosinstall.py", "", WAITING_LOAD)]
     jobs = []
+    environment = {"PATH": run_rostests.make_program_path(results_dir)}
     for file, mode, load in parts:
         arguments = (str(ROOT / "test" / "workspaces" / file), *(("-k", f"[{mode}]") if mode else ()))
         name = " ".join(["workspaces:", file, mode]).rstrip()
-        jobs.append(make_pytest_job(name, arguments, results_dir / (mode or file[:-3]), load))
+        own_results = results_dir / (mode or file[:-3])
+        jobs.append(make_pytest_job(name, arguments, own_results, load)._replace(environment=environment))
     return jobs
 
 
 def make_jobs(stages, results, pattern):
-    """Return all jobs of the stages, in the order in which they begin: what takes long first."""
+    """Return all jobs of the stages, in the order in which they begin: noetic, what waits, and what computes.
+
+    What computes fills the cores to the end; noetic computes for longest. Of what computes, the simulator's unit tests
+    take longest.
+    """
     jobs = []
     # What these two install the first time comes from the network.
     if "noetic" in stages and os.environ.get("HERO_PYTHON38"):
         own_results = results / "noetic"
         command = (str(ROOT / "test" / "noetic" / "run"), os.environ["HERO_PYTHON38"], str(own_results))
-        jobs.append(Job("noetic", command, own_results, UNIT_LOAD, TIMEOUT_S, has_own_network=False))
+        jobs.append(Job("noetic", command, own_results, COMPUTING_LOAD, TIMEOUT_S, has_own_network=False))
+    if "noetic_rostest" in stages and os.environ.get("HERO_PYTHON38"):
+        own_results = results / "noetic_rostest"
+        script = str(ROOT / "test" / "noetic" / "run_rostests")
+        command = (script, os.environ["HERO_PYTHON38"], str(own_results), pattern or "hero_driver/")
+        jobs.append(Job("noetic_rostest", command, own_results, count_cores(), TIMEOUT_S, has_own_network=False))
     if "lint" in stages:
         own_results = results / "lint"
         environment = {"HERO_RESULTS": str(own_results)}
         command = (str(ROOT / "script" / "lint"),)
-        jobs.append(Job("lint", command, own_results, LINT_LOAD, TIMEOUT_S, environment, has_own_network=False))
+        jobs.append(Job("lint", command, own_results, COMPUTING_LOAD, TIMEOUT_S, environment, has_own_network=False))
     if "workspaces" in stages:
         jobs += make_workspace_jobs(results / "workspaces")
+    if "unit" in stages:
+        jobs += make_unit_jobs(results / "unit")
     if "faults" in stages:
         families = [pattern] if pattern in faults.find_families() else faults.find_families()
         jobs += faults.make_jobs(results / "faults", families, results / "faults.jsonl")
     if "rostest" in stages:
         jobs += run_rostests.make_jobs(results / "rostest", pattern)
-    if "unit" in stages:
-        jobs += make_unit_jobs(results / "unit")
-    return jobs
+    return sorted(jobs, key=lambda job: (job.name != "noetic", job.load, job.name != "unit: hero_sim"))
 
 
 def main():

@@ -31,7 +31,7 @@ def find_publisher(topic):
 
 def subscribe(address, topic, number):
     """Return a socket on which messages come."""
-    sock = socket.create_connection(address, 20.0)
+    sock = socket.create_connection(address, 60.0)
     fields = {
         "callerid": "/many_subscribers_%d" % number,
         "topic": topic,

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import rosgraph
+import rospy
 
 from hero_test.processes import find_free_port
 from hero_test.waiting import wait_for
@@ -16,7 +17,7 @@ from hero_test.waiting import wait_for
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 BENCH = ROOT / "bench"
-DEADLINE_S = 30.0
+DEADLINE_S = 60.0
 EMULATED_NAMES = 12
 STOCK_NAMES = 19
 """Topics and services of an emulated robot and of one with the complete stock firmware, odom_raw included."""
@@ -65,6 +66,12 @@ class Program:
 def start_python(script, *arguments, **options):
     """Return a running script of the fault suite or, by its path, any other one."""
     return Program(sys.executable, str(HERE / script), *map(str, arguments), **options)
+
+
+def wait_until_commanded(count):
+    """Wait until somebody publishes commands to so many robots."""
+    topics = {"/hero_%d/velocity_controller/cmd_vel" % number for number in range(count)}
+    wait_for(lambda: topics <= {topic for topic, _ in rospy.get_published_topics()}, "commands to %d robots" % count)
 
 
 class Master:

@@ -7,6 +7,7 @@ from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from rig import Program
 
+from hero_test.processes import find_program
 from hero_test.waiting import wait_for
 
 SPEED_M_S = 0.1
@@ -56,7 +57,7 @@ class GroundTruth:
 
 def start_simulator(robots, port, *arguments, first_id=0):
     """Return a simulator whose robots dial a port of this machine; it ends with `with`."""
-    command = ["rosrun", "hero_sim", "hero_sim", "--count", robots, "--first-id", first_id, "--port", port]
+    command = [find_program("hero_sim", "hero_sim"), "--count", robots, "--first-id", first_id, "--port", port]
     command += ["--arena", "empty", "--quiet", *arguments]
     return Program(*map(str, command))
 

@@ -74,7 +74,7 @@ def test_invalid_service_requests_never_reach_a_robot(start_driver, record):
     ]
     for name, service_type, values in requests:
         full_name = "/hero_1/" + name
-        rospy.wait_for_service(full_name, 20.0)
+        rospy.wait_for_service(full_name, 60.0)
         with pytest.raises(rospy.ServiceException, match="finite"):
             rospy.ServiceProxy(full_name, service_type)(*values)
         refused += robot.payloads_on(name) == []

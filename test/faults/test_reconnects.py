@@ -29,7 +29,7 @@ class Swarm:
         links = [emulated_swarm.EmulatedRobot(number, self._address, nagle=False) for number in self._numbers]
         for link in links:
             link.socket.setblocking(True)
-            link.socket.settimeout(20.0)
+            link.socket.settimeout(60.0)
             while link.synchronised_s is None and not link.closed:
                 link.receive(1.0)
             assert not link.closed, link.number

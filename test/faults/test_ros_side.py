@@ -7,11 +7,12 @@ import threading
 
 import pytest
 import rospy
-from driver_case import has_connection, list_driver_topics, make_publisher
+from driver_case import has_connection, list_driver_topics, make_publisher, reads_from_somebody
 from fake_robot import FakeRobot
 from geometry_msgs.msg import Twist
 from rig import STOCK_NAMES, count_holdings, start_python
 from rosgraph_msgs.msg import Clock
+from scripted_publisher import ScriptedPublisher
 from service_check import ServiceCheck
 from stock_messages import make_laser
 
@@ -122,10 +123,38 @@ def test_a_publisher_at_1_khz_delays_nobody_and_its_stop_arrives(served, effort,
     record("%d velocities at 1 kHz, then a stop" % count, 1, 1, "all but the newest each 60 ms (%d taken)" % taken)
 
 
+def test_a_publisher_that_goes_while_it_is_connected_to_may_return(served, record):
+    driver, _, service = served
+    topic = "/hero_1/cmd_vel"
+    with ScriptedPublisher(topic) as publisher:
+        publisher.refuses = True
+        publisher.announce()
+        wait_for(lambda: publisher.refused, "a connection that is refused")
+        wait_for(lambda: not reads_from_somebody(driver.node, topic), "the refused connection to be forgotten")
+        publisher.refuses = False
+        publisher.announce()
+        wait_for(lambda: publisher.connections, "a connection")
+        wait_for(lambda: reads_from_somebody(driver.node, topic), "the driver to know of it")
+    record("a publisher that goes while the driver connects to it returns", 1, 1)
+
+
+def test_a_publisher_that_replaces_another_of_its_program_is_heard(served, record):
+    _, robot, service = served
+    topic = "/hero_1/cmd_vel"
+    with ScriptedPublisher(topic) as publisher:
+        publisher.announce()
+        wait_for(lambda: publisher.connections, "a connection")
+        publisher.announce()  # of no effect while the connection stands
+        service.verify()
+        publisher.connections[0].close()
+        wait_for(lambda: len(publisher.connections) > 1, "a connection to the second publisher")
+    record("a publisher is closed and another one opened by the same program", 1, 1)
+
+
 def test_fifty_simultaneous_service_calls_are_answered(served, effort, record):
     _, _, service = served
     name = "/hero_1/velocity_controller/pid_parameters"
-    rospy.wait_for_service(name, 20.0)
+    rospy.wait_for_service(name, 60.0)
     calls = effort.choose(2, 20)
     answers, failures = [], []
 

@@ -60,13 +60,13 @@ def test_addresses_outside_the_allow_list_get_no_byte(start_driver, record):
     tries = 50
     heard = 0
     for number in range(tries):
-        with socket.socket() as stranger:
-            stranger.bind(("127.0.0.%d" % (10 + number), 0))
-            stranger.settimeout(20.0)
-            stranger.connect(driver.address)
+        with socket.socket() as peer:
+            peer.bind(("127.0.0.%d" % (10 + number), 0))
+            peer.settimeout(60.0)
+            peer.connect(driver.address)
             try:
-                stranger.sendall(emulated_swarm.declare(2))
-                heard += len(stranger.recv(100))
+                peer.sendall(emulated_swarm.declare(2))
+                heard += len(peer.recv(100))
             except OSError:
                 continue
     assert not driver.fleet.find("/hero_2")
@@ -201,7 +201,7 @@ def test_one_address_cannot_occupy_all_connections(start_driver, record):
 
 def test_a_device_cannot_impersonate_the_driver(start_driver, record):
     driver = start_driver(parameters={"namespace_policy": "any"})
-    rospy.wait_for_service(driver.node + "/stop", 20.0)
+    rospy.wait_for_service(driver.node + "/stop", 60.0)
     rospy.ServiceProxy(driver.node + "/stop", SetBool)(True)
     device = FakeRobot(
         declarations=[
@@ -232,7 +232,7 @@ def test_new_robot_names_are_rate_limited_per_address(start_driver, record):
     def is_refused():
         with socket.socket() as sock:
             sock.bind(("127.0.0.66", 0))
-            sock.settimeout(20.0)
+            sock.settimeout(60.0)
             sock.connect(driver.address)
             known.append(sock.sendall(emulated_swarm.declare(100 + len(known))))
             wait_for(lambda: driver.find_lines("hero_%d" % (99 + len(known))) or found(), "an answer")

@@ -201,7 +201,7 @@ def test_a_stop_ends_the_self_tuning_of_simulated_robots(field, record, controll
     for ground_truth in ground_truths:
         ground_truth.close()
         name = "/%s/%s/pid_calibration" % (ground_truth.name, controller)
-        rospy.wait_for_service(name, 20.0)
+        rospy.wait_for_service(name, 60.0)
         rospy.ServiceProxy(name, Trigger)()
     watchers = [GroundTruth(number) for number in range(ROBOTS)]
     wait_for(lambda: all(watcher.path and watcher.path[-1][2] > TUNING_M_S for watcher in watchers), "the tuning")

@@ -21,8 +21,13 @@ ROS_MODULES = (
 OTHER_PACKAGES = {
     # module that is imported: package to declare
     **{name: name for name in ROS_MODULES},
+    "cv2": "python3-opencv",
+    "PIL": "python3-pil",
     **{name: f"python3-{name}" for name in "matplotlib numpy pexpect rospkg scipy selenium tornado tqdm yaml".split()},
 }
+
+WITHOUT_ROSDEP_KEY = {"apriltag"}
+"""Optional modules: no package.xml can name them."""
 
 FIT_A_PROTOCOL = tuple(f"hero_client.{name}" for name in ("program", "robot", "ros_clock", "ros_link", "swarm"))
 """For mypy, what they take from ROS is Any."""
@@ -59,7 +64,7 @@ def list_packages() -> List[str]:
 def list_programs(package: str) -> List[str]:
     """Programs of a package that rosrun finds: those that CMake makes, and scripts in nodes/."""
     scripts = [path.name for path in sorted((ROOT / package / "nodes").glob("*"))]
-    return re.findall(r"hero_add_program\((\w+)", read_cmake(package)) + scripts
+    return re.findall(r"hero_add_(?:program|node)\((\w+)", read_cmake(package)) + scripts
 
 
 @lru_cache(maxsize=None)

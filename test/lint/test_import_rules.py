@@ -58,6 +58,7 @@ PURE_ROOMS = (
     "hero_client.robot_base",
     "hero_client.robot_link",
     "hero_client.swarm_base",
+    "hero_client.texts",
     "hero_calibration.dead_zone",
     "hero_calibration.encoder_readings",
     "hero_calibration.infrared",
@@ -131,6 +132,12 @@ def test_only_the_transports_touch_sockets(name):
 @pytest.mark.parametrize("name", sorted(MODULES))
 def test_nothing_imports_a_node(name):
     assert not [found for found in imports_of(name) if found.module.endswith(".node")]
+
+
+@pytest.mark.parametrize("name", modules_below("hero_sim"))
+def test_only_stepped_robots_need_the_client(name):
+    # `python3 -m hero_sim` runs without ROS, and hero_client lies beside it only in a workspace.
+    assert part_of(name, "hero_sim") == "stepped" or "hero_client" not in {found.top for found in imports_of(name)}
 
 
 @pytest.mark.parametrize("name", modules_below("hero_sim"))

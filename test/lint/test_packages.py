@@ -27,6 +27,7 @@ ORDER = (
     "hero_monitor",
     "hero_recording",
     "hero_calibration",
+    "hero_localization",
     "hero_examples",
     "hero_bringup",
     "hero_tutorial",
@@ -140,7 +141,8 @@ def test_only_known_libraries_are_imported():
     for path in sources.list_source_modules().values():
         package = sources.package_of(path)
         for found in sources.read_imports(path):
-            known = found.top in STANDARD_LIBRARY or found.top == package or needed_package(found.module, package)
+            known = found.top in STANDARD_LIBRARY | sources.WITHOUT_ROSDEP_KEY | {package}
+            known = known or needed_package(found.module, package)
             assert known, f"{path}:{found.line}: {found.module}: tell test/lint/sources.py which package it is in"
 
 
@@ -161,7 +163,7 @@ def test_bootstrap_installs_the_python_packages_that_are_declared():
 def test_every_program_has_a_module_with_a_main():
     for package in PACKAGES:
         text = sources.read_cmake(package)
-        for name, module in re.findall(r"hero_add_program\((\w+) ?(\w*)\)", text):
+        for name, module in re.findall(r"hero_add_(?:program|node)\((\w+) ?(\w*)\)", text):
             path = sources.ROOT / package / "src" / package / f"{module or name}.py"
             functions = [node for node in ast.parse(path.read_text()).body if isinstance(node, ast.FunctionDef)]
             assert "main" in [function.name for function in functions], f"{package}: {name}"

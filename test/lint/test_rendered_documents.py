@@ -37,6 +37,7 @@ for (const cell of document.querySelectorAll("td, th")) {
 }
 return broken;"""
 
+
 @pytest.fixture(scope="module")
 def pages():
     """The address of the rendered pages."""

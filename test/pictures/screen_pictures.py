@@ -16,11 +16,11 @@ from picture_program import make_pictures
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path += [str(ROOT / "bench"), str(ROOT / "hero_monitor" / "test" / "rostest")]
-from measuring import find_free_port  # noqa: E402
 from monitor_page import MonitorPage  # noqa: E402
 from running_suite import RunningSuite  # noqa: E402
 
 from hero_test.browser import MISSING as NO_BROWSER  # noqa: E402
+from hero_test.processes import find_free_port  # noqa: E402
 from hero_test.virtual_screen import MISSING, VirtualScreen  # noqa: E402
 
 PICTURES_FOLDER = ROOT / "docs" / "pictures"

@@ -81,24 +81,18 @@ def test_robots_that_did_not_move_are_named(demo):
     assert "hero_1 " in output
 
 
-def test_an_interrupt_ends_everything(demo):
-    port = find_free_port()
-    process = demo("--count", "2", "--port", str(port))
-    wait_until_driver_listens(port)
+def test_an_interrupt_ends_everything_the_monitor_too(demo):
+    driver_port = find_free_port()
+    process = demo("--count", "2", "--monitor", "--port", str(driver_port))
+    line = next(line for line in process.stdout if b"the monitor: " in line)
+    monitor_port = int(re.search(rb":(\d+)/", line).group(1))
+    wait_until_driver_listens(driver_port)
+    wait_for(lambda: listens(monitor_port), "the monitor's page", TIMEOUT_S)
     os.killpg(process.pid, signal.SIGINT)
     output = read_to_end(process)
     assert process.returncode == 130, output
-    assert not listens(port), "the driver still listens"
-
-
-def test_the_monitor_starts_with_the_demo_and_ends_with_it(demo):
-    process = demo("--count", "1", "--monitor", "--port", str(find_free_port()))
-    line = next(line for line in process.stdout if b"the monitor: " in line)
-    port = int(re.search(rb":(\d+)/", line).group(1))
-    wait_for(lambda: listens(port), "the monitor's page", TIMEOUT_S)
-    os.killpg(process.pid, signal.SIGINT)
-    read_to_end(process)
-    assert not listens(port), "the monitor still listens"
+    assert not listens(driver_port), "the driver still listens"
+    assert not listens(monitor_port), "the monitor still listens"
 
 
 def test_closing_the_terminal_ends_everything():
