@@ -26,7 +26,7 @@ poses = st.builds(Pose, good, good, st.floats(-1e4, 1e4))
 any_poses = st.one_of(poses, st.builds(Pose, numbers, numbers, numbers), st.none())
 eight = st.lists(st.sampled_from((NAN, INF, 0.0, 0.05, 0.2)), min_size=8, max_size=8)
 ranges = st.one_of(st.none(), st.just([]), eight)
-often = settings(max_examples=300, deadline=None)
+often = settings(max_examples=300)
 
 
 def make_message(place=(0.1, 0.2, 0.0), turn=(0.0, 0.0, 0.0, 1.0), frame="world"):

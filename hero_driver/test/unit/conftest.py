@@ -1,22 +1,15 @@
-"""What the unit tests share: byte captures of a real robot where they are there, vectors, no time limits."""
+"""What the unit tests share: byte captures of a real robot where they are there, and vectors."""
 
 import os
 import sys
 from pathlib import Path
 
-import hypothesis
 import pytest
 
 CAPTURES = Path(__file__).resolve().parents[3].parent / "shared" / "captures"
 
 # The vectors of the rosserial core serve the other tests too.
 sys.path.insert(0, str(Path(__file__).parent / "rosserial"))
-
-# A busy machine is not a failure.
-hypothesis.settings.register_profile(
-    "patient", deadline=None, suppress_health_check=[hypothesis.HealthCheck.too_slow]
-)
-hypothesis.settings.load_profile("patient")
 
 
 @pytest.fixture

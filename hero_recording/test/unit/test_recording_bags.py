@@ -164,7 +164,7 @@ def good_bag(tmp_path_factory):
     return path
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     places=st.lists(st.floats(0.0, 1.0, exclude_max=True), min_size=1, max_size=20),
     bit=st.integers(0, 7),

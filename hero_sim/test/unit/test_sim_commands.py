@@ -92,7 +92,7 @@ def test_garbage_from_the_server_does_no_harm():
     assert not driver.swarm.robots[0].sensing.laser_enabled
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.lists(st.tuples(st.integers(0, 124), st.binary(max_size=80)), max_size=8), st.binary(max_size=60))
 def test_a_robot_survives_whatever_a_server_sends(sent, noise):
     driver = DriverSide()

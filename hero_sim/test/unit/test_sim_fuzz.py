@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, example, given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from hero_sim.errors import OptionError
@@ -62,7 +62,7 @@ contents = st.one_of(
     mappings.map(json.dumps).map(str.encode),
 )
 # Not a test of how fast the machine is.
-often = settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+often = settings(max_examples=200)
 
 
 @pytest.fixture(scope="module")

@@ -79,7 +79,7 @@ def test_a_stall_delays_everything_and_then_delivers_everything():
     assert radio.is_transparent(601)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(
     profile=st.sampled_from(sorted(PROFILES)),
     gaps=st.lists(st.integers(0, 400), max_size=60),

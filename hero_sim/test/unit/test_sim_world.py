@@ -107,7 +107,7 @@ def test_a_robot_pushes_another_but_never_enters_it():
 wheel_speeds = st.floats(-0.28, 0.28, allow_nan=False)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     arena=st.sampled_from(("default",) + SHIPPED),
     robots=st.integers(1, 9),
