@@ -16,7 +16,7 @@ from jobs import Job, count_cores, run_jobs
 
 ROOT = Path(__file__).resolve().parents[1]
 TIMEOUT_S = 3600.0  # of one .test file; each <test> in it has its own, shorter time-limit
-LOAD = 0.25  # most of a rostest is waiting
+LOAD = 1 / 3  # most of a rostest is waiting
 TIME_LIMIT = re.compile(r'time-limit="([0-9.]+)"')
 
 

@@ -16,7 +16,7 @@ from jobs import Job, count_cores, run_jobs
 ROOT = Path(__file__).resolve().parents[1]
 TIMEOUT_S = 1800.0
 COMPUTING_LOAD = 1.0
-WAITING_LOAD = 0.25
+WAITING_LOAD = 1 / 3
 
 sys.path.insert(0, str(ROOT / "test" / "faults"))
 import run as faults  # noqa: E402

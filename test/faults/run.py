@@ -15,7 +15,7 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 SHORT_TIMEOUT_S = 3600.0
 LONG_TIMEOUT_S = 4 * 3600.0
-LOAD = 0.25  # most of a fault is waiting
+LOAD = 1 / 3  # most of a fault is waiting
 
 sys.path.insert(0, str(HERE.parent))
 from jobs import Job, count_cores, run_jobs  # noqa: E402

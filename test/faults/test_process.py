@@ -2,7 +2,6 @@
 
 import signal
 import socket
-import subprocess
 import sys
 
 import pytest
@@ -18,6 +17,7 @@ from simulated_robots import SPEED_M_S, GroundTruth, drive, start_simulator, wai
 from hero_driver.rosserial import packets, payloads
 from hero_msgs.msg import Encoder
 from hero_test.processes import find_free_port, suspended
+from hero_test.small_disk import SmallDisk
 from hero_test.waiting import wait_for
 
 ROBOTS = 3
@@ -77,28 +77,13 @@ def test_the_driver_ends_although_the_master_hangs(master, start_driver, record)
 # Where its log goes.
 
 
-def make_small_disk(path, script):
-    """Return a command that gives the program after it a full disk at path, which nobody else sees."""
-    mount = 'mount -t tmpfs -o size=32k,mode=777 small %s && %s && exec "$@"' % (path, script)
-    return ["unshare", "--mount", "--propagation", "private", "sh", "-c", mount, "sh"]
-
-
-FILL = "{ dd if=/dev/zero of=%s/filler bs=1k 2>/dev/null || true; }"
-
-
-@pytest.mark.skipif(
-    subprocess.run(
-        ["unshare", "--mount", "--propagation", "private", "true"], stderr=subprocess.DEVNULL, check=False
-    ).returncode
-    != 0,
-    reason="this system lets no test have mounts of its own (unshare --mount): run it as root, not in a chroot",
-)
 @pytest.mark.parametrize("when", ["from the start", "while it runs"])
-def test_a_full_disk_affects_only_the_logs(start_driver, record, tmp_path, when):
-    script = FILL % tmp_path if when == "from the start" else "true"
-    driver = start_driver(
-        prefix=make_small_disk(tmp_path, script), environment={"ROS_LOG_DIR": str(tmp_path)}
-    )
+def test_a_full_disk_affects_only_the_logs(start_driver, record, tmp_path, request, when):
+    disk = SmallDisk(tmp_path, "32k")
+    request.addfinalizer(disk.close)
+    if when == "from the start":
+        disk.take(32 * 1024)
+    driver = start_driver(environment={"ROS_LOG_DIR": disk.path})
     robot = FakeRobot(1).connect(driver.address)
     service = ServiceCheck(driver, robot)
     for count in range(200):

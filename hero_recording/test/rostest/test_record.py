@@ -19,13 +19,12 @@ from geometry_msgs.msg import Twist, Vector3
 from nav_msgs.msg import Odometry
 
 from hero_test.processes import find_program, has_traceback
+from hero_test.small_disk import SmallDisk
 from hero_test.waiting import wait_for
 
 RECORD = find_program("hero_recording", "record")
 TIMEOUT_S = 60.0
 ROBOT_TOPICS = ("odom", "encoder", "proximity", "ground_truth")
-MOST_TAKEN = 4 * 10**9
-"""Bytes that are taken from the disk at once: others on this machine take or free less than half of that meanwhile."""
 
 
 def is_subscribed(namespace):
@@ -36,8 +35,7 @@ def is_subscribed(namespace):
 
 class RecordTest(unittest.TestCase):
     def setUp(self):
-        # On a disk: where /tmp is in memory, files that fill it take that.
-        self.folder = tempfile.mkdtemp(dir=os.environ.get("ROS_TEST_RESULTS_DIR"))
+        self.folder = tempfile.mkdtemp()
         self.addCleanup(shutil.rmtree, self.folder)
 
     def start(self, *command, stdout=subprocess.PIPE, **options):
@@ -178,24 +176,23 @@ class RecordTest(unittest.TestCase):
             self.assertGreater(bag.get_message_count("/hero_0/odom"), 10)
 
     def test_recordings_stop_on_a_full_disk_whatever_reads_their_output(self):
-        free = shutil.disk_usage(self.folder).free
-        taken = min(MOST_TAKEN, free // 2)
-        limit_mb = (free - taken // 2) // 10**6
+        disk = SmallDisk(self.folder, "60m")
+        self.addCleanup(disk.close)
+        self.folder = disk.path
         read_end, write_end = os.pipe()
         os.close(read_end)
         with os.fdopen(write_end, "wb") as closed, open("/dev/full", "wb") as full:
             outputs = {"read": subprocess.PIPE, "closed": closed, "full": full}
             recordings = {
-                name: self.start_recording(name, "--min-free-mb", str(limit_mb), stdout=stdout)
+                name: self.start_recording(name, "--min-free-mb", "30", stdout=stdout)
                 for name, stdout in outputs.items()
             }
         for name in recordings:
             self.wait_for_files(name + "/hero_*.bag.active")
         self.assertEqual([recording.poll() for recording in recordings.values()], [None] * 3)
-        with open(os.path.join(self.folder, "filler"), "wb") as filler:
-            os.posix_fallocate(filler.fileno(), 0, taken)
+        disk.take(40 * 10**6)
         code, output = self.finish(recordings["read"])
-        self.assertRegex(output, r"stopped: only \d+ MB are left in .* less than the limit of %d MB" % limit_mb)
+        self.assertRegex(output, r"stopped: only \d+ MB are left in .* less than the limit of 30 MB")
         for name, recording in recordings.items():
             self.assertEqual(recording.wait(TIMEOUT_S), 1, name)
             self.assert_one_closed_bag(name)
