@@ -14,7 +14,7 @@ import run_rostests
 from jobs import Job, count_cores, run_jobs
 
 ROOT = Path(__file__).resolve().parents[1]
-TIMEOUT_S = 1800.0
+TIMEOUT_S = 3600.0  # of one that hangs
 COMPUTING_LOAD = 1.0
 WAITING_LOAD = 1 / 3
 

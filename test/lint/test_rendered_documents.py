@@ -14,7 +14,6 @@ from hero_test.browser import MISSING, open_browser
 from hero_test.waiting import wait_for
 
 RENDERED = sources.ROOT / ".work" / "docs"
-TIMEOUT_S = 20.0
 NEXT_PAGE = "a.md-footer__link--next"
 
 FIND_CUT_LINES = """
@@ -69,7 +68,7 @@ def test_search_finds_pages_without_a_server(pages, browser):
     browser.get(pages + "/index.html")
     browser.find_element("css selector", "input[name=query]").send_keys("odometry")
     find_titles = "return [...document.querySelectorAll('.md-search-result__item h1')].map(title => title.innerText)"
-    wait_for(lambda: "8. Odometry" in browser.execute_script(find_titles), "the page is found", TIMEOUT_S)
+    wait_for(lambda: "8. Odometry" in browser.execute_script(find_titles), "the page is found")
 
 
 def test_the_copy_button_copies_commands_alone(pages, browser):
@@ -78,7 +77,7 @@ def test_the_copy_button_copies_commands_alone(pages, browser):
     browser.get(pages + "/docs/tutorial/ros_basics/05_subscriber.html")
     block = browser.find_element("css selector", ".highlight:has(.gp)")
     assert "$ rosrun" in block.text and "[build] Summary" in block.text
-    button = wait_for(lambda: block.find_elements("css selector", "button[data-clipboard-target]"), "it", TIMEOUT_S)[0]
+    button = wait_for(lambda: block.find_elements("css selector", "button[data-clipboard-target]"), "it")[0]
     browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", button)
     button.click()
     browser.execute_script("document.body.prepend(document.createElement('textarea'))")

@@ -14,8 +14,8 @@ def open_browser(width, height):
     options = webdriver.ChromeOptions()
     options.binary_location = shutil.which("chromium")
     # No sandbox: it needs rights that containers lack, and only our own pages are shown.
-    for argument in ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"):
-        options.add_argument(argument)
+    for name in ("headless=new", "no-sandbox", "disable-gpu", "disable-dev-shm-usage", "disable-background-networking"):
+        options.add_argument("--" + name)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
     browser = webdriver.Chrome(service=Service(shutil.which("chromedriver")), options=options)
     set_page_size(browser, width, height)
