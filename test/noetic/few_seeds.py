@@ -5,7 +5,7 @@ The stage proves the language and the versions of libraries; the stage unit runs
 
 import collections
 
-SEEDS_MAX = 2
+SEEDS_MAX = 1
 EXAMPLES_MAX = 10
 
 

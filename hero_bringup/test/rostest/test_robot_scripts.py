@@ -7,8 +7,10 @@ import socket
 import subprocess
 import sys
 import unittest
+import xmlrpc.client
 from unittest import mock
 
+import rosgraph
 import rospy
 import rostest
 from geometry_msgs.msg import Twist
@@ -19,6 +21,7 @@ from hero_test.swarm_watch import SwarmWatch
 from hero_test.waiting import wait_for
 
 ROBOTS = 4
+COMMANDS = "/hero_%d/velocity_controller/cmd_vel"
 
 DEADLINE_S = 60.0
 
@@ -43,8 +46,17 @@ class CommandLog:
 
     def __init__(self, robot_id):
         self.speeds_m_s = []
-        topic = "/hero_%d/velocity_controller/cmd_vel" % robot_id
+        topic = COMMANDS % robot_id
         rospy.Subscriber(topic, Twist, lambda twist: self.speeds_m_s.append(twist.linear.x), queue_size=100)
+
+
+def connect_and_leave(topic):
+    """Do to all that publish a topic what rospy does where it is told of a publisher twice at once."""
+    master = rosgraph.Master("/test")
+    for node in dict(master.getSystemState()[0])[topic]:
+        with xmlrpc.client.ServerProxy(master.lookupNode(node)) as publisher:
+            _, _, (_, host, port) = publisher.requestTopic("/test", topic, [["TCPROS"]])
+        socket.create_connection((host, port)).close()
 
 
 class RobotScriptsTest(unittest.TestCase):
@@ -72,6 +84,8 @@ class RobotScriptsTest(unittest.TestCase):
         scripts = [self.start(DRIVE_FOR_EVER % robot_id) for robot_id in range(len(ends))]
         rows = self.watch.rows.values()
         wait_for(lambda: sum(row[-1][4] > 0.03 for row in rows) == len(ends), "motion of all")
+        for robot_id in range(len(ends)):
+            connect_and_leave(COMMANDS % robot_id)
         logs = [CommandLog(robot_id) for robot_id in range(len(ends))]
         wait_for(lambda: all(log.speeds_m_s for log in logs), "commands")
         for script, (number, status) in zip(scripts, ends):

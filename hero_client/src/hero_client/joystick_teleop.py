@@ -13,6 +13,7 @@ from .errors import ProgramError
 from .geometry import STOP, Velocity
 from .program import Program
 from .swarm import REPORT_PERIOD_S, Swarm
+from .teleop_output import TeleopOutput
 
 __all__ = ["JoystickMapping", "JoystickTeleop"]
 
@@ -23,9 +24,6 @@ SILENCE_S = 0.5
 
 FIRST_WARNING_S = 2.0
 """joy_node may start later."""
-
-STOP_REPEAT_S = 0.5
-"""Stops are sent for so long, then teleop is silent: other programs may drive the robot."""
 
 
 class JoystickMapping(NamedTuple):
@@ -68,7 +66,7 @@ class JoystickTeleop:
         self._newest: Optional[Joy] = None
         self._arrival_s = -math.inf
         self._is_stop_pressed = False
-        self._last_motion_s = -math.inf
+        self._output = TeleopOutput()
         self._next_warning_s = swarm.now_s + FIRST_WARNING_S
         self._reported_status = ""
 
@@ -108,9 +106,7 @@ class JoystickTeleop:
         elif now_s >= self._next_warning_s:
             self._next_warning_s = now_s + REPORT_PERIOD_S
             rospy.logwarn("nothing on /joy: is a joystick plugged in, and does its driver (package joy) run?")
-        if command != STOP:
-            self._last_motion_s = now_s
-        if now_s - self._last_motion_s < STOP_REPEAT_S:
+        if self._output.passes(command):
             for robot in self._swarm:
                 robot.drive(*command)
         self._report_stop()

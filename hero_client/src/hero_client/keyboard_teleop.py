@@ -18,14 +18,12 @@ from .robot import Robot
 from .robot_constants import MAX_LINEAR_M_S
 from .stop_status import paint
 from .swarm import Swarm
+from .teleop_output import TeleopOutput
 
 __all__ = ["MAX_ANGULAR_RAD_S", "MIN_ANGULAR_RAD_S", "MIN_LINEAR_M_S", "KeyDrive", "KeyboardTeleop"]
 
 PERIOD_S = 0.1
 """Between two commands; the robot takes one every 50 ms at most."""
-
-STOP_REPEAT_S = 0.5
-"""Stops are sent for so long, then teleop is silent: an idle teleop does not disturb other programs."""
 
 FIRST_TIMEOUT_S = 0.75
 """A single press drives for this time: a little more than the longest usual wait for the first repeat."""
@@ -135,7 +133,7 @@ class KeyboardTeleop:
         self._swarm = swarm
         self._chosen: List[Robot] = swarm.robots[:1]
         self._drive = KeyDrive(linear_m_s, angular_rad_s)
-        self._last_motion_s = -math.inf
+        self._output = TeleopOutput()
         self._next_send_s = 0.0
         self._sent = STOP
         self._has_reported_stopped = False
@@ -195,12 +193,10 @@ class KeyboardTeleop:
     def step(self, now_s: float) -> None:
         """Send what is due: a change at once, else every PERIOD_S."""
         command = self._drive.command(now_s)
-        if command != STOP:
-            self._last_motion_s = now_s
         if command == self._sent and now_s < self._next_send_s:
             return
         self._next_send_s = now_s + PERIOD_S
-        if now_s - self._last_motion_s < STOP_REPEAT_S:
+        if self._output.passes(command):
             self.send(command)
 
     def send(self, command: Velocity) -> None:

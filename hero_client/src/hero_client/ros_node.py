@@ -6,6 +6,7 @@ node wait for. rospy has no setting for either, so this file, and no other here,
 
 import errno
 import http.client
+import socket
 import threading
 import xmlrpc.client
 from typing import Any
@@ -125,8 +126,19 @@ def _serve_each_connection_by_itself() -> None:
     server = tcpros_base.init_tcpros_server()
     serve = server._tcp_server_callback
 
+    def serve_unless_gone(sock: socket.socket, address: Any) -> None:
+        # rospy warns of what connects and leaves, as it does itself where it is told of a publisher twice at once.
+        try:
+            is_gone = not sock.recv(1, socket.MSG_PEEK)
+        except OSError:
+            is_gone = True
+        if is_gone:
+            sock.close()
+        else:
+            serve(sock, address)
+
     def serve_on_a_thread(*connection: Any) -> None:
-        threading.Thread(target=serve, args=connection, name="connection", daemon=True).start()
+        threading.Thread(target=serve_unless_gone, args=connection, name="connection", daemon=True).start()
 
     server._tcp_server_callback = serve_on_a_thread
 

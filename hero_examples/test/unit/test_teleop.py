@@ -49,6 +49,11 @@ def swarm():
     return swarm
 
 
+def hang(swarm):
+    """Let the program do nothing for a second, as if it were suspended."""
+    true_paths.run(swarm, lambda time_s: None, 1.0, hz=20.0)
+
+
 def use_keys(swarm, teleop, presses, duration_s):
     """Press keys at their times, (s, key), while teleop takes its steps as often as the program does."""
     presses = [(swarm.now_s + time_s, key) for time_s, key in presses]
@@ -77,6 +82,14 @@ def test_a_held_key_drives_and_letting_go_stops_with_repeated_zeros(swarm):
     zeros_ms = [time_ms for time_ms, linear_m_s, angular_rad_s in sent if linear_m_s == angular_rad_s == 0.0]
     assert zeros_ms[-1] - zeros_ms[0] > 2 * READ_PERIOD_MS
     assert swarm.now_s * 1000.0 - zeros_ms[-1] > 1000.0  # then it is silent: other programs may drive
+
+
+def test_keys_stop_the_robot_also_after_the_program_hung(swarm):
+    teleop, sent = KeyboardTeleop(swarm, 0.1, 1.5), record_commands(swarm[0])
+    use_keys(swarm, teleop, hold("w", 1.0), 1.0)
+    hang(swarm)
+    use_keys(swarm, teleop, [], 0.2)
+    assert [command[1:] for command in sent[-2:]] == [(0.0, 0.0)] * 2
 
 
 @pytest.mark.parametrize("key", ["s", " "])
@@ -141,6 +154,14 @@ def test_a_silent_joystick_stops_the_robots_before_their_watchdogs(swarm):
     assert sent[-1][1:] == (0.0, 0.0)
     use_stick(swarm, teleop, None, 2.0)
     assert swarm.now_s - sent[-1][0] / 1000.0 > 1.0  # then it is silent
+
+
+def test_a_stick_stops_the_robots_also_after_the_program_hung(swarm):
+    teleop, sent = JoystickTeleop(swarm, MAPPING), record_commands(swarm[0])
+    use_stick(swarm, teleop, make_joy(1.0), 1.0)
+    hang(swarm)
+    use_stick(swarm, teleop, None, 0.3)
+    assert [command[1:] for command in sent[-2:]] == [(0.0, 0.0)] * 2
 
 
 def test_a_short_press_of_the_stop_button_stops_all_robots_once(swarm):
