@@ -54,6 +54,12 @@ PROMPT_PATTERN = re.compile("\x02([0-9]+)\x03")
 SHOWN_LINES = 30
 """Of a wrong output, at its beginning and at its end."""
 COLUMNS = 400  # so that nothing wraps
+
+RECONNECTION = re.compile(
+    r"\[WARN\] \[[\d.]+\]: (Inbound TCP/IP connection failed|Could not process inbound connection)"
+)
+"""rospy's warnings of a subscriber that connected twice at once, or too late; no page shows them."""
+
 CONTROL_SEQUENCE = re.compile(r"\x1b\][^\x07\x1b]*(?:\x07|\x1b\\)|\x1b\[[0-9;?]*[A-Za-z]|\x1b[=>]|\x07")
 
 
@@ -200,7 +206,7 @@ def clean_output(raw: str) -> str:
     """Return what the terminal shows in the end, without control sequences and overwritten text."""
     lines = CONTROL_SEQUENCE.sub("", raw).replace("\r\n", "\n").split("\n")
     shown = [line.rstrip("\r").rsplit("\r", 1)[-1].rstrip() for line in lines]
-    text = "\n".join(shown).expandtabs(4)
+    text = "\n".join(line for line in shown if not RECONNECTION.match(line)).expandtabs(4)
     return text if text.endswith("\n") or not text else text + "\n"
 
 

@@ -82,7 +82,8 @@ class DriverRestartTest(unittest.TestCase):
 
         wait_for(drives, "motion")
         self.assertEqual(program.end(), 0)
-        self.assertEqual(program.find_lines(r"\[WARN\]|\[ERROR\]| left "), [])
+        # rospy warns of a subscriber that was told of a publisher twice at once, and left one connection.
+        self.assertEqual(program.find_lines(r"\[(WARN|ERROR)\](?!.*Inbound TCP/IP connection failed)| left "), [])
         self.assertFalse(has_traceback(program.text()), program.lines)
 
     def test_robots_are_back_when_the_driver_is_started_again(self):
