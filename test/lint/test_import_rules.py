@@ -15,6 +15,7 @@ SOCKET_OWNERS = (
     "hero_driver.ros.handshakes",
     "hero_driver.ros.rospy_internals",
     "hero_driver.ros.raw_subscriber",
+    "hero_client.ros_node",
     "hero_sim.link.tcp_link",
     "hero_tools.checkup.network",
     "hero_monitor.server",
