@@ -314,16 +314,19 @@ class FakeRobot:
         self.motors.start_tuning(controller)
 
     def _run_motors(self) -> None:
-        """Send encoder readings and, while it tunes itself, the lines that the firmware logs."""
+        """Send encoder readings and, while it tunes itself, the lines that the firmware logs.
+
+        As on the robot, those that a pause left out are not made up for.
+        """
         encoder_s = tuning_s = time.monotonic()
         while not self._closing.wait(max(min(encoder_s, tuning_s) - time.monotonic(), 0.0)):
             now_s = time.monotonic()
             if now_s >= encoder_s:
-                encoder_s += ENCODER_INTERVAL_S
+                encoder_s = now_s + ENCODER_INTERVAL_S
                 if self.requests and not self.is_silent:
                     self.send("encoder", self.motors.encode_encoder(self.name, now_s, time.time()))
             if now_s >= tuning_s:
-                tuning_s += TUNING_INTERVAL_S
+                tuning_s = now_s + TUNING_INTERVAL_S
                 if self.motors.is_tuning and not self.is_silent:
                     text = "Tunning Motor Set: [0.000000,0.000000], [0.050000,0.050000]->[-50,210]"
                     self.log("\x1b[93m[/%s] %s\x1b[0m" % (self.name, text))

@@ -3,7 +3,7 @@
     rosrun hero_tools check            a line per point: OK, WARN or FAIL, and what to do
     rosrun hero_tools check --json     the same as one line of JSON
 
-Changes nothing. Ends within about 3 s whatever hangs; the exit status is 1 if a point failed.
+Changes nothing. Ends within about 5 s whatever hangs; the exit status is 1 if a point failed.
 """
 
 import argparse
@@ -20,7 +20,7 @@ from hero_client.texts import make_printable
 from .checkup import computer, graph, localization, network
 from .checkup.points import FAIL, OK, WARN, Finding, Point, run_points, warn
 
-TIMEOUT_S = 1.5  # of the points that run at once: those that need no ROS master, the node, those that need it
+TIMEOUT_S = 4.0  # of the points that run at once: those that need no ROS master, the node, those that need it
 LEAVE_TIMEOUT_S = 0.3
 
 

@@ -20,8 +20,8 @@ from hero_msgs.msg import Robot, RobotArray
 from .network import HOST_REMEDY, Address, find_source_address, is_loopback, is_own, resolve
 from .points import Finding, fail, ok, wait_until, warn
 
-CONNECT_TIMEOUT_S = 0.8
-REPORT_TIMEOUT_S = 0.8
+CONNECT_TIMEOUT_S = 3.0
+REPORT_TIMEOUT_S = 3.0
 LINES_MAX = 10
 CLEAN_UP = "did it end without a word? rosnode cleanup"
 

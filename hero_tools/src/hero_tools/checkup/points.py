@@ -75,7 +75,7 @@ def wait_until(condition: Callable[[], bool], timeout_s: float) -> bool:
     return condition()
 
 
-def ask_system(command: List[str], timeout_s: float = 0.9) -> Optional[str]:
+def ask_system(command: List[str], timeout_s: float = 2.0) -> Optional[str]:
     """Return the output of a command that only reads; None if it is missing, fails, or does not end in time."""
     environment = dict(os.environ, LC_ALL="C", PATH="%s:%s" % (os.environ.get("PATH", ""), TOOL_PATH))
     try:
