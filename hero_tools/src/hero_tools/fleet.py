@@ -29,7 +29,8 @@ from .fleet_rows import ORDERS, RobotRow, find_missing, sort_rows
 from .fleet_table import format_json, format_table, format_title
 
 DRIVER_TIMEOUT_S = 10.0  # how long --once waits for a driver that is just starting
-LISTEN_S = 1.5  # scans arrive 5 times a second, new subscriptions take a few 0.1 s
+LISTEN_S = 1.5  # how long --once counts messages
+LISTEN_MAX_S = 5.0  # also for robots that are ready but silent: a busy PC takes its time to subscribe
 DRAW_PERIOD_S = 0.5
 ASKING_DRAW_PERIOD_S = 0.1  # while people wait for a stop
 ENTER_SCREEN = "\x1b[?1049h\x1b[?25l"  # xterm: the alternate screen, no cursor
@@ -172,9 +173,12 @@ class FleetProgram:
                 text = "fleet: no driver: nothing on /hero_driver/robots after %.0f s"
                 print(text % DRIVER_TIMEOUT_S, file=sys.stderr)
             return 1
-        end_s = time.monotonic() + LISTEN_S
-        while time.monotonic() < end_s and self._program.sleep(0.1):
+        start_s = time.monotonic()
+        while self._program.sleep(0.1):
             self._read()
+            heard = all(row.is_heard for row in self._rows if row.robot.state == Robot.READY)
+            if time.monotonic() - start_s > (LISTEN_S if heard else LISTEN_MAX_S):
+                break
         self.print_fleet()
         return 0
 

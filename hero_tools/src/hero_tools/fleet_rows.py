@@ -43,6 +43,11 @@ class RobotRow(NamedTuple):
         return self.track.nearest.range_m if self.track.nearest else math.inf
 
     @property
+    def is_heard(self) -> bool:
+        """Whether odometry and a scan have arrived."""
+        return self.track.pose is not None and self.track.proximity_seen
+
+    @property
     def moved(self) -> bool:
         """Whether the robot has driven or turned more than noise could explain."""
         return self.track.distance_m >= MOVED_M or self.track.turned_rad >= MOVED_RAD
