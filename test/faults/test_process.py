@@ -3,6 +3,7 @@
 import signal
 import socket
 import sys
+import time
 
 import pytest
 import rospy
@@ -21,6 +22,7 @@ from hero_test.small_disk import SmallDisk
 from hero_test.waiting import wait_for
 
 ROBOTS = 3
+SILENCE_S = 4.0
 NOT_AT_REST = "not known to be at rest"
 """What the driver says at its end of robots whose wheels did not show that they stopped."""
 
@@ -72,6 +74,26 @@ def test_the_driver_ends_although_the_master_hangs(master, start_driver, record)
         code = driver.wait_end()
     robot.close()
     record("SIGTERM while the ROS master hangs", 1, int(code == 0))
+
+
+def test_a_driver_that_was_suspended_keeps_its_robots(start_driver, record):
+    driver = start_driver(parameters={"silence_timeout_s": SILENCE_S})
+    robot = FakeRobot(1).connect(driver.address)
+    service = ServiceCheck(driver, robot)
+    service.verify()
+    robot.is_silent = True
+    with suspended(driver.process.pid):
+        end_s = time.monotonic() + 1.2 * SILENCE_S
+        wait_for(lambda: time.monotonic() > end_s, "the time that would make it lose a silent robot")
+        driver.fleet.newest = None
+    wait_for(lambda: driver.fleet.newest, "the driver")
+    driver.fleet.newest = None
+    wait_for(lambda: driver.fleet.newest, "a report that comes after its first look at the robots")
+    robot.is_silent = False
+    robot.send_bytes(TIME_PACKET)
+    assert service.verify(20) and not driver.find_lines("hero_1 left")
+    robot.close()
+    record("the driver is suspended for longer than robots may be silent", 1, 1)
 
 
 # Where its log goes.

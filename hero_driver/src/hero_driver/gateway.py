@@ -181,6 +181,11 @@ class Gateway(LinkHandler):
         if peer.session.outgoing and not link.closed:
             self._send_outgoing(peer)
 
+    def resume(self, now_s: float) -> None:
+        """Keep robots that could not be heard meanwhile."""
+        for peer in self.peers.values():
+            peer.session.forgive_silence(now_s)
+
     @staticmethod
     def _send_outgoing(peer: Peer) -> None:
         for packet in peer.session.take_packets():

@@ -32,6 +32,9 @@ class Handler(LinkHandler):
     def poll_link(self, link, now_s):
         """Have nothing to do."""
 
+    def resume(self, now_s):
+        """Have nothing to do."""
+
     def close_link(self, link, reason):
         with self.changed:
             self.endings.append(reason)

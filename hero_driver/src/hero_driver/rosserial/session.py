@@ -223,6 +223,7 @@ class Session:
         self.undeclared_messages = 0
         self.opened_s = now_s
         self.last_receive_s = now_s
+        self._listening_s = now_s  # since when silence counts
         self._limits = limits
         self.outgoing: List[bytes] = []
         self._last_request_s: Optional[float] = None
@@ -271,7 +272,7 @@ class Session:
 
     def poll(self, now_s: float) -> List[Event]:
         """Do what is due by now_s; call it at least a few times per second."""
-        silent_s = now_s - self.last_receive_s
+        silent_s = now_s - max(self.last_receive_s, self._listening_s)
         if silent_s > self._limits.silence_timeout_s and self.state is not SessionState.ENDED:
             self._enter_next(_Happening.TIMED_OUT)
             return [SessionEnded("silent for %.1f s" % silent_s)]
@@ -283,6 +284,10 @@ class Session:
             self._request_due_s = now_s + REQUEST_INTERVAL_S
             self._enter_next(_Happening.REQUESTED)
         return []
+
+    def forgive_silence(self, now_s: float) -> None:
+        """Count silence from now on: until now nothing could be received."""
+        self._listening_s = now_s
 
     def take_packets(self) -> List[bytes]:
         """Return the packets that the session itself wants to send, and forget them."""

@@ -30,6 +30,8 @@ LISTEN_BACKLOG = 256
 POLL_INTERVAL_S = 0.1
 """Sessions are polled this often for what is due (repeated requests, silence)."""
 
+PAUSE_S = 1.0
+"""Between two polls: after more, the driver was suspended, or its PC was too busy to run it."""
 
 CALLS_MAX = 10000
 """Calls of other threads that may wait: each of them has a bound of its own, so more come only if the loop hangs."""
@@ -90,6 +92,7 @@ class EventLoop(LinkOwner):
         self._readers: Set[Reader] = set()
         self._thread_id = 0
         self._turned_s = 0.0  # when the last turn ended
+        self._polled_s = 0.0  # when links were last polled
         self._timers: List[Tuple[float, int, Callable[[], None]]] = []
         self._timer_numbers = itertools.count()
         self._calls = CallQueue(CALLS_MAX, self._wake, self._report_call)
@@ -118,7 +121,7 @@ class EventLoop(LinkOwner):
     def run(self) -> None:
         """Serve until stop(); then close everything."""
         self._thread_id = threading.get_ident()
-        self._turned_s = time.monotonic()
+        self._turned_s = self._polled_s = time.monotonic()
         try:
             while self._is_running:
                 self._run_once()
@@ -328,6 +331,9 @@ class EventLoop(LinkOwner):
     def _poll_links(self) -> None:
         self.call_later(POLL_INTERVAL_S, self._poll_links)
         now_s = time.monotonic()
+        if now_s - self._polled_s > PAUSE_S:
+            self._handler.resume(now_s)
+        self._polled_s = now_s
         for link in list(self._links.values()):
             if not link.closed:
                 self._handler.poll_link(link, now_s)

@@ -62,6 +62,10 @@ class LinkHandler:
         """Called every POLL_INTERVAL_S for each connection."""
         raise NotImplementedError
 
+    def resume(self, now_s: float) -> None:
+        """The loop runs again after a pause in which it received nothing; called before poll_link()."""
+        raise NotImplementedError
+
     def report_bug(self, error: Exception) -> None:
         """One of the calls above, or one made for the loop, raised error; the loop goes on."""
         raise NotImplementedError
