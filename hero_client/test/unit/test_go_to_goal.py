@@ -101,7 +101,8 @@ def test_a_blocked_robot_stops_fails_and_tells_where_the_obstacle_is():
         ranges = [math.inf] * 8
         ranges[index] = 0.06
         assert controller.step(HERE, ranges, 0.0).linear_m_s == 0.0
-        controller.step(HERE, ranges, BLOCKED_S + 0.1)
+        for number in range(1, int(BLOCKED_S / STEP_S) + 2):
+            controller.step(HERE, ranges, STEP_S * number)
         assert controller.state is State.FAILED
         assert "0.06 m" in controller.reason and "%s degrees" % degrees in controller.reason
         assert "1.000 m are left" in controller.reason
@@ -110,9 +111,11 @@ def test_a_blocked_robot_stops_fails_and_tells_where_the_obstacle_is():
 def test_an_obstacle_that_leaves_in_time_ends_no_motion():
     controller = GoToGoalController(Goal(1.0, 0.0), 0.0)
     near = [0.06] + [math.inf] * 7
-    assert controller.step(HERE, near, 0.0).linear_m_s == 0.0
-    assert controller.step(HERE, [math.inf] * 8, 1.0).linear_m_s > 0.0
-    controller.step(HERE, near, BLOCKED_S + 0.1)
+    steps = int(0.6 * BLOCKED_S / STEP_S)
+    for number in range(2 * steps + 1):
+        is_free = number == steps
+        command = controller.step(HERE, [math.inf] * 8 if is_free else near, STEP_S * number)
+        assert (command.linear_m_s > 0.0) == is_free
     assert controller.state is State.ACTIVE
 
 
@@ -135,6 +138,18 @@ def test_wheels_that_do_not_turn_fail_the_motion():
         for index in range(int(STALL_S / STEP_S) + 2):
             controller.step(HERE, None, STEP_S * index)
         assert controller.state is State.FAILED and "wheels do not turn" in controller.reason
+
+
+def test_a_pc_that_runs_nothing_for_a_while_fails_no_motion():
+    controller = GoToGoalController(Goal(1.0, 0.0), 0.0)
+    now_s = 0.0
+    for pause_s, pose in ((0.0, HERE), (5.0, HERE), (0.0, None)):
+        now_s += pause_s
+        for _ in range(int(0.3 * STALL_S / STEP_S)):
+            now_s += STEP_S
+            controller.step(pose, None, now_s)
+    controller.step(HERE, None, now_s + STEP_S)
+    assert controller.state is State.ACTIVE, controller.reason
 
 
 @pytest.mark.parametrize("way_m", [0.3, -0.2, 0.01])

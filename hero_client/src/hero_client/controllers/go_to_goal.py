@@ -68,7 +68,7 @@ class GoToGoalController(MotionController):
         target = Pose(self.goal.x_m, self.goal.y_m, self.goal.yaw_rad)
         return go_to_pose(pose, target, GoToPoseLaw(), at_goal=True)
 
-    def _approach(self, pose: Pose, ranges: Sequence[float], now_s: float) -> Velocity:
+    def _approach(self, pose: Pose, ranges: Sequence[float], seen_s: float) -> Velocity:
         goal, tolerance_m = self.goal, AIM_SHARE * self._tolerance_m
         if goal.yaw_rad is None:
             command = go_to_point(pose, goal.x_m, goal.y_m, GoToLaw(tolerance_m=tolerance_m))
@@ -77,14 +77,14 @@ class GoToGoalController(MotionController):
         if not self._avoid or not ranges:
             return command
         bearing_rad = wrap_angle(math.atan2(goal.y_m - pose.y_m, goal.x_m - pose.x_m) - pose.yaw_rad)
-        if now_s - self._last_bent_s > FREE_S:
+        if seen_s - self._last_bent_s > FREE_S:
             self._side = 0
         bent, side = bend_around(command, bearing_rad, self.distance_m, ranges, self._side)
         if side:
-            self._side, self._last_bent_s = side, now_s
+            self._side, self._last_bent_s = side, seen_s
             self._obstacle = find_nearest(ranges, 0.0, math.tau / len(ranges))
         if self.distance_m < self._least_m - PROGRESS_M:
-            self._least_m, self._progress_s = self.distance_m, now_s
-        elif now_s - self._progress_s > PROGRESS_S:
+            self._least_m, self._progress_s = self.distance_m, seen_s
+        elif seen_s - self._progress_s > PROGRESS_S:
             self._fail("no nearer for %g s%s; %s" % (PROGRESS_S, self._describe_distance(), self._describe_obstacle()))
         return bent

@@ -27,6 +27,9 @@ SILENT_STEPS = 20
 """After so many steps without a pose, 2 s, the motion has failed: the robot is gone. Steps, not seconds: a program that
 was kept from running has not heard the robot either."""
 
+LONGEST_STEP_S = 0.2
+"""What a step takes longer does not count as time in which the robot was seen: the PC was too busy to run all."""
+
 CLEARANCE_M = 0.02
 """Free space kept between the body and an obstacle in the way."""
 
@@ -75,6 +78,8 @@ class MotionController:
         self.distance_m = math.nan
         self._timeout_s = timeout_s
         self._start_s = now_s
+        self._stepped_s = now_s
+        self._seen_s = now_s  # runs only while the robot is seen
         self._silent_steps = 0
         self._stopped_since_s: Optional[float] = None
         self._blocked_since_s: Optional[float] = None
@@ -91,39 +96,42 @@ class MotionController:
         """
         if self.state is not State.ACTIVE:
             return STOP
+        step_s, self._stepped_s = min(now_s - self._stepped_s, LONGEST_STEP_S), now_s
         if now_s - self._start_s > self._timeout_s:
             return self._fail(self._describe_timeout())
         if pose is None or not all(math.isfinite(value) for value in pose):
             self._silent_steps += 1
             return STOP if self._silent_steps < SILENT_STEPS else self._fail("no pose for 2 s")
         self._silent_steps = 0
+        self._seen_s += step_s
+        seen_s = self._seen_s
         # It stops well inside the tolerance and restarts only outside: hysteresis against chattering at the border.
         self._at_goal = self._offset(pose) < (1.0 if self._at_goal else AIM_SHARE)
-        command = self._arrive(pose) if self._at_goal else self._approach(pose, ranges or (), now_s)
+        command = self._arrive(pose) if self._at_goal else self._approach(pose, ranges or (), seen_s)
         if self._at_goal and command == STOP:
             if self._stopped_since_s is None:
-                self._stopped_since_s = now_s
-            if now_s - self._stopped_since_s >= SETTLE_S:
+                self._stopped_since_s = seen_s
+            if seen_s - self._stopped_since_s >= SETTLE_S:
                 self.state = State.REACHED
             return STOP
         self._stopped_since_s = None
-        command = self._slow_for_obstacle(command, ranges or (), now_s)
-        self._check_wheels(pose, command, now_s)
+        command = self._slow_for_obstacle(command, ranges or (), seen_s)
+        self._check_wheels(pose, command, seen_s)
         return command if self.state is State.ACTIVE else STOP
 
     def _offset(self, pose: Pose) -> float:
         """Update distance_m and return how far off the goal is, as a share of the tolerance."""
         raise NotImplementedError
 
-    def _approach(self, pose: Pose, ranges: Sequence[float], now_s: float) -> Velocity:
-        """Return the command on the way."""
+    def _approach(self, pose: Pose, ranges: Sequence[float], seen_s: float) -> Velocity:
+        """Return the command on the way; seen_s: like now_s of step(), but runs only while the robot is seen."""
         raise NotImplementedError
 
     def _arrive(self, pose: Pose) -> Velocity:
         """Return the command at the goal; STOP if nothing is left to do."""
         return STOP
 
-    def _slow_for_obstacle(self, command: Velocity, ranges: Sequence[float], now_s: float) -> Velocity:
+    def _slow_for_obstacle(self, command: Velocity, ranges: Sequence[float], seen_s: float) -> Velocity:
         """Return the command, slower before an obstacle that is nearer than the goal; fail if it stays there."""
         free_m, obstacle = find_in_path(ranges, backward=command.linear_m_s < 0.0)
         limit_m_s = APPROACH_GAIN * max(0.0, free_m - CLEARANCE_M)
@@ -135,12 +143,12 @@ class MotionController:
             return Velocity(math.copysign(limit_m_s, command.linear_m_s), command.angular_rad_s)
         self._obstacle = obstacle
         if self._blocked_since_s is None:
-            self._blocked_since_s = now_s
-        if now_s - self._blocked_since_s >= self._patience_s:
+            self._blocked_since_s = seen_s
+        if seen_s - self._blocked_since_s >= self._patience_s:
             self._fail(self._describe_obstacle() + self._describe_distance())
         return Velocity(0.0, command.angular_rad_s)
 
-    def _check_wheels(self, pose: Pose, command: Velocity, now_s: float) -> None:
+    def _check_wheels(self, pose: Pose, command: Velocity, seen_s: float) -> None:
         """Fail if odometry stays the same although the wheels were told to move."""
         is_told_to_move = (
             abs(command.linear_m_s) >= STALL_LINEAR_M_S or abs(command.angular_rad_s) >= STALL_ANGULAR_RAD_S
@@ -152,8 +160,8 @@ class MotionController:
             or measure_distance(last, pose) > MOVED_M
             or abs(wrap_angle(pose.yaw_rad - last.yaw_rad)) > MOVED_RAD
         ):
-            self._moved_pose, self._moved_s = pose, now_s
-        elif now_s - self._moved_s >= STALL_S:
+            self._moved_pose, self._moved_s = pose, seen_s
+        elif seen_s - self._moved_s >= STALL_S:
             self._fail(
                 "its wheels do not turn: is something blocking them, is the battery empty, or does another program"
                 " stop the robot?"

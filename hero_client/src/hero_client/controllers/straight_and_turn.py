@@ -46,7 +46,7 @@ class ForwardController(MotionController):
         self.distance_m = abs(self._remaining_m)
         return self.distance_m / TOLERANCE_M
 
-    def _approach(self, pose: Pose, ranges: Sequence[float], now_s: float) -> Velocity:
+    def _approach(self, pose: Pose, ranges: Sequence[float], seen_s: float) -> Velocity:
         speed_m_s = min(self._linear_m_s, max(MIN_LINEAR_M_S, LINEAR_GAIN * self.distance_m))
         start_yaw_rad = self._start.yaw_rad if self._start else pose.yaw_rad
         turn_rad_s = clamp(ANGULAR_GAIN * wrap_angle(start_yaw_rad - pose.yaw_rad), 1.0)
@@ -71,7 +71,7 @@ class TurnController(MotionController):
         self._last_yaw_rad = pose.yaw_rad
         return abs(self._remaining_rad) / TOLERANCE_RAD
 
-    def _approach(self, pose: Pose, ranges: Sequence[float], now_s: float) -> Velocity:
+    def _approach(self, pose: Pose, ranges: Sequence[float], seen_s: float) -> Velocity:
         speed_rad_s = min(self._angular_rad_s, max(MIN_ANGULAR_RAD_S, ANGULAR_GAIN * abs(self._remaining_rad)))
         return Velocity(0.0, math.copysign(speed_rad_s, self._remaining_rad))
 
