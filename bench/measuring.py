@@ -38,9 +38,9 @@ def read_one_cpu_s(pid):
     """Return the CPU seconds that one process has used, 0 if it has ended."""
     try:
         fields = Path("/proc/%s/stat" % pid).read_text().rpartition(")")[2].split()
-    except OSError:
+        return (int(fields[11]) + int(fields[12])) / TICKS_PER_S
+    except (OSError, IndexError):  # the second where it went while it was read
         return 0.0
-    return (int(fields[11]) + int(fields[12])) / TICKS_PER_S
 
 
 def find_tree(pid):
@@ -50,7 +50,7 @@ def find_tree(pid):
         if entry.name.isdigit():
             try:
                 parent = int((entry / "stat").read_text().rpartition(")")[2].split()[1])
-            except (OSError, ValueError):
+            except (OSError, IndexError):
                 continue
             children.setdefault(parent, []).append(int(entry.name))
     found, todo = [], [pid]

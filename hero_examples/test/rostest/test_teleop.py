@@ -27,7 +27,7 @@ def is_running(pid):
     """Return whether a process runs; one that has ended may still be listed until its parent looks."""
     try:
         with open("/proc/%d/stat" % pid) as stat:
-            return stat.read().rpartition(")")[2].split()[0] != "Z"
+            return stat.read().rpartition(")")[2].split()[:1] not in ([], ["Z"])  # nothing: it went while it was read
     except OSError:
         return False
 
