@@ -103,13 +103,16 @@ def test_no_code_is_cut_and_no_word_in_a_table_is_broken(pages, browser):
 
 def test_blocks_name_their_terminal_where_there_are_several(pages, browser):
     browser.get(pages + "/docs/tutorial/ros_basics/03_node.html")
-    titles = [title.text for title in browser.find_elements("css selector", ".filename")]
-    assert titles[:4] == ["Terminal 1", "Terminal 2", "Terminal 2", "Terminal 3"]
+    find_titles = "return [...document.querySelectorAll('.filename')].map(title => title.innerText).slice(0, 4)"
+    expected = ["Terminal 1", "Terminal 2", "Terminal 2", "Terminal 3"]
+    wait_for(lambda: browser.execute_script(find_titles) == expected, lambda: browser.execute_script(find_titles))
 
 
 def test_each_tutorial_leads_to_the_next(pages, browser):
     course = sorted((sources.ROOT / "docs" / "tutorial" / "hero").glob("[0-9]*.md"))
     browser.get("%s/docs/tutorial/hero/%s.html" % (pages, course[0].stem))
     for page in course[1:]:
-        browser.get(browser.find_element("css selector", NEXT_PAGE).get_attribute("href"))
-        assert browser.current_url.endswith("/%s.html" % page.stem)
+        link = wait_for(lambda: browser.find_elements("css selector", NEXT_PAGE), "the link to the next page")[0]
+        browser.get(link.get_attribute("href"))
+        end = "/%s.html" % page.stem
+        wait_for(lambda end=end: browser.current_url.endswith(end), lambda: browser.current_url)
