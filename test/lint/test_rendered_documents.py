@@ -60,13 +60,18 @@ def browser():
     browser.quit()
 
 
+def find(browser, selector):
+    """Return the first such element, once the page has one."""
+    return wait_for(lambda: browser.find_elements("css selector", selector), selector)[0]
+
+
 def test_all_pages_render_without_a_warning(pages):
     assert (RENDERED / "index.html").is_file()
 
 
 def test_search_finds_pages_without_a_server(pages, browser):
     browser.get(pages + "/index.html")
-    browser.find_element("css selector", "input[name=query]").send_keys("odometry")
+    find(browser, "input[name=query]").send_keys("odometry")
     find_titles = "return [...document.querySelectorAll('.md-search-result__item h1')].map(title => title.innerText)"
     wait_for(lambda: "8. Odometry" in browser.execute_script(find_titles), "the page is found")
 
@@ -75,7 +80,7 @@ def test_the_copy_button_copies_commands_alone(pages, browser):
     from selenium.webdriver.common.keys import Keys
 
     browser.get(pages + "/docs/tutorial/ros_basics/05_subscriber.html")
-    block = browser.find_element("css selector", ".highlight:has(.gp)")
+    block = find(browser, ".highlight:has(.gp)")
     assert "$ rosrun" in block.text and "[build] Summary" in block.text
     button = wait_for(lambda: block.find_elements("css selector", "button[data-clipboard-target]"), "it")[0]
     browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", button)
@@ -112,7 +117,6 @@ def test_each_tutorial_leads_to_the_next(pages, browser):
     course = sorted((sources.ROOT / "docs" / "tutorial" / "hero").glob("[0-9]*.md"))
     browser.get("%s/docs/tutorial/hero/%s.html" % (pages, course[0].stem))
     for page in course[1:]:
-        link = wait_for(lambda: browser.find_elements("css selector", NEXT_PAGE), "the link to the next page")[0]
-        browser.get(link.get_attribute("href"))
+        browser.get(find(browser, NEXT_PAGE).get_attribute("href"))
         end = "/%s.html" % page.stem
         wait_for(lambda end=end: browser.current_url.endswith(end), lambda: browser.current_url)
