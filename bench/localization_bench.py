@@ -18,7 +18,7 @@ import numpy as np
 from localization_nodes import measure_nodes
 from measuring import measure_machine_us, print_machine
 
-from hero_client.geometry import Pose, measure_distance, wrap_angle
+from hero_client.values.geometry import Pose, measure_distance, wrap_angle
 from hero_localization.arena_calibration import average_tags, calibrate_arena
 from hero_localization.camera_model import Camera, Lens
 from hero_localization.detectors import create_detector

@@ -18,9 +18,9 @@ from measuring import measure_machine_us, print_machine, read_cpu_s, write_repor
 from running_suite import RunningSuite
 
 from hero_client import CommonFrame, ProgramError
+from hero_client.apps.formations import assign_goals, place_formation
 from hero_client.controllers.avoidance import WanderLaw
 from hero_client.controllers.orca import AvoidanceLaw
-from hero_client.formations import assign_goals, place_formation
 from hero_examples.explore import Explorer, explore_together
 from hero_examples.random_walk import Walker
 from hero_examples.swarm_go_to import STEP_S, Formation

@@ -28,7 +28,7 @@ from std_srvs.srv import SetBool
 from tornado.httpclient import HTTPRequest
 from tornado.websocket import websocket_connect
 
-from hero_client.drivers import Drivers
+from hero_client.ros.drivers import Drivers
 from hero_test.processes import find_free_port, suspended
 
 HERE = Path(__file__).resolve().parent

@@ -3,4 +3,10 @@
 from catkin_pkg.python_setup import generate_distutils_setup
 from setuptools import setup
 
-setup(**generate_distutils_setup(packages=["hero_client", "hero_client.controllers"], package_dir={"": "src"}))
+ROOMS = ("values", "controllers", "ros", "robots", "apps")
+
+setup(
+    **generate_distutils_setup(
+        packages=["hero_client", *("hero_client." + room for room in ROOMS)], package_dir={"": "src"}
+    )
+)

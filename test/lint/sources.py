@@ -29,7 +29,7 @@ OTHER_PACKAGES = {
 WITHOUT_ROSDEP_KEY = {"apriltag"}
 """Optional modules: no package.xml can name them."""
 
-FIT_A_PROTOCOL = tuple(f"hero_client.{name}" for name in ("program", "robot", "ros_clock", "ros_link", "swarm"))
+FIT_A_PROTOCOL = tuple(f"hero_client.{name}" for name in ("program", "robot", "ros.ros_clock", "ros.ros_link", "swarm"))
 """For mypy, what they take from ROS is Any."""
 
 

@@ -16,10 +16,10 @@ import rospy
 import rostest
 from sensor_msgs.msg import Joy
 
-from hero_client.drivers import Drivers
-from hero_client.errors import NodeError
+from hero_client.ros.drivers import Drivers
 from hero_client.ros_node import start_ros_node
 from hero_client.swarm import Swarm
+from hero_client.values.errors import NodeError
 from hero_msgs.msg import Robot, RobotArray
 from hero_test.example_program import ExampleProgram
 from hero_test.processes import find_pid, find_program, suspended
@@ -230,7 +230,7 @@ class StopRequestTest(unittest.TestCase):
                 settled.append(listener.is_settled if settled else None)
             raise NodeError("no ROS master")
 
-        with suspended(find_pid("/hero_driver")), mock.patch("hero_client.drivers.ask_master", refuse):
+        with suspended(find_pid("/hero_driver")), mock.patch("hero_client.ros.drivers.ask_master", refuse):
             listener = Drivers()
             self.addCleanup(listener.close)
             wait_for(lambda: len(settled) >= 2, "a second look")

@@ -14,9 +14,9 @@ from typing import Sequence
 import rospy
 
 from hero_client import command_line
-from hero_client.errors import ProgramError
 from hero_client.parameters import robot_ids_option
 from hero_client.program import Program
+from hero_client.values.errors import ProgramError
 
 from .calibration import INFRARED, PARTS, Calibration
 from .discovery import find_robots

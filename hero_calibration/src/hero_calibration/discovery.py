@@ -3,8 +3,8 @@
 import time
 from typing import Dict, List, Optional, Sequence
 
-from hero_client.drivers import Drivers
 from hero_client.program import Program
+from hero_client.ros.drivers import Drivers
 from hero_msgs.msg import Robot
 
 from .errors import CalibrationError

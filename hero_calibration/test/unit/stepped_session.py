@@ -3,7 +3,7 @@
 from hero_calibration.errors import CalibrationError
 from hero_calibration.probe import Probe
 from hero_calibration.session import Session
-from hero_client.geometry import Pose
+from hero_client.values.geometry import Pose
 
 
 class StepProbe(Probe):

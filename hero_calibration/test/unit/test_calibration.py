@@ -11,7 +11,7 @@ from hero_calibration import infrared_model as model
 from hero_calibration.encoder_readings import TICK_M
 from hero_calibration.errors import CalibrationError
 from hero_calibration.infrared_model import Facing
-from hero_client.robot_constants import BODY_RADIUS_M
+from hero_client.values.robot_constants import BODY_RADIUS_M
 
 
 def servo_speeds(pulses_us, center_us, zone_us=30.0, gain=1.0, sign=1.0, noise_m_s=0.0, seed=0):

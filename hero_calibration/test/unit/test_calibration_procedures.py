@@ -16,7 +16,7 @@ from hero_calibration.placement import place_robots
 from hero_calibration.restore import restore
 from hero_calibration.step_response import ANGULAR_RAD_S, STEP_M_S
 from hero_calibration.velocity import VelocityResult, calibrate_velocity
-from hero_client.robot_constants import BODY_RADIUS_M
+from hero_client.values.robot_constants import BODY_RADIUS_M
 from hero_sim.link.wifi import PROFILES, Radio
 from hero_sim.robot.ranges import FACTORY_CALIBRATION_COUNTS_M2, calibrate
 from hero_sim.stepped.robot_rows import RobotRows

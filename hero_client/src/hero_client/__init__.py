@@ -8,38 +8,38 @@ from threading import Thread
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # of these mypy knows what programs may use of a robot, whatever connects it
-    from .robot_base import BaseRobot as BaseRobot  # noqa: PLC0414 - so that it counts as exported
-    from .swarm_base import BaseSwarm as BaseSwarm  # noqa: PLC0414
+    from .robots.robot_base import BaseRobot as BaseRobot  # noqa: PLC0414 - so that it counts as exported
+    from .robots.swarm_base import BaseSwarm as BaseSwarm  # noqa: PLC0414
 
 # The rospy of Debian 11 calls it when a script ends; its Python 3.9 no longer has it.
 if not hasattr(Thread, "isAlive"):
     setattr(Thread, "isAlive", Thread.is_alive)  # noqa: B010 - mypy knows no such method
 
 _MODULES = {
-    "BackgroundMotion": "background_motion",
-    "BaseRobot": "robot_base",
-    "BaseSwarm": "swarm_base",
-    "COLORS": "colors",
-    "Clock": "clock",
-    "CommonFrame": "common_frame",
-    "Drivers": "drivers",
-    "FrameError": "errors",
-    "GoToGoalServer": "go_to_goal_server",
-    "GoalError": "errors",
-    "HeroError": "errors",
-    "NodeError": "errors",
-    "Obstacle": "readings",
-    "Pose": "geometry",
+    "BackgroundMotion": "values.background_motion",
+    "BaseRobot": "robots.robot_base",
+    "BaseSwarm": "robots.swarm_base",
+    "COLORS": "values.colors",
+    "Clock": "values.clock",
+    "CommonFrame": "robots.common_frame",
+    "Drivers": "ros.drivers",
+    "FrameError": "values.errors",
+    "GoToGoalServer": "apps.go_to_goal_server",
+    "GoalError": "values.errors",
+    "HeroError": "values.errors",
+    "NodeError": "values.errors",
+    "Obstacle": "values.readings",
+    "Pose": "values.geometry",
     "Program": "program",
-    "ProgramError": "errors",
+    "ProgramError": "values.errors",
     "Robot": "robot",
-    "RobotError": "errors",
-    "RobotNotReadyError": "errors",
-    "StaleDataError": "errors",
-    "StopStatus": "stop_status",
-    "StoppedError": "errors",
+    "RobotError": "values.errors",
+    "RobotNotReadyError": "values.errors",
+    "StaleDataError": "values.errors",
+    "StopStatus": "ros.stop_status",
+    "StoppedError": "values.errors",
     "Swarm": "swarm",
-    "Velocity": "geometry",
+    "Velocity": "values.geometry",
     "open_swarm": "swarm",
     "rate": "script",
     "read_parameters": "parameters",

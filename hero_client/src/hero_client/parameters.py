@@ -11,7 +11,7 @@ from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Seq
 
 import rospy
 
-from .errors import ProgramError
+from .values.errors import ProgramError
 
 __all__ = [
     "Parameter",

@@ -18,8 +18,8 @@ from nav_msgs.msg import Odometry
 
 from hero_msgs.msg import Encoder
 
-from .robot_base import NEXT_ODOM_S, BaseRobot, check_robot_id
-from .ros_link import RosLink
+from .robots.robot_base import NEXT_ODOM_S, BaseRobot, check_robot_id
+from .ros.ros_link import RosLink
 from .script import start_node
 
 __all__ = ["Robot"]

@@ -18,8 +18,8 @@ import rospy
 from rospy.impl import tcpros_base
 from rospy.impl.registration import RegManager, get_registration_listeners
 
-from .errors import NodeError
 from .texts import one_line
+from .values.errors import NodeError
 
 __all__ = [
     "MASTER_TIMEOUT_S",

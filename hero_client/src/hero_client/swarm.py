@@ -6,15 +6,15 @@ import rospy
 
 from hero_msgs.msg import RobotArray
 
-from .background_motion import Sleep
-from .drivers import USUAL_TOPIC, share_drivers
-from .errors import ProgramError, RobotNotReadyError
 from .program import Program
 from .robot import Robot
-from .ros_clock import ROS_CLOCK
+from .robots.swarm_base import REPORT_PERIOD_S, BaseSwarm
+from .ros.drivers import USUAL_TOPIC, share_drivers
+from .ros.ros_clock import ROS_CLOCK
+from .ros.stop_status import StopStatus
 from .script import start_node
-from .stop_status import StopStatus
-from .swarm_base import REPORT_PERIOD_S, BaseSwarm
+from .values.background_motion import Sleep
+from .values.errors import ProgramError, RobotNotReadyError
 
 __all__ = ["Swarm", "open_swarm"]
 

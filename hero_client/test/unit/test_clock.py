@@ -2,8 +2,8 @@
 
 import pytest
 
-from hero_client.background_motion import Hold, run_steps
-from hero_client.clock import Clock
+from hero_client.values.background_motion import Hold, run_steps
+from hero_client.values.clock import Clock
 
 
 class Watch(Clock):

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from hero_client.drivers import clean, find_drivers, merge
+from hero_client.ros.drivers import clean, find_drivers, merge
 from hero_msgs.msg import Robot, RobotArray
 
 

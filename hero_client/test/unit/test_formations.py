@@ -6,7 +6,7 @@ import random
 
 import pytest
 
-from hero_client.formations import FormationError, assign_goals, place_formation
+from hero_client.apps.formations import FormationError, assign_goals, place_formation
 
 
 def test_goals_are_assigned_with_the_least_sum_of_squares():

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from hero_client.keyboard import Keyboard
+from hero_client.apps.keyboard import Keyboard
 
 
 @pytest.fixture

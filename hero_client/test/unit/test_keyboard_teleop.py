@@ -1,8 +1,8 @@
 """Keys and the time -> commands."""
 
-from hero_client.geometry import STOP
-from hero_client.keyboard import split_keys
-from hero_client.keyboard_teleop import MOTIONS, STOP_KEYS, KeyDrive
+from hero_client.apps.keyboard import split_keys
+from hero_client.apps.keyboard_teleop import MOTIONS, STOP_KEYS, KeyDrive
+from hero_client.values.geometry import STOP
 
 
 def test_a_single_press_drives_until_its_time_is_out():

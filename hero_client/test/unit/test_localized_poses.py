@@ -7,8 +7,8 @@ import pytest
 pytest.importorskip("hero_msgs.msg", reason="needs ROS")
 import rospy
 
-from hero_client.errors import FrameError, StaleDataError
-from hero_client.localized_poses import LocalizedPoses
+from hero_client.ros.localized_poses import LocalizedPoses
+from hero_client.values.errors import FrameError, StaleDataError
 from hero_msgs.msg import RobotPose, RobotPoses
 
 SENT_S = 100.0

@@ -5,8 +5,8 @@ import sys
 
 import pytest
 
-from hero_client.errors import NodeError
 from hero_client.ros_node import ask_master
+from hero_client.values.errors import NodeError
 
 BAD_URIS = ("", "localhost", "http://", "http://[::1", "http://localhost:port", "http://a..b:11311", "ftp://localhost")
 

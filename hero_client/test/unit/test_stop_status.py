@@ -2,8 +2,8 @@
 
 import pytest
 
-from hero_client.drivers import merge
-from hero_client.stop_status import CROSSING_S, NAMES_SHOWN, TIME_LIMIT_S, DriverReply, StopRequest
+from hero_client.ros.drivers import merge
+from hero_client.ros.stop_status import CROSSING_S, NAMES_SHOWN, TIME_LIMIT_S, DriverReply, StopRequest
 from hero_msgs.msg import Robot, RobotArray
 
 SOON_S, LATE_S = CROSSING_S, TIME_LIMIT_S

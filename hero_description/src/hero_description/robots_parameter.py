@@ -2,8 +2,8 @@
 
 from typing import Any, List
 
-from hero_client.errors import ProgramError
 from hero_client.parameters import Parameter, parse_robot_ids
+from hero_client.values.errors import ProgramError
 
 
 def check_given(name: str, value: Any) -> List[int]:

@@ -10,9 +10,9 @@ import shutil
 import sys
 import tempfile
 
-from hero_client.errors import ProgramError
 from hero_client.parameters import choice, flag, read_parameters
 from hero_client.program import Program, run
+from hero_client.values.errors import ProgramError
 
 from .robots_parameter import given_robots
 from .rviz_config import FRAMES, make_config

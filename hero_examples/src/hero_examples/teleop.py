@@ -1,10 +1,15 @@
 """Drives robots with the keys of a terminal; the robot stops when no key comes."""
 
 from hero_client import Program, open_swarm, read_parameters, run
-from hero_client.keyboard import Keyboard
-from hero_client.keyboard_teleop import MAX_ANGULAR_RAD_S, MIN_ANGULAR_RAD_S, MIN_LINEAR_M_S, KeyboardTeleop
+from hero_client.apps.keyboard import Keyboard
+from hero_client.apps.keyboard_teleop import (
+    MAX_ANGULAR_RAD_S,
+    MIN_ANGULAR_RAD_S,
+    MIN_LINEAR_M_S,
+    KeyboardTeleop,
+)
 from hero_client.parameters import number, robot_ids
-from hero_client.robot_constants import MAX_LINEAR_M_S
+from hero_client.values.robot_constants import MAX_LINEAR_M_S
 
 
 def drive():

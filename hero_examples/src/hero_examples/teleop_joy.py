@@ -1,9 +1,9 @@
 """Drives robots with a joystick on /joy while the enable button is held; another button stops all robots."""
 
 from hero_client import Program, ProgramError, open_swarm, read_parameters, run
-from hero_client.joystick_teleop import JoystickMapping, JoystickTeleop
+from hero_client.apps.joystick_teleop import JoystickMapping, JoystickTeleop
 from hero_client.parameters import number, robot_ids, whole_number
-from hero_client.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
+from hero_client.values.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
 
 
 def drive():

@@ -6,7 +6,7 @@ import true_paths
 
 from hero_client import CommonFrame
 from hero_client.controllers.unicycle import FollowLaw
-from hero_client.robot_constants import BODY_RADIUS_M
+from hero_client.values.robot_constants import BODY_RADIUS_M
 from hero_sim.stepped.swarm import StepSwarm
 
 pytest.importorskip("rospy", reason="the program imports rospy")

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import true_paths
 
+from hero_client.apps.goals import MAX_QUEUED_GOALS, GoalQueue, GoalRequest, InvalidGoalError
 from hero_client.controllers.go_to_goal import Goal
-from hero_client.goals import MAX_QUEUED_GOALS, GoalQueue, GoalRequest, InvalidGoalError
 from hero_sim.stepped.swarm import StepSwarm
 from hero_sim.world.arena_file import load_arena
 

@@ -8,8 +8,8 @@ import pytest
 import true_paths
 
 from hero_client import CommonFrame, ProgramError
+from hero_client.apps.formations import assign_goals, place_formation
 from hero_client.controllers.orca import AvoidanceLaw
-from hero_client.formations import assign_goals, place_formation
 from hero_sim.stepped.swarm import StepSwarm
 from hero_sim.world.arena_file import load_arena
 

@@ -8,8 +8,8 @@ import true_paths
 from hero_sim.stepped.swarm import StepSwarm
 
 pytest.importorskip("rospy", reason="teleoperation imports rospy")
-from hero_client.joystick_teleop import JoystickMapping, JoystickTeleop
-from hero_client.keyboard_teleop import KeyboardTeleop
+from hero_client.apps.joystick_teleop import JoystickMapping, JoystickTeleop
+from hero_client.apps.keyboard_teleop import KeyboardTeleop
 
 READ_PERIOD_MS = 51
 """The robot reads commands so often, and drops one that comes within 50 ms of the one before it."""

@@ -5,7 +5,7 @@ A path is an array (T, N, 3) of one world: rows 50 ms apart, robots, and x m, y 
 
 import numpy as np
 
-from hero_client.robot_constants import BODY_RADIUS_M
+from hero_client.values.robot_constants import BODY_RADIUS_M
 from hero_sim.world.arena import measure_clearance
 
 TOUCH_M = 0.001

@@ -6,7 +6,7 @@ from typing import Dict, List, Mapping, NamedTuple, Sequence
 import cv2
 import numpy as np
 
-from hero_client.geometry import Pose, measure_distance
+from hero_client.values.geometry import Pose, measure_distance
 
 from .camera_model import Camera, Lens
 from .errors import CalibrationError

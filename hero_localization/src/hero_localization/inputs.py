@@ -10,8 +10,8 @@ import rospy
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry
 
-from hero_client.geometry import Pose
-from hero_client.readings import is_plausible, read_pose
+from hero_client.values.geometry import Pose
+from hero_client.values.readings import is_plausible, read_pose
 
 from .pose_filter import Measurement
 

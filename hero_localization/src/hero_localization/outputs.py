@@ -10,7 +10,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseWithCovarianceStamped, Quaternion, TransformStamped
 from tf2_msgs.msg import TFMessage
 
-from hero_client.geometry import Pose
+from hero_client.values.geometry import Pose
 from hero_msgs.msg import RobotPose, RobotPoses
 
 from .swarm_localizer import LocalizedRobot

@@ -11,8 +11,8 @@ from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional
 import numpy as np
 import yaml
 
-from hero_client.geometry import Pose
 from hero_client.texts import one_line
+from hero_client.values.geometry import Pose
 
 from .camera_model import Camera, Lens
 from .detectors import DEFAULT_BACKEND

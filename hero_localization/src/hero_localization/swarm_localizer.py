@@ -7,7 +7,7 @@ import enum
 import math
 from typing import Dict, Iterable, List, NamedTuple, Optional
 
-from hero_client.geometry import Pose, measure_distance, wrap_angle
+from hero_client.values.geometry import Pose, measure_distance, wrap_angle
 
 from .heading_check import HeadingCheck, is_upside_down
 from .pose_filter import Estimate, Measurement, Outcome, PoseFilter

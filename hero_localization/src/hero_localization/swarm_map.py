@@ -5,7 +5,7 @@ from typing import Deque, Dict, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
-from hero_client.geometry import Pose
+from hero_client.values.geometry import Pose
 
 from .occupancy_grid import OccupancyGrid
 from .stamped_history import StampedHistory, interpolate_pose

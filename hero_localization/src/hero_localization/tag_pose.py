@@ -9,7 +9,7 @@ from typing import Dict, Iterable, List, Mapping, NamedTuple, Optional, Sequence
 
 import numpy as np
 
-from hero_client.geometry import Pose, invert_pose, transform_pose, wrap_angle
+from hero_client.values.geometry import Pose, invert_pose, transform_pose, wrap_angle
 
 from .camera_model import Camera
 from .tag_corners import TagCorners

@@ -6,7 +6,7 @@ from typing import Deque, Dict, List, Mapping, NamedTuple, Optional, Sequence, T
 
 import numpy as np
 
-from hero_client.geometry import Pose, transform_pose
+from hero_client.values.geometry import Pose, transform_pose
 
 from .arena_calibration import find_moved_references
 from .camera_model import Camera

@@ -7,7 +7,10 @@ import pytest
 
 cv2 = pytest.importorskip("cv2")
 
-from hero_client.geometry import Pose, transform_pose  # noqa: E402 - without OpenCV there is no calibration
+from hero_client.values.geometry import (  # noqa: E402 - without OpenCV there is no calibration
+    Pose,
+    transform_pose,
+)
 from hero_localization.arena_calibration import (  # noqa: E402
     average_tags,
     calibrate_arena,

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from hero_client.geometry import Pose, invert_pose, transform_pose, wrap_angle
+from hero_client.values.geometry import Pose, invert_pose, transform_pose, wrap_angle
 from hero_localization.pose_filter import Measurement, Outcome, PoseFilter
 
 ODOMETRY_S = 0.034

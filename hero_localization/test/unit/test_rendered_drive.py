@@ -10,7 +10,7 @@ from geometry_msgs.msg import Point, Pose, PoseWithCovariance, Quaternion
 from nav_msgs.msg import Odometry
 from std_msgs.msg import Header
 
-from hero_client import geometry
+from hero_client.values import geometry
 from hero_localization import calibrate_camera, settings
 from hero_localization.arena_calibration import average_tags, calibrate_arena
 from hero_localization.camera_model import Camera, Lens

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from hero_client.geometry import Pose, transform_pose, wrap_angle
+from hero_client.values.geometry import Pose, transform_pose, wrap_angle
 from hero_localization.errors import CalibrationError
 from hero_localization.robot_calibration import calibrate_robot
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import yaml
 
-from hero_client.geometry import Pose
+from hero_client.values.geometry import Pose
 from hero_localization import settings
 from hero_localization.camera_model import Camera, Lens
 from hero_localization.detectors import DEFAULT_BACKEND

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from hero_client.geometry import Pose
+from hero_client.values.geometry import Pose
 from hero_localization.stamped_history import StampedHistory, interpolate_pose
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hero_client.errors import FrameError
+from hero_client.values.errors import FrameError
 from hero_localization.occupancy_grid import OccupancyGrid
 from hero_localization.stepped_localization import CameraModel, StepLocalization
 from hero_localization.swarm_map import SwarmMap

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hero_client.geometry import Pose
+from hero_client.values.geometry import Pose
 from hero_localization.pose_filter import Measurement
 from hero_localization.swarm_localizer import RobotState, SwarmLocalizer
 

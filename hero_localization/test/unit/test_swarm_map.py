@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from hero_client.geometry import Pose
+from hero_client.values.geometry import Pose
 from hero_localization.map_files import save_map
 from hero_localization.occupancy_grid import OccupancyGrid
 from hero_localization.swarm_map import SwarmMap

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from hero_client.geometry import Pose, transform_pose, wrap_angle
+from hero_client.values.geometry import Pose, transform_pose, wrap_angle
 from hero_localization.camera_model import Camera, Lens
 from hero_localization.heading_check import HeadingCheck, is_upside_down
 from hero_localization.tag_corners import TagCorners

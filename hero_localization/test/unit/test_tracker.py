@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hero_client.geometry import Pose
+from hero_client.values.geometry import Pose
 from hero_localization.camera_model import Camera, Lens
 from hero_localization.settings import Settings
 from hero_localization.tag_corners import TagCorners

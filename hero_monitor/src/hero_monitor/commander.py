@@ -11,10 +11,10 @@ from typing import Dict, NamedTuple, Optional
 import rospy
 from geometry_msgs.msg import PoseStamped, Twist
 
-from hero_client.drivers import Drivers
-from hero_client.errors import NodeError
-from hero_client.geometry import Pose
+from hero_client.ros.drivers import Drivers
 from hero_client.ros_node import ask_master
+from hero_client.values.errors import NodeError
+from hero_client.values.geometry import Pose
 
 from .background import Background
 from .dead_man import STOPS, DeadMan, Velocity

@@ -6,8 +6,8 @@ import re
 import stat
 from typing import List, NamedTuple, Optional
 
-from hero_client.errors import ProgramError
 from hero_client.parameters import flag, number, read_parameters, whole_number
+from hero_client.values.errors import ProgramError
 
 from .access import TOKEN_LENGTH_MIN, is_loopback
 

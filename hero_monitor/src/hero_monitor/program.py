@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, Dict, Union
 
 import rospy
 
-from hero_client.errors import ProgramError
-from hero_client.geometry import Pose
 from hero_client.program import Program, run
+from hero_client.values.errors import ProgramError
+from hero_client.values.geometry import Pose
 
 from .access import Access
 from .background import Background

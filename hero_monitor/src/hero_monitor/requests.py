@@ -7,7 +7,7 @@ import json
 import math
 from typing import Any, Callable, Dict, Union
 
-from hero_client.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
+from hero_client.values.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
 
 LONGEST_TEXT = 2000
 FARTHEST_GOAL_M = 1000.0

@@ -6,9 +6,9 @@ from typing import Optional, Tuple
 from geometry_msgs.msg import PoseStamped
 from std_msgs.msg import ColorRGBA
 
-from hero_client.geometry import Pose
-from hero_client.readings import read_pose
-from hero_client.robot_listener import NewestMessage, RobotListener
+from hero_client.ros.robot_listener import NewestMessage, RobotListener
+from hero_client.values.geometry import Pose
+from hero_client.values.readings import read_pose
 
 from .placement import Placement
 from .sections import encode_color

@@ -7,7 +7,7 @@ import pytest
 from geometry_msgs.msg import Point32, Polygon, PolygonStamped
 from sensor_msgs.msg import CompressedImage
 
-from hero_client.geometry import Pose
+from hero_client.values.geometry import Pose
 from hero_monitor.camera_picture import BYTES_MAX, SILENT_S, CameraPicture
 from hero_monitor.placement import APART_M, Placement
 from hero_monitor.requests import RequestError, read_request

@@ -12,7 +12,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from hero_client.robot_constants import BODY_RADIUS_M
+from hero_client.values.robot_constants import BODY_RADIUS_M
 
 from . import analysis
 from .observations import Observations, RobotObservations

@@ -8,8 +8,8 @@ import math
 from operator import attrgetter
 from typing import Any, Callable, Dict, List, Tuple
 
-from hero_client.drivers import STATES
-from hero_client.geometry import yaw_of
+from hero_client.ros.drivers import STATES
+from hero_client.values.geometry import yaw_of
 
 from . import topics
 

@@ -17,12 +17,12 @@ from typing import Dict, List, Optional, Sequence, Set
 
 import rospy
 
-from hero_client.drivers import Drivers
-from hero_client.keyboard import Keyboard, NoTerminalError
+from hero_client.apps.keyboard import Keyboard, NoTerminalError
 from hero_client.program import Program
 from hero_client.program import run as run_program
-from hero_client.robot_listener import RobotListener, RobotTrack
-from hero_client.stop_status import StopStatus, paint
+from hero_client.ros.drivers import Drivers
+from hero_client.ros.robot_listener import RobotListener, RobotTrack
+from hero_client.ros.stop_status import StopStatus, paint
 from hero_msgs.msg import Robot
 
 from .fleet_rows import ORDERS, RobotRow, find_missing, sort_rows

@@ -7,9 +7,9 @@ import json
 import math
 from typing import Any, Dict, List, Optional, Sequence
 
-from hero_client.geometry import Pose
-from hero_client.readings import Obstacle, finite
 from hero_client.texts import make_printable
+from hero_client.values.geometry import Pose
+from hero_client.values.readings import Obstacle, finite
 from hero_msgs.msg import Robot
 
 from .fleet_rows import RobotRow

@@ -7,9 +7,9 @@ nan: not known, which counts as an obstacle.
 import math
 from typing import NamedTuple, Optional, Sequence, Tuple
 
-from ..geometry import STOP, Velocity, clamp, wrap_angle
-from ..readings import Obstacle
-from ..robot_constants import BODY_RADIUS_M, MIN_RANGE_M
+from ..values.geometry import STOP, Velocity, clamp, wrap_angle
+from ..values.readings import Obstacle
+from ..values.robot_constants import BODY_RADIUS_M, MIN_RANGE_M
 
 __all__ = [
     "DETOUR",

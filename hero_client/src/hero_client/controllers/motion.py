@@ -9,8 +9,8 @@ import enum
 import math
 from typing import Optional, Sequence
 
-from ..geometry import STOP, Pose, Velocity, measure_distance, wrap_angle
-from ..readings import Obstacle
+from ..values.geometry import STOP, Pose, Velocity, measure_distance, wrap_angle
+from ..values.readings import Obstacle
 from .avoidance import find_in_path
 
 __all__ = ["DEFAULT_TIMEOUT_S", "SILENT_STEPS", "MotionController", "State"]

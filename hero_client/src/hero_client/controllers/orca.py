@@ -16,8 +16,8 @@ from typing import NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from ..geometry import Pose, Velocity
-from ..robot_constants import BODY_RADIUS_M
+from ..values.geometry import Pose, Velocity
+from ..values.robot_constants import BODY_RADIUS_M
 
 __all__ = [
     "AvoidanceLaw",

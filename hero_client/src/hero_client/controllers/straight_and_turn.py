@@ -3,7 +3,7 @@
 import math
 from typing import Optional, Sequence
 
-from ..geometry import Pose, Velocity, clamp, wrap_angle
+from ..values.geometry import Pose, Velocity, clamp, wrap_angle
 from .motion import DEFAULT_TIMEOUT_S, MotionController
 
 __all__ = ["ForwardController", "TurnController"]

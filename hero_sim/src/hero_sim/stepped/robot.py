@@ -2,8 +2,8 @@
 
 from typing import Callable, Tuple
 
-from hero_client.geometry import Pose
-from hero_client.robot_base import BaseRobot
+from hero_client.robots.robot_base import BaseRobot
+from hero_client.values.geometry import Pose
 
 from .link import StepLink
 from .step_clock import StepClock

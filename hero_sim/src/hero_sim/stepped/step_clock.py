@@ -9,9 +9,9 @@ import itertools
 import math
 from typing import Any, List, Optional, Tuple
 
-from hero_client.background_motion import BackgroundMotion, Hold, Steps
-from hero_client.clock import Clock
-from hero_client.errors import HeroError
+from hero_client.values.background_motion import BackgroundMotion, Hold, Steps
+from hero_client.values.clock import Clock
+from hero_client.values.errors import HeroError
 
 from .robot_rows import RobotRows
 

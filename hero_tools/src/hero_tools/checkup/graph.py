@@ -12,9 +12,9 @@ import rosgraph.roslogging
 import rospy
 from rosgraph_msgs.msg import Log
 
-from hero_client.drivers import STATES
-from hero_client.errors import NodeError
+from hero_client.ros.drivers import STATES
 from hero_client.ros_node import ask_master
+from hero_client.values.errors import NodeError
 from hero_msgs.msg import Robot, RobotArray
 
 from .network import HOST_REMEDY, Address, find_source_address, is_loopback, is_own, resolve

@@ -9,10 +9,10 @@ from typing import NamedTuple, Optional
 import rospy
 from sensor_msgs.msg import Joy
 
-from .errors import ProgramError
-from .geometry import STOP, Velocity
-from .program import Program
-from .swarm import REPORT_PERIOD_S, Swarm
+from ..program import Program
+from ..swarm import REPORT_PERIOD_S, Swarm
+from ..values.errors import ProgramError
+from ..values.geometry import STOP, Velocity
 from .teleop_output import TeleopOutput
 
 __all__ = ["JoystickMapping", "JoystickTeleop"]

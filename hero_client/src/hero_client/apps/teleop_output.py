@@ -1,6 +1,6 @@
 """Which commands of a teleoperation are sent: every motion, and some stops after it."""
 
-from .geometry import STOP, Velocity
+from ..values.geometry import STOP, Velocity
 
 __all__ = ["TeleopOutput"]
 

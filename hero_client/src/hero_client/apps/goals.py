@@ -7,11 +7,11 @@ import math
 import queue
 from typing import Any, Callable, NamedTuple, Protocol, Tuple
 
-from .controllers.go_to_goal import Goal
-from .controllers.motion import MotionController
-from .errors import HeroError
-from .geometry import yaw_of
-from .robot_base import BaseRobot
+from ..controllers.go_to_goal import Goal
+from ..controllers.motion import MotionController
+from ..robots.robot_base import BaseRobot
+from ..values.errors import HeroError
+from ..values.geometry import yaw_of
 
 __all__ = [
     "FEEDBACK_PERIOD_S",

@@ -10,8 +10,8 @@ from functools import lru_cache
 import rospy
 import tf2_ros
 
-from .errors import FrameError
-from .geometry import Pose, yaw_of
+from ..values.errors import FrameError
+from ..values.geometry import Pose, yaw_of
 
 __all__ = ["FrameListener", "share_frames"]
 

@@ -9,17 +9,17 @@ from contextlib import suppress
 from functools import partial
 from typing import Callable, Generator, List, Optional
 
-from .background_motion import BackgroundMotion, Sleep, Steps
-from .colors import Color
-from .controllers.go_to_goal import DEFAULT_TOLERANCE_M, Goal, GoToGoalController
-from .controllers.motion import DEFAULT_TIMEOUT_S, MotionController, State
-from .controllers.straight_and_turn import ForwardController, TurnController
-from .errors import GoalError, StaleDataError, StoppedError
-from .geometry import Pose, Velocity, clamp, transform_pose
+from ..controllers.go_to_goal import DEFAULT_TOLERANCE_M, Goal, GoToGoalController
+from ..controllers.motion import DEFAULT_TIMEOUT_S, MotionController, State
+from ..controllers.straight_and_turn import ForwardController, TurnController
+from ..values.background_motion import BackgroundMotion, Sleep, Steps
+from ..values.colors import Color
+from ..values.errors import GoalError, StaleDataError, StoppedError
+from ..values.geometry import Pose, Velocity, clamp, transform_pose
+from ..values.readings import FRESH_S, Obstacle, find_nearest
+from ..values.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
 from .group import POLL_PERIOD_S, READY_TIMEOUT_S, REPEAT_PERIOD_S, Group, stop_after, wait_for_all
 from .light import Light
-from .readings import FRESH_S, Obstacle, find_nearest
-from .robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
 from .robot_link import RobotLink
 
 __all__ = ["BaseRobot", "check_robot_id"]

@@ -7,7 +7,7 @@ from typing import Any, Callable, Dict, Optional, Tuple, Type
 
 import rospy
 
-from .errors import StaleDataError
+from ..values.errors import StaleDataError
 
 __all__ = ["CommandTopic", "NewestMessages"]
 

@@ -12,10 +12,10 @@ from geometry_msgs.msg import PoseStamped
 
 from hero_msgs.msg import GoToAction, GoToFeedback, GoToResult
 
-from .controllers.go_to_goal import DEFAULT_TOLERANCE_M, Goal
-from .controllers.motion import DEFAULT_TIMEOUT_S
+from ..controllers.go_to_goal import DEFAULT_TOLERANCE_M, Goal
+from ..controllers.motion import DEFAULT_TIMEOUT_S
+from ..robot import Robot
 from .goals import GoalOutcome, GoalQueue, GoalRequest, InvalidGoalError, check_limits, read_goal
-from .robot import Robot
 
 __all__ = ["GoToGoalServer"]
 

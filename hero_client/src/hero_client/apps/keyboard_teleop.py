@@ -10,14 +10,14 @@ import os
 import sys
 from typing import Dict, List, Tuple
 
-from .errors import StaleDataError
-from .geometry import STOP, Velocity
+from ..program import Program
+from ..robot import Robot
+from ..ros.stop_status import paint
+from ..swarm import Swarm
+from ..values.errors import StaleDataError
+from ..values.geometry import STOP, Velocity
+from ..values.robot_constants import MAX_LINEAR_M_S
 from .keyboard import Keyboard
-from .program import Program
-from .robot import Robot
-from .robot_constants import MAX_LINEAR_M_S
-from .stop_status import paint
-from .swarm import Swarm
 from .teleop_output import TeleopOutput
 
 __all__ = ["MAX_ANGULAR_RAD_S", "MIN_ANGULAR_RAD_S", "MIN_LINEAR_M_S", "KeyDrive", "KeyboardTeleop"]

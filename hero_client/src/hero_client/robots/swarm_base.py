@@ -3,11 +3,11 @@
 from abc import abstractmethod
 from typing import Any, Dict, Generic, Iterator, List, Mapping, Optional, Sequence, TypeVar
 
-from .background_motion import BackgroundMotion
-from .clock import Clock
-from .colors import Color
-from .errors import GoalError, HeroError
-from .geometry import Pose
+from ..values.background_motion import BackgroundMotion
+from ..values.clock import Clock
+from ..values.colors import Color
+from ..values.errors import GoalError, HeroError
+from ..values.geometry import Pose
 from .group import Group
 from .robot_base import BaseRobot
 from .robot_link import MAP

@@ -9,10 +9,10 @@ import rospy
 
 from hero_msgs.msg import RobotPose, RobotPoses
 
-from .errors import FrameError, NodeError, StaleDataError
-from .geometry import Pose
-from .readings import FRESH_S, is_plausible
-from .ros_node import ask_master
+from ..ros_node import ask_master
+from ..values.errors import FrameError, NodeError, StaleDataError
+from ..values.geometry import Pose
+from ..values.readings import FRESH_S, is_plausible
 
 __all__ = ["TOPIC", "LocalizedPoses", "PoseListener", "share_poses"]
 

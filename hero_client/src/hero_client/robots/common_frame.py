@@ -2,9 +2,9 @@
 
 from typing import Dict, List, Mapping, Optional, Tuple
 
-from .clock import Clock
-from .errors import FrameError, ProgramError, StaleDataError
-from .geometry import Pose, invert_pose, transform_pose
+from ..values.clock import Clock
+from ..values.errors import FrameError, ProgramError, StaleDataError
+from ..values.geometry import Pose, invert_pose, transform_pose
 from .robot_base import BaseRobot
 from .swarm_base import AnyRobot, BaseSwarm
 

@@ -13,16 +13,16 @@ from std_msgs.msg import ColorRGBA
 from hero_msgs.msg import Encoder
 from hero_msgs.srv import SetOdom
 
-from .background_motion import BackgroundMotion, Steps, run_steps
+from ..texts import one_line
+from ..values.background_motion import BackgroundMotion, Steps, run_steps
+from ..values.errors import HeroError, RobotError
+from ..values.geometry import Pose, Velocity, yaw_of
+from ..values.readings import FRESH_S, front_first
 from .drivers import share_drivers
-from .errors import HeroError, RobotError
 from .frames import share_frames
-from .geometry import Pose, Velocity, yaw_of
 from .localized_poses import share_poses
-from .readings import FRESH_S, front_first
 from .robot_topics import CommandTopic, NewestMessages
 from .ros_clock import ROS_CLOCK
-from .texts import one_line
 
 __all__ = ["RosLink"]
 

@@ -12,8 +12,8 @@ import rospy
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 
-from .geometry import Pose, measure_distance, wrap_angle
-from .readings import Obstacle, find_nearest, is_plausible, read_pose, read_ranges
+from ..values.geometry import Pose, measure_distance, wrap_angle
+from ..values.readings import Obstacle, find_nearest, is_plausible, read_pose, read_ranges
 
 __all__ = ["NewestMessage", "RateMeter", "RobotListener", "RobotTrack"]
 

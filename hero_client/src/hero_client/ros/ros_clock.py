@@ -4,7 +4,7 @@ import time
 
 import rospy
 
-from .clock import Clock
+from ..values.clock import Clock
 
 __all__ = ["ROS_CLOCK"]
 

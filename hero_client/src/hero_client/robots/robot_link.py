@@ -2,9 +2,9 @@
 
 from typing import List, Optional, Protocol, Tuple
 
-from .background_motion import BackgroundMotion, Steps
-from .clock import Clock
-from .geometry import Pose, Velocity
+from ..values.background_motion import BackgroundMotion, Steps
+from ..values.clock import Clock
+from ..values.geometry import Pose, Velocity
 
 __all__ = ["MAP", "RobotLink"]
 

@@ -4,8 +4,8 @@ import itertools
 import math
 from typing import Optional, Tuple
 
-from .background_motion import BackgroundMotion, Steps
-from .colors import COLORS, Color, parse_color
+from ..values.background_motion import BackgroundMotion, Steps
+from ..values.colors import COLORS, Color, parse_color
 from .robot_link import RobotLink
 
 __all__ = ["Light"]

@@ -1,0 +1,1 @@
+"""Robots and swarms, whatever connects them. Pure."""

@@ -1,0 +1,1 @@
+"""Robots and drivers over ROS topics and services."""

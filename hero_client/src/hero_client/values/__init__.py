@@ -1,0 +1,1 @@
+"""What programs compute with: poses, readings, colors, errors, times. Pure."""
