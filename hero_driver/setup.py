@@ -3,7 +3,7 @@
 from catkin_pkg.python_setup import generate_distutils_setup
 from setuptools import setup
 
-ROOMS = ("rosserial", "transport", "fleet", "corrections", "commands", "ros", "robot_requests")
+ROOMS = ("rosserial", "transport", "fleet", "corrections", "commands", "ros")
 
 setup(
     **generate_distutils_setup(

@@ -151,11 +151,8 @@ def silent_connections(peer):
 
 
 def never_reads(peer):
-    """Asks for the time and for parameters and reads no answer."""
-    request = packets.encode_packet(packets.ID_TIME, bytes(8)) * 20
-    request += (
-        packets.encode_packet(packets.ID_PARAMETER_REQUEST, payloads.encode_parameter_request("~long")) * 5
-    )
+    """Asks for the time and reads no answer."""
+    request = packets.encode_packet(packets.ID_TIME, bytes(8)) * 30
 
     def talk(sock):
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)

@@ -75,7 +75,6 @@ def scene(master):
 
     robots = ["--count", str(GOOD_ROBOTS)]
     with DriverProcess({"grace_s": 1.0}, name="isolating_driver") as driver:
-        rospy.set_param("/hero_66/long", "x" * 4000)
         port = str(driver.address[1])
         with start_python("listener.py", *robots) as listener, Program(
             sys.executable, str(BENCH / "ros_load.py"), "command", *robots

@@ -42,12 +42,6 @@ class DriverConfig:
     host: str = _plain("0.0.0.0", "address to listen on; empty: only connect to ~robots")
     port: int = _number(DEFAULT_PORT, 0, 65535, "", "TCP port to listen on; 0: any free port")
     robots: Tuple[Address, ...] = _plain((), "robots that are TCP servers, to connect to: a list of {host, port}")
-    namespace_policy: str = _choice(
-        "robot",
-        ("robot", "any"),
-        "names of topics, services and parameters that robots may use. robot: HeRos only, each in /hero_N and /tf;"
-        " any: all except those of drivers and of ROS",
-    )
     allow: Tuple[Network, ...] = _plain((), "networks (CIDR) that robots may connect from; empty: all")
     max_connections: int = _number(400, 1, 5000, "", "connections in total")
     max_connections_per_address: int = _number(400, 1, 5000, "", "connections per address")

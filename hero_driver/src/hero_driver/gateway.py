@@ -15,28 +15,24 @@ from .config import DriverConfig
 from .corrections.robot_corrections import CorrectionSettings
 from .fleet import namespaces
 from .fleet.admission import Admission
-from .fleet.namespaces import Identity, NameRules
+from .fleet.namespaces import Identity
 from .fleet.registry import Decision, FleetRegistry, RobotEvent, RobotRecord, Verdict
 from .peer import Peer
 from .robot_log import RobotLog
-from .robot_requests.robot_requests import RobotRequests
 from .robot_status import RobotStatus, describe_robot
 from .ros.log_relay import LogRelay
 from .ros.robot_bridge import BridgeContext, RobotBridge
 from .ros.transform_publisher import TransformPublisher
 from .ros.worker import Worker
 from .rosserial.session import (
-    CallReceived,
     Event,
     LogReceived,
     MessagesReceived,
-    ParameterRequested,
     Problem,
     Session,
     SessionEnded,
     Topic,
     TopicDeclared,
-    TopicKind,
 )
 from .stop_delivery import StopDelivery, describe_doubt
 from .transport import THE_DRIVER_ENDS, EventLoop, Link, LinkHandler
@@ -70,12 +66,11 @@ class Gateway(LinkHandler):
         self._registrar = registrar
         self._clock_ns = clock_ns
         self._on_change = on_change
-        self._names = NameRules(config.namespace_policy, node)
+        self._node = node
         self._robot_log = RobotLog(log)
         self._admission = Admission(config.admission_limits)
         self._loop: EventLoop
         self._sender: CommandSender
-        self._requests: RobotRequests
         self._transforms: TransformPublisher
         self._context: BridgeContext
         self.peers: Dict[Link, Peer] = {}
@@ -93,7 +88,6 @@ class Gateway(LinkHandler):
             loop.call_later, self._find_peer, lambda: self.stopped, self._warn_robot
         )
         self._stops = StopDelivery(loop.call_later, lambda: self.stopped, self._on_change, self._warn_robot)
-        self._requests = RobotRequests(self._config, self._log, loop.call_soon, self._warn_robot)
         self._transforms = TransformPublisher(self._config.transform_period_s, loop.call_later)
         self._context = BridgeContext(
             loop=loop,
@@ -110,10 +104,6 @@ class Gateway(LinkHandler):
             max_names=2 * self._config.max_topics,
         )
         loop.call_later(FLEET_POLL_S, self._poll_fleet)
-
-    def close(self) -> None:
-        """End the workers; the loop has ended before."""
-        self._requests.close()
 
     # What the transport calls.
 
@@ -255,10 +245,6 @@ class Gateway(LinkHandler):
             self._declare(peer, event.topic, now_s)
         elif isinstance(event, LogReceived):
             self._robot_log.receive(peer, event.log, now_s)
-        elif isinstance(event, CallReceived):
-            self._call_service(peer, event.topic, event.request)
-        elif isinstance(event, ParameterRequested):
-            self._requests.answer_parameter(peer, event.name)
         elif isinstance(event, Problem):
             self._warn_robot(peer, event.text)
         elif isinstance(event, SessionEnded):
@@ -290,29 +276,22 @@ class Gateway(LinkHandler):
     def _resolve(self, peer: Peer, topic: Topic, identity: Identity) -> Optional[str]:
         """Return the ROS name of what a robot declared, None if it may not use it, which is logged."""
         info = topic.info
-        is_published = topic.kind is TopicKind.PUBLISHER
-        refusal = self._names.find_refusal(info.name, info.message_type, is_published, identity)
+        refusal = namespaces.find_refusal(info.name, info.message_type, identity, self._node)
         if refusal is not None:
             self._warn_robot(peer, "topic %s refused: %s" % (ascii(info.name), refusal))
             return None
-        return self._names.resolve(info.name, identity)
+        return namespaces.resolve(info.name, identity)
 
     def _identify(self, peer: Peer, topic: Topic, now_s: float) -> bool:
         """Find out which robot a peer is from the first name that tells; return whether it is settled."""
         identity = namespaces.identify(topic.info.name)
         address = peer.link.address
         if identity is None:
-            if self._config.namespace_policy == "robot":
-                if topic.info.name in namespaces.TF_TOPICS:
-                    peer.early_topics = [*peer.early_topics[-7:], topic]
-                else:
-                    self._warn_robot(
-                        peer,
-                        "topic %s refused: not a name below /hero_N; for devices that are no HeRos set"
-                        " ~namespace_policy to any" % ascii(topic.info.name),
-                    )
-                return False
-            identity = namespaces.identify_any(topic.info.name, address.host)
+            if topic.info.name in namespaces.TF_TOPICS:
+                peer.early_topics = [*peer.early_topics[-7:], topic]
+            else:
+                self._warn_robot(peer, "topic %s refused: not a name below /hero_N" % ascii(topic.info.name))
+            return False
         if self._resolve(peer, topic, identity) is None:
             return False
         known = self.fleet.robots.get(identity.namespace)
@@ -347,13 +326,11 @@ class Gateway(LinkHandler):
             decision.old_link.close("the robot connected again from %s" % (peer.link.address,))
         bridge = self.bridges.get(identity.namespace)
         if bridge is None:
-            correction_settings = self._correction_settings() if namespaces.is_hero(identity) else None
-            bridge = RobotBridge(identity, correction_settings, self._context, self._registrar)
+            bridge = RobotBridge(identity, self._correction_settings(), self._context, self._registrar)
             self.bridges[identity.namespace] = bridge
         peer.bridge = bridge
         rebooted = peer.boot is not None
-        if bridge.corrections is not None:
-            bridge.corrections.restart(rebooted and decision.verdict is not Verdict.ARRIVED)
+        bridge.corrections.restart(rebooted and decision.verdict is not Verdict.ARRIVED)
         bridge.attach()
         text = "%s %s (%s)" % (bridge.label, decision.verdict.value, peer.link.address)
         self._log.log_throttled("info", "joined " + bridge.label, text, host=peer.link.address.host)
@@ -382,11 +359,6 @@ class Gateway(LinkHandler):
         for peer in list(self.peers.values()):
             if peer.refused and peer.record is record and may_come(peer.link.address.host):
                 peer.link.close("the robot with the same id left; this one may try again")
-
-    def _call_service(self, peer: Peer, topic: Topic, request: bytes) -> None:
-        name = None if peer.bridge is None else self._resolve(peer, topic, peer.bridge.identity)
-        if name is not None:
-            self._requests.call_service(peer, topic, name, request, self._sender.send_message)
 
     def _find_peer(self, bridge: RobotBridge) -> Optional[Peer]:
         """Return the connection of a bridge's robot, None if it is away."""
@@ -467,7 +439,6 @@ class Gateway(LinkHandler):
             bridge = self.bridges.pop(record.identity.namespace, None)
             if bridge is not None:
                 bridge.close()
-                self._requests.forget(bridge.label)
                 text = "%s is gone; its topics and services are taken down" % bridge.label
                 self._log.log_throttled("info", "gone " + bridge.label, text, host=record.host)
             self._admit_duplicates(record, lambda host: True)

@@ -147,7 +147,6 @@ class DriverNode:
         self._stop_interface.close()
         self._master_watch.close()
         self._registrar.close()
-        self._gateway.close()
         self._log.close()
 
     def _has_ended(self, timeout_s: float) -> bool:

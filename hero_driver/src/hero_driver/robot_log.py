@@ -56,7 +56,7 @@ class RobotLog:
         if record.booted_s is not None and booted_s - record.booted_s > REBOOT_SLACK_S:
             text = "%s rebooted %.1f s ago" % (peer.label, uptime_s)
             self._log.log_throttled("warn", "rebooted " + peer.label, text, host=peer.link.address.host)
-            if peer.bridge is not None and peer.bridge.corrections is not None and peer.boot is None:
+            if peer.bridge is not None and peer.boot is None:
                 peer.bridge.corrections.note_reboot()
         # Delays of the network only make a boot look later, so the earliest is the best.
         if (

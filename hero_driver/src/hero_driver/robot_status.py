@@ -49,10 +49,8 @@ def describe_robot(
     dropped = record.dropped_messages
     problem = ""
     if bridge is not None:
-        dropped += bridge.refused_commands + bridge.commands.dropped
+        dropped += bridge.refused_commands + bridge.commands.dropped + bridge.corrections.refused
         problem = bridge.last_error
-    if corrections is not None:
-        dropped += corrections.refused
     packets, bad_packets, received_length = record.packets, record.bad_packets, record.received_length
     if peer is not None:
         packets += peer.session.reader.packets

@@ -11,7 +11,6 @@ from fake_robot import FakeRobot
 from geometry_msgs.msg import Twist
 from rosgraph_msgs.msg import Log as RosLog
 
-from hero_driver.rosserial import packets, payloads
 from hero_msgs.msg import Robot, RobotArray
 from hero_test.processes import Program, find_program
 from hero_test.waiting import wait_for
@@ -278,11 +277,3 @@ class OwnDriverCase(unittest.TestCase):
         if ready:
             driver.fleet.wait_ready(robot.namespace)
         return robot
-
-
-def ask_parameter(robot, name):
-    """Return the answer (ints, floats, strings) to a robot's request for a parameter."""
-    count = len(robot.payloads_with_id(packets.ID_PARAMETER_REQUEST))
-    robot.send_packet(packets.ID_PARAMETER_REQUEST, payloads.encode_parameter_request(name))
-    answers = wait_packets(robot, packets.ID_PARAMETER_REQUEST, count + 1)
-    return payloads.decode_parameter_answer(answers[count])

@@ -35,7 +35,6 @@ TIME_PACKET = packets.encode_packet(packets.ID_TIME, bytes(8))
 
 PUB, SUB = packets.ID_PUBLISHER, packets.ID_SUBSCRIBER
 ANSWERS, REQUESTS = packets.ID_SERVICE_SERVER_PUBLISHER, packets.ID_SERVICE_SERVER_SUBSCRIBER
-CLIENT_REQUESTS, CLIENT_ANSWERS = packets.ID_SERVICE_CLIENT_PUBLISHER, packets.ID_SERVICE_CLIENT_SUBSCRIBER
 
 
 class Declaration(NamedTuple):
@@ -289,7 +288,7 @@ class FakeRobot:
 
     def payloads_on(self, name: str) -> List[bytes]:
         """Return what it received on a topic, or as requests of a service, in order."""
-        topic_id = self.find_id(name, (SUB, REQUESTS, CLIENT_ANSWERS))
+        topic_id = self.find_id(name, (SUB, REQUESTS))
         return [packet.payload for packet in list(self.received) if packet.topic_id == topic_id]
 
     def payloads_with_id(self, topic_id: int) -> List[bytes]:

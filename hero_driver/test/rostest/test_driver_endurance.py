@@ -4,7 +4,6 @@
 import contextlib
 import os
 import subprocess
-import threading
 
 import rosgraph
 import rospy
@@ -20,15 +19,9 @@ from driver_case import (
     wait_payloads,
 )
 from fake_robot import (
-    ANSWER_MD5,
-    CLIENT_ANSWERS,
-    CLIENT_REQUESTS,
-    STOCK_DECLARATIONS,
     TIME_PACKET,
-    Declaration,
 )
 from std_msgs.msg import ColorRGBA
-from std_srvs.srv import Trigger, TriggerResponse
 
 from hero_driver.rosserial import packets
 from hero_msgs.msg import Encoder, Robot
@@ -103,43 +96,6 @@ class TestDriverEndurance(OwnDriverCase):
             # A reader that does read gets all there is.
             wait_for(lambda: scans.messages, "scans at the other reader")
             self.assertTrue(loud.is_connected)
-
-    def test_a_service_that_hangs_keeps_only_its_caller_waiting(self):
-        release = threading.Event()
-        self.addCleanup(release.set)
-
-        def hang(_):
-            release.wait(60.0)
-            return TriggerResponse(True, "at last")
-
-        for number in (1, 2):
-            rospy.Service("/hero_%d/quick" % number, Trigger, lambda _: TriggerResponse(True, "at once"))
-        rospy.Service("/hero_1/slow", Trigger, hang)
-        driver = self.start()
-        robots = []
-        for number in (1, 2):
-            clients = [
-                Declaration(kind, topic_id, "/{}/" + name, "std_srvs/Trigger", md5sum)
-                for name, first in (("slow", 0), ("quick", 1))
-                for kind, topic_id, md5sum in (
-                    (CLIENT_REQUESTS, 140 + first, TRIGGER_REQUEST_MD5),
-                    (CLIENT_ANSWERS, 120 + first, ANSWER_MD5),
-                )
-            ]
-            robots.append(self.dial(driver, number, declarations=[*STOCK_DECLARATIONS, *clients]))
-        robots[0].send_packet(140, b"")
-        robots[1].send_packet(141, b"")
-        self.assertEqual(
-            wait_packets(robots[1], 121), [stock_messages.to_bytes(TriggerResponse(True, "at once"))]
-        )
-        self.assert_time_is_answered(robots[0])
-        make_publisher("/hero_1/led", ColorRGBA).publish(ColorRGBA())
-        wait_payloads(robots[0], "led")
-        self.assertEqual(robots[0].payloads_with_id(120), [])
-        release.set()
-        self.assertEqual(
-            wait_packets(robots[0], 120), [stock_messages.to_bytes(TriggerResponse(True, "at last"))]
-        )
 
     def test_many_returns_leave_no_threads_sockets_or_topics_behind(self):
         driver = self.start(grace_s=600.0)

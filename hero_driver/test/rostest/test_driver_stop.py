@@ -3,13 +3,11 @@
 
 import math
 import signal
-import struct
 import subprocess
 import sys
 
 import rospy
 import rostest
-import stock_messages
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from driver_case import (
     DriverProcess,
@@ -19,7 +17,7 @@ from driver_case import (
     make_publisher,
     reads_from_somebody,
 )
-from fake_robot import READ_CYCLE_S, SUB, TWIST_MD5, Declaration
+from fake_robot import READ_CYCLE_S, SUB
 from geometry_msgs.msg import Twist
 from std_msgs.msg import Bool, ColorRGBA
 from std_srvs.srv import SetBool, Trigger
@@ -326,39 +324,6 @@ class TestDriverStop(OwnDriverCase):
         ]
         # What was sent before the driver noticed, by its own clock: one in 0.06 s of half a second.
         self.assertLess(len(late), 15)
-
-    # Devices that are no HeRos.
-
-    def test_devices_are_stopped_on_every_twist_and_get_nothing_but_zeros(self):
-        driver = self.share(namespace_policy="any")
-        declarations = [
-            Declaration(SUB, 100, "/crane/hook", "geometry_msgs/Twist", TWIST_MD5),
-            Declaration(SUB, 101, "/crane/cmd_vel", "geometry_msgs/Twist", TWIST_MD5),
-        ]
-        device = self.dial(driver, ready=False, declarations=declarations)
-        hook = make_publisher("/crane/hook", Twist)
-        sideways = stock_messages.from_bytes(Twist, struct.pack("<6d", 0.0, 0.3, 0.0, 0.0, 0.0, 0.0))
-        hook.publish(sideways)
-        wait_for(lambda: device.payloads_with_id(100), "the command")
-        self.assertEqual(device.payloads_with_id(100), [stock_messages.to_bytes(sideways)])
-        hook.publish(make_command(math.inf))
-        driver.wait_line("a command on /crane/hook is not finite")
-        self.call_stop(driver, True)
-        wait_for(lambda: device.payloads_with_id(101)[-1:] == [bytes(48)], "the stop of the other topic")
-        hook.publish(sideways)
-        hook.publish(Twist())
-        wait_for(lambda: any(entry.dropped_messages >= 2 for entry in driver.fleet.newest.robots), "the refusals")
-        self.assertEqual(set(device.payloads_with_id(100)[1:]), {bytes(48)})
-
-    def test_devices_are_stopped_at_the_end_of_the_driver(self):
-        driver = self.start(namespace_policy="any")
-        declarations = [Declaration(SUB, 100, "/crane/hook", "geometry_msgs/Twist", TWIST_MD5)]
-        device = self.dial(driver, ready=False, declarations=declarations)
-        make_publisher("/crane/hook", Twist).publish(make_command(0.3))
-        wait_for(lambda: device.payloads_with_id(100), "the command")
-        driver.process.send_signal(signal.SIGTERM)
-        self.assertEqual(driver.wait_end(), 0, driver.lines)
-        self.assertEqual(device.payloads_with_id(100)[-1], bytes(48))
 
 
 if __name__ == "__main__":

@@ -4,7 +4,6 @@ import stock_messages
 from std_msgs.msg import String
 
 STRING_MD5 = String._md5sum
-TRIGGER_REQUEST_MD5 = "d41d8cd98f00b204e9800998ecf8427e"
 WRONG_MD5 = "0123456789abcdef0123456789abcdef"
 
 

@@ -12,6 +12,8 @@ from pathlib import Path
 from types import SimpleNamespace
 from unittest import mock
 
+from corrected_robot import make_settings
+
 from hero_driver import command_sender, stop_delivery
 from hero_driver.commands.velocity_shaper import STOP_PAYLOADS
 from hero_driver.fleet.namespaces import identify
@@ -92,7 +94,7 @@ class CommandedRobot:
             command_max_age_s=10.0, log=None, max_names=100, is_stopped=lambda: False, add_transform=None
         )
         registrar = SimpleNamespace(submit=lambda job, **_: True)  # nothing is registered with a master
-        self.bridge = robot_bridge.RobotBridge(identify("/hero_1/odom"), None, context, registrar)
+        self.bridge = robot_bridge.RobotBridge(identify("/hero_1/odom"), make_settings(), context, registrar)
         self.bridge.attach()
         self.peer = Peer(self, Session(SessionLimits(), clock.now_s), None, bridge=self.bridge)
         self._names = {}

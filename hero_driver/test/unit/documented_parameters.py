@@ -62,7 +62,7 @@ def make_yaml():
 
 
 GROUPS = {
-    "Connections": ("host", "port", "robots", "namespace_policy", "allow"),
+    "Connections": ("host", "port", "robots", "allow"),
     "Limits": ("max_*",),
     "Timeouts": ("*_timeout_s", "grace_s", "command_max_age_s"),
     "Commands": ("clamp", "orphan_stop_s", "start_stopped", "allow_self_tuning"),

@@ -131,14 +131,6 @@ def test_discarding_motion_drops_what_waits_on_every_topic_and_keeps_stops():
     assert take(queue, 0.0) == [(POSITION, ZERO_TWIST)]
 
 
-def test_discarding_motion_drops_the_waiting_commands_of_a_device():
-    queue = make_queue()
-    queue.offer("/crane/cmd_vel", FAST, is_motion=True)
-    queue.offer(LED, b"1")
-    queue.discard_motion(0.0)
-    assert take(queue, 0.0) == [(LED, b"1")]
-
-
 def test_after_motion_was_discarded_the_next_one_waits_until_it_may_go():
     queue = make_queue()
     offer(queue, VELOCITY, FAST, 0.0)

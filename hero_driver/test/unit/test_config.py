@@ -31,7 +31,6 @@ def test_no_parameters_are_the_defaults():
     config = read_config({})
     assert config == DriverConfig()
     assert (config.host, config.port, config.robots) == ("0.0.0.0", 11411, ())
-    assert config.namespace_policy == "robot"
 
 
 def test_a_configuration_cannot_be_changed():

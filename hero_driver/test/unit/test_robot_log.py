@@ -23,7 +23,7 @@ def make_peer():
     return SimpleNamespace(
         label="hero_1",
         link=SimpleNamespace(address=SimpleNamespace(host="10.0.0.1")),
-        bridge=SimpleNamespace(corrections=None),
+        bridge=SimpleNamespace(corrections=SimpleNamespace(note_reboot=lambda: None)),
         record=SimpleNamespace(booted_s=None, dropped_messages=0),
         refused=False,
         boot=None,

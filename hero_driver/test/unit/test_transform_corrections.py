@@ -6,8 +6,6 @@ import pytest
 from corrected_robot import CorrectedRobot, list_transforms
 from robot_messages import MS, NOW_NS, NS_PER_S, build_transform, build_transform_message
 
-from hero_driver.corrections.transforms import split_transforms
-
 
 def receive_transforms(robot, *pairs, stamp_ns=NOW_NS):
     message = build_transform_message(*(build_transform(stamp_ns, *pair) for pair in pairs))
@@ -126,10 +124,3 @@ def test_a_broken_message_of_transforms_is_refused_whole():
     two = build_transform_message(*[build_transform(NOW_NS, "hero_0/base_link", "hero_0/hat_link")] * 2)
     assert robot.receive("/tf", b"\x01\x00\x00\x00" + two[4:], NOW_NS) == []
     assert robot.corrections.refused == len(message) + 2
-
-
-def test_transforms_of_other_devices_pass_whatever_their_frames():
-    transforms = [build_transform(NOW_NS, "map", "rover"), build_transform(2 * NS_PER_S, "rover", "camera")]
-    message = build_transform_message(*transforms)
-    assert split_transforms(message) == transforms
-    assert split_transforms(message[:-1]) == []

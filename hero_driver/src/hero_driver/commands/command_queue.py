@@ -5,7 +5,7 @@ are bounded: a motion command that waits is replaced by a newer one, of the rest
 """
 
 import collections
-from typing import Any, ContextManager, Deque, Dict, List, Optional, Set, Tuple
+from typing import Any, ContextManager, Deque, Dict, List, Optional, Tuple
 
 from .velocity_shaper import VelocityShaper
 
@@ -34,7 +34,6 @@ class CommandQueue:
         self._offered_s: Dict[str, float] = {}
         self._waiting: Deque[Command] = collections.deque()
         self._lock = lock
-        self._unshaped: Set[str] = set()  # motion topics among the names that wait
         self._is_idle = True  # after the last take(), and nothing was offered since
         self.dropped = 0
 
@@ -49,10 +48,8 @@ class CommandQueue:
         self._offered_s[name] = now_s
         self._is_idle = False
 
-    def offer(self, name: str, payload: bytes, is_motion: bool = False) -> None:
-        """Take anything else; is_motion: it moves a device that takes all commands as they come."""
-        if is_motion:
-            self._unshaped.add(name)
+    def offer(self, name: str, payload: bytes) -> None:
+        """Take anything else."""
         with self._lock:
             if len(self._waiting) >= QUEUE_LENGTH:
                 self._waiting.popleft()
@@ -65,11 +62,6 @@ class CommandQueue:
         for shaper in self._shapers.values():
             shaper.discard_motion()
             shaper.delay_until(resume_s)
-        if self._unshaped:
-            with self._lock:
-                self._waiting = collections.deque(
-                    command for command in self._waiting if command[0] not in self._unshaped
-                )
 
     def clear(self) -> None:
         """Forget everything: the connection is gone."""

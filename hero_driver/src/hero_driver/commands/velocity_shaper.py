@@ -52,16 +52,6 @@ def check_twist(payload: bytes, clamp: bool) -> Optional[bytes]:
     return _TWIST.pack(clamped_m_s, *components[1:5], clamped_rad_s)
 
 
-def check_device_twist(payload: bytes) -> Optional[bytes]:
-    """Return payload (geometry_msgs/Twist) unchanged, or None if a component is not finite.
-
-    Devices other than HeRos may use all six components and have limits of their own.
-    """
-    if len(payload) != TWIST_LENGTH or not all(map(math.isfinite, _TWIST.unpack(payload))):
-        return None
-    return payload if any(_TWIST.unpack(payload)) else ZERO_TWIST
-
-
 def check_motor_pulses(payload: bytes) -> Optional[bytes]:
     """Return payload (hero_msgs/Motor) unchanged, or None if it has another length."""
     return payload if len(payload) == len(STOPPED_MOTORS) else None

@@ -4,7 +4,7 @@ Takes payloads of tf2_msgs/TFMessage, gives single transforms.
 """
 
 import re
-from typing import Callable, List, Set
+from typing import Callable, Set
 
 from . import message_layouts
 from .message_layouts import TRANSFORM, TRANSFORM_FRAMES, TRANSFORM_HEAD, TRANSFORM_START, TRANSFORM_TAIL
@@ -130,11 +130,3 @@ class TransformCorrector:
 
 def _show_name(name: bytes) -> str:
     return ascii(name[:FRAME_NAME_SHOWN].decode("latin-1"))
-
-
-def split_transforms(payload: bytes) -> List[bytes]:
-    """Return the transforms of a device that is no HeRo as they are; none if payload is no TFMessage."""
-    transforms = message_layouts.read_transforms(payload) or []
-    return [
-        message_layouts.pack_transform_head(stamp_ns, frames) + tail for stamp_ns, frames, tail in transforms
-    ]

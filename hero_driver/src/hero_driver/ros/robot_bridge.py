@@ -17,13 +17,11 @@ from ..commands.velocity_shaper import (
     STOP_PAYLOADS,
     STOPPED_MOTORS,
     ZERO_TWIST,
-    check_device_twist,
     check_motor_pulses,
     check_twist,
 )
 from ..corrections import message_layouts
 from ..corrections.robot_corrections import TRANSFORMS, CorrectionSettings, RobotCorrections
-from ..corrections.transforms import split_transforms
 from ..corrections.wheel_motion import WheelMotion
 from ..fleet.namespaces import Identity
 from ..robot_constants import LONGEST_WATCHDOG_S
@@ -43,7 +41,6 @@ VELOCITY_ALIAS = "/cmd_vel"
 programs published on one topic. The newest command wins."""
 
 MOTOR_TYPE = "hero_msgs/Motor"
-ODOMETRY_TYPE = "nav_msgs/Odometry"
 TRANSFORM_TYPE = "tf2_msgs/TFMessage"
 TWIST_TYPE = "geometry_msgs/Twist"
 CALIBRATION_SUFFIX = "/pid_calibration"
@@ -79,11 +76,10 @@ class RobotBridge:
     def __init__(
         self,
         identity: Identity,
-        correction_settings: Optional[CorrectionSettings],
+        correction_settings: CorrectionSettings,
         context: BridgeContext,
         registrar: Worker,
     ) -> None:
-        """correction_settings is None for devices that are no HeRos: their messages pass through as they are."""
         self.identity = identity
         self.label = identity.namespace.lstrip("/")
         self.commands = CommandQueue(context.command_max_age_s, threading.Lock())
@@ -96,15 +92,13 @@ class RobotBridge:
         self._connected = False
         self._connection = 0
         self._publishers: Dict[str, RawPublisher] = {}
-        self.corrections: Optional[RobotCorrections] = None
-        if correction_settings is not None:
-            self.corrections = RobotCorrections(
-                identity.namespace,
-                correction_settings,
-                self._publishers.__getitem__,
-                context.add_transform,
-                self.wheels,
-            )
+        self.corrections = RobotCorrections(
+            identity.namespace,
+            correction_settings,
+            self._publishers.__getitem__,
+            context.add_transform,
+            self.wheels,
+        )
         self._services: Dict[str, RobotService] = {}
         self._service_halves: Dict[Tuple[str, TopicKind], Topic] = {}
         self._ids: Dict[str, int] = {}
@@ -184,7 +178,7 @@ class RobotBridge:
         """Subscribe to what the robot takes, and to its alias (job of the registrar); return whether it can be used."""
         is_usable = self._endpoints.subscribe(name, layout, functools.partial(self._make_subscriber, name, name))
         alias = self.identity.namespace + VELOCITY_ALIAS
-        if self.corrections is None or name != self.identity.namespace + VELOCITY_CONTROLLER or alias in self._ids:
+        if name != self.identity.namespace + VELOCITY_CONTROLLER or alias in self._ids:
             return is_usable
         if is_usable and layout.message_type == TWIST_TYPE:
             make_subscriber = functools.partial(self._make_subscriber, name, alias)
@@ -235,35 +229,14 @@ class RobotBridge:
             if ros_type != TRANSFORM_TYPE:
                 text = "topic /tf refused: its type is %s, not %s" % (ros_type, TRANSFORM_TYPE)
                 self._endpoints.report_error(name, text)
-            elif self.corrections is None:
-                topic.receive = self._pass_transforms
             else:
                 topic.receive = self.corrections.handler_for(name, ros_type)
             return []
-        derived = {} if self.corrections is None else self.corrections.derive_topics(name, ros_type)
+        derived = self.corrections.derive_topics(name, ros_type)
         for publisher_name in (name, *derived):
             self._publishers.setdefault(publisher_name, RawPublisher(QUEUE_LENGTH, self._context.loop.call_later))
-        if self.corrections is None:
-            publisher = self._publishers[name]
-            receive = self._pass_odometry if ros_type == ODOMETRY_TYPE else self._pass_message
-            topic.receive = functools.partial(receive, publisher)
-        else:
-            topic.receive = self.corrections.handler_for(name, ros_type)
+        topic.receive = self.corrections.handler_for(name, ros_type)
         return [(publisher_name, self._publishers[publisher_name]) for publisher_name in (name, *derived)]
-
-    @staticmethod
-    def _pass_message(publisher: RawPublisher, payload: bytes, _arrival_ns: int) -> None:
-        publisher.publish(payload)
-
-    def _pass_odometry(self, publisher: RawPublisher, payload: bytes, _arrival_ns: int) -> None:
-        publisher.publish(payload)
-        velocity = message_layouts.read_odometry_velocity(payload)
-        if velocity is not None:
-            self.wheels.read_velocity(*velocity)
-
-    def _pass_transforms(self, payload: bytes, _arrival_ns: int) -> None:
-        for transform in split_transforms(payload):
-            self._context.add_transform(transform)
 
     def _declare_service_half(self, topic: Topic, name: str) -> None:
         self._service_halves[name, topic.kind] = topic
@@ -299,12 +272,7 @@ class RobotBridge:
 
     def _receive_answer(self, service: RobotService, payload: bytes) -> None:
         request = service.receive_answer(payload)
-        if (
-            request is not None
-            and self.corrections is not None
-            and service.service_type == SET_ODOM_TYPE
-            and is_success(payload)
-        ):
+        if request is not None and service.service_type == SET_ODOM_TYPE and is_success(payload):
             # The answer comes before the first reading of the counters that the robot has just zeroed.
             self.corrections.set_pose(read_set_odom_pose(request))
 
@@ -368,8 +336,7 @@ class RobotBridge:
             return functools.partial(self._receive_command, name)
         check: Callable[[bytes], Optional[bytes]] = check_motor_pulses
         if ros_type != MOTOR_TYPE:
-            is_hero = self.corrections is not None
-            check = functools.partial(check_twist, clamp=self._context.clamp) if is_hero else check_device_twist
+            check = functools.partial(check_twist, clamp=self._context.clamp)
         return functools.partial(self._receive_motion, name, source, check, stop_payload)
 
     def _receive_motion(
@@ -403,10 +370,7 @@ class RobotBridge:
                 self._commanded[name] = (now_s, source)
             else:
                 self._commanded.pop(name, None)
-            if self.corrections is not None:
-                self.commands.offer_motion(name, command, stop_payload, now_s)
-            else:
-                self.commands.offer(name, command, is_motion=True)
+            self.commands.offer_motion(name, command, stop_payload, now_s)
             self._context.send_commands(self)
 
     def _change_commander(self, sender: Any, now_s: float) -> None:
@@ -445,7 +409,7 @@ class RobotBridge:
 
     def _send_request(self, name: str, service_type: str, request: bytes) -> Optional[str]:
         """Send a service request; return why not, if so."""
-        fault = find_request_error(service_type, request) if self.corrections is not None else None
+        fault = find_request_error(service_type, request)
         if fault is not None:
             return fault
         if not self._connected or name not in self._ids:

@@ -1,12 +1,11 @@
 """Encodes and decodes the payloads of rosserial's own packets; payloads of topics are not touched here.
 
 Field order is the wire of rosserial_msgs: TopicInfo (id, name, type, md5, buffer size), Log (level, text),
-RequestParam (name and the lists ints, floats, strings) and std_msgs/Time (seconds, nanoseconds).
-Little endian, strings and lists with a 32-bit length in front.
+and std_msgs/Time (seconds, nanoseconds). Little endian, strings with a 32-bit length in front.
 """
 
 import struct
-from typing import List, NamedTuple, Sequence, Tuple
+from typing import NamedTuple
 
 from .errors import PayloadError
 from .packets import Bytes
@@ -21,13 +20,9 @@ __all__ = [
     "TopicInfo",
     "WireTime",
     "decode_log",
-    "decode_parameter_answer",
-    "decode_parameter_request",
     "decode_time",
     "decode_topic_info",
     "encode_log",
-    "encode_parameter_answer",
-    "encode_parameter_request",
     "encode_time",
     "encode_topic_info",
     "split_seconds",
@@ -97,10 +92,6 @@ class _Cursor:
 
     def read_int32(self, field: str) -> int:
         value: int = _INT32.unpack(self.read_bytes(4, field))[0]
-        return value
-
-    def read_float32(self, field: str) -> float:
-        value: float = struct.unpack("<f", self.read_bytes(4, field))[0]
         return value
 
     def read_text(self, field: str) -> str:
@@ -190,47 +181,3 @@ def split_seconds(time_s: float) -> WireTime:
     """Return time_s (s, not negative) as whole seconds and nanoseconds."""
     nanoseconds = round(time_s * 1e9)
     return WireTime(nanoseconds // 10**9, nanoseconds % 10**9)
-
-
-def encode_parameter_request(name: str) -> bytes:
-    """Return the payload with which a peer asks for the parameter called name."""
-    return _encode_text(name)
-
-
-def decode_parameter_request(payload: Bytes) -> str:
-    """Return the name of the parameter that a peer asks for.
-
-    Raises: PayloadError if it is cut short or longer than its field.
-    """
-    cursor = _Cursor(payload, "RequestParam")
-    name = cursor.read_text("name")
-    cursor.finish()
-    return name
-
-
-def encode_parameter_answer(ints: Sequence[int], floats: Sequence[float], strings: Sequence[str]) -> bytes:
-    """Return the payload that answers a parameter request; at most one of the lists is usually not empty.
-
-    Raises: PayloadError if a number does not fit 32 bits (floats are single precision).
-    """
-    try:
-        parts = [_UINT32.pack(len(ints)), struct.pack("<%di" % len(ints), *ints)]
-        parts += [_UINT32.pack(len(floats)), struct.pack("<%df" % len(floats), *floats)]
-    except (struct.error, OverflowError) as error:
-        raise PayloadError("RequestParam: a number does not fit 32 bits (%s)" % error) from error
-    parts.append(_UINT32.pack(len(strings)))
-    parts += [_encode_text(text) for text in strings]
-    return b"".join(parts)
-
-
-def decode_parameter_answer(payload: Bytes) -> Tuple[List[int], List[float], List[str]]:
-    """Return the lists (ints, floats, strings) of a parameter answer.
-
-    Raises: PayloadError if it is cut short or longer than its fields.
-    """
-    cursor = _Cursor(payload, "RequestParam answer")
-    ints = [cursor.read_int32("ints") for _ in range(cursor.read_uint32("ints"))]
-    floats = [cursor.read_float32("floats") for _ in range(cursor.read_uint32("floats"))]
-    strings = [cursor.read_text("strings") for _ in range(cursor.read_uint32("strings"))]
-    cursor.finish()
-    return ints, floats, strings

@@ -9,7 +9,7 @@ Source: ros_lib node_handle.h (negotiateTopics, requestSyncTime, spinOnce) and t
 import enum
 import re
 from dataclasses import dataclass, field
-from typing import Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple, Union
+from typing import Callable, Dict, List, NamedTuple, Optional, Tuple, Union
 
 from . import packets, payloads
 from .errors import PacketTooLongError, PayloadError, TopicIdError
@@ -17,11 +17,9 @@ from .packets import Bytes, PacketReader, encode_packet
 from .payloads import Log, TopicInfo
 
 __all__ = [
-    "CallReceived",
     "Event",
     "LogReceived",
     "MessagesReceived",
-    "ParameterRequested",
     "Problem",
     "Session",
     "SessionEnded",
@@ -65,8 +63,6 @@ class TopicKind(enum.Enum):
     SUBSCRIBER = packets.ID_SUBSCRIBER
     SERVICE_ANSWERS = packets.ID_SERVICE_SERVER_PUBLISHER
     SERVICE_REQUESTS = packets.ID_SERVICE_SERVER_SUBSCRIBER
-    CLIENT_REQUESTS = packets.ID_SERVICE_CLIENT_PUBLISHER
-    CLIENT_ANSWERS = packets.ID_SERVICE_CLIENT_SUBSCRIBER
 
     @property
     def is_from_robot(self) -> bool:
@@ -74,9 +70,15 @@ class TopicKind(enum.Enum):
         return self in _FROM_ROBOT
 
 
-_MESSAGES = frozenset((TopicKind.PUBLISHER, TopicKind.SERVICE_ANSWERS))
-_FROM_ROBOT = _MESSAGES | {TopicKind.CLIENT_REQUESTS}
+_FROM_ROBOT = frozenset((TopicKind.PUBLISHER, TopicKind.SERVICE_ANSWERS))
 _KIND_BY_PACKET_ID = {kind.value: kind for kind in TopicKind}
+
+_NOT_SERVED = {
+    packets.ID_SERVICE_CLIENT_PUBLISHER: "wants to call a service of ROS, which robots cannot",
+    packets.ID_SERVICE_CLIENT_SUBSCRIBER: "wants to call a service of ROS, which robots cannot",
+    packets.ID_PARAMETER_REQUEST: "asks for a parameter of ROS, which robots cannot read",
+}
+"""What no HeRo does, but rosserial allows."""
 
 
 def _ignore(payload: bytes, arrival_ns: int) -> None:
@@ -106,13 +108,6 @@ class MessagesReceived(NamedTuple):
     messages: List[Tuple[Topic, bytes]]
 
 
-class CallReceived(NamedTuple):
-    """The robot calls a ROS service; topic is the half that carries its requests."""
-
-    topic: Topic
-    request: bytes
-
-
 class TopicDeclared(NamedTuple):
     """The robot declared a topic that is new, or differs from what it had declared under this id."""
 
@@ -129,12 +124,6 @@ class TimeRequested(NamedTuple):
     """The robot asked for the time; the answer is among take_packets()."""
 
 
-class ParameterRequested(NamedTuple):
-    """The robot asks for a parameter; answer with encode_parameter_answer()."""
-
-    name: str
-
-
 class Problem(NamedTuple):
     """The robot sent something that cannot be used; text says what and why. Nothing else is affected."""
 
@@ -149,11 +138,9 @@ class SessionEnded(NamedTuple):
 
 Event = Union[
     MessagesReceived,
-    CallReceived,
     TopicDeclared,
     LogReceived,
     TimeRequested,
-    ParameterRequested,
     Problem,
     SessionEnded,
 ]
@@ -311,28 +298,9 @@ class Session:
             )
         return encode_packet(topic_id, payload)
 
-    def encode_parameter_answer(
-        self, ints: Sequence[int], floats: Sequence[float], strings: Sequence[str]
-    ) -> bytes:
-        """Return the packet that answers a ParameterRequested.
-
-        Raises: PayloadError for numbers outside 32 bits, PacketTooLongError for more than the robot's buffer.
-        """
-        payload = payloads.encode_parameter_answer(ints, floats, strings)
-        if len(payload) > self._limits.max_payload_length:
-            raise PacketTooLongError(
-                "a parameter of %d bytes does not fit the robot's buffer of %d bytes"
-                % (len(payload), self._limits.max_payload_length)
-            )
-        return encode_packet(packets.ID_PARAMETER_REQUEST, payload)
-
     def _receive_special(
         self, topic_id: int, payload: bytes, now_s: float, time_of_day_s: float
     ) -> Optional[Event]:
-        topic = self.topics.get(topic_id)
-        if topic is not None and topic.kind is TopicKind.CLIENT_REQUESTS:
-            self._last_configured_s = now_s
-            return CallReceived(topic, payload)
         if topic_id in _KIND_BY_PACKET_ID:
             return self._declare(_KIND_BY_PACKET_ID[topic_id], payload)
         if topic_id == packets.ID_TIME:
@@ -350,8 +318,8 @@ class Session:
             if self.state is SessionState.ASKING or now_s - self._last_configured_s > UNCONFIGURED_S:
                 self._ask_by(self._earliest_repeat_s(now_s))
             return LogReceived(log)
-        if topic_id == packets.ID_PARAMETER_REQUEST:
-            return ParameterRequested(payloads.decode_parameter_request(payload))
+        if topic_id in _NOT_SERVED:
+            return Problem(_NOT_SERVED[topic_id])
         return self._receive_undeclared(topic_id, now_s)
 
     def _receive_undeclared(self, topic_id: int, now_s: float) -> Optional[Event]:
@@ -401,7 +369,7 @@ class Session:
                 )
         for topics, holds in (
             (self.topics, True),
-            (self._messages, kind in _MESSAGES),
+            (self._messages, kind.is_from_robot),
             (self._receivers, not kind.is_from_robot),
         ):
             topics.pop(info.topic_id, None)

@@ -1,7 +1,6 @@
 """Payloads of rosserial's own packets: read from bytes by hand, written back, refused when odd."""
 
 import math
-import struct
 
 import pytest
 from hypothesis import given
@@ -14,13 +13,9 @@ from hero_driver.rosserial.payloads import (
     TopicInfo,
     WireTime,
     decode_log,
-    decode_parameter_answer,
-    decode_parameter_request,
     decode_time,
     decode_topic_info,
     encode_log,
-    encode_parameter_answer,
-    encode_parameter_request,
     encode_time,
     encode_topic_info,
     split_seconds,
@@ -33,15 +28,13 @@ TF_BYTES = (
     + bytes.fromhex("00100000")
 )
 LOG_BYTES = bytes.fromhex("02 05000000 1b5b39326d")
-ANSWER_BYTES = bytes.fromhex("02000000 01000000 ffffffff 01000000 0000803f 02000000 01000000 61 00000000")
 
-DECODERS = [decode_topic_info, decode_log, decode_time, decode_parameter_request, decode_parameter_answer]
+DECODERS = [decode_topic_info, decode_log, decode_time]
 
 # What UTF-8 can carry: no surrogates.
 texts = st.text(st.characters(blacklist_categories=("Cs",)), max_size=40)
 uint32s = st.integers(0, 2**32 - 1)
 int32s = st.integers(-(2**31), 2**31 - 1)
-floats32 = st.floats(width=32, allow_nan=False)
 
 
 def test_a_declaration_is_read_from_bytes_and_written_as_the_same_bytes():
@@ -93,31 +86,12 @@ def test_split_seconds_stay_near_and_always_fit(time_s):
     assert len(encode_time(WireTime(secs, nsecs))) == 8
 
 
-def test_a_parameter_request_is_its_name():
-    assert decode_parameter_request(bytes.fromhex("04000000 7e676169")) == "~gai"
-    assert encode_parameter_request("~gai") == bytes.fromhex("04000000 7e676169")
-
-
-def test_a_parameter_answer_is_three_lists():
-    assert decode_parameter_answer(ANSWER_BYTES) == ([1, -1], [1.0], ["a", ""])
-    assert encode_parameter_answer([1, -1], [1.0], ["a", ""]) == ANSWER_BYTES
-    assert encode_parameter_answer([], [], []) == bytes(12)
-
-
-@pytest.mark.parametrize("ints, floats", [([2**31], []), ([-(2**31) - 1], []), ([], [1e39])])
-def test_a_parameter_that_does_not_fit_the_wire_is_an_error_of_ours(ints, floats):
-    with pytest.raises(PayloadError, match="32 bits"):
-        encode_parameter_answer(ints, floats, [])
-
-
 @pytest.mark.parametrize(
     "decode, data",
     [
         (decode_topic_info, TF_BYTES),
         (decode_log, LOG_BYTES),
         (decode_time, bytes(8)),
-        (decode_parameter_request, bytes.fromhex("04000000 7e676169")),
-        (decode_parameter_answer, ANSWER_BYTES),
     ],
 )
 def test_a_payload_cut_anywhere_or_with_bytes_behind_it_is_refused(decode, data):
@@ -172,15 +146,3 @@ def test_any_log_line_is_read_back(level, text):
 @given(secs=uint32s, nsecs=uint32s)
 def test_any_time_is_read_back(secs, nsecs):
     assert decode_time(encode_time(WireTime(secs, nsecs))) == (secs, nsecs)
-
-
-@given(name=texts)
-def test_any_parameter_name_is_read_back(name):
-    assert decode_parameter_request(encode_parameter_request(name)) == name
-
-
-@given(ints=st.lists(int32s), floats=st.lists(floats32), strings=st.lists(texts))
-def test_any_parameter_is_read_back(ints, floats, strings):
-    data = encode_parameter_answer(ints, floats, strings)
-    assert decode_parameter_answer(data) == (ints, floats, strings)
-    assert struct.unpack_from("<I", data) == (len(ints),)

@@ -27,11 +27,9 @@ from vectors import (
     build_text,
 )
 
-from hero_driver.rosserial.errors import PacketTooLongError, PayloadError
 from hero_driver.rosserial.session import (
     LogReceived,
     MessagesReceived,
-    ParameterRequested,
     Problem,
     Session,
     SessionEnded,
@@ -259,21 +257,15 @@ def test_data_on_an_id_that_the_robot_receives_is_not_passed_on():
     assert session.undeclared_messages == 1
 
 
-def test_a_parameter_request_is_an_event_and_its_answer_a_packet():
+@pytest.mark.parametrize(
+    "packet_id, text", [(4, "wants to call a service"), (5, "wants to call a service"), (6, "asks for a parameter")]
+)
+def test_requests_that_only_other_devices_make_are_refused_by_name(packet_id, text):
     session = open_declared_session()
-    assert receive(session, build_packet(6, build_text("~gain"))) == [ParameterRequested("~gain")]
-    assert session.encode_parameter_answer([7], [], []) == build_packet(
-        6, bytes.fromhex("01000000 07000000 00000000 00000000")
-    )
-
-
-def test_a_parameter_longer_than_the_robots_buffer_is_never_encoded():
-    session = open_declared_session(max_payload_length=100)
-    assert len(session.encode_parameter_answer([0] * 22, [], [])) == 100 + 8
-    with pytest.raises(PacketTooLongError, match="104 bytes"):
-        session.encode_parameter_answer([0] * 23, [], [])
-    with pytest.raises(PayloadError):
-        session.encode_parameter_answer([2**31], [], [])
+    (problem,) = receive(session, build_packet(packet_id, build_text("~gain")))
+    assert text in problem.text
+    assert session.undeclared_messages == 0
+    assert session.take_packets() == []
 
 
 @pytest.mark.parametrize("frame_id", [0, 1, 2, 3, 4, 5, 6, 7, 10])

@@ -47,8 +47,6 @@ def test_the_stock_robots_topics_are_kept_by_id_with_kind_and_direction():
         (1, TopicKind.SUBSCRIBER, False),
         (2, TopicKind.SERVICE_ANSWERS, True),
         (3, TopicKind.SERVICE_REQUESTS, False),
-        (4, TopicKind.CLIENT_REQUESTS, True),
-        (5, TopicKind.CLIENT_ANSWERS, False),
     ],
 )
 def test_the_id_of_the_declaring_packet_says_the_kind_and_the_direction(frame_id, kind, is_from_robot):

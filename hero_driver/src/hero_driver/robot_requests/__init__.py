@@ -1,1 +1,0 @@
-"""What robots ask of ROS: parameters and services, served on worker threads."""
