@@ -6,6 +6,7 @@ import time
 from typing import Any, Dict, List, Optional, Sequence
 
 from hero_client.command_line import say
+from hero_client.safe_file import replace_file
 
 from . import store
 from .errors import CalibrationError, EndedError
@@ -82,7 +83,8 @@ class Calibration:
             if importlib.util.find_spec("matplotlib") is not None:
                 from .figures import draw_robot
 
-                draw_robot(probe.name, list(results)).savefig(picture, dpi=120)
+                with replace_file(picture) as file:
+                    draw_robot(probe.name, list(results)).savefig(file, dpi=120, format="png")
                 self._files[probe.robot_id].append(picture)
         except CalibrationError as error:
             probe.failure = probe.failure or str(error)

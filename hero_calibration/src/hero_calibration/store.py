@@ -9,6 +9,7 @@ from typing import Any, Dict, List, NamedTuple, Tuple
 
 import yaml
 
+from hero_client.safe_file import lock_file, write_file
 from hero_client.texts import make_printable, one_line
 
 from .errors import CalibrationError
@@ -73,37 +74,18 @@ def save(path: str, calibration: Calibration) -> None:
     base, suffix = os.path.splitext(path)
     values = calibration.values
     try:
-        if os.path.exists(path):
-            with open(path, "rb") as file:
-                _write_atomically(base + PREVIOUS + suffix, file.read())
-            with suppress(CalibrationError):
-                old = load(path)
-                values = {**old.values, **values} if old.robot_id == calibration.robot_id else values
-        content = {"robot": "hero_%d" % calibration.robot_id, "date": calibration.date, **values}
-        text: str = yaml.safe_dump(content, sort_keys=False, default_flow_style=None)
-        _write_atomically(path, text.encode())
+        with lock_file(path):
+            if os.path.exists(path):
+                with open(path, "rb") as file:
+                    write_file(base + PREVIOUS + suffix, file.read())
+                with suppress(CalibrationError):
+                    old = load(path)
+                    values = {**old.values, **values} if old.robot_id == calibration.robot_id else values
+            content = {"robot": "hero_%d" % calibration.robot_id, "date": calibration.date, **values}
+            text: str = yaml.safe_dump(content, sort_keys=False, default_flow_style=None)
+            write_file(path, text.encode())
     except OSError as error:
         raise CalibrationError("%s cannot be written: %s" % (path, error.strerror)) from error
-
-
-def _write_atomically(path: str, content: bytes) -> None:
-    """Write a file: whenever power fails, path is the old one or the new one, complete. Raises: OSError."""
-    written = "%s.%d.new" % (path, os.getpid())
-    try:
-        with open(written, "wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(written, path)
-    except OSError:
-        with suppress(OSError):
-            os.remove(written)
-        raise
-    folder = os.open(os.path.dirname(path) or ".", os.O_RDONLY)
-    try:
-        os.fsync(folder)  # the name itself
-    finally:
-        os.close(folder)
 
 
 def load(path: str) -> Calibration:

@@ -6,6 +6,8 @@ import numpy as np
 import yaml
 from PIL import Image
 
+from hero_client.safe_file import replace_file, write_file
+
 from .occupancy_grid import OccupancyGrid
 
 __all__ = ["save_map"]
@@ -26,7 +28,8 @@ def save_map(path: str, grid: OccupancyGrid) -> str:
     pixels[grid.free] = FREE
     pixels[grid.occupied] = OCCUPIED
     picture = os.path.splitext(path)[0] + ".png"
-    Image.fromarray(pixels[::-1]).save(picture)  # the first row of a picture is its upper one
+    with replace_file(picture) as file:
+        Image.fromarray(pixels[::-1]).save(file, "PNG")  # the first row of a picture is its upper one
     content = {
         "image": os.path.basename(picture),
         "resolution": grid.cell_m,
@@ -35,6 +38,5 @@ def save_map(path: str, grid: OccupancyGrid) -> str:
         "occupied_thresh": OCCUPIED_SHARE,
         "free_thresh": FREE_SHARE,
     }
-    with open(path, "w", encoding="utf-8") as file:
-        yaml.safe_dump(content, file, sort_keys=False)
+    write_file(path, yaml.safe_dump(content, sort_keys=False).encode())
     return picture

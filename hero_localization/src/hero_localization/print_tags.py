@@ -14,6 +14,7 @@ import numpy as np
 
 from hero_client import command_line
 from hero_client.parameters import robot_ids_option
+from hero_client.safe_file import replace_file
 
 from .errors import LocalizationError
 from .tag_pose import DEFAULT_SIZE_M, REFERENCE_SIZE_M
@@ -267,7 +268,7 @@ def run(options: argparse.Namespace) -> None:
     paper_mm = PAPERS_MM[options.paper]
     pages = list(split_pages(sheets, paper_mm))
     try:
-        with PdfPages(options.out) as pdf:
+        with replace_file(options.out) as file, PdfPages(file) as pdf:
             for page in pages:
                 pdf.savefig(draw_page(page, options.family, paper_mm))
             if options.board:

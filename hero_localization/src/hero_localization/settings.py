@@ -11,6 +11,7 @@ from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional
 import numpy as np
 import yaml
 
+from hero_client.safe_file import lock_file, write_file
 from hero_client.texts import one_line
 from hero_client.values.geometry import Pose
 
@@ -54,7 +55,15 @@ def load(path: str) -> Settings:
 def update(path: str, parts: Mapping[str, Any]) -> None:
     """Replace the text of these parts in a file, or begin it; all other text stays. Raises: SettingsError."""
     path = os.path.expanduser(path)
-    text = _read(path)
+    try:
+        os.makedirs(os.path.dirname(path) or ".", exist_ok=True)
+        with lock_file(path):
+            write_file(path, _replace_parts(path, _read(path), parts).encode())
+    except OSError as error:
+        raise SettingsError("%s cannot be written: %s" % (path, error.strerror)) from None
+
+
+def _replace_parts(path: str, text: str, parts: Mapping[str, Any]) -> str:
     content = {**_parse(path, text), **parts}
     text += "\n" if text and not text.endswith("\n") else ""
     for key, part in parts.items():
@@ -64,13 +73,7 @@ def update(path: str, parts: Mapping[str, Any]) -> None:
         text = text[:start] + _dump(key, part) + text[end:]
     if not _holds(text, content):
         text = "".join(map(_dump, content, content.values()))  # the text was YAML of another form, such as JSON
-    try:
-        os.makedirs(os.path.dirname(path) or ".", exist_ok=True)
-        with open(path + ".new", "w", encoding="utf-8") as file:
-            file.write(text)
-        os.replace(path + ".new", path)
-    except OSError as error:
-        raise SettingsError("%s cannot be written: %s" % (path, error.strerror)) from None
+    return text
 
 
 def _dump(key: str, part: Any) -> str:

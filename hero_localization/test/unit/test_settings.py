@@ -1,6 +1,9 @@
 """The file of a camera: what calibrations write is what the tracker reads; wrong files are refused with a remedy."""
 
+import errno
 import math
+import os
+import threading
 
 import numpy as np
 import pytest
@@ -128,3 +131,29 @@ def test_a_file_that_cannot_be_written_is_an_error(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(SettingsError, match="cannot be"):
         settings.update(str(tmp_path / "file" / "camera.yaml"), {})
+
+
+def test_no_part_is_lost_when_several_calibrations_write_a_file(path):
+    def calibrate(first):
+        for number in range(first, first + 12):
+            settings.update(path, {"part_%d" % number: number})
+
+    settings.update(path, {})
+    threads = [threading.Thread(target=calibrate, args=(first,)) for first in (0, 100, 200)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(read(path)) == 36
+
+
+def test_a_full_disk_leaves_the_settings_as_they_were(path, monkeypatch):
+    settings.update(path, {"decimate": 1.0})
+
+    def fail(fd):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", fail)
+    with pytest.raises(SettingsError, match=r"camera\.yaml cannot be written: No space left on device"):
+        settings.update(path, {"decimate": 2.0})
+    assert read(path) == {"decimate": 1.0} and os.listdir(os.path.dirname(path)) == ["camera.yaml"]

@@ -10,6 +10,7 @@ import numpy as np
 
 from hero_client import command_line
 from hero_client.parameters import robot_ids_option
+from hero_client.safe_file import replace_file
 
 from . import analysis
 from .bags import BagSet
@@ -71,7 +72,8 @@ def draw(options: argparse.Namespace, observations: Observations, bags: BagSet) 
             missing.append("no figure of %s: nothing of %s in the recording" % (name, FIGURES[name]))
             continue
         try:
-            figure.savefig(path, dpi=130)
+            with replace_file(path) as file:
+                figure.savefig(file, dpi=130, format=options.format)
         except OSError as error:
             raise RecordingError("%s cannot be written: %s; choose another --out" % (path, error.strerror)) from error
         paths.append(path)

@@ -1,0 +1,94 @@
+"""Files that survive a power cut, a full disk and other writers. Imports nothing of ours, and no ROS.
+
+A file is replaced as a whole (rename(2)): whatever happens, its path holds the old content or the new one.
+"""
+
+import errno
+import fcntl
+import os
+import secrets
+import stat
+import time
+from contextlib import contextmanager, suppress
+from typing import IO, Iterator
+
+__all__ = ["lock_file", "replace_file", "write_file"]
+
+LOCK_TIMEOUT_S = 10.0
+"""Writers hold a lock for milliseconds; one that is suspended meanwhile must not block the others for ever."""
+
+RETRY_S = 0.02
+
+NO_LOCKS = (errno.EBADF, errno.EINVAL, errno.ENOLCK, errno.ENOTSUP)
+"""flock(2) of a folder on file systems without such locks, such as NFS: files are replaced as a whole there, too."""
+
+
+@contextmanager
+def lock_file(path: str) -> Iterator[None]:
+    """Keep other programs and threads that lock this file out, from reading it until it is replaced.
+
+    It is the folder that is locked, as a file that is replaced, or not there yet, cannot be: within this context no
+    other file of the same folder can be locked. The folder must exist.
+
+    Raises: OSError, after LOCK_TIMEOUT_S with EBUSY.
+    """
+    folder = os.open(os.path.dirname(os.path.realpath(path)), os.O_RDONLY)
+    try:
+        deadline_s = time.monotonic() + LOCK_TIMEOUT_S
+        while True:
+            try:
+                fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                break
+            except BlockingIOError:
+                if time.monotonic() > deadline_s:
+                    raise OSError(errno.EBUSY, "another program has it locked", path) from None
+                time.sleep(RETRY_S)
+            except OSError as error:
+                if error.errno not in NO_LOCKS:
+                    raise
+                break
+        yield
+    finally:
+        os.close(folder)
+
+
+@contextmanager
+def replace_file(path: str) -> Iterator[IO[bytes]]:
+    """Give a new file to write, which replaces the one at path at the end of the context, unless that raises.
+
+    Symbolic links stay, and the file that they point to is replaced; so do its mode and, where permitted, its owner.
+    What is no regular file, such as /dev/stdout, is written as it is.
+
+    Raises: OSError; the file at path is then the old one, and nothing lies beside it.
+    """
+    path = os.path.realpath(path)
+    old = os.stat(path) if os.path.exists(path) else None
+    if old is not None and not stat.S_ISREG(old.st_mode):
+        with open(path, "wb") as device:
+            yield device
+        return
+    new = "%s.%s.new" % (path, secrets.token_hex(4))
+    try:
+        with open(new, "xb") as file:
+            if old is not None:
+                with suppress(PermissionError):
+                    os.chmod(file.fileno(), stat.S_IMODE(old.st_mode))
+                    os.chown(file.fileno(), old.st_uid, old.st_gid)
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(new, path)
+    finally:
+        with suppress(FileNotFoundError):
+            os.remove(new)
+    folder = os.open(os.path.dirname(path), os.O_RDONLY)
+    try:
+        os.fsync(folder)  # the name itself
+    finally:
+        os.close(folder)
+
+
+def write_file(path: str, content: bytes) -> None:
+    """Replace the file at path by one with this content. Raises: OSError, as replace_file()."""
+    with replace_file(path) as file:
+        file.write(content)

@@ -1,0 +1,114 @@
+"""Files that survive power cuts, full disks and other writers."""
+
+import errno
+import os
+import threading
+
+import pytest
+
+from hero_client import safe_file
+from hero_client.safe_file import lock_file, replace_file, write_file
+
+
+def fail_to_sync(fd):
+    raise OSError(errno.ENOSPC, "No space left on device")
+
+
+def test_a_new_file_is_on_the_disk_before_it_takes_the_name(tmp_path, monkeypatch):
+    path = str(tmp_path / "a.yaml")
+    steps = []
+    monkeypatch.setattr(os, "fsync", lambda fd: steps.append(os.readlink("/proc/self/fd/%d" % fd)))
+    replace = os.replace
+    monkeypatch.setattr(os, "replace", lambda old, new: (steps.append((old, new)), replace(old, new)))
+    write_file(path, b"new")
+    new = steps[0]
+    assert os.path.dirname(new) == str(tmp_path) and new != path
+    assert steps == [new, (new, path), str(tmp_path)]
+
+
+def test_a_full_disk_leaves_the_old_file_and_nothing_beside_it(tmp_path, monkeypatch):
+    path = tmp_path / "a.yaml"
+    path.write_bytes(b"old")
+    monkeypatch.setattr(os, "fsync", fail_to_sync)
+    with pytest.raises(OSError, match="No space left"):
+        write_file(str(path), b"new")
+    assert path.read_bytes() == b"old" and os.listdir(str(tmp_path)) == ["a.yaml"]
+
+
+@pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt])
+def test_whatever_ends_a_writer_leaves_the_old_file(tmp_path, error):
+    path = tmp_path / "a.yaml"
+    path.write_bytes(b"old")
+    with pytest.raises(error), replace_file(str(path)) as file:
+        file.write(b"half of the n")
+        raise error
+    assert path.read_bytes() == b"old" and os.listdir(str(tmp_path)) == ["a.yaml"]
+
+
+def test_a_symbolic_link_stays_and_its_target_is_replaced(tmp_path):
+    (tmp_path / "elsewhere").mkdir()
+    target, link = tmp_path / "elsewhere" / "real.yaml", tmp_path / "link.yaml"
+    target.write_bytes(b"old")
+    link.symlink_to(target)
+    write_file(str(link), b"new")
+    assert link.is_symlink() and target.read_bytes() == b"new"
+
+
+def test_a_replaced_file_keeps_its_mode(tmp_path):
+    path = tmp_path / "a.yaml"
+    path.write_bytes(b"old")
+    path.chmod(0o640)
+    write_file(str(path), b"new")
+    assert path.stat().st_mode & 0o777 == 0o640
+
+
+def test_a_device_is_written_and_not_replaced(tmp_path):
+    pipe = str(tmp_path / "pipe")
+    os.mkfifo(pipe)
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    write_file(pipe, b"new")
+    assert os.read(reader, 10) == b"new"
+    os.close(reader)
+
+
+def test_writers_at_the_same_time_leave_one_whole_file(tmp_path):
+    path = tmp_path / "a.yaml"
+    with replace_file(str(path)) as first:
+        first.write(b"first" * 1000)
+        write_file(str(path), b"second")
+        assert path.read_bytes() == b"second"
+    assert path.read_bytes() == b"first" * 1000
+
+
+def test_no_change_is_lost_when_several_change_a_file(tmp_path):
+    path = tmp_path / "count"
+    path.write_bytes(b"0")
+
+    def count():
+        for _ in range(30):
+            with lock_file(str(path)):
+                write_file(str(path), b"%d" % (int(path.read_bytes()) + 1))
+
+    threads = [threading.Thread(target=count) for _ in range(3)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert path.read_bytes() == b"90"
+
+
+def test_a_lock_that_is_never_released_ends_in_an_error(tmp_path, monkeypatch):
+    monkeypatch.setattr(safe_file, "LOCK_TIMEOUT_S", 0.0)
+    path = str(tmp_path / "a.yaml")
+    with lock_file(path), pytest.raises(OSError, match="another program has it locked"), lock_file(path):
+        pass
+
+
+def test_a_file_system_without_locks_is_no_obstacle(tmp_path, monkeypatch):
+    def refuse(fd, operation):
+        raise OSError(errno.EBADF, "Bad file descriptor")
+
+    monkeypatch.setattr(safe_file.fcntl, "flock", refuse)
+    with lock_file(str(tmp_path / "a.yaml")):
+        write_file(str(tmp_path / "a.yaml"), b"new")
+    assert (tmp_path / "a.yaml").read_bytes() == b"new"
