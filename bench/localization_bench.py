@@ -19,19 +19,20 @@ from localization_nodes import measure_nodes
 from measuring import measure_machine_us, print_machine
 
 from hero_client.values.geometry import Pose, measure_distance, wrap_angle
-from hero_localization.arena_calibration import average_tags, calibrate_arena
-from hero_localization.camera_model import Camera, Lens
-from hero_localization.detectors import create_detector
-from hero_localization.lens_calibration import calibrate_lens, find_board
-from hero_localization.pose_filter import Estimate, Measurement
-from hero_localization.robot_calibration import CALIBRATION_DRIVE, calibrate_robot
-from hero_localization.swarm_localizer import SwarmLocalizer
-from hero_localization.tag_corners import TagCorners
-from hero_localization.tag_pose import MountedTag, ReferenceTag, TagLayout, fit_squares, locate
-from hero_localization.tag_search import TagSearch
-from hero_sim.camera.board_images import Board, BoardRenderer, list_board_places
-from hero_sim.camera.renderer import CameraRenderer
-from hero_sim.camera.view import CameraOptions, PrintedTag
+from hero_localization.calibration.arena_calibration import average_tags, calibrate_arena
+from hero_localization.calibration.lens_calibration import calibrate_lens, find_board
+from hero_localization.calibration.robot_calibration import CALIBRATION_DRIVE, calibrate_robot
+from hero_localization.camera.camera_model import Camera, Lens
+from hero_localization.filter.pose_filter import Estimate, Measurement
+from hero_localization.filter.swarm_localizer import SwarmLocalizer
+from hero_localization.prints.boards import Board
+from hero_localization.simulated_camera.board_renderer import BoardRenderer, list_board_places
+from hero_localization.simulated_camera.renderer import CameraRenderer
+from hero_localization.simulated_camera.view import CameraOptions, PrintedTag
+from hero_localization.tracking.detectors import create_detector
+from hero_localization.tracking.tag_corners import TagCorners
+from hero_localization.tracking.tag_pose import MountedTag, ReferenceTag, TagLayout, fit_squares, locate
+from hero_localization.tracking.tag_search import TagSearch
 from hero_sim.stepped.swarm import StepSwarm
 from hero_sim.world.arena_file import load_arena
 

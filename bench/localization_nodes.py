@@ -19,11 +19,11 @@ from measuring import read_cpu_s, start, start_master, stop
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Image
 
-from hero_localization.camera_model import Camera, Lens
-from hero_localization.settings import describe_camera, update
+from hero_localization.camera.camera_model import Camera, Lens
+from hero_localization.simulated_camera.renderer import CameraRenderer
+from hero_localization.simulated_camera.view import CameraOptions, PrintedTag, View
+from hero_localization.tracking.settings import describe_camera, update
 from hero_msgs.msg import RobotPose, RobotPoses
-from hero_sim.camera.renderer import CameraRenderer
-from hero_sim.camera.view import CameraOptions, PrintedTag, View
 from hero_sim.world.arena import build_rectangle
 
 OPTIONS = CameraOptions()

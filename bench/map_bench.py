@@ -24,9 +24,9 @@ from hero_client.controllers.orca import AvoidanceLaw
 from hero_examples.explore import Explorer, explore_together
 from hero_examples.random_walk import Walker
 from hero_examples.swarm_go_to import STEP_S, Formation
-from hero_localization.occupancy_grid import OccupancyGrid
+from hero_localization.mapping.occupancy_grid import OccupancyGrid
+from hero_localization.mapping.swarm_map import SwarmMap
 from hero_localization.stepped_localization import StepLocalization
-from hero_localization.swarm_map import SwarmMap
 from hero_sim.stepped.swarm import StepSwarm
 from hero_sim.world.arena_file import load_arena
 

@@ -3,4 +3,10 @@
 from catkin_pkg.python_setup import generate_distutils_setup
 from setuptools import setup
 
-setup(**generate_distutils_setup(packages=["hero_localization"], package_dir={"": "src"}))
+ROOMS = ("prints", "camera", "tracking", "filter", "mapping", "calibration", "nodes", "simulated_camera")
+
+setup(
+    **generate_distutils_setup(
+        packages=["hero_localization", *("hero_localization." + room for room in ROOMS)], package_dir={"": "src"}
+    )
+)

@@ -39,6 +39,13 @@ ROOMS = {
     "hero_client.controllers": {"values"},
     "hero_client.ros": {"ros_node", "texts", "values"},
     "hero_client.robots": {"controllers", "values"},
+    "hero_localization.prints": {"errors"},
+    "hero_localization.camera": {"errors"},
+    "hero_localization.tracking": {"errors", "prints", "camera"},
+    "hero_localization.filter": {"errors"},
+    "hero_localization.mapping": {"errors", "filter"},
+    "hero_localization.calibration": {"errors", "prints", "camera", "tracking", "filter"},
+    "hero_localization.simulated_camera": {"errors", "prints"},
 }
 PURE_ROOMS = (
     "hero_driver.rosserial",
@@ -66,6 +73,14 @@ PURE_ROOMS = (
     "hero_calibration.session",
     "hero_calibration.step_response",
     "hero_calibration.velocity",
+    "hero_localization.calibration",
+    "hero_localization.camera.camera_model",
+    "hero_localization.camera.lens_file",
+    "hero_localization.filter",
+    "hero_localization.mapping",
+    "hero_localization.prints",
+    "hero_localization.stepped_localization",
+    "hero_localization.tracking",
 )
 
 
@@ -99,7 +114,7 @@ def test_rooms_import_only_what_lies_below_them(room):
             assert part in ROOMS[room] | {own, None}, f"{name}, line {found.line}: {found.module}"
 
 
-@pytest.mark.parametrize("package", ("hero_driver", "hero_sim", "hero_client"))
+@pytest.mark.parametrize("package", ("hero_driver", "hero_sim", "hero_client", "hero_localization"))
 def test_neither_rooms_nor_modules_import_each_other_in_a_circle(package):
     modules = set(modules_below(package)) - {package}
     by_module = {name: {found.module for found in imports_of(name)} & modules - {name} for name in modules}
@@ -129,6 +144,12 @@ def test_only_the_transports_touch_sockets(name):
 @pytest.mark.parametrize("name", sorted(MODULES))
 def test_nothing_imports_a_node(name):
     assert not [found for found in imports_of(name) if found.module.endswith(".node")]
+
+
+@pytest.mark.parametrize("name", modules_below("hero_localization"))
+def test_real_cameras_and_their_calibration_need_no_simulator(name):
+    simulated = part_of(name, "hero_localization") in {"simulated_camera", "stepped_localization"}
+    assert simulated or "hero_sim" not in {found.top for found in imports_of(name)}
 
 
 @pytest.mark.parametrize("name", modules_below("hero_sim"))

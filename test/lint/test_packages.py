@@ -163,8 +163,8 @@ def test_bootstrap_installs_the_python_packages_that_are_declared():
 def test_every_program_has_a_module_with_a_main():
     for package in PACKAGES:
         text = sources.read_cmake(package)
-        for name, module in re.findall(r"hero_add_(?:program|node)\((\w+) ?(\w*)\)", text):
-            path = sources.ROOT / package / "src" / package / f"{module or name}.py"
+        for name, module in re.findall(r"hero_add_(?:program|node)\((\w+) ?([\w.]*)\)", text):
+            path = sources.ROOT / package / "src" / package / f"{(module or name).replace('.', '/')}.py"
             functions = [node for node in ast.parse(path.read_text()).body if isinstance(node, ast.FunctionDef)]
             assert "main" in [function.name for function in functions], f"{package}: {name}"
 

@@ -15,9 +15,9 @@ from hero_client.values.errors import FrameError
 from hero_client.values.geometry import Pose
 from hero_sim.stepped.swarm import StepSwarm
 
-from .pose_filter import Estimate, Measurement, PoseFilter, make_covariance
-from .swarm_localizer import PUBLISH_RATE_HZ
-from .swarm_map import SwarmMap
+from .filter.pose_filter import Estimate, Measurement, PoseFilter, make_covariance
+from .filter.swarm_localizer import PUBLISH_RATE_HZ
+from .mapping.swarm_map import SwarmMap
 
 __all__ = ["CameraModel", "StepLocalization"]
 

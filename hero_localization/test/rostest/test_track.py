@@ -21,11 +21,11 @@ from geometry_msgs.msg import Point, PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
-from hero_localization import settings as camera_file
-from hero_localization.camera_model import Lens
+from hero_localization.camera.camera_model import Lens
+from hero_localization.prints.tag_images import draw_tag
+from hero_localization.simulated_camera.camera_node import list_references
+from hero_localization.tracking import settings as camera_file
 from hero_msgs.msg import ObjectPoses, RobotPose, RobotPoses
-from hero_sim.camera.tag_images import draw_tag
-from hero_sim.camera_node import list_references
 from hero_sim.world.arena import build_default
 from hero_test.processes import Program, find_program
 from hero_test.waiting import wait_for

@@ -11,16 +11,16 @@ from hero_client.values.geometry import (  # noqa: E402 - without OpenCV there i
     Pose,
     transform_pose,
 )
-from hero_localization.arena_calibration import (  # noqa: E402
+from hero_localization.calibration.arena_calibration import (  # noqa: E402
     average_tags,
     calibrate_arena,
-    find_moved_references,
     measure_residuals,
 )
-from hero_localization.camera_model import Camera, Lens  # noqa: E402
+from hero_localization.camera.camera_model import Camera, Lens  # noqa: E402
 from hero_localization.errors import CalibrationError  # noqa: E402
-from hero_localization.tag_corners import TagCorners  # noqa: E402
-from hero_localization.tag_pose import ReferenceTag  # noqa: E402
+from hero_localization.tracking.moved_references import find_moved_references  # noqa: E402
+from hero_localization.tracking.tag_corners import TagCorners  # noqa: E402
+from hero_localization.tracking.tag_pose import ReferenceTag  # noqa: E402
 
 LENS = Lens(
     1920,

@@ -6,12 +6,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hero_localization import calibrate_camera, settings
-from hero_localization.camera_model import Lens
+from hero_localization.calibration.lens_calibration import BoardView, LensCalibration
+from hero_localization.calibration.robot_calibration import RobotCalibration
+from hero_localization.camera.camera_model import Lens
+from hero_localization.camera.frame_source import Frame
 from hero_localization.errors import CalibrationError
-from hero_localization.frame_source import Frame
-from hero_localization.lens_calibration import BoardView, LensCalibration
-from hero_localization.robot_calibration import RobotCalibration
+from hero_localization.nodes import calibrate_camera
+from hero_localization.tracking import settings
 
 FOUND = {
     0: RobotCalibration(0.001, -0.002, math.radians(3.0), 0.060, 0.001, 0.001, []),

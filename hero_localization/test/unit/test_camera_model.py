@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hero_localization.camera_model import Camera, Lens
+from hero_localization.camera.camera_model import Camera, Lens
 
 MATRIX = np.array(((1390.0, 0.0, 955.0), (0.0, 1385.0, 545.0), (0.0, 0.0, 1.0)))
 DISTORTION = np.array((-0.12, 0.03, 0.0008, -0.0006, -0.002))

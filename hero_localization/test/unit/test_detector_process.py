@@ -11,13 +11,13 @@ import pytest
 
 pytest.importorskip("cv2")
 
-from hero_localization.detector_process import (
+from hero_localization.errors import DetectorError
+from hero_localization.prints.tag_images import draw_tag
+from hero_localization.tracking.detector_process import (
     DetectorProcess,
 )
-from hero_localization.detectors import create_detector
-from hero_localization.errors import DetectorError
-from hero_localization.tag_search import TagSearch
-from hero_sim.camera.tag_images import draw_tag
+from hero_localization.tracking.detectors import create_detector
+from hero_localization.tracking.tag_search import TagSearch
 
 WIDTH_PX, HEIGHT_PX = 480, 360
 
@@ -91,7 +91,8 @@ def test_close_ends_the_process_and_is_safe_twice(process):
 
 def run_program(lines):
     """Run a program that starts a detector's process, in a group of its own; return what it prints, and its status."""
-    program = "import os, signal; import numpy as np; from hero_localization.detector_process import DetectorProcess;"
+    program = "import os, signal; import numpy as np;"
+    program += "from hero_localization.tracking.detector_process import DetectorProcess;"
     program += "started = DetectorProcess('aruco', '36h11', 2.0, 480, 360);" + lines
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     command = [sys.executable, "-c", program]

@@ -8,12 +8,12 @@ import pytest
 
 pytest.importorskip("cv2")
 
-from hero_localization.detectors import create_detector
 from hero_localization.errors import DetectorError
-from hero_localization.tag_corners import TagCorners
-from hero_sim.camera.renderer import CameraRenderer
-from hero_sim.camera.tag_images import draw_tag
-from hero_sim.camera.view import CameraOptions, PrintedTag, tag_corners
+from hero_localization.prints.tag_images import draw_tag
+from hero_localization.simulated_camera.renderer import CameraRenderer
+from hero_localization.simulated_camera.view import CameraOptions, PrintedTag, tag_corners
+from hero_localization.tracking.detectors import create_detector
+from hero_localization.tracking.tag_corners import TagCorners
 from hero_sim.world.arena import build_rectangle
 
 OPTIONS = CameraOptions(width_px=640, height_px=480, center_px=(318.0, 242.0))

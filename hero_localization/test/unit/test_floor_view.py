@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from test_camera_model import DISTORTION, MATRIX
 
-from hero_localization.camera_model import Camera, Lens
+from hero_localization.camera.camera_model import Camera, Lens
 from hero_localization.errors import SettingsError
-from hero_localization.floor_view import LONGEST_SIDE_PX, FloorView
-from hero_localization.tag_corners import TagCorners
+from hero_localization.tracking.floor_view import LONGEST_SIDE_PX, FloorView
+from hero_localization.tracking.tag_corners import TagCorners
 
 HEIGHT_M = 0.076
 

@@ -8,9 +8,9 @@ import pytest
 import rospy
 from sensor_msgs.msg import CompressedImage, Image
 
-from hero_localization import frame_source
+from hero_localization.camera import frame_source
+from hero_localization.camera.frame_source import TopicSource, open_source
 from hero_localization.errors import FrameSourceError
-from hero_localization.frame_source import TopicSource, open_source
 
 RATE_HZ = 10.0
 SLOW_S = 2.5 / RATE_HZ

@@ -5,10 +5,11 @@ import pytest
 
 pytest.importorskip("cv2")
 
+from hero_localization.calibration.lens_calibration import BoardView, calibrate_lens, find_board
 from hero_localization.errors import CalibrationError
-from hero_localization.lens_calibration import BoardView, calibrate_lens, find_board
-from hero_sim.camera.board_images import Board, BoardRenderer, list_board_corners
-from hero_sim.camera.view import CameraOptions, View
+from hero_localization.prints.boards import Board, list_board_corners
+from hero_localization.simulated_camera.board_renderer import BoardRenderer
+from hero_localization.simulated_camera.view import CameraOptions, View
 
 OPTIONS = CameraOptions(
     width_px=960,

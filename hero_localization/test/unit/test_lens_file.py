@@ -2,8 +2,8 @@
 
 import pytest
 
+from hero_localization.camera.lens_file import load_lens
 from hero_localization.errors import CalibrationError
-from hero_localization.lens_file import load_lens
 
 STOCK_LENS = """image_width: 640
 image_height: 480

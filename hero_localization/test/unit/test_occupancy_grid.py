@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hero_client.values.geometry import Pose
-from hero_localization.occupancy_grid import BEAMS, OccupancyGrid
+from hero_localization.mapping.occupancy_grid import BEAMS, OccupancyGrid
 from hero_sim.robot.ranges import calibrate, convert_to_ranges
 from hero_sim.world import range_sensors
 from hero_sim.world.arena import Segments, build_rectangle

@@ -8,11 +8,11 @@ import pytest
 pytest.importorskip("matplotlib")
 cv2 = pytest.importorskip("cv2")
 
-from hero_localization import print_tags  # noqa: E402 - there is nothing to print without these
-from hero_localization.detectors import create_detector  # noqa: E402
+from hero_localization.calibration.lens_calibration import find_board  # noqa: E402
 from hero_localization.errors import LocalizationError  # noqa: E402
-from hero_localization.lens_calibration import find_board  # noqa: E402
-from hero_sim.camera.board_images import Board  # noqa: E402
+from hero_localization.prints import print_tags  # noqa: E402 - there is nothing to print without these
+from hero_localization.prints.boards import Board  # noqa: E402
+from hero_localization.tracking.detectors import create_detector  # noqa: E402
 
 DOTS_PER_MM = 8.0
 A4_MM = print_tags.PAPERS_MM["a4"]

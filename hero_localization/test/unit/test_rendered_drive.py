@@ -11,19 +11,20 @@ from nav_msgs.msg import Odometry
 from std_msgs.msg import Header
 
 from hero_client.values import geometry
-from hero_localization import calibrate_camera, settings
-from hero_localization.arena_calibration import average_tags, calibrate_arena
-from hero_localization.camera_model import Camera, Lens
-from hero_localization.detectors import create_detector
-from hero_localization.frame_source import Frame
-from hero_localization.pose_filter import Measurement
-from hero_localization.settings import Settings
-from hero_localization.swarm_localizer import SwarmLocalizer
-from hero_localization.tag_pose import ReferenceTag, TagLayout
-from hero_localization.tag_search import TagSearch
-from hero_localization.tracker import Tracker
-from hero_sim.camera.renderer import CameraRenderer
-from hero_sim.camera.view import CameraOptions, PrintedTag
+from hero_localization.calibration.arena_calibration import average_tags, calibrate_arena
+from hero_localization.camera.camera_model import Camera, Lens
+from hero_localization.camera.frame_source import Frame
+from hero_localization.filter.pose_filter import Measurement
+from hero_localization.filter.swarm_localizer import SwarmLocalizer
+from hero_localization.nodes import calibrate_camera
+from hero_localization.simulated_camera.renderer import CameraRenderer
+from hero_localization.simulated_camera.view import CameraOptions, PrintedTag
+from hero_localization.tracking import settings
+from hero_localization.tracking.detectors import create_detector
+from hero_localization.tracking.settings import Settings
+from hero_localization.tracking.tag_pose import ReferenceTag, TagLayout
+from hero_localization.tracking.tag_search import TagSearch
+from hero_localization.tracking.tracker import Tracker
 from hero_sim.stepped.swarm import StepSwarm
 from hero_sim.world.arena_file import load_arena
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from hero_client.values.geometry import Pose, transform_pose, wrap_angle
+from hero_localization.calibration.robot_calibration import calibrate_robot
 from hero_localization.errors import CalibrationError
-from hero_localization.robot_calibration import calibrate_robot
 
 STEP_S = 0.01
 FULL = (

@@ -10,10 +10,10 @@ import pytest
 import yaml
 
 from hero_client.values.geometry import Pose
-from hero_localization import settings
-from hero_localization.camera_model import Camera, Lens
-from hero_localization.detectors import DEFAULT_BACKEND
+from hero_localization.camera.camera_model import Camera, Lens
 from hero_localization.errors import SettingsError
+from hero_localization.tracking import settings
+from hero_localization.tracking.detectors import DEFAULT_BACKEND
 
 MATRIX = (1390.0, 0.0, 950.0, 0.0, 1391.0, 550.0, 0.0, 0.0, 1.0)
 LENS = Lens.from_camera_info(1920, 1080, MATRIX, "plumb_bob", (-0.1, 0.02, 0.0, 0.0))

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from hero_client.values.geometry import Pose
-from hero_localization.stamped_history import StampedHistory, interpolate_pose
+from hero_localization.filter.stamped_history import StampedHistory, interpolate_pose
 
 
 @pytest.fixture

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from hero_client.values.errors import FrameError
-from hero_localization.occupancy_grid import OccupancyGrid
+from hero_localization.mapping.occupancy_grid import OccupancyGrid
+from hero_localization.mapping.swarm_map import SwarmMap
 from hero_localization.stepped_localization import CameraModel, StepLocalization
-from hero_localization.swarm_map import SwarmMap
 from hero_sim.stepped.swarm import StepSwarm
 
 

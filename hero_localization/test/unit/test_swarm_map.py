@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from hero_client.values.geometry import Pose
-from hero_localization.map_files import save_map
-from hero_localization.occupancy_grid import OccupancyGrid
-from hero_localization.swarm_map import SwarmMap
+from hero_localization.mapping.map_files import save_map
+from hero_localization.mapping.occupancy_grid import OccupancyGrid
+from hero_localization.mapping.swarm_map import SwarmMap
 from hero_sim.world.arena import measure_clearance
 from hero_sim.world.arena_file import load_arena
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from hero_client.values.geometry import Pose, transform_pose, wrap_angle
-from hero_localization.camera_model import Camera, Lens
-from hero_localization.heading_check import HeadingCheck, is_upside_down
-from hero_localization.tag_corners import TagCorners
-from hero_localization.tag_pose import MountedTag, ReferenceTag, TagLayout, fit_squares, locate
+from hero_localization.camera.camera_model import Camera, Lens
+from hero_localization.filter.heading_check import HeadingCheck, is_upside_down
+from hero_localization.tracking.tag_corners import TagCorners
+from hero_localization.tracking.tag_pose import MountedTag, ReferenceTag, TagLayout, fit_squares, locate
 
 LENS = Lens(
     1920,

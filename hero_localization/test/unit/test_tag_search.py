@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from hero_localization.detectors import TagDetector
-from hero_localization.tag_corners import TagCorners
-from hero_localization.tag_search import TagSearch
+from hero_localization.tracking.detectors import TagDetector
+from hero_localization.tracking.tag_corners import TagCorners
+from hero_localization.tracking.tag_search import TagSearch
 
 FRAME_S = 1.0 / 30.0
 WIDTH_PX, HEIGHT_PX = 1920, 1080

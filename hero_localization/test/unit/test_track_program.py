@@ -5,8 +5,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from hero_localization import track
 from hero_localization.errors import DetectorError
+from hero_localization.nodes import track
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from hero_sim import camera_node, main
+from hero_sim import main
 
 LIMIT_S = 60.0
 
@@ -37,14 +37,6 @@ def test_a_full_disk_is_reported_in_one_line(arguments):
     with open("/dev/full", "wb") as full:
         status, errors = run_simulator(*arguments, stdout=full)
     assert (status, errors) == (1, "hero_sim: the output cannot be written: No space left on device\n")
-
-
-def test_the_camera_reports_errors_by_its_own_name(monkeypatch, capsys):
-    monkeypatch.setattr(sys, "argv", ["camera", "--first-id", "200"])
-    with pytest.raises(SystemExit) as end:
-        camera_node.main()
-    assert end.value.code == 1
-    assert capsys.readouterr().err == "camera: tags from 100 on are reference tags: take lower ids\n"
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,1 @@
+"""Intrinsics and extrinsics of a camera, and how tags sit on robots."""

@@ -1,0 +1,190 @@
+"""Where the camera hangs, from reference tags of known place. Pure but for OpenCV."""
+
+import math
+from typing import Dict, List, Mapping, NamedTuple, Sequence
+
+import cv2
+import numpy as np
+
+from ..camera.camera_model import Camera, Lens
+from ..errors import CalibrationError
+from ..tracking.tag_corners import TagCorners
+from ..tracking.tag_pose import ReferenceTag, TagPose, fit_squares
+
+__all__ = [
+    "LEAST_TAGS",
+    "ArenaCalibration",
+    "average_tags",
+    "calibrate_arena",
+    "fit_references",
+    "measure_residuals",
+]
+
+LEAST_TAGS = 4
+LEAST_EXTENT_M = 0.3
+"""Tags in a row leave the camera free to swing about it."""
+
+GOOD_RESIDUAL_M = 0.003
+WORST_RESIDUAL_M = 0.006
+"""Places that were measured with a tape are good to 2 mm."""
+
+_YAW_ROUNDS = 4
+_SEEN_SHARE = 0.5
+"""A tag must be found in at least this share of the frames."""
+
+
+class ArenaCalibration(NamedTuple):
+    """The camera at its place.
+
+    Attributes:
+        camera: lens and place in `map`.
+        residuals_m: how far each reference tag is seen from the place it was given, by id.
+        left_out: ids of tags that were left out, as they contradict all others.
+        problems: what speaks against using it; empty: it is good.
+    """
+
+    camera: Camera
+    residuals_m: Dict[int, float]
+    left_out: List[int]
+    problems: List[str]
+
+    @property
+    def rms_m(self) -> float:
+        """Root mean square of the residuals of the tags used."""
+        return _compute_rms(self.residuals_m, self.left_out)
+
+
+def average_tags(frames: Sequence[Sequence[TagCorners]]) -> List[TagCorners]:
+    """Return the median corners of the tags that most frames show exactly once."""
+    seen: Dict[int, List[np.ndarray]] = {}
+    for tags in frames:
+        ids = [tag.tag_id for tag in tags]
+        for tag in tags:
+            if ids.count(tag.tag_id) == 1:
+                seen.setdefault(tag.tag_id, []).append(tag.corners)
+    return [
+        TagCorners(tag_id, np.median(corners, axis=0))
+        for tag_id, corners in sorted(seen.items())
+        if len(corners) >= _SEEN_SHARE * len(frames)
+    ]
+
+
+def calibrate_arena(
+    lens: Lens, tags: Sequence[TagCorners], references: Mapping[int, ReferenceTag]
+) -> ArenaCalibration:
+    """Return where the camera hangs, from what it sees of the reference tags; other tags are ignored.
+
+    Only the places of the tags' centers count; their yaw is found with the camera.
+
+    Raises: CalibrationError if fewer than four reference tags are seen, or all lie in a row.
+    """
+    seen = [tag for tag in tags if tag.tag_id in references]
+    missing = sorted(set(references) - {tag.tag_id for tag in seen})
+    if len(seen) < LEAST_TAGS:
+        raise CalibrationError(
+            "the camera sees %d of %d reference tags, not %s: it takes %d; are they in the picture, whole, and lit?"
+            % (len(seen), len(references), ", ".join(map(str, missing)) or "more", LEAST_TAGS)
+        )
+    _check_extent(seen, references)
+    camera = _fit(lens, seen, references)
+    residuals_m = measure_residuals(camera, seen, references)
+    left_out: List[int] = []
+    worst = max(residuals_m, key=lambda tag_id: residuals_m[tag_id])
+    if residuals_m[worst] > WORST_RESIDUAL_M / 2.0 and len(seen) > LEAST_TAGS:
+        others = [tag for tag in seen if tag.tag_id != worst]
+        without = _fit(lens, others, references)
+        rest_m = measure_residuals(without, others, references)
+        alone_m = measure_residuals(without, seen, references)[worst]
+        if alone_m > WORST_RESIDUAL_M and alone_m > 3.0 * max(rest_m.values()):
+            camera, left_out = without, [worst]
+            residuals_m = {**rest_m, worst: alone_m}
+    return ArenaCalibration(camera, residuals_m, left_out, _judge(residuals_m, left_out, missing))
+
+
+def _judge(residuals_m: Mapping[int, float], left_out: Sequence[int], missing: Sequence[int]) -> List[str]:
+    problems = [
+        "tag %d was left out: it is seen %.0f mm from its place; measure that again"
+        % (tag_id, 1e3 * residuals_m[tag_id])
+        for tag_id in left_out
+    ]
+    for tag_id, residual_m in sorted(residuals_m.items()):
+        if tag_id not in left_out and residual_m > WORST_RESIDUAL_M:
+            problems.append(
+                "tag %d is seen %.0f mm from its place; measure that again" % (tag_id, 1e3 * residual_m)
+            )
+    if missing:
+        problems.append("not seen: reference tags %s" % ", ".join(map(str, missing)))
+    rms_m = _compute_rms(residuals_m, left_out)
+    if rms_m > GOOD_RESIDUAL_M:
+        problems.append(
+            "residual %.1f mm rms is above %.0f mm: check all places, the tags' size, and the lens calibration"
+            % (1e3 * rms_m, 1e3 * GOOD_RESIDUAL_M)
+        )
+    return problems
+
+
+def _compute_rms(residuals_m: Mapping[int, float], left_out: Sequence[int]) -> float:
+    used_m = [residual_m for tag_id, residual_m in residuals_m.items() if tag_id not in left_out]
+    return math.sqrt(sum(residual_m**2 for residual_m in used_m) / len(used_m))
+
+
+def _check_extent(seen: Sequence[TagCorners], references: Mapping[int, ReferenceTag]) -> None:
+    places_m = np.array([references[tag.tag_id].pose[:2] for tag in seen])
+    spread_m = np.linalg.svd(places_m - places_m.mean(axis=0), compute_uv=False)
+    if spread_m[1] < LEAST_EXTENT_M:
+        raise CalibrationError(
+            "all reference tags lie in a row: spread them over the field, best into its corners"
+        )
+
+
+def _fit(lens: Lens, seen: Sequence[TagCorners], references: Mapping[int, ReferenceTag]) -> Camera:
+    known = [references[tag.tag_id] for tag in seen]
+    pixels = np.vstack([tag.corners for tag in seen])
+    yaws_rad = [tag.pose.yaw_rad for tag in known]
+    camera = None
+    for _ in range(_YAW_ROUNDS):
+        points_m = np.vstack(
+            [
+                _list_corners(tag._replace(pose=tag.pose._replace(yaw_rad=yaw)))
+                for tag, yaw in zip(known, yaws_rad)
+            ]
+        )
+        is_found, turn, shift = cv2.solvePnP(points_m, pixels, lens.matrix, lens.distortion)
+        if not is_found or not np.isfinite(turn).all() or not np.isfinite(shift).all():
+            raise CalibrationError(
+                "no place of the camera explains what it sees: check ids and places of the tags"
+            )
+        rotation = cv2.Rodrigues(turn)[0]
+        camera = Camera(lens, rotation, (-rotation.T @ shift).ravel())
+        yaws_rad = [fit.pose.yaw_rad for fit in fit_references(camera, seen, references)]
+    assert camera is not None
+    return camera
+
+
+def _list_corners(tag: ReferenceTag) -> np.ndarray:
+    half_m = tag.size_m / 2.0
+    square_m = half_m * np.array(((1, 1), (1, -1), (-1, -1), (-1, 1)))
+    cos, sin = math.cos(tag.pose.yaw_rad), math.sin(tag.pose.yaw_rad)
+    places_m = square_m @ np.array(((cos, sin), (-sin, cos))) + tag.pose[:2]
+    return np.column_stack((places_m, np.full(4, tag.height_m)))
+
+
+def fit_references(
+    camera: Camera, tags: Sequence[TagCorners], references: Mapping[int, ReferenceTag]
+) -> List[TagPose]:
+    """Return where the camera sees the reference tags; other tags are ignored."""
+    seen = [tag for tag in tags if tag.tag_id in references]
+    known = [references[tag.tag_id] for tag in seen]
+    return fit_squares(camera, seen, [tag.size_m for tag in known], [tag.height_m for tag in known])
+
+
+def measure_residuals(
+    camera: Camera, seen: Sequence[TagCorners], references: Mapping[int, ReferenceTag]
+) -> Dict[int, float]:
+    """Return how far (m) from its place each reference tag is seen, by id."""
+    return {
+        fit.tag_id: math.hypot(
+            fit.pose.x_m - references[fit.tag_id].pose.x_m, fit.pose.y_m - references[fit.tag_id].pose.y_m
+        )
+        for fit in fit_references(camera, seen, references)
+    }

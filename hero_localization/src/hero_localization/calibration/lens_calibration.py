@@ -1,0 +1,172 @@
+"""The lens of a camera, from pictures of a ChArUco board. Pure but for OpenCV."""
+
+import math
+from typing import List, NamedTuple, Optional, Sequence, Tuple
+
+import cv2
+import numpy as np
+
+from ..camera.camera_model import Lens
+from ..errors import CalibrationError
+from ..prints.boards import Board, create_board, list_board_corners
+
+__all__ = ["BoardView", "LensCalibration", "calibrate_lens", "find_board"]
+
+LEAST_VIEWS = 8
+LEAST_CORNERS = 12
+"""In one picture; fewer fix no board."""
+
+GOOD_RMS_PX = 0.5
+OUTLIER = 3.0
+"""A picture whose error is so many times the median is left out: blurred, or a bent board."""
+
+GOOD_FOCAL_ERROR = 0.003
+"""Of the focal length, standard deviation. The arena's calibration takes most of it up, by the camera's height."""
+
+TILTED_RAD = 0.25
+LEAST_TILTED = 4
+"""Pictures with a tilted board: without them nearness cannot be told from focal length."""
+
+_WINDOW_SHARE = 0.12
+"""Half a window by the side of a square; the markers begin at 0.13 of it."""
+
+REGIONS = (
+    ("upper left", "upper middle", "upper right"),
+    ("middle left", "middle", "middle right"),
+    ("lower left", "lower middle", "lower right"),
+)
+LEAST_IN_REGION = 20
+
+
+class BoardView(NamedTuple):
+    """The board in one picture: ids of its inner corners (K,), and their pixels (K, 2)."""
+
+    ids: np.ndarray
+    pixels: np.ndarray
+
+
+class LensCalibration(NamedTuple):
+    """A lens.
+
+    Attributes:
+        rms_px: how far the board's corners lie from where the lens puts them.
+        focal_error: standard deviation of the focal length, share.
+        left_out: indices of the views that were left out.
+        problems: what speaks against using it; empty: it is good.
+    """
+
+    lens: Lens
+    rms_px: float
+    focal_error: float
+    left_out: List[int]
+    problems: List[str]
+
+
+def find_board(gray: np.ndarray, board: Board) -> Optional[BoardView]:
+    """Return the board in a picture (H, W), 8 bit; None if too little of it is seen."""
+    made = create_board(board)
+    if hasattr(cv2.aruco, "CharucoDetector"):  # since OpenCV 4.7
+        pixels, ids, _, _ = cv2.aruco.CharucoDetector(made).detectBoard(gray)
+    else:
+        dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, board.dictionary))
+        corners, markers, _ = cv2.aruco.detectMarkers(gray, dictionary)
+        if markers is None:
+            return None
+        _, pixels, ids = cv2.aruco.interpolateCornersCharuco(corners, markers, gray, made)
+    if ids is None or len(ids) < LEAST_CORNERS:
+        return None
+    return BoardView(
+        np.asarray(ids).ravel(), _refine(gray, np.asarray(pixels, dtype=np.float32).reshape(-1, 2))
+    )
+
+
+def _refine(gray: np.ndarray, pixels: np.ndarray) -> np.ndarray:
+    """Return corners found again in windows well within their squares: OpenCV 4.6 leaves them half a pixel off."""
+    apart_px = np.linalg.norm(pixels[:, None] - pixels, axis=2)
+    np.fill_diagonal(apart_px, np.inf)
+    half_px = int(np.clip(_WINDOW_SHARE * np.median(apart_px.min(axis=0)), 2, 11))
+    criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 30, 0.001)
+    return cv2.cornerSubPix(gray, pixels[:, None].copy(), (half_px, half_px), (-1, -1), criteria)[:, 0]
+
+
+def calibrate_lens(
+    views: Sequence[BoardView], width_px: int, height_px: int, board: Board
+) -> LensCalibration:
+    """Return the lens through which the board was seen.
+
+    Raises: CalibrationError for fewer than eight pictures, or pictures that no lens explains.
+    """
+    if len(views) < LEAST_VIEWS:
+        raise CalibrationError(
+            "the board was found in %d pictures; it takes %d, from all sides and tilted"
+            % (len(views), LEAST_VIEWS)
+        )
+    used = views
+    fit = _fit(used, width_px, height_px, board)
+    left_out = np.flatnonzero(fit.errors_px > OUTLIER * np.median(fit.errors_px)).tolist()
+    if left_out and len(views) - len(left_out) >= LEAST_VIEWS:
+        used = [view for index, view in enumerate(views) if index not in left_out]
+        fit = _fit(used, width_px, height_px, board)
+    else:
+        left_out = []
+    problems = []
+    if fit.rms_px > GOOD_RMS_PX:
+        problems.append(
+            "error %.2f px rms is above %.1f px: is the board flat, are the pictures sharp?"
+            % (fit.rms_px, GOOD_RMS_PX)
+        )
+    if (fit.tilts_rad > TILTED_RAD).sum() < LEAST_TILTED:
+        problems.append("the board is hardly tilted: take pictures with it tilted by 30 to 45 degrees")
+    elif fit.focal_error > GOOD_FOCAL_ERROR:
+        problems.append(
+            "the focal length is known to %.2f %% only: take more pictures with the board tilted by 30 to 45 degrees"
+            % (100.0 * fit.focal_error)
+        )
+    empty = _list_empty_regions(used, width_px, height_px)
+    if empty:
+        problems.append("take pictures with the board there: %s" % ", ".join(empty))
+    return LensCalibration(fit.lens, fit.rms_px, fit.focal_error, left_out, problems)
+
+
+class _Fit(NamedTuple):
+    lens: Lens
+    rms_px: float
+    focal_error: float
+    errors_px: np.ndarray
+    tilts_rad: np.ndarray
+
+
+def _fit(views: Sequence[BoardView], width_px: int, height_px: int, board: Board) -> _Fit:
+    corners_m = list_board_corners(board).astype(np.float32)
+    # k3 trades with k1 and k2: webcams whose field is below 90 degrees do without it.
+    try:
+        rms_px, matrix, distortion, turns, _, deviations, _, errors_px = cv2.calibrateCameraExtended(
+            [corners_m[view.ids] for view in views],
+            [view.pixels for view in views],
+            (width_px, height_px),
+            None,
+            None,
+            flags=cv2.CALIB_FIX_K3,
+        )
+    except cv2.error as error:
+        raise CalibrationError(
+            "no lens explains these pictures: %s" % str(error).strip().splitlines()[-1]
+        ) from None
+    if not np.isfinite(matrix).all() or not math.isfinite(rms_px):
+        raise CalibrationError("no lens explains these pictures: take them again")
+    lens = Lens(width_px, height_px, matrix, np.asarray(distortion, dtype=float).ravel()[:5])
+    focal_error = float(max(deviations.ravel()[:2] / (matrix[0, 0], matrix[1, 1])))
+    tilts_rad = np.array([math.acos(min(abs(cv2.Rodrigues(turn)[0][2, 2]), 1.0)) for turn in turns])
+    return _Fit(lens, float(rms_px), focal_error, np.asarray(errors_px).ravel(), tilts_rad)
+
+
+def _list_empty_regions(views: Sequence[BoardView], width_px: int, height_px: int) -> List[str]:
+    pixels = np.vstack([view.pixels for view in views])
+    size: Tuple[int, int] = (width_px, height_px)
+    columns, rows = np.clip((3.0 * pixels / size).astype(int), 0, 2).T
+    return [
+        name
+        for row, names in enumerate(REGIONS)
+        for column, name in enumerate(names)
+        if ((rows == row) & (columns == column)).sum() < LEAST_IN_REGION
+    ]

@@ -1,0 +1,1 @@
+"""Cameras: where their pixels look, and the images that they deliver."""

@@ -1,0 +1,122 @@
+"""What a calibrated camera sees of the arena, and where in the arena a pixel lies. Pure.
+
+Pixels are OpenCV's: u right, v down, the center of the first pixel is (0, 0). The optical frame is REP 103's: x right,
+y down, z forward. Lenses are sensor_msgs/CameraInfo's `plumb_bob`. Source: OpenCV, Camera Calibration and 3D
+Reconstruction.
+"""
+
+from typing import NamedTuple, Sequence, Union
+
+import numpy as np
+
+from ..errors import CalibrationError
+
+__all__ = ["Camera", "Lens"]
+
+_MOST_ROUNDS = 50
+_ROUNDING = 1e-10
+"""Normalized image coordinates: a ten millionth of a pixel."""
+
+
+class Lens(NamedTuple):
+    """How directions in the optical frame fall on pixels."""
+
+    width_px: int
+    height_px: int
+    matrix: np.ndarray
+    """Focal lengths and principal point, (3, 3), px: K of CameraInfo."""
+    distortion: np.ndarray
+    """k1, k2, p1, p2, k3: D of CameraInfo."""
+
+    @classmethod
+    def from_camera_info(
+        cls, width_px: int, height_px: int, matrix: Sequence[float], model: str, d: Sequence[float]
+    ) -> "Lens":
+        """Return the lens that a sensor_msgs/CameraInfo describes (K as nine numbers, distortion_model, D).
+
+        Raises: ValueError for a camera that is not calibrated, or a lens of another model.
+        """
+        values = np.asarray(matrix, dtype=float).reshape(-1)
+        if values.shape != (9,) or not np.isfinite(values).all() or values[0] <= 0.0 or values[4] <= 0.0:
+            raise ValueError("this camera is not calibrated: K is %s" % list(values))
+        distortion = np.asarray(d, dtype=float).reshape(-1)
+        if (distortion.any() and model != "plumb_bob") or len(distortion) not in (0, 4, 5):
+            raise ValueError(
+                "a lens must be plumb_bob with up to 5 numbers, not %r with %d" % (model, len(distortion))
+            )
+        if not np.isfinite(distortion).all():
+            raise ValueError("the distortion of a lens must be finite, not %s" % list(distortion))
+        padded = np.concatenate((distortion, np.zeros(5 - len(distortion))))
+        return cls(int(width_px), int(height_px), values.reshape(3, 3), padded)
+
+    def check_size(self, height_px: int, width_px: int) -> None:
+        """Refuse pictures of another size. Raises: CalibrationError."""
+        if (width_px, height_px) != (self.width_px, self.height_px):
+            raise CalibrationError(
+                "pictures have %d x %d pixels, but the lens was calibrated with %d x %d: set the camera to that, or"
+                " calibrate lens and arena again" % (width_px, height_px, self.width_px, self.height_px)
+            )
+
+    def distort(self, rays: np.ndarray) -> np.ndarray:
+        """Return the pixels (N, 2) of rays (N, 2): x / z and y / z in the optical frame."""
+        bent = _bend(np.asarray(rays, dtype=float), self.distortion)
+        return bent @ self.matrix[:2, :2].T + self.matrix[:2, 2]
+
+    def undistort(self, pixels: np.ndarray) -> np.ndarray:
+        """Return the rays (N, 2) of pixels (N, 2): x / z and y / z in the optical frame.
+
+        Pixels beyond what the lens can show, where the distortion folds back, are nan.
+        """
+        # Not by linalg.solve: OpenBLAS has several threads for it, which then spin and cost more than everything else.
+        (focal_u, skew, center_u), (_, focal_v, center_v) = self.matrix[:2].tolist()
+        u, v = np.asarray(pixels, dtype=float).reshape(-1, 2).T
+        bent_y = (v - center_v) / focal_v
+        bent = np.column_stack(((u - center_u - skew * bent_y) / focal_u, bent_y))
+        rays = bent.copy()
+        error = np.full(rays.shape, np.inf)
+        with np.errstate(over="ignore", invalid="ignore"):  # where nothing converges
+            for _ in range(_MOST_ROUNDS):
+                error = bent - _bend(rays, self.distortion)
+                rays = rays + error
+                if not (np.abs(error) > _ROUNDING).any():
+                    break
+        rays[~(np.abs(error) < 1e-6).all(axis=1)] = np.nan
+        return rays
+
+
+def _bend(rays: np.ndarray, distortion: np.ndarray) -> np.ndarray:
+    k1, k2, p1, p2, k3 = distortion
+    x, y = rays[:, 0], rays[:, 1]
+    r2 = x * x + y * y
+    radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    bent_x = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)
+    bent_y = y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y
+    return np.column_stack((bent_x, bent_y))
+
+
+class Camera(NamedTuple):
+    """A lens at its place in the frame `map`."""
+
+    lens: Lens
+    rotation: np.ndarray
+    """(3, 3): turns a vector of `map` into the optical frame."""
+    position_m: np.ndarray
+    """(3,), in `map`."""
+
+    def project(self, points_m: np.ndarray) -> np.ndarray:
+        """Return the pixels (N, 2) of points (N, 3) in `map`; nan behind the camera."""
+        seen_m = (np.asarray(points_m, dtype=float) - self.position_m) @ self.rotation.T
+        depth_m = np.where(seen_m[:, 2] > 1e-6, seen_m[:, 2], np.nan)
+        return self.lens.distort(seen_m[:, :2] / depth_m[:, None])
+
+    def intersect(self, pixels: np.ndarray, height_m: Union[float, np.ndarray]) -> np.ndarray:
+        """Return the points x, y (N, 2) in `map` that pixels (N, 2) show of the plane z = height_m; nan for none.
+
+        height_m is one height, or one for each pixel (N,).
+        """
+        rays = self.lens.undistort(pixels)
+        directions = np.column_stack((rays, np.ones(len(rays)))) @ self.rotation
+        with np.errstate(divide="ignore", invalid="ignore"):
+            distance = (height_m - self.position_m[2]) / directions[:, 2]
+        distance[~(distance > 0.0)] = np.nan
+        return self.position_m[:2] + distance[:, None] * directions[:, :2]

@@ -1,0 +1,297 @@
+"""Pictures of one camera, gray, with the time at which they were taken: from topics, a V4L2 device or a video file."""
+
+import itertools
+import math
+import os
+import threading
+import time
+from typing import Any, Generic, NamedTuple, Optional, Tuple, TypeVar
+
+import cv2
+import numpy as np
+import rospy
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image
+
+from hero_client.values.geometry import clamp
+
+from ..errors import FrameSourceError
+from .camera_model import Lens
+
+__all__ = ["DeviceSource", "Frame", "FrameSource", "LiveSource", "Newest", "TopicSource", "VideoSource", "open_source"]
+
+T = TypeVar("T")
+
+_DEPTHS = {"mono8": 1, "8UC1": 1, "bgr8": 3, "8UC3": 3, "rgb8": 3, "bgra8": 4, "rgba8": 4}
+_TO_GRAY = {
+    "bgr8": cv2.COLOR_BGR2GRAY,
+    "8UC3": cv2.COLOR_BGR2GRAY,
+    "rgb8": cv2.COLOR_RGB2GRAY,
+    "bgra8": cv2.COLOR_BGRA2GRAY,
+    "rgba8": cv2.COLOR_RGBA2GRAY,
+}
+
+_DEVICES = "/dev/"
+_URL = "://"
+
+PLAUSIBLE_AGE_S = 5.0
+"""V4L2 stamps its buffers by the clock that does not jump; a time that is further from it is of another clock."""
+
+
+READ_BYTES = 2**20
+"""At once: of a picture in smaller parts, each costs a turn of the interpreter; a larger buffer costs page faults."""
+
+
+class Frame(NamedTuple):
+    """One picture."""
+
+    stamp_s: float
+    """ROS time at which it was taken."""
+    gray: np.ndarray
+    """(H, W), 8 bit."""
+    number: int
+    """Of the source's pictures: gaps are those that did not get here."""
+
+
+class Newest(Generic[T]):
+    """Hands over what arrives on other threads, of which only the newest counts: frames, or the tags in them."""
+
+    def __init__(self) -> None:
+        self._arrival = threading.Condition()
+        self._newest: Optional[T] = None
+
+    def keep(self, item: T) -> None:
+        """Put item in the place of what has not been taken yet."""
+        with self._arrival:
+            self._newest = item
+            self._arrival.notify()
+
+    def take(self, timeout_s: float) -> Optional[T]:
+        """Return the newest item, or the next one; None if none comes within timeout_s."""
+        with self._arrival:
+            if self._newest is None:
+                self._arrival.wait(timeout_s)
+            item, self._newest = self._newest, None
+            return item
+
+
+class FrameSource:
+    """Pictures of a camera.
+
+    Attributes:
+        lens: as the camera's driver tells; None if it does not.
+        problem: why there are no usable pictures, for people; empty if there are.
+        arrived_s: when the newest picture came; before, when the source was opened.
+    """
+
+    def __init__(self) -> None:
+        self.lens: Optional[Lens] = None
+        self.problem = ""
+        self.arrived_s = rospy.get_time()
+
+    def poll(self, timeout_s: float) -> Any:
+        """Return the next picture, a Frame; None if none comes in time or is usable."""
+        raise NotImplementedError
+
+    def close(self) -> None:
+        """Leave the camera; safe twice. Topics end with the node."""
+
+
+class LiveSource(FrameSource):
+    """Pictures that come by themselves: only the newest counts, and only those that are polled are decoded."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._newest: Newest[Any] = Newest()
+
+    def _keep(self, picture: Any) -> None:
+        self.arrived_s = rospy.get_time()
+        self._newest.keep(picture)
+
+    def poll(self, timeout_s: float) -> Any:
+        """Return the newest picture, unless an earlier call did; None if none comes in time or is usable."""
+        picture = self._newest.take(timeout_s)
+        return None if picture is None else self._decode(picture)
+
+    def _decode(self, picture: Any) -> Any:
+        raise NotImplementedError
+
+
+class TopicSource(LiveSource):
+    """Subscription to the pictures and camera_info of a camera driver."""
+
+    def __init__(self, topic: str) -> None:
+        """topic: sensor_msgs/Image, or CompressedImage if it ends in /compressed; camera_info lies beside it."""
+        super().__init__()
+        self._is_compressed = topic.endswith("/compressed")
+        kind = CompressedImage if self._is_compressed else Image
+        rospy.Subscriber(topic, kind, self._keep, queue_size=1, buff_size=READ_BYTES, tcp_nodelay=True)
+        base = topic[: -len("/compressed")] if self._is_compressed else topic
+        rospy.Subscriber(base.rpartition("/")[0] + "/camera_info", CameraInfo, self._read_info, queue_size=1)
+
+    def _read_info(self, info: CameraInfo) -> None:
+        try:
+            self.lens = Lens.from_camera_info(info.width, info.height, info.K, info.distortion_model, info.D)
+        except ValueError:
+            self.lens = None  # the file's lens counts
+
+    def _decode(self, picture: Any) -> Optional[Frame]:
+        gray = self._decode_jpeg(picture) if self._is_compressed else self._decode_image(picture)
+        if gray is None:
+            return None
+        self.problem = ""
+        header = picture.header
+        return Frame((header.stamp if header.stamp else rospy.get_rostime()).to_sec(), gray, header.seq)
+
+    def _decode_image(self, message: Image) -> Optional[np.ndarray]:
+        channels = _DEPTHS.get(message.encoding)
+        size = message.step * message.height
+        if channels is None:
+            text = "pictures have the encoding %r, but must have one of %s"
+            self.problem = text % (message.encoding, ", ".join(_DEPTHS))
+            return None
+        if not 0 < message.width * channels <= message.step or not 0 < size <= len(message.data):
+            text = "pictures of %d x %d pixels come with %d bytes: is the camera's driver in order?"
+            self.problem = text % (message.width, message.height, len(message.data))
+            return None
+        rows = np.frombuffer(message.data, np.uint8, size).reshape(message.height, message.step)
+        image = rows[:, : message.width * channels].reshape(message.height, message.width, channels)
+        code = _TO_GRAY.get(message.encoding)
+        return image[:, :, 0] if code is None else cv2.cvtColor(image, code)
+
+    def _decode_jpeg(self, message: CompressedImage) -> Optional[np.ndarray]:
+        data = np.frombuffer(message.data, np.uint8)
+        gray: Optional[np.ndarray] = cv2.imdecode(data, cv2.IMREAD_GRAYSCALE) if len(data) else None
+        if gray is None:
+            text = "compressed pictures of the format %r cannot be decoded: is the camera's driver in order?"
+            self.problem = text % message.format
+        return gray
+
+
+class DeviceSource(LiveSource):
+    """A V4L2 device such as /dev/video0, or the URL of a network camera."""
+
+    def __init__(self, path: str, size_px: Tuple[int, int], rate_hz: float) -> None:
+        """size_px: width and height to ask the device for.
+
+        Raises: FrameSourceError if it cannot be opened.
+        """
+        super().__init__()
+        backend = cv2.CAP_V4L2 if path.startswith(_DEVICES) else cv2.CAP_ANY
+        self._capture = _open_capture(path, backend, "no camera, or another program uses it")
+        self._capture.set(cv2.CAP_PROP_FOURCC, cv2.VideoWriter_fourcc(*"MJPG"))
+        self._capture.set(cv2.CAP_PROP_FRAME_WIDTH, size_px[0])
+        self._capture.set(cv2.CAP_PROP_FRAME_HEIGHT, size_px[1])
+        self._capture.set(cv2.CAP_PROP_FPS, rate_hz)
+        self._capture.set(cv2.CAP_PROP_BUFFERSIZE, 2)
+        self._path = path
+        self._ending = threading.Event()
+        self._thread = threading.Thread(target=self._read, name="camera", daemon=True)
+        self._thread.start()
+
+    def _read(self) -> None:
+        for number in itertools.count():
+            if self._ending.is_set():
+                return
+            is_read, image = self._capture.read()
+            if not is_read:
+                self.problem = "%s gives no more pictures: is it plugged in?" % self._path
+                return
+            taken_s = self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0
+            self._keep((rospy.get_time() - self._find_age(taken_s), image, number))
+
+    def _decode(self, picture: Tuple[float, np.ndarray, int]) -> Frame:
+        stamp_s, image, number = picture
+        return Frame(stamp_s, _make_gray(image), number)
+
+    @staticmethod
+    def _find_age(taken_s: float) -> float:
+        """Return how long ago a picture was taken; 0 if the device does not tell."""
+        age_s = time.monotonic() - taken_s
+        return age_s if math.isfinite(age_s) and 0.0 <= age_s < PLAUSIBLE_AGE_S else 0.0
+
+    def close(self) -> None:
+        """Release the device; safe twice."""
+        self._ending.set()
+        self._thread.join(2.0)
+        self._capture.release()
+
+
+class VideoSource(FrameSource):
+    """A video file, played in real time; it waits for a program that is slower, so that no picture is lost."""
+
+    def __init__(self, path: str) -> None:
+        """Raises: FrameSourceError if it cannot be opened."""
+        super().__init__()
+        self._path = path
+        self._capture = _open_capture(path, cv2.CAP_ANY, "no video that OpenCV can read")
+        self._start_s = rospy.get_time()
+        self._numbers = itertools.count()
+        self._next: Optional[Frame] = None
+
+    def poll(self, timeout_s: float) -> Optional[Frame]:
+        """Return the next picture as soon as it is due; None if that is later than timeout_s, or there is none."""
+        if self._next is None:
+            self._next = self._read()
+        wait_s = timeout_s if self._next is None else self._next.stamp_s - rospy.get_time()
+        time.sleep(clamp(max(0.0, wait_s), timeout_s))
+        if self._next is None or wait_s > timeout_s:
+            return None
+        frame, self._next = self._next, None
+        self.arrived_s = rospy.get_time()
+        self._start_s += self.arrived_s - frame.stamp_s
+        return frame._replace(stamp_s=self.arrived_s)
+
+    def _read(self) -> Optional[Frame]:
+        is_read, image = self._capture.read()
+        if not is_read:
+            self.problem = "%s gives no more pictures: the video has ended" % self._path
+            return None
+        stamp_s = self._start_s + self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0
+        return Frame(stamp_s, _make_gray(image), next(self._numbers))
+
+    def close(self) -> None:
+        """Close the file; safe twice."""
+        self._capture.release()
+
+
+def _make_gray(image: np.ndarray) -> np.ndarray:
+    return cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) if image.ndim == 3 else image
+
+
+def _open_capture(path: str, backend: int, reason: str) -> Any:
+    """Open a device or a video. Raises: FrameSourceError with this reason if OpenCV can open nothing there."""
+    _check_path(path)
+    capture = cv2.VideoCapture(path, backend)
+    if not capture.isOpened():
+        raise FrameSourceError("%s cannot be opened: %s" % (path, reason))
+    return capture
+
+
+def _check_path(path: str) -> None:
+    """Refuse what cannot be opened, by the reason, which OpenCV does not tell. Raises: FrameSourceError."""
+    if _URL in path:
+        return
+    is_device = path.startswith(_DEVICES)
+    if not os.path.exists(path):
+        raise FrameSourceError("%s does not exist%s" % (path, "; ls /dev/video* lists cameras" if is_device else ""))
+    if os.path.isdir(path):
+        raise FrameSourceError("%s is a folder, but must be a camera or a video" % path)
+    if not os.access(path, os.R_OK):
+        remedy = ": sudo usermod -aG video $USER, and log in again" if is_device else ""
+        raise FrameSourceError("%s may not be read by this user%s" % (path, remedy))
+
+
+def open_source(image: str, device: str, size_px: str, rate_hz: float) -> FrameSource:
+    """Return the source of pictures: the device or video if one is named, else the topic image.
+
+    Raises: FrameSourceError for a device or video that cannot be opened, or a size that is none.
+    """
+    if not device:
+        return TopicSource(rospy.resolve_name(image))
+    path = os.path.expanduser(device)
+    if not path.startswith(_DEVICES) and _URL not in path:
+        return VideoSource(path)
+    words = size_px.split("x")
+    if len(words) != 2 or not all(word.strip().isdecimal() for word in words):
+        raise FrameSourceError("the size of pictures is %r, but must be such as 1920x1080" % size_px)
+    return DeviceSource(path, (int(words[0]), int(words[1])), rate_hz)

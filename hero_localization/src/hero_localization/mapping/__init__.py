@@ -1,0 +1,1 @@
+"""The occupancy grid that the robots' proximity sensors draw together."""

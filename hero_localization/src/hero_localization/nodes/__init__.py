@@ -1,0 +1,1 @@
+"""The programs that join the rooms to ROS."""

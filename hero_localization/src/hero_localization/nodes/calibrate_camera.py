@@ -1,0 +1,343 @@
+"""Program calibrate_camera: lens, place of the camera, tags on robots. Each ends with a figure, a verdict and the file.
+
+rosrun hero_localization calibrate_camera lens                  move the printed board about in the picture
+rosrun hero_localization calibrate_camera lens --yaml FILE      take camera_calibration's result
+rosrun hero_localization calibrate_camera arena                 by reference tags of known place
+rosrun hero_localization calibrate_camera robots --robots 0     robots turn and drive a little
+"""
+
+import argparse
+import math
+import sys
+from functools import partial
+from typing import Any, Dict, List, Optional, Sequence, Tuple, Union
+
+import numpy as np
+import rospy
+from nav_msgs.msg import Odometry
+
+from hero_client import Program, ProgramError, Robot, command_line
+from hero_client.command_line import say
+from hero_client.parameters import robot_ids_option
+from hero_client.values.errors import HeroError
+from hero_client.values.geometry import Pose
+from hero_client.values.readings import is_plausible, read_pose
+
+from ..calibration.arena_calibration import LEAST_TAGS, average_tags, calibrate_arena, fit_references
+from ..calibration.lens_calibration import LEAST_VIEWS, BoardView, LensCalibration, calibrate_lens, find_board
+from ..calibration.robot_calibration import CALIBRATION_DRIVE, RobotCalibration, calibrate_robot
+from ..camera.camera_model import Lens
+from ..camera.frame_source import Frame, open_source
+from ..camera.lens_file import load_lens
+from ..errors import CalibrationError, DetectorError, LocalizationError
+from ..prints.boards import Board
+from ..tracking import settings as camera_file
+from ..tracking.detector_process import DetectorProcess
+from ..tracking.settings import Settings
+from ..tracking.tag_corners import TagCorners
+from ..tracking.tag_pose import MountedTag, fit_squares
+
+MOST_VIEWS = 40
+ENOUGH_VIEWS = 12
+STILL_PX = 3.0
+"""A board that moves by more than this between two pictures is blurred."""
+
+NEW_PX = 40.0
+"""A board whose corners are nearer than this to those of a view that was taken shows nothing new."""
+
+ARENA_FRAMES = 30
+FRAME_S = 10.0
+WAIT_S = 0.1
+HINT_S = 10.0
+"""After so long without the board in a picture, what may be wrong is said."""
+
+READY_S = 10.0
+LOOK_S = 3.0
+"""A robot whose tag is not seen within this time is not moved."""
+
+
+class Pictures:
+    """The newest picture of the camera, for a program that works on one after another."""
+
+    def __init__(self, options: argparse.Namespace, program: Program) -> None:
+        """Open the camera. Raises: FrameSourceError."""
+        self._finder: Optional[DetectorProcess] = None
+        self._program = program
+        self.source = open_source(options.image, options.device, options.size, options.rate)
+        self._name = options.device or options.image
+
+    def poll(self) -> Optional[Frame]:
+        """Return the next picture; None if none comes in a moment. Raises: ProgramError if the program is to end."""
+        self._check_running()
+        frame: Optional[Frame] = self.source.poll(WAIT_S)
+        return frame
+
+    def _check_running(self) -> None:
+        if not self._program.running:
+            raise ProgramError("ended before the calibration was complete: the file is as it was")
+
+    def take(self) -> Frame:
+        """Wait for the next picture. Raises: CalibrationError if none comes; as poll()."""
+        for _ in range(round(FRAME_S / WAIT_S)):
+            frame = self.poll()
+            if frame is not None:
+                return frame
+        reason = self.source.problem or "is the camera's driver running?"
+        raise CalibrationError("no picture from %s for %g s: %s" % (self._name, FRAME_S, reason))
+
+    def find_tags(self, settings: Settings, decimate: float, frame: Frame) -> List[TagCorners]:
+        """Return the tags in a picture; decimate of the first call counts.
+
+        Raises: CalibrationError for another size than the lens has, DetectorError; ProgramError as poll().
+        """
+        height_px, width_px = frame.gray.shape
+        if settings.lens is not None:
+            settings.lens.check_size(height_px, width_px)
+        if self._finder is None:
+            # Not in this process: Ctrl-C during a detection would end it, and leave a robot driving.
+            self._finder = DetectorProcess(settings.detector, settings.family, decimate, width_px, height_px)
+        try:
+            return self._finder.search(frame.gray, frame.stamp_s, {})
+        except DetectorError:
+            self._check_running()  # what ends this program may end the detector first
+            raise
+
+    def find_lens(self, settings: Settings) -> Optional[Lens]:
+        """Return the lens of the file, else that of camera_info; None if neither is known."""
+        return settings.lens or self.source.lens
+
+    def close(self) -> None:
+        """Leave the camera, and end the search."""
+        self.source.close()
+        if self._finder is not None:
+            self._finder.close()
+
+
+def calibrate_lens_by_board(options: argparse.Namespace, pictures: Pictures, program: Program) -> int:
+    """Collect views of the board, and calibrate. Return the exit code."""
+    board = Board()
+    say("move the board slowly through the whole picture, near and far, tilted by 30 to 45 degrees; hold still between")
+    views: List[BoardView] = []
+    wanted = options.views or MOST_VIEWS
+    size = (0, 0)
+    last: Optional[BoardView] = None
+    found_s = program.now_s
+    result: Optional[LensCalibration] = None
+    while len(views) < wanted and (result is None or result.problems):
+        frame = pictures.take()
+        size = (frame.gray.shape[1], frame.gray.shape[0])
+        view = find_board(frame.gray, board)
+        if view is not None:
+            found_s = program.now_s
+        elif program.now_s > found_s + HINT_S:
+            found_s = program.now_s
+            text = "no board in the pictures (mean shade %.0f of 255): hold it near, flat, in good light"
+            say(text % frame.gray.mean())
+        is_still = view is not None and last is not None and _measure_shift(view, last) < STILL_PX
+        last = view
+        if view is None or not (is_still or options.views):
+            continue
+        if any(_measure_shift(view, other) < NEW_PX for other in views):
+            continue
+        views.append(view)
+        if len(views) < ENOUGH_VIEWS:
+            say("%d of at least %d pictures" % (len(views), min(ENOUGH_VIEWS, wanted)))
+            continue
+        result = calibrate_lens(views, *size, board)
+        say("%d pictures: %s" % (len(views), result.problems[0] if result.problems else "enough"))
+    result = result or calibrate_lens(views, *size, board)
+    say("error %.2f px rms, focal length known to %.2f %%" % (result.rms_px, 100.0 * result.focal_error))
+    return _finish(options.file, camera_file.describe_lens(result.lens), result.problems)
+
+
+def _measure_shift(view: BoardView, other: BoardView) -> float:
+    """Return by how many pixels the corners that both views show moved, on average; inf if they share none."""
+    _, here, there = np.intersect1d(view.ids, other.ids, return_indices=True)
+    if not len(here):
+        return math.inf
+    return float(np.linalg.norm(view.pixels[here] - other.pixels[there], axis=1).mean())
+
+
+def import_lens(options: argparse.Namespace) -> int:
+    """Take the lens of a YAML file as camera_calibration writes it. Return the exit code. Raises: CalibrationError."""
+    lens = load_lens(options.yaml)
+    say("focal lengths %.1f and %.1f px" % (lens.matrix[0, 0], lens.matrix[1, 1]))
+    return _finish(options.file, camera_file.describe_lens(lens), [])
+
+
+def calibrate_place(options: argparse.Namespace, pictures: Pictures) -> int:
+    """Find where the camera hangs. Return the exit code."""
+    settings = camera_file.load(options.file)
+    frames: List[Sequence[TagCorners]] = []
+    while len(frames) < ARENA_FRAMES:
+        frame = pictures.take()
+        frames.append(pictures.find_tags(settings, 1.0, frame))
+    lens = pictures.find_lens(settings)
+    if lens is None:
+        raise CalibrationError("%s holds no lens: calibrate_camera lens comes first" % options.file)
+    lens.check_size(*frame.gray.shape)
+    tags = average_tags(frames)
+    result = calibrate_arena(lens, tags, settings.layout.references)
+    for tag_id, residual_m in sorted(result.residuals_m.items()):
+        say("tag %d: %.1f mm%s" % (tag_id, 1e3 * residual_m, " (left out)" if tag_id in result.left_out else ""))
+    say("residual %.1f mm rms; the camera hangs %.2f m high" % (1e3 * result.rms_m, result.camera.position_m[2]))
+    fits = fit_references(result.camera, tags, settings.layout.references)
+    parts = camera_file.describe_camera(result.camera, {fit.tag_id: fit.pose for fit in fits})
+    return _finish(options.file, parts, result.problems)
+
+
+def calibrate_robot_tags(options: argparse.Namespace, pictures: Pictures, program: Program) -> int:
+    """Let robots turn and drive, one after another, and find how their tags sit. Return the exit code."""
+    settings = camera_file.load(options.file)
+    robots: Sequence[int] = options.robots
+    tags = settings.layout.find_tags(robots)
+    results: Dict[int, RobotCalibration] = {}
+    problems: List[str] = []
+    for robot_id in robots:
+        tag_id = tags.get(robot_id)
+        if tag_id is None:
+            text = "hero_%d: tag %d stands for something else: name the robot's in tag_robots"
+            problems.append(text % (robot_id, robot_id))
+            continue
+        try:
+            result = results[tag_id] = _watch_robot(settings, pictures, program, robot_id, tag_id)
+        except ProgramError:
+            raise
+        except (CalibrationError, HeroError) as error:
+            problems.append("hero_%d: %s" % (robot_id, error))
+            say(problems[-1])
+            continue
+        say(
+            "hero_%d: tag %.1f mm ahead, %.1f mm left, turned by %.1f degrees; delay %.0f ms; %.1f mm rms"
+            % (
+                robot_id,
+                1e3 * result.x_m,
+                1e3 * result.y_m,
+                math.degrees(result.yaw_rad),
+                1e3 * result.delay_s,
+                1e3 * result.rms_m,
+            )
+        )
+        problems += ["hero_%d: %s" % (robot_id, problem) for problem in result.problems]
+    if not results:
+        raise CalibrationError("; ".join(problems))
+    mounts: Dict[int, Union[MountedTag, RobotCalibration]] = {**settings.layout.mounts, **results}
+    described = {
+        tag_id: camera_file.describe_pose(Pose(mount.x_m, mount.y_m, mount.yaw_rad)) for tag_id, mount in mounts.items()
+    }
+    delay_s = float(np.median([result.delay_s for result in results.values()]))
+    return _finish(options.file, {"mounts": described, "delay_s": round(delay_s, 4)}, problems)
+
+
+def _watch_robot(
+    settings: Settings, pictures: Pictures, program: Program, robot_id: int, tag_id: int
+) -> RobotCalibration:
+    """Drive one robot, and return how its tag sits. Raises: CalibrationError if it cannot be seen; HeroError."""
+    camera, mount = settings.camera, settings.layout.find_mount(tag_id)
+    assert camera is not None
+    odometry: List[Tuple[float, Pose]] = []
+    seen: List[Tuple[float, Pose]] = []
+
+    def watch(frame: Optional[Frame]) -> int:
+        found = pictures.find_tags(settings, settings.decimate, frame) if frame is not None else []
+        tags = [tag for tag in found if tag.tag_id == tag_id]
+        if frame is not None and len(tags) == 1:
+            pose = fit_squares(camera, tags, [mount.size_m], [mount.height_m])[0].pose
+            if is_plausible(pose):
+                seen.append((frame.stamp_s, pose))
+        return len(tags)
+
+    with Robot(robot_id) as robot:
+        robot.wait_until_ready(READY_S, program.sleep)
+        robot.check_not_stopped()
+        look_until_s, count = rospy.get_time() + LOOK_S, 0
+        while not seen:
+            count = max(count, watch(pictures.take()))
+            if not seen and rospy.get_time() > look_until_s:
+                reason = "is there more than once" if count else "is not in the picture, or too dark"
+                raise CalibrationError("tag %d %s; the robot was not moved" % (tag_id, reason))
+        say("hero_%d turns left and right, and drives forward and back" % robot_id)
+        # Not an OdometryInput: rospy would give its raw messages to Robot as well.
+        keep = partial(_keep_odometry, odometry)
+        subscriber = rospy.Subscriber("/hero_%d/odom" % robot_id, Odometry, keep, queue_size=30, tcp_nodelay=True)
+        try:
+            for duration_s, linear_m_s, angular_rad_s in CALIBRATION_DRIVE:
+                end_s = rospy.get_time() + duration_s
+                while rospy.get_time() < end_s:
+                    robot.drive(linear_m_s, angular_rad_s)
+                    watch(pictures.poll())
+        finally:
+            subscriber.unregister()
+    return calibrate_robot(seen, odometry)
+
+
+def _keep_odometry(kept: List[Tuple[float, Pose]], message: Odometry) -> None:
+    pose = read_pose(message.pose.pose)
+    if pose is not None:
+        kept.append((message.header.stamp.to_sec(), pose))
+
+
+def _finish(path: str, parts: Dict[str, Any], problems: Sequence[str]) -> int:
+    """Write the file, and print the verdict. Return the exit code."""
+    camera_file.update(path, parts)
+    for problem in problems:
+        say("  " + problem)
+    say("%s; written to %s" % ("USE WITH CARE" if problems else "good", path))
+    return 1 if problems else 0
+
+
+def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
+    """Read the command line."""
+    description = "Calibrate an overhead camera, in three steps."
+    parser = argparse.ArgumentParser(prog="calibrate_camera", description=description)
+    parser.add_argument("part", choices=("lens", "arena", "robots"), help="what to calibrate, in this order")
+    parser.add_argument("--file", default=camera_file.DEFAULT_PATH, help="of the camera (%(default)s)")
+    parser.add_argument("--image", default="camera/image_raw", help="topic of the pictures (%(default)s)")
+    parser.add_argument("--device", default="", help="instead of a topic: /dev/video0, a URL, or a video file")
+    parser.add_argument("--size", default="1920x1080", help="of a device's pictures (%(default)s)")
+    parser.add_argument("--rate", type=float, default=30.0, help="of a device, Hz (%(default)s)")
+    parser.add_argument("--yaml", metavar="FILE", help="lens: take the result of camera_calibration")
+    parser.add_argument("--views", type=int, default=0, metavar="N", help="lens: take so many pictures, moving or not")
+    parser.add_argument("--robots", type=robot_ids_option, default=None, help="robots: ids, such as '0 1 2' or 0-3")
+    options = parser.parse_args(arguments)
+    if options.part == "robots" and options.robots is None:
+        parser.error("robots: name them, such as --robots 0-3; each turns on the spot and drives 0.12 m to and fro")
+    if options.views and options.views < LEAST_VIEWS:
+        parser.error("--views %d: it takes at least %d pictures" % (options.views, LEAST_VIEWS))
+    return options
+
+
+def _check_file(options: argparse.Namespace) -> None:
+    """Refuse a file that lacks what a part needs. Raises: CalibrationError, SettingsError."""
+    settings = camera_file.load(options.file)
+    count = len(settings.layout.references)
+    if options.part == "arena" and count < LEAST_TAGS:
+        raise CalibrationError(
+            "%s names %d reference tags, but it takes %d: write their places into it (x, y in m, yaw in degrees), such"
+            " as  references: {100: [-0.9, -0.6, 0], 101: [0.9, -0.6, 0], ...}" % (options.file, count, LEAST_TAGS)
+        )
+    if options.part == "robots" and settings.camera is None:
+        raise CalibrationError("%s holds no place of the camera: calibrate_camera arena comes first" % options.file)
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Run with the arguments of the command line; return the exit code. Raises: LocalizationError, ProgramError."""
+    options = parse_options(arguments)
+    if options.part == "lens" and options.yaml:
+        return import_lens(options)
+    _check_file(options)
+    with Program("calibrate_camera", anonymous=True) as program:
+        pictures = Pictures(options, program)
+        try:
+            if options.part == "lens":
+                return calibrate_lens_by_board(options, pictures, program)
+            if options.part == "arena":
+                return calibrate_place(options, pictures)
+            return calibrate_robot_tags(options, pictures, program)
+        finally:
+            pictures.close()
+
+
+def main() -> None:
+    """Run the program calibrate_camera."""
+    command_line.run(lambda: run(rospy.myargv(sys.argv)[1:]), LocalizationError, ProgramError)

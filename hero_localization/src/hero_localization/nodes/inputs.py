@@ -1,0 +1,119 @@
+"""What comes in from ROS: odometry of robots, and poses measured by motion capture, a camera or anything else."""
+
+import math
+import struct
+from typing import Callable, Tuple
+
+import genpy
+import numpy as np
+import rospy
+from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
+from nav_msgs.msg import Odometry
+
+from hero_client.values.geometry import Pose
+from hero_client.values.readings import is_plausible, read_pose
+
+from ..filter.pose_filter import Measurement
+
+__all__ = ["OdometryInput", "PoseInput"]
+
+_HEADER = struct.Struct("<3I")
+_LENGTH = struct.Struct("<I")
+_POSE = struct.Struct("<7d")
+
+POSE_TYPES = {kind._md5sum: kind for kind in (PoseStamped, PoseWithCovarianceStamped, Odometry)}
+"""Types of measured poses, by md5; of an Odometry the pose counts."""
+
+
+class OdometryInput:
+    """Subscription to /hero_N/odom, of which only stamp, position and heading are decoded: 29 messages per robot."""
+
+    def __init__(self, namespace: str, receive: Callable[[float, Pose], None]) -> None:
+        """receive: is given stamp (s) and pose of each message, on a thread of rospy."""
+        self._receive = receive
+        rospy.Subscriber(namespace + "/odom", rospy.AnyMsg, self._receive_message, queue_size=30, tcp_nodelay=True)
+
+    def _receive_message(self, message: rospy.AnyMsg) -> None:
+        if message._connection_header["md5sum"] != Odometry._md5sum:
+            return
+        try:
+            stamp_s, pose = _read_odometry(message._buff)
+        except struct.error:
+            return
+        if is_plausible(pose) and math.isfinite(stamp_s):
+            self._receive(stamp_s, pose)
+
+
+def _read_odometry(data: bytes) -> Tuple[float, Pose]:
+    """Return stamp (s) and pose in the plane of a serialized nav_msgs/Odometry. Raises: struct.error."""
+    _, seconds, nanoseconds = _HEADER.unpack_from(data)
+    offset = _HEADER.size
+    for _ in range(2):  # frame_id, child_frame_id
+        offset += _LENGTH.size + _LENGTH.unpack_from(data, offset)[0]
+    x_m, y_m, _, x, y, z, w = _POSE.unpack_from(data, offset)
+    yaw_rad = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    return seconds + 1e-9 * nanoseconds, Pose(x_m, y_m, yaw_rad)
+
+
+class PoseInput:
+    """Subscription to poses of one robot that something measures: one of POSE_TYPES."""
+
+    def __init__(
+        self,
+        topic: str,
+        frame: str,
+        default_covariance: np.ndarray,
+        receive: Callable[[Measurement], None],
+        warn: Callable[[str], None],
+    ) -> None:
+        """receive: is given each pose; warn: a line on what cannot be used. Both on a thread of rospy.
+
+        frame: what the poses must name, if they name one.
+        default_covariance: (3, 3), of poses that come without one.
+        """
+        self._topic = topic
+        self._frame = frame
+        self._default_covariance = default_covariance
+        self._receive = receive
+        self._warn = warn
+        rospy.Subscriber(topic, rospy.AnyMsg, self._receive_message, queue_size=30, tcp_nodelay=True)
+
+    def _receive_message(self, message: rospy.AnyMsg) -> None:
+        kind = POSE_TYPES.get(message._connection_header["md5sum"])
+        if kind is None:
+            self._warn(
+                "%s has the type %s, but must have one of: %s"
+                % (
+                    self._topic,
+                    message._connection_header.get("type", "?"),
+                    ", ".join(kind._type for kind in POSE_TYPES.values()),
+                )
+            )
+            return
+        try:
+            content = kind().deserialize(message._buff)
+        except genpy.DeserializationError:
+            return
+        frame = content.header.frame_id.lstrip("/")
+        if frame not in ("", self._frame):
+            self._warn(
+                "%s is in the frame %r, but must be in %r: set ~pose_frame to it, or publish it there"
+                % (self._topic, frame, self._frame)
+            )
+            return
+        has_covariance = kind is not PoseStamped
+        pose = read_pose(content.pose.pose if has_covariance else content.pose)
+        if pose is None:
+            self._warn("%s holds a pose that no robot can have: not finite, or beyond 1000 m" % self._topic)
+            return
+        covariance = self._default_covariance
+        if has_covariance:
+            covariance = np.array(content.pose.covariance).reshape(6, 6)[np.ix_((0, 1, 5), (0, 1, 5))]
+            if not covariance.any():  # not filled in
+                covariance = self._default_covariance
+        # A stamp of zero says that the sender does not know the time: that of arrival is the best there is.
+        stamp = content.header.stamp if content.header.stamp else rospy.get_rostime()
+        try:
+            self._receive(Measurement(stamp.to_sec(), pose, covariance))
+        except ValueError as error:
+            self._warn("%s: %s" % (self._topic, error))

@@ -1,0 +1,166 @@
+"""Program localize: where all robots are in one frame, from their odometry and poses that something measures.
+
+rosrun hero_localization localize                                      poses on /hero_N/measured_pose
+rosrun hero_localization localize _pose_topic:=/vrpn_client_node/hero_{id}/pose
+"""
+
+import threading
+from functools import partial
+from typing import Any, Dict, List, Optional
+
+import rospy
+from diagnostic_msgs.msg import DiagnosticStatus
+
+from hero_client import Program, ProgramError, read_parameters, run
+from hero_client.parameters import number, robot_ids
+from hero_client.ros.drivers import share_drivers
+from hero_client.values.geometry import Pose
+from hero_client.values.readings import is_plausible
+from hero_msgs.msg import RobotPose, RobotPoses
+
+from ..filter.pose_filter import Measurement, make_covariance
+from ..filter.swarm_localizer import PUBLISH_RATE_HZ, SwarmLocalizer
+from .inputs import OdometryInput, PoseInput
+from .outputs import Outputs, name_status
+
+DIAGNOSTICS_PERIOD_S = 1.0
+UNKNOWN_S = 3.0
+"""So long after it was seen, the tag of an unknown robot is named."""
+
+MAX_SD = 1e3
+"""Of a position (m) or heading (rad); a larger one is none."""
+
+
+class LocalizationNode:
+    """Inputs, filters and outputs of all robots; robots that join a driver are added."""
+
+    def __init__(self, parameters: Dict[str, Any]) -> None:
+        """Start with the robots of ~robots. Raises: ProgramError for a topic without {id}."""
+        self._frame = str(parameters["frame"]).lstrip("/")
+        self._pose_topic = _check_topic(parameters["pose_topic"])
+        self._pose_frame = str(parameters["pose_frame"]).lstrip("/") or self._frame
+        self._covariance = make_covariance(parameters["position_sd_m"], parameters["heading_sd_rad"])
+        self._chosen: Optional[List[int]] = parameters["robots"]
+        self._lock = threading.Lock()  # inputs come on threads of rospy
+        self._localizer = SwarmLocalizer()
+        self._outputs = Outputs(self._frame)
+        self._inputs: Dict[int, List[Any]] = {}
+        self._next_diagnostics_s = 0.0
+        self._unknown_s: Dict[int, float] = {}
+        self._picture = threading.Event()
+        self._add_robots(self._chosen or [])
+        self._swarm_topic = str(parameters["swarm_topic"])
+        rospy.Subscriber(self._swarm_topic, RobotPoses, self._receive_swarm, queue_size=10, tcp_nodelay=True)
+
+    def _add_robots(self, ids: List[int]) -> None:
+        for robot_id in ids:
+            if robot_id in self._inputs:
+                continue
+            with self._lock:
+                self._localizer.add_robots([robot_id])
+            self._outputs.add_robot(robot_id)
+            topic = self._pose_topic.replace("{id}", str(robot_id))
+            warn = partial(rospy.logwarn_throttle, 10.0)
+            self._inputs[robot_id] = [
+                OdometryInput("/hero_%d" % robot_id, partial(self._receive_odometry, robot_id)),
+                PoseInput(topic, self._pose_frame, self._covariance, partial(self._receive_pose, robot_id), warn),
+            ]
+
+    def _receive_odometry(self, robot_id: int, stamp_s: float, pose: Pose) -> None:
+        with self._lock:
+            lines = self._localizer.add_odometry(robot_id, stamp_s, pose)
+        _log(lines)
+
+    def _receive_pose(self, robot_id: int, measurement: Measurement) -> None:
+        with self._lock:
+            lines = self._localizer.add_measurement(robot_id, measurement)
+        _log(lines)
+
+    def _receive_swarm(self, report: RobotPoses) -> None:
+        """Take the poses of all robots that one picture shows."""
+        if report.header.frame_id.lstrip("/") not in ("", self._frame):
+            text = "%s is in the frame %r, but must be in %r: give its publisher and this node the same ~frame"
+            rospy.logwarn_throttle(10.0, text % (self._swarm_topic, report.header.frame_id, self._frame))
+            return
+        lines: List[str] = []
+        for robot in report.robots:
+            pose = Pose(robot.x, robot.y, robot.yaw)
+            if robot.id not in self._inputs:
+                self._unknown_s[robot.id] = rospy.get_time()
+            if robot.id in self._inputs and robot.state == RobotPose.TRACKED and is_plausible(pose):
+                is_told = 0.0 < robot.position_sd < MAX_SD and 0.0 < robot.yaw_sd < MAX_SD
+                covariance = make_covariance(robot.position_sd, robot.yaw_sd) if is_told else self._covariance
+                measurement = Measurement(robot.stamp.to_sec(), pose, covariance)
+                with self._lock:
+                    lines += self._localizer.add_measurement(robot.id, measurement)
+        self._picture.set()
+        _log(lines)
+
+    def step(self, period_s: float) -> None:
+        """Wait for the poses of a picture, or for period_s, and publish."""
+        self._picture.wait(period_s)
+        self._picture.clear()
+        if self._chosen is None:
+            report = share_drivers().read()
+            self._add_robots(sorted(robot.id for robot in report.robots if robot.id >= 0) if report else [])
+        now_s = rospy.get_time()
+        with self._lock:
+            lines = self._localizer.find_lost(now_s)
+            robots = self._localizer.list_robots(now_s)
+        _log(lines)
+        self._outputs.publish(robots)
+        if not self._next_diagnostics_s - DIAGNOSTICS_PERIOD_S <= now_s < self._next_diagnostics_s:
+            self._next_diagnostics_s = now_s + DIAGNOSTICS_PERIOD_S
+            self._outputs.publish_diagnostics(robots, self._list_unknown_robots(now_s))
+
+    def _list_unknown_robots(self, now_s: float) -> List[DiagnosticStatus]:
+        """Return a warning for each tag that is seen on a robot which no driver knows."""
+        if self._chosen is not None:
+            return []
+        return [
+            DiagnosticStatus(
+                DiagnosticStatus.WARN,
+                name_status("hero_%d" % robot_id),
+                "its tag is seen, but no driver knows the robot: is it on, and is tag %d its own?" % robot_id,
+                "hero_%d" % robot_id,
+                [],
+            )
+            for robot_id, seen_s in sorted(self._unknown_s.copy().items())
+            if abs(now_s - seen_s) < UNKNOWN_S and robot_id not in self._inputs
+        ]
+
+
+def _check_topic(topic: Any) -> str:
+    if "{id}" not in str(topic):
+        raise ProgramError('~pose_topic is %r, but must hold {id}, such as "/hero_{id}/measured_pose"' % (topic,))
+    return str(topic)
+
+
+def _log(lines: List[str]) -> None:
+    for line in lines:
+        rospy.loginfo(line)
+
+
+def localize() -> None:
+    """Localize robots until the program is to end. Raises: ProgramError for a wrong parameter."""
+    with Program("localization") as program:
+        parameters = read_parameters(
+            {
+                "robots": robot_ids("all"),
+                "frame": "map",
+                "pose_topic": "/hero_{id}/measured_pose",
+                "pose_frame": "",
+                "swarm_topic": "/track/measured_poses",
+                "position_sd_m": number(0.002, 1e-5, 1.0, "m"),
+                "heading_sd_rad": number(0.01, 1e-5, 10.0, "rad"),
+                "rate_hz": number(PUBLISH_RATE_HZ, 1.0, 100.0, "Hz"),
+            }
+        )
+        node = LocalizationNode(parameters)
+        while program.running:
+            node.step(1.0 / parameters["rate_hz"])
+
+
+def main() -> None:
+    """Run the program localize."""
+    run(localize)

@@ -1,0 +1,157 @@
+"""Program map_arena: the robots of a swarm map the arena, by their poses from localize and their proximity sensors.
+
+rosrun hero_localization map_arena
+rosrun hero_localization map_arena _bounds_m:="-1.5 -1 1.5 1"
+rosservice call /map_arena/save                            writes ~file: map_server and hero_sim read it
+"""
+
+import os
+import threading
+from functools import partial
+from typing import Any, Dict, Optional
+
+import numpy as np
+import rospy
+from geometry_msgs.msg import Point, PoseArray, Quaternion
+from geometry_msgs.msg import Pose as PoseMessage
+from map_msgs.msg import OccupancyGridUpdate
+from nav_msgs.msg import MapMetaData
+from nav_msgs.msg import OccupancyGrid as MapMessage
+from sensor_msgs.msg import LaserScan
+from std_msgs.msg import Float32
+from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
+
+from hero_client import Program, ProgramError, read_parameters, run
+from hero_client.parameters import number
+from hero_client.values.geometry import Pose
+from hero_client.values.readings import front_first, is_plausible, read_ranges
+from hero_msgs.msg import RobotPose, RobotPoses
+
+from ..mapping.map_files import save_map
+from ..mapping.occupancy_grid import BEAMS, OccupancyGrid
+from ..mapping.swarm_map import SwarmMap
+
+PERIOD_S = 0.1
+PUBLISH_STEPS = 10
+"""Steps between two publications: one second."""
+
+
+class MapNode:
+    """The map, its inputs and outputs."""
+
+    def __init__(self, parameters: Dict[str, Any]) -> None:
+        """Begin an empty map. Raises: ProgramError for bounds that are none, or a file that does not end in .yaml."""
+        self._grid = _make_grid(parameters["bounds_m"], parameters["cell_m"])
+        self._map = SwarmMap(self._grid)
+        self._lock = threading.Lock()  # inputs come on threads of rospy
+        self._path = _check_path(str(parameters["file"]))
+        self._frame = ""
+        self._steps = 0
+        self._scans: Dict[int, rospy.Subscriber] = {}
+        self._publisher = rospy.Publisher("/map", MapMessage, queue_size=1, latch=True)
+        self._updates = rospy.Publisher("/map_updates", OccupancyGridUpdate, queue_size=5)
+        self._frontiers = rospy.Publisher("~frontiers", PoseArray, queue_size=1, latch=True)
+        self._share = rospy.Publisher("~known_share", Float32, queue_size=1, latch=True)
+        rospy.Subscriber(parameters["poses_topic"], RobotPoses, self._receive_poses, queue_size=10, tcp_nodelay=True)
+        rospy.Service("~save", Trigger, self._save)
+
+    def _receive_poses(self, report: RobotPoses) -> None:
+        self._frame = report.header.frame_id
+        with self._lock:
+            for robot in report.robots:
+                pose = Pose(robot.x, robot.y, robot.yaw)
+                if robot.state == RobotPose.TRACKED and is_plausible(pose):
+                    self._map.add_pose(robot.id, robot.stamp.to_sec(), pose)
+        for robot in report.robots:
+            if robot.id not in self._scans:
+                self._scans[robot.id] = rospy.Subscriber(
+                    "/hero_%d/proximity" % robot.id,
+                    LaserScan,
+                    partial(self._receive_ranges, robot.id),
+                    queue_size=5,
+                    tcp_nodelay=True,
+                )
+
+    def _receive_ranges(self, robot_id: int, scan: LaserScan) -> None:
+        scan.ranges = read_ranges(scan)
+        ranges_m = front_first(scan)
+        if len(ranges_m) == BEAMS:
+            with self._lock:
+                self._map.add_ranges(robot_id, scan.header.stamp.to_sec(), ranges_m)
+
+    def step(self) -> None:
+        """Put in what has come, and publish once a second; call it every PERIOD_S."""
+        with self._lock:
+            self._map.update()
+        self._steps += 1
+        if self._frame and self._steps % PUBLISH_STEPS == 0:
+            self._publish()
+
+    def _publish(self) -> None:
+        with self._lock:
+            percent, box = self._map.take_change()
+            frontiers_m, share = self._grid.find_frontiers(), self._grid.known_share
+        stamp = rospy.get_rostime()
+        message = MapMessage()
+        message.header.stamp, message.header.frame_id = stamp, self._frame
+        rows, columns = percent.shape
+        origin = PoseMessage(Point(*self._grid.origin_m, 0.0), Quaternion(0.0, 0.0, 0.0, 1.0))
+        message.info = MapMetaData(stamp, self._grid.cell_m, columns, rows, origin)
+        message.data = percent.ravel().tolist()
+        self._publisher.publish(message)
+        if box.row_end > box.row and self._updates.get_num_connections():
+            update = OccupancyGridUpdate(header=message.header, x=box.column, y=box.row)
+            update.width, update.height = box.column_end - box.column, box.row_end - box.row
+            update.data = percent[box.row : box.row_end, box.column : box.column_end].ravel().tolist()
+            self._updates.publish(update)
+        places = [PoseMessage(Point(*place_m, 0.0), Quaternion(0.0, 0.0, 0.0, 1.0)) for place_m in frontiers_m]
+        self._frontiers.publish(PoseArray(message.header, places))
+        self._share.publish(Float32(share))
+
+    def _save(self, request: TriggerRequest) -> TriggerResponse:
+        del request
+        try:
+            os.makedirs(os.path.dirname(self._path), exist_ok=True)
+            with self._lock:
+                picture = save_map(self._path, self._grid)
+        except OSError as error:
+            return TriggerResponse(False, "%s cannot be written: %s" % (error.filename or self._path, error.strerror))
+        return TriggerResponse(True, "%s and %s" % (self._path, picture))
+
+
+def _check_path(path: str) -> str:
+    if not path.endswith(".yaml"):
+        raise ProgramError("~file is %r, but must end in .yaml; the picture beside it in .png" % path)
+    return os.path.abspath(os.path.expanduser(path))
+
+
+def _make_grid(bounds: Any, cell_m: float) -> OccupancyGrid:
+    values: Optional[np.ndarray] = None
+    try:
+        values = np.array([float(word) for word in str(bounds).split()])
+        if values.shape == (4,) and np.isfinite(values).all() and np.ptp(values) <= 100.0:
+            return OccupancyGrid((values[0], values[1], values[2], values[3]), cell_m)
+    except ValueError:
+        pass  # no numbers, or no area
+    raise ProgramError('~bounds_m is %r, but must be "x_min y_min x_max y_max" in m, up to 100 m wide' % (bounds,))
+
+
+def map_arena() -> None:
+    """Map until the program is to end. Raises: ProgramError for a wrong parameter."""
+    with Program("map_arena") as program:
+        parameters = read_parameters(
+            {
+                "bounds_m": "-1.1 -1.1 1.1 1.1",
+                "cell_m": number(0.01, 0.005, 0.1, "m"),
+                "poses_topic": "/localization/poses",
+                "file": "~/hero_maps/arena.yaml",
+            }
+        )
+        node = MapNode(parameters)
+        while program.pace(PERIOD_S):
+            node.step()
+
+
+def main() -> None:
+    """Run the program map_arena."""
+    run(map_arena)

@@ -1,0 +1,170 @@
+"""Program track: finds tagged robots and objects in the pictures of an overhead camera.
+
+rosrun hero_localization track                                     /camera/image_raw
+rosrun hero_localization track _image:=/camera/image_raw/compressed
+rosrun hero_localization track _device:=/dev/video0
+"""
+
+import math
+import re
+from typing import Any, Dict, List, Optional, Tuple
+
+import rospy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+
+from hero_client import Program, read_parameters, run
+from hero_client.parameters import number
+from hero_client.values.geometry import Pose
+from hero_msgs.msg import ObjectPose, ObjectPoses, RobotPose, RobotPoses
+
+from ..camera.frame_source import Frame, open_source
+from ..errors import DetectorError, LocalizationError
+from ..tracking import settings as camera_file
+from ..tracking.detector_process import DetectorProcess
+from ..tracking.tag_pose import Sightings
+from ..tracking.tracker import Tracker
+from .outputs import make_robot_pose, name_status
+from .picture_output import PictureOutput
+
+SILENT_S = 2.0
+DIAGNOSTICS_PERIOD_S = 1.0
+WAIT_S = 0.1
+LOG_PERIOD_S = 30.0
+"""Between two lines on one problem."""
+
+
+class TrackNode:
+    """The tracker, its inputs and outputs."""
+
+    def __init__(self, parameters: Dict[str, Any]) -> None:
+        """Read the camera's file and open its pictures. Raises: LocalizationError."""
+        self._path = str(parameters["file"])
+        self._settings = camera_file.load(self._path)
+        self._frame_id = str(parameters["frame"]).lstrip("/")
+        camera = self._settings.camera
+        self._tracker = Tracker(self._settings, camera) if camera is not None else None
+        self._process: Optional[DetectorProcess] = None
+        self._expected: Dict[int, Pose] = {}
+        self._diagnosed_s = -math.inf
+        self._logged_s: Dict[str, float] = {}
+        self._publisher = rospy.Publisher("~measured_poses", RobotPoses, queue_size=5)
+        self._objects = rospy.Publisher("~objects", ObjectPoses, queue_size=5)
+        self._pictures = PictureOutput(self._frame_id, self._settings.layout.default_mount.height_m)
+        self._diagnostics = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=2)
+        rospy.Subscriber(parameters["poses_topic"], RobotPoses, self._expect, queue_size=2, tcp_nodelay=True)
+        self._source = open_source(
+            str(parameters["image"]), str(parameters["device"]), str(parameters["size_px"]), parameters["rate_hz"]
+        )
+
+    def _expect(self, report: RobotPoses) -> None:
+        self._expected = {
+            robot.id: Pose(robot.x, robot.y, robot.yaw) for robot in report.robots if robot.state != RobotPose.UNKNOWN
+        }
+
+    def step(self) -> None:
+        """Work on the newest picture, or wait a moment for it.
+
+        Raises: LocalizationError for a detector that cannot be started or has ended, and for unusable pictures.
+        """
+        frame = self._source.poll(WAIT_S)
+        if frame is not None and self._tracker is not None:
+            self._take_frame(self._tracker, frame)
+        now_s = rospy.get_time()
+        if not self._diagnosed_s <= now_s < self._diagnosed_s + DIAGNOSTICS_PERIOD_S:
+            self._diagnosed_s = now_s
+            self._publish_diagnostics(now_s)
+
+    def _take_frame(self, tracker: Tracker, frame: Frame) -> None:
+        height_px, width_px = frame.gray.shape
+        tracker.camera.lens.check_size(height_px, width_px)
+        if self._process is None:
+            settings = self._settings
+            self._process = DetectorProcess(settings.detector, settings.family, settings.decimate, width_px, height_px)
+            return  # by now the picture is a second old
+        tags = self._process.search(frame.gray, frame.stamp_s, tracker.project(self._expected))
+        tracker.measure_shade(frame.gray)
+        self._publish(tracker, tracker.take(tags, frame.stamp_s, frame.number), frame.stamp_s)
+        self._pictures.show(tracker, frame, rospy.get_time())
+
+    # -- outputs ----------------------------------------------------------------------------------------------
+
+    def _publish(self, tracker: Tracker, sightings: Sightings, stamp_s: float) -> None:
+        stamp = rospy.Time.from_sec(tracker.taken_s(stamp_s))
+        report = RobotPoses()
+        report.header.stamp, report.header.frame_id = stamp, self._frame_id
+        for robot_id, seen in sorted(sightings.robots.items()):
+            report.robots.append(make_robot_pose(robot_id, RobotPose.TRACKED, stamp, seen.pose, seen.covariance))
+        self._publisher.publish(report)
+        if self._objects.get_num_connections():
+            objects = [ObjectPose(name, *seen.pose) for name, seen in sorted(sightings.objects.items())]
+            self._objects.publish(ObjectPoses(report.header, objects))
+
+    def _publish_diagnostics(self, now_s: float) -> None:
+        statuses: List[DiagnosticStatus] = []
+        for name, text, is_error in self._list_problems(now_s):
+            level = DiagnosticStatus.ERROR if is_error else DiagnosticStatus.WARN
+            statuses.append(DiagnosticStatus(name=name_status(name), level=level, message=text))
+            self._log(name, text, is_error, now_s)
+        camera = name_status("camera")
+        if not any(status.name == camera for status in statuses) and self._tracker is not None:
+            text = "%s, %d tags" % (self._tracker.describe_rate(), len(self._tracker.found))
+            statuses.append(DiagnosticStatus(name=camera, level=DiagnosticStatus.OK, message=text))
+        message = DiagnosticArray(status=statuses)
+        message.header.stamp = rospy.get_rostime()
+        self._diagnostics.publish(message)
+
+    def _log(self, name: str, text: str, is_error: bool, now_s: float) -> None:
+        """Log a problem unless its last line, with other figures perhaps, is younger than LOG_PERIOD_S."""
+        kind = name + re.sub("[0-9.]+", "", text)
+        logged_s = self._logged_s.get(kind, -math.inf)
+        if not logged_s <= now_s < logged_s + LOG_PERIOD_S:
+            self._logged_s[kind] = now_s
+            (rospy.logerr if is_error else rospy.logwarn)("%s: %s" % (name, text))
+
+    def _list_problems(self, now_s: float) -> List[Tuple[str, str, bool]]:
+        if self._tracker is None:
+            text = "not calibrated: %s holds no place of the camera; rosrun hero_localization calibrate_camera"
+            return [("camera", text % self._path, True)]
+        if self._source.problem:
+            return [("camera", self._source.problem, True)]
+        silent_s = now_s - self._source.arrived_s
+        if silent_s > SILENT_S:
+            text = "no picture for %.0f s: is the camera's driver running?"
+            return [("camera", text % silent_s, True)]
+        return [tuple(problem) for problem in self._tracker.list_problems()]
+
+    def close(self) -> None:
+        """End the detector and leave the camera; safe twice."""
+        self._source.close()
+        if self._process is not None:
+            self._process.close()
+
+
+def track() -> None:
+    """Track until the program is to end. Raises: ProgramError, LocalizationError."""
+    with Program("track") as program:
+        parameters = read_parameters(
+            {
+                "image": "camera/image_raw",
+                "device": "",
+                "size_px": "1920x1080",
+                "rate_hz": number(30.0, 1.0, 240.0, "Hz"),
+                "file": camera_file.DEFAULT_PATH,
+                "frame": "map",
+                "poses_topic": "/localization/poses",
+            }
+        )
+        node = TrackNode(parameters)
+        try:
+            while program.running:
+                node.step()
+        except DetectorError:
+            if program.running:  # what ends this program may end the detector first
+                raise
+        finally:
+            node.close()
+
+
+def main() -> None:
+    """Run the program track."""
+    run(track, LocalizationError)

@@ -1,0 +1,296 @@
+"""The simulated overhead camera as a ROS node: pictures of the simulated robots, as a camera driver publishes them.
+
+With --board it shows the board for the lens instead, as if somebody held it into the picture. Needs OpenCV
+(python3-opencv). Renders only what somebody subscribes to.
+"""
+
+import argparse
+import math
+import sys
+import threading
+from typing import Dict, List, Optional, Sequence, Tuple
+
+import cv2
+import numpy as np
+import rospy
+from geometry_msgs.msg import Point
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image
+
+from hero_client import command_line
+from hero_sim.errors import SimulatorError
+from hero_sim.world.arena import Arena, build_default
+from hero_sim.world.arena_file import load_arena
+
+from ..errors import LocalizationError, SettingsError
+from ..prints.boards import Board
+from ..prints.tag_images import FAMILIES, REFERENCE_SIZE_M
+from .board_renderer import BoardRenderer, list_board_places
+from .frame_times import list_frames
+from .renderer import CameraRenderer
+from .view import CameraOptions, PrintedTag, View
+
+PROGRAM = "simulated_camera"
+NODE = "camera"
+FRAME_ID = "camera_optical"
+JPEG_QUALITY = 90
+
+REFERENCES = 4
+FIRST_REFERENCE_ID = 100
+"""Of families that have so many tags; otherwise the last ones are reference tags."""
+
+REFERENCE_GAP_M = 0.12
+"""Between the arena's bounds and the centers of the reference tags beside it."""
+
+MOUNT_ERROR_M, MOUNT_ERROR_RAD = 0.002, 0.03
+PLACE_ERROR_M = 0.001
+"""Standard deviations of what people glue on robots by eye, and lay out by tape."""
+
+BOARD_PICTURES = 4
+"""The board is held for so many pictures at each place."""
+
+MISSED_S = 0.1
+"""A picture that this machine is so late for is dropped, as a camera does whose program is too slow."""
+
+
+class TrueRobots:
+    """Where the robots truly are, by the simulator's topics."""
+
+    def __init__(self, robot_ids: Sequence[int]) -> None:
+        self._lock = threading.Lock()
+        self._newest: Dict[int, List[Tuple[float, np.ndarray, np.ndarray]]] = {robot_id: [] for robot_id in robot_ids}
+        for robot_id in robot_ids:
+            topic = "/hero_%d/ground_truth" % robot_id
+            rospy.Subscriber(topic, Odometry, self._receive, robot_id, queue_size=10, tcp_nodelay=True)
+
+    def _receive(self, message: Odometry, robot_id: int) -> None:
+        place, turn = message.pose.pose.position, message.pose.pose.orientation
+        pose = np.array((place.x, place.y, 2.0 * math.atan2(turn.z, turn.w)))
+        speed = np.array((message.twist.twist.linear.x, message.twist.twist.angular.z))
+        with self._lock:
+            kept = self._newest[robot_id]
+            kept.append((message.header.stamp.to_sec(), pose, speed))
+            del kept[:-20]
+
+    def find(self, stamp_s: float) -> Tuple[List[int], np.ndarray, np.ndarray]:
+        """Return the ids of the robots that were heard of, their poses (N, 3) at stamp_s, and speeds (N, 2)."""
+        ids, poses, speeds = [], [], []
+        with self._lock:
+            for robot_id, kept in self._newest.items():
+                if kept:
+                    at_s, pose, speed = min(kept, key=lambda item: abs(item[0] - stamp_s))
+                    moved_m, turned_rad = speed * np.clip(stamp_s - at_s, -0.1, 0.1)
+                    heading_rad = pose[2] + turned_rad / 2.0
+                    step = (moved_m * math.cos(heading_rad), moved_m * math.sin(heading_rad), turned_rad)
+                    ids.append(robot_id)
+                    poses.append(pose + step)
+                    speeds.append(speed)
+        return ids, np.array(poses).reshape(-1, 3), np.array(speeds).reshape(-1, 2)
+
+
+class RobotScene:
+    """The arena with its robots."""
+
+    def __init__(self, options: argparse.Namespace, camera: CameraOptions) -> None:
+        """Prepare the pictures. Raises: OptionError for an unusable arena."""
+        self._ids = list(range(options.first_id, options.first_id + options.count))
+        arena = _load_arena(options)
+        random = np.random.RandomState(options.seed)
+        errors = np.array((MOUNT_ERROR_M, MOUNT_ERROR_M, MOUNT_ERROR_RAD)) * (not options.perfect)
+        tags = [
+            PrintedTag(
+                robot_id, options.tag_size, 0.076, *(random.standard_normal(3) * errors), family=options.family
+            )
+            for robot_id in self._ids
+        ]
+        references = []
+        for tag in list_references(arena, options.family):
+            off_m = random.standard_normal(2) * PLACE_ERROR_M * (not options.perfect)
+            references.append(tag._replace(x_m=tag.x_m + off_m[0], y_m=tag.y_m + off_m[1]))
+        self._renderer = CameraRenderer(camera, arena, tags, references, options.seed)
+        self._hand_m: Optional[Tuple[float, float]] = None
+        self._true = TrueRobots(self._ids)
+        rospy.Subscriber("~hand", Point, self._receive_hand)
+
+    def _receive_hand(self, point: Point) -> None:
+        self._hand_m = (point.x, point.y) if math.isfinite(point.x) and math.isfinite(point.y) else None
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether the simulator has told where each robot is."""
+        return len(self._true.find(0.0)[0]) == len(self._ids)
+
+    def render(self, taken_s: float) -> np.ndarray:
+        """Return the picture (H, W), 8 bit, that was taken at a time."""
+        _, poses, speeds = self._true.find(taken_s)
+        return self._renderer.render(poses, speeds, self._hand_m)
+
+
+class BoardScene:
+    """The board for the lens, held into the picture at one place after another."""
+
+    is_complete = True
+
+    def __init__(self, options: argparse.Namespace, camera: CameraOptions) -> None:
+        self._random = np.random.RandomState(options.seed)
+        self._renderer = BoardRenderer(camera, Board())
+        self._places = list_board_places(camera, self._random)
+        self._place = next(self._places)
+        self._shown = 0
+
+    def render(self, taken_s: float) -> np.ndarray:
+        """Return the next picture (H, W), 8 bit."""
+        del taken_s
+        if self._shown == BOARD_PICTURES:
+            self._place, self._shown = next(self._places), 0
+        self._shown += 1
+        return self._renderer.render(*self._place, self._random)
+
+
+class CameraNode:
+    """Publishers of one camera."""
+
+    def __init__(self, options: argparse.Namespace) -> None:
+        """Prepare the pictures. Raises: OptionError for an unusable arena."""
+        size = (options.width, round(options.width * 9 / 16))
+        self._options = _scale(CameraOptions(), *size)._replace(
+            rate_hz=options.rate, delay_s=options.delay, exposure_s=options.exposure
+        )
+        self._matrix = View(self._options).matrix
+        self._scene = BoardScene(options, self._options) if options.board else RobotScene(options, self._options)
+        self._stamps_arrival = options.stamps == "arrival"
+        self._seed = options.seed
+        self._image = rospy.Publisher("camera/image_raw", Image, queue_size=1)
+        self._jpeg = rospy.Publisher("camera/image_raw/compressed", CompressedImage, queue_size=1)
+        self._info = rospy.Publisher("camera/camera_info", CameraInfo, queue_size=1)
+
+    def run(self) -> None:
+        """Publish pictures until ROS ends."""
+        for frame in list_frames(self._options, rospy.get_time(), self._seed):
+            wait_s = frame.arrival_s - rospy.get_time()
+            if wait_s > 0.0:
+                rospy.sleep(wait_s)
+            if rospy.is_shutdown():
+                return
+            if rospy.get_time() - frame.arrival_s < MISSED_S:
+                stamp_s = rospy.get_time() if self._stamps_arrival else frame.stamp_s
+                self._publish(rospy.Time.from_sec(stamp_s), frame.stamp_s)
+
+    def _publish(self, stamp: rospy.Time, taken_s: float) -> None:
+        if not self._scene.is_complete:
+            return
+        if self._info.get_num_connections():
+            info = CameraInfo(height=self._options.height_px, width=self._options.width_px)
+            info.distortion_model, info.D = "plumb_bob", list(self._options.distortion)
+            info.K = self._matrix.ravel().tolist()
+            info.R = np.eye(3).ravel().tolist()
+            info.P = np.hstack((self._matrix, np.zeros((3, 1)))).ravel().tolist()
+            info.header.stamp, info.header.frame_id = stamp, FRAME_ID
+            self._info.publish(info)
+        is_raw, is_jpeg = self._image.get_num_connections() > 0, self._jpeg.get_num_connections() > 0
+        if not (is_raw or is_jpeg):
+            return
+        gray = self._scene.render(taken_s)
+        if is_raw:
+            image = Image(height=gray.shape[0], width=gray.shape[1], encoding="mono8", step=gray.shape[1])
+            image.header.stamp, image.header.frame_id = stamp, FRAME_ID
+            image.data = gray.tobytes()
+            self._image.publish(image)
+        if is_jpeg:
+            _, coded = cv2.imencode(".jpg", gray, (cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY))
+            jpeg = CompressedImage(format="mono8; jpeg compressed mono8", data=coded.tobytes())
+            jpeg.header.stamp, jpeg.header.frame_id = stamp, FRAME_ID
+            self._jpeg.publish(jpeg)
+
+
+def _scale(camera: CameraOptions, width_px: int, height_px: int) -> CameraOptions:
+    """Return the same camera with another number of pixels."""
+    share = width_px / camera.width_px
+    (fx, fy), (cx, cy) = camera.focal_px, camera.center_px
+    return camera._replace(
+        width_px=width_px,
+        height_px=height_px,
+        focal_px=(fx * share, fy * share),
+        center_px=((cx + 0.5) * share - 0.5, (cy + 0.5) * share - 0.5),
+        blur_px=camera.blur_px * share,
+    )
+
+
+def _load_arena(options: argparse.Namespace) -> Arena:
+    return load_arena(options.arena) if options.arena else build_default(options.count)
+
+
+def find_first_reference(family: str) -> int:
+    """Return the id of the first reference tag."""
+    return min(FIRST_REFERENCE_ID, FAMILIES[family].size - REFERENCES)
+
+
+def list_references(arena: Arena, family: str) -> List[PrintedTag]:
+    """Return the reference tags, on the floor beside the arena, where they are meant to lie: at whole millimeters."""
+    x_min_m, y_min_m, x_max_m, y_max_m = arena.bounds_m.tolist()
+    y_m = 0.8 * (y_max_m - y_min_m) / 2.0
+    middle_m = (y_min_m + y_max_m) / 2.0
+    places_m = [
+        (round(x_m, 3), round(middle_m + side * y_m, 3))
+        for x_m in (x_min_m - REFERENCE_GAP_M, x_max_m + REFERENCE_GAP_M)
+        for side in (-1.0, 1.0)
+    ]
+    return [
+        PrintedTag(find_first_reference(family) + index, REFERENCE_SIZE_M, 0.0, *place_m, family=family)
+        for index, place_m in enumerate(places_m)
+    ]
+
+
+def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
+    """Read the command line."""
+    parser = argparse.ArgumentParser(prog=PROGRAM, description="A simulated camera above the simulated robots.")
+    add = parser.add_argument
+    add("--count", type=int, default=1, metavar="N", help="number of robots (%(default)s)")
+    add("--first-id", type=int, default=0, metavar="K", help="id of the first robot (%(default)s)")
+    add("--arena", metavar="FILE", help="the simulator's arena")
+    add("--width", type=int, default=1920, metavar="PX", help="of the pictures, 16:9 (%(default)s)")
+    add("--rate", type=float, default=30.0, metavar="HZ", help="pictures per second (%(default)s)")
+    add("--delay", type=float, default=0.07, metavar="S", help="from taking a picture to its arrival (%(default)s)")
+    add("--exposure", type=float, default=0.008, metavar="S", help="exposure time (%(default)s)")
+    add("--stamps", choices=("capture", "arrival"), default="capture", help="what stamps tell (%(default)s)")
+    add("--family", choices=sorted(FAMILIES), default="36h11", help="of the tags (%(default)s)")
+    add("--tag-size", type=float, default=0.04, metavar="M", help="side of the robots' tags (%(default)s)")
+    add("--board", action="store_true", help="show the board for the lens, at one place after another")
+    add("--perfect", action="store_true", help="tags exactly in the robots' centers, reference tags at their places")
+    text = "print where the reference tags lie, as the camera's file wants it, and end"
+    add("--print-references", action="store_true", help=text)
+    add("--seed", type=int, default=0, help="of noise, dropped pictures and places of tags (%(default)s)")
+    options = parser.parse_args(arguments)
+    limits = {
+        "count": (1, 500),
+        "first_id": (0, 500),
+        "width": (160, 4096),
+        "rate": (0.5, 120.0),
+        "delay": (0.0, 5.0),
+        "exposure": (0.0, 0.1),
+        "tag_size": (0.01, 0.2),
+    }
+    for name, (low, high) in limits.items():
+        value = getattr(options, name)
+        if not low <= value <= high:
+            parser.error("--%s: %g is not from %g to %g" % (name.replace("_", "-"), value, low, high))
+    return options
+
+
+def _run() -> None:
+    options = parse_options(rospy.myargv(sys.argv)[1:])
+    first_reference = find_first_reference(options.family)
+    if options.first_id + options.count > first_reference:
+        raise SettingsError("tags from %d on are reference tags: take lower ids" % first_reference)
+    if options.print_references:
+        tags = list_references(_load_arena(options), options.family)
+        places = ["%d: [%.3f, %.3f, 0]" % (tag.tag_id, tag.x_m, tag.y_m) for tag in tags]
+        print("references: {%s}" % ", ".join(places))
+        return
+    rospy.init_node(NODE)
+    CameraNode(options).run()
+
+
+def main() -> None:
+    """Run the camera until ROS ends."""
+    command_line.run(_run, LocalizationError, SimulatorError)

@@ -1,0 +1,122 @@
+"""The search for tags in a process of its own: detectors hold the GIL for many milliseconds, and one takes SIGINT over.
+
+Pictures go over in shared memory, all else over a pipe. The process knows nothing of ROS, and ends with its parent.
+"""
+
+import mmap
+import os
+import subprocess  # nosec B404 - it starts this module
+import sys
+from contextlib import suppress
+from multiprocessing import Pipe
+from multiprocessing.connection import Connection
+from typing import Any, List, Mapping, Optional, Tuple
+
+import numpy as np
+
+from ..errors import DetectorError
+from .detectors import create_detector
+from .tag_corners import TagCorners
+from .tag_search import TagSearch
+
+__all__ = ["DetectorProcess"]
+
+ANSWER_S = 60.0
+"""Long enough for a search of the whole picture on a machine that is busy with much else."""
+END_S = 5.0
+
+
+class DetectorProcess:
+    """A TagSearch that runs in another process."""
+
+    def __init__(self, backend: str, family: str, decimate: float, width_px: int, height_px: int) -> None:
+        """Start the process. Raises: DetectorError for a detector that cannot be made, or does not start."""
+        self._shape = (height_px, width_px)
+        memory = os.memfd_create("hero_frame")
+        os.ftruncate(memory, width_px * height_px)
+        self._frame = np.frombuffer(mmap.mmap(memory, width_px * height_px), np.uint8).reshape(self._shape)
+        near, far = Pipe()
+        command = [sys.executable, "-m", __name__, str(far.fileno()), str(memory)]
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+        self._connection: Optional[Connection] = near
+        with far:
+            self._process = subprocess.Popen(  # nosec B603 - no shell, nothing from outside
+                command,
+                env=environment,
+                pass_fds=(far.fileno(), memory),
+                # Ctrl-C goes to a terminal's whole group; apriltag lets it end its process, whatever was set before.
+                start_new_session=True,
+            )
+        os.close(memory)
+        problem = self._ask((backend, family, decimate, width_px, height_px))
+        if problem is not None:
+            self.close()
+            raise DetectorError(problem)
+
+    def search(
+        self, gray: np.ndarray, stamp_s: float, expected: Mapping[int, Tuple[float, float]]
+    ) -> List[TagCorners]:
+        """Return the tags found in the next frame, as TagSearch.search() does.
+
+        Raises: DetectorError if the process ended or does not answer; ValueError for a frame of another size.
+        """
+        if gray.shape != self._shape:
+            raise ValueError("a frame of %s pixels, but frames have %s" % (gray.shape, self._shape))
+        self._frame[:] = gray
+        return [
+            TagCorners(tag_id, corners) for tag_id, corners in self._ask((stamp_s, dict(expected)))
+        ]
+
+    def _ask(self, question: Any) -> Any:
+        if self._connection is None:
+            raise DetectorError("the detector's process has ended")
+        try:
+            self._connection.send(question)
+            if self._connection.poll(ANSWER_S):
+                return self._connection.recv()
+        except (EOFError, OSError):
+            self.close()
+            raise DetectorError(
+                "the detector's process ended with status %s: start again" % self._process.returncode
+            ) from None
+        self.close()
+        raise DetectorError("the detector's process did not answer for %.0f s: start again" % ANSWER_S)
+
+    def close(self) -> None:
+        """End the process; safe twice."""
+        if self._connection is None:
+            return
+        self._connection.close()
+        self._connection = None
+        try:
+            self._process.wait(END_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+
+def serve(connection: Connection, memory: int) -> None:
+    """Answer questions until the parent is gone."""
+    backend, family, decimate, width_px, height_px = connection.recv()
+    frame = np.frombuffer(mmap.mmap(memory, width_px * height_px), np.uint8).reshape(height_px, width_px)
+    try:
+        search = TagSearch(create_detector(backend, family, decimate), width_px, height_px)
+    except DetectorError as error:
+        connection.send(str(error))
+        return
+    connection.send(None)
+    while True:
+        stamp_s, expected = connection.recv()
+        # The type's module may be __main__ here, so plain tuples go over.
+        connection.send([tuple(tag) for tag in search.search(frame, stamp_s, expected)])
+
+
+def main() -> None:
+    """Run the child process, until its parent closes the connection or ends."""
+    connection, memory = Connection(int(sys.argv[1])), int(sys.argv[2])
+    with suppress(EOFError, OSError):
+        serve(connection, memory)
+
+
+if __name__ == "__main__":
+    main()

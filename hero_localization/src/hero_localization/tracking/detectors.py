@@ -1,0 +1,131 @@
+"""Tags in gray pictures: two detectors behind one interface, with the same corners, the same order, the same heading.
+
+Corners are in OpenCV's pixels (the center of the first pixel is (0, 0)), in the order upper left, upper right, lower
+right, lower left of the tag as AprilTag's own pictures show it upright. What the libraries do differently:
+python3-apriltag puts pixel centers at half integers and begins at the lower left; OpenCV 4 has all AprilTags turned by
+180 degrees, and rounds edges inwards by half a pixel unless it refines them.
+"""
+
+from importlib.util import find_spec
+from typing import Dict, List, Tuple
+
+import numpy as np
+
+from ..errors import DetectorError
+from ..prints.tag_images import FAMILIES, draw_tag
+from .tag_corners import TagCorners
+
+__all__ = ["BACKENDS", "DEFAULT_BACKEND", "TagDetector", "create_detector"]
+
+_LEAST_MARGIN = {"36h11": 10.0, "16h5": 30.0}
+"""How clearly black and white must differ, of 255: what 16h5 finds in noise and floor textures stays below."""
+
+
+class TagDetector:
+    """What finds tags of one family."""
+
+    def detect(self, gray: np.ndarray, origin: Tuple[int, int] = (0, 0)) -> List[TagCorners]:
+        """Return the tags in gray (H, W), 8 bit.
+
+        Args:
+            gray: a picture, or a window of one.
+            origin: column and row of the window's first pixel in the picture that corners refer to.
+        """
+        raise NotImplementedError
+
+
+class AprilTagDetector(TagDetector):
+    """python3-apriltag, AprilTag 3's own detector: the more accurate one.
+
+    It holds the GIL and takes SIGINT over while it detects: programs with other threads run it in a process of its own.
+    """
+
+    def __init__(self, family: str, decimate: float) -> None:
+        try:
+            from apriltag import apriltag
+        except ImportError:
+            raise DetectorError(
+                "the detector apriltag is not installed: apt install python3-apriltag, or take the detector aruco"
+            ) from None
+        # Corrected bits bring false tags in, of which 16h5 has many already.
+        self._detector = apriltag(
+            "tag" + family, threads=1, maxhamming=0 if family == "16h5" else 1, decimate=decimate
+        )
+        self._least_margin = _LEAST_MARGIN[family]
+
+    def detect(self, gray: np.ndarray, origin: Tuple[int, int] = (0, 0)) -> List[TagCorners]:
+        """Return the tags in gray."""
+        shift = np.array(origin) - 0.5
+        return [
+            TagCorners(int(found["id"]), np.asarray(found["lb-rb-rt-lt"], dtype=float)[::-1] + shift)
+            for found in self._detector.detect(np.ascontiguousarray(gray))
+            if found["margin"] >= self._least_margin
+        ]
+
+
+class ArucoDetector(TagDetector):
+    """OpenCV's aruco, which always searches the whole picture: decimate is not used."""
+
+    def __init__(self, family: str, decimate: float) -> None:
+        try:
+            import cv2
+        except ImportError:
+            raise DetectorError("the detector aruco is not installed: apt install python3-opencv") from None
+        dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, FAMILIES[family].dictionary))
+        is_new = hasattr(cv2.aruco, "ArucoDetector")  # since OpenCV 4.7
+        options = cv2.aruco.DetectorParameters() if is_new else cv2.aruco.DetectorParameters_create()
+        options.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
+        options.cornerRefinementWinSize = 3
+        if is_new:
+            options.relativeCornerRefinmentWinSize = 1.0  # in cells: less leaves no window at small tags
+        options.adaptiveThreshWinSizeMin, options.adaptiveThreshWinSizeMax = 5, 25
+        options.perspectiveRemovePixelPerCell = 8  # the default, 4, misreads cells of less than 3 pixels
+        options.errorCorrectionRate = 0.0 if family == "16h5" else 0.6
+        if is_new:
+            self._detect = cv2.aruco.ArucoDetector(dictionary, options).detectMarkers
+        else:
+            self._detect = lambda gray: cv2.aruco.detectMarkers(gray, dictionary, parameters=options)
+        self._roll = 0
+        self._roll = self._find_roll(family)
+
+    def _find_roll(self, family: str) -> int:
+        """Return by how many corners this version's order has to be moved on, found by a tag of known heading."""
+        cells = draw_tag(family, 0)
+        picture = np.kron(np.pad(cells, 3, constant_values=255), np.ones((10, 10), np.uint8))
+        corners = self.detect(picture)[0].corners
+        return -int(np.argmin(corners.sum(axis=1)))
+
+    def detect(self, gray: np.ndarray, origin: Tuple[int, int] = (0, 0)) -> List[TagCorners]:
+        """Return the tags in gray."""
+        found, ids, _ = self._detect(np.ascontiguousarray(gray))
+        if ids is None:
+            return []
+        return [
+            TagCorners(int(tag_id), np.roll(np.asarray(corners[0], dtype=float), self._roll, axis=0) + origin)
+            for corners, tag_id in zip(found, ids.ravel())
+        ]
+
+
+BACKENDS: Dict[str, type] = {"apriltag": AprilTagDetector, "aruco": ArucoDetector}
+
+DEFAULT_BACKEND = "apriltag" if find_spec("apriltag") else "aruco"
+"""Debian 11 has no python3-apriltag that works."""
+
+
+def create_detector(backend: str = DEFAULT_BACKEND, family: str = "36h11", decimate: float = 2.0) -> TagDetector:
+    """Return a detector.
+
+    Args:
+        backend: apriltag or aruco.
+        family: 36h11, or 16h5 for prints made for the stock suite.
+        decimate: apriltag looks for squares in a picture so many times smaller; corners are refined in the whole one.
+
+    Raises: DetectorError for a backend that is unknown or not installed, an unknown family, a decimation below 1.
+    """
+    if backend not in BACKENDS:
+        raise DetectorError("detector %r: known are %s" % (backend, ", ".join(sorted(BACKENDS))))
+    if family not in FAMILIES:
+        raise DetectorError("tag family %r: known are %s" % (family, ", ".join(sorted(FAMILIES))))
+    if not decimate >= 1.0:
+        raise DetectorError("decimation %s: it must be at least 1" % decimate)
+    return BACKENDS[backend](family, decimate)

@@ -1,0 +1,95 @@
+"""Pictures as seen from straight above, to scale, so that they lie under a map. Knows pictures, not ROS."""
+
+import math
+from typing import Collection, Sequence, Tuple
+
+import cv2
+import numpy as np
+
+from ..camera.camera_model import Camera
+from ..errors import SettingsError
+from .tag_corners import TagCorners
+
+__all__ = ["FloorView"]
+
+LONGEST_SIDE_PX = 1280
+
+STEP_PX = 8
+"""Pixels are found in such steps, with those between on a line: all of them would hold up the tracker."""
+
+MOST_REACH = 3.0
+"""Of the view to each side of the camera, in heights of the camera: a tilted camera sees to the horizon."""
+
+_BORDER_POINTS = 17
+
+_FOUND_BGR, _UNUSABLE_BGR = (0, 200, 0), (0, 0, 255)
+
+
+class FloorView:
+    """A window onto the plane at one height: the tags' height, so that robots lie where their poses are.
+
+    Attributes:
+        box_m: x min, y min, x max, y max of the view in map.
+    """
+
+    def __init__(self, camera: Camera, height_m: float) -> None:
+        """camera: looks down; height_m: of the plane. Raises: SettingsError if the camera does not see the plane."""
+        self._camera = camera
+        self._height_m = height_m
+        self.box_m = self._find_box()
+        left_m, low_m, right_m, high_m = self.box_m
+        self._px_per_m = LONGEST_SIDE_PX / max(right_m - left_m, high_m - low_m)
+        width_px = round((right_m - left_m) * self._px_per_m)
+        height_px = round((high_m - low_m) * self._px_per_m)
+        across, down = ((np.arange(math.ceil(side / STEP_PX) + 2) - 0.5) * STEP_PX for side in (width_px, height_px))
+        grid = np.meshgrid(left_m + across / self._px_per_m, high_m - down / self._px_per_m)
+        points_m = np.column_stack([axis.ravel() for axis in grid] + [np.full(grid[0].size, height_m)])
+        coarse = np.nan_to_num(camera.project(points_m), nan=-1e4).reshape(*grid[0].shape, 2).astype(np.float32)
+        sources = cv2.resize(coarse, None, fx=STEP_PX, fy=STEP_PX, interpolation=cv2.INTER_LINEAR)
+        shown = slice(STEP_PX, STEP_PX + height_px), slice(STEP_PX, STEP_PX + width_px)
+        self._maps = cv2.convertMaps(np.ascontiguousarray(sources[shown]), None, cv2.CV_16SC2)
+
+    def _find_box(self) -> Tuple[float, float, float, float]:
+        lens = self._camera.lens
+        u, v = (np.linspace(0.0, side_px - 1.0, _BORDER_POINTS) for side_px in (lens.width_px, lens.height_px))
+        border = [np.column_stack((u, np.full(len(u), edge))) for edge in (v[0], v[-1])]
+        border += [np.column_stack((np.full(len(v), edge), v)) for edge in (u[0], u[-1])]
+        points_m = self._camera.intersect(np.concatenate(border), self._height_m)
+        points_m = points_m[np.isfinite(points_m).all(axis=1)]
+        if not len(points_m):
+            raise SettingsError("the camera does not look at the floor: calibrate the arena again")
+        center_m, reach_m = self._camera.position_m[:2], MOST_REACH * abs(self._camera.position_m[2])
+        low = np.maximum(points_m.min(axis=0), center_m - reach_m)
+        high = np.minimum(points_m.max(axis=0), center_m + reach_m)
+        if not (low < high).all():
+            raise SettingsError("the camera does not look at the floor below it: calibrate the arena again")
+        return float(low[0]), float(low[1]), float(high[0]), float(high[1])
+
+    def rectify(self, picture: np.ndarray) -> np.ndarray:
+        """Return a camera's picture (H, W) as seen from above: x right, y up, black where it saw nothing."""
+        return cv2.remap(picture, self._maps[0], self._maps[1], cv2.INTER_LINEAR)
+
+    def find_pixels(self, pixels: np.ndarray) -> np.ndarray:
+        """Return where pixels (N, 2) of the camera's picture are in the view."""
+        points_m = self._camera.intersect(pixels, self._height_m)
+        left_m, _, _, high_m = self.box_m
+        return np.column_stack((points_m[:, 0] - left_m, high_m - points_m[:, 1])) * self._px_per_m - 0.5
+
+    def draw(self, picture: np.ndarray, tags: Sequence[TagCorners], unusable: Collection[int]) -> np.ndarray:
+        """Return a camera's picture from above in color (H, W, 3), with the tags in it; unusable: ids drawn in red."""
+        drawn = cv2.cvtColor(self.rectify(picture), cv2.COLOR_GRAY2BGR)
+        for tag in tags:
+            corners = self.find_pixels(tag.corners)
+            if not np.isfinite(corners).all():
+                continue
+            color = _UNUSABLE_BGR if tag.tag_id in unusable else _FOUND_BGR
+            center, front = (_round(corners[:count].mean(axis=0)) for count in (4, 2))
+            cv2.polylines(drawn, [np.rint(corners).astype(np.int32)], True, color, 2)
+            cv2.line(drawn, center, front, color, 2)
+            place = (center[0] + 12, center[1] - 12)
+            cv2.putText(drawn, str(tag.tag_id), place, cv2.FONT_HERSHEY_SIMPLEX, 0.7, color, 2)
+        return drawn
+
+
+def _round(pixel: np.ndarray) -> Tuple[int, int]:
+    return int(round(float(pixel[0]))), int(round(float(pixel[1])))

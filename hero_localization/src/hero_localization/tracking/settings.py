@@ -1,0 +1,247 @@
+"""The file of one camera: lens, place, tags. Calibrations write their parts of it, the tracker reads it all.
+
+Pure but for the file. Lengths in m, angles in degrees, pixels as in camera_model.
+"""
+
+import math
+import os
+import re
+from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional
+
+import numpy as np
+import yaml
+
+from hero_client.safe_file import lock_file, write_file
+from hero_client.texts import one_line
+from hero_client.values.geometry import Pose
+
+from ..camera.camera_model import Camera, Lens
+from ..errors import SettingsError
+from ..prints.tag_images import DEFAULT_SIZE_M, REFERENCE_SIZE_M
+from .detectors import DEFAULT_BACKEND
+from .tag_pose import DEFAULT_HEIGHT_M, MountedTag, ReferenceTag, TagLayout
+
+__all__ = ["DEFAULT_PATH", "Settings", "describe_camera", "describe_lens", "describe_pose", "load", "update"]
+
+DEFAULT_PATH = "~/hero_localization/camera.yaml"
+
+
+class Settings(NamedTuple):
+    """What a camera's file holds; None: not calibrated yet."""
+
+    detector: str = DEFAULT_BACKEND
+    family: str = "36h11"
+    decimate: float = 2.0
+    layout: TagLayout = TagLayout()
+    lens: Optional[Lens] = None
+    camera: Optional[Camera] = None
+    delay_s: float = 0.0
+    """Pictures were taken so long before their stamps."""
+    seen_references: Mapping[int, Pose] = {}
+    """Where the calibration of the arena saw the reference tags."""
+
+
+def load(path: str) -> Settings:
+    """Return the settings of a file; of one that does not exist, those of a camera that nobody calibrated.
+
+    Raises: SettingsError with the file, the key and what it must be.
+    """
+    content = _parse(path, _read(path))
+    try:
+        return _build(content)
+    except ValueError as error:
+        raise SettingsError("%s: %s" % (path, error)) from None
+
+
+def update(path: str, parts: Mapping[str, Any]) -> None:
+    """Replace the text of these parts in a file, or begin it; all other text stays. Raises: SettingsError."""
+    path = os.path.expanduser(path)
+    try:
+        os.makedirs(os.path.dirname(path) or ".", exist_ok=True)
+        with lock_file(path):
+            write_file(path, _replace_parts(path, _read(path), parts).encode())
+    except OSError as error:
+        raise SettingsError("%s cannot be written: %s" % (path, error.strerror)) from None
+
+
+def _replace_parts(path: str, text: str, parts: Mapping[str, Any]) -> str:
+    content = {**_parse(path, text), **parts}
+    text += "\n" if text and not text.endswith("\n") else ""
+    for key, part in parts.items():
+        # The line of a key without indentation, and those below it that are indented.
+        found = re.search("(?m)^%s *:.*\n(\n*[ \t]+.*\n)*" % key, text)
+        start, end = found.span() if found else (len(text), len(text))
+        text = text[:start] + _dump(key, part) + text[end:]
+    if not _holds(text, content):
+        text = "".join(map(_dump, content, content.values()))  # the text was YAML of another form, such as JSON
+    return text
+
+
+def _dump(key: str, part: Any) -> str:
+    # PyYAML puts innermost collections into one line, also that of a key and a number.
+    flow_style = None if isinstance(part, (dict, list)) else False
+    return str(yaml.safe_dump({key: part}, sort_keys=False, default_flow_style=flow_style))
+
+
+def _holds(text: str, content: Mapping[str, Any]) -> bool:
+    try:
+        return _parse("", text) == content
+    except SettingsError:
+        return False
+
+
+def describe_lens(lens: Lens) -> Dict[str, Any]:
+    """Return the part of the file that holds a lens."""
+    return {
+        "lens": {
+            "width_px": lens.width_px,
+            "height_px": lens.height_px,
+            "matrix": np.asarray(lens.matrix).ravel().tolist(),
+            "distortion": np.asarray(lens.distortion).tolist(),
+        }
+    }
+
+
+def describe_camera(camera: Camera, seen: Mapping[int, Pose]) -> Dict[str, Any]:
+    """Return the parts of the file that hold a camera's place and what it saw of the reference tags from there."""
+    return {
+        **describe_lens(camera.lens),
+        "camera": {"rotation": camera.rotation.ravel().tolist(), "position_m": camera.position_m.tolist()},
+        "seen_references": {tag_id: describe_pose(pose) for tag_id, pose in sorted(seen.items())},
+    }
+
+
+def describe_pose(pose: Pose) -> List[float]:
+    """Return x, y (m) and yaw (degrees) as the file holds them."""
+    return [round(pose.x_m, 5), round(pose.y_m, 5), round(math.degrees(pose.yaw_rad), 3)]
+
+
+def _read(path: str) -> str:
+    try:
+        with open(os.path.expanduser(path), encoding="utf-8") as file:
+            return file.read()
+    except FileNotFoundError:
+        return ""
+    except OSError as error:
+        raise SettingsError("%s cannot be read: %s" % (path, error.strerror)) from None
+    except UnicodeDecodeError as error:
+        raise SettingsError("%s is no YAML file: %s" % (path, one_line(error))) from None
+
+
+def _parse(path: str, text: str) -> Dict[str, Any]:
+    try:
+        content = yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        raise SettingsError("%s is no YAML file: %s" % (path, one_line(error))) from None
+    if content is None:
+        return {}
+    if not isinstance(content, dict):
+        raise SettingsError("%s must hold keys and values, such as family: 36h11" % path)
+    return content
+
+
+def _build(content: Mapping[str, Any]) -> Settings:
+    known = (
+        "detector family decimate tag_size_m tag_height_m lens camera delay_s references reference_size_m"
+        " seen_references objects tag_robots mounts"
+    ).split()
+    for key in content:
+        if key not in known:
+            raise ValueError("unknown key %s; known are: %s" % (key, ", ".join(known)))
+    size_m = _number(content, "tag_size_m", DEFAULT_SIZE_M, 0.005, 1.0)
+    height_m = _number(content, "tag_height_m", DEFAULT_HEIGHT_M, 0.0, 1.0)
+    reference_size_m = _number(content, "reference_size_m", REFERENCE_SIZE_M, 0.005, 1.0)
+
+    def read_mount(value: Any) -> MountedTag:
+        return MountedTag(size_m, height_m, *_pose(value))
+
+    tag_robots = _by_tag(content, "tag_robots", "the number of a robot", _whole_number)
+    for robot in tag_robots.values():
+        if list(tag_robots.values()).count(robot) > 1:
+            raise ValueError("tag_robots names robot %d more than once, but a robot wears one tag" % robot)
+    layout = TagLayout(
+        tag_robots=tag_robots,
+        mounts=_by_tag(content, "mounts", "[x_m, y_m, yaw_deg]", read_mount),
+        default_mount=MountedTag(size_m, height_m),
+        objects=_by_tag(content, "objects", "a name", _name),
+        references=_by_tag(
+            content, "references", "[x_m, y_m, yaw_deg]", lambda value: ReferenceTag(_pose(value), reference_size_m)
+        ),
+    )
+    lens = _build_lens(content["lens"]) if "lens" in content else None
+    return Settings(
+        str(content.get("detector", DEFAULT_BACKEND)),
+        str(content.get("family", "36h11")),
+        _number(content, "decimate", 2.0, 1.0, 8.0),
+        layout,
+        lens,
+        _build_camera(content["camera"], lens) if "camera" in content else None,
+        _number(content, "delay_s", 0.0, -1.0, 5.0),
+        _by_tag(content, "seen_references", "[x_m, y_m, yaw_deg]", _pose),
+    )
+
+
+def _number(content: Mapping[str, Any], key: str, default: float, low: float, high: float) -> float:
+    value = content.get(key, default)
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
+        raise ValueError("%s is %r, but must be a number from %g to %g" % (key, value, low, high))
+    return float(value)
+
+
+def _by_tag(content: Mapping[str, Any], key: str, form: str, read: Callable[[Any], Any]) -> Dict[int, Any]:
+    """Return a mapping from ids of tags to what read makes of the values."""
+    given = content.get(key)
+    if given is None:
+        return {}
+    try:
+        return {_whole_number(tag_id): read(value) for tag_id, value in given.items()}
+    except (AttributeError, TypeError, ValueError):
+        raise ValueError("%s must hold ID: %s for each tag, not %r" % (key, form, given)) from None
+
+
+def _whole_number(value: Any) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or value < 0:
+        raise ValueError
+    return value
+
+
+def _name(value: Any) -> str:
+    if not isinstance(value, (str, int)) or value == "":
+        raise ValueError
+    return str(value)
+
+
+def _pose(values: Any) -> Pose:
+    if not isinstance(values, list):
+        raise ValueError
+    x_m, y_m, yaw_deg = map(float, values)
+    if not all(map(math.isfinite, (x_m, y_m, yaw_deg))):
+        raise ValueError
+    return Pose(x_m, y_m, math.radians(yaw_deg))
+
+
+def _build_lens(part: Any) -> Lens:
+    try:
+        return Lens.from_camera_info(
+            int(part["width_px"]), int(part["height_px"]), part["matrix"], "plumb_bob", part["distortion"]
+        )
+    except (KeyError, TypeError, OverflowError):
+        keys = "width_px, height_px, matrix (nine numbers) and distortion"
+        raise ValueError("lens is %r, but must hold %s: calibrate the lens" % (part, keys)) from None
+    except ValueError as error:
+        raise ValueError("lens: %s: calibrate the lens" % error) from None
+
+
+def _build_camera(part: Any, lens: Optional[Lens]) -> Camera:
+    if lens is None:
+        raise ValueError("camera needs lens: calibrate the lens, then the arena")
+    try:
+        rotation = np.asarray(part["rotation"], dtype=float).reshape(3, 3)
+        position_m = np.asarray(part["position_m"], dtype=float).reshape(3)
+        is_rotation = np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-3) and np.linalg.det(rotation) > 0.0
+        if is_rotation and np.isfinite(position_m).all():
+            return Camera(lens, rotation, position_m)
+    except (KeyError, TypeError, ValueError):
+        pass  # keys that are missing, other values than numbers, or too few of them
+    keys = "rotation (nine numbers) and position_m (three)"
+    raise ValueError("camera is %r, but must hold %s: calibrate the arena" % (part, keys))

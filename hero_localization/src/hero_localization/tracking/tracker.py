@@ -1,0 +1,176 @@
+"""From the pictures of one camera to poses in `map`, and what is wrong with camera and tags. Pure."""
+
+import math
+from collections import deque
+from typing import Deque, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
+
+import numpy as np
+
+from hero_client.values.geometry import Pose, transform_pose
+
+from ..camera.camera_model import Camera
+from .moved_references import find_moved_references
+from .settings import Settings
+from .tag_corners import TagCorners
+from .tag_pose import Sightings, locate
+
+__all__ = ["Problem", "Tracker"]
+
+RATE_FRAMES = 30
+
+KEPT_S = 2.0
+"""A problem of a tag is named for so long after it was last seen."""
+
+MOVED_FRAMES = 15
+"""A camera that shakes is no camera that moved."""
+
+MISSING_S = 5.0
+"""A hand that covers a reference tag goes away sooner."""
+
+LEAST_USED_SHARE = 0.8
+"""Of the pictures; tags that are searched less often move further between two searches."""
+
+LEAST_SIDE_PX = 10.0
+"""Of a tag's side in the picture that the detector searches; one cell of 36h11 is a tenth of it."""
+
+DARK, BRIGHT = 35.0, 225.0
+"""Mean shade, of 255."""
+
+
+class Problem(NamedTuple):
+    """Something that people should see to."""
+
+    name: str
+    """What: camera, or "tag 17"."""
+    text: str
+    is_error: bool
+    """Whether poses are missing or wrong because of it."""
+
+
+class Tracker:
+    """One camera.
+
+    Attributes:
+        camera: lens and place.
+        found: the tags in the last picture.
+        sightings: what they stand for.
+    """
+
+    def __init__(self, settings: Settings, camera: Camera) -> None:
+        """camera: lens and place."""
+        self.found: Sequence[TagCorners] = ()
+        self.sightings: Optional[Sightings] = None
+        self._settings = settings
+        self.camera = camera
+        self._pictures: Deque[Tuple[float, int]] = deque(maxlen=RATE_FRAMES)
+        self._shade = math.nan
+        self._tag_problems: Dict[int, Tuple[float, str]] = {}
+        self._moved: Dict[int, int] = {}
+        self._reference_seen_s: Dict[int, float] = {}
+
+    def measure_shade(self, gray: np.ndarray) -> None:
+        """Look how bright a picture (H, W), 8 bit, is."""
+        self._shade = float(gray[::16, ::16].mean())
+
+    def take(self, tags: Sequence[TagCorners], stamp_s: float, number: int) -> Sightings:
+        """Return what the tags of the next picture stand for.
+
+        stamp_s: as the picture bears it; number: counts the camera's pictures, with those that were left out.
+        """
+        self._pictures.append((stamp_s, number))
+        self.found = tags
+        self.sightings = sightings = locate(self.camera, tags, self._settings.layout)
+        self._note_problems(sightings, stamp_s)
+        return sightings
+
+    def taken_s(self, stamp_s: float) -> float:
+        """Return when a picture was taken: its stamp, less the delay that the robots' calibration found; at least 0."""
+        return max(0.0, stamp_s - self._settings.delay_s)
+
+    def project(self, robots: Mapping[int, Pose]) -> Dict[int, Tuple[float, float]]:
+        """Return where the centers of the tags of robots at these poses in map are in a picture, px, by tag."""
+        layout = self._settings.layout
+        places: Dict[int, np.ndarray] = {}
+        for robot, tag_id in layout.find_tags(robots).items():
+            mount = layout.find_mount(tag_id)
+            place = transform_pose(robots[robot], Pose(mount.x_m, mount.y_m, 0.0))
+            places[tag_id] = np.array((place.x_m, place.y_m, mount.height_m))
+        if not places:
+            return {}
+        pixels = self.camera.project(np.array(list(places.values())))
+        return {tag_id: (float(u), float(v)) for tag_id, (u, v) in zip(places, pixels) if np.isfinite((u, v)).all()}
+
+    # -- what is wrong --------------------------------------------------------------------------------------
+
+    def _note_problems(self, sightings: Sightings, stamp_s: float) -> None:
+        note = self._tag_problems
+        for tag_id in sightings.unknown:
+            note[tag_id] = (stamp_s, "stands for no robot, object or reference: name it in the camera's file")
+        for tag_id in sightings.doubled:
+            note[tag_id] = (stamp_s, "is there more than once, and counts for nothing: remove one")
+        for tag_id, share in sightings.misshapen.items():
+            text = "measures %.0f %% of its size: print it at 100 %%, or set tag_size_m" % (100.0 * share)
+            note[tag_id] = (stamp_s, text)
+        seen = {tag_id: sighting.pose for tag_id, sighting in sightings.references.items()}
+        moved_m = find_moved_references(seen, self._settings.seen_references)
+        for tag_id in seen:
+            self._moved[tag_id] = self._moved.get(tag_id, 0) + 1 if tag_id in moved_m else 0
+        for tag_id in self._settings.seen_references:
+            # Time goes back when a recording is played again.
+            is_new = not self._reference_seen_s.get(tag_id, math.inf) <= stamp_s
+            if is_new or tag_id in seen or tag_id in sightings.doubled:
+                self._reference_seen_s[tag_id] = stamp_s
+
+    @property
+    def rates_hz(self) -> Tuple[float, float]:
+        """Pictures per second that were used, and those that the camera sent."""
+        if len(self._pictures) < 2 or self._pictures[-1][0] <= self._pictures[0][0]:
+            return 0.0, 0.0
+        (first_s, first), (last_s, last) = self._pictures[0], self._pictures[-1]
+        used = len(self._pictures) - 1
+        return used / (last_s - first_s), max(used, last - first) / (last_s - first_s)
+
+    def describe_rate(self) -> str:
+        """Return how many pictures per second are used, and of how many if some are not."""
+        used_hz, sent_hz = self.rates_hz
+        return "%.1f%s pictures per second" % (used_hz, "" if used_hz == sent_hz else " of %.1f" % sent_hz)
+
+    def list_problems(self) -> List[Problem]:
+        """Return what is wrong with light, camera and tags."""
+        newest_s = self._pictures[-1][0] if self._pictures else -math.inf
+        problems = []
+        used_hz, sent_hz = self.rates_hz
+        if used_hz < LEAST_USED_SHARE * sent_hz and len(self._pictures) == RATE_FRAMES:
+            text = "%s are used: this computer is busy, or too slow for more" % self.describe_rate()
+            problems.append(Problem("camera", text, False))
+        if self._shade < DARK or self._shade > BRIGHT:
+            kind, remedy = ("dark", "more") if self._shade < DARK else ("bright", "less")
+            text = "pictures are too %s (mean %.0f of 255): give %s light or exposure" % (kind, self._shade, remedy)
+            problems.append(Problem("camera", text, True))
+        sides_px = [tag.side_px for tag in self.found if self._settings.layout.find_robot(tag.tag_id) is not None]
+        decimate = self._settings.decimate if self._settings.detector == "apriltag" else 1.0
+        if sides_px and min(sides_px) < LEAST_SIDE_PX * decimate:
+            remedy = "set decimate: 1, or hang the camera lower" if decimate > 1.0 else "hang the camera lower"
+            text = "tags measure %.0f px, and get lost below %.0f: %s"
+            problems.append(Problem("camera", text % (min(sides_px), LEAST_SIDE_PX * decimate, remedy), False))
+        moved = [tag_id for tag_id, count in self._moved.items() if count >= MOVED_FRAMES]
+        watched = [tag_id for tag_id in self._moved if tag_id in self._settings.seen_references]
+        missing = [tag_id for tag_id, seen_s in self._reference_seen_s.items() if seen_s < newest_s - MISSING_S]
+        if moved and len(moved) * 2 > len(watched):
+            text = "reference tags are not where they were: the camera moved; calibrate the arena again"
+            problems.append(Problem("camera", text, True))
+        else:
+            for tag_id in moved:
+                text = "this reference tag moved: put it back, or calibrate the arena again"
+                problems.append(Problem("tag %d" % tag_id, text, False))
+        if len(missing) * 2 > len(self._reference_seen_s):
+            text = "%d of %d reference tags are not seen: is there light enough, and did the camera move?"
+            problems.append(Problem("camera", text % (len(missing), len(self._reference_seen_s)), False))
+        else:
+            for tag_id in sorted(missing):
+                text = "this reference tag is not seen: is it covered, gone, or too dark?"
+                problems.append(Problem("tag %d" % tag_id, text, False))
+        for tag_id, (stamp_s, text) in sorted(self._tag_problems.items()):
+            if abs(newest_s - stamp_s) <= KEPT_S:  # time goes back when a recording is played again
+                problems.append(Problem("tag %d" % tag_id, text, False))
+        return problems

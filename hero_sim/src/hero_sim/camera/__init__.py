@@ -1,1 +1,0 @@
-"""A simulated camera above the arena: pictures, or corners of tags, by the robots' true poses. Needs OpenCV."""
