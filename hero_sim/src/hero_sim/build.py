@@ -9,7 +9,7 @@ import numpy as np
 from .errors import OptionError
 from .faults import FaultInjector, parse_fault
 from .link.tcp_link import TcpLink
-from .population import Rngs, build_radios, build_world
+from .population import Rngs, build_radios, build_world, draw_servo_timing
 from .robot.firmware import Firmware
 from .robot.flash import Flash
 from .robot.ranges import FACTORY_CALIBRATION_COUNTS_M2, calibrate
@@ -53,7 +53,8 @@ def build_swarm(options: argparse.Namespace, addresses: List[str], report: Repor
     for index, address in enumerate(addresses):
         body, flash = Body(world, index), _build_flash(options, world.errors, index)
         robot_id = options.first_id + index
-        robots.append(Firmware(robot_id, body, flash, rngs.robots[index], address, options.imu_hat, report))
+        timing = draw_servo_timing(options, robot_id)
+        robots.append(Firmware(robot_id, body, flash, rngs.robots[index], address, options.imu_hat, timing, report))
     swarm = Swarm(world, robots)
     swarm.switch_on(rngs.boot, BOOT_SPREAD_MS)
     return swarm

@@ -9,7 +9,8 @@ from . import output
 from .build import build_simulator
 from .errors import OptionError
 from .faults import LONGEST_S, FaultInjector, parse_fault
-from .population import build_errors, check_population
+from .population import SERVO_TIMINGS, build_errors, check_population
+from .robot.servo_pins import CORE_2
 from .simulator import Simulator
 from .world.robot_errors import describe_errors
 
@@ -75,6 +76,12 @@ def _add_robot_options(group: "argparse._ArgumentGroup") -> None:
         choices=("calibrated", "factory"),
         default="calibrated",
         help="servo centers in the flash: the true ones, or 1500 (calibrated)",
+    )
+    add(
+        "--servo-timing",
+        choices=SERVO_TIMINGS,
+        default=CORE_2,
+        help="of which ESP8266 core: 2.x never waits for a pulse, 3.x does; drawn: each robot its own (core2)",
     )
     add(
         "--flash-dir",

@@ -12,15 +12,22 @@ import numpy as np
 
 from .errors import OptionError
 from .link.wifi import PROFILES, Radio
+from .robot.servo_pins import CORE_2, CORE_3
 from .robot_constants import LARGEST_ID
 from .world.arena import build_default, place_robots
 from .world.arena_file import load_arena
 from .world.robot_errors import RobotErrors, draw_errors, set_known
 from .world.world import World
 
-__all__ = ["Rngs", "build_errors", "build_radios", "build_world", "check_population"]
+__all__ = [
+    "SERVO_TIMINGS", "Rngs", "build_errors", "build_radios", "build_world", "check_population", "draw_servo_timing",
+]  # fmt: skip
 
 MOST_ROBOTS = 1000
+
+_DRAWN = "drawn"
+SERVO_TIMINGS = (CORE_2, CORE_3, _DRAWN)
+"""Of all robots, or one of the two for each: which core real robots carry is not known."""
 
 
 class Rngs:
@@ -66,6 +73,14 @@ def build_errors(options: argparse.Namespace) -> RobotErrors:
     for text in options.error:
         set_known(errors, options.first_id, text)
     return errors
+
+
+def draw_servo_timing(options: argparse.Namespace, robot_id: int) -> str:
+    """Return the servo timing of a robot, which as its errors depends on seed and id alone."""
+    if options.servo_timing != _DRAWN:
+        return str(options.servo_timing)
+    rng = np.random.RandomState([options.seed, robot_id % 2**32, len(SERVO_TIMINGS)])
+    return (CORE_2, CORE_3)[rng.randint(2)]
 
 
 def build_world(options: argparse.Namespace, worlds: int = 1) -> World:

@@ -1,3 +1,4 @@
+import math
 import struct
 
 import pytest
@@ -73,14 +74,14 @@ def test_self_tuning_of_the_velocity_controller_spins_the_robot():
     assert abs(driver.true_pose(0)[2] - before_rad) == pytest.approx(4.0, abs=1.0)
 
 
-def test_self_tuning_of_the_position_controller_rocks_the_wheels():
+def test_self_tuning_of_the_position_controller_rocks_to_and_fro():
     driver = tune(start(), POSITION, 1000)
-    distances_m = []
-    for _ in range(100):
-        driver.run(20)
-        distances_m.append(driver.swarm.world.travels_m[0].tolist())
-    for wheel_m in zip(*distances_m):
-        assert 0.001 < max(wheel_m) - min(wheel_m) < 0.02
+    places_m = []
+    for _ in range(600):
+        driver.run(10)
+        places_m.append(driver.true_pose(0)[:2])
+    assert sum(map(math.dist, places_m, places_m[1:])) == pytest.approx(0.46, rel=0.05)
+    assert max(math.dist(place_m, places_m[0]) for place_m in places_m) < 0.03
 
 
 @both_controllers

@@ -25,6 +25,7 @@ from hero_sim.robot.messages import LaserMessages
 from hero_sim.robot.motor_control import MotorControl
 from hero_sim.robot.ranges import calibrate, convert_to_ranges
 from hero_sim.robot.sensing import Sensing
+from hero_sim.robot.servo_pins import CORE_2, ServoPins
 from hero_sim.stepped.proximity import correct_ranges, measure_ranges
 from hero_sim.stepped.robot_rows import RobotRows
 from hero_sim.world.body import Body
@@ -60,7 +61,9 @@ class ScalarRobot:
         self.flash = flash = Flash(calibration.tolist(), np.rint(errors.servo_center_us[index]).tolist())
         self.sensing = Sensing(name, body, False, flash)
         rng = np.random.RandomState(0)
-        self.motors = MotorControl(name, body, self.sensing.odometry, flash, rng, lambda text: None)
+        self.motors = MotorControl(
+            name, body, self.sensing.odometry, flash, ServoPins(CORE_2), rng, lambda text: None
+        )
         self.table = CommandTable(name, self.sensing, self.motors, flash, lambda text: None, pytest.fail)
         self.shapers = {
             topic_id: VelocityShaper(STOP_PAYLOADS[kind], round(COMMAND_INTERVAL_S * 1000))
@@ -241,7 +244,7 @@ class WholeFirmware:
         flash = Flash([0.5] * 8)
         rng = np.random.RandomState(0)
         self.world = world
-        self.firmware = Firmware(0, Body(world, 0), flash, rng, "127.0.0.1", False, pytest.fail)
+        self.firmware = Firmware(0, Body(world, 0), flash, rng, "127.0.0.1", False, CORE_2, pytest.fail)
         self.firmware.switch_on(0)
         while not self.has_sent(ids.ID_ODOM):
             now_ms = self.firmware.due_ms

@@ -23,6 +23,7 @@ from .commands import CommandTable
 from .flash import Flash
 from .motor_control import MotorControl
 from .sensing import Sensing
+from .servo_pins import ServoPins
 
 __all__ = ["Firmware"]
 
@@ -87,6 +88,7 @@ class Firmware:
         rng: np.random.RandomState,
         address: str,
         has_imu_hat: bool,
+        servo_timing: str,
         report: Callable[[str], None],
     ) -> None:
         """Build a robot that is switched off; address is for its boot line, report takes lines for people."""
@@ -102,6 +104,7 @@ class Firmware:
         self.answer_delay_ms = 0
         self._address = address
         self._has_imu_hat = has_imu_hat
+        self._servo_timing = servo_timing
         self._report = report
         self._phase = _PHASE_OFF
         self._booted_at_ms = 0
@@ -113,7 +116,8 @@ class Firmware:
         name, body, flash = self.name, self.body, self.flash
         self.clock = RobotClock()
         self.sensing = Sensing(name, body, self._has_imu_hat, flash)
-        self.motors = MotorControl(name, body, self.sensing.odometry, flash, self.rng, self.log)
+        pins = ServoPins(self._servo_timing)
+        self.motors = MotorControl(name, body, self.sensing.odometry, flash, pins, self.rng, self.log)
         self._commands = CommandTable(name, self.sensing, self.motors, flash, self.log, self.warn)
         self._declarations = declarations.encode_declarations(name)
         self.configured = False
@@ -124,6 +128,7 @@ class Firmware:
         self._pending: Deque[packets.Packet] = deque()
         self._spinning = False
         self._blocked_us = 0
+        self._is_held = False
         self._answers: List[Tuple[int, bytes]] = []
         self._advertised = False
         self._blocked_until_ms: Optional[int] = None
@@ -304,11 +309,15 @@ class Firmware:
             if now_ms >= self._next_log_ms:
                 self.log("\x1b[96m[/%s] Conected at time %d\x1b[0m" % (self.name, millis))
                 self._next_log_ms = now_ms + (LOG_MS if self.configured else UNCONFIGURED_LOG_MS)
-            if self.configured:
+            if self.configured and not self._is_held:
                 self._run_configured(millis, now_ms)
-            # A controller that is due comes first, also after the loop was blocked.
-            if now_ms >= self._next_spin_ms and not self._is_controller_due(millis):
+                self._is_held = self._hold(now_ms)
+                if self._is_held:
+                    return
+            # A controller that is due comes first, also after the loop was blocked, but only once in a pass.
+            if now_ms >= self._next_spin_ms and (self._is_held or not self._is_controller_due(millis)):
                 self._begin_spin(now_ms)
+            self._is_held = False
         if self._spinning:
             self._read_packets(now_ms)
         if self._spinning or self._blocked_until_ms is not None:
@@ -367,14 +376,21 @@ class Firmware:
             if not self._receive_packet(self._pending.popleft(), millis, now_ms):
                 # After a request for topics spinOnce() returns; the others wait for the next one.
                 break
-            if self._blocked_us >= 1000:
-                self.due_ms = now_ms + self._blocked_us // 1000
-                self._blocked_us %= 1000
+            if self._hold(now_ms):
                 return
         self._spinning = False
         self._next_spin_ms = now_ms + (SPIN_MS if self.configured else UNCONFIGURED_SPIN_MS)
         if self.configured and millis - self._last_request_ms > TIME_REQUEST_MS:
             self._request_time(millis)
+
+    def _hold(self, now_ms: int) -> bool:
+        """Return whether the loop goes on later, at due_ms, because what it called has taken a millisecond or more."""
+        self._blocked_us += self.motors.motors.held_us
+        self.motors.motors.held_us = 0
+        blocked_ms, self._blocked_us = divmod(self._blocked_us, 1000)
+        if blocked_ms:
+            self.due_ms = now_ms + blocked_ms
+        return blocked_ms > 0
 
     def _receive_packet(self, packet: packets.Packet, millis: int, now_ms: int) -> bool:
         """Handle one packet; return whether the firmware goes on reading."""

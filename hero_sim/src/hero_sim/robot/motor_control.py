@@ -26,6 +26,7 @@ from ..world.body import Body
 from ..world.kinematics import split_to_wheels
 from .flash import Flash
 from .motor_pid import POSITION_GAINS, VELOCITY_GAINS, Gains, MotorPid
+from .servo_pins import ServoPins
 from .wheel_odometry import WheelOdometry
 
 __all__ = ["Controller", "MotorControl"]
@@ -40,11 +41,13 @@ VELOCITY_TUNING_MS = (41000, 65000)
 POSITION_TUNING_MS = (11000, 49000)
 """Self-tuning ends by itself, without a result, after between these times (measured)."""
 
-_TUNING_START_US = 130
-_TUNING_STEP_US = 80
-_TUNING_BAND_TICKS = 1
-# Its relay would switch at 1 m/s, which no wheel reaches: its output stays where it starts.
-_VELOCITY_TUNING_US = (_TUNING_STEP_US - _TUNING_START_US, _TUNING_START_US + _TUNING_STEP_US)
+_VELOCITY_TUNING_START_US = 130
+_VELOCITY_TUNING_US = (-50, 210)
+"""Its relay would switch at 1 m/s, which no wheel reaches: its output stays 80 us beyond 130 us, as the wheels turn."""
+
+_POSITION_TUNING_STEP_US = 145
+_POSITION_TUNING_BAND_TICKS = 10
+"""Fitted to the measured path of 0.46 m in 6 s."""
 
 
 class MotorDriver:
@@ -54,12 +57,15 @@ class MotorDriver:
         centers_us: the robot's calibration: the pulses at which its wheels should rest, left and right.
         attached: whether pulses go out.
         stop_at_ms: when the watchdog stops them.
+        held_us: how long the calls of write() and stop() have held the robot's loop; the caller takes it away.
     """
 
-    def __init__(self, body: Body, centers_us: Sequence[float]) -> None:
+    def __init__(self, body: Body, centers_us: Sequence[float], pins: ServoPins) -> None:
         """Begin without pulses; centers that no servo has are taken for 1500, as of an erased flash."""
         low_us, high_us = PULSE_RANGE_US
         self._body = body
+        self._pins = pins
+        self.held_us = 0
         self.centers_us = [int(pulse_us) if low_us < pulse_us < high_us else 1500 for pulse_us in centers_us]
         self.attached = False
         self.stop_at_ms = 0
@@ -68,6 +74,7 @@ class MotorDriver:
     def write(self, now_ms: int, left_us: int, right_us: int) -> None:
         """Write pulses, limited to 1000..2000 us."""
         self.stop_at_ms = now_ms + MOTOR_WATCHDOG_MS + 1
+        self.held_us += self._pins.write(now_ms * 1000 + self.held_us)
         pulses_us = (left_us, right_us)
         if self.attached and pulses_us == self._pulses_us:
             return
@@ -87,6 +94,7 @@ class MotorDriver:
     def stop(self) -> None:
         """Stop the pulses."""
         self.attached = False
+        self.held_us += self._pins.detach()
         self._body.release()
 
 
@@ -189,6 +197,7 @@ class MotorControl:
         body: Body,
         odometry: WheelOdometry,
         flash: Flash,
+        pins: ServoPins,
         rng: np.random.RandomState,
         log: Callable[[str], None],
     ) -> None:
@@ -198,7 +207,7 @@ class MotorControl:
         self._odometry = odometry
         self._rng = rng
         self._log = log
-        self.motors = motors = MotorDriver(body, flash.motor_centers_us)
+        self.motors = motors = MotorDriver(body, flash.motor_centers_us, pins)
         self.velocity = Controller(
             motors, VELOCITY_GAINS, flash.velocity_pid, VELOCITY_LIMIT_US, VELOCITY_WATCHDOG_MS
         )
@@ -254,7 +263,7 @@ class MotorControl:
         controller.start_tuning(now_ms, int(self._rng.randint(*limits_ms)))
         self._tuning_start_ticks = self._count_ticks(world_ms)
         self._relay = [1, 1]
-        start_us = 0 if is_position else _TUNING_START_US
+        start_us = 0 if is_position else _VELOCITY_TUNING_START_US
         self.motors.drive(now_ms, (start_us, start_us))
         self._reschedule(now_ms)
 
@@ -282,9 +291,9 @@ class MotorControl:
     def _tune_position(self, now_ms: int, moved_ticks: Sequence[int]) -> None:
         """Rock each wheel about its place."""
         for wheel, ticks in enumerate(moved_ticks):
-            if self._relay[wheel] * ticks > _TUNING_BAND_TICKS:
+            if self._relay[wheel] * ticks > _POSITION_TUNING_BAND_TICKS:
                 self._relay[wheel] = -self._relay[wheel]
-        self._tune(self.position, now_ms, moved_ticks, [_TUNING_STEP_US * relay for relay in self._relay])
+        self._tune(self.position, now_ms, moved_ticks, [_POSITION_TUNING_STEP_US * relay for relay in self._relay])
 
     def _tune(
         self, controller: Controller, now_ms: int, measured: Sequence[float], outputs_us: Sequence[int]

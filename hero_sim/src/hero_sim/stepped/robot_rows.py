@@ -2,7 +2,7 @@
 
 Pure: no bytes, sockets, threads, ROS or clock. Same world and calls, same bytes. The robots share the phases of their
 timers, which depend on the time alone, so that a world of a batch gives what it gives alone. Left out of the firmware:
-boot, self-tuning, the IMU hat, faults, and the millisecond for which a command blocks its loop.
+boot, self-tuning, the IMU hat, faults, and the time for which a command or a servo pulse (of core 3) blocks its loop.
 """
 
 from typing import Callable, List, Sequence
