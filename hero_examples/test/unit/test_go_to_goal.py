@@ -143,6 +143,46 @@ def test_a_new_goal_replaces_the_old_one(goals):
     assert math.dist(goals.swarm[0].pose[:2], (0.0, 0.1)) < TRUE_TOLERANCE_M
 
 
+def stream(goals, count, put):
+    """Call put(n) for each of count goals, 10 times a second, and drive to the last one."""
+    goals.events = [(0.1 * number, lambda number=number: put(number)) for number in range(1, count)]
+    put(0)
+    goals.drive()
+
+
+def test_a_stream_of_goals_is_followed_without_a_stop(goals, monkeypatch):
+    sent, send = [], goals.swarm.rows.send_velocity
+    monkeypatch.setattr(
+        goals.swarm.rows, "send_velocity", lambda row, *velocity: (sent.append(velocity), send(row, *velocity))
+    )
+    stream(goals, 40, lambda number: goals.put(0.3 + 0.005 * number, 0.0))
+    assert len(goals.listener.accepted) == 40 and goals.queue.reached and not goals.queue.busy
+    assert [outcome.reason for outcome in goals.listener.outcomes] == ["another goal came"] * 39 + [""]
+    assert math.dist(goals.swarm[0].pose[:2], (0.495, 0.0)) < TOLERANCE_M
+    assert all(linear_m_s > 0.0 for linear_m_s, _ in sent[:40])
+    assert goals.swarm.now_s < 8.0
+
+
+def test_of_goals_that_wait_only_the_newest_is_driven_to(goals):
+    for y_m in (0.3, 0.2, 0.1):
+        goals.put(0.0, y_m)
+    goals.drive()
+    assert [request.goal.y_m for request in goals.listener.accepted] == [0.1]
+    assert [outcome.gave_up for outcome in goals.listener.outcomes] == [True, True, False]
+
+
+def test_the_time_limit_of_a_goal_begins_with_it_and_names_it(goals):
+    stream(goals, 30, lambda number: goals.put(50.0 + number, 0.0, timeout_s=2.0))
+    assert [outcome.gave_up for outcome in goals.listener.outcomes] == [True] * 29 + [False]
+    assert "reach (79, 0): not there after 2 s" in goals.listener.outcomes[-1].reason
+
+
+def test_goals_in_another_frame_begin_anew(goals):
+    stream(goals, 2, lambda number: goals.put(0.2, 0.0, frame=("", "robot")[number]))
+    assert [request.frame for request in goals.listener.accepted] == ["", "robot"]
+    assert goals.queue.reached and goals.swarm[0].pose.x_m > 0.2
+
+
 def test_a_cancelled_goal_ends_and_another_ones_cancellation_does_not(goals):
     goals.put(0.5, 0.0, handle="mine")
     goals.events = [(1.0, lambda: goals.queue.cancel("another")), (2.0, lambda: goals.queue.cancel("mine"))]

@@ -1,9 +1,12 @@
 """Localized robots in virtual time: they reach places of the map by ground truth, and map what they see."""
 
+import math
+
 import numpy as np
 import pytest
 
-from hero_client.values.errors import FrameError
+from hero_client.values.errors import FrameError, GoalError
+from hero_client.values.geometry import Pose
 from hero_localization.mapping.occupancy_grid import OccupancyGrid
 from hero_localization.mapping.swarm_map import SwarmMap
 from hero_localization.stepped_localization import CameraModel, StepLocalization
@@ -20,6 +23,36 @@ def test_goals_in_map_are_reached_to_10_mm_although_odometry_drifts():
             assert np.hypot(*(swarm.rows.world.poses[:, :2] - goal).T).max() < 0.01
         drift_m = [np.hypot(robot.pose_in("world").x_m, robot.pose_in("world").y_m + 0.3) for robot in swarm.robots]
         assert max(drift_m) > 0.015  # or this would try nothing
+
+
+@pytest.mark.parametrize(
+    ("measure", "reason", "farthest_m"),
+    [
+        (lambda now_s, true: true._replace(yaw_rad=true.yaw_rad + math.pi), "heading of its pose .* upside down", 0.12),
+        (lambda now_s, true: true._replace(yaw_rad=true.yaw_rad + 2.0), "heading of its pose is about 115", 0.25),
+        (lambda now_s, true: true._replace(x_m=true.x_m + now_s // 1.0 % 2.0), "its pose jumps, .* by 1.00 m", 0.35),
+        (lambda now_s, true: true._replace(x_m=true.x_m + now_s // 0.2 % 2.0), "its pose jumps", 0.1),
+        (lambda now_s, true: Pose(0.0, 0.0, 0.0), "wheels turn, but .* does the camera's image stand still", 0.35),
+    ],
+)
+def test_a_robot_with_wrong_poses_stops_soon_and_says_what_is_wrong(measure, reason, farthest_m):
+    with StepSwarm(1, seed=3, arena="empty") as swarm:
+        robot = swarm[0]
+        robot.localize_by(lambda: measure(swarm.now_s, robot.true_pose))
+        start = robot.true_pose
+        with pytest.raises(GoalError, match=reason):
+            robot.go_to(0.6, 0.1, frame="map")
+        swarm.sleep(1.0)
+        assert math.dist(start[:2], robot.true_pose[:2]) < farthest_m
+        assert robot.velocity == (0.0, 0.0)
+
+
+def test_a_robot_that_is_carried_once_still_reaches_its_goal():
+    with StepSwarm(1, seed=3, arena="empty") as swarm:
+        robot = swarm[0]
+        robot.localize_by(lambda: robot.true_pose._replace(x_m=robot.true_pose.x_m - 0.3 * (swarm.now_s > 1.0)))
+        robot.go_to(0.2, 0.1, frame="map")
+        assert math.dist(robot.true_pose[:2], (0.5, 0.1)) < 0.015
 
 
 def test_robots_are_not_localized_before_the_first_picture_has_come():

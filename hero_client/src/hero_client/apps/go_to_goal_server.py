@@ -15,7 +15,7 @@ from hero_msgs.msg import GoToAction, GoToFeedback, GoToResult
 from ..controllers.go_to_goal import DEFAULT_TOLERANCE_M, Goal
 from ..controllers.motion import DEFAULT_TIMEOUT_S
 from ..robot import Robot
-from .goals import GoalOutcome, GoalQueue, GoalRequest, InvalidGoalError, check_limits, read_goal
+from .goals import REPLACED, GoalOutcome, GoalQueue, GoalRequest, InvalidGoalError, check_limits, read_goal
 
 __all__ = ["GoToGoalServer"]
 
@@ -43,6 +43,7 @@ class GoToGoalServer:
         self._goals = GoalQueue(robot, self, avoid)
         self._news = threading.Event()
         self._is_closing = False
+        self._log = rospy.loginfo
         self._subscriber = rospy.Subscriber(
             robot.namespace + "/goal", PoseStamped, self._receive_goal, queue_size=1, tcp_nodelay=True
         )
@@ -122,7 +123,7 @@ class GoToGoalServer:
         if request.handle is not None:
             request.handle.set_accepted()
         frame = request.frame or "odom"
-        rospy.loginfo("%s goes to (%.3f, %.3f) in %s", self.robot.name, request.goal.x_m, request.goal.y_m, frame)
+        self._log("%s goes to (%.3f, %.3f) in %s", self.robot.name, request.goal.x_m, request.goal.y_m, frame)
 
     def show_progress(self, request: GoalRequest, distance_m: float, elapsed_s: float) -> None:
         """See GoalListener."""
@@ -136,11 +137,13 @@ class GoToGoalServer:
         """See GoalListener."""
         handle, name = request.handle, self.robot.name
         reached, gave_up, reason, distance_m, elapsed_s = outcome
+        # Goals on the topic may come as a stream.
+        self._log = rospy.logdebug if reason == REPLACED and handle is None else rospy.loginfo
         if reached:
             rospy.loginfo("%s is at its goal after %.1f s, %.3f m off", name, elapsed_s, distance_m)
             end = handle and handle.set_succeeded
         elif gave_up:
-            rospy.loginfo("%s gives up its goal: %s", name, reason)
+            self._log("%s gives up its goal: %s", name, reason)
             end = handle and handle.set_canceled
         else:
             rospy.logwarn("%s", reason)

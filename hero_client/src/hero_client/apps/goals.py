@@ -1,5 +1,8 @@
 """One robot's goals: which are accepted, that a new one replaces the old one, and how each ends. Pure.
 
+A new goal in the same frame turns the robot on its way, without a stop: goals may come as a stream. Only the newest of
+those that wait is driven to.
+
 Goals and cancellations may come from any thread; the one that calls drive_to_next() drives the robot.
 """
 
@@ -7,8 +10,8 @@ import math
 import queue
 from typing import Any, Callable, NamedTuple, Protocol, Tuple
 
-from ..controllers.go_to_goal import Goal
-from ..controllers.motion import MotionController
+from ..controllers.go_to_goal import Goal, GoToGoalController
+from ..controllers.motion import State
 from ..robots.robot_base import BaseRobot
 from ..values.errors import HeroError
 from ..values.geometry import yaw_of
@@ -18,6 +21,7 @@ __all__ = [
     "MAX_COORDINATE_M",
     "MAX_FRAME_LENGTH",
     "MAX_QUEUED_GOALS",
+    "REPLACED",
     "GoalListener",
     "GoalOutcome",
     "GoalQueue",
@@ -39,6 +43,9 @@ MAX_QUATERNION_ENTRY = 1e3
 """A unit quaternion has no entry beyond 1."""
 
 MAX_FRAME_LENGTH = 200
+
+REPLACED = "another goal came"
+"""Why a goal was given up of which a newer one took the place."""
 
 
 class InvalidGoalError(ValueError):
@@ -159,7 +166,19 @@ class GoalQueue:
         # A goal handle cannot be compared with None.
         if handle is not None and self._cancelled is not None and handle == self._cancelled:
             return "cancelled"
-        return "" if self._requests.empty() else "another goal came"
+        return "" if self._requests.empty() else REPLACED
+
+    def _take_newest(self) -> GoalRequest:
+        """Return the newest goal that waits, of at least one; the older ones end."""
+        request = self._requests.get()
+        while not self._requests.empty():
+            self._end_replaced(request, math.nan, 0.0)
+            request = self._requests.get()
+        return request
+
+    def _end_replaced(self, request: GoalRequest, distance_m: float, elapsed_s: float) -> None:
+        self._listener.end_goal(request, GoalOutcome(False, True, REPLACED, distance_m, elapsed_s))
+        self._requests.task_done()
 
     def drive_to_next(self, wait: Callable[[float], object]) -> bool:
         """Drive to the next goal until it is reached, fails or is given up; return whether there was one.
@@ -168,8 +187,7 @@ class GoalQueue:
         """
         if self._is_closed or self._requests.empty():
             return False
-        request = self._requests.get()
-        self._drive(request, wait)
+        self._drive(self._take_newest(), wait)
         self._requests.task_done()
         return True
 
@@ -178,13 +196,28 @@ class GoalQueue:
         distance_m = math.nan
         self.reached = False
 
-        def sleep(duration_s: float) -> bool:
-            wait(duration_s)
-            return not self._find_interruption(request.handle)
+        def can_turn_to_next() -> bool:
+            # Places in the robot's own frame are those of the moment at which it begins.
+            return request.frame != "robot" and self._requests.queue[-1].frame == request.frame
 
-        def on_step(controller: MotionController) -> None:
-            nonlocal distance_m, next_feedback_s
+        def sleep(duration_s: float) -> bool:
+            end_s = self._robot.now_s + duration_s
+            while duration_s > 0.0:
+                wait(duration_s)
+                interruption = self._find_interruption(request.handle)
+                if interruption and not (interruption == REPLACED and can_turn_to_next()):
+                    return False
+                duration_s = end_s - self._robot.now_s
+            return True
+
+        def on_step(controller: GoToGoalController) -> None:
+            nonlocal request, start_s, distance_m, next_feedback_s
             distance_m, now_s = controller.distance_m, self._robot.now_s
+            if controller.state is State.ACTIVE and not self._requests.empty() and can_turn_to_next():
+                self._end_replaced(request, distance_m, now_s - start_s)
+                request, start_s = self._take_newest(), now_s
+                controller.change_goal(request.goal, request.tolerance_m, request.timeout_s, now_s)
+                self._listener.accept_goal(request)
             if now_s >= next_feedback_s:
                 next_feedback_s = now_s + FEEDBACK_PERIOD_S
                 self._listener.show_progress(request, distance_m, now_s - start_s)

@@ -2,7 +2,8 @@
 
 Two things are judged by what a stock robot knows. Its proximity sensors show an obstacle in the way; without them
 nothing would, because wheels that slip at a wall count on, and odometry with them. Its odometry shows wheels that do
-not turn. now_s is any clock that never steps back.
+not turn. Poses from elsewhere, such as those in map, are compared with odometry. now_s is any clock that never steps
+back.
 """
 
 import enum
@@ -12,6 +13,7 @@ from typing import Optional, Sequence
 from ..values.geometry import STOP, Pose, Velocity, measure_distance, wrap_angle
 from ..values.readings import Obstacle
 from .avoidance import find_in_path
+from .pose_check import PoseCheck
 
 __all__ = ["DEFAULT_TIMEOUT_S", "SILENT_STEPS", "MotionController", "State"]
 
@@ -86,13 +88,22 @@ class MotionController:
         self._patience_s = BLOCKED_S
         self._obstacle: Optional[Obstacle] = None
         self._moved_pose: Optional[Pose] = None
+        self._moved_odometry: Optional[Pose] = None
         self._moved_s = now_s
+        self._pose_check = PoseCheck()
         self._at_goal = False
 
-    def step(self, pose: Optional[Pose], ranges: Optional[Sequence[float]], now_s: float) -> Velocity:
+    def step(
+        self,
+        pose: Optional[Pose],
+        ranges: Optional[Sequence[float]],
+        now_s: float,
+        odometry: Optional[Pose] = None,
+    ) -> Velocity:
         """Return the next command; call it 10 times per second.
 
         pose: None while it is not known, and so is one that is not finite. ranges: as in avoidance; None: not known.
+        odometry: the pose in hero_N/odom, if pose is not that one.
         """
         if self.state is not State.ACTIVE:
             return STOP
@@ -116,7 +127,10 @@ class MotionController:
             return STOP
         self._stopped_since_s = None
         command = self._slow_for_obstacle(command, ranges or (), seen_s)
-        self._check_wheels(pose, command, seen_s)
+        self._check_wheels(pose, odometry, command, seen_s)
+        problem = self._pose_check.add(pose, odometry, seen_s) if odometry is not None else ""
+        if problem:
+            self._fail(problem)
         return command if self.state is State.ACTIVE else STOP
 
     def _offset(self, pose: Pose) -> float:
@@ -148,20 +162,20 @@ class MotionController:
             self._fail(self._describe_obstacle() + self._describe_distance())
         return Velocity(0.0, command.angular_rad_s)
 
-    def _check_wheels(self, pose: Pose, command: Velocity, seen_s: float) -> None:
-        """Fail if odometry stays the same although the wheels were told to move."""
+    def _check_wheels(self, pose: Pose, odometry: Optional[Pose], command: Velocity, seen_s: float) -> None:
+        """Fail if the pose stays the same although the wheels were told to move."""
         is_told_to_move = (
             abs(command.linear_m_s) >= STALL_LINEAR_M_S or abs(command.angular_rad_s) >= STALL_ANGULAR_RAD_S
         )
-        last = self._moved_pose
-        if (
-            last is None
-            or not is_told_to_move
-            or measure_distance(last, pose) > MOVED_M
-            or abs(wrap_angle(pose.yaw_rad - last.yaw_rad)) > MOVED_RAD
-        ):
-            self._moved_pose, self._moved_s = pose, seen_s
+        if not is_told_to_move or _has_moved(self._moved_pose, pose):
+            self._moved_pose, self._moved_odometry, self._moved_s = pose, odometry, seen_s
         elif seen_s - self._moved_s >= STALL_S:
+            if odometry is not None and _has_moved(self._moved_odometry, odometry):
+                self._fail(
+                    "its wheels turn, but its pose stays the same: does the camera's image stand still, or is the robot"
+                    " held?"
+                )
+                return
             self._fail(
                 "its wheels do not turn: is something blocking them, is the battery empty, or does another program"
                 " stop the robot?"
@@ -186,3 +200,12 @@ class MotionController:
         range_m, bearing_rad = self._obstacle
         place = "%.2f m from the robot's center" % range_m if range_m > 0.0 else "too close to measure"
         return "an obstacle is in the way, %s, at %+.0f degrees" % (place, math.degrees(bearing_rad))
+
+
+def _has_moved(last: Optional[Pose], pose: Pose) -> bool:
+    """Return whether a pose differs from the last one by more than noise; True without a last one."""
+    return (
+        last is None
+        or measure_distance(last, pose) > MOVED_M
+        or abs(wrap_angle(pose.yaw_rad - last.yaw_rad)) > MOVED_RAD
+    )

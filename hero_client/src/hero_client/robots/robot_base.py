@@ -29,7 +29,7 @@ NEXT_ODOM_S = 5.0
 
 STOPPED_WARNING_PERIOD_S = 5.0
 
-OnStep = Callable[[MotionController], None]
+OnStep = Callable[[GoToGoalController], None]
 
 
 def check_robot_id(robot_id: int) -> None:
@@ -129,9 +129,6 @@ class BaseRobot(Group):
         self._link.wait_for_next("proximity", timeout_s)
         return self._link.read_ranges()
 
-    def _read_pose(self) -> Pose:
-        return self.pose
-
     def fresh_pose(self) -> Optional[Pose]:
         """Return `pose`, or None where that would raise."""
         try:
@@ -230,7 +227,7 @@ class BaseRobot(Group):
         _check_speed(distance_m, linear_m_s)
         self._end_motion()
         controller = ForwardController(distance_m, self.now_s, linear_m_s)
-        self._run(self._follow(controller, "drive %g m" % distance_m, self._read_pose))
+        self._run(self._follow(controller, lambda: "drive %g m" % distance_m))
 
     def turn(self, angle_rad: float, angular_rad_s: float = 1.5) -> None:
         """Turn on the spot by angle_rad, positive to the left, to within 0.03 rad by the robot's odometry.
@@ -243,7 +240,7 @@ class BaseRobot(Group):
         _check_speed(angle_rad, angular_rad_s)
         self._end_motion()
         controller = TurnController(angle_rad, self.now_s, angular_rad_s)
-        self._run(self._follow(controller, "turn %g rad" % angle_rad, self._read_pose))
+        self._run(self._follow(controller, lambda: "turn %g rad" % angle_rad))
 
     def go_to(
         self,
@@ -317,12 +314,11 @@ class BaseRobot(Group):
         tolerance_m: float,
         on_step: OnStep = lambda controller: None,
     ) -> Steps:
-        text = "reach (%g, %g)%s" % (goal.x_m, goal.y_m, "" if frame == "odom" else " in the frame %s" % frame)
         if avoid:
             self._link.subscribe("proximity")
         self._link.subscribe("odom")
         yield from wait_for_all(self._members)
-        read_pose = self._read_pose
+        given, read_pose = goal, None
         if frame == "robot":
             place = transform_pose((yield from self._wait_for_pose()), Pose(goal.x_m, goal.y_m, goal.yaw_rad or 0.0))
             goal = Goal(place.x_m, place.y_m, None if goal.yaw_rad is None else place.yaw_rad)
@@ -331,7 +327,12 @@ class BaseRobot(Group):
                 self.pose_in(frame)  # waits for one that was never there, which the steps do not
             read_pose = partial(self.pose_in, frame, timeout_s=0.0)
         controller = GoToGoalController(goal, self.now_s, tolerance_m, timeout_s, avoid)
-        yield from self._follow(controller, text, read_pose, on_step)
+
+        def describe() -> str:
+            x_m, y_m = (given if frame == "robot" else controller.goal)[:2]
+            return "reach (%g, %g)%s" % (x_m, y_m, "" if frame == "odom" else " in the frame %s" % frame)
+
+        yield from self._follow(controller, describe, read_pose, lambda: on_step(controller))
 
     def _wait_for_pose(self) -> Generator[float, bool, Pose]:
         """Return `pose`. Raises: StaleDataError if it is not fresh for READY_TIMEOUT_S, or at the end."""
@@ -344,36 +345,40 @@ class BaseRobot(Group):
     def _follow(
         self,
         controller: MotionController,
-        text: str,
-        read_pose: Callable[[], Pose],
-        on_step: OnStep = lambda controller: None,
+        describe: Callable[[], str],
+        read_pose: Optional[Callable[[], Pose]] = None,
+        on_step: Callable[[], None] = lambda: None,
     ) -> Steps:
-        """Drive as the controller says to its end. Raises: GoalError, StoppedError, RobotNotReadyError."""
+        """Drive as the controller says to its end. Raises: GoalError, StoppedError, RobotNotReadyError.
+
+        describe: returns what the robot is to do, for errors. read_pose: reads a pose that is not the odometry's.
+        """
         yield from wait_for_all(self._members)
-        yield from stop_after(self._obey(controller, text, read_pose, on_step), self._members)
+        yield from stop_after(self._obey(controller, describe, read_pose, on_step), self._members)
 
     def _obey(
         self,
         controller: MotionController,
-        text: str,
-        read_pose: Callable[[], Pose],
-        on_step: OnStep,
+        describe: Callable[[], str],
+        read_pose: Optional[Callable[[], Pose]],
+        on_step: Callable[[], None],
     ) -> Steps:
         while True:
             self.check_not_stopped()
-            pose, absence = None, ""
+            pose, odometry, absence = None, None, ""
             try:
-                pose = read_pose()
+                pose = read_pose() if read_pose else self.pose
+                odometry = self.fresh_pose() if read_pose else None
             except StaleDataError as error:
                 absence = ": %s" % error
-            self._send_velocity(*controller.step(pose, self.fresh_proximity(), self.now_s))
-            on_step(controller)
+            self._send_velocity(*controller.step(pose, self.fresh_proximity(), self.now_s, odometry))
+            on_step()
             if controller.state is State.REACHED:
                 return
             if controller.state is State.FAILED:
-                raise GoalError("%s did not %s: %s%s" % (self.name, text, controller.reason, absence))
+                raise GoalError("%s did not %s: %s%s" % (self.name, describe(), controller.reason, absence))
             if not (yield REPEAT_PERIOD_S):
-                raise GoalError("%s did not %s: cancelled" % (self.name, text))
+                raise GoalError("%s did not %s: cancelled" % (self.name, describe()))
 
     def _end_motion(self) -> None:
         """Cancel a motion in the background and wait until it has sent its stops."""

@@ -1,0 +1,77 @@
+"""Whether poses that are measured from outside, such as those in map, agree with what the robot's wheels do. Pure.
+
+A robot that is steered by a wrong pose drives anywhere: a tag that is glued on upside down turns its heading by 180
+degrees, and a tag that is in the picture twice moves it to and fro. Odometry shows both within centimeters.
+"""
+
+import math
+from collections import deque
+from typing import Deque, Optional, Tuple
+
+from ..values.geometry import Pose, invert_pose, measure_distance, transform_pose, wrap_angle
+
+__all__ = ["PoseCheck"]
+
+DRIVE_M = 0.04
+"""Headings are compared over drives of this length: measured poses are a few millimeters off."""
+
+MAX_TURN_RAD = 0.3
+"""A drive that bends by more shows no direction."""
+
+MIN_SHARE = 0.5
+"""A robot that came less far than this share of what odometry counted was held, and shows no direction."""
+
+WRONG_HEADING_RAD = math.pi / 3.0
+"""Controllers reach goals with smaller errors; a robot that slides along a wall by MIN_SHARE is off by this at most."""
+
+WRONG_DRIVES = 2
+"""So many drives in a row: one may be a correction of the pose."""
+
+JUMP_M = 0.1
+"""In one step of 0.1 s a robot drives 0.02 m at most."""
+
+JUMPS, JUMP_WINDOW_S = 3, 10.0
+"""So many jumps within this time: a robot that is carried, or found again, jumps once."""
+
+
+class PoseCheck:
+    """Compares the poses of one robot with its odometry."""
+
+    def __init__(self) -> None:
+        self._last: Optional[Tuple[Pose, Pose]] = None
+        self._start: Optional[Tuple[Pose, Pose]] = None
+        self._wrong_drives = 0
+        self._jumps_s: Deque[float] = deque(maxlen=JUMPS)
+
+    def add(self, pose: Pose, odometry: Pose, now_s: float) -> str:
+        """Take both poses, each in its own frame, at every step; return what is wrong, for users, else nothing."""
+        last, self._last = self._last, (pose, odometry)
+        if last is None or self._start is None:
+            self._start = self._last
+            return ""
+        jump_m = abs(measure_distance(last[0], pose) - measure_distance(last[1], odometry))
+        if jump_m > JUMP_M:
+            self._start = self._last
+            self._jumps_s.append(now_s)
+            if len(self._jumps_s) == JUMPS and now_s - self._jumps_s[0] <= JUMP_WINDOW_S:
+                text = "its pose jumps, the last time by %.2f m: is its tag there twice, or is the robot carried?"
+                return text % jump_m
+            return ""
+        start_pose, start_odometry = self._start
+        drive = transform_pose(invert_pose(start_odometry), odometry)
+        is_bent = abs(wrap_angle(drive.yaw_rad)) > MAX_TURN_RAD
+        driven_m = math.hypot(drive.x_m, drive.y_m)
+        if driven_m < DRIVE_M and not is_bent:
+            return ""
+        self._start = self._last
+        moved = transform_pose(invert_pose(start_pose), pose)
+        if is_bent or math.hypot(moved.x_m, moved.y_m) < MIN_SHARE * driven_m:
+            return ""
+        error_rad = wrap_angle(math.atan2(drive.y_m, drive.x_m) - math.atan2(moved.y_m, moved.x_m))
+        self._wrong_drives = self._wrong_drives + 1 if abs(error_rad) > WRONG_HEADING_RAD else 0
+        if self._wrong_drives < WRONG_DRIVES:
+            return ""
+        return (
+            "the heading of its pose is about %.0f degrees off the direction in which it drives: is its tag on upside"
+            " down? `rosrun hero_localization calibrate_camera robots` measures it" % math.degrees(error_rad)
+        )
