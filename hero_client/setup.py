@@ -7,6 +7,8 @@ ROOMS = ("values", "controllers", "ros", "robots", "apps")
 
 setup(
     **generate_distutils_setup(
-        packages=["hero_client", *("hero_client." + room for room in ROOMS)], package_dir={"": "src"}
+        packages=["hero_client", *("hero_client." + room for room in ROOMS)],
+        package_dir={"": "src"},
+        package_data={"hero_client": ["py.typed"]},
     )
 )

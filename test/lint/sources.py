@@ -29,7 +29,13 @@ OTHER_PACKAGES = {
 WITHOUT_ROSDEP_KEY = {"apriltag"}
 """Optional modules: no package.xml can name them."""
 
-FIT_A_PROTOCOL = tuple(f"hero_client.{name}" for name in ("program", "robot", "ros.ros_clock", "ros.ros_link", "swarm"))
+FIT_A_PROTOCOL = (
+    "hero_client.robot",
+    "hero_client.ros.ros_link",
+    "hero_client.swarm",
+    "hero_node.ros.program",
+    "hero_node.ros.ros_clock",
+)
 """For mypy, what they take from ROS is Any."""
 
 

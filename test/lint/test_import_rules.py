@@ -12,10 +12,9 @@ SOCKETS = {"asyncio", "socket", "socketserver", "ssl", "tornado"}
 # check, which asks for the addresses of names; and the pages of the fleet monitor.
 SOCKET_OWNERS = (
     "hero_driver.transport",
-    "hero_driver.ros.handshakes",
     "hero_driver.ros.rospy_internals",
     "hero_driver.ros.raw_subscriber",
-    "hero_client.ros_node",
+    "hero_node.ros",
     "hero_sim.link.tcp_link",
     "hero_tools.checkup.network",
     "hero_monitor.server",
@@ -37,7 +36,7 @@ ROOMS = {
     "hero_sim.stepped": SIM_GROUND | {"world", "robot", "link", "population"},
     "hero_client.values": set(),
     "hero_client.controllers": {"values"},
-    "hero_client.ros": {"ros_node", "texts", "values"},
+    "hero_client.ros": {"values"},
     "hero_client.robots": {"controllers", "values"},
     "hero_localization.prints": {"errors"},
     "hero_localization.camera": {"errors"},
@@ -62,7 +61,11 @@ PURE_ROOMS = (
     "hero_client.robots",
     "hero_client.apps.formations",
     "hero_client.apps.goals",
-    "hero_client.texts",
+    "hero_node.clock",
+    "hero_node.errors",
+    "hero_node.parameters",
+    "hero_node.texts",
+    "hero_node.token_bucket",
     "hero_calibration.dead_zone",
     "hero_calibration.encoder_readings",
     "hero_calibration.infrared",
@@ -162,8 +165,6 @@ def test_only_stepped_robots_need_the_client(name):
 def test_the_simulator_shares_only_packets_and_payloads_with_the_driver(name):
     core = "hero_driver.rosserial"
     shared = [f"{core}.{module}" for module in ("errors", "packets", "payloads")]
-    if name == "hero_sim.node":
-        shared.append("hero_driver.ros.running_node")  # knows nothing of the robots' protocol
     if part_of(name, "hero_sim") == "stepped":  # stands in for the driver, too: its pure rules, never its protocol
         shared += ["hero_driver.commands", "hero_driver.corrections", "hero_driver.robot_constants"]
     for found in imports_of(name):

@@ -18,6 +18,7 @@ STANDARD_LIBRARY = getattr(sys, "stdlib_module_names", None)
 # The packages from the ground up: each depends only on packages before it, whatever its tests use.
 ORDER = (
     "hero_msgs",
+    "hero_node",
     "hero_test",
     "hero_driver",
     "hero_client",

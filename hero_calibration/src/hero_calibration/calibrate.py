@@ -13,10 +13,10 @@ from typing import Sequence
 
 import rospy
 
-from hero_client import command_line
-from hero_client.parameters import robot_ids_option
-from hero_client.program import Program
-from hero_client.values.errors import ProgramError
+from hero_node import command_line
+from hero_node.errors import ProgramError
+from hero_node.parameters import robot_ids_option
+from hero_node.ros.program import Program
 
 from .calibration import INFRARED, PARTS, Calibration
 from .discovery import find_robots

@@ -5,8 +5,8 @@ import os
 import time
 from typing import Any, Dict, List, Optional, Sequence
 
-from hero_client.command_line import say
-from hero_client.safe_file import replace_file
+from hero_node.command_line import say
+from hero_node.safe_file import replace_file
 
 from . import store
 from .errors import CalibrationError, EndedError

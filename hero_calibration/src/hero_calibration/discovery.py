@@ -3,9 +3,9 @@
 import time
 from typing import Dict, List, Optional, Sequence
 
-from hero_client.program import Program
 from hero_client.ros.drivers import Drivers
 from hero_msgs.msg import Robot
+from hero_node.ros.program import Program
 
 from .errors import CalibrationError
 from .ros_probe import RosProbe

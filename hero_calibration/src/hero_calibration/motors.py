@@ -4,7 +4,7 @@ from typing import Dict, List, NamedTuple, Sequence
 
 import numpy as np
 
-from hero_client.command_line import say
+from hero_node.command_line import say
 
 from . import dead_zone
 from .errors import CalibrationError

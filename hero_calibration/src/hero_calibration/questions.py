@@ -2,8 +2,8 @@
 
 import sys
 
-from hero_client.command_line import say
-from hero_client.program import Program
+from hero_node.command_line import say
+from hero_node.ros.program import Program
 
 from .errors import CalibrationError, EndedError
 

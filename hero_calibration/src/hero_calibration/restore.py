@@ -2,7 +2,7 @@
 
 from typing import Dict, List, Optional, Sequence
 
-from hero_client.command_line import say
+from hero_node.command_line import say
 
 from . import store
 from .errors import CalibrationError

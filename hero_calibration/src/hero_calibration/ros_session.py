@@ -6,7 +6,7 @@ from typing import Callable, Sequence
 
 import rospy
 
-from hero_client.program import Program
+from hero_node.ros.program import Program
 
 from .probe import Probe
 from .session import Session

@@ -7,7 +7,7 @@ clock of this computer: a subclass has the time (ros_session).
 from abc import ABC, abstractmethod
 from typing import Callable, List, Optional, Sequence
 
-from hero_client.command_line import say
+from hero_node.command_line import say
 
 from .errors import CalibrationError, EndedError
 from .probe import Probe

@@ -9,8 +9,8 @@ from typing import Any, Dict, List, NamedTuple, Tuple
 
 import yaml
 
-from hero_client.safe_file import lock_file, write_file
-from hero_client.texts import make_printable, one_line
+from hero_node.safe_file import lock_file, write_file
+from hero_node.texts import make_printable, one_line
 
 from .errors import CalibrationError
 

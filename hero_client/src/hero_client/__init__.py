@@ -4,53 +4,102 @@ Public names are imported on first use (PEP 562), so that pure modules of this p
 """
 
 from importlib import import_module
-from threading import Thread
 from typing import TYPE_CHECKING, Any
 
-if TYPE_CHECKING:  # of these mypy knows what programs may use of a robot, whatever connects it
-    from .robots.robot_base import BaseRobot as BaseRobot  # noqa: PLC0414 - so that it counts as exported
-    from .robots.swarm_base import BaseSwarm as BaseSwarm  # noqa: PLC0414
+if TYPE_CHECKING:  # for editors and mypy
+    from hero_node.clock import Clock
+    from hero_node.errors import HeroError, NodeError, ProgramError
+    from hero_node.ros.private_parameters import read_parameters
+    from hero_node.ros.program import Program, run
+    from hero_node.ros.script import rate, start_node
 
-# The rospy of Debian 11 calls it when a script ends; its Python 3.9 no longer has it.
-if not hasattr(Thread, "isAlive"):
-    setattr(Thread, "isAlive", Thread.is_alive)  # noqa: B010 - mypy knows no such method
+    from .apps.go_to_goal_server import GoToGoalServer
+    from .robot import Robot
+    from .robots.common_frame import CommonFrame
+    from .robots.robot_base import BaseRobot
+    from .robots.swarm_base import BaseSwarm
+    from .ros.drivers import Drivers
+    from .ros.stop_status import StopStatus
+    from .swarm import Swarm, open_swarm
+    from .values.background_motion import BackgroundMotion
+    from .values.colors import COLORS
+    from .values.errors import (
+        FrameError,
+        GoalError,
+        RobotError,
+        RobotNotReadyError,
+        StaleDataError,
+        StoppedError,
+    )
+    from .values.geometry import Pose, Velocity
+    from .values.readings import Obstacle
+
+__all__ = [
+    "COLORS",
+    "BackgroundMotion",
+    "BaseRobot",
+    "BaseSwarm",
+    "Clock",
+    "CommonFrame",
+    "Drivers",
+    "FrameError",
+    "GoToGoalServer",
+    "GoalError",
+    "HeroError",
+    "NodeError",
+    "Obstacle",
+    "Pose",
+    "Program",
+    "ProgramError",
+    "Robot",
+    "RobotError",
+    "RobotNotReadyError",
+    "StaleDataError",
+    "StopStatus",
+    "StoppedError",
+    "Swarm",
+    "Velocity",
+    "open_swarm",
+    "rate",
+    "read_parameters",
+    "run",
+    "start_node",
+]
 
 _MODULES = {
-    "BackgroundMotion": "values.background_motion",
-    "BaseRobot": "robots.robot_base",
-    "BaseSwarm": "robots.swarm_base",
-    "COLORS": "values.colors",
-    "Clock": "values.clock",
-    "CommonFrame": "robots.common_frame",
-    "Drivers": "ros.drivers",
-    "FrameError": "values.errors",
-    "GoToGoalServer": "apps.go_to_goal_server",
-    "GoalError": "values.errors",
-    "HeroError": "values.errors",
-    "NodeError": "values.errors",
-    "Obstacle": "values.readings",
-    "Pose": "values.geometry",
-    "Program": "program",
-    "ProgramError": "values.errors",
-    "Robot": "robot",
-    "RobotError": "values.errors",
-    "RobotNotReadyError": "values.errors",
-    "StaleDataError": "values.errors",
-    "StopStatus": "ros.stop_status",
-    "StoppedError": "values.errors",
-    "Swarm": "swarm",
-    "Velocity": "values.geometry",
-    "open_swarm": "swarm",
-    "rate": "script",
-    "read_parameters": "parameters",
-    "run": "program",
-    "start_node": "script",
+    "BackgroundMotion": "hero_client.values.background_motion",
+    "BaseRobot": "hero_client.robots.robot_base",
+    "BaseSwarm": "hero_client.robots.swarm_base",
+    "COLORS": "hero_client.values.colors",
+    "Clock": "hero_node.clock",
+    "CommonFrame": "hero_client.robots.common_frame",
+    "Drivers": "hero_client.ros.drivers",
+    "FrameError": "hero_client.values.errors",
+    "GoToGoalServer": "hero_client.apps.go_to_goal_server",
+    "GoalError": "hero_client.values.errors",
+    "HeroError": "hero_node.errors",
+    "NodeError": "hero_node.errors",
+    "Obstacle": "hero_client.values.readings",
+    "Pose": "hero_client.values.geometry",
+    "Program": "hero_node.ros.program",
+    "ProgramError": "hero_node.errors",
+    "Robot": "hero_client.robot",
+    "RobotError": "hero_client.values.errors",
+    "RobotNotReadyError": "hero_client.values.errors",
+    "StaleDataError": "hero_client.values.errors",
+    "StopStatus": "hero_client.ros.stop_status",
+    "StoppedError": "hero_client.values.errors",
+    "Swarm": "hero_client.swarm",
+    "Velocity": "hero_client.values.geometry",
+    "open_swarm": "hero_client.swarm",
+    "rate": "hero_node.ros.script",
+    "read_parameters": "hero_node.ros.private_parameters",
+    "run": "hero_node.ros.program",
+    "start_node": "hero_node.ros.script",
 }
-
-__all__ = sorted(_MODULES)  # noqa: PLE0605
 
 
 def __getattr__(name: str) -> Any:
     if name not in _MODULES:
         raise AttributeError("hero_client has no attribute %r" % name)
-    return getattr(import_module("hero_client." + _MODULES[name]), name)
+    return getattr(import_module(_MODULES[name]), name)

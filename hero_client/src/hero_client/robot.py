@@ -17,10 +17,10 @@ from typing import Any
 from nav_msgs.msg import Odometry
 
 from hero_msgs.msg import Encoder
+from hero_node.ros.script import start_node
 
 from .robots.robot_base import NEXT_ODOM_S, BaseRobot, check_robot_id
 from .ros.ros_link import RosLink
-from .script import start_node
 
 __all__ = ["Robot"]
 

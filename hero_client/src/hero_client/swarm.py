@@ -5,16 +5,17 @@ from typing import Iterable, List, Optional
 import rospy
 
 from hero_msgs.msg import RobotArray
+from hero_node.errors import ProgramError
+from hero_node.ros.program import Program
+from hero_node.ros.ros_clock import ROS_CLOCK
+from hero_node.ros.script import start_node
 
-from .program import Program
 from .robot import Robot
 from .robots.swarm_base import REPORT_PERIOD_S, BaseSwarm
 from .ros.drivers import USUAL_TOPIC, share_drivers
-from .ros.ros_clock import ROS_CLOCK
 from .ros.stop_status import StopStatus
-from .script import start_node
 from .values.background_motion import Sleep
-from .values.errors import ProgramError, RobotNotReadyError
+from .values.errors import RobotNotReadyError
 
 __all__ = ["Swarm", "open_swarm"]
 

@@ -9,8 +9,8 @@ import rospy
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-from hero_client.parameters import read_parameters
-from hero_client.program import Program, run
+from hero_node.ros.private_parameters import read_parameters
+from hero_node.ros.program import Program, run
 
 from .robots_parameter import given_robots
 from .rviz_config import LIGHTS_TOPIC

@@ -2,8 +2,8 @@
 
 from typing import Any, List
 
-from hero_client.parameters import Parameter, parse_robot_ids
-from hero_client.values.errors import ProgramError
+from hero_node.errors import ProgramError
+from hero_node.parameters import Parameter, parse_robot_ids
 
 
 def check_given(name: str, value: Any) -> List[int]:

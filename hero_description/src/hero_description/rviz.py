@@ -10,9 +10,10 @@ import shutil
 import sys
 import tempfile
 
-from hero_client.parameters import choice, flag, read_parameters
-from hero_client.program import Program, run
-from hero_client.values.errors import ProgramError
+from hero_node.errors import ProgramError
+from hero_node.parameters import choice, flag
+from hero_node.ros.private_parameters import read_parameters
+from hero_node.ros.program import Program, run
 
 from .robots_parameter import given_robots
 from .rviz_config import FRAMES, make_config

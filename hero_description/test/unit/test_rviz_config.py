@@ -3,9 +3,9 @@
 import pytest
 import yaml
 
-from hero_client.values.errors import ProgramError
 from hero_description.robots_parameter import check_given
 from hero_description.rviz_config import GOAL_TOPIC, POINT_TOPIC, make_config
+from hero_node.errors import ProgramError
 
 TOPIC_KEYS = ("TF Prefix", "Topic", "Marker Topic", "Image Topic")
 

@@ -21,6 +21,10 @@ import rosgraph
 import rosgraph.roslogging
 import rospy
 
+from hero_node.ros.connections import open_tcpros_server
+from hero_node.ros.master import find_running_node
+from hero_node.ros.ros_node import end_ros_node
+
 from .config import ConfigError, DriverConfig, read_config
 from .gateway import STOP_LIMIT_S, Gateway
 from .reports import FleetStatus, Reporter
@@ -30,9 +34,7 @@ from .ros.rospy_internals import (
     call_before_shutdown,
     keep_publishers_connected,
     leave_topics_out_of_rosout,
-    open_tcpros_server,
 )
-from .ros.running_node import find_running_node
 from .ros.worker import Worker
 from .stop_interface import PARAMETER, StopInterface
 from .transport import Address, EventLoop, HostNotFoundError, NoAnswerError, TransportSettings
@@ -237,7 +239,7 @@ def main(argv: Optional[List[str]] = None) -> int:
         return node.spin()
     finally:
         node.close()
-        _leave_ros()
+        end_ros_node("the driver ended", LEAVE_WAIT_S)
 
 
 def _enter_ros(argv: Optional[List[str]], log: LogRelay) -> None:
@@ -266,13 +268,6 @@ def _enter_ros(argv: Optional[List[str]], log: LogRelay) -> None:
         ) from error
     leave_topics_out_of_rosout()
     tell_of_lost_log_lines()
-
-
-def _leave_ros() -> None:
-    """Tell the ROS master that this node ends; one that does not answer must not hold it up."""
-    leaving = threading.Thread(target=rospy.signal_shutdown, args=("the driver ended",), daemon=True)
-    leaving.start()
-    leaving.join(LEAVE_WAIT_S)
 
 
 def _wait_for_master() -> None:

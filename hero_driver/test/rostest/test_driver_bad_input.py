@@ -25,9 +25,9 @@ from fake_robot import PUB, STOCK_DECLARATIONS, Declaration, FakeRobot
 from std_msgs.msg import ColorRGBA
 from std_srvs.srv import SetBool
 
-from hero_driver.ros.handshakes import HANDSHAKE_TIMEOUT_S
 from hero_driver.rosserial import packets
 from hero_msgs.msg import Encoder, Robot
+from hero_node.ros.handshakes import HANDSHAKE_TIMEOUT_S
 from hero_test.waiting import wait_for
 
 USAGE_ERROR = 2

@@ -10,8 +10,8 @@ from hero_client import CommonFrame, Program, open_swarm, read_parameters, run
 from hero_client.controllers.avoidance import WanderLaw, WanderMemory, wander
 from hero_client.controllers.go_to_goal import Goal, GoToGoalController
 from hero_client.controllers.motion import State
-from hero_client.parameters import flag, number, robot_ids, whole_number
 from hero_client.values.geometry import STOP
+from hero_node.parameters import flag, number, robot_ids, whole_number
 
 NEAR_M = 0.35
 """So near to where the map ends a robot walks at random: its eight beams leave gaps, which only motion fills."""

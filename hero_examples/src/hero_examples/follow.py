@@ -4,9 +4,9 @@ import rospy
 
 from hero_client import CommonFrame, Program, ProgramError, Swarm, read_parameters, run
 from hero_client.controllers.unicycle import FollowLaw, follow
-from hero_client.parameters import number, parse_poses, robot_ids
 from hero_client.values.geometry import STOP
 from hero_client.values.robot_constants import MAX_LINEAR_M_S
+from hero_node.parameters import number, parse_poses, robot_ids
 
 
 def step(swarm, common, law):

@@ -5,7 +5,7 @@ import colorsys
 import rospy
 
 from hero_client import Program, open_swarm, read_parameters, run
-from hero_client.parameters import choice, number, robot_ids
+from hero_node.parameters import choice, number, robot_ids
 
 
 def rainbow(phase, share, lit):

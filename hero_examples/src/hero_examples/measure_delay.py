@@ -6,8 +6,8 @@ from matplotlib.figure import Figure
 from nav_msgs.msg import Odometry
 
 from hero_client import Program, open_swarm, read_parameters, run
-from hero_client.parameters import robot_ids, whole_number
 from hero_client.values.geometry import wrap_angle, yaw_of
+from hero_node.parameters import robot_ids, whole_number
 
 
 def measure(program, robot, turns):

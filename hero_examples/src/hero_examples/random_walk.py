@@ -7,9 +7,9 @@ import rospy
 
 from hero_client import Program, open_swarm, read_parameters, run
 from hero_client.controllers.avoidance import WanderLaw, WanderMemory, wander
-from hero_client.parameters import number, robot_ids, whole_number
 from hero_client.values.geometry import STOP
 from hero_client.values.robot_constants import MAX_LINEAR_M_S
+from hero_node.parameters import number, robot_ids, whole_number
 
 
 class Walker:

@@ -6,8 +6,8 @@ from hero_client import CommonFrame, Program, ProgramError, open_swarm, read_par
 from hero_client.apps.formations import assign_goals, place_formation
 from hero_client.controllers.orca import AvoidanceLaw
 from hero_client.controllers.swarm_go_to import SwarmGoToController
-from hero_client.parameters import flag, number, parse_poses, robot_ids, whole_number
 from hero_client.values.robot_constants import MAX_LINEAR_M_S
+from hero_node.parameters import flag, number, parse_poses, robot_ids, whole_number
 
 STEP_S = 0.1
 

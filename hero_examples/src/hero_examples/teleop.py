@@ -8,8 +8,8 @@ from hero_client.apps.keyboard_teleop import (
     MIN_LINEAR_M_S,
     KeyboardTeleop,
 )
-from hero_client.parameters import number, robot_ids
 from hero_client.values.robot_constants import MAX_LINEAR_M_S
+from hero_node.parameters import number, robot_ids
 
 
 def drive():

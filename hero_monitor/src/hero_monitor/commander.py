@@ -12,9 +12,9 @@ import rospy
 from geometry_msgs.msg import PoseStamped, Twist
 
 from hero_client.ros.drivers import Drivers
-from hero_client.ros_node import ask_master
-from hero_client.values.errors import NodeError
 from hero_client.values.geometry import Pose
+from hero_node.errors import NodeError
+from hero_node.ros.master import ask_master
 
 from .background import Background
 from .dead_man import STOPS, DeadMan, Velocity

@@ -9,6 +9,8 @@ import ipaddress
 from collections import Counter
 from typing import Dict, NamedTuple, Protocol, Set
 
+from hero_node.token_bucket import TokenBuckets
+
 CONNECTIONS_MAX = 400
 UNTRUSTED_PER_ADDRESS_MAX = 50
 """Untrusted connections of one address. Each is served one request per turn of the loop, however many it sends."""
@@ -19,9 +21,6 @@ UNTRUSTED_S = 10.0
 TOKEN_BURST = 5
 TOKEN_PERIOD_S = 5.0
 """An address may try TOKEN_BURST wrong tokens at once, then one in TOKEN_PERIOD_S."""
-
-ADDRESSES_MAX = 1000
-"""Addresses whose wrong tokens are remembered."""
 
 
 class Connection(Protocol):
@@ -100,16 +99,12 @@ class TokenAttempts:
     """Wrong tokens, limited by a token bucket per address."""
 
     def __init__(self) -> None:
-        self._full_again_s: Dict[str, float] = {}
+        self._buckets = TokenBuckets(TOKEN_BURST, 1.0 / TOKEN_PERIOD_S)
 
     def admits(self, address: str, now_s: float) -> bool:
         """Return whether this address may try a token."""
-        full_s = self._full_again_s.get(group_address(address), now_s)
-        return full_s - now_s <= (TOKEN_BURST - 1) * TOKEN_PERIOD_S
+        return self._buckets.count(group_address(address), now_s) >= 1.0
 
     def count_wrong(self, address: str, now_s: float) -> None:
         """Count a wrong token."""
-        address = group_address(address)
-        if len(self._full_again_s) >= ADDRESSES_MAX and address not in self._full_again_s:
-            del self._full_again_s[min(self._full_again_s, key=lambda known: self._full_again_s[known])]
-        self._full_again_s[address] = max(now_s, self._full_again_s.get(address, now_s)) + TOKEN_PERIOD_S
+        self._buckets.take(group_address(address), 1.0, now_s)

@@ -6,8 +6,9 @@ import re
 import stat
 from typing import List, NamedTuple, Optional
 
-from hero_client.parameters import flag, number, read_parameters, whole_number
-from hero_client.values.errors import ProgramError
+from hero_node.errors import ProgramError
+from hero_node.parameters import flag, number, whole_number
+from hero_node.ros.private_parameters import read_parameters
 
 from .access import TOKEN_LENGTH_MIN, is_loopback
 

@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any, Dict, Union
 
 import rospy
 
-from hero_client.program import Program, run
-from hero_client.values.errors import ProgramError
 from hero_client.values.geometry import Pose
+from hero_node.errors import ProgramError
+from hero_node.file_limit import raise_file_limit
+from hero_node.ros.program import Program, run
 
 from .access import Access
 from .background import Background
@@ -43,7 +44,7 @@ class Monitor:
         # Here, so that a machine without tornado gets a line that says what to do.
         import tornado.ioloop
 
-        from .server import Actions, Server, raise_file_limit
+        from .server import Actions, Server
 
         self._parameters = parameters
         self._program = program

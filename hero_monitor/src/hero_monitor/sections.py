@@ -9,8 +9,8 @@ import math
 from collections import deque
 from typing import Any, Deque, Dict, List, NamedTuple, Optional, Sequence
 
-from hero_client.texts import make_printable
 from hero_client.values.geometry import Pose
+from hero_node.texts import make_printable
 
 LONGEST_LINE = 400
 LOG_LINES_KEPT = 500

@@ -8,10 +8,8 @@ import itertools
 import json
 import logging
 import mimetypes
-import resource
 import secrets
 import socket
-import sys
 import time
 from collections import deque
 from pathlib import Path
@@ -311,10 +309,3 @@ class Server:
 
 def ignore_request(handler: tornado.web.RequestHandler) -> None:
     """Log no request: a URL may contain a secret by mistake."""
-
-
-def raise_file_limit() -> int:
-    """Raise the limit of open files to the hard limit; return it."""
-    _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
-    return sys.maxsize if hard == resource.RLIM_INFINITY else hard

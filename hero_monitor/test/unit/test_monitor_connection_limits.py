@@ -3,7 +3,6 @@
 import pytest
 
 from hero_monitor.connection_limits import (
-    ADDRESSES_MAX,
     TOKEN_BURST,
     TOKEN_PERIOD_S,
     UNTRUSTED_S,
@@ -129,12 +128,3 @@ def test_wrong_tokens_of_one_address_keep_no_other_from_trying():
     attempts = TokenAttempts()
     use_up(attempts, UNTRUSTED)
     assert attempts.admits(OWNER, 0.0)
-
-
-def test_the_addresses_that_are_remembered_are_bounded():
-    attempts = TokenAttempts()
-    use_up(attempts, UNTRUSTED)
-    for number in range(2 * ADDRESSES_MAX):
-        attempts.count_wrong("10.%d.%d.1" % divmod(number, 256), 0.0)
-    assert not attempts.admits(UNTRUSTED, 0.0)
-    assert len(attempts._full_again_s) <= ADDRESSES_MAX

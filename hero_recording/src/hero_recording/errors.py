@@ -3,7 +3,7 @@
 from contextlib import contextmanager
 from typing import Iterator
 
-from hero_client.texts import make_printable
+from hero_node.texts import make_printable
 
 
 class RecordingError(Exception):

@@ -10,8 +10,8 @@ import shutil
 import sys
 from typing import Dict, List, Optional, Sequence, Set, Tuple
 
-from hero_client import command_line
-from hero_client.parameters import robot_ids_option
+from hero_node import command_line
+from hero_node.parameters import robot_ids_option
 
 from .bags import BagSet
 from .errors import RecordingError

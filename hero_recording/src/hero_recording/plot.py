@@ -8,9 +8,9 @@ from typing import Dict, List, Sequence
 
 import numpy as np
 
-from hero_client import command_line
-from hero_client.parameters import robot_ids_option
-from hero_client.safe_file import replace_file
+from hero_node import command_line
+from hero_node.parameters import robot_ids_option
+from hero_node.safe_file import replace_file
 
 from . import analysis
 from .bags import BagSet

@@ -19,10 +19,10 @@ from typing import Dict, List, Optional, Sequence, Set
 import rosgraph
 import roslib.packages
 
-from hero_client import command_line
-from hero_client.parameters import robot_ids_option
-from hero_client.ros_node import ask_master, check_master
-from hero_client.values.errors import NodeError
+from hero_node import command_line
+from hero_node.errors import NodeError
+from hero_node.parameters import robot_ids_option
+from hero_node.ros.master import ask_master, check_master
 
 from .disk_guard import MB, find_reason_to_stop, prepare_folder
 from .errors import RecordingError

@@ -7,7 +7,6 @@ import os
 import queue
 import signal
 import sys
-import threading
 from typing import Tuple
 
 import rosgraph
@@ -15,7 +14,8 @@ import rosgraph.network
 import rosgraph.roslogging
 import rospy
 
-from hero_driver.ros.running_node import find_running_node
+from hero_node.ros.master import find_running_node
+from hero_node.ros.ros_node import end_ros_node
 
 from . import main as command_line
 from . import output
@@ -29,6 +29,9 @@ NODE_NAME = "hero_sim"
 
 SERVICE_LIMIT_S = 2.0
 """A service call that the simulator's thread does not serve by then is answered with a failure."""
+
+MASTER_WAIT_S = 0.7
+"""A master that is gone must not delay the end for longer."""
 
 LINGER_S = 2.5
 """roslaunch ends all of its nodes at once; the driver takes up to 2 s to stop its robots."""
@@ -78,10 +81,7 @@ def check_environment() -> None:
 def main() -> None:
     """Run the simulator until ROS or a signal ends it."""
     status = output.call(_run)
-    # ROS is told, but a master that is gone must not delay the end for long.
-    shutdown = threading.Thread(target=rospy.signal_shutdown, args=("hero_sim ends",), daemon=True)
-    shutdown.start()
-    shutdown.join(timeout=0.7)
+    end_ros_node("hero_sim ends", MASTER_WAIT_S)
     os._exit(status)
 
 

@@ -14,8 +14,8 @@ from typing import Dict, List, Optional, Sequence
 
 import rospy
 
-from hero_client import command_line
-from hero_client.texts import make_printable
+from hero_node import command_line
+from hero_node.texts import make_printable
 
 from .checkup import computer, graph, localization, network
 from .checkup.points import FAIL, OK, WARN, Finding, Point, run_points, warn

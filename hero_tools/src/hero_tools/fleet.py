@@ -18,12 +18,12 @@ from typing import Dict, List, Optional, Sequence, Set
 import rospy
 
 from hero_client.apps.keyboard import Keyboard, NoTerminalError
-from hero_client.program import Program
-from hero_client.program import run as run_program
 from hero_client.ros.drivers import Drivers
 from hero_client.ros.robot_listener import RobotListener, RobotTrack
 from hero_client.ros.stop_status import StopStatus, paint
 from hero_msgs.msg import Robot
+from hero_node.ros.program import Program
+from hero_node.ros.program import run as run_program
 
 from .fleet_rows import ORDERS, RobotRow, find_missing, sort_rows
 from .fleet_table import format_json, format_table, format_title

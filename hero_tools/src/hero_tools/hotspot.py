@@ -18,7 +18,7 @@ import subprocess
 import sys
 from typing import List, Optional, Sequence, Tuple
 
-from hero_client import command_line
+from hero_node import command_line
 
 CONNECTION = "hero_hotspot"
 ADDRESS = "10.42.0.1"  # robots connect to it by default

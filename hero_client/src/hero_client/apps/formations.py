@@ -14,8 +14,8 @@ from typing import Any, Dict, List, Sequence, Tuple
 import yaml
 from scipy.optimize import linear_sum_assignment
 
-from ..texts import one_line
-from ..values.errors import ProgramError
+from hero_node.errors import ProgramError
+from hero_node.texts import one_line
 
 __all__ = ["FormationError", "Point", "assign_goals", "place_formation"]
 

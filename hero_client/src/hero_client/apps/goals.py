@@ -13,7 +13,6 @@ from typing import Any, Callable, NamedTuple, Protocol, Tuple
 from ..controllers.go_to_goal import Goal, GoToGoalController
 from ..controllers.motion import State
 from ..robots.robot_base import BaseRobot
-from ..values.errors import HeroError
 from ..values.geometry import yaw_of
 
 __all__ = [

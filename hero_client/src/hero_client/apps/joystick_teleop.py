@@ -9,9 +9,10 @@ from typing import NamedTuple, Optional
 import rospy
 from sensor_msgs.msg import Joy
 
-from ..program import Program
+from hero_node.errors import ProgramError
+from hero_node.ros.program import Program
+
 from ..swarm import REPORT_PERIOD_S, Swarm
-from ..values.errors import ProgramError
 from ..values.geometry import STOP, Velocity
 from .teleop_output import TeleopOutput
 

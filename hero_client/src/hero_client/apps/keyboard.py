@@ -9,7 +9,7 @@ import termios
 import tty
 from typing import IO, Any, List, Optional, Tuple
 
-from ..values.errors import ProgramError
+from hero_node.errors import ProgramError
 
 __all__ = ["ARROWS", "Keyboard", "NoTerminalError", "open_terminal", "split_keys"]
 

@@ -10,7 +10,8 @@ import os
 import sys
 from typing import Dict, List, Tuple
 
-from ..program import Program
+from hero_node.ros.program import Program
+
 from ..robot import Robot
 from ..ros.stop_status import paint
 from ..swarm import Swarm

@@ -2,8 +2,10 @@
 
 from typing import Dict, List, Mapping, Optional, Tuple
 
-from ..values.clock import Clock
-from ..values.errors import FrameError, ProgramError, StaleDataError
+from hero_node.clock import Clock
+from hero_node.errors import ProgramError
+
+from ..values.errors import FrameError, StaleDataError
 from ..values.geometry import Pose, invert_pose, transform_pose
 from .robot_base import BaseRobot
 from .swarm_base import AnyRobot, BaseSwarm

@@ -3,8 +3,9 @@
 import math
 from typing import Optional, Protocol, Sequence, TypeVar
 
+from hero_node.clock import Clock
+
 from ..values.background_motion import BackgroundMotion, Hold, Sleep, Steps, run_steps
-from ..values.clock import Clock
 from ..values.errors import RobotNotReadyError
 
 __all__ = ["POLL_PERIOD_S", "READY_TIMEOUT_S", "REPEAT_PERIOD_S", "Group", "Member", "stop_after", "wait_for_all"]

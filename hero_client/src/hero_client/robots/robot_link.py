@@ -2,8 +2,9 @@
 
 from typing import List, Optional, Protocol, Tuple
 
+from hero_node.clock import Clock
+
 from ..values.background_motion import BackgroundMotion, Steps
-from ..values.clock import Clock
 from ..values.geometry import Pose, Velocity
 
 __all__ = ["MAP", "RobotLink"]

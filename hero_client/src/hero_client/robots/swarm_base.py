@@ -3,10 +3,12 @@
 from abc import abstractmethod
 from typing import Any, Dict, Generic, Iterator, List, Mapping, Optional, Sequence, TypeVar
 
+from hero_node.clock import Clock
+from hero_node.errors import HeroError
+
 from ..values.background_motion import BackgroundMotion
-from ..values.clock import Clock
 from ..values.colors import Color
-from ..values.errors import GoalError, HeroError
+from ..values.errors import GoalError
 from ..values.geometry import Pose
 from .group import Group
 from .robot_base import BaseRobot

@@ -17,9 +17,9 @@ import rospy
 from std_msgs.msg import Bool
 
 from hero_msgs.msg import Robot, RobotArray
+from hero_node.errors import NodeError, ProgramError
+from hero_node.ros.master import ask_master
 
-from ..ros_node import ask_master
-from ..values.errors import NodeError, ProgramError
 from .stop_status import TIME_LIMIT_S, DriverReply, StopRequest, StopStatus
 
 __all__ = ["STATES", "STOP_STATES", "USUAL_TOPIC", "Drivers", "share_drivers"]

@@ -8,9 +8,10 @@ from typing import Dict, NamedTuple, Optional
 import rospy
 
 from hero_msgs.msg import RobotPose, RobotPoses
+from hero_node.errors import NodeError
+from hero_node.ros.master import ask_master
 
-from ..ros_node import ask_master
-from ..values.errors import FrameError, NodeError, StaleDataError
+from ..values.errors import FrameError, StaleDataError
 from ..values.geometry import Pose
 from ..values.readings import FRESH_S, is_plausible
 

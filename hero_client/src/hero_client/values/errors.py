@@ -1,28 +1,15 @@
-"""Everything that goes wrong in a program that uses robots. The text is one line: what, why, and what to do. Pure."""
+"""What goes wrong with robots. The text is one line: what, why, and what to do. Pure."""
+
+from hero_node.errors import HeroError
 
 __all__ = [
     "FrameError",
     "GoalError",
-    "HeroError",
-    "NodeError",
-    "ProgramError",
     "RobotError",
     "RobotNotReadyError",
     "StaleDataError",
     "StoppedError",
 ]
-
-
-class HeroError(Exception):
-    """The base of all errors of this package. A program that does not catch it prints its text and ends with 1."""
-
-
-class ProgramError(HeroError):
-    """The program cannot work as it was started, for example because of a wrong parameter."""
-
-
-class NodeError(ProgramError):
-    """The program's ROS node cannot start, or the ROS master does not answer."""
 
 
 class FrameError(HeroError):

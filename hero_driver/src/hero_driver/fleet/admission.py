@@ -5,7 +5,7 @@ import ipaddress
 from dataclasses import dataclass
 from typing import Counter, Optional, Tuple, Union
 
-from .token_bucket import TokenBuckets
+from hero_node.token_bucket import TokenBuckets
 
 __all__ = ["GARBAGE_BURST_LENGTH", "GARBAGE_PER_S", "NEW_ROBOTS_PER_S", "Admission", "AdmissionLimits", "RateLimit"]
 

@@ -11,7 +11,8 @@ from typing import Dict, List, Tuple
 
 import rospy
 
-from ..fleet.token_bucket import TokenBuckets
+from hero_node.token_bucket import TokenBuckets
+
 from .rospy_internals import ROSOUT_LOGGER, list_log_handlers
 from .worker import Worker
 

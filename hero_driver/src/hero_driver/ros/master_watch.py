@@ -12,8 +12,9 @@ from typing import Any, Callable, Tuple
 import rosgraph
 import rospy
 
+from hero_node.ros.master import LimitedTransport
+
 from .rospy_internals import list_registrations
-from .running_node import LimitedTransport
 
 CHECK_INTERVAL_S = 2.0
 

@@ -12,9 +12,8 @@ import traceback
 from typing import Any, Callable, List, NamedTuple, Sequence, Tuple
 
 import rospy
-from rosgraph.network import decode_ros_handshake_header, write_ros_handshake_header
 from rosgraph_msgs.msg import Log
-from rospy.impl import rosout, tcpros_base, tcpros_pubsub
+from rospy.impl import rosout, tcpros_pubsub
 from rospy.impl.registration import (
     RegManager,
     get_registration_listeners,
@@ -22,64 +21,11 @@ from rospy.impl.registration import (
     get_topic_manager,
 )
 
-from .handshakes import HandshakeReader
-
-WAITING_CONNECTIONS = 1024
-"""Subscribers that may wait to be accepted. rospy lets 5 wait, while one recorder or RViz comes for all topics of all
-robots at once: the others' connections stall in TCP's back-off, for a minute and more with fifty robots. The system may
-cap it (net.core.somaxconn, 4096 on Linux)."""
-
-REASON_LENGTH_MAX = 300
-"""rospy's reason to refuse a connection may list every topic of the node: 200 kB with 100 robots."""
-
 RECONNECT_PAUSE_S = 0.5
 """As rospy waits before it connects again; a publisher that breaks each connection costs no more than this."""
 
 ROSOUT_LOGGER = "rosout"
 """The logger of rospy.loginfo() and the like."""
-
-
-# Programs that connect: subscribers and service clients.
-
-
-def open_tcpros_server(warn: Callable[[str, str], None]) -> None:
-    """Serve programs that connect, none of which can hold up another; call it before rospy.init_node().
-
-    rospy reads connection headers on the thread that accepts connections, one after another and without a time
-    limit: one connection that sends two bytes and waits would keep every other subscriber and service client out.
-    warn(address, text) is called from any thread.
-    """
-    server = tcpros_base.init_tcpros_server()
-
-    def serve(sock: socket.socket, address: Any, data: bytes) -> None:
-        reason = _serve_connection(server, sock, address, data)
-        if reason:
-            warn(address[0], "connection of %s to a topic or service refused: %s" % (address[0], reason))
-
-    server._tcp_server_callback = HandshakeReader(serve).add
-    tcpros_base.start_tcpros_server()
-    # A second listen() on a socket that listens changes how many may wait.
-    server.tcp_ros_server.server_sock.listen(WAITING_CONNECTIONS)
-
-
-def _serve_connection(server: Any, sock: socket.socket, address: Any, data: bytes) -> str:
-    """Hand a connection with its header (data) to rospy, as TCPROSServer does; return why not, empty if served."""
-    try:
-        header = decode_ros_handshake_header(data)
-        if "topic" in header:
-            refusal = server.topic_connection_handler(sock, address, header)
-        elif "service" in header:
-            refusal = server.service_connection_handler(sock, address, header)
-        else:
-            refusal = "topic missing"
-        if not refusal:
-            return ""
-        reason = str(refusal)[:REASON_LENGTH_MAX]
-        write_ros_handshake_header(sock, {"error": reason})
-    except Exception as error:  # noqa: BLE001 - whatever the header does to rospy, only this connection is lost
-        reason = "%s: %s" % (type(error).__name__, str(error)[:REASON_LENGTH_MAX])
-    sock.close()
-    return "" if rospy.is_shutdown() else ascii(reason)[1:-1]
 
 
 # Publishers and subscribers.

@@ -7,13 +7,13 @@ import heapq
 import itertools
 import os
 import queue
-import resource
 import select
 import socket
-import sys
 import threading
 import time
 from typing import Callable, Dict, List, NamedTuple, Optional, Set, Tuple, TypeVar
+
+from hero_node.file_limit import raise_file_limit
 
 from .call_queue import CallQueue
 from .dialler import start_dialler
@@ -101,7 +101,7 @@ class EventLoop(LinkOwner):
         self._wake_sender.setblocking(False)
         self._is_running = True
         self._ended = threading.Event()  # for the diallers
-        self._file_limit = _raise_file_limit()
+        self._file_limit = raise_file_limit()
         self.listening: Optional[Address] = None
 
     def open(self) -> None:
@@ -362,14 +362,6 @@ class EventLoop(LinkOwner):
 
     def _warn_network(self, text: str) -> None:
         self.call_soon(lambda: self._handler.warn_network(text))
-
-
-def _raise_file_limit() -> int:
-    """Let this process open as many files as it may without privileges; return how many."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    if soft != hard:
-        resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
-    return sys.maxsize if hard == resource.RLIM_INFINITY else hard
 
 
 def _listen(host: str, port: int) -> socket.socket:

@@ -17,9 +17,6 @@ import rospy
 from nav_msgs.msg import Odometry
 
 from hero_client import Program, ProgramError, Robot, command_line
-from hero_client.command_line import say
-from hero_client.parameters import robot_ids_option
-from hero_client.values.errors import HeroError
 from hero_client.values.geometry import Pose
 from hero_client.values.readings import is_plausible, read_pose
 

@@ -13,7 +13,6 @@ import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
 from hero_client import Program, read_parameters, run
-from hero_client.parameters import number
 from hero_client.values.geometry import Pose
 from hero_msgs.msg import ObjectPose, ObjectPoses, RobotPose, RobotPoses
 

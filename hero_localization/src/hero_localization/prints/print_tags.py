@@ -12,9 +12,9 @@ from typing import Any, Iterator, List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
-from hero_client import command_line
-from hero_client.parameters import robot_ids_option
-from hero_client.safe_file import replace_file
+from hero_node import command_line
+from hero_node.parameters import robot_ids_option
+from hero_node.safe_file import replace_file
 
 from ..errors import LocalizationError
 from .tag_images import DEFAULT_SIZE_M, REFERENCE_SIZE_M

@@ -17,7 +17,7 @@ from geometry_msgs.msg import Point
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
-from hero_client import command_line
+from hero_node import command_line
 from hero_sim.errors import SimulatorError
 from hero_sim.world.arena import Arena, build_default
 from hero_sim.world.arena_file import load_arena

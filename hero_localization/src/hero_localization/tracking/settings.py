@@ -11,9 +11,9 @@ from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional
 import numpy as np
 import yaml
 
-from hero_client.safe_file import lock_file, write_file
-from hero_client.texts import one_line
 from hero_client.values.geometry import Pose
+from hero_node.safe_file import lock_file, write_file
+from hero_node.texts import one_line
 
 from ..camera.camera_model import Camera, Lens
 from ..errors import SettingsError

@@ -3,12 +3,12 @@
 import sys
 from typing import Callable, List, Optional, Tuple
 
-from hero_client.command_line import say
 from hero_client.robots.robot_link import MAP
 from hero_client.values.background_motion import BackgroundMotion, Steps
 from hero_client.values.errors import FrameError, StaleDataError
 from hero_client.values.geometry import Pose, Velocity
 from hero_client.values.readings import FRESH_S
+from hero_node.command_line import say
 
 from ..world.kinematics import Pose as WorldPose
 from ..world.kinematics import find_frame

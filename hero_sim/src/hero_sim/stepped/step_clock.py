@@ -10,8 +10,8 @@ import math
 from typing import Any, List, Optional, Tuple
 
 from hero_client.values.background_motion import BackgroundMotion, Hold, Steps
-from hero_client.values.clock import Clock
-from hero_client.values.errors import HeroError
+from hero_node.clock import Clock
+from hero_node.errors import HeroError
 
 from .robot_rows import RobotRows
 

@@ -15,9 +15,9 @@ from typing import List, Optional, Sequence
 
 import numpy as np
 
-from hero_client.command_line import say
 from hero_client.robots.swarm_base import BaseSwarm
 from hero_client.values.background_motion import Steps
+from hero_node.command_line import say
 
 from ..errors import OptionError
 from ..link.wifi import PROFILES

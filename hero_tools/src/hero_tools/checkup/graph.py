@@ -13,9 +13,9 @@ import rospy
 from rosgraph_msgs.msg import Log
 
 from hero_client.ros.drivers import STATES
-from hero_client.ros_node import ask_master
-from hero_client.values.errors import NodeError
 from hero_msgs.msg import Robot, RobotArray
+from hero_node.errors import NodeError
+from hero_node.ros.master import ask_master
 
 from .network import HOST_REMEDY, Address, find_source_address, is_loopback, is_own, resolve
 from .points import Finding, fail, ok, wait_until, warn

@@ -4,7 +4,7 @@ import time
 
 import rospy
 
-from ..values.clock import Clock
+from ..clock import Clock
 
 __all__ = ["ROS_CLOCK"]
 

@@ -17,10 +17,10 @@ from typing import Callable, List, Optional, Sequence, Type
 
 import rospy
 
-from . import command_line
+from .. import command_line
+from ..clock import Clock
+from ..errors import HeroError
 from .ros_node import start_ros_node
-from .values.clock import Clock
-from .values.errors import HeroError
 
 __all__ = ["Program", "run"]
 

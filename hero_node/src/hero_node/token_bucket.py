@@ -2,7 +2,10 @@
 
 from typing import Dict
 
-_BUCKETS_MAX = 1000
+__all__ = ["BUCKETS_MAX", "TokenBucket", "TokenBuckets"]
+
+BUCKETS_MAX = 1000
+"""Names whose buckets are remembered."""
 
 
 class TokenBucket:
@@ -44,7 +47,14 @@ class TokenBuckets:
         """Take tokens from the bucket of name; return False, and take none, if there are not enough."""
         bucket = self._buckets.get(name)
         if bucket is None:
-            if len(self._buckets) >= _BUCKETS_MAX:
+            if len(self._buckets) >= BUCKETS_MAX:
                 self._buckets = {key: kept for key, kept in self._buckets.items() if not kept.is_full(now_s)}
+            if len(self._buckets) >= BUCKETS_MAX:
+                del self._buckets[next(iter(self._buckets))]  # the oldest
             bucket = self._buckets[name] = TokenBucket(self._burst, self._per_s, now_s)
         return bucket.take(tokens, now_s)
+
+    def count(self, name: str, now_s: float) -> float:
+        """Return how many tokens the bucket of name holds."""
+        bucket = self._buckets.get(name)
+        return self._burst if bucket is None else bucket.count(now_s)

@@ -6,8 +6,8 @@ import threading
 
 import pytest
 
-from hero_client import safe_file
-from hero_client.safe_file import lock_file, replace_file, write_file
+from hero_node import safe_file
+from hero_node.safe_file import lock_file, replace_file, write_file
 
 
 def fail_to_sync(fd):

@@ -1,9 +1,8 @@
-"""The waits of a program: the rate of a loop, and steps that end as they must whatever a wait does."""
+"""The rate of a loop."""
 
 import pytest
 
-from hero_client.values.background_motion import Hold, run_steps
-from hero_client.values.clock import Clock
+from hero_node.clock import Clock
 
 
 class Watch(Clock):
@@ -52,33 +51,3 @@ def test_pace_waits_for_the_rest_of_the_period_only():
     at_s = watch.now_s
     watch.pace(0.1)
     assert watch.now_s == pytest.approx(at_s + 0.1)
-
-
-def take_notes(notes):
-    try:
-        while (yield 0.1):
-            notes.append("step")
-        notes.append("told to end")
-    finally:
-        notes.append("stop")
-        yield Hold(0.06)
-        notes.append("stop")
-
-
-def test_steps_are_told_when_a_wait_says_so_and_take_their_end():
-    watch, held_s, notes = Watch(0.25), [], []
-    run_steps(take_notes(notes), watch.sleep, held_s.append)
-    assert notes == ["step", "step", "told to end", "stop", "stop"]
-    assert held_s == [0.06]
-
-
-@pytest.mark.parametrize("error", (KeyboardInterrupt, SystemExit, RuntimeError))
-def test_what_ends_a_wait_is_raised_after_the_stops(error):
-    held_s, notes = [], []
-
-    def interrupt(duration_s):
-        raise error
-
-    with pytest.raises(error):
-        run_steps(take_notes(notes), interrupt, held_s.append)
-    assert notes == ["stop", "stop"] and held_s == [0.06]

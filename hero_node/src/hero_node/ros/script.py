@@ -8,10 +8,11 @@ from typing import Any, Iterator, Optional, Type
 
 import rospy
 
-from .command_line import print_error
-from .ros.ros_clock import ROS_CLOCK
-from .ros_node import check_master, start_ros_node
-from .values.errors import HeroError
+from ..command_line import print_error
+from ..errors import HeroError
+from .master import check_master
+from .ros_clock import ROS_CLOCK
+from .ros_node import start_ros_node
 
 __all__ = ["rate", "start_node"]
 

@@ -1,17 +1,13 @@
-"""Parameters of a program: declared with a default and a check, read from the ROS parameter server.
-
-    parameters = read_parameters({"robots": robot_ids("0"), "linear_m_s": number(0.1, 0.0, 0.2, "m/s")})
+"""Parameters of a program: declared with a default and a check; see ros.private_parameters. Pure.
 
 A wrong value ends the program with one line: the name, the value and what it must be.
 """
 
 import argparse
 import math
-from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
-import rospy
-
-from .values.errors import ProgramError
+from .errors import ProgramError
 
 __all__ = [
     "Parameter",
@@ -22,7 +18,6 @@ __all__ = [
     "number",
     "parse_poses",
     "parse_robot_ids",
-    "read_parameters",
     "robot_ids",
     "robot_ids_option",
     "whole_number",
@@ -54,7 +49,7 @@ def whole_number(default: int, low: int, high: int) -> Parameter:
     def check(name: str, value: Any) -> int:
         if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
             raise ProgramError("~%s is %r, but must be a whole number from %d to %d" % (name, value, low, high))
-        return value
+        return int(value)
 
     return Parameter(default, check)
 
@@ -78,28 +73,6 @@ def choice(default: str, choices: Sequence[str]) -> Parameter:
 def robot_ids(default: str) -> Parameter:
     """Declare ids of robots; "all" becomes None. See parse_robot_ids()."""
     return Parameter(default, parse_robot_ids)
-
-
-def read_parameters(declared: Mapping[str, Any]) -> Dict[str, Any]:
-    """Return the node's private parameters, checked, with defaults for those that are not set.
-
-    declared: name -> a Parameter, or a default that needs no check.
-    Raises: ProgramError for a value that fails its check, or a name that is not declared, with those that are.
-    """
-    try:
-        given = rospy.get_param("~", {})
-    except KeyError:
-        given = {}
-    unknown = sorted(set(given) - set(declared))
-    if unknown:
-        raise ProgramError("unknown parameter ~%s; known are: %s" % (unknown[0], ", ".join(sorted(declared))))
-    values = {}
-    for name, parameter in declared.items():
-        if isinstance(parameter, Parameter):
-            values[name] = parameter.check(name, given.get(name, parameter.default))
-        else:
-            values[name] = given.get(name, parameter)
-    return values
 
 
 def check_number(name: str, value: Any, low: float, high: float, unit: str = "") -> float:

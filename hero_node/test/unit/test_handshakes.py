@@ -7,7 +7,7 @@ import threading
 
 import pytest
 
-from hero_driver.ros.handshakes import HEADER_LENGTH_MAX, HandshakeReader
+from hero_node.ros.handshakes import HEADER_LENGTH_MAX, HandshakeReader
 
 DEADLINE_S = 60.0
 HEADER = struct.pack("<I", 9) + b"some text"

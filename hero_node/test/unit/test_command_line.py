@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-HEADER = "import sys; from hero_client import command_line\n"
+HEADER = "import sys; from hero_node import command_line\n"
 FEW, MANY = "print('text')", "print('text' * 100000)"
 TO_ITS_END = "def main():\n    for _ in range(100): command_line.say('text')\n    print('end', file=sys.stderr)\n"
 

@@ -1,0 +1,1 @@
+"""What every node and program of the suite is made of. Only modules in `ros` import ROS."""

@@ -1,0 +1,87 @@
+"""XML-RPC calls to the ROS master and to nodes, with a time limit: rospy would wait for ever.
+
+Source: ROS Master API, ROS Slave API.
+"""
+
+import errno
+import http.client
+import xmlrpc.client
+from typing import Any
+from xml.parsers.expat import ExpatError
+
+import rosgraph
+import rospy
+
+from ..errors import NodeError
+
+__all__ = ["MASTER_TIMEOUT_S", "SUCCESS", "LimitedTransport", "ask_master", "check_master", "find_running_node"]
+
+MASTER_TIMEOUT_S = 3.0
+"""A master answers within milliseconds, under load within a second."""
+
+SUCCESS = 1
+"""First part of an answer of the master (ROS Master API)."""
+
+
+class LimitedTransport(xmlrpc.client.Transport):
+    """XML-RPC over HTTP with a time limit."""
+
+    def make_connection(self, host: Any) -> Any:
+        """Return a connection that gives up after MASTER_TIMEOUT_S."""
+        connection = super().make_connection(host)
+        connection.timeout = MASTER_TIMEOUT_S
+        return connection
+
+    def single_request(self, *arguments: Any, **options: Any) -> Any:
+        """Send a request; a timeout gets an error number, because rospy's shutdown fails on an error without one."""
+        try:
+            return super().single_request(*arguments, **options)
+        except OSError as error:
+            if error.errno is not None:
+                raise
+            raise OSError(errno.ETIMEDOUT, "no answer within %g s" % MASTER_TIMEOUT_S) from None
+
+
+def ask_master(method: str, *arguments: Any) -> Any:
+    """Call a method of the ROS master (Master API) and return its value.
+
+    Raises: NodeError if the master does not answer in time or refuses.
+    """
+    uri = ""
+    try:
+        uri = rosgraph.get_master_uri()
+        with xmlrpc.client.ServerProxy(uri, transport=LimitedTransport()) as master:
+            code, text, value = getattr(master, method)(rospy.get_name(), *arguments)
+    except (OSError, OverflowError, ValueError, http.client.HTTPException, xmlrpc.client.Error, ExpatError) as error:
+        raise NodeError("no ROS master at %r (%s)" % (uri, error)) from None
+    if code != SUCCESS:
+        raise NodeError("the ROS master refuses %s: %s" % (method, text))
+    return value
+
+
+def check_master() -> None:
+    """Raise NodeError with what to do if no ROS master answers."""
+    try:
+        ask_master("getPid")
+    except NodeError as error:
+        raise NodeError(
+            "%s: start roslaunch hero_bringup hero_bringup.launch first, or set ROS_MASTER_URI, for example to"
+            " http://localhost:11311" % error
+        ) from None
+
+
+def find_running_node(default_name: str) -> str:
+    """Return the full name that this node will have, if a node of that name answers, else an empty string.
+
+    Call it before rospy.init_node(), which would end the other node. A registration that a dead node left behind does
+    not count.
+
+    default_name: the name that is passed to rospy.init_node(); remappings and the namespace are applied.
+    """
+    name: str = rosgraph.names.resolve_name(rospy.names.get_mappings().get("__name", default_name), rospy.get_name())
+    try:
+        with xmlrpc.client.ServerProxy(ask_master("lookupNode", name), transport=LimitedTransport()) as node:
+            node.getPid(name)
+    except (NodeError, OSError, http.client.HTTPException, xmlrpc.client.Error, ExpatError):
+        return ""
+    return name

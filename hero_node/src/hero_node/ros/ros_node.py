@@ -1,0 +1,80 @@
+"""Starts and ends a ROS node, or says in one line why not, without waiting for a master or program that hangs.
+
+rospy waits for a master without a time limit, and a call that hangs holds a lock that other threads and the end of the
+node wait for. rospy has no setting for either, so this file uses its internals.
+"""
+
+import threading
+from typing import Any
+
+import rosgraph
+import rosgraph.roslogging
+import rospy
+from rospy.impl.registration import RegManager, get_registration_listeners
+
+from ..errors import NodeError
+from ..texts import one_line
+from .connections import open_tcpros_server
+from .master import SUCCESS, LimitedTransport, check_master, find_running_node
+
+__all__ = ["end_ros_node", "end_without_delay", "limit_master_calls", "start_ros_node"]
+
+
+class NodeMaster(rospy.core._LockedServerProxy):
+    """The ROS master, as rospy calls it for all topics and services of the node."""
+
+    def _ServerProxy__request(self, methodname: str, params: Any) -> Any:  # noqa: N802 - the name that xmlrpc calls
+        # rospy repeats a registration until it succeeds or the node has ended, with a lock that the end waits for.
+        if methodname.startswith("register") and rospy.core.is_shutdown_requested():
+            return SUCCESS, "the node ends", []
+        return super()._ServerProxy__request(methodname, params)
+
+
+def limit_master_calls() -> None:
+    """Give rospy's calls to the master a time limit; for the time before rospy.init_node()."""
+    uri = rosgraph.get_master_uri()
+    rospy.core._xmlrpc_cache[uri] = NodeMaster(uri, transport=LimitedTransport())
+
+
+def start_ros_node(name: str, anonymous: bool = False) -> None:
+    """Start the node of this process; signals stay with the caller.
+
+    Raises: NodeError without a ROS master, without a directory for logs, for wrong remappings, or if a node of this
+        name already runs, which ROS would end.
+    """
+    check_master()
+    running = "" if anonymous else find_running_node(name)
+    if running:
+        raise NodeError("%s already runs: end it, or start this one with another __name:=" % running)
+    limit_master_calls()
+    open_tcpros_server(lambda host, text: rospy.logwarn(text))
+    try:
+        rospy.init_node(name, anonymous=anonymous, disable_signals=True)
+    except rosgraph.roslogging.LoggingException as error:
+        raise NodeError("%s: set ROS_LOG_DIR to a directory" % error) from None
+    except (rospy.ROSInitException, OSError, ValueError) as error:
+        raise NodeError(one_line(error)) from None
+    end_without_delay()
+
+
+def end_without_delay() -> None:
+    """Let this node end as soon as its topics are closed.
+
+    rospy's registration thread, for which the interpreter waits, looks for the end only every 0.5 s: it is woken as
+    the shutdown begins, too early, and sleeps again before rospy says that the node is down. Here it is woken after.
+    """
+    managers = [listener for listener in get_registration_listeners().listeners if isinstance(listener, RegManager)]
+
+    def wake(reason: str) -> None:
+        for manager in managers:
+            with manager.cond:
+                manager.cond.notify_all()
+
+    rospy.core.add_shutdown_hook(wake)
+
+
+def end_ros_node(reason: str, timeout_s: float) -> None:
+    """Tell ROS that this node ends; a master that does not answer holds it up for timeout_s at most."""
+    ending = threading.Thread(target=rospy.signal_shutdown, args=(reason,), name="shutdown", daemon=True)
+    ending.start()
+    ending.join(timeout_s)
