@@ -61,4 +61,4 @@ def _serve_connection(server: Any, sock: socket.socket, address: Any, data: byte
     except Exception as error:  # noqa: BLE001 - whatever the header does to rospy, only this connection is lost
         reason = "%s: %s" % (type(error).__name__, str(error)[:REASON_LENGTH_MAX])
     sock.close()
-    return "" if rospy.is_shutdown() else ascii(reason)[1:-1]
+    return "" if rospy.core.is_shutdown_requested() else ascii(reason)[1:-1]
