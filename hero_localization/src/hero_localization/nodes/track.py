@@ -15,6 +15,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from hero_client import Program, read_parameters, run
 from hero_client.values.geometry import Pose
 from hero_msgs.msg import ObjectPose, ObjectPoses, RobotPose, RobotPoses
+from hero_node.parameters import number
 
 from ..camera.frame_source import Frame, open_source
 from ..errors import DetectorError, LocalizationError
