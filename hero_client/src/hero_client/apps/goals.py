@@ -10,6 +10,8 @@ import math
 import queue
 from typing import Any, Callable, NamedTuple, Protocol, Tuple
 
+from hero_node.errors import HeroError
+
 from ..controllers.go_to_goal import Goal, GoToGoalController
 from ..controllers.motion import State
 from ..robots.robot_base import BaseRobot
