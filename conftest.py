@@ -1,8 +1,20 @@
-"""What all tests of pytest share: hypothesis without time limits. A busy machine is not a failure."""
+"""What all tests of pytest share: hypothesis without time limits, chance or memory.
+
+A busy machine is not a failure. Every run tries the same examples, whatever earlier runs found or left behind.
+"""
+
+from pathlib import Path
 
 import hypothesis
+import hypothesis.configuration
 
 hypothesis.settings.register_profile(
-    "patient", deadline=None, suppress_health_check=[hypothesis.HealthCheck.too_slow]
+    "repeatable",
+    deadline=None,
+    derandomize=True,
+    database=None,
+    suppress_health_check=[hypothesis.HealthCheck.too_slow],
 )
-hypothesis.settings.load_profile("patient")
+hypothesis.settings.load_profile("repeatable")
+# Its tables of characters; the sources stay clean.
+hypothesis.configuration.set_hypothesis_home_dir(str(Path(__file__).resolve().parent / ".work" / "hypothesis"))

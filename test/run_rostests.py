@@ -56,11 +56,11 @@ def make_program_path(results_dir):
     return f"{programs.resolve()}:{os.environ['PATH']}"
 
 
-def make_jobs(results_dir, pattern=""):
-    """Return one job for each rostest."""
+def make_jobs(results_dir, pattern="", paths=()):
+    """Return one job for each rostest, or for these."""
     program_path = make_program_path(results_dir)
     jobs = []
-    for path in find_rostests(pattern):
+    for path in paths or find_rostests(pattern):
         package_dir = path.parents[2]
         own_results = Path(results_dir) / package_dir.name / path.stem
         command = (

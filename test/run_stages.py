@@ -1,6 +1,6 @@
 """Runs the stages of script/test side by side, which starts it: tests that wait beside builds and checks that compute.
 
-Usage: run_stages.py RESULTS_DIR STAGE [STAGE ...] [--pattern PATTERN]
+Usage: run_stages.py RESULTS_DIR [STAGE ...] [--pattern PATTERN] [--paths PATH ...]
 The workspace must be sourced. HERO_PYTHON38 is the interpreter of the stages noetic and noetic_rostest; without one,
 they are left out.
 """
@@ -29,14 +29,31 @@ def make_pytest_job(name, arguments, results_dir, load):
     return Job(name, (*command, *junit), results_dir, load, TIMEOUT_S)
 
 
-def make_unit_jobs(results_dir):
-    """Return one job for each package, that with most files first; with the seed, failures can be repeated."""
+def make_unit_jobs(results_dir, packages):
+    """Return the jobs of some packages, that with most files first; of a single package one for each core."""
     jobs = []
-    for path in sorted(ROOT.glob("*/test/unit"), key=lambda path: -len(list(path.iterdir()))):
-        package = path.parents[1].name
-        arguments = (str(path), "--hypothesis-seed=0")
-        jobs.append(make_pytest_job("unit: " + package, arguments, results_dir / package, COMPUTING_LOAD))
+    for package in sorted(packages, key=lambda package: -len(packages[package])):
+        files = sorted(packages[package], key=lambda path: -path.stat().st_size)
+        parts = min(count_cores() // len(packages) or 1, len(files))
+        for part in range(parts):
+            name = package + (f"_{part + 1}_of_{parts}" if parts > 1 else "")
+            arguments = map(str, files[part::parts])
+            jobs.append(make_pytest_job("unit: " + name, arguments, results_dir / name, COMPUTING_LOAD))
     return jobs
+
+
+def find_unit_tests(paths=()):
+    """Return the files of the unit tests of each package: all, or of the packages or tests that the paths name."""
+    if not paths:
+        paths = [path.parents[1] for path in ROOT.glob("*/test/unit")]
+    packages = {}
+    for path in paths:
+        package = ROOT / path.relative_to(ROOT).parts[0]
+        is_test = path.name.startswith("test_") and package / "test" / "unit" in path.parents
+        found = {path} if is_test else set((package / "test" / "unit").rglob("test_*.py"))
+        if found:
+            packages.setdefault(package.name, set()).update(found)
+    return packages
 
 
 def make_workspace_jobs(results_dir):
@@ -53,7 +70,7 @@ def make_workspace_jobs(results_dir):
     return jobs
 
 
-def make_jobs(stages, results, pattern):
+def make_jobs(stages, results, pattern, paths):
     """Return all jobs of the stages, in the order in which they begin: noetic, what waits, and what computes.
 
     What computes fills the cores to the end; noetic computes for longest. Of what computes, the simulator's unit tests
@@ -75,15 +92,24 @@ def make_jobs(stages, results, pattern):
         environment = {"HERO_RESULTS": str(own_results)}
         command = (str(ROOT / "script" / "lint"),)
         jobs.append(Job("lint", command, own_results, COMPUTING_LOAD, TIMEOUT_S, environment, has_own_network=False))
+        tests = [str(ROOT / "test" / "documents")]
+        documents = make_pytest_job("documents", tests, results / "documents", COMPUTING_LOAD)
+        jobs.append(documents._replace(has_own_network=False))
     if "workspaces" in stages:
         jobs += make_workspace_jobs(results / "workspaces")
     if "unit" in stages:
-        jobs += make_unit_jobs(results / "unit")
+        jobs += make_unit_jobs(results / "unit", find_unit_tests())
     if "faults" in stages:
         families = [pattern] if pattern in faults.find_families() else faults.find_families()
         jobs += faults.make_jobs(results / "faults", families, results / "faults.jsonl")
     if "rostest" in stages:
         jobs += run_rostests.make_jobs(results / "rostest", pattern)
+    rostests = [path for path in paths if path.suffix == ".test"]
+    if rostests:
+        jobs += run_rostests.make_jobs(results / "rostest", paths=rostests)
+    if len(paths) > len(rostests):
+        unit_tests = find_unit_tests([path for path in paths if path.suffix != ".test"])
+        jobs += make_unit_jobs(results / "unit", unit_tests)
     return sorted(jobs, key=lambda job: (job.name != "noetic", job.load, job.name != "unit: hero_sim"))
 
 
@@ -91,10 +117,14 @@ def main():
     """Run from the command line; return the exit code."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("results", type=Path)
-    parser.add_argument("stages", nargs="+")
+    parser.add_argument("stages", nargs="*")
     parser.add_argument("--pattern", default="", help="of the paths of rostests, or a family of faults")
+    parser.add_argument("--paths", type=Path, nargs="*", default=(), help="packages, or files of them")
     options = parser.parse_args()
-    passed = run_jobs(make_jobs(options.stages, options.results, options.pattern), count_cores())
+    jobs = make_jobs(options.stages, options.results, options.pattern, options.paths)
+    if not jobs:
+        parser.exit(1, "no unit tests, and no rostest, for %s\n" % ", ".join(map(str, options.paths)))
+    passed = run_jobs(jobs, count_cores())
     if "faults" in options.stages:
         faults.print_table(faults.read_rows(options.results / "faults.jsonl"))
     return int(not passed)

@@ -58,7 +58,7 @@ function(hero_add_tests)
   if(IS_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR}/test/unit)
     set(results ${CATKIN_TEST_RESULTS_DIR}/${PROJECT_NAME}/pytest.xml)
     catkin_run_tests_target("pytest" "unit" "pytest.xml"
-      COMMAND "${PYTHON_EXECUTABLE} -m pytest test/unit --hypothesis-seed=0 --junitxml=${results}"
+      COMMAND "${PYTHON_EXECUTABLE} -m pytest test/unit --junitxml=${results}"
       WORKING_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR})
   endif()
   if(IS_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR}/launch)

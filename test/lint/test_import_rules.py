@@ -1,8 +1,5 @@
 """The borders between the layers, as ARCHITECTURE.md draws them: who may import what."""
 
-import ast
-
-import pytest
 import sources
 
 MODULES = {name: path for name, path in sources.list_source_modules().items() if not name.startswith("hero_test")}
@@ -91,6 +88,22 @@ def imports_of(name):
     return sources.read_imports(MODULES[name])
 
 
+def list_imports():
+    """All imports of all modules, as (name of the module, import)."""
+    return [(name, found) for name in sorted(MODULES) for found in imports_of(name)]
+
+
+def check(violations):
+    """Fail with all violations of a rule, one a line."""
+    violations = list(violations)
+    assert not violations, "\n".join(violations)
+
+
+def describe(name, found):
+    """Where an import stands."""
+    return f"{sources.name_of(MODULES[name])}:{found.line}: imports {found.module}"
+
+
 def modules_below(package):
     return [name for name in MODULES if name == package or name.startswith(package + ".")]
 
@@ -101,97 +114,82 @@ def part_of(module, package):
     return parts[1] if parts[0] == package and len(parts) > 1 and ".".join(parts[:2]) in MODULES else None
 
 
-@pytest.mark.parametrize("name", [name for room in PURE_ROOMS for name in modules_below(room)])
-def test_pure_rooms_know_no_ros_clock_socket_or_thread(name):
-    for found in imports_of(name):
-        assert found.top not in NOT_IN_PURE_ROOMS, f"line {found.line}"
-        assert not sources.is_ros_import(found.module), f"line {found.line}"
+def test_pure_rooms_know_no_ros_clock_socket_or_thread():
+    check(
+        describe(name, found)
+        for name in [name for room in PURE_ROOMS for name in modules_below(room)]
+        for found in imports_of(name)
+        if found.top in NOT_IN_PURE_ROOMS or sources.is_ros_import(found.module)
+    )
 
 
-@pytest.mark.parametrize("room", ROOMS)
-def test_rooms_import_only_what_lies_below_them(room):
-    package, own = room.split(".")
-    for name in modules_below(room):
-        for found in imports_of(name):
-            part = part_of(found.module, package)
-            assert part in ROOMS[room] | {own, None}, f"{name}, line {found.line}: {found.module}"
+def test_rooms_import_only_what_lies_below_them():
+    check(
+        describe(name, found)
+        for room, below in ROOMS.items()
+        for name in modules_below(room)
+        for found in imports_of(name)
+        if part_of(found.module, room.split(".")[0]) not in below | {room.split(".")[1], None}
+    )
 
 
-@pytest.mark.parametrize("package", ("hero_driver", "hero_sim", "hero_client", "hero_localization"))
-def test_neither_rooms_nor_modules_import_each_other_in_a_circle(package):
-    modules = set(modules_below(package)) - {package}
-    by_module = {name: {found.module for found in imports_of(name)} & modules - {name} for name in modules}
-    by_room = {}
-    for name, imported in by_module.items():
-        room = part_of(name, package)
-        by_room.setdefault(room, set()).update({part_of(other, package) for other in imported} - {room})
-    for imports in (by_module, by_room):
-        while imports:
-            leaves = {name for name, imported in imports.items() if not imported & imports.keys()}
-            assert leaves, f"circle among {sorted(imports)}"
-            imports = {name: imported for name, imported in imports.items() if name not in leaves}
+def test_neither_rooms_nor_modules_import_each_other_in_a_circle():
+    for package in sorted({room.split(".")[0] for room in ROOMS}):
+        modules = set(modules_below(package)) - {package}
+        by_module = {name: {found.module for found in imports_of(name)} & modules - {name} for name in modules}
+        by_room = {}
+        for name, imported in by_module.items():
+            room = part_of(name, package)
+            by_room.setdefault(room, set()).update({part_of(other, package) for other in imported} - {room})
+        check_no_circle(by_module)
+        check_no_circle(by_room)
 
 
-@pytest.mark.parametrize("name", sorted(MODULES))
-def test_nothing_imports_the_gateway_except_the_node(name):
-    assert name == "hero_driver.node" or not [f for f in imports_of(name) if f.module == "hero_driver.gateway"]
+def check_no_circle(imports):
+    """Remove what imports nothing of the others, again and again; what stays is a circle."""
+    while imports:
+        leaves = {name for name, imported in imports.items() if not imported & imports.keys()}
+        assert leaves, f"circle among {sorted(imports)}"
+        imports = {name: imported for name, imported in imports.items() if name not in leaves}
 
 
-@pytest.mark.parametrize("name", sorted(MODULES))
-def test_only_the_transports_touch_sockets(name):
-    touched = {found.top for found in imports_of(name)} & SOCKETS
-    owner = any(name == module or name.startswith(module + ".") for module in SOCKET_OWNERS)
-    assert owner or not touched, f"{name} imports {', '.join(sorted(touched))}"
+def test_nothing_imports_the_gateway_except_the_node():
+    gateway = [(name, found) for name, found in list_imports() if found.module == "hero_driver.gateway"]
+    check(describe(name, found) for name, found in gateway if name != "hero_driver.node")
 
 
-@pytest.mark.parametrize("name", sorted(MODULES))
-def test_nothing_imports_a_node(name):
-    assert not [found for found in imports_of(name) if found.module.endswith(".node")]
+def test_only_the_transports_touch_sockets():
+    touching = [(name, found) for name, found in list_imports() if found.top in SOCKETS]
+    owners = tuple(owner + "." for owner in SOCKET_OWNERS)
+    check(describe(name, found) for name, found in touching if not f"{name}.".startswith(owners))
 
 
-@pytest.mark.parametrize("name", modules_below("hero_localization"))
-def test_real_cameras_and_their_calibration_need_no_simulator(name):
-    simulated = part_of(name, "hero_localization") in {"simulated_camera", "stepped_localization"}
-    assert simulated or "hero_sim" not in {found.top for found in imports_of(name)}
+def test_nothing_imports_a_node():
+    check(describe(name, found) for name, found in list_imports() if found.module.endswith(".node"))
 
 
-@pytest.mark.parametrize("name", modules_below("hero_sim"))
-def test_only_stepped_robots_need_the_client(name):
+def test_real_cameras_and_their_calibration_need_no_simulator():
+    package, simulated = "hero_localization", {"simulated_camera", "stepped_localization"}
+    others = [name for name in modules_below(package) if part_of(name, package) not in simulated]
+    check(describe(name, found) for name in others for found in imports_of(name) if found.top == "hero_sim")
+
+
+def test_only_stepped_robots_need_the_client():
     # `python3 -m hero_sim` runs without ROS, and hero_client lies beside it only in a workspace.
-    assert part_of(name, "hero_sim") == "stepped" or "hero_client" not in {found.top for found in imports_of(name)}
+    others = [name for name in modules_below("hero_sim") if part_of(name, "hero_sim") != "stepped"]
+    check(describe(name, found) for name in others for found in imports_of(name) if found.top == "hero_client")
 
 
-@pytest.mark.parametrize("name", modules_below("hero_sim"))
-def test_the_simulator_shares_only_packets_and_payloads_with_the_driver(name):
+def test_the_simulator_shares_only_packets_and_payloads_with_the_driver():
     core = "hero_driver.rosserial"
-    shared = [f"{core}.{module}" for module in ("errors", "packets", "payloads")]
-    if part_of(name, "hero_sim") == "stepped":  # stands in for the driver, too: its pure rules, never its protocol
-        shared += ["hero_driver.commands", "hero_driver.corrections", "hero_driver.robot_constants"]
-    for found in imports_of(name):
-        if found.top == "hero_driver" and found.module != core:  # `from hero_driver.rosserial import ...`
-            allowed = any(
-                found.module == module or found.module.startswith(module + ".") for module in shared
-            )
-            assert allowed, f"line {found.line}: {found.module}"
-
-
-@pytest.fixture(scope="module")
-def names_by_module():
-    names = {}
-    for path in sources.list_python_files():  # a directory of tests is on the path: its modules go by their stem
-        names.setdefault(path.stem, set()).update(sources.list_top_level_names(path))
-    modules = sources.list_source_modules().items()
-    return {**names, **{name: sources.list_top_level_names(path) for name, path in modules}}
-
-
-@pytest.mark.parametrize("path", sources.list_python_files(), ids=sources.name_of)
-def test_names_that_are_imported_from_our_modules_exist(path, names_by_module):
-    for node in ast.walk(sources.parse(path)):
-        if isinstance(node, ast.ImportFrom) and not node.level and node.module in names_by_module:
-            for alias in node.names:
-                is_module = f"{node.module}.{alias.name}" in names_by_module
-                is_name = names_by_module[node.module] & {alias.name, "__getattr__"}
-                assert is_module or is_name, f"line {node.lineno}: {alias.name}"
+    for name in modules_below("hero_sim"):
+        shared = [f"{core}.{module}" for module in ("errors", "packets", "payloads")]
+        if part_of(name, "hero_sim") == "stepped":  # stands in for the driver, too: its pure rules, never its protocol
+            shared += ["hero_driver.commands", "hero_driver.corrections", "hero_driver.robot_constants"]
+        for found in imports_of(name):
+            if found.top == "hero_driver" and found.module != core:  # `from hero_driver.rosserial import ...`
+                allowed = any(found.module == module or found.module.startswith(module + ".") for module in shared)
+                assert allowed, describe(name, found)
 
 
 def test_the_rooms_and_modules_that_the_rules_name_exist():

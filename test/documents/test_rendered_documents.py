@@ -4,16 +4,15 @@ A broken link, or a page that is missing in the menu, fails the rendering.
 """
 
 import subprocess
-import sys
+from pathlib import Path
 
 import pytest
-import sources
 
-sys.path.insert(0, str(sources.ROOT / "hero_test" / "src"))
 from hero_test.browser import MISSING, open_browser
 from hero_test.waiting import wait_for
 
-RENDERED = sources.ROOT / ".work" / "docs"
+ROOT = Path(__file__).resolve().parents[2]
+RENDERED = ROOT / ".work" / "docs"
 NEXT_PAGE = "a.md-footer__link--next"
 
 FIND_CUT_LINES = """
@@ -41,7 +40,7 @@ return broken;"""
 def pages():
     """The address of the rendered pages."""
     result = subprocess.run(
-        [sources.ROOT / "script" / "docs"],
+        [ROOT / "script" / "docs"],
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
@@ -114,7 +113,7 @@ def test_blocks_name_their_terminal_where_there_are_several(pages, browser):
 
 
 def test_each_tutorial_leads_to_the_next(pages, browser):
-    course = sorted((sources.ROOT / "docs" / "tutorial" / "hero").glob("[0-9]*.md"))
+    course = sorted((ROOT / "docs" / "tutorial" / "hero").glob("[0-9]*.md"))
     browser.get("%s/docs/tutorial/hero/%s.html" % (pages, course[0].stem))
     for page in course[1:]:
         browser.get(find(browser, NEXT_PAGE).get_attribute("href"))
