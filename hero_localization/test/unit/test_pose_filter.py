@@ -106,6 +106,45 @@ def test_a_pose_counts_at_the_time_at_which_it_was_measured():
     assert rms(stamped_at_arrival) > 0.01 > 5.0 * rms(stamped_at_capture)
 
 
+@pytest.mark.parametrize("age_s", [0.0, 0.008, 0.02, 0.04, 0.1, 0.2])
+def test_poses_of_any_age_are_used_and_right_to_a_millimeter(age_s):
+    """As of a motion capture system at 100 Hz; odometry arrives 10 ms after its stamp."""
+    drive, pose_filter, errors = Drive(1, loss=0.0).run(8.0), PoseFilter(), []
+    events = [(sample.stamp_s + 0.01, 0, sample) for sample in drive.samples]
+    events += [(0.01 * index + age_s, 1, 0.01 * index) for index in range(790)]
+    for _, kind, event in sorted(events):
+        if kind == 1:
+            measured = Measurement(event, drive.true_pose(event), np.diag((1e-7, 1e-7, 1e-5)))
+            used = (Outcome.FIRST, Outcome.USED, Outcome.WAITING)
+            assert event < 0.1 or pose_filter.add_measurement(measured) in used
+            continue
+        for correction in pose_filter.add_odometry(event.stamp_s, event.odometry):
+            assert correction.outcome in (Outcome.FIRST, Outcome.USED)
+        found = pose_filter.estimate()
+        if found is not None and found.stamp_s > 1.0:
+            true = drive.true_pose(found.stamp_s)
+            errors.append((found.pose.x_m - true.x_m, found.pose.y_m - true.y_m))
+    assert rms(np.array(errors)) < 0.001
+
+
+def test_poses_count_without_waiting_once_odometry_has_ended():
+    pose_filter = PoseFilter()
+    pose_filter.add_odometry(1.0, Pose(0.0, 0.0, 0.0))
+    pose = Pose(0.3, 0.1, 0.5)
+    outcomes = [pose_filter.add_measurement(Measurement(1.1 + 0.1 * i, pose, COVARIANCE)) for i in range(4)]
+    assert outcomes == [Outcome.WAITING, Outcome.WAITING, Outcome.USED, Outcome.USED]
+    np.testing.assert_allclose(pose_filter.pose(), pose)
+
+
+def test_slip_explains_no_more_than_what_odometry_counted():
+    pose_filter = PoseFilter()
+    pose_filter.add_odometry(1.0, Pose(0.0, 0.0, 0.0))
+    pose_filter.add_odometry(1.3, Pose(0.05, 0.0, 0.0))
+    assert pose_filter.add_measurement(Measurement(1.0, Pose(0.0, 0.0, 0.0), COVARIANCE)) is Outcome.FIRST
+    assert pose_filter.add_measurement(Measurement(1.3, Pose(0.3, 0.0, 0.0), COVARIANCE)) is Outcome.OUTLIER
+    assert pose_filter.add_measurement(Measurement(1.3, Pose(-0.04, 0.0, 0.0), COVARIANCE)) is Outcome.USED
+
+
 def test_a_late_pose_gives_the_same_as_if_it_had_come_in_order():
     drive = Drive(2).run(2.5)
     measured = [drive.measure(0.1 * index) for index in range(25)]

@@ -70,6 +70,22 @@ def test_single_outliers_are_a_problem_until_a_pose_fits_again():
     assert swarm.run(0.1, {0: (1.0, 2.0, 0.0)})[0].problem == ""
 
 
+def test_a_robot_that_is_carried_in_view_is_not_tracked_after_0_15_seconds():
+    swarm = Swarm(0).run(1.0, {0: (1.0, 2.0, 0.0)})
+    for index in range(3):
+        swarm.run(PERIOD_S, {0: (1.1 + 0.1 * index, 2.0 + 0.2 * index, 0.5 * index)})
+    assert swarm[0].state is RobotState.LOST
+    assert "3 measured poses in a row disagree" in swarm[0].problem
+    assert swarm.run(0.1, {0: (1.0, 2.0, 0.0)})[0].state is RobotState.TRACKED
+
+
+def test_poses_that_wait_for_odometry_are_told_of_when_it_comes():
+    swarm = Swarm(0).run(0.1)
+    measurement = Measurement(swarm.now_s + 0.02, Pose(1.0, 2.0, 0.0), COVARIANCE)
+    assert swarm.localizer.add_measurement(0, measurement) == []
+    assert swarm.run(PERIOD_S).lines == ["hero_0 found at (1.000, 2.000) m, 0 degrees"]
+
+
 def test_a_tag_that_is_on_upside_down_is_named_once_the_robot_drives():
     swarm = Swarm(0)
     for index in range(80):

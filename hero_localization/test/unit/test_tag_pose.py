@@ -9,7 +9,15 @@ from hero_client.values.geometry import Pose, transform_pose, wrap_angle
 from hero_localization.camera.camera_model import Camera, Lens
 from hero_localization.filter.heading_check import HeadingCheck, is_upside_down
 from hero_localization.tracking.tag_corners import TagCorners
-from hero_localization.tracking.tag_pose import MountedTag, ReferenceTag, TagLayout, fit_squares, locate
+from hero_localization.tracking.tag_pose import (
+    SYSTEMATIC_M,
+    SYSTEMATIC_RAD,
+    MountedTag,
+    ReferenceTag,
+    TagLayout,
+    fit_squares,
+    locate,
+)
 
 LENS = Lens(
     1920,
@@ -58,7 +66,8 @@ def test_covariance_holds_what_noise_of_the_corners_does():
     tags = [see(1, pose, noise_px=random.normal(0.0, 0.1, (4, 2))) for _ in range(2000)]
     found = fit_squares(CAMERA, tags, [0.04] * 2000, [0.076] * 2000)
     spread = np.std([fit.pose for fit in found], axis=0)
-    modelled = np.sqrt(np.diagonal(found[0].covariance) - np.array((0.001, 0.001, 0.004)) ** 2)
+    systematic = np.array((SYSTEMATIC_M, SYSTEMATIC_M, SYSTEMATIC_RAD))
+    modelled = np.sqrt(np.diagonal(found[0].covariance) - systematic**2)
     assert spread == pytest.approx(modelled, rel=0.2)
 
 

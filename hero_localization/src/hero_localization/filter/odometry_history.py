@@ -32,6 +32,8 @@ class Odometry(NamedTuple):
     distance_m: float
     turned_rad: float
     """Length of the path, and of all turns, since the first reading."""
+    heading_rad: float = 0.0
+    """Turns to the left less turns to the right since then: not wrapped."""
 
 
 class OdometryHistory:
@@ -57,9 +59,9 @@ class OdometryHistory:
         """Add a reading of /hero_N/odom; one that is not newer than the last is left out."""
         if stamp_s <= self.newest_s:
             return
-        pose, distance_m, turned_rad = transform_pose(self._offset, raw), 0.0, 0.0
+        pose, distance_m, turned_rad, heading_rad = transform_pose(self._offset, raw), 0.0, 0.0, 0.0
         if self._readings.newest is not None:
-            last, distance_m, turned_rad = self._readings.newest
+            last, distance_m, turned_rad, heading_rad = self._readings.newest
             step_m, step_rad = measure_distance(last, pose), _turn_between(last, pose)
             if _is_jump(step_m, step_rad, stamp_s - self.newest_s):
                 self.jumps += 1
@@ -67,8 +69,9 @@ class OdometryHistory:
                 pose, step_m, step_rad = last, 0.0, 0.0
             distance_m += step_m
             turned_rad += abs(step_rad)
+            heading_rad += step_rad
         self.raw_pose = raw
-        self._readings.add(stamp_s, Odometry(pose, distance_m, turned_rad))
+        self._readings.add(stamp_s, Odometry(pose, distance_m, turned_rad, heading_rad))
 
     def find(self, stamp_s: float) -> Optional[Odometry]:
         """Return the odometry at stamp_s, interpolated between two readings; after the newest, that one.
@@ -83,6 +86,7 @@ def _interpolate(start: Odometry, end: Odometry, share: float) -> Odometry:
         interpolate_pose(start.pose, end.pose, share),
         start.distance_m + share * (end.distance_m - start.distance_m),
         start.turned_rad + share * (end.turned_rad - start.turned_rad),
+        start.heading_rad + share * (end.heading_rad - start.heading_rad),
     )
 
 

@@ -3,8 +3,11 @@
 An extended Kalman filter of x, y and yaw. Odometry is the motion, not a measurement: between two measured poses the
 estimate follows it exactly, and grows less certain with each meter and radian. A measured pose counts at the time at
 which it was measured, not at which it arrived: the filter goes back there, and plays what it knew of the time since
-again. A robot that a wall holds turns its wheels in vain: a measured pose that odometry cannot explain may still be
-one to which the robot came with slipping wheels.
+again; one that is newer than the newest odometry waits for the next. A robot that a wall holds turns its wheels in
+vain: a measured pose that odometry cannot explain may still be one to which the robot came with slipping wheels.
+
+Odometry is wrong by a scale rather than by chance: wheels of unequal size turn a robot by the same angle in each meter.
+So its error grows with the distance since the last measured pose, not with the root of it.
 
 Source: S. Thrun, W. Burgard, D. Fox, Probabilistic Robotics, chapters 3.3 and 5.4.
 """
@@ -17,16 +20,30 @@ import numpy as np
 
 from hero_client.values.geometry import Pose, invert_pose, measure_distance, transform_pose, wrap_angle
 
-from .odometry_history import OdometryHistory
+from .odometry_history import Odometry, OdometryHistory
 
 __all__ = ["Estimate", "Measurement", "Outcome", "PoseFilter", "make_covariance"]
 
-DISTANCE_VARIANCE_M2_M = 4e-4
-"""Along the path: 20 mm (standard deviation) after one meter; slip is 1 to 3 % and differs between robots."""
+DISTANCE_SCALE_SD = 0.012
+YAW_SCALE_SD_RAD_M = 0.065
+TURN_SCALE_SD = 0.014
+"""Standard deviations of the scale errors of path, heading by path, and turns, as measured on simulated robots."""
 
-YAW_VARIANCE_RAD2_M = 2.5e-3
-YAW_VARIANCE_RAD2_RAD = 5e-4
-"""Of the heading: 0.05 rad after a meter, 0.02 rad after a radian."""
+DISTANCE_VARIANCE_M2_M = 1.5e-5
+YAW_VARIANCE_RAD2_M = 1e-3
+YAW_VARIANCE_RAD2_RAD = 2e-4
+"""What chance adds: 4 mm (standard deviation) and 0.03 rad after a meter, 0.014 rad after a radian."""
+
+SYSTEMATIC_M, SYSTEMATIC_RAD = 0.0007, 0.003
+"""Of measured poses (standard deviations in x, y, and of yaw), what stays however many are joined: calibration."""
+
+UNTOLD_M_S, UNTOLD_RAD_S = 0.2, 2.0
+"""How fast a robot may move while its odometry is missing."""
+
+SYSTEMATIC = np.array((SYSTEMATIC_M**2, SYSTEMATIC_M**2, SYSTEMATIC_RAD**2))
+
+WAIT_S = 0.25
+"""A measured pose waits so long for odometry; readings come every 0.034 s."""
 
 IDLE_VARIANCE_M2_S = 1e-8
 IDLE_VARIANCE_RAD2_S = 1e-7
@@ -74,6 +91,8 @@ class Outcome(enum.Enum):
 
     FIRST = "first"
     USED = "used"
+    WAITING = "waiting"
+    """For odometry of its time."""
     OUTLIER = "outlier"
     MOVED = "moved"
     """Used as a new start: the robot was carried."""
@@ -81,10 +100,22 @@ class Outcome(enum.Enum):
     NO_ODOMETRY = "no odometry"
 
 
+class Correction(NamedTuple):
+    """What became of a measured pose that had waited, and where the robot was taken to be before it."""
+
+    measurement: Measurement
+    outcome: Outcome
+    before: Optional[Pose]
+
+
 class _Step(NamedTuple):
     """An estimate, and the measured pose that led to it from the one before; None for a start."""
 
     estimate: Estimate
+    measured: Estimate
+    """After the last measured pose: from there on errors of odometry add up."""
+    odometry: Odometry
+    """At that time."""
     measurement: Optional[Measurement]
     is_held: bool = False
     """Whether the wheels turn in vain: then odometry does not tell where the robot goes next."""
@@ -103,13 +134,20 @@ class PoseFilter:
         self.used_s = -math.inf
         self._steps: List[_Step] = []
         self._rejected: List[Measurement] = []
+        self._waiting: List[Measurement] = []
+        self._systematic = np.zeros(3)
 
-    def add_odometry(self, stamp_s: float, pose: Pose) -> None:
-        """Follow a reading of /hero_N/odom."""
+    def add_odometry(self, stamp_s: float, pose: Pose) -> List[Correction]:
+        """Follow a reading of /hero_N/odom; return what became of measured poses that waited for it."""
         self.odometry.add(stamp_s, pose)
         if self._steps and self._steps[-1].estimate.stamp_s < stamp_s - 2.0 * REPLAYED_S:
             # Nothing was measured for a while: move the start on, for odometry is not kept for ever.
-            self._steps = [_Step(self._predict(self._steps[-1].estimate, stamp_s - REPLAYED_S), None)]
+            last = self._steps[-1]
+            self._steps = [last._replace(estimate=self._predict(last, stamp_s - REPLAYED_S), measurement=None)]
+        due = [measurement for measurement in self._waiting if measurement.stamp_s <= stamp_s]
+        self._waiting = [measurement for measurement in self._waiting if measurement.stamp_s > stamp_s]
+        # The pose before each, then what became of it.
+        return [Correction(pose, before=self.pose(), outcome=self._use(pose)) for pose in due]
 
     def add_measurement(self, measurement: Measurement) -> Outcome:
         """Correct the estimate by a measured pose, which may be older than others that were used.
@@ -117,6 +155,17 @@ class PoseFilter:
         Raises: ValueError for numbers that are not finite, or a covariance that is none.
         """
         _check(measurement)
+        ahead_s = measurement.stamp_s - self.odometry.newest_s
+        if 0.0 < ahead_s <= WAIT_S:
+            self._waiting.append(measurement)
+            return Outcome.WAITING
+        if ahead_s > WAIT_S:  # odometry has ended
+            waiting, self._waiting = self._waiting, []
+            for earlier in waiting:
+                self._use(earlier)
+        return self._use(measurement)
+
+    def _use(self, measurement: Measurement) -> Outcome:
         stamp_s = measurement.stamp_s
         if self.odometry.find(stamp_s) is None:
             return Outcome.NO_ODOMETRY
@@ -143,12 +192,13 @@ class PoseFilter:
                 kept.append(replayed)
         self._rejected.clear()
         self._keep(kept)
+        self._note_systematic(measurement)
         return Outcome.USED
 
     def _correct(self, steps: Sequence[_Step], measurement: Measurement) -> Optional[_Step]:
         """Return the step from the last of steps to a measured pose; None for an outlier."""
         start = steps[-1].estimate
-        predicted = self._predict(start, measurement.stamp_s)
+        predicted = self._predict(steps[-1], measurement.stamp_s)
         estimate = self._update(predicted, measurement)
         if estimate is None:
             driven_m = measure_distance(start.pose, predicted.pose)
@@ -156,7 +206,14 @@ class PoseFilter:
             if driven_m <= SLIP_M and turned_rad <= SLIP_RAD:
                 slip = np.diag((driven_m**2, driven_m**2, turned_rad**2))
                 estimate = self._update(predicted._replace(covariance=predicted.covariance + slip), measurement)
-        return None if estimate is None else _Step(estimate, measurement, self._is_held(steps, measurement))
+        if estimate is None:
+            return None
+        return self._make_step(estimate, measurement)._replace(is_held=self._is_held(steps, measurement))
+
+    def _make_step(self, estimate: Estimate, measurement: Optional[Measurement] = None) -> _Step:
+        odometry = self.odometry.find(estimate.stamp_s)
+        assert odometry is not None, "poses without odometry of their time are not used"
+        return _Step(estimate, estimate, odometry, measurement)
 
     def _is_held(self, steps: Sequence[_Step], measurement: Measurement) -> bool:
         """Return whether the robot came nowhere since a pose measured a moment ago, though its wheels turned."""
@@ -173,8 +230,12 @@ class PoseFilter:
 
     def _start(self, measurement: Measurement) -> None:
         self._rejected.clear()
-        covariance = np.array(measurement.covariance, dtype=float)
-        self._keep([_Step(Estimate(measurement.stamp_s, measurement.pose, covariance), None)])
+        self._keep([self._make_step(_take_as_estimate(measurement))])
+        self._note_systematic(measurement)
+
+    def _note_systematic(self, measurement: Measurement) -> None:
+        # Of a motion capture system that claims less, no more than it claims.
+        self._systematic = np.minimum(SYSTEMATIC, np.diagonal(measurement.covariance))
 
     def _keep(self, steps: List[_Step]) -> None:
         self.used_s = steps[-1].estimate.stamp_s
@@ -185,31 +246,39 @@ class PoseFilter:
         last = [measurement for measurement in self._rejected if self.odometry.find(measurement.stamp_s) is not None]
         if len(last) < MOVED_POSES or last[-1].stamp_s - last[0].stamp_s < MOVED_S:
             return False
-        estimate = Estimate(last[0].stamp_s, last[0].pose, np.array(last[0].covariance, dtype=float))
+        step = self._make_step(_take_as_estimate(last[0]))
         for measurement in last[1:]:
-            if measurement.stamp_s < estimate.stamp_s:
+            if measurement.stamp_s < step.estimate.stamp_s:
                 return False
-            updated = self._update(self._predict(estimate, measurement.stamp_s), measurement)
+            updated = self._update(self._predict(step, measurement.stamp_s), measurement)
             if updated is None:
                 return False
-            estimate = updated
+            step = self._make_step(updated)
         return True
 
-    def _predict(self, estimate: Estimate, stamp_s: float) -> Estimate:
-        """Return the estimate moved on to stamp_s by the odometry since."""
-        start, end = self.odometry.find(estimate.stamp_s), self.odometry.find(stamp_s)
+    def _predict(self, step: _Step, stamp_s: float) -> Estimate:
+        """Return the estimate of a step moved on to stamp_s by the odometry since."""
+        start, end = self.odometry.find(step.estimate.stamp_s), self.odometry.find(stamp_s)
         if start is None or end is None:  # it drove nothing that is known
-            return estimate._replace(stamp_s=stamp_s)
-        pose = transform_pose(estimate.pose, transform_pose(invert_pose(start.pose), end.pose))
-        moved_x_m, moved_y_m = pose.x_m - estimate.pose.x_m, pose.y_m - estimate.pose.y_m
-        driven_m, turned_rad = end.distance_m - start.distance_m, end.turned_rad - start.turned_rad
-        elapsed_s = stamp_s - estimate.stamp_s
+            return step.estimate._replace(stamp_s=stamp_s)
+        pose = transform_pose(step.estimate.pose, transform_pose(invert_pose(start.pose), end.pose))
+        measured = step.measured
+        moved_x_m, moved_y_m = pose.x_m - measured.pose.x_m, pose.y_m - measured.pose.y_m
+        driven_m, turned_rad = end.distance_m - step.odometry.distance_m, end.turned_rad - step.odometry.turned_rad
+        elapsed_s = stamp_s - measured.stamp_s
+        untold_s = max(0.0, stamp_s - max(measured.stamp_s, self.odometry.newest_s))
         # A wrong heading at the start leads to a wrong place at the end.
-        lever = np.array(((1.0, 0.0, -moved_y_m), (0.0, 1.0, moved_x_m), (0.0, 0.0, 1.0)))
-        place_m2 = DISTANCE_VARIANCE_M2_M * driven_m + IDLE_VARIANCE_M2_S * elapsed_s
+        jacobian = np.array(((1.0, 0.0, -moved_y_m), (0.0, 1.0, moved_x_m), (0.0, 0.0, 1.0)))
+        place_m2 = (DISTANCE_SCALE_SD * driven_m) ** 2 + DISTANCE_VARIANCE_M2_M * driven_m
+        place_m2 += IDLE_VARIANCE_M2_S * elapsed_s + (UNTOLD_M_S * untold_s) ** 2
         yaw_rad2 = YAW_VARIANCE_RAD2_M * driven_m + YAW_VARIANCE_RAD2_RAD * turned_rad
-        growth = np.diag((place_m2, place_m2, yaw_rad2 + IDLE_VARIANCE_RAD2_S * elapsed_s))
-        return Estimate(stamp_s, pose, lever @ estimate.covariance @ lever.T + growth)
+        yaw_rad2 += IDLE_VARIANCE_RAD2_S * elapsed_s + (UNTOLD_RAD_S * untold_s) ** 2
+        # One that grows evenly along the path leads half as far astray.
+        drift_rad2 = (YAW_SCALE_SD_RAD_M * driven_m) ** 2
+        drift_rad2 += (TURN_SCALE_SD * (end.heading_rad - step.odometry.heading_rad)) ** 2
+        astray = np.array((-moved_y_m / 2.0, moved_x_m / 2.0, 1.0))
+        growth = np.diag((place_m2, place_m2, yaw_rad2)) + drift_rad2 * np.outer(astray, astray)
+        return Estimate(stamp_s, pose, jacobian @ measured.covariance @ jacobian.T + growth)
 
     @staticmethod
     def _update(predicted: Estimate, measurement: Measurement) -> Optional[Estimate]:
@@ -247,8 +316,9 @@ class PoseFilter:
         pose = self.pose()
         if pose is None:
             return None
-        newest = self._steps[-1].estimate
-        return self._predict(newest, max(newest.stamp_s, self.odometry.newest_s))._replace(pose=pose)
+        stamp_s = max(self._steps[-1].estimate.stamp_s, self.odometry.newest_s)
+        covariance = self._predict(self._steps[-1], stamp_s).covariance
+        return Estimate(stamp_s, pose, covariance + np.diag(self._systematic))
 
     def find_odom_origin(self, pose: Pose) -> Pose:
         """Return where the frame hero_N/odom is in `map` if the robot is at pose, that of estimate()."""
@@ -260,6 +330,10 @@ class PoseFilter:
 def make_covariance(position_sd_m: float, yaw_sd_rad: float) -> np.ndarray:
     """Return the covariance of x, y and yaw, (3, 3), of independent errors; position_sd_m: in x and y each."""
     return np.diag((position_sd_m**2, position_sd_m**2, yaw_sd_rad**2))
+
+
+def _take_as_estimate(measurement: Measurement) -> Estimate:
+    return Estimate(measurement.stamp_s, measurement.pose, np.array(measurement.covariance, dtype=float))
 
 
 def _invert(matrix: np.ndarray) -> np.ndarray:

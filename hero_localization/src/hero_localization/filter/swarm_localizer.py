@@ -17,6 +17,9 @@ __all__ = ["PUBLISH_RATE_HZ", "LocalizedRobot", "RobotState", "SwarmLocalizer"]
 LOST_S = 1.0
 """A robot whose pose was not measured for so long is lost: its pose follows its odometry alone."""
 
+DISAGREEING_POSES, DISAGREEING_S = 2, 0.1
+"""So many outliers in a row, so long after the last pose that was used: the robot is not where its odometry tells."""
+
 ANNOUNCED_STEP_M = 0.02
 """A correction that moves a robot by more than this is said."""
 
@@ -68,6 +71,11 @@ class _Robot:
         self.late_s: Optional[float] = None
         """Stamp of the last measured pose if it was too old to be used."""
 
+    @property
+    def disagrees(self) -> bool:
+        """Whether it is measured elsewhere, as while somebody carries it."""
+        return self.outliers >= DISAGREEING_POSES and self.measured_s - self.filter.used_s >= DISAGREEING_S
+
 
 class SwarmLocalizer:
     """Filters of all robots."""
@@ -84,11 +92,14 @@ class SwarmLocalizer:
     def add_odometry(self, robot_id: int, stamp_s: float, pose: Pose) -> List[str]:
         """Follow a reading of /hero_N/odom; return lines for people."""
         robot = self._robots[robot_id]
-        robot.filter.add_odometry(stamp_s, pose)
-        if robot.jumps == robot.filter.odometry.jumps:
-            return []
-        robot.jumps = robot.filter.odometry.jumps
-        return ["hero_%d: its odometry was set or it restarted; its place in the map stays" % robot_id]
+        used_s, lines = robot.filter.used_s, []
+        for measurement, outcome, before in robot.filter.add_odometry(stamp_s, pose):
+            lines += self._note(robot_id, measurement, outcome, before, used_s)
+            used_s = robot.filter.used_s
+        if robot.jumps != robot.filter.odometry.jumps:
+            robot.jumps = robot.filter.odometry.jumps
+            lines.append("hero_%d: its odometry was set or it restarted; its place in the map stays" % robot_id)
+        return lines
 
     def add_measurement(self, robot_id: int, measurement: Measurement) -> List[str]:
         """Correct a robot by a measured pose; return lines for people.
@@ -99,6 +110,16 @@ class SwarmLocalizer:
         before = robot.filter.pose()
         used_s = robot.filter.used_s
         outcome = robot.filter.add_measurement(measurement)
+        return [] if outcome is Outcome.WAITING else self._note(robot_id, measurement, outcome, before, used_s)
+
+    def _note(
+        self, robot_id: int, measurement: Measurement, outcome: Outcome, before: Optional[Pose], used_s: float
+    ) -> List[str]:
+        """Note what became of a measured pose; return lines for people.
+
+        before, used_s: where the robot was taken to be before it, and the stamp of the last one that was used.
+        """
+        robot = self._robots[robot_id]
         is_late = outcome in (Outcome.TOO_LATE, Outcome.NO_ODOMETRY)
         robot.late_s = measurement.stamp_s if is_late else None
         odometry = robot.filter.odometry.find(measurement.stamp_s)
@@ -148,7 +169,7 @@ class SwarmLocalizer:
         state = RobotState.TRACKED
         if estimate is None:
             state = RobotState.UNKNOWN
-        elif robot.is_lost:
+        elif robot.is_lost or robot.disagrees:
             state = RobotState.LOST
         problem = self._find_problem(robot, state, now_s)
         origin = None if estimate is None else robot.filter.find_odom_origin(estimate.pose)
@@ -167,7 +188,7 @@ class SwarmLocalizer:
             return "measured poses come with stamps %.1f s old: do the clocks agree?" % (now_s - robot.late_s)
         if robot.measured_s > now_s + AHEAD_S:
             return "measured poses come with stamps %.1f s ahead: do the clocks agree?" % (robot.measured_s - now_s)
-        if state is RobotState.LOST:
+        if robot.is_lost:
             return "not measured for %.0f s: is its tag covered or out of view?" % (now_s - robot.filter.used_s)
         error_rad = robot.heading.error_rad
         if error_rad is not None and abs(error_rad) > WRONG_HEADING_RAD:

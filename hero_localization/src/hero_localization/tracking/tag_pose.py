@@ -31,7 +31,7 @@ DEFAULT_HEIGHT_M = 0.076
 
 CORNER_PX = 0.1
 """Standard deviation of a corner's place: twice what is measured on still pictures."""
-SYSTEMATIC_M, SYSTEMATIC_RAD = 0.001, 0.004
+SYSTEMATIC_M, SYSTEMATIC_RAD = 0.0007, 0.003
 """What calibration leaves: of lens, camera, tag on the robot."""
 
 LARGEST_SIZE_ERROR = 0.15
