@@ -2,13 +2,9 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from hero_sim.robot_constants import BODY_RADIUS_M
 from hero_sim.world import world as worlds
-from hero_sim.world.arena import build_default, build_rectangle, place_robots
-from hero_sim.world.arena_file import SHIPPED, load_arena
+from hero_sim.world.arena import build_default, place_robots
 from hero_sim.world.body import Body
 from hero_sim.world.kinematics import split_to_wheels
 from hero_sim.world.robot_errors import MAX_WHEEL_M_S, SERVO_LAG_S, draw_errors
@@ -68,72 +64,6 @@ def test_a_spin_stays_on_the_spot():
     run(world, 3.0)
     assert world.poses[0, :2] == pytest.approx([0.0, 0.0], abs=1e-12)
     assert world.poses[0, 2] == pytest.approx(3.0 * (3.0 - SERVO_LAG_S), abs=0.04)
-
-
-def test_robots_at_one_place_do_not_drive_through_each_other():
-    poses = np.zeros((2, 3))
-    world = build_world(robots=2, poses=poses)
-    for index in range(2):
-        command(world, index, 0.1, 0.0)
-    run(world, 1.0)
-    assert world.poses.tolist() == poses.tolist()
-
-
-def test_a_robot_stops_at_a_wall_and_its_wheels_keep_turning():
-    world = build_world(arena=build_rectangle(1.0, 1.0, 1))
-    command(world, 0, 0.2, 0.0)
-    run(world, 10.0)
-    assert world.poses[0, 0] == pytest.approx(0.5 - BODY_RADIUS_M, abs=1e-6)
-    assert world.travels_m[0, 0] > 1.9
-
-
-def test_a_robot_slides_along_a_wall_that_it_meets_at_an_angle():
-    world = build_world(arena=build_rectangle(1.0, 3.0, 1), poses=[(0.0, 0.0, math.pi / 4)])
-    command(world, 0, 0.2, 0.0)
-    run(world, 6.0)
-    assert world.poses[0, 0] == pytest.approx(0.5 - BODY_RADIUS_M, abs=1e-6)
-    assert world.poses[0, 1] > 0.7
-
-
-def test_a_robot_pushes_another_but_never_enters_it():
-    world = build_world(2, arena=build_rectangle(2.0, 1.0, 1), poses=[(-0.3, 0.0, 0.0), (0.0, 0.0, 0.0)])
-    command(world, 0, 0.1, 0.0)
-    for _ in range(600):
-        world.step()
-        assert math.hypot(*(world.poses[0, :2] - world.poses[1, :2])) >= 2 * BODY_RADIUS_M - 1e-6
-    assert world.poses[1, 0] > 0.1
-
-
-wheel_speeds = st.floats(-0.28, 0.28, allow_nan=False)
-
-
-@settings(max_examples=25)
-@given(
-    arena=st.sampled_from(("default",) + SHIPPED),
-    robots=st.integers(1, 9),
-    seed=st.integers(0, 2**31),
-    commands=st.lists(st.lists(wheel_speeds, min_size=18, max_size=18), min_size=1, max_size=6),
-)
-def test_nobody_is_ever_inside_a_wall_or_another_robot(arena, robots, seed, commands):
-    arena = build_default(robots) if arena == "default" else load_arena(arena)
-    world = build_world(robots, arena, errors=1.0, seed=seed)
-    x_min, y_min, x_max, y_max = arena.bounds_m
-    for speeds in commands:
-        world.commands_m_s[:] = np.array(speeds).reshape(9, 2)[:robots]
-        for _ in range(100):
-            world.step()
-            assert not world.find_overlaps().any()
-    assert (world.poses[:, :2] > (x_min, y_min)).all()
-    assert (world.poses[:, :2] < (x_max, y_max)).all()
-
-
-def test_robots_that_are_pressed_into_a_corner_stay_apart():
-    poses = [(0.1 * x, 0.1 * y, math.pi / 4) for x in range(4) for y in range(4)]
-    world = build_world(16, arena=build_rectangle(1.2, 1.2, 1), poses=poses, errors=1.0)
-    world.commands_m_s[:] = 0.28
-    for _ in range(800):
-        world.step()
-        assert not world.find_overlaps().any()
 
 
 def test_another_seed_gives_another_path():

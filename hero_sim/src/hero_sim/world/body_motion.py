@@ -33,8 +33,7 @@ class BodyMotion:
         ways_m, self.headings[:] = follow_arcs(self.headings, travels_m, rotations_rad)
         places_m, theta_rad = self.poses[:2], self.poses[2]
         for moved_m, way_m, rotation_rad in zip(fastest_m, ways_m, rotations_rad):
-            before_m, places_m = places_m, places_m + way_m
+            places_m += way_m
             theta_rad += rotation_rad
             if self.contacts.could_touch(moved_m):
-                self.contacts.separate(places_m, before_m)
-        self.poses[:2] = places_m
+                self.contacts.separate(places_m)

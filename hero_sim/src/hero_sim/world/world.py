@@ -7,7 +7,7 @@ only operations that IEEE 754 defines to the last bit, and random numbers are ro
 which the differences between mathematical libraries vanish.
 """
 
-from typing import List, Optional, Sequence, Union
+from typing import List, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
@@ -138,9 +138,9 @@ class World:
             self._bodies.roll(self._ground_m[self._body_step : self._block_step])
             self._body_step = self._block_step
 
-    def find_overlaps(self) -> np.ndarray:
-        """Return which robots (R,) reach more than 1 um into a wall, an obstacle or another robot."""
-        return self._bodies.contacts.find_overlaps(self.poses[:, :2].T)
+    def measure_overlaps(self) -> Tuple[np.ndarray, np.ndarray]:
+        """Return how deep (m) each robot is in another robot at most (R,), and in a wall or obstacle (R,)."""
+        return self._bodies.contacts.measure_overlaps(self.poses[:, :2].T)
 
     def measure_body_speeds(self) -> np.ndarray:
         """Return linear (m/s) and angular speed (rad/s) of each robot (R, 2), as its wheels have it."""

@@ -1,0 +1,207 @@
+"""Bodies that meet: what must hold in every step, whatever they do."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hero_sim.robot_constants import BODY_RADIUS_M
+from hero_sim.world import compiled, contacts
+from hero_sim.world.arena import build_default, build_rectangle, place_robots
+from hero_sim.world.arena_file import SHIPPED, load_arena
+from hero_sim.world.kinematics import split_to_wheels
+from hero_sim.world.robot_errors import draw_errors
+from hero_sim.world.world import World
+
+MAX_OVERLAP_M = 5e-4
+WIDE = build_rectangle(20.0, 20.0, 1)
+
+
+def build_world(poses, arena=WIDE, errors=0.0, seed=0):
+    drawn = draw_errors([np.random.RandomState([seed, index]) for index in range(len(poses))], errors)
+    return World(arena, np.array(poses, dtype=float), [np.random.RandomState(seed)], drawn)
+
+
+def set_speeds(world, speeds_m_s):
+    """Let robots drive straight on, from now on and without lag."""
+    world.speeds_m_s[:] = world.commands_m_s[:] = np.array(speeds_m_s, dtype=float)[:, None]
+
+
+def step(world):
+    """Take one step, and check what must hold after each."""
+    world.step()
+    robots_m, walls_m = world.measure_overlaps()
+    assert robots_m.max() <= MAX_OVERLAP_M
+    assert walls_m.max() <= 1e-6
+
+
+def test_a_robot_stops_at_a_wall_and_its_wheels_keep_turning():
+    world = build_world([(0.0, 0.0, 0.0)], build_rectangle(1.0, 1.0, 1))
+    set_speeds(world, [0.2])
+    for _ in range(400):
+        step(world)
+    assert world.poses[0, 0] == pytest.approx(0.5 - BODY_RADIUS_M, abs=1e-6)
+    assert world.travels_m[0, 0] > 0.75
+
+
+def test_a_robot_slides_along_a_wall_that_it_meets_at_an_angle():
+    world = build_world([(0.0, 0.0, math.pi / 4)], build_rectangle(1.0, 3.0, 1))
+    set_speeds(world, [0.2])
+    for _ in range(600):
+        step(world)
+    assert world.poses[0, 0] == pytest.approx(0.5 - BODY_RADIUS_M, abs=1e-6)
+    assert world.poses[0, 1] == pytest.approx(0.2 * 6.0 * math.sin(math.pi / 4), abs=1e-3)
+
+
+def test_a_robot_in_the_way_is_pushed_at_half_the_speed():
+    world = build_world([(-BODY_RADIUS_M, 0.0, 0.0), (BODY_RADIUS_M, 0.0, 0.0)])
+    set_speeds(world, [0.1, 0.0])
+    for _ in range(300):
+        step(world)
+    assert world.poses[:, 0] == pytest.approx([0.15 - BODY_RADIUS_M, 0.15 + BODY_RADIUS_M], abs=1e-3)
+    assert world.poses[:, 1] == pytest.approx([0.0, 0.0], abs=1e-12)
+
+
+@pytest.mark.parametrize("robots", [2, 5, 12])
+def test_pushing_moves_the_center_of_all_as_their_wheels_do(robots):
+    rng = np.random.RandomState(robots)
+    poses = np.column_stack((np.arange(robots) * 2.0 * BODY_RADIUS_M, rng.uniform(0, 0.01, robots), np.zeros(robots)))
+    poses[:, 2] = np.where(np.arange(robots) < robots / 2, 0.0, math.pi) + rng.uniform(-0.5, 0.5, robots)
+    world = build_world(poses)
+    speeds_m_s = rng.uniform(0.1, 0.28, robots)
+    set_speeds(world, speeds_m_s)
+    moved_m = np.zeros(robots)
+    for number in range(1, 201):
+        step(world)
+        rolled_m = speeds_m_s * np.array((np.cos(poses[:, 2]), np.sin(poses[:, 2]))) * 0.01 * number
+        assert world.poses[:, :2].mean(axis=0) == pytest.approx(poses[:, :2].mean(axis=0) + rolled_m.mean(axis=1))
+        moved_m = np.hypot(*(world.poses[:, :2] - poses[:, :2] - rolled_m.T).T)
+    assert moved_m.max() > 0.02
+
+
+def test_a_robot_that_no_longer_pushes_lets_go_at_once():
+    world = build_world([(-BODY_RADIUS_M, 0.0, 0.0), (BODY_RADIUS_M, 0.0, 0.0)])
+    set_speeds(world, [0.2, 0.0])
+    for _ in range(50):
+        step(world)
+    before = world.poses.copy()
+    set_speeds(world, [-0.2, 0.0])
+    for number in range(1, 50):
+        step(world)
+        assert world.poses[:, 0] == pytest.approx(before[:, 0] + [-0.002 * number, 0.0], abs=1e-4)
+
+
+def test_a_robot_pressed_from_behind_still_slides_off_sideways():
+    poses = [(-0.2, 0.0, 0.0), (-0.1, 0.0, 0.0), (0.0, 0.005, 0.0), (0.5, 0.0, 0.0)]
+    world = build_world(poses, build_rectangle(1.2, 1.2, 1))
+    set_speeds(world, [0.2, 0.2, 0.2, 0.0])
+    for _ in range(500):
+        step(world)
+    assert world.poses[2, 1] > 0.05
+
+
+@pytest.mark.parametrize("to_wall_m", [0.0, 0.01, 0.02, 0.03, 0.1])
+def test_robots_pushed_far_at_once_are_still_kept_out_of_walls(to_wall_m):
+    edge_m = 0.6 - BODY_RADIUS_M - to_wall_m
+    poses = [(edge_m, 0.0, 0.0), (edge_m, 0.0, 0.0), (edge_m - 0.08, 0.0, 0.0)]
+    world = build_world(poses, build_rectangle(1.2, 1.2, 1))
+    set_speeds(world, [0.01, 0.01, 0.0])
+    for _ in range(12):
+        world.step()
+        assert world.measure_overlaps()[1].max() <= 1e-6
+    for _ in range(20):
+        step(world)
+
+
+def test_robots_that_come_from_afar_do_not_drive_through_each_other():
+    world = build_world([(-0.9, 0.0, 0.0), (0.9, 0.0, math.pi), (0.0, 0.9, -math.pi / 2), (0.0, -0.9, math.pi / 2)])
+    set_speeds(world, [0.28] * 4)
+    for _ in range(450):
+        step(world)
+    assert world.poses[0, 0] < world.poses[1, 0]
+
+
+wheel_speeds = st.floats(-0.28, 0.28, allow_nan=False)
+
+
+@settings(max_examples=12)
+@given(
+    arena=st.sampled_from(("default",) + SHIPPED),
+    robots=st.integers(1, 9),
+    seed=st.integers(0, 2**31),
+    commands=st.lists(st.lists(wheel_speeds, min_size=18, max_size=18), min_size=1, max_size=6),
+)
+def test_nobody_is_ever_inside_a_wall_or_another_robot(arena, robots, seed, commands):
+    arena = build_default(robots) if arena == "default" else load_arena(arena)
+    world = build_world(place_robots(arena, robots, np.random.RandomState(seed)), arena, 1.0, seed)
+    x_min, y_min, x_max, y_max = arena.bounds_m
+    for speeds in commands:
+        world.commands_m_s[:] = np.array(speeds).reshape(9, 2)[:robots]
+        for _ in range(100):
+            step(world)
+    assert (world.poses[:, :2] > (x_min, y_min)).all()
+    assert (world.poses[:, :2] < (x_max, y_max)).all()
+
+
+def press(robots, towards_rad, steps):
+    """Drive robots into a corner or against a wall at full speed."""
+    arena = build_rectangle(*[max(1.2, 0.14 * math.sqrt(robots))] * 2, robots)
+    poses = np.array(arena.starts)
+    poses[:, 2] = towards_rad + np.random.RandomState(0).uniform(-0.2, 0.2, robots)
+    world = build_world(poses, arena, 1.0)
+    world.commands_m_s[:] = 0.28
+    for _ in range(steps):
+        step(world)
+    return world.poses
+
+
+@pytest.mark.parametrize("robots, towards_rad", [(16, math.pi / 4), (40, 0.0)])
+def test_robots_that_press_into_a_corner_or_wall_stay_apart(robots, towards_rad):
+    poses = press(robots, towards_rad, 300)
+    assert np.sort(poses[:, 0])[-4:].min() > poses[:, 0].max() - 2.0 * BODY_RADIUS_M
+
+
+def test_pressed_robots_give_the_same_bytes_compiled_and_not(monkeypatch):
+    pytest.importorskip("numba", reason="the compiled loops need numba")
+    results = []
+    for rows in (10**9, 0):
+        monkeypatch.setattr(compiled, "COMPILED_ROWS", rows)
+        results.append(press(20, math.pi / 4, 300).tobytes())
+    assert results[0] == results[1]
+
+
+def test_the_order_of_rows_matters_less_than_a_tenth_of_a_millimeter():
+    rng = np.random.RandomState(3)
+    poses = np.column_stack((rng.uniform(-0.012, 0.012, (8, 2)), rng.uniform(-math.pi, math.pi, 8)))
+    poses[:, :2] += 0.1 * np.array([(x, y) for x in range(4) for y in range(2)])
+    found = []
+    for order in (np.arange(8), np.arange(8)[::-1]):
+        world = build_world(poses[order])
+        set_speeds(world, np.full(8, 0.1))
+        for _ in range(25):
+            step(world)
+        found.append(world.poses[np.argsort(order), :2])
+    assert found[0] == pytest.approx(found[1], abs=1e-4)
+
+
+def test_a_turn_on_the_spot_moves_no_neighbor():
+    world = build_world([(0.0, 0.0, 0.0), (2.0 * BODY_RADIUS_M, 0.0, 0.0)])
+    world.speeds_m_s[0] = world.commands_m_s[0] = split_to_wheels(0.0, 3.0)
+    for _ in range(200):
+        step(world)
+    assert world.poses[:, :2] == pytest.approx(np.array([(0.0, 0.0), (2.0 * BODY_RADIUS_M, 0.0)]), abs=1e-9)
+
+
+def test_it_is_known_from_how_far_away_robots_have_to_be_looked_at(monkeypatch):
+    """Bodies are compared only when they could touch: rarely while they are far apart."""
+    world, calls = build_world([(-0.9, 0.0, 0.0), (0.9, 0.0, math.pi)]), []
+    separate = contacts.Contacts.separate
+    monkeypatch.setattr(
+        contacts.Contacts, "separate", lambda self, positions_m: (calls.append(0), separate(self, positions_m))
+    )
+    set_speeds(world, [0.1, 0.1])
+    for _ in range(800):
+        step(world)
+    assert 5 < len(calls) < 100
