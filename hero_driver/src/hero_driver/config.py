@@ -1,14 +1,25 @@
 """The node's private parameters: read once, checked, frozen.
 
-Each field below is a parameter; its metadata holds unit, range and meaning, from which docs/driver_parameters.md and
+Each field of DriverConfig declares a parameter. From the declarations docs/driver_parameters.md and
 config/hero_driver.yaml are generated.
 """
 
 import dataclasses
-import difflib
 import ipaddress
 from dataclasses import dataclass
 from typing import Any, Dict, Mapping, Tuple
+
+from hero_node.errors import ProgramError
+from hero_node.parameters import (
+    Parameter,
+    check_parameters,
+    choice,
+    flag,
+    make_error,
+    number,
+    whole_number,
+    words,
+)
 
 from .corrections.tick_odometry import WheelGeometry
 from .fleet.admission import AdmissionLimits, Network
@@ -19,91 +30,169 @@ from .transport import Address
 DEFAULT_PORT = 11411
 
 
-class ConfigError(Exception):
-    """A parameter is unknown or out of range; the text names it, its value and what is allowed."""
+def _read_robots(name: str, value: Any) -> Tuple[Address, ...]:
+    allowed = "a list of {host: name or address, port: 1 to 65535}"
+    if not isinstance(value, (list, tuple)):
+        raise make_error(name, value, allowed)
+    addresses = []
+    for entry in value:
+        if (
+            not isinstance(entry, dict)
+            or not set(entry) <= {"host", "port"}
+            or not isinstance(entry.get("host"), str)
+        ):
+            raise make_error(name, entry, allowed)
+        port = entry.get("port", DEFAULT_PORT)
+        if isinstance(port, bool) or not isinstance(port, int) or not 1 <= port <= 65535 or not entry["host"]:
+            raise make_error(name, entry, allowed)
+        addresses.append(Address(entry["host"], port))
+    if len(set(addresses)) != len(addresses):
+        raise make_error(name, value, "a list that names no robot twice")
+    return tuple(addresses)
 
 
-def _number(default: Any, low: float, high: float, unit: str, text: str) -> Any:
-    return dataclasses.field(default=default, metadata={"unit": unit, "range": (low, high), "text": text})
+def _read_networks(name: str, value: Any) -> Tuple[Network, ...]:
+    allowed = "a list of networks such as 10.42.0.0/24"
+    if not isinstance(value, (list, tuple)) or not all(isinstance(entry, str) for entry in value):
+        raise make_error(name, value, allowed)
+    networks = []
+    for entry in value:
+        try:
+            networks.append(ipaddress.ip_network(entry))
+        except ValueError as error:
+            raise make_error(name, entry, "%s (%s)" % (allowed, error)) from error
+    return tuple(networks)
 
 
-def _choice(default: str, options: Tuple[str, ...], text: str) -> Any:
-    return dataclasses.field(default=default, metadata={"unit": "", "options": options, "text": text})
+def _read_diagonal(name: str, value: Any) -> Tuple[float, ...]:
+    allowed = "a list of 6 numbers that are not negative"
+    if not isinstance(value, (list, tuple)) or len(value) != 6:
+        raise make_error(name, value, allowed)
+    for entry in value:
+        if isinstance(entry, bool) or not isinstance(entry, (int, float)) or not 0.0 <= entry < float("inf"):
+            raise make_error(name, value, allowed)
+    return tuple(float(entry) for entry in value)
 
 
-def _plain(default: Any, text: str, unit: str = "") -> Any:
-    return dataclasses.field(default=default, metadata={"unit": unit, "text": text})
+def _declare(parameter: Parameter) -> Any:
+    return dataclasses.field(default=parameter.default, metadata={"parameter": parameter})
 
 
 @dataclass(frozen=True)
 class DriverConfig:
     """All parameters of the driver."""
 
-    host: str = _plain("0.0.0.0", "address to listen on; empty: only connect to ~robots")
-    port: int = _number(DEFAULT_PORT, 0, 65535, "", "TCP port to listen on; 0: any free port")
-    robots: Tuple[Address, ...] = _plain((), "robots that are TCP servers, to connect to: a list of {host, port}")
-    allow: Tuple[Network, ...] = _plain((), "networks (CIDR) that robots may connect from; empty: all")
-    max_connections: int = _number(400, 1, 5000, "", "connections in total")
-    max_connections_per_address: int = _number(400, 1, 5000, "", "connections per address")
-    max_unidentified: int = _number(200, 1, 5000, "", "connections that have not identified themselves")
-    max_topics: int = _number(64, 1, 1000, "", "topic ids that one robot may declare")
-    max_payload_length: int = _number(4096, 64, 65535, "bytes", "longest payload of a packet from a robot")
-    max_packets_per_s: int = _number(5000, 10, 1000000, "1/s", "packets per robot; stock robots send 211")
-    max_bytes_per_s: int = _number(
-        2000000, 1000, 100000000, "bytes/s", "bytes per robot; stock robots send 44051"
+    host: str = _declare(words("0.0.0.0", "address to listen on; empty: only connect to ~robots"))
+    port: int = _declare(whole_number(DEFAULT_PORT, 0, 65535, "", "TCP port to listen on; 0: any free port"))
+    robots: Tuple[Address, ...] = _declare(
+        Parameter((), _read_robots, "robots that are TCP servers, to connect to: a list of {host, port}")
     )
-    declare_timeout_s: float = _number(
-        20.0, 2.0, 600.0, "s", "time for a robot to declare a topic that identifies it; then it is disconnected"
+    allow: Tuple[Network, ...] = _declare(
+        Parameter((), _read_networks, "networks (CIDR) that robots may connect from; empty: all")
     )
-    silence_timeout_s: float = _number(6.0, 3.0, 600.0, "s", "silence after which a connection is closed")
-    grace_s: float = _number(10.0, 0.0, 3600.0, "s", "time that a robot's topics and id are kept after it disconnects")
-    service_timeout_s: float = _number(5.0, 0.1, 600.0, "s", "time for a robot to answer a service call")
-    clamp: bool = _plain(False, "limit velocities to those of the firmware (0.20 m/s, 8.0 rad/s)")
-    command_max_age_s: float = _number(
-        2.0, 0.1, 60.0, "s", "age at which a motion command that could not be sent is dropped; stops are kept"
+    max_connections: int = _declare(whole_number(400, 1, 5000, "", "connections in total"))
+    max_connections_per_address: int = _declare(whole_number(400, 1, 5000, "", "connections per address"))
+    max_unidentified: int = _declare(
+        whole_number(200, 1, 5000, "", "connections that have not identified themselves")
     )
-    orphan_stop_s: float = _number(
-        0.25, 0.0, 10.0, "s", "delay before a robot is stopped when the program that drove it ends"
+    max_topics: int = _declare(whole_number(64, 1, 1000, "", "topic ids that one robot may declare"))
+    max_payload_length: int = _declare(
+        whole_number(4096, 64, 65535, "bytes", "longest payload of a packet from a robot")
     )
-    allow_self_tuning: bool = _plain(
-        False, "allow pid_calibration, during which a robot spins for up to a minute and finds no gains that it keeps"
+    max_packets_per_s: int = _declare(
+        whole_number(5000, 10, 1000000, "1/s", "packets per robot; stock robots send 211")
     )
-    start_stopped: str = _choice(
-        "as_before",
-        ("as_before", "always", "never"),
-        "whether robots are stopped when the driver starts; as_before: if they were when a driver of this name ended",
+    max_bytes_per_s: int = _declare(
+        whole_number(2000000, 1000, 100000000, "bytes/s", "bytes per robot; stock robots send 44051")
     )
-    odometry: str = _choice(
-        "ticks", ("ticks", "robot"), "source of odom: encoder ticks, or the robot's own estimate"
+    declare_timeout_s: float = _declare(
+        number(
+            20.0,
+            2.0,
+            600.0,
+            "s",
+            "time for a robot to declare a topic that identifies it; then it is disconnected",
+        )
     )
-    wheel_diameter_m: float = _number(WHEEL_DIAMETER_M, 0.001, 1.0, "m", "diameter of a wheel")
-    wheel_separation_m: float = _number(WHEEL_SEPARATION_M, 0.001, 1.0, "m", "distance between the wheels")
-    ticks_per_turn: float = _number(TICKS_PER_TURN, 1.0, 1000000.0, "", "encoder ticks per revolution of a wheel")
-    pose_covariance: Tuple[float, ...] = _plain(
-        (1e-4, 1e-4, 1e-9, 1e-9, 1e-9, 1e-2),
-        "diagonal of odom's pose covariance: x, y, z, roll, pitch, yaw",
-        "m^2, rad^2",
+    silence_timeout_s: float = _declare(
+        number(6.0, 3.0, 600.0, "s", "silence after which a connection is closed")
     )
-    twist_covariance: Tuple[float, ...] = _plain(
-        (1e-4, 1e-9, 1e-9, 1e-9, 1e-9, 1e-2),
-        "diagonal of odom's twist covariance: x, y, z, roll, pitch, yaw",
-        "m^2/s^2, rad^2/s^2",
+    grace_s: float = _declare(
+        number(10.0, 0.0, 3600.0, "s", "time that a robot's topics and id are kept after it disconnects")
     )
-    stamps: str = _choice(
-        "robot", ("robot", "arrival"), "clock of the stamps: the robot's, or time of arrival at the driver"
+    service_timeout_s: float = _declare(
+        number(5.0, 0.1, 600.0, "s", "time for a robot to answer a service call")
     )
-    max_future_s: float = _number(
-        0.05, 0.0, 10.0, "s", "stamps further in the future are replaced by the time of arrival"
+    clamp: bool = _declare(flag(False, "limit velocities to those of the firmware (0.20 m/s, 8.0 rad/s)"))
+    command_max_age_s: float = _declare(
+        number(
+            2.0,
+            0.1,
+            60.0,
+            "s",
+            "age at which a motion command that could not be sent is dropped; stops are kept",
+        )
     )
-    max_age_s: float = _number(
-        5.0, 0.1, 3600.0, "s", "stamps further in the past are replaced by the time of arrival"
+    orphan_stop_s: float = _declare(
+        number(0.25, 0.0, 10.0, "s", "delay before a robot is stopped when the program that drove it ends")
     )
-    transform_period_s: float = _number(
-        0.01, 0.001, 1.0, "s", "period at which the transforms of all robots are published"
+    allow_self_tuning: bool = _declare(
+        flag(
+            False,
+            "allow pid_calibration, during which a robot spins for up to a minute and finds no gains that it keeps",
+        )
     )
-    report_period_s: float = _number(
-        1.0, 0.1, 60.0, "s", "period of ~robots and /diagnostics"
+    start_stopped: str = _declare(
+        choice(
+            "as_before",
+            ("as_before", "always", "never"),
+            "whether robots are stopped when the driver starts;"
+            " as_before: if they were when a driver of this name ended",
+        )
     )
+    odometry: str = _declare(
+        choice("ticks", ("ticks", "robot"), "source of odom: encoder ticks, or the robot's own estimate")
+    )
+    wheel_diameter_m: float = _declare(number(WHEEL_DIAMETER_M, 0.001, 1.0, "m", "diameter of a wheel"))
+    wheel_separation_m: float = _declare(
+        number(WHEEL_SEPARATION_M, 0.001, 1.0, "m", "distance between the wheels")
+    )
+    ticks_per_turn: float = _declare(
+        number(TICKS_PER_TURN, 1.0, 1000000.0, "", "encoder ticks per revolution of a wheel")
+    )
+    pose_covariance: Tuple[float, ...] = _declare(
+        Parameter(
+            (1e-4, 1e-4, 1e-9, 1e-9, 1e-9, 1e-2),
+            _read_diagonal,
+            "diagonal of odom's pose covariance: x, y, z, roll, pitch, yaw",
+            "m^2, rad^2",
+        )
+    )
+    twist_covariance: Tuple[float, ...] = _declare(
+        Parameter(
+            (1e-4, 1e-9, 1e-9, 1e-9, 1e-9, 1e-2),
+            _read_diagonal,
+            "diagonal of odom's twist covariance: x, y, z, roll, pitch, yaw",
+            "m^2/s^2, rad^2/s^2",
+        )
+    )
+    stamps: str = _declare(
+        choice(
+            "robot",
+            ("robot", "arrival"),
+            "clock of the stamps: the robot's, or time of arrival at the driver",
+        )
+    )
+    max_future_s: float = _declare(
+        number(0.05, 0.0, 10.0, "s", "stamps further in the future are replaced by the time of arrival")
+    )
+    max_age_s: float = _declare(
+        number(5.0, 0.1, 3600.0, "s", "stamps further in the past are replaced by the time of arrival")
+    )
+    transform_period_s: float = _declare(
+        number(0.01, 0.001, 1.0, "s", "period at which the transforms of all robots are published")
+    )
+    report_period_s: float = _declare(number(1.0, 0.1, 60.0, "s", "period of ~robots and /diagnostics"))
 
     @property
     def session_limits(self) -> SessionLimits:
@@ -132,116 +221,20 @@ class DriverConfig:
         return WheelGeometry(self.wheel_diameter_m, self.wheel_separation_m, self.ticks_per_turn)
 
 
-def read_config(parameters: Mapping[str, Any]) -> DriverConfig:
-    """Return the checked configuration in parameters (names without "~").
-
-    Raises: ConfigError.
-    """
-    fields = {field.name: field for field in dataclasses.fields(DriverConfig)}
-    values: Dict[str, Any] = {}
-    for name, value in parameters.items():
-        if name not in fields:
-            near = difflib.get_close_matches(name, fields, 1)
-            raise ConfigError(
-                "parameter ~%s is not known%s; known are: %s"
-                % (_show_name(name), "; did you mean ~%s?" % near[0] if near else "", ", ".join(sorted(fields)))
-            )
-        values[name] = _check(fields[name], value)
-    config = DriverConfig(**values)
-    if not config.host and not config.robots:
-        raise ConfigError(
-            "parameter ~host is empty and ~robots too: the driver would neither listen nor dial;"
-            " give an address to listen on (0.0.0.0 for all) or robots to dial"
-        )
-    return config
-
-
-def _show_name(name: str) -> str:
-    """Return name as one line, whatever somebody set as a parameter's name."""
-    return name if name.isprintable() else ascii(name)
-
-
-def _check(field: "dataclasses.Field[Any]", value: Any) -> Any:
-    if field.name in _READERS:
-        return _READERS[field.name](field.name, value)
-    if "options" in field.metadata:
-        if value not in field.metadata["options"]:
-            raise _make_error(field.name, value, "one of " + ", ".join(field.metadata["options"]))
-        return value
-    if "range" in field.metadata:
-        return _check_number(field, value)
-    if not isinstance(value, type(field.default)):
-        raise _make_error(field.name, value, "true or false" if isinstance(field.default, bool) else "a text")
-    return value
-
-
-def _check_number(field: "dataclasses.Field[Any]", value: Any) -> Any:
-    low, high = field.metadata["range"]
-    is_whole = isinstance(field.default, int)
-    allowed = "a %snumber from %g to %g%s" % (
-        "whole " if is_whole else "",
-        low,
-        high,
-        " (%s)" % field.metadata["unit"] if field.metadata["unit"] else "",
-    )
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise _make_error(field.name, value, allowed)
-    if not low <= value <= high or (is_whole and value != int(value)):
-        raise _make_error(field.name, value, allowed)
-    return int(value) if is_whole else float(value)
-
-
-def _read_robots(name: str, value: Any) -> Tuple[Address, ...]:
-    allowed = "a list of {host: name or address, port: 1 to 65535}"
-    if not isinstance(value, list):
-        raise _make_error(name, value, allowed)
-    addresses = []
-    for entry in value:
-        if (
-            not isinstance(entry, dict)
-            or not set(entry) <= {"host", "port"}
-            or not isinstance(entry.get("host"), str)
-        ):
-            raise _make_error(name, entry, allowed)
-        port = entry.get("port", DEFAULT_PORT)
-        if isinstance(port, bool) or not isinstance(port, int) or not 1 <= port <= 65535 or not entry["host"]:
-            raise _make_error(name, entry, allowed)
-        addresses.append(Address(entry["host"], port))
-    if len(set(addresses)) != len(addresses):
-        raise _make_error(name, value, "a list that names no robot twice")
-    return tuple(addresses)
-
-
-def _read_networks(name: str, value: Any) -> Tuple[Network, ...]:
-    allowed = "a list of networks such as 10.42.0.0/24"
-    if not isinstance(value, list) or not all(isinstance(entry, str) for entry in value):
-        raise _make_error(name, value, allowed)
-    networks = []
-    for entry in value:
-        try:
-            networks.append(ipaddress.ip_network(entry))
-        except ValueError as error:
-            raise _make_error(name, entry, "%s (%s)" % (allowed, error)) from error
-    return tuple(networks)
-
-
-def _read_diagonal(name: str, value: Any) -> Tuple[float, ...]:
-    allowed = "a list of 6 numbers that are not negative"
-    if not isinstance(value, (list, tuple)) or len(value) != 6:
-        raise _make_error(name, value, allowed)
-    for entry in value:
-        if isinstance(entry, bool) or not isinstance(entry, (int, float)) or not 0.0 <= entry < float("inf"):
-            raise _make_error(name, value, allowed)
-    return tuple(float(entry) for entry in value)
-
-
-_READERS = {
-    "robots": _read_robots,
-    "allow": _read_networks,
-    "pose_covariance": _read_diagonal,
-    "twist_covariance": _read_diagonal,
+PARAMETERS: Dict[str, Parameter] = {
+    field.name: field.metadata["parameter"] for field in dataclasses.fields(DriverConfig)
 }
 
 
-def _make_error(name: str, value: Any, allowed: str) -> ConfigError:
-    return ConfigError("parameter ~%s is %r; it must be %s" % (name, value, allowed))
+def read_config(given: Mapping[str, Any]) -> DriverConfig:
+    """Return the checked configuration in the given parameters (names without "~").
+
+    Raises: ProgramError.
+    """
+    config = DriverConfig(**check_parameters(PARAMETERS, given))
+    if not config.host and not config.robots:
+        raise ProgramError(
+            "~host is empty and ~robots too: the driver would neither listen nor dial;"
+            " give an address to listen on (0.0.0.0 for all) or robots to dial"
+        )
+    return config

@@ -21,11 +21,12 @@ import rosgraph
 import rosgraph.roslogging
 import rospy
 
+from hero_node.errors import ProgramError
 from hero_node.ros.connections import open_tcpros_server
 from hero_node.ros.master import find_running_node
 from hero_node.ros.ros_node import end_ros_node
 
-from .config import ConfigError, DriverConfig, read_config
+from .config import DriverConfig, read_config
 from .gateway import STOP_LIMIT_S, Gateway
 from .reports import FleetStatus, Reporter
 from .ros.log_relay import LogRelay, prepare_logging, tell_of_lost_log_lines
@@ -214,7 +215,7 @@ def main(argv: Optional[List[str]] = None) -> int:
         _enter_ros(argv, log)
     except KeyboardInterrupt:
         return 130
-    except ConfigError as error:
+    except ProgramError as error:
         sys.stderr.write("hero_driver cannot start: %s\n" % error)
         return 2
     try:
@@ -222,7 +223,7 @@ def main(argv: Optional[List[str]] = None) -> int:
         # The driver's own note of its last run, not a setting.
         was_stopped = parameters.pop(PARAMETER.lstrip("~"), False) is True
         config = read_config(parameters)
-    except ConfigError as error:
+    except ProgramError as error:
         rospy.logfatal("hero_driver cannot start: %s", error)
         return 2
     sys.setswitchinterval(SWITCH_INTERVAL_S)
@@ -243,17 +244,17 @@ def main(argv: Optional[List[str]] = None) -> int:
 
 
 def _enter_ros(argv: Optional[List[str]], log: LogRelay) -> None:
-    """Become a ROS node. Raises: ConfigError where the environment does not allow it."""
+    """Become a ROS node. Raises: ProgramError where the environment does not allow it."""
     try:
         _wait_for_master()
     except (ValueError, OSError) as error:
         uri = ascii(rosgraph.get_master_uri())
-        raise ConfigError(
+        raise ProgramError(
             "ROS_MASTER_URI is %s: %s; it must be like http://localhost:11311" % (uri, error)
         ) from error
     running = find_running_node(NODE_NAME)
     if running:
-        raise ConfigError(
+        raise ProgramError(
             "a driver already runs as %s: end it, or start this one with another name:= and port:= (simulated robots"
             " alone: roslaunch hero_sim hero_sim.launch)" % running
         )
@@ -263,7 +264,7 @@ def _enter_ros(argv: Optional[List[str]], log: LogRelay) -> None:
     try:
         rospy.init_node(NODE_NAME, argv=argv, disable_signals=True)
     except (rosgraph.roslogging.LoggingException, NotADirectoryError, PermissionError) as error:
-        raise ConfigError(
+        raise ProgramError(
             "no log file can be written (%s): set ROS_LOG_DIR to a folder that can be written to" % error
         ) from error
     leave_topics_out_of_rosout()
@@ -291,7 +292,7 @@ def _read_private_parameters() -> Any:
     try:
         parameters = rospy.get_param("~", {})
     except (rosgraph.MasterException, OSError) as error:
-        raise ConfigError("the ROS master cannot be asked for parameters: %s" % error) from error
+        raise ProgramError("the ROS master cannot be asked for parameters: %s" % error) from error
     return parameters if isinstance(parameters, dict) else {}
 
 

@@ -8,18 +8,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hero_driver.config import ConfigError, DriverConfig, read_config
+from hero_driver.config import PARAMETERS, DriverConfig, read_config
 from hero_driver.transport import Address
+from hero_node.errors import ProgramError
 
-FIELDS = {field.name: field for field in dataclasses.fields(DriverConfig)}
-NUMBERS = [name for name, field in FIELDS.items() if "range" in field.metadata]
-CHOICES = [name for name, field in FIELDS.items() if "options" in field.metadata]
+NUMBERS = [name for name, parameter in PARAMETERS.items() if parameter.limits]
+CHOICES = [name for name, parameter in PARAMETERS.items() if parameter.choices]
 DIAGONALS = ["pose_covariance", "twist_covariance"]
 
 
 def refuse(name, value):
     """Return the error about a parameter, and check that it is one line with the name and the value."""
-    with pytest.raises(ConfigError) as caught:
+    with pytest.raises(ProgramError) as caught:
         read_config({name: value})
     text = str(caught.value)
     assert "~" + name in text
@@ -38,13 +38,13 @@ def test_a_configuration_cannot_be_changed():
         read_config({}).port = 1
 
 
-@pytest.mark.parametrize("name", FIELDS)
+@pytest.mark.parametrize("name", PARAMETERS)
 def test_every_parameter_has_a_text_and_a_default_that_is_allowed(name):
-    default = FIELDS[name].default
-    assert FIELDS[name].metadata["text"]
+    default = PARAMETERS[name].default
+    assert PARAMETERS[name].text
     if name in ("robots", "allow"):
         default = list(default)
-    assert getattr(read_config({name: default}), name) == FIELDS[name].default
+    assert getattr(read_config({name: default}), name) == PARAMETERS[name].default
 
 
 def test_values_come_where_they_belong():
@@ -89,7 +89,7 @@ def test_an_unknown_parameter_is_refused_with_the_name_that_was_meant():
 
 @pytest.mark.parametrize("name", NUMBERS)
 def test_the_limits_of_a_number_are_allowed_and_what_lies_beyond_is_not(name):
-    low, high = FIELDS[name].metadata["range"]
+    low, high = PARAMETERS[name].limits
     assert getattr(read_config({name: low}), name) == low
     assert getattr(read_config({name: high}), name) == high
     for value in (low - 1, high + 1, -math.inf, math.inf, math.nan):
@@ -115,10 +115,10 @@ def test_a_whole_number_may_be_written_with_a_point_and_a_half_may_not():
 
 @pytest.mark.parametrize("name", CHOICES)
 def test_only_the_choices_are_allowed(name):
-    for option in FIELDS[name].metadata["options"]:
+    for option in PARAMETERS[name].choices:
         assert getattr(read_config({name: option}), name) == option
     for value in ("none", "", 1, True, ["robot"], {"a": 1}):
-        assert "one of " + ", ".join(FIELDS[name].metadata["options"]) in refuse(name, value)
+        assert "one of: " + ", ".join(PARAMETERS[name].choices) in refuse(name, value)
 
 
 @pytest.mark.parametrize("name", ["clamp", "allow_self_tuning"])
@@ -195,10 +195,10 @@ yaml_values = st.recursive(
 )
 
 
-@given(name=st.sampled_from(sorted(FIELDS)), value=yaml_values)
+@given(name=st.sampled_from(sorted(PARAMETERS)), value=yaml_values)
 def test_any_value_is_taken_or_refused_in_one_line(name, value):
     try:
         read_config({name: value})
-    except ConfigError as error:
+    except ProgramError as error:
         assert "~" + name in str(error)
         assert "\n" not in str(error)

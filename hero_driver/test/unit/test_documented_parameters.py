@@ -14,7 +14,6 @@ PACKAGE = Path(__file__).resolve().parents[2]
 def test_the_page_of_parameters_is_generated_from_the_code():
     page = PACKAGE.parent / "docs" / "driver_parameters.md"
     assert page.read_text() == documented_parameters.make_page()
-    assert all(row in page.read_text() for row in documented_parameters.make_rows())
 
 
 def test_the_yaml_file_holds_every_parameter_at_its_default():

@@ -8,11 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from vectors import ENCODER_MESSAGE, GOOD, HANDSHAKE, ODOM_MESSAGE, TIME_REQUEST, VECTORS, build_packet
 
-from hero_driver.config import ConfigError, DriverConfig, read_config
+from hero_driver.config import DriverConfig, read_config
 from hero_driver.fleet.log_lines import LONGEST_TEXT, read_log_line
 from hero_driver.fleet.namespaces import identify
 from hero_driver.rosserial.packets import DEFAULT_MAX_PAYLOAD_LENGTH, OVERHEAD_LENGTH, PacketReader
 from hero_driver.rosserial.session import MessagesReceived, SessionEnded
+from hero_node.errors import ProgramError
 
 MAX_TOPICS = 8
 
@@ -125,7 +126,7 @@ names = st.sampled_from(sorted(DriverConfig.__dataclass_fields__))
 def test_any_parameters_are_taken_or_refused_in_one_line(parameters):
     try:
         config = read_config(parameters)
-    except ConfigError as error:
+    except ProgramError as error:
         assert "~" in str(error) and "\n" not in str(error)
     else:
         assert 0 <= config.port <= 65535 and config.max_topics >= 1

@@ -4,23 +4,26 @@ A wrong value ends the program with one line: the name, the value and what it mu
 """
 
 import argparse
+import difflib
 import math
-from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 from .errors import ProgramError
 
 __all__ = [
     "Parameter",
-    "check_flag",
     "check_number",
+    "check_parameters",
     "choice",
     "flag",
+    "make_error",
     "number",
     "parse_poses",
     "parse_robot_ids",
     "robot_ids",
     "robot_ids_option",
     "whole_number",
+    "words",
 ]
 
 ALL_ROBOTS = "all"
@@ -31,48 +34,97 @@ MAX_COORDINATE_M = 1e6
 
 
 class Parameter(NamedTuple):
-    """A parameter with a check."""
+    """A parameter: what is allowed, and what documents say of it."""
 
     default: Any
     check: Callable[[str, Any], Any]
     """Name, value -> the checked value. Raises: ProgramError."""
+    text: str = ""
+    """What it means."""
+    unit: str = ""
+    limits: Optional[Tuple[float, float]] = None
+    choices: Tuple[str, ...] = ()
 
 
-def number(default: float, low: float, high: float, unit: str = "") -> Parameter:
+def number(default: float, low: float, high: float, unit: str = "", text: str = "") -> Parameter:
     """Declare a number in low..high."""
-    return Parameter(default, lambda name, value: check_number(name, value, low, high, unit))
+    return Parameter(
+        default, lambda name, value: check_number(name, value, low, high, unit), text, unit, (low, high)
+    )
 
 
-def whole_number(default: int, low: int, high: int) -> Parameter:
+def whole_number(default: int, low: int, high: int, unit: str = "", text: str = "") -> Parameter:
     """Declare a whole number in low..high."""
 
     def check(name: str, value: Any) -> int:
-        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-            raise ProgramError("~%s is %r, but must be a whole number from %d to %d" % (name, value, low, high))
+        is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+        if not is_number or not low <= value <= high or value != int(value):
+            raise make_error(name, value, _describe_limits("a whole number", low, high, unit))
         return int(value)
 
-    return Parameter(default, check)
+    return Parameter(default, check, text, unit, (low, high))
 
 
-def flag(default: bool) -> Parameter:
+def flag(default: bool, text: str = "") -> Parameter:
     """Declare true or false."""
-    return Parameter(default, check_flag)
+
+    def check(name: str, value: Any) -> bool:
+        if not isinstance(value, bool):
+            raise make_error(name, value, "true or false")
+        return value
+
+    return Parameter(default, check, text)
 
 
-def choice(default: str, choices: Sequence[str]) -> Parameter:
+def choice(default: str, choices: Sequence[str], text: str = "") -> Parameter:
     """Declare one of some words."""
 
     def check(name: str, value: Any) -> str:
         if value not in choices:
-            raise ProgramError("~%s is %r, but must be one of: %s" % (name, value, ", ".join(choices)))
+            raise make_error(name, value, "one of: " + ", ".join(choices))
         return str(value)
 
-    return Parameter(default, check)
+    return Parameter(default, check, text, choices=tuple(choices))
 
 
-def robot_ids(default: str) -> Parameter:
+def words(default: str, text: str = "") -> Parameter:
+    """Declare a text."""
+
+    def check(name: str, value: Any) -> str:
+        if not isinstance(value, str):
+            raise make_error(name, value, "a text")
+        return value
+
+    return Parameter(default, check, text)
+
+
+def robot_ids(default: str, text: str = "") -> Parameter:
     """Declare ids of robots; "all" becomes None. See parse_robot_ids()."""
-    return Parameter(default, parse_robot_ids)
+    return Parameter(default, parse_robot_ids, text)
+
+
+def check_parameters(declared: Mapping[str, Any], given: Mapping[str, Any]) -> Dict[str, Any]:
+    """Return the checked value of each declared parameter, its default where none is given.
+
+    declared: name -> a Parameter, or a default that needs no check.
+    Raises: ProgramError for a value that fails its check, or a name that is not declared, with those that are.
+    """
+    for name in sorted(set(given) - set(declared)):
+        near = difflib.get_close_matches(name, declared, 1)
+        raise ProgramError(
+            "unknown parameter ~%s%s; known are: %s"
+            % (
+                name if name.isprintable() else ascii(name),
+                "; did you mean ~%s?" % near[0] if near else "",
+                ", ".join(sorted(declared)),
+            )
+        )
+    return {
+        name: parameter.check(name, given.get(name, parameter.default))
+        if isinstance(parameter, Parameter)
+        else given.get(name, parameter)
+        for name, parameter in declared.items()
+    }
 
 
 def check_number(name: str, value: Any, low: float, high: float, unit: str = "") -> float:
@@ -80,18 +132,18 @@ def check_number(name: str, value: Any, low: float, high: float, unit: str = "")
 
     Raises: ProgramError with the name, the value and the range.
     """
-    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    if not (is_number and math.isfinite(value) and low <= value <= high):
-        allowed = "a number from %g to %g%s" % (low, high, " " + unit if unit else "")
-        raise ProgramError("~%s is %r, but must be %s" % (name, value, allowed))
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
+        raise make_error(name, value, _describe_limits("a number", low, high, unit))
     return float(value)
 
 
-def check_flag(name: str, value: Any) -> bool:
-    """Return value if it is true or false. Raises: ProgramError with the name and the value."""
-    if not isinstance(value, bool):
-        raise ProgramError("~%s is %r, but must be true or false" % (name, value))
-    return value
+def _describe_limits(kind: str, low: float, high: float, unit: str) -> str:
+    return "%s from %g to %g%s" % (kind, low, high, " " + unit if unit else "")
+
+
+def make_error(name: str, value: Any, allowed: str) -> ProgramError:
+    """Return the error about a value that is not allowed; allowed: what it must be."""
+    return ProgramError("~%s is %r, but must be %s" % (name, value, allowed))
 
 
 def parse_robot_ids(name: str, value: Any) -> Optional[List[int]]:

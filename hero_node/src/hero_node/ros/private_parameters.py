@@ -7,8 +7,7 @@ from typing import Any, Dict, Mapping
 
 import rospy
 
-from ..errors import ProgramError
-from ..parameters import Parameter
+from ..parameters import check_parameters
 
 __all__ = ["read_parameters"]
 
@@ -23,13 +22,4 @@ def read_parameters(declared: Mapping[str, Any]) -> Dict[str, Any]:
         given = rospy.get_param("~", {})
     except KeyError:
         given = {}
-    unknown = sorted(set(given) - set(declared))
-    if unknown:
-        raise ProgramError("unknown parameter ~%s; known are: %s" % (unknown[0], ", ".join(sorted(declared))))
-    values = {}
-    for name, parameter in declared.items():
-        if isinstance(parameter, Parameter):
-            values[name] = parameter.check(name, given.get(name, parameter.default))
-        else:
-            values[name] = given.get(name, parameter)
-    return values
+    return check_parameters(declared, given)

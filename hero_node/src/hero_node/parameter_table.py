@@ -1,0 +1,33 @@
+"""Tables of parameters for documents, from their declarations. Pure."""
+
+from typing import Any, List, Mapping
+
+import yaml
+
+from .parameters import Parameter
+
+__all__ = ["make_table", "write_default"]
+
+
+def make_table(declared: Mapping[str, Parameter]) -> List[str]:
+    """Return the lines of a table in Markdown: name, default, unit, what is allowed, meaning."""
+    lines = ["| Parameter | Default | Unit | Range | Meaning |", "|---|---|---|---|---|"]
+    for name, parameter in declared.items():
+        cells = ("`~%s`" % name, "`%s`" % write_default(parameter), parameter.unit, _describe(parameter), parameter.text)
+        lines.append("| %s |" % " | ".join(cells))
+    return lines
+
+
+def write_default(parameter: Parameter) -> str:
+    """Return the default as it is written in YAML."""
+    default: Any = parameter.default
+    value = list(default) if isinstance(default, tuple) else default
+    return str(yaml.safe_dump(value, default_flow_style=True)).split("\n", 1)[0]
+
+
+def _describe(parameter: Parameter) -> str:
+    if parameter.limits is not None:
+        return "%s to %s" % tuple(f"{limit:,}".replace(",", " ") for limit in parameter.limits)
+    if isinstance(parameter.default, bool):
+        return "true, false"
+    return ", ".join("`%s`" % option for option in parameter.choices)
