@@ -13,8 +13,8 @@ def make_table(declared: Mapping[str, Parameter]) -> List[str]:
     """Return the lines of a table in Markdown: name, default, unit, what is allowed, meaning."""
     lines = ["| Parameter | Default | Unit | Range | Meaning |", "|---|---|---|---|---|"]
     for name, parameter in declared.items():
-        cells = ("`~%s`" % name, "`%s`" % write_default(parameter), parameter.unit, _describe(parameter), parameter.text)
-        lines.append("| %s |" % " | ".join(cells))
+        cells = ("`%s`" % write_default(parameter), parameter.unit, _describe(parameter), parameter.text)
+        lines.append("| `~%s` | %s |" % (name, " | ".join(cells)))
     return lines
 
 

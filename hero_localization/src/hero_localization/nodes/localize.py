@@ -16,7 +16,7 @@ from hero_client.ros.drivers import share_drivers
 from hero_client.values.geometry import Pose
 from hero_client.values.readings import is_plausible
 from hero_msgs.msg import RobotPose, RobotPoses
-from hero_node.parameters import number, robot_ids
+from hero_node.parameters import number, robot_ids, words
 
 from ..filter.pose_filter import Measurement, make_covariance
 from ..filter.swarm_localizer import PUBLISH_RATE_HZ, SwarmLocalizer
@@ -141,21 +141,25 @@ def _log(lines: List[str]) -> None:
         rospy.loginfo(line)
 
 
+PARAMETERS = {
+    "robots": robot_ids("all", "ids; all: those of all drivers"),
+    "frame": words("map", "the common frame"),
+    "pose_topic": words(
+        "/hero_{id}/measured_pose",
+        "poses of one robot from elsewhere: geometry_msgs/PoseStamped, PoseWithCovarianceStamped, or nav_msgs/Odometry",
+    ),
+    "pose_frame": words("", "name of `~frame` in these poses, such as world; empty: the same"),
+    "swarm_topic": words("/track/measured_poses", "hero_msgs/RobotPoses of `track`"),
+    "position_sd_m": number(0.002, 1e-5, 1.0, "m", "error of poses that come without covariance"),
+    "heading_sd_rad": number(0.01, 1e-5, 10.0, "rad", "the same of their yaw"),
+    "rate_hz": number(PUBLISH_RATE_HZ, 1.0, 100.0, "Hz", "minimum publish rate; poses of an image come at once"),
+}
+
+
 def localize() -> None:
     """Localize robots until the program is to end. Raises: ProgramError for a wrong parameter."""
     with Program("localization") as program:
-        parameters = read_parameters(
-            {
-                "robots": robot_ids("all"),
-                "frame": "map",
-                "pose_topic": "/hero_{id}/measured_pose",
-                "pose_frame": "",
-                "swarm_topic": "/track/measured_poses",
-                "position_sd_m": number(0.002, 1e-5, 1.0, "m"),
-                "heading_sd_rad": number(0.01, 1e-5, 10.0, "rad"),
-                "rate_hz": number(PUBLISH_RATE_HZ, 1.0, 100.0, "Hz"),
-            }
-        )
+        parameters = read_parameters(PARAMETERS)
         node = LocalizationNode(parameters)
         while program.running:
             node.step(1.0 / parameters["rate_hz"])

@@ -25,7 +25,7 @@ from hero_client import Program, ProgramError, read_parameters, run
 from hero_client.values.geometry import Pose
 from hero_client.values.readings import front_first, is_plausible, read_ranges
 from hero_msgs.msg import RobotPose, RobotPoses
-from hero_node.parameters import number
+from hero_node.parameters import number, words
 
 from ..mapping.map_files import save_map
 from ..mapping.occupancy_grid import BEAMS, OccupancyGrid
@@ -136,17 +136,21 @@ def _make_grid(bounds: Any, cell_m: float) -> OccupancyGrid:
     raise ProgramError('~bounds_m is %r, but must be "x_min y_min x_max y_max" in m, up to 100 m wide' % (bounds,))
 
 
+PARAMETERS = {
+    "bounds_m": words("-1.1 -1.1 1.1 1.1", "x min, y min, x max, y max"),
+    "cell_m": number(0.01, 0.005, 0.1, "m", "side of a cell"),
+    "poses_topic": words("/localization/poses", "hero_msgs/RobotPoses of `localize`"),
+    "file": words(
+        "~/hero_maps/arena.yaml",
+        "written by the service `~save`, with an image: map_server reads it, and `hero_sim arena:=FILE`",
+    ),
+}
+
+
 def map_arena() -> None:
     """Map until the program is to end. Raises: ProgramError for a wrong parameter."""
     with Program("map_arena") as program:
-        parameters = read_parameters(
-            {
-                "bounds_m": "-1.1 -1.1 1.1 1.1",
-                "cell_m": number(0.01, 0.005, 0.1, "m"),
-                "poses_topic": "/localization/poses",
-                "file": "~/hero_maps/arena.yaml",
-            }
-        )
+        parameters = read_parameters(PARAMETERS)
         node = MapNode(parameters)
         while program.pace(PERIOD_S):
             node.step()

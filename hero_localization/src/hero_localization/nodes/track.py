@@ -15,7 +15,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from hero_client import Program, read_parameters, run
 from hero_client.values.geometry import Pose
 from hero_msgs.msg import ObjectPose, ObjectPoses, RobotPose, RobotPoses
-from hero_node.parameters import number
+from hero_node.parameters import number, words
 
 from ..camera.frame_source import Frame, open_source
 from ..errors import DetectorError, LocalizationError
@@ -140,20 +140,25 @@ class TrackNode:
             self._process.close()
 
 
+PARAMETERS = {
+    "image": words(
+        "camera/image_raw", "sensor_msgs/Image or CompressedImage (`.../compressed`), with its camera_info beside it"
+    ),
+    "device": words(
+        "", "instead: a V4L2 device such as `/dev/video0`, the URL of a network camera, or a video file"
+    ),
+    "size_px": words("1920x1080", "of the images of a device"),
+    "rate_hz": number(30.0, 1.0, 240.0, "Hz", "of a device"),
+    "file": words(camera_file.DEFAULT_PATH, "[camera file](#camera-file)"),
+    "frame": words("map", "the common frame"),
+    "poses_topic": words("/localization/poses", "where robots are expected: windows of an image are searched first"),
+}
+
+
 def track() -> None:
     """Track until the program is to end. Raises: ProgramError, LocalizationError."""
     with Program("track") as program:
-        parameters = read_parameters(
-            {
-                "image": "camera/image_raw",
-                "device": "",
-                "size_px": "1920x1080",
-                "rate_hz": number(30.0, 1.0, 240.0, "Hz"),
-                "file": camera_file.DEFAULT_PATH,
-                "frame": "map",
-                "poses_topic": "/localization/poses",
-            }
-        )
+        parameters = read_parameters(PARAMETERS)
         node = TrackNode(parameters)
         try:
             while program.running:
