@@ -29,6 +29,7 @@ from tornado.httpclient import HTTPRequest
 from tornado.websocket import websocket_connect
 
 from hero_client.ros.drivers import Drivers
+from hero_monitor.freshness import INERT_S
 from hero_test.processes import find_free_port, suspended
 
 HERE = Path(__file__).resolve().parent
@@ -53,17 +54,22 @@ class Page:
     async def _open(self, port):
         url = "127.0.0.1:%d" % port
         page = await websocket_connect(HTTPRequest("ws://%s/live" % url, headers={"Origin": "http://" + url}))
-        await page.write_message(json.dumps({"do": "look", "truth": False}))
+        self._clock_ms = 0
         self._reader = asyncio.ensure_future(self._drain(page))
         return page
 
     async def _drain(self, page):
-        while await page.read_message() is not None:
-            pass
+        while True:
+            text = await page.read_message()
+            if text is None:
+                return
+            self._clock_ms = json.loads(text).get("clock_ms", self._clock_ms)
 
     def stop(self, stopped):
-        """Press the button, or release."""
-        message = json.dumps({"do": "stop", "stop": stopped})
+        """Press the button, or release, which does nothing shortly after a stop."""
+        if not stopped:
+            time.sleep(INERT_S + 0.2)
+        message = json.dumps({"do": "stop" if stopped else "release", "heard_ms": self._clock_ms})
         asyncio.run_coroutine_threadsafe(self._write(message), self._loop).result(5.0)
 
     async def _write(self, message):

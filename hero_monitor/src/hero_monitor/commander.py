@@ -18,6 +18,7 @@ from hero_node.ros.master import ask_master
 
 from .background import Background
 from .dead_man import STOPS, DeadMan, Velocity
+from .freshness import read_clock_ms
 
 GOAL_LISTENER_TIMEOUT_S = 2.0
 """To connect to a program that takes goals; about 0.1 s is usual."""
@@ -41,6 +42,7 @@ class Commander:
         self._dead_man = DeadMan()
         self._velocities: Dict[str, Optional[rospy.Publisher]] = {}
         self._goals: Dict[str, rospy.Publisher] = {}
+        self.stopped_ms: Optional[int] = None  # when a page last stopped all robots
 
     def drive(self, page: int, velocity: Velocity) -> bool:
         """Drive a robot for HOLD_TIMEOUT_S; return False if another page drives it."""
@@ -49,7 +51,7 @@ class Commander:
         self._publish(velocity)
         return True
 
-    def release(self, page: int, namespace: str) -> None:
+    def end_drive(self, page: int, namespace: str) -> None:
         """Stop a robot that this page drives."""
         self._dead_man.release(page, namespace)
 
@@ -115,6 +117,7 @@ class Commander:
         """Ask all drivers to stop all robots, or to release them."""
         self._drivers.request_stop(stop)
         if stop:
+            self.stopped_ms = read_clock_ms()
             self._dead_man.drop_all()
             self.step()
 

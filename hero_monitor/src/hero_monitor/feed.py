@@ -30,15 +30,14 @@ from hero_node.texts import make_printable
 
 from .background import Background
 from .camera_picture import CameraPicture
+from .losses import SILENT_S, LocalizationWatch, list_losses
+from .master_link import MasterLink
 from .placement import Placement
 from .robot_feed import RobotFeed
 from .sections import LOG_LINES_KEPT, Sections, encode_pose, encode_ranges, shorten
 
-DRIVER_SILENT_S = 5.0
-"""The driver reports once a second; it is gone after this time without a report."""
-
-LOCALIZATION_SILENT_S = 3.0
-"""hero_localization reports 25 times a second; it is gone after this time without a report."""
+ROW_PERIOD_S = 0.5
+"""Between two updates of the table without a report: rates."""
 
 LOG_LINES_PER_READ = 40
 """Decoding a line takes about 0.05 ms; a swarm that tunes its motors logs thousands a second."""
@@ -83,7 +82,11 @@ class FleetFeed:
         self._feeds: Dict[str, RobotFeed] = {}
         self._scene: Dict[str, NewestMessage] = {}
         self._fleet_s = 0.0
-        self._localized_s = -math.inf
+        self._fleet_stamp_s: Optional[float] = None
+        self._answering: Dict[str, bool] = {}
+        self._localization = LocalizationWatch()
+        self._tracked: Set[str] = set()
+        self._master = MasterLink(background)
         self._pending_reads = 0
         self._listening = ""
         self._rows: Sequence[Robot] = ()
@@ -139,6 +142,7 @@ class FleetFeed:
             self._read(feed.read_newest)
         self._read(self._read_scene)
         self._put_robots()
+        self._list_losses()
         self._read(self._read_log)
 
     def _read(self, part: Callable[[], None]) -> None:
@@ -149,25 +153,30 @@ class FleetFeed:
 
     def _read_fleet(self) -> None:
         now_s = time.monotonic()
+        answering = self.drivers.find_answering(SILENT_S)
         reports = self.drivers.count()
         message = self.drivers.read() if reports != self._reports else None
         self._reports = reports
         if message is not None:
-            self._fleet_s = now_s
             self._listening, self.stopped = message.listening, message.stopped
+            self._fleet_stamp_s = message.header.stamp.to_sec()
             self._rows = message.robots[:ROBOTS_MAX]
             self.robots = {row.namespace.strip("/"): row for row in self._rows if row.state != Robot.REFUSED}
             self.placement.set_robots(self.robots)
-        elif self._rows and self._fleet_s and now_s - self._fleet_s < DRIVER_SILENT_S:
+        elif answering == self._answering and now_s < self._fleet_s + ROW_PERIOD_S:
             return
-        driver = bool(self._fleet_s) and now_s - self._fleet_s < DRIVER_SILENT_S
-        stamp_s = None if message is None else message.header.stamp.to_sec()
-        self.stopped = self.stopped and driver
-        fleet = {"driver": driver, "listening": make_printable(self._listening), "stopped": self.stopped}
+        self._fleet_s, self._answering = now_s, answering
+        has_driver = any(answering.values())
+        self.stopped = self.stopped and all(answering.values())
+        fleet = {"driver": has_driver, "listening": make_printable(self._listening), "stopped": self.stopped}
         fleet["frame"] = shorten(self.placement.frame) if self.placement.is_localized else ""
-        self.sections.put("fleet", {**fleet, "robots": [self._make_row(row, stamp_s) for row in self._rows]})
+        self.sections.put("fleet", {**fleet, "robots": [self._make_row(row) for row in self._rows]})
 
-    def _make_row(self, row: Robot, stamp_s: Optional[float]) -> Dict[str, Any]:
+    def _list_losses(self) -> None:
+        losses = list_losses(self._answering, self._master.check(), self._localization, time.monotonic())
+        self.sections.put("losses", [loss._asdict() for loss in losses])
+
+    def _make_row(self, row: Robot) -> Dict[str, Any]:
         name = make_printable(row.namespace.strip("/"))
         # Topics and diagnostics under the name of a robot that was refused are those of another robot.
         refused = row.state == Robot.REFUSED
@@ -179,11 +188,13 @@ class FleetFeed:
             "id": row.id,
             "address": shorten(row.address),
             "state": STATES.get(row.state, str(row.state)),
+            # Without an answer of its driver all the rest is what was known last.
+            "known": self._is_known(row.namespace),
             "stop": "" if refused else STOP_STATES.get(row.stop_state, str(row.stop_state)),
             "firmware": shorten(row.firmware),
             "hardware": shorten(row.hardware),
             "config": shorten(row.config),
-            "since": round(stamp_s - since_s) if stamp_s is not None and since_s else None,
+            "since": round(self._fleet_stamp_s - since_s) if self._fleet_stamp_s is not None and since_s else None,
             "uptime": round(row.uptime.to_sec()),
             "reconnects": row.reconnects,
             "packets": round(row.packets_per_s, 1),
@@ -194,9 +205,26 @@ class FleetFeed:
             "bad": row.bad_packets,
             "clock": finite(round(row.clock_offset, 4)),
             "error": shorten(row.last_error),
-            "located": not refused and self.placement.knows(name),
+            "source": "" if refused else self._name_pose_source(name),
             "health": [0, ""] if refused else self._health.get(name, [0, ""]),
         }
+
+    def _is_known(self, namespace: str) -> bool:
+        """Return whether the driver of a robot answers."""
+        answers = self._answering.values()
+        if all(answers) or not any(answers):
+            return any(answers)
+        return self._answering.get(self.drivers.find(namespace), False)
+
+    def _name_pose_source(self, name: str) -> str:
+        """Return what a robot's place on the map is known by: camera, odometry, unknown; empty if by nothing."""
+        if not self.placement.knows(name):
+            return ""
+        if not self.placement.is_localized:
+            return "odometry"
+        if self._localization.is_lost(time.monotonic()):
+            return "unknown"
+        return "camera" if name in self._tracked else "odometry"
 
     def read_stop(self) -> bool:
         """Update the status of a stop; return whether it has changed."""
@@ -228,10 +256,11 @@ class FleetFeed:
                 if name in self.robots:
                     self._health[name] = [status.level, shorten(status.message)]
         now_s = time.monotonic()
-        if taken.get("/localization/poses") is not None:
-            self._localized_s = now_s
-            self._localize(taken["/localization/poses"])
-        elif now_s > self._localized_s + LOCALIZATION_SILENT_S:
+        if "/localization/poses" not in self._scene:
+            self._localization.pause(now_s)
+        elif taken.get("/localization/poses") is not None:
+            self._localize(taken["/localization/poses"], now_s)
+        elif not self._localization.is_expected(now_s):
             self.placement.localize("", {})
         if taken.get("/track/picture/outline") is not None:
             self.picture.receive_outline(taken["/track/picture/outline"])
@@ -243,7 +272,9 @@ class FleetFeed:
         elif "/hero_sim/markers" not in self._scene:
             self.sections.put("ground_truth", {})
 
-    def _localize(self, report: RobotPoses) -> None:
+    def _localize(self, report: RobotPoses, now_s: float) -> None:
+        self._tracked = {"hero_%d" % robot.id for robot in report.robots if robot.state == RobotPose.TRACKED}
+        self._localization.receive(len(self._tracked), now_s)
         poses = {}
         for robot in report.robots[:ROBOTS_MAX]:
             name, pose = "hero_%d" % robot.id, Pose(robot.x, robot.y, robot.yaw)

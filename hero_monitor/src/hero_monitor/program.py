@@ -22,6 +22,7 @@ from .commander import STOP_PERIOD_S, Commander
 from .connection_limits import CONNECTIONS_MAX, ConnectionLimits
 from .dead_man import Velocity
 from .feed import FleetFeed
+from .freshness import CLOCK_PERIOD_S, explain_refused_release, is_fresh, read_clock_ms
 from .parameters import Parameters, load_parameters
 from .requests import RequestError, read_request
 from .sections import encode
@@ -58,6 +59,7 @@ class Monitor:
         self._server = Server(Access(parameters.token, parameters.host_names), limits, actions)
         self._tick = tornado.ioloop.PeriodicCallback(self._update_pages, 1000.0 / parameters.rate_hz)
         self._stops = tornado.ioloop.PeriodicCallback(self._step, 1000.0 * STOP_PERIOD_S)
+        self._clock = tornado.ioloop.PeriodicCallback(self._send_clock, 1000.0 * CLOCK_PERIOD_S)
         self._end_check = tornado.ioloop.PeriodicCallback(self._check_end, 1000.0 * END_CHECK_PERIOD_S)
         self._leaving: Any = None
         self._pending_goals = 0
@@ -97,8 +99,8 @@ class Monitor:
             self._leaving = None
         page.send(encode({"hello": {"control": self._parameters.control}}))
         if not self._tick.is_running():
-            self._tick.start()
-            self._stops.start()
+            for repeated in (self._tick, self._stops, self._clock):
+                repeated.start()
 
     def _close_page(self, page: "PageSocket") -> None:
         self._commander.drop_page(page.number)
@@ -108,12 +110,12 @@ class Monitor:
     def _leave(self) -> None:
         """The last page has been gone for LINGER_S."""
         self._leaving = None
-        self._tick.stop()
-        self._stops.stop()
+        for repeated in (self._tick, self._stops, self._clock):
+            repeated.stop()
         self._feed.update_subscriptions(has_pages=False, ground_truth=False, picture=False)
 
     def _update_pages(self) -> None:
-        pages = self._server.pages
+        pages = self._server.served_pages()
         ground_truth, picture = (any(getattr(page, name) for page in pages) for name in ("ground_truth", "picture"))
         self._feed.update_subscriptions(True, ground_truth, picture)
         self._feed.read()
@@ -125,12 +127,20 @@ class Monitor:
         if self._feed.read_stop():
             self._broadcast_updates()
 
+    def _send_clock(self) -> None:
+        """Tell each page the time, which tells it that the monitor runs, and whether it is among those served."""
+        served = set(self._server.served_pages())
+        for page in self._server.pages:
+            if page.ready:
+                page.send(encode({"clock_ms": read_clock_ms(), "served": page in served}))
+
     def _broadcast_updates(self) -> None:
-        """Send all pages what is new to them; a page that is still receiving the last update gets it later."""
+        """Send the pages what is new to them; a page that is still receiving the last update gets it later."""
+        sections, served = self._feed.sections, set(self._server.served_pages())
         for page in self._server.pages:
             page.send_waiting()
             if page.ready:
-                updates = self._feed.sections.take_updates(page.seen)
+                updates = (sections.take_updates if page in served else sections.take_stop)(page.seen)
                 if updates is not None:
                     page.send(updates)
 
@@ -145,16 +155,21 @@ class Monitor:
         kind, robot = request["do"], request.get("robot")
         if kind == "show":
             page.ground_truth, page.picture = request["ground_truth"], request["picture"]
+            page.visible = request["visible"]
         elif kind == "stop":
-            self._commander.request_stop(request["stop"])
-            self._feed.read_stop()
-            verb = "stop" if request["stop"] else "release"
-            page.acknowledge(verb)
-            # After the acknowledgement has left.
-            self._loop.add_callback(self._broadcast_updates)
-            self._background.warn("a page requests to %s all robots" % verb)
+            self._request_stop(page, stop=True)
         elif kind == "release":
-            self._commander.release(page.number, "/" + robot)
+            refusal = explain_refused_release(request, read_clock_ms(), self._commander.stopped_ms)
+            if refusal:
+                page.tell("error", refusal)
+            else:
+                self._request_stop(page, stop=False)
+        elif kind == "end_drive":
+            self._commander.end_drive(page.number, "/" + robot)
+        elif not is_fresh(request, read_clock_ms()):
+            # A button that is still held sends the next one at once.
+            if kind != "drive":
+                page.tell("error", "the request was delayed: nothing was done")
         elif not self._parameters.control:
             page.tell("error", "this monitor is view only: start it with control:=true to drive robots")
         elif robot not in self._feed.robots:
@@ -169,6 +184,15 @@ class Monitor:
             page.tell("error", "too many goals at once")
         else:
             self._loop.add_callback(self._send_goal, page, request)
+
+    def _request_stop(self, page: "PageSocket", stop: bool) -> None:
+        self._commander.request_stop(stop)
+        self._feed.read_stop()
+        verb = "stop" if stop else "release"
+        page.acknowledge(verb)
+        # After the acknowledgement has left.
+        self._loop.add_callback(self._broadcast_updates)
+        self._background.warn("a page requests to %s all robots" % verb)
 
     async def _send_goal(self, page: "PageSocket", request: Dict[str, Any]) -> None:
         """Send a goal in the background, and tell the page the outcome."""

@@ -30,17 +30,26 @@ def _is_number(limit: float) -> Callable[[Any], bool]:
     return lambda value: isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= limit
 
 
+_FRESH = {"heard_ms": _is_number(1e15)}
+
 REQUESTS: Dict[str, Dict[str, Callable[[Any], bool]]] = {
-    "stop": {"stop": _is_flag},
-    "drive": {"robot": _is_name, "linear": _is_number(MAX_LINEAR_M_S), "angular": _is_number(MAX_ANGULAR_RAD_S)},
-    "release": {"robot": _is_name},
-    "goal": {"robot": _is_name, "x": _is_number(FARTHEST_GOAL_M), "y": _is_number(FARTHEST_GOAL_M)},
-    "show": {"ground_truth": _is_flag, "picture": _is_flag},
+    "stop": {},
+    "release": _FRESH,
+    "drive": {
+        "robot": _is_name,
+        "linear": _is_number(MAX_LINEAR_M_S),
+        "angular": _is_number(MAX_ANGULAR_RAD_S),
+        **_FRESH,
+    },
+    "end_drive": {"robot": _is_name},
+    "goal": {"robot": _is_name, "x": _is_number(FARTHEST_GOAL_M), "y": _is_number(FARTHEST_GOAL_M), **_FRESH},
+    "show": {"ground_truth": _is_flag, "picture": _is_flag, "visible": _is_flag},
 }
 """What a page can request, by its field "do", with the fields that it needs and their checks.
 
-stop: stop all robots (true), or release them. drive: a button is held; velocity in m/s and rad/s. release: it is
-released. goal: a pose on the map in m; yaw (rad) may be added. show: what the page shows in addition to the fleet.
+stop: stop all robots. release: release them. drive: a button is held; velocity in m/s and rad/s. end_drive: it is let
+go. goal: a pose on the map in m; yaw (rad) may be added. show: whether anyone can see the page, and what it shows in
+addition to the fleet. heard_ms: the monitor's clock, as the page last heard it (freshness).
 """
 
 _is_yaw = _is_number(2.0 * math.pi)

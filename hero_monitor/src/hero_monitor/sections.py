@@ -126,13 +126,18 @@ class Sections:
 
     def take_updates(self, page: Page) -> Optional[str]:
         """Return the sections that are new to a page as one JSON object, None without any; marks them as received."""
-        parts = [
-            '"%s":%s' % (name, self._texts[name])
-            for name, version in self._versions.items()
-            if page.versions.get(name) != version
-        ]
-        page.versions = dict(self._versions)
+        parts = self._take(page, list(self._versions))
         if page.log_number < self.log.count:
             parts.append('"log":%s' % self.log.encode_after(page.log_number))
             page.log_number = self.log.count
         return "{%s}" % ",".join(parts) if parts else None
+
+    def take_stop(self, page: Page) -> Optional[str]:
+        """Return the same of the status of a stop alone, for a page that is not served."""
+        parts = self._take(page, ["stop"] if "stop" in self._versions else [])
+        return "{%s}" % ",".join(parts) if parts else None
+
+    def _take(self, page: Page, names: Sequence[str]) -> List[str]:
+        new = [name for name in names if page.versions.get(name) != self._versions[name]]
+        page.versions.update((name, self._versions[name]) for name in new)
+        return ['"%s":%s' % (name, self._texts[name]) for name in new]

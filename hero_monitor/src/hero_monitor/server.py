@@ -37,6 +37,14 @@ CONTENT_SECURITY_POLICY = (
 )
 
 PAGES_MAX = 30
+"""Pages that are served: those that can be seen come first. Others get STOP ALL alone."""
+
+SOCKETS_MAX = 200
+"""Pages in all."""
+
+STUCK_S = 5.0
+"""A page that has taken nothing for this time is not seen by anyone."""
+
 SEND_BUFFER = 65536
 """Bytes that the kernel may buffer for one page: about a second of a large swarm."""
 
@@ -105,7 +113,7 @@ class BaseHandler(tornado.web.RequestHandler):
             404: "there is no such page",
             421: "not a name of this PC; see host_names in docs/monitor.md",
             429: "too many wrong tokens from this address; wait %d s" % TOKEN_PERIOD_S,
-            503: "too many pages are open",
+            503: "too many pages are open; to stop all robots: rosservice call /hero_driver/stop true",
         }
         self.set_header("Content-Type", "text/plain; charset=utf-8")
         self.finish(reasons.get(status_code, "error %d" % status_code) + "\n")
@@ -174,11 +182,11 @@ class PageSocket(tornado.websocket.WebSocketHandler, BaseHandler):
     pages: List["PageSocket"]
 
     def prepare(self) -> Optional[Awaitable[None]]:
-        """Refuse browsers that are not logged in, and pages beyond PAGES_MAX."""
+        """Refuse browsers that are not logged in, and pages beyond SOCKETS_MAX."""
         BaseHandler.prepare(self)
         if not self.is_logged_in:
             raise tornado.web.HTTPError(403)
-        if len(self.pages) >= PAGES_MAX:
+        if len(self.pages) >= SOCKETS_MAX:
             raise tornado.web.HTTPError(503)
         return None
 
@@ -197,6 +205,8 @@ class PageSocket(tornado.websocket.WebSocketHandler, BaseHandler):
         self.number = next(PageSocket.numbers)
         self.seen = Page()
         self.ground_truth = self.picture = False
+        self.visible = True
+        self._sent_s = time.monotonic()
         self._sending: Optional[Awaitable[None]] = None
         self._waiting: Deque[str] = deque(maxlen=WAITING_MAX)
         self.set_nodelay(True)
@@ -222,8 +232,15 @@ class PageSocket(tornado.websocket.WebSocketHandler, BaseHandler):
         """Whether everything has been sent."""
         return self._sending is None or self._sending.done()  # type: ignore[attr-defined]
 
+    @property
+    def is_idle(self) -> bool:
+        """Whether no one can see this page: it is hidden, or takes nothing."""
+        return not self.visible or (not self.ready and time.monotonic() - self._sent_s > STUCK_S)
+
     def send(self, text: str) -> None:
         """Send a text to this page."""
+        if self.ready:
+            self._sent_s = time.monotonic()
         try:
             self._sending = self.write_message(text)
         except tornado.websocket.WebSocketClosedError:
@@ -245,6 +262,11 @@ class PageSocket(tornado.websocket.WebSocketHandler, BaseHandler):
         """Send what waits as soon as the page has received the rest; beyond WAITING_MAX the oldest are dropped."""
         while self._waiting and self.ready:
             self.send(self._waiting.popleft())
+
+
+def choose_served(pages: List[PageSocket]) -> List[PageSocket]:
+    """Return at most PAGES_MAX: first those that can be seen, in the order in which they came."""
+    return sorted(pages, key=lambda page: page.is_idle)[:PAGES_MAX]
 
 
 class LimitedServer(tornado.httpserver.HTTPServer):
@@ -298,6 +320,10 @@ class Server:
         self._http.add_sockets(sockets)
         self._expiry.start()
         return int(sockets[0].getsockname()[1])
+
+    def served_pages(self) -> List[PageSocket]:
+        """Return the pages that get updates."""
+        return choose_served(self.pages)
 
     def close(self) -> None:
         """Disconnect all pages."""

@@ -12,11 +12,6 @@ KEEP_NOTICES = (
     ".observe(document.getElementById('notices'), { childList: true })"
 )
 
-RELEASE = (
-    "const done = arguments[0], button = document.getElementById('release'); button.click();"
-    "const again = () => button.textContent.includes('again') ? (button.click(), done()) : setTimeout(again, 20);"
-    "again()"
-)
 READ_BANNER = "const banner = document.getElementById('stopping'); return [banner.dataset.level, banner.textContent]"
 
 
@@ -49,11 +44,12 @@ class MonitorPage:
         return self.browser.execute_script(script)
 
     def rows(self):
-        """Return the texts of the table, a list for each robot."""
-        return self.run(
-            "return [...document.querySelectorAll('#fleet tbody tr')]"
+        """Return the texts of the table by heading, of each robot; also those of columns that are not shown."""
+        heads, *rows = self.run(
+            "return [...document.querySelectorAll('#fleet tr')]"
             ".map(row => [...row.children].map(cell => cell.textContent))"
         )
+        return [dict(zip(heads, row)) for row in rows]
 
     def facts(self):
         """Return what is shown of the chosen robot: texts by title."""
@@ -71,9 +67,12 @@ class MonitorPage:
         """Click on STOP ALL and return the banner in the same moment: an answer may follow."""
         return tuple(self.run("document.getElementById('stop').click();" + READ_BANNER))
 
-    def press_release_twice(self):
-        """Click, and again once the page asks for that: the second click counts for some seconds only."""
-        self.browser.execute_async_script(RELEASE)
+    def hold_release(self):
+        """Hold Release until robots are released; it does nothing for a while after a stop."""
+        wait_for(lambda: not self.run("return document.querySelector('#release.inert')"), "the end of the delay")
+        self.actions().click_and_hold(self.find("#release")).perform()
+        wait_for(lambda: self.run("return document.getElementById('release_bar').hidden"), "the release")
+        self.actions().release().perform()
 
     def choose(self, robot):
         """Choose a robot in the table."""

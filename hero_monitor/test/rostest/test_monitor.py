@@ -14,6 +14,7 @@ from rosgraph_msgs.msg import Log
 
 from hero_sim.srv import InjectFault
 from hero_test.browser import MISSING
+from hero_test.processes import find_pid, suspended
 from hero_test.swarm_watch import SwarmWatch
 from hero_test.waiting import wait_for
 
@@ -28,13 +29,14 @@ class PageTest(unittest.TestCase):
         cls.watch = SwarmWatch(range(3))
         cls.watch.wait_until_complete(TIMEOUT_S)
         cls.command = None
+        cls.commands = []
         rospy.Subscriber("/hero_0/velocity_controller/cmd_vel", Twist, cls.receive_command)
         # A page that never reads must not hold up the other one.
         cls.stuck = PageClient(HOST)
         cls.page = MonitorPage("http://%s/" % HOST)
 
         def all_are_ready():
-            return [row[1] for row in cls.page.rows()] == ["READY"] * 3
+            return [row["State"] for row in cls.page.rows()] == ["READY"] * 3
 
         wait_for(all_are_ready, "three robots that are ready")
 
@@ -48,6 +50,7 @@ class PageTest(unittest.TestCase):
     def receive_command(cls, message):
         """Keep the newest command of the monitor to robot 0: nothing else drives it."""
         cls.command = message
+        cls.commands.append(message)
 
     def speed_of(self, robot_id):
         """Return the true speed over the last 0.2 s, m/s."""
@@ -72,16 +75,16 @@ class PageTest(unittest.TestCase):
 
     def test_the_table_shows_every_robot_with_address_rates_and_versions(self):
         for row in self.page.rows():
-            if row[7] != "v3.8":
+            if row["Firmware"] != "v3.8":
                 # It booted, and told its versions, before the driver listened.
-                rospy.ServiceProxy("/hero_sim/fault", InjectFault)("reboot:robot=" + row[0][len("hero_") :])
-        wait_for(lambda: all(row[7] == "v3.8" for row in self.page.rows()), self.page.rows)
+                rospy.ServiceProxy("/hero_sim/fault", InjectFault)("reboot:robot=" + row["Robot"][len("hero_") :])
+        wait_for(lambda: all(row["Firmware"] == "v3.8" for row in self.page.rows()), self.page.rows)
         self.page.wait_for_text("#ready", "3 of 3 ready")
         rows = self.page.rows()
-        self.assertEqual([row[0] for row in rows], ["hero_0", "hero_1", "hero_2"])
+        self.assertEqual([row["Robot"] for row in rows], ["hero_0", "hero_1", "hero_2"])
         for row in rows:
-            self.assertIn("127.0.1.", row[3])
-        wait_for(lambda: all(float(row[4].split()[0]) > 0 for row in self.page.rows()), "rates")
+            self.assertIn("127.0.1.", row["Address"])
+        wait_for(lambda: all(float(row["Odom"].split()[0]) > 0 for row in self.page.rows()), "rates")
         self.page.save("monitor_desktop.png")
         self.page.resize(820, 1180)
         self.page.save("monitor_tablet.png")
@@ -121,6 +124,23 @@ class PageTest(unittest.TestCase):
         self.page.actions().release().perform()
         self.page.open()
         self.page.wait_for_text("#ready", "3 of 3")
+
+    def test_a_monitor_that_was_suspended_drives_no_robot_by_old_commands(self):
+        self.page.choose("hero_0")
+        self.page.actions().click_and_hold(self.page.find("#pad [aria-label='forward']")).perform()
+        self.wait_until_commanded()
+        with suspended(find_pid("/hero_monitor")):
+            sent = self.page.run("return window.sent = 0")
+            self.page.run(
+                "const send = WebSocket.prototype.send;"
+                "WebSocket.prototype.send = function (text) { window.sent += text.includes('drive'); send.call(this, text); }"
+            )
+            wait_for(lambda: self.page.run("return window.sent") > sent + 10, "commands in the socket")
+            self.page.actions().release().perform()
+            self.commands.clear()
+        wait_for(lambda: Twist() in self.commands, "a stop")
+        self.wait_until_standing(0)
+        self.assertEqual([command for command in self.commands if command != Twist()], [])
 
     def test_a_robot_stops_when_the_monitor_ends(self):
         process = start_monitor("_control:=true")
@@ -164,7 +184,7 @@ class PageTest(unittest.TestCase):
         self.click_on_map(30, 30)
         self.page.wait_for_notice("go_to_goal.launch")
 
-    def test_stop_all_stops_driven_robots_and_two_clicks_release_them(self):
+    def test_stop_all_stops_driven_robots_and_a_hold_releases_them(self):
         publisher = rospy.Publisher("/hero_2/velocity_controller/cmd_vel", Twist, queue_size=1)
         command = Twist()
         command.linear.x = 0.03
@@ -176,7 +196,7 @@ class PageTest(unittest.TestCase):
             self.wait_until_standing(2)
             self.page.wait_for_text("#stopping", "stopped, all wheels at rest")
             self.page.save("monitor_stopped.png")
-            self.page.press_release_twice()
+            self.page.hold_release()
             self.wait_until_moving(2)
         finally:
             timer.shutdown()

@@ -113,9 +113,11 @@ class BadDataTest(unittest.TestCase):
 
     def test_a_refused_robot_shows_nothing_of_the_one_with_its_name(self):
         self.good.publish(make_odometry(0.0, 0.0))
-        wait_for(lambda: self.page.rows()[0][4] != "-", self.page.rows)
+        wait_for(lambda: self.page.rows()[0]["Odom"] != "-", self.page.rows)
         refused = self.page.rows()[1]
-        self.assertEqual(refused[:5], ["hero_0", "REFUSED", "", "127.0.9.9:5", "-"])
+        shown = {name: refused[name] for name in ("Robot", "State", "Stop", "Address", "Pose", "Odom")}
+        expected = {"Robot": "hero_0", "State": "REFUSED", "Stop": "", "Address": "127.0.9.9:5", "Pose": "-", "Odom": "-"}
+        self.assertEqual(shown, expected)
 
 
 if __name__ == "__main__":

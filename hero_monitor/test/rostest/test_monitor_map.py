@@ -95,12 +95,12 @@ class MapTest(unittest.TestCase):
         cls.page.close()
         end(cls.driver)
 
-    def wait_for_facts(self, pose, frame):
+    def wait_for_facts(self, pose, source):
         def are_shown():
             facts = self.page.facts()
-            return facts.get("pose", "").startswith(pose) and facts.get("frame") == frame
+            return facts.get("pose", "").startswith(pose) and facts.get("pose source") == source
 
-        wait_for(are_shown, "pose %s in %s" % (pose, frame))
+        wait_for(are_shown, "pose %s by %s" % (pose, source))
 
     def find_colors(self):
         """Return left, right, top and bottom (px) of each of COLORS that the map shows."""
@@ -111,12 +111,21 @@ class MapTest(unittest.TestCase):
         self.wait_for_facts("-0.250 0.000 m, 0", alone)
         self.assertEqual(self.page.text("#frame"), "")
         localization = Repeater("/localization/poses", self.poses)
-        self.wait_for_facts("-0.900 0.400 m, 90", "map")
+        self.wait_for_facts("-0.900 0.400 m, 90", "camera")
         self.page.wait_for_text("#frame", "frame map, by localization")
         self.page.choose("hero_1")
-        wait_for(lambda: self.page.facts().get("frame") == alone, "a robot of which nothing is known")
+        wait_for(lambda: self.page.facts().get("pose source") == alone, "a robot of which nothing is known")
         self.page.choose("hero_0")
+        poses = self.poses.robots[0]
+        poses.state = RobotPose.LOST
+        self.wait_for_facts("-0.900 0.400 m, 90", "odometry")
+        self.page.wait_for_text("#losses", "The camera measures no robot")
+        poses.state = RobotPose.TRACKED
+        wait_for(lambda: not self.page.text("#losses"), "the camera")
         localization.close()
+        self.wait_for_facts("-0.900 0.400 m, 90", "unknown")
+        self.page.wait_for_text("#losses", "Localization is silent: positions are unknown")
+        self.page.wait_for_text("#link", "localization lost")
         self.wait_for_facts("-0.250 0.000 m, 0", alone)
         wait_for(lambda: self.page.text("#frame") == "", "no frame")
 

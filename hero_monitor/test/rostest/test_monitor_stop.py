@@ -91,7 +91,7 @@ class StopTest(unittest.TestCase):
             wait_for(lambda page=page: page.banner() == (level, text), lambda page=page: page.banner())
 
     def stop_states(self, page):
-        return {row[0]: row[2] for row in page.rows() if row[1] != "REFUSED"}
+        return {row["Robot"]: row["Stop"] for row in page.rows() if row["State"] != "REFUSED"}
 
     def test_all_pages_show_that_robots_are_stopping_and_at_rest(self):
         self.set_behavior(rest=False)
@@ -153,6 +153,28 @@ class StopTest(unittest.TestCase):
             self.page.click("#stop")
             self.wait_for_reports(True)
             self.wait_for_banner(GREEN, "stopped, all wheels at rest")
+            self.page.wait_for_text("#losses", "No ROS master")
+            self.page.wait_for_text("#link", "master lost")
+        self.page.wait_for_text("#link", "live")
+
+    def test_robots_of_a_driver_that_hangs_or_ended_are_unknown(self):
+        wait_for(lambda: self.states("hero_100") == {"READY"}, self.page.rows)
+        with suspended(self.drivers[1].pid):
+            wait_for(lambda: self.states("hero_100", "hero_101") == {"UNKNOWN"}, self.page.rows)
+            self.page.wait_for_text("#losses", "No answer from hero_driver_b: its robots are unknown")
+            self.assertEqual(self.states("hero_1"), {"READY"})
+            self.page.save("monitor_unknown.png")
+        wait_for(lambda: self.states("hero_100") == {"READY"}, self.page.rows)
+        end(self.drivers[0])
+        try:
+            wait_for(lambda: self.states("hero_1", "hero_2") <= {"UNKNOWN"}, self.page.rows)
+            self.page.wait_for_text("#losses", "No answer from hero_driver")
+        finally:
+            self.drivers[0] = start_scripted_driver("hero_driver", [0, 1, 2, 3], twin_of=0)
+        self.page.wait_for_text("#ready", "6 of 7")
+
+    def states(self, *robots):
+        return {row["State"].partition(",")[0] for row in self.page.rows() if row["Robot"] in robots}
 
     def test_the_page_reports_that_the_monitor_does_not_answer(self):
         with suspended(find_pid("/hero_monitor")):
@@ -170,7 +192,8 @@ class StopTest(unittest.TestCase):
             self.page.wait_for_text("#ready", "6 of 7")
         finally:
             end(process)
-        self.page.wait_for_text("#link", "no connection")
+        self.page.wait_for_text("#losses", "No connection to the monitor")
+        self.assertEqual({row["State"] for row in self.page.rows()}, {"UNKNOWN"})
         self.page.click("#stop")
         self.assertEqual(self.page.banner(), (RED, "NOT STOPPED: there is no connection to the monitor"))
         process = start_monitor()

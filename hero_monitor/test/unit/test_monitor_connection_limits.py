@@ -124,6 +124,12 @@ def test_after_too_many_wrong_tokens_an_address_has_to_wait():
     assert attempts.admits(UNTRUSTED, 100.1 + TOKEN_PERIOD_S)
 
 
+def test_an_address_that_waited_long_has_no_more_tries_than_a_new_one():
+    attempts = TokenAttempts()
+    attempts.count_wrong(UNTRUSTED, 0.0)
+    use_up(attempts, UNTRUSTED, 1000.0)
+
+
 def test_wrong_tokens_of_one_address_keep_no_other_from_trying():
     attempts = TokenAttempts()
     use_up(attempts, UNTRUSTED)

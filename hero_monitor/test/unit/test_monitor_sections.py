@@ -42,6 +42,16 @@ def test_a_page_that_missed_updates_gets_the_newest():
     assert json.loads(sections.take_updates(slow)) == {"poses": {"hero_0": [9]}}
 
 
+def test_a_page_that_is_not_served_gets_the_status_of_a_stop_alone():
+    sections, page = Sections(), Page()
+    assert sections.take_stop(page) is None
+    sections.put("fleet", {})
+    sections.put("stop", {"text": "stopping"})
+    assert json.loads(sections.take_stop(page)) == {"stop": {"text": "stopping"}}
+    assert sections.take_stop(page) is None
+    assert json.loads(sections.take_updates(page)) == {"fleet": {}}
+
+
 def test_a_new_page_gets_the_newest_lines_and_a_slow_one_a_count():
     sections, early = Sections(), Page()
     sections.log.append(1.0, 2, "node", "", "first")
@@ -179,13 +189,15 @@ def read(**fields):
 @pytest.mark.parametrize(
     "request_fields",
     [
-        {"do": "stop", "stop": True},
-        {"do": "drive", "robot": "hero_1", "linear": -0.2, "angular": 8},
-        {"do": "release", "robot": "hero_1"},
-        {"do": "goal", "robot": "hero_1", "x": 1, "y": 2},
-        {"do": "goal", "robot": "hero_1", "x": 1, "y": 2, "yaw": 3},
-        {"do": "goal", "robot": "hero_1", "x": 1, "y": 2, "yaw": None},
-        {"do": "show", "ground_truth": False, "picture": True},
+        {"do": "stop"},
+        {"do": "stop", "heard_ms": 5},
+        {"do": "release", "heard_ms": 5},
+        {"do": "drive", "robot": "hero_1", "linear": -0.2, "angular": 8, "heard_ms": 5},
+        {"do": "end_drive", "robot": "hero_1"},
+        {"do": "goal", "robot": "hero_1", "x": 1, "y": 2, "heard_ms": 5},
+        {"do": "goal", "robot": "hero_1", "x": 1, "y": 2, "yaw": 3, "heard_ms": 5},
+        {"do": "goal", "robot": "hero_1", "x": 1, "y": 2, "yaw": None, "heard_ms": 5},
+        {"do": "show", "ground_truth": False, "picture": True, "visible": True},
     ],
 )
 def test_requests_of_the_page_are_parsed(request_fields):
@@ -203,19 +215,20 @@ def test_requests_of_the_page_are_parsed(request_fields):
         "{}",
         "[" * 1900,
         " " * 3000,
-        '{"do":"stop"}',
-        '{"do":"stop","stop":1}',
-        '{"do":"drive","robot":"hero_0","linear":0.3,"angular":0}',
-        '{"do":"drive","robot":"hero_0","linear":NaN,"angular":0}',
-        '{"do":"drive","robot":"hero_0","linear":0.1,"angular":1e999}',
-        '{"do":"drive","robot":"hero_0","linear":"0.1","angular":0}',
-        '{"do":"drive","robot":"hero_0","linear":true,"angular":0}',
+        '{"do":"release"}',
+        '{"do":"release","heard_ms":"1"}',
+        '{"do":"drive","robot":"hero_0","linear":0.1,"angular":0}',
+        '{"do":"drive","robot":"hero_0","linear":0.3,"angular":0,"heard_ms":5}',
+        '{"do":"drive","robot":"hero_0","linear":NaN,"angular":0,"heard_ms":5}',
+        '{"do":"drive","robot":"hero_0","linear":0.1,"angular":1e999,"heard_ms":5}',
+        '{"do":"drive","robot":"hero_0","linear":"0.1","angular":0,"heard_ms":5}',
+        '{"do":"drive","robot":"hero_0","linear":true,"angular":0,"heard_ms":5}',
         '{"do":"drive","robot":7,"linear":0.1,"angular":0}',
-        '{"do":"goal","robot":"hero_0","x":1}',
-        '{"do":"goal","robot":"hero_0","x":1,"y":1,"yaw":"north"}',
-        '{"do":"goal","robot":"","x":1,"y":1}',
+        '{"do":"goal","robot":"hero_0","x":1,"heard_ms":5}',
+        '{"do":"goal","robot":"hero_0","x":1,"y":1,"yaw":"north","heard_ms":5}',
+        '{"do":"goal","robot":"","x":1,"y":1,"heard_ms":5}',
         '{"do":"show"}',
-        '{"do":"show","ground_truth":true}',
+        '{"do":"show","ground_truth":true,"picture":false}',
         '{"do":"reboot"}',
         '{"do":["stop"],"stop":true}',
     ],

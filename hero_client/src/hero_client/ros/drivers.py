@@ -291,6 +291,15 @@ class Drivers:
             return []
         return [link.driver for link in self._find_known() if link.newest(limit_s) is None]
 
+    def find_answering(self, limit_s: float) -> Dict[str, bool]:
+        """Return for each driver that ever reported whether it is connected and has reported within limit_s."""
+        since_s = time.monotonic() - limit_s
+        return {
+            link.driver: link.is_connected and link.newest(since_s) is not None
+            for link in self._links.values()
+            if link.report is not None
+        }
+
     def names(self) -> List[str]:
         """Return the drivers that are known; without one, the usual one."""
         return sorted(link.driver for link in self._find_known()) or [driver_of(self._usual)]

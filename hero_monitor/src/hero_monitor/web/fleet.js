@@ -1,6 +1,8 @@
 // The table of robots. Cells change in place, which keeps selection, scrolling and screen readers undisturbed.
 
 import { colorOf } from "./colors.js";
+import { nearestOf } from "./history.js";
+import { sourceOf, stateOf } from "./losses.js";
 
 export function spanOf(seconds) {
   if (seconds === null || seconds === undefined) return "-";
@@ -13,67 +15,96 @@ const number = (value, digits, unit) => (value === null ? "-" : `${value.toFixed
 
 export const healthOf = (robot) => robot.error || (robot.health[0] > 0 ? robot.health[1] : "");
 
-/** Heading, text of a cell, sort key, and whether it is a number. */
+function stateText(robot, state) {
+  const shown = stateOf(robot, state);
+  return shown === "READY" && robot.odom === 0 ? "READY, no data" : shown;
+}
+
+const speedOf = (robot, state, history) => history.speedOf(robot.name);
+const nearestRange = (robot, state) => nearestOf(state.ranges[robot.name]);
+
+/** value: what the table sorts by; text: of a value; lasting: it stays true of a robot that is unknown now. */
 const COLUMNS = [
-  ["Robot", (robot) => robot.name || robot.address, (robot) => robot.id, false],
-  ["State", (robot) => robot.state, (robot) => robot.state, false],
-  ["Stop", (robot) => robot.stop, (robot) => robot.stop, false],
-  ["Address", (robot) => robot.address, (robot) => robot.address, false],
-  ["Odom", (robot) => number(robot.odom, 1, " Hz"), (robot) => robot.odom ?? -1, true],
-  ["From robot", (robot) => number(robot.bytes / 1000, 1, " kB/s"), (robot) => robot.bytes, true],
-  ["Clock", (robot) => number(robot.clock === null ? null : robot.clock * 1000, 1, " ms"), (robot) => Math.abs(robot.clock ?? 0), true],
-  ["Firmware", (robot) => robot.firmware || "-", (robot) => robot.firmware, false],
-  ["Reconnects", (robot) => String(robot.reconnects), (robot) => robot.reconnects, true],
-  ["Last error", (robot) => healthOf(robot), (robot) => healthOf(robot), false],
+  { title: "Robot", value: (robot) => robot.id, text: (id, robot) => robot.name || robot.address, lasting: true },
+  { title: "State", value: stateText, tag: "state", lasting: true },
+  { title: "Stop", value: (robot) => robot.stop, tag: "stop" },
+  { title: "Light", value: (robot, state) => state.lights[robot.name] || "", text: (light) => light || "off" },
+  { title: "Nearest", value: nearestRange, text: (mm) => number(mm === null ? null : mm / 1000, 2, " m"), isNumber: true },
+  { title: "Speed", value: speedOf, text: (speed) => number(speed, 2, " m/s"), isNumber: true },
+  { title: "Pose", value: sourceOf, text: (source) => source || "own odometry", tag: "source", lasting: true },
+  { title: "Address", value: (robot) => robot.address, details: true, lasting: true },
+  { title: "Odom", value: (robot) => robot.odom, text: (rate) => number(rate, 1, " Hz"), details: true, isNumber: true },
+  { title: "From robot", value: (robot) => robot.bytes, text: (bytes) => number(bytes / 1000, 1, " kB/s"), details: true, isNumber: true },
+  { title: "Clock", value: (robot) => robot.clock, text: (clock) => number(clock === null ? null : clock * 1000, 1, " ms"), details: true, isNumber: true },
+  { title: "Firmware", value: (robot) => robot.firmware, details: true, lasting: true },
+  { title: "Reconnects", value: (robot) => robot.reconnects, details: true, isNumber: true, lasting: true },
+  { title: "Last error", value: healthOf, text: String, details: true, isError: true, lasting: true },
 ];
 
+function compare(a, b) {
+  if (a === b) return 0;
+  if (a === null || b === null) return a === null ? -1 : 1;
+  return a < b ? -1 : 1;
+}
+
 export class FleetTable {
-  constructor(choose) {
+  constructor({ choose, history }) {
     this.choose = choose;
-    this.column = 0;
+    this.history = history;
+    this.column = COLUMNS[0];
     this.down = false;
     this.rows = new Map();
-    this.body = document.querySelector("#fleet tbody");
-    const head = document.querySelector("#fleet thead tr");
-    this.heads = COLUMNS.map(([title, , , isNumber], index) => {
-      const cell = document.createElement("th");
-      cell.scope = "col";
-      if (isNumber) cell.className = "number";
-      const button = document.createElement("button");
-      button.type = "button";
-      button.textContent = title;
-      button.addEventListener("click", () => this.sortBy(index));
-      cell.append(button);
-      head.append(cell);
-      return cell;
-    });
+    this.table = document.querySelector("#fleet table");
+    this.body = this.table.tBodies[0];
+    this.heads = COLUMNS.map((column) => this.makeHead(column));
+    const details = document.getElementById("details");
+    const show = (isShown) => {
+      this.table.classList.toggle("detailed", isShown);
+      details.setAttribute("aria-pressed", String(isShown));
+      localStorage.setItem("details", String(isShown));
+    };
+    details.addEventListener("click", () => show(details.getAttribute("aria-pressed") !== "true"));
+    show(localStorage.getItem("details") === "true");
   }
 
-  sortBy(index) {
-    this.down = this.column === index ? !this.down : false;
-    this.column = index;
+  makeHead(column) {
+    const cell = document.createElement("th");
+    cell.scope = "col";
+    cell.className = classOf(column);
+    const button = document.createElement("button");
+    button.type = "button";
+    button.textContent = column.title;
+    button.addEventListener("click", () => this.sortBy(column));
+    cell.append(button);
+    this.table.tHead.rows[0].append(cell);
+    return cell;
+  }
+
+  sortBy(column) {
+    this.down = this.column === column ? !this.down : false;
+    this.column = column;
     if (this.last) this.show(this.last);
   }
 
   show(state) {
     this.last = state;
-    const key = COLUMNS[this.column][2];
     const sign = this.down ? -1 : 1;
-    const robots = [...state.fleet.robots].sort((one, other) => {
-      const [a, b] = [key(one), key(other)];
-      return sign * (a < b ? -1 : a > b ? 1 : 0) || one.id - other.id;
-    });
+    const valueOf = (robot) => this.column.value(robot, state, this.history);
+    const robots = [...state.fleet.robots].sort(
+      (one, other) => sign * compare(valueOf(one), valueOf(other)) || one.id - other.id,
+    );
     this.heads.forEach((cell, index) => {
-      const order = index !== this.column ? "none" : this.down ? "descending" : "ascending";
+      const order = COLUMNS[index] !== this.column ? "none" : this.down ? "descending" : "ascending";
       if (cell.getAttribute("aria-sort") !== order) cell.setAttribute("aria-sort", order);
     });
+    this.table.classList.toggle("stopping", robots.some((robot) => robot.stop));
     const left = new Set(this.rows.keys());
     robots.forEach((robot, index) => {
       const id = `${robot.name} ${robot.address} ${robot.state === "REFUSED"}`;
       left.delete(id);
       const row = this.rows.get(id) || this.addRow(id);
       if (this.body.children[index] !== row.line) this.body.insertBefore(row.line, this.body.children[index] || null);
-      this.fill(row, robot, state.chosen);
+      this.fill(row, robot, state);
     });
     for (const id of left) {
       this.rows.get(id).line.remove();
@@ -83,48 +114,55 @@ export class FleetTable {
 
   addRow(id) {
     const line = document.createElement("tr");
-    const row = { line, cells: [], tags: [], texts: [], robot: null };
-    COLUMNS.forEach(([, , , isNumber], index) => {
+    const row = { line, targets: [], texts: [], robot: null };
+    COLUMNS.forEach((column, index) => {
       const cell = document.createElement(index === 0 ? "th" : "td");
+      cell.className = classOf(column);
+      let target = cell;
       if (index === 0) {
         cell.scope = "row";
         const button = document.createElement("button");
         button.type = "button";
-        const chip = document.createElement("span");
-        chip.className = "chip";
-        row.chip = chip;
-        row.label = document.createElement("span");
-        button.append(chip, row.label);
+        row.chip = document.createElement("span");
+        row.chip.className = "chip";
+        target = document.createElement("span");
+        button.append(row.chip, target);
         cell.append(button);
-      } else if (index <= 2) {
-        const tag = document.createElement("span");
-        tag.className = "tag";
-        cell.append(tag);
-        row.tags.push(tag);
+      } else if (column.tag || column.title === "Light") {
+        target = document.createElement("span");
+        target.className = column.tag ? "tag" : "light";
+        cell.append(target);
       }
-      if (isNumber) cell.className = "number";
-      if (index === COLUMNS.length - 1) cell.className = "error";
       line.append(cell);
-      row.cells.push(cell);
+      row.targets.push(target);
     });
     line.addEventListener("click", () => row.robot.state !== "REFUSED" && this.choose(row.robot.name));
     this.rows.set(id, row);
     return row;
   }
 
-  fill(row, robot, chosen) {
+  fill(row, robot, state) {
     row.robot = robot;
-    COLUMNS.forEach(([, text], index) => {
-      const now = text(robot);
-      if (row.texts[index] === now) return;
-      row.texts[index] = now;
-      const target = index === 0 ? row.label : row.tags[index - 1] || row.cells[index];
-      target.textContent = now;
-      if (index === COLUMNS.length - 1) target.title = now;
+    const isUnknown = stateOf(robot, state) === "UNKNOWN";
+    const isRefused = robot.state === "REFUSED"; // then topics of its name are those of another robot
+    COLUMNS.forEach(({ title, value, text, tag, lasting }, index) => {
+      const now = value(robot, state, this.history);
+      const isHidden = (isUnknown && !lasting) || (isRefused && ["Light", "Nearest", "Speed", "Pose"].includes(title));
+      const shown = isHidden ? "-" : text ? text(now, robot) : String(now || (tag ? "" : "-"));
+      if (row.texts[index] === shown) return;
+      row.texts[index] = shown;
+      const target = row.targets[index];
+      target.textContent = shown;
+      if (tag) target.dataset[tag] = shown;
+      if (title === "Light") target.style.setProperty("--light", shown.startsWith("#") ? shown : "transparent");
+      if (title === "Last error") target.title = shown;
     });
-    row.tags[0].dataset.state = robot.state;
-    row.tags[1].dataset.stop = robot.stop;
     row.chip.style.background = colorOf(robot.id);
-    row.line.classList.toggle("chosen", robot.name === chosen && robot.state !== "REFUSED");
+    row.line.classList.toggle("unknown", isUnknown);
+    row.line.classList.toggle("chosen", robot.name === state.chosen && robot.state !== "REFUSED");
   }
+}
+
+function classOf({ details, isNumber, isError, title }) {
+  return [details && "details", isNumber && "number", isError && "error", title === "Stop" && "stop"].filter(Boolean).join(" ");
 }

@@ -2,22 +2,24 @@
 //
 // Names and texts come from robots, programs and the network: they are inserted as text, never as markup.
 
+import { Connection } from "./connection.js";
 import { FleetTable } from "./fleet.js";
+import { History } from "./history.js";
+import { showLosses, stateOf } from "./losses.js";
 import { FleetMap } from "./map.js";
 import { LogView } from "./log.js";
 import { RobotPanel } from "./robot.js";
 import { StopPanel } from "./stop.js";
 
-const RETRY_MS = 1000;
-const SILENT_MS = 5000; // the driver reports once a second
 const NOTICE_MS = 6000;
 
 const element = (id) => document.getElementById(id);
 
-/** The sections as received, and the name of the chosen robot. */
+/** As received, whether it is up to date, and the name of the chosen robot. */
 const state = {
   hello: { control: false },
   fleet: { driver: false, listening: "", stopped: false, robots: [] },
+  losses: [],
   poses: {},
   ranges: {},
   lights: {},
@@ -25,25 +27,29 @@ const state = {
   ground_truth: {},
   picture: null,
   arena: { boxes: [], circles: [] },
+  isFresh: false,
   chosen: null,
 };
+const RECEIVED = Object.keys(state).filter((name) => name !== "isFresh" && name !== "chosen");
 
-let socket = null;
-let lastMs = 0;
-
-const isOpen = () => socket !== null && socket.readyState === WebSocket.OPEN;
-
-/** Send a request; false without a connection. */
-function send(request) {
-  if (!isOpen()) return false;
-  socket.send(JSON.stringify(request));
-  return true;
-}
-
-/** Whether requests queue up on a stalled network: commands of a held button must not. */
-function congested() {
-  return socket !== null && socket.bufferedAmount > 0;
-}
+const connection = new Connection({
+  onOpen() {
+    log.clear();
+    stop.open();
+    map.requestShown();
+  },
+  onUpdates: receive,
+  onChange() {
+    if (!connection.isOpen) panel.endDrive();
+    showAll();
+    stop.show();
+  },
+  onPause() {
+    panel.endDrive();
+    notice("info", "This page was suspended.");
+  },
+});
+const send = (request) => connection.send(request);
 
 function choose(name) {
   state.chosen = name;
@@ -65,85 +71,54 @@ function notice(level, text) {
   setTimeout(() => line.remove(), NOTICE_MS);
 }
 
+const history = new History();
 const map = new FleetMap(state, { choose, send, notice });
-const table = new FleetTable(choose);
+const table = new FleetTable({ choose, history });
 const log = new LogView();
-const panel = new RobotPanel({ send, congested, map });
-const stop = new StopPanel({ send, isOpen, releaseRobot: () => panel.release(), notice });
+const panel = new RobotPanel({ connection, map });
+const stop = new StopPanel({ connection, endDrive: () => panel.endDrive(), notice });
 
 function showHead() {
-  const open = isOpen();
-  const link = element("link");
   const { driver, robots, listening, frame } = state.fleet;
-  link.textContent = !open ? "no connection to the monitor" : driver ? "live" : "no driver";
-  link.className = "pill " + (open && driver ? "good" : "bad");
-  const ready = robots.filter((robot) => robot.state === "READY").length;
-  element("ready").textContent = `${ready} of ${robots.length} ready`;
-  element("listening").textContent = driver && listening ? `driver on ${listening}` : "";
+  const isLive = state.isFresh && driver;
+  const link = element("link");
+  link.textContent = isLive && state.losses.length === 0 ? "live" : isLive ? state.losses[0].source + " lost" : "unknown";
+  link.className = "pill " + (isLive && state.losses.length === 0 ? "good" : "quiet");
+  const count = (wanted) => robots.filter((robot) => stateOf(robot, state) === wanted).length;
+  const unknown = count("UNKNOWN");
+  element("ready").textContent = unknown ? `${unknown} of ${robots.length} unknown` : `${count("READY")} of ${robots.length} ready`;
+  element("listening").textContent = isLive && listening ? `driver on ${listening}` : "";
   element("frame").textContent = frame ? `frame ${frame}, by localization` : "";
-  document.body.classList.toggle("stale", !open);
-  const empty = element("empty");
-  empty.hidden = open && robots.length > 0;
-  empty.textContent = !open
-    ? "No connection to the monitor. This view is outdated."
-    : driver
-      ? "No robots. Robots appear here when they connect to the driver."
-      : "No driver: roslaunch hero_bringup hero_bringup.launch";
+  document.body.classList.toggle("stale", !state.isFresh);
+  element("empty").hidden = robots.length > 0 || !isLive;
+  element("empty").textContent = "No robots. Robots appear here when they connect to the driver.";
+  showLosses(state, connection);
+}
+
+/** Show the state in all panels. */
+function showAll() {
+  state.isFresh = connection.isFresh && connection.served;
+  if (state.chosen !== null && !state.fleet.robots.some((robot) => robot.name === state.chosen)) choose(null);
+  table.show(state);
+  panel.show(state);
+  showHead();
+  map.draw();
 }
 
 function receive(updates) {
-  for (const name of ["hello", "fleet", "poses", "ranges", "lights", "goals", "ground_truth", "picture", "arena"]) {
+  for (const name of RECEIVED) {
     if (name in updates) state[name] = updates[name];
   }
   stop.receive(updates);
+  if ("poses" in updates || "fleet" in updates) history.update(state);
   if ("notice" in updates) notice(updates.notice.level, updates.notice.text);
   if ("log" in updates) log.append(updates.log);
-  if ("fleet" in updates || "hello" in updates) {
-    if (state.chosen !== null && !state.fleet.robots.some((robot) => robot.name === state.chosen)) choose(null);
-    table.show(state);
-    showHead();
-  }
-  if ("poses" in updates || "fleet" in updates || "hello" in updates) panel.show(state);
+  if ("fleet" in updates || "hello" in updates || "losses" in updates) showAll();
+  else if ("poses" in updates) panel.show(state);
   map.update(updates);
 }
 
-function connect() {
-  socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/live`);
-  const own = socket;
-  let opened = false;
-  own.addEventListener("open", () => {
-    opened = true;
-    lastMs = Date.now();
-    log.clear();
-    stop.open();
-    map.requestShown();
-    showHead();
-  });
-  own.addEventListener("message", (event) => {
-    lastMs = Date.now();
-    receive(JSON.parse(event.data));
-  });
-  own.addEventListener("close", async () => {
-    panel.release();
-    socket = null;
-    showHead();
-    stop.show();
-    if (!opened) {
-      // A restarted monitor may have another token: then this page becomes the login page.
-      try {
-        const page = await (await fetch(".", { cache: "no-store" })).text();
-        if (page.includes("login.js")) location.reload();
-      } catch {
-        // It does not answer; keep trying.
-      }
-    }
-    setTimeout(connect, RETRY_MS);
-  });
-}
-
-setInterval(() => {
-  if (isOpen() && Date.now() - lastMs > SILENT_MS) socket.close();
-}, 1000);
+document.addEventListener("visibilitychange", () => map.requestShown());
 
 // Small screens show one panel at a time.
 for (const button of document.querySelectorAll("#tabs button")) {
@@ -173,4 +148,4 @@ element("theme").addEventListener("click", () => {
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => map.draw());
 
 showHead();
-connect();
+connection.open();

@@ -1,5 +1,6 @@
 // The map, seen from above: x to the right, y up, as in ROS. Lengths in mm, angles in mrad.
 
+import { isLate } from "./connection.js";
 import { CameraPicture } from "./picture.js";
 import { BODY_MM, MapPainter, TRAIL_MS } from "./painter.js";
 
@@ -52,9 +53,10 @@ export class FleetMap {
     this.draw();
   }
 
-  /** Subscribe to ground truth and picture or not; to be repeated on each connection. */
+  /** Tell what is to be seen here; to be repeated on each connection. */
   requestShown() {
-    this.send({ do: "show", ground_truth: this.shows.ground_truth, picture: this.shows.picture });
+    const { ground_truth, picture } = this.shows;
+    this.send({ do: "show", ground_truth, picture, visible: !document.hidden });
   }
 
   setGoing(going) {
@@ -83,7 +85,7 @@ export class FleetMap {
     canvas.addEventListener("pointerup", (event) => {
       const only = this.pointers.size === 1;
       this.pointers.delete(event.pointerId);
-      if (this.going && only && this.aim) this.sendGoal();
+      if (this.going && only && this.aim && !isLate(event)) this.sendGoal();
       else if (only && !this.moved) this.pick(event.offsetX, event.offsetY);
     });
     canvas.addEventListener("pointercancel", (event) => {
@@ -234,7 +236,7 @@ export class FleetMap {
 
   /** What there is to see: when it changes, the view fits it again. */
   sceneKey(count) {
-    return `${count} ${this.state.fleet.frame} ${this.picture.box} ${this.state.arena.boxes.length} ${this.state.fleet.robots.filter((robot) => robot.located).length}`;
+    return `${count} ${this.state.fleet.frame} ${this.picture.box} ${this.state.arena.boxes.length} ${this.state.fleet.robots.filter((robot) => robot.source).length}`;
   }
 
   keepTrails() {

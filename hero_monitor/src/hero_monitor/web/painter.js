@@ -1,6 +1,7 @@
 // Paints the map: grid, arena, trails, goals, beams and robots. Lengths in mm, angles in mrad.
 
 import { colorOf, isDark } from "./colors.js";
+import { sourceOf, stateOf } from "./losses.js";
 
 export const BODY_MM = 36.85;
 export const TRAIL_MS = 60000;
@@ -158,7 +159,7 @@ export class MapPainter {
 
   paintBeams(robot) {
     const ranges = this.state.ranges[robot.name];
-    if (!ranges || robot.state !== "READY") return;
+    if (!ranges || stateOf(robot, this.state) !== "READY") return;
     const { context, view } = this;
     this.at(this.state.poses[robot.name], () => {
       ranges.forEach((range, index) => {
@@ -194,10 +195,12 @@ export class MapPainter {
 
   paintRobot(robot) {
     const { context, view, state } = this;
-    const here = robot.state === "READY";
-    const light = state.lights[robot.name];
+    const here = stateOf(robot, state) === "READY";
+    const isPlaced = here && sourceOf(robot, state) !== "unknown";
+    const ink = here ? colorOf(robot.id) : this.ink("--quiet");
+    const light = here ? state.lights[robot.name] : null;
     this.at(state.poses[robot.name], () => {
-      context.globalAlpha = here ? 1 : 0.4;
+      context.globalAlpha = isPlaced ? 1 : 0.4;
       if (light) {
         const glow = context.createRadialGradient(0, 0, BODY_MM * 0.6, 0, 0, BODY_MM * 2);
         glow.addColorStop(0, light + "99");
@@ -212,16 +215,16 @@ export class MapPainter {
         context.fillRect(-WHEEL_MM[0], side * WHEEL_MM[2] - WHEEL_MM[1] / 2, 2 * WHEEL_MM[0], WHEEL_MM[1]);
       }
       context.fillStyle = this.ink("--shell");
-      context.strokeStyle = colorOf(robot.id);
+      context.strokeStyle = ink;
       context.lineWidth = Math.max(6, 1.6 / view.scale);
-      if (!here) context.setLineDash([12, 9]);
+      if (!isPlaced) context.setLineDash([12, 9]);
       context.beginPath();
       context.arc(0, 0, BODY_MM - 3, 0, 2 * Math.PI);
       context.fill();
       context.stroke();
       context.setLineDash([]);
       // An arrowhead marks the front.
-      context.fillStyle = colorOf(robot.id);
+      context.fillStyle = ink;
       context.beginPath();
       context.moveTo(BODY_MM * 1.38, 0);
       context.lineTo(BODY_MM * 0.72, BODY_MM * 0.48);
@@ -272,7 +275,8 @@ export class MapPainter {
       const short = robots.length > 12 && BODY_MM * view.scale < 22 && robot.name !== state.chosen && robot.id >= 0;
       const text = short ? String(robot.id) : robot.name;
       context.strokeText(text, x, y);
-      context.fillStyle = robot.state === "READY" ? this.ink("--ink") : this.ink("--bad");
+      const shown = stateOf(robot, state);
+      context.fillStyle = this.ink({ READY: "--ink", UNKNOWN: "--quiet" }[shown] || "--bad");
       context.fillText(text, x, y);
     }
   }

@@ -1,13 +1,16 @@
 // The chosen robot: its data, and controls for driving it if the monitor allows that.
 //
 // Dead man's switch: while a button or key is held, the page sends a command every 100 ms. It stops sending when the
-// button is released, the page is hidden or loses focus, or the network stalls. The monitor stops the robot on
-// "release", after 0.4 s of silence, or when the socket closes.
+// button is let go, the page is hidden or loses focus, was suspended, or the network stalls. The monitor stops the robot
+// on "end_drive", after 0.4 s of silence, or when the socket closes.
 
 import { colorOf } from "./colors.js";
+import { isLate } from "./connection.js";
 import { healthOf, spanOf } from "./fleet.js";
+import { stateOf } from "./losses.js";
 
 const HOLD_MS = 100;
+const GAP_MS = 400; // after such a pause of this page, a button that was held may have been let go
 const KEYS = {
   ArrowUp: [1, 0], ArrowDown: [-1, 0], ArrowLeft: [0, 1], ArrowRight: [0, -1],
   KeyW: [1, 0], KeyS: [-1, 0], KeyA: [0, 1], KeyD: [0, -1],
@@ -16,9 +19,8 @@ const KEYS = {
 const element = (id) => document.getElementById(id);
 
 export class RobotPanel {
-  constructor({ send, congested, map }) {
-    this.send = send;
-    this.congested = congested;
+  constructor({ connection, map }) {
+    this.connection = connection;
     this.map = map;
     this.name = null;
     this.driving = null;
@@ -30,6 +32,7 @@ export class RobotPanel {
       const direction = button.dataset.direction.split(" ").map(Number);
       button.addEventListener("pointerdown", (event) => {
         event.preventDefault();
+        if (isLate(event)) return;
         pad.focus();
         button.setPointerCapture(event.pointerId);
         button.classList.add("down");
@@ -38,23 +41,23 @@ export class RobotPanel {
       for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) {
         button.addEventListener(end, () => {
           button.classList.remove("down");
-          this.release();
+          this.endDrive();
         });
       }
       button.addEventListener("contextmenu", (event) => event.preventDefault());
       // A button that is reached with Tab is held with the space bar.
       button.addEventListener("keydown", (event) => {
-        if (event.code === "Space" && !event.repeat) this.hold(direction);
+        if (event.code === "Space" && !event.repeat && !isLate(event)) this.hold(direction);
         if (event.code === "Space") event.preventDefault();
       });
-      button.addEventListener("keyup", (event) => event.code === "Space" && this.release());
+      button.addEventListener("keyup", (event) => event.code === "Space" && this.endDrive());
     }
     pad.addEventListener("keydown", (event) => this.pressKey(event));
     pad.addEventListener("keyup", (event) => this.liftKey(event));
-    pad.addEventListener("focusout", () => this.release());
-    addEventListener("blur", () => this.release());
-    addEventListener("pagehide", () => this.release());
-    document.addEventListener("visibilitychange", () => document.hidden && this.release());
+    pad.addEventListener("focusout", () => this.endDrive());
+    addEventListener("blur", () => this.endDrive());
+    addEventListener("pagehide", () => this.endDrive());
+    document.addEventListener("visibilitychange", () => document.hidden && this.endDrive());
     for (const [id, unit] of [["linear", "m/s"], ["angular", "rad/s"]]) {
       const show = () => (element(`${id}_value`).textContent = `${Number(element(id).value).toFixed(2)} ${unit}`);
       element(id).addEventListener("input", show);
@@ -73,7 +76,7 @@ export class RobotPanel {
   pressKey(event) {
     if (!(event.code in KEYS) || event.ctrlKey || event.altKey || event.metaKey) return;
     event.preventDefault();
-    if (event.repeat) return;
+    if (event.repeat || isLate(event)) return;
     this.keys.add(event.code);
     this.holdKeys();
   }
@@ -81,7 +84,7 @@ export class RobotPanel {
   liftKey(event) {
     if (!this.keys.delete(event.code)) return;
     if (this.keys.size) this.holdKeys();
-    else this.release();
+    else this.endDrive();
   }
 
   holdKeys() {
@@ -93,27 +96,30 @@ export class RobotPanel {
   hold(direction) {
     if (this.name === null) return;
     this.driving = { robot: this.name, direction };
+    this.sentMs = Date.now();
     this.sendCommand();
     if (this.timer === null) this.timer = setInterval(() => this.sendCommand(), HOLD_MS);
   }
 
   sendCommand() {
-    if (document.hidden || !document.hasFocus()) {
-      this.release();
+    const now = Date.now();
+    if (document.hidden || !document.hasFocus() || now - this.sentMs > GAP_MS) {
+      this.endDrive();
       return;
     }
-    if (this.congested()) return;
+    this.sentMs = now;
+    if (this.connection.isCongested) return;
     const { robot, direction } = this.driving;
     // Backwards the turn is inverted, as in a car.
     const angular = direction[1] * (direction[0] < 0 ? -1 : 1) * Number(element("angular").value);
-    this.send({ do: "drive", robot, linear: direction[0] * Number(element("linear").value), angular });
+    this.connection.send({ do: "drive", robot, linear: direction[0] * Number(element("linear").value), angular });
   }
 
-  release() {
+  endDrive() {
     this.keys.clear();
     if (this.timer !== null) clearInterval(this.timer);
     this.timer = null;
-    if (this.driving !== null) this.send({ do: "release", robot: this.driving.robot });
+    if (this.driving !== null) this.connection.send({ do: "end_drive", robot: this.driving.robot });
     this.driving = null;
   }
 
@@ -121,15 +127,16 @@ export class RobotPanel {
     const robot = state.fleet.robots.find((one) => one.name === state.chosen && one.state !== "REFUSED") || null;
     const name = robot === null ? null : robot.name;
     if (name !== this.name) {
-      this.release();
+      this.endDrive();
       this.name = name;
       this.setGoing(false);
     }
     document.querySelector("#robot .chip").style.background = robot ? colorOf(robot.id) : "transparent";
     element("name").textContent = robot ? robot.name : "No robot is chosen";
-    element("state").textContent = robot ? robot.state : "";
-    element("state").dataset.state = robot ? robot.state : "";
-    element("control").hidden = robot === null || !state.hello.control;
+    const shown = robot ? stateOf(robot, state) : "";
+    element("state").textContent = shown;
+    element("state").dataset.state = shown;
+    element("control").hidden = robot === null || !state.hello.control || shown === "UNKNOWN";
     element("advice").hidden = robot !== null && state.hello.control;
     element("advice").textContent =
       robot === null ? "Click a robot on the map or in the table." : "View only. control:=true lets the monitor drive robots.";
@@ -140,13 +147,15 @@ export class RobotPanel {
   }
 
   listFacts(robot, state) {
+    if (stateOf(robot, state) === "UNKNOWN") return [["all data", "unknown"]];
     const pose = state.poses[robot.name];
     const ranges = (state.ranges[robot.name] || []).filter((range) => range !== null && range >= 0);
     const meters = (value) => (value / 1000).toFixed(3);
     const facts = [
       ["pose", pose ? `${meters(pose[0])} ${meters(pose[1])} m, ${((pose[2] / 1000) * (180 / Math.PI)).toFixed(0)}°` : "-"],
       ["stop", robot.stop || "-"],
-      ["frame", robot.located ? state.fleet.frame || "map" : "own odometry: position on the map unknown"],
+      ["pose source", robot.source || "own odometry: position on the map unknown"],
+      ["frame", robot.source ? state.fleet.frame || "map" : "-"],
       ["distance", robot.distance === null ? "-" : `${robot.distance.toFixed(2)} m since this view opened`],
       ["nearest", ranges.length ? `${meters(Math.min(...ranges))} m` : "nothing in range"],
       ["odometry", robot.odom === null ? "-" : `${robot.odom.toFixed(1)} Hz`],

@@ -1,0 +1,39 @@
+"""Asks the ROS master again and again whether it is there; pages are told, and go on without it."""
+
+import time
+
+import rosgraph
+
+from hero_client.ros_node import ask_master
+from hero_client.values.errors import NodeError
+
+from .background import Background
+from .losses import MASTER_PERIOD_S, MASTER_SILENT_S
+
+
+class MasterLink:
+    """The ROS master, as far as it answers."""
+
+    def __init__(self, background: Background) -> None:
+        self._background = background
+        self._asked_s = -MASTER_PERIOD_S
+        self._is_pending = False
+        self._has_failed = False
+
+    def check(self) -> str:
+        """Ask if it is time to; return why the master is lost, empty if it answers. Returns at once."""
+        now_s = time.monotonic()
+        if not self._is_pending and now_s - self._asked_s >= MASTER_PERIOD_S:
+            self._asked_s, self._is_pending = now_s, True
+            self._background.submit(self._ask)
+        is_late = self._is_pending and now_s - self._asked_s > MASTER_SILENT_S
+        return "%s does not answer" % rosgraph.get_master_uri() if self._has_failed or is_late else ""
+
+    def _ask(self) -> None:
+        try:
+            ask_master("getPid")
+            self._has_failed = False
+        except NodeError:
+            self._has_failed = True
+        finally:
+            self._is_pending = False

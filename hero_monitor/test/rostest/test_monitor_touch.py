@@ -1,0 +1,251 @@
+#!/usr/bin/env python3
+"""STOP ALL, Release and driving by touch and keyboard in a real browser, at every size of screen; without ROS.
+
+The page's clock is the test's: what a page does after a second depends on no load.
+"""
+
+import unittest
+
+import rostest
+from monitor_page import MonitorPage
+from scripted_monitor import LONG_CAUSE, ScriptedMonitor, make_fleet, make_robot
+
+from hero_test.browser import MISSING
+from hero_test.waiting import wait_for
+
+SIZES = [(320, 568), (568, 320), (360, 740), (740, 360), (390, 844), (820, 1180), (1180, 820), (1440, 900), (1920, 1080)]
+ROBOTS = [make_robot(number) for number in range(3)]
+UNKNOWN = [make_robot(number, known=False) for number in range(3)]
+LOSSES = [{"source": "driver", "cause": LONG_CAUSE, "remedy": "switch off robots that move"}] * 3
+
+
+def make_status(level, text):
+    return {"level": level, "text": text, "is_final": level == "info", "reads": 0}
+
+
+LONG_STATUS = make_status("error", "NOT STOPPED: " + ", ".join("hero_%d" % number for number in range(60)) + " move")
+REST = make_status("info", "stopped, all wheels at rest")
+
+STATES = {
+    "empty": {"fleet": make_fleet(), "losses": [], "stop": None},
+    "live": {"fleet": make_fleet(*ROBOTS)},
+    "stopping": {"stop": make_status("warn", "stopping")},
+    "stopped": {"fleet": make_fleet(*ROBOTS, stopped=True), "stop": REST},
+    "not stopped": {"stop": LONG_STATUS},
+    "unknown": {"fleet": make_fleet(*UNKNOWN, stopped=True), "losses": LOSSES},
+}
+
+TAKE_CLOCK = """
+let now = performance.now(), date = Date.now();
+window.stepMs = 0;
+performance.now = () => (now += window.stepMs);
+Date.now = () => date;
+window.advance = (ms) => { date += ms; now += ms; };
+"""
+
+FIND_BUTTONS = """
+const place = (id) => {
+  const { left, top, width, height } = document.getElementById(id).getBoundingClientRect();
+  return [left, top, width, height];
+};
+const [left, top, width, height] = place("stop");
+const at = (x, y) => document.elementFromPoint(left + x * width, top + y * height);
+const covered = [[0.5, 0.5], [0.08, 0.2], [0.92, 0.2], [0.08, 0.8], [0.92, 0.8]].filter(([x, y]) => at(x, y).id !== "stop");
+return { stop: place("stop"), release: place("release"), covered, size: [innerWidth, innerHeight] };
+"""
+
+
+@unittest.skipIf(MISSING, "not installed: %s (script/bootstrap --test)" % ", ".join(MISSING))
+class TouchTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.monitor = ScriptedMonitor()
+        cls.page = MonitorPage(cls.monitor.url)
+        cls.page.browser.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": True, "maxTouchPoints": 2})
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.page.close()
+        cls.monitor.close()
+
+    def setUp(self):
+        self.monitor.is_silent, self.monitor.served = False, True
+        self.show("empty")
+        self.show("live")
+        self.page.open()
+        self.page.wait_for_text("#ready", "3 of 3 ready")
+        self.monitor.requests.clear()
+
+    def show(self, name):
+        self.monitor.show(**STATES[name])
+        return name
+
+    def take_clock(self):
+        """Stop the page's clock; window.stepMs makes it go on, window.advance() jump."""
+        self.page.run(TAKE_CLOCK)
+
+    def touch(self, kind, *place):
+        points = [{"x": place[0], "y": place[1]}] if place else []
+        self.page.browser.execute_cdp_cmd("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+    def tap(self, place):
+        self.touch("touchStart", *place)
+        self.touch("touchEnd")
+
+    def find(self, name):
+        """Return the middle of a button."""
+        left, top, width, height = self.page.run(FIND_BUTTONS)[name]
+        return left + width / 2, top + height / 2
+
+    def press_key(self, kind, key):
+        text = {"Enter": "\r", "Space": " "}[key]
+        keys = {"type": kind, "code": key, "key": key if key == "Enter" else " ", "text": text}
+        self.page.browser.execute_cdp_cmd("Input.dispatchKeyEvent", keys)
+
+    def stop(self):
+        self.tap(self.find("stop"))
+        self.page.wait_for_text("#stop", "STOPPED")
+
+    def wait_until_armed(self):
+        self.page.run("window.advance(2100)")
+        wait_for(lambda: self.page.run("return !document.querySelector('#release.inert')"), "the end of the delay")
+
+    def check_that_nothing_was_released(self):
+        """Stop once more, which the monitor hears of after all that was sent before."""
+        stops = len(self.monitor.requested("stop"))
+        self.tap(self.find("stop"))
+        wait_for(lambda: len(self.monitor.requested("stop")) > stops, "another stop")
+        self.assertEqual(self.monitor.requested("release"), [])
+
+    def test_stop_all_keeps_its_place_at_every_size_in_every_state(self):
+        places = {size: set() for size in SIZES}
+        for state in [*STATES, "silent"]:
+            if state == "silent":
+                self.monitor.is_silent = True
+                self.page.wait_for_text("#losses", "No answer from the monitor")
+            else:
+                self.show(state)
+                self.page.run("return new Promise((done) => setTimeout(done, 150))")
+            for size in SIZES:
+                self.page.resize(*size)
+                found = self.page.run(FIND_BUTTONS)
+                self.assertEqual((found["covered"], tuple(found["size"])), ([], size), (state, size))
+                places[size].add(tuple(found["stop"]))
+                left, top, width, height = found["release"]
+                if width:
+                    self.assertGreater(top, 0.6 * size[1], (state, size))
+                    self.assertLess(left, 20, (state, size))
+                    self.assertLessEqual(top + height, size[1], (state, size))
+        self.page.resize(1440, 900)
+        self.assertEqual({size: len(found) for size, found in places.items()}, dict.fromkeys(SIZES, 1))
+
+    def test_three_quick_taps_on_stop_all_or_release_never_release(self):
+        for size in SIZES:
+            self.page.resize(*size)
+            self.setUp()
+            self.take_clock()
+            for _ in range(3):
+                self.tap(self.find("stop"))
+            self.page.wait_for_text("#stop", "STOPPED")
+            self.wait_until_armed()
+            for _ in range(3):
+                self.tap(self.find("release"))
+            self.check_that_nothing_was_released()
+
+    def test_release_acts_when_a_finger_holds_it_for_a_second(self):
+        self.page.resize(360, 740)
+        self.take_clock()
+        self.stop()
+        self.wait_until_armed()
+        self.touch("touchStart", *self.find("release"))
+        self.page.run("window.stepMs = 50")
+        self.monitor.wait_for_request("release")
+        self.touch("touchEnd")
+        self.page.wait_for_text("#stop", "STOP ALL")
+
+    def test_release_does_nothing_for_two_seconds_after_a_stop(self):
+        self.take_clock()
+        self.stop()
+        self.page.run("window.advance(1900)")
+        self.touch("touchStart", *self.find("release"))
+        self.page.run("window.stepMs = 50")
+        self.page.wait_for_notice("Hold Release for 1 s")
+        self.page.run("window.advance(5000)")
+        self.touch("touchEnd")
+        self.check_that_nothing_was_released()
+
+    def test_a_stop_of_another_page_ends_a_hold_of_release(self):
+        self.take_clock()
+        self.stop()
+        self.wait_until_armed()
+        self.touch("touchStart", *self.find("release"))
+        wait_for(lambda: self.page.run("return !!document.querySelector('#release.holding')"), "the hold")
+        self.show("stopping")
+        wait_for(lambda: self.page.run("return !document.querySelector('#release.holding')"), "the end of the hold")
+        self.touch("touchEnd")
+        self.check_that_nothing_was_released()
+
+    def test_a_hold_of_release_ends_when_the_page_is_suspended(self):
+        self.take_clock()
+        self.stop()
+        self.wait_until_armed()
+        self.touch("touchStart", *self.find("release"))
+        wait_for(lambda: self.page.run("return !!document.querySelector('#release.holding')"), "the hold")
+        self.page.run("window.advance(1500)")
+        wait_for(lambda: self.page.run("return !document.querySelector('#release.holding')"), "the end of the hold")
+        self.touch("touchEnd")
+        self.check_that_nothing_was_released()
+
+    def test_the_keyboard_stops_at_a_press_and_releases_at_a_hold(self):
+        self.take_clock()
+        self.page.run("document.getElementById('stop').focus()")
+        for kind in ("keyDown", "keyUp"):
+            self.press_key(kind, "Enter")
+        self.page.wait_for_text("#stop", "STOPPED")
+        self.wait_until_armed()
+        self.page.run("document.getElementById('release').focus()")
+        for key in ("Enter", "Space", "Enter"):
+            for kind in ("keyDown", "keyUp"):
+                self.press_key(kind, key)
+        self.assertEqual(self.monitor.requested("release"), [])
+        self.press_key("keyDown", "Space")
+        self.page.run("window.stepMs = 50")
+        self.monitor.wait_for_request("release")
+        self.press_key("keyUp", "Space")
+
+    def test_a_page_that_hears_nothing_shows_all_as_unknown_within_two_seconds(self):
+        self.take_clock()
+        self.assertEqual({row["State"] for row in self.page.rows()}, {"READY"})
+        self.monitor.is_silent = True
+        self.page.run("window.advance(1750)")
+        self.page.wait_for_text("#losses", "No answer from the monitor since")
+        self.assertEqual({row["State"] for row in self.page.rows()}, {"UNKNOWN"})
+        self.assertIn("roslaunch hero_bringup monitor.launch", self.page.text("#losses"))
+        self.assertEqual((self.page.text("#link"), self.page.text("#ready")), ("unknown", "3 of 3 unknown"))
+        self.assertEqual(self.page.run("return document.querySelectorAll('.good').length"), 0)
+        self.monitor.is_silent = False
+        self.page.wait_for_text("#ready", "3 of 3 ready")
+
+    def test_a_page_that_was_suspended_stops_driving_and_shows_nothing_as_known(self):
+        self.take_clock()
+        self.page.choose("hero_0")
+        button = self.page.find("#pad [aria-label='forward']").rect
+        self.touch("touchStart", button["x"] + 9, button["y"] + 9)
+        self.monitor.wait_for_request("drive")
+        self.monitor.is_silent = True
+        self.page.run("window.advance(3000)")
+        self.monitor.wait_for_request("end_drive")
+        self.page.wait_for_text("#ready", "3 of 3 unknown")
+        self.assertEqual(self.monitor.requests[-1]["do"], "end_drive")
+        self.touch("touchEnd")
+
+    def test_a_page_for_which_there_is_no_place_says_how_to_stop_and_does(self):
+        self.monitor.served = False
+        self.page.wait_for_text("#losses", "Too many pages are open")
+        self.assertIn("STOP ALL works here", self.page.text("#losses"))
+        self.tap(self.find("stop"))
+        self.monitor.wait_for_request("stop")
+
+
+if __name__ == "__main__":
+    rostest.rosrun("hero_monitor", "test_monitor_touch", TouchTest)

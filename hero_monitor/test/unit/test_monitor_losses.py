@@ -1,0 +1,83 @@
+"""What is not known is named with cause and remedy within 2 s; old requests move no robot."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from hero_monitor.freshness import AGE_MAX_S, INERT_S, explain_refused_release, is_fresh
+from hero_monitor.losses import FORGOTTEN_S, LocalizationWatch, list_losses
+from hero_monitor.server import PAGES_MAX, choose_served
+
+
+def list_sources(drivers, localization=None, now_s=0.0, master=""):
+    return [loss.source for loss in list_losses(drivers, master, localization or LocalizationWatch(), now_s)]
+
+
+def test_nothing_is_lost_while_all_that_was_ever_heard_answers():
+    assert list_sources({"/hero_driver": True}) == []
+
+
+def test_a_driver_that_does_not_answer_is_named_and_a_missing_one_too():
+    losses = list_losses({"/hero_driver": True, "/hero_driver_b": False}, "", LocalizationWatch(), 0.0)
+    assert [loss.cause for loss in losses] == ["No answer from hero_driver_b: its robots are unknown"]
+    assert "roslaunch" in losses[0].remedy
+    assert list_sources({}) == ["driver"]
+
+
+def test_what_is_worst_comes_first():
+    assert list_sources({"/hero_driver": False}, master="http://pc:11311 does not answer") == ["driver", "master"]
+
+
+def test_localization_is_lost_within_two_seconds_and_later_not_missed():
+    localization = LocalizationWatch()
+    assert list_sources({"/d": True}, localization, 100.0) == []
+    localization.receive(tracked=3, now_s=100.0)
+    assert list_sources({"/d": True}, localization, 101.0) == []
+    assert list_sources({"/d": True}, localization, 102.0) == ["localization"]
+    assert list_sources({"/d": True}, localization, 100.1 + FORGOTTEN_S) == []
+    localization.receive(tracked=3, now_s=200.0)
+    assert list_sources({"/d": True}, localization, 200.1) == []
+
+
+def test_localization_that_was_not_listened_to_was_not_silent():
+    localization = LocalizationWatch()
+    localization.receive(tracked=1, now_s=100.0)
+    localization.pause(150.0)
+    assert list_sources({"/d": True}, localization, 151.0) == []
+
+
+def test_a_camera_that_measures_none_of_the_robots_it_measured_is_lost():
+    localization = LocalizationWatch()
+    localization.receive(tracked=0, now_s=100.0)
+    assert list_sources({"/d": True}, localization, 100.1) == []
+    localization.receive(tracked=2, now_s=101.0)
+    localization.receive(tracked=0, now_s=102.0)
+    assert list_sources({"/d": True}, localization, 102.1) == ["camera"]
+
+
+@pytest.mark.parametrize("kind", sorted(AGE_MAX_S))
+def test_a_request_that_a_socket_held_moves_no_robot(kind):
+    limit_ms = round(1000 * AGE_MAX_S[kind])
+    for age_ms, expected in ((0, True), (limit_ms, True), (limit_ms + 1, False), (60000, False), (-1, False)):
+        assert is_fresh({"do": kind, "heard_ms": 1000000 - age_ms}, 1000000) is expected
+
+
+def test_a_stop_counts_at_any_age():
+    assert is_fresh({"do": "stop", "heard_ms": 0}, 1000000)
+    assert is_fresh({"do": "end_drive", "robot": "hero_0"}, 1000000)
+
+
+def test_no_release_counts_shortly_after_a_stop_of_any_page():
+    inert_ms = round(1000 * INERT_S)
+    fresh = {"do": "release", "heard_ms": 1000000}
+    assert explain_refused_release(fresh, 1000000, None) == ""
+    assert "less than 2 s ago" in explain_refused_release(fresh, 1000000, 1000000 - inert_ms + 1)
+    assert explain_refused_release(fresh, 1000000, 1000000 - inert_ms) == ""
+    assert "delayed" in explain_refused_release({**fresh, "heard_ms": 990000}, 1000000, None)
+
+
+def test_pages_that_no_one_can_see_give_way_to_others():
+    pages = [SimpleNamespace(number=number, is_idle=number < 5) for number in range(PAGES_MAX + 3)]
+    served = [page.number for page in choose_served(pages)]
+    assert len(served) == PAGES_MAX
+    assert served == [*range(5, PAGES_MAX + 3), 0, 1]
