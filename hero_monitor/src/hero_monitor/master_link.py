@@ -1,11 +1,15 @@
-"""Asks the ROS master again and again whether it is there; pages are told, and go on without it."""
+"""Asks the ROS master again and again whether it is there, and registers at one that was started again.
+
+Pages are told, and go on without it.
+"""
 
 import time
 
 import rosgraph
+import rospy
 
-from hero_client.ros_node import ask_master
-from hero_client.values.errors import NodeError
+from hero_node.errors import NodeError
+from hero_node.ros.registration import is_registered, register_again
 
 from .background import Background
 from .losses import MASTER_PERIOD_S, MASTER_SILENT_S
@@ -31,7 +35,9 @@ class MasterLink:
 
     def _ask(self) -> None:
         try:
-            ask_master("getPid")
+            if not is_registered():
+                register_again()
+                rospy.logwarn("the ROS master was started again: the monitor is registered anew")
             self._has_failed = False
         except NodeError:
             self._has_failed = True

@@ -10,6 +10,7 @@ import subprocess
 import threading
 import uuid
 
+import rosgraph
 import rospy
 
 from hero_test.processes import find_program
@@ -85,22 +86,31 @@ def start_monitor(*arguments, prefix=()):
     )
 
 
-def start_scripted_driver(name, ids, **parameters):
+def start_scripted_driver(name, ids, prefix=(), **parameters):
     """Start a driver that reports robots with these ids."""
     private = ["_%s:=%s" % item for item in parameters.items()]
+    program = find_program("hero_test", "scripted_driver")
     return subprocess.Popen(
-        [find_program("hero_test", "scripted_driver"), "__name:=" + name, "_ids:='%s'" % json.dumps(ids), *private],
+        [*prefix, program, "__name:=" + name, "_ids:='%s'" % json.dumps(ids), *private],
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         start_new_session=True,
     )
 
 
+def start_master(port):
+    """Start a ROS master; return it as soon as it answers."""
+    process = subprocess.Popen(["rosmaster", "--core", "-p", str(port)], start_new_session=True)
+    uri = "http://127.0.0.1:%d" % port
+    wait_for(lambda: rosgraph.Master("/test", uri).is_online(), "the master at " + uri)
+    return process
+
+
 def end(process):
     """End a program and return what it printed."""
     if process.poll() is None:
         os.killpg(process.pid, signal.SIGTERM)
-    return process.communicate(timeout=TIMEOUT_S)[0].decode()
+    return (process.communicate(timeout=TIMEOUT_S)[0] or b"").decode()
 
 
 def wait_until_it_answers(host):

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """STOP ALL in a real browser: what people see while robots stop, stand, move though stopped, or nobody answers."""
 
+import contextlib
 import json
 import unittest
 
@@ -12,7 +13,9 @@ from monitor_page import MonitorPage
 from monitor_process import (
     HOST,
     OTHER_HOST,
+    OTHER_PORT,
     end,
+    start_master,
     start_monitor,
     start_scripted_driver,
     wait_until_it_answers,
@@ -172,6 +175,32 @@ class StopTest(unittest.TestCase):
         finally:
             self.drivers[0] = start_scripted_driver("hero_driver", [0, 1, 2, 3], twin_of=0)
         self.page.wait_for_text("#ready", "6 of 7")
+
+    def test_a_page_shows_robots_again_after_master_and_driver_were_started_again(self):
+        port = OTHER_PORT + 1000
+        prefix = ["env", "ROS_MASTER_URI=http://127.0.0.1:%d" % port]
+        with contextlib.ExitStack() as stack:
+
+            def start(start_one, *arguments, **options):
+                process = start_one(*arguments, **options)
+                stack.callback(end, process)
+                return process
+
+            master = start(start_master, port)
+            driver = start(start_scripted_driver, "hero_driver", [0, 1], prefix=prefix)
+            start(start_monitor, prefix=prefix)
+            wait_until_it_answers(OTHER_HOST)
+            self.page.browser.get("http://%s/" % OTHER_HOST)
+            self.page.wait_for_text("#ready", "2 of 2 ready")
+            end(master)
+            end(driver)
+            self.page.wait_for_text("#losses", "No answer from hero_driver")
+            self.page.wait_for_text("#losses", "No ROS master")
+            self.assertEqual(self.page.text("#ready"), "2 of 2 unknown")
+            start(start_master, port)
+            start(start_scripted_driver, "hero_driver", [0, 1, 2], prefix=prefix)
+            self.page.wait_for_text("#ready", "3 of 3 ready")
+            wait_for(lambda: self.page.text("#losses") == "", "no loss")
 
     def states(self, *robots):
         return {row["State"].partition(",")[0] for row in self.page.rows() if row["Robot"] in robots}

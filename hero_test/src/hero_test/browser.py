@@ -4,6 +4,9 @@ import shutil
 
 MISSING = [name for name in ("chromedriver", "chromium") if shutil.which(name) is None]
 
+SCRIPT_TIMEOUT_S = 300.0
+"""Only a test that fails waits so long; a busy machine needs its time."""
+
 
 def open_browser(width, height):
     """Return a Chromium whose pages have this size in pixels; quit() ends it."""
@@ -18,6 +21,7 @@ def open_browser(width, height):
         options.add_argument("--" + name)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
     browser = webdriver.Chrome(service=Service(shutil.which("chromedriver")), options=options)
+    browser.set_script_timeout(SCRIPT_TIMEOUT_S)
     set_page_size(browser, width, height)
     return browser
 
