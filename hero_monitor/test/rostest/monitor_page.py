@@ -12,6 +12,11 @@ KEEP_NOTICES = (
     ".observe(document.getElementById('notices'), { childList: true })"
 )
 
+CLICK_ROW = (
+    "const rows = [...document.querySelectorAll('#fleet tbody button')];"
+    "const found = rows.find((one) => one.textContent === arguments[0]);"
+    "if (found) found.click(); return !!found"
+)
 READ_BANNER = "const banner = document.getElementById('stopping'); return [banner.dataset.level, banner.textContent]"
 
 
@@ -76,10 +81,19 @@ class MonitorPage:
 
     def choose(self, robot):
         """Choose a robot in the table."""
-        for row in self.browser.find_elements("css selector", "#fleet tbody tr"):
-            if row.text.startswith(robot):
-                row.find_element("css selector", "button").click()
+        wait_for(lambda: self.browser.execute_script(CLICK_ROW, robot), "a row of " + robot)
         wait_for(lambda: self.text("#name") == robot, robot + " to be chosen")
+
+    def hold(self, direction, condition, what):
+        """Hold a button of the pad until a condition is true; again where a busy PC has ended the hold."""
+        button = self.find("#pad [aria-label='%s']" % direction)
+
+        def is_true():
+            if not self.run("return !!document.querySelector('#pad .down')"):
+                self.actions().release().click_and_hold(button).perform()
+            return condition()
+
+        wait_for(is_true, what)
 
     def wait_for_text(self, selector, text):
         wait_for(lambda: text in self.text(selector), "%r in %s" % (text, selector))

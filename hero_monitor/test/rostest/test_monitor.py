@@ -20,6 +20,11 @@ from hero_test.waiting import wait_for
 
 HOSTILE = "<img src=x onerror='document.title=\"broken\"'><script>document.title='broken'</script> \u202e\x1b[31m"
 
+COUNT_DRIVES = (
+    "const send = WebSocket.prototype.send; window.sent = 0; WebSocket.prototype.send = function (text) {"
+    "window.sent += text.includes('\"drive\"'); send.call(this, text) }"
+)
+
 
 @unittest.skipIf(MISSING, "not installed: %s (script/bootstrap --test)" % ", ".join(MISSING))
 class PageTest(unittest.TestCase):
@@ -52,6 +57,10 @@ class PageTest(unittest.TestCase):
         cls.command = message
         cls.commands.append(message)
 
+    def setUp(self):
+        self.page.open()
+        self.page.wait_for_text("#ready", "3 of 3 ready")
+
     def speed_of(self, robot_id):
         """Return the true speed over the last 0.2 s, m/s."""
         path = self.watch.path(robot_id)[-5:]
@@ -63,10 +72,9 @@ class PageTest(unittest.TestCase):
     def wait_until_standing(self, robot_id):
         wait_for(lambda: self.speed_of(robot_id) < 0.005, "robot %d to stand" % robot_id)
 
-    def wait_until_commanded(self):
-        """Wait for a command that moves robot 0, and for the motion."""
-        wait_for(lambda: self.command not in (None, Twist()), "a command")
-        self.wait_until_moving(0)
+    def drive(self, direction):
+        """Hold a button until robot 0 moves."""
+        self.page.hold(direction, lambda: self.command not in (None, Twist()) and self.speed_of(0) > 0.02, "motion")
 
     def wait_until_stopped(self):
         """Wait for a stop of robot 0: it would stand, too, 2 s after the last command."""
@@ -107,35 +115,24 @@ class PageTest(unittest.TestCase):
 
     def test_a_robot_drives_while_a_button_is_held_and_stops_on_release(self):
         self.page.choose("hero_0")
-        button = self.page.find("#pad [aria-label='forward']")
-        self.page.actions().click_and_hold(button).perform()
-        self.wait_until_commanded()
+        self.drive("forward")
         self.page.actions().release().perform()
         self.wait_until_stopped()
 
     def test_a_robot_stops_when_its_page_is_gone(self):
         self.page.choose("hero_0")
-        button = self.page.find("#pad [aria-label='backward']")
-        self.page.actions().click_and_hold(button).perform()
-        self.wait_until_commanded()
+        self.drive("backward")
         # Leaves without a word: no release, no close.
         self.page.run("WebSocket.prototype.send = () => {}")
         self.wait_until_stopped()
         self.page.actions().release().perform()
-        self.page.open()
-        self.page.wait_for_text("#ready", "3 of 3")
 
     def test_a_monitor_that_was_suspended_drives_no_robot_by_old_commands(self):
         self.page.choose("hero_0")
-        self.page.actions().click_and_hold(self.page.find("#pad [aria-label='forward']")).perform()
-        self.wait_until_commanded()
+        self.drive("forward")
         with suspended(find_pid("/hero_monitor")):
-            sent = self.page.run("return window.sent = 0")
-            self.page.run(
-                "const send = WebSocket.prototype.send;"
-                "WebSocket.prototype.send = function (text) { window.sent += text.includes('drive'); send.call(this, text); }"
-            )
-            wait_for(lambda: self.page.run("return window.sent") > sent + 10, "commands in the socket")
+            self.page.run(COUNT_DRIVES)
+            self.page.hold("forward", lambda: self.page.run("return window.sent") > 2, "commands in the socket")
             self.page.actions().release().perform()
             self.commands.clear()
         wait_for(lambda: Twist() in self.commands, "a stop")
@@ -149,15 +146,12 @@ class PageTest(unittest.TestCase):
             self.page.browser.get("http://%s/" % OTHER_HOST)
             self.page.wait_for_text("#ready", "3 of 3")
             self.page.choose("hero_0")
-            self.page.actions().click_and_hold(self.page.find("#pad [aria-label='turn left']")).perform()
-            wait_for(lambda: self.command not in (None, Twist()), "a command")
+            self.page.hold("turn left", lambda: self.command not in (None, Twist()), "a command")
         finally:
             output = end(process)
         self.wait_until_stopped()
         self.assertNotIn("Traceback", output)
         self.page.actions().release().perform()
-        self.page.open()
-        self.page.wait_for_text("#ready", "3 of 3")
 
     def click_on_map(self, right_px, down_px):
         self.page.click("#goto")

@@ -131,16 +131,13 @@ class StopTest(unittest.TestCase):
         commands = []
         rospy.Subscriber("/hero_2/velocity_controller/cmd_vel", Twist, commands.append)
         self.page.choose("hero_2")
-        button = self.page.find("#pad [aria-label='forward']")
-        self.page.actions().click_and_hold(button).perform()
-        wait_for(lambda: any(command.linear.x > 0 for command in commands), "a command")
+        self.page.hold("forward", lambda: any(command.linear.x > 0 for command in commands), "a command")
         # Pressed on another page, while the button is held.
         self.other.click("#stop")
         wait_for(lambda: commands[-1].linear.x == 0, "a stop")
         self.wait_for_banner(GREEN, "stopped, all wheels at rest")
         self.page.actions().release().perform()
-        self.page.actions().click_and_hold(button).perform()
-        self.page.wait_for_notice("all robots are stopped")
+        self.page.hold("forward", lambda: "all robots are stopped: release them first" in self.page.notices(), "a notice")
         self.assertEqual(commands[-1].linear.x, 0.0)
         self.page.actions().release().perform()
 

@@ -75,7 +75,7 @@ const history = new History();
 const map = new FleetMap(state, { choose, send, notice });
 const table = new FleetTable({ choose, history });
 const log = new LogView();
-const panel = new RobotPanel({ connection, map });
+const panel = new RobotPanel({ connection, map, notice });
 const stop = new StopPanel({ connection, endDrive: () => panel.endDrive(), notice });
 
 function showHead() {

@@ -19,8 +19,9 @@ const KEYS = {
 const element = (id) => document.getElementById(id);
 
 export class RobotPanel {
-  constructor({ connection, map }) {
+  constructor({ connection, map, notice }) {
     this.connection = connection;
+    this.notice = notice;
     this.map = map;
     this.name = null;
     this.driving = null;
@@ -103,8 +104,10 @@ export class RobotPanel {
 
   sendCommand() {
     const now = Date.now();
-    if (document.hidden || !document.hasFocus() || now - this.sentMs > GAP_MS) {
+    if (document.hidden || !document.hasFocus()) return this.endDrive();
+    if (now - this.sentMs > GAP_MS) {
       this.endDrive();
+      this.notice("info", "This page was busy or suspended: press again to drive.");
       return;
     }
     this.sentMs = now;
@@ -117,6 +120,7 @@ export class RobotPanel {
 
   endDrive() {
     this.keys.clear();
+    for (const button of element("pad").querySelectorAll(".down")) button.classList.remove("down");
     if (this.timer !== null) clearInterval(this.timer);
     this.timer = null;
     if (this.driving !== null) this.connection.send({ do: "end_drive", robot: this.driving.robot });
