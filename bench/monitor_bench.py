@@ -42,7 +42,8 @@ class Client:
         """Connect as a page does."""
         request = HTTPRequest("ws://%s/live" % self.url, headers={"Origin": "http://" + self.url})
         self.socket = await websocket_connect(request)
-        await self.socket.write_message(json.dumps({"do": "show", "ground_truth": ground_truth, "picture": False, "visible": True}))
+        shown = {"ground_truth": ground_truth, "picture": False, "visible": True}
+        await self.socket.write_message(json.dumps({"do": "show", **shown}))
         self.reader = asyncio.ensure_future(self.read())
 
     async def read(self):

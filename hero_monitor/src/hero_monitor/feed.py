@@ -4,7 +4,6 @@ While no page is open, only the drivers' reports and the log are subscribed to, 
 are subscribed to in the background, because the ROS master may block.
 """
 
-import math
 import re
 import time
 from collections import deque

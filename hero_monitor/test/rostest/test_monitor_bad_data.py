@@ -116,8 +116,7 @@ class BadDataTest(unittest.TestCase):
         wait_for(lambda: self.page.rows()[0]["Odom"] != "-", self.page.rows)
         refused = self.page.rows()[1]
         shown = {name: refused[name] for name in ("Robot", "State", "Stop", "Address", "Pose", "Odom")}
-        expected = {"Robot": "hero_0", "State": "REFUSED", "Stop": "", "Address": "127.0.9.9:5", "Pose": "-", "Odom": "-"}
-        self.assertEqual(shown, expected)
+        self.assertEqual(list(shown.values()), ["hero_0", "REFUSED", "", "127.0.9.9:5", "-", "-"])
 
 
 if __name__ == "__main__":

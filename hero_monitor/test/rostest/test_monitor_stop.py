@@ -137,7 +137,8 @@ class StopTest(unittest.TestCase):
         wait_for(lambda: commands[-1].linear.x == 0, "a stop")
         self.wait_for_banner(GREEN, "stopped, all wheels at rest")
         self.page.actions().release().perform()
-        self.page.hold("forward", lambda: "all robots are stopped: release them first" in self.page.notices(), "a notice")
+        refusal = "all robots are stopped: release them first"
+        self.page.hold("forward", lambda: refusal in self.page.notices(), "a notice")
         self.assertEqual(commands[-1].linear.x, 0.0)
         self.page.actions().release().perform()
 
@@ -173,7 +174,7 @@ class StopTest(unittest.TestCase):
             self.drivers[0] = start_scripted_driver("hero_driver", [0, 1, 2, 3], twin_of=0)
         self.page.wait_for_text("#ready", "6 of 7")
 
-    def test_a_page_shows_robots_again_after_master_and_driver_were_started_again(self):
+    def test_a_page_shows_robots_again_once_master_and_driver_are_back(self):
         port = OTHER_PORT + 1000
         prefix = ["env", "ROS_MASTER_URI=http://127.0.0.1:%d" % port]
         with contextlib.ExitStack() as stack:

@@ -13,7 +13,8 @@ from scripted_monitor import LONG_CAUSE, ScriptedMonitor, make_fleet, make_robot
 from hero_test.browser import MISSING
 from hero_test.waiting import wait_for
 
-SIZES = [(320, 568), (568, 320), (360, 740), (740, 360), (390, 844), (820, 1180), (1180, 820), (1440, 900), (1920, 1080)]
+PORTRAIT = [(320, 568), (360, 740), (390, 844), (820, 1180)]
+SIZES = [*PORTRAIT, *((height, width) for width, height in PORTRAIT), (1440, 900), (1920, 1080)]
 ROBOTS = [make_robot(number) for number in range(3)]
 UNKNOWN = [make_robot(number, known=False) for number in range(3)]
 LOSSES = [{"source": "driver", "cause": LONG_CAUSE, "remedy": "switch off robots that move"}] * 3
@@ -50,7 +51,8 @@ const place = (id) => {
 };
 const [left, top, width, height] = place("stop");
 const at = (x, y) => document.elementFromPoint(left + x * width, top + y * height);
-const covered = [[0.5, 0.5], [0.08, 0.2], [0.92, 0.2], [0.08, 0.8], [0.92, 0.8]].filter(([x, y]) => at(x, y).id !== "stop");
+const points = [[0.5, 0.5], [0.08, 0.2], [0.92, 0.2], [0.08, 0.8], [0.92, 0.8]];
+const covered = points.filter(([x, y]) => at(x, y).id !== "stop");
 return { stop: place("stop"), release: place("release"), covered, size: [innerWidth, innerHeight] };
 """
 
