@@ -228,7 +228,7 @@ class TouchTest(unittest.TestCase):
         self.monitor.is_silent = False
         self.page.wait_for_text("#ready", "3 of 3 ready")
 
-    def test_a_page_that_was_suspended_stops_driving_and_shows_nothing_as_known(self):
+    def test_a_page_that_was_suspended_stops_driving_and_knows_nothing(self):
         self.take_clock()
         self.page.choose("hero_0")
         button = self.page.find("#pad [aria-label='forward']").rect
