@@ -1,5 +1,6 @@
 """Times the pure layers on the bytes of one stock robot: packets, session, corrections. One core, no sockets."""
 
+import collections
 import struct
 import time
 import timeit
@@ -62,7 +63,8 @@ def main():
     messages = [event.messages for event in received if isinstance(event, MessagesReceived)]
 
     def correct():
-        corrections = RobotCorrections("/hero_0", settings, lambda name: NoSink(), NoSink().publish, WheelMotion())
+        sinks = collections.defaultdict(NoSink)
+        corrections = RobotCorrections("/hero_0", settings, sinks, NoSink().publish, WheelMotion())
         for event in declared:
             if isinstance(event, TopicDeclared) and event.topic.kind.is_from_robot:
                 info = event.topic.info

@@ -3,6 +3,7 @@
 fuzz_codec.py [-max_total_time=60] [CORPUS_DIR]
 """
 
+import collections
 import sys
 
 import atheris
@@ -38,7 +39,7 @@ def try_bytes(data):
     """Let one robot send data, cut as its first byte says, and correct the messages in it."""
     session = Session(SessionLimits(max_topics=MAX_TOPICS), 0.0)
     sink = Sink()
-    corrections = RobotCorrections("/hero_0", SETTINGS, lambda name: sink, sink.publish, WheelMotion())
+    corrections = RobotCorrections("/hero_0", SETTINGS, collections.defaultdict(Sink), sink.publish, WheelMotion())
     step = 1 + (data[0] if data else 0)
     for index, start in enumerate(range(1, len(data), step)):
         for event in session.receive_bytes(data[start : start + step], 0.01 * index, 1795240942.0):

@@ -21,6 +21,8 @@ from hero_node.parameters import (
     words,
 )
 
+from .commands.command_settings import CommandSettings
+from .corrections.robot_corrections import CorrectionSettings
 from .corrections.tick_odometry import WheelGeometry
 from .fleet.admission import AdmissionLimits, Network
 from .robot_constants import TICKS_PER_TURN, WHEEL_DIAMETER_M, WHEEL_SEPARATION_M
@@ -213,6 +215,31 @@ class DriverConfig:
             self.max_unidentified,
             self.max_packets_per_s,
             self.max_bytes_per_s,
+        )
+
+    @property
+    def correction_settings(self) -> CorrectionSettings:
+        """How the data of robots are corrected."""
+        return CorrectionSettings(
+            self.odometry,
+            self.wheel_geometry,
+            self.pose_covariance,
+            self.twist_covariance,
+            self.stamps,
+            self.max_future_s,
+            self.max_age_s,
+        )
+
+    @property
+    def command_settings(self) -> CommandSettings:
+        """What robots may be told."""
+        return CommandSettings(
+            self.clamp,
+            self.allow_self_tuning,
+            self.orphan_stop_s,
+            self.service_timeout_s,
+            self.command_max_age_s,
+            max_names=2 * self.max_topics,
         )
 
     @property

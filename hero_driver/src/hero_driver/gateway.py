@@ -12,7 +12,6 @@ from typing import Callable, Dict, List, Optional
 
 from .command_sender import CommandSender
 from .config import DriverConfig
-from .corrections.robot_corrections import CorrectionSettings
 from .fleet import namespaces
 from .fleet.admission import Admission
 from .fleet.namespaces import Identity
@@ -51,6 +50,7 @@ class Gateway(LinkHandler):
     def __init__(
         self,
         config: DriverConfig,
+        loop: EventLoop,
         log: LogRelay,
         registrar: Worker,
         node: str,
@@ -62,6 +62,7 @@ class Gateway(LinkHandler):
         on_change() is called when a robot's state changes; it must not block.
         """
         self._config = config
+        self._loop = loop
         self._log = log
         self._registrar = registrar
         self._clock_ns = clock_ns
@@ -69,41 +70,23 @@ class Gateway(LinkHandler):
         self._node = node
         self._robot_log = RobotLog(log)
         self._admission = Admission(config.admission_limits)
-        self._loop: EventLoop
-        self._sender: CommandSender
-        self._transforms: TransformPublisher
-        self._context: BridgeContext
+        self._sender = CommandSender(loop.call_later, self._find_peer, lambda: self.stopped, self._warn_robot)
+        self._stops = StopDelivery(loop.call_later, lambda: self.stopped, on_change, self._warn_robot)
+        self._transforms = TransformPublisher(config.transform_period_s, loop.call_later)
+        self._context = BridgeContext(
+            self, loop, log, self._transforms, registrar, config.correction_settings, config.command_settings
+        )
         self.peers: Dict[Link, Peer] = {}
         self.fleet = FleetRegistry(config.grace_s)
         self.bridges: Dict[str, RobotBridge] = {}
-        self._stops: StopDelivery
         self.stopped = False
         self.refused_connections = 0
         self.last_refusal = ""
 
-    def open(self, loop: EventLoop) -> None:
-        """Begin to serve what loop brings."""
-        self._loop = loop
-        self._sender = CommandSender(
-            loop.call_later, self._find_peer, lambda: self.stopped, self._warn_robot
-        )
-        self._stops = StopDelivery(loop.call_later, lambda: self.stopped, self._on_change, self._warn_robot)
-        self._transforms = TransformPublisher(self._config.transform_period_s, loop.call_later)
-        self._context = BridgeContext(
-            loop=loop,
-            log=self._log.log_throttled,
-            send_commands=self._sender.send_commands,
-            stop=self._stop_robot,
-            add_transform=self._transforms.add,
-            is_stopped=lambda: self.stopped,
-            clamp=self._config.clamp,
-            allow_self_tuning=self._config.allow_self_tuning,
-            orphan_stop_s=self._config.orphan_stop_s,
-            service_timeout_s=self._config.service_timeout_s,
-            command_max_age_s=self._config.command_max_age_s,
-            max_names=2 * self._config.max_topics,
-        )
-        loop.call_later(FLEET_POLL_S, self._poll_fleet)
+    def open(self) -> None:
+        """Begin to serve what the loop brings."""
+        self._transforms.open()
+        self._loop.call_later(FLEET_POLL_S, self._poll_fleet)
 
     # What the transport calls.
 
@@ -326,7 +309,7 @@ class Gateway(LinkHandler):
             decision.old_link.close("the robot connected again from %s" % (peer.link.address,))
         bridge = self.bridges.get(identity.namespace)
         if bridge is None:
-            bridge = RobotBridge(identity, self._correction_settings(), self._context, self._registrar)
+            bridge = RobotBridge(identity, self._context)
             self.bridges[identity.namespace] = bridge
         peer.bridge = bridge
         rebooted = peer.boot is not None
@@ -341,18 +324,6 @@ class Gateway(LinkHandler):
         early_logs, peer.early_logs = peer.early_logs, []
         for log in early_logs:
             self._robot_log.receive(peer, log, record.joined_s)
-
-    def _correction_settings(self) -> CorrectionSettings:
-        config = self._config
-        return CorrectionSettings(
-            config.odometry,
-            config.wheel_geometry,
-            config.pose_covariance,
-            config.twist_covariance,
-            config.stamps,
-            config.max_future_s,
-            config.max_age_s,
-        )
 
     def _admit_duplicates(self, record: RobotRecord, may_come: Callable[[str], bool]) -> None:
         """Let robots in that wait because another one has their id, by having them dial again."""
@@ -419,7 +390,14 @@ class Gateway(LinkHandler):
     def _list_stoppable(self) -> List[Peer]:
         return [peer for peer in self.peers.values() if peer.bridge is not None and not peer.refused]
 
-    def _stop_robot(self, bridge: RobotBridge) -> None:
+    # What bridges ask for.
+
+    def send_commands(self, bridge: RobotBridge) -> None:
+        """Send the commands that wait, as soon as the robot can take them."""
+        self._sender.send_commands(bridge)
+
+    def stop_robot(self, bridge: RobotBridge) -> None:
+        """Stop the bridge's robot, if it is connected."""
         peer = self._find_peer(bridge)
         if peer is not None:
             self._stops.begin(peer)

@@ -82,11 +82,11 @@ class DriverNode:
                 "error", "a topic or service could not be set up: %s: %s" % (type(error).__name__, error)
             ),
         )
-        self._gateway = Gateway(
-            config, self._log, self._registrar, rospy.get_name(), make_ros_clock(), self._changed.set
-        )
         settings = TransportSettings(config.host, config.port, config.robots, config.silence_timeout_s)
-        self._loop = EventLoop(settings, self._gateway)
+        self._loop = EventLoop(settings)
+        self._gateway = Gateway(
+            config, self._loop, log, self._registrar, rospy.get_name(), make_ros_clock(), self._changed.set
+        )
         self._thread = threading.Thread(target=self._run_loop, name="sockets", daemon=True)
         self._crash: Optional[BaseException] = None
         self._reporter: Reporter
@@ -101,8 +101,8 @@ class DriverNode:
 
     def open(self) -> None:
         """Listen, dial and serve. Raises: OSError if the port cannot be had."""
-        self._loop.open()
-        self._gateway.open(self._loop)
+        self._loop.open(self._gateway)
+        self._gateway.open()
         self._reporter = Reporter()
         self._stop_interface.open(self._starts_stopped)
         self._stop_interface.keep()

@@ -15,6 +15,7 @@ from unittest import mock
 from corrected_robot import make_settings
 
 from hero_driver import command_sender, stop_delivery
+from hero_driver.commands.command_settings import CommandSettings
 from hero_driver.commands.velocity_shaper import STOP_PAYLOADS
 from hero_driver.fleet.namespaces import identify
 from hero_driver.peer import Peer
@@ -90,11 +91,16 @@ class CommandedRobot:
         self._acknowledged_length = 0
         self._buffer = b""
         self._reader = packets.PacketReader()
-        context = SimpleNamespace(
-            command_max_age_s=10.0, log=None, max_names=100, is_stopped=lambda: False, add_transform=None
+        context = robot_bridge.BridgeContext(
+            owner=SimpleNamespace(stopped=False),
+            loop=None,
+            log=SimpleNamespace(log_throttled=None),
+            transforms=SimpleNamespace(add=None),
+            registrar=SimpleNamespace(submit=lambda job, **_: True),  # nothing is registered with a master
+            corrections=make_settings(),
+            commands=CommandSettings(False, False, 0.25, 5.0, command_max_age_s=10.0, max_names=100),
         )
-        registrar = SimpleNamespace(submit=lambda job, **_: True)  # nothing is registered with a master
-        self.bridge = robot_bridge.RobotBridge(identify("/hero_1/odom"), make_settings(), context, registrar)
+        self.bridge = robot_bridge.RobotBridge(identify("/hero_1/odom"), context)
         self.bridge.attach()
         self.peer = Peer(self, Session(SessionLimits(), clock.now_s), None, bridge=self.bridge)
         self._names = {}

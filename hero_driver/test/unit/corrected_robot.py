@@ -46,12 +46,24 @@ class ListSink:
         self._outputs.append((self._name, payload))
 
 
-def make_cleaner(namespace, outputs, is_wanted=lambda name: True, **settings):
-    """Return a corrections of which everything comes to the list outputs, as (name, payload)."""
+class ListSinks(dict):
+    """The sink of every topic."""
+
+    def __init__(self, outputs, is_wanted):
+        super().__init__()
+        self._outputs = outputs
+        self._is_wanted = is_wanted
+
+    def __missing__(self, name):
+        return ListSink(name, self._outputs, self._is_wanted(name))
+
+
+def make_corrections(namespace, outputs, is_wanted=lambda name: True, **settings):
+    """Return corrections of which everything comes to the list outputs, as (name, payload)."""
     return RobotCorrections(
         namespace,
         make_settings(**settings),
-        lambda name: ListSink(name, outputs, is_wanted(name)),
+        ListSinks(outputs, is_wanted),
         ListSink(TRANSFORMS, outputs).publish,
         WheelMotion(),
     )
@@ -66,7 +78,7 @@ class CorrectedRobot:
 
     def __init__(self, types=None, is_wanted=lambda name: True, **settings):
         self.outputs = []
-        self.corrections = make_cleaner("/hero_0", self.outputs, is_wanted, **settings)
+        self.corrections = make_corrections("/hero_0", self.outputs, is_wanted, **settings)
         self.declare(TYPES if types is None else types)
 
     def declare(self, types):

@@ -5,7 +5,7 @@ import struct
 from collections import Counter
 
 import pytest
-from corrected_robot import make_cleaner
+from corrected_robot import make_corrections
 from robot_messages import NOW_NS, read_odometry, read_stamp_ns, read_transform
 
 from hero_driver.corrections.robot_corrections import TRANSFORMS
@@ -20,7 +20,7 @@ START_NS = 1795240942 * 10**9 + 831 * 10**6
 def clean(data, namespace, start_ns, **settings):
     """Clean what is in a recording, arrivals as the bytes came; return the corrections and (name, payload) pairs."""
     outputs = []
-    corrections = make_cleaner(namespace, outputs, **settings)
+    corrections = make_corrections(namespace, outputs, **settings)
     session = Session(SessionLimits(), 0.0)
     for start in range(0, len(data), 1000):
         arrival_ns = start_ns + start * 10**9 // 44051

@@ -51,8 +51,8 @@ def start():
 
     def start_loop():
         handler = Handler()
-        handler.loop = EventLoop(TransportSettings("127.0.0.1", 0, (), 1.0), handler)
-        handler.loop.open()
+        handler.loop = EventLoop(TransportSettings("127.0.0.1", 0, (), 1.0))
+        handler.loop.open(handler)
         thread = threading.Thread(target=handler.loop.run, daemon=True)
         thread.start()
         handler.thread = thread

@@ -39,8 +39,8 @@ class Bench:
 
     def __init__(self, monkeypatch):
         self.handler = Handler()
-        self.loop = EventLoop(TransportSettings("", 0, (), 1.0), self.handler)
-        self.loop.open()
+        self.loop = EventLoop(TransportSettings("", 0, (), 1.0))
+        self.loop.open(self.handler)
         self.loop_thread = threading.Thread(target=self.loop.run, daemon=True)
         self.loop_thread.start()
         self.received = []  # pairs: payload, whether it came on the loop's thread

@@ -7,7 +7,7 @@ import collections
 import functools
 import itertools
 from dataclasses import dataclass
-from typing import Any, Callable, DefaultDict, Deque, Dict, Iterator, List, Protocol, Tuple
+from typing import Any, Callable, DefaultDict, Deque, Dict, Iterator, List, Mapping, Protocol, Tuple
 
 from ..robot_constants import SCAN_TIME_S
 from . import message_layouts
@@ -43,7 +43,6 @@ class Sink(Protocol):
         """Send payload to everybody who listens."""
 
 
-FindSink = Callable[[str], Sink]
 Handler = Callable[[bytes, int], None]
 """Takes a payload and its arrival (ns)."""
 
@@ -77,17 +76,17 @@ class RobotCorrections:
         self,
         namespace: str,
         settings: CorrectionSettings,
-        find_sink: FindSink,
+        sinks: Mapping[str, Sink],
         add_transform: AddTransform,
         wheels: WheelMotion,
     ) -> None:
         """Correct the messages of the robot in namespace.
 
-        find_sink(name) gives the sink of a topic that was chosen or derived; add_transform takes transforms of all
+        sinks: of the topics that were chosen or derived, by their names; add_transform takes transforms of all
         robots; wheels is told of the encoder's readings, or of odometry where there is no encoder.
         """
         self._wheels = wheels
-        self._find_sink = find_sink
+        self._sinks = sinks
         self._add_transform = add_transform
         self._namespace = namespace
         self._stamps = StampFilter(settings.stamps == "arrival", settings.max_future_s, settings.max_age_s)
@@ -168,9 +167,9 @@ class RobotCorrections:
         """Return what takes the payloads of the topic called name."""
         if name == TRANSFORMS and message_type == "tf2_msgs/TFMessage":
             return self.transforms.correct
-        sink = self._find_sink(name)
+        sink = self._sinks[name]
         if name == self._odom_name and message_type == "nav_msgs/Odometry":
-            self._odom_sink, self._raw_sink = sink, self._find_sink(self._raw_name)
+            self._odom_sink, self._raw_sink = sink, self._sinks[self._raw_name]
             return self._correct_odometry
         if name == self._namespace + "/encoder" and message_type == "hero_msgs/Encoder":
             self._hears_encoder = True
@@ -178,7 +177,7 @@ class RobotCorrections:
             self._uses_estimate = self._has_encoder and self.odometry.has_reading
             return functools.partial(self._correct_encoder, name, sink)
         if name == self._namespace + "/laser" and message_type == "sensor_msgs/LaserScan":
-            return functools.partial(self._correct_laser, sink, self._find_sink(self._proximity_name))
+            return functools.partial(self._correct_laser, sink, self._sinks[self._proximity_name])
         if name == self._namespace + "/imu" and message_type == "sensor_msgs/Imu":
             return functools.partial(self._correct_stamped, name, sink)
         return lambda payload, _: sink.publish(payload)

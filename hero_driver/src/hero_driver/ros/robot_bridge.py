@@ -9,9 +9,10 @@ import functools
 import math
 import threading
 import time
-from typing import Any, Callable, Dict, List, NamedTuple, Optional, Set, Tuple
+from typing import Any, Callable, Dict, List, NamedTuple, Optional, Protocol, Set, Tuple
 
 from ..commands.command_queue import CommandQueue
+from ..commands.command_settings import CommandSettings
 from ..commands.service_requests import find_request_error, is_success, read_set_odom_pose
 from ..commands.velocity_shaper import (
     STOP_PAYLOADS,
@@ -29,10 +30,12 @@ from ..rosserial.session import Topic, TopicKind
 from ..transport import EventLoop
 from . import message_types
 from .endpoints import QUEUE_LENGTH, Endpoints, Layout
+from .log_relay import LogRelay
 from .raw_publisher import RawPublisher
 from .raw_subscriber import RawSubscriber
 from .rospy_internals import read_caller
 from .services import RobotService
+from .transform_publisher import TransformPublisher
 from .worker import Worker
 
 VELOCITY_CONTROLLER = "/velocity_controller/cmd_vel"
@@ -53,50 +56,55 @@ TUNING_HEARD_S = 1.0
 """A robot that tunes itself logs up to 47 lines per second (VelocityControl.ino:118)."""
 
 
-class BridgeContext(NamedTuple):
-    """What all bridges share; the functions are called on the thread of the sockets."""
+class BridgeOwner(Protocol):
+    """What a bridge needs of the gateway, on the thread of the sockets."""
 
+    stopped: bool
+    """Whether all robots are stopped."""
+
+    def send_commands(self, bridge: "RobotBridge") -> None:
+        """Send the commands that wait in bridge.commands, as soon as the robot can take them."""
+
+    def stop_robot(self, bridge: "RobotBridge") -> None:
+        """Stop the bridge's robot."""
+
+
+class BridgeContext(NamedTuple):
+    """What all bridges share."""
+
+    owner: BridgeOwner
     loop: EventLoop
-    log: Callable[[str, str, str], None]  # level, throttle key, text; from any thread
-    send_commands: Callable[["RobotBridge"], None]
-    stop: Callable[["RobotBridge"], None]
-    add_transform: Callable[[bytes], None]
-    is_stopped: Callable[[], bool]
-    clamp: bool
-    allow_self_tuning: bool
-    orphan_stop_s: float
-    service_timeout_s: float
-    command_max_age_s: float
-    max_names: int  # topics and services of one robot over all its connections
+    log: LogRelay
+    transforms: TransformPublisher
+    registrar: Worker
+    corrections: CorrectionSettings
+    commands: CommandSettings
 
 
 class RobotBridge:
     """The endpoints of one robot."""
 
-    def __init__(
-        self,
-        identity: Identity,
-        correction_settings: CorrectionSettings,
-        context: BridgeContext,
-        registrar: Worker,
-    ) -> None:
+    def __init__(self, identity: Identity, context: BridgeContext) -> None:
         self.identity = identity
         self.label = identity.namespace.lstrip("/")
-        self.commands = CommandQueue(context.command_max_age_s, threading.Lock())
+        self.commands = CommandQueue(context.commands.command_max_age_s, threading.Lock())
         self.wheels = WheelMotion()
         self.refused_commands = 0
-        self._context = context
-        self._registrar = registrar
-        self._endpoints = Endpoints(self.label, context.log)
+        self._owner = context.owner
+        self._loop = context.loop
+        self._log = context.log
+        self._settings = context.commands
+        self._registrar = context.registrar
+        self._endpoints = Endpoints(self.label, context.log.log_throttled)
         self._closed = False
         self._connected = False
         self._connection = 0
         self._publishers: Dict[str, RawPublisher] = {}
         self.corrections = RobotCorrections(
             identity.namespace,
-            correction_settings,
-            self._publishers.__getitem__,
-            context.add_transform,
+            context.corrections,
+            self._publishers,
+            context.transforms.add,
             self.wheels,
         )
         self._services: Dict[str, RobotService] = {}
@@ -157,7 +165,7 @@ class RobotBridge:
         """The robot declared topic, which is called name in ROS."""
         info, kind = topic.info, topic.kind
         if name not in self._names:
-            if len(self._names) >= self._context.max_names:
+            if len(self._names) >= self._settings.max_names:
                 text = "topic %s refused: more than %d names (2 * max_topics)" % (name, len(self._names))
                 self._endpoints.report_error("names", text)
                 return
@@ -205,12 +213,12 @@ class RobotBridge:
                 self._ids.pop(name, None)
             elif name not in self._ids:
                 self._ids[name] = topic.info.topic_id
-                if self._context.is_stopped() and self.is_motion(name):
-                    self._context.stop(self)
+                if self._owner.stopped and self.is_motion(name):
+                    self._owner.stop_robot(self)
 
         def do() -> None:
             is_usable = register()
-            self._context.loop.call_soon(lambda: settle(is_usable))
+            self._loop.call_soon(lambda: settle(is_usable))
 
         self._submit(do)
 
@@ -234,7 +242,7 @@ class RobotBridge:
             return []
         derived = self.corrections.derive_topics(name, ros_type)
         for publisher_name in (name, *derived):
-            self._publishers.setdefault(publisher_name, RawPublisher(QUEUE_LENGTH, self._context.loop.call_later))
+            self._publishers.setdefault(publisher_name, RawPublisher(QUEUE_LENGTH, self._loop.call_later))
         topic.receive = self.corrections.handler_for(name, ros_type)
         return [(publisher_name, self._publishers[publisher_name]) for publisher_name in (name, *derived)]
 
@@ -266,7 +274,7 @@ class RobotBridge:
                 return "the robot declared it with another type"
             return self._send_request(name, ros_type, request)
 
-        loop, timeout_s = self._context.loop, self._context.service_timeout_s
+        loop, timeout_s = self._loop, self._settings.service_timeout_s
         service = self._services[name] = RobotService(name, ros_type, timeout_s, send, loop.ask, loop.call_later)
         return service
 
@@ -325,7 +333,7 @@ class RobotBridge:
     def _make_subscriber(self, name: str, source: str, ros_type: str) -> RawSubscriber:
         """Return the subscriber to source, which is name or an alias of it."""
         receive = self._choose_receiver(name, source, ros_type)
-        subscriber = RawSubscriber(receive, self._context.loop, functools.partial(self._lose_sender, name, source))
+        subscriber = RawSubscriber(receive, self._loop, functools.partial(self._lose_sender, name, source))
         self._subscribers[source] = subscriber
         return subscriber
 
@@ -336,7 +344,7 @@ class RobotBridge:
             return functools.partial(self._receive_command, name)
         check: Callable[[bytes], Optional[bytes]] = check_motor_pulses
         if ros_type != MOTOR_TYPE:
-            check = functools.partial(check_twist, clamp=self._context.clamp)
+            check = functools.partial(check_twist, clamp=self._settings.clamp)
         return functools.partial(self._receive_motion, name, source, check, stop_payload)
 
     def _receive_motion(
@@ -350,7 +358,7 @@ class RobotBridge:
         command = check(payload)
         if command is None:
             self.refused_commands += 1
-            self._context.log(
+            self._log.log_throttled(
                 "warn",
                 source,
                 "%s: a command on %s is not finite and was refused; correct the program that sends it"
@@ -358,8 +366,8 @@ class RobotBridge:
             )
             if name in self._commanded:
                 # It must not go on with what it was told before.
-                self._context.stop(self)
-        elif not self._connected or (self._context.is_stopped() and command != stop_payload):
+                self._owner.stop_robot(self)
+        elif not self._connected or (self._owner.stopped and command != stop_payload):
             self.refused_commands += 1
         else:
             now_s = time.monotonic()
@@ -371,7 +379,7 @@ class RobotBridge:
             else:
                 self._commanded.pop(name, None)
             self.commands.offer_motion(name, command, stop_payload, now_s)
-            self._context.send_commands(self)
+            self._owner.send_commands(self)
 
     def _change_commander(self, sender: Any, now_s: float) -> None:
         """Another connection brings the newest command: warn if two programs take turns, not one follows another."""
@@ -380,7 +388,7 @@ class RobotBridge:
         if not before or not after or before == after:
             return
         if after == self._superseded[0] and now_s - self._superseded[1] < TURNS_S:
-            self._context.log(
+            self._log.log_throttled(
                 "warn",
                 "two programs " + self.label,
                 "%s is commanded by %s and %s at once and obeys the newest command: end one of them"
@@ -396,16 +404,16 @@ class RobotBridge:
 
         def stop_orphan() -> None:
             if self._commanded.get(name) == commanded:
-                self._context.stop(self)
+                self._owner.stop_robot(self)
 
-        self._context.loop.call_later(self._context.orphan_stop_s, stop_orphan)
+        self._loop.call_later(self._settings.orphan_stop_s, stop_orphan)
 
     def _receive_command(self, name: str, payload: bytes) -> None:
         if not self._connected:
             self.refused_commands += 1
             return
         self.commands.offer(name, payload)
-        self._context.send_commands(self)
+        self._owner.send_commands(self)
 
     def _send_request(self, name: str, service_type: str, request: bytes) -> Optional[str]:
         """Send a service request; return why not, if so."""
@@ -415,16 +423,16 @@ class RobotBridge:
         if not self._connected or name not in self._ids:
             return "the robot is not connected"
         if name.endswith(CALIBRATION_SUFFIX):
-            if not self._context.allow_self_tuning:
+            if not self._settings.allow_self_tuning:
                 return (
                     "self-tuning spins the robot for up to a minute and finds no gains that the firmware keeps; measure"
                     " them with hero_calibration calibrate, or set ~allow_self_tuning"
                 )
-            if self._context.is_stopped():
+            if self._owner.stopped:
                 return "it moves the robot, and all robots are stopped (~stop)"
             self.note_tuning(True)
         self.commands.offer(name, request)
-        self._context.send_commands(self)
+        self._owner.send_commands(self)
         return None
 
     # Jobs of the registrar; these may block.

@@ -33,10 +33,13 @@ class TransformPublisher:
         self._period_s = period_s
         self._call_later = call_later
         self._publisher = RawPublisher(QUEUE_LENGTH, call_later)
-        self._publisher.open("/tf", make_raw_class(TFMessage))
         self._transforms: List[bytes] = []
         self.add: Callable[[bytes], None] = self._transforms.append
         self.is_scheduled = False
+
+    def open(self) -> None:
+        """Advertise /tf; asks the ROS master."""
+        self._publisher.open("/tf", make_raw_class(TFMessage))
 
     def schedule(self) -> None:
         """Publish what was added within the period; for after each read, unless is_scheduled."""

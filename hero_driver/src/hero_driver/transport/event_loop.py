@@ -81,9 +81,9 @@ class Reader:
 class EventLoop(LinkOwner):
     """The thread that owns all sockets. open(), then run() on that thread, stop() from any."""
 
-    def __init__(self, settings: TransportSettings, handler: LinkHandler) -> None:
+    def __init__(self, settings: TransportSettings) -> None:
         self._settings = settings
-        self._handler = handler
+        self._handler = LinkHandler()
         # selectors does the same, but what it adds in Python is a twentieth of all that the driver does.
         self._epoll = select.epoll()
         self._serves: Dict[int, Callable[[int], None]] = {}
@@ -104,11 +104,12 @@ class EventLoop(LinkOwner):
         self._file_limit = raise_file_limit()
         self.listening: Optional[Address] = None
 
-    def open(self) -> None:
-        """Bind the listening socket and begin to dial.
+    def open(self, handler: LinkHandler) -> None:
+        """Bind the listening socket and begin to dial; handler is told of all links.
 
         Raises: OSError if the address cannot be bound.
         """
+        self._handler = handler
         if self._settings.host:
             self._listener = _listen(self._settings.host, self._settings.port)
             self.listening = Address(*self._listener.getsockname()[:2])

@@ -1,0 +1,15 @@
+"""The parameters that commands to a robot depend on, as in config.DriverConfig. Pure."""
+
+from typing import NamedTuple
+
+
+class CommandSettings(NamedTuple):
+    """What a robot may be told, and how long it may take."""
+
+    clamp: bool
+    allow_self_tuning: bool
+    orphan_stop_s: float
+    service_timeout_s: float
+    command_max_age_s: float
+    max_names: int
+    """Topics and services of one robot over all its connections."""
