@@ -86,10 +86,10 @@ class TestDriverBadInput(OwnDriverCase):
                     self.assertIn(text, driver.lines[0])
 
     def test_an_unknown_parameter_is_named_with_the_one_that_was_meant(self):
-        self.assert_start_fails({"prot": 11411}, "~prot is not known", "did you mean ~port?")
+        self.assert_start_fails({"prot": 11411}, "unknown parameter ~prot", "did you mean ~port?")
 
     def test_a_wrong_value_is_named_with_what_is_allowed(self):
-        self.assert_start_fails({"port": 70000}, "parameter ~port is ", "0 to 65535")
+        self.assert_start_fails({"port": 70000}, "~port is 70000, but must be ", "0 to 65535")
 
     # Bytes.
 
