@@ -116,6 +116,17 @@ def test_what_is_seen_near_is_not_driven_at_but_passed_on_the_right():
         assert found[0] > 0.0  # the right of a robot that looks along y
 
 
+@pytest.mark.parametrize("range_m", [0.0, 0.047, 0.06])
+@pytest.mark.parametrize("speed_m_s", [0.08, 0.0])
+def test_a_robot_backs_off_at_the_documented_speed_from_what_touches(range_m, speed_m_s):
+    law = AvoidanceLaw()
+    ranges = [range_m] + [math.inf] * 7
+    wanted, normals, bounds = avoid_sensed(Pose(0.0, 0.0, 0.0), ranges, np.array([speed_m_s, 0.0]), law)
+    found = nearest_allowed(wanted, normals, bounds, law.max_linear_m_s)
+    away_m_s = min(law.back_off_m_s, law.body_m + law.clearance_m - range_m)
+    assert found[0] == pytest.approx(-away_m_s, abs=1e-6)
+
+
 def test_what_is_far_or_not_known_changes_nothing():
     law = AvoidanceLaw()
     ahead = np.array([0.08, 0.0])

@@ -73,3 +73,12 @@ def test_a_velocity_of_odometry_that_is_not_zero_is_a_turn(velocity):
     assert wheels.still_readings == 1
     wheels.read_velocity(*velocity)
     assert (wheels.readings, wheels.still_readings) == (2, 0)
+
+
+@pytest.mark.parametrize("broken", [math.nan, math.inf])
+def test_counters_that_are_not_numbers_are_no_turn_of_a_wheel(broken):
+    wheels = WheelMotion()
+    read_all(wheels, [(broken, 7.0)] * 10)
+    assert wheels.readings == 0
+    read_all(wheels, [(5.0, 7.0), (5.0, broken), (5.0, 7.0)])
+    assert (wheels.readings, wheels.still_readings) == (2, 1)

@@ -6,6 +6,7 @@ import pytest
 import true_paths
 
 from hero_client import CommonFrame
+from hero_client.controllers.motion import State
 from hero_sim.stepped.swarm import StepSwarm
 
 pytest.importorskip("rospy", reason="the program imports rospy")
@@ -57,3 +58,14 @@ def test_robots_whose_place_is_not_known_stop_and_are_named(swarm):
     explorers, path = explore(swarm, [LEFT, RIGHT], 1.0, frame="nowhere")
     assert true_paths.measure_lengths(path).max() < 0.001
     assert "nowhere" in explorers[0].common.missing["hero_0"]
+
+
+def test_of_places_that_were_not_reached_the_newest_are_not_tried_again(swarm):
+    explorer = Explorer(swarm[0], CommonFrame("map"))
+    pose = swarm[0].true_pose
+    places = [(5.0 + number, 0.0) for number in range(6)]
+    for tried in range(1, 7):
+        explorer.choose(pose, places[:tried], [], 0.0)
+        explorer.controller.state = State.FAILED
+    explorer.choose(pose, places, [], 0.0)
+    assert explorer.goal == places[0]  # failed longest ago

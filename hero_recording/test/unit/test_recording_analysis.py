@@ -168,6 +168,17 @@ def test_without_an_origin_odometry_is_aligned_with_ground_truth(two_robots):
     assert errors.yaw_rad == pytest.approx(0.0, abs=1e-5)
 
 
+def test_a_true_heading_that_passes_pi_between_two_readings_is_no_error():
+    robot = RobotObservations()
+    robot.origins.append(Origin(0.0, 0.0, 0.0, 0.0))
+    for reading in range(100):
+        stamp_s, yaw_rad = 0.1 * reading, 0.25 * reading
+        for series, shift in ((robot.ground_truth, 0.0), (robot.odometry, 0.5)):  # stamps half way between
+            turn_rad = math.remainder(yaw_rad + 0.25 * shift, math.tau)
+            series.add(stamp_s, stamp_s + 0.1 * shift, 0.0, 0.0, turn_rad, 0.0, 0.0)
+    assert np.abs(analysis.compute_errors(robot).yaw_rad[:-1]).max() < 1e-6
+
+
 def test_commands_to_a_moving_robot_have_no_motion_delay():
     robot = RobotObservations()
     for reading in range(300):

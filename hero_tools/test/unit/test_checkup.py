@@ -7,7 +7,7 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from hero_tools import check
-from hero_tools.checkup import computer, graph, localization, network
+from hero_tools.checkup import computer, graph, localization, network, points
 from hero_tools.checkup.network import Address
 from hero_tools.checkup.points import FAIL, OK, WARN, ask_system, ok, run_points
 
@@ -27,6 +27,25 @@ def test_a_point_that_hangs_or_breaks_fails_alone():
     assert {name: finding.state for name, finding in findings.items()} == {"hangs": FAIL, "breaks": FAIL, "works": OK}
     assert "no answer within 0.2 s" in findings["hangs"].text
     assert "two lines" in findings["breaks"].text
+
+
+def test_all_points_that_hang_share_one_time_limit(monkeypatch):
+    waits_s = []
+
+    class HungThread:
+        def __init__(self, **options):
+            self.start = lambda: None
+
+        def join(self, timeout_s):
+            waits_s.append(timeout_s)
+            clock_s[0] += timeout_s
+
+    clock_s = [100.0]
+    monkeypatch.setattr(points.threading, "Thread", HungThread)
+    monkeypatch.setattr(points.time, "monotonic", lambda: clock_s[0])
+    findings = run_points({"a": list, "b": list, "c": list}, 2.0)
+    assert {finding.state for finding in findings.values()} == {FAIL}
+    assert sum(waits_s) == 2.0
 
 
 def test_a_free_port_passes_and_one_of_another_program_is_named():

@@ -189,14 +189,14 @@ def avoid_sensed(
             continue
         angle_rad = pose.yaw_rad + index * 2.0 * math.pi / len(ranges)
         towards = np.array([math.cos(angle_rad), math.sin(angle_rad)])
-        limit_m_s = law.closing_gain * (gap_m - law.clearance_m)
+        limit_m_s = max(law.closing_gain * (gap_m - law.clearance_m), -law.back_off_m_s)
         excess_m_s = float(wanted @ towards) - limit_m_s
         if excess_m_s > 0.0:
             right = np.array([towards[1], -towards[0]])
             forward_m_s = max(0.0, min(excess_m_s, excess_m_s + limit_m_s))
             wanted = wanted - excess_m_s * towards + forward_m_s * right
         normals.append(-towards)
-        bounds.append(-max(limit_m_s, -law.back_off_m_s))
+        bounds.append(-limit_m_s)
     return wanted, np.array(normals).reshape(-1, 2), np.array(bounds)
 
 

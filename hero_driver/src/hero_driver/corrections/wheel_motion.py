@@ -4,6 +4,8 @@ Rest is counted in readings (29 per second of the robot's own time), not in time
 network held back arrive all at once.
 """
 
+import math
+
 REST_TICKS = 1.0
 """A wheel at rest on the edge of a tick (0.54 mm) counts it back and forth."""
 
@@ -49,7 +51,9 @@ class WheelMotion:
         self._has_anchor = False
 
     def read_ticks(self, left_ticks: float, right_ticks: float) -> None:
-        """Take a reading of the wheels' counters."""
+        """Take a reading of the wheels' counters; of one that is not finite, nobody can tell a turn."""
+        if not math.isfinite(left_ticks + right_ticks):
+            return
         self.readings += 1
         tolerance_ticks = self._tolerance_ticks
         if (
