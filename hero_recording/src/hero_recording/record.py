@@ -5,6 +5,7 @@ closed at the end.
 """
 
 import argparse
+import ctypes
 import glob
 import math
 import os
@@ -14,7 +15,7 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
-from typing import Dict, List, Optional, Sequence, Set
+from typing import Dict, List, Optional, Sequence, Set, Tuple
 
 import rosgraph
 import roslib.packages
@@ -37,6 +38,9 @@ SILENCE_S = 15.0
 
 CLOSING_S = 10.0
 """The recorder has to close its files within this; roslaunch waits 15 s before it sends SIGTERM."""
+
+PR_SET_PDEATHSIG = 1
+"""Of prctl(2)."""
 
 EMPTY_BAG_BYTES = 10000
 """A bag without messages is a header of 4 kB and at most the names of topics."""
@@ -74,17 +78,24 @@ class Recording:
                 say("%s was cut off, or is being recorded; to repair it: record --repair %s" % (path, path))
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             signal.signal(number, self._receive_signal)
+        seconds = self._options.seconds
         say(
-            "recording to %s until Ctrl-C; %s are free, stops by itself below %s"
+            "recording to %s %s; %s are free, stops by itself below %s"
             % (
                 os.path.join(self._options.folder, self._options.name + "_*.bag"),
+                "until Ctrl-C" if seconds is None else "for %g s, or until Ctrl-C" % seconds,
                 format_size(self._free_mb * MB),
                 format_size(self._options.min_free_mb * MB),
             )
         )
         start_s = time.monotonic()
         # Its stdout names every topic that it subscribes to; warnings and errors go to stderr.
-        recorder = subprocess.Popen(self._command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+        recorder = subprocess.Popen(
+            self._command,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            preexec_fn=_end_with_parent,
+        )
         reason = None
         try:
             reason = self._watch(recorder, start_s)
@@ -153,6 +164,11 @@ def end_process(process: "subprocess.Popen[bytes]") -> int:
     return process.wait()
 
 
+def _end_with_parent() -> None:
+    """Let this process, the recorder to be, close its files and end if the program is killed."""
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGINT)
+
+
 def say(text: str) -> None:
     """Write a line; the recording goes on where nobody reads it."""
     command_line.say("record: " + text)
@@ -186,11 +202,28 @@ def read_launch_options(ros_arguments: Sequence[str]) -> List[str]:
         return []
     namespace = rosgraph.names.make_caller_id(name)
     parameters = ask_master("getParam", namespace) if ask_master("hasParam", namespace) else {}
-    options = []
-    for key, value in sorted(parameters.items()):
-        if value is not False:  # a flag is given or left out
-            options.append("--" + key.replace("_", "-") + ("" if value is True else "=%s" % value))
-    return options
+    return [option for key, value in sorted(parameters.items()) for option in _make_option(key, value)]
+
+
+def split_arguments(arguments: Sequence[str]) -> Tuple[List[str], List[str]]:
+    """Return options, which private parameters (_name:=value) become as well, and ROS's own arguments."""
+    options, ros_arguments = [], []
+    for word in arguments:
+        name, mark, value = word.partition(rosgraph.names.REMAP)
+        if not mark:
+            options.append(word)
+        elif name.startswith("_") and not name.startswith("__"):
+            options += _make_option(name[1:], {"true": True, "false": False}.get(value, value))
+        else:
+            ros_arguments.append(word)
+    return options, ros_arguments
+
+
+def _make_option(name: str, value: object) -> List[str]:
+    """Return a parameter as an option; a flag is given or left out."""
+    if value is False:
+        return []
+    return ["--" + name.replace("_", "-") + ("" if value is True else "=%s" % value)]
 
 
 def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
@@ -230,8 +263,7 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
 
 def run(arguments: Sequence[str]) -> int:
     """Run with the arguments of the command line; return the exit code. Raises: RecordingError, NodeError."""
-    ros_arguments = [word for word in arguments if rosgraph.names.REMAP in word]
-    options = [word for word in arguments if rosgraph.names.REMAP not in word]
+    options, ros_arguments = split_arguments(arguments)
     parsed = parse_options(read_launch_options(ros_arguments) + options)
     if parsed.repair:
         for path in parsed.repair:

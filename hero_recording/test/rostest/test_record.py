@@ -175,6 +175,13 @@ class RecordTest(unittest.TestCase):
         with rosbag.Bag(os.path.join(self.folder, path)) as bag:
             self.assertGreater(bag.get_message_count("/hero_0/odom"), 10)
 
+    def test_no_recorder_goes_on_when_the_program_is_killed(self):
+        process = self.start_recording("killed")
+        self.wait_for_files("killed/*.active")
+        process.kill()  # the program alone
+        wait_for(lambda: not self.files("killed/*.active"), "closed files")
+        self.assert_one_closed_bag("killed")
+
     def test_recordings_stop_on_a_full_disk_whatever_reads_their_output(self):
         disk = SmallDisk(self.folder, "60m")
         self.addCleanup(disk.close)

@@ -23,3 +23,18 @@ def test_a_wrong_option_is_refused_with_its_name_and_value(option, value, words,
     assert caught.value.code == 2
     line = capsys.readouterr().err.splitlines()[-1]
     assert option in line and value in line and words in line
+
+
+def test_private_parameters_are_options_and_other_ros_arguments_go_to_the_recorder():
+    words = ["_split_mb:=7", "--raw", "__name:=my_record", "_name:=a", "_raw:=false", "/tf:=/other"]
+    options, ros_arguments = record.split_arguments(words)
+    assert ros_arguments == ["__name:=my_record", "/tf:=/other"]
+    parsed = record.parse_options(options)
+    assert (parsed.split_mb, parsed.name, parsed.raw) == (7, "a", True)
+
+
+def test_an_unknown_private_parameter_is_refused_by_name(capsys):
+    with pytest.raises(SystemExit) as caught:
+        record.run(["_foldr:=/tmp"])
+    assert caught.value.code == 2
+    assert "unrecognized arguments: --foldr=/tmp" in capsys.readouterr().err
