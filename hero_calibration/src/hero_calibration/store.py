@@ -10,7 +10,8 @@ from typing import Any, Dict, List, NamedTuple, Tuple
 import yaml
 
 from hero_node.safe_file import lock_file, write_file
-from hero_node.texts import make_printable, one_line
+from hero_node.texts import make_printable
+from hero_node.yaml_text import YamlError, parse_yaml, read_text
 
 from .errors import CalibrationError
 
@@ -91,12 +92,11 @@ def save(path: str, calibration: Calibration) -> None:
 def load(path: str) -> Calibration:
     """Read a file. Raises: CalibrationError with file, key, value and what is allowed."""
     try:
-        with open(path, encoding="utf-8") as file:
-            content = yaml.safe_load(file)
+        content = parse_yaml(read_text(path))
     except OSError as error:
         raise CalibrationError("%s cannot be read: %s" % (path, error.strerror)) from error
-    except (yaml.YAMLError, ValueError, RecursionError) as error:  # ValueError: no UTF-8, no date, too many digits
-        raise _refuse(path, "is no calibration: " + one_line(error)) from error
+    except YamlError as error:
+        raise _refuse(path, "is no calibration: %s" % error) from error
     if not isinstance(content, dict) or "robot" not in content:
         raise _refuse(path, "is no calibration: it needs a line robot: hero_N")
     known = {**SETTINGS, **RESULTS}

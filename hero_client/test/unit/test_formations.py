@@ -7,6 +7,7 @@ import random
 import pytest
 
 from hero_client.apps.formations import FormationError, assign_goals, place_formation
+from hero_test.bad_yaml import make_bad_yaml
 
 
 def test_goals_are_assigned_with_the_least_sum_of_squares():
@@ -64,3 +65,12 @@ def test_a_wrong_formation_is_told_in_one_line(formation, says):
     with pytest.raises(FormationError, match=says) as raised:
         place_formation(formation, 3, 0.2)
     assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize("key", ["shape", "center", "points", "columns", "spacing_m"])
+def test_no_formation_breaks_its_reader(key):
+    for content in make_bad_yaml(key):
+        try:
+            place_formation(content.decode("utf-8", "replace") + "\nshape: grid\n" * (key == "columns"), 4, 0.1)
+        except FormationError as error:
+            assert str(error).isprintable() and len(str(error)) < 400

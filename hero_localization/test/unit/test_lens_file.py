@@ -4,6 +4,7 @@ import pytest
 
 from hero_localization.camera.lens_file import load_lens
 from hero_localization.errors import CalibrationError
+from hero_test.bad_yaml import make_bad_yaml
 
 STOCK_LENS = """image_width: 640
 image_height: 480
@@ -22,7 +23,7 @@ distortion_coefficients:
 
 def test_lens_of_camera_calibration_is_read(tmp_path):
     (tmp_path / "ost.yaml").write_text(STOCK_LENS)
-    found = load_lens(tmp_path / "ost.yaml")
+    found = load_lens(str(tmp_path / "ost.yaml"))
     assert (found.width_px, found.height_px, found.matrix[1, 1], found.distortion[1]) == (
         640,
         480,
@@ -45,10 +46,19 @@ def test_lens_of_camera_calibration_is_read(tmp_path):
 def test_file_that_is_no_lens_is_refused_with_one_line(tmp_path, text, words):
     (tmp_path / "lens.yaml").write_text(text)
     with pytest.raises(CalibrationError, match=words) as refused:
-        load_lens(tmp_path / "lens.yaml")
+        load_lens(str(tmp_path / "lens.yaml"))
     assert "\n" not in str(refused.value)
 
 
 def test_missing_file_is_named(tmp_path):
     with pytest.raises(CalibrationError, match=r"lens.yaml cannot be read: No such file"):
-        load_lens(tmp_path / "lens.yaml")
+        load_lens(str(tmp_path / "lens.yaml"))
+
+
+def test_no_file_breaks_the_reader(tmp_path):
+    for content in (*make_bad_yaml("image_width"), *(STOCK_LENS.encode() + bad for bad in make_bad_yaml("rows"))):
+        (tmp_path / "lens.yaml").write_bytes(content)
+        try:
+            load_lens(str(tmp_path / "lens.yaml"))
+        except CalibrationError as error:
+            assert str(error).isprintable() and len(str(error)) < 400

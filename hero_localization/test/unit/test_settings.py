@@ -14,6 +14,7 @@ from hero_localization.camera.camera_model import Camera, Lens
 from hero_localization.errors import SettingsError
 from hero_localization.tracking import settings
 from hero_localization.tracking.detectors import DEFAULT_BACKEND
+from hero_test.bad_yaml import make_bad_yaml
 
 MATRIX = (1390.0, 0.0, 950.0, 0.0, 1391.0, 550.0, 0.0, 0.0, 1.0)
 LENS = Lens.from_camera_info(1920, 1080, MATRIX, "plumb_bob", (-0.1, 0.02, 0.0, 0.0))
@@ -157,3 +158,15 @@ def test_a_full_disk_leaves_the_settings_as_they_were(path, monkeypatch):
     with pytest.raises(SettingsError, match=r"camera\.yaml cannot be written: No space left on device"):
         settings.update(path, {"decimate": 2.0})
     assert read(path) == {"decimate": 1.0} and os.listdir(os.path.dirname(path)) == ["camera.yaml"]
+
+
+@pytest.mark.parametrize("key", ["tag_robots", "camera", "family"])
+def test_no_file_breaks_the_reader_or_the_writer(tmp_path, key):
+    path = tmp_path / "camera.yaml"
+    for content in make_bad_yaml(key):
+        path.write_bytes(content)
+        for use in (settings.load, lambda path: settings.update(path, {"mounts": {8: [0.003, 0.0, 5.0]}})):
+            try:
+                use(str(path))
+            except SettingsError as error:
+                assert str(error).isprintable() and len(str(error)) < 600

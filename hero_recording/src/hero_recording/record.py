@@ -94,7 +94,7 @@ class Recording:
             self._command,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
-            preexec_fn=_end_with_parent,
+            preexec_fn=_end_with_parent,  # noqa: PLW1509 - this program has no other thread
         )
         reason = None
         try:

@@ -11,11 +11,11 @@
 import math
 from typing import Any, Dict, List, Sequence, Tuple
 
-import yaml
 from scipy.optimize import linear_sum_assignment
 
 from hero_node.errors import ProgramError
-from hero_node.texts import one_line
+from hero_node.texts import shorten
+from hero_node.yaml_text import YamlError, parse_yaml
 
 __all__ = ["FormationError", "Point", "assign_goals", "place_formation"]
 
@@ -40,17 +40,17 @@ def place_formation(formation: Any, count: int, least_spacing_m: float) -> List[
     """
     if isinstance(formation, str):
         try:
-            formation = yaml.safe_load(formation)
-        except yaml.YAMLError as error:
-            raise FormationError("formation: not YAML: %s" % one_line(error)) from None
+            formation = parse_yaml(formation)
+        except YamlError as error:
+            raise FormationError("formation: not YAML: %s" % error) from None
     if not isinstance(formation, dict):
-        raise FormationError("formation: must be a table with %s, not %r" % (", ".join(KEYS), formation))
-    unknown = sorted(set(formation) - set(KEYS))
+        raise FormationError("formation: must be a table with %s, not %s" % (", ".join(KEYS), shorten(formation)))
+    unknown = sorted(set(formation) - set(KEYS), key=str)
     if unknown:
-        raise FormationError("formation: unknown key %r; known are: %s" % (unknown[0], ", ".join(KEYS)))
+        raise FormationError("formation: unknown key %s; known are: %s" % (shorten(unknown[0]), ", ".join(KEYS)))
     shape = formation.get("shape", "circle")
     if shape not in SHAPES:
-        raise FormationError("formation: shape is %r, but must be one of: %s" % (shape, ", ".join(SHAPES)))
+        raise FormationError("formation: shape is %s, but must be one of: %s" % (shorten(shape), ", ".join(SHAPES)))
     center = _read_point("center", formation.get("center", [0.0, 0.0]))
     spacing_m = _read_number("spacing_m", formation.get("spacing_m", DEFAULT_SPACING_M))
     turn_rad = math.radians(_read_number("turn_deg", formation.get("turn_deg", 0.0)))
@@ -79,7 +79,7 @@ def _circle(count: int, spacing_m: float) -> List[Point]:
 def _grid(count: int, spacing_m: float, formation: Dict[str, Any]) -> List[Point]:
     columns = formation.get("columns", math.ceil(math.sqrt(count)))
     if isinstance(columns, bool) or not isinstance(columns, int) or columns < 1:
-        raise FormationError("formation: columns is %r, but must be a whole number, 1 or more" % (columns,))
+        raise FormationError("formation: columns is %s, but must be a whole number, 1 or more" % shorten(columns))
     rows = math.ceil(count / columns)
     return [
         (
@@ -110,13 +110,13 @@ def _check_spacing(places: List[Point], least_spacing_m: float) -> None:
 
 def _read_number(key: str, value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise FormationError("formation: %s is %r, but must be a number" % (key, value))
+        raise FormationError("formation: %s is %s, but must be a number" % (key, shorten(value)))
     return float(value)
 
 
 def _read_point(key: str, value: Any) -> Point:
     if not isinstance(value, (list, tuple)) or len(value) != 2:
-        raise FormationError("formation: %s holds %r, but must hold [x, y] in m" % (key, value))
+        raise FormationError("formation: %s holds %s, but must hold [x, y] in m" % (key, shorten(value)))
     return _read_number(key, value[0]), _read_number(key, value[1])
 
 

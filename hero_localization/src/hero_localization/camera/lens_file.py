@@ -1,9 +1,7 @@
 """The lens files of camera_calibration. Pure but for files."""
 
-from pathlib import Path
-from typing import Union
-
-import yaml
+from hero_node.texts import one_line
+from hero_node.yaml_text import YamlError, parse_yaml, read_text
 
 from ..errors import CalibrationError
 from .camera_model import Lens
@@ -11,10 +9,10 @@ from .camera_model import Lens
 __all__ = ["load_lens"]
 
 
-def load_lens(path: Union[str, Path]) -> Lens:
+def load_lens(path: str) -> Lens:
     """Return the lens in a file of camera_calibration. Raises: CalibrationError."""
     try:
-        content = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+        content = parse_yaml(read_text(path))
         return Lens.from_camera_info(
             int(content["image_width"]),
             int(content["image_height"]),
@@ -24,11 +22,11 @@ def load_lens(path: Union[str, Path]) -> Lens:
         )
     except OSError as error:
         raise CalibrationError("%s cannot be read: %s" % (path, error.strerror)) from None
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise CalibrationError("%s is no YAML file: %s" % (path, str(error).splitlines()[0])) from None
+    except YamlError as error:
+        raise CalibrationError("%s is no YAML file: %s" % (path, error)) from None
     except KeyError as error:
         raise CalibrationError(
             "%s: %s is missing; is it a file of camera_calibration?" % (path, error)
         ) from None
-    except (AttributeError, TypeError, ValueError) as error:
-        raise CalibrationError("%s is no file of camera_calibration: %s" % (path, error)) from None
+    except (AttributeError, OverflowError, TypeError, ValueError) as error:
+        raise CalibrationError("%s is no file of camera_calibration: %s" % (path, one_line(error))) from None

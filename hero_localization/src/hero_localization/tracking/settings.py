@@ -13,7 +13,8 @@ import yaml
 
 from hero_client.values.geometry import Pose
 from hero_node.safe_file import lock_file, write_file
-from hero_node.texts import one_line
+from hero_node.texts import shorten
+from hero_node.yaml_text import YamlError, parse_yaml, read_text
 
 from ..camera.camera_model import Camera, Lens
 from ..errors import SettingsError
@@ -85,7 +86,8 @@ def _dump(key: str, part: Any) -> str:
 
 def _holds(text: str, content: Mapping[str, Any]) -> bool:
     try:
-        return _parse("", text) == content
+        # As texts: values may be shared, which takes as long as all of them written out, or hold themselves.
+        return str(yaml.safe_dump(_parse("", text))) == str(yaml.safe_dump(content))
     except SettingsError:
         return False
 
@@ -118,21 +120,20 @@ def describe_pose(pose: Pose) -> List[float]:
 
 def _read(path: str) -> str:
     try:
-        with open(os.path.expanduser(path), encoding="utf-8") as file:
-            return file.read()
+        return read_text(os.path.expanduser(path))
     except FileNotFoundError:
         return ""
     except OSError as error:
         raise SettingsError("%s cannot be read: %s" % (path, error.strerror)) from None
-    except UnicodeDecodeError as error:
-        raise SettingsError("%s is no YAML file: %s" % (path, one_line(error))) from None
+    except YamlError as error:
+        raise SettingsError("%s is no YAML file: %s" % (path, error)) from None
 
 
 def _parse(path: str, text: str) -> Dict[str, Any]:
     try:
-        content = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        raise SettingsError("%s is no YAML file: %s" % (path, one_line(error))) from None
+        content = parse_yaml(text)
+    except YamlError as error:
+        raise SettingsError("%s is no YAML file: %s" % (path, error)) from None
     if content is None:
         return {}
     if not isinstance(content, dict):
@@ -170,8 +171,8 @@ def _build(content: Mapping[str, Any]) -> Settings:
     )
     lens = _build_lens(content["lens"]) if "lens" in content else None
     return Settings(
-        str(content.get("detector", DEFAULT_BACKEND)),
-        str(content.get("family", "36h11")),
+        _word(content, "detector", DEFAULT_BACKEND),
+        _word(content, "family", "36h11"),
         _number(content, "decimate", 2.0, 1.0, 8.0),
         layout,
         lens,
@@ -184,8 +185,15 @@ def _build(content: Mapping[str, Any]) -> Settings:
 def _number(content: Mapping[str, Any], key: str, default: float, low: float, high: float) -> float:
     value = content.get(key, default)
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
-        raise ValueError("%s is %r, but must be a number from %g to %g" % (key, value, low, high))
+        raise ValueError("%s is %s, but must be a number from %g to %g" % (key, shorten(value), low, high))
     return float(value)
+
+
+def _word(content: Mapping[str, Any], key: str, default: str) -> str:
+    value = content.get(key, default)
+    if not isinstance(value, (str, int)):
+        raise ValueError("%s is %s, but must be a word such as %s" % (key, shorten(value), default))
+    return str(value)
 
 
 def _by_tag(content: Mapping[str, Any], key: str, form: str, read: Callable[[Any], Any]) -> Dict[int, Any]:
@@ -196,7 +204,7 @@ def _by_tag(content: Mapping[str, Any], key: str, form: str, read: Callable[[Any
     try:
         return {_whole_number(tag_id): read(value) for tag_id, value in given.items()}
     except (AttributeError, TypeError, ValueError):
-        raise ValueError("%s must hold ID: %s for each tag, not %r" % (key, form, given)) from None
+        raise ValueError("%s must hold ID: %s for each tag, not %s" % (key, form, shorten(given))) from None
 
 
 def _whole_number(value: Any) -> int:
@@ -227,7 +235,7 @@ def _build_lens(part: Any) -> Lens:
         )
     except (KeyError, TypeError, OverflowError):
         keys = "width_px, height_px, matrix (nine numbers) and distortion"
-        raise ValueError("lens is %r, but must hold %s: calibrate the lens" % (part, keys)) from None
+        raise ValueError("lens is %s, but must hold %s: calibrate the lens" % (shorten(part), keys)) from None
     except ValueError as error:
         raise ValueError("lens: %s: calibrate the lens" % error) from None
 
@@ -244,4 +252,4 @@ def _build_camera(part: Any, lens: Optional[Lens]) -> Camera:
     except (KeyError, TypeError, ValueError):
         pass  # keys that are missing, other values than numbers, or too few of them
     keys = "rotation (nine numbers) and position_m (three)"
-    raise ValueError("camera is %r, but must hold %s: calibrate the arena" % (part, keys))
+    raise ValueError("camera is %s, but must hold %s: calibrate the arena" % (shorten(part), keys))

@@ -1,0 +1,40 @@
+"""YAML from files and parameters as values, or one line that says what is wrong with it. Knows no ROS."""
+
+from typing import Any, Type
+
+import yaml
+
+from .texts import one_line
+
+__all__ = ["MAX_CHARACTERS", "YamlError", "parse_yaml", "read_text"]
+
+MAX_CHARACTERS = 500_000
+"""PyYAML reads about 160,000 in a second, in which nothing else of the program runs; real files have some thousand."""
+
+
+class YamlError(ValueError):
+    """A text that is no YAML, or more than can be read; the error's text is one line."""
+
+
+def read_text(path: str) -> str:
+    """Return the text of a file. Raises: OSError. YamlError if it is no UTF-8, or too long."""
+    try:
+        with open(path, encoding="utf-8") as file:
+            text = file.read(MAX_CHARACTERS + 1)
+    except UnicodeDecodeError as error:
+        raise YamlError(one_line(error)) from None
+    if len(text) > MAX_CHARACTERS:
+        raise YamlError("it has more than %d characters" % MAX_CHARACTERS)
+    return text
+
+
+def parse_yaml(text: str, loader: Type[Any] = yaml.SafeLoader) -> Any:
+    """Return what a text of at most MAX_CHARACTERS says. Raises: YamlError."""
+    if len(text) > MAX_CHARACTERS:
+        raise YamlError("it has more than %d characters" % MAX_CHARACTERS)
+    try:
+        return yaml.load(text, loader)
+    except RecursionError:
+        raise YamlError("lists or tables within each other, deeper than can be read") from None
+    except (yaml.YAMLError, ValueError) as error:  # ValueError: no date, or too many digits
+        raise YamlError(one_line(error)) from None

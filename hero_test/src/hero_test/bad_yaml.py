@@ -1,0 +1,30 @@
+"""Texts at which no reader of YAML may break or hang: it refuses each in one line."""
+
+__all__ = ["make_bad_yaml"]
+
+
+def make_bad_yaml(key):
+    """Return texts, bytes; those that are YAML have this key."""
+    shared = ["&a [x, x, x, x, x, x, x, x, x, x]"]
+    for name, before in zip("bcdefghi", "abcdefgh"):
+        shared.append("&%s [%s]" % (name, ", ".join(["*" + before] * 10)))
+    return [
+        b"[" * 3000,
+        b"{a: " * 3000,
+        b"\xff\xfe\x00",
+        b"\x00\x1b[2J",
+        *(
+            ("%s: %s" % (key, value)).encode()
+            for value in (
+                "[",
+                "2020-13-45",
+                "9" * 5000,
+                "1\n" * 300000,
+                "&a [*a]",
+                "&a {b: *a}",
+                "{1: 2, b: 3, 2020-01-01: 4}",
+                ".inf",
+                "[%s]" % ", ".join(shared),  # 1e9 entries, if written out
+            )
+        ),
+    ]
