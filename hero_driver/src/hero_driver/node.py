@@ -22,7 +22,7 @@ import rosgraph.roslogging
 import rospy
 
 from hero_node.errors import ProgramError
-from hero_node.ros.connections import open_tcpros_server
+from hero_node.ros.connections import limit_xmlrpc_connections, open_tcpros_server
 from hero_node.ros.master import find_running_node
 from hero_node.ros.ros_node import end_ros_node
 
@@ -259,6 +259,7 @@ def _enter_ros(argv: Optional[List[str]], log: LogRelay) -> None:
             " alone: roslaunch hero_sim hero_sim.launch)" % running
         )
     prepare_logging()
+    limit_xmlrpc_connections()
     open_tcpros_server(lambda host, text: log.log_throttled("warn", "handshake " + host, text, host=host))
     keep_publishers_connected()
     try:

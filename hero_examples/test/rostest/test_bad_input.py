@@ -14,6 +14,7 @@ WRONG = {
     ("random_walk", "_robots:=zero"): r"~robots .*'zero'.*0-3",
     ("random_walk", "_seed:=0.5"): r"~seed .*0.5.* whole number",
     ("random_walk", "_sped:=0.1"): r"sped.*linear_m_s",
+    ("random_walk", "_robots:=::"): r"private parameter .* has no value: put it in quotes",
     ("go_to_goal", "_goals:=1 2 3 4"): r"~goals .*'1 2 3 4'.*x y heading",
     ("go_to_goal", "_once:=true"): r"~once .* ~goals is empty",
     ("swarm_go_to", "_formation:={shape: star}"): r"formation: shape is 'star'.* circle",

@@ -3,11 +3,14 @@
 import queue
 import socket
 import struct
+import threading
+import xmlrpc.client
 
 import pytest
 from rosgraph.network import decode_ros_handshake_header, encode_ros_handshake_header
 from rospy.impl import tcpros_base
 
+from hero_node.ros import connections
 from hero_node.ros.connections import REASON_LENGTH_MAX, open_tcpros_server
 
 DEADLINE_S = 60.0
@@ -90,3 +93,23 @@ def test_bytes_that_are_no_header_close_the_connection(server):
     client = server.connect(struct.pack("<I", 8) + b"\xff" * 8)
     assert client.recv(1) == b"", "closed"
     assert server.headers == []
+
+
+def test_half_open_calls_take_no_more_threads_than_allowed(monkeypatch):
+    monkeypatch.setattr(connections, "XMLRPC_CONNECTIONS_MAX", 3)
+    server = connections.LimitedXmlRpcServer(("127.0.0.1", 0), 0)
+    server.register_function(lambda: "pong", "ping")
+    serving = threading.Thread(target=server.serve_forever)
+    serving.start()
+    clients = []
+    for _ in range(8):
+        clients.append(socket.create_connection(server.server_address, DEADLINE_S))
+        clients[-1].sendall(b"POST /RPC2 HTTP/1.1\r\n")
+    assert [client.recv(1) for client in clients[:5]] == [b""] * 5  # the oldest were closed
+    with xmlrpc.client.ServerProxy("http://127.0.0.1:%d" % server.server_address[1]) as node:
+        assert node.ping() == "pong"
+    for client in clients:
+        client.close()
+    server.shutdown()
+    serving.join()
+    server.server_close()

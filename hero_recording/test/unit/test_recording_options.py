@@ -25,7 +25,7 @@ def test_a_wrong_option_is_refused_with_its_name_and_value(option, value, words,
     assert option in line and value in line and words in line
 
 
-def test_private_parameters_are_options_and_other_ros_arguments_go_to_the_recorder():
+def test_private_parameters_are_options_and_other_remappings_rosbags():
     words = ["_split_mb:=7", "--raw", "__name:=my_record", "_name:=a", "_raw:=false", "/tf:=/other"]
     options, ros_arguments = record.split_arguments(words)
     assert ros_arguments == ["__name:=my_record", "/tf:=/other"]

@@ -7,13 +7,18 @@ TCPROS protocol.
 import socket
 from typing import Any, Callable
 
+import rosgraph.xmlrpc
 import rospy
 from rosgraph.network import decode_ros_handshake_header, write_ros_handshake_header
 from rospy.impl import tcpros_base
 
-from .handshakes import HandshakeReader
+from .handshakes import ConnectionLimit, HandshakeReader
 
-__all__ = ["REASON_LENGTH_MAX", "open_tcpros_server"]
+__all__ = ["REASON_LENGTH_MAX", "XMLRPC_CONNECTIONS_MAX", "limit_xmlrpc_connections", "open_tcpros_server"]
+
+XMLRPC_CONNECTIONS_MAX = 256
+"""Calls of the master and of other nodes, each with a thread for as long as it is open: they stay open between calls,
+one of each node at most, and are opened again when they were closed meanwhile."""
 
 WAITING_CONNECTIONS = 1024
 """Subscribers that may wait to be accepted. rospy lets 5 wait, while one recorder or RViz comes for all topics of all
@@ -22,6 +27,29 @@ cap it (net.core.somaxconn, 4096 on Linux)."""
 
 REASON_LENGTH_MAX = 300
 """rospy's reason to refuse a connection may list every topic of the node: 200 kB with 100 robots."""
+
+
+class LimitedXmlRpcServer(rosgraph.xmlrpc.ThreadingXMLRPCServer):
+    """Serves the calls to this node."""
+
+    def __init__(self, *arguments: Any) -> None:
+        self._limit = ConnectionLimit(XMLRPC_CONNECTIONS_MAX)
+        super().__init__(*arguments)
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """Serve a connection on a thread of its own, which the oldest one may lose for it."""
+        self._limit.add(request, client_address)
+        super().process_request(request, client_address)
+
+    def shutdown_request(self, request: Any) -> None:
+        """Close a connection."""
+        self._limit.remove(request)
+        super().shutdown_request(request)
+
+
+def limit_xmlrpc_connections() -> None:
+    """Keep connections that send no whole call from taking all threads; for the time before rospy.init_node()."""
+    rosgraph.xmlrpc.ThreadingXMLRPCServer = LimitedXmlRpcServer
 
 
 def open_tcpros_server(warn: Callable[[str, str], None]) -> None:

@@ -27,6 +27,35 @@ Serve = Callable[[socket.socket, Any, bytes], None]
 """Takes over a connection: its blocking socket, the address of its other end, and the header with its length."""
 
 
+class ConnectionLimit:
+    """At most so many connections at a time; for calls from any thread."""
+
+    def __init__(self, most: int) -> None:
+        self._most = most
+        self._lock = threading.Lock()
+        self._held: Dict[socket.socket, Any] = {}  # the other end's address of each; the oldest first
+
+    def add(self, sock: socket.socket, address: Any) -> None:
+        """Hold a connection; if there are too many, shut down the oldest one of the address with the most."""
+        with self._lock:
+            if len(self._held) >= self._most:
+                self._evict()
+            self._held[sock] = address
+
+    def _evict(self) -> None:
+        counts: Counter[str] = collections.Counter(address[0] for address in self._held.values())
+        most = counts.most_common(1)[0][0]
+        victim = next(sock for sock, address in self._held.items() if address[0] == most)
+        del self._held[victim]
+        with contextlib.suppress(OSError):
+            victim.shutdown(socket.SHUT_RDWR)  # its own thread closes it
+
+    def remove(self, sock: socket.socket) -> bool:
+        """Return whether sock was still held."""
+        with self._lock:
+            return self._held.pop(sock, None) is not None
+
+
 class HandshakeReader:
     """The threads that read headers; add() is called by the thread that accepts connections."""
 
@@ -34,41 +63,23 @@ class HandshakeReader:
         """serve() is called on the connection's thread, and may block."""
         self._serve = serve
         self._timeout_s = timeout_s
-        self._pending_max = pending_max
-        self._lock = threading.Lock()
-        self._pending: Dict[socket.socket, Any] = {}  # the other end's address of each; the oldest first
+        self._pending = ConnectionLimit(pending_max)
 
     def add(self, sock: socket.socket, address: Any) -> None:
         """Take over a connection that was just accepted from address (host, port, ...)."""
-        with self._lock:
-            if len(self._pending) >= self._pending_max:
-                self._evict()
-            self._pending[sock] = address
+        self._pending.add(sock, address)
         try:
             threading.Thread(target=self._run, args=(sock, address), name="handshake", daemon=True).start()
         except RuntimeError:
             # The system has no thread left: the next connection may get one.
-            self._forget(sock)
+            self._pending.remove(sock)
             sock.close()
-
-    def _evict(self) -> None:
-        counts: Counter[str] = collections.Counter(address[0] for address in self._pending.values())
-        most = counts.most_common(1)[0][0]
-        victim = next(sock for sock, address in self._pending.items() if address[0] == most)
-        del self._pending[victim]
-        with contextlib.suppress(OSError):
-            victim.shutdown(socket.SHUT_RDWR)  # its own thread closes it
-
-    def _forget(self, sock: socket.socket) -> bool:
-        """Return whether sock was still pending."""
-        with self._lock:
-            return self._pending.pop(sock, None) is not None
 
     def _run(self, sock: socket.socket, address: Any) -> None:
         header = b""
         with contextlib.suppress(OSError):
             header = self._read_header(sock)
-        if self._forget(sock) and header:
+        if self._pending.remove(sock) and header:
             sock.settimeout(None)
             self._serve(sock, address, header)
         else:

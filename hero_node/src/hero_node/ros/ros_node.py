@@ -14,7 +14,7 @@ from rospy.impl.registration import RegManager, get_registration_listeners
 
 from ..errors import NodeError
 from ..texts import one_line
-from .connections import open_tcpros_server
+from .connections import limit_xmlrpc_connections, open_tcpros_server
 from .master import SUCCESS, LimitedTransport, check_master, find_running_node
 
 __all__ = ["end_ros_node", "end_without_delay", "limit_master_calls", "start_ros_node"]
@@ -47,11 +47,14 @@ def start_ros_node(name: str, anonymous: bool = False) -> None:
     if running:
         raise NodeError("%s already runs: end it, or start this one with another __name:=" % running)
     limit_master_calls()
+    limit_xmlrpc_connections()
     open_tcpros_server(lambda host, text: rospy.logwarn(text))
     try:
         rospy.init_node(name, anonymous=anonymous, disable_signals=True)
     except rosgraph.roslogging.LoggingException as error:
         raise NodeError("%s: set ROS_LOG_DIR to a directory" % error) from None
+    except TypeError:  # of the parameter server, which takes no nil: _x:= and _x:=~ hold none, nor does _x:=::
+        raise NodeError("a private parameter (_name:=value) has no value: put it in quotes") from None
     except (rospy.ROSInitException, OSError, ValueError) as error:
         raise NodeError(one_line(error)) from None
     end_without_delay()
