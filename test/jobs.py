@@ -3,7 +3,7 @@
 A job says how many cores it keeps busy. Most tests wait more than they compute (for ROS, for robots that move in real
 time), so more of them run at once than there are cores. A job that leaves no results (it hung, or died) counts as one
 failure. Where the system permits it, each job has a network of its own: ports cannot collide, and no program outside
-reaches the robots of a test.
+reaches the robots of a test. Its processes are its own too: none outlives it, not even if it is killed.
 """
 
 import concurrent.futures
@@ -36,10 +36,14 @@ class Job(NamedTuple):
     has_own_network: bool = True
 
 
+# The shell stays, as the first process in there: it waits for those whose parents have ended.
+CONTAINER = ("unshare", "--net", "--pid", "--fork", "--kill-child", "--mount-proc", "sh", "-c")
+
+
 @functools.lru_cache(maxsize=None)
-def make_own_network():
-    """Return a command that gives a program a network of its own, empty where this system does not permit that."""
-    command = ("unshare", "--net", "sh", "-c", 'ip link set lo up && exec "$@"', "sh")
+def make_container():
+    """Return a command that gives a program a network and processes of its own; empty where that is not permitted."""
+    command = (*CONTAINER, 'ip link set lo up && "$@"; exit $?', "sh")
     try:
         subprocess.run([*command, "true"], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     except (OSError, subprocess.CalledProcessError):
@@ -49,7 +53,7 @@ def make_own_network():
 
 def run_command(job):
     """Run a job; return whether it ended well, and its CPU time (s), where it waited for what it started."""
-    prefix = make_own_network() if job.has_own_network else ()
+    prefix = make_container() if job.has_own_network else ()
     with open(job.results_dir / "log.txt", "wb") as log:
         process = subprocess.Popen(
             [*prefix, *job.command],

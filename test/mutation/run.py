@@ -1,9 +1,11 @@
 """Changes one thing at a time in the modules of a package, and counts the changes that its unit tests notice.
 
 Usage: run.py [--sample N] [--seed N] WORK_DIR [PACKAGE ...]
-The workspace must be sourced. Every change is tried in a process of its own, with the tests that execute its line, the
-fastest first; the sources stay as they are. Verdicts are kept in WORK_DIR, so that a run continues where the last one
-ended: a change that was noticed is tried again when its module changes, one that was not also when the tests change.
+The workspace must be sourced. Changed are all modules that know nothing of ROS, and of the others what unit tests run:
+the rest of those is left to rostests. Every change is tried in a process of its own, with the tests that execute its
+line, the fastest first; the sources stay as they are. Verdicts are kept in WORK_DIR, so that a run continues where the
+last one ended: a change that was noticed is tried again when its module changes, one that was not also when the tests
+change.
 """
 
 import argparse
@@ -29,6 +31,9 @@ from reached import ReachedLines
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 EQUIVALENT = HERE / "equivalent.txt"
+sys.path.insert(0, str(ROOT / "test" / "lint"))
+import sources  # noqa: E402
+
 CPU_LIMIT_FACTOR, CPU_LIMIT_LEAST_S = 5.0, 10
 HANGS_S = 300
 KILLED, SURVIVED, NOT_REACHED = "killed", "survived", "not reached"
@@ -78,7 +83,6 @@ class Mutant(NamedTuple):
     path: Path
     index: int
     line: int
-    text: str
     key: str  # the same in the next version, as long as its function has it
     tests: tuple  # those that execute it, the fastest first
     seconds: float  # of these tests
@@ -148,8 +152,8 @@ def find_reached_lines(package, paths, state):
     return json.loads(kept.read_text(encoding="utf-8"))
 
 
-def list_mutants(package, paths, reached):
-    """Return all mutants of the modules that unit tests execute, and the names of the other modules."""
+def list_mutants(paths, reached):
+    """Return all mutants of these modules."""
     tests_by_line, tests_by_path = {}, {}
     durations = {test: seconds for test, (seconds, _) in reached["tests"].items()}
     for test, (_, lines_by_path) in reached["tests"].items():
@@ -158,13 +162,11 @@ def list_mutants(package, paths, reached):
             for line in lines:
                 tests_by_line.setdefault((path, line), set()).add(test)
     texts = {path: path.read_text(encoding="utf-8") for path in paths}
-    mutants, others = [], []
+    pure = set(sources.list_pure_modules())
+    mutants = []
     for path, text in texts.items():
         users = [other for other, its_text in texts.items() if other == path or path.stem in its_text]
         importing = set().union(*(tests_by_path.get(str(user), ()) for user in users))
-        if not importing:
-            others.append(path)
-            continue
         keys = {}
         for index, mutation in enumerate(list_mutations(ast.parse(text))):
             lines = range(mutation.first_line, mutation.last_line + 1)
@@ -174,8 +176,9 @@ def list_mutants(package, paths, reached):
             keys[key] = keys.get(key, 0) + 1
             key += f" #{keys[key]}"
             seconds = sum(map(durations.get, tests))
-            mutants.append(Mutant(path, index, mutation.last_line, mutation.describe(), key, tests, seconds))
-    return mutants, others
+            if tests or path in pure:
+                mutants.append(Mutant(path, index, mutation.last_line, key, tests, seconds))
+    return mutants
 
 
 def try_mutant(package, mutant):
@@ -233,7 +236,7 @@ def read_verdicts(path, tests_hash, hashes):
 
 
 def try_package(package, work_dir, sample, seed):
-    """Try a package; return how many mutants it has, [(mutant, verdict), ...], and the modules that no test runs."""
+    """Try a package; return how many mutants it has, and [(mutant, verdict), ...] of those tried."""
     state = work_dir / package
     state.mkdir(parents=True, exist_ok=True)
     paths = sorted(path for path in (ROOT / package / "src").rglob("*.py") if path.name != "__init__.py")
@@ -241,9 +244,8 @@ def try_package(package, work_dir, sample, seed):
     for name in reached["imported"]:
         with contextlib.suppress(Exception):  # only saves the children time
             importlib.import_module(name)
-    mutants, others = list_mutants(package, paths, reached)
     equivalent = read_equivalent()
-    mutants = [mutant for mutant in mutants if mutant.key not in equivalent]
+    mutants = [mutant for mutant in list_mutants(paths, reached) if mutant.key not in equivalent]
     chosen = random.Random(seed).sample(mutants, min(sample or len(mutants), len(mutants)))
     hashes = {path: hash_files([path]) for path in paths}
     verdicts = read_verdicts(state / "verdicts.jsonl", reached["hash"], set(hashes.values()))
@@ -256,10 +258,10 @@ def try_package(package, work_dir, sample, seed):
             kept.flush()
 
         try_all(package, [mutant for mutant in chosen if mutant.key not in verdicts], note)
-    return len(mutants), [(mutant, verdicts[mutant.key]) for mutant in chosen], others
+    return len(mutants), [(mutant, verdicts[mutant.key]) for mutant in chosen]
 
 
-def print_package(package, total, results, others):
+def print_package(package, total, results):
     """Print the row of a package, and what survived."""
     counts = {verdict: [found for _, found in results].count(verdict) for verdict in (KILLED, SURVIVED, NOT_REACHED)}
     score = 100.0 * counts[KILLED] / max(len(results), 1)
@@ -270,8 +272,6 @@ def print_package(package, total, results, others):
     for mutant, verdict in sorted(results, key=lambda result: (result[0].path, result[0].line)):
         if verdict != KILLED:
             print(f"    {mutant.path.relative_to(ROOT)}:{mutant.line}: {verdict}: {mutant.key.partition(' ')[2]}")
-    for path in others:
-        print(f"    {path.relative_to(ROOT)}: no unit test runs it")
     sys.stdout.flush()
 
 
