@@ -185,7 +185,12 @@ class DriverNode:
             return
         if is_periodic:
             self._reporter.measure_rates(status)
-        self._reporter.publish(status)
+        try:
+            self._reporter.publish(status)
+        except rospy.ROSException:
+            if not rospy.is_shutdown():
+                raise
+            return  # another program ends the node (rosnode kill): rospy closes topics before it calls end()
         if is_periodic:
             self._reporter.diagnose()
 
