@@ -109,6 +109,64 @@ def test_misplaced_tag_is_named_and_left_out():
     assert place_error_m(found.camera) < 0.002
 
 
+@pytest.mark.parametrize("tag_id", PLACES)
+def test_one_tag_5_mm_from_its_place_is_named_among_six(tag_id):
+    random = np.random.RandomState(tag_id)
+    shifts_m = {other: tuple(random.normal(0.0, 0.0005, 2)) for other in PLACES}
+    shifts_m[tag_id] = (0.003, -0.004)
+    found = calibrate_arena(LENS, see_all(shifts_m), REFERENCES)
+    assert found.left_out == [tag_id]
+    assert found.problems[0].startswith("tag %d was left out" % tag_id)
+
+
+@pytest.mark.parametrize("scale", [0.98, 0.992, 1.009, 1.02])
+def test_places_by_a_tape_that_is_wrong_are_refused_by_the_tags_size(scale):
+    wrong = {
+        tag_id: tag._replace(pose=Pose(scale * tag.pose.x_m, scale * tag.pose.y_m, 0.0))
+        for tag_id, tag in REFERENCES.items()
+    }
+    with pytest.raises(CalibrationError, match=r"measure %.1f %% of their size.*reference_size_m" % (100.0 * scale)):
+        calibrate_arena(LENS, see_all(), wrong)
+
+
+def test_places_in_millimeters_are_refused_as_such():
+    wrong = {
+        tag_id: ReferenceTag(Pose(1e3 * tag.pose.x_m, 1e3 * tag.pose.y_m, 0.0)) for tag_id, tag in REFERENCES.items()
+    }
+    with pytest.raises(CalibrationError, match="lie 2400 m apart: write their places in m, not in mm"):
+        calibrate_arena(LENS, see_all(), wrong)
+
+
+@pytest.mark.parametrize("count", [4, 6])
+def test_y_the_wrong_way_is_named(count):
+    ids = tuple(PLACES)[:count]
+    wrong = {
+        tag_id: REFERENCES[tag_id]._replace(pose=Pose(PLACES[tag_id][0], -PLACES[tag_id][1], 0.0)) for tag_id in ids
+    }
+    with pytest.raises(CalibrationError, match="y the wrong way"):
+        calibrate_arena(LENS, see_all(ids=ids), wrong)
+
+
+@pytest.mark.parametrize("count", [4, 6])
+@pytest.mark.parametrize("pair", [(100, 101), (100, 102), (101, 102)])
+def test_swapped_reference_tags_are_named(count, pair):
+    ids, (one, other) = tuple(PLACES)[:count], pair
+    wrong = {tag_id: REFERENCES[tag_id] for tag_id in ids}
+    wrong[one], wrong[other] = wrong[other], wrong[one]
+    with pytest.raises(CalibrationError, match="tags %d and %d swapped" % pair):
+        calibrate_arena(LENS, see_all(ids=ids), wrong)
+
+
+def test_places_that_no_mistake_explains_are_refused_or_told():
+    random = np.random.RandomState(0)
+    for _ in range(5):
+        wrong = {tag_id: ReferenceTag(Pose(*random.uniform(-1.0, 1.0, 2), 0.0)) for tag_id in PLACES}
+        try:
+            assert calibrate_arena(LENS, see_all(), wrong).problems
+        except CalibrationError as error:
+            assert "reference tags" in str(error)
+
+
 def test_misplaced_one_of_four_shows_in_the_residuals():
     ids = (100, 101, 102, 103)
     found = calibrate_arena(LENS, see_all({102: (0.05, 0.0)}, ids=ids), {k: REFERENCES[k] for k in ids})

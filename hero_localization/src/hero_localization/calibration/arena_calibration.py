@@ -1,10 +1,13 @@
 """Where the camera hangs, from reference tags of known place. Pure but for OpenCV."""
 
+import itertools
 import math
-from typing import Dict, List, Mapping, NamedTuple, Sequence
+from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence
 
 import cv2
 import numpy as np
+
+from hero_client.values.geometry import Pose
 
 from ..camera.camera_model import Camera, Lens
 from ..errors import CalibrationError
@@ -27,6 +30,17 @@ LEAST_EXTENT_M = 0.3
 GOOD_RESIDUAL_M = 0.003
 WORST_RESIDUAL_M = 0.006
 """Places that were measured with a tape are good to 2 mm."""
+
+WRONG_PLACE_M = 0.004
+WRONG_SHARE = 3.0
+"""A tag is wrong that lies so far from where all others put it, and so many times as far as these disagree."""
+
+SUSPICIOUS_RMS_M = 0.02
+"""No tape is so wrong at all tags."""
+
+MAX_SCALE_ERROR = 0.007
+HEIGHTS_M = (0.2, 20.0)
+MAX_FIELD_M = 30.0
 
 _YAW_ROUNDS = 4
 _SEEN_SHARE = 0.5
@@ -76,7 +90,8 @@ def calibrate_arena(
 
     Only the places of the tags' centers count; their yaw is found with the camera.
 
-    Raises: CalibrationError if fewer than four reference tags are seen, or all lie in a row.
+    Raises: CalibrationError if fewer than four reference tags are seen, all lie in a row, or the places cannot be
+        right; if one mistake explains them (y the wrong way, swapped tags, scale, units), it is named.
     """
     seen = [tag for tag in tags if tag.tag_id in references]
     missing = sorted(set(references) - {tag.tag_id for tag in seen})
@@ -87,18 +102,79 @@ def calibrate_arena(
         )
     _check_extent(seen, references)
     camera = _fit(lens, seen, references)
+    if camera is None or _compute_rms(measure_residuals(camera, seen, references), ()) > SUSPICIOUS_RMS_M:
+        _refuse_mistakes(lens, seen, references)
+    if camera is None:
+        raise CalibrationError(
+            "no camera above the floor sees the reference tags like this: check the ids and places in the camera file"
+        )
     residuals_m = measure_residuals(camera, seen, references)
     left_out: List[int] = []
-    worst = max(residuals_m, key=lambda tag_id: residuals_m[tag_id])
-    if residuals_m[worst] > WORST_RESIDUAL_M / 2.0 and len(seen) > LEAST_TAGS:
-        others = [tag for tag in seen if tag.tag_id != worst]
-        without = _fit(lens, others, references)
-        rest_m = measure_residuals(without, others, references)
-        alone_m = measure_residuals(without, seen, references)[worst]
-        if alone_m > WORST_RESIDUAL_M and alone_m > 3.0 * max(rest_m.values()):
-            camera, left_out = without, [worst]
-            residuals_m = {**rest_m, worst: alone_m}
+    wrong = _find_wrong_tag(lens, seen, references)
+    if wrong is not None:
+        left_out, camera = [wrong.tag_id], wrong.camera_without
+        residuals_m = measure_residuals(camera, seen, references)
+    if _compute_rms(residuals_m, left_out) < WORST_RESIDUAL_M:  # or it is no matter of scale
+        _check_sizes(camera, [tag for tag in seen if tag.tag_id not in left_out], references)
     return ArenaCalibration(camera, residuals_m, left_out, _judge(residuals_m, left_out, missing))
+
+
+def _refuse_mistakes(lens: Lens, seen: Sequence[TagCorners], references: Mapping[int, ReferenceTag]) -> None:
+    """Try mistakes that people make with places. Raises: CalibrationError that names those that explain all."""
+    mirrored = {
+        tag_id: tag._replace(pose=Pose(tag.pose.x_m, -tag.pose.y_m, 0.0)) for tag_id, tag in references.items()
+    }
+    tried = [("y the wrong way (seen from above, y points left of x)", mirrored)]
+    for one, other in itertools.combinations(sorted(tag.tag_id for tag in seen), 2):
+        swapped = {**references, one: references[other], other: references[one]}
+        tried.append(("tags %d and %d swapped" % (one, other), swapped))
+    causes = []
+    for cause, places in tried:
+        camera = _fit(lens, seen, places)
+        if camera is not None and _compute_rms(measure_residuals(camera, seen, places), ()) < WORST_RESIDUAL_M:
+            causes.append(cause)
+    if causes:
+        raise CalibrationError("the places of the reference tags have %s: correct them" % ", or ".join(causes))
+
+
+class _WrongTag(NamedTuple):
+    """A tag that contradicts all others, and the camera without it."""
+
+    tag_id: int
+    camera_without: Camera
+
+
+def _find_wrong_tag(
+    lens: Lens, seen: Sequence[TagCorners], references: Mapping[int, ReferenceTag]
+) -> Optional[_WrongTag]:
+    """Return the tag without which the others agree by far better; None if there is none, or none to spare."""
+    if len(seen) <= LEAST_TAGS:
+        return None
+    found: Optional[_WrongTag] = None
+    least_m = math.inf
+    for tag in seen:
+        others = [other for other in seen if other is not tag]
+        camera = _fit(lens, others, references)
+        if camera is None:
+            continue
+        rest_m = _compute_rms(measure_residuals(camera, others, references), ())
+        alone_m = measure_residuals(camera, [tag], references)[tag.tag_id]
+        if rest_m < least_m:
+            least_m = rest_m
+            is_wrong = alone_m > WRONG_PLACE_M and alone_m > WRONG_SHARE * rest_m
+            found = _WrongTag(tag.tag_id, camera) if is_wrong else None
+    return found
+
+
+def _check_sizes(camera: Camera, seen: Sequence[TagCorners], references: Mapping[int, ReferenceTag]) -> None:
+    """Compare the tags' measured size with the printed one. Raises: CalibrationError if places are out of scale."""
+    shares = [fit.size_m / references[fit.tag_id].size_m for fit in fit_references(camera, seen, references)]
+    share = float(np.median(shares))
+    if not abs(share - 1.0) <= MAX_SCALE_ERROR:
+        raise CalibrationError(
+            "reference tags measure %.1f %% of their size: measure the places again, is the tape right? and the side of"
+            " a black square (reference_size_m)" % (100.0 * share)
+        )
 
 
 def _judge(residuals_m: Mapping[int, float], left_out: Sequence[int], missing: Sequence[int]) -> List[str]:
@@ -130,6 +206,9 @@ def _compute_rms(residuals_m: Mapping[int, float], left_out: Sequence[int]) -> f
 
 def _check_extent(seen: Sequence[TagCorners], references: Mapping[int, ReferenceTag]) -> None:
     places_m = np.array([references[tag.tag_id].pose[:2] for tag in seen])
+    extent_m = float(np.ptp(places_m, axis=0).max())
+    if extent_m > MAX_FIELD_M:
+        raise CalibrationError("the reference tags lie %g m apart: write their places in m, not in mm or cm" % extent_m)
     spread_m = np.linalg.svd(places_m - places_m.mean(axis=0), compute_uv=False)
     if spread_m[1] < LEAST_EXTENT_M:
         raise CalibrationError(
@@ -137,11 +216,12 @@ def _check_extent(seen: Sequence[TagCorners], references: Mapping[int, Reference
         )
 
 
-def _fit(lens: Lens, seen: Sequence[TagCorners], references: Mapping[int, ReferenceTag]) -> Camera:
+def _fit(lens: Lens, seen: Sequence[TagCorners], references: Mapping[int, ReferenceTag]) -> Optional[Camera]:
+    """Return the camera above the floor that sees the tags like this best; None if there is none."""
     known = [references[tag.tag_id] for tag in seen]
     pixels = np.vstack([tag.corners for tag in seen])
     yaws_rad = [tag.pose.yaw_rad for tag in known]
-    camera = None
+    camera: Optional[Camera] = None
     for _ in range(_YAW_ROUNDS):
         points_m = np.vstack(
             [
@@ -149,16 +229,17 @@ def _fit(lens: Lens, seen: Sequence[TagCorners], references: Mapping[int, Refere
                 for tag, yaw in zip(known, yaws_rad)
             ]
         )
-        is_found, turn, shift = cv2.solvePnP(points_m, pixels, lens.matrix, lens.distortion)
+        try:
+            is_found, turn, shift = cv2.solvePnP(points_m, pixels, lens.matrix, lens.distortion)
+        except cv2.error:
+            return None
         if not is_found or not np.isfinite(turn).all() or not np.isfinite(shift).all():
-            raise CalibrationError(
-                "no place of the camera explains what it sees: check ids and places of the tags"
-            )
+            return None
         rotation = cv2.Rodrigues(turn)[0]
         camera = Camera(lens, rotation, (-rotation.T @ shift).ravel())
         yaws_rad = [fit.pose.yaw_rad for fit in fit_references(camera, seen, references)]
     assert camera is not None
-    return camera
+    return camera if HEIGHTS_M[0] <= camera.position_m[2] <= HEIGHTS_M[1] else None
 
 
 def _list_corners(tag: ReferenceTag) -> np.ndarray:
