@@ -79,6 +79,17 @@ def test_a_robot_that_is_carried_in_view_is_not_tracked_after_0_15_seconds():
     assert swarm.run(0.1, {0: (1.0, 2.0, 0.0)})[0].state is RobotState.TRACKED
 
 
+def test_robots_of_a_moved_camera_are_lost_without_a_line():
+    swarm = Swarm(0).run(1.0, {0: (1.0, 2.0, 0.0)})
+    swarm.localizer.distrust(swarm.now_s + 0.03, [0])
+    assert swarm[0].state is RobotState.TRACKED, "another camera sees it"
+    swarm.localizer.distrust(swarm.now_s + 0.2, [0, 7])
+    assert swarm[0].state is RobotState.LOST and "calibrate_camera arena" in swarm[0].problem
+    swarm.run(2.0)
+    assert len(swarm.lines) == 1
+    assert swarm.run(0.1, {0: (1.0, 2.0, 0.0)})[0].state is RobotState.TRACKED
+
+
 def test_poses_that_wait_for_odometry_are_told_of_when_it_comes():
     swarm = Swarm(0).run(0.1)
     measurement = Measurement(swarm.now_s + 0.02, Pose(1.0, 2.0, 0.0), COVARIANCE)

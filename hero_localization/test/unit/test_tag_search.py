@@ -19,7 +19,7 @@ class SeenTags(TagDetector):
     """Finds those of the tags given that lie in the window with their margin."""
 
     def __init__(self):
-        self.tags, self.searched_px, self.windows = [], 0, []
+        self.tags, self.searched_px, self.blind = [], 0, set()
 
     def place(self, tags):
         half = SIDE_PX / 2.0
@@ -34,22 +34,25 @@ class SeenTags(TagDetector):
         return [
             tag
             for tag in self.tags
-            if (tag.corners >= low + margin).all() and (tag.corners <= high - margin).all()
+            if tag.tag_id not in self.blind
+            and (tag.corners >= low + margin).all() and (tag.corners <= high - margin).all()
         ]
 
 
 class Watch:
     """A search, and the number of the frame."""
 
-    def __init__(self):
-        self.detector, self.index = SeenTags(), -1
-        self.search = TagSearch(self.detector, WIDTH_PX, HEIGHT_PX)
+    def __init__(self, with_fine=False, smallest_px=20.0):
+        self.detector, self.fine, self.index = SeenTags(), SeenTags(), -1
+        fine = self.fine if with_fine else None
+        self.search = TagSearch(self.detector, WIDTH_PX, HEIGHT_PX, fine, smallest_px)
 
     def see(self, tags, expected=None, frames=1):
         for _ in range(frames):
             self.index += 1
-            self.detector.place(tags)
-            self.detector.searched_px = 0
+            for detector in (self.detector, self.fine):
+                detector.place(tags)
+                detector.searched_px = 0
             found = self.search.search(FRAME, self.index * FRAME_S, expected)
         return sorted(tag.tag_id for tag in found)
 
@@ -131,23 +134,66 @@ def test_tag_lost_for_long_is_found_at_once_where_it_is_expected():
     assert watch.see([(1, (1410.0, 720.0))], expected={1: (1400.0, 700.0)}) == [1]
 
 
-def test_tag_that_moved_on_unseen_is_found_anywhere_within_200_ms():
+def test_tag_that_drove_on_unseen_is_found_within_300_ms():
     """After two seconds below a hand, and with nobody who knows where it is."""
     watch = Watch()
-    watch.see([(1, (200.0, 900.0))], frames=40)
+    watch.see([(1, (900.0, 500.0))], frames=40)
     watch.see([], frames=60)
-    seen = [watch.see([(1, (1700.0, 100.0))]) for _ in range(round(0.2 / FRAME_S) + 1)]
+    seen = [watch.see([(1, (1130.0, 360.0))]) for _ in range(round(0.3 / FRAME_S))]
     assert seen[-1] == [1]
 
 
-def test_search_in_a_hurry_ends_when_a_tag_is_gone_for_good():
+def test_tag_that_is_carried_by_hand_is_seen_within_100_ms():
     watch = Watch()
-    watch.see([(1, (200.0, 900.0))], frames=40)
-    watch.see([], frames=150)
-    assert watch.count_searched_px() < 1.7 * WIDTH_PX * HEIGHT_PX
+    watch.see([(1, (900.0, 500.0))], frames=40)
+    seen = [watch.see([(1, (900.0 + 23.0 * index, 500.0))]) for index in range(1, 16)]
+    assert [1] in seen[:3] and seen.count([1]) > 5
 
 
-def test_flickering_tag_does_not_hurry_the_search():
+def test_tags_that_one_hand_covered_are_found_together():
+    watch, tags = Watch(), [(index, (500.0 + 100.0 * index, 500.0)) for index in range(8)]
+    watch.see(tags, frames=40)
+    watch.see([], frames=60)
+    moved = [(index, (500.0 + 100.0 * index, 700.0)) for index in range(8)]
+    seen = [watch.see(moved) for _ in range(round(0.3 / FRAME_S))]
+    assert seen[-1] == list(range(8))
+
+
+@pytest.mark.parametrize("is_leaving", [False, True])
+def test_lost_tags_cost_a_third_more_at_most(is_leaving):
+    """One after another, one per second: covered for half a second, or driven out of the image."""
+    tags = everywhere()[::8]
+    usual, losing = Watch(), Watch()
+    usual_px = losing_px = 0
+    for index in range(90):
+        rim, inner = tags[index // 30 % 3][0], tags[20 + index // 30][0]
+        hidden = rim if is_leaving else inner
+        usual.see(tags)
+        losing.see([tag for tag in tags if index % 30 < 15 or tag[0] != hidden])
+        if index >= 30:
+            usual_px += usual.detector.searched_px
+            losing_px += losing.detector.searched_px
+    assert losing_px < 1.3 * usual_px
+
+
+def test_small_tags_that_the_detector_misses_are_found_by_the_fine_one():
+    watch = Watch(with_fine=True)
+    tags = everywhere()[:100:4]
+    watch.detector.blind = {tag_id for tag_id, _ in tags[::2]}
+    watch.see(tags, frames=10)
+    for _ in range(70):
+        assert watch.see(tags) == [tag_id for tag_id, _ in tags]
+    # 13 windows, and every other turn of the tiles.
+    assert watch.fine.searched_px < 14 * 80**2 + 2 * 1.7 * WIDTH_PX * HEIGHT_PX / 12.0
+
+
+def test_large_tags_need_no_fine_detector():
+    watch = Watch(with_fine=True, smallest_px=40.0)
+    watch.see(everywhere()[:100:4], frames=80)
+    assert watch.fine.searched_px == 0
+
+
+def test_flickering_tag_is_not_searched_around_its_place():
     watch = Watch()
     watch.see([], frames=60)
     searched_px = 0
@@ -170,7 +216,7 @@ def test_neighbors_in_one_window_come_once():
     assert watch.see([(1, (600.0, 400.0)), (2, (632.0, 400.0))], frames=20) == [1, 2]
 
 
-def test_a_lost_tag_is_not_searched_in_a_hurry_after_time_has_gone_back():
+def test_a_lost_tag_is_forgotten_after_time_has_gone_back():
     watch = Watch()
     watch.see([(1, (600.0, 400.0))], frames=300)
     watch.see([], frames=10)

@@ -93,6 +93,9 @@ class LocalizationNode:
                 measurement = Measurement(robot.stamp.to_sec(), pose, covariance)
                 with self._lock:
                     lines += self._localizer.add_measurement(robot.id, measurement)
+        with self._lock:
+            lost = [robot.id for robot in report.robots if robot.state == RobotPose.LOST]
+            self._localizer.distrust(report.header.stamp.to_sec(), lost)
         self._picture.set()
         _log(lines)
 

@@ -41,7 +41,7 @@ class PictureOutput:
         if self._shown_s <= now_s < self._shown_s + PERIOD_S or not publishers:
             return
         self._shown_s = now_s
-        if self._view is None:
+        if self._view is None or self._view.camera is not tracker.camera:
             self._view = FloorView(tracker.camera, self._height_m)
             self._publish_outline(self._view)
         sightings = tracker.sightings

@@ -21,7 +21,7 @@ from ..camera.frame_source import Frame, open_source
 from ..errors import DetectorError, LocalizationError
 from ..tracking import settings as camera_file
 from ..tracking.detector_process import DetectorProcess
-from ..tracking.tag_pose import Sightings
+from ..tracking.tag_pose import Sightings, find_smallest_side
 from ..tracking.tracker import Tracker
 from .outputs import make_robot_pose, name_status
 from .picture_output import PictureOutput
@@ -40,6 +40,7 @@ class TrackNode:
         """Read the camera's file and open its pictures. Raises: LocalizationError."""
         self._path = str(parameters["file"])
         self._settings = camera_file.load(self._path)
+        self._file_s = camera_file.find_change_s(self._path)
         self._frame_id = str(parameters["frame"]).lstrip("/")
         camera = self._settings.camera
         self._tracker = Tracker(self._settings, camera) if camera is not None else None
@@ -72,18 +73,38 @@ class TrackNode:
         now_s = rospy.get_time()
         if not self._diagnosed_s <= now_s < self._diagnosed_s + DIAGNOSTICS_PERIOD_S:
             self._diagnosed_s = now_s
+            self._follow_file()
             self._publish_diagnostics(now_s)
+
+    def _follow_file(self) -> None:
+        """Take the camera file again if a calibration wrote it."""
+        changed_s = camera_file.find_change_s(self._path)
+        if changed_s == self._file_s:
+            return
+        self._file_s = changed_s
+        try:
+            settings = camera_file.load(self._path)
+        except LocalizationError as error:
+            rospy.logerr("%s; the calibration before it counts" % error)
+            return
+        if settings.camera is not None:
+            self._settings, self._tracker = settings, Tracker(settings, settings.camera)
+            rospy.loginfo("%s has changed, and counts from now on" % self._path)
 
     def _take_frame(self, tracker: Tracker, frame: Frame) -> None:
         height_px, width_px = frame.gray.shape
         tracker.camera.lens.check_size(height_px, width_px)
         if self._process is None:
             settings = self._settings
-            self._process = DetectorProcess(settings.detector, settings.family, settings.decimate, width_px, height_px)
+            smallest_px = find_smallest_side(tracker.camera, settings.layout.default_mount)
+            self._process = DetectorProcess(
+                settings.detector, settings.family, settings.decimate, width_px, height_px, smallest_px
+            )
             return  # by now the picture is a second old
-        tags = self._process.search(frame.gray, frame.stamp_s, tracker.project(self._expected))
+        expected = tracker.project(self._expected)
+        tags = self._process.search(frame.gray, frame.stamp_s, expected)
         tracker.measure_shade(frame.gray)
-        self._publish(tracker, tracker.take(tags, frame.stamp_s, frame.number), frame.stamp_s)
+        self._publish(tracker, tracker.take(tags, frame.stamp_s, frame.number, expected), frame.stamp_s)
         self._pictures.show(tracker, frame, rospy.get_time())
 
     # -- outputs ----------------------------------------------------------------------------------------------
@@ -93,7 +114,8 @@ class TrackNode:
         report = RobotPoses()
         report.header.stamp, report.header.frame_id = stamp, self._frame_id
         for robot_id, seen in sorted(sightings.robots.items()):
-            report.robots.append(make_robot_pose(robot_id, RobotPose.TRACKED, stamp, seen.pose, seen.covariance))
+            state = RobotPose.LOST if tracker.is_moved else RobotPose.TRACKED
+            report.robots.append(make_robot_pose(robot_id, state, stamp, seen.pose, seen.covariance))
         self._publisher.publish(report)
         if self._objects.get_num_connections():
             objects = [ObjectPose(name, *seen.pose) for name, seen in sorted(sightings.objects.items())]

@@ -3,6 +3,7 @@
 Pictures go over in shared memory, all else over a pipe. The process knows nothing of ROS, and ends with its parent.
 """
 
+import math
 import mmap
 import os
 import subprocess  # nosec B404 - it starts this module
@@ -29,8 +30,16 @@ END_S = 5.0
 class DetectorProcess:
     """A TagSearch that runs in another process."""
 
-    def __init__(self, backend: str, family: str, decimate: float, width_px: int, height_px: int) -> None:
-        """Start the process. Raises: DetectorError for a detector that cannot be made, or does not start."""
+    def __init__(
+        self,
+        backend: str,
+        family: str,
+        decimate: float,
+        width_px: int,
+        height_px: int,
+        smallest_px: float = math.inf,
+    ) -> None:
+        """Start the process; smallest_px: side of the smallest tag to be expected. Raises: DetectorError for a detector that cannot be made, or does not start."""
         self._shape = (height_px, width_px)
         memory = os.memfd_create("hero_frame")
         os.ftruncate(memory, width_px * height_px)
@@ -48,7 +57,7 @@ class DetectorProcess:
                 start_new_session=True,
             )
         os.close(memory)
-        problem = self._ask((backend, family, decimate, width_px, height_px))
+        problem = self._ask((backend, family, decimate, width_px, height_px, smallest_px))
         if problem is not None:
             self.close()
             raise DetectorError(problem)
@@ -97,10 +106,11 @@ class DetectorProcess:
 
 def serve(connection: Connection, memory: int) -> None:
     """Answer questions until the parent is gone."""
-    backend, family, decimate, width_px, height_px = connection.recv()
+    backend, family, decimate, width_px, height_px, smallest_px = connection.recv()
     frame = np.frombuffer(mmap.mmap(memory, width_px * height_px), np.uint8).reshape(height_px, width_px)
     try:
-        search = TagSearch(create_detector(backend, family, decimate), width_px, height_px)
+        fine = create_detector(backend, family, 1.0) if backend == "apriltag" and decimate > 1.0 else None
+        search = TagSearch(create_detector(backend, family, decimate), width_px, height_px, fine, smallest_px)
     except DetectorError as error:
         connection.send(str(error))
         return

@@ -29,12 +29,13 @@ class FloorView:
     """A window onto the plane at one height: the tags' height, so that robots lie where their poses are.
 
     Attributes:
+        camera: as given.
         box_m: x min, y min, x max, y max of the view in map.
     """
 
     def __init__(self, camera: Camera, height_m: float) -> None:
         """camera: looks down; height_m: of the plane. Raises: SettingsError if the camera does not see the plane."""
-        self._camera = camera
+        self.camera = camera
         self._height_m = height_m
         self.box_m = self._find_box()
         left_m, low_m, right_m, high_m = self.box_m
@@ -50,15 +51,15 @@ class FloorView:
         self._maps = cv2.convertMaps(np.ascontiguousarray(sources[shown]), None, cv2.CV_16SC2)
 
     def _find_box(self) -> Tuple[float, float, float, float]:
-        lens = self._camera.lens
+        lens = self.camera.lens
         u, v = (np.linspace(0.0, side_px - 1.0, _BORDER_POINTS) for side_px in (lens.width_px, lens.height_px))
         border = [np.column_stack((u, np.full(len(u), edge))) for edge in (v[0], v[-1])]
         border += [np.column_stack((np.full(len(v), edge), v)) for edge in (u[0], u[-1])]
-        points_m = self._camera.intersect(np.concatenate(border), self._height_m)
+        points_m = self.camera.intersect(np.concatenate(border), self._height_m)
         points_m = points_m[np.isfinite(points_m).all(axis=1)]
         if not len(points_m):
             raise SettingsError("the camera does not look at the floor: calibrate the arena again")
-        center_m, reach_m = self._camera.position_m[:2], MOST_REACH * abs(self._camera.position_m[2])
+        center_m, reach_m = self.camera.position_m[:2], MOST_REACH * abs(self.camera.position_m[2])
         low = np.maximum(points_m.min(axis=0), center_m - reach_m)
         high = np.minimum(points_m.max(axis=0), center_m + reach_m)
         if not (low < high).all():
@@ -71,7 +72,7 @@ class FloorView:
 
     def find_pixels(self, pixels: np.ndarray) -> np.ndarray:
         """Return where pixels (N, 2) of the camera's picture are in the view."""
-        points_m = self._camera.intersect(pixels, self._height_m)
+        points_m = self.camera.intersect(pixels, self._height_m)
         left_m, _, _, high_m = self.box_m
         return np.column_stack((points_m[:, 0] - left_m, high_m - points_m[:, 1])) * self._px_per_m - 0.5
 

@@ -22,7 +22,7 @@ from ..prints.tag_images import DEFAULT_SIZE_M, REFERENCE_SIZE_M
 from .detectors import DEFAULT_BACKEND
 from .tag_pose import DEFAULT_HEIGHT_M, MountedTag, ReferenceTag, TagLayout
 
-__all__ = ["DEFAULT_PATH", "Settings", "describe_camera", "describe_lens", "describe_pose", "load", "update"]
+__all__ = ["DEFAULT_PATH", "Settings", "describe_camera", "describe_lens", "describe_pose", "find_change_s", "load", "update"]
 
 DEFAULT_PATH = "~/hero_localization/camera.yaml"
 
@@ -52,6 +52,14 @@ def load(path: str) -> Settings:
         return _build(content)
     except ValueError as error:
         raise SettingsError("%s: %s" % (path, error)) from None
+
+
+def find_change_s(path: str) -> float:
+    """Return when a file was changed last, by the clock of its disk; 0 if it does not exist."""
+    try:
+        return os.stat(os.path.expanduser(path)).st_mtime
+    except OSError:
+        return 0.0
 
 
 def update(path: str, parts: Mapping[str, Any]) -> None:

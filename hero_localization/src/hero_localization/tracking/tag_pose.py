@@ -23,6 +23,7 @@ __all__ = [
     "Sightings",
     "TagLayout",
     "TagPose",
+    "find_smallest_side",
     "fit_squares",
     "locate",
 ]
@@ -165,6 +166,19 @@ def fit_squares(
         covariance = np.diag((place_m2, place_m2, yaw_rad2))
         poses.append(TagPose(tag.tag_id, pose, 2.0 * float(abs(turn)), covariance))
     return poses
+
+
+def find_smallest_side(camera: Camera, mount: MountedTag) -> float:
+    """Return the side (px) of the smallest tag of its kind that lies wholly in the image; inf if there is none."""
+    width_px, height_px = camera.lens.width_px, camera.lens.height_px
+    u, v = np.meshgrid(np.linspace(0.02, 0.98, 9) * width_px, np.linspace(0.03, 0.97, 7) * height_px)
+    centers_m = camera.intersect(np.column_stack((u.ravel(), v.ravel())), mount.height_m)
+    half_m = mount.size_m / 2.0
+    square_m = np.array(((half_m, half_m), (half_m, -half_m), (-half_m, -half_m), (-half_m, half_m)))
+    points_m = (centers_m[:, None] + square_m).reshape(-1, 2)
+    pixels = camera.project(np.column_stack((points_m, np.full(len(points_m), mount.height_m)))).reshape(-1, 4, 2)
+    sides_px = [TagCorners(0, corners).side_px for corners in pixels if np.isfinite(corners).all()]
+    return min(sides_px, default=math.inf)
 
 
 def locate(camera: Camera, tags: Sequence[TagCorners], layout: TagLayout) -> Sightings:

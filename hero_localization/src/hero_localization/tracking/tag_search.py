@@ -1,29 +1,46 @@
 """Follows tags from frame to frame in small windows, and searches the whole picture for others, a tile at a time. Pure.
 
-A detector takes 90 ms for a whole picture of 1920 by 1080 and 0.2 ms for a window around one tag. So known tags are
-looked for where they are expected, in every frame, and the rest of the picture is searched in turn: in two seconds, or
-in a fraction of one while a tag that was seen steadily is lost.
+A detector takes 90 ms for a whole image of 1920 by 1080 and 0.2 ms for a window around one tag. So known tags are
+looked for where they are expected, in every frame, and the rest of the image is searched in turn, in two seconds. Where
+tags are small, a second detector that uses all pixels looks where the first one found nothing, and takes every other
+turn. A tag that was seen steadily and is lost is also searched around its place, at most one image's pixels per second.
 """
 
 import math
-from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
+from typing import Dict, List, Mapping, NamedTuple, Optional, Tuple
 
 import numpy as np
 
 from .detectors import TagDetector
 from .tag_corners import TagCorners
 
-__all__ = ["TagSearch"]
+__all__ = ["FINE_BELOW_PX", "TagSearch"]
+
+FINE_BELOW_PX = 28.0
+"""In an image at half its size, one tag in ten of less than this is missed, or more in bad light."""
+
+FINE_S = 2.0
+"""So long the fine detector alone looks for a tag that only it found."""
 
 SWEEP_S = 2.0
-HURRIED_SWEEP_S = 0.15
-"""How long a search of the whole picture takes, and how long while a tag is lost."""
+"""How long a search of the whole image takes."""
 
-HURRY_S = 3.0
-"""So long a lost tag is searched in a hurry."""
+NEARBY_S = 3.0
+NEARBY_EXPECTED_S = 1.0
+"""So long a lost tag is searched around its place; if its robot's odometry tells where it is, one that is carried."""
+
+NEARBY_SIDES_S, MAX_NEARBY_SIDES = 24.0, 12.0
+"""How far a tag may have come, in its sides: 1 m/s by hand at first, 0.24 m/s by itself for 2 s."""
+
+NEARBY_IMAGES_S, NEARBY_START_IMAGES = 0.9, 0.1
+"""Pixels that are searched around lost tags in a second, and at once, by those of an image."""
 
 STEADY_S = 1.0
-"""A tag that was seen for less than this is not searched in a hurry: at the rim, tags come and go."""
+"""A tag that was seen for less than this is not searched when it is lost, nor one that left the image."""
+RIM_SIDES = 1.5
+
+FINE_COST = 2.5
+"""Of the fine detector, by that of the other one, for as many pixels."""
 
 LONGEST_STEP_S = 0.2
 """A longer gap between frames counts as this long, or all tiles would be searched at once."""
@@ -61,16 +78,27 @@ class TagSearch:
     """Finds tags in the frames of one camera."""
 
     def __init__(
-        self, detector: TagDetector, width_px: int, height_px: int, overlap_px: int = OVERLAP_PX
+        self,
+        detector: TagDetector,
+        width_px: int,
+        height_px: int,
+        fine_detector: Optional[TagDetector] = None,
+        smallest_px: float = math.inf,
+        overlap_px: int = OVERLAP_PX,
     ) -> None:
-        self._detector = detector
+        """fine_detector: finds smaller tags at more cost; smallest_px: side of the smallest tag to be expected."""
+        self._detector, self._fine = detector, fine_detector
+        self._sweeps = [detector] if fine_detector is None or smallest_px >= FINE_BELOW_PX else [fine_detector, detector]
         self._tracks: List[_Track] = []
+        self._lost: Dict[int, _Track] = {}
+        self._size_px = np.array((width_px, height_px))
         self._tiles = _list_tiles(width_px, height_px, overlap_px)
         self._next_tile = 0
         self._due = 0.0
-        self._hurry_until_s = -math.inf
+        self._nearby_px = 0.0
         self._previous_s: Optional[float] = None
         self._sides_px: Dict[int, float] = {}
+        self._fine_until_s: Dict[int, float] = {}
 
     def search(
         self, gray: np.ndarray, stamp_s: float, expected: Optional[Mapping[int, Tuple[float, float]]] = None
@@ -85,57 +113,121 @@ class TagSearch:
         """
         if self._previous_s is not None and stamp_s < self._previous_s - KEPT_S:
             # Time went back, as when a recording is replayed: stamps tell no more for how long a tag is lost.
-            self._tracks, self._hurry_until_s = [], -math.inf
-        places: Dict[int, Sequence[float]] = dict(expected or {})
+            self._tracks, self._lost, self._fine_until_s = [], {}, {}
+        places = {tag_id: np.array(place, dtype=float) for tag_id, place in (expected or {}).items()}
         found: List[TagCorners] = []
         for track in self._tracks:
-            place, count, elapsed_s = places.pop(track.tag_id, None), len(found), stamp_s - track.stamp_s
-            for window_s in (NARROW_S, elapsed_s) if elapsed_s > NARROW_S else (elapsed_s,):
-                # First where it was: what is known from elsewhere is newer than the frame.
-                self._look_at(gray, track.center, track.side_px, window_s, found)
-                if place is not None and all(tag.tag_id != track.tag_id for tag in found):
-                    self._look_at(gray, np.asarray(place, dtype=float), track.side_px, window_s, found)
-                if len(found) > count:
-                    break
+            elapsed_s = stamp_s - track.stamp_s
+            # First where it was: what is known from elsewhere is newer than the frame.
+            centers = [track.center, *([places[track.tag_id]] if track.tag_id in places else [])]
+            windows_s = (NARROW_S, elapsed_s) if elapsed_s > NARROW_S else (elapsed_s,)
+            any(
+                self._look_for(gray, track.tag_id, center, track.side_px, window_s, stamp_s, found)
+                for window_s in windows_s
+                for center in centers
+            )
+        tracked = {track.tag_id for track in self._tracks}
         for tag_id, place in places.items():
             # Lost for long: where it is expected, it costs no more than a window.
-            if tag_id in self._sides_px:
-                center = np.asarray(place, dtype=float)
-                self._look_at(gray, center, self._sides_px[tag_id], LONGEST_STEP_S, found)
-        for left, top, right, bottom in self._take_tiles(stamp_s):
-            _add_new(found, self._detector.detect(gray[top:bottom, left:right], (left, top)))
+            if tag_id in self._sides_px and tag_id not in tracked:
+                self._look_for(gray, tag_id, place, self._sides_px[tag_id], LONGEST_STEP_S, stamp_s, found)
+        for detector, (left, top, right, bottom) in self._take_tiles(stamp_s):
+            _add_new(found, detector.detect(gray[top:bottom, left:right], (left, top)))
+        self._search_nearby(gray, stamp_s, places, found)
         self._follow(found, stamp_s)
         self._previous_s = stamp_s
         return found
 
-    def _look_at(
-        self, gray: np.ndarray, center: np.ndarray, side_px: float, elapsed_s: float, found: List[TagCorners]
-    ) -> None:
+    def _look_for(
+        self,
+        gray: np.ndarray,
+        tag_id: int,
+        center: np.ndarray,
+        side_px: float,
+        elapsed_s: float,
+        stamp_s: float,
+        found: List[TagCorners],
+    ) -> bool:
+        """Search a window for a tag, and return whether it is there; what else is there is added to found, too."""
         slack_sides = min(SLACK_SIDES_S * max(elapsed_s, 0.0), MOST_SLACK_SIDES)
         half_px = (WINDOW_SIDES + slack_sides) * side_px + SLACK_PX
+        detectors = [self._detector]
+        if self._fine is not None and side_px < FINE_BELOW_PX:
+            is_hard = stamp_s < self._fine_until_s.get(tag_id, -math.inf)
+            detectors = [self._fine] if is_hard else [self._detector, self._fine]
+        for detector in detectors:
+            if self._detect(detector, gray, center, half_px, side_px, tag_id, found):
+                if len(detectors) > 1 and detector is self._fine:
+                    self._fine_until_s[tag_id] = stamp_s + FINE_S
+                return True
+        return False
+
+    @staticmethod
+    def _detect(
+        detector: TagDetector,
+        gray: np.ndarray,
+        center: np.ndarray,
+        half_px: float,
+        side_px: float,
+        tag_id: int,
+        found: List[TagCorners],
+    ) -> bool:
+        """Search a square, and return whether a tag is there."""
         if not np.isfinite(center).all():
-            return
+            return False
         height, width = gray.shape
         left, top = (max(0, math.floor(place - half_px)) for place in center)
         right, bottom = (
             min(limit, math.ceil(place + half_px)) for place, limit in zip(center, (width, height))
         )
-        if min(right - left, bottom - top) >= side_px:
-            _add_new(found, self._detector.detect(gray[top:bottom, left:right], (left, top)))
+        if min(right - left, bottom - top) < side_px:
+            return False
+        seen = detector.detect(gray[top:bottom, left:right], (left, top))
+        _add_new(found, seen)
+        return any(tag.tag_id == tag_id for tag in seen)
 
-    def _take_tiles(self, stamp_s: float) -> List[Tuple[int, int, int, int]]:
-        """Return the tiles to be searched in this frame."""
+    def _take_tiles(self, stamp_s: float) -> List[Tuple[TagDetector, Tuple[int, int, int, int]]]:
+        """Return the tiles to be searched in this frame, and the detector for each."""
         if self._previous_s is None:
             self._previous_s = stamp_s
-            return self._tiles
+            return [(self._sweeps[0], tile) for tile in self._tiles]
         elapsed_s = min(max(stamp_s - self._previous_s, 0.0), LONGEST_STEP_S)
-        is_hurried = stamp_s <= self._hurry_until_s
-        self._due += len(self._tiles) * elapsed_s / (HURRIED_SWEEP_S if is_hurried else SWEEP_S)
+        self._nearby_px = min(self._nearby_px + NEARBY_IMAGES_S * elapsed_s * self._size_px.prod(), self._size_px.prod())
+        self._due += len(self._tiles) * elapsed_s / SWEEP_S
         count = min(int(self._due), len(self._tiles))
         self._due -= int(self._due)
-        first = self._next_tile
-        self._next_tile = (first + count) % len(self._tiles)
-        return [self._tiles[(first + index) % len(self._tiles)] for index in range(count)]
+        first, total = self._next_tile, len(self._tiles) * len(self._sweeps)
+        self._next_tile = (first + count) % total
+        turns = [divmod((first + index) % total, len(self._tiles)) for index in range(count)]
+        return [(self._sweeps[sweep], self._tiles[tile]) for sweep, tile in turns]
+
+    def _search_nearby(
+        self, gray: np.ndarray, stamp_s: float, places: Mapping[int, np.ndarray], found: List[TagCorners]
+    ) -> None:
+        """Search around the places of lost tags, one after another, as far as there are pixels left for it."""
+        image_px = float(self._size_px.prod())
+        if not self._lost:
+            self._nearby_px = min(self._nearby_px, NEARBY_START_IMAGES * image_px)
+        is_found = False
+        for tag_id, track in list(self._lost.items()):
+            seen = {tag.tag_id for tag in found}
+            if not is_found and not seen.isdisjoint(self._lost):
+                # What covered one may have covered others.
+                is_found, self._nearby_px = True, image_px
+            lost_s = stamp_s - track.stamp_s
+            if lost_s <= 0.0 or lost_s > (NEARBY_EXPECTED_S if tag_id in places else NEARBY_S):
+                del self._lost[tag_id]
+                continue
+            if tag_id in seen:
+                continue
+            half_px = (WINDOW_SIDES + min(NEARBY_SIDES_S * lost_s, MAX_NEARBY_SIDES)) * track.side_px
+            detector = self._sweeps[0] if track.side_px < FINE_BELOW_PX else self._detector
+            cost_px = 4.0 * half_px**2 * (1.0 if detector is self._detector else FINE_COST)
+            if cost_px > self._nearby_px:
+                return
+            self._nearby_px -= cost_px
+            self._lost[tag_id] = self._lost.pop(tag_id)  # the next one comes first next time
+            self._detect(detector, gray, track.center, half_px, track.side_px, tag_id, found)
 
     def _follow(self, found: List[TagCorners], stamp_s: float) -> None:
         old = list(self._tracks)
@@ -147,14 +239,18 @@ class TagSearch:
             if same:
                 nearest = min(same, key=lambda track: float(abs(track.center - center).sum()))
                 old = [track for track in old if track is not nearest]
-                first_s = nearest.first_s if nearest.stamp_s == self._previous_s else stamp_s
+                is_steady = nearest.stamp_s == self._previous_s or tag.tag_id in self._lost
+                first_s = nearest.first_s if is_steady else stamp_s
             self._tracks.append(_Track(tag.tag_id, center, side_px, stamp_s, first_s))
+            self._lost.pop(tag.tag_id, None)
         for track in old:
             if stamp_s - track.stamp_s > KEPT_S:
                 continue
             self._tracks.append(track)
-            if track.stamp_s - track.first_s >= STEADY_S:
-                self._hurry_until_s = max(self._hurry_until_s, track.stamp_s + HURRY_S)
+            rim_px = np.minimum(track.center, self._size_px - track.center).min()
+            is_new = track.stamp_s == self._previous_s
+            if is_new and track.stamp_s - track.first_s >= STEADY_S and rim_px > RIM_SIDES * track.side_px:
+                self._lost[track.tag_id] = track
 
 
 def _list_tiles(width_px: int, height_px: int, overlap_px: int) -> List[Tuple[int, int, int, int]]:

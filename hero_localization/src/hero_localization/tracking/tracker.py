@@ -2,7 +2,7 @@
 
 import math
 from collections import deque
-from typing import Deque, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
+from typing import Deque, Dict, List, Mapping, NamedTuple, Optional, Sequence, Set, Tuple
 
 import numpy as np
 
@@ -21,8 +21,14 @@ RATE_FRAMES = 30
 KEPT_S = 2.0
 """A problem of a tag is named for so long after it was last seen."""
 
-MOVED_FRAMES = 15
+MOVED_S = 0.5
 """A camera that shakes is no camera that moved."""
+
+MIN_REFERENCES = 2
+"""So many reference tags in one image tell whether the camera moved."""
+
+EXPECTED_FRAMES, MAX_MISSED_SHARE = 60, 0.2
+"""A tag that is missed in a larger share of so many images in which it is expected is named."""
 
 MISSING_S = 5.0
 """A hand that covers a reference tag goes away sooner."""
@@ -30,8 +36,11 @@ MISSING_S = 5.0
 LEAST_USED_SHARE = 0.8
 """Of the pictures; tags that are searched less often move further between two searches."""
 
-LEAST_SIDE_PX = 10.0
-"""Of a tag's side in the picture that the detector searches; one cell of 36h11 is a tenth of it."""
+LEAST_SIDE_PX = 14.0
+"""Of a tag's side; one cell of 36h11 is an eighth of it."""
+
+MARGIN_PX = 40.0
+"""A tag that is expected nearer to the border than this need not be seen."""
 
 DARK, BRIGHT = 35.0, 225.0
 """Mean shade, of 255."""
@@ -54,6 +63,7 @@ class Tracker:
         camera: lens and place.
         found: the tags in the last picture.
         sightings: what they stand for.
+        is_moved: whether most reference tags were not at their places when they were seen last, so that no pose is right.
     """
 
     def __init__(self, settings: Settings, camera: Camera) -> None:
@@ -65,18 +75,28 @@ class Tracker:
         self._pictures: Deque[Tuple[float, int]] = deque(maxlen=RATE_FRAMES)
         self._shade = math.nan
         self._tag_problems: Dict[int, Tuple[float, str]] = {}
-        self._moved: Dict[int, int] = {}
+        self.is_moved = False
+        self._expected: Dict[int, Deque[bool]] = {}
+        self._moved_since_s: Dict[int, float] = {}
         self._reference_seen_s: Dict[int, float] = {}
 
     def measure_shade(self, gray: np.ndarray) -> None:
         """Look how bright a picture (H, W), 8 bit, is."""
         self._shade = float(gray[::16, ::16].mean())
 
-    def take(self, tags: Sequence[TagCorners], stamp_s: float, number: int) -> Sightings:
+    def take(
+        self,
+        tags: Sequence[TagCorners],
+        stamp_s: float,
+        number: int,
+        expected: Optional[Mapping[int, Tuple[float, float]]] = None,
+    ) -> Sightings:
         """Return what the tags of the next picture stand for.
 
-        stamp_s: as the picture bears it; number: counts the camera's pictures, with those that were left out.
+        stamp_s: as the picture bears it; number: counts the camera's pictures, with those that were left out; expected:
+        as project() tells.
         """
+        self._note_expected({tag.tag_id for tag in tags}, expected or {})
         self._pictures.append((stamp_s, number))
         self.found = tags
         self.sightings = sightings = locate(self.camera, tags, self._settings.layout)
@@ -102,6 +122,14 @@ class Tracker:
 
     # -- what is wrong --------------------------------------------------------------------------------------
 
+    def _note_expected(self, seen: Set[int], expected: Mapping[int, Tuple[float, float]]) -> None:
+        size_px = (self.camera.lens.width_px, self.camera.lens.height_px)
+        for tag_id, place in expected.items():
+            if all(MARGIN_PX < at < limit - MARGIN_PX for at, limit in zip(place, size_px)):
+                self._expected.setdefault(tag_id, deque(maxlen=EXPECTED_FRAMES)).append(tag_id in seen)
+            else:
+                self._expected.pop(tag_id, None)
+
     def _note_problems(self, sightings: Sightings, stamp_s: float) -> None:
         note = self._tag_problems
         for tag_id in sightings.unknown:
@@ -113,8 +141,12 @@ class Tracker:
             note[tag_id] = (stamp_s, text)
         seen = {tag_id: sighting.pose for tag_id, sighting in sightings.references.items()}
         moved_m = find_moved_references(seen, self._settings.seen_references)
-        for tag_id in seen:
-            self._moved[tag_id] = self._moved.get(tag_id, 0) + 1 if tag_id in moved_m else 0
+        known = seen.keys() & self._settings.seen_references.keys()
+        if len(known) >= MIN_REFERENCES:
+            self.is_moved = 2 * len(moved_m) > len(known)
+        for tag_id in known:
+            since_s = self._moved_since_s.get(tag_id, math.inf)
+            self._moved_since_s[tag_id] = min(since_s, stamp_s) if tag_id in moved_m else math.inf
         for tag_id in self._settings.seen_references:
             # Time goes back when a recording is played again.
             is_new = not self._reference_seen_s.get(tag_id, math.inf) <= stamp_s
@@ -148,16 +180,21 @@ class Tracker:
             text = "pictures are too %s (mean %.0f of 255): give %s light or exposure" % (kind, self._shade, remedy)
             problems.append(Problem("camera", text, True))
         sides_px = [tag.side_px for tag in self.found if self._settings.layout.find_robot(tag.tag_id) is not None]
-        decimate = self._settings.decimate if self._settings.detector == "apriltag" else 1.0
-        if sides_px and min(sides_px) < LEAST_SIDE_PX * decimate:
-            remedy = "set decimate: 1, or hang the camera lower" if decimate > 1.0 else "hang the camera lower"
-            text = "tags measure %.0f px, and get lost below %.0f: %s"
-            problems.append(Problem("camera", text % (min(sides_px), LEAST_SIDE_PX * decimate, remedy), False))
-        moved = [tag_id for tag_id, count in self._moved.items() if count >= MOVED_FRAMES]
-        watched = [tag_id for tag_id in self._moved if tag_id in self._settings.seen_references]
+        if sides_px and min(sides_px) < LEAST_SIDE_PX:
+            text = "tags measure %.0f px, and get lost below %.0f: hang the camera lower, or print larger tags"
+            problems.append(Problem("camera", text % (min(sides_px), LEAST_SIDE_PX), False))
+        missed = [
+            tag_id
+            for tag_id, seen in sorted(self._expected.items())
+            if len(seen) == EXPECTED_FRAMES and seen.count(False) > MAX_MISSED_SHARE * EXPECTED_FRAMES
+        ]
+        if missed:
+            text = "tags %s are often missed where their robots are: covered, too dark, too small, or without their tag?"
+            problems.append(Problem("camera", text % ", ".join(map(str, missed)), False))
+        moved = [tag_id for tag_id, since_s in self._moved_since_s.items() if since_s <= newest_s - MOVED_S]
         missing = [tag_id for tag_id, seen_s in self._reference_seen_s.items() if seen_s < newest_s - MISSING_S]
-        if moved and len(moved) * 2 > len(watched):
-            text = "reference tags are not where they were: the camera moved; calibrate the arena again"
+        if moved and self.is_moved:
+            text = "reference tags are not where they were: the camera moved; no pose counts until calibrate_camera arena"
             problems.append(Problem("camera", text, True))
         else:
             for tag_id in moved:

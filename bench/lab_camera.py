@@ -1,0 +1,151 @@
+"""Images as a webcam in a lab takes them: a renderer apart from the simulated camera's, so that neither hides a mistake.
+
+Each tag is sampled along the rays of 4 x 4 points of each pixel and of several moments of the exposure; the lens is
+inverted by Newton's method along the radius. Then, in this order: vignette, blur, gamma, noise, JPEG.
+"""
+
+import math
+from typing import NamedTuple, Sequence, Tuple
+
+import cv2
+import numpy as np
+
+from hero_localization.prints.tag_images import draw_tag
+
+__all__ = ["LENS_A", "LENS_B", "LabCamera", "LabLens", "LabTag"]
+
+SAMPLES = 4
+MOMENTS = 5
+BODY_RADIUS_M, PLATE_RADIUS_M = 0.0375, 0.0365
+FLOOR, BODY, BLACK, WHITE = 0.45, 0.05, 0.06, 0.85
+"""Reflected shares of the light."""
+
+
+class LabLens(NamedTuple):
+    """Focal length (px), radial distortion, and size of the images."""
+
+    focal_px: float
+    k1: float
+    k2: float
+    size_px: Tuple[int, int] = (1920, 1080)
+
+
+LENS_A = LabLens(1391.0, -0.32, 0.11)
+LENS_B = LabLens(900.0, -0.38, 0.16)
+
+
+class LabTag(NamedTuple):
+    """A print at a true pose, moving at m/s along its robot's heading and rad/s; robots' tags sit on a disc."""
+
+    tag_id: int
+    x_m: float
+    y_m: float
+    yaw_rad: float = 0.0
+    size_m: float = 0.04
+    height_m: float = 0.076
+    speed_m_s: float = 0.0
+    turn_rad_s: float = 0.0
+
+
+class LabCamera(NamedTuple):
+    """A camera that looks down, tilted."""
+
+    lens: LabLens = LENS_A
+    position_m: Tuple[float, float, float] = (0.02, -0.03, 2.2)
+    tilt_rad: Tuple[float, float, float] = (math.radians(5.0), math.radians(-3.3), 0.02)
+    exposure_s: float = 0.008
+    blur_px: float = 0.8
+    noise: float = 3.0
+    vignette: float = 0.45
+    gamma: float = 1.0
+    jpeg_quality: int = 80
+
+    @property
+    def rotation(self) -> np.ndarray:
+        """What turns a vector of the arena into the optical frame, (3, 3)."""
+        return cv2.Rodrigues(np.array(self.tilt_rad))[0] @ np.diag((1.0, -1.0, -1.0))
+
+    @property
+    def center_px(self) -> Tuple[float, float]:
+        """The principal point."""
+        return self.lens.size_px[0] / 2.0 + 7.0, self.lens.size_px[1] / 2.0 - 5.0
+
+    def project(self, points_m: np.ndarray) -> np.ndarray:
+        """Return the pixels (N, 2) of points (N, 3)."""
+        seen = (points_m - self.position_m) @ self.rotation.T
+        rays = seen[:, :2] / seen[:, 2:]
+        r2 = (rays**2).sum(axis=1, keepdims=True)
+        return rays * (1.0 + self.lens.k1 * r2 + self.lens.k2 * r2**2) * self.lens.focal_px + self.center_px
+
+    def find_points(self, pixels: np.ndarray, height_m: float) -> np.ndarray:
+        """Return the points (N, 2) of the plane at height_m that pixels (N, 2) show."""
+        bent = (pixels - self.center_px) / self.lens.focal_px
+        bent_r = np.hypot(*bent.T)
+        radius = bent_r.copy()
+        for _ in range(8):
+            r2 = radius**2
+            value = radius * (1.0 + self.lens.k1 * r2 + self.lens.k2 * r2**2) - bent_r
+            radius -= value / (1.0 + 3.0 * self.lens.k1 * r2 + 5.0 * self.lens.k2 * r2**2)
+        rays = bent * (radius / np.maximum(bent_r, 1e-12))[:, None]
+        directions = np.column_stack((rays, np.ones(len(rays)))) @ self.rotation
+        share = (height_m - self.position_m[2]) / directions[:, 2]
+        return np.array(self.position_m[:2]) + share[:, None] * directions[:, :2]
+
+    def render(self, tags: Sequence[LabTag], random: np.random.RandomState) -> np.ndarray:
+        """Return an image (H, W), 8 bit, of tags on an empty floor."""
+        width, height = self.lens.size_px
+        light = np.full((height, width), FLOOR)
+        for tag in tags:
+            self._draw(light, tag)
+        u, v = np.meshgrid(np.linspace(-1.0, 1.0, width), np.linspace(-1.0, 1.0, height))
+        light *= 1.0 - self.vignette * (0.7 * (u**2 + v**2) / 2.0 + 0.15 * (1.0 + u))
+        light = cv2.GaussianBlur(light, (0, 0), self.blur_px)
+        image = 255.0 * light ** (1.0 / self.gamma) + random.normal(0.0, self.noise, light.shape)
+        gray = np.clip(np.rint(image), 0, 255).astype(np.uint8)
+        coded = cv2.imencode(".jpg", gray, (cv2.IMWRITE_JPEG_QUALITY, self.jpeg_quality))[1]
+        return cv2.imdecode(coded, cv2.IMREAD_GRAYSCALE)
+
+    def _draw(self, light: np.ndarray, tag: LabTag) -> None:
+        cells = draw_tag("36h11", tag.tag_id)
+        is_robot = tag.height_m > 0.0
+        reach_m = BODY_RADIUS_M if is_robot else 0.75 * tag.size_m
+        around = reach_m * np.array(((-1, -1), (-1, 1), (1, 1), (1, -1))) * 1.5 + (tag.x_m, tag.y_m)
+        corners = self.project(np.column_stack((around, np.full(4, tag.height_m))))
+        low = np.maximum(np.floor(corners.min(axis=0)).astype(int), 0)
+        high = np.minimum(np.ceil(corners.max(axis=0)).astype(int) + 1, self.lens.size_px)
+        if (high - low < 1).any():
+            return
+        columns, rows = high - low
+        fine = [(np.arange(SAMPLES * n) + 0.5) / SAMPLES - 0.5 + start for n, start in zip((columns, rows), low)]
+        u, v = np.meshgrid(*fine)
+        points_m = self.find_points(np.column_stack((u.ravel(), v.ravel())), tag.height_m)
+        moments = MOMENTS if tag.speed_m_s or tag.turn_rad_s else 1
+        patch = np.zeros(len(points_m))
+        under = np.repeat(np.repeat(light[low[1] : high[1], low[0] : high[0]], SAMPLES, axis=0), SAMPLES, axis=1).ravel()
+        for share in (np.arange(moments) + 0.5) / moments - 0.5:
+            time_s = share * self.exposure_s
+            yaw_rad = tag.yaw_rad + tag.turn_rad_s * time_s
+            moved_m = tag.speed_m_s * time_s
+            place_m = (tag.x_m + moved_m * math.cos(yaw_rad), tag.y_m + moved_m * math.sin(yaw_rad))
+            patch += _shade(points_m - place_m, yaw_rad, tag.size_m, cells, is_robot, under) / moments
+        mean = patch.reshape(rows, SAMPLES, columns, SAMPLES).mean(axis=(1, 3))
+        light[low[1] : high[1], low[0] : high[0]] = mean
+
+
+def _shade(
+    offsets_m: np.ndarray, yaw_rad: float, size_m: float, cells: np.ndarray, is_robot: bool, under: np.ndarray
+) -> np.ndarray:
+    """Return the shades (N,) at offsets (N, 2) from a tag's center; under: those of what it lies on."""
+    cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
+    front_m = offsets_m @ (cos, sin)
+    left_m = offsets_m @ (-sin, cos)
+    row = np.floor((0.5 - front_m / size_m) * len(cells)).astype(int)
+    column = np.floor((0.5 - left_m / size_m) * len(cells)).astype(int)
+    inside = (np.minimum(row, column) >= 0) & (np.maximum(row, column) < len(cells))
+    if is_robot:
+        radius_m = np.hypot(front_m, left_m)
+        shade = np.where(radius_m < PLATE_RADIUS_M, WHITE, np.where(radius_m < BODY_RADIUS_M, BODY, under))
+    else:
+        shade = np.where(np.maximum(np.abs(front_m), np.abs(left_m)) < 0.7 * size_m, WHITE, under)
+    shade[inside] = np.where(cells[row[inside], column[inside]] > 0, WHITE, BLACK)
+    return shade
