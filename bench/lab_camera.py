@@ -1,4 +1,4 @@
-"""Images as a webcam in a lab takes them: a renderer apart from the simulated camera's, so that neither hides a mistake.
+"""Images as a webcam in a lab takes them: a renderer apart from the simulated camera's, so that none hides a mistake.
 
 Each tag is sampled along the rays of 4 x 4 points of each pixel and of several moments of the exposure; the lens is
 inverted by Newton's method along the radius. Then, in this order: vignette, blur, gamma, noise, JPEG.
@@ -121,7 +121,7 @@ class LabCamera(NamedTuple):
         points_m = self.find_points(np.column_stack((u.ravel(), v.ravel())), tag.height_m)
         moments = MOMENTS if tag.speed_m_s or tag.turn_rad_s else 1
         patch = np.zeros(len(points_m))
-        under = np.repeat(np.repeat(light[low[1] : high[1], low[0] : high[0]], SAMPLES, axis=0), SAMPLES, axis=1).ravel()
+        under = np.kron(light[low[1] : high[1], low[0] : high[0]], np.ones((SAMPLES, SAMPLES))).ravel()
         for share in (np.arange(moments) + 0.5) / moments - 0.5:
             time_s = share * self.exposure_s
             yaw_rad = tag.yaw_rad + tag.turn_rad_s * time_s

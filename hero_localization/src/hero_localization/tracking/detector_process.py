@@ -39,7 +39,10 @@ class DetectorProcess:
         height_px: int,
         smallest_px: float = math.inf,
     ) -> None:
-        """Start the process; smallest_px: side of the smallest tag to be expected. Raises: DetectorError for a detector that cannot be made, or does not start."""
+        """Start the process; smallest_px: side of the smallest tag to be expected.
+
+        Raises: DetectorError for a detector that cannot be made, or does not start.
+        """
         self._shape = (height_px, width_px)
         memory = os.memfd_create("hero_frame")
         os.ftruncate(memory, width_px * height_px)

@@ -88,7 +88,9 @@ class TagSearch:
     ) -> None:
         """fine_detector: finds smaller tags at more cost; smallest_px: side of the smallest tag to be expected."""
         self._detector, self._fine = detector, fine_detector
-        self._sweeps = [detector] if fine_detector is None or smallest_px >= FINE_BELOW_PX else [fine_detector, detector]
+        self._sweeps = [detector]
+        if fine_detector is not None and smallest_px < FINE_BELOW_PX:
+            self._sweeps.insert(0, fine_detector)
         self._tracks: List[_Track] = []
         self._lost: Dict[int, _Track] = {}
         self._size_px = np.array((width_px, height_px))
@@ -192,7 +194,8 @@ class TagSearch:
             self._previous_s = stamp_s
             return [(self._sweeps[0], tile) for tile in self._tiles]
         elapsed_s = min(max(stamp_s - self._previous_s, 0.0), LONGEST_STEP_S)
-        self._nearby_px = min(self._nearby_px + NEARBY_IMAGES_S * elapsed_s * self._size_px.prod(), self._size_px.prod())
+        image_px = float(self._size_px.prod())
+        self._nearby_px = min(self._nearby_px + NEARBY_IMAGES_S * elapsed_s * image_px, image_px)
         self._due += len(self._tiles) * elapsed_s / SWEEP_S
         count = min(int(self._due), len(self._tiles))
         self._due -= int(self._due)

@@ -63,7 +63,7 @@ class Tracker:
         camera: lens and place.
         found: the tags in the last picture.
         sightings: what they stand for.
-        is_moved: whether most reference tags were not at their places when they were seen last, so that no pose is right.
+        is_moved: whether most reference tags were not at their places when they were seen last: no pose is right.
     """
 
     def __init__(self, settings: Settings, camera: Camera) -> None:
@@ -189,12 +189,12 @@ class Tracker:
             if len(seen) == EXPECTED_FRAMES and seen.count(False) > MAX_MISSED_SHARE * EXPECTED_FRAMES
         ]
         if missed:
-            text = "tags %s are often missed where their robots are: covered, too dark, too small, or without their tag?"
+            text = "tags %s are often missed where their robots are: covered, too dark, too small, or taken off?"
             problems.append(Problem("camera", text % ", ".join(map(str, missed)), False))
         moved = [tag_id for tag_id, since_s in self._moved_since_s.items() if since_s <= newest_s - MOVED_S]
         missing = [tag_id for tag_id, seen_s in self._reference_seen_s.items() if seen_s < newest_s - MISSING_S]
         if moved and self.is_moved:
-            text = "reference tags are not where they were: the camera moved; no pose counts until calibrate_camera arena"
+            text = "reference tags are not where they were: the camera moved; calibrate_camera arena again"
             problems.append(Problem("camera", text, True))
         else:
             for tag_id in moved:
