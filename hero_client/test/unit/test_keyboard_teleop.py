@@ -1,7 +1,8 @@
 """Keys and the time -> commands."""
 
 from hero_client.apps.keyboard import split_keys
-from hero_client.apps.keyboard_teleop import MOTIONS, STOP_KEYS, KeyDrive
+from hero_client.apps.keyboard_teleop import END_KEY, MOTIONS, STOP_KEYS, KeyDrive, read_stops
+from hero_client.apps.teleop_output import PAUSE_S, PauseDetector
 from hero_client.values.geometry import STOP
 
 
@@ -70,3 +71,29 @@ def test_other_escape_sequences_are_no_keys():
     assert split_keys("\x1b[1;5Aw") == (["w"], "")
     assert split_keys("\x1bOPw") == (["w"], "")
     assert split_keys("\x1b") == ([], "")
+
+
+class Typed:
+    """A terminal in which keys wait, so many for each read."""
+
+    def __init__(self, *reads):
+        self.reads = list(reads)
+
+    def read_keys(self):
+        return self.reads.pop(0) if self.reads else []
+
+
+def test_of_keys_typed_during_a_pause_only_those_that_stop_or_end_count():
+    keyboard = Typed(["w"] * 1000, ["w", "\r", "r", "up", "g"], ["s", "1", END_KEY])
+    assert read_stops(keyboard) == ["\r", "s", END_KEY]
+    assert keyboard.reads == []
+    assert read_stops(Typed(["w"], None)) is None
+
+
+def test_a_pause_is_longer_than_any_step_of_a_program_that_runs():
+    pauses = PauseDetector(10.0)
+    for number in range(100):
+        assert not pauses.step(10.0 + 0.1 * number)
+    assert pauses.is_paused(19.91 + PAUSE_S)
+    assert pauses.step(19.91 + PAUSE_S)
+    assert not pauses.step(19.92 + PAUSE_S)

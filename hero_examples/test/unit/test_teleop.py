@@ -164,6 +164,30 @@ def test_a_stick_stops_the_robots_also_after_the_program_hung(swarm):
     assert [command[1:] for command in sent[-2:]] == [(0.0, 0.0)] * 2
 
 
+@pytest.mark.parametrize("is_heard_first", [True, False])
+def test_what_a_stick_sent_during_a_pause_of_the_program_drives_nobody(swarm, is_heard_first):
+    teleop, sent = JoystickTeleop(swarm, MAPPING), record_commands(swarm[0])
+    use_stick(swarm, teleop, make_joy(1.0), 1.0)
+    hang(swarm)
+    del sent[:]
+    if is_heard_first:
+        teleop.receive(make_joy(1.0))
+    teleop.step(swarm.now_s)
+    for _ in range(10):
+        teleop.receive(make_joy(1.0))
+    use_stick(swarm, teleop, None, 1.0)
+    assert {command[1:] for command in sent} == {(0.0, 0.0)}
+    use_stick(swarm, teleop, make_joy(1.0), 1.0)
+    assert sent[-1][1] > 0.0
+
+
+def test_a_stop_button_pressed_during_a_pause_of_the_program_counts(swarm):
+    teleop = JoystickTeleop(swarm, MAPPING)
+    hang(swarm)
+    teleop.receive(make_joy(0.0, stop=True))
+    assert swarm.drivers.requests == [True]
+
+
 def test_a_short_press_of_the_stop_button_stops_all_robots_once(swarm):
     teleop = JoystickTeleop(swarm, MAPPING)
     teleop.receive(make_joy(0.0, stop=True))

@@ -14,7 +14,7 @@ from hero_node.ros.program import Program
 
 from ..swarm import REPORT_PERIOD_S, Swarm
 from ..values.geometry import STOP, Velocity
-from .teleop_output import TeleopOutput
+from .teleop_output import PauseDetector, TeleopOutput
 
 __all__ = ["JoystickMapping", "JoystickTeleop"]
 
@@ -22,6 +22,9 @@ PERIOD_S = 0.1
 
 SILENCE_S = 0.5
 """Without a message for this time the robot stops: joy_node repeats held axes by autorepeat_rate of the launch file."""
+
+DRAIN_S = 0.3
+"""So long after a pause of the program what comes on /joy may be what waited meanwhile."""
 
 FIRST_WARNING_S = 2.0
 """joy_node may start later."""
@@ -68,6 +71,8 @@ class JoystickTeleop:
         self._arrival_s = -math.inf
         self._is_stop_pressed = False
         self._output = TeleopOutput()
+        self._pauses = PauseDetector(swarm.now_s)
+        self._fresh_s = -math.inf  # from when on messages are no longer those of before a pause
         self._next_warning_s = swarm.now_s + FIRST_WARNING_S
         self._reported_status = ""
 
@@ -79,7 +84,9 @@ class JoystickTeleop:
         if is_pressed and not self._is_stop_pressed:
             self._swarm.drivers.request_stop(True)
         self._is_stop_pressed = is_pressed
-        self._newest, self._arrival_s = joy, self._swarm.now_s
+        now_s = self._swarm.now_s
+        if now_s >= self._fresh_s and not self._pauses.is_paused(now_s):
+            self._newest, self._arrival_s = joy, now_s
 
     def run(self, program: Program) -> None:
         """Subscribe to /joy, and drive until the program is to end.
@@ -102,6 +109,8 @@ class JoystickTeleop:
         Raises: ProgramError; see JoystickMapping.read().
         """
         command = STOP
+        if self._pauses.step(now_s):
+            self._newest, self._fresh_s = None, now_s + DRAIN_S
         if self._newest is not None and now_s - self._arrival_s < SILENCE_S:
             command = self._mapping.read(self._newest)
         elif now_s >= self._next_warning_s:

@@ -8,7 +8,7 @@ before they repeat, and short once the key repeats (every 30..50 ms).
 import math
 import os
 import sys
-from typing import Dict, List, Tuple
+from typing import Dict, List, Optional, Tuple
 
 from hero_node.ros.program import Program
 
@@ -19,7 +19,7 @@ from ..values.errors import StaleDataError
 from ..values.geometry import STOP, Velocity
 from ..values.robot_constants import MAX_LINEAR_M_S
 from .keyboard import Keyboard
-from .teleop_output import TeleopOutput
+from .teleop_output import PauseDetector, TeleopOutput
 
 __all__ = ["MAX_ANGULAR_RAD_S", "MIN_ANGULAR_RAD_S", "MIN_LINEAR_M_S", "KeyDrive", "KeyboardTeleop"]
 
@@ -56,6 +56,7 @@ STOP_KEYS = ("s", " ", "\x1a")
 
 STOP_ALL_KEYS = ("\r", "\n")
 RELEASE_KEY = "r"
+END_KEY = "\x04"  # Ctrl-D
 
 HELP = """\
 Hold a key to drive; release it to stop.
@@ -146,14 +147,16 @@ class KeyboardTeleop:
         """
         show_text(HELP)
         next_line_s = 0.0
+        pauses = PauseDetector(program.now_s)
         while program.running:
             if program.wait_readable([keyboard.fileno()], PERIOD_S / 2.0):
-                keys = keyboard.read_keys()
-                if keys is None or "\x04" in keys:  # Ctrl-D
+                keys = read_stops(keyboard) if pauses.is_paused(program.now_s) else keyboard.read_keys()
+                if keys is None or END_KEY in keys:
                     break
                 for key in keys:
                     self.press(key, program.now_s)
             now_s = program.now_s
+            pauses.step(now_s)
             self.step(now_s)
             if now_s >= next_line_s:
                 show_live_line(*self.describe())
@@ -248,6 +251,19 @@ class KeyboardTeleop:
             near = "%.2f m at %+.0f deg" % (nearest.range_m, math.degrees(nearest.bearing_rad))
         where = "x %.2f y %.2f m %.0f deg" % (pose.x_m, pose.y_m, math.degrees(pose.yaw_rad))
         return "info", "%s | %s | %s | near: %s" % (robots, speeds, where, near)
+
+
+def read_stops(keyboard: Keyboard) -> Optional[List[str]]:
+    """Return the keys that stop or end among all that wait; None if the terminal is gone.
+
+    After a pause of the program: what was typed meanwhile must drive no robot.
+    """
+    stops: List[str] = []
+    keys = keyboard.read_keys()
+    while keys:
+        stops += [key for key in keys if key in (*STOP_KEYS, *STOP_ALL_KEYS, END_KEY)]
+        keys = keyboard.read_keys()
+    return None if keys is None else stops
 
 
 def show_text(text: str) -> None:

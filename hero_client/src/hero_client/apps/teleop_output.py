@@ -1,8 +1,11 @@
-"""Which commands of a teleoperation are sent: every motion, and some stops after it."""
+"""Which commands of a teleoperation are sent: every motion, some stops after it, and no motion of before a pause."""
 
 from ..values.geometry import STOP, Velocity
 
-__all__ = ["TeleopOutput"]
+__all__ = ["PauseDetector", "TeleopOutput"]
+
+PAUSE_S = 0.5
+"""A teleoperation takes a step every 0.05 to 0.1 s; after more than this it, or its PC, was suspended or too busy."""
 
 STOPS = 5
 """How often a stop is sent. Counted, not timed: a program that hung after a motion sends them, too."""
@@ -22,3 +25,21 @@ class TeleopOutput:
             return True
         self._stops -= 1
         return self._stops >= 0
+
+
+class PauseDetector:
+    """Notices that a program did not run: input that waited meanwhile is old. Pure."""
+
+    def __init__(self, now_s: float) -> None:
+        """Begin to watch."""
+        self._ran_s = now_s
+
+    def is_paused(self, now_s: float) -> bool:
+        """Return whether the program has not taken a step for longer than PAUSE_S."""
+        return now_s - self._ran_s > PAUSE_S
+
+    def step(self, now_s: float) -> bool:
+        """The program takes a step; return whether it comes after a pause."""
+        after_pause = self.is_paused(now_s)
+        self._ran_s = now_s
+        return after_pause
