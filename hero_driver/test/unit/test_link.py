@@ -5,6 +5,7 @@ import socket
 import pytest
 
 from hero_driver.transport import Address, Link
+from hero_driver.transport.link import UNSENT_MAX
 
 
 def read_quick_acknowledge(sock):
@@ -35,3 +36,64 @@ def test_what_a_robot_sends_is_acknowledged_at_once(pair):
     far.sendall(b"a burst")
     assert link.read() == b"a burst"
     assert read_quick_acknowledge(near) == 1
+
+
+class Owner:
+    """Takes what a link asks of its loop."""
+
+    def __init__(self):
+        self.calls = []
+
+    def watch(self, link):
+        """Have nothing to do."""
+
+    def call_soon(self, call):
+        self.calls.append(call)
+
+
+class NarrowSocket:
+    """Takes a few bytes of each write, or none."""
+
+    def __init__(self, *lengths):
+        self.lengths = list(lengths)
+        self.taken = b""
+
+    def setsockopt(self, *_):
+        """Have nothing to do."""
+
+    def send(self, data):
+        length = self.lengths.pop(0) if self.lengths else 0
+        if length == 0:
+            raise BlockingIOError
+        self.taken += data[:length]
+        return min(length, len(data))
+
+
+def test_what_is_unsent_is_counted_by_what_the_socket_took():
+    sock = NarrowSocket(10, 0, 20, 30)
+    link = Link(Owner(), sock, Address("127.0.0.1", 1))
+    packet = bytes(range(200))
+    link.send_packet(packet)
+    assert link._unsent_length == 190
+    for left in (190, 170, 140, 140):
+        link.flush()
+        assert link._unsent_length == left
+    sock.lengths = [1000]
+    assert link.flush()
+    assert link._unsent_length == 0
+    assert sock.taken == packet
+
+
+def test_a_peer_that_reads_little_by_little_is_closed_at_unsent_max():
+    sock, owner = NarrowSocket(), Owner()
+    link = Link(owner, sock, Address("127.0.0.1", 1))
+    packet = bytes(1000)
+    for _ in range(UNSENT_MAX // len(packet)):
+        link.send_packet(packet)
+        sock.lengths = [10, 0]
+        link.flush()
+    assert owner.calls == []
+    for _ in range(3):
+        link.send_packet(packet)
+    assert owner.calls
+    assert len(sock.taken) == 10 * (UNSENT_MAX // len(packet))

@@ -7,12 +7,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hero_driver.corrections.tick_odometry import (
+    MAX_GAP_S,
     MAX_STEP_S,
     TWIST_WINDOW,
     Pose,
     TickOdometry,
     WheelGeometry,
 )
+from hero_driver.robot_constants import MAX_WHEEL_SPEED_M_S
 
 STOCK = WheelGeometry()
 PERIOD_S = 0.034
@@ -293,3 +295,15 @@ def test_any_readings_leave_a_finite_pose_and_velocity(readings):
         assert math.isfinite(odometry.x_m) and math.isfinite(odometry.y_m)
         assert math.isfinite(odometry.linear_m_s) and math.isfinite(odometry.angular_rad_s)
         assert -math.pi <= odometry.yaw_rad <= math.pi
+
+
+@pytest.mark.parametrize("pause_s", [MAX_GAP_S + 1.0, 3600.0, 1e6])
+def test_after_any_pause_no_more_than_the_longest_gap_is_believed(pause_s):
+    odometry = make_odometry()
+    left, right = drive(odometry, 0.1, 0.1, 10)
+    before = (odometry.x_m, odometry.y_m, odometry.yaw_rad)
+    # New counters: as far away as no wheel gets in the gap that is believed.
+    jump = 1.1 * MAX_WHEEL_SPEED_M_S * MAX_GAP_S / TICK_M
+    odometry.integrate(left + jump, right + jump, START_S + pause_s)
+    assert (odometry.x_m, odometry.y_m, odometry.yaw_rad) == before
+    assert odometry.resets == 1
