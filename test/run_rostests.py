@@ -72,7 +72,9 @@ def make_jobs(results_dir, pattern="", paths=()):
             f"--results-filename={path.stem}.xml",
             str(path),
         )
-        environment = {"PATH": program_path, "ROS_TEST_RESULTS_DIR": str(own_results)}
+        # A driver keeps its stop there by its name, which drivers of several tests have.
+        ros_home = Path(os.environ["ROS_HOME"]) / package_dir.name / path.stem
+        environment = {"PATH": program_path, "ROS_TEST_RESULTS_DIR": str(own_results), "ROS_HOME": str(ros_home)}
         jobs.append(Job(str(path.relative_to(ROOT)), command, own_results, LOAD, TIMEOUT_S, environment))
     return jobs
 

@@ -75,7 +75,7 @@ class CommandSender:
         if self._is_stopped():
             # What a thread of rospy's offered just before the stop.
             bridge.commands.discard_motion(now_s)
-        stops_only = bridge.wheels.readings > 0 and now_s - peer.session.last_receive_s > HEARD_S
+        stops_only = peer.wheels.readings > 0 and now_s - peer.session.last_receive_s > HEARD_S
         in_flight = link.read_unacknowledged_length()
         acknowledged = link.handed_length - in_flight >= peer.motion_mark
         for name, payload in bridge.commands.take(in_flight, acknowledged, stops_only, now_s):

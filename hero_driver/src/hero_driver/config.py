@@ -138,10 +138,21 @@ class DriverConfig:
     orphan_stop_s: float = _declare(
         number(0.25, 0.0, 10.0, "s", "delay before a robot is stopped when the program that drove it ends")
     )
+    silent_stop_s: float = _declare(
+        number(
+            0.5,
+            0.0,
+            10.0,
+            "s",
+            "silence of a program that commands a robot regularly (at least four times) after which the robot is"
+            " stopped, at least four periods of the program; 0: never",
+        )
+    )
     allow_self_tuning: bool = _declare(
         flag(
             False,
-            "allow pid_calibration, during which a robot spins for up to a minute and finds no gains that it keeps",
+            "allow pid_calibration, during which a robot spins for up to a minute and finds no gains that it keeps; if"
+            " driver or Wi-Fi fail meanwhile it spins on until it is connected again",
         )
     )
     start_stopped: str = _declare(
@@ -237,6 +248,7 @@ class DriverConfig:
             self.clamp,
             self.allow_self_tuning,
             self.orphan_stop_s,
+            self.silent_stop_s,
             self.service_timeout_s,
             self.command_max_age_s,
             max_names=2 * self.max_topics,

@@ -8,9 +8,10 @@ Everything here runs on the thread of the sockets, except what says otherwise. I
 
 import time
 import traceback
-from typing import Callable, Dict, List, Optional
+from typing import Callable, Dict, List, Optional, Tuple
 
 from .command_sender import CommandSender
+from .commands.stop_progress import StopState
 from .config import DriverConfig
 from .fleet import namespaces
 from .fleet.admission import Admission
@@ -33,12 +34,13 @@ from .rosserial.session import (
     Topic,
     TopicDeclared,
 )
-from .stop_delivery import StopDelivery, describe_doubt
+from .stop_delivery import StopDelivery, can_move, describe_doubt, find_stop_payload
 from .transport import THE_DRIVER_ENDS, EventLoop, Link, LinkHandler
 
 NS_PER_S = 10**9
 
 FLEET_POLL_S = 0.1
+COMMANDER_POLL_S = 0.05
 
 STOP_LIMIT_S = 2.0
 """At the end of the driver, and of a connection, robots get this long to come to rest; 0.4 s is usual."""
@@ -68,10 +70,10 @@ class Gateway(LinkHandler):
         self._clock_ns = clock_ns
         self._on_change = on_change
         self._node = node
-        self._robot_log = RobotLog(log)
         self._admission = Admission(config.admission_limits)
         self._sender = CommandSender(loop.call_later, self._find_peer, lambda: self.stopped, self._warn_robot)
         self._stops = StopDelivery(loop.call_later, lambda: self.stopped, on_change, self._warn_robot)
+        self._robot_log = RobotLog(log, self._stops.begin)
         self._transforms = TransformPublisher(config.transform_period_s, loop.call_later)
         self._context = BridgeContext(
             self, loop, log, self._transforms, registrar, config.correction_settings, config.command_settings
@@ -87,6 +89,7 @@ class Gateway(LinkHandler):
         """Begin to serve what the loop brings."""
         self._transforms.open()
         self._loop.call_later(FLEET_POLL_S, self._poll_fleet)
+        self._loop.call_later(COMMANDER_POLL_S, self._poll_commanders)
 
     # What the transport calls.
 
@@ -155,9 +158,13 @@ class Gateway(LinkHandler):
             self._send_outgoing(peer)
 
     def resume(self, now_s: float) -> None:
-        """Keep robots that could not be heard meanwhile."""
+        """Keep robots that could not be heard meanwhile, forget commands that waited, and go on with stops at once."""
+        for bridge in self.bridges.values():
+            bridge.resume(now_s)
         for peer in self.peers.values():
             peer.session.forgive_silence(now_s)
+            if peer.stop is not None:
+                peer.stop.renew(now_s)
 
     @staticmethod
     def _send_outgoing(peer: Peer) -> None:
@@ -242,19 +249,26 @@ class Gateway(LinkHandler):
         self._log.log_throttled("error", peer.label + text[:80], line, group, peer.link.address.host)
 
     def _declare(self, peer: Peer, topic: Topic, now_s: float) -> None:
-        if peer.record is None and not self._identify(peer, topic, now_s):
-            return
+        if self.stopped and find_stop_payload(topic) is not None:
+            # After the whole burst of declarations: every motion topic is to get its zero.
+            self._loop.call_soon(lambda: self._stop_late(peer))
+        if peer.record is None:
+            self._identify(peer, topic, now_s)
+        if peer.refused:
+            peer.watch_wheels(topic)
         if peer.refused or peer.bridge is None or peer.record is None:
             return
         name = self._resolve(peer, topic, peer.bridge.identity)
         if name is None:
             return
         peer.bridge.declare(topic, name)
-        if self.stopped and peer.stop is None and peer.bridge.is_motion(name):
-            # After the whole burst of declarations: every motion topic is to get its zero.
-            self._loop.call_soon(lambda: self._stops.begin(peer))
         if peer.record.receive(RobotEvent.DECLARED, now_s):
             self._on_change()
+
+    def _stop_late(self, peer: Peer) -> None:
+        """Stop a robot that has joined while all are stopped."""
+        if self.stopped and peer.stop is None:
+            self._stops.begin(peer)
 
     def _resolve(self, peer: Peer, topic: Topic, identity: Identity) -> Optional[str]:
         """Return the ROS name of what a robot declared, None if it may not use it, which is logged."""
@@ -265,8 +279,8 @@ class Gateway(LinkHandler):
             return None
         return namespaces.resolve(info.name, identity)
 
-    def _identify(self, peer: Peer, topic: Topic, now_s: float) -> bool:
-        """Find out which robot a peer is from the first name that tells; return whether it is settled."""
+    def _identify(self, peer: Peer, topic: Topic, now_s: float) -> None:
+        """Find out which robot a peer is from the first name that tells."""
         identity = namespaces.identify(topic.info.name)
         address = peer.link.address
         if identity is None:
@@ -274,9 +288,9 @@ class Gateway(LinkHandler):
                 peer.early_topics = [*peer.early_topics[-7:], topic]
             else:
                 self._warn_robot(peer, "topic %s refused: not a name below /hero_N" % ascii(topic.info.name))
-            return False
+            return
         if self._resolve(peer, topic, identity) is None:
-            return False
+            return
         known = self.fleet.robots.get(identity.namespace)
         if known is not None and known.link is not None:
             # Only needed here, and every read would cost more.
@@ -285,7 +299,7 @@ class Gateway(LinkHandler):
             refusal = self._admission.admit_new_robot(address.host, now_s)
             if refusal is not None:
                 peer.link.close(refusal)
-                return False
+                return
         decision = self.fleet.claim_identity(
             peer.link, identity, address.host, str(address), peer.session.opened_s, now_s
         )
@@ -297,9 +311,8 @@ class Gateway(LinkHandler):
                 "error", "duplicate " + identity.namespace + address.host, decision.reason
             )
             self._on_change()
-            return False
+            return
         self._join(peer, decision)
-        return True
 
     def _join(self, peer: Peer, decision: Decision) -> None:
         record = decision.record
@@ -313,7 +326,7 @@ class Gateway(LinkHandler):
             self.bridges[identity.namespace] = bridge
         peer.bridge = bridge
         rebooted = peer.boot is not None
-        bridge.corrections.restart(rebooted and decision.verdict is not Verdict.ARRIVED)
+        bridge.corrections.restart(rebooted and decision.verdict is not Verdict.ARRIVED, peer.wheels)
         bridge.attach()
         text = "%s %s (%s)" % (bridge.label, decision.verdict.value, peer.link.address)
         self._log.log_throttled("info", "joined " + bridge.label, text, host=peer.link.address.host)
@@ -344,12 +357,23 @@ class Gateway(LinkHandler):
     def list_robots(self, now_s: float) -> List[RobotStatus]:
         """Return the state of every robot, sorted by namespace."""
         statuses = []
+        duplicate_stops = {
+            str(peer.link.address): self._stops.find_state(peer) for peer in self.peers.values() if peer.refused
+        }
         for record in self.fleet.robots.values():
             bridge = self.bridges.get(record.identity.namespace)
             peer: Optional[Peer] = record.link.peer if record.link is not None else None
             stop_state = self._stops.find_state(peer)
-            statuses.append(describe_robot(record, bridge, peer, stop_state, now_s))
+            statuses.append(describe_robot(record, bridge, peer, stop_state, duplicate_stops, now_s))
         return sorted(statuses, key=lambda status: (status.message.id, status.message.namespace))
+
+    def list_stops(self) -> List[Tuple[str, Optional[StopState]]]:
+        """Return name and stop of every connection that can move a robot, and None for robots that are away."""
+        records = sorted(self.fleet.robots.values(), key=lambda record: record.identity.number)
+        connected = [peer for peer in self.peers.values() if peer.bridge is not None or can_move(peer)]
+        connected.sort(key=lambda peer: 0 if peer.record is None else peer.record.identity.number)
+        away = [record.identity.namespace.lstrip("/") for record in records if record.link is None]
+        return [(peer.label, self._stops.find_state(peer)) for peer in connected] + [(name, None) for name in away]
 
     # Stop.
 
@@ -359,8 +383,6 @@ class Gateway(LinkHandler):
         if stopped:
             for peer in self._list_stoppable():
                 self._stops.begin(peer)
-        else:
-            self._stops.release()
         self._on_change()
 
     def stop_and_wait(self, answer: Callable[[None], None]) -> None:
@@ -388,7 +410,7 @@ class Gateway(LinkHandler):
             self._log.log("error", "the driver ends, and these robots are not known to be at rest: %s" % names)
 
     def _list_stoppable(self) -> List[Peer]:
-        return [peer for peer in self.peers.values() if peer.bridge is not None and not peer.refused]
+        return [peer for peer in self.peers.values() if can_move(peer)]
 
     # What bridges ask for.
 
@@ -409,6 +431,12 @@ class Gateway(LinkHandler):
                 self.receive_data(peer.link, data, time.monotonic())
         except Exception as error:  # noqa: BLE001 - one robot's trouble must not keep the others moving
             self.report_bug(error)
+
+    def _poll_commanders(self) -> None:
+        self._loop.call_later(COMMANDER_POLL_S, self._poll_commanders)
+        now_s = time.monotonic()
+        for bridge in self.bridges.values():
+            bridge.stop_if_silent(now_s)
 
     def _poll_fleet(self) -> None:
         self._loop.call_later(FLEET_POLL_S, self._poll_fleet)

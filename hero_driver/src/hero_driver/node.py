@@ -28,6 +28,7 @@ from hero_node.ros.ros_node import end_ros_node
 
 from .config import DriverConfig, read_config
 from .gateway import STOP_LIMIT_S, Gateway
+from .kept_stop import KeptStop
 from .reports import FleetStatus, Reporter
 from .ros.log_relay import LogRelay, prepare_logging, tell_of_lost_log_lines
 from .ros.master_watch import MasterWatch
@@ -37,7 +38,7 @@ from .ros.rospy_internals import (
     leave_topics_out_of_rosout,
 )
 from .ros.worker import Worker
-from .stop_interface import PARAMETER, StopInterface
+from .stop_interface import StopInterface
 from .transport import Address, EventLoop, HostNotFoundError, NoAnswerError, TransportSettings
 
 NODE_NAME = "hero_driver"
@@ -67,10 +68,8 @@ def make_ros_clock() -> Callable[[], int]:
 class DriverNode:
     """The whole driver: open() until close()."""
 
-    def __init__(self, config: DriverConfig, log: LogRelay, was_stopped: bool) -> None:
-        """was_stopped: whether the robots were stopped when a driver of this name ended."""
+    def __init__(self, config: DriverConfig, log: LogRelay) -> None:
         self._config = config
-        self._starts_stopped = {"as_before": was_stopped, "always": True, "never": False}[config.start_stopped]
         # Not an Event: a signal handler that interrupts the waiting thread would wait for the Event's lock for ever.
         self._ends: queue.SimpleQueue[None] = queue.SimpleQueue()
         self._changed = threading.Event()
@@ -90,22 +89,24 @@ class DriverNode:
         self._thread = threading.Thread(target=self._run_loop, name="sockets", daemon=True)
         self._crash: Optional[BaseException] = None
         self._reporter: Reporter
+        self._kept = KeptStop(rospy.get_name())
         self._stop_interface = StopInterface(
             self._loop,
             self._gateway.set_stopped,
             lambda: self._gateway.stopped,
-            lambda: self._gateway.list_robots(time.monotonic()),
+            self._gateway.list_stops,
+            self._kept,
             self._log,
         )
-        self._master_watch = MasterWatch("~stop", self._stop_interface.keep, self._log.log)
+        self._master_watch = MasterWatch("~stop", self._log.log)
 
     def open(self) -> None:
         """Listen, dial and serve. Raises: OSError if the port cannot be had."""
         self._loop.open(self._gateway)
         self._gateway.open()
         self._reporter = Reporter()
-        self._stop_interface.open(self._starts_stopped)
-        self._stop_interface.keep()
+        since = self._kept.read_since() if self._config.start_stopped == "as_before" else ""
+        self._stop_interface.open(bool(since) or self._config.start_stopped == "always", since)
         self._thread.start()
         self._master_watch.open()
         self._log.log("info", self._describe_start())
@@ -224,15 +225,12 @@ def main(argv: Optional[List[str]] = None) -> int:
         sys.stderr.write("hero_driver cannot start: %s\n" % error)
         return 2
     try:
-        parameters = _read_private_parameters()
-        # The driver's own note of its last run, not a setting.
-        was_stopped = parameters.pop(PARAMETER.lstrip("~"), False) is True
-        config = read_config(parameters)
+        config = read_config(_read_private_parameters())
     except ProgramError as error:
         rospy.logfatal("hero_driver cannot start: %s", error)
         return 2
     sys.setswitchinterval(SWITCH_INTERVAL_S)
-    node = DriverNode(config, log, was_stopped)
+    node = DriverNode(config, log)
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, lambda *_: node.end())
     call_before_shutdown(node.end)

@@ -4,10 +4,12 @@ from dataclasses import dataclass, field
 from typing import List, Optional
 
 from .commands.stop_progress import StopProgress
+from .corrections.message_layouts import read_encoder
+from .corrections.wheel_motion import WheelMotion
 from .fleet import log_lines
 from .fleet.admission import RateLimit
 from .fleet.registry import RobotRecord
-from .ros.robot_bridge import RobotBridge
+from .ros.robot_bridge import NO_LIGHT, RobotBridge
 from .rosserial.payloads import Log
 from .rosserial.session import Session, Topic
 from .transport import Link
@@ -22,9 +24,8 @@ class Peer:
     rate_limit: RateLimit
     record: Optional[RobotRecord] = None
     bridge: Optional[RobotBridge] = None
-    refused: bool = (
-        False  # a duplicate: kept open and ignored, so that it does not dial in 20 times per second
-    )
+    wheels: WheelMotion = field(default_factory=WheelMotion)
+    refused: bool = False  # a duplicate: kept open and only stopped, so that it does not dial in 20 times per second
     boot: Optional[log_lines.BootLine] = None
     early_logs: List[Log] = field(default_factory=list)
     early_topics: List[Topic] = field(default_factory=list)  # /tf, declared before a name that tells who it is
@@ -39,7 +40,24 @@ class Peer:
         """How log lines call this peer."""
         if self.bridge is not None:
             return self.bridge.label
+        if self.record is not None:
+            return "%s at %s (refused)" % (self.record.identity.namespace.lstrip("/"), self.link.address)
         return str(self.link.address)
+
+    @property
+    def light(self) -> bytes:
+        """The color (std_msgs/ColorRGBA) that the robot's light was given last; dark if none is known."""
+        return NO_LIGHT if self.bridge is None else self.bridge.light
+
+    def watch_wheels(self, topic: Topic) -> None:
+        """Let the encoder's readings of a robot without a bridge tell of its wheels."""
+        if topic.info.message_type.endswith("/Encoder"):
+            topic.receive = self._read_wheels
+
+    def _read_wheels(self, payload: bytes, _arrival_ns: int) -> None:
+        reading = read_encoder(payload)
+        if reading is not None:
+            self.wheels.read_ticks(reading[1], reading[2])
 
     def has_acknowledged_motion(self) -> bool:
         """Return whether the robot's TCP has acknowledged the last motion command."""

@@ -58,8 +58,15 @@ class Reporter:
             row.packets_per_s, row.bytes_per_s = self._rates.get(row.namespace, (0.0, 0.0))
             message.robots.append(row)
             message.robots += [
-                Robot(id=row.id, namespace=row.namespace, address=address, state=Robot.REFUSED, last_error=reason)
-                for address, reason in robot.refused
+                Robot(
+                    id=row.id,
+                    namespace=row.namespace,
+                    address=address,
+                    state=Robot.REFUSED,
+                    stop_state=stop_state.value,
+                    last_error=reason,
+                )
+                for address, reason, stop_state in robot.duplicates
             ]
         self._publisher.publish(message)
 
@@ -128,7 +135,7 @@ class Reporter:
             ("corrected stamps", robot.corrected_stamps),
             ("odometry resets", robot.odometry_resets),
             ("refused transforms", ", ".join(robot.foreign_frames)),
-            ("refused duplicates", "; ".join(reason for _, reason in robot.refused)),
+            ("refused duplicates", "; ".join(reason for _, reason, _ in robot.duplicates)),
             ("last error", row.last_error),
         ):
             stat.add(key, value)
@@ -140,8 +147,8 @@ def _assess(robot: RobotStatus) -> Tuple[int, str]:
     row = robot.message
     if row.stop_state == Robot.MOVING:
         return DiagnosticStatus.ERROR, "its wheels turn although it was stopped"
-    if robot.refused:
-        return DiagnosticStatus.ERROR, robot.refused[0][1]
+    if robot.duplicates:
+        return DiagnosticStatus.ERROR, robot.duplicates[0][1]
     if robot.problem:
         return DiagnosticStatus.ERROR, robot.problem
     if row.state == Robot.AWAY:

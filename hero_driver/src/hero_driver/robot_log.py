@@ -1,5 +1,7 @@
 """Reads log lines of robots (versions, uptime, self-tuning) and relays them to /rosout. On the event loop's thread."""
 
+from typing import Callable
+
 from .fleet import log_lines
 from .fleet.registry import RobotRecord
 from .peer import Peer
@@ -21,8 +23,10 @@ REBOOT_SLACK_S = 2.0
 class RobotLog:
     """Where the log lines of all robots go."""
 
-    def __init__(self, log: LogRelay) -> None:
+    def __init__(self, log: LogRelay, stop: Callable[[Peer], None]) -> None:
+        """stop(peer) stops a robot that tunes itself though it was not told to."""
         self._log = log
+        self._stop = stop
 
     def receive(self, peer: Peer, log: Log, now_s: float) -> None:
         """Take a line of a robot: note what it tells, and pass it on."""
@@ -40,6 +44,10 @@ class RobotLog:
             record.firmware, record.hardware, record.config = line.boot
         if line.tunes is not None:
             peer.bridge.note_tuning(line.tunes)
+            if line.tunes and not peer.bridge.was_told_to_tune and peer.stop is None:
+                # Left by an earlier driver or connection: nothing else would end it.
+                self._log.log("warn", "%s tunes itself, though not told to by this driver: stopped" % peer.label)
+                self._stop(peer)
         if line.heartbeat is not None:
             self._receive_heartbeat(peer, record, line.heartbeat.uptime_s, now_s)
         if now_s - peer.log_window_s >= 1.0:

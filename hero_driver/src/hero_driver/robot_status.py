@@ -1,7 +1,7 @@
 """Collects the state of one robot for reports. Runs on the event loop's thread."""
 
 from dataclasses import dataclass
-from typing import List, Optional, Tuple
+from typing import List, Mapping, Optional, Tuple
 
 import rospy
 
@@ -29,7 +29,7 @@ class RobotStatus:
     corrected_stamps: int
     odometry_resets: int
     foreign_frames: List[str]
-    refused: List[Tuple[str, str]]  # address and reason of each duplicate that waits
+    duplicates: List[Tuple[str, str, StopState]]  # address, reason and stop of each refused one that waits
 
     @property
     def name(self) -> str:
@@ -42,9 +42,13 @@ def describe_robot(
     bridge: Optional[RobotBridge],
     peer: Optional[Peer],
     stop_state: StopState,
+    duplicate_stops: Mapping[str, StopState],
     now_s: float,
 ) -> RobotStatus:
-    """Return the state of the robot that record tells of; bridge and peer are its own, where it has them."""
+    """Return the state of the robot that record tells of; bridge and peer are its own, where it has them.
+
+    duplicate_stops: by the addresses of refused connections.
+    """
     corrections = None if bridge is None else bridge.corrections
     dropped = record.dropped_messages
     problem = ""
@@ -83,5 +87,8 @@ def describe_robot(
         0 if corrections is None else corrections.corrected_stamps,
         0 if corrections is None else corrections.odometry.resets,
         [] if corrections is None else sorted(corrections.transforms.foreign_frames),
-        sorted(record.refused.items())[:DUPLICATES_SHOWN],
+        [
+            (address, reason, duplicate_stops.get(address, StopState.NOT_STOPPED))
+            for address, reason in sorted(record.refused.items())[:DUPLICATES_SHOWN]
+        ],
     )

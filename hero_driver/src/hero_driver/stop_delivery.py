@@ -1,15 +1,17 @@
 """Stops robots, and confirms by their wheels that they are at rest.
 
-One stop is one write with a zero for every motion topic that the robot declared, whatever was used before. It is
-repeated until the robot's wheels are at rest, because the firmware drops a Twist that comes within 50 ms of the last
-one (VelocityControl.ino:159), and because only the wheels show what a robot has taken. The two controllers know nothing
-of each other, so each gets its zero. Servo pulses of 1500 us come in front of the first zeros only: they let a wheel
-creep whose servo has another center, until a zero Twist takes the pulses away.
+One stop is one write with a zero for every motion topic that the connection declared, whatever was used before, and
+whoever the connection says it is. It is repeated until the wheels are at rest or a newer command moves the robot,
+because the firmware drops a Twist that comes within 50 ms of the last one (VelocityControl.ino:159), and because only
+the wheels show what a robot has taken. The two controllers know nothing of each other, so each gets its zero. A zero
+Twist also ends servo pulses (cmd_motor): it switches the servos off. Pulses of 1500 us would not: they turn a wheel
+whose servo has another center, and with the servo timing of ESP8266 Arduino core 3 each costs the robot 20 ms. Only a
+robot that takes no Twist gets them.
 
 A robot that tunes itself (pid_calibration) drops every zero within 50 ms of its controller's last run, and that runs
-every 21 ms. Only a read that takes longer lets a zero through: TUNING_PULSES servo pulses (0.5 ms each) and the zeros
-in one write, small enough for the robot's TCP window of 2144 bytes. Measured with the stock firmware: 110 pulses ended
-the tuning in 9 of 9 tries, 60 in 1 of 6.
+every 21 ms. Only a read that takes longer lets a zero through: BURST_LIGHTS light commands (1 ms each) and the zeros in
+one write, small enough for the robot's TCP window of 2144 bytes. They hold the robot's last color, so that its light
+stays as it was, dark if there was none.
 
 Runs on the thread of the sockets and never blocks, except stop_without_loop(), for when that thread's loop has broken.
 """
@@ -18,15 +20,57 @@ import time
 from typing import Callable, Iterable, List, Optional
 
 from .commands.stop_progress import StopProgress, StopState
-from .commands.velocity_shaper import COMMAND_INTERVAL_S
+from .commands.velocity_shaper import COMMAND_INTERVAL_S, STOP_PAYLOADS, ZERO_TWIST
+from .corrections.message_layouts import MD5SUMS
 from .peer import Peer
+from .ros.message_types import apply_aliases
 from .rosserial.errors import RosserialError
+from .rosserial.session import Topic
 
-TUNING_PULSES = 140
-"""Servo pulses in front of the zeros: 70 ms of the robot's reading cycle, 1680 of its window's 2144 bytes."""
+BURST_LIGHTS = 62
+"""Light commands in front of the zeros that end a self-tuning: 1488 bytes. Measured: 40 of 40 tunings ended."""
+
+LIGHT_TYPE, LIGHT_MD5 = "std_msgs/ColorRGBA", "a29a96539573343b1310c73607334b00"
+LIGHT_SUFFIX = "/led"
 
 POLL_S = 0.02
 REST_POLL_S = 0.1
+
+
+def is_light(topic: Topic) -> bool:
+    """Return whether a topic that a robot declared sets the color of its light."""
+    info = topic.info
+    return (info.message_type, info.md5sum) == (LIGHT_TYPE, LIGHT_MD5) and info.name.endswith(LIGHT_SUFFIX)
+
+
+def find_stop_payload(topic: Topic) -> Optional[bytes]:
+    """Return what stops a robot on a topic that it declared, None if the topic does not move it."""
+    ros_type = apply_aliases(topic.info.message_type)
+    if topic.kind.is_from_robot or topic.info.md5sum != MD5SUMS.get(ros_type):
+        return None
+    return STOP_PAYLOADS.get(ros_type)
+
+
+def can_move(peer: Peer) -> bool:
+    """Return whether the robot has declared a topic that moves it."""
+    return any(find_stop_payload(topic) is not None for topic in peer.session.topics.values())
+
+
+def encode_stop(peer: Peer, with_burst: bool) -> bytes:
+    """Return one stop for every motion topic that the connection declared, empty if there is none."""
+    light, motors, twists = b"", b"", b""
+    for topic_id, topic in peer.session.topics.items():
+        payload = find_stop_payload(topic)
+        try:
+            if payload is ZERO_TWIST:
+                twists += peer.session.encode_message(topic_id, payload)
+            elif payload is not None:
+                motors += peer.session.encode_message(topic_id, payload)
+            elif with_burst and is_light(topic):
+                light = peer.session.encode_message(topic_id, peer.light)
+        except RosserialError:
+            continue  # its buffer is too small for such a message, so nothing can drive the robot by it
+    return BURST_LIGHTS * light + (twists or motors)
 
 
 class StopDelivery:
@@ -52,12 +96,13 @@ class StopDelivery:
 
     def begin(self, peer: Peer) -> None:
         """Stop one robot; the first stop is written before this returns."""
-        if peer.bridge is None or peer.link.closed:
+        if peer.link.closed or not can_move(peer):
             return
         now_s = time.monotonic()
-        peer.bridge.forget_motion()
+        if peer.bridge is not None:
+            peer.bridge.forget_motion()
         if peer.stop is None:
-            peer.stop = StopProgress(now_s, peer.bridge.wheels)
+            peer.stop = StopProgress(now_s, peer.wheels)
             self._peers.append(peer)
         else:
             peer.stop.renew(now_s)
@@ -66,12 +111,6 @@ class StopDelivery:
             self._is_scheduled = True
             self._call_later(POLL_S, self._poll)
         self._on_change()
-
-    def release(self) -> None:
-        """Let all robots move again."""
-        for peer in self._peers:
-            peer.stop = None
-        self._peers.clear()
 
     def find_state(self, peer: Optional[Peer]) -> StopState:
         """Return what is known of the stop of a robot; peer is None for one that is away."""
@@ -112,17 +151,16 @@ class StopDelivery:
 
     def _poll(self) -> None:
         now_s = time.monotonic()
-        is_stopped = self._is_stopped()
         for peer in self._peers:
-            if peer.stop is None or peer.link.closed or peer.bridge is None:
+            if peer.stop is None or peer.link.closed:
                 continue
-            # A stop of this robot alone is over when it is driven again, or at rest.
-            if is_stopped or not peer.bridge.is_commanded:
+            # While robots may move, a stop is over when the robot is driven again, or at rest.
+            is_driven = not self._is_stopped() and peer.bridge is not None and peer.bridge.is_commanded
+            if not is_driven:
                 self._advance(peer, now_s)
-                if is_stopped or _is_pending(peer):
-                    continue
-            peer.stop = None
-            self._on_change()
+            if is_driven or not (self._is_stopped() or _is_pending(peer)):
+                peer.stop = None
+                self._on_change()
         self._peers = [peer for peer in self._peers if peer.stop is not None and not peer.link.closed]
         self._is_scheduled = bool(self._peers)
         if self._is_scheduled:
@@ -131,32 +169,25 @@ class StopDelivery:
 
     def _advance(self, peer: Peer, now_s: float) -> None:
         stop = peer.stop
-        if stop is None or peer.link.closed or peer.bridge is None:
+        if stop is None or peer.link.closed:
             return
         before = stop.state
         if stop.is_due(peer.has_acknowledged_motion(), now_s):
-            burst = stop.needs_burst(peer.bridge.tunes(now_s), now_s)
-            self._send(peer, TUNING_PULSES if burst else int(stop.is_first), now_s)
+            burst = stop.needs_burst(peer.bridge is not None and peer.bridge.tunes(now_s), now_s)
+            self._send(peer, burst, now_s)
             stop.note_sent(burst, now_s)
         if stop.state is not before:
             if stop.state is StopState.MOVING:
                 self._warn_robot(peer, "its wheels turn although it was stopped")
+            elif stop.state is StopState.AT_REST and peer.bridge is not None:
+                peer.bridge.note_tuning(False)
             self._on_change()
 
     @staticmethod
-    def _send(peer: Peer, pulses: int, now_s: float) -> None:
-        """Write one stop in one piece, with servo pulses of 1500 us in front."""
-        assert peer.bridge is not None
-        packets = []
-        for topic_id, payload in peer.bridge.list_stops(pulses):
-            try:
-                packets.append(peer.session.encode_message(topic_id, payload))
-            except RosserialError:
-                # This connection has not declared the topic again yet, so nothing can drive the robot by it.
-                continue
-        if packets:
-            peer.link.send_packet(b"".join(packets))
-            peer.motion_mark = peer.link.handed_length
+    def _send(peer: Peer, with_burst: bool, now_s: float) -> None:
+        peer.link.send_packet(encode_stop(peer, with_burst))
+        peer.motion_mark = peer.link.handed_length
+        if peer.bridge is not None:
             peer.bridge.commands.discard_motion(now_s + COMMAND_INTERVAL_S)
 
 

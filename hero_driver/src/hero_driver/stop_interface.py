@@ -1,27 +1,29 @@
 """The emergency stop in ROS: the service ~stop, the topic ~stop_request, and the stop kept over restarts.
 
 Programs connect to ~stop_request at their start, so that it works while the ROS master is dead, hung or slow, and ask
-until ~robots says that the robots are stopped. Whether they are is kept on the parameter server (~stopped) for a driver
-that is started again under the same name.
+until ~robots says that the robots are stopped. Whether they are is kept in a file (kept_stop).
 """
 
-from typing import Any, Callable, List
+import weakref
+from typing import Any, Callable, FrozenSet, List, Optional, Tuple
 
 import rospy
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, SetBoolResponse
 
-from hero_msgs.msg import Robot
-
-from .robot_status import RobotStatus
+from .commands.stop_progress import StopState
+from .kept_stop import KeptStop
 from .ros.log_relay import LogRelay
+from .ros.rospy_internals import find_connection, is_latched_before, list_publishers
 from .ros.worker import Worker
 from .transport import EventLoop, NoAnswerError
 
-PARAMETER = "~stopped"
-
 ANSWER_WAIT_S = 0.5
 """The thread of the sockets answers within milliseconds; a service call must not hang where it does not."""
+
+
+Stops = List[Tuple[str, Optional[StopState]]]
+"""Name and stop of each connection that can move a robot, and None for each robot that is away."""
 
 
 class StopInterface:
@@ -32,54 +34,68 @@ class StopInterface:
         loop: EventLoop,
         set_stopped: Callable[[bool], None],
         is_stopped: Callable[[], bool],
-        list_robots: Callable[[], List[RobotStatus]],
+        list_stops: Callable[[], Stops],
+        kept: KeptStop,
         log: LogRelay,
     ) -> None:
         """The three functions are called on the thread of the sockets."""
         self._loop = loop
         self._set_stopped = set_stopped
         self._is_stopped = is_stopped
-        self._list_robots = list_robots
+        self._list_stops = list_stops
+        self._kept = kept
         self._log = log
-        self._stopped = False  # as programs asked; at its end the driver stops robots without being asked
+        self._request_topic = rospy.resolve_name("~stop_request")
+        self._earlier: Optional[FrozenSet[str]] = frozenset()  # publishers that were there before
+        self._heard: weakref.WeakSet[Any] = weakref.WeakSet()  # connections that have brought a request
         self._publisher: rospy.Publisher
         self._service: rospy.Service
-        self._keeper = Worker("stop parameter", 100, self._report_lost_parameter)
+        self._keeper = Worker("stop keeper", 100, self._report_not_kept)
 
-    def open(self, stopped: bool) -> None:
-        """Serve; begin as stopped says. The loop does not run yet."""
-        self._stopped = stopped
+    def open(self, stopped: bool, since: str) -> None:
+        """Serve; begin as stopped says. The loop does not run yet. since: since when they are, if that was kept."""
         self._set_stopped(stopped)
+        self._keep(stopped)
         if stopped:
-            self._log.log("warn", "all robots are stopped from the start, until ~stop releases them")
+            begin = "since " + since if since else "from the start (~start_stopped)"
+            text = "all robots are stopped %s; this releases them: rosservice call %s false"
+            self._log.log("warn", text % (begin, rospy.resolve_name("~stop")))
         self._publisher = rospy.Publisher("~stopped", Bool, queue_size=1, latch=True)
         self._publisher.publish(Bool(stopped))
+        self._earlier = list_publishers(self._request_topic, Bool._type)
         rospy.Subscriber("~stop_request", Bool, self._take_request, queue_size=10, tcp_nodelay=True)
         self._service = rospy.Service("~stop", SetBool, self._serve)
 
-    def keep(self) -> None:
-        """Write down whether robots are stopped, after each change and for a ROS master that was started again."""
-        self._keeper.submit(lambda: rospy.set_param(PARAMETER, self._stopped))
+    def _keep(self, stopped: bool) -> None:
+        self._keeper.submit(lambda: self._kept.write(stopped))
 
     def close(self) -> None:
-        """Keep nothing any more; safe to call twice."""
-        self._keeper.close()
+        """Keep nothing any more once what was asked for is kept; safe to call twice."""
+        self._keeper.close(drain=True)
 
     def _serve(self, request: Any) -> SetBoolResponse:
         stopped = bool(request.data)
 
-        def set_and_answer(answer: Callable[[List[RobotStatus]], None]) -> None:
+        def set_and_answer(answer: Callable[[Stops], None]) -> None:
             self._set(stopped)
-            answer(self._list_robots())
+            answer(self._list_stops())
 
         try:
-            robots = self._loop.ask(set_and_answer, ANSWER_WAIT_S)
+            stops = self._loop.ask(set_and_answer, ANSWER_WAIT_S)
         except NoAnswerError:
             return SetBoolResponse(False, "NOT STOPPED: the driver hangs" if stopped else "the driver hangs")
-        return SetBoolResponse(True, describe_stop(robots) if stopped else "robots may move")
+        return SetBoolResponse(True, describe_stop(stops) if stopped else "robots may move")
 
     def _take_request(self, message: Bool) -> None:
         stopped = bool(message.data)
+        connection = find_connection(self._request_topic, message)
+        is_first = connection is not None and connection not in self._heard
+        if is_first:
+            self._heard.add(connection)
+            if not stopped and is_latched_before(connection, self._earlier):
+                text = "a release on ~stop_request was refused, because it is from before the driver was there"
+                self._log.log("warn", text)
+                return
         self._loop.call_soon(lambda: self._set(stopped))
 
     def _set(self, stopped: bool) -> None:
@@ -87,36 +103,28 @@ class StopInterface:
         changed = stopped is not self._is_stopped()
         if not changed and not stopped:
             return
-        self._stopped = stopped
         self._set_stopped(stopped)
         if changed:
             # Published and written elsewhere: both may block.
+            self._keep(stopped)
             self._keeper.submit(lambda: self._publisher.publish(Bool(stopped)))
-            self.keep()
             self._log.log("warn", "stopping all robots" if stopped else "robots may move")
 
-    def _report_lost_parameter(self, error: BaseException) -> None:
-        self._log.log(
-            "warn",
-            "whether robots are stopped cannot be kept on the parameter server (%s): a driver that is started again"
-            " begins without it" % error,
-        )
+    def _report_not_kept(self, error: BaseException) -> None:
+        text = "whether robots are stopped cannot be kept in %s (%s): a driver that is started again begins without it"
+        self._log.log("warn", text % (self._kept.path, error))
 
 
-def describe_stop(robots: List[RobotStatus]) -> str:
+def describe_stop(stops: Stops) -> str:
     """Return how far the stop of all robots has come, for people."""
-    groups = (
-        ("still moving", Robot.MOVING),
-        ("being stopped", Robot.STOPPING),
-        ("not confirmed, they send no readings of their wheels", Robot.UNCONFIRMED),
-    )
-    connected = [robot for robot in robots if robot.message.state != Robot.AWAY]
-    parts = ["%d at rest" % sum(robot.message.stop_state == Robot.AT_REST for robot in connected)]
-    for text, state in groups:
-        names = [robot.name for robot in connected if robot.message.stop_state == state]
+    parts = ["%d at rest" % sum(state is StopState.AT_REST for _, state in stops)]
+    for text, state in (
+        ("still moving", StopState.MOVING),
+        ("being stopped", StopState.STOPPING),
+        ("not confirmed, they send no readings of their wheels", StopState.UNCONFIRMED),
+        ("away, stopped when they return", None),
+    ):
+        names = [name for name, its_state in stops if its_state is state]
         if names:
             parts.append("%d %s: %s" % (len(names), text, ", ".join(names)))
-    away = [robot.name for robot in robots if robot.message.state == Robot.AWAY]
-    if away:
-        parts.append("%d away, stopped when they return: %s" % (len(away), ", ".join(away)))
     return "; ".join(parts)

@@ -7,7 +7,7 @@ keeps setting it, and an accepted zero resets it. Of the motion watchdogs (2, 4 
 
 import collections
 import struct
-from typing import DefaultDict
+from typing import DefaultDict, Sequence
 
 VELOCITY_GATE_S = 0.050
 """The firmware drops a velocity that it reads within this time after its controller's watchdog was set."""
@@ -16,7 +16,11 @@ PULSES_HOLD_S = 0.0005
 LED_HOLD_S = 0.001
 """So long each cmd_motor and each led holds the robot's program, and so delays what comes behind it."""
 
-NEUTRAL_PULSES = struct.pack("<2h", 1500, 1500)
+DEAD_ZONE_US = 15
+"""A wheel rests within this distance of its servo's center."""
+
+LAG_S = 0.3
+"""Wheels that are stopped come to rest so much later (measured: 0.25 to 0.35 s)."""
 
 TICKS_PER_S = 200.0
 """How fast the wheels turn when they do, about 0.1 m/s."""
@@ -40,10 +44,15 @@ class FakeMotors:
 
     Attributes:
         is_pushed: whether somebody turns the wheels by hand.
+        lag_s: for how long the wheels turn on when nothing drives them.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, centers_us: Sequence[int] = (1500, 1500), lag_s: float = 0.0) -> None:
+        """centers_us: the servos' real centers, left and right."""
         self.is_pushed = False
+        self.lag_s = lag_s
+        self._centers_us = centers_us
+        self._driven_s = _NEVER_S
         self._controllers: DefaultDict[str, Controller] = collections.defaultdict(Controller)
         self._has_pulses = False
         self._read_s = 0.0
@@ -80,7 +89,9 @@ class FakeMotors:
     def take_pulses(self, payload: bytes) -> None:
         """Take a Motor command."""
         self._read_s += PULSES_HOLD_S
-        self._has_pulses = payload != NEUTRAL_PULSES
+        pulses_us = struct.unpack("<2h", payload)
+        offsets_us = [pulse_us - center_us for pulse_us, center_us in zip(pulses_us, self._centers_us)]
+        self._has_pulses = any(abs(offset_us) > DEAD_ZONE_US for offset_us in offsets_us)
 
     def take_velocity(self, name: str, is_zero: bool) -> None:
         """Take a Twist for the controller in a topic's name, which may drop it."""
@@ -96,6 +107,8 @@ class FakeMotors:
     def count_ticks(self, now_s: float) -> int:
         """Return the ticks of each wheel at now_s."""
         if self.is_turning:
+            self._driven_s = now_s
+        if now_s - self._driven_s <= self.lag_s:
             self._ticks += TICKS_PER_S * (now_s - self._turned_s)
         self._turned_s = now_s
         return int(self._ticks)

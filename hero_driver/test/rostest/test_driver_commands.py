@@ -11,6 +11,7 @@ import struct
 import rospy
 import rostest
 from driver_case import NODE, DriverCase, Recorder, make_command, make_publisher, wait_payloads
+from fake_robot import STOCK_DECLARATIONS
 from geometry_msgs.msg import Twist
 from rosgraph_msgs.msg import Log as RosLog
 from std_msgs.msg import Bool, ColorRGBA
@@ -211,7 +212,7 @@ class TestDriverCommands(DriverCase):
         for robot in robots:
             motions = [velocity for velocity in robot.velocities if not velocity.is_zero]
             self.assertEqual([velocity.linear_m_s for velocity in motions], [0.1])
-        self.assertEqual(set(robots[0].payloads_on("cmd_motor")), {STOPPED_MOTORS})
+        self.assertEqual(robots[0].payloads_on("cmd_motor"), [])
         self.call_stop(False)
         wait_for(lambda: not stopped.messages[-1].data, "the latched state")
         for publisher, robot in zip(publishers, robots):
@@ -245,7 +246,14 @@ class TestDriverCommands(DriverCase):
         make_publisher("/hero_17/cmd_motor", Motor).publish(Motor(1400, 1600))
         wait_payloads(robot, "cmd_motor")
         self.call_stop(True)
-        self.assertEqual(wait_payloads(robot, "cmd_motor", 2)[1], struct.pack("<2h", 1500, 1500))
+        self.wait_stopped(robot)
+        self.assertEqual(len(robot.payloads_on("cmd_motor")), 1)
+
+    def test_a_robot_without_velocity_control_is_stopped_by_servo_pulses(self):
+        motors_only = [entry for entry in STOCK_DECLARATIONS if entry.message_type != "geometry_msgs/Twist"]
+        robot = self.join(18, declarations=motors_only)
+        self.call_stop(True)
+        self.assertEqual(wait_payloads(robot, "cmd_motor")[0], STOPPED_MOTORS)
 
     def test_a_robot_that_does_not_read_gets_the_newest_command_and_no_backlog(self):
         stalled = self.join(19, receive_buffer_length=4096)

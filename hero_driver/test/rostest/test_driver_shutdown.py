@@ -3,7 +3,6 @@
 
 import signal
 import socket
-import struct
 
 import rospy
 import rostest
@@ -106,7 +105,7 @@ class TestDriverShutdown(OwnDriverCase):
         driver.process.send_signal(signal.SIGINT)
         driver.wait_end()
         wait_for(lambda: robot.ended, "the end of the connection")
-        self.assertEqual(robot.payloads_on("cmd_motor")[-1], struct.pack("<2h", 1500, 1500))
+        self.assertEqual(len(robot.payloads_on("cmd_motor")), 1)  # zeros end servo pulses, too
         self.assertEqual(robot.payloads_on("position_controller/cmd_vel")[-2:], [bytes(48)] * 2)
         self.assertEqual(robot.payloads_on(VELOCITY)[-2:], [bytes(48)] * 2)
 

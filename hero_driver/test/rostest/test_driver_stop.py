@@ -37,6 +37,9 @@ def is_error(diagnostics, name):
     )
 
 
+ROSTOPIC_MOTION = ("geometry_msgs/Twist", "[0.1, 0.0, 0.0]", "[0.0, 0.0, 0.0]")
+
+
 class TestDriverStop(OwnDriverCase):
     """Each test has robots of its own numbers, also where it has a driver of its own: topics outlast a connection."""
 
@@ -201,6 +204,22 @@ class TestDriverStop(OwnDriverCase):
         )
         self.drive(robot)
 
+    def test_a_refused_robot_is_stopped_and_counted(self):
+        driver = self.share()
+        first = self.dial_stock(driver, 80)
+        second = self.dial(
+            driver, 80, ready=False, read_cycle_s=READ_CYCLE_S, has_motors=True, source_host="127.0.0.80"
+        )
+        driver.fleet.wait("/hero_80", Robot.REFUSED)
+        for robot in (first, second):
+            robot.motors.take_velocity("/hero_80/velocity_controller/cmd_vel", False)
+        self.call_stop(driver, True)
+        for state in (Robot.READY, Robot.REFUSED):
+            driver.fleet.wait("/hero_80", state, "at rest", lambda entry: entry.stop_state == Robot.AT_REST)
+        self.assertFalse(first.motors.is_turning or second.motors.is_turning)
+        self.assertTrue(all(velocity.is_zero for velocity in second.velocities))
+        self.assertIn("2 at rest", self.call_stop(driver, True))
+
     # Who asks for it.
 
     def test_a_request_on_the_topic_stops_and_releases(self):
@@ -218,11 +237,12 @@ class TestDriverStop(OwnDriverCase):
     def test_a_driver_that_is_started_again_stays_stopped(self):
         first = self.start()
         self.call_stop(first, True)
-        wait_for(lambda: rospy.get_param(first.node + "/stopped", None), "the parameter")
         first.process.send_signal(signal.SIGINT)
         first.wait_end()
+        rospy.delete_param(first.node)  # as with a new ROS master
         second = DriverProcess(name=first.node[1:])
         self.addCleanup(second.__exit__)
+        second.wait_line("all robots are stopped since 20.*rosservice call %s/stop false" % second.node)
         stopped = Recorder(second.node + "/stopped", Bool)
         wait_for(lambda: stopped.messages and stopped.messages[-1].data, "the second driver to begin stopped")
         robot = self.dial_stock(second, 78)
@@ -234,10 +254,13 @@ class TestDriverStop(OwnDriverCase):
         self.drive(robot)
 
     def test_start_stopped_says_otherwise(self):
-        driver = self.start(stopped=True, start_stopped="never")
-        self.drive(self.dial_stock(driver, 60))
         driver = self.start(start_stopped="always")
         self.wait_at_rest(driver, self.dial_stock(driver, 77))
+        driver.process.send_signal(signal.SIGINT)
+        driver.wait_end()
+        again = DriverProcess({"start_stopped": "never"}, name=driver.node[1:])
+        self.addCleanup(again.__exit__)
+        self.drive(self.dial_stock(again, 60))
 
     # Programs that go, or go wrong.
 
@@ -258,6 +281,40 @@ class TestDriverStop(OwnDriverCase):
         commander.kill()
         wait_for(lambda: not robot.motors.is_turning, "the wheels to rest")
         self.assertFalse(driver.fleet.newest.stopped)
+
+    def test_a_robot_stops_when_its_commander_hangs(self):
+        driver = self.share()
+        robot = self.dial_stock(driver, 82)
+        commander = subprocess.Popen(["rostopic", "pub", "-r", "20", "/hero_82/cmd_vel", *ROSTOPIC_MOTION])
+        self.addCleanup(commander.wait)
+        self.addCleanup(commander.kill)
+        wait_for(lambda: len(robot.velocities) > 10, "regular commands")
+        commander.send_signal(signal.SIGSTOP)
+        wait_for(lambda: not robot.motors.is_turning, "the wheels to rest")
+        driver.wait_line("hero_82 is stopped: /rostopic_.* has been silent")
+
+    def test_latched_motion_and_releases_of_before_are_not_acted_on(self):
+        publisher = rospy.Publisher("/hero_83/cmd_vel", Twist, queue_size=1, latch=True)
+        publisher.publish(make_command(0.1))
+        releases = rospy.Publisher("/latch_driver/stop_request", Bool, queue_size=1, latch=True)
+        releases.publish(Bool(False))
+        driver = DriverProcess({"start_stopped": "always"}, name="latch_driver")
+        self.addCleanup(driver.__exit__)
+        driver.wait_line("a release on ~stop_request was refused")
+        wait_for(lambda: driver.fleet.newest is not None, "the report")
+        self.assertTrue(driver.fleet.newest.stopped)
+        self.call_stop(driver, False)
+        robot = self.dial_stock(driver, 83)
+        driver.wait_line("hero_83: a command on /hero_83/cmd_vel was refused")
+        self.assertFalse(any(not velocity.is_zero for velocity in robot.velocities))
+        # A publisher that comes later latches, too: so does rostopic.
+        command = ["rostopic", "pub", "-1", "/hero_83/cmd_vel", *ROSTOPIC_MOTION]
+        self.addCleanup(subprocess.Popen(command).wait)
+        wait_for(lambda: robot.motors.is_turning, "the wheels to turn")
+        releases.publish(Bool(True))
+        self.wait_at_rest(driver, robot)
+        releases.publish(Bool(False))
+        wait_for(lambda: not driver.fleet.newest.stopped, "the release")
 
     def test_the_end_of_a_program_that_moves_nothing_stops_nobody(self):
         driver = self.share(orphan_stop_s=0.0)

@@ -6,13 +6,12 @@ import struct
 import unittest
 
 import rostest
-from fake_motors import NEUTRAL_PULSES
 from fake_robot import FakeRobot
 
 from hero_driver.rosserial import packets, payloads
 from hero_test.waiting import TIMEOUT_S, wait_for
 
-NEUTRAL = packets.encode_packet(104, NEUTRAL_PULSES)
+NEUTRAL = packets.encode_packet(104, struct.pack("<2h", 1500, 1500))
 LED = packets.encode_packet(100, bytes(16))
 POSITION_ID, VELOCITY_ID = 106, 109
 TUNE_POSITION_ID, TUNE_VELOCITY_ID = 108, 111

@@ -18,6 +18,7 @@ from hero_driver import command_sender, stop_delivery
 from hero_driver.commands.command_settings import CommandSettings
 from hero_driver.commands.velocity_shaper import STOP_PAYLOADS
 from hero_driver.fleet.namespaces import identify
+from hero_driver.gateway import COMMANDER_POLL_S
 from hero_driver.peer import Peer
 from hero_driver.ros import robot_bridge
 from hero_driver.rosserial import packets
@@ -37,6 +38,7 @@ from fake_robot import (
 VELOCITY = "/hero_1/velocity_controller/cmd_vel"
 POSITION = "/hero_1/position_controller/cmd_vel"
 MOTORS = "/hero_1/cmd_motor"
+LIGHT = "/hero_1/led"
 
 
 class Clock:
@@ -79,31 +81,35 @@ class CommandedRobot:
         network_s: time from the driver to the robot's TCP; the acknowledgement takes as long again.
     """
 
-    def __init__(self, clock, network_s=0.0, phase_s=0.0, has_readings=False):
+    def __init__(self, clock, network_s=0.0, phase_s=0.0, has_readings=False, motors=None):
         self.clock = clock
         self.network_s = network_s
         self.writes = []
         self.taken = []
-        self.motors = FakeMotors()
+        self.motors = motors or FakeMotors()
         self.closed = False
         self.handed_length = 0
         self.warnings = []
+        self.lines = []
+        self.is_stopped = False
         self._acknowledged_length = 0
         self._buffer = b""
         self._reader = packets.PacketReader()
         context = robot_bridge.BridgeContext(
-            owner=SimpleNamespace(stopped=False),
+            owner=self,
             loop=None,
-            log=SimpleNamespace(log_throttled=None),
+            log=SimpleNamespace(log_throttled=lambda level, key, text: self.lines.append(text)),
             transforms=SimpleNamespace(add=None),
             registrar=SimpleNamespace(submit=lambda job, **_: True),  # nothing is registered with a master
             corrections=make_settings(),
-            commands=CommandSettings(False, False, 0.25, 5.0, command_max_age_s=10.0, max_names=100),
+            commands=CommandSettings(False, True, 0.25, 0.5, 5.0, command_max_age_s=10.0, max_names=100),
         )
         self.bridge = robot_bridge.RobotBridge(identify("/hero_1/odom"), context)
         self.bridge.attach()
         self.peer = Peer(self, Session(SessionLimits(), clock.now_s), None, bridge=self.bridge)
+        self.bridge.corrections.restart(False, self.peer.wheels)
         self._names = {}
+        self._senders = {}
         subscribed = FakeRobot(1, [entry for entry in STOCK_DECLARATIONS if entry.kind == SUB])
         for event in self.peer.session.receive_bytes(subscribed.encode_declarations(), clock.now_s, 0.0):
             self.bridge.declare(event.topic, event.topic.info.name)
@@ -111,13 +117,25 @@ class CommandedRobot:
         self.sender = command_sender.CommandSender(
             clock.call_later, lambda _: self.peer, lambda: False, self._warn
         )
-        self.is_stopped = False
         self.stops = stop_delivery.StopDelivery(
             clock.call_later, lambda: self.is_stopped, lambda: None, self._warn
         )
         clock.call_later(phase_s, self._read)
+        clock.call_later(0.0, self._watch_commanders)
         if has_readings:
             clock.call_later(phase_s, self._send_reading)
+
+    # What the bridge asks of the gateway.
+
+    @property
+    def stopped(self):
+        return self.is_stopped
+
+    def send_commands(self, bridge):
+        self.sender.send_commands(bridge)
+
+    def stop_robot(self, _):
+        self.stops.begin(self.peer)
 
     def _warn(self, _, text):
         self.warnings.append(text)
@@ -152,6 +170,8 @@ class CommandedRobot:
             self.taken.append((now_s, name, packet.payload))
             if name == MOTORS:
                 self.motors.take_pulses(packet.payload)
+            elif name == LIGHT:
+                self.motors.take_led()
             else:
                 self.motors.take_velocity(name, not any(packet.payload))
         self.clock.call_later(READ_CYCLE_S, self._read)
@@ -159,10 +179,37 @@ class CommandedRobot:
     def _send_reading(self):
         ticks = self.motors.count_ticks(self.clock.now_s)
         self.peer.session.last_receive_s = self.clock.now_s
-        self.bridge.wheels.read_ticks(ticks, ticks)
+        self.peer.wheels.read_ticks(ticks, ticks)
         self.clock.call_later(ENCODER_INTERVAL_S, self._send_reading)
 
-    # The program.
+    def list_motor_packets(self):
+        """Return the servo pulses among all that the driver wrote."""
+        written = packets.PacketReader().receive_bytes(b"".join(data for _, data in self.writes))
+        return [packet for packet in written if self._names[packet.topic_id] == MOTORS]
+
+    # The programs.
+
+    def _watch_commanders(self):
+        self.bridge.stop_if_silent(self.clock.now_s)
+        self.clock.call_later(COMMANDER_POLL_S, self._watch_commanders)
+
+    def publish(self, name, payload, node="/program", source=None, is_old=False):
+        """Let a node publish on a motion topic, or on an alias of it (source)."""
+        source = source or name
+        sender = self._senders.setdefault((node, source), SimpleNamespace(header={"callerid": node}))
+        self.bridge._subscribers[source] = SimpleNamespace(last_sender=sender, is_old=is_old)
+        ros_type = "hero_msgs/Motor" if name == MOTORS else "geometry_msgs/Twist"
+        self.bridge._choose_receiver(name, source, ros_type)(payload)
+
+    def publish_velocity(self, linear_m_s, name=VELOCITY, **settings):
+        """Let a node publish a Twist."""
+        self.publish(name, struct.pack("<6d", linear_m_s, 0.0, 0.0, 0.0, 0.0, 0.0), **settings)
+
+    def publish_at(self, rate_hz, duration_s, linear_m_s=0.1, **settings):
+        """Let a node publish Twists for some time."""
+        for _ in range(int(rate_hz * duration_s)):
+            self.publish_velocity(linear_m_s, **settings)
+            self.clock.run(1.0 / rate_hz)
 
     def command(self, name, payload):
         """Offer a motion command, as the subscriber to its topic does."""

@@ -65,7 +65,6 @@ def make_corrections(namespace, outputs, is_wanted=lambda name: True, **settings
         make_settings(**settings),
         ListSinks(outputs, is_wanted),
         ListSink(TRANSFORMS, outputs).publish,
-        WheelMotion(),
     )
 
 
@@ -87,7 +86,7 @@ class CorrectedRobot:
 
     def reconnect(self, rebooted):
         """Begin a new connection with the stock topics."""
-        self.corrections.restart(rebooted)
+        self.corrections.restart(rebooted, WheelMotion())
         self.declare(TYPES)
 
     def receive(self, name, payload, arrival_ns):

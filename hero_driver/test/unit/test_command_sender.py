@@ -79,7 +79,7 @@ def test_velocity_position_and_servo_pulses_are_spaced_each_on_its_own():
 def test_a_robot_that_is_not_heard_gets_stops_and_no_motion():
     with Clock().is_the_drivers() as clock:
         robot = CommandedRobot(clock)
-        robot.bridge.wheels.read_ticks(0.0, 0.0)
+        robot.peer.wheels.read_ticks(0.0, 0.0)
         clock.run(HEARD_S + 0.1)
         robot.drive(0.1)
         clock.run(0.2)

@@ -4,6 +4,7 @@ import socket
 import struct
 import threading
 import time
+from types import SimpleNamespace
 
 import pytest
 import rospy
@@ -12,6 +13,7 @@ from rospy.impl.tcpros_pubsub import TCPROSSub
 from rospy.topics import _SubscriberImpl
 from std_msgs.msg import String
 
+from hero_driver.ros import raw_subscriber, rospy_internals
 from hero_driver.ros.message_types import make_raw_class
 from hero_driver.ros.raw_subscriber import MESSAGE_LENGTH_MAX, RawSubscriber
 from hero_driver.transport import EventLoop, LinkHandler, TransportSettings
@@ -32,6 +34,9 @@ class Handler(LinkHandler):
 
     def report_bug(self, error):
         self.faults.append(error)
+
+    def resume(self, now_s):
+        """Have nothing to do."""
 
 
 class Bench:
@@ -60,6 +65,9 @@ class Bench:
                 self.impl.close()
 
         monkeypatch.setattr(rospy, "Subscriber", Subscriber)
+        topics = SimpleNamespace(get_subscriber_impl={"/topic": self.impl}.get)
+        monkeypatch.setattr(rospy_internals, "get_topic_manager", lambda: topics)
+        self.old = []  # payloads that were called old
         self.subscriber = RawSubscriber(self.receive, self.loop)
         self.subscriber.open("/topic", RAW_CLASS, 50)
 
@@ -67,14 +75,17 @@ class Bench:
         if payload == self.fails_on:
             raise ValueError("not this one")
         with self.arrived:
+            if self.subscriber.is_old:
+                self.old.append(payload)
             self.received.append((payload, threading.current_thread() is self.loop_thread))
             self.arrived.notify_all()
 
-    def publish(self):
+    def publish(self, is_latched=False):
         """Connect a publisher; return its socket, rospy's connection and rospy's thread."""
         ours, theirs = socket.socketpair()
         connection = TCPROSTransport(TCPROSSub("/topic", RAW_CLASS, queue_size=50), "/topic")
         connection.socket = ours
+        connection.is_latched = is_latched
         connection.header = {"callerid": "/publisher"}
         connection.set_endpoint_id("http://publisher:%d/" % theirs.fileno())
         assert self.impl.add_connection(connection)
@@ -227,3 +238,58 @@ def test_rospy_keeps_reading_where_topic_statistics_are_wanted(bench, monkeypatc
     bench.wait_for(20)
     assert bench.list_payloads() == [b"%d" % number for number in range(20)]
     assert not bench.loop._readers
+
+
+def uri_of(publisher):
+    return "http://publisher:%d/" % publisher.fileno()
+
+
+@pytest.mark.parametrize(
+    ("is_latched", "was_there", "is_old"), [(True, True, True), (True, False, False), (False, True, False)]
+)
+def test_only_what_a_publisher_had_latched_before_the_subscription_is_old(bench, is_latched, was_there, is_old):
+    publisher, _, _ = bench.publish(is_latched)
+    bench.subscriber._earlier = frozenset([uri_of(publisher)]) if was_there else frozenset(["http://other/"])
+    publisher.sendall(frame(b"first"))
+    bench.wait_for(1)
+    publisher.sendall(frame(b"second"))
+    bench.wait_for(2)
+    assert bench.old == [b"first"] * is_old
+
+
+def test_where_the_master_cannot_be_asked_all_that_is_latched_is_old(bench):
+    publisher, _, _ = bench.publish(is_latched=True)
+    bench.subscriber._earlier = None
+    publisher.sendall(frame(b"first"))
+    bench.wait_for(1)
+    assert bench.old == [b"first"]
+
+
+def test_what_a_publisher_sent_while_the_driver_did_not_run_is_old(bench):
+    publisher, _, _ = bench.publish_adopted()
+    pauses, goes_on = threading.Event(), threading.Event()
+    count = len(bench.received)
+
+    def pause():
+        pauses.set()
+        goes_on.wait(DEADLINE_S)
+        bench.loop._ran_s -= 3600.0
+
+    bench.loop.call_soon(pause)
+    assert pauses.wait(DEADLINE_S)
+    texts = [b"%d" % number * 50 for number in range(100)]
+    publisher.sendall(b"".join(map(frame, texts)))
+    goes_on.set()
+    bench.wait_for(count + len(texts))
+    publisher.sendall(frame(b"new"))
+    bench.wait_for(count + len(texts) + 1)
+    assert bench.old == texts
+
+
+def test_the_first_message_of_a_publisher_right_after_a_pause_is_old(bench):
+    bench.loop._resumed_s = time.monotonic() + DEADLINE_S
+    publisher, _, _ = bench.publish()
+    publisher.sendall(frame(b"first"))
+    bench.wait_for(1)
+    bench.loop._resumed_s = time.monotonic() - raw_subscriber.RESUMED_S
+    assert bench.old == [b"first"]

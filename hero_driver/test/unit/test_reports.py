@@ -65,7 +65,8 @@ def make_record(**changes):
 
 def publish(reporter, *records):
     """Return the rows of a report about robots."""
-    robots = [describe_robot(record, None, None, StopState.NOT_STOPPED, NOW_S) for record in records]
+    stops = {"10.0.0.2:1": StopState.MOVING}
+    robots = [describe_robot(record, None, None, StopState.NOT_STOPPED, stops, NOW_S) for record in records]
     reporter.publish(FleetStatus(NOW_S, "", False, 0, 0, "", robots))
     return reporter._publisher.published[-1].robots
 
@@ -78,6 +79,7 @@ def test_a_duplicate_has_a_row_with_its_own_address_and_nothing_else(reporter):
         ("10.0.0.2:1", Robot.REFUSED, ""),
     ]
     assert rows[1].last_error == refused["10.0.0.2:1"]
+    assert [row.stop_state for row in rows] == [Robot.NOT_STOPPED, Robot.MOVING]
 
 
 def test_hundreds_of_duplicates_of_one_robot_do_not_fill_the_report(reporter):

@@ -37,15 +37,31 @@ def say_uptime(robot_log, peer, uptime_ms):
 
 
 def test_a_robot_whose_uptime_falls_has_rebooted(lines):
-    robot_log, peer = RobotLog(LogRelay()), make_peer()
+    robot_log, peer = RobotLog(LogRelay(), None), make_peer()
     say_uptime(robot_log, peer, 60000)
     say_uptime(robot_log, peer, 2500)
     assert ("warn", "hero_1 rebooted 2.5 s ago") in lines
 
 
 def test_a_robot_that_says_again_and_again_that_it_rebooted_gives_one_line(lines):
-    robot_log, peer = RobotLog(LogRelay()), make_peer()
+    robot_log, peer = RobotLog(LogRelay(), None), make_peer()
     for _ in range(500):
         say_uptime(robot_log, peer, 9999999999)
         say_uptime(robot_log, peer, 1)
     assert len([text for level, text in lines if level == "warn"]) == 1
+
+
+@pytest.mark.parametrize(("was_told", "stops"), [(False, 1), (True, 0)])
+def test_a_robot_that_tunes_itself_without_being_told_to_is_stopped(lines, was_told, stops):
+    peer, stopped = make_peer(), []
+    peer.bridge.was_told_to_tune, peer.stop = was_told, None
+    peer.bridge.note_tuning = lambda tunes: None
+
+    def stop(robot):
+        stopped.append(robot)
+        robot.stop = "in progress"
+
+    robot_log = RobotLog(LogRelay(), stop)
+    for _ in range(5):
+        robot_log.receive(peer, Log(LOG_INFO, "[/hero_1] Tunning Motor Set: [0,0]"), NOW_S)
+    assert stopped == [peer] * stops

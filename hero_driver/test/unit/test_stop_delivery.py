@@ -1,12 +1,13 @@
 """Stops in the driver's own time: whatever moves a robot and whenever it reads, it is at rest, and soon."""
 
 import pytest
-from commanded_robot import MOTORS, POSITION, VELOCITY, WINDOW_LENGTH, Clock, CommandedRobot
+from commanded_robot import LIGHT, MOTORS, POSITION, VELOCITY, WINDOW_LENGTH, Clock, CommandedRobot
+from fake_motors import LAG_S, FakeMotors
 from hypothesis import given
 from hypothesis import strategies as st
 
 from hero_driver.commands.stop_progress import StopState
-from hero_driver.commands.velocity_shaper import STOPPED_MOTORS
+from hero_driver.stop_delivery import BURST_LIGHTS
 
 phases = st.floats(0.0, 0.051)
 networks = st.floats(0.0, 0.05)
@@ -14,14 +15,20 @@ CONFIRMED_S = 0.5
 """A stop is confirmed so soon, beside what the network takes; self-tuning takes somewhat longer."""
 
 
-def make_moving(clock, mover, **settings):
-    """Return a robot that has been moving for some time."""
-    robot = CommandedRobot(clock, has_readings=True, **settings)
+TUNED_S = 2.0
+
+FAST = b"\x78\x05\x40\x06"
+
+
+def make_moving(clock, mover, lag_s=0.0, **settings):
+    """Return a robot that has been moving for some time, with servo centers that are off."""
+    motors = FakeMotors((1545, 1455), lag_s)
+    robot = CommandedRobot(clock, has_readings=True, motors=motors, **settings)
     if mover == "pulses":
-        robot.command(MOTORS, b"\x78\x05\x40\x06")
+        robot.publish(MOTORS, FAST)
     elif mover == "both controllers":
         for name in (VELOCITY, POSITION):
-            robot.drive(0.1, name)
+            robot.publish_velocity(0.1, name)
     else:
         robot.motors.start_tuning(mover)
     clock.run(2.0)
@@ -34,18 +41,36 @@ def stop(robot):
     robot.stops.begin(robot.peer)
 
 
+def count_bursts(robot):
+    return sum(len(data) > 62 * 24 for _, data in robot.writes)
+
+
 @pytest.mark.parametrize("mover", ["pulses", "both controllers", "velocity_controller", "position_controller"])
 @given(phase_s=phases, network_s=networks)
 def test_a_stop_ends_whatever_moves_the_robot_and_is_confirmed_soon(mover, phase_s, network_s):
     with Clock().is_the_drivers() as clock:
         robot = make_moving(clock, mover, phase_s=phase_s, network_s=network_s)
+        motor_packets = len(robot.list_motor_packets())
         stop(robot)
-        clock.run(CONFIRMED_S + 4 * network_s + 1.5 * mover.endswith("controller"))
+        clock.run(CONFIRMED_S + 4 * network_s + TUNED_S * mover.endswith("controller"))
         assert not robot.motors.is_turning
         assert robot.peer.stop.state is StopState.AT_REST
         written = len(robot.writes)
         clock.run(10.0)
     assert len(robot.writes) == written
+    assert len(robot.list_motor_packets()) == motor_packets
+    assert robot.warnings == [] or mover.endswith("controller")
+
+
+@pytest.mark.parametrize("mover", ["pulses", "both controllers"])
+@given(phase_s=phases, network_s=networks)
+def test_an_ordinary_stop_of_wheels_with_a_lag_gets_no_burst(mover, phase_s, network_s):
+    with Clock().is_the_drivers() as clock:
+        robot = make_moving(clock, mover, lag_s=LAG_S, phase_s=phase_s, network_s=network_s)
+        stop(robot)
+        clock.run(1.0 + 4 * network_s)
+        assert robot.peer.stop.state is StopState.AT_REST
+    assert count_bursts(robot) == 0
     assert robot.warnings == []
 
 
@@ -61,16 +86,59 @@ def test_a_motion_just_before_a_stop_does_not_swallow_it():
             assert robot.peer.stop.state is StopState.AT_REST, offset_ms
 
 
-def test_the_stop_of_a_self_tuning_robot_fits_its_window_in_one_write():
+@pytest.mark.parametrize("controller", ["velocity_controller", "position_controller"])
+@given(phase_s=phases, network_s=networks)
+def test_a_tuning_that_is_known_ends_with_one_write_that_fits_the_window(controller, phase_s, network_s):
     with Clock().is_the_drivers() as clock:
-        robot = make_moving(clock, "velocity_controller")
+        robot = make_moving(clock, controller, phase_s=phase_s, network_s=network_s)
         robot.bridge.note_tuning(True)
         del robot.writes[:]
         stop(robot)
+        clock.run(CONFIRMED_S + 0.5 + 4 * network_s)
+        assert robot.peer.stop.state is StopState.AT_REST
+        assert not robot.bridge.tunes(clock.now_s)
+    assert WINDOW_LENGTH >= max(len(data) for _, data in robot.writes) >= BURST_LIGHTS * 24 + 2 * 56
+    assert robot.list_motor_packets() == []
+
+
+def test_after_a_burst_the_light_has_the_color_that_it_had_before():
+    with Clock().is_the_drivers() as clock:
+        robot = make_moving(clock, "velocity_controller")
+        for color in (b"old color......!", b"16 bytes of red!"):
+            robot.bridge._receive_command(LIGHT, color)
+        robot.bridge.was_told_to_tune = True
+        clock.run(0.5)
+        stop(robot)
         clock.run(3.0)
-    assert not robot.motors.is_turning
-    assert max(len(data) for _, data in robot.writes) <= WINDOW_LENGTH
-    assert max(data.count(STOPPED_MOTORS) for _, data in robot.writes) > 110
+    lights = [payload for _, name, payload in robot.taken if name == LIGHT]
+    assert len(lights) > BURST_LIGHTS
+    assert lights[-1] == b"16 bytes of red!"
+
+
+def test_no_stops_pile_up_in_front_of_a_robot_that_acknowledges_nothing():
+    with Clock().is_the_drivers() as clock:
+        robot = CommandedRobot(clock, network_s=10.0)
+        stop(robot)
+        clock.run(4.0)
+    assert len(robot.writes) == 1
+    assert robot.peer.stop.state is StopState.STOPPING
+
+
+@pytest.mark.parametrize("stopped", ["all", "this one"])
+def test_a_release_right_after_a_stop_leaves_no_robot_moving(stopped):
+    for offset_ms in range(0, 70, 3):
+        with Clock().is_the_drivers() as clock:
+            robot = CommandedRobot(clock, has_readings=True, phase_s=0.001 * (offset_ms % 51))
+            clock.run(1.0)
+            robot.publish_velocity(0.1)
+            clock.run(0.001 * offset_ms)
+            robot.is_stopped = stopped == "all"
+            robot.stops.begin(robot.peer)
+            clock.run(0.005)
+            robot.is_stopped = False
+            clock.run(CONFIRMED_S)
+            assert not robot.motors.is_turning, offset_ms
+            assert robot.peer.stop is None, offset_ms
 
 
 def test_wheels_that_turn_although_stopped_are_reported_and_stopped():
@@ -118,14 +186,13 @@ def test_the_end_waits_until_its_deadline_for_a_robot_that_does_not_rest():
     assert [doubtful for _, doubtful in ended] == [[robot.peer]]
 
 
-def test_a_released_robot_is_not_stopped_any_more():
+def test_a_motion_after_the_release_ends_the_zeros_of_the_stop():
     with Clock().is_the_drivers() as clock:
         robot = make_moving(clock, "both controllers")
         stop(robot)
         robot.is_stopped = False
-        robot.stops.release()
         written = len(robot.writes)
-        robot.drive(0.1)
+        robot.publish_velocity(0.1)
         clock.run(5.0)
     assert len(robot.writes) == written + 1
     assert robot.writes[-1][0] - robot.writes[-2][0] > 0.05, "a motion within the firmware's gate of a stop"

@@ -3,8 +3,10 @@
 import pytest
 
 from hero_driver.commands.stop_progress import (
-    REPORT_AFTER_S,
+    SILENT_AFTER_S,
+    STOPS_UNREAD,
     TIRED_AFTER_S,
+    UNREAD_AFTER_S,
     StopProgress,
     StopState,
 )
@@ -16,13 +18,18 @@ STEP_S = 0.002
 
 
 class Robot:
-    """A robot whose wheels turn at the speed that turns(now_s) gives (ticks per second), read 29 times a second."""
+    """A robot whose wheels turn at the speed that turns(now_s) gives (ticks per second), read 29 times a second.
 
-    def __init__(self, turns, reads=True, is_acknowledged=lambda now_s: True, warm_up=0):
+    Readings made before held_until_s come all at once then.
+    """
+
+    def __init__(self, turns, reads=True, is_acknowledged=lambda now_s: True, warm_up=0, held_until_s=0.0):
         self.wheels = WheelMotion()
         self.turns = turns
         self.reads = reads
         self.is_acknowledged = is_acknowledged
+        self.held_until_s = held_until_s
+        self.held = []
         self.ticks = 0.0
         self.now_s = 100.0
         self.next_reading_s = 100.0
@@ -40,7 +47,11 @@ class Robot:
                 self.next_reading_s += READING_S
                 self.ticks += self.turns(self.now_s - 100.0) * READING_S
                 if self.reads:
-                    self.wheels.read_ticks(self.ticks, self.ticks)
+                    self.held.append(self.ticks)
+            if self.now_s >= 100.0 + self.held_until_s:
+                for ticks in self.held:
+                    self.wheels.read_ticks(ticks, ticks)
+                del self.held[:]
             if self.stop.is_due(self.is_acknowledged(self.now_s - 100.0), self.now_s):
                 burst = self.stop.needs_burst(tunes, self.now_s)
                 self.stop.note_sent(burst, self.now_s)
@@ -94,15 +105,33 @@ def test_wheels_that_are_pushed_after_rest_are_seen_and_stopped_again():
 
 def test_a_robot_without_readings_is_told_for_two_cycles_and_unconfirmed():
     robot = Robot(lambda now_s: 0.0, reads=False)
-    assert robot.run(20.0) == [StopState.STOPPING, StopState.UNCONFIRMED]
+    assert robot.run(UNREAD_AFTER_S - 0.1) == [StopState.STOPPING]
+    assert robot.run(20.0)[-1] is StopState.UNCONFIRMED
+    assert len(robot.sent_s) == STOPS_UNREAD
     assert 2 * READ_CYCLE_S <= robot.sent_s[-1] < 0.2
 
 
 def test_a_robot_without_new_readings_is_unconfirmed_until_they_come():
     robot = Robot(lambda now_s: 0.0, reads=False, warm_up=20)
-    assert robot.run(REPORT_AFTER_S + 0.5) == [StopState.STOPPING, StopState.UNCONFIRMED]
+    assert robot.run(SILENT_AFTER_S + 0.5) == [StopState.STOPPING, StopState.UNCONFIRMED]
     robot.reads = True
-    assert robot.run(REPORT_AFTER_S + 1.0)[-1] is StopState.AT_REST
+    assert robot.run(SILENT_AFTER_S + 1.0)[-1] is StopState.AT_REST
+
+
+@pytest.mark.parametrize("held_until_s", [0.9, 1.1, 1.5, 1.9])
+def test_a_robot_at_rest_whose_readings_come_late_is_never_called_moving(held_until_s):
+    robot = Robot(lambda now_s: 186.0 if now_s < 0.35 else 0.0, warm_up=20, held_until_s=held_until_s)
+    assert robot.run(3.0) == [StopState.STOPPING, StopState.AT_REST]
+    assert not any(robot.bursts)
+
+
+def test_readings_of_before_the_stop_that_come_late_do_not_call_it_moving():
+    robot = Robot(lambda now_s: 0.0)
+    robot.held = [6.0 * number for number in range(60)]
+    robot.ticks = robot.held[-1]
+    robot.held_until_s = 0.05
+    assert robot.run(3.0) == [StopState.STOPPING, StopState.AT_REST]
+    assert not any(robot.bursts)
 
 
 def test_no_stops_pile_up_in_front_of_a_robot_that_acknowledges_nothing():
@@ -120,11 +149,37 @@ def test_a_robot_that_tunes_itself_gets_bursts_from_the_first_stop_on():
     assert all(later - earlier >= 0.15 for earlier, later in zip(robot.sent_s, robot.sent_s[1:]))
 
 
-def test_wheels_that_zeros_do_not_stop_get_bursts_too():
+def list_burst_times(robot):
+    return [sent_s for sent_s, burst in zip(robot.sent_s, robot.bursts) if burst]
+
+
+def test_wheels_that_go_on_without_slowing_down_get_a_burst_after_0_8_s():
     robot = Robot(lambda now_s: 186.0)
-    robot.run(1.0)
-    assert not robot.bursts[0]
-    assert all(robot.bursts[-2:])
+    robot.run(3.0)
+    first_s, second_s = list_burst_times(robot)[:2]
+    assert 0.8 <= first_s < 1.3
+    assert second_s - first_s >= 0.8
+
+
+@pytest.mark.parametrize(
+    "turns",
+    [
+        lambda now_s: 186.0 if now_s < 0.35 else 0.0,
+        lambda now_s: 186.0 * max(0.0, 1.0 - now_s),
+        lambda now_s: 372.0 if now_s < 0.6 else 0.0,
+    ],
+    ids=["an ordinary stop", "wheels that slow down", "a late stop"],
+)
+def test_wheels_that_come_to_rest_by_themselves_get_no_burst(turns):
+    robot = Robot(turns, warm_up=20)
+    assert robot.run(3.0)[-1] is StopState.AT_REST
+    assert not any(robot.bursts)
+
+
+def test_no_burst_before_the_robot_has_acknowledged_a_stop():
+    robot = Robot(lambda now_s: 186.0, is_acknowledged=lambda now_s: now_s > 2.0)
+    robot.run(2.7)
+    assert not any(robot.bursts)
 
 
 def test_asking_again_brings_the_next_stop_forward():

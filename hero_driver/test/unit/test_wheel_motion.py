@@ -59,13 +59,6 @@ def test_counters_that_are_set_to_zero_are_no_turn():
     assert wheels.still_readings == REST_READINGS
 
 
-def test_a_new_connection_knows_nothing_of_the_last_one():
-    wheels = WheelMotion()
-    read_all(wheels, [(1.0, 1.0)] * 9)
-    wheels.restart()
-    assert (wheels.readings, wheels.still_readings) == (0, 0)
-
-
 @pytest.mark.parametrize("velocity", [(0.01, 0.0), (0.0, 0.2), (math.nan, 0.0)])
 def test_a_velocity_of_odometry_that_is_not_zero_is_a_turn(velocity):
     wheels = WheelMotion()

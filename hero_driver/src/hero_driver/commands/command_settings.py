@@ -9,6 +9,7 @@ class CommandSettings(NamedTuple):
     clamp: bool
     allow_self_tuning: bool
     orphan_stop_s: float
+    silent_stop_s: float
     service_timeout_s: float
     command_max_age_s: float
     max_names: int

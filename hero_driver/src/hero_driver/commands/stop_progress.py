@@ -1,11 +1,13 @@
 """The stop of one robot: when to send it, and what the robot's wheels show. Pure: times and readings go in.
 
-See stop_delivery for what is sent and why.
+See stop_delivery for what is sent and why. Wheels are judged by readings and by time since the robot acknowledged a
+stop: readings that a network or a busy PC delays come all at once, and an ordinary stop takes 0.25 to 0.35 s.
 """
 
 import enum
+from typing import NamedTuple, Optional
 
-from ..corrections.wheel_motion import REST_READINGS, WheelMotion
+from ..corrections.wheel_motion import MOVES_KEPT, REST_READINGS, WheelMotion
 
 STOPS_MIN = 4
 """A stop may meet a motion command in the same reading cycle of the robot; one in the next cycle then counts."""
@@ -17,14 +19,13 @@ they come within 50 ms of the last one that it took, do no harm."""
 STOPS_UNREAD = 6
 """So many are sent to a robot that gives no readings of its wheels."""
 
-RESTLESS_READINGS = 29
-"""Readings without a turn (1 s) after which wheels that turned though stopped are at rest again: slow creep shows."""
+MOVING_READINGS = 29
+"""Wheels that still turn after so many (1 s) are reported; wheels that turned though stopped are at rest again after as
+many without a turn: slow creep shows."""
 
-REPORT_AFTER_S = 1.0
-"""After this time without rest a stop is reported as one that did not succeed (yet)."""
-
-TUNING_AFTER_S = 0.4
-"""Wheels that still turn after this time may be of a robot that tunes itself without having said so."""
+UNREAD_AFTER_S = 1.0
+SILENT_AFTER_S = 2.0
+"""Without any reading of its wheels a robot's stop is unconfirmed after this time; without a new one after that."""
 
 TUNING_INTERVAL_S = 0.15
 """Between two stops to a robot that tunes itself, which needs 70 ms for each."""
@@ -34,6 +35,15 @@ STUBBORN_INTERVAL_S = 0.25
 TIRED_AFTER_S = 5.0
 TIRED_INTERVAL_S = 1.0
 """Wheels that go on turning, of a robot that somebody pushes perhaps, get fewer stops, but get them for ever."""
+
+
+READING_S = 0.034
+"""Between two readings, by the robot's time."""
+
+
+class _Mark(NamedTuple):
+    readings: int
+    now_s: float
 
 
 class StopState(enum.Enum):
@@ -61,12 +71,9 @@ class StopProgress:
         self._stops = 0
         self._next_s = now_s
         self._mark = wheels.readings
+        self._acknowledged: Optional[_Mark] = None  # when a stop first was
+        self._watched: Optional[_Mark] = None  # when one first was after the last burst
         self._rest_readings = REST_READINGS
-
-    @property
-    def is_first(self) -> bool:
-        """Whether no stop was sent yet."""
-        return self._stops == 0
 
     def renew(self, now_s: float) -> None:
         """Somebody asked once more: send the next stop at once, unless the wheels are at rest."""
@@ -82,26 +89,27 @@ class StopProgress:
         self._assess(is_acknowledged, now_s)
         if self.state is StopState.AT_REST or now_s < self._next_s:
             return False
-        if self.state is StopState.UNCONFIRMED and (
-            self._wheels.readings == 0 or now_s - self._began_s > TIRED_AFTER_S
-        ):
+        if self._wheels.readings == 0 and self._stops >= STOPS_UNREAD:
+            return False
+        if self.state is StopState.UNCONFIRMED and now_s - self._began_s > TIRED_AFTER_S:
             return False
         # The first one goes at once; more in front of a robot that takes nothing would only pile up.
         return is_acknowledged or self._stops == 0
 
     def needs_burst(self, tunes: bool, now_s: float) -> bool:
-        """Return whether the next stop has to be one that ends a self-tuning; tunes: whether the robot says so."""
-        return tunes or (
-            now_s - self._began_s >= TUNING_AFTER_S
-            and self._wheels.readings - self._mark > 0
-            and self._wheels.still_readings < REST_READINGS
-        )
+        """Return whether the next stop has to be one that ends a self-tuning.
+
+        tunes: whether that is known. If not, wheels tell that go on without slowing down for 0.8 s.
+        """
+        return tunes or (self._has_passed(self._watched, MOVES_KEPT, now_s) and self._wheels.go_on)
 
     def note_sent(self, was_burst: bool, now_s: float) -> None:
         """A stop was sent."""
         self._stops += 1
         if self._stops <= STOPS_MIN:
             self._mark = self._wheels.readings
+        if was_burst:
+            self._watched = None
         elapsed_s = now_s - self._began_s
         interval_s = TUNING_INTERVAL_S if was_burst else INTERVAL_S
         if elapsed_s >= TIRED_AFTER_S:
@@ -110,28 +118,34 @@ class StopProgress:
             interval_s = max(interval_s, STUBBORN_INTERVAL_S)
         self._next_s = now_s + interval_s
 
+    def _has_passed(self, mark: Optional[_Mark], readings: int, now_s: float) -> bool:
+        """Return whether so many readings came since mark, and the time that they take has passed."""
+        return (
+            mark is not None
+            and self._wheels.readings - mark.readings >= readings
+            and now_s - mark.now_s >= readings * READING_S
+        )
+
     def _assess(self, is_acknowledged: bool, now_s: float) -> None:
         wheels = self._wheels
+        if is_acknowledged and self._stops > 0:
+            self._acknowledged = self._acknowledged or _Mark(wheels.readings, now_s)
+            self._watched = self._watched or _Mark(wheels.readings, now_s)
         if self.state is StopState.AT_REST:
             if wheels.still_readings < REST_READINGS:
                 self.state = StopState.MOVING
-                self._rest_readings = RESTLESS_READINGS
+                self._rest_readings = MOVING_READINGS
                 self._began_s = self._next_s = now_s
+                self._watched = None
             return
         fresh = wheels.readings - self._mark
-        if (
-            self._stops >= STOPS_MIN
-            and fresh >= REST_READINGS
-            and wheels.still_readings >= self._rest_readings
-        ):
+        is_still = wheels.still_readings >= self._rest_readings
+        if self._stops >= STOPS_MIN and fresh >= REST_READINGS and is_still:
             self.state = StopState.AT_REST
             wheels.settle()
             self._rest_readings = REST_READINGS
-        elif wheels.readings == 0:
-            if self._stops >= STOPS_UNREAD and is_acknowledged:
-                self.state = StopState.UNCONFIRMED
-        elif now_s - self._began_s >= REPORT_AFTER_S:
-            if wheels.still_readings < self._rest_readings and fresh > 0:
-                self.state = StopState.MOVING
-            elif self.state is not StopState.MOVING and is_acknowledged:
+        elif not is_still and self._has_passed(self._acknowledged, MOVING_READINGS, now_s):
+            self.state = StopState.MOVING
+        elif fresh == 0 and is_acknowledged and self.state is not StopState.MOVING:
+            if now_s - self._began_s >= (SILENT_AFTER_S if wheels.readings else UNREAD_AFTER_S):
                 self.state = StopState.UNCONFIRMED

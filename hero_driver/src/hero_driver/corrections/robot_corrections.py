@@ -78,14 +78,13 @@ class RobotCorrections:
         settings: CorrectionSettings,
         sinks: Mapping[str, Sink],
         add_transform: AddTransform,
-        wheels: WheelMotion,
     ) -> None:
         """Correct the messages of the robot in namespace.
 
         sinks: of the topics that were chosen or derived, by their names; add_transform takes transforms of all
-        robots; wheels is told of the encoder's readings, or of odometry where there is no encoder.
+        robots.
         """
-        self._wheels = wheels
+        self._wheels = WheelMotion()
         self._sinks = sinks
         self._add_transform = add_transform
         self._namespace = namespace
@@ -116,8 +115,12 @@ class RobotCorrections:
         self._odom_stamp_ns = -BURST_NS
         self._waiting: List[_Waiting] = []
 
-    def restart(self, rebooted: bool) -> None:
-        """A new connection begins; after a reboot the robot's counters begin anew too."""
+    def restart(self, rebooted: bool, wheels: WheelMotion) -> None:
+        """A new connection begins; after a reboot the robot's counters begin anew too.
+
+        wheels is told of the encoder's readings, or of odometry where there is no encoder.
+        """
+        self._wheels = wheels
         self._has_encoder = self._uses_estimate = self._hears_encoder = False
         self._is_first_reading = True
         self._encoder_stamp_ns = self._odom_stamp_ns = -BURST_NS

@@ -4,7 +4,9 @@ Rest is counted in readings (29 per second of the robot's own time), not in time
 network held back arrive all at once.
 """
 
+import collections
 import math
+from typing import Deque
 
 REST_TICKS = 1.0
 """A wheel at rest on the edge of a tick (0.54 mm) counts it back and forth."""
@@ -14,6 +16,9 @@ SETTLED_TICKS = 2.0
 
 REST_READINGS = 5
 """Readings without a turn after which wheels are at rest: 0.17 s; 6 mm/s and more would show."""
+
+MOVES_KEPT = 24
+"""Readings by which wheels are seen to go on: 0.8 s, more than twice what an ordinary stop takes."""
 
 LINEAR_REST_M_S = 0.002
 ANGULAR_REST_RAD_S = 0.05
@@ -34,17 +39,19 @@ class WheelMotion:
         self._has_anchor = False
         self._tolerance_ticks = REST_TICKS
         self._left_ticks = self._right_ticks = 0.0
+        self._moves: Deque[float] = collections.deque(maxlen=MOVES_KEPT)  # distance of each reading, of any unit
+
+    @property
+    def go_on(self) -> bool:
+        """Whether wheels turn and did not slow down by half in the last MOVES_KEPT readings."""
+        moves = list(self._moves)
+        half = len(moves) // 2
+        return self.still_readings < REST_READINGS and 2.0 * sum(moves[half:]) >= sum(moves[:half])
 
     def settle(self) -> None:
         """The wheels are at rest: from here on only a turn by more than SETTLED_TICKS counts."""
         self._has_anchor = False
         self._tolerance_ticks = SETTLED_TICKS
-
-    def restart(self) -> None:
-        """A new connection begins."""
-        self.readings = self.still_readings = 0
-        self._has_anchor = False
-        self._tolerance_ticks = REST_TICKS
 
     def forget_ticks(self) -> None:
         """The robot sets its counters to zero, which is no turn of a wheel."""
@@ -62,10 +69,12 @@ class WheelMotion:
             and self._has_anchor
         ):
             self.still_readings += 1
+            self._moves.append(0.0)
             return
         # Of the first reading nobody can tell.
         if self._has_anchor:
             self.still_readings = 0
+            self._moves.append(abs(left_ticks - self._left_ticks) + abs(right_ticks - self._right_ticks))
             self._tolerance_ticks = REST_TICKS
         self._has_anchor = True
         self._left_ticks, self._right_ticks = left_ticks, right_ticks
@@ -75,3 +84,4 @@ class WheelMotion:
         self.readings += 1
         is_still = abs(linear_m_s) <= LINEAR_REST_M_S and abs(angular_rad_s) <= ANGULAR_REST_RAD_S
         self.still_readings = self.still_readings + 1 if is_still else 0
+        self._moves.append(0.0 if is_still else abs(linear_m_s) + abs(angular_rad_s))

@@ -25,9 +25,8 @@ SUCCESS = 1
 class MasterWatch:
     """Looks every CHECK_INTERVAL_S whether the master still knows this node."""
 
-    def __init__(self, sentinel: str, on_restart: Callable[[], None], log: Callable[[str, str], None]) -> None:
-        """sentinel: a service that this node always has; on_restart() is called when the master was started again."""
-        self._on_restart = on_restart
+    def __init__(self, sentinel: str, log: Callable[[str, str], None]) -> None:
+        """sentinel: a service that this node always has."""
         self._sentinel = rospy.resolve_name(sentinel)
         self._log = log
         self._ended = threading.Event()
@@ -62,7 +61,6 @@ class MasterWatch:
                     self._log("info", "the ROS master answers again")
             elif not self._ended.is_set():
                 topics, services = self._register(master)
-                self._on_restart()
                 self._log(
                     "warn",
                     "the ROS master was started again: %d topics and %d services are registered anew; restart"

@@ -7,17 +7,27 @@ loop until it ends. After that rospy goes on by its own rules: it closes, or it 
 Source of the framing: ROS TCPROS, a 32-bit length before each message.
 """
 
+import fcntl
 import functools
 import socket
 import struct
+import termios
 import threading
-from typing import Any, Callable, Optional
+from typing import Any, Callable, FrozenSet, Optional
 
 import rospy
 from rospy.exceptions import TransportException, TransportTerminated
 
 from ..transport import EventLoop, Reader
-from .rospy_internals import count_read, find_connection, replace_reading, take_socket, unregister
+from .rospy_internals import (
+    count_read,
+    find_connection,
+    is_latched_before,
+    list_publishers,
+    replace_reading,
+    take_socket,
+    unregister,
+)
 
 READ_LENGTH = 4096
 """Read at once from one publisher: 78 velocities, so that one that floods does not delay the robots."""
@@ -25,7 +35,11 @@ READ_LENGTH = 4096
 MESSAGE_LENGTH_MAX = 1 << 20
 """A robot takes messages of 4 kB; a publisher that announces more than this does not speak TCPROS."""
 
+RESUMED_S = 0.5
+"""After a pause of the driver rospy's threads pass on within this time what they held."""
+
 _LENGTH = struct.Struct("<I")
+_INT = struct.Struct("i")
 
 
 def _drop(payload: bytes) -> None:
@@ -40,16 +54,27 @@ class RawSubscriber:
         receive: Callable[[bytes], None],
         loop: EventLoop,
         on_sender_lost: Callable[[], None] = lambda: None,
+        finds_old: bool = False,
     ) -> None:
-        """receive(payload) is called on the loop's thread, on_sender_lost() when the newest one's publisher left."""
+        """receive(payload) is called on the loop's thread, on_sender_lost() when the newest one's publisher left.
+
+        finds_old: whether is_old is wanted, which takes one more call to the ROS master.
+        """
         self.receive = receive
         self.on_sender_lost = on_sender_lost
         self.last_sender: Any = None  # connection of the newest message, where this module reads it
+        self.is_old = False  # whether the newest message may be from before the subscription, or a pause of the driver
+        self._name = ""
+        self._finds_old = finds_old
+        self._earlier: Optional[FrozenSet[str]] = frozenset()
         self._loop = loop
         self._subscriber: Any = None
 
     def open(self, name: str, raw_class: Any, queue_length: int) -> None:
         """Subscribe to the topic called name; asks the ROS master, so it may block."""
+        self._name = name
+        if self._finds_old:
+            self._earlier = list_publishers(name, raw_class._type)
         self._subscriber = rospy.Subscriber(
             name, raw_class, self._take, queue_size=queue_length, tcp_nodelay=True
         )
@@ -63,14 +88,15 @@ class RawSubscriber:
 
     def _take(self, message: Any) -> None:
         """A message came through rospy, on the thread of its publisher's connection."""
-        connection = find_connection(self._subscriber, message)
+        connection = find_connection(self._name, message)
         self._loop.call_soon(functools.partial(self.take, connection, message.data))
         if connection is not None:
             replace_reading(connection, functools.partial(self._hand_over, connection))
 
     def take(self, connection: Any, payload: bytes) -> None:
-        """Pass on one message that came on connection; on the loop's thread."""
+        """Pass on the first message that came on connection; on the loop's thread."""
         self.last_sender = connection
+        self.is_old = is_latched_before(connection, self._earlier) or self._loop.has_resumed_within(RESUMED_S)
         self.receive(payload)
 
     def _hand_over(self, connection: Any) -> None:
@@ -79,6 +105,8 @@ class RawSubscriber:
         if sock is None:
             raise TransportTerminated("closed")
         stream = MessageStream(self, connection, sock, rest)
+        if self._loop.has_resumed_within(RESUMED_S):
+            stream.resume()
         self._loop.add_reader(stream)
         stream.ended.wait()
         if stream.error is not None:
@@ -97,12 +125,20 @@ class MessageStream(Reader):
         self._connection = connection
         self._socket = sock
         self._rest = rest
+        self._old_length = 0  # of what is still to be read
         self.ended = threading.Event()
         self.error: Optional[OSError] = None
 
     def fileno(self) -> int:
         """Return the socket's file descriptor, the same one until close()."""
         return self._socket.fileno()
+
+    def resume(self) -> None:
+        """Take what the socket holds by now for old."""
+        answer = bytearray(_INT.size)
+        # How much can be read; its number is that of TIOCINQ (tcp(7)).
+        fcntl.ioctl(self._socket.fileno(), termios.FIONREAD, answer)
+        self._old_length = _INT.unpack(answer)[0]
 
     def read(self) -> bool:
         """Pass on the messages that have come; return whether the connection still stands."""
@@ -119,6 +155,8 @@ class MessageStream(Reader):
         if self._rest:
             data = self._rest + data
         subscriber = self._subscriber
+        old_end = self._old_length and self._old_length + len(self._rest)
+        self._old_length = max(0, self._old_length - length_read)
         position, end = 0, len(data)
         while end - position >= _LENGTH.size:
             length: int = _LENGTH.unpack_from(data, position)[0]
@@ -127,6 +165,7 @@ class MessageStream(Reader):
             start = position + _LENGTH.size
             if end - start < length:
                 break
+            subscriber.is_old = position < old_end
             position = start + length
             messages += 1
             subscriber.last_sender = self._connection

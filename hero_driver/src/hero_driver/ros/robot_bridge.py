@@ -13,17 +13,11 @@ from typing import Any, Callable, Dict, List, NamedTuple, Optional, Protocol, Se
 
 from ..commands.command_queue import CommandQueue
 from ..commands.command_settings import CommandSettings
+from ..commands.commander import Commander, Commanders
 from ..commands.service_requests import find_request_error, is_success, read_set_odom_pose
-from ..commands.velocity_shaper import (
-    STOP_PAYLOADS,
-    STOPPED_MOTORS,
-    ZERO_TWIST,
-    check_motor_pulses,
-    check_twist,
-)
+from ..commands.velocity_shaper import STOP_PAYLOADS, check_motor_pulses, check_twist
 from ..corrections import message_layouts
 from ..corrections.robot_corrections import TRANSFORMS, CorrectionSettings, RobotCorrections
-from ..corrections.wheel_motion import WheelMotion
 from ..fleet.namespaces import Identity
 from ..robot_constants import LONGEST_WATCHDOG_S
 from ..rosserial.session import Topic, TopicKind
@@ -48,6 +42,9 @@ TRANSFORM_TYPE = "tf2_msgs/TFMessage"
 TWIST_TYPE = "geometry_msgs/Twist"
 CALIBRATION_SUFFIX = "/pid_calibration"
 SET_ODOM_TYPE = "hero_msgs/SetOdom"
+
+LIGHT_SUFFIX = "/led"
+NO_LIGHT = bytes(16)
 
 TURNS_S = 1.0
 """A program that commands again so soon after another one has not ended; robots stop 2 s after the last command."""
@@ -88,7 +85,7 @@ class RobotBridge:
         self.identity = identity
         self.label = identity.namespace.lstrip("/")
         self.commands = CommandQueue(context.commands.command_max_age_s, threading.Lock())
-        self.wheels = WheelMotion()
+        self.light = NO_LIGHT
         self.refused_commands = 0
         self._owner = context.owner
         self._loop = context.loop
@@ -105,19 +102,19 @@ class RobotBridge:
             context.corrections,
             self._publishers,
             context.transforms.add,
-            self.wheels,
         )
         self._services: Dict[str, RobotService] = {}
         self._service_halves: Dict[Tuple[str, TopicKind], Topic] = {}
         self._ids: Dict[str, int] = {}
         self._layouts: Dict[str, Layout] = {}  # as declared last, of what the robot takes
         self._publisher_layouts: Dict[str, Layout] = {}  # and of what it sends
-        # Motion topic -> when motion, not a stop, was last offered, and on which topic of ROS.
-        self._commanded: Dict[str, Tuple[float, str]] = {}
+        self._commanders = Commanders()
         self._subscribers: Dict[str, RawSubscriber] = {}
-        self._commander: Any = None  # connection of the newest motion command
+        self._newest_sender: Any = None  # connection of the newest motion command, and the name of its node
+        self._newest_node = ""
         self._superseded = ("", -math.inf)  # name of the node that commanded before, and until when
         self._tuning_heard_s = -math.inf
+        self.was_told_to_tune = False
         self._names: Set[str] = set()
         self._subscribed_types: Dict[str, str] = {}
 
@@ -128,7 +125,8 @@ class RobotBridge:
         self._connection += 1
         self._ids.clear()
         self._service_halves.clear()
-        self.wheels.restart()
+        self._commanders = Commanders()
+        self.note_tuning(False)
         self._connected = True
 
     def detach(self, reason: str) -> None:
@@ -213,8 +211,6 @@ class RobotBridge:
                 self._ids.pop(name, None)
             elif name not in self._ids:
                 self._ids[name] = topic.info.topic_id
-                if self._owner.stopped and self.is_motion(name):
-                    self._owner.stop_robot(self)
 
         def do() -> None:
             is_usable = register()
@@ -294,46 +290,51 @@ class RobotBridge:
         """Return whether messages on the topic called name move the robot."""
         return self._subscribed_types.get(name) in STOP_PAYLOADS
 
-    def list_stops(self, pulses: int) -> List[Tuple[int, bytes]]:
-        """Return ids and payloads that stop the robot, in the order in which it has to get them.
-
-        pulses: how many servo pulses of 1500 us to put in front; a robot that takes no Twist gets one at least.
-        """
-        twists, motors = [], []
-        for name, topic_id in self._ids.items():
-            ros_type = self._subscribed_types.get(name)
-            if ros_type == TWIST_TYPE:
-                twists.append((topic_id, ZERO_TWIST))
-            elif ros_type == MOTOR_TYPE:
-                motors.append((topic_id, STOPPED_MOTORS))
-        return motors * (pulses if twists else max(1, pulses)) + twists
-
     def forget_motion(self) -> None:
         """Drop the motion commands that wait: the robot is being stopped."""
-        self._commanded.clear()
+        self._commanders.stop()
         self.commands.discard_motion(time.monotonic())
+
+    def resume(self, now_s: float) -> None:
+        """The driver runs again after a pause: what waits is old, and silence counts from now on."""
+        self.commands.discard_motion(now_s)
+        self._commanders.forgive_silence(now_s)
 
     @property
     def is_commanded(self) -> bool:
         """Whether a program has asked for motion, and not for a stop, since the last forget_motion()."""
-        return bool(self._commanded)
+        return self._commanders.are_moving
+
+    def stop_if_silent(self, now_s: float) -> None:
+        """Stop the robot if the program that commands it regularly has fallen silent: it hangs, or its network does."""
+        silent = self._commanders.find_silent(self._settings.silent_stop_s, now_s)
+        if silent is not None and self._settings.silent_stop_s > 0.0:
+            silence_s = now_s - silent.commanded_s
+            text = "%s is stopped: %s, which commands it regularly, has been silent for %.1f s (~silent_stop_s)"
+            self._log.log_throttled(
+                "warn", "silent " + self.label, text % (self.label, silent.node or "a program", silence_s)
+            )
+            self._owner.stop_robot(self)
 
     # Self-tuning.
 
     def note_tuning(self, tunes: bool) -> None:
-        """The robot said that it tunes itself, or that it has ended that."""
+        """The robot said that it tunes itself, or it is known that it has ended that."""
         self._tuning_heard_s = time.monotonic() if tunes else -math.inf
+        self.was_told_to_tune = self.was_told_to_tune and tunes
 
     def tunes(self, now_s: float) -> bool:
-        """Return whether the robot tunes itself, as far as its log tells."""
-        return now_s - self._tuning_heard_s < TUNING_HEARD_S
+        """Return whether the robot tunes itself, as far as its log and the calls to its services tell."""
+        return self.was_told_to_tune or now_s - self._tuning_heard_s < TUNING_HEARD_S
 
     # A ROS program sent a message for the robot.
 
     def _make_subscriber(self, name: str, source: str, ros_type: str) -> RawSubscriber:
         """Return the subscriber to source, which is name or an alias of it."""
         receive = self._choose_receiver(name, source, ros_type)
-        subscriber = RawSubscriber(receive, self._loop, functools.partial(self._lose_sender, name, source))
+        subscriber = RawSubscriber(
+            receive, self._loop, functools.partial(self._lose_sender, name, source), ros_type in STOP_PAYLOADS
+        )
         self._subscribers[source] = subscriber
         return subscriber
 
@@ -364,27 +365,37 @@ class RobotBridge:
                 "%s: a command on %s is not finite and was refused; correct the program that sends it"
                 % (self.label, source),
             )
-            if name in self._commanded:
+            if self._commanders.find(name) is not None or self.tunes(time.monotonic()):
                 # It must not go on with what it was told before.
                 self._owner.stop_robot(self)
-        elif not self._connected or (self._owner.stopped and command != stop_payload):
+            return
+        moves, subscriber = command != stop_payload, self._subscribers[source]
+        if moves and subscriber.is_old:
+            self.refused_commands += 1
+            self._log.log_throttled(
+                "warn",
+                "old " + source,
+                "%s: a command on %s was refused, because it may be from before the robot, or the driver, was there"
+                " or ran; send it again" % (self.label, source),
+            )
+        elif not self._connected or (moves and self._owner.stopped):
             self.refused_commands += 1
         else:
             now_s = time.monotonic()
-            sender = self._subscribers[source].last_sender
-            if sender is not self._commander:
-                self._change_commander(sender, now_s)
-            if command != stop_payload:
-                self._commanded[name] = (now_s, source)
-            else:
-                self._commanded.pop(name, None)
+            sender = subscriber.last_sender
+            if sender is not self._newest_sender:
+                self._change_sender(sender, now_s)
+            commander = self._commanders.note_command(name, Commander(sender, self._newest_node, source), moves, now_s)
+            if not moves and (self.tunes(now_s) or self._commanders.has_more_to_stop(commander, now_s)):
+                self._owner.stop_robot(self)
+                return
             self.commands.offer_motion(name, command, stop_payload, now_s)
             self._owner.send_commands(self)
 
-    def _change_commander(self, sender: Any, now_s: float) -> None:
+    def _change_sender(self, sender: Any, now_s: float) -> None:
         """Another connection brings the newest command: warn if two programs take turns, not one follows another."""
-        before, after = read_caller(self._commander), read_caller(sender)
-        self._commander = sender
+        before, after = self._newest_node, read_caller(sender)
+        self._newest_sender, self._newest_node = sender, after
         if not before or not after or before == after:
             return
         if after == self._superseded[0] and now_s - self._superseded[1] < TURNS_S:
@@ -398,12 +409,15 @@ class RobotBridge:
 
     def _lose_sender(self, name: str, source: str) -> None:
         """The program that sent the newest command on source has gone (thread of the sockets)."""
-        commanded = self._commanded.get(name)
-        if commanded is None or commanded[1] != source or time.monotonic() - commanded[0] > LONGEST_WATCHDOG_S:
+        commander = self._commanders.find(name)
+        if commander is None or commander.source != source:
+            return
+        if time.monotonic() - commander.commanded_s > LONGEST_WATCHDOG_S:
             return
 
         def stop_orphan() -> None:
-            if self._commanded.get(name) == commanded:
+            # Any newer command is another commander's.
+            if self._commanders.find(name) is commander:
                 self._owner.stop_robot(self)
 
         self._loop.call_later(self._settings.orphan_stop_s, stop_orphan)
@@ -412,6 +426,8 @@ class RobotBridge:
         if not self._connected:
             self.refused_commands += 1
             return
+        if name.endswith(LIGHT_SUFFIX) and len(payload) == len(NO_LIGHT):
+            self.light = payload
         self.commands.offer(name, payload)
         self._owner.send_commands(self)
 
@@ -430,7 +446,7 @@ class RobotBridge:
                 )
             if self._owner.stopped:
                 return "it moves the robot, and all robots are stopped (~stop)"
-            self.note_tuning(True)
+            self.was_told_to_tune = True
         self.commands.offer(name, request)
         self._owner.send_commands(self)
         return None

@@ -9,8 +9,9 @@ import socket
 import threading
 import time
 import traceback
-from typing import Any, Callable, List, NamedTuple, Sequence, Tuple
+from typing import Any, Callable, FrozenSet, List, NamedTuple, Optional, Sequence, Tuple
 
+import rosgraph
 import rospy
 from rosgraph_msgs.msg import Log
 from rospy.impl import rosout, tcpros_pubsub
@@ -98,12 +99,32 @@ def send(connection: Any, data: bytes) -> bytes:
     return data[sent:]
 
 
-def find_connection(subscriber: Any, message: Any) -> Any:
-    """Return the connection on which a message came to a subscriber; None where rospy has to read it on.
+def list_publishers(name: str, message_type: str) -> Optional[FrozenSet[str]]:
+    """Register as a subscriber of a topic; return the URIs of the nodes that publish it already, None if not known.
+
+    To be called before rospy subscribes, which registers again. Asks the ROS master, so it may block.
+    """
+    try:
+        uris = rosgraph.Master(rospy.get_name()).registerSubscriber(name, message_type, rospy.get_node_uri())
+    except (rosgraph.MasterException, OSError):
+        return None
+    return frozenset(uris)
+
+
+def is_latched_before(connection: Any, earlier: Optional[FrozenSet[str]]) -> bool:
+    """Return whether the first message on a connection may be one that its publisher had latched before.
+
+    earlier: what list_publishers() gave. A publisher that came later latches nothing but what is new.
+    """
+    return connection is not None and connection.is_latched and (earlier is None or connection.endpoint_id in earlier)
+
+
+def find_connection(name: str, message: Any) -> Any:
+    """Return the connection on which a message came to the subscriber of a topic; None where rospy has to read it on.
 
     Where topic statistics are wanted (/enable_statistics), rospy has to see every message.
     """
-    impl = None if subscriber is None else subscriber.impl
+    impl = get_topic_manager().get_subscriber_impl(name)
     if impl is None or impl.statistics_logger is not None:
         return None
     for connection in impl.connections:

@@ -5,6 +5,7 @@ import errno
 import functools
 import heapq
 import itertools
+import math
 import os
 import queue
 import select
@@ -31,7 +32,7 @@ POLL_INTERVAL_S = 0.1
 """Sessions are polled this often for what is due (repeated requests, silence)."""
 
 PAUSE_S = 1.0
-"""Between two polls: after more, the driver was suspended, or its PC was too busy to run it."""
+"""Between two turns of the loop: after more, the driver or its PC was suspended, or too busy to run the loop."""
 
 CALLS_MAX = 10000
 """Calls of other threads that may wait: each of them has a bound of its own, so more come only if the loop hangs."""
@@ -73,6 +74,9 @@ class Reader:
         """Read what there is, without waiting; return whether to go on. On the loop's thread."""
         raise NotImplementedError
 
+    def resume(self) -> None:
+        """What can be read now may have come in a pause in which the loop did not run."""
+
     def close(self) -> None:
         """Let go of the socket: read() returned False or raised, or the loop ends."""
         raise NotImplementedError
@@ -92,7 +96,8 @@ class EventLoop(LinkOwner):
         self._readers: Set[Reader] = set()
         self._thread_id = 0
         self._turned_s = 0.0  # when the last turn ended
-        self._polled_s = 0.0  # when links were last polled
+        self._ran_s = math.inf  # when the loop was last seen to run, on a clock that goes on while the PC sleeps
+        self._resumed_s = -math.inf
         self._timers: List[Tuple[float, int, Callable[[], None]]] = []
         self._timer_numbers = itertools.count()
         self._calls = CallQueue(CALLS_MAX, self._wake, self._report_call)
@@ -122,7 +127,7 @@ class EventLoop(LinkOwner):
     def run(self) -> None:
         """Serve until stop(); then close everything."""
         self._thread_id = threading.get_ident()
-        self._turned_s = self._polled_s = time.monotonic()
+        self._turned_s = time.monotonic()
         try:
             while self._is_running:
                 self._run_once()
@@ -142,7 +147,9 @@ class EventLoop(LinkOwner):
             if timeout_s < 0.0:
                 timeout_s = 0.0
         serves = self._serves
-        for descriptor, mask in self._epoll.poll(timeout_s):
+        ready = self._epoll.poll(timeout_s)
+        self._look_for_pause()
+        for descriptor, mask in ready:
             # What was closed in this turn is not there. Where its number has gone to, there is a connection that was
             # accepted since, and reading it for nothing does no harm.
             serve = serves.get(descriptor)
@@ -153,6 +160,19 @@ class EventLoop(LinkOwner):
         now_s = self._turned_s = time.monotonic()
         while self._timers and self._timers[0][0] <= now_s:
             self._call(heapq.heappop(self._timers)[2])
+
+    def _look_for_pause(self) -> None:
+        """Tell the others of a pause in which this loop did not run, before anything is read that came meanwhile."""
+        ran_s, self._ran_s = self._ran_s, time.clock_gettime(time.CLOCK_BOOTTIME)
+        if self._ran_s - ran_s > PAUSE_S:
+            self._resumed_s = time.monotonic()
+            for reader in self._readers:
+                reader.resume()
+            self._handler.resume(self._resumed_s)
+
+    def has_resumed_within(self, duration_s: float) -> bool:
+        """Return whether a pause has just ended in which this loop did not run; from any thread."""
+        return time.monotonic() - self._resumed_s < duration_s
 
     def stop(self) -> None:
         """Let run() return; from any thread."""
@@ -281,6 +301,7 @@ class EventLoop(LinkOwner):
     def _serve_reader(self, reader: Reader, _mask: int) -> None:
         goes_on = False
         try:
+            self._look_for_pause()
             goes_on = reader.read()
         except Exception as error:  # noqa: BLE001 - as above
             self._handler.report_bug(error)
@@ -332,9 +353,6 @@ class EventLoop(LinkOwner):
     def _poll_links(self) -> None:
         self.call_later(POLL_INTERVAL_S, self._poll_links)
         now_s = time.monotonic()
-        if now_s - self._polled_s > PAUSE_S:
-            self._handler.resume(now_s)
-        self._polled_s = now_s
         for link in list(self._links.values()):
             if not link.closed:
                 self._handler.poll_link(link, now_s)

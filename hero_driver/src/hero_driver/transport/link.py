@@ -63,7 +63,7 @@ class LinkHandler:
         raise NotImplementedError
 
     def resume(self, now_s: float) -> None:
-        """The loop runs again after a pause in which it received nothing; called before poll_link()."""
+        """The loop runs again after a pause in which it received nothing; called before anything else."""
         raise NotImplementedError
 
     def report_bug(self, error: Exception) -> None:

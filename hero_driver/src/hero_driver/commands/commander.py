@@ -1,0 +1,119 @@
+"""Which programs command one robot on its motion topics, and how regularly. Pure."""
+
+import collections
+from typing import Any, Deque, Dict, Optional
+
+from ..robot_constants import LONGEST_WATCHDOG_S
+
+REGULAR_INTERVALS = 3
+"""Between four commands: from then on a program commands regularly. Fewer may be single commands."""
+
+INTERVALS_KEPT = 8
+"""Its period is the longest of these intervals: a program with jitter, or with pauses, is not taken for a hung one."""
+
+SILENT_PERIODS = 4
+
+RIVAL_SILENCE_S = 0.5
+"""A program that commands regularly, and did so within this time or SILENT_PERIODS, drives the robot at this moment."""
+
+
+class Commander:
+    """A publisher that commands a robot on one motion topic, while no other one does.
+
+    Attributes:
+        sender: its connection.
+        node: the name of its node, empty where that is not known.
+        source: the topic of ROS that it publishes on.
+        moves: whether its newest command moves the robot.
+        commanded_s: when that came.
+    """
+
+    def __init__(self, sender: Any, node: str, source: str) -> None:
+        self.sender = sender
+        self.node = node
+        self.source = source
+        self.moves = False
+        self.commanded_s = 0.0
+        self._intervals_s: Optional[Deque[float]] = None  # None before the first command
+
+    def note_command(self, moves: bool, now_s: float) -> None:
+        """Its next command came."""
+        interval_s = now_s - self.commanded_s
+        self.moves, self.commanded_s = moves, now_s
+        if self._intervals_s is None or interval_s > LONGEST_WATCHDOG_S:
+            self._intervals_s = collections.deque(maxlen=INTERVALS_KEPT)
+        else:
+            self._intervals_s.append(interval_s)
+
+    def forgive_silence(self, now_s: float) -> None:
+        """Count silence from now on: until now nothing could be heard."""
+        self.commanded_s = max(self.commanded_s, now_s)
+
+    def find_period_s(self) -> Optional[float]:
+        """Return the period of its commands, None while they are not known to be regular."""
+        intervals_s = self._intervals_s
+        return max(intervals_s) if intervals_s and len(intervals_s) >= REGULAR_INTERVALS else None
+
+    def has_fallen_silent(self, silence_s: float, now_s: float) -> bool:
+        """Return whether it commanded regularly, and has been silent for silence_s and for SILENT_PERIODS."""
+        period_s = self.find_period_s()
+        return period_s is not None and now_s - self.commanded_s >= max(silence_s, SILENT_PERIODS * period_s)
+
+
+class Commanders:
+    """The programs that command one robot: on each motion topic the one of the newest command."""
+
+    def __init__(self) -> None:
+        self._by_topic: Dict[str, Commander] = {}
+
+    def note_command(self, name: str, commander: Commander, moves: bool, now_s: float) -> Commander:
+        """A command came on the motion topic called name; return its commander, which may be known already."""
+        known = self._by_topic.get(name)
+        if known is None or (known.sender, known.source) != (commander.sender, commander.source):
+            known = self._by_topic[name] = commander
+        known.note_command(moves, now_s)
+        return known
+
+    def find(self, name: str) -> Optional[Commander]:
+        """Return what moves the robot on a motion topic, None where its newest command was a stop."""
+        commander = self._by_topic.get(name)
+        return commander if commander is not None and commander.moves else None
+
+    @property
+    def are_moving(self) -> bool:
+        """Whether a program has asked for motion, and not for a stop, since the last stop()."""
+        return any(commander.moves for commander in self._by_topic.values())
+
+    def stop(self) -> None:
+        """The robot is being stopped, whatever was commanded."""
+        for commander in self._by_topic.values():
+            commander.moves = False
+
+    def forgive_silence(self, now_s: float) -> None:
+        """Count silence from now on."""
+        for commander in self._by_topic.values():
+            commander.forgive_silence(now_s)
+
+    def find_silent(self, silence_s: float, now_s: float) -> Optional[Commander]:
+        """Return a program that moves the robot and has fallen silent, None if there is none."""
+        for commander in self._by_topic.values():
+            if commander.moves and commander.has_fallen_silent(silence_s, now_s):
+                return commander
+        return None
+
+    def has_more_to_stop(self, commander: Commander, now_s: float) -> bool:
+        """Return whether a stop of commander has to end motion of other topics than its own.
+
+        Not where another program drives the robot there at this moment.
+        """
+        others = [
+            other
+            for other in self._by_topic.values()
+            if other is not commander and other.moves and now_s - other.commanded_s < LONGEST_WATCHDOG_S
+        ]
+        return bool(others) and not any(
+            other.node != commander.node
+            and other.find_period_s() is not None
+            and not other.has_fallen_silent(RIVAL_SILENCE_S, now_s)
+            for other in others
+        )

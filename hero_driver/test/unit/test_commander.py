@@ -1,0 +1,173 @@
+"""Programs that command one robot: which of them hangs, and what a stop of one has to end."""
+
+import pytest
+from commanded_robot import MOTORS, POSITION, VELOCITY, Clock, CommandedRobot
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hero_driver.commands.velocity_shaper import STOPPED_MOTORS, ZERO_TWIST
+
+NAN_TWIST = bytes(6) + b"\xf8\x7f" + bytes(40)
+STOP_S = 0.5
+
+
+@pytest.mark.parametrize("name", [VELOCITY, POSITION])
+@pytest.mark.parametrize(("rate_hz", "stopped_s"), [(5, 0.8), (10, 0.5), (20, 0.5), (100, 0.5)])
+def test_a_regular_commander_that_falls_silent_is_stopped(name, rate_hz, stopped_s):
+    with Clock().is_the_drivers() as clock:
+        robot = CommandedRobot(clock, has_readings=True)
+        robot.publish_at(rate_hz, 2.0, name=name)
+        clock.run(stopped_s - 1.0 / rate_hz - 0.02)
+        assert robot.motors.is_turning
+        clock.run(STOP_S)
+        assert not robot.motors.is_turning
+    assert "/program, which commands it regularly, has been silent" in robot.lines[0]
+    assert len(robot.lines) == 1
+
+
+@pytest.mark.parametrize("commands", [1, 2, 3])
+def test_single_commands_keep_the_meaning_that_the_firmware_gives_them(commands):
+    with Clock().is_the_drivers() as clock:
+        robot = CommandedRobot(clock, has_readings=True)
+        robot.publish_at(10, 0.1 * commands)
+        clock.run(5.0)
+        assert robot.motors.is_turning
+    assert robot.lines == []
+
+
+def test_a_program_that_commands_once_a_second_is_left_to_the_firmware():
+    with Clock().is_the_drivers() as clock:
+        robot = CommandedRobot(clock, has_readings=True)
+        robot.publish_at(1, 10.0)
+        clock.run(2.9)
+        assert robot.motors.is_turning
+
+
+@given(pauses_s=st.lists(st.floats(0.0, 0.45), min_size=5, max_size=40))
+def test_a_program_with_jitter_is_never_taken_for_a_hung_one(pauses_s):
+    with Clock().is_the_drivers() as clock:
+        robot = CommandedRobot(clock, has_readings=True)
+        for pause_s in pauses_s:
+            robot.publish_velocity(0.1)
+            clock.run(pause_s)
+    assert robot.lines == []
+
+
+def test_bursts_of_commands_with_pauses_stop_the_robot_once_at_most():
+    with Clock().is_the_drivers() as clock:
+        robot = CommandedRobot(clock, has_readings=True)
+        for _ in range(10):
+            robot.publish_at(50, 0.1)
+            clock.run(0.9)
+    assert len(robot.lines) == 1
+
+
+def test_silence_does_not_count_while_the_driver_itself_did_not_run():
+    with Clock().is_the_drivers() as clock:
+        robot = CommandedRobot(clock, has_readings=True)
+        robot.publish_at(10, 2.0)
+        robot.bridge.resume(clock.now_s + 0.5)
+        clock.run(0.8)
+        assert robot.motors.is_turning
+        clock.run(0.2 + STOP_S)
+        assert not robot.motors.is_turning
+
+
+def test_of_two_programs_the_one_that_goes_on_keeps_the_robot_moving():
+    with Clock().is_the_drivers() as clock:
+        robot = CommandedRobot(clock, has_readings=True)
+        for _ in range(10):
+            for node in ("/first", "/second"):
+                robot.publish_velocity(0.1, node=node)
+            clock.run(0.1)
+        robot.publish_at(10, 3.0, node="/second")
+        assert robot.motors.is_turning
+    assert [line for line in robot.lines if "silent" in line] == []
+
+
+def test_a_commander_that_stopped_its_robot_may_be_silent():
+    with Clock().is_the_drivers() as clock:
+        robot = CommandedRobot(clock, has_readings=True)
+        robot.publish_at(10, 2.0)
+        robot.publish_velocity(0.0)
+        clock.run(10.0)
+    assert robot.lines == []
+
+
+# What a stop on one topic ends.
+
+
+@pytest.mark.parametrize("mover", [VELOCITY, POSITION, MOTORS])
+@pytest.mark.parametrize(("topic", "stop"), [(VELOCITY, ZERO_TWIST), (POSITION, ZERO_TWIST), (MOTORS, STOPPED_MOTORS)])
+@pytest.mark.parametrize("node", ["/program", "/other"])
+def test_a_stop_on_one_motion_topic_ends_what_came_through_another(mover, topic, stop, node):
+    with Clock().is_the_drivers() as clock:
+        robot = CommandedRobot(clock, has_readings=True)
+        payload = b"\x78\x05\x40\x06" if mover == MOTORS else bytes(6) + b"\xf0\x3f" + bytes(40)
+        robot.publish(mover, payload)
+        clock.run(1.0)
+        assert robot.motors.is_turning
+        robot.publish(topic, stop, node=node)
+        clock.run(STOP_S)
+        assert not robot.motors.is_turning
+
+
+def test_a_stop_leaves_what_another_program_drives_at_this_moment():
+    with Clock().is_the_drivers() as clock:
+        robot = CommandedRobot(clock, has_readings=True)
+        robot.publish_at(5, 2.0, name=POSITION, node="/other")
+        robot.publish_velocity(0.0)
+        clock.run(0.3)
+        assert robot.motors.is_turning
+        robot.publish_at(5, 1.0, name=POSITION, node="/other")
+        clock.run(3.0)
+        assert not robot.motors.is_turning, "the other program fell silent"
+
+
+def test_a_stop_that_repeats_itself_on_a_resting_robot_stays_two_packets():
+    with Clock().is_the_drivers() as clock:
+        robot = CommandedRobot(clock, has_readings=True)
+        clock.run(1.0)
+        robot.publish_velocity(0.0)
+        clock.run(2.0)
+    assert len(robot.writes) == 2
+
+
+@pytest.mark.parametrize("controller", ["velocity_controller", "position_controller"])
+@pytest.mark.parametrize("name", [VELOCITY, POSITION])
+@pytest.mark.parametrize("payload", [ZERO_TWIST, NAN_TWIST], ids=["zero", "NaN"])
+def test_an_ordinary_stop_ends_a_tuning_that_the_driver_knows_of(controller, name, payload):
+    with Clock().is_the_drivers() as clock:
+        robot = CommandedRobot(clock, has_readings=True)
+        clock.run(1.0)
+        calibration = "/hero_1/%s/pid_calibration" % controller
+        robot.bridge._ids[calibration] = 1000
+        assert robot.bridge._send_request(calibration, "std_srvs/Trigger", b"") is None
+        robot.motors.start_tuning(controller)
+        clock.run(2.0)
+        robot.publish(name, payload)
+        clock.run(1.0)
+        assert not robot.motors.is_turning
+        assert not robot.bridge.tunes(clock.now_s)
+
+
+def test_a_command_of_before_the_robot_was_there_does_not_move_it():
+    with Clock().is_the_drivers() as clock:
+        robot = CommandedRobot(clock, has_readings=True)
+        robot.publish_velocity(0.1, is_old=True)
+        clock.run(1.0)
+        assert robot.taken == []
+        assert "/hero_1/velocity_controller/cmd_vel was refused" in robot.lines[0]
+        robot.publish_velocity(0.0, is_old=True)
+        clock.run(1.0)
+        assert [speed for _, speed in robot.list_speeds()] == [0.0, 0.0]
+
+
+def test_after_a_pause_of_the_driver_a_command_that_waited_is_forgotten():
+    with Clock().is_the_drivers() as clock:
+        robot = CommandedRobot(clock, network_s=0.3, has_readings=True)
+        robot.publish_velocity(0.05)
+        robot.publish_velocity(0.1)
+        robot.bridge.resume(clock.now_s)
+        clock.run(2.0)
+    assert [speed for _, speed in robot.list_speeds()] == [0.05]
