@@ -42,6 +42,8 @@ ROOMS = {
     "hero_localization.mapping": {"errors", "filter"},
     "hero_localization.calibration": {"errors", "prints", "camera", "tracking", "filter"},
     "hero_localization.simulated_camera": {"errors", "prints"},
+    "hero_swarm.behaviors": {"behavior", "steering"},
+    "hero_swarm.metrics": set(),
 }
 PURE_ROOMS = (
     "hero_driver.rosserial",
@@ -81,6 +83,10 @@ PURE_ROOMS = (
     "hero_localization.prints",
     "hero_localization.stepped_localization",
     "hero_localization.tracking",
+    "hero_swarm.behavior",
+    "hero_swarm.behaviors",
+    "hero_swarm.metrics",
+    "hero_swarm.trial",
 )
 
 

@@ -29,6 +29,7 @@ ORDER = (
     "hero_recording",
     "hero_calibration",
     "hero_localization",
+    "hero_swarm",
     "hero_examples",
     "hero_bringup",
     "hero_tutorial",

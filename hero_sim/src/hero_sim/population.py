@@ -6,7 +6,7 @@ The same options give the same robots behind sockets and stepped in process.
 import argparse
 import copy
 import numbers
-from typing import List
+from typing import Any, List, Sequence
 
 import numpy as np
 
@@ -14,13 +14,14 @@ from .errors import OptionError
 from .link.wifi import PROFILES, Radio
 from .robot.servo_pins import CORE_2, CORE_3
 from .robot_constants import LARGEST_ID
-from .world.arena import build_default, place_robots
+from .world.arena import Arena, build_default, place_robots
 from .world.arena_file import load_arena
 from .world.robot_errors import RobotErrors, draw_errors, set_known
 from .world.world import World
 
 __all__ = [
     "SERVO_TIMINGS", "Rngs", "build_errors", "build_radios", "build_world", "check_population", "draw_servo_timing",
+    "place_worlds",
 ]  # fmt: skip
 
 MOST_ROBOTS = 1000
@@ -31,17 +32,32 @@ SERVO_TIMINGS = (CORE_2, CORE_3, _DRAWN)
 
 
 class Rngs:
-    """One stream of random numbers for each purpose, so that one more draw here does not change all others."""
+    """One stream of random numbers for each purpose, so that one more draw here does not change all others.
+
+    Attributes:
+        places, world, boot: streams, made when they are asked for: to make one takes longer than to place a robot.
+        robots, radios: a stream for each robot.
+    """
 
     def __init__(self, options: argparse.Namespace) -> None:
         """Derive all from options.seed."""
+        seeds = _reseed(options.seed).randint(0, 2**31 - 1, size=3 + 2 * options.count)
+        self._seeds = dict(zip(("places", "world", "boot"), seeds[:3]), robots=seeds[3::2], radios=seeds[4::2])
 
-        def make(seed: int) -> np.random.RandomState:
-            return np.random.RandomState(seed)
+    def __getattr__(self, name: str) -> Any:
+        if name not in self.__dict__.get("_seeds", ()):
+            raise AttributeError(name)
+        seeds = self._seeds[name]
+        return list(map(np.random.RandomState, seeds)) if np.ndim(seeds) else np.random.RandomState(seeds)
 
-        seeds = make(options.seed).randint(0, 2**31 - 1, size=3 + 2 * options.count)
-        self.places, self.world, self.boot = map(make, seeds[:3])
-        self.robots, self.radios = list(map(make, seeds[3::2])), list(map(make, seeds[4::2]))
+
+_SCRATCH = np.random.RandomState(0)
+
+
+def _reseed(seed: Any) -> np.random.RandomState:
+    """Return a stream for draws that are done before the next call: far faster than a new one."""
+    _SCRATCH.seed(seed)
+    return _SCRATCH
 
 
 def check_population(options: argparse.Namespace, worlds: int = 1) -> None:
@@ -68,7 +84,7 @@ def build_errors(options: argparse.Namespace) -> RobotErrors:
     """
     # By id, so that a robot is the same one in any swarm.
     ids = range(options.first_id, options.first_id + options.count)
-    rngs = [np.random.RandomState([options.seed, robot_id % 2**32]) for robot_id in ids]
+    rngs = (_reseed([options.seed, robot_id % 2**32]) for robot_id in ids)
     errors = draw_errors(rngs, 0.0 if options.perfect else 1.0)
     for text in options.error:
         set_known(errors, options.first_id, text)
@@ -94,6 +110,14 @@ def build_world(options: argparse.Namespace, worlds: int = 1) -> World:
     poses = [place_robots(arena, options.count, rng.places) for rng in rngs]
     errors = RobotErrors(*map(np.concatenate, zip(*map(build_errors, each))))
     return World(arena, np.concatenate(poses), [rng.world for rng in rngs], errors)
+
+
+def place_worlds(arena: Arena, poses: np.ndarray, seeds: Sequence[int], errors: float) -> World:
+    """Return one world of robots at poses (W, N, 3) for each seed; errors: 0 for robots as on the drawing, 1 usual."""
+    worlds, robots, _ = poses.shape
+    drawn = draw_errors((_reseed([seed, robot]) for seed in seeds for robot in range(robots)), errors)
+    rngs = [np.random.RandomState(seed) for seed in seeds]
+    return World(arena, poses.reshape(worlds * robots, 3), rngs, drawn)
 
 
 def build_radios(options: argparse.Namespace, worlds: int = 1) -> List[Radio]:

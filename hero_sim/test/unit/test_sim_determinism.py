@@ -16,7 +16,7 @@ STEPS = 6000
 COMMAND_STEPS = 40
 SCAN_STEPS = 20
 
-HASH = "fbebba403e712d37db83bcf67117ad83fcf44bc9a1f10c1d53656639a42e6ea3"
+HASH = "68733cbae075bd169c184d519b806492fc189d26c565d8777cd6b406af257cdc"
 """Of seed 7, with numpy 1.17 to 2.2 and with and without AVX2, AVX-512 and FMA."""
 
 

@@ -5,7 +5,7 @@ timers, which depend on the time alone, so that a world of a batch gives what it
 boot, self-tuning, the IMU hat, faults, and the time for which a command or a servo pulse (of core 3) blocks its loop.
 """
 
-from typing import Callable, List, Sequence
+from typing import Callable, List, Optional, Sequence
 
 import numpy as np
 
@@ -28,7 +28,7 @@ from ..robot_constants import (
     VELOCITY_WATCHDOG_MS,
 )
 from ..world.kinematics import split_to_wheels
-from ..world.world import STEP_MS, World
+from ..world.world import STEP_MS, View, World
 from .command_shaper import CommandShaper, Rows, Values
 from .proximity import correct_ranges, measure_ranges
 from .radio_rows import RadioRows
@@ -64,9 +64,6 @@ class RobotRows:
         world: ground truth.
         ticks: of both wheels since the odometry was last set (R, 2), whole numbers, read every 34 ms.
         odometry_ms: when the program received these (R,).
-        proximity_m: ranges from the robot's center (R, 8), front first, counter-clockwise; inf nothing in
-            range, 0 too close, nan not calibrated.
-        counts, ranges_m: of the eight sensors (R, 8) as in /laser, rear first.
         scan_ms: when the program received these (R,), every 205 ms.
         on_cycle, on_scan: called when the program has received odometry and ticks, and ranges.
     """
@@ -93,8 +90,8 @@ class RobotRows:
         self._encoders = WheelEncoders(world)
         self._odometry = TickOdometryRows(rows)
         self.ticks, self.odometry_ms = received.ticks, received.odometry_ms
-        self.counts, self.ranges_m = received.counts, received.ranges_m
-        self.proximity_m, self.scan_ms = received.proximity_m, received.scan_ms
+        self.scan_ms = received.scan_ms
+        self._view: Optional[View] = None  # of the newest scan, until somebody reads it
         self._servos = ServoPulses(world, np.rint(errors.servo_center_us.T))
         self._velocity = WheelControllers(rows, VELOCITY_GAINS, VELOCITY_LIMIT_US, VELOCITY_WATCHDOG_MS)
         self._position = WheelControllers(rows, POSITION_GAINS, POSITION_LIMIT_US, POSITION_WATCHDOG_MS)
@@ -162,6 +159,7 @@ class RobotRows:
 
     def set_infrared_calibration(self, row: int, constants_counts_m2: Sequence[float]) -> None:
         """Set the constants of the eight sensors of one robot, rear first; nan stands for not calibrated."""
+        self._read_scan()
         self._calibration_counts_m2[row] = constants_counts_m2
 
     @property
@@ -173,6 +171,24 @@ class RobotRows:
     def velocities(self) -> np.ndarray:
         """Linear m/s and angular rad/s in hero_N/base_link (R, 2), as the driver computes them from the ticks."""
         return self._odometry.measure_velocities().T if self._is_ideal else self._received.velocities
+
+    @property
+    def proximity_m(self) -> np.ndarray:
+        """Ranges from the robot's center (R, 8), front first, counter-clockwise.
+
+        inf nothing in range, 0 too close, nan not calibrated. Ask anew after advance().
+        """
+        return self._read_scan().proximity_m
+
+    @property
+    def ranges_m(self) -> np.ndarray:
+        """Ranges of the eight sensors (R, 8) as in /laser, rear first."""
+        return self._read_scan().ranges_m
+
+    @property
+    def counts(self) -> np.ndarray:
+        """Readings of the eight sensors (R, 8), rear first."""
+        return self._read_scan().counts
 
     # -- time passes -----------------------------------------------------------------------------------------
 
@@ -220,10 +236,10 @@ class RobotRows:
         has_scan = now_ms - self._scanned_ms > LASER_GATE_MS
         if has_scan:
             self._scanned_ms = now_ms
-            measured.counts[:] = self.world.read_infrared(self._rows)
-            measured.ranges_m[:] = measure_ranges(measured.counts, self._calibration_counts_m2)
-            measured.proximity_m[:] = correct_ranges(measured.ranges_m)
+            self._view = self.world.observe()
             measured.scan_ms[:] = now_ms
+            if not self._is_ideal:
+                self._read_scan()
         self._encoders.read(now_ms, True)
         measured.ticks[:] = self._encoders.ticks.T
         measured.odometry_ms[:] = now_ms
@@ -232,6 +248,16 @@ class RobotRows:
         if self._cycle_ms - self._scanned_ms > LASER_GATE_MS:
             self._cycle_ms += LASER_READ_MS
         return has_scan
+
+    def _read_scan(self) -> Readings:
+        """Compute the newest scan, which takes long, when somebody reads it; return what was received."""
+        if self._view is not None:
+            measured = self._measured
+            measured.counts[:] = self.world.read_infrared(self._rows, self._view)
+            measured.ranges_m[:] = measure_ranges(measured.counts, self._calibration_counts_m2)
+            measured.proximity_m[:] = correct_ranges(measured.ranges_m)
+            self._view = None
+        return self._received
 
     def _receive_readings(self, now_ms: int) -> None:
         for readings, rows, has_scan in self._radios.receive_readings(now_ms):

@@ -4,7 +4,7 @@
 calibration is in its flash, not here.
 """
 
-from typing import Dict, List, NamedTuple, Sequence
+from typing import Dict, Iterable, List, NamedTuple
 
 import numpy as np
 
@@ -82,14 +82,14 @@ class RobotErrors(NamedTuple):
     beta_counts: np.ndarray
 
 
-def draw_errors(rngs: Sequence[np.random.RandomState], scale: float = 1.0) -> RobotErrors:
+def draw_errors(rngs: Iterable[np.random.RandomState], scale: float = 1.0) -> RobotErrors:
     """Return usual differences: one robot drawn from each of rngs; with scale 0 all are as on the drawing.
 
     Sources: odometry off by 1.4 to 3.0 % of the path and alpha from 0.39 to 0.44 are published; that servos of
     one kind differ by some per cent and some microseconds is an assumption.
     """
     drawn = np.array([draw_normal(rng, (6 + BEAMS,)) for rng in rngs]) * scale
-    same = np.ones((len(rngs), 1))
+    same = np.ones((len(drawn), 1))
     return RobotErrors(
         servo_center_us=SERVO_CENTER_US + np.rint(6.0 * drawn[:, 0:2]),
         dead_zone_us=same * SERVO_DEAD_ZONE_US,

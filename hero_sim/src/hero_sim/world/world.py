@@ -7,7 +7,7 @@ only operations that IEEE 754 defines to the last bit, and random numbers are ro
 which the differences between mathematical libraries vanish.
 """
 
-from typing import List, Optional, Sequence, Tuple, Union
+from typing import List, NamedTuple, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from .noise import draw_normal
 from .range_sensors import BEAMS, NOISE_COUNTS, measure_signals
 from .robot_errors import MAX_WHEEL_M_S, SERVO_GAIN_M_S_US, RobotErrors
 
-__all__ = ["STEP_MS", "World"]
+__all__ = ["STEP_MS", "View", "World"]
 
 STEP_MS = 10
 """Length of a physics step; the fastest robot moves 3 mm in it, far less than its radius."""
@@ -34,6 +34,19 @@ _SCAN_ROWS = 200
 _REST_M_S = 1e-6
 
 Rows = Union[int, slice, np.ndarray]  # the number of one row, or several of them
+
+
+class View(NamedTuple):
+    """The bodies at one time, for sensors that are read later.
+
+    Attributes:
+        number: which view of the world it is; the noise of its readings depends on it alone.
+        places_m, headings: x and y, cosine and sine of all robots (R, 2).
+    """
+
+    number: int
+    places_m: np.ndarray
+    headings: np.ndarray
 
 
 class World:
@@ -60,6 +73,9 @@ class World:
         self.time_ms = 0
         self.errors = errors
         self._rngs = rngs
+        self._views = 0
+        self._scan_seeds = [int(rng.randint(0, 2**31 - 1)) for rng in rngs]
+        self._scan_rng = np.random.RandomState(0)
         self._bodies = BodyMotion(arena, self.worlds, np.array(poses, dtype=float).reshape(rows, 3).T.copy())
         self._poses = self._bodies.poses.T
         self._poses.flags.writeable = False
@@ -146,27 +162,36 @@ class World:
         """Return linear (m/s) and angular speed (rad/s) of each robot (R, 2), as its wheels have it."""
         return np.column_stack(join_wheels(*self._speeds))
 
-    def read_infrared(self, which: np.ndarray) -> np.ndarray:
+    def observe(self) -> View:
+        """Return where all bodies are now."""
+        self._views += 1
+        return View(self._views, self.poses[:, :2].copy(), self._bodies.headings.T.copy())
+
+    def read_infrared(self, which: np.ndarray, view: Optional[View] = None) -> np.ndarray:
         """Return one noisy reading (whole counts, 0..1023) of the eight sensors of the robots which, (K, 8).
 
-        which (K,): rows in ascending order, at least one.
+        which (K,): rows in ascending order, at least one. view: when it was taken; None for now.
         """
+        view = self.observe() if view is None else view
         parts = [which[start : start + _SCAN_ROWS] for start in range(0, len(which), _SCAN_ROWS)]
-        signals = np.concatenate([self._measure_signals(part) for part in parts])
+        signals = np.concatenate([self._measure_signals(part, view) for part in parts])
         # Each world draws for its own robots.
         counts = np.bincount(which // self._robots, minlength=self.worlds)
-        drawing = counts.nonzero()[0].tolist()
-        noise = np.concatenate([draw_normal(self._rngs[world], (counts[world], BEAMS)) for world in drawing])
-        counts_read = np.rint(signals + noise * NOISE_COUNTS)
+        noise = [self._draw_scan_noise(world, view, counts[world]) for world in counts.nonzero()[0].tolist()]
+        counts_read = np.rint(signals + np.concatenate(noise) * NOISE_COUNTS)
         # Adding zero turns -0.0 into 0.0, whose inverse is the right infinity.
         return np.minimum(np.maximum(counts_read, 0.0), 1023.0) + 0.0
 
-    def _measure_signals(self, which: np.ndarray) -> np.ndarray:
-        places_m = self.poses[:, :2]
+    def _draw_scan_noise(self, world: int, view: View, robots: int) -> np.ndarray:
+        """Return the noise of a view (robots, 8): motion is the same whether somebody reads it or not."""
+        self._scan_rng.seed((self._scan_seeds[world], view.number))
+        return draw_normal(self._scan_rng, (robots, BEAMS))
+
+    def _measure_signals(self, which: np.ndarray, view: View) -> np.ndarray:
         return measure_signals(
-            places_m[which],
-            self._bodies.headings.T[which],
-            places_m.reshape(self.worlds, self._robots, 2)[which // self._robots],
+            view.places_m[which],
+            view.headings[which],
+            view.places_m.reshape(self.worlds, self._robots, 2)[which // self._robots],
             self._walls,
             self.arena.circles_m,
             self.errors.alpha_counts_m2[which],

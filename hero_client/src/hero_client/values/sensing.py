@@ -1,0 +1,161 @@
+"""What robots sense of each other, computed from their poses: one function for each sensor.
+
+Pure: numpy only, over all robots of W worlds with N robots each; robots of different worlds never sense each other.
+Poses are (W, N, 3), x m, y m, yaw rad, in one frame; NaN for a robot whose pose is not known, which senses nothing
+and is not sensed. Only places count, so the order of the robots, and their ids, change nothing.
+"""
+
+import math
+from typing import Any, NamedTuple, Optional
+
+import numpy as np
+
+from .robot_constants import BODY_RADIUS_M
+
+__all__ = ["Binary", "Neighborhood", "Neighbors", "sense_binary", "sense_neighbors"]
+
+
+class Binary(NamedTuple):
+    """A sensor in the front rim that tells whether a beam or cone straight ahead touches another body."""
+
+    half_angle_rad: float = 0.0
+    """0 is a beam."""
+    range_m: float = math.inf
+    """To the surface of the other body."""
+    error: float = 0.0
+    """Probability that a reading is wrong."""
+
+
+class Neighbors(NamedTuple):
+    """A sensor that tells where other robots are, and how they are turned."""
+
+    range_m: float = math.inf
+    """Between the centers."""
+    field_rad: float = 2.0 * math.pi
+    """Width of the field of view, centered on the front."""
+    range_noise_m: float = 0.0
+    bearing_noise_rad: float = 0.0
+    """Standard deviations; the relative heading has that of the bearing."""
+    dropout: float = 0.0
+    """Probability that a neighbor is missed."""
+    occlusion: bool = False
+    """Whether bodies hide those behind them."""
+
+
+class Neighborhood(NamedTuple):
+    """What R robots sense of their neighbors; each array has one column for every robot of the same world (R, N).
+
+    Attributes:
+        seen: which neighbors are sensed; never the robot itself. The other arrays are 0 where it is False.
+        forward_m, left_m: places in the body frame.
+        heading_rad: relative to the robot's own, -pi..pi.
+        rows: row of the neighbor, for what robots tell each other.
+    """
+
+    seen: np.ndarray
+    forward_m: np.ndarray
+    left_m: np.ndarray
+    heading_rad: np.ndarray
+    rows: np.ndarray
+
+    @property
+    def range_m(self) -> np.ndarray:
+        """Distances between the centers (R, N)."""
+        return np.hypot(self.forward_m, self.left_m)
+
+    @property
+    def bearing_rad(self) -> np.ndarray:
+        """Directions, counter-clockwise from the front (R, N), -pi..pi."""
+        return np.arctan2(self.left_m, self.forward_m)
+
+    @property
+    def counts(self) -> np.ndarray:
+        """How many neighbors each robot senses (R,)."""
+        return self.seen.sum(axis=1)
+
+    def average(self, values: np.ndarray) -> np.ndarray:
+        """Return the mean of values (R, N) over the neighbors of each robot (R,); 0 without neighbors."""
+        return (values * self.seen).sum(axis=1) / np.maximum(self.counts, 1)
+
+
+def _look(poses: np.ndarray, forward_m: float) -> Any:
+    """Return where all robots are (W, N, N), to the front and to the left, from a point forward_m in front of each."""
+    x_m, y_m, yaw_rad = np.moveaxis(poses, -1, 0)
+    cosine, sine = np.cos(yaw_rad)[..., None], np.sin(yaw_rad)[..., None]
+    to_x_m, to_y_m = x_m[:, None, :] - x_m[..., None], y_m[:, None, :] - y_m[..., None]
+    return cosine * to_x_m + sine * to_y_m - forward_m, cosine * to_y_m - sine * to_x_m
+
+
+def sense_binary(poses: np.ndarray, sensor: Binary, random: Optional[Any] = None) -> np.ndarray:
+    """Return what each robot's sensor tells (W * N,).
+
+    random: needed for a sensor with errors; random.random() returns one number from 0 to 1 for each robot (W * N,).
+    """
+    ahead_m, left_m = _look(poses, BODY_RADIUS_M)
+    with np.errstate(invalid="ignore"):
+        square_m2 = ahead_m * ahead_m + left_m * left_m
+        # The tangents to a body span an angle whose sine is its radius over the distance of its center.
+        if sensor.half_angle_rad == 0.0:
+            touched = (np.abs(left_m) < BODY_RADIUS_M) & (ahead_m > 0.0)
+            depth_m = np.sqrt(np.maximum(BODY_RADIUS_M * BODY_RADIUS_M - left_m * left_m, 0.0))
+            gap_m = ahead_m - depth_m
+        else:
+            distance_m = np.sqrt(square_m2)
+            spread_rad = np.arcsin(np.minimum(BODY_RADIUS_M / np.maximum(distance_m, 1e-9), 1.0))
+            touched = np.abs(np.arctan2(left_m, ahead_m)) < sensor.half_angle_rad + spread_rad
+            gap_m = distance_m - BODY_RADIUS_M
+        touched &= gap_m <= sensor.range_m
+        touched |= square_m2 <= BODY_RADIUS_M * BODY_RADIUS_M
+    robots = poses.shape[1]
+    touched[:, np.arange(robots), np.arange(robots)] = False
+    sees = touched.any(axis=2).ravel()
+    if sensor.error > 0.0 and random is not None:
+        sees ^= random.random() < sensor.error
+    return sees & np.isfinite(poses).all(axis=2).ravel()
+
+
+def sense_neighbors(poses: np.ndarray, sensor: Neighbors, random: Optional[Any] = None) -> Neighborhood:
+    """Return what all W * N robots sense of their neighbors.
+
+    random: needed for noise and drop-outs; random.normal(N) and random.random(N) return arrays (W * N, N).
+    """
+    worlds, robots, _ = poses.shape
+    forward_m, left_m = _look(poses, 0.0)
+    with np.errstate(invalid="ignore"):
+        range_m = np.hypot(forward_m, left_m)
+        seen = range_m <= sensor.range_m
+        if sensor.field_rad < 2.0 * math.pi:
+            seen &= np.abs(np.arctan2(left_m, forward_m)) <= sensor.field_rad / 2.0
+    seen[:, np.arange(robots), np.arange(robots)] = False
+    if sensor.occlusion:
+        seen &= ~_find_hidden(forward_m, left_m, range_m)
+    seen = seen.reshape(-1, robots)
+    heading_rad = (poses[:, None, :, 2] - poses[:, :, None, 2]).reshape(-1, robots)
+    forward_m, left_m = forward_m.reshape(-1, robots), left_m.reshape(-1, robots)
+    if random is not None:
+        if sensor.dropout > 0.0:
+            seen &= random.random(robots) >= sensor.dropout
+        if sensor.range_noise_m > 0.0 or sensor.bearing_noise_rad > 0.0:
+            stretch = 1.0 + sensor.range_noise_m * random.normal(robots) / np.maximum(range_m.reshape(-1, robots), 1e-9)
+            off_rad = sensor.bearing_noise_rad * random.normal(robots)
+            cosine, sine = stretch * np.cos(off_rad), stretch * np.sin(off_rad)
+            forward_m, left_m = cosine * forward_m - sine * left_m, sine * forward_m + cosine * left_m
+            heading_rad = heading_rad + sensor.bearing_noise_rad * random.normal(robots)
+    heading_rad = heading_rad - 2.0 * math.pi * np.rint(heading_rad / (2.0 * math.pi))
+    rows = np.repeat(np.arange(worlds * robots).reshape(worlds, robots), robots, axis=0)
+    forward_m, left_m, heading_rad = (np.where(seen, values, 0.0) for values in (forward_m, left_m, heading_rad))
+    return Neighborhood(seen, forward_m, left_m, heading_rad, rows)
+
+
+def _find_hidden(forward_m: np.ndarray, left_m: np.ndarray, range_m: np.ndarray) -> np.ndarray:
+    """Return which robots (W, N, N) are behind the body of a third one: their centers are not in sight."""
+    safe_m = np.maximum(range_m, 1e-9)
+    ahead, across = forward_m / safe_m, left_m / safe_m
+    # Of robot k, seen by robot i in the direction of robot j: how far along, and how far aside.
+    along_m = ahead[..., None] * forward_m[:, :, None] + across[..., None] * left_m[:, :, None]
+    aside_m = ahead[..., None] * left_m[:, :, None] - across[..., None] * forward_m[:, :, None]
+    hides = (np.abs(aside_m) < BODY_RADIUS_M) & (along_m > 1e-9) & (along_m < range_m[..., None] - 1e-9)
+    robots = range_m.shape[1]
+    hides[:, :, np.arange(robots), np.arange(robots)] = False
+    result: np.ndarray = hides.any(axis=3)
+    return result

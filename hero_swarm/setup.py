@@ -1,0 +1,12 @@
+"""Python package of hero_swarm, for catkin_python_setup(); not to be run by hand."""
+
+from catkin_pkg.python_setup import generate_distutils_setup
+from setuptools import setup
+
+ROOMS = ("behaviors", "metrics")
+
+setup(
+    **generate_distutils_setup(
+        packages=["hero_swarm", *("hero_swarm." + room for room in ROOMS)], package_dir={"": "src"}
+    )
+)

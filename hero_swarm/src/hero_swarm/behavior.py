@@ -1,0 +1,126 @@
+"""What a behaviour is: a class with sensors, a rate, parameters with units, and step() for one robot or for all.
+
+Pure: numpy only. R robots are the rows of all arrays, world after world.
+
+    class Aggregation(Behavior):
+        sees = Binary()
+        v0_m_s, w0_rad_s = -0.108, -0.75  # nothing seen
+        v1_m_s, w1_rad_s = 0.0, -5.02     # a robot seen
+
+        def step(self, sensed, memory, random):
+            linear_m_s = np.where(sensed.sees, self.v1_m_s, self.v0_m_s)
+            angular_rad_s = np.where(sensed.sees, self.w1_rad_s, self.w0_rad_s)
+            return linear_m_s, angular_rad_s, memory
+"""
+
+import zlib
+from typing import Any, Dict, Optional, Sequence, Tuple
+
+import numpy as np
+
+from hero_client.values.sensing import Binary, Neighborhood, Neighbors, sense_binary, sense_neighbors
+
+__all__ = ["Behavior", "Binary", "Command", "Neighborhood", "Neighbors", "Random", "Sensed", "sense"]
+
+Command = Tuple[Any, Any, Any]
+"""linear m/s and angular rad/s, each a number or an array (R,), and the memory for the next step."""
+
+
+class Random:
+    """Random numbers for all robots: those of a world depend on its seed alone, not on the worlds beside it."""
+
+    def __init__(self, seeds: Sequence[int], robots: int) -> None:
+        """Begin one stream for each world with robots."""
+        self._streams = [np.random.RandomState(seed) for seed in seeds]
+        self._robots = robots
+
+    def _draw(self, name: str, columns: Optional[int]) -> np.ndarray:
+        shape = (self._robots,) if columns is None else (self._robots, columns)
+        return np.concatenate([getattr(stream, name)(shape) for stream in self._streams])
+
+    def random(self, columns: Optional[int] = None) -> np.ndarray:
+        """Return numbers from 0 to 1: one for each robot (R,), or so many (R, columns)."""
+        return self._draw("random_sample", columns)
+
+    def normal(self, columns: Optional[int] = None) -> np.ndarray:
+        """Return standard normal numbers: one for each robot (R,), or so many (R, columns)."""
+        return self._draw("standard_normal", columns)
+
+
+class Sensed:
+    """What R robots sense, as attributes: those below, and one for each sensor of the behaviour, by its name.
+
+    A Binary gives an array (R,) of bool, Neighbors a Neighborhood.
+
+    Attributes:
+        time_s: since the behaviour began.
+        is_known: whether each robot's own pose is known (R,); one whose pose is not known senses nothing.
+        poses: x m, y m, yaw rad (R, 3) in the common frame; NaN where it is not known.
+        numbers: each robot's number in its world, 0 to N - 1 (R,).
+        count: robots in each world, N.
+    """
+
+    def __init__(self, time_s: float, poses: np.ndarray, readings: Dict[str, Any]) -> None:
+        """Take the poses (W, N, 3) and the readings of all sensors by their names."""
+        worlds, self.count, _ = poses.shape
+        self.time_s = time_s
+        self.poses = poses.reshape(-1, 3)
+        self.is_known = np.isfinite(self.poses).all(axis=1)
+        self.numbers = np.tile(np.arange(self.count), worlds)
+        self._readings = readings
+
+    def __getattr__(self, name: str) -> Any:
+        try:
+            return self.__dict__["_readings"][name]
+        except KeyError:
+            raise AttributeError("the behaviour has no sensor %r" % name) from None
+
+
+class Behavior:
+    """One behaviour; subclasses say what it senses and does. Instances may set other parameters: Milling(rate_hz=10).
+
+    Attributes:
+        rate_hz: steps per second.
+        metric: name of the metric (hero_swarm.metrics) that shows how well it does.
+    """
+
+    rate_hz: float = 20.0
+    metric: str = "dispersion_ratio"
+
+    def __init__(self, **parameters: Any) -> None:
+        """Set parameters by name. Raises: TypeError for one that the behaviour does not have."""
+        for name, value in parameters.items():
+            if name.startswith("_") or not hasattr(self, name) or callable(getattr(self, name)):
+                raise TypeError("%s has no parameter %r; it has %s" % (type(self).__name__, name, self.parameters()))
+            setattr(self, name, value)
+
+    def parameters(self) -> Dict[str, Any]:
+        """Return all parameters and sensors with their values."""
+        names = [name for name in dir(self) if not name.startswith("_")]
+        return {name: getattr(self, name) for name in names if not callable(getattr(self, name))}
+
+    def sensors(self) -> Dict[str, Any]:
+        """Return the sensors by name."""
+        return {name: value for name, value in self.parameters().items() if isinstance(value, (Binary, Neighbors))}
+
+    def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:
+        """Return the commands of all robots and what to remember; memory is None in the first step."""
+        raise NotImplementedError
+
+    def colors(self, memory: Any) -> Optional[np.ndarray]:
+        """Return the color that each robot shows, red green blue from 0 to 1 (R, 3), or None."""
+        return None
+
+
+def sense(behavior: Behavior, time_s: float, poses: np.ndarray, random: Random) -> Sensed:
+    """Return what the sensors of a behaviour tell about poses (W, N, 3); NaN for those that are not known."""
+    readings: Dict[str, Any] = {}
+    for name, sensor in behavior.sensors().items():
+        read: Any = sense_binary if isinstance(sensor, Binary) else sense_neighbors
+        readings[name] = read(poses, sensor, random)
+    return Sensed(time_s, poses, readings)
+
+
+def derive_seed(seed: int, purpose: str) -> int:
+    """Return a seed for another stream of random numbers of the same world."""
+    return zlib.crc32(("%d %s" % (seed, purpose)).encode())

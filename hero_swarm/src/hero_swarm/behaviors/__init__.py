@@ -1,0 +1,66 @@
+"""The behaviours that come with the suite, by the names that programs and launch files take."""
+
+import importlib
+import importlib.util
+import inspect
+import os
+from typing import Dict, List, Type
+
+from ..behavior import Behavior
+
+__all__ = ["find_behavior", "list_names"]
+
+_MODULES: Dict[str, str] = {
+    "aggregation": "aggregation.Aggregation",
+    "evolved_aggregation": "binary_family.EvolvedAggregation",
+    "cyclic_pursuit": "binary_family.CyclicPursuit",
+    "dispersal": "binary_family.Dispersal",
+    "milling": "binary_family.Milling",
+    "wall_following": "binary_family.WallFollowing",
+    "flocking": "flocking.Flocking",
+    "dispersion": "spacing.Dispersion",
+    "segregation": "spacing.Segregation",
+    "rendezvous": "consensus.Rendezvous",
+    "leader_followers": "consensus.LeaderFollowers",
+    "formation": "consensus.Formation",
+    "coverage": "coverage.VoronoiCoverage",
+    "voter": "voting.Voter",
+    "majority": "voting.Majority",
+}
+
+
+def list_names() -> List[str]:
+    """Return the names of all behaviours."""
+    return sorted(_MODULES)
+
+
+def find_behavior(name: str) -> Type[Behavior]:
+    """Return a behaviour by its name, or by FILE.py or FILE.py:Class.
+
+    Raises: ValueError that says what there is.
+    """
+    if name in _MODULES:
+        module, class_name = _MODULES[name].split(".")
+        found: Type[Behavior] = getattr(importlib.import_module(__name__ + "." + module), class_name)
+        return found
+    path, _, class_name = name.partition(":")
+    if not path.endswith(".py"):
+        raise ValueError("behavior %r: must be FILE.py, FILE.py:Class, or one of %s" % (name, ", ".join(list_names())))
+    if not os.path.isfile(path):
+        raise ValueError("behavior %s: there is no such file" % path)
+    spec = importlib.util.spec_from_file_location("user_behavior", path)
+    if spec is None or spec.loader is None:
+        raise ValueError("behavior %s: is not a Python file" % path)
+    loaded = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(loaded)
+    classes = {
+        key: value for key, value in vars(loaded).items()
+        if inspect.isclass(value) and issubclass(value, Behavior) and value.__module__ == loaded.__name__
+    }  # fmt: skip
+    if class_name in classes:
+        return classes[class_name]
+    if class_name or len(classes) != 1:
+        raise ValueError(
+            "behavior %s: name one class as %s:CLASS; it has %s" % (name, path, ", ".join(sorted(classes)) or "none")
+        )
+    return next(iter(classes.values()))

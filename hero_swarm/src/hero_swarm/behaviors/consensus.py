@@ -1,0 +1,75 @@
+"""Behaviours by agreement with neighbors: rendezvous, leader and followers, formation by distances."""
+
+from typing import Any
+
+import numpy as np
+
+from ..behavior import Behavior, Command, Neighbors, Random, Sensed
+from ..steering import steer
+
+__all__ = ["Formation", "LeaderFollowers", "Rendezvous"]
+
+
+class Rendezvous(Behavior):
+    """Robots meet: each drives to the mean place of its neighbors (Olfati-Saber, Fax, Murray, Proc. IEEE 2007)."""
+
+    near = Neighbors(range_m=2.0)
+    metric = "consensus_error"
+    gain_1_s = 0.5
+    max_linear_m_s = 0.1
+
+    def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:
+        """See Behavior."""
+        near = sensed.near
+        forward_m_s, left_m_s = self.gain_1_s * near.average(near.forward_m), self.gain_1_s * near.average(near.left_m)
+        return (*steer(forward_m_s, left_m_s, self.max_linear_m_s), memory)
+
+
+class LeaderFollowers(Behavior):
+    """Robot 0 drives a wide circle; each of the others follows the robot numbered before it at gap_m."""
+
+    near = Neighbors()
+    metric = "consensus_error"
+    gap_m = 0.15
+    gain_1_s = 1.0
+    leader_m_s, leader_rad_s = 0.05, 0.08
+    max_linear_m_s = 0.12
+
+    def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:
+        """See Behavior."""
+        near, numbers = sensed.near, sensed.numbers
+        robots, leads = np.arange(len(numbers)), np.maximum(numbers - 1, 0)
+        ahead_m, left_m = near.forward_m[robots, leads], near.left_m[robots, leads]
+        range_m = np.maximum(np.hypot(ahead_m, left_m), 1e-6)
+        speed = self.gain_1_s * (range_m - self.gap_m) / range_m * near.seen[robots, leads]
+        linear_m_s, angular_rad_s = steer(np.maximum(speed * ahead_m, 0.0), speed * left_m, self.max_linear_m_s)
+        is_leader = numbers == 0
+        return (
+            np.where(is_leader, self.leader_m_s, linear_m_s),
+            np.where(is_leader, self.leader_rad_s, angular_rad_s),
+            memory,
+        )
+
+
+class Formation(Behavior):
+    """Robots take the distances of a regular polygon from each other, wherever and however turned it comes to lie.
+
+    Gradient of the squared errors of the squared distances (L. Krick, M. Broucke, B. Francis, Int. J. Control 2009).
+    """
+
+    near = Neighbors()
+    metric = "fatness"
+    side_m = 0.25
+    gain_1_m2s = 0.6
+    max_linear_m_s = 0.08
+
+    def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:
+        """See Behavior."""
+        near, count = sensed.near, sensed.count
+        radius_m = self.side_m / (2.0 * np.sin(np.pi / count))
+        steps = sensed.numbers[:, None] - np.arange(count)
+        wanted_m = 2.0 * radius_m * np.abs(np.sin(np.pi * steps / count))
+        off_m2 = (near.forward_m**2 + near.left_m**2 - wanted_m**2) * near.seen
+        forward_m_s = self.gain_1_m2s * (off_m2 * near.forward_m).sum(axis=1)
+        left_m_s = self.gain_1_m2s * (off_m2 * near.left_m).sum(axis=1)
+        return (*steer(forward_m_s, left_m_s, self.max_linear_m_s), memory)

@@ -1,0 +1,65 @@
+"""Behaviours by forces between neighbors: dispersion and segregation."""
+
+from typing import Any
+
+import numpy as np
+
+from ..behavior import Behavior, Command, Neighbors, Random, Sensed
+from ..steering import steer
+
+__all__ = ["Dispersion", "Segregation"]
+
+
+class Dispersion(Behavior):
+    """Robots repel each other until all are spacing_m apart (A. Howard et al., DARS 2002)."""
+
+    near = Neighbors(range_m=1.0)
+    metric = "nearest_neighbor"
+    spacing_m = 0.5
+    gain_1_s = 0.4
+    max_linear_m_s = 0.1
+
+    def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:
+        """See Behavior."""
+        near = sensed.near
+        range_m = np.maximum(near.range_m, 1e-6)
+        push = self.gain_1_s * np.maximum(self.spacing_m - range_m, 0.0) * near.seen / range_m
+        forward_m_s, left_m_s = -(push * near.forward_m).sum(axis=1), -(push * near.left_m).sum(axis=1)
+        return (*steer(forward_m_s, left_m_s, self.max_linear_m_s), memory)
+
+
+class Segregation(Behavior):
+    """Robots gather with those of their own group, and keep away from the others.
+
+    Differential potential (M. Kumar, D. Garg, V. Kumar, Segregation of heterogeneous units in a swarm of robotic
+    agents, IEEE TAC 2010): the distance at rest is own_m in a group and others_m between groups. A robot's group is its
+    number modulo groups; it shows it by its light.
+    """
+
+    near = Neighbors()
+    metric = "algebraic_connectivity"
+    groups = 2
+    own_m = 0.15
+    others_m = 1.0
+    gain_1_s = 0.1
+    wander_m_s = 0.03
+    max_linear_m_s = 0.1
+
+    def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:
+        """See Behavior; the memory is the group of each robot."""
+        near, group = sensed.near, sensed.numbers % self.groups
+        range_m = np.maximum(near.range_m, 1e-6)
+        is_own = group[near.rows] == group[:, None]
+        rest_m = np.where(is_own, self.own_m, self.others_m)
+        off_m = range_m - rest_m
+        force = self.gain_1_s * np.where(is_own, off_m, np.minimum(off_m, 0.0)) * near.seen / range_m
+        scale = 4.0 / np.maximum(near.counts, 1) ** 0.5
+        forward_m_s = scale * (force * near.forward_m).sum(axis=1) + self.wander_m_s * random.normal()
+        left_m_s = scale * (force * near.left_m).sum(axis=1) + self.wander_m_s * random.normal()
+        return (*steer(forward_m_s, left_m_s, self.max_linear_m_s), group)
+
+    def colors(self, memory: Any) -> np.ndarray:
+        """See Behavior."""
+        palette = np.array([(1, 0, 0), (0, 0, 1), (0, 1, 0), (1, 1, 0), (1, 0, 1), (0, 1, 1)], dtype=float)
+        shown: np.ndarray = palette[memory % len(palette)]
+        return shown

@@ -1,0 +1,54 @@
+"""Metrics of who is near whom. Pure: places (W, N, 2) in m; results (W,)."""
+
+import numpy as np
+
+from hero_client.values.robot_constants import BODY_RADIUS_M
+
+__all__ = ["algebraic_connectivity", "cluster_fraction", "collisions", "measure_distances", "nearest_neighbor"]
+
+
+def measure_distances(places_m: np.ndarray) -> np.ndarray:
+    """Return the distances (W, N, N) of all robots of each world; inf from a robot to itself."""
+    apart_m = np.sqrt(((places_m[:, :, None] - places_m[:, None]) ** 2).sum(axis=-1))
+    robots = np.arange(places_m.shape[1])
+    apart_m[:, robots, robots] = np.inf
+    return apart_m
+
+
+def cluster_fraction(places_m: np.ndarray, reach_m: float = 4.0 * BODY_RADIUS_M) -> np.ndarray:
+    """Return the share of robots in the largest cluster.
+
+    Two robots belong together if their centers are less than reach_m apart; by default no third robot fits between them
+    (M. Gauci et al., Self-organized aggregation without computation, IJRR 2014).
+    """
+    near = measure_distances(places_m) < reach_m
+    labels = np.tile(np.arange(places_m.shape[1]), (len(places_m), 1))
+    while True:
+        # The smallest number in a cluster spreads to all of it.
+        spread = np.minimum(labels, np.where(near, labels[:, None], labels.shape[1]).min(axis=2))
+        if (spread == labels).all():
+            break
+        labels = spread
+    sizes = (labels[:, :, None] == labels[:, None]).sum(axis=2).max(axis=1)
+    share: np.ndarray = sizes / places_m.shape[1]
+    return share
+
+
+def nearest_neighbor(places_m: np.ndarray) -> np.ndarray:
+    """Return the mean distance (m) between the centers of each robot and its nearest neighbor."""
+    distances_m: np.ndarray = measure_distances(places_m).min(axis=2).mean(axis=1)
+    return distances_m
+
+
+def algebraic_connectivity(places_m: np.ndarray, reach_m: float) -> np.ndarray:
+    """Return the second smallest eigenvalue of the graph of robots less than reach_m apart; 0 if it falls apart."""
+    near = (measure_distances(places_m) < reach_m).astype(float)
+    laplacian = near.sum(axis=2)[..., None] * np.eye(near.shape[1]) - near
+    values: np.ndarray = np.linalg.eigvalsh(laplacian)[:, 1]
+    return np.where(values < 1e-9, 0.0, values)
+
+
+def collisions(places_m: np.ndarray, tolerance_m: float = 0.0) -> np.ndarray:
+    """Return how many pairs of robots touch, or are less than tolerance_m apart."""
+    counts: np.ndarray = (measure_distances(places_m) < 2.0 * BODY_RADIUS_M + tolerance_m).sum(axis=(1, 2)) // 2
+    return counts

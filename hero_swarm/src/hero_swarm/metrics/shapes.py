@@ -1,0 +1,84 @@
+"""Metrics of the shape of a swarm. Pure: places (W, N, 2) in m; results (W,)."""
+
+import math
+from functools import lru_cache
+from typing import List, Tuple
+
+import numpy as np
+
+from hero_client.values.robot_constants import BODY_RADIUS_M
+
+__all__ = ["coverage", "dispersion", "dispersion_ratio", "fatness", "hull_area", "ideal_dispersion"]
+
+Point = Tuple[float, ...]
+
+
+def _distances_from_center(places_m: np.ndarray) -> np.ndarray:
+    off_m = places_m - places_m.mean(axis=1, keepdims=True)
+    return np.hypot(off_m[..., 0], off_m[..., 1])
+
+
+def dispersion(places_m: np.ndarray) -> np.ndarray:
+    """Return the sum of the distances (m) of all robots from their center."""
+    total_m: np.ndarray = _distances_from_center(places_m).sum(axis=1)
+    return total_m
+
+
+@lru_cache(maxsize=None)
+def ideal_dispersion(robots: int, radius_m: float = BODY_RADIUS_M) -> float:
+    """Return the least dispersion (m) of so many discs: the densest packing, around the best of its centers."""
+    reach = math.ceil(math.sqrt(robots)) + 2
+    rows, columns = np.meshgrid(np.arange(-reach, reach + 1), np.arange(-reach, reach + 1), indexing="ij")
+    lattice = np.column_stack(((columns + rows / 2.0).ravel(), (rows * math.sqrt(0.75)).ravel()))
+    # A disc, the middle between two, and the middle between three.
+    centers = np.array([(0.0, 0.0), (0.5, 0.0), (0.5, math.sqrt(0.75) / 3.0)])
+    sums = [np.sort(np.hypot(*(lattice - center).T))[:robots].sum() for center in centers]
+    return float(2.0 * radius_m * min(sums))
+
+
+def dispersion_ratio(places_m: np.ndarray) -> np.ndarray:
+    """Return the dispersion as a multiple of the least possible one."""
+    return dispersion(places_m) / ideal_dispersion(places_m.shape[1])
+
+
+def fatness(places_m: np.ndarray) -> np.ndarray:
+    """Return how far robots are from being on one circle around their center: 0 on it, 1 if one is in the middle."""
+    distances_m = _distances_from_center(places_m)
+    ratio: np.ndarray = distances_m.min(axis=1) / distances_m.max(axis=1)
+    return 1.0 - ratio * ratio
+
+
+def hull_area(places_m: np.ndarray) -> np.ndarray:
+    """Return the area (m2) of the convex hull of all centers."""
+    return np.array([_measure_hull(world_m) for world_m in places_m])
+
+
+def _measure_hull(points_m: np.ndarray) -> float:
+    """Return the area of a convex hull, found by the monotone chain (Andrew 1979)."""
+    order = np.lexsort((points_m[:, 1], points_m[:, 0]))
+    corners: List[Point] = []
+    for way in (points_m[order], points_m[order[::-1]]):
+        chain: List[Point] = []
+        for point in map(tuple, way.tolist()):
+            while len(chain) > 1 and _turn(chain[-2], chain[-1], point) <= 0.0:
+                chain.pop()
+            chain.append(point)
+        corners += chain[:-1]
+    x_m, y_m = np.array(corners).T
+    return abs(float(x_m @ np.roll(y_m, -1) - y_m @ np.roll(x_m, -1))) / 2.0
+
+
+def _turn(first: Point, second: Point, third: Point) -> float:
+    """Return twice the area of a triangle, positive if its corners go counter-clockwise."""
+    return (second[0] - first[0]) * (third[1] - first[1]) - (second[1] - first[1]) * (third[0] - first[0])
+
+
+def coverage(places_m: np.ndarray, bounds_m: np.ndarray, range_m: float, cell_m: float = 0.05) -> np.ndarray:
+    """Return the share of the area in bounds_m (x min, y min, x max, y max) within range_m of a robot."""
+    x_min, y_min, x_max, y_max = bounds_m
+    x_m, y_m = np.arange(x_min + cell_m / 2, x_max, cell_m), np.arange(y_min + cell_m / 2, y_max, cell_m)
+    to_x_m = x_m[None, :, None] - places_m[..., 0][:, None]
+    to_y_m = y_m[None, :, None] - places_m[..., 1][:, None]
+    near = (to_x_m**2)[:, :, None] + (to_y_m**2)[:, None] < range_m * range_m
+    share: np.ndarray = near.any(axis=3).mean(axis=(1, 2))
+    return share

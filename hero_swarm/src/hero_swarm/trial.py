@@ -1,0 +1,119 @@
+"""Runs a behaviour on stepped robots: many worlds at once, in virtual time. Pure.
+
+    trial = Trial(Milling(), arena=build_rectangle(1.71, 1.42, 1), robots=20, seeds=range(10))
+    for time_s, poses in trial.run(200.0):
+        print(time_s, rotation(poses[..., :2], trial.velocities))
+"""
+
+import math
+from collections import deque
+from typing import Any, Deque, Iterator, Optional, Sequence, Tuple
+
+import numpy as np
+
+from hero_client.values.robot_constants import BODY_RADIUS_M
+from hero_sim.population import place_worlds
+from hero_sim.stepped.robot_rows import RobotRows
+from hero_sim.world.arena import Arena
+
+from .behavior import Behavior, Random, derive_seed, sense
+
+__all__ = ["OPEN", "Trial", "scatter"]
+
+OPEN = Arena("open", np.empty((0, 4)), np.empty((0, 3)), (), np.array([-50.0, -50.0, 50.0, 50.0]))
+"""A plane without walls."""
+
+_MAX_TRIES = 20000
+
+
+def scatter(robots: int, width_m: float, height_m: float, seed: int, gap_m: float = 0.0) -> np.ndarray:
+    """Return poses (robots, 3) drawn uniformly in a rectangle around the origin, with gap_m between bodies.
+
+    Raises: ValueError if they find no place.
+    """
+    random = np.random.RandomState(derive_seed(seed, "places"))
+    half_m = np.array((width_m, height_m)) / 2.0 - BODY_RADIUS_M
+    poses = np.empty((robots, 3))
+    placed = 0
+    for _ in range(_MAX_TRIES):
+        if placed == robots:
+            return poses
+        x_share, y_share, turn = 2.0 * random.random_sample(3) - 1.0
+        place_m = half_m * (x_share, y_share)
+        if ((poses[:placed, :2] - place_m) ** 2).sum(axis=1).min(initial=np.inf) > (2.0 * BODY_RADIUS_M + gap_m) ** 2:
+            poses[placed] = (*place_m, math.pi * turn)
+            placed += 1
+    raise ValueError("%d robots find no place in %g m x %g m" % (robots, width_m, height_m))
+
+
+class Trial:
+    """One behaviour on W worlds with N robots each.
+
+    Attributes:
+        rows: the robots, as arrays.
+        poses: true poses (W, N, 3), as of the last control step.
+        velocities: how they changed since the control step before, per second (W, N, 3).
+        memory: what the behaviour remembers.
+    """
+
+    def __init__(
+        self,
+        behavior: Behavior,
+        arena: Arena = OPEN,
+        robots: int = 20,
+        seeds: Sequence[int] = (0,),
+        size_m: Optional[Tuple[float, float]] = None,
+        errors: float = 1.0,
+        delay_s: float = 0.0,
+        filter_commands: Any = None,
+    ) -> None:
+        """Scatter robots over size_m, or over the arena. Each seed is one world.
+
+        errors: 0 for robots as on the drawing, 1 for usual ones. delay_s: age of the poses that robots sense each
+        other by. filter_commands: called with poses (W, N, 3), linear and angular speeds (W, N), returns speeds.
+        """
+        x_min, y_min, x_max, y_max = arena.bounds_m
+        width_m, height_m = (x_max - x_min, y_max - y_min) if size_m is None else size_m
+        starts = np.array([scatter(robots, width_m, height_m, seed) for seed in seeds])
+        self.behavior = behavior
+        self.rows = RobotRows(place_worlds(arena, starts, seeds, errors))
+        self.poses, self.velocities = starts, np.zeros_like(starts)
+        self.memory: Any = None
+        self._random = Random([derive_seed(seed, "behavior") for seed in seeds], robots)
+        self._delay_s = delay_s
+        self._filter = filter_commands
+        self._seen: Deque[Tuple[float, np.ndarray]] = deque([(-math.inf, starts)])
+        self._all = np.arange(starts.shape[0] * robots)
+
+    def step(self) -> float:
+        """Take one control step, let its time pass, and return the time (s)."""
+        rows, now_s = self.rows, self.rows.now_ms / 1000.0
+        poses = rows.world.poses.reshape(self.poses.shape).copy()
+        self.velocities = (poses - self.poses) * self.behavior.rate_hz
+        self.poses = poses
+        self._seen.append((now_s, poses))
+        while len(self._seen) > 1 and self._seen[1][0] <= now_s - self._delay_s + 1e-9:
+            self._seen.popleft()
+        sensed_poses = self._seen[0][1]
+        sensed = sense(self.behavior, now_s, sensed_poses, self._random)
+        linear_m_s, angular_rad_s, self.memory = self.behavior.step(sensed, self.memory, self._random)
+        if self._filter is not None:
+            shape = self.poses.shape[:2]
+            speeds = (np.broadcast_to(values, self._all.shape).reshape(shape) for values in (linear_m_s, angular_rad_s))
+            linear_m_s, angular_rad_s = (values.ravel() for values in self._filter(sensed_poses, *speeds))
+        rows.send_velocity(self._all, linear_m_s, angular_rad_s)
+        colors = self.behavior.colors(self.memory)
+        if colors is not None:
+            rows.send_light(self._all, np.column_stack((colors, np.ones(len(colors)))))
+        rows.advance(rows.now_ms + round(1000.0 / self.behavior.rate_hz))
+        return rows.now_ms / 1000.0
+
+    def run(self, time_s: float, every_s: float = 1.0) -> Iterator[Tuple[float, np.ndarray]]:
+        """Yield the time (s) and the poses (W, N, 3) every so often, for so long."""
+        due_s = 0.0
+        while self.rows.now_ms < time_s * 1000.0 - 1e-6:
+            now_s = self.rows.now_ms / 1000.0
+            self.step()
+            if now_s >= due_s - 1e-9:
+                due_s += every_s
+                yield now_s, self.poses

@@ -1,0 +1,178 @@
+"""Each built-in behaviour by its metric, beside robots that stand still and robots that walk at random."""
+
+import inspect
+
+import numpy as np
+import pytest
+
+from hero_sim.world.arena import build_rectangle
+from hero_swarm import metrics
+from hero_swarm.behavior import Behavior
+from hero_swarm.behaviors import find_behavior, list_names
+from hero_swarm.behaviors.consensus import Formation, LeaderFollowers
+from hero_swarm.behaviors.coverage import VoronoiCoverage
+from hero_swarm.trial import OPEN, Trial
+
+ARENA = build_rectangle(1.71, 1.42, 1)
+SQUARE = build_rectangle(2.0, 2.0, 1)
+SEEDS = (1, 2)
+
+
+class StandingStill(Behavior):
+    def step(self, sensed, memory, random):
+        return np.zeros(len(sensed.poses)), np.zeros(len(sensed.poses)), memory
+
+
+class RandomWalk(Behavior):
+    def step(self, sensed, memory, random):
+        turn_rad_s = random.normal() if memory is None else 0.9 * memory + 0.5 * random.normal()
+        return np.full(len(turn_rad_s), 0.1), turn_rad_s, turn_rad_s
+
+
+def measure(behavior, metric, robots, time_s, arena=OPEN, size_m=(1.5, 1.5), last_s=30):
+    """Return the median of a metric (poses, velocities, trial) over the last seconds, for each seed."""
+    trial = Trial(behavior, arena, robots, SEEDS, size_m)
+    values = [
+        metric(poses, trial.velocities, trial) for time, poses in trial.run(time_s) if time >= time_s - last_s
+    ]
+    return np.median(values, axis=0)
+
+
+def by_name(name):
+    return lambda poses, velocities, trial: metrics.METRICS[name](poses, velocities)
+
+
+def measure_side_error(poses, velocities, trial):
+    """How far off a regular polygon its distances are, as a share of its side."""
+    robots = poses.shape[1]
+    sides_m = Formation.side_m * np.abs(np.sin(np.pi * np.arange(robots) / robots)) / np.sin(np.pi / robots)
+    off_m = [
+        np.hypot(*(poses[:, first, :2] - poses[:, second, :2]).T) - sides_m[second - first]
+        for first in range(robots) for second in range(first)
+    ]  # fmt: skip
+    return np.abs(off_m).max(axis=0) / Formation.side_m
+
+
+def measure_gap_error(poses, velocities, trial):
+    """How far off the gap each follower is at most, while the leader moves on."""
+    gaps_m = np.hypot(*np.moveaxis(np.diff(poses[..., :2], axis=1), -1, 0))
+    leads = np.hypot(*velocities[:, 0, :2].T) > 0.02
+    return np.where(leads, np.abs(gaps_m - LeaderFollowers.gap_m).max(axis=1), 9.0)
+
+
+def measure_mixing(poses, velocities, trial):
+    """The share of robots whose nearest neighbor is of another group."""
+    distances_m = np.hypot(*np.moveaxis(poses[:, :, None, :2] - poses[:, None, :, :2], -1, 0))
+    distances_m[:, np.arange(poses.shape[1]), np.arange(poses.shape[1])] = np.inf
+    return (distances_m.argmin(axis=2) % 2 != np.arange(poses.shape[1]) % 2).mean(axis=1)
+
+
+def measure_way_to_center(poses, velocities, trial):
+    """The mean distance of robots from the middles of their cells, as Lloyd's algorithm has it."""
+    grid_m = np.linspace(-0.975, 0.975, 40)
+    points_m = np.array(np.meshgrid(grid_m, grid_m)).reshape(2, -1).T
+    distances_m = []
+    for places_m in poses[..., :2]:
+        owner = ((points_m[:, None] - places_m) ** 2).sum(axis=2).argmin(axis=1)
+        middles_m = [points_m[owner == row].mean(axis=0) for row in range(len(places_m))]
+        distances_m.append(np.hypot(*(np.array(middles_m) - places_m).T).mean())
+    return np.array(distances_m)
+
+
+def measure_flock(poses, velocities, trial):
+    """Order, if the robots move on and stay together; else nothing."""
+    moves = np.hypot(*np.moveaxis(velocities[..., :2], -1, 0)).mean(axis=1) > 0.02
+    together = metrics.cluster_fraction(poses[..., :2], 0.8) > 0.9
+    return metrics.order(poses[..., 2]) * moves * together
+
+
+def measure_wall_time(poses, velocities, trial):
+    """The share of robots near a wall that drive."""
+    gaps_m = np.minimum(1.71 / 2.0 - np.abs(poses[..., 0]), 1.42 / 2.0 - np.abs(poses[..., 1]))
+    moves = np.hypot(*np.moveaxis(velocities[..., :2], -1, 0)) >= 0.03
+    return ((gaps_m < 0.1) & moves).mean(axis=1)
+
+
+def measure_agreement(poses, velocities, trial):
+    if not isinstance(trial.memory, np.ndarray) or trial.memory.dtype != int:
+        return np.zeros(len(poses))
+    shares = trial.memory.reshape(poses.shape[:2]).mean(axis=1)
+    return np.maximum(shares, 1.0 - shares)
+
+
+# name: metric, its limit, whether it must be above, robots, seconds, arena, size of the start
+CASES = {
+    "aggregation": (by_name("dispersion_ratio"), 1.4, False, 20, 90, OPEN, (2.07, 2.07)),
+    "evolved_aggregation": (by_name("cluster_fraction"), 0.9, True, 20, 100, ARENA, None),
+    "cyclic_pursuit": (by_name("rotation"), 0.4, True, 20, 110, ARENA, None),
+    "dispersal": (by_name("nearest_neighbor"), 0.22, True, 20, 60, ARENA, (0.6, 0.6)),
+    "milling": (by_name("rotation"), 0.6, True, 20, 100, ARENA, None),
+    "wall_following": (measure_wall_time, 0.7, True, 9, 60, ARENA, None),
+    "flocking": (measure_flock, 0.9, True, 12, 60, OPEN, (1.0, 1.0)),
+    "dispersion": (by_name("nearest_neighbor"), 0.45, True, 16, 60, OPEN, (0.6, 0.6)),
+    "segregation": (measure_mixing, 0.1, False, 12, 120, OPEN, (1.2, 1.2)),
+    "rendezvous": (by_name("consensus_error"), 0.2, False, 10, 40, OPEN, (2.0, 2.0)),
+    "leader_followers": (measure_gap_error, 0.06, False, 5, 60, OPEN, (1.0, 1.0)),
+    "formation": (measure_side_error, 0.1, False, 6, 60, OPEN, (0.8, 0.8)),
+    "coverage": (measure_way_to_center, 0.03, False, 12, 60, SQUARE, (0.8, 0.8)),
+    "voter": (measure_agreement, 0.99, True, 6, 200, SQUARE, None),
+    "majority": (measure_agreement, 0.99, True, 9, 160, SQUARE, None),
+}
+
+
+SLOWER = {"cyclic_pursuit": {"wheel_m_s": 0.06}}  # at full speed the servos' lag breaks its ring up
+
+
+@pytest.mark.parametrize("name", sorted(CASES))
+def test_a_behavior_does_what_its_metric_says(name):
+    metric, limit, is_above, robots, time_s, arena, size_m = CASES[name]
+    values = measure(find_behavior(name)(**SLOWER.get(name, {})), metric, robots, time_s, arena, size_m)
+    assert (values >= limit if is_above else values <= limit).all(), values
+
+
+@pytest.mark.parametrize("name", sorted(CASES))
+@pytest.mark.parametrize("behavior", [StandingStill, RandomWalk])
+def test_standing_still_and_random_walks_fail_every_metric(name, behavior):
+    metric, limit, is_above, robots, _, arena, size_m = CASES[name]
+    values = measure(behavior(), metric, robots, 15, arena, size_m, last_s=5)
+    assert (values < limit if is_above else values > limit).all(), values
+
+
+def test_every_behavior_is_tested_and_names_its_units_and_source():
+    assert sorted(CASES) == list_names()
+    for name in list_names():
+        found = find_behavior(name)
+        assert found.__doc__
+        assert found.metric in metrics.METRICS
+        source = inspect.getsource(inspect.getmodule(found))
+        assert any(sign in source for sign in ("et al.", "Reynolds", "Olfati", "Krick", "Galam")), name
+
+
+def test_a_world_of_a_batch_gives_the_same_bytes_as_alone():
+    together = Trial(find_behavior("voter")(), SQUARE, 6, [3, 4, 5])
+    alone = Trial(find_behavior("voter")(), SQUARE, 6, [4])
+    for trial in (together, alone):
+        for _ in range(60):
+            trial.step()
+    assert together.poses[1].tobytes() == alone.poses[0].tobytes()
+    assert together.poses[0].tobytes() != alone.poses[0].tobytes()
+
+
+def test_a_parameter_that_a_behavior_lacks_is_refused():
+    assert VoronoiCoverage(width_m=3.0).width_m == 3.0
+    with pytest.raises(TypeError, match="no parameter 'with_m'"):
+        VoronoiCoverage(with_m=3.0)
+
+
+def test_a_behavior_of_a_file_is_found_by_its_name(tmp_path):
+    path = tmp_path / "mine.py"
+    path.write_text(
+        "from hero_swarm.behavior import Behavior\n"
+        "class Mine(Behavior):\n"
+        "    def step(self, sensed, memory, random):\n"
+        "        return 0.1 + 0.0 * sensed.numbers, 0.0 * sensed.numbers, memory\n"
+    )
+    assert find_behavior(str(path)).__name__ == find_behavior("%s:Mine" % path).__name__ == "Mine"
+    for wrong in ("nothing", "/nowhere.py", "%s:Other" % path):
+        with pytest.raises(ValueError, match="behavior "):
+            find_behavior(wrong)

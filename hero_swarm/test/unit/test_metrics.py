@@ -1,0 +1,86 @@
+"""Metrics by configurations whose values are known."""
+
+import math
+
+import numpy as np
+import pytest
+
+from hero_client.values.robot_constants import BODY_RADIUS_M
+from hero_swarm import metrics
+from hero_swarm.metrics.shapes import ideal_dispersion
+
+
+def ring(robots, radius_m=0.5):
+    angles_rad = 2.0 * math.pi * np.arange(robots) / robots
+    return np.column_stack((np.cos(angles_rad), np.sin(angles_rad)))[None] * radius_m, angles_rad
+
+
+def test_the_ideal_dispersion_is_that_of_the_densest_packing():
+    assert ideal_dispersion(1) == 0.0
+    assert ideal_dispersion(7, 1.0) == pytest.approx(12.0)
+    assert ideal_dispersion(100, 0.037) == pytest.approx(26.03, rel=0.01)
+
+
+def test_dispersion_is_the_sum_of_distances_to_the_center():
+    places_m, _ = ring(8)
+    assert metrics.dispersion(places_m) == pytest.approx([4.0])
+    assert metrics.dispersion_ratio(places_m) == pytest.approx([4.0 / ideal_dispersion(8)])
+
+
+def test_clusters_of_each_world_are_counted_apart():
+    gap_m = 4.0 * BODY_RADIUS_M
+    near = np.column_stack((np.arange(6) * 0.9 * gap_m, np.zeros(6)))
+    split = near + np.where(np.arange(6) < 2, 0.0, 1.0)[:, None]
+    assert metrics.cluster_fraction(np.array((near, split, near * 2.0))) == pytest.approx([1.0, 4.0 / 6.0, 1.0 / 6.0])
+
+
+def test_rotation_is_one_for_a_ring_and_none_for_robots_at_rest_or_opposed():
+    places_m, angles_rad = ring(10)
+    circling = np.column_stack((-np.sin(angles_rad), np.cos(angles_rad)))[None] * 0.1
+    assert metrics.rotation(places_m, circling) == pytest.approx([1.0])
+    assert metrics.rotation(places_m, -circling) == pytest.approx([1.0])
+    assert metrics.rotation(places_m, 0.0 * circling) == pytest.approx([0.0])
+    opposed = circling * np.where(np.arange(10) % 2, 1.0, -1.0)[:, None]
+    assert metrics.rotation(places_m, opposed) == pytest.approx([0.0])
+
+
+def test_order_and_fatness_have_their_extremes():
+    places_m, angles_rad = ring(10)
+    assert metrics.order(np.full((1, 5), 2.0)) == pytest.approx([1.0])
+    assert metrics.order(angles_rad[None]) == pytest.approx([0.0], abs=1e-9)
+    assert metrics.fatness(places_m) == pytest.approx([0.0], abs=1e-9)
+    assert metrics.fatness(np.concatenate((places_m, np.zeros((1, 1, 2))), axis=1)) == pytest.approx([1.0])
+
+
+def test_the_hull_of_a_square_is_its_area_whatever_lies_inside():
+    square = np.array([(0, 0), (2, 0), (2, 1), (0, 1), (1, 0.5), (0.2, 0.3), (1, 0)], dtype=float)
+    assert metrics.hull_area(square[None]) == pytest.approx([2.0])
+
+
+def test_connectivity_of_a_path_is_the_closed_form_and_zero_if_apart():
+    path = np.column_stack((np.arange(5) * 0.1, np.zeros(5)))
+    expected = 2.0 * (1.0 - math.cos(math.pi / 5.0))
+    apart = path * np.where(np.arange(5) < 3, 1.0, 9.0)[:, None]
+    assert metrics.algebraic_connectivity(np.array((path, apart)), 0.15) == pytest.approx([expected, 0.0])
+
+
+def test_collisions_and_the_nearest_neighbor_ignore_the_robot_itself():
+    places_m = np.array([[(0.0, 0.0), (0.07, 0.0), (0.5, 0.0)]])
+    assert metrics.collisions(places_m).tolist() == [1]
+    assert metrics.nearest_neighbor(places_m) == pytest.approx([(0.07 + 0.07 + 0.43) / 3.0])
+
+
+def test_coverage_is_the_share_of_the_area_in_range():
+    bounds_m = np.array((-1.0, -1.0, 1.0, 1.0))
+    assert metrics.coverage(np.zeros((1, 1, 2)), bounds_m, 0.5) == pytest.approx([math.pi * 0.25 / 4.0], abs=0.01)
+    assert metrics.coverage(np.zeros((1, 1, 2)), bounds_m, 2.0) == pytest.approx([1.0])
+
+
+def test_consensus_is_the_spread_about_the_mean():
+    assert metrics.consensus_error(np.array([[[0.0], [2.0]], [[5.0], [5.0]]])) == pytest.approx([1.0, 0.0])
+
+
+def test_the_time_until_is_the_first_one_and_endless_if_never():
+    times_s, values = np.arange(4.0), np.array([(3, 3), (2, 3), (1, 3), (2, 3)], dtype=float)
+    assert metrics.time_until(times_s, values, 2.0).tolist() == [1.0, math.inf]
+    assert metrics.time_until(times_s, values, 3.0, falls=False).tolist() == [0.0, 0.0]
