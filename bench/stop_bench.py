@@ -29,7 +29,7 @@ from tornado.httpclient import HTTPRequest
 from tornado.websocket import websocket_connect
 
 from hero_client.ros.drivers import Drivers
-from hero_monitor.freshness import INERT_S
+from hero_monitor.control.freshness import INERT_S
 from hero_test.processes import find_free_port, suspended
 
 HERE = Path(__file__).resolve().parent

@@ -14,7 +14,7 @@ SOCKET_OWNERS = (
     "hero_node.ros",
     "hero_sim.link.tcp_link",
     "hero_tools.checkup.network",
-    "hero_monitor.server",
+    "hero_monitor.serving.server",
     "hero_monitor.program",
 )
 

@@ -10,7 +10,7 @@ from hero_node.errors import ProgramError
 from hero_node.parameters import flag, number, whole_number
 from hero_node.ros.private_parameters import read_parameters
 
-from .access import TOKEN_LENGTH_MIN, is_loopback
+from .serving.access import TOKEN_LENGTH_MIN, is_loopback
 
 TOKEN_REMEDY = (
     "write one into a file that only you can read, and name it with token_file:=FILE: "

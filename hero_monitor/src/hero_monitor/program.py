@@ -16,19 +16,19 @@ from hero_node.errors import ProgramError
 from hero_node.file_limit import raise_file_limit
 from hero_node.ros.program import Program, run
 
-from .access import Access
 from .background import Background
-from .commander import STOP_PERIOD_S, Commander
-from .connection_limits import CONNECTIONS_MAX, ConnectionLimits
-from .dead_man import Velocity
-from .feed import FleetFeed
-from .freshness import CLOCK_PERIOD_S, explain_refused_release, is_fresh, read_clock_ms
+from .control.commander import STOP_PERIOD_S, Commander
+from .control.dead_man import Velocity
+from .control.freshness import CLOCK_PERIOD_S, explain_refused_release, is_fresh, read_clock_ms
+from .control.requests import RequestError, read_request
+from .fleet_feed.feed import FleetFeed
+from .fleet_feed.page_state import encode
 from .parameters import Parameters, load_parameters
-from .requests import RequestError, read_request
-from .sections import encode
+from .serving.access import Access
+from .serving.connection_limits import CONNECTIONS_MAX, ConnectionLimits
 
 if TYPE_CHECKING:
-    from .server import PageSocket
+    from .serving.server import PageSocket
 
 LINGER_S = 10.0
 """How long subscriptions outlive the last page, which may only reload."""
@@ -45,7 +45,7 @@ class Monitor:
         # Here, so that a machine without tornado gets a line that says what to do.
         import tornado.ioloop
 
-        from .server import Actions, Server
+        from .serving.server import Actions, Server
 
         self._parameters = parameters
         self._program = program
@@ -136,11 +136,11 @@ class Monitor:
 
     def _broadcast_updates(self) -> None:
         """Send the pages what is new to them; a page that is still receiving the last update gets it later."""
-        sections, served = self._feed.sections, set(self._server.served_pages())
+        state, served = self._feed.page_state, set(self._server.served_pages())
         for page in self._server.pages:
             page.send_waiting()
             if page.ready:
-                updates = (sections.take_updates if page in served else sections.take_stop)(page.seen)
+                updates = (state.take_updates if page in served else state.take_stop)(page.seen)
                 if updates is not None:
                     page.send(updates)
 

@@ -6,11 +6,11 @@ import threading
 
 import tornado.ioloop
 
-from hero_monitor.access import Access
-from hero_monitor.connection_limits import ConnectionLimits
-from hero_monitor.freshness import CLOCK_PERIOD_S, read_clock_ms
-from hero_monitor.sections import encode
-from hero_monitor.server import Actions, Server
+from hero_monitor.control.freshness import CLOCK_PERIOD_S, read_clock_ms
+from hero_monitor.fleet_feed.page_state import encode
+from hero_monitor.serving.access import Access
+from hero_monitor.serving.connection_limits import ConnectionLimits
+from hero_monitor.serving.server import Actions, Server
 from hero_test.waiting import wait_for
 
 LONG_CAUSE = "No answer from " + ", ".join("hero_driver_%d" % number for number in range(30))

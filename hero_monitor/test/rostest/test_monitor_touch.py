@@ -61,6 +61,7 @@ return { stop: place("stop"), release: place("release"), covered, size: [innerWi
 class TouchTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
+        cls.is_touched = False
         cls.monitor = ScriptedMonitor()
         cls.page = MonitorPage(cls.monitor.url)
         cls.page.browser.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": True, "maxTouchPoints": 2})
@@ -78,6 +79,10 @@ class TouchTest(unittest.TestCase):
         self.page.wait_for_text("#ready", "3 of 3 ready")
         self.monitor.requests.clear()
 
+    def tearDown(self):
+        if self.is_touched:
+            self.touch("touchCancel")
+
     def show(self, name):
         self.monitor.show(**STATES[name])
         return name
@@ -87,6 +92,7 @@ class TouchTest(unittest.TestCase):
         self.page.run(TAKE_CLOCK)
 
     def touch(self, kind, *place):
+        TouchTest.is_touched = kind == "touchStart"
         points = [{"x": place[0], "y": place[1]}] if place else []
         self.page.browser.execute_cdp_cmd("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
 
@@ -110,7 +116,9 @@ class TouchTest(unittest.TestCase):
 
     def wait_until_armed(self):
         self.page.run("window.advance(2100)")
-        wait_for(lambda: self.page.run("return !document.querySelector('#release.inert')"), "the end of the delay")
+        # After the jump the page hears the monitor anew.
+        is_armed = "return !document.querySelector('#release.inert') && document.getElementById('losses').hidden"
+        wait_for(lambda: self.page.text("#link") == "live" and self.page.run(is_armed), "the end of the delay")
 
     def check_that_nothing_was_released(self):
         """Stop once more, which the monitor hears of after all that was sent before."""

@@ -2,7 +2,7 @@
 
 import pytest
 
-from hero_monitor.access import Access, is_loopback
+from hero_monitor.serving.access import Access, is_loopback
 
 TOKEN = "a secret of more than sixteen letters"
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from hero_monitor.connection_limits import (
+from hero_monitor.serving.connection_limits import (
     TOKEN_BURST,
     TOKEN_PERIOD_S,
     UNTRUSTED_S,

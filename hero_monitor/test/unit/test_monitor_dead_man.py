@@ -2,7 +2,7 @@
 
 import pytest
 
-from hero_monitor.dead_man import HOLD_TIMEOUT_S, STOPS, DeadMan, Velocity
+from hero_monitor.control.dead_man import HOLD_TIMEOUT_S, STOPS, DeadMan, Velocity
 
 FORWARD = Velocity("/hero_0", 0.1, 0.0)
 STOPPED = Velocity("/hero_0", 0.0, 0.0)

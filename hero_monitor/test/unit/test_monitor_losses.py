@@ -4,9 +4,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from hero_monitor.freshness import AGE_MAX_S, INERT_S, explain_refused_release, is_fresh
-from hero_monitor.losses import FORGOTTEN_S, LocalizationWatch, list_losses
-from hero_monitor.server import PAGES_MAX, choose_served
+from hero_monitor.control.freshness import AGE_MAX_S, INERT_S, explain_refused_release, is_fresh
+from hero_monitor.fleet_feed.losses import FORGOTTEN_S, LocalizationWatch, list_losses
+from hero_monitor.serving.server import PAGES_MAX, choose_served
 
 
 def list_sources(drivers, localization=None, now_s=0.0, master=""):

@@ -1,63 +1,65 @@
-// The last minute of each robot, as charts and the table need it.
+// The last minute of all robots, in steps of half a second, as charts and the table need it.
 
 export const KEPT_MS = 60000;
-const STEP_MS = 200;
-const SPEED_MS = 600; // over which a speed is measured: odometry comes in steps of some mm
+const STEP_MS = 500;
+const SPAN = 2; // steps between the two samples: odometry and the network come in steps, too
+const GAP_MS = 3500; // across a longer gap nothing is measured
 const JUMP_MM = 500; // moved by hand, or its odometry was set
 
-/** Milliseconds, x and y in mm, nearest range in mm or null, rate of odometry in Hz or null. */
-class Sample {
-  constructor(ms, pose, nearest, odom, yaw) {
-    Object.assign(this, { ms, x: pose[0], y: pose[1], yaw, nearest, odom });
-  }
-}
+/** Quantities of a robot between two samples of it, the second one newer by `seconds`. */
+export const QUANTITIES = {
+  speed: { title: "speed", unit: "m/s", of: (from, to, seconds) => distance(from, to) / 1000 / seconds },
+  turn: { title: "turn rate", unit: "rad/s", of: (from, to, seconds) => wrap(to.yaw - from.yaw) / seconds },
+  nearest: { title: "nearest obstacle", unit: "m", of: (from, to) => (to.nearest === null ? null : to.nearest / 1000) },
+  odometry: { title: "odometry rate", unit: "Hz", of: (from, to) => to.odom },
+};
 
+const distance = (from, to) => Math.hypot(to.x - from.x, to.y - from.y);
+const wrap = (mrad) => Math.atan2(Math.sin(mrad / 1000), Math.cos(mrad / 1000));
+
+/** Nearest valid range in mm; null without one. */
 export function nearestOf(ranges) {
   const valid = (ranges || []).filter((range) => range !== null && range >= 0);
   return valid.length ? Math.min(...valid) : null;
 }
 
-const wrap = (mrad) => Math.atan2(Math.sin(mrad / 1000), Math.cos(mrad / 1000));
-
 export class History {
   constructor() {
-    this.samples = new Map(); // by name, oldest first
+    this.steps = []; // of {ms, samples: {name: {x, y, yaw, nearest, odom}}}, oldest first; mm and mrad
   }
 
-  /** Take what is known now; what is outdated leaves a gap. */
+  /** Take what is known now; robots that are unknown leave a gap. */
   update(state) {
-    const now = Date.now();
-    const odom = new Map(state.fleet.robots.map((robot) => [robot.name, robot.known ? robot.odom : 0]));
-    for (const [name, pose] of Object.entries(state.poses)) {
-      const samples = this.samples.get(name) || [];
-      this.samples.set(name, samples);
-      const last = samples[samples.length - 1];
-      if (pose === null || !odom.get(name) || (last && now - last.ms < STEP_MS)) continue;
-      samples.push(new Sample(now, pose, nearestOf(state.ranges[name]), odom.get(name), pose[2]));
+    const ms = Date.now();
+    if (this.steps.length && ms - this.steps[this.steps.length - 1].ms < STEP_MS) return;
+    const samples = {};
+    for (const robot of state.fleet.robots) {
+      const pose = state.poses[robot.name];
+      if (!pose || !robot.known || !robot.odom || robot.state !== "READY") continue;
+      const [x, y, yaw] = pose;
+      samples[robot.name] = { x, y, yaw, nearest: nearestOf(state.ranges[robot.name]), odom: robot.odom };
     }
-    for (const [name, samples] of this.samples) {
-      while (samples.length && now - samples[0].ms > KEPT_MS + SPEED_MS) samples.shift();
-      if (!(name in state.poses)) this.samples.delete(name);
-    }
+    this.steps.push({ ms, samples });
+    while (ms - this.steps[0].ms > KEPT_MS) this.steps.shift();
   }
 
-  /** Speed in m/s at a sample, and turning in rad/s; null where there is nothing to measure. */
-  static motionAt(samples, index) {
-    const to = samples[index];
-    let first = index;
-    while (first > 0 && to.ms - samples[first].ms < SPEED_MS) first -= 1;
-    const from = samples[first];
-    const seconds = (to.ms - from.ms) / 1000;
-    const distance = Math.hypot(to.x - from.x, to.y - from.y);
-    if (seconds < 0.3 || seconds > 2 || distance > JUMP_MM) return { speed: null, turn: null };
-    return { speed: distance / 1000 / seconds, turn: wrap(to.yaw - from.yaw) / seconds };
+  /** A quantity of a robot at a step; null if it is unknown. */
+  valueAt(index, name, quantity) {
+    const [before, now] = [this.steps[index - SPAN], this.steps[index]];
+    const [from, to] = [before?.samples[name], now?.samples[name]];
+    if (!from || !to || now.ms - before.ms > GAP_MS || distance(from, to) > JUMP_MM) return null;
+    return quantity.of(from, to, (now.ms - before.ms) / 1000);
   }
 
   /** Speed of a robot now, m/s; null if it is unknown. */
   speedOf(name) {
-    const samples = this.samples.get(name) || [];
-    const last = samples[samples.length - 1];
-    if (!last || Date.now() - last.ms > 1500) return null;
-    return History.motionAt(samples, samples.length - 1).speed;
+    return this.valueAt(this.steps.length - 1, name, QUANTITIES.speed);
+  }
+
+  /** Times (s, the newest is 0), and for each robot its values. */
+  listSeries(names, quantity) {
+    const now = this.steps.length ? this.steps[this.steps.length - 1].ms : 0;
+    const times = this.steps.map(({ ms }) => (ms - now) / 1000);
+    return [times, ...names.map((name) => this.steps.map((_, index) => this.valueAt(index, name, quantity)))];
   }
 }

@@ -22,7 +22,7 @@ function listLosses(state, connection) {
     return [
       {
         cause: cause + since,
-        remedy: "start it again: roslaunch hero_bringup monitor.launch; STOP ALL is sent once it answers. Until then: rosservice call /hero_driver/stop true",
+        remedy: "Start it again: roslaunch hero_bringup monitor.launch; STOP ALL is sent once it answers. Until then: rosservice call /hero_driver/stop true",
       },
     ];
   }

@@ -3,12 +3,15 @@
 // Names and texts come from robots, programs and the network: they are inserted as text, never as markup.
 
 import { Connection } from "./connection.js";
-import { FleetTable } from "./fleet.js";
+import { FleetTable } from "./panels/fleet.js";
 import { History } from "./history.js";
 import { showLosses, stateOf } from "./losses.js";
-import { FleetMap } from "./map.js";
-import { LogView } from "./log.js";
-import { RobotPanel } from "./robot.js";
+import { FleetMap } from "./map/map.js";
+import { LogView } from "./panels/log.js";
+import { RobotPanel } from "./panels/robot.js";
+import { Chart } from "./panels/chart.js";
+import { showSummary } from "./panels/summary.js";
+import { Projector } from "./projector.js";
 import { StopPanel } from "./stop.js";
 
 const NOTICE_MS = 6000;
@@ -54,7 +57,7 @@ const send = (request) => connection.send(request);
 function choose(name) {
   state.chosen = name;
   table.show(state);
-  panel.show(state);
+  showPanel();
   map.draw();
   log.choose(name);
 }
@@ -75,8 +78,19 @@ const history = new History();
 const map = new FleetMap(state, { choose, send, notice });
 const table = new FleetTable({ choose, history });
 const log = new LogView();
+const chart = new Chart(history);
+new Projector(() => map.draw());
 const panel = new RobotPanel({ connection, map, notice });
 const stop = new StopPanel({ connection, endDrive: () => panel.endDrive(), notice });
+
+/** The chosen robot, or all of them in numbers; and the chart of either. */
+function showPanel() {
+  panel.show(state);
+  const robots = state.fleet.robots.filter((robot) => robot.state !== "REFUSED");
+  element("summary").hidden = state.chosen !== null;
+  showSummary({ ...state, fleet: { ...state.fleet, robots } }, history);
+  chart.show(robots.filter((robot) => state.chosen === null || robot.name === state.chosen));
+}
 
 function showHead() {
   const { driver, robots, listening, frame } = state.fleet;
@@ -100,7 +114,7 @@ function showAll() {
   state.isFresh = connection.isFresh && connection.served;
   if (state.chosen !== null && !state.fleet.robots.some((robot) => robot.name === state.chosen)) choose(null);
   table.show(state);
-  panel.show(state);
+  showPanel();
   showHead();
   map.draw();
 }
@@ -110,7 +124,7 @@ function receive(updates) {
     if (name in updates) state[name] = updates[name];
   }
   stop.receive(updates);
-  if ("poses" in updates || "fleet" in updates) history.update(state);
+  history.update(state);
   if ("notice" in updates) notice(updates.notice.level, updates.notice.text);
   if ("log" in updates) log.append(updates.log);
   if ("fleet" in updates || "hello" in updates || "losses" in updates) showAll();

@@ -1,6 +1,6 @@
-"""The fleet as numbered sections of JSON, of which each page gets those that are new to it. Pure.
+"""What pages show, in named parts of JSON, of which each page gets those that are new to it: its updates. Pure.
 
-Every section is complete in itself: a page that missed some needs none of them to understand the next. Lengths are
+Every part is complete in itself: a page that missed some needs none of them to understand the next. Lengths are
 integers in mm and angles in mrad: short, and finer than a screen can show.
 """
 
@@ -99,7 +99,7 @@ class LogRing:
         return encode({"missed": max(0, first - number - 1) if number else 0, "lines": new})
 
 
-class Page:
+class Received:
     """What one page has received."""
 
     def __init__(self) -> None:
@@ -107,8 +107,8 @@ class Page:
         self.log_number = 0
 
 
-class Sections:
-    """The current sections."""
+class PageState:
+    """The current state."""
 
     def __init__(self) -> None:
         self.log = LogRing()
@@ -116,7 +116,7 @@ class Sections:
         self._versions: Dict[str, int] = {}
 
     def put(self, name: str, value: Any) -> bool:
-        """Replace a section; return whether it has changed."""
+        """Replace a part; return whether it has changed."""
         text = encode(value)
         if self._texts.get(name) == text:
             return False
@@ -124,20 +124,20 @@ class Sections:
         self._versions[name] = self._versions.get(name, 0) + 1
         return True
 
-    def take_updates(self, page: Page) -> Optional[str]:
-        """Return the sections that are new to a page as one JSON object, None without any; marks them as received."""
+    def take_updates(self, page: Received) -> Optional[str]:
+        """Return what is new to a page as one JSON object, None without any; marks it as received."""
         parts = self._take(page, list(self._versions))
         if page.log_number < self.log.count:
             parts.append('"log":%s' % self.log.encode_after(page.log_number))
             page.log_number = self.log.count
         return "{%s}" % ",".join(parts) if parts else None
 
-    def take_stop(self, page: Page) -> Optional[str]:
+    def take_stop(self, page: Received) -> Optional[str]:
         """Return the same of the status of a stop alone, for a page that is not served."""
         parts = self._take(page, ["stop"] if "stop" in self._versions else [])
         return "{%s}" % ",".join(parts) if parts else None
 
-    def _take(self, page: Page, names: Sequence[str]) -> List[str]:
+    def _take(self, page: Received, names: Sequence[str]) -> List[str]:
         new = [name for name in names if page.versions.get(name) != self._versions[name]]
         page.versions.update((name, self._versions[name]) for name in new)
         return ['"%s":%s' % (name, self._texts[name]) for name in new]

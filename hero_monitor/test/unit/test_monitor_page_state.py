@@ -1,4 +1,4 @@
-"""What pages receive: new sections with short numbers; and what they send, checked."""
+"""What pages receive: new state with short numbers; and what they send, checked."""
 
 import json
 import math
@@ -8,78 +8,78 @@ from geometry_msgs.msg import Point32, Polygon, PolygonStamped
 from sensor_msgs.msg import CompressedImage
 
 from hero_client.values.geometry import Pose
-from hero_monitor.camera_picture import BYTES_MAX, SILENT_S, CameraPicture
-from hero_monitor.placement import APART_M, Placement
-from hero_monitor.requests import RequestError, read_request
-from hero_monitor.sections import (
+from hero_monitor.control.requests import RequestError, read_request
+from hero_monitor.fleet_feed.camera_picture import BYTES_MAX, SILENT_S, CameraPicture
+from hero_monitor.fleet_feed.page_state import (
     LOG_LINES_AT_ONCE,
     LOG_LINES_KEPT,
-    Page,
-    Sections,
+    PageState,
+    Received,
     encode_color,
     encode_pose,
     encode_ranges,
 )
+from hero_monitor.fleet_feed.placement import APART_M, Placement
 
 
-def test_a_page_gets_each_section_once_until_it_changes():
-    sections, page = Sections(), Page()
-    sections.put("poses", {"hero_0": [1, 2, 3]})
-    sections.put("fleet", {})
-    assert json.loads(sections.take_updates(page)) == {"poses": {"hero_0": [1, 2, 3]}, "fleet": {}}
-    assert sections.take_updates(page) is None
-    sections.put("poses", {"hero_0": [1, 2, 3]})
-    assert sections.take_updates(page) is None
-    sections.put("poses", {"hero_0": [1, 2, 4]})
-    assert json.loads(sections.take_updates(page)) == {"poses": {"hero_0": [1, 2, 4]}}
+def test_a_page_gets_each_part_of_the_state_once_until_it_changes():
+    state, page = PageState(), Received()
+    state.put("poses", {"hero_0": [1, 2, 3]})
+    state.put("fleet", {})
+    assert json.loads(state.take_updates(page)) == {"poses": {"hero_0": [1, 2, 3]}, "fleet": {}}
+    assert state.take_updates(page) is None
+    state.put("poses", {"hero_0": [1, 2, 3]})
+    assert state.take_updates(page) is None
+    state.put("poses", {"hero_0": [1, 2, 4]})
+    assert json.loads(state.take_updates(page)) == {"poses": {"hero_0": [1, 2, 4]}}
 
 
 def test_a_page_that_missed_updates_gets_the_newest():
-    sections, quick, slow = Sections(), Page(), Page()
+    state, quick, slow = PageState(), Received(), Received()
     for step in range(10):
-        sections.put("poses", {"hero_0": [step]})
-        assert json.loads(sections.take_updates(quick)) == {"poses": {"hero_0": [step]}}
-    assert json.loads(sections.take_updates(slow)) == {"poses": {"hero_0": [9]}}
+        state.put("poses", {"hero_0": [step]})
+        assert json.loads(state.take_updates(quick)) == {"poses": {"hero_0": [step]}}
+    assert json.loads(state.take_updates(slow)) == {"poses": {"hero_0": [9]}}
 
 
 def test_a_page_that_is_not_served_gets_the_status_of_a_stop_alone():
-    sections, page = Sections(), Page()
-    assert sections.take_stop(page) is None
-    sections.put("fleet", {})
-    sections.put("stop", {"text": "stopping"})
-    assert json.loads(sections.take_stop(page)) == {"stop": {"text": "stopping"}}
-    assert sections.take_stop(page) is None
-    assert json.loads(sections.take_updates(page)) == {"fleet": {}}
+    state, page = PageState(), Received()
+    assert state.take_stop(page) is None
+    state.put("fleet", {})
+    state.put("stop", {"text": "stopping"})
+    assert json.loads(state.take_stop(page)) == {"stop": {"text": "stopping"}}
+    assert state.take_stop(page) is None
+    assert json.loads(state.take_updates(page)) == {"fleet": {}}
 
 
 def test_a_new_page_gets_the_newest_lines_and_a_slow_one_a_count():
-    sections, early = Sections(), Page()
-    sections.log.append(1.0, 2, "node", "", "first")
-    sections.take_updates(early)
+    state, early = PageState(), Received()
+    state.log.append(1.0, 2, "node", "", "first")
+    state.take_updates(early)
     for number in range(LOG_LINES_KEPT + 50):
-        sections.log.append(2.0, 2, "node", "hero_3", "line %d" % number)
-    updates = json.loads(sections.take_updates(early))["log"]
+        state.log.append(2.0, 2, "node", "hero_3", "line %d" % number)
+    updates = json.loads(state.take_updates(early))["log"]
     assert len(updates["lines"]) == LOG_LINES_AT_ONCE
     assert updates["lines"][-1][-1] == "line %d" % (LOG_LINES_KEPT + 49)
     assert updates["missed"] == LOG_LINES_KEPT + 50 - LOG_LINES_AT_ONCE
-    assert json.loads(sections.take_updates(Page()))["log"]["missed"] == 0
-    assert sections.take_updates(early) is None
+    assert json.loads(state.take_updates(Received()))["log"]["missed"] == 0
+    assert state.take_updates(early) is None
 
 
 def test_lines_that_were_dropped_unread_count_as_missed():
-    sections, page = Sections(), Page()
-    sections.log.append(1.0, 2, "node", "", "first")
-    sections.take_updates(page)
-    sections.log.skip(1000)
-    sections.log.append(1.0, 2, "node", "", "last")
-    updates = json.loads(sections.take_updates(page))["log"]
+    state, page = PageState(), Received()
+    state.log.append(1.0, 2, "node", "", "first")
+    state.take_updates(page)
+    state.log.skip(1000)
+    state.log.append(1.0, 2, "node", "", "last")
+    updates = json.loads(state.take_updates(page))["log"]
     assert (updates["missed"], len(updates["lines"])) == (1000, 1)
 
 
 def test_log_lines_are_short_and_hold_nothing_that_cannot_be_printed():
-    sections = Sections()
-    sections.log.append(1.0, 2, "no\x1bde", "", "a\u202eb\n" + 1000 * "x")
-    line = json.loads(sections.take_updates(Page()))["log"]["lines"][0]
+    state = PageState()
+    state.log.append(1.0, 2, "no\x1bde", "", "a\u202eb\n" + 1000 * "x")
+    line = json.loads(state.take_updates(Received()))["log"]["lines"][0]
     assert line[3] == "no?de"
     assert line[5].startswith("a?b?x") and len(line[5]) <= 400
 

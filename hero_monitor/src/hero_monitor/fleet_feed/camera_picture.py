@@ -6,7 +6,7 @@ It lies under the robots if the map is in its frame; otherwise the page shows it
 import math
 from typing import Any, Dict, List, Optional
 
-from .sections import FARTHEST_M
+from .page_state import FARTHEST_M
 
 JPEG_START = b"\xff\xd8"
 BYTES_MAX = 2000000

@@ -4,10 +4,10 @@
 // button is let go, the page is hidden or loses focus, was suspended, or the network stalls. The monitor stops the robot
 // on "end_drive", after 0.4 s of silence, or when the socket closes.
 
-import { colorOf } from "./colors.js";
-import { isLate } from "./connection.js";
+import { colorOf } from "../map/colors.js";
+import { isLate } from "../connection.js";
 import { healthOf, spanOf } from "./fleet.js";
-import { stateOf } from "./losses.js";
+import { stateOf } from "../losses.js";
 
 const HOLD_MS = 100;
 const GAP_MS = 400; // after such a pause of this page, a button that was held may have been let go
@@ -135,15 +135,16 @@ export class RobotPanel {
       this.name = name;
       this.setGoing(false);
     }
-    document.querySelector("#robot .chip").style.background = robot ? colorOf(robot.id) : "transparent";
-    element("name").textContent = robot ? robot.name : "No robot is chosen";
+    const chip = document.querySelector("#robot .chip");
+    chip.hidden = robot === null;
+    if (robot) chip.style.background = colorOf(robot.id);
+    element("name").textContent = robot ? robot.name : "All robots";
     const shown = robot ? stateOf(robot, state) : "";
     element("state").textContent = shown;
     element("state").dataset.state = shown;
     element("control").hidden = robot === null || !state.hello.control || shown === "UNKNOWN";
-    element("advice").hidden = robot !== null && state.hello.control;
-    element("advice").textContent =
-      robot === null ? "Click a robot on the map or in the table." : "View only. control:=true lets the monitor drive robots.";
+    element("advice").hidden = robot === null || state.hello.control;
+    element("advice").textContent = "View only. control:=true lets the monitor drive robots.";
     const trouble = robot ? healthOf(robot) : "";
     element("trouble").hidden = !trouble;
     element("trouble").textContent = trouble;

@@ -16,7 +16,7 @@ from hero_client.values.geometry import Pose
 from hero_node.errors import NodeError
 from hero_node.ros.master import ask_master
 
-from .background import Background
+from ..background import Background
 from .dead_man import STOPS, DeadMan, Velocity
 from .freshness import read_clock_ms
 

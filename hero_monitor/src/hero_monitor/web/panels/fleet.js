@@ -1,8 +1,8 @@
 // The table of robots. Cells change in place, which keeps selection, scrolling and screen readers undisturbed.
 
-import { colorOf } from "./colors.js";
-import { nearestOf } from "./history.js";
-import { sourceOf, stateOf } from "./losses.js";
+import { colorOf } from "../map/colors.js";
+import { nearestOf } from "../history.js";
+import { sourceOf, stateOf } from "../losses.js";
 
 export function spanOf(seconds) {
   if (seconds === null || seconds === undefined) return "-";
@@ -27,7 +27,7 @@ const nearestRange = (robot, state) => nearestOf(state.ranges[robot.name]);
 const COLUMNS = [
   { title: "Robot", value: (robot) => robot.id, text: (id, robot) => robot.name || robot.address, lasting: true },
   { title: "State", value: stateText, tag: "state", lasting: true },
-  { title: "Stop", value: (robot) => robot.stop, tag: "stop" },
+  { title: "Stop", value: (robot, state) => (stateOf(robot, state) === "UNKNOWN" ? "" : robot.stop), tag: "stop", lasting: true },
   { title: "Light", value: (robot, state) => state.lights[robot.name] || "", text: (light) => light || "off" },
   { title: "Nearest", value: nearestRange, text: (mm) => number(mm === null ? null : mm / 1000, 2, " m"), isNumber: true },
   { title: "Speed", value: speedOf, text: (speed) => number(speed, 2, " m/s"), isNumber: true },
@@ -143,12 +143,13 @@ export class FleetTable {
 
   fill(row, robot, state) {
     row.robot = robot;
-    const isUnknown = stateOf(robot, state) === "UNKNOWN";
+    const shownState = stateOf(robot, state);
+    const isOutdated = shownState !== "READY" && shownState !== "JOINING";
     const isRefused = robot.state === "REFUSED"; // then topics of its name are those of another robot
     COLUMNS.forEach(({ title, value, text, tag, lasting }, index) => {
       const now = value(robot, state, this.history);
-      const isHidden = (isUnknown && !lasting) || (isRefused && ["Light", "Nearest", "Speed", "Pose"].includes(title));
-      const shown = isHidden ? "-" : text ? text(now, robot) : String(now || (tag ? "" : "-"));
+      const isHidden = (isOutdated && !lasting) || (isRefused && ["Light", "Nearest", "Speed", "Pose"].includes(title));
+      const shown = isHidden ? "-" : text ? text(now, robot) : now === "" && !tag ? "-" : String(now);
       if (row.texts[index] === shown) return;
       row.texts[index] = shown;
       const target = row.targets[index];
@@ -158,7 +159,7 @@ export class FleetTable {
       if (title === "Last error") target.title = shown;
     });
     row.chip.style.background = colorOf(robot.id);
-    row.line.classList.toggle("unknown", isUnknown);
+    row.line.classList.toggle("unknown", shownState === "UNKNOWN");
     row.line.classList.toggle("chosen", robot.name === state.chosen && robot.state !== "REFUSED");
   }
 }

@@ -1,4 +1,4 @@
-"""Reads ROS topics into sections of JSON for pages.
+"""Reads ROS topics into the state that pages show.
 
 While no page is open, only the drivers' reports and the log are subscribed to, and neither is decoded. Topics of robots
 are subscribed to in the background, because the ROS master may block.
@@ -27,13 +27,13 @@ from hero_client.values.readings import finite, is_plausible, read_pose
 from hero_msgs.msg import Robot, RobotPose, RobotPoses
 from hero_node.texts import make_printable
 
-from .background import Background
+from ..background import Background
 from .camera_picture import CameraPicture
 from .losses import SILENT_S, LocalizationWatch, list_losses
 from .master_link import MasterLink
+from .page_state import LOG_LINES_KEPT, PageState, encode_pose, encode_ranges, shorten
 from .placement import Placement
 from .robot_feed import RobotFeed
-from .sections import LOG_LINES_KEPT, Sections, encode_pose, encode_ranges, shorten
 
 ROW_PERIOD_S = 0.5
 """Between two updates of the table without a report: rates."""
@@ -73,7 +73,7 @@ class FleetFeed:
 
     def __init__(self, map_frame: str, background: Background) -> None:
         self._background = background
-        self.sections = Sections()
+        self.page_state = PageState()
         self.placement = Placement(map_frame)
         self.picture = CameraPicture()
         self.robots: Dict[str, Robot] = {}
@@ -134,7 +134,7 @@ class FleetFeed:
     # ---------------------------------------------------------------- reading
 
     def read(self) -> None:
-        """Update the sections; a message that cannot be decoded affects no other."""
+        """Update the state; a message that cannot be decoded affects no other."""
         self.read_stop()
         self._read(self._read_fleet)
         for feed in list(self._feeds.values()):
@@ -169,11 +169,11 @@ class FleetFeed:
         self.stopped = self.stopped and all(answering.values())
         fleet = {"driver": has_driver, "listening": make_printable(self._listening), "stopped": self.stopped}
         fleet["frame"] = shorten(self.placement.frame) if self.placement.is_localized else ""
-        self.sections.put("fleet", {**fleet, "robots": [self._make_row(row) for row in self._rows]})
+        self.page_state.put("fleet", {**fleet, "robots": [self._make_row(row) for row in self._rows]})
 
     def _list_losses(self) -> None:
         losses = list_losses(self._answering, self._master.check(), self._localization, time.monotonic())
-        self.sections.put("losses", [loss._asdict() for loss in losses])
+        self.page_state.put("losses", [loss._asdict() for loss in losses])
 
     def _make_row(self, row: Robot) -> Dict[str, Any]:
         name = make_printable(row.namespace.strip("/"))
@@ -236,7 +236,7 @@ class FleetFeed:
         # Different each time while it is pending, which shows pages that the monitor is alive.
         self._pending_reads = self._pending_reads + 1 if pending else 0
         value = None if status is None else {**status._asdict(), "reads": self._pending_reads}
-        return self.sections.put("stop", value)
+        return self.page_state.put("stop", value)
 
     def _read_scene(self) -> None:
         taken = {topic: newest.take() for topic, newest in self._scene.items()}
@@ -248,7 +248,7 @@ class FleetFeed:
                     self.placement.receive_transform(transform.header.frame_id, transform.child_frame_id, pose)
             self.placement.set_robots(self.robots)
         if taken.get("/hero_sim/arena") is not None:
-            self.sections.put("arena", describe_arena(taken["/hero_sim/arena"]))
+            self.page_state.put("arena", describe_arena(taken["/hero_sim/arena"]))
         if taken.get("/diagnostics") is not None:
             for status in taken["/diagnostics"].status:
                 name = status.name.rpartition(": ")[2]
@@ -265,11 +265,11 @@ class FleetFeed:
             self.picture.receive_outline(taken["/track/picture/outline"])
         if taken.get("/track/picture/compressed") is not None:
             self.picture.receive(taken["/track/picture/compressed"], now_s)
-        self.sections.put("picture", self.picture.describe(self.placement.frame, now_s))
+        self.page_state.put("picture", self.picture.describe(self.placement.frame, now_s))
         if taken.get("/hero_sim/markers") is not None:
-            self.sections.put("ground_truth", find_true_poses(taken["/hero_sim/markers"]))
+            self.page_state.put("ground_truth", find_true_poses(taken["/hero_sim/markers"]))
         elif "/hero_sim/markers" not in self._scene:
-            self.sections.put("ground_truth", {})
+            self.page_state.put("ground_truth", {})
 
     def _localize(self, report: RobotPoses, now_s: float) -> None:
         self._tracked = {"hero_%d" % robot.id for robot in report.robots if robot.state == RobotPose.TRACKED}
@@ -297,10 +297,10 @@ class FleetFeed:
             if goal is not None:
                 goals[feed.name] = encode_pose(goal)
         for name, value in (("poses", poses), ("ranges", ranges), ("lights", lights), ("goals", goals)):
-            self.sections.put(name, value)
+            self.page_state.put(name, value)
 
     def _read_log(self) -> None:
-        log, drivers = self.sections.log, self.drivers.names()
+        log, drivers = self.page_state.log, self.drivers.names()
         limit = LOG_LINES_PER_READ if log.count else LOG_LINES_KEPT
         waiting = len(self._log_bytes)
         for _ in range(waiting - limit):

@@ -1,11 +1,14 @@
 // Paints the map: grid, arena, trails, goals, beams and robots. Lengths in mm, angles in mrad.
 
 import { colorOf, isDark } from "./colors.js";
-import { sourceOf, stateOf } from "./losses.js";
+import { placeLabels } from "./labels.js";
+import { sourceOf, stateOf } from "../losses.js";
 
 export const BODY_MM = 36.85;
 export const TRAIL_MS = 60000;
 const WHEEL_MM = [24.6, 6, 31.5]; // radius, width, distance from the middle
+const LEAST_PX = 9; // radius of a robot, however far the view is
+const PROJECTED_PX = 26;
 const SENSOR_REACH_MM = 236.8;
 const TRAIL_INKS = [0.15, 0.28, 0.42, 0.6];
 
@@ -19,6 +22,9 @@ export class MapPainter {
     const { map, context } = this;
     const { view, state, shows } = map;
     Object.assign(this, { view, state, width: map.width, height: map.height });
+    this.isProjected = document.body.classList.contains("projector");
+    // On a wall, robots are seen from afar.
+    this.enlarged = Math.max(1, (this.isProjected ? PROJECTED_PX : LEAST_PX) / (BODY_MM * view.scale));
     const style = getComputedStyle(document.documentElement);
     this.ink = (name) => style.getPropertyValue(name).trim();
     context.save();
@@ -200,26 +206,19 @@ export class MapPainter {
     const ink = here ? colorOf(robot.id) : this.ink("--quiet");
     const light = here ? state.lights[robot.name] : null;
     this.at(state.poses[robot.name], () => {
+      context.scale(this.enlarged, this.enlarged);
       context.globalAlpha = isPlaced ? 1 : 0.4;
-      if (light) {
-        const glow = context.createRadialGradient(0, 0, BODY_MM * 0.6, 0, 0, BODY_MM * 2);
-        glow.addColorStop(0, light + "99");
-        glow.addColorStop(1, light + "00");
-        context.fillStyle = glow;
-        context.beginPath();
-        context.arc(0, 0, BODY_MM * 2, 0, 2 * Math.PI);
-        context.fill();
-      }
       context.fillStyle = this.ink("--tyre");
       for (const side of [-1, 1]) {
         context.fillRect(-WHEEL_MM[0], side * WHEEL_MM[2] - WHEEL_MM[1] / 2, 2 * WHEEL_MM[0], WHEEL_MM[1]);
       }
+      // From the rim to the middle: identity, a dark gap, and the light, which glows only within the gap.
       context.fillStyle = this.ink("--shell");
       context.strokeStyle = ink;
-      context.lineWidth = Math.max(6, 1.6 / view.scale);
+      context.lineWidth = 7;
       if (!isPlaced) context.setLineDash([12, 9]);
       context.beginPath();
-      context.arc(0, 0, BODY_MM - 3, 0, 2 * Math.PI);
+      context.arc(0, 0, BODY_MM - 3.5, 0, 2 * Math.PI);
       context.fill();
       context.stroke();
       context.setLineDash([]);
@@ -227,20 +226,20 @@ export class MapPainter {
       context.fillStyle = ink;
       context.beginPath();
       context.moveTo(BODY_MM * 1.38, 0);
-      context.lineTo(BODY_MM * 0.72, BODY_MM * 0.48);
-      context.lineTo(BODY_MM * 0.72, -BODY_MM * 0.48);
+      context.lineTo(BODY_MM * 0.92, BODY_MM * 0.4);
+      context.lineTo(BODY_MM * 0.92, -BODY_MM * 0.4);
       context.closePath();
       context.fill();
       context.fillStyle = light || this.ink("--dark-light");
       context.beginPath();
-      context.arc(-2, 0, BODY_MM * 0.42, 0, 2 * Math.PI);
+      context.arc(0, 0, BODY_MM * (light ? 0.58 : 0.3), 0, 2 * Math.PI);
       context.fill();
       context.globalAlpha = 1;
       if (robot.name === state.chosen) {
         context.strokeStyle = this.ink("--accent");
-        context.lineWidth = 2.5 / view.scale;
+        context.lineWidth = 2.5 / view.scale / this.enlarged;
         context.beginPath();
-        context.arc(0, 0, BODY_MM * 1.5 + 4 / view.scale, 0, 2 * Math.PI);
+        context.arc(0, 0, BODY_MM * 1.5 + 4 / view.scale / this.enlarged, 0, 2 * Math.PI);
         context.stroke();
       }
     });
@@ -261,24 +260,30 @@ export class MapPainter {
   }
 
   paintNames(robots) {
-    const { context, view, state } = this;
-    context.font = "600 12px system-ui, sans-serif";
-    context.textAlign = "center";
+    const { context, state } = this;
+    const radius = BODY_MM * this.view.scale * this.enlarged;
+    const isCrowded = robots.length > 12 && radius < 22;
+    const size = this.isProjected ? 26 : 12;
+    context.font = `600 ${size}px system-ui, sans-serif`;
+    context.textAlign = "left";
     context.textBaseline = "top";
     context.lineWidth = 3;
     context.strokeStyle = this.ink("--floor");
-    for (const robot of robots) {
-      const pose = state.poses[robot.name];
-      const x = this.width / 2 + (pose[0] - view.x) * view.scale;
-      const y = this.height / 2 - (pose[1] - view.y) * view.scale + BODY_MM * 1.25 * view.scale + 3;
-      // Ids alone where names would overlap.
-      const short = robots.length > 12 && BODY_MM * view.scale < 22 && robot.name !== state.chosen && robot.id >= 0;
-      const text = short ? String(robot.id) : robot.name;
-      context.strokeText(text, x, y);
-      const shown = stateOf(robot, state);
-      context.fillStyle = this.ink({ READY: "--ink", UNKNOWN: "--quiet" }[shown] || "--bad");
-      context.fillText(text, x, y);
-    }
+    const labels = robots.map((robot) => {
+      const [x, y] = this.map.toScreen(...state.poses[robot.name]);
+      // Numbers alone where names would be too many, and for an audience.
+      const isShort = robot.id >= 0 && robot.name !== state.chosen && (isCrowded || this.isProjected);
+      const text = isShort ? String(robot.id) : robot.name;
+      const isNeeded = robot.name === state.chosen || stateOf(robot, state) !== "READY";
+      return { x, y, radius: radius * 1.15, width: context.measureText(text).width, height: size, isNeeded, text, robot };
+    });
+    placeLabels(labels).forEach((corner, index) => {
+      if (!corner) return;
+      const { text, robot } = labels[index];
+      context.strokeText(text, ...corner);
+      context.fillStyle = this.ink({ READY: "--ink", UNKNOWN: "--quiet" }[stateOf(robot, state)] || "--bad");
+      context.fillText(text, ...corner);
+    });
   }
 
   paintScale() {

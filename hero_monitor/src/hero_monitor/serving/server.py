@@ -1,6 +1,6 @@
-"""HTTP and one WebSocket per page (tornado): sends sections of JSON, receives requests. Knows nothing of ROS.
+"""HTTP and one WebSocket per page (tornado): sends updates as JSON, receives requests. Knows nothing of ROS.
 
-One thread owns all connections. No page can delay another: a slow page misses updates (every section is complete in
+One thread owns all connections. No page can delay another: a slow page misses updates (every part is complete in
 itself), and what cannot be sent at once takes 64 kB at most.
 """
 
@@ -22,11 +22,14 @@ import tornado.netutil
 import tornado.web
 import tornado.websocket
 
+from ..fleet_feed.page_state import Received, encode
 from .access import Access
 from .connection_limits import TOKEN_PERIOD_S, ConnectionLimits, TokenAttempts
-from .sections import Page, encode
 
-WEB = Path(__file__).resolve().parent / "web"
+WEB = Path(__file__).resolve().parents[1] / "web"
+FILES = {path.relative_to(WEB).as_posix(): path for path in WEB.glob("**/*") if path.is_file()}
+"""The page's files; no other is served."""
+
 COOKIE = "hero_monitor"
 SESSION_DAYS = 0.5
 """How long a login lasts."""
@@ -126,8 +129,8 @@ class FileHandler(BaseHandler):
         """Send a file."""
         if not name:
             name = "index.html" if self.is_logged_in else "login.html"
-        path = WEB / name
-        if "/" in name or not path.is_file():
+        path = FILES.get(name)
+        if path is None:
             raise tornado.web.HTTPError(404)
         kind = {".js": "text/javascript", ".svg": "image/svg+xml"}.get(path.suffix)
         kind = kind or mimetypes.guess_type(name)[0] or "application/octet-stream"
@@ -203,7 +206,7 @@ class PageSocket(tornado.websocket.WebSocketHandler, BaseHandler):
     def open(self, *arguments: str, **others: str) -> None:
         """Register a page."""
         self.number = next(PageSocket.numbers)
-        self.seen = Page()
+        self.seen = Received()
         self.ground_truth = self.picture = False
         self.visible = True
         self._sent_s = time.monotonic()

@@ -10,8 +10,8 @@ from hero_client.ros.robot_listener import NewestMessage, RobotListener
 from hero_client.values.geometry import Pose
 from hero_client.values.readings import read_pose
 
+from .page_state import encode_color
 from .placement import Placement
-from .sections import encode_color
 
 LIGHT_S = 15.0
 """The firmware switches the LED off this long after the last command (LEDStatus.ino:76)."""

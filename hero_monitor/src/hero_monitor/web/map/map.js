@@ -1,6 +1,6 @@
 // The map, seen from above: x to the right, y up, as in ROS. Lengths in mm, angles in mrad.
 
-import { isLate } from "./connection.js";
+import { isLate } from "../connection.js";
 import { CameraPicture } from "./picture.js";
 import { BODY_MM, MapPainter, TRAIL_MS } from "./painter.js";
 
@@ -160,6 +160,11 @@ export class FleetMap {
   toMap(px, py) {
     const { x, y, scale } = this.view;
     return [x + (px - this.width / 2) / scale, y - (py - this.height / 2) / scale];
+  }
+
+  toScreen(x, y) {
+    const { view } = this;
+    return [this.width / 2 + (x - view.x) * view.scale, this.height / 2 - (y - view.y) * view.scale];
   }
 
   pan(px, py) {

@@ -11,7 +11,7 @@ import rospy
 from hero_node.errors import NodeError
 from hero_node.ros.registration import is_registered, register_again
 
-from .background import Background
+from ..background import Background
 from .losses import MASTER_PERIOD_S, MASTER_SILENT_S
 
 

@@ -1,6 +1,6 @@
 // Log lines of nodes and robots, newest at the bottom.
 
-import { colorOf } from "./colors.js";
+import { colorOf } from "../map/colors.js";
 
 const LINES_MAX = 500;
 const LEVELS = { 1: "debug", 2: "info", 4: "warn", 8: "error", 16: "fatal" };

@@ -73,16 +73,16 @@ def list_losses(
         if len(silent) > 1:
             cause = "No answer from %s: their robots are unknown" % names
         losses.append(
-            Loss("driver", cause, "switch off robots that move; start the driver again: " + NO_DRIVER)
+            Loss("driver", cause, "Switch off robots that move; start the driver again: " + NO_DRIVER)
         )
     elif not drivers:
-        losses.append(Loss("driver", "No driver", NO_DRIVER))
+        losses.append(Loss("driver", "No driver", "Start it: " + NO_DRIVER))
     if master:
         losses.append(
             Loss(
                 "master",
                 "No ROS master (%s): robots and programs that start now do not appear" % master,
-                "what is connected goes on, and STOP ALL works; start it again: " + NO_DRIVER,
+                "What is connected goes on, and STOP ALL works; start it again: " + NO_DRIVER,
             )
         )
     if localization.is_lost(now_s):
@@ -90,7 +90,7 @@ def list_losses(
             Loss(
                 "localization",
                 "Localization is silent: positions are unknown",
-                "look at its terminal, or start it again: roslaunch hero_localization localization.launch",
+                "Look at its terminal, or start it again: roslaunch hero_localization localization.launch",
             )
         )
     elif localization.has_lost_camera(now_s):
@@ -98,7 +98,7 @@ def list_losses(
             Loss(
                 "camera",
                 "The camera measures no robot: positions follow odometry, which drifts",
-                "is it plugged in, uncovered and lit? Does track run? roslaunch hero_localization camera.launch",
+                "Is it plugged in, uncovered and lit? Does track run? roslaunch hero_localization camera.launch",
             )
         )
     return losses

@@ -1,0 +1,1 @@
+"""Requests of pages, and what they make robots do."""

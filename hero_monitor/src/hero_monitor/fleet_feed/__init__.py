@@ -1,0 +1,1 @@
+"""ROS topics into the state that pages show."""

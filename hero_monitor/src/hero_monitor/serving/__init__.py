@@ -1,0 +1,1 @@
+"""HTTP and WebSocket, and who may use them; no ROS."""

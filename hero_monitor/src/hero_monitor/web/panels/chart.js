@@ -1,0 +1,96 @@
+// A chart of one quantity over the last minute (uPlot, in vendor/): a line for each robot, or mean and extremes of many.
+
+import { KEPT_MS, QUANTITIES } from "../history.js";
+import { colorOf } from "../map/colors.js";
+
+const LINES_MAX = 12; // more cannot be told apart
+const PERIOD_MS = 500;
+const HEIGHT_PX = 170;
+
+const element = (id) => document.getElementById(id);
+
+/** Mean, least and greatest of the values that are known at each time. */
+function summarize(values) {
+  const columns = values[0].map((_, index) => values.map((line) => line[index]).filter((value) => value !== null));
+  const reduce = (find) => columns.map((known) => (known.length ? find(known) : null));
+  return [
+    reduce((known) => known.reduce((sum, value) => sum + value, 0) / known.length),
+    reduce((known) => Math.min(...known)),
+    reduce((known) => Math.max(...known)),
+  ];
+}
+
+export class Chart {
+  constructor(history) {
+    this.history = history;
+    this.key = "";
+    this.plot = null;
+    this.select = element("quantity");
+    for (const [name, { title, unit }] of Object.entries(QUANTITIES)) {
+      this.select.add(new Option(`${title}, ${unit}`, name));
+    }
+    this.select.addEventListener("input", () => this.show(this.robots || []));
+    setInterval(() => this.draw(), PERIOD_MS);
+    new ResizeObserver(() => this.resize()).observe(element("chart"));
+  }
+
+  /** Show the lines of these robots. */
+  show(robots) {
+    this.robots = robots;
+    this.draw();
+  }
+
+  draw() {
+    const names = (this.robots || []).map((robot) => robot.name);
+    element("charts").hidden = names.length === 0;
+    if (names.length === 0 || element("chart").clientWidth === 0) return;
+    const quantity = QUANTITIES[this.select.value];
+    let [times, ...values] = this.history.listSeries(names, quantity);
+    if (names.length > LINES_MAX && times.length) values = summarize(values);
+    const key = `${this.select.value} ${document.documentElement.dataset.theme} ${names.slice(0, LINES_MAX + 1)}`;
+    if (key !== this.key) this.rebuild(key, quantity);
+    this.plot.setData([times, ...values]);
+    const known = values.map((line) => line[line.length - 1]).filter((value) => value !== null && value !== undefined);
+    const mean = known.reduce((sum, value) => sum + value, 0) / known.length;
+    element("chart_now").textContent = known.length ? `now ${mean.toFixed(2)} ${quantity.unit}` : "unknown now";
+  }
+
+  rebuild(key, quantity) {
+    this.key = key;
+    this.plot?.destroy();
+    const style = getComputedStyle(document.documentElement);
+    const [ink, grid, accent] = ["--quiet", "--line", "--accent"].map((name) => style.getPropertyValue(name).trim());
+    const lines = this.robots.length > LINES_MAX
+      ? [["mean", accent, 2], ["least", ink, 1], ["greatest", ink, 1]]
+      : this.robots.map((robot) => [robot.name, colorOf(robot.id), 1.5]);
+    const axis = { stroke: ink, grid: { stroke: grid, width: 1 }, ticks: { show: false }, font: "12px system-ui, sans-serif" };
+    this.plot = new uPlot(
+      {
+        width: element("chart").clientWidth,
+        height: HEIGHT_PX,
+        legend: { show: false },
+        cursor: { show: false },
+        scales: { x: { time: false, range: [-KEPT_MS / 1000, 0] }, y: { range: (plot, low, high) => rangeOf(low, high) } },
+        axes: [
+          { ...axis, size: 26, values: (plot, ticks) => ticks.map((tick) => (tick === 0 ? "now" : `${tick} s`)) },
+          { ...axis, size: 44 },
+        ],
+        series: [{}, ...lines.map(([label, stroke, width]) => ({ label, stroke, width, points: { show: false } }))],
+      },
+      [[]],
+      element("chart"),
+    );
+    element("chart").setAttribute("aria-label", `${quantity.title} over the last minute, ${quantity.unit}`);
+  }
+
+  resize() {
+    const width = element("chart").clientWidth;
+    if (this.plot && width) this.plot.setSize({ width, height: HEIGHT_PX });
+  }
+}
+
+/** From zero, and never so narrow that noise fills the chart. */
+function rangeOf(low, high) {
+  const [least, most] = [Math.min(0, low ?? 0), Math.max(0.05, high ?? 0)];
+  return [least, most + 0.05 * (most - least)];
+}

@@ -1,0 +1,26 @@
+// The swarm in numbers, shown while no robot is chosen.
+
+import { stateOf } from "../losses.js";
+
+const DRIVING_M_S = 0.01;
+
+const element = (id) => document.getElementById(id);
+
+/** Each robot counts once: lost before stopped, stopped before driving. */
+function classify(robot, state, history) {
+  if (stateOf(robot, state) !== "READY") return "lost";
+  if (robot.stop) return "stopped";
+  return (history.speedOf(robot.name) ?? 0) >= DRIVING_M_S ? "driving" : "ready";
+}
+
+export function showSummary(state, history) {
+  const counts = { ready: 0, driving: 0, stopped: 0, lost: 0 };
+  for (const robot of state.fleet.robots) counts[classify(robot, state, history)] += 1;
+  for (const [name, count] of Object.entries(counts)) {
+    element(`count_${name}`).textContent = count;
+    element(`count_${name}`).parentElement.classList.toggle("zero", count === 0);
+  }
+  const speeds = state.fleet.robots.map((robot) => history.speedOf(robot.name)).filter((speed) => speed !== null);
+  const mean = speeds.reduce((sum, speed) => sum + speed, 0) / speeds.length;
+  element("mean_speed").textContent = speeds.length ? `mean speed ${mean.toFixed(2)} m/s` : "mean speed unknown";
+}

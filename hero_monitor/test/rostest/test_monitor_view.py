@@ -1,0 +1,188 @@
+#!/usr/bin/env python3
+"""What the page shows, in a real browser: summary, charts, table, map, projector, and contrast by axe; without ROS."""
+
+import math
+import time
+import unittest
+from pathlib import Path
+
+import rostest
+from monitor_page import MonitorPage
+from scripted_monitor import ScriptedMonitor, make_fleet, make_robot
+
+from hero_test.browser import MISSING
+from hero_test.waiting import wait_for
+
+AXE = (Path(__file__).resolve().parents[1] / "vendor" / "axe.min.js").read_text(encoding="utf-8")
+RUN_AXE = """
+const done = arguments[0];
+axe.run(document, { runOnly: ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa"] }).then(({ violations }) =>
+  done(violations.map(({ id, nodes }) => id + ": " + nodes.map((node) => node.html.slice(0, 90)).join(" | "))));
+"""
+PLACE_LABELS = """
+const done = arguments[0];
+import("/map/labels.js").then(({ placeLabels }) => {
+  const labels = [...Array(100).keys()].map((index) => ({
+    x: (index * 137) % 211, y: (index * 89) % 197, radius: 9, width: 44, height: 12, isNeeded: index === 7,
+  }));
+  const boxes = placeLabels(labels).map((corner) => corner && [...corner, 44, 12]);
+  const overlap = (a, b) => a && b && Math.abs(a[0] - b[0]) < 44 && Math.abs(a[1] - b[1]) < 12;
+  const overlaps = boxes.filter((box, index) => boxes.some((other, at) => at !== index && overlap(box, other)));
+  done([boxes.filter(Boolean).length, overlaps.length, boxes[7] !== null]);
+});
+"""
+READ_PIXELS = """
+const canvas = document.getElementById("canvas"), ratio = devicePixelRatio;
+const { width, height } = canvas.getBoundingClientRect();
+const context = canvas.getContext("2d");
+const read = (x, y) => [...context.getImageData(x * ratio, y * ratio, 1, 1).data].slice(0, 3);
+return arguments[0].map(([right, up]) => read(width / 2 + right, height / 2 - up));
+"""
+READ_COLORS = """
+const tags = [...document.querySelectorAll("tbody [data-state]")];
+return tags.map((tag) => getComputedStyle(tag).backgroundColor);
+"""
+BODY_MM = 36.85
+
+
+@unittest.skipIf(MISSING, "not installed: %s (script/bootstrap --test)" % ", ".join(MISSING))
+class ViewTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.monitor = ScriptedMonitor()
+        cls.page = MonitorPage(cls.monitor.url)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.page.close()
+        cls.monitor.close()
+
+    def setUp(self):
+        self.show([make_robot(number) for number in range(4)])
+        self.page.open()
+        self.page.wait_for_text("#ready", "4 of 4 ready")
+
+    def tearDown(self):
+        self.assertEqual(self.page.errors(), [])
+
+    def show(self, robots, travelled_m=0.0, **fleet):
+        poses = {
+            robot["name"]: [300 * (index % 10) + round(1000 * travelled_m), 300 * (index // 10), 0]
+            for index, robot in enumerate(robots)
+        }
+        ranges = {robot["name"]: [None, 120, 0, -1] for robot in robots}
+        self.monitor.show(fleet=make_fleet(*robots, **fleet), poses=poses, ranges=ranges, losses=[], stop=None)
+
+    def drive(self, robots, condition):
+        """Let robots drive at 0.05 m/s until a condition is true."""
+        start_s = time.monotonic()
+
+        def is_true():
+            self.show(robots, 0.05 * (time.monotonic() - start_s))
+            return condition()
+
+        wait_for(is_true, "the page to show it")
+
+    def counts(self):
+        return {name: int(self.page.text("#count_" + name)) for name in ("ready", "driving", "stopped", "lost")}
+
+    def test_the_summary_counts_each_robot_once(self):
+        states = [{}, {"stop": "at rest"}, {"state": "AWAY"}, {"known": False}, {"state": "REFUSED"}]
+        self.show([make_robot(number, **changes) for number, changes in enumerate(states)])
+        wait_for(lambda: self.counts() == {"ready": 1, "driving": 0, "stopped": 1, "lost": 2}, self.counts)
+
+    def test_robots_that_move_count_as_driving_at_their_mean_speed(self):
+        robots = [make_robot(number) for number in range(4)]
+        self.drive(robots, lambda: self.counts()["driving"] == 4)
+        self.assertIn(" m/s", self.page.text("#mean_speed"))
+        self.assertGreater(float(self.page.rows()[0]["Speed"].split()[0]), 0.0)
+
+    def test_a_chart_shows_the_chosen_quantity_of_all_robots_or_one(self):
+        self.drive([make_robot(number) for number in range(4)], lambda: "now" in self.page.text("#chart_now"))
+        count = "return document.querySelectorAll('#chart canvas').length"
+        self.assertEqual(self.page.run(count), 1)
+        self.page.find("#quantity [value='nearest']").click()
+        self.drive([make_robot(number) for number in range(4)], lambda: self.page.text("#chart_now") == "now 0.00 m")
+        label = self.page.find("#chart").get_attribute("aria-label")
+        self.assertEqual(label, "nearest obstacle over the last minute, m")
+        self.page.choose("hero_1")
+        self.assertFalse(self.page.find("#summary").is_displayed())
+        self.assertEqual(self.page.run(count), 1)
+
+    def test_the_table_hides_details_until_they_are_asked_for(self):
+        def heads():
+            found = self.page.browser.find_elements("css selector", "th[scope=col]")
+            return [head.text.split()[0] for head in found if head.text]
+
+        self.assertEqual(heads(), ["Robot", "State", "Light", "Nearest", "Speed", "Pose"])
+        self.page.click("#details")
+        self.assertIn("Firmware", heads())
+        self.page.click("#details")
+
+    def test_only_what_is_wrong_has_color_in_the_table(self):
+        self.show([make_robot(0), make_robot(1, state="AWAY"), make_robot(2, known=False), make_robot(3, odom=0.0)])
+        wait_for(lambda: [row["State"] for row in self.page.rows()][3] == "READY, no data", self.page.rows)
+        colors = self.page.run(READ_COLORS)
+        self.assertEqual(colors[0], "rgba(0, 0, 0, 0)")
+        self.assertEqual(len(set(colors)), 4)
+
+    def test_the_light_of_a_robot_leaves_its_ring_of_identity_alone(self):
+        self.monitor.show(fleet=make_fleet(make_robot(0)), poses={"hero_0": [0, 0, 0]}, ranges={}, lights={})
+        self.page.wait_for_text("#ready", "1 of 1")
+        self.page.click("#fit")
+
+        def read():
+            # Fit shows 300 mm around a single robot. Middle, light, gap and ring, at an angle without the arrow.
+            width, height = self.page.run("return [canvas.clientWidth, canvas.clientHeight - 72]")
+            scale = min(width, height) * 0.95 / 300
+            radii = [part * BODY_MM * scale for part in (0.0, 0.5, 0.7, 0.905)]
+            points = [[radius * math.cos(2.2), radius * math.sin(2.2)] for radius in radii]
+            return self.page.browser.execute_script(READ_PIXELS, points)
+
+        dark = wait_for(read, "pixels")
+        self.monitor.show(lights={"hero_0": "#00ff00"})
+        lit = wait_for(lambda: read() if read()[0] == [0, 255, 0] else None, read)
+        self.assertEqual(lit[1], [0, 255, 0])
+        self.assertEqual(lit[2:], dark[2:])
+        self.assertNotIn(lit[3], (lit[0], lit[2]))
+
+    def test_labels_overlap_neither_each_other_nor_leave_out_the_chosen_one(self):
+        placed, overlapping, has_needed = self.page.browser.execute_async_script(PLACE_LABELS)
+        self.assertGreater(placed, 5)
+        self.assertEqual((overlapping, has_needed), (0, True))
+
+    def test_the_projector_shows_the_map_alone_and_stop_all_in_its_place(self):
+        place = self.page.find("#stop").rect
+        self.page.click("#projector")
+        wait_for(lambda: not self.page.find("#fleet").is_displayed(), "the map alone")
+        width = self.page.run("return innerWidth")
+        self.assertEqual(self.page.find("#map").rect["width"], width)
+        self.page.save("monitor_projector.png")
+        self.assertTrue(self.page.find("#stop").is_displayed())
+        self.page.click("#projector")
+        wait_for(lambda: self.page.find("#fleet").is_displayed(), "the whole page")
+        self.assertEqual(self.page.find("#stop").rect, place)
+
+    def test_no_state_of_the_page_breaks_a_rule_of_wcag_aa(self):
+        robots = [make_robot(number, stop="at rest") for number in range(3)]
+        away = make_robot(3, state="AWAY", error="silent for 6.1 s")
+        bad = [away, make_robot(4, known=False), make_robot(5, odom=0.0)]
+        status = {"level": "error", "text": "NOT STOPPED: hero_3 moves", "is_final": False, "reads": 0}
+        loss = {"source": "driver", "cause": "No answer from hero_driver", "remedy": "start it again"}
+        self.page.run(AXE)
+        for theme in ("light", "dark"):
+            self.page.run("document.documentElement.dataset.theme = '%s'" % theme)
+            for name, updates in (
+                ("empty", {"fleet": make_fleet()}),
+                ("live", {"fleet": make_fleet(*robots)}),
+                ("stopped", {"fleet": make_fleet(*robots, stopped=True), "stop": {**status, "level": "info"}}),
+                ("wrong", {"fleet": make_fleet(*robots, *bad), "stop": status, "losses": [loss]}),
+            ):
+                self.monitor.show(**updates)
+                count = "%d of" % len(updates["fleet"]["robots"])
+                wait_for(lambda count=count: count[:1] in self.page.text("#ready"), name)
+                self.assertEqual(self.page.browser.execute_async_script(RUN_AXE), [], (theme, name))
+
+
+if __name__ == "__main__":
+    rostest.rosrun("hero_monitor", "test_monitor_view", ViewTest)
