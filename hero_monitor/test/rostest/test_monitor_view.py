@@ -38,6 +38,11 @@ const context = canvas.getContext("2d");
 const read = (x, y) => [...context.getImageData(x * ratio, y * ratio, 1, 1).data].slice(0, 3);
 return arguments[0].map(([right, up]) => read(width / 2 + right, height / 2 - up));
 """
+FIND_CUT = """
+const cut = (one) => one.clientWidth > 0 && one.scrollWidth > one.clientWidth + 1;
+return [document.body, ...document.querySelectorAll("header, main section, .scroll, .filters, #tabs, .counts")]
+  .filter(cut).map((one) => one.id + one.className + " " + one.scrollWidth + " > " + one.clientWidth);
+"""
 READ_COLORS = """
 const tags = [...document.querySelectorAll("tbody [data-state]")];
 return tags.map((tag) => getComputedStyle(tag).backgroundColor);
@@ -163,6 +168,29 @@ class ViewTest(unittest.TestCase):
         wait_for(lambda: self.page.find("#fleet").is_displayed(), "the whole page")
         self.assertEqual(self.page.find("#stop").rect, place)
 
+    def test_messages_that_differ_only_in_numbers_are_one_line(self):
+        texts = ["hero_%d: silent for %d.5 s" % (number % 3, number) for number in range(6)]
+        lines = [[number, 0.0, 4, "hero_driver", text[:6], text] for number, text in enumerate(texts)]
+        self.monitor.tell(log={"missed": 0, "lines": [*lines, [7, 0.0, 4, "other", "", "ends"]]})
+        wait_for(lambda: self.page.text("#lines").endswith("ends"), "the lines")
+        shown = self.page.run("return [...document.querySelectorAll('#lines li')].map((one) => one.innerText)")
+        self.assertEqual(len(shown), 2)
+        for text in ("3 robots", "silent for 5.5 s", "6 times"):
+            self.assertIn(text, shown[0])
+
+    def test_a_phone_cuts_nothing_off_and_shows_layers_on_request(self):
+        self.page.resize(320, 568)
+        self.addCleanup(self.page.resize, 1440, 900)
+        names = self.page.find("#names")
+        self.assertFalse(names.is_displayed())
+        self.page.click("#layers")
+        self.assertTrue(names.is_displayed())
+        self.page.click("#layers")
+        self.page.save("monitor_phone.png")
+        for panel in ("fleet", "robot", "log"):
+            self.page.click("[data-panel=%s]" % panel)
+            self.assertEqual(self.page.run(FIND_CUT), [], panel)
+
     def test_no_state_of_the_page_breaks_a_rule_of_wcag_aa(self):
         robots = [make_robot(number, stop="at rest") for number in range(3)]
         away = make_robot(3, state="AWAY", error="silent for 6.1 s")
@@ -182,6 +210,11 @@ class ViewTest(unittest.TestCase):
                 count = "%d of" % len(updates["fleet"]["robots"])
                 wait_for(lambda count=count: count[:1] in self.page.text("#ready"), name)
                 self.assertEqual(self.page.browser.execute_async_script(RUN_AXE), [], (theme, name))
+        self.addCleanup(self.page.resize, 1440, 900)
+        self.page.resize(360, 740)
+        for panel in ("fleet", "robot", "log"):
+            self.page.click("[data-panel=%s]" % panel)
+            self.assertEqual(self.page.browser.execute_async_script(RUN_AXE), [], panel)
 
 
 if __name__ == "__main__":

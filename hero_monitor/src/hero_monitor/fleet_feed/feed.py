@@ -167,9 +167,15 @@ class FleetFeed:
         self._fleet_s, self._answering = now_s, answering
         has_driver = any(answering.values())
         self.stopped = self.stopped and all(answering.values())
-        fleet = {"driver": has_driver, "listening": make_printable(self._listening), "stopped": self.stopped}
-        fleet["frame"] = shorten(self.placement.frame) if self.placement.is_localized else ""
-        self.page_state.put("fleet", {**fleet, "robots": [self._make_row(row) for row in self._rows]})
+        fleet = {
+            "driver": has_driver,
+            "listening": make_printable(self._listening),
+            "stopped": self.stopped,
+            "frame": shorten(self.placement.frame),
+            "localized": self.placement.is_localized,
+            "robots": [self._make_row(row) for row in self._rows],
+        }
+        self.page_state.put("fleet", fleet)
 
     def _list_losses(self) -> None:
         losses = list_losses(self._answering, self._master.check(), self._localization, time.monotonic())

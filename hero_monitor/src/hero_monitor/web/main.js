@@ -21,7 +21,7 @@ const element = (id) => document.getElementById(id);
 /** As received, whether it is up to date, and the name of the chosen robot. */
 const state = {
   hello: { control: false },
-  fleet: { driver: false, listening: "", stopped: false, robots: [] },
+  fleet: { driver: false, listening: "", stopped: false, frame: "", localized: false, robots: [] },
   losses: [],
   poses: {},
   ranges: {},
@@ -93,7 +93,7 @@ function showPanel() {
 }
 
 function showHead() {
-  const { driver, robots, listening, frame } = state.fleet;
+  const { driver, robots, listening, frame, localized } = state.fleet;
   const isLive = state.isFresh && driver;
   const link = element("link");
   link.textContent = isLive && state.losses.length === 0 ? "live" : isLive ? state.losses[0].source + " lost" : "unknown";
@@ -102,7 +102,8 @@ function showHead() {
   const unknown = count("UNKNOWN");
   element("ready").textContent = unknown ? `${unknown} of ${robots.length} unknown` : `${count("READY")} of ${robots.length} ready`;
   element("listening").textContent = isLive && listening ? `driver on ${listening}` : "";
-  element("frame").textContent = frame ? `frame ${frame}, by localization` : "";
+  const source = localized ? "by localization" : "by odometry, which drifts";
+  element("frame").textContent = robots.length ? `frame ${frame}, ${source}` : "";
   document.body.classList.toggle("stale", !state.isFresh);
   element("empty").hidden = robots.length > 0 || !isLive;
   element("empty").textContent = "No robots. Robots appear here when they connect to the driver.";
@@ -133,6 +134,12 @@ function receive(updates) {
 }
 
 document.addEventListener("visibilitychange", () => map.requestShown());
+
+// Phones show the map's buttons on request.
+element("layers").addEventListener("click", () => {
+  const isOpen = element("tools").classList.toggle("open");
+  element("layers").setAttribute("aria-expanded", String(isOpen));
+});
 
 // Small screens show one panel at a time.
 for (const button of document.querySelectorAll("#tabs button")) {

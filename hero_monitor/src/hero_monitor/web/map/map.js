@@ -246,6 +246,9 @@ export class FleetMap {
 
   keepTrails() {
     const now = Date.now();
+    const { frame } = this.state.fleet;
+    if (frame !== this.trailsFrame) this.trails.clear();
+    this.trailsFrame = frame;
     for (const [name, pose] of Object.entries(this.state.poses)) {
       if (pose === null) continue;
       const trail = this.trails.get(name) || [];

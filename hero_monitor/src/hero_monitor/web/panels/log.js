@@ -1,10 +1,11 @@
-// Log lines of nodes and robots, newest at the bottom.
+// Log lines of nodes and robots, newest at the bottom; a message that comes again, for any robot, stays one line.
 
 import { colorOf } from "../map/colors.js";
 
 const LINES_MAX = 500;
 const LEVELS = { 1: "debug", 2: "info", 4: "warn", 8: "error", 16: "fatal" };
 const AT_END_PX = 30;
+const NUMBER = /\d+(\.\d+)?/g;
 
 function cell(className, text) {
   const part = document.createElement("span");
@@ -20,12 +21,14 @@ export class LogView {
     this.mine = document.getElementById("mine");
     this.words = document.getElementById("words");
     this.chosen = null;
+    this.groups = new Map(); // by message without its numbers: the line that shows it, how often it came, and of whom
     for (const input of [this.level, this.mine, this.words]) {
       input.addEventListener("input", () => this.filter());
     }
   }
 
   clear() {
+    this.groups.clear();
     this.list.replaceChildren();
   }
 
@@ -43,27 +46,40 @@ export class LogView {
       gap.entry = null;
       this.list.append(gap);
     }
-    for (const [, seconds, level, node, robot, text] of lines) {
-      const line = document.createElement("li");
-      line.className = LEVELS[level] || "info";
-      line.entry = { level, robot, words: `${node} ${text}`.toLowerCase() };
-      const time = new Date(seconds * 1000);
-      line.append(cell("time", time.toTimeString().slice(0, 8)), cell("level", LEVELS[level] || "?"));
-      const source = cell("node", robot || node);
-      source.title = node;
-      if (robot) source.style.color = colorOf(Number(robot.slice(robot.indexOf("_") + 1)));
-      line.append(source, cell("text", robot && text.startsWith(`${robot}: `) ? text.slice(robot.length + 2) : text));
-      line.hidden = !this.admits(line.entry);
-      this.list.append(line);
+    for (const [, seconds, level, node, robot, text] of lines) this.add({ seconds, level, node, robot, text });
+    while (this.list.childElementCount > LINES_MAX) {
+      this.groups.delete(this.list.firstElementChild.entry?.key);
+      this.list.firstElementChild.remove();
     }
-    while (this.list.childElementCount > LINES_MAX) this.list.firstElementChild.remove();
     if (atEnd) this.list.scrollTop = this.list.scrollHeight;
+  }
+
+  /** Show a line at the end; what differs from one before only in numbers joins it. */
+  add({ seconds, level, node, robot, text }) {
+    const key = `${level} ${node} ${text.replace(NUMBER, "#")}`;
+    const former = this.groups.get(key);
+    former?.line.remove();
+    const robots = new Set(former?.robots).add(robot);
+    const count = (former?.count ?? 0) + 1;
+    const line = document.createElement("li");
+    line.className = LEVELS[level] || "info";
+    line.entry = { key, level, robots, words: `${node} ${text}`.toLowerCase() };
+    const time = new Date(seconds * 1000);
+    line.append(cell("time", time.toTimeString().slice(0, 8)), cell("level", LEVELS[level] || "?"));
+    const source = cell("node", robots.size > 1 ? `${robots.size} robots` : robot || node);
+    source.title = node;
+    if (robot && robots.size === 1) source.style.color = colorOf(Number(robot.slice(robot.indexOf("_") + 1)));
+    line.append(source, cell("text", robot && text.startsWith(`${robot}: `) ? text.slice(robot.length + 2) : text));
+    if (count > 1) line.lastElementChild.append(cell("count", `${count} times`));
+    line.hidden = !this.admits(line.entry);
+    this.groups.set(key, { line, count, robots });
+    this.list.append(line);
   }
 
   admits(entry) {
     if (entry === null) return true;
     if (entry.level < Number(this.level.value)) return false;
-    if (this.mine.checked && this.chosen !== null && entry.robot !== this.chosen) return false;
+    if (this.mine.checked && this.chosen !== null && !entry.robots.has(this.chosen)) return false;
     return entry.words.includes(this.words.value.trim().toLowerCase());
   }
 

@@ -160,7 +160,7 @@ export class RobotPanel {
       ["pose", pose ? `${meters(pose[0])} ${meters(pose[1])} m, ${((pose[2] / 1000) * (180 / Math.PI)).toFixed(0)}°` : "-"],
       ["stop", robot.stop || "-"],
       ["pose source", robot.source || "own odometry: position on the map unknown"],
-      ["frame", robot.source ? state.fleet.frame || "map" : "-"],
+      ["frame", robot.source ? state.fleet.frame : "-"],
       ["distance", robot.distance === null ? "-" : `${robot.distance.toFixed(2)} m since this view opened`],
       ["nearest", ranges.length ? `${meters(Math.min(...ranges))} m` : "nothing in range"],
       ["odometry", robot.odom === null ? "-" : `${robot.odom.toFixed(1)} Hz`],
@@ -176,7 +176,7 @@ export class RobotPanel {
     ];
     const truth = state.ground_truth[robot.name];
     if (pose && truth) {
-      facts.splice(1, 0, [state.fleet.frame ? "error of the pose" : "odometry error", `${Math.hypot(pose[0] - truth[0], pose[1] - truth[1]).toFixed(0)} mm`]);
+      facts.splice(1, 0, [state.fleet.localized ? "error of the pose" : "odometry error", `${Math.hypot(pose[0] - truth[0], pose[1] - truth[1]).toFixed(0)} mm`]);
     }
     return facts;
   }
