@@ -11,15 +11,17 @@ Uses only topics and services under /hero_N, the same for simulated and real rob
 BaseRobot, which robots that are stepped in process (hero_sim.stepped) share.
 """
 
+import atexit
 import math
 from typing import Any
 
 from nav_msgs.msg import Odometry
 
 from hero_msgs.msg import Encoder
+from hero_node.command_line import print_error
 from hero_node.ros.script import start_node
 
-from .robots.robot_base import NEXT_ODOM_S, BaseRobot, check_robot_id
+from .robots.robot_base import COMMAND_S, NEXT_ODOM_S, BaseRobot, check_robot_id
 from .ros.ros_link import RosLink
 
 __all__ = ["Robot"]
@@ -51,6 +53,15 @@ class Robot(BaseRobot):
             self._link.subscribe("odom")
         if proximity:
             self._link.subscribe("proximity")
+        atexit.register(self._explain_end)
+
+    def _explain_end(self) -> None:
+        """Say that the end of a program ends a single command, which its robot would otherwise obey for 2 s."""
+        if self._moves_sent == 1 and self.now_s - self._last_move_s < COMMAND_S:
+            print_error(
+                "%s stops, as the program ends right after drive(): name a time, such as duration_s=2.0, or repeat it"
+                " in a loop" % self.name
+            )
 
     @property
     def odometry(self) -> Odometry:

@@ -38,6 +38,8 @@ class Swarm(BaseSwarm[Robot]):
 
         Raises: ValueError for an invalid or repeated id. NodeError if no ROS master answers within 3 s.
         """
+        if isinstance(robot_ids, (int, str)):
+            raise ValueError("a swarm is named by numbers, such as [0, 1, 2] or range(3), not by %r" % (robot_ids,))
         numbers = list(robot_ids)
         for number in numbers:
             if numbers.count(number) > 1:

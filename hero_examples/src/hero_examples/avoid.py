@@ -4,9 +4,9 @@ from hero_client import BaseRobot, Robot, rate
 
 
 def step(robot: BaseRobot) -> None:
-    front, left, *_, right = robot.proximity  # m from the robot's center; inf: nothing in range
-    is_blocked = min(front, left, right) < 0.15
-    angular_rad_s = 1.5 if left > right else -1.5
+    front, front_left, *_, front_right = robot.proximity  # m from the robot's center, 45 degrees apart; inf: nothing
+    is_blocked = min(front, front_left, front_right) < 0.15
+    angular_rad_s = 1.5 if front_left > front_right else -1.5
     robot.drive(0.0 if is_blocked else 0.08, angular_rad_s if is_blocked else 0.0)
 
 

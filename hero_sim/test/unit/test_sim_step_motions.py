@@ -323,3 +323,48 @@ def test_dropping_a_swarm_with_a_motion_on_its_way_is_no_error(recwarn):
     del swarm
     gc.collect()
     assert not recwarn.list
+
+
+def test_a_swarm_drives_forward_and_turns_all_at_once():
+    with StepSwarm(4, seed=2, arena="empty", perfect=True) as swarm:
+        before = [robot.true_pose for robot in swarm]
+        swarm.forward(0.1)
+        swarm.turn(1.0)
+        for robot, pose in zip(swarm, before):
+            forward_m, _, turn_rad = find_motion(pose, robot.true_pose)
+            assert (forward_m, turn_rad) == (pytest.approx(0.1, abs=0.01), pytest.approx(1.0, abs=0.1))
+        assert swarm.now_s < 12.0 and is_at_rest(swarm)  # one after the other they need 30 s
+
+
+def test_a_robot_of_a_swarm_that_cannot_drive_on_is_named():
+    with StepSwarm(6, arena=CORNER_ARENA) as swarm, pytest.raises(GoalError, match="hero_4 did not drive 0.3 m"):
+        swarm.forward(0.3)
+
+
+def test_speeds_that_are_limited_are_said_once(capsys):
+    with StepSwarm(1) as swarm:
+        for _ in range(3):
+            swarm[0].drive(0.5, 0.0)
+        assert capsys.readouterr().err.count("hero_0 cannot drive 0.5 m/s and 0 rad/s: it is limited to 0.2 m/s") == 1
+
+
+def test_an_angle_that_looks_like_degrees_is_asked_about(capsys):
+    with StepSwarm(1) as swarm:
+        swarm[0].turn_steps(90, 1.5).close()
+        assert "hero_0 turns by 90 rad, 14.3 full turns: for degrees, turn(math.radians(90))" in capsys.readouterr().err
+        swarm[0].turn_steps(2.0 * math.tau, 1.5).close()
+        assert not capsys.readouterr().err
+
+
+def test_headings_in_another_frame_stay_within_a_half_turn():
+    with StepSwarm(1, arena="empty") as swarm:
+        swarm.sleep(0.2)
+        swarm[0].set_pose(0.0, 0.0, 3.0)
+        swarm[0]._link._origin = swarm[0].true_pose._replace(yaw_rad=3.0)
+        assert abs(swarm[0].pose_in("world").yaw_rad) <= math.pi
+        assert swarm[0].pose_in("world").yaw_rad == pytest.approx(6.0 - math.tau, abs=0.02)
+
+
+def test_a_slice_of_a_swarm_is_refused_with_what_to_write():
+    with StepSwarm(2) as swarm, pytest.raises(TypeError, match=r"swarm\[3\] is hero_3; for several robots"):
+        swarm[0:2]

@@ -15,7 +15,7 @@ from ..controllers.straight_and_turn import ForwardController, TurnController
 from ..values.background_motion import BackgroundMotion, Sleep, Steps
 from ..values.colors import Color
 from ..values.errors import GoalError, StaleDataError, StoppedError
-from ..values.geometry import Pose, Velocity, clamp, transform_pose
+from ..values.geometry import Pose, Velocity, clamp, transform_pose, wrap_angle
 from ..values.readings import FRESH_S, Obstacle, find_nearest
 from ..values.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
 from .group import POLL_PERIOD_S, READY_TIMEOUT_S, REPEAT_PERIOD_S, Group, stop_after, wait_for_all
@@ -28,6 +28,9 @@ NEXT_ODOM_S = 5.0
 """The next odometry comes within 0.1 s, on a busy machine within a second."""
 
 STOPPED_WARNING_PERIOD_S = 5.0
+
+COMMAND_S = 2.0
+"""For so long a robot obeys a command that no other follows."""
 
 OnStep = Callable[[GoToGoalController], None]
 
@@ -60,6 +63,10 @@ class BaseRobot(Group):
         self._light = Light(link)
         self._motion: Optional[BackgroundMotion] = None
         self._next_warning_s = -math.inf
+        self._first_data_s = self.now_s + READY_TIMEOUT_S
+        self._moves_sent = 0
+        self._last_move_s = -math.inf
+        self._is_clipped = False
 
     # ------------------------------------------------------------------ data
 
@@ -72,6 +79,10 @@ class BaseRobot(Group):
 
     def _check_fresh(self, topic: str) -> None:
         age_s = self._link.age_s(topic)
+        if age_s == math.inf and self.now_s < self._first_data_s:
+            with suppress(StaleDataError):  # reported below
+                self._link.wait_for_next(topic, self._first_data_s - self.now_s)
+            age_s = self._link.age_s(topic)
         if age_s <= FRESH_S:
             return
         name = "%s/%s" % (self.namespace, topic)
@@ -82,6 +93,8 @@ class BaseRobot(Group):
     @property
     def pose(self) -> Pose:
         """Where the robot is by its odometry, in the frame hero_N/odom: 0, 0, 0 where it was switched on.
+
+        In the first 2 s of a Robot it waits for the first odometry, as other data properties wait for theirs.
 
         Raises: StaleDataError if odometry is older than 1 s.
         """
@@ -99,7 +112,8 @@ class BaseRobot(Group):
         """
         frame = frame.lstrip("/")
         localized = self._link.find_localized(frame, timeout_s)
-        return localized or transform_pose(self._link.find_origin(frame, timeout_s), self.pose)
+        pose = localized or transform_pose(self._link.find_origin(frame, timeout_s), self.pose)
+        return pose._replace(yaw_rad=wrap_angle(pose.yaw_rad))
 
     @property
     def velocity(self) -> Velocity:
@@ -130,18 +144,12 @@ class BaseRobot(Group):
         return self._link.read_ranges()
 
     def fresh_pose(self) -> Optional[Pose]:
-        """Return `pose`, or None where that would raise."""
-        try:
-            return self.pose
-        except StaleDataError:
-            return None
+        """Return `pose` without waiting, or None if it is not fresh."""
+        return self._link.read_pose() if self._link.age_s("odom") <= FRESH_S else None
 
     def fresh_proximity(self) -> List[float]:
-        """Return `proximity`, or eight times nan (not known) where that would raise."""
-        try:
-            return self.proximity
-        except StaleDataError:
-            return [math.nan] * 8
+        """Return `proximity` without waiting, or eight times nan (not known) if it is not fresh."""
+        return self._link.read_ranges() if self._link.age_s("proximity") <= FRESH_S else [math.nan] * 8
 
     def nearest(self) -> Optional[Obstacle]:
         """Return range (m, from the robot's center) and bearing (rad) of the nearest obstacle; None if none is seen.
@@ -207,6 +215,14 @@ class BaseRobot(Group):
         if not (math.isfinite(linear_m_s) and math.isfinite(angular_rad_s)):
             raise ValueError("speeds must be finite, not %r m/s and %r rad/s" % (linear_m_s, angular_rad_s))
         self.driven = True
+        self._moves_sent = self._moves_sent + 1 if linear_m_s or angular_rad_s else 0
+        self._last_move_s = self.now_s
+        if not self._is_clipped and (abs(linear_m_s) > MAX_LINEAR_M_S or abs(angular_rad_s) > MAX_ANGULAR_RAD_S):
+            self._is_clipped = True
+            self._link.log_error(
+                "%s cannot drive %g m/s and %g rad/s: it is limited to %g m/s and %g rad/s"
+                % (self.name, linear_m_s, angular_rad_s, MAX_LINEAR_M_S, MAX_ANGULAR_RAD_S)
+            )
         self._link.send_velocity(clamp(linear_m_s, MAX_LINEAR_M_S), clamp(angular_rad_s, MAX_ANGULAR_RAD_S))
 
     def _describe_stop(self) -> str:
@@ -224,10 +240,9 @@ class BaseRobot(Group):
 
         Raises: GoalError as go_to(). ValueError for a speed that is not positive. RobotNotReadyError. StoppedError.
         """
-        _check_speed(distance_m, linear_m_s)
+        steps = self.forward_steps(distance_m, linear_m_s)
         self._end_motion()
-        controller = ForwardController(distance_m, self.now_s, linear_m_s)
-        self._run(self._follow(controller, lambda: "drive %g m" % distance_m))
+        self._run(steps)
 
     def turn(self, angle_rad: float, angular_rad_s: float = 1.5) -> None:
         """Turn on the spot by angle_rad, positive to the left, to within 0.03 rad by the robot's odometry.
@@ -237,10 +252,30 @@ class BaseRobot(Group):
         Raises: GoalError if the wheels do not turn or odometry ends. ValueError for a speed that is not positive.
         RobotNotReadyError. StoppedError.
         """
-        _check_speed(angle_rad, angular_rad_s)
+        steps = self.turn_steps(angle_rad, angular_rad_s)
         self._end_motion()
+        self._run(steps)
+
+    def forward_steps(self, distance_m: float, linear_m_s: float) -> Steps:
+        """Return forward() as steps. Raises: ValueError for a speed that is not positive."""
+        _check_speed(distance_m, linear_m_s)
+        controller = ForwardController(distance_m, self.now_s, linear_m_s)
+        return self._follow(controller, lambda: "drive %g m" % distance_m)
+
+    def turn_steps(self, angle_rad: float, angular_rad_s: float) -> Steps:
+        """Return turn() as steps. Raises: ValueError for a speed that is not positive."""
+        _check_speed(angle_rad, angular_rad_s)
+        if abs(angle_rad) > math.tau and float(angle_rad).is_integer():
+            text = "%s turns by %g rad, %.1f full turns: for degrees, turn(math.radians(%g))"
+            self._link.log_error(text % (self.name, angle_rad, abs(angle_rad) / math.tau, angle_rad))
         controller = TurnController(angle_rad, self.now_s, angular_rad_s)
-        self._run(self._follow(controller, lambda: "turn %g rad" % angle_rad))
+        return self._follow(controller, lambda: "turn %g rad" % angle_rad)
+
+    def start_motion(self, steps: Steps) -> BackgroundMotion:
+        """Take the steps of a motion in the background, in place of the present one; return the motion."""
+        self._end_motion()
+        self._motion = self._link.start(steps)
+        return self._motion
 
     def go_to(
         self,
@@ -288,9 +323,7 @@ class BaseRobot(Group):
         motion.cancel(), stop() or another motion of this robot ends it, and result() then raises GoalError. Several
         robots at once: start all, then ask each motion for its result().
         """
-        self._end_motion()
-        self._motion = self._link.start(self._pursue(Goal(x_m, y_m, yaw_rad), frame, avoid, timeout_s, tolerance_m))
-        return self._motion
+        return self.start_motion(self._pursue(Goal(x_m, y_m, yaw_rad), frame, avoid, timeout_s, tolerance_m))
 
     def pursue(
         self,
@@ -419,9 +452,9 @@ class BaseRobot(Group):
 
     def __repr__(self) -> str:
         """Return the robot's name with its pose, or with why it is not ready."""
-        is_stopped = self.is_stopped  # waits until it is known why a robot is missing, too
-        state = self.missing() or ("stopped" if is_stopped else "ready")
-        return "<%s: %s%s>" % (self.name, state, ", %r" % (self.fresh_pose(),) if self.fresh_pose() else "")
+        state = self.missing() or ("stopped" if self._link.is_stopped else "ready")
+        pose = self.fresh_pose()
+        return "<%s: %s%s>" % (self.name, state, ", %r" % (pose,) if pose else "")
 
 
 def _check_speed(distance: float, speed: float) -> None:

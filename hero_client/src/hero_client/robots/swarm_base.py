@@ -67,7 +67,23 @@ class BaseSwarm(Group, Generic[AnyRobot]):
 
         Raises: as Robot.go_to(), for the robots that failed; the others reach their goals.
         """
-        motions = self.start_go_to(x_m, y_m, yaw_rad, **options)
+        self._wait_for(self.start_go_to(x_m, y_m, yaw_rad, **options))
+
+    def forward(self, distance_m: float, linear_m_s: float = 0.1) -> None:
+        """Drive all robots straight on at once; return when all have ended: see Robot.forward().
+
+        Raises: as Robot.forward(), for the robots that failed; the others end their motions.
+        """
+        steps = [(robot, robot.forward_steps(distance_m, linear_m_s)) for robot in self.robots]
+        self._wait_for([robot.start_motion(motion) for robot, motion in steps])
+
+    def turn(self, angle_rad: float, angular_rad_s: float = 1.5) -> None:
+        """Turn all robots on the spot at once; return when all have ended: see Robot.turn(). Raises: as forward()."""
+        steps = [(robot, robot.turn_steps(angle_rad, angular_rad_s)) for robot in self.robots]
+        self._wait_for([robot.start_motion(motion) for robot, motion in steps])
+
+    @staticmethod
+    def _wait_for(motions: Sequence[BackgroundMotion]) -> None:
         errors = [error for error in (motion.exception() for motion in motions) if error is not None]
         if len(errors) > 1 and all(isinstance(error, HeroError) for error in errors):
             raise GoalError("; ".join(map(str, errors)))
@@ -119,6 +135,8 @@ class BaseSwarm(Group, Generic[AnyRobot]):
             robot.leave_topics()
 
     def __getitem__(self, robot_id: int) -> AnyRobot:
+        if isinstance(robot_id, slice):
+            raise TypeError("swarm[3] is hero_3; for several robots: [swarm[robot_id] for robot_id in (0, 1)]")
         if robot_id not in self._by_id:
             names = ", ".join(robot.name for robot in self.robots)
             raise KeyError("hero_%s is not in this swarm: %s" % (robot_id, names))

@@ -1,8 +1,10 @@
 """The frame of a plain script: a ROS node that starts by itself, errors as one line, a loop with a rate."""
 
+import os
 import signal
 import sys
 import threading
+from traceback import walk_tb
 from types import FrameType
 from typing import Any, Iterator, Optional, Type
 
@@ -15,6 +17,10 @@ from .ros_clock import ROS_CLOCK
 from .ros_node import start_ros_node
 
 __all__ = ["rate", "start_node"]
+
+
+_START = threading.Lock()
+"""Threads of a script may open robots at the same time."""
 
 
 def rate(hz: float) -> Iterator[float]:
@@ -40,21 +46,29 @@ def start_node(name: str = "hero_program") -> None:
     """
     if sys.excepthook is sys.__excepthook__:
         sys.excepthook = _print_exception
-    if rospy.core.is_initialized():
-        check_master()  # rospy itself would wait for a master for ever
-        return
-    if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGTERM, _raise_exit)
-        signal.signal(signal.SIGHUP, _raise_exit)
-    start_ros_node(name, anonymous=True)
+    with _START:
+        if rospy.core.is_initialized():
+            check_master()  # rospy itself would wait for a master for ever
+            return
+        if threading.current_thread() is threading.main_thread():
+            signal.signal(signal.SIGTERM, _raise_exit)
+            signal.signal(signal.SIGHUP, _raise_exit)
+        start_ros_node(name, anonymous=True)
 
 
 def _print_exception(kind: Type[BaseException], error: BaseException, traceback: Any) -> None:
     """Print a HeroError as one line and Ctrl-C not at all; a mistake in the script keeps its traceback."""
     if issubclass(kind, HeroError):
-        print_error(str(error))
+        print_error(str(error) + _find_line(traceback))
     elif not issubclass(kind, KeyboardInterrupt):
         sys.__excepthook__(kind, error, traceback)
+
+
+def _find_line(traceback: Any) -> str:
+    """Return where in the script an error was raised, for the end of a message; nothing without a script."""
+    script = getattr(sys.modules["__main__"], "__file__", None)
+    lines = [line for frame, line in walk_tb(traceback) if frame.f_code.co_filename == script]
+    return " (%s, line %d)" % (os.path.basename(script), lines[-1]) if script and lines else ""
 
 
 def _raise_exit(number: int, frame: Optional[FrameType]) -> None:
