@@ -3,13 +3,34 @@
     parameters = read_parameters({"robots": robot_ids("0"), "linear_m_s": number(0.1, 0.0, 0.2, "m/s")})
 """
 
-from typing import Any, Dict, Mapping
+import sys
+from contextlib import suppress
+from typing import Any, Dict, List, Mapping
 
+import rosgraph
 import rospy
 
+from ..errors import ProgramError
 from ..parameters import check_parameters
 
-__all__ = ["read_parameters"]
+__all__ = ["delete_own_parameters", "read_parameters"]
+
+
+def _list_own() -> List[str]:
+    """Return the parameters that are given on the command line (_name:=value)."""
+    names = [word.partition(rosgraph.names.REMAP)[0] for word in sys.argv[1:] if rosgraph.names.REMAP in word]
+    return [name[1:] for name in names if name.startswith("_") and not name.startswith("__")]
+
+
+def delete_own_parameters() -> None:
+    """Take what is given on the command line off the parameter server, where the next start would find it.
+
+    What a launch file gives stays: roslaunch starts nodes again with it.
+    """
+    with suppress(OSError, rospy.ROSException):
+        for name in _list_own():
+            with suppress(KeyError):
+                rospy.delete_param("~" + name)
 
 
 def read_parameters(declared: Mapping[str, Any]) -> Dict[str, Any]:
@@ -22,4 +43,10 @@ def read_parameters(declared: Mapping[str, Any]) -> Dict[str, Any]:
         given = rospy.get_param("~", {})
     except KeyError:
         given = {}
-    return check_parameters(declared, given)
+    try:
+        return check_parameters(declared, given)
+    except ProgramError as error:
+        if set(given) <= set(_list_own()):
+            raise
+        text = "%s; what a killed program or a launch file left on the parameter server: rosparam delete %s"
+        raise ProgramError(text % (error, rospy.get_name())) from None

@@ -20,6 +20,7 @@ import rospy
 from .. import command_line
 from ..clock import Clock
 from ..errors import HeroError
+from .private_parameters import delete_own_parameters
 from .ros_node import start_ros_node
 
 __all__ = ["Program", "run"]
@@ -100,6 +101,7 @@ class Program(Clock):
     def __exit__(self, *error: object) -> None:
         self._ending = True
         self._finished.set()
+        delete_own_parameters()
         rospy.signal_shutdown("the program ends")
 
 
