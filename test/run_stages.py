@@ -60,7 +60,7 @@ def make_workspace_jobs(results_dir):
     """Return one job for each build mode, and one for each other file."""
     parts = [("test_build_modes.py", mode, COMPUTING_LOAD) for mode in ("catkin_build", "install")]
     parts += [("test_demo.py", "", WAITING_LOAD), ("test_rosinstall.py", "", WAITING_LOAD)]
-    jobs = []
+    jobs = [make_core_job(results_dir / "core", "not unit_tests")]  # they have run, with all packages
     environment = {"PATH": run_rostests.make_program_path(results_dir)}
     for file, mode, load in parts:
         arguments = (str(ROOT / "test" / "workspaces" / file), *(("-k", f"[{mode}]") if mode else ()))
@@ -68,6 +68,12 @@ def make_workspace_jobs(results_dir):
         own_results = results_dir / (mode or file[:-3])
         jobs.append(make_pytest_job(name, arguments, own_results, load)._replace(environment=environment))
     return jobs
+
+
+def make_core_job(results_dir, selection):
+    """Return the job that builds and tests the core without the other packages."""
+    arguments = (str(ROOT / "test" / "workspaces" / "test_core.py"), "-k", selection)
+    return make_pytest_job("core", arguments, results_dir, COMPUTING_LOAD)
 
 
 def make_jobs(stages, results, pattern, paths):
@@ -97,6 +103,8 @@ def make_jobs(stages, results, pattern, paths):
         jobs.append(documents._replace(has_own_network=False))
     if "workspaces" in stages:
         jobs += make_workspace_jobs(results / "workspaces")
+    if "core" in stages:
+        jobs.append(make_core_job(results / "core", ""))
     if "unit" in stages:
         jobs += make_unit_jobs(results / "unit", find_unit_tests())
     if "faults" in stages:

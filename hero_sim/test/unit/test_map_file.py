@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from PIL import Image
 
 from hero_sim.errors import OptionError
 from hero_sim.world.arena import measure_clearance, place_robots
 from hero_sim.world.arena_file import load_arena
+
+Image = pytest.importorskip("PIL.Image", reason="images of maps need python3-pil")
 
 MAP = (
     "image: room.png\nresolution: 0.01\norigin: [-0.6, -0.5, 0.0]\n"

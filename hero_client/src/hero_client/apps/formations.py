@@ -11,11 +11,11 @@
 import math
 from typing import Any, Dict, List, Sequence, Tuple
 
-from scipy.optimize import linear_sum_assignment
-
 from hero_node.errors import ProgramError
 from hero_node.texts import shorten
 from hero_node.yaml_text import YamlError, parse_yaml
+
+from ..values.assignment import assign_rows
 
 __all__ = ["FormationError", "Point", "assign_goals", "place_formation"]
 
@@ -129,5 +129,5 @@ def assign_goals(starts: Sequence[Point], goals: Sequence[Point]) -> List[int]:
         raise ValueError("%d robots cannot take %d goals, one each" % (len(starts), len(goals)))
     if not starts:
         return []
-    costs_m2 = [[(sx - gx) ** 2 + (sy - gy) ** 2 for gx, gy in goals] for sx, sy in starts]
-    return [int(column) for column in linear_sum_assignment(costs_m2)[1]]
+    between_m = np.asarray(starts, dtype=float)[:, np.newaxis] - np.asarray(goals, dtype=float)
+    return assign_rows(np.sum(between_m**2, axis=2))
