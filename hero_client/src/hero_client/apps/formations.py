@@ -11,6 +11,8 @@
 import math
 from typing import Any, Dict, List, Sequence, Tuple
 
+import numpy as np
+
 from hero_node.errors import ProgramError
 from hero_node.texts import shorten
 from hero_node.yaml_text import YamlError, parse_yaml
