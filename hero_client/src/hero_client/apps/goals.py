@@ -228,8 +228,8 @@ class GoalQueue:
         try:
             # A robot that has yet to join is waited for as long as it then may drive.
             self._robot.wait_until_ready(request.timeout_s, sleep)
-            self._robot.pursue(
-                request.goal,
+            self._robot.go_to(
+                *request.goal,
                 request.frame or "odom",
                 self._avoid,
                 request.timeout_s,

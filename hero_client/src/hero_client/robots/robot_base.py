@@ -287,6 +287,7 @@ class BaseRobot(Group):
         timeout_s: float = DEFAULT_TIMEOUT_S,
         tolerance_m: float = DEFAULT_TOLERANCE_M,
         sleep: Optional[Sleep] = None,
+        on_step: OnStep = lambda controller: None,
     ) -> None:
         """Drive to a position, turn to yaw_rad if given, and return when the robot has stopped there.
 
@@ -298,6 +299,8 @@ class BaseRobot(Group):
         The default field of simulated robots is 1.5 m by 1.5 m with walls (larger for more than nine robots): a single
         robot starts in its middle and reaches 0.7 m to each side.
 
+        on_step: called after each command.
+
         What the sensors do not see (black, low or thin things) ends no motion: wheels that slip are counted as driven.
 
         Raises: GoalError with the reason if the goal is not reached: an obstacle in the way and where it is, wheels
@@ -305,7 +308,8 @@ class BaseRobot(Group):
         StoppedError if all robots are stopped. FrameError as pose_in(). The robot is stopped then.
         """
         self._end_motion()
-        self.pursue(Goal(x_m, y_m, yaw_rad), frame, avoid, timeout_s, tolerance_m, sleep)
+        steps = self._pursue(Goal(x_m, y_m, yaw_rad), frame, avoid, timeout_s, tolerance_m, on_step)
+        self._run(steps, sleep)
 
     def start_go_to(
         self,
@@ -324,19 +328,6 @@ class BaseRobot(Group):
         robots at once: start all, then ask each motion for its result().
         """
         return self.start_motion(self._pursue(Goal(x_m, y_m, yaw_rad), frame, avoid, timeout_s, tolerance_m))
-
-    def pursue(
-        self,
-        goal: Goal,
-        frame: str,
-        avoid: bool,
-        timeout_s: float,
-        tolerance_m: float,
-        sleep: Optional[Sleep] = None,
-        on_step: OnStep = lambda controller: None,
-    ) -> None:
-        """As go_to(), for programs with goals of their own; on_step is called after each command."""
-        self._run(self._pursue(goal, frame, avoid, timeout_s, tolerance_m, on_step), sleep)
 
     def _pursue(
         self,

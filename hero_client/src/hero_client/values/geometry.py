@@ -51,7 +51,7 @@ def transform_pose(origin: Pose, pose: Pose) -> Pose:
     return Pose(
         origin.x_m + cos * pose.x_m - sin * pose.y_m,
         origin.y_m + sin * pose.x_m + cos * pose.y_m,
-        origin.yaw_rad + pose.yaw_rad,
+        wrap_angle(origin.yaw_rad + pose.yaw_rad),
     )
 
 
