@@ -53,7 +53,7 @@ def render_turn(poses):
 
 
 def write_camera_file(path):
-    """Write where the rendered camera hangs."""
+    """Write the pose of the rendered camera."""
     view = View(OPTIONS)
     lens = Lens(OPTIONS.width_px, OPTIONS.height_px, view.matrix, view.distortion)
     update(path, describe_camera(Camera(lens, view.rotation, view.position_m), {}))

@@ -1,4 +1,4 @@
-"""Robots drive to where the map ends, and walk at random there: see map_arena in hero_localization."""
+"""Robots drive to frontiers of the map, and walk at random there: see map_arena in hero_localization."""
 
 import math
 import random
@@ -14,7 +14,7 @@ from hero_client.values.geometry import STOP
 from hero_node.parameters import flag, number, robot_ids, whole_number
 
 NEAR_M = 0.35
-"""So near to where the map ends a robot walks at random: its eight beams leave gaps, which only motion fills."""
+"""So near to a frontier a robot walks at random: its eight beams leave gaps, which only motion fills."""
 
 APART_M = 0.3
 """Goals of two robots are further apart than this."""
@@ -39,7 +39,7 @@ class Explorer:
         return self.controller.goal[:2] if self.controller else None
 
     def step(self, frontiers, taken, now_s):
-        """Send the next command. frontiers: places where the map ends; taken: goals of the other robots."""
+        """Send the next command. frontiers: places on the frontier of the map; taken: goals of the other robots."""
         pose, ranges = self.common.pose_of(self.robot), self.robot.fresh_proximity()
         command = STOP
         if pose is not None and not all(map(math.isnan, ranges)):

@@ -1,4 +1,4 @@
-"""explore in virtual time: robots share out the places where the map ends, go there, and walk at random there."""
+"""explore in virtual time: robots share out frontiers, go there, and walk at random there."""
 
 import math
 

@@ -164,7 +164,7 @@ class TrackTest(unittest.TestCase):
         writer.release()
         status, text = self.calibrate("arena", "--device", self.video)
         self.assertEqual(status, 0, text)
-        self.assertIn("the camera hangs 2.20 m high", text)
+        self.assertIn("the camera is 2.20 m above the floor", text)
         self.assertIn("good; written to " + self.path, text)
 
     def test_1b_track_publishes_poses_and_objects_of_a_video_to_its_end(self):
@@ -232,7 +232,7 @@ class TrackTest(unittest.TestCase):
 
     def test_7_wrong_tags_bad_light_and_a_moved_camera_are_named(self):
         self.spoiler.change = add_tags(0, 77)
-        self.wait_for_problem("track: tag 0", "is there more than once, and counts for nothing")
+        self.wait_for_problem("track: tag 0", "appears more than once in the image and is ignored")
         self.wait_for_problem("localization: hero_77", "its tag is seen, but no driver knows the robot")
         self.spoiler.change = lambda gray: gray // 8
         self.wait_for_problem("track: camera", "pictures are too dark")

@@ -1,4 +1,4 @@
-"""Where the camera hangs, from reference tags: right ones, misplaced ones, too few; and a camera that was moved."""
+"""The camera pose from reference tags: right ones, misplaced ones, too few; and a camera that was moved."""
 
 import math
 

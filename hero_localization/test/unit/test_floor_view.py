@@ -1,4 +1,4 @@
-"""Views from above: places in the map are at their pixels, whichever way the camera hangs."""
+"""Views from above: places in the map are at their pixels, whichever way the camera looks."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Where the camera hangs, from reference tags of known place. Pure but for OpenCV."""
+"""The camera pose (extrinsics) from reference tags of known place. Pure but for OpenCV."""
 
 import itertools
 import math
@@ -86,7 +86,7 @@ def average_tags(frames: Sequence[Sequence[TagCorners]]) -> List[TagCorners]:
 def calibrate_arena(
     lens: Lens, tags: Sequence[TagCorners], references: Mapping[int, ReferenceTag]
 ) -> ArenaCalibration:
-    """Return where the camera hangs, from what it sees of the reference tags; other tags are ignored.
+    """Return the camera pose from the image of the reference tags; other tags are ignored.
 
     Only the places of the tags' centers count; their yaw is found with the camera.
 

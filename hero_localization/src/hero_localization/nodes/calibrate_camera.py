@@ -167,7 +167,7 @@ def import_lens(options: argparse.Namespace) -> int:
 
 
 def calibrate_place(options: argparse.Namespace, pictures: Pictures) -> int:
-    """Find where the camera hangs. Return the exit code."""
+    """Calibrate the camera pose (extrinsics). Return the exit code."""
     settings = camera_file.load(options.file)
     frames: List[Sequence[TagCorners]] = []
     while len(frames) < ARENA_FRAMES:
@@ -181,7 +181,8 @@ def calibrate_place(options: argparse.Namespace, pictures: Pictures) -> int:
     result = calibrate_arena(lens, tags, settings.layout.references)
     for tag_id, residual_m in sorted(result.residuals_m.items()):
         say("tag %d: %.1f mm%s" % (tag_id, 1e3 * residual_m, " (left out)" if tag_id in result.left_out else ""))
-    say("residual %.1f mm rms; the camera hangs %.2f m high" % (1e3 * result.rms_m, result.camera.position_m[2]))
+    height_m = result.camera.position_m[2]
+    say("residual %.1f mm rms; the camera is %.2f m above the floor" % (1e3 * result.rms_m, height_m))
     fits = fit_references(result.camera, tags, settings.layout.references)
     parts = camera_file.describe_camera(result.camera, {fit.tag_id: fit.pose for fit in fits})
     return _finish(options.file, parts, result.problems)

@@ -1,4 +1,4 @@
-"""Where the simulated camera hangs, how it maps points to pixels, and what spoils its pictures. Pure.
+"""Extrinsics and intrinsics of the simulated camera, and what degrades its images. Pure.
 
 Frame `world` as in the arena. Pixels as in OpenCV: the center of the first one is (0, 0).
 """

@@ -135,7 +135,7 @@ class Tracker:
         for tag_id in sightings.unknown:
             note[tag_id] = (stamp_s, "stands for no robot, object or reference: name it in the camera's file")
         for tag_id in sightings.doubled:
-            note[tag_id] = (stamp_s, "is there more than once, and counts for nothing: remove one")
+            note[tag_id] = (stamp_s, "appears more than once in the image and is ignored: remove one")
         for tag_id, share in sightings.misshapen.items():
             text = "measures %.0f %% of its size: print it at 100 %%, or set tag_size_m" % (100.0 * share)
             note[tag_id] = (stamp_s, text)
