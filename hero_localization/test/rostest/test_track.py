@@ -246,7 +246,7 @@ class TrackTest(unittest.TestCase):
 
     def test_9_a_second_camera_is_enough_and_check_reads_both(self):
         names = ("__name:=track_2", "~measured_poses:=/track/measured_poses")
-        options = ("_image:=camera/tags", "_file:=" + self.path)
+        options = ("_image:=camera/image_raw", "_file:=" + self.path)
         program = Program(find_program("hero_localization", "track"), *names, *options)
         self.addCleanup(program.close)
         self.wait_for_state(0, RobotPose.TRACKED)

@@ -65,7 +65,8 @@ class _Robot:
         self.filter = PoseFilter()
         self.heading = HeadingCheck()
         self.is_lost = False
-        self.is_untrusted = False
+        self.untrusted_s = -math.inf
+        """Stamp of the last image of a camera that moved; -inf if the robot was measured since."""
         self.outliers = 0
         self.jumps = 0
         self.measured_s = -math.inf
@@ -131,7 +132,7 @@ class SwarmLocalizer:
             robot.outliers += outcome is Outcome.OUTLIER
             return []
         robot.outliers = 0
-        was_lost, robot.is_lost, robot.is_untrusted = robot.is_lost, False, False
+        was_lost, robot.is_lost, robot.untrusted_s = robot.is_lost, False, -math.inf
         after = robot.filter.pose()
         if before is None or after is None:
             return ["hero_%d found at %s" % (robot_id, _describe_pose(measurement.pose))]
@@ -153,7 +154,7 @@ class SwarmLocalizer:
         for robot_id in robot_ids:
             robot = self._robots.get(robot_id)
             if robot is not None and stamp_s > robot.filter.used_s + DISAGREEING_S:
-                robot.is_untrusted = True
+                robot.untrusted_s = stamp_s
 
     def find_lost(self, now_s: float) -> List[str]:
         """Notice robots that are not measured any more; return lines for people. Call it some times a second.
@@ -166,7 +167,8 @@ class SwarmLocalizer:
             self._robots = {robot_id: _Robot() for robot_id in self._robots}
         self._now_s = now_s
         for robot_id, robot in sorted(self._robots.items()):
-            if not (robot.is_lost or robot.is_untrusted) and -math.inf < robot.filter.used_s < now_s - LOST_S:
+            seen_s = max(robot.filter.used_s, robot.untrusted_s)
+            if not robot.is_lost and -math.inf < seen_s < now_s - LOST_S:
                 robot.is_lost = True
                 lines.append("hero_%d lost: its pose follows its odometry" % robot_id)
         return lines
@@ -180,7 +182,7 @@ class SwarmLocalizer:
         state = RobotState.TRACKED
         if estimate is None:
             state = RobotState.UNKNOWN
-        elif robot.is_lost or robot.is_untrusted or robot.disagrees:
+        elif robot.is_lost or robot.untrusted_s > -math.inf or robot.disagrees:
             state = RobotState.LOST
         problem = self._find_problem(robot, state, now_s)
         origin = None if estimate is None else robot.filter.find_odom_origin(estimate.pose)
@@ -199,7 +201,7 @@ class SwarmLocalizer:
             return "measured poses come with stamps %.1f s old: do the clocks agree?" % (now_s - robot.late_s)
         if robot.measured_s > now_s + AHEAD_S:
             return "measured poses come with stamps %.1f s ahead: do the clocks agree?" % (robot.measured_s - now_s)
-        if robot.is_untrusted:
+        if robot.untrusted_s > now_s - LOST_S:
             return "the camera that sees it moved: calibrate_camera arena"
         if robot.is_lost:
             return "not measured for %.0f s: is its tag covered or out of view?" % (now_s - robot.filter.used_s)

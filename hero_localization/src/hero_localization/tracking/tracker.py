@@ -194,7 +194,7 @@ class Tracker:
         moved = [tag_id for tag_id, since_s in self._moved_since_s.items() if since_s <= newest_s - MOVED_S]
         missing = [tag_id for tag_id, seen_s in self._reference_seen_s.items() if seen_s < newest_s - MISSING_S]
         if moved and self.is_moved:
-            text = "reference tags are not where they were: the camera moved; calibrate_camera arena again"
+            text = "reference tags are not where they were: the camera moved; calibrate the arena again"
             problems.append(Problem("camera", text, True))
         else:
             for tag_id in moved:
