@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from driver_side import parse_options
 
-from hero_client import CommonFrame, Pose, StaleDataError
+from hero_client import CommonFrame, GoalError, Pose, StaleDataError
 from hero_client.controllers.avoidance import WanderMemory, wander
 from hero_sim import main
 from hero_sim.errors import OptionError
@@ -316,3 +316,27 @@ def test_motions_that_are_due_together_take_their_steps_in_order():
     clock.sleep(0.25)
     assert taken == [*range(30)] * 3
     assert not any(motion.done() for motion in motions)
+
+
+def test_robots_change_places_around_each_other_and_around_one_that_stays(tmp_path):
+    arena = tmp_path / "arena.yaml"
+    arena.write_text(
+        "walls_m: [[[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]]]\n"
+        "starts_m_deg: [[-0.3, 0, 0], [0.3, 0, 180], [0.0, 0.02, 90]]\n"
+    )
+    with StepSwarm(3, seed=1, arena=str(arena), perfect=True) as swarm:
+        stays = swarm[2].true_pose
+        swarm.go_to_each({0: (0.3, 0.0), 1: (-0.3, 0.0)}, frame="world", tolerance_m=0.02)
+        assert math.dist(swarm[0].true_pose[:2], (0.3, 0.0)) < 0.03
+        assert math.dist(swarm[1].true_pose[:2], (-0.3, 0.0)) < 0.03
+        assert math.dist(swarm[2].true_pose[:2], stays[:2]) < 0.01
+
+
+def test_robots_that_do_not_get_to_their_goals_are_named_and_stopped():
+    with StepSwarm(2, seed=1, arena="empty") as swarm:
+        with pytest.raises(GoalError, match="no goal is reached by hero_1: not there after 2 s"):
+            swarm.go_to_each({1: (5.0, 0.0)}, timeout_s=2.0)
+        swarm.sleep(0.5)
+        assert swarm[1].velocity == (0.0, 0.0)
+        with pytest.raises(KeyError, match="hero_7 is not in this swarm"):
+            swarm.go_to_each({7: (0.0, 0.0)})

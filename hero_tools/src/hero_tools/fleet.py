@@ -18,6 +18,7 @@ from typing import Dict, List, Optional, Sequence, Set
 import rospy
 
 from hero_client.apps.keyboard import Keyboard, NoTerminalError
+from hero_client.apps.keyboard_teleop import RELEASE_KEY, STOP_ALL_KEYS
 from hero_client.ros.drivers import Drivers
 from hero_client.ros.robot_listener import RobotListener, RobotTrack
 from hero_client.ros.stop_status import StopStatus, paint
@@ -39,7 +40,10 @@ HOME = "\x1b[H"
 CLEAR_LINE_END = "\x1b[K"
 CLEAR_SCREEN_END = "\x1b[J"
 PRINT_PERIOD_S = 5.0  # without a terminal
-KEYS_HELP = "q quit   s STOP ALL ROBOTS   r release them   o order"
+STOP_KEYS = (*STOP_ALL_KEYS, "s")
+"""Those of teleop, and s, which there stops the robots that it drives."""
+
+KEYS_HELP = "q quit   Enter, s STOP ALL ROBOTS   r release them   o order"
 MAX_OPTION = 1e6
 
 
@@ -156,8 +160,8 @@ class FleetProgram:
         """Execute the command of a key."""
         if key == "o":
             self._order = ORDERS[(ORDERS.index(self._order) + 1) % len(ORDERS)]
-        elif key in ("s", "r"):
-            self._fleet.drivers.request_stop(key == "s")
+        elif key in STOP_KEYS or key == RELEASE_KEY:
+            self._fleet.drivers.request_stop(key in STOP_KEYS)
 
     def print_fleet(self) -> None:
         """Print the fleet once, as lines or as JSON."""

@@ -1,16 +1,20 @@
 """Several robots as one object, whatever connects them: see swarm. Pure."""
 
 from abc import abstractmethod
-from typing import Any, Dict, Generic, Iterator, List, Mapping, Optional, Sequence, TypeVar
+from typing import Any, Dict, Generic, Iterator, List, Mapping, Optional, Sequence, Tuple, TypeVar
 
 from hero_node.clock import Clock
 from hero_node.errors import HeroError
 
-from ..values.background_motion import BackgroundMotion
+from ..controllers.go_to_goal import DEFAULT_TOLERANCE_M
+from ..controllers.motion import DEFAULT_TIMEOUT_S
+from ..controllers.orca import AvoidanceLaw
+from ..controllers.swarm_go_to import SwarmGoToController
+from ..values.background_motion import BackgroundMotion, Steps
 from ..values.colors import Color
-from ..values.errors import GoalError
+from ..values.errors import GoalError, StaleDataError
 from ..values.geometry import Pose
-from .group import Group
+from .group import REPEAT_PERIOD_S, Group, stop_after, wait_for_all
 from .robot_base import BaseRobot
 from .robot_link import MAP
 
@@ -62,8 +66,8 @@ class BaseSwarm(Group, Generic[AnyRobot]):
     def go_to(self, x_m: float, y_m: float, yaw_rad: Optional[float] = None, **options: Any) -> None:
         """Drive every robot to this place of its own frame, all at once; return when all have ended.
 
-        options: as in Robot.go_to(). With frame="robot" all robots make the same move. For goals of each robot, use
-        robot.start_go_to(); for goals in a common frame without collisions, controllers.swarm_go_to.
+        options: as in Robot.go_to(). With frame="robot" all robots make the same move. For goals of each robot, see
+        go_to_each().
 
         Raises: as Robot.go_to(), for the robots that failed; the others reach their goals.
         """
@@ -81,6 +85,52 @@ class BaseSwarm(Group, Generic[AnyRobot]):
         """Turn all robots on the spot at once; return when all have ended: see Robot.turn(). Raises: as forward()."""
         steps = [(robot, robot.turn_steps(angle_rad, angular_rad_s)) for robot in self.robots]
         self._wait_for([robot.start_motion(motion) for robot, motion in steps])
+
+    def go_to_each(
+        self,
+        goals: Mapping[int, Tuple[float, float]],
+        frame: str = MAP,
+        timeout_s: float = DEFAULT_TIMEOUT_S,
+        tolerance_m: float = DEFAULT_TOLERANCE_M,
+    ) -> None:
+        """Drive robots to places of one frame, around each other; return when all are there.
+
+            swarm.go_to_each({0: (0.2, 0.1), 1: (-0.2, 0.1)})
+
+        goals: robot's id -> (x m, y m), at least 0.18 m apart; robots without a goal stay where they are, and
+        the others drive around them. Law: controllers.swarm_go_to.
+
+        Raises: GoalError with those that are not there after timeout_s. KeyError for a robot of no swarm. FrameError,
+        StoppedError and RobotNotReadyError as Robot.go_to(). All robots are stopped then.
+        """
+        for robot_id in goals:
+            self[robot_id]._end_motion()
+        self._run(stop_after(self._go_to_each(goals, frame, timeout_s, tolerance_m), self._members))
+
+    def _go_to_each(
+        self, goals: Mapping[int, Tuple[float, float]], frame: str, timeout_s: float, tolerance_m: float
+    ) -> Steps:
+        yield from wait_for_all(self._members)
+        places = [goals.get(robot.robot_id) or robot.pose_in(frame)[:2] for robot in self.robots]
+        controller = SwarmGoToController(places, AvoidanceLaw(), REPEAT_PERIOD_S, seed=0, tolerance_m=tolerance_m)
+        end_s = self.now_s + timeout_s
+        while not all(controller.arrived):
+            poses: List[Optional[Pose]] = []
+            absence = ""
+            for robot in self.robots:
+                try:
+                    poses.append(robot.pose_in(frame, timeout_s=0.0))
+                except StaleDataError as error:
+                    poses.append(None)
+                    absence = "; %s" % error
+            commands = controller.step(poses, [robot.fresh_proximity() for robot in self.robots])
+            for robot, command in zip(self.robots, commands):
+                robot.check_not_stopped()
+                robot._send_velocity(*command)
+            if self.now_s > end_s or not (yield REPEAT_PERIOD_S):
+                late = [robot.name for robot, arrived in zip(self.robots, controller.arrived) if not arrived]
+                why = "cancelled" if self.now_s <= end_s else "not there after %g s" % timeout_s
+                raise GoalError("no goal is reached by %s: %s%s" % (", ".join(late), why, absence))
 
     @staticmethod
     def _wait_for(motions: Sequence[BackgroundMotion]) -> None:
