@@ -10,7 +10,6 @@ from measuring import measure_machine_us, print_machine
 
 from hero_driver.corrections.robot_corrections import CorrectionSettings, RobotCorrections
 from hero_driver.corrections.tick_odometry import WheelGeometry
-from hero_driver.corrections.wheel_motion import WheelMotion
 from hero_driver.ros.message_types import apply_aliases
 from hero_driver.rosserial import packets
 from hero_driver.rosserial.session import MessagesReceived, Session, SessionLimits, TopicDeclared
@@ -64,7 +63,7 @@ def main():
 
     def correct():
         sinks = collections.defaultdict(NoSink)
-        corrections = RobotCorrections("/hero_0", settings, sinks, NoSink().publish, WheelMotion())
+        corrections = RobotCorrections("/hero_0", settings, sinks, NoSink().publish)
         for event in declared:
             if isinstance(event, TopicDeclared) and event.topic.kind.is_from_robot:
                 info = event.topic.info
