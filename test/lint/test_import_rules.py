@@ -86,6 +86,7 @@ PURE_ROOMS = (
     "hero_swarm.behavior",
     "hero_swarm.behaviors",
     "hero_swarm.metrics",
+    "hero_swarm.safety",
     "hero_swarm.trial",
 )
 

@@ -1,0 +1,184 @@
+"""Program behavior: runs one behaviour on robots, by the poses that localize or the simulator gives them.
+
+rosrun hero_swarm behavior _behavior:=milling _robots:=0-9 _frame:=map
+"""
+
+import time
+from typing import Any, List, Optional
+
+import numpy as np
+import rospy
+from geometry_msgs.msg import Point
+from std_msgs.msg import ColorRGBA, Float32
+from visualization_msgs.msg import Marker, MarkerArray
+
+from hero_client import Program, ProgramError, Swarm, read_parameters, run
+from hero_client.values.robot_constants import BODY_RADIUS_M
+from hero_node.parameters import choice, number, robot_ids, whole_number, words
+
+from ..behavior import Behavior, Binary, Random, Sensed, sense
+from ..behaviors import find_behavior
+from ..metrics import METRICS
+from ..safety import MODES, SafetyFilter
+from .pose_source import PoseSource
+
+BEAM_M = 3.0
+"""Length at which a beam of endless range is drawn."""
+
+REPORT_PERIOD_S = 5.0
+SHOW_PERIOD_S = 0.1
+
+_FREE_COLOR, _SEEN_COLOR = ColorRGBA(0.4, 0.6, 1.0, 0.5), ColorRGBA(1.0, 0.3, 0.1, 0.9)
+
+
+def _make_behavior(name: str) -> Behavior:
+    try:
+        return find_behavior(name)()
+    except ValueError as error:
+        raise ProgramError("~" + str(error)) from None
+
+
+def _parse_fence(text: str) -> Optional[np.ndarray]:
+    """Return x min, y min, x max, y max; None for no fence. Raises: ProgramError."""
+    if not text.strip():
+        return None
+    try:
+        bounds_m = np.array([float(word) for word in text.split()])
+    except ValueError:
+        bounds_m = np.empty(0)
+    if bounds_m.shape != (4,) or not np.isfinite(bounds_m).all() or (bounds_m[2:] <= bounds_m[:2]).any():
+        raise ProgramError('~fence is %r, but must be "x_min y_min x_max y_max" in m' % text)
+    return bounds_m
+
+
+class BehaviorNode:
+    """One behaviour on one swarm."""
+
+    def __init__(self, swarm: Swarm, parameters: Any) -> None:
+        """Begin; robots are stopped until their poses are known. Raises: ProgramError for a wrong parameter."""
+        self._swarm = swarm
+        self._behavior = _make_behavior(parameters["behavior"])
+        self._frame = parameters["frame"]
+        ids = [robot.robot_id for robot in swarm]
+        self._source = PoseSource(ids, self._frame, parameters["poses_topic"])
+        self._filter = SafetyFilter(parameters["safety"], _parse_fence(parameters["fence"]))
+        self._random = Random([parameters["seed"]], len(ids))
+        self._memory: Any = None
+        self._start_s = rospy.get_time()
+        self._last: Optional[np.ndarray] = None
+        self._next_report_s = self._next_show_s = 0.0
+        self._colors: Optional[np.ndarray] = None
+        self._metric = rospy.Publisher("~metric", Float32, queue_size=5)
+        self._markers = rospy.Publisher("~markers", MarkerArray, queue_size=2)
+
+    @property
+    def period_s(self) -> float:
+        """Time between two steps."""
+        return 1.0 / self._behavior.rate_hz
+
+    def step(self) -> None:
+        """Sense, decide, and command all robots."""
+        poses, ages_s = self._source.read()
+        now_s = rospy.get_time()
+        sensed = sense(self._behavior, now_s - self._start_s, poses[None], self._random)
+        linear_m_s, angular_rad_s, self._memory = self._behavior.step(sensed, self._memory, self._random)
+        shape = (1, len(poses))
+        speeds = [np.broadcast_to(values, len(poses)).reshape(shape) for values in (linear_m_s, angular_rad_s)]
+        speeds = list(self._filter(poses[None], *speeds, ages_s[None]))
+        known = sensed.is_known
+        for robot, is_known, linear, angular in zip(self._swarm, known, speeds[0][0].tolist(), speeds[1][0].tolist()):
+            if is_known and np.isfinite(linear) and np.isfinite(angular):
+                robot.drive(linear, angular)
+            else:
+                robot.drive(0.0, 0.0)
+        self._show_colors()
+        if time.monotonic() >= self._next_report_s and not known.all():
+            self._next_report_s = time.monotonic() + REPORT_PERIOD_S
+            rospy.logwarn(self._source.describe_missing(poses))
+        if time.monotonic() >= self._next_show_s and known.all():
+            velocities = np.zeros_like(poses) if self._last is None else (poses - self._last) / SHOW_PERIOD_S
+            self._next_show_s = time.monotonic() + SHOW_PERIOD_S
+            self._last = poses
+            value = float(METRICS[self._behavior.metric](poses[None], velocities[None])[0])
+            self._metric.publish(Float32(value))
+            if self._markers.get_num_connections():
+                self._markers.publish(MarkerArray([*self._draw_beams(poses, sensed), self._draw_text(poses, value)]))
+
+    def _show_colors(self) -> None:
+        colors = self._behavior.colors(self._memory)
+        if colors is None:
+            return
+        for row, (robot, color) in enumerate(zip(self._swarm, colors)):
+            if self._colors is None or (self._colors[row] != color).any():
+                robot.led(tuple(color.tolist()))
+        self._colors = colors.copy()
+
+    def _make_marker(self, name: str, kind: int) -> Marker:
+        marker = Marker()
+        marker.header.frame_id, marker.header.stamp = self._frame, rospy.Time.now()
+        marker.ns, marker.type, marker.action = name, kind, Marker.ADD
+        marker.pose.orientation.w = 1.0
+        return marker
+
+    def _draw_beams(self, poses: np.ndarray, sensed: Sensed) -> List[Marker]:
+        """Return lines along the beams, or to the neighbors that are sensed."""
+        markers = []
+        for name, sensor in self._behavior.sensors().items():
+            marker = self._make_marker(name, Marker.LINE_LIST)
+            marker.scale.x = 0.004
+            reading = getattr(sensed, name)
+            for row, (x_m, y_m, yaw_rad) in enumerate(poses.tolist()):
+                if isinstance(sensor, Binary):
+                    length_m = min(sensor.range_m, BEAM_M)
+                    ends = [(BODY_RADIUS_M + length_m, 0.0)]
+                    color = _SEEN_COLOR if reading[row] else _FREE_COLOR
+                else:
+                    columns = reading.seen[row].nonzero()[0]
+                    ends = list(zip(reading.forward_m[row, columns], reading.left_m[row, columns]))
+                    color = _FREE_COLOR
+                cosine, sine = np.cos(yaw_rad), np.sin(yaw_rad)
+                for forward_m, left_m in ends:
+                    marker.points.append(Point(x_m, y_m, 0.03))
+                    end_x_m, end_y_m = cosine * forward_m - sine * left_m, sine * forward_m + cosine * left_m
+                    marker.points.append(Point(x_m + end_x_m, y_m + end_y_m, 0.03))
+                    marker.colors += [color, color]
+            markers.append(marker)
+        return markers
+
+    def _draw_text(self, poses: np.ndarray, value: float) -> Marker:
+        marker = self._make_marker("metric", Marker.TEXT_VIEW_FACING)
+        marker.text = "%s %.2f" % (self._behavior.metric, value)
+        marker.scale.z, marker.color = 0.08, ColorRGBA(1.0, 1.0, 1.0, 1.0)
+        marker.pose.position = Point(float(poses[:, 0].mean()), float(poses[:, 1].max()) + 0.25, 0.1)
+        return marker
+
+
+PARAMETERS = {
+    "behavior": words("aggregation", "a built-in behaviour, FILE.py, or FILE.py:Class"),
+    "robots": robot_ids("all", "ids; all: those that have joined a driver"),
+    "frame": words("map", "frame of the poses: that of localize, or `world` for the simulator's ground truth"),
+    "poses_topic": words("/localization/poses", "hero_msgs/RobotPoses of `localize`"),
+    "safety": choice("off", MODES, "what keeps robots apart: off, fence, or fence and robots"),
+    "fence": words("", "x min, y min, x max, y max of the fence, m"),
+    "seed": whole_number(0, 0, 2**31 - 1, "", "of the behaviour's random numbers"),
+    "time_s": number(0.0, 0.0, 1e6, "s", "stop after so long; 0 runs until Ctrl-C"),
+}
+
+
+def behavior() -> None:
+    """Run the behaviour until the program is to end. Raises: ProgramError for a wrong parameter."""
+    with Program("behavior") as program:
+        parameters = read_parameters(PARAMETERS)
+        _make_behavior(parameters["behavior"])
+        ids = parameters["robots"]
+        with (Swarm.discover(odom=False, proximity=False, sleep=program.sleep) if ids is None
+              else Swarm(ids, odom=False, proximity=False)) as swarm:  # fmt: skip
+            node = BehaviorNode(swarm, parameters)
+            end_s = time.monotonic() + (parameters["time_s"] or np.inf)
+            while time.monotonic() < end_s and program.pace(node.period_s):
+                node.step()
+
+
+def main() -> None:
+    """Run the program behavior."""
+    run(behavior)

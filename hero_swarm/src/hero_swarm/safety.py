@@ -1,0 +1,115 @@
+"""Keeps robots apart and inside a fence, between a behaviour and its commands: barrier functions on the steered point.
+
+Pure: numpy only, over W worlds with N robots each. A point in front of the axle can move any way at once, so a
+command is a velocity of this point; the nearest one is taken at which no two robots, and no robot and the fence,
+close faster than their distance allows (L. Wang, A. Ames, M. Egerstedt, Safety barrier certificates for
+collisions-free multirobot systems, IEEE T-RO 2017). Each of two robots takes half of the change, without asking the
+other.
+"""
+
+from typing import Optional, Tuple
+
+import numpy as np
+
+from hero_client.controllers.half_planes import nearest_allowed_all
+from hero_client.values.robot_constants import BODY_RADIUS_M
+
+__all__ = ["MODES", "OFF", "ROBOTS", "SafetyFilter"]
+
+OFF, FENCE, ROBOTS = "off", "fence", "fence and robots"
+MODES = (OFF, FENCE, ROBOTS)
+
+MAX_AGE_S = 0.5
+"""A robot whose pose is older is stopped."""
+
+
+class SafetyFilter:
+    """Changes commands as little as safety allows; parameters may be set on an instance.
+
+    Attributes:
+        mode: off, fence, or fence and robots.
+        lookahead_m: the steered point lies so far in front of the axle.
+        margin_m: free space kept around each body.
+        gain_1_s: closing speed allowed for each meter that is left.
+        neighbors: so many of the nearest robots are looked at: more do not fit around one.
+        sidestep: share of what is taken from a velocity that goes to its right, so that robots that meet pass.
+        max_speed_m_s, max_angular_rad_s: limits of the commands.
+    """
+
+    lookahead_m = 0.03
+    margin_m = 0.012
+    gain_1_s = 2.0
+    neighbors = 6
+    sidestep = 1.0
+    max_speed_m_s = 0.2
+    max_angular_rad_s = 6.0
+
+    def __init__(self, mode: str = ROBOTS, fence_m: Optional[np.ndarray] = None) -> None:
+        """fence_m: x min, y min, x max, y max, which no body leaves. Raises: ValueError for another mode."""
+        if mode not in MODES:
+            raise ValueError("safety %r: must be one of %s" % (mode, ", ".join(MODES)))
+        self.mode = mode
+        self._fence_m = fence_m
+        self._last: Optional[np.ndarray] = None
+
+    def __call__(
+        self, poses: np.ndarray, linear_m_s: np.ndarray, angular_rad_s: np.ndarray, ages_s: Optional[np.ndarray] = None
+    ) -> Tuple[np.ndarray, np.ndarray]:
+        """Return safe linear and angular speeds (W, N) for those wanted, at poses (W, N, 3) that are ages_s old (W, N).
+
+        Robots drove on as they were told meanwhile. One whose pose is NaN or too old is stopped, and others ignore it.
+        """
+        if self.mode == OFF:
+            return linear_m_s, angular_rad_s
+        ages_s = np.zeros(poses.shape[:2]) if ages_s is None else ages_s
+        known = np.isfinite(poses).all(axis=2) & (ages_s <= MAX_AGE_S)
+        yaw_rad = np.where(known, poses[..., 2], 0.0)
+        places_m = np.where(known[..., None], poses[..., :2], 1e6)
+        if self._last is not None:
+            drift_s = np.where(known, ages_s, 0.0)
+            yaw_rad = yaw_rad + drift_s * self._last[1]
+            headings = np.stack((np.cos(yaw_rad), np.sin(yaw_rad)), axis=-1)
+            places_m = places_m + (drift_s * self._last[0])[..., None] * headings
+        cosine, sine = np.cos(yaw_rad), np.sin(yaw_rad)
+        points_m = places_m + self.lookahead_m * np.stack((cosine, sine), axis=-1)
+        aside_m_s = angular_rad_s * self.lookahead_m
+        wanted = np.stack((cosine * linear_m_s - sine * aside_m_s, sine * linear_m_s + cosine * aside_m_s), axis=-1)
+        normals, bounds = self._list_half_planes(points_m)
+        # What is not allowed of a velocity is driven to the right, as on a road: robots that meet would wait forever.
+        lacking = np.maximum(bounds - (normals * wanted[:, :, None]).sum(axis=-1), 0.0)
+        right = np.stack((-normals[..., 1], normals[..., 0]), axis=-1)
+        wanted = wanted + self.sidestep * (lacking[..., None] * right).sum(axis=2)
+        found = nearest_allowed_all(
+            wanted.reshape(-1, 2), normals.reshape(-1, *normals.shape[2:]), bounds.reshape(-1, bounds.shape[2]),
+            self.max_speed_m_s,
+        ).reshape(wanted.shape)  # fmt: skip
+        linear_m_s = (found[..., 0] * cosine + found[..., 1] * sine) * known
+        angular_rad_s = (found[..., 1] * cosine - found[..., 0] * sine) / self.lookahead_m * known
+        excess = np.maximum(np.abs(angular_rad_s) / self.max_angular_rad_s, 1.0)
+        linear_m_s, angular_rad_s = linear_m_s / excess, angular_rad_s / excess
+        self._last = np.array((linear_m_s, angular_rad_s))
+        return linear_m_s, angular_rad_s
+
+    def _list_half_planes(self, points_m: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+        """Return normals (W, N, K, 2) and bounds (W, N, K) for the steered points (W, N, 2)."""
+        radius_m = BODY_RADIUS_M + self.lookahead_m + self.margin_m
+        normals, bounds = [np.empty((*points_m.shape[:2], 0, 2))], [np.empty((*points_m.shape[:2], 0))]
+        robots = points_m.shape[1]
+        count = min(self.neighbors, robots - 1)
+        if self.mode == ROBOTS and count > 0:
+            away_m = points_m[:, :, None] - points_m[:, None]
+            square_m2 = (away_m * away_m).sum(axis=-1)
+            square_m2[:, np.arange(robots), np.arange(robots)] = np.inf
+            nearest = np.argpartition(square_m2, count - 1, axis=2)[..., :count]
+            away_m = np.take_along_axis(away_m, nearest[..., None], axis=2)
+            distance_m = np.sqrt(np.maximum(np.take_along_axis(square_m2, nearest, axis=2), 1e-12))
+            normals.append(away_m / distance_m[..., None])
+            # Half of the closing speed that the pair may have.
+            bounds.append(-0.5 * self.gain_1_s * (distance_m - 2.0 * radius_m))
+        if self._fence_m is not None:
+            inside = BODY_RADIUS_M + self.lookahead_m
+            gaps_m = np.concatenate((points_m - self._fence_m[:2], self._fence_m[2:] - points_m), axis=-1) - inside
+            inward = np.array([(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)])
+            normals.append(np.broadcast_to(inward, (*points_m.shape[:2], 4, 2)))
+            bounds.append(-self.gain_1_s * gaps_m)
+        return np.concatenate(normals, axis=2), np.concatenate(bounds, axis=2)
