@@ -19,6 +19,7 @@ __all__ = [
     "INTERRUPTED",
     "OUTPUT_ERRORS",
     "PIPE_CLOSED",
+    "WRONG_ARGUMENTS",
     "call",
     "print_error",
     "run",
@@ -28,6 +29,8 @@ __all__ = [
 FAILED = 1
 INTERRUPTED = 128 + signal.SIGINT
 PIPE_CLOSED = 128 + signal.SIGPIPE
+WRONG_ARGUMENTS = 2
+"""As argparse ends."""
 
 OUTPUT_ERRORS = (errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
@@ -90,8 +93,10 @@ def say(text: str, stream: Optional[IO[str]] = None, end: str = "\n") -> None:
 
 def print_error(text: str) -> None:
     """Write a line with the program's name to stderr."""
+    folder, name = os.path.split(sys.argv[0])
+    program = os.path.basename(folder) if name == "__main__.py" else name  # python3 -m PACKAGE
     with suppress(OSError):
-        print("%s: %s" % (os.path.basename(sys.argv[0]), make_printable(text)), file=sys.stderr, flush=True)
+        print("%s: %s" % (program, make_printable(text)), file=sys.stderr, flush=True)
 
 
 def _report(failure: OSError) -> int:

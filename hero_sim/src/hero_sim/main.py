@@ -5,9 +5,10 @@ import contextlib
 import signal
 from typing import Callable, Iterator, Optional, Sequence, Tuple
 
-from . import output
+from hero_node.command_line import WRONG_ARGUMENTS, call
+
 from .build import build_simulator
-from .errors import OptionError
+from .errors import OptionError, SimulatorError
 from .faults import LONGEST_S, FaultInjector, parse_fault
 from .population import SERVO_TIMINGS, build_errors, check_population
 from .robot.servo_pins import CORE_2
@@ -112,7 +113,7 @@ def parse_options(parser: argparse.ArgumentParser, arguments: Optional[Sequence[
     try:
         check_options(options)
     except OptionError as error:
-        parser.exit(output.WRONG_ARGUMENTS, "hero_sim: %s\n" % error)
+        parser.exit(WRONG_ARGUMENTS, "hero_sim: %s\n" % error)
     if options.print_errors:
         print("\n".join(describe_errors(build_errors(options), options.first_id)))
         parser.exit()
@@ -152,7 +153,7 @@ def _report(text: str) -> None:
 
 def main(arguments: Optional[Sequence[str]] = None) -> int:
     """Run the simulator; return the exit status."""
-    return output.call(lambda: _run(parse_options(build_parser(), arguments)))
+    return call(lambda: _run(parse_options(build_parser(), arguments)), SimulatorError)
 
 
 def _run(options: argparse.Namespace) -> None:

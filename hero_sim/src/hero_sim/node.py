@@ -14,12 +14,12 @@ import rosgraph.network
 import rosgraph.roslogging
 import rospy
 
+from hero_node.command_line import call
 from hero_node.ros.master import find_running_node
 from hero_node.ros.ros_node import end_ros_node
 
 from . import main as command_line
-from . import output
-from .errors import OptionError
+from .errors import OptionError, SimulatorError
 from .faults import FaultInjector, parse_fault
 from .ground_truth import GroundTruth
 from .simulator import Simulator
@@ -80,7 +80,7 @@ def check_environment() -> None:
 
 def main() -> None:
     """Run the simulator until ROS or a signal ends it."""
-    status = output.call(_run)
+    status = call(_run, SimulatorError)
     end_ros_node("hero_sim ends", MASTER_WAIT_S)
     os._exit(status)
 
