@@ -12,7 +12,7 @@ from hero_localization.errors import DetectorError
 from hero_localization.prints.tag_images import draw_tag
 from hero_localization.simulated_camera.renderer import CameraRenderer
 from hero_localization.simulated_camera.view import CameraOptions, PrintedTag, tag_corners
-from hero_localization.tracking.detectors import create_detector
+from hero_localization.tracking.detectors import create_detector, find_print_mistake
 from hero_localization.tracking.tag_corners import TagCorners
 from hero_sim.world.arena import build_rectangle
 
@@ -117,3 +117,13 @@ def test_missing_library_is_named_with_its_package(monkeypatch):
     monkeypatch.setitem(sys.modules, "apriltag", None)
     with pytest.raises(DetectorError, match="apt install python3-apriltag"):
         create_detector("apriltag")
+
+
+def test_tags_of_another_family_and_mirrored_images_are_named():
+    image = np.full((200, 900), 255, np.uint8)
+    for index in range(4):
+        cells = np.kron(draw_tag("16h5", index), np.ones((16, 16), np.uint8))
+        image[50:146, 60 + 200 * index : 156 + 200 * index] = cells
+    assert "set family: 16h5" in find_print_mistake(image, "36h11")
+    assert find_print_mistake(image, "16h5") == ""
+    assert "mirrored" in find_print_mistake(image[:, ::-1], "16h5")

@@ -5,7 +5,7 @@ import pytest
 
 pytest.importorskip("cv2")
 
-from hero_localization.calibration.lens_calibration import BoardView, calibrate_lens, find_board
+from hero_localization.calibration.lens_calibration import BoardView, calibrate_lens, find_board, is_mirrored
 from hero_localization.errors import CalibrationError
 from hero_localization.prints.boards import Board, list_board_corners
 from hero_localization.simulated_camera.board_renderer import BoardRenderer
@@ -123,3 +123,25 @@ def test_one_bad_picture_is_left_out():
     found = calibrate(views)
     assert found.left_out == [4] and found.rms_px < 0.3
     assert found.lens.matrix[0, 0] == pytest.approx(695.0, rel=0.003)
+
+
+def test_the_focal_length_is_no_worse_than_reported():
+    """Of views whose corners are wrong together, as those of a board that is a little bent or blurred."""
+    random, off, reported = np.random.RandomState(1), [], []
+    for seed in range(4):
+        views = []
+        for view in project(list_holds(20, 0.6, seed), noise_px=0.05, seed=seed):
+            center = view.pixels.mean(axis=0)
+            bend = np.eye(2) + random.normal(0.0, 5e-4, (2, 2))
+            views.append(view._replace(pixels=((view.pixels - center) @ bend + center).astype(np.float32)))
+        found = calibrate(views)
+        off.append(found.lens.matrix[0, 0] / OPTIONS.focal_px[0] - 1.0)
+        reported.append(found.focal_error)
+    assert np.sqrt(np.mean(np.square(off))) < 1.5 * np.sqrt(np.mean(np.square(reported)))
+
+
+def test_a_mirrored_board_is_recognized():
+    random = np.random.RandomState(5)
+    picture = BoardRenderer(OPTIONS, BOARD).render(*list_holds(1, 0.3)[0], random)
+    assert not is_mirrored(picture, BOARD)
+    assert is_mirrored(np.ascontiguousarray(picture[:, ::-1]), BOARD)

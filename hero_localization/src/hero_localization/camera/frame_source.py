@@ -37,6 +37,9 @@ PLAUSIBLE_AGE_S = 5.0
 """V4L2 stamps its buffers by the clock that does not jump; a time that is further from it is of another clock."""
 
 
+MIN_BACKOFF_S, MAX_BACKOFF_S = 0.5, 8.0
+"""Between two attempts to open a camera that ended."""
+
 READ_BYTES = 2**20
 """At once: of a picture in smaller parts, each costs a turn of the interpreter; a larger buffer costs page faults."""
 
@@ -168,7 +171,7 @@ class TopicSource(LiveSource):
 
 
 class DeviceSource(LiveSource):
-    """A V4L2 device such as /dev/video0, or the URL of a network camera."""
+    """A V4L2 device such as /dev/video0, or the URL of a network camera; opened again whenever it ends."""
 
     def __init__(self, path: str, size_px: Tuple[int, int], rate_hz: float) -> None:
         """size_px: width and height to ask the device for.
@@ -176,28 +179,39 @@ class DeviceSource(LiveSource):
         Raises: FrameSourceError if it cannot be opened.
         """
         super().__init__()
-        backend = cv2.CAP_V4L2 if path.startswith(_DEVICES) else cv2.CAP_ANY
-        self._capture = _open_capture(path, backend, "no camera, or another program uses it")
-        self._capture.set(cv2.CAP_PROP_FOURCC, cv2.VideoWriter_fourcc(*"MJPG"))
-        self._capture.set(cv2.CAP_PROP_FRAME_WIDTH, size_px[0])
-        self._capture.set(cv2.CAP_PROP_FRAME_HEIGHT, size_px[1])
-        self._capture.set(cv2.CAP_PROP_FPS, rate_hz)
-        self._capture.set(cv2.CAP_PROP_BUFFERSIZE, 2)
-        self._path = path
+        self._path, self._size_px, self._rate_hz = path, size_px, rate_hz
+        self._capture = self._open()
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._read, name="camera", daemon=True)
         self._thread.start()
 
+    def _open(self) -> Any:
+        backend = cv2.CAP_V4L2 if self._path.startswith(_DEVICES) else cv2.CAP_ANY
+        capture = _open_capture(self._path, backend, "no camera, or another program uses it")
+        capture.set(cv2.CAP_PROP_FOURCC, cv2.VideoWriter_fourcc(*"MJPG"))
+        capture.set(cv2.CAP_PROP_FRAME_WIDTH, self._size_px[0])
+        capture.set(cv2.CAP_PROP_FRAME_HEIGHT, self._size_px[1])
+        capture.set(cv2.CAP_PROP_FPS, self._rate_hz)
+        capture.set(cv2.CAP_PROP_BUFFERSIZE, 2)
+        return capture
+
     def _read(self) -> None:
-        for number in itertools.count():
-            if self._ending.is_set():
-                return
+        number, backoff_s = 0, MIN_BACKOFF_S
+        while not self._ending.is_set():
             is_read, image = self._capture.read()
-            if not is_read:
-                self.problem = "%s gives no more pictures: is it plugged in?" % self._path
-                return
-            taken_s = self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0
-            self._keep((rospy.get_time() - self._find_age(taken_s), image, number))
+            if is_read:
+                taken_s = self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0
+                self._keep((rospy.get_time() - self._find_age(taken_s), image, number))
+                number, backoff_s, self.problem = number + 1, MIN_BACKOFF_S, ""
+                continue
+            self._capture.release()
+            self.problem = "%s gives no more images: is it plugged in? It is opened again" % self._path
+            self._ending.wait(backoff_s)
+            backoff_s = min(2.0 * backoff_s, MAX_BACKOFF_S)
+            try:
+                self._capture = self._open()
+            except FrameSourceError as error:
+                self.problem = str(error)
 
     def _decode(self, picture: Tuple[float, np.ndarray, int]) -> Frame:
         stamp_s, image, number = picture

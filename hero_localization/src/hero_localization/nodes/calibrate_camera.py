@@ -25,7 +25,14 @@ from hero_node.errors import HeroError
 from hero_node.parameters import robot_ids_option
 
 from ..calibration.arena_calibration import LEAST_TAGS, average_tags, calibrate_arena, fit_references
-from ..calibration.lens_calibration import LEAST_VIEWS, BoardView, LensCalibration, calibrate_lens, find_board
+from ..calibration.lens_calibration import (
+    LEAST_VIEWS,
+    BoardView,
+    LensCalibration,
+    calibrate_lens,
+    find_board,
+    is_mirrored,
+)
 from ..calibration.robot_calibration import CALIBRATION_DRIVE, RobotCalibration, calibrate_robot
 from ..camera.camera_model import Lens
 from ..camera.frame_source import Frame, open_source
@@ -34,12 +41,13 @@ from ..errors import CalibrationError, DetectorError, LocalizationError
 from ..prints.boards import Board
 from ..tracking import settings as camera_file
 from ..tracking.detector_process import DetectorProcess
+from ..tracking.detectors import find_print_mistake
 from ..tracking.settings import Settings
 from ..tracking.tag_corners import TagCorners
 from ..tracking.tag_pose import MountedTag, fit_squares
 
-MOST_VIEWS = 40
-ENOUGH_VIEWS = 12
+MOST_VIEWS = 25
+ENOUGH_VIEWS = 20
 STILL_PX = 3.0
 """A board that moves by more than this between two pictures is blurred."""
 
@@ -132,6 +140,8 @@ def calibrate_lens_by_board(options: argparse.Namespace, pictures: Pictures, pro
             found_s = program.now_s
         elif program.now_s > found_s + HINT_S:
             found_s = program.now_s
+            if is_mirrored(frame.gray, board):
+                raise CalibrationError("images are mirrored: switch that off in the camera or its driver")
             text = "no board in the pictures (mean shade %.0f of 255): hold it near, flat, in good light"
             say(text % frame.gray.mean())
         is_still = view is not None and last is not None and _measure_shift(view, last) < STILL_PX
@@ -178,7 +188,11 @@ def calibrate_place(options: argparse.Namespace, pictures: Pictures) -> int:
         raise CalibrationError("%s holds no lens: calibrate_camera lens comes first" % options.file)
     lens.check_size(*frame.gray.shape)
     tags = average_tags(frames)
-    result = calibrate_arena(lens, tags, settings.layout.references)
+    try:
+        result = calibrate_arena(lens, tags, settings.layout.references)
+    except CalibrationError as error:
+        hint = find_print_mistake(frame.gray, settings.family)
+        raise CalibrationError("%s%s" % (error, "; " + hint if hint else "")) from None
     for tag_id, residual_m in sorted(result.residuals_m.items()):
         say("tag %d: %.1f mm%s" % (tag_id, 1e3 * residual_m, " (left out)" if tag_id in result.left_out else ""))
     height_m = result.camera.position_m[2]

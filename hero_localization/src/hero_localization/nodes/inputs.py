@@ -7,6 +7,7 @@ from typing import Callable, Tuple
 import genpy
 import numpy as np
 import rospy
+from geometry_msgs.msg import Pose as PoseMessage
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry
 
@@ -20,6 +21,10 @@ __all__ = ["OdometryInput", "PoseInput"]
 _HEADER = struct.Struct("<3I")
 _LENGTH = struct.Struct("<I")
 _POSE = struct.Struct("<7d")
+
+MAX_FIELD_M = 100.0
+MIN_UPRIGHT = 0.7
+"""Of the robot's axis, the part that points up: 45 degrees."""
 
 POSE_TYPES = {kind._md5sum: kind for kind in (PoseStamped, PoseWithCovarianceStamped, Odometry)}
 """Types of measured poses, by md5; of an Odometry the pose counts."""
@@ -53,6 +58,18 @@ def _read_odometry(data: bytes) -> Tuple[float, Pose]:
     x_m, y_m, _, x, y, z, w = _POSE.unpack_from(data, offset)
     yaw_rad = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
     return seconds + 1e-9 * nanoseconds, Pose(x_m, y_m, yaw_rad)
+
+
+def find_pose_mistake(pose: PoseMessage) -> str:
+    """Return what is wrong with a geometry_msgs/Pose that no robot on the floor can have; empty if nothing is."""
+    turn, place = pose.orientation, pose.position
+    farthest_m = max(abs(place.x), abs(place.y))
+    if MAX_FIELD_M < farthest_m < math.inf:
+        return "holds a position of %.0f m: does the motion capture system publish mm?" % farthest_m
+    norm2 = turn.x**2 + turn.y**2 + turn.z**2 + turn.w**2
+    if norm2 > 0.5 and 1.0 - 2.0 * (turn.x**2 + turn.y**2) / norm2 < MIN_UPRIGHT:
+        return "holds a robot that lies on its side: is the up axis of the motion capture system z?"
+    return ""
 
 
 class PoseInput:
@@ -102,7 +119,12 @@ class PoseInput:
             )
             return
         has_covariance = kind is not PoseStamped
-        pose = read_pose(content.pose.pose if has_covariance else content.pose)
+        message_pose = content.pose.pose if has_covariance else content.pose
+        mistake = find_pose_mistake(message_pose)
+        if mistake:
+            self._warn("%s %s" % (self._topic, mistake))
+            return
+        pose = read_pose(message_pose)
         if pose is None:
             self._warn("%s holds a pose that no robot can have: not finite, or beyond 1000 m" % self._topic)
             return

@@ -15,10 +15,14 @@ from ..errors import DetectorError
 from ..prints.tag_images import FAMILIES, draw_tag
 from .tag_corners import TagCorners
 
-__all__ = ["BACKENDS", "DEFAULT_BACKEND", "TagDetector", "create_detector"]
+__all__ = ["BACKENDS", "DEFAULT_BACKEND", "TagDetector", "create_detector", "find_print_mistake"]
 
 _LEAST_MARGIN = {"36h11": 10.0, "16h5": 30.0}
 """How clearly black and white must differ, of 255: what 16h5 finds in noise and floor textures stays below."""
+
+
+MIN_MISTAKEN_TAGS = 3
+"""Fewer may be noise."""
 
 
 class TagDetector:
@@ -129,3 +133,13 @@ def create_detector(backend: str = DEFAULT_BACKEND, family: str = "36h11", decim
     if not decimate >= 1.0:
         raise DetectorError("decimation %s: it must be at least 1" % decimate)
     return BACKENDS[backend](family, decimate)
+
+
+def find_print_mistake(gray: np.ndarray, family: str) -> str:
+    """Return what is wrong if an image (H, W) shows tags of another family, or mirrored; empty if nothing is found."""
+    for other in FAMILIES:
+        if other != family and len(ArucoDetector(other, 1.0).detect(gray)) >= MIN_MISTAKEN_TAGS:
+            return "the image shows tags of %s: set family: %s in the camera file" % (other, other)
+    if len(ArucoDetector(family, 1.0).detect(gray[:, ::-1])) >= MIN_MISTAKEN_TAGS:
+        return "the image is mirrored: switch that off in the camera or its driver"
+    return ""
