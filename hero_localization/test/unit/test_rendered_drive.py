@@ -40,7 +40,7 @@ walls_m: [[[-2, -1], [2, -1], [2, 1], [-2, 1], [-2, -1]]]
 starts_m_deg: [[0.1, 0.0, 0]]
 """
 PICTURE_S = 0.1
-MOST_OFF_M, MOST_OFF_RAD = 0.008, 0.03
+MOST_OFF_M, MOST_OFF_RAD = 0.008, 0.04
 """Two of the small pictures' pixels; a jump from one camera to the other by a mistake is far more."""
 PLACES_M = ((-0.35, -0.16), (0.35, -0.16), (0.35, 0.16), (-0.35, 0.16))
 """Of a camera's reference tags, from the place below it."""
