@@ -8,6 +8,7 @@ import pytest
 
 from hero_client.values.geometry import Pose, invert_pose, transform_pose, wrap_angle
 from hero_localization.filter.pose_filter import Measurement, Outcome, PoseFilter
+from hero_localization.filter.stamped_history import interpolate_pose
 
 ODOMETRY_S = 0.034
 CAMERA_S = 1.0 / 30.0
@@ -58,7 +59,7 @@ class Drive:
         index = min(int(stamp_s / ODOMETRY_S), len(self.samples) - 2)
         start, end = self.samples[index : index + 2]
         share = (stamp_s - start.stamp_s) / ODOMETRY_S
-        return Pose(*(a + share * (b - a) for a, b in zip(start.true, end.true)))
+        return interpolate_pose(start.true, end.true, share)
 
     def measure(self, stamp_s):
         x_m, y_m, yaw_rad = self.true_pose(stamp_s)
