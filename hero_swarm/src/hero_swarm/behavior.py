@@ -20,7 +20,7 @@ import numpy as np
 
 from hero_client.values.sensing import Binary, Neighborhood, Neighbors, sense_binary, sense_neighbors
 
-__all__ = ["Behavior", "Binary", "Command", "Neighborhood", "Neighbors", "Random", "Sensed", "sense"]
+__all__ = ["Behavior", "Binary", "Command", "Neighborhood", "Neighbors", "Random", "Sensed", "derive_seed", "sense"]
 
 Command = Tuple[Any, Any, Any]
 """linear m/s and angular rad/s, each a number or an array (R,), and the memory for the next step."""

@@ -66,15 +66,17 @@ class Trial:
         errors: float = 1.0,
         delay_s: float = 0.0,
         filter_commands: Any = None,
+        starts: Optional[np.ndarray] = None,
     ) -> None:
-        """Scatter robots over size_m, or over the arena. Each seed is one world.
+        """Put robots at starts (W, N, 3), or scatter them over size_m, or over the arena. Each seed is one world.
 
         errors: 0 for robots as on the drawing, 1 for usual ones. delay_s: age of the poses that robots sense each
         other by. filter_commands: called with poses (W, N, 3), linear and angular speeds (W, N), returns speeds.
         """
         x_min, y_min, x_max, y_max = arena.bounds_m
         width_m, height_m = (x_max - x_min, y_max - y_min) if size_m is None else size_m
-        starts = np.array([scatter(robots, width_m, height_m, seed) for seed in seeds])
+        if starts is None:
+            starts = np.array([scatter(robots, width_m, height_m, seed) for seed in seeds])
         self.behavior = behavior
         self.rows = RobotRows(place_worlds(arena, starts, seeds, errors))
         self.poses, self.velocities = starts, np.zeros_like(starts)

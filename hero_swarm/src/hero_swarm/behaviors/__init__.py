@@ -35,12 +35,12 @@ def list_names() -> List[str]:
 
 
 def find_behavior(name: str) -> Type[Behavior]:
-    """Return a behaviour by its name, or by FILE.py or FILE.py:Class.
+    """Return a behaviour by its name, its module.Class, FILE.py or FILE.py:Class.
 
     Raises: ValueError that says what there is.
     """
-    if name in _MODULES:
-        module, class_name = _MODULES[name].split(".")
+    if name in _MODULES or name in _MODULES.values():
+        module, class_name = _MODULES.get(name, name).split(".")
         found: Type[Behavior] = getattr(importlib.import_module(__name__ + "." + module), class_name)
         return found
     path, _, class_name = name.partition(":")

@@ -9,7 +9,8 @@ from .motion import consensus_error, order, rotation
 from .shapes import coverage, dispersion, dispersion_ratio, fatness, hull_area
 
 __all__ = [
-    "METRICS", "algebraic_connectivity", "cluster_fraction", "collisions", "consensus_error", "coverage", "dispersion",
+    "METRICS", "UNITS", "algebraic_connectivity", "cluster_fraction", "collisions", "consensus_error",
+    "coverage", "dispersion",
     "dispersion_ratio", "fatness", "hull_area", "nearest_neighbor", "order", "rotation", "time_until",
 ]  # fmt: skip
 
@@ -30,6 +31,9 @@ METRICS: Dict[str, Metric] = {
     "rotation": lambda poses, velocities: rotation(poses[..., :2], velocities[..., :2]),
 }
 """Those that need poses and velocities alone, by name."""
+
+UNITS = {"consensus_error": "m", "dispersion": "m", "hull_area": "m^2", "nearest_neighbor": "m"}
+"""Of those that have one."""
 
 
 def time_until(times_s: np.ndarray, values: np.ndarray, limit: float, falls: bool = True) -> np.ndarray:

@@ -1,0 +1,1 @@
+"""From a file that describes an experiment to its runs, intervals and plots."""

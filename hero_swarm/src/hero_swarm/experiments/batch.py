@@ -1,0 +1,187 @@
+"""Computes some runs of one cell at once, in virtual time. Runs in worker processes; knows neither them nor
+the results.
+
+Metrics are taken once per second of simulated time. A run has the same values alone and in any batch.
+"""
+
+import math
+import os
+import time
+import traceback
+from typing import List, NamedTuple, Optional, Sequence, Tuple
+
+import numpy as np
+
+from hero_sim.errors import OptionError
+from hero_sim.world.arena import Arena
+from hero_sim.world.arena_file import load_arena
+
+from ..behavior import Behavior
+from ..behaviors import find_behavior
+from ..metrics import METRICS
+from ..trial import OPEN, Trial
+from .errors import ExperimentError
+from .experiment_file import ERRORS, Cell, Experiment, Metric, parse_experiment
+from .results_folder import Run
+from .starts import place_all
+from .streams import Stream, open_stream
+
+__all__ = [
+    "METRICS_ENDING",
+    "POSES_ENDING",
+    "SAMPLE_S",
+    "BatchResult",
+    "compute_batch",
+    "list_sources",
+    "load_checked",
+]
+
+SAMPLE_S = 1.0
+"""Between two samples of the metrics."""
+
+METRICS_ENDING, POSES_ENDING = ".metrics.npy", ".poses.npy"
+"""Files of a batch: samples (T, W, metrics) of the metrics of list_sources(), and poses (T, W, N, 3); nan
+after a run's end."""
+
+
+class BatchResult(NamedTuple):
+    """What one batch gave, and how long that took."""
+
+    runs: List[Run]
+    wall_s: float
+
+
+def load_checked(experiment: Experiment) -> None:
+    """Load the behavior, arenas and starts of all cells once, so that what is wrong is told before anything runs.
+
+    Raises: ExperimentError.
+    """
+    for cell in experiment.cells:
+        _build_behavior(experiment, cell)
+        place_all(experiment.start, _load_arena(cell), cell.settings["robots"], experiment.seeds[:1])
+
+
+def _build_behavior(experiment: Experiment, cell: Cell) -> Behavior:
+    try:
+        return find_behavior(experiment.behavior)(**cell.parameters)
+    except (TypeError, ValueError) as error:
+        raise ExperimentError(str(error)) from error
+
+
+def _load_arena(cell: Cell) -> Arena:
+    name = cell.settings.get("arena")
+    try:
+        return load_arena(name) if name else OPEN
+    except OptionError as error:
+        raise ExperimentError(str(error)) from error
+
+
+def compute_batch(
+    text: str, cell_index: int, seeds: Sequence[int], stem: str, with_poses: bool
+) -> BatchResult:
+    """Compute the runs of one cell with these seeds; their metrics over time, and poses, go to files that
+    begin with stem.
+
+    text: of the experiment's file.
+    Raises: ExperimentError, also for whatever the behavior raises.
+    """
+    began_s = time.monotonic()
+    experiment = parse_experiment(text, "the experiment", METRICS)
+    cell = experiment.cells[cell_index]
+    behavior, arena = _build_behavior(experiment, cell), _load_arena(cell)
+    trial = Trial(
+        behavior,
+        arena,
+        cell.settings["robots"],
+        seeds,
+        starts=place_all(experiment.start, arena, cell.settings["robots"], seeds),
+        errors=ERRORS[cell.settings.get("errors", "default")],
+        delay_s=cell.settings.get("delay_s", 0.0),
+    )
+    try:
+        series, ends = _run(experiment, trial, stem, with_poses)
+    except Exception as error:
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        raise ExperimentError(
+            "%s with seeds %d to %d: %s: %s (%s, line %s)"
+            % (
+                cell.label,
+                seeds[0],
+                seeds[-1],
+                type(error).__name__,
+                error,
+                os.path.basename(place.filename),
+                place.lineno,
+            )
+        ) from error
+    names = list_sources(experiment)
+    runs = [
+        Run(
+            cell_index,
+            seed,
+            tuple(_take(metric, names, series[: ends[world] + 1, world]) for metric in experiment.metrics),
+        )
+        for world, seed in enumerate(seeds)
+    ]
+    return BatchResult(runs, time.monotonic() - began_s)
+
+
+def list_sources(experiment: Experiment) -> List[str]:
+    """Return the metrics that are sampled, those of the columns and of the condition that ends a run."""
+    names = [metric.source for metric in experiment.metrics]
+    if experiment.until is not None:
+        names.append(experiment.until.metric)
+    return sorted(set(names))
+
+
+def _run(experiment: Experiment, trial: Trial, stem: str, with_poses: bool) -> Tuple[np.ndarray, List[int]]:
+    """Run a trial; return the samples (T, W, metrics) and the last sample of each world."""
+    names, until = list_sources(experiment), experiment.until
+    worlds, robots, _ = trial.poses.shape
+    samples = math.floor(experiment.time_s / SAMPLE_S + 1e-9) + 1
+    series = np.full((samples, worlds, len(names)), np.nan)
+    ends = np.full(worlds, samples - 1)
+    running = np.ones(worlds, dtype=bool)
+    pose_period_s = 1.0 / experiment.record_hz if with_poses else math.inf
+    poses_file: Optional[Stream] = None
+    if with_poses:
+        count = math.floor(experiment.time_s / pose_period_s + 1e-9) + 1
+        poses_file = open_stream(stem + POSES_ENDING, (count, worlds, robots, 3))
+    poses, velocities = trial.poses, np.zeros_like(trial.poses)
+    now_s = 0.0
+    while True:
+        if poses_file is not None and now_s >= poses_file.count * pose_period_s - 1e-6:
+            poses_file.append(np.where(running[:, None, None], poses, np.nan))
+        sample = math.floor(now_s / SAMPLE_S + 1e-6)
+        if sample < samples and np.isnan(series[sample]).all():
+            series[sample] = np.column_stack([METRICS[name](poses, velocities) for name in names])
+            if until is not None:
+                held = running & until.holds(series[sample, :, names.index(until.metric)])
+                ends[held], running[held] = sample, False
+        if now_s >= experiment.time_s - 1e-6 or not running.any():
+            break
+        before = poses
+        now_s = trial.step()
+        poses = trial.rows.world.poses.reshape(before.shape).copy()
+        velocities = (poses - before) * trial.behavior.rate_hz
+    if poses_file is not None:
+        poses_file.close()
+    with_ends = np.where(np.arange(samples)[:, None, None] <= ends[:, None], series, np.nan)
+    file = open_stream(stem + METRICS_ENDING, with_ends.shape)
+    for values in with_ends:
+        file.append(values)
+    file.close()
+    return series, ends.tolist()
+
+
+def _take(metric: Metric, names: Sequence[str], series: np.ndarray) -> float:
+    """Return the value of a column from the samples (T, metrics) of one run."""
+    values = series[:, names.index(metric.source)]
+    if metric.bound is not None:
+        held = metric.bound.holds(values).nonzero()[0]
+        return float(held[0] * SAMPLE_S) if len(held) else math.inf
+    if metric.last_s:
+        # One after the other: the result does not depend on how numpy adds.
+        last = values[-max(1, round(metric.last_s / SAMPLE_S)) :].tolist()
+        return sum(last) / len(last)
+    return float(values[-1])

@@ -1,0 +1,125 @@
+"""Where batches are computed: worker processes of this machine, or a Dask cluster. Both are an Executor.
+
+Knows nothing of experiments: it calls a function with arguments, and survives workers that die.
+"""
+
+import collections
+import multiprocessing
+import os
+import signal
+import threading
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
+from typing import Any, Callable, Deque, Dict, Iterable, Iterator, Tuple
+
+from .errors import ExperimentError
+
+__all__ = ["compute", "open_dask", "open_pool"]
+
+MAX_NEW_POOLS = 3
+"""Worker pools that are started in place of broken ones; a batch that kills its worker would do so for ever."""
+
+DASK_RETRIES = 3
+
+_WAITING = 2
+"""Batches that wait for each worker: none idles while results are written, and few are lost by a kill."""
+
+Task = Tuple[Any, ...]
+"""Arguments of one call."""
+
+
+def open_pool(jobs: int) -> ProcessPoolExecutor:
+    """Return a pool of jobs workers that start from nothing: threads of this process are no danger to them."""
+    return ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"), _prepare_worker)
+
+
+def _prepare_worker() -> None:
+    """Leave Ctrl-C to the program, which ends its workers, and end when the program is killed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+
+    def follow() -> None:
+        parent.join()
+        os._exit(1)
+
+    threading.Thread(target=follow, name="end with the program", daemon=True).start()
+
+
+def open_dask(address: str, check: Callable[[], str]) -> Tuple[Executor, int]:
+    """Return an executor on the cluster at address (tcp://HOST:PORT, or the path of a scheduler file), and its workers.
+
+    check() returns which code a process runs; a worker on which it differs is refused.
+    Raises: ExperimentError without dask, without a cluster, or for a worker with other code.
+    """
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise ExperimentError(
+            "--executor dask needs distributed: apt install python3-distributed, or pip install distributed"
+        ) from error
+    is_address = "://" in address
+    try:
+        client = Client(
+            address if is_address else None, scheduler_file=None if is_address else address, timeout=20
+        )
+        codes = client.run(check)
+    except (OSError, ValueError) as error:
+        raise ExperimentError(
+            "no Dask cluster at %s: %s" % (address, " ".join(str(error).split()))
+        ) from error
+    if not codes:
+        raise ExperimentError(
+            "the Dask cluster at %s has no workers: start dask-worker %s" % (address, address)
+        )
+    own = check()
+    for worker, code in sorted(codes.items()):
+        if code != own:
+            raise ExperimentError(
+                "worker %s runs other code (%s, here %s): update it and start it again" % (worker, code, own)
+            )
+    return client.get_executor(pure=False, retries=DASK_RETRIES), len(codes)
+
+
+def compute(
+    open_executor: Callable[[], Executor], workers: int, function: Callable[..., Any], tasks: Iterable[Task]
+) -> Iterator[Tuple[Task, Any]]:
+    """Yield each task with function(*task), as they are done; a broken pool is replaced, and its tasks run again.
+
+    Raises: ExperimentError if pools keep breaking; whatever function raises.
+    """
+    waiting: Deque[Task] = collections.deque(tasks)
+    new_pools = 0
+    while waiting:
+        executor = open_executor()
+        running: Dict[Future[Any], Task] = {}
+        try:
+            yield from _drain(executor, workers * _WAITING, function, waiting, running)
+        except BrokenExecutor as error:
+            new_pools += 1
+            if new_pools > MAX_NEW_POOLS:
+                raise ExperimentError(
+                    "worker processes died %d times (out of memory?): use fewer --jobs or a smaller --batch"
+                    % new_pools
+                ) from error
+            waiting.extendleft(running.values())
+        finally:
+            for future in running:
+                future.cancel()
+            executor.shutdown(wait=True)
+
+
+def _drain(
+    executor: Executor,
+    most: int,
+    function: Callable[..., Any],
+    waiting: Deque[Task],
+    running: Dict["Future[Any]", Task],
+) -> Iterator[Tuple[Task, Any]]:
+    """Run what waits; running holds what is not done yet, also when this ends by an error."""
+    while waiting or running:
+        while waiting and len(running) < most:
+            running[executor.submit(function, *waiting[0])] = waiting[0]
+            waiting.popleft()
+        for future in wait(running, return_when=FIRST_COMPLETED).done:
+            result = future.result()
+            yield running.pop(future), result

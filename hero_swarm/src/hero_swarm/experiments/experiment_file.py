@@ -1,0 +1,278 @@
+"""The file of an experiment: which behavior, what varies, how long, which seeds and metrics. Pure.
+
+    behavior: aggregation.Aggregation
+    vary: {robots: [10, 25], errors: [perfect, default]}
+    start: {kind: uniform, cover: 0.02, gap_m: 0.0}
+    time_s: 300
+    seeds: {from: 1, count: 30}
+    metrics: [cluster_fraction, {time_until: {dispersion_ratio: 1.15}}]
+
+Each combination of the values that vary is a cell; each cell runs with every seed.
+"""
+
+import itertools
+import json
+import math
+from typing import Any, Collection, Dict, List, NamedTuple, Optional, Tuple
+
+from .errors import ExperimentError
+from .marked_yaml import Entry, read_entries
+
+__all__ = ["Bound", "Cell", "Comparing", "Experiment", "Metric", "Start", "parse_experiment"]
+
+MAX_ROBOTS = 1000
+MAX_TIME_S = 86_400.0
+MAX_SEED = 2**31 - 1
+MAX_RUNS = 1_000_000
+
+START_KINDS = ("uniform", "grid", "circle", "file", "arena")
+SETTINGS = ("robots", "errors", "delay_s", "arena")
+ERRORS = {"perfect": 0.0, "default": 1.0}
+"""How far robots are from the drawing, as the simulator takes it."""
+TESTS = ("wilcoxon",)
+_REQUIRED = ("behavior", "time_s", "seeds", "metrics")
+_KEYS = (
+    "behavior", "vary", *SETTINGS, "parameters", "start", "time_s", "until", "seeds", "metrics", "record", "compare"
+)  # fmt: skip
+
+
+FALLING = ("collisions", "consensus_error", "dispersion", "dispersion_ratio", "fatness", "hull_area")
+"""Metrics that a bound without <= or >= is reached from above; the others rise to it."""
+
+
+class Bound(NamedTuple):
+    """A condition: that a metric has come down to a value, or up to it."""
+
+    metric: str
+    value: float
+    falls: bool
+
+    def holds(self, value: Any) -> Any:
+        """Return whether it holds for a value of the metric, or for each of an array."""
+        return value <= self.value if self.falls else value >= self.value
+
+
+class Metric(NamedTuple):
+    """A column of the results.
+
+    Attributes:
+        source: the metric that is computed.
+        last_s: its mean over the last seconds of a run; 0: its value at the end.
+        bound: the column is the time (s) until this holds, inf if it never does.
+    """
+
+    name: str
+    source: str
+    last_s: float = 0.0
+    bound: Optional[Bound] = None
+
+
+class Start(NamedTuple):
+    """How robots are placed; lengths in m.
+
+    Attributes:
+        kind: uniform in a square of which the bodies cover a share; grid or circle with gaps between bodies;
+        file: poses of
+            a file; arena: starts of the arena.
+        cover: share of the square that bodies cover.
+        gap_m: least distance between bodies.
+        file: path of a CSV file with a line x m, y m, yaw rad for each robot.
+    """
+
+    kind: str
+    cover: float
+    gap_m: float
+    file: Optional[str]
+
+
+class Cell(NamedTuple):
+    """One combination of the values that vary.
+
+    Attributes:
+        varied: name -> value, in the order of the file: the columns of the results.
+        settings: robots, errors, delay_s (age of the poses that robots sense each other by), arena.
+        parameters: name -> value, of the behavior.
+    """
+
+    varied: Dict[str, Any]
+    settings: Dict[str, Any]
+    parameters: Dict[str, float]
+
+    @property
+    def label(self) -> str:
+        """The values that vary, for people."""
+        return ", ".join("%s %s" % item for item in self.varied.items()) or "all"
+
+
+class Comparing(NamedTuple):
+    """Which metric is compared between which cells: those that differ in one name only."""
+
+    metric: str
+    between: str
+    test: str
+
+
+class Experiment(NamedTuple):
+    """A file that has been checked.
+
+    Attributes:
+        seeds: of each cell.
+        metrics: columns of the results.
+        until: a run ends when this holds.
+        record_hz: of trajectories; 0: none.
+    """
+
+    behavior: str
+    cells: Tuple[Cell, ...]
+    start: Start
+    time_s: float
+    until: Optional[Bound]
+    seeds: range
+    metrics: Tuple[Metric, ...]
+    record_hz: float
+    compare: Optional[Comparing]
+
+    def describe_cell(self, cell: Cell) -> str:
+        """Return all that a run of cell depends on besides its seed and the code, as JSON."""
+        description = {
+            "behavior": self.behavior,
+            "cell": cell._asdict(),
+            "start": self.start._asdict(),
+            "time_s": self.time_s,
+            "until": self.until,
+            "metrics": self.metrics,
+            "record_hz": self.record_hz,
+        }
+        return json.dumps(description, sort_keys=True)
+
+
+def parse_experiment(text: str, file: str, known_metrics: Collection[str]) -> Experiment:
+    """Return the experiment in text, the contents of file.
+
+    known_metrics: names of metrics. The behavior and its parameters are checked when it is loaded.
+    Raises: ExperimentError with file and line for whatever is unknown, missing, or of a wrong type or unit.
+    """
+    root = read_entries(text, file).mapping(_KEYS, _REQUIRED)
+    start = _parse_start(root.get("start"))
+    cells = _parse_cells(root)
+    metrics = tuple(_parse_metric(entry, known_metrics) for entry in root["metrics"].entries())
+    names = [metric.name for metric in metrics]
+    for entry, name in zip(root["metrics"].entries(), names):
+        if names.count(name) > 1:
+            raise ExperimentError("%s: metrics holds %s more than once" % (entry.place, name))
+    seeds = _parse_seeds(root["seeds"])
+    if len(cells) * len(seeds) > MAX_RUNS:
+        root["seeds"].refuse(
+            "such that there are at most %d runs, not %d" % (MAX_RUNS, len(cells) * len(seeds))
+        )
+    time_s = root["time_s"].number(0.1, MAX_TIME_S, "s")
+    until = _parse_bound(root["until"], known_metrics) if "until" in root else None
+    record_hz = 0.0
+    if "record" in root:
+        record_hz = root["record"].mapping(("hz",), ("hz",))["hz"].number(0.01, 20.0, "Hz")
+    compare = _parse_comparing(root["compare"], names, cells) if "compare" in root else None
+    behavior = root["behavior"].text()
+    return Experiment(behavior, cells, start, time_s, until, seeds, metrics, record_hz, compare)
+
+
+def _parse_start(entry: Optional[Entry]) -> Start:
+    if entry is None:
+        return Start("arena", 0.0, 0.0, None)
+    given = entry.mapping(("kind", "cover", "gap_m", "file"), ("kind",))
+    kind = given["kind"].choice(START_KINDS)
+    allowed = {"uniform": ("cover", "gap_m"), "file": ("file",), "arena": ()}.get(kind, ("gap_m",))
+    for name, value in given.items():
+        if name != "kind" and name not in allowed:
+            raise ExperimentError(
+                "%s: start.%s does not go with kind: %s; %s"
+                % (
+                    value.place,
+                    name,
+                    kind,
+                    "allowed are: %s" % ", ".join(allowed) if allowed else "leave it out",
+                )
+            )
+    required = {"uniform": ("cover",), "file": ("file",)}.get(kind, ())
+    entry.mapping(None, required)
+    cover = given["cover"].number(1e-4, 0.5, "(share of the area)") if "cover" in given else 0.0
+    gap_m = given["gap_m"].number(0.0, 10.0, "m") if "gap_m" in given else 0.0
+    return Start(kind, cover, gap_m, given["file"].text() if "file" in given else None)
+
+
+def _parse_setting(name: str, entry: Entry) -> Any:
+    if name == "robots":
+        return entry.whole(1, MAX_ROBOTS)
+    if name == "delay_s":
+        return entry.number(0.0, 10.0, "s")
+    return entry.choice(tuple(ERRORS)) if name == "errors" else entry.text()
+
+
+def _parse_parameter(entry: Entry) -> float:
+    return entry.number(-1e6, 1e6, "")
+
+
+def _parse_cells(root: Dict[str, Entry]) -> Tuple[Cell, ...]:
+    settings = {name: _parse_setting(name, root[name]) for name in SETTINGS if name in root}
+    given = root["parameters"].mapping() if "parameters" in root else {}
+    parameters = {name: _parse_parameter(entry) for name, entry in given.items()}
+    varied: List[Tuple[str, List[Any]]] = []
+    for name, entry in (root["vary"].mapping() if "vary" in root else {}).items():
+        if name in settings or name in parameters:
+            raise ExperimentError("%s: %s is given twice: once as what varies" % (entry.place, name))
+        values = [
+            _parse_setting(name, item) if name in SETTINGS else _parse_parameter(item) for item in entry.entries()
+        ]
+        for value, item in zip(values, entry.entries()):
+            if values.count(value) > 1:
+                raise ExperimentError("%s: %s holds %r more than once" % (item.place, entry.name, value))
+        varied.append((name, values))
+    if "robots" not in settings and "robots" not in dict(varied):
+        raise ExperimentError("%s: robots is missing: give robots: 20, or vary it" % root["behavior"].place)
+    names = [name for name, _ in varied]
+    cells = []
+    for combination in itertools.product(*(values for _, values in varied)):
+        chosen = dict(zip(names, combination))
+        own = {name: value for name, value in chosen.items() if name in SETTINGS}
+        others = {name: value for name, value in chosen.items() if name not in SETTINGS}
+        cells.append(Cell(chosen, {**settings, **own}, {**parameters, **others}))
+    return tuple(cells)
+
+
+def _parse_seeds(entry: Entry) -> range:
+    given = entry.mapping(("from", "count"), ("count",))
+    first = given["from"].whole(0, MAX_SEED) if "from" in given else 1
+    return range(first, first + given["count"].whole(1, MAX_RUNS))
+
+
+def _parse_bound(entry: Entry, known_metrics: Collection[str]) -> Bound:
+    """Return the bound of a mapping such as {dispersion_ratio: 1.15} or {order: ">= 0.9"}."""
+    name, value = entry.single(known_metrics)
+    if not isinstance(value.value, str):
+        return Bound(name, value.number(-math.inf, math.inf, ""), name in FALLING)
+    sign, _, text = value.value.partition(" ")
+    try:
+        limit = float(text)
+    except ValueError:
+        limit = math.nan
+    if sign not in ("<=", ">=") or not math.isfinite(limit):
+        value.refuse('a number, or a text such as "<= 1.15" or ">= 0.95"')
+    return Bound(name, limit, sign == "<=")
+
+
+def _parse_metric(entry: Entry, known_metrics: Collection[str]) -> Metric:
+    if not isinstance(entry.value, dict):
+        name = entry.choice(known_metrics)
+        return Metric(name, name)
+    kind, inner = entry.single(("time_until", "mean_of_last_s"))
+    if kind == "time_until":
+        bound = _parse_bound(inner, known_metrics)
+        return Metric("time_until_%s_%g_s" % (bound.metric, bound.value), bound.metric, bound=bound)
+    name, value = inner.single(known_metrics)
+    last_s = value.number(1.0, MAX_TIME_S, "s")
+    return Metric("%s_mean_of_last_%g_s" % (name, last_s), name, last_s)
+
+
+def _parse_comparing(entry: Entry, metrics: List[str], cells: Tuple[Cell, ...]) -> Comparing:
+    given = entry.mapping(("metric", "between", "test"), ("metric", "between"))
+    test = given["test"].choice(TESTS) if "test" in given else TESTS[0]
+    return Comparing(given["metric"].choice(metrics), given["between"].choice(list(cells[0].varied)), test)

@@ -1,0 +1,177 @@
+"""YAML with line numbers: each value knows where it stands, so that an error names its line. Pure but for PyYAML.
+
+Anchors and merge keys are refused: a line would not be unique, and a short file could stand for a huge one.
+"""
+
+import math
+from typing import Any, Callable, Collection, Dict, List, NamedTuple, NoReturn, Optional, Tuple
+
+import yaml
+
+from hero_node.texts import one_line
+from hero_node.yaml_text import MAX_CHARACTERS
+
+from .errors import ExperimentError
+
+__all__ = ["Entry", "read_entries"]
+
+MAX_DEPTH = 20
+"""Of lists and mappings within each other; an experiment has four."""
+
+
+class Entry(NamedTuple):
+    """A value of the file.
+
+    Attributes:
+        value: text, number, truth value or None; a list of Entry; or a dictionary of name -> Entry.
+        name: what it is called, with what it is in: "seeds.count".
+        place: file and line.
+    """
+
+    value: Any
+    name: str
+    place: str
+
+    def refuse(self, text: str) -> NoReturn:
+        """Raise ExperimentError: place, name and value, and what it must be."""
+        shown = (
+            self.value
+            if not isinstance(self.value, (list, dict))
+            else "a list"
+            if self.is_list
+            else "a mapping"
+        )
+        raise ExperimentError("%s: %s is %s, but must be %s" % (self.place, self.name, _quote(shown), text))
+
+    @property
+    def is_list(self) -> bool:
+        """Whether it is a list."""
+        return isinstance(self.value, list)
+
+    def number(self, low: float, high: float, unit: str) -> float:
+        """Return a number in low..high."""
+        value = self.value
+        is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+        if not is_number or not math.isfinite(value) or not low <= value <= high:
+            limits = " from %g to %g" % (low, high) if math.isfinite(high - low) else ""
+            self.refuse("a number%s%s" % (limits, " " + unit if unit else ""))
+        return float(value)
+
+    def whole(self, low: int, high: int) -> int:
+        """Return a whole number in low..high."""
+        value = self.value
+        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+            self.refuse("a whole number from %d to %d" % (low, high))
+        return int(value)
+
+    def text(self) -> str:
+        """Return a text that is not empty."""
+        if not isinstance(self.value, str) or not self.value:
+            self.refuse("a text")
+        return str(self.value)
+
+    def choice(self, choices: Collection[str]) -> str:
+        """Return one of choices."""
+        if not isinstance(self.value, str) or self.value not in choices:
+            self.refuse("one of: %s" % ", ".join(choices))
+        return str(self.value)
+
+    def entries(self) -> List["Entry"]:
+        """Return the entries of a list that is not empty."""
+        if not isinstance(self.value, list) or not self.value:
+            self.refuse("a list such as [a, b]")
+        return list(self.value)
+
+    def mapping(
+        self, allowed: Optional[Collection[str]] = None, required: Collection[str] = ()
+    ) -> Dict[str, "Entry"]:
+        """Return name -> entry of a mapping with only the allowed names (None: any), and all the required ones."""
+        if not isinstance(self.value, dict):
+            self.refuse("a mapping such as {%s: ...}" % next(iter(allowed or ("name",))))
+        where = " in %s" % self.name if self.name else ""
+        for name, entry in self.value.items():
+            if allowed is not None and name not in allowed:
+                raise ExperimentError(
+                    "%s: unknown %s%s; allowed are: %s"
+                    % (entry.place, _quote(name), where, ", ".join(allowed))
+                )
+        for name in required:
+            if name not in self.value:
+                raise ExperimentError("%s: %s is missing%s" % (self.place, name, where))
+        return dict(self.value)
+
+    def single(self, allowed: Collection[str]) -> Tuple[str, "Entry"]:
+        """Return name and entry of a mapping with one name."""
+        mapping = self.mapping(allowed)
+        if len(mapping) != 1:
+            self.refuse("a mapping with one name")
+        return next(iter(mapping.items()))
+
+
+def read_entries(text: str, file: str) -> Entry:
+    """Return the mapping that text, the contents of file, holds.
+
+    Raises: ExperimentError with file and line for what is not YAML, not a mapping, or too large.
+    """
+    if len(text) > MAX_CHARACTERS:
+        raise ExperimentError("%s: longer than %d characters, so not an experiment" % (file, MAX_CHARACTERS))
+    _check_depth(text, file)
+    try:
+        node = yaml.compose(text, Loader=yaml.SafeLoader)
+    except yaml.MarkedYAMLError as error:
+        line = error.problem_mark.line + 1 if error.problem_mark else 1
+        raise ExperimentError("%s, line %d: not YAML: %s" % (file, line, error.problem)) from None
+    except yaml.YAMLError as error:
+        raise ExperimentError("%s: not YAML: %s" % (file, one_line(error))) from None
+    if not isinstance(node, yaml.MappingNode):
+        raise ExperimentError(
+            "%s: must hold names and values, such as behavior: aggregation.Aggregation" % file
+        )
+    return _convert(node, "", file, yaml.SafeLoader(""))
+
+
+def _check_depth(text: str, file: str) -> None:
+    """Refuse deep nesting and anchors before anything that works recursively meets them."""
+    opened = (yaml.MappingStartEvent, yaml.SequenceStartEvent)
+    closed = (yaml.MappingEndEvent, yaml.SequenceEndEvent)
+    depth = 0
+    try:
+        for event in yaml.parse(text, Loader=yaml.SafeLoader):
+            depth += isinstance(event, opened) - isinstance(event, closed)
+            is_shared = isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None) is not None
+            if depth > MAX_DEPTH or is_shared:
+                what = "anchors cannot be used" if is_shared else "more than %d levels" % MAX_DEPTH
+                raise ExperimentError("%s, line %d: %s" % (file, event.start_mark.line + 1, what))
+    except yaml.YAMLError:
+        return  # compose() says what is wrong
+
+
+def _convert(node: yaml.Node, name: str, file: str, loader: Any) -> Entry:
+    place = "%s, line %d" % (file, node.start_mark.line + 1)
+    if isinstance(node, yaml.MappingNode):
+        return Entry(_convert_mapping(node, name, file, loader), name, place)
+    if isinstance(node, yaml.SequenceNode):
+        return Entry([_convert(item, name, file, loader) for item in node.value], name, place)
+    construct: Callable[[yaml.Node], Any] = loader.construct_object
+    try:
+        return Entry(construct(node), name, place)
+    except (yaml.YAMLError, ValueError) as error:
+        raise ExperimentError("%s: %s: %s" % (place, name, one_line(error))) from None
+
+
+def _convert_mapping(node: yaml.MappingNode, name: str, file: str, loader: Any) -> Dict[str, Entry]:
+    mapping: Dict[str, Entry] = {}
+    for key_node, value_node in node.value:
+        place = "%s, line %d" % (file, key_node.start_mark.line + 1)
+        if not isinstance(key_node, yaml.ScalarNode):
+            raise ExperimentError("%s: a name must be a text" % place)
+        key = str(key_node.value)
+        if key in mapping:
+            raise ExperimentError("%s: %s stands twice" % (place, _quote(key)))
+        mapping[key] = _convert(value_node, "%s.%s" % (name, key) if name else key, file, loader)
+    return mapping
+
+
+def _quote(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."

@@ -1,0 +1,77 @@
+"""Program report: medians with intervals, comparisons and plots of an experiment's runs, as text, CSV, and a page."""
+
+import argparse
+import json
+import os
+import sys
+from typing import Dict, Mapping, Optional, Sequence
+
+import numpy as np
+
+from hero_node import command_line
+from hero_node.errors import HeroError
+from hero_node.safe_file import write_file
+
+from ..metrics import UNITS
+from .batch import METRICS_ENDING, SAMPLE_S, list_sources
+from .errors import ExperimentError
+from .experiment_file import Experiment
+from .report_page import OverTime, draw_page
+from .results_folder import ResultsFolder
+from .runner import read_experiment
+from .summary import build_report, describe, format_summaries
+
+__all__ = ["main", "write_report"]
+
+
+def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
+    """Read the command line."""
+    parser = argparse.ArgumentParser(
+        prog="report", description="Medians, intervals and plots of an experiment."
+    )
+    parser.add_argument("folder", metavar="FOLDER", help="the results of run")
+    return parser.parse_args(arguments)
+
+
+def write_report(path: str) -> None:
+    """Write table, summary and page of the results in a folder, and print them. Raises: ExperimentError."""
+    file = os.path.join(path, "experiment.yaml")
+    if not os.path.isfile(file):
+        raise ExperimentError("%s: no experiment.yaml in it, so not a folder of run" % path)
+    text, experiment = read_experiment(file)
+    folder = ResultsFolder(path, experiment, None)
+    runs = folder.read_runs()
+    report = build_report(experiment, runs)
+    folder.write_table(runs)
+    write_file(os.path.join(path, "summary.csv"), format_summaries(report).encode())
+    page = draw_page(report, UNITS, _read_over_time(folder, experiment), text, _read_about(path))
+    write_file(os.path.join(path, "report.html"), page.encode())
+    print(describe(report))
+    print(os.path.join(path, "report.html"))
+
+
+def _read_over_time(folder: ResultsFolder, experiment: Experiment) -> Dict[str, OverTime]:
+    """Return the course of each metric that was sampled, for the cells that have runs."""
+    cells = {cell: folder.read_series(cell, METRICS_ENDING) for cell in range(len(experiment.cells))}
+    recorded = {cell: np.stack(list(runs.values()), axis=1) for cell, runs in cells.items() if runs}
+    if not recorded:
+        return {}
+    times_s = SAMPLE_S * np.arange(len(next(iter(recorded.values()))))
+    return {
+        name: (times_s, {cell: samples[..., index] for cell, samples in recorded.items()})
+        for index, name in enumerate(list_sources(experiment))
+    }
+
+
+def _read_about(path: str) -> Mapping[str, str]:
+    with open(os.path.join(path, "about.json"), encoding="utf-8") as file:
+        about: Dict[str, str] = json.load(file)
+    return about
+
+
+def main(arguments: Optional[Sequence[str]] = None) -> None:
+    """Run the program."""
+    command_line.run(
+        lambda: write_report(parse_options(sys.argv[1:] if arguments is None else arguments).folder),
+        HeroError,
+    )

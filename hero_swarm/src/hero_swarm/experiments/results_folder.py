@@ -1,0 +1,219 @@
+"""The folder of an experiment's results: nothing in it is half-written, stale or counted twice.
+
+    experiment.yaml    the file, as it was when the experiment began
+    about.json         versions, commit, machine
+    batches/*.jsonl    the runs of each finished batch, named by the digest of its cell, its seeds and the code
+    series/*.npy       metrics over time of each batch, and poses if they are recorded
+    times.csv          wall time of each batch: the only file that depends on the machine
+    runs.csv           all runs, sorted; the same bytes however they were computed
+
+A batch is written to a temporary file, which is renamed when the disk has it. Knows neither processes nor robots.
+"""
+
+import csv
+import hashlib
+import io
+import json
+import math
+import os
+import shutil
+from contextlib import suppress
+from typing import Any, Dict, Iterable, List, NamedTuple, Optional, Sequence, Set, Tuple
+
+import numpy as np
+
+from hero_node.safe_file import write_file
+
+from .errors import ExperimentError
+from .experiment_file import Experiment
+
+__all__ = ["REAL", "SIMULATED", "ResultsFolder", "Run", "RunKey", "format_csv", "format_table"]
+
+SIMULATED = "simulated"
+"""Kind of a run that was computed."""
+
+REAL = "real"
+"""Kind of a run on robots."""
+
+RunKey = Tuple[int, int]
+"""Index of the cell, and seed."""
+
+
+class Run(NamedTuple):
+    """What one run gave.
+
+    Attributes:
+        cell: index of the cell.
+        values: of the metrics, in the order of the experiment; inf: a bound was not reached.
+        kind: SIMULATED or REAL.
+        remark: why a run on robots does not count; empty: it does.
+    """
+
+    cell: int
+    seed: int
+    values: Tuple[float, ...]
+    kind: str = SIMULATED
+    remark: str = ""
+
+
+class ResultsFolder:
+    """The results of one experiment."""
+
+    def __init__(self, path: str, experiment: Experiment, code: Optional[str]) -> None:
+        """Use the folder path; code: digest of what computes the runs, None: only to read. Nothing is read or
+        written yet."""
+        self.path = path
+        self._experiment = experiment
+        self._code = code
+        self._cells = [
+            hashlib.sha256(experiment.describe_cell(cell).encode()).hexdigest() for cell in experiment.cells
+        ]
+        self._batches = os.path.join(path, "batches")
+
+    def begin(self, text: str, about: Dict[str, str], fresh: bool) -> List[Run]:
+        """Create the folder, or go on with it; return the runs that it holds already.
+
+        text: of the experiment's file; fresh: delete what earlier runs left.
+        Raises: ExperimentError if it holds runs of another experiment or of other code, or something else.
+        """
+        if os.path.isdir(self.path) and os.listdir(self.path) and not os.path.isdir(self._batches):
+            raise ExperimentError(
+                "%s: holds files, but no results of an experiment; choose another --out" % self.path
+            )
+        if fresh:
+            for name in ("batches", "series"):
+                shutil.rmtree(os.path.join(self.path, name), ignore_errors=True)
+            for name in ("runs.csv", "times.csv", "about.json"):
+                with suppress(FileNotFoundError):
+                    os.remove(os.path.join(self.path, name))
+        os.makedirs(self._batches, exist_ok=True)
+        runs = self.read_runs()
+        if not runs:
+            write_file(os.path.join(self.path, "experiment.yaml"), text.encode())
+            about_text = json.dumps({"code": self._code, **about}, indent=2) + "\n"
+            write_file(os.path.join(self.path, "about.json"), about_text.encode())
+        return runs
+
+    def read_runs(self) -> List[Run]:
+        """Return the runs of all finished batches, sorted.
+
+        Raises: ExperimentError for a batch of another experiment or of other code.
+        """
+        found: Dict[Tuple[int, int, str], Run] = {}
+        for name in sorted(os.listdir(self._batches)):
+            if name.endswith(".jsonl"):
+                for run in self._read_batch(name):
+                    found[run.cell, run.seed, run.kind] = run
+        return [found[key] for key in sorted(found)]
+
+    def _read_batch(self, name: str) -> List[Run]:
+        """Return the runs of a batch; none if the file is damaged, so that they are computed again."""
+        path = os.path.join(self._batches, name)
+        try:
+            with open(path, encoding="utf-8") as file:
+                header, *lines = [json.loads(line) for line in file]
+            digest, code, kind = header["cell"], header["code"], header["kind"]
+            seeds = [int(seed) for seed in header["seeds"]]
+            by_seed = {int(line["seed"]): line for line in lines}
+        except (ValueError, KeyError, TypeError):
+            return []
+        remedy = "start anew with --fresh, or choose another --out"
+        if self._code not in (None, code) and kind == SIMULATED:
+            raise ExperimentError(
+                "%s: computed by other code (%s, now %s); %s" % (path, code, self._code, remedy)
+            )
+        if digest not in self._cells:
+            raise ExperimentError("%s: of an experiment with other parameters; %s" % (path, remedy))
+        if sorted(by_seed) != sorted(seeds) or name != self._name_batch(digest, seeds, code, kind):
+            return []
+        cell, count = self._cells.index(digest), len(self._experiment.metrics)
+        runs = [
+            Run(cell, seed, tuple(map(_decode, by_seed[seed]["values"])), kind, by_seed[seed]["remark"])
+            for seed in seeds
+        ]
+        return [run for run in runs if len(run.values) == count and run.seed in self._experiment.seeds]
+
+    def write_batch(self, runs: Sequence[Run]) -> None:
+        """Keep the runs of one cell: once this returns they survive any end of the program."""
+        assert self._code is not None
+        digest, kind = self._cells[runs[0].cell], runs[0].kind
+        seeds = [run.seed for run in runs]
+        header = {"cell": digest, "code": self._code, "kind": kind, "seeds": seeds}
+        lines = [header] + [
+            {"seed": run.seed, "values": list(map(_encode, run.values)), "remark": run.remark} for run in runs
+        ]
+        name = self._name_batch(digest, seeds, self._code, kind)
+        content = "".join(json.dumps(line) + "\n" for line in lines)
+        write_file(os.path.join(self._batches, name), content.encode())
+
+    def _name_batch(self, cell: str, seeds: Sequence[int], code: str, kind: str) -> str:
+        identity = json.dumps([cell, list(seeds), code, kind])
+        return hashlib.sha256(identity.encode()).hexdigest()[:24] + ".jsonl"
+
+    def name_series(self, cell: int, seeds: Sequence[int]) -> str:
+        """Return the path, without its ending, for what a batch records over time."""
+        folder = os.path.join(self.path, "series")
+        os.makedirs(folder, exist_ok=True)
+        assert self._code is not None
+        return os.path.join(
+            folder, self._name_batch(self._cells[cell], seeds, self._code, SIMULATED)[: -len(".jsonl")]
+        )
+
+    def read_series(self, cell: int, ending: str) -> Dict[int, np.ndarray]:
+        """Return what the runs of a cell recorded over time, by seed, from the files that end so; arrays (T, ...)."""
+        series: Dict[int, np.ndarray] = {}
+        for name in sorted(os.listdir(self._batches)):
+            path = os.path.join(self.path, "series", name[: -len(".jsonl")] + ending)
+            if name.endswith(".jsonl") and os.path.isfile(path):
+                runs = [run for run in self._read_batch(name) if run.cell == cell]
+                recorded = np.load(path, mmap_mode="r")
+                with open(os.path.join(self._batches, name), encoding="utf-8") as file:
+                    seeds = json.loads(file.readline())["seeds"]
+                series.update({run.seed: recorded[:, seeds.index(run.seed)] for run in runs})
+        return series
+
+    def note_time(self, cell: int, seeds: Sequence[int], wall_s: float) -> None:
+        """Append how long a batch took."""
+        path = os.path.join(self.path, "times.csv")
+        with open(path, "a", encoding="utf-8") as file:
+            if file.tell() == 0:
+                file.write("cell,first_seed,runs,wall_s\n")
+            file.write("%d,%d,%d,%.3f\n" % (cell, seeds[0], len(seeds), wall_s))
+
+    def list_missing(self, runs: Iterable[Run]) -> List[RunKey]:
+        """Return cell and seed of the runs that are still to be computed, cell by cell."""
+        done: Set[RunKey] = {(run.cell, run.seed) for run in runs}
+        every = ((cell, seed) for cell in range(len(self._cells)) for seed in self._experiment.seeds)
+        return [key for key in every if key not in done]
+
+    def write_table(self, runs: Sequence[Run]) -> str:
+        """Write runs.csv and return its path."""
+        path = os.path.join(self.path, "runs.csv")
+        write_file(path, format_table(self._experiment, runs).encode())
+        return path
+
+
+def format_table(experiment: Experiment, runs: Sequence[Run]) -> str:
+    """Return the runs as CSV: what varies, seed, kind, metrics, remark; numbers so that they are read back exactly."""
+    metrics = [metric.name for metric in experiment.metrics]
+    rows: List[List[Any]] = [[*experiment.cells[0].varied, "seed", "kind", *metrics, "remark"]]
+    for run in runs:
+        varied = experiment.cells[run.cell].varied.values()
+        rows.append([*varied, run.seed, run.kind, *map(repr, run.values), run.remark])
+    return format_csv(rows)
+
+
+def format_csv(rows: Iterable[Sequence[Any]]) -> str:
+    """Return rows as CSV."""
+    output = io.StringIO()
+    csv.writer(output, lineterminator="\n").writerows(rows)
+    return output.getvalue()
+
+
+def _encode(value: float) -> Any:
+    """Return value for JSON, which has no infinity."""
+    return value if math.isfinite(value) else repr(value)
+
+
+def _decode(value: Any) -> float:
+    return float(value)

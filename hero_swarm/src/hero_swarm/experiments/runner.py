@@ -1,0 +1,172 @@
+"""Program run: computes the runs that an experiment lacks, and writes the table of all runs."""
+
+import argparse
+import functools
+import math
+import os
+import sys
+import time
+from concurrent.futures import Executor
+from typing import Any, Callable, Iterable, Iterator, Optional, Sequence, Tuple
+
+from tqdm import tqdm
+
+from hero_node import command_line
+from hero_node.errors import HeroError
+from hero_node.yaml_text import YamlError, read_text
+
+from ..metrics import METRICS
+from . import engines
+from .batch import compute_batch, load_checked
+from .code_version import describe_machine, hash_code
+from .errors import ExperimentError
+from .experiment_file import MAX_ROBOTS, Experiment, parse_experiment
+from .results_folder import ResultsFolder, RunKey
+
+__all__ = ["run_experiment"]
+
+MAX_BATCH = 1000
+
+BATCH_ROBOT_S = 20_000.0
+"""Robot-seconds in a batch: 1 to 5 s of work, compared with which a task's few ms of overhead are small."""
+
+DASK = "dask:"
+
+Task = Tuple[str, int, Tuple[int, ...], str, bool]
+"""Arguments of compute_batch()."""
+
+
+def _parse_part(text: str) -> Tuple[int, int]:
+    part, slash, parts = text.partition("/")
+    if not (slash and part.isdecimal() and parts.isdecimal() and 1 <= int(part) <= int(parts)):
+        raise argparse.ArgumentTypeError("%r must be K/N with K from 1 to N, such as 3/16" % text)
+    return int(part), int(parts)
+
+
+def _parse_executor(text: str) -> str:
+    if not text.startswith(DASK) or text == DASK:
+        raise argparse.ArgumentTypeError("%r must be dask:tcp://HOST:PORT or dask:SCHEDULER_FILE" % text)
+    return text[len(DASK) :]
+
+
+def _whole(low: int, high: int) -> Callable[[str], int]:
+    def parse(text: str) -> int:
+        if not text.isdecimal() or not low <= int(text) <= high:
+            raise argparse.ArgumentTypeError("%r must be a whole number from %d to %d" % (text, low, high))
+        return int(text)
+
+    return parse
+
+
+def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
+    """Read the command line."""
+    parser = argparse.ArgumentParser(prog="run", description="Run an experiment: all seeds of all cells.")
+    parser.add_argument("file", metavar="EXPERIMENT.yaml", help="what to run")
+    parser.add_argument("--out", metavar="FOLDER", help="of the results (the file's name without .yaml)")
+    parser.add_argument(
+        "--jobs", type=_whole(1, 1024), default=os.cpu_count() or 1, help="processes (%(default)s)"
+    )
+    parser.add_argument(
+        "--batch", type=_whole(1, MAX_BATCH), help="runs that are computed together (1 to 5 s of work)"
+    )
+    parser.add_argument(
+        "--executor",
+        type=_parse_executor,
+        metavar="dask:ADDRESS",
+        help="a Dask cluster: tcp://HOST:PORT or scheduler file",
+    )
+    parser.add_argument(
+        "--part", type=_parse_part, default=(1, 1), metavar="K/N", help="only the K-th of N parts"
+    )
+    parser.add_argument("--fresh", action="store_true", help="delete earlier results in the folder")
+    return parser.parse_args(arguments)
+
+
+def read_experiment(path: str) -> Tuple[str, Experiment]:
+    """Return the text of an experiment's file, and what it describes. Raises: ExperimentError."""
+    try:
+        text = read_text(path)
+    except (OSError, YamlError) as error:
+        raise ExperimentError(
+            "%s cannot be read: %s" % (path, getattr(error, "strerror", None) or error)
+        ) from error
+    return text, parse_experiment(text, path, METRICS)
+
+
+def choose_batch(experiment: Experiment, cell: int) -> int:
+    """Return how many runs of a cell are computed together."""
+    robots = int(experiment.cells[cell].settings["robots"])
+    assert robots <= MAX_ROBOTS
+    return max(1, min(MAX_BATCH, math.ceil(BATCH_ROBOT_S / (robots * experiment.time_s))))
+
+
+def list_tasks(
+    text: str, experiment: Experiment, missing: Sequence[RunKey], batch: Optional[int], folder: ResultsFolder
+) -> Iterator[Task]:
+    """Yield the arguments of compute_batch() for the missing runs, which are sorted by cell."""
+    for cell in range(len(experiment.cells)):
+        seeds = [seed for own, seed in missing if own == cell]
+        size = batch or choose_batch(experiment, cell)
+        for start in range(0, len(seeds), size):
+            chosen = tuple(seeds[start : start + size])
+            yield text, cell, chosen, folder.name_series(cell, chosen), experiment.record_hz > 0.0
+
+
+def _choose_engine(options: argparse.Namespace, behavior: str) -> Tuple[Callable[[], Executor], int]:
+    """Return what opens the executor, and its number of workers."""
+    if options.executor is None:
+        return functools.partial(engines.open_pool, options.jobs), options.jobs
+    executor, workers = engines.open_dask(options.executor, functools.partial(hash_code, behavior))
+    return lambda: executor, workers
+
+
+def _watch(done: Iterable[Tuple[Any, Any]], missing: int, begun: int) -> Iterator[Tuple[Any, Any]]:
+    """Yield what is done, and show on a terminal how far it is and how long it will take."""
+    with tqdm(total=missing + begun, initial=begun, unit="run", disable=None, file=sys.stderr) as bar:
+        for task, result in done:
+            yield task, result
+            bar.update(len(task[2]))
+
+
+def run_experiment(options: argparse.Namespace) -> str:
+    """Run what is missing; return a line for people.
+
+    Raises: ExperimentError.
+    """
+    text, experiment = read_experiment(options.file)
+    load_checked(experiment)
+    folder = ResultsFolder(
+        options.out or os.path.splitext(options.file)[0], experiment, hash_code(experiment.behavior)
+    )
+    runs = folder.begin(text, describe_machine(), options.fresh)
+    part, parts = options.part
+    # Whatever is there already, the parts share out all runs in the same way.
+    own = set(folder.list_missing(())[part - 1 :: parts])
+    missing = [key for key in folder.list_missing(runs) if key in own]
+    tasks = list_tasks(text, experiment, missing, options.batch, folder)
+    if missing:
+        opener, workers = _choose_engine(options, experiment.behavior)
+        began_s = time.monotonic()
+        for task, results in _watch(
+            engines.compute(opener, workers, compute_batch, tasks), len(missing), len(runs)
+        ):
+            folder.write_batch(results.runs)
+            folder.note_time(task[1], task[2], results.wall_s)
+        print("%d runs in %.1f s" % (len(missing), time.monotonic() - began_s), file=sys.stderr)
+    left = folder.list_missing(folder.read_runs())
+    if left:
+        return "%s: %d of %d runs are still to be computed, by other parts" % (
+            folder.path, len(left), len(experiment.cells) * len(experiment.seeds)
+        )  # fmt: skip
+    return "%s: all runs of %d cells with %d seeds each" % (
+        folder.write_table(folder.read_runs()), len(experiment.cells), len(experiment.seeds)
+    )  # fmt: skip
+
+
+def main(arguments: Optional[Sequence[str]] = None) -> None:
+    """Run the program."""
+
+    def run() -> None:
+        print(run_experiment(parse_options(sys.argv[1:] if arguments is None else arguments)))
+
+    command_line.run(run, HeroError)

@@ -1,0 +1,88 @@
+"""Where the robots of a run begin, which depends on seed and number alone. Pure but for a file."""
+
+import math
+from typing import List, Sequence
+
+import numpy as np
+
+from hero_client.values.robot_constants import BODY_RADIUS_M
+from hero_sim.errors import OptionError
+from hero_sim.world.arena import Arena, place_robots
+
+from ..behavior import derive_seed
+from ..trial import scatter
+from .errors import ExperimentError
+from .experiment_file import Start
+
+__all__ = ["place_all"]
+
+_DIAMETER_M = 2.0 * BODY_RADIUS_M
+
+
+def place_all(start: Start, arena: Arena, robots: int, seeds: Sequence[int]) -> np.ndarray:
+    """Return poses (W, N, 3), x m, y m, yaw rad, of the robots of one world for each seed.
+
+    Raises: ExperimentError if they find no place, or for a file that cannot be used.
+    """
+    try:
+        return np.array([_place(start, arena, robots, seed) for seed in seeds])
+    except (OptionError, ValueError) as error:
+        raise ExperimentError("start: %s" % error) from error
+
+
+def _place(start: Start, arena: Arena, robots: int, seed: int) -> np.ndarray:
+    if start.kind == "file":
+        assert start.file is not None
+        return _read_poses(start.file, robots)
+    if start.kind == "arena":
+        return place_robots(arena, robots, np.random.RandomState(derive_seed(seed, "places")))
+    if start.kind == "uniform":
+        side_m = math.sqrt(robots * math.pi * BODY_RADIUS_M * BODY_RADIUS_M / start.cover)
+        return scatter(robots, side_m, side_m, seed, start.gap_m)
+    spacing_m = _DIAMETER_M + start.gap_m
+    return (
+        _place_in_grid(robots, spacing_m, seed)
+        if start.kind == "grid"
+        else _place_in_circle(robots, spacing_m)
+    )
+
+
+def _place_in_grid(robots: int, spacing_m: float, seed: int) -> np.ndarray:
+    """Return a square of rows around the origin, headings drawn from the seed."""
+    columns = math.ceil(math.sqrt(robots))
+    index = np.arange(robots)
+    x_m, y_m = (index % columns) * spacing_m, (index // columns) * spacing_m
+    yaw_rad = math.pi * (2.0 * np.random.RandomState(derive_seed(seed, "places")).random_sample(robots) - 1.0)
+    return np.column_stack((x_m - x_m.max() / 2.0, y_m - y_m.max() / 2.0, yaw_rad))
+
+
+def _place_in_circle(robots: int, spacing_m: float) -> np.ndarray:
+    """Return a circle around the origin, all headed counter-clockwise along it."""
+    radius_m = spacing_m / 2.0 / math.sin(math.pi / max(robots, 2))
+    angle_rad = 2.0 * math.pi * np.arange(robots) / robots
+    yaw_rad = np.remainder(angle_rad + 1.5 * math.pi, 2.0 * math.pi) - math.pi
+    return np.column_stack((radius_m * np.cos(angle_rad), radius_m * np.sin(angle_rad), yaw_rad))
+
+
+def _read_poses(path: str, robots: int) -> np.ndarray:
+    """Return the first poses of a file with a line x m, y m, yaw rad for each robot. Raises: ExperimentError."""
+    poses: List[List[float]] = []
+    number = 0
+    try:
+        with open(path, encoding="utf-8") as file:
+            for line in file:
+                number += 1
+                if line.strip() and not line.startswith("#"):
+                    pose = [float(word) for word in line.split(",")]
+                    if len(pose) != 3 or not all(map(math.isfinite, pose)):
+                        raise ValueError("must be x m, y m, yaw rad")
+                    poses.append(pose)
+    except OSError as error:
+        raise ExperimentError("start.file %s cannot be read: %s" % (path, error.strerror)) from error
+    except ValueError as error:
+        raise ExperimentError(
+            "start.file %s, line %d: %s; must be x m, y m, yaw rad" % (path, number, error)
+        ) from error
+    if len(poses) < robots:
+        raise ExperimentError("start.file %s: has %d poses for %d robots" % (path, len(poses), robots))
+    return np.array(poses[:robots])

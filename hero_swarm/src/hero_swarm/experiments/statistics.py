@@ -1,0 +1,143 @@
+"""Intervals and tests for the runs of an experiment. Pure: numpy, and scipy for the signed-rank test only.
+
+Medians have percentile bootstrap intervals (Efron 1979): bias-corrected intervals are undefined where most values are
+equal, which metrics that are bounded often are. Paired differences are tested by Wilcoxon's signed-rank test
+(1945), their size
+is Cliff's delta (1993), and several comparisons are corrected by Holm's step-down method (1979).
+"""
+
+from typing import List, NamedTuple, Sequence, Tuple
+
+import numpy as np
+
+from .errors import ExperimentError
+
+__all__ = [
+    "FEW_SEEDS",
+    "Comparison",
+    "Interval",
+    "bootstrap_median",
+    "cliffs_delta",
+    "compare_pairs",
+    "correct_by_holm",
+]
+
+RESAMPLES = 9999
+"""Odd, and one less than a round number, so that both bounds of the interval are resampled values."""
+
+CONFIDENCE = 0.95
+
+FEW_SEEDS = 30
+"""Below this number of values the interval of a median is narrower than it claims."""
+
+_SEED = 20261123
+"""The resampling is the same for each report of the same runs."""
+
+_BLOCK_VALUES = 2_000_000
+"""Values that are resampled at once, which bounds the memory."""
+
+
+class Interval(NamedTuple):
+    """The median of some values, and the bounds of its confidence interval."""
+
+    median: float
+    low: float
+    high: float
+
+
+class Comparison(NamedTuple):
+    """Values of two cells, paired by their seeds.
+
+    Attributes:
+        pairs: how many.
+        difference: of each pair, second minus first: median and interval.
+        p_value: of the signed-rank test, two-sided; 1 if all pairs are equal.
+        delta: Cliff's delta, -1 to 1: how much more often a value of the second is larger than one of the first.
+    """
+
+    pairs: int
+    difference: Interval
+    p_value: float
+    delta: float
+
+
+def bootstrap_median(values: Sequence[float]) -> Interval:
+    """Return the median of values, all finite or inf, with its interval of CONFIDENCE.
+
+    Raises: ExperimentError without a value, or for nan.
+    """
+    sample = np.sort(np.asarray(values, dtype=float))
+    if not len(sample) or np.isnan(sample).any():
+        raise ExperimentError(
+            "no median of %d values%s" % (len(sample), ", one of which is nan" if len(sample) else "")
+        )
+    rng = np.random.RandomState(_SEED)
+    block = max(1, _BLOCK_VALUES // len(sample))
+    medians: List[np.ndarray] = []
+    for start in range(0, RESAMPLES, block):
+        chosen = rng.randint(len(sample), size=(min(block, RESAMPLES - start), len(sample)))
+        medians.append(_find_medians(sample, chosen))
+    resampled = np.sort(np.concatenate(medians))
+    tail = (RESAMPLES + 1) * (1.0 - CONFIDENCE) / 2.0
+    low, high = round(tail) - 1, RESAMPLES - round(tail)
+    middle = _find_medians(sample, np.arange(len(sample))[None])[0]
+    return Interval(float(middle), float(resampled[low]), float(resampled[high]))
+
+
+def _find_medians(sample: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    """Return the median of each row (M,) of indices chosen (M, N) into the ascending sample (N,)."""
+    count = chosen.shape[1]
+    middle = [(count - 1) // 2, count // 2]
+    # The order of indices is that of the values, and whole numbers are sorted faster.
+    low, high = sample[np.partition(chosen, middle, axis=1)[:, middle].T]
+    # Half of the difference is nan between equal infinities.
+    return np.where(low == high, low, low / 2.0 + high / 2.0)
+
+
+def cliffs_delta(first: Sequence[float], second: Sequence[float]) -> float:
+    """Return how much more often a value of second is larger than one of first than smaller, -1 to 1."""
+    ours, theirs = np.sort(np.asarray(first, dtype=float)), np.asarray(second, dtype=float)
+    larger = np.searchsorted(ours, theirs, side="left").sum()  # values of first below each of second
+    smaller = (len(ours) - np.searchsorted(ours, theirs, side="right")).sum()
+    return float(larger - smaller) / (len(ours) * len(theirs))
+
+
+def compare_pairs(first: Sequence[float], second: Sequence[float]) -> Comparison:
+    """Compare values of the same seeds, in the same order.
+
+    Raises: ExperimentError for samples of different lengths, for a value that is not finite, or without scipy.
+    """
+    ours, theirs = np.asarray(first, dtype=float), np.asarray(second, dtype=float)
+    if len(ours) != len(theirs):
+        raise ExperimentError("%d and %d values cannot be paired" % (len(ours), len(theirs)))
+    differences = theirs - ours
+    if not np.isfinite(differences).all():
+        raise ExperimentError(
+            "a value that is not finite cannot be compared: compare another metric, or longer runs"
+        )
+    delta = cliffs_delta(ours.tolist(), theirs.tolist())
+    return Comparison(len(differences), bootstrap_median(differences), _signed_rank(differences), delta)
+
+
+def _signed_rank(differences: np.ndarray) -> float:
+    """Return the two-sided p-value of Wilcoxon's signed-rank test; pairs without a difference do not count."""
+    unequal = differences[differences != 0.0]
+    if not len(unequal):
+        return 1.0
+    try:
+        from scipy.stats import wilcoxon
+    except ImportError as error:
+        raise ExperimentError(
+            "comparing cells needs scipy: apt install python3-scipy, or pip install scipy"
+        ) from error
+    return float(wilcoxon(unequal).pvalue)
+
+
+def correct_by_holm(p_values: Sequence[float]) -> Tuple[float, ...]:
+    """Return the p-values (in their order) of several tests of one question, corrected for their number."""
+    order = sorted(range(len(p_values)), key=lambda index: p_values[index])
+    corrected, largest = [0.0] * len(p_values), 0.0
+    for rank, index in enumerate(order):
+        largest = max(largest, min(1.0, (len(order) - rank) * p_values[index]))
+        corrected[index] = largest
+    return tuple(corrected)

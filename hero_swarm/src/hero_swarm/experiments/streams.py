@@ -1,0 +1,40 @@
+"""Arrays that grow on the disk, not in memory: what runs record. A file has its name once it is whole."""
+
+import os
+from typing import Any, Tuple
+
+import numpy as np
+
+__all__ = ["Stream", "open_stream"]
+
+
+class Stream:
+    """An array (T, ...) of single precision that is written entry by entry.
+
+    Attributes:
+        count: entries that were written.
+    """
+
+    def __init__(self, path: str, array: Any) -> None:
+        """Write into array, a memory map of path + ".part"."""
+        self.count = 0
+        self._path, self._array = path, array
+
+    def append(self, values: np.ndarray) -> None:
+        """Write the next entry."""
+        self._array[self.count] = values
+        self.count += 1
+
+    def close(self) -> None:
+        """Give the file its name; entries that were not written are nan."""
+        self._array[self.count :] = np.nan
+        self._array.flush()
+        del self._array
+        os.replace(self._path + ".part", self._path)
+
+
+def open_stream(path: str, shape: Tuple[int, ...]) -> Stream:
+    """Return a stream of shape (T, ...), which replaces the file path (.npy) when it is closed."""
+    array: Any = np.lib.format.open_memmap(  # type: ignore[no-untyped-call]
+        path + ".part", mode="w+", dtype=np.float32, shape=shape)
+    return Stream(path, array)

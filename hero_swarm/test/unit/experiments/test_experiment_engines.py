@@ -1,0 +1,61 @@
+"""Batches on worker processes: all are computed once, whatever workers do."""
+
+import functools
+import os
+import signal
+
+import pytest
+
+from hero_swarm.experiments import engines
+from hero_swarm.experiments.errors import ExperimentError
+
+open_two = functools.partial(engines.open_pool, 2)
+
+
+def square(number):
+    return number * number
+
+
+def square_but_die_once(number, folder):
+    """Kill the worker the first time that number 3 is computed."""
+    marker = os.path.join(folder, "died")
+    if number == 3 and not os.path.exists(marker):
+        with open(marker, "w"):
+            os.kill(os.getpid(), signal.SIGKILL)
+    return number * number
+
+
+def die(number):
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def fail(number):
+    raise ValueError("of number %d" % number)
+
+
+def test_every_task_is_computed_once():
+    done = list(engines.compute(open_two, 2, square, [(number,) for number in range(20)]))
+    assert sorted(done) == [((number,), number * number) for number in range(20)]
+
+
+def test_tasks_of_a_killed_worker_run_again(tmp_path):
+    tasks = [(number, str(tmp_path)) for number in range(8)]
+    done = list(engines.compute(open_two, 2, square_but_die_once, tasks))
+    assert sorted(result for _, result in done) == [number * number for number in range(8)]
+    assert os.path.exists(str(tmp_path / "died"))
+
+
+def test_a_task_that_always_kills_its_worker_ends_with_an_error():
+    with pytest.raises(ExperimentError, match="worker processes died"):
+        list(engines.compute(functools.partial(engines.open_pool, 1), 1, die, [(1,)]))
+
+
+def test_an_error_of_the_users_code_reaches_the_program():
+    with pytest.raises(ValueError, match="of number 4"):
+        list(engines.compute(open_two, 2, fail, [(4,)]))
+
+
+def test_without_dask_the_error_names_its_package(monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "distributed", None)
+    with pytest.raises(ExperimentError, match="python3-distributed"):
+        engines.open_dask("tcp://127.0.0.1:1", lambda: "")

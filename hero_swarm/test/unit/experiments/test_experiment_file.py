@@ -1,0 +1,148 @@
+"""The file of an experiment: cells, seeds and metrics, and errors that name the line."""
+
+import pytest
+
+from hero_swarm.experiments.errors import ExperimentError
+from hero_swarm.experiments.experiment_file import Bound, Start, parse_experiment
+from hero_swarm.experiments.marked_yaml import MAX_CHARACTERS
+
+METRICS = ("cluster_fraction", "dispersion")
+
+FILE = """\
+behavior: aggregation.Aggregation
+vary: {robots: [10, 25], errors: [perfect, default]}
+start: {kind: uniform, cover: 0.02, gap_m: 0.0}
+time_s: 300
+seeds: {from: 1, count: 30}
+metrics: [cluster_fraction, {time_until: {dispersion: 1.15}}]
+record: {hz: 1}
+compare: {metric: cluster_fraction, between: errors, test: wilcoxon}
+"""
+
+
+def parse(text):
+    return parse_experiment(text, "e.yaml", METRICS)
+
+
+def test_every_combination_of_what_varies_is_a_cell():
+    experiment = parse(FILE)
+    assert [tuple(cell.varied.values()) for cell in experiment.cells] == [
+        (10, "perfect"), (10, "default"), (25, "perfect"), (25, "default")
+    ]  # fmt: skip
+    assert experiment.cells[1].settings == {"robots": 10, "errors": "default"}
+
+
+def test_all_parts_of_the_file_are_read():
+    experiment = parse(FILE)
+    assert experiment.start == Start("uniform", 0.02, 0.0, None)
+    assert list(experiment.seeds) == list(range(1, 31))
+    assert experiment.time_s == 300.0 and experiment.record_hz == 1.0
+    assert [metric.name for metric in experiment.metrics] == [
+        "cluster_fraction",
+        "time_until_dispersion_1.15_s",
+    ]
+    assert experiment.metrics[1].bound == Bound("dispersion", 1.15, True)
+    assert tuple(experiment.compare) == ("cluster_fraction", "errors", "wilcoxon")
+
+
+def test_parameters_of_the_behavior_can_vary():
+    experiment = parse(
+        FILE.replace("errors: [perfect, default]", "v0_m_s: [-0.1, -0.05]").replace("errors", "v0_m_s")
+    )
+    assert [cell.parameters for cell in experiment.cells] == [{"v0_m_s": -0.1}, {"v0_m_s": -0.05}] * 2
+
+
+def test_without_anything_that_varies_there_is_one_cell():
+    experiment = parse("behavior: a.B\nrobots: 5\ntime_s: 1\nseeds: {count: 2}\nmetrics: [dispersion]\n")
+    assert len(experiment.cells) == 1 and experiment.cells[0].label == "all"
+
+
+def test_a_cell_is_described_by_everything_that_its_runs_depend_on():
+    texts = [
+        FILE,
+        FILE.replace("10, 25", "11, 25"),
+        FILE.replace("time_s: 300", "time_s: 301"),
+        FILE.replace("cover: 0.02", "cover: 0.03"),
+        FILE.replace("1.15", "1.2"),
+        FILE.replace("time_s: 300", "time_s: 300\nuntil: {dispersion: 2}"),
+        FILE.replace("aggregation.Aggregation", "aggregation.Other"),
+        FILE.replace("hz: 1", "hz: 2"),
+    ]
+    described = {parse(text).describe_cell(parse(text).cells[0]) for text in texts}
+    assert len(described) == len(texts)
+    # More seeds do not make earlier runs worthless.
+    more = parse(FILE.replace("count: 30", "count: 60"))
+    assert more.describe_cell(more.cells[0]) in described
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "words"),
+    [
+        ("time_s: 300", "time: 300", 4, "unknown 'time'; allowed are: behavior"),
+        ("time_s: 300", "time_s: 300 s", 4, "time_s is '300 s', but must be a number from 0.1"),
+        ("time_s: 300", "time_s: true", 4, "time_s is True"),
+        ("time_s: 300", "time_s: .inf", 4, "time_s is inf"),
+        ("time_s: 300\n", "", 1, "time_s is missing"),
+        ("10, 25", "10, 2.5", 2, "vary.robots is 2.5, but must be a whole number"),
+        ("10, 25", "10, 10", 2, "holds 10 more than once"),
+        ("[10, 25]", "10", 2, "vary.robots is 10, but must be a list"),
+        ("cover: 0.02", "cover: 2 %", 3, "start.cover is '2 %'"),
+        ("kind: uniform", "kind: heap", 3, "must be one of: uniform"),
+        ("cover: 0.02, ", "", 3, "cover is missing in start"),
+        ("kind: uniform", "kind: grid", 3, "start.cover does not go with kind: grid"),
+        ("count: 30", "count: 0", 5, "seeds.count is 0"),
+        ("count: 30", "count: 999999", 5, "at most 1000000 runs"),
+        ("from: 1", "first: 1", 5, "unknown 'first' in seeds; allowed are: from, count"),
+        ("[cluster_fraction", "[cluster", 6, "must be one of: cluster_fraction, dispersion"),
+        ("{dispersion: 1.15}", "{dispersion: near}", 6, "dispersion is 'near', but must be a number"),
+        ("time_until:", "time_after:", 6, "unknown 'time_after'"),
+        ("[cluster_fraction,", "[dispersion, dispersion,", 6, "more than once"),
+        ("hz: 1", "hz: 100", 7, "record.hz is 100"),
+        ("metric: cluster_fraction", "metric: dispersion", 8, "compare.metric is 'dispersion'"),
+        ("between: errors", "between: wifi", 8, "must be one of: robots, errors"),
+        ("time_s: 300", "time_s: 300\nrobots: 5", 2, "robots is given twice"),
+        ("time_s: 300", "time_s: 300\ntime_s: 3", 5, "'time_s' stands twice"),
+        ("time_s: 300", "time_s: [", 6, "not YAML"),
+        ("time_s: 300", "time_s: &a 300", 4, "anchors cannot be used"),
+        ("time_s: 300", "time_s: " + "[" * 30 + "]" * 30, 4, "more than 20 levels"),
+    ],
+)
+def test_what_is_wrong_is_refused_with_its_line(old, new, line, words):
+    assert old in FILE
+    with pytest.raises(ExperimentError) as caught:
+        parse(FILE.replace(old, new, 1))
+    assert str(caught.value).startswith("e.yaml, line %d: " % line)
+    assert words in str(caught.value) and "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("text", ["", "3", "[1, 2]", "x" * (MAX_CHARACTERS + 1), "\0", "[" * 100_000])
+def test_what_is_no_experiment_at_all_is_refused(text):
+    with pytest.raises(ExperimentError, match=r"^e\.yaml") as caught:
+        parse(text)
+    assert len(str(caught.value)) < 300
+
+
+@pytest.mark.parametrize(
+    ("text", "bound"),
+    [
+        ("-2", Bound("dispersion", -2.0, True)),
+        ('">= 1.5"', Bound("dispersion", 1.5, False)),
+        ('"<= 1.5"', Bound("dispersion", 1.5, True)),
+    ],
+)
+def test_a_bound_says_from_which_side_it_is_reached(text, bound):
+    (metric,) = parse(FILE.replace("1.15", text)).metrics[1:]
+    assert metric.bound == bound
+    assert bound.holds(bound.value) and bound.holds(bound.value - 1.0) is bound.falls
+
+
+def test_metrics_that_rise_are_reached_from_below():
+    (metric,) = parse(FILE.replace("{dispersion: 1.15}", "{cluster_fraction: 0.9}")).metrics[1:]
+    assert not metric.bound.falls
+
+
+def test_a_mean_of_the_last_seconds_is_a_column():
+    (metric,) = parse(
+        FILE.replace("{time_until: {dispersion: 1.15}}", "{mean_of_last_s: {dispersion: 60}}")
+    ).metrics[1:]
+    assert (metric.name, metric.source, metric.last_s) == ("dispersion_mean_of_last_60_s", "dispersion", 60.0)

@@ -1,0 +1,147 @@
+"""The folder of results: what is damaged, stale or of other code never counts, and order changes nothing."""
+
+import json
+import math
+import os
+
+import pytest
+
+from hero_swarm.experiments.errors import ExperimentError
+from hero_swarm.experiments.experiment_file import parse_experiment
+from hero_swarm.experiments.results_folder import REAL, ResultsFolder, Run
+
+FILE = """\
+behavior: a.B
+vary: {robots: [2, 3]}
+time_s: 10
+seeds: {from: 5, count: 4}
+metrics: [dispersion, {time_until: {dispersion: 1.0}}]
+"""
+
+
+def parse(text=FILE):
+    return parse_experiment(text, "e.yaml", ("dispersion",))
+
+
+def make_run(cell, seed):
+    return Run(cell, seed, (0.1 * seed + cell, math.inf if seed % 2 else 1.0 / 3.0))
+
+
+RUNS = [make_run(cell, seed) for cell in (0, 1) for seed in range(5, 9)]
+
+
+def open_folder(path, text=FILE, code="c0de", fresh=False):
+    folder = ResultsFolder(str(path), parse(text), code)
+    return folder, folder.begin(text, {"numpy": "1"}, fresh)
+
+
+def batches_of(path):
+    return sorted((path / "batches").iterdir())
+
+
+@pytest.mark.parametrize("batches", [[[0], [1], [2], [3]], [[0, 1, 2, 3]], [[3, 1], [0, 2]]])
+def test_the_table_does_not_depend_on_batches_or_their_order(batches, tmp_path):
+    folder, _ = open_folder(tmp_path)
+    for batch in batches:
+        for cell in (1, 0):
+            folder.write_batch([RUNS[4 * cell + index] for index in batch])
+    assert folder.read_runs() == RUNS
+    with open(folder.write_table(folder.read_runs())) as file:
+        lines = file.read().splitlines()
+    assert lines[0] == "robots,seed,kind,dispersion,time_until_dispersion_1_s,remark"
+    assert lines[1] == "2,5,simulated,0.5,inf,"
+    assert len(lines) == 9
+
+
+def test_a_resumed_experiment_lacks_only_what_is_missing(tmp_path):
+    folder, runs = open_folder(tmp_path)
+    assert runs == [] and len(folder.list_missing(runs)) == 8
+    folder.write_batch(RUNS[:3])
+    again, runs = open_folder(tmp_path)
+    assert runs == RUNS[:3]
+    assert again.list_missing(runs) == [(0, 8), (1, 5), (1, 6), (1, 7), (1, 8)]
+
+
+def test_more_seeds_keep_the_runs_that_are_there(tmp_path):
+    folder, _ = open_folder(tmp_path)
+    folder.write_batch(RUNS[:4])
+    _, runs = open_folder(tmp_path, FILE.replace("count: 4", "count: 6"))
+    assert runs == RUNS[:4]
+    _, runs = open_folder(tmp_path, FILE.replace("count: 4", "count: 2"))
+    assert runs == RUNS[:2]
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda text: text[: len(text) // 2],
+        lambda text: text[: text.rindex('{"seed"')],
+        lambda text: "",
+        lambda text: text.replace('"seeds": [5, 6, 7]', '"seeds": [5, 6, 8]').replace(
+            '"seed": 7', '"seed": 8'
+        ),
+        lambda text: text.replace('{"seed": 6', '{"sleep": 6'),
+    ],
+    ids=["cut", "a line less", "empty", "other seeds", "other names"],
+)
+def test_a_damaged_batch_is_computed_again(damage, tmp_path):
+    folder, _ = open_folder(tmp_path)
+    folder.write_batch(RUNS[:3])
+    (batch,) = batches_of(tmp_path)
+    batch.write_text(damage(batch.read_text()))
+    _, runs = open_folder(tmp_path)
+    assert runs == []
+
+
+def test_what_a_killed_writer_left_behind_does_not_count(tmp_path):
+    folder, _ = open_folder(tmp_path)
+    folder.write_batch(RUNS[:3])
+    (batch,) = batches_of(tmp_path)
+    batch.with_name(batch.name + ".a1b2.new").write_text(batch.read_text())
+    assert folder.read_runs() == RUNS[:3]
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"code": "0ther"}, "computed by other code (c0de, now 0ther)"),
+        ({"text": FILE.replace("time_s: 10", "time_s: 11")}, "of an experiment with other parameters"),
+        (
+            {"text": FILE.replace("dispersion: 1.0", "dispersion: 2.0")},
+            "of an experiment with other parameters",
+        ),
+    ],
+)
+def test_runs_of_other_code_or_parameters_are_refused_until_fresh(changed, words, tmp_path):
+    folder, _ = open_folder(tmp_path)
+    folder.write_batch(RUNS[:3])
+    with pytest.raises(ExperimentError) as caught:
+        open_folder(tmp_path, **changed)
+    assert words in str(caught.value) and "--fresh" in str(caught.value)
+    assert batches_of(tmp_path), "nothing is lost by the refusal"
+    _, runs = open_folder(tmp_path, fresh=True, **changed)
+    assert runs == [] and not batches_of(tmp_path)
+
+
+def test_a_folder_with_other_files_is_not_touched(tmp_path):
+    (tmp_path / "thesis.tex").write_text("x")
+    for fresh in (False, True):
+        with pytest.raises(ExperimentError, match="no results of an experiment"):
+            open_folder(tmp_path, fresh=fresh)
+    assert os.listdir(str(tmp_path)) == ["thesis.tex"]
+
+
+def test_runs_on_robots_stay_marked_and_beside_simulated_ones(tmp_path):
+    folder, _ = open_folder(tmp_path)
+    real = [Run(0, 5, (1.0, 2.0), REAL, "hero_2 lost its pose")]
+    folder.write_batch(RUNS[:1])
+    folder.write_batch(real)
+    assert folder.read_runs() == [real[0], RUNS[0]]
+    with open(folder.write_table(folder.read_runs())) as file:
+        assert "2,5,real,1.0,2.0,hero_2 lost its pose" in file.read()
+
+
+def test_the_folder_says_what_made_it(tmp_path):
+    open_folder(tmp_path)
+    assert (tmp_path / "experiment.yaml").read_text() == FILE
+    assert json.loads((tmp_path / "about.json").read_text()) == {"code": "c0de", "numpy": "1"}

@@ -1,0 +1,246 @@
+"""Whole experiments: the same table however they are computed, resumed and killed, and errors that name their place."""
+
+import csv
+import math
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hero_swarm.experiments import report, runner
+from hero_swarm.experiments.batch import METRICS_ENDING, POSES_ENDING
+from hero_swarm.experiments.errors import ExperimentError
+from hero_swarm.experiments.experiment_file import Start
+from hero_swarm.experiments.starts import place_all
+
+FILE = """\
+behavior: aggregation
+vary: {robots: [3, 5], errors: [perfect, default]}
+start: {kind: uniform, cover: 0.05}
+time_s: 3
+seeds: {from: 11, count: 5}
+metrics: [dispersion, {mean_of_last_s: {nearest_neighbor: 2}}, {time_until: {dispersion_ratio: 1.0}}]
+record: {hz: 2}
+compare: {metric: dispersion, between: errors}
+"""
+
+
+def write(folder, text=FILE):
+    path = folder / "e.yaml"
+    path.write_text(text)
+    return path
+
+
+def run(path, *options):
+    runner.run_experiment(runner.parse_options([str(path), "--jobs", "1", *options]))
+    return path.with_suffix("")
+
+
+def read_table(folder):
+    with open(str(folder / "runs.csv")) as file:
+        return list(csv.DictReader(file))
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    return run(write(tmp_path_factory.mktemp("finished")))
+
+
+@pytest.mark.parametrize("options", [["--batch", "1"], ["--batch", "2", "--jobs", "2"]])
+def test_the_table_has_the_same_bytes_for_all_batches_and_jobs(finished, options, tmp_path):
+    folder = run(write(tmp_path), *options)
+    assert (folder / "runs.csv").read_bytes() == (finished / "runs.csv").read_bytes()
+
+
+def test_parts_together_give_the_same_bytes(finished, tmp_path):
+    path = write(tmp_path)
+    for part in ("2/3", "1/3", "3/3"):
+        assert not (path.with_suffix("") / "runs.csv").exists()
+        folder = run(path, "--part", part)
+    assert (folder / "runs.csv").read_bytes() == (finished / "runs.csv").read_bytes()
+
+
+def test_killed_anywhere_a_resumed_experiment_gives_the_same_bytes(finished, tmp_path):
+    path = write(tmp_path)
+    command = [sys.executable, "-m", "hero_swarm", "run", str(path), "--jobs", "1", "--batch", "1"]
+    batches = path.with_suffix("") / "batches"
+    for kept in (0, 5):
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        while process.poll() is None:
+            if batches.is_dir() and sum(name.endswith(".jsonl") for name in os.listdir(str(batches))) >= kept:
+                process.send_signal(signal.SIGKILL)
+                break
+        process.wait()
+    folder = run(path)
+    assert (folder / "runs.csv").read_bytes() == (finished / "runs.csv").read_bytes()
+
+
+def test_all_runs_differ_and_start_alike_for_the_same_seed_in_paired_cells(finished):
+    rows = read_table(finished)
+    assert len(rows) == 20 and len({row["dispersion"] for row in rows}) == 20
+    starts = place_all(Start("uniform", 0.05, 0.0, None), None, 5, [11, 12])
+    assert not np.array_equal(starts[0], starts[1])
+    assert np.array_equal(starts[1:], place_all(Start("uniform", 0.05, 0.0, None), None, 5, [12]))
+
+
+def test_what_is_recorded_over_time_agrees_with_the_table(finished):
+    samples = [np.load(str(path)) for path in (finished / "series").glob("*" + METRICS_ENDING)]
+    assert {array.shape for array in samples} == {(4, 5, 3)}  # t = 0 to 3 s, runs, metrics
+    ends = sorted(value for array in samples for value in array[-1, :, 0].tolist())
+    assert ends == pytest.approx(sorted(float(row["dispersion"]) for row in read_table(finished)), rel=1e-6)
+    poses = [np.load(str(path)) for path in (finished / "series").glob("*" + POSES_ENDING)]
+    assert sorted(array.shape for array in poses) == [(7, 5, 3, 3)] * 2 + [(7, 5, 5, 3)] * 2
+    assert all(np.isfinite(array).all() for array in poses)
+
+
+def test_a_run_ends_when_its_condition_holds_and_others_go_on(tmp_path):
+    text = FILE.replace("time_s: 3", "time_s: 3\nuntil: {dispersion_ratio: 2.5}").replace("hz: 2", "hz: 1")
+    folder = run(write(tmp_path, text))
+    for path in (folder / "series").glob("*" + METRICS_ENDING):
+        samples = np.load(str(path))[:, :, 1]  # of dispersion_ratio
+        for values in samples.T:
+            values = values[~np.isnan(values)]
+            assert (values[:-1] > 2.5).all() and (len(values) == 4 or values[-1] <= 2.5)
+    lengths = {
+        int(np.isfinite(np.load(str(path))[:, k, 0]).sum())
+        for path in (folder / "series").glob("*.metrics.npy")
+        for k in range(5)
+    }
+    assert len(lengths) > 1, "the condition was met at different times, or the test shows nothing"
+
+
+def test_a_bound_that_is_never_reached_is_infinite(finished):
+    assert {row["time_until_dispersion_ratio_1_s"] for row in read_table(finished)} == {"inf"}
+
+
+def test_the_report_stands_alone_and_names_every_cell_and_remark(finished):
+    report.write_report(str(finished))
+    page = (finished / "report.html").read_text()
+    for words in (
+        "robots 3, errors perfect",
+        "robots 5, errors default",
+        "5 seeds",
+        "not reached in",
+        "Cliff",
+    ):
+        assert words in page
+    assert "http://" not in page.replace("http://www.w3.org", "").replace("http://purl.org", "").replace(
+        "http://creativecommons.org", ""
+    )
+    with open(str(finished / "summary.csv")) as file:
+        summary = list(csv.DictReader(file))
+    assert len(summary) == 12
+    values = [
+        float(row["dispersion"])
+        for row in read_table(finished)
+        if (row["robots"], row["errors"]) == ("3", "perfect")
+    ]
+    (own,) = [
+        row
+        for row in summary
+        if (row["robots"], row["errors"], row["metric"]) == ("3", "perfect", "dispersion")
+    ]
+    assert float(own["median"]) == np.median(values)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("aggregation", "agregation", "'agregation'"),
+        ("aggregation", "nowhere.py:A", "nowhere.py"),
+        ("errors: [perfect, default]", "speed_m_s: [1, 2]", "no parameter 'speed_m_s'"),
+        ("cover: 0.05", "cover: 0.5, gap_m: 1", "find no place"),
+        (
+            "start: {kind: uniform, cover: 0.05}",
+            "start: {kind: file, file: none.csv}",
+            "none.csv cannot be read",
+        ),
+        ("start: {kind: uniform, cover: 0.05}", "arena: nowhere.yaml", "nowhere.yaml"),
+    ],
+)
+def test_what_cannot_run_is_refused_before_anything_runs(old, new, words, tmp_path):
+    text = FILE.replace(old, new).replace("compare: {metric: dispersion, between: errors}\n", "")
+    with pytest.raises(ExperimentError) as caught:
+        run(write(tmp_path, text))
+    assert words in str(caught.value) and "\n" not in str(caught.value)
+    assert os.listdir(str(tmp_path)) == ["e.yaml"]
+
+
+def test_an_error_of_the_behavior_names_its_line_and_the_runs(tmp_path):
+    own = tmp_path / "own.py"
+    own.write_text(
+        "from hero_swarm.behavior import Behavior\n\n"
+        "class Own(Behavior):\n"
+        "    def step(self, sensed, memory, random):\n"
+        "        return [1, 2][5], 0.0, None\n"
+    )
+    text = FILE.replace("behavior: aggregation", "behavior: %s" % own)
+    with pytest.raises(
+        ExperimentError,
+        match=r"robots 3, errors perfect with seeds 11 to 15: IndexError: .*\(own.py, line 5\)",
+    ):
+        run(write(tmp_path, text))
+
+
+def test_changed_code_of_the_behavior_is_noticed(tmp_path):
+    own = tmp_path / "own.py"
+    source = (
+        "from hero_swarm.behavior import Behavior\n\n"
+        "class Own(Behavior):\n"
+        "    def step(self, sensed, memory, random):\n"
+        "        return 0.1, 0.0, None\n"
+    )
+    own.write_text(source)
+    path = write(tmp_path, FILE.replace("behavior: aggregation", "behavior: %s" % own))
+    run(path)
+    own.write_text(source.replace("0.1", "0.05"))
+    with pytest.raises(ExperimentError, match="computed by other code"):
+        run(path)
+    run(path, "--fresh")
+
+
+@pytest.mark.parametrize(
+    ("start", "check"),
+    [
+        (Start("grid", 0.0, 0.02, None), lambda gaps_m: gaps_m.min() == pytest.approx(0.02)),
+        (Start("circle", 0.0, 0.02, None), lambda gaps_m: gaps_m.min() == pytest.approx(0.02)),
+        (Start("uniform", 0.1, 0.01, None), lambda gaps_m: gaps_m.min() >= 0.01),
+    ],
+)
+def test_starts_keep_their_gap_and_their_center(start, check):
+    (poses,) = place_all(start, None, 9, [3])
+    apart_m = np.hypot(*(poses[:, None, :2] - poses[:, :2]).T)[~np.eye(9, dtype=bool)]
+    assert check(apart_m - 0.0736)
+    assert np.hypot(*poses[:, :2].mean(axis=0)) < 0.2
+    assert (np.abs(poses[:, 2]) <= math.pi).all()
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ("0,0,0\n", "has 1 poses for 2 robots"),
+        ("0,0\n", "line 1"),
+        ("0,0,0\n0,x,0\n", "line 2"),
+        ("0,0,inf\n", "line 1"),
+    ],
+)
+def test_a_wrong_file_of_starts_is_refused_with_its_line(content, words, tmp_path):
+    path = Path(str(tmp_path)) / "starts.csv"
+    path.write_text(content)
+    with pytest.raises(ExperimentError) as caught:
+        place_all(Start("file", 0.0, 0.0, str(path)), None, 2, [1])
+    assert words in str(caught.value) and "starts.csv" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "arguments", [["--part", "4/3"], ["--part", "x"], ["--jobs", "0"], ["--executor", "slurm"]]
+)
+def test_a_wrong_option_is_refused_by_name(arguments, capsys):
+    with pytest.raises(SystemExit) as caught:
+        runner.parse_options(["e.yaml", *arguments])
+    assert caught.value.code == 2
+    assert arguments[0] in capsys.readouterr().err

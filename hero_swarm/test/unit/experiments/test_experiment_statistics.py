@@ -1,0 +1,88 @@
+"""Intervals and comparisons: their coverage, ties, infinities, and values that can be computed by hand."""
+
+import math
+
+import numpy as np
+import pytest
+
+from hero_swarm.experiments import statistics
+from hero_swarm.experiments.errors import ExperimentError
+
+
+def test_equal_values_give_equal_bounds():
+    assert statistics.bootstrap_median([0.3] * 30) == (0.3, 0.3, 0.3)
+
+
+def test_values_that_are_nearly_all_equal_have_finite_bounds():
+    interval = statistics.bootstrap_median([1.0] * 28 + [0.9, 0.2])
+    assert interval == (1.0, 1.0, 1.0)
+
+
+def test_runs_that_never_reached_a_bound_count_as_infinite():
+    interval = statistics.bootstrap_median([10.0, 12.0, 14.0, math.inf, math.inf])
+    assert interval.median == 14.0 and interval.low == 10.0 and interval.high == math.inf
+
+
+def test_the_median_of_an_even_number_lies_between_the_middle_two():
+    assert statistics.bootstrap_median([4.0, 1.0, 3.0, 2.0]).median == 2.5
+
+
+@pytest.mark.parametrize("values", [[], [1.0, math.nan]])
+def test_no_value_and_nan_are_refused(values):
+    with pytest.raises(ExperimentError, match="no median"):
+        statistics.bootstrap_median(values)
+
+
+@pytest.mark.parametrize(
+    ("draw", "median"), [("standard_normal", 0.0), ("standard_exponential", math.log(2.0))]
+)
+def test_intervals_cover_the_true_median_as_often_as_they_claim(draw, median):
+    rng = np.random.RandomState(5)
+    covered = 0
+    for _ in range(100):
+        interval = statistics.bootstrap_median(getattr(rng, draw)(30))
+        covered += interval.low <= median <= interval.high
+    # Of 100 intervals with a coverage of 0.95, 87 to 99 cover in all but one of 100 samples.
+    assert 87 <= covered <= 99
+
+
+def test_the_report_of_the_same_runs_is_the_same():
+    values = np.random.RandomState(1).standard_normal(40)
+    assert statistics.bootstrap_median(values) == statistics.bootstrap_median(values[::-1])
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "delta"),
+    [([1, 2, 3], [4, 5, 6], 1.0), ([4, 5], [1, 2], -1.0), ([1, 2], [1, 2], 0.0), ([1, 1], [1, 2], 0.5)],
+)
+def test_cliffs_delta_counts_larger_minus_smaller(first, second, delta):
+    assert statistics.cliffs_delta(first, second) == delta
+
+
+def test_pairs_without_a_difference_have_p_one():
+    comparison = statistics.compare_pairs([1.0, 2.0], [1.0, 2.0])
+    assert comparison.p_value == 1.0 and comparison.difference == (0.0, 0.0, 0.0)
+
+
+def test_the_signed_rank_test_agrees_with_its_exact_distribution():
+    # All of six differences positive: 2 of the 2**6 signs are as extreme.
+    second = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
+    comparison = statistics.compare_pairs([0.0] * 6, second)
+    assert comparison.p_value == pytest.approx(2.0 / 64.0)
+    assert comparison.difference.median == 3.5 and comparison.delta == 1.0
+
+
+def test_the_sign_of_a_difference_is_second_minus_first():
+    assert statistics.compare_pairs([3.0, 4.0], [1.0, 2.0]).difference.median == -2.0
+
+
+def test_samples_that_cannot_be_paired_are_refused():
+    with pytest.raises(ExperimentError, match="2 and 1 values"):
+        statistics.compare_pairs([1.0, 2.0], [1.0])
+    with pytest.raises(ExperimentError, match="not finite"):
+        statistics.compare_pairs([1.0, math.inf], [1.0, 2.0])
+
+
+def test_holm_corrects_each_p_by_its_rank_and_never_below_a_smaller_one():
+    assert statistics.correct_by_holm([0.04, 0.01, 0.03]) == pytest.approx((0.06, 0.03, 0.06))
+    assert statistics.correct_by_holm([0.9, 0.8]) == (1.0, 1.0)
