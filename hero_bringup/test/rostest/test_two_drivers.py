@@ -13,7 +13,7 @@ from geometry_msgs.msg import Twist
 from hero_client.ros.drivers import Drivers
 from hero_client.swarm import Swarm
 from hero_monitor.background import Background
-from hero_monitor.commander import Commander
+from hero_monitor.control.commander import Commander
 from hero_test.processes import find_pid, suspended
 from hero_test.program_terminal import ProgramTerminal, run_fleet
 from hero_test.swarm_watch import SwarmWatch

@@ -1,6 +1,7 @@
 """Robots stepped in process have the interface of Robot and Swarm, and the same calls give the same bytes."""
 
 import math
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -129,7 +130,7 @@ def test_proximity_begins_ahead_and_goes_round_to_the_left():
         assert ranges[4:7] == [math.inf] * 3  # behind, and to the right: free
     assert robot.nearest().range_m == pytest.approx(0.12, abs=0.02)
     assert robot.nearest().bearing_rad == pytest.approx(0.0)
-    assert swarm[0].nearest() is None
+    assert swarm[5].nearest() is None
 
 
 def test_pose_and_velocity_follow_the_commands_and_speeds_are_cut():
@@ -282,6 +283,7 @@ def test_wrong_options_are_refused_in_the_words_of_the_command_line(wrong, capsy
     options = {name: [value] if name == "error" else value for name, value in wrong.items()}
     with pytest.raises(OptionError) as refused:
         StepSwarm(**{"count": 1, **options})
+    monkeypatch.setattr(sys, "argv", ["hero_sim"])
     arguments = [OPTIONS[name] + "=" + str(value) for name, value in wrong.items()]
     assert main.main(["--port", "9", *arguments]) in (1, 2)
     assert capsys.readouterr().err.strip() == "hero_sim: %s" % refused.value

@@ -83,8 +83,8 @@ class BehaviorNode:
         sensed = sense(self._behavior, now_s - self._start_s, poses[None], self._random)
         linear_m_s, angular_rad_s, self._memory = self._behavior.step(sensed, self._memory, self._random)
         shape = (1, len(poses))
-        speeds = [np.broadcast_to(values, len(poses)).reshape(shape) for values in (linear_m_s, angular_rad_s)]
-        speeds = list(self._filter(poses[None], *speeds, ages_s[None]))
+        wanted = [np.broadcast_to(values, len(poses)).reshape(shape) for values in (linear_m_s, angular_rad_s)]
+        speeds = self._filter(poses[None], wanted[0], wanted[1], ages_s[None])
         known = sensed.is_known
         for robot, is_known, linear, angular in zip(self._swarm, known, speeds[0][0].tolist(), speeds[1][0].tolist()):
             if is_known and np.isfinite(linear) and np.isfinite(angular):
