@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 import rosgraph
 from driver_case import Recorder
-from rig import ROOT, Program, count_holdings, start_python
+from rig import Program, count_holdings, start_python
 
 from hero_msgs.msg import Encoder, Robot
 from hero_test.processes import find_free_port
@@ -136,18 +136,8 @@ class Watch:
 
 def start_robots(host, address, port, first=0):
     """Return simulated robots that run at host and dial address."""
-    path = "%s:%s" % (ROOT / "hero_sim" / "src", ROOT / "hero_driver" / "src")
     command = [sys.executable, "-m", "hero_sim", "--count", str(ROBOTS), "--first-id", str(first)]
-    return Program(
-        *command,
-        "--host",
-        address,
-        "--port",
-        str(port),
-        "--quiet",
-        prefix=host.prefix,
-        environment={"PYTHONPATH": path},
-    )
+    return Program(*command, "--host", address, "--port", str(port), "--quiet", prefix=host.prefix)
 
 
 @pytest.fixture(scope="module")
