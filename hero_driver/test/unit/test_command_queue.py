@@ -141,6 +141,38 @@ def test_after_motion_was_discarded_the_next_one_waits_until_it_may_go():
     assert take(queue, 0.1) == [(VELOCITY, SLOW)]
 
 
+def test_topics_not_used_before_wait_too_after_motion_was_discarded():
+    queue = make_queue()
+    queue.discard_motion(0.1)
+    queue.offer_motion(MOTORS, PULSES, STOPPED_MOTORS, 0.01)
+    assert take(queue, 0.09) == []
+    assert take(queue, 0.1) == [(MOTORS, PULSES)]
+
+
+@pytest.mark.parametrize("used_before", [False, True])
+def test_motion_goes_out_after_older_stops_of_other_topics(used_before):
+    queue = make_queue()
+    if used_before:  # the order of the topics does not matter
+        queue.offer_motion(MOTORS, PULSES, STOPPED_MOTORS, -1.0)
+        assert take(queue, -1.0) == [(MOTORS, PULSES)]
+    offer(queue, POSITION, ZERO_TWIST, 0.0)
+    queue.offer_motion(MOTORS, PULSES, STOPPED_MOTORS, 0.01)
+    assert take(queue, 0.01) == [(POSITION, ZERO_TWIST)]
+    assert queue.due_in_s(True, 0.01) == pytest.approx(0.06)
+    assert take(queue, 0.05) == []
+    assert take(queue, 0.07) + take(queue, 0.07) == [(POSITION, ZERO_TWIST), (MOTORS, PULSES)]
+    assert queue.is_idle
+
+
+def test_zeros_that_keep_coming_on_another_topic_do_not_hold_up_motion():
+    queue = make_queue()
+    sent = []
+    for step in range(100):
+        offer(queue, VELOCITY if step % 2 else POSITION, FAST if step % 2 else ZERO_TWIST, 0.02 * step)
+        sent += take(queue, 0.02 * step)
+    assert sent.count((VELOCITY, FAST)) > 20
+
+
 def test_of_servo_pulses_only_the_newest_goes_out():
     queue = make_queue()
     for pulse_us in range(1400, 1410):

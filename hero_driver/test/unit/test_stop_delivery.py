@@ -197,3 +197,19 @@ def test_a_motion_after_the_release_ends_the_zeros_of_the_stop():
     assert len(robot.writes) == written + 1
     assert robot.writes[-1][0] - robot.writes[-2][0] > 0.05, "a motion within the firmware's gate of a stop"
     assert robot.motors.is_turning
+
+
+@pytest.mark.parametrize("pause_s", [0.001, 0.01, 0.05, 0.1, 0.15, 0.2, 0.3])
+def test_zeros_of_an_earlier_stop_do_not_end_servo_pulses(pause_s):
+    with Clock().is_the_drivers() as clock:
+        robot = CommandedRobot(clock, has_readings=True)
+        robot.publish_velocity(0.1, name=POSITION)
+        clock.run(0.3)
+        for name in (VELOCITY, POSITION):  # as a program does that stops whichever controller drives
+            robot.publish_velocity(0.0, name=name)
+        clock.run(pause_s)
+        robot.publish(MOTORS, FAST)
+        clock.run(0.9)
+        assert robot.taken[-1][1:] == (MOTORS, FAST)
+        assert robot.motors.is_turning
+    assert len([name for _, name, _ in robot.taken if name == MOTORS]) == 1

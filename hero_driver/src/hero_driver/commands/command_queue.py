@@ -2,9 +2,11 @@
 
 Motion commands are shaped (velocity_shaper), everything else goes in order and never waits behind them. Queues
 are bounded: a motion command that waits is replaced by a newer one, of the rest the oldest is dropped and counted.
+Motion waits for older stops of other topics, and for their repeats: each zero Twist switches the servos off.
 """
 
 import collections
+import math
 from typing import Any, ContextManager, Deque, Dict, List, Optional, Tuple
 
 from .velocity_shaper import VelocityShaper
@@ -32,6 +34,8 @@ class CommandQueue:
         self._max_age_s = max_age_s
         self._shapers: Dict[str, VelocityShaper] = {}  # replaced, never changed: read on all threads
         self._offered_s: Dict[str, float] = {}
+        self._waits_since_s: Dict[str, float] = {}  # since when a topic's motion waits, newer ones in its place too
+        self._resume_s = -math.inf
         self._waiting: Deque[Command] = collections.deque()
         self._lock = lock
         self._is_idle = True  # after the last take(), and nothing was offered since
@@ -43,9 +47,12 @@ class CommandQueue:
         if shaper is None:
             with self._lock:
                 shaper = self._shapers.get(name) or VelocityShaper(stop_payload)
+                shaper.delay_until(self._resume_s)
                 self._shapers = {**self._shapers, name: shaper}
-        shaper.offer(payload)
+        if not shaper.has_motion:
+            self._waits_since_s[name] = now_s
         self._offered_s[name] = now_s
+        shaper.offer(payload)
         self._is_idle = False
 
     def offer(self, name: str, payload: bytes) -> None:
@@ -59,6 +66,7 @@ class CommandQueue:
 
     def discard_motion(self, resume_s: float) -> None:
         """Forget the motion commands that wait, and send none before resume_s; stops that wait are kept."""
+        self._resume_s = resume_s
         for shaper in self._shapers.values():
             shaper.discard_motion()
             shaper.delay_until(resume_s)
@@ -70,6 +78,7 @@ class CommandQueue:
             self._waiting.clear()
             self._shapers = {}
         self._offered_s.clear()
+        self._resume_s = -math.inf
 
     @property
     def is_idle(self) -> bool:
@@ -91,7 +100,7 @@ class CommandQueue:
             for name, shaper in self._shapers.items():
                 if now_s - self._offered_s.get(name, now_s) > self._max_age_s:
                     shaper.discard_motion()
-                payload = shaper.take(now_s, stops_only)
+                payload = shaper.take(now_s, stops_only or self._is_behind_a_stop(name, shaper))
                 if payload is not None:
                     commands.append((name, payload))
                 is_idle = is_idle and shaper.is_idle
@@ -113,8 +122,20 @@ class CommandQueue:
         if self._waiting:
             return RETRY_S
         due_s: Optional[float] = None
-        for shaper in self._shapers.values():
+        for name, shaper in self._shapers.items():
+            if not shaper.has_stop and self._is_behind_a_stop(name, shaper):
+                continue
             delay_s = shaper.due_in_s(now_s)
             if delay_s is not None and (due_s is None or delay_s < due_s):
                 due_s = delay_s
         return due_s if motion_may_go or due_s is None else max(RETRY_S, due_s)
+
+    def _is_behind_a_stop(self, name: str, shaper: VelocityShaper) -> bool:
+        """Return whether the motion that waits on a topic has to wait for an older stop of another topic.
+
+        Not for newer ones: another program's stream of zeros would hold it up for ever.
+        """
+        return shaper.has_motion and any(
+            other is not shaper and other.has_stop and self._offered_s[other_name] < self._waits_since_s[name]
+            for other_name, other in self._shapers.items()
+        )

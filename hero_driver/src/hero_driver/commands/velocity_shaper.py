@@ -73,9 +73,19 @@ class VelocityShaper:
         self._next_s = -math.inf
 
     @property
+    def has_stop(self) -> bool:
+        """Whether a stop, or its repeat, waits to be sent."""
+        return self._stop_pending or self._repeats_left > 0
+
+    @property
+    def has_motion(self) -> bool:
+        """Whether a command that is no stop waits to be sent."""
+        return self._newest is not None
+
+    @property
     def is_idle(self) -> bool:
         """Whether nothing waits to be sent."""
-        return not self._stop_pending and self._newest is None and self._repeats_left == 0
+        return not self.has_stop and not self.has_motion
 
     def offer(self, payload: bytes) -> None:
         """Take a checked command; it replaces one that waits, except a stop."""
