@@ -383,6 +383,8 @@ class Gateway(LinkHandler):
         if stopped:
             for peer in self._list_stoppable():
                 self._stops.begin(peer)
+        else:
+            self._stops.release()
         self._on_change()
 
     def stop_and_wait(self, answer: Callable[[None], None]) -> None:

@@ -112,6 +112,13 @@ class StopDelivery:
             self._call_later(POLL_S, self._poll)
         self._on_change()
 
+    def release(self) -> None:
+        """Robots may move: a stop that is over must not end a self-tuning that begins before the next poll."""
+        for peer in self._peers:
+            if not _is_pending(peer):
+                peer.stop = None
+        self._peers = [peer for peer in self._peers if peer.stop is not None]
+
     def find_state(self, peer: Optional[Peer]) -> StopState:
         """Return what is known of the stop of a robot; peer is None for one that is away."""
         if peer is not None and peer.stop is not None:

@@ -186,6 +186,19 @@ def test_the_end_waits_until_its_deadline_for_a_robot_that_does_not_rest():
     assert [doubtful for _, doubtful in ended] == [[robot.peer]]
 
 
+def test_a_tuning_that_begins_right_after_a_release_goes_on():
+    with Clock().is_the_drivers() as clock:
+        robot = make_moving(clock, "pulses")
+        stop(robot)
+        clock.run(2.0)
+        robot.is_stopped = False
+        robot.stops.release()
+        assert robot.peer.stop is None
+        robot.motors.start_tuning("velocity_controller")
+        clock.run(2.0)
+        assert robot.motors.is_turning
+
+
 def test_a_motion_after_the_release_ends_the_zeros_of_the_stop():
     with Clock().is_the_drivers() as clock:
         robot = make_moving(clock, "both controllers")
