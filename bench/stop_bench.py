@@ -1,45 +1,62 @@
-"""Measures stops of simulated robots that drive: from the press to the zero on each socket, and to wheels at rest.
+"""Measures stops of simulated robots of the whole spread: each way to ask for one, each way in which robots move.
 
-Starts its own ROS master, driver and robots, which are commanded at 10 Hz all the time. Run it with script/bench stop.
+Starts its own ROS master, driver and robots: as many for each servo center and core. Run it with script/bench stop.
 """
 
 import argparse
 import asyncio
-import contextlib
+import collections
 import json
-import socket
+import math
+import os
+import pty
+import signal
+import subprocess
 import sys
+import tempfile
 import threading
 import time
 from pathlib import Path
+from typing import Dict, List, Tuple
 
-import rosgraph
 import rospy
-from measuring import (
-    measure_machine_us,
-    percentile_ms,
-    print_machine,
-    wait_for_port,
-    write_report,
-)
+from measuring import measure_machine_us, print_machine, stop, wait_for_port, write_report
 from running_suite import RunningSuite
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
+from stop_commander import MODES, TUNINGS
 from tornado.httpclient import HTTPRequest
 from tornado.websocket import websocket_connect
 
-from hero_client.ros.drivers import Drivers
-from hero_monitor.control.freshness import INERT_S
-from hero_test.processes import find_free_port, suspended
+from hero_test.processes import find_free_port
 
 HERE = Path(__file__).resolve().parent
-POLL_S = 0.02
-SETTLE_S = 2.0
-LIMIT_S = 5.0
-REST_GOAL_S = 0.3
-HALF_OPEN = 100
-METHODS = ("topic", "service", "program", "monitor")
-CONDITIONS = ("undisturbed", "hung master", "half-open connections", "hung driver")
+REQUESTS = ("topic", "service", "monitor", "teleop")
+"""Ways to stop all robots until they are released; they are commanded meanwhile."""
+
+ENDS = ("program", "dead", "silent")
+"""Of the program that commands the robots: Ctrl-C, at which it sends zeros, SIGKILL, SIGSTOP."""
+
+GONE_AFTER_S = {"dead": 0.25, "silent": 0.5}
+"""The driver takes a program for gone after so long (orphan_stop_s, silent_stop_s): times and paths count from then."""
+
+RESTARTED = ("program", "dead")
+METHODS = (*REQUESTS, "zero", *ENDS)
+CENTERS_OFF_US = (0, 30, 50)
+CORES = ("core2", "core3")
+DEAD_ZONE_US = 15
+
+REST_GOAL_S, PATH_GOAL_M, GAP_GOAL_S = 0.5, 0.04, 0.5
+WATCH_S, LIMIT_S = 1.5, 8.0
+REGULAR_S = 2.0
+"""For so long a program has commanded before it ends, also after a pause: regularly, and beyond the overshoot of the
+position controller's first second."""
+
+POLL_S = 0.1
+STALL_S = 0.1
+"""A try in which the machine left the simulator without time for longer is repeated, so often at most:"""
+
+REPEATS = 3
 
 
 class Page:
@@ -65,161 +82,243 @@ class Page:
                 return
             self._clock_ms = json.loads(text).get("clock_ms", self._clock_ms)
 
-    def stop(self, stopped):
-        """Press the button, or release, which does nothing shortly after a stop."""
-        if not stopped:
-            time.sleep(INERT_S + 0.2)
-        message = json.dumps({"do": "stop" if stopped else "release", "heard_ms": self._clock_ms})
+    def stop(self):
+        """Press the button."""
+        message = json.dumps({"do": "stop", "heard_ms": self._clock_ms})
         asyncio.run_coroutine_threadsafe(self._write(message), self._loop).result(5.0)
 
     async def _write(self, message):
         await self._socket.write_message(message)
 
 
-class Swarm:
-    """The robots, in a process of their own."""
+class Teleop:
+    """Teleoperation in a terminal of its own."""
 
-    def __init__(self, suite, robots):
-        """Start them and what commands them; return when all move."""
-        command = [sys.executable, str(HERE / "stopped_swarm.py"), "--count", str(robots), "--port", str(suite.port)]
-        command += ["--arena", "empty", "--quiet"]
-        self._process = suite.start(command, stdin=-1, stdout=-1)
-        load = [sys.executable, str(HERE / "ros_load.py"), "command", "--speed", "0.1", "--count", str(robots)]
-        suite.start(load, stdout=-1)
-        self.robots = robots
-        suite.wait_for(lambda: self.ask("read")["moving"] == robots, "%d robots that move" % robots)
+    def __init__(self, suite):
+        """Start it."""
+        self._keys, terminal = pty.openpty()
+        suite.start(["rosrun", "hero_examples", "teleop"], stdin=terminal, stdout=terminal, stderr=terminal)
+        os.close(terminal)
+        shown = bytearray()
+        threading.Thread(target=self._drain, args=(shown,), daemon=True).start()
+        suite.wait_for(lambda: b"hero_0 |" in shown, "the live line of teleop")
 
-    def ask(self, command):
-        """Return the answer to mark or read."""
-        self._process.stdin.write(command + "\n")
-        self._process.stdin.flush()
-        return json.loads(self._process.stdout.readline())
+    def _drain(self, shown):
+        while True:
+            try:
+                shown += os.read(self._keys, 65536)
+            except OSError:  # it has ended
+                return
 
-
-def measure_press(swarm, stop):
-    """Return (s to the zero, s to rest) of each robot after stop(True); None where that took LIMIT_S."""
-    swarm.ask("mark")
-    pressed_s = time.monotonic()
-    stop(True)
-    while True:
-        noted = swarm.ask("read")
-        is_late = time.monotonic() - pressed_s > LIMIT_S
-        if is_late or (None not in noted["zero_s"] and None not in noted["rest_s"]):
-            break
-        time.sleep(POLL_S)
-    return [
-        tuple(None if moment_s is None else moment_s - pressed_s for moment_s in moments)
-        for moments in zip(noted["zero_s"], noted["rest_s"])
-    ]
+    def stop(self):
+        """Press Enter."""
+        os.write(self._keys, b"\r")
 
 
-def measure_row(suite, swarm, title, stop, presses):
-    """Press so often; print and return one row."""
-    samples = []
-    for _ in range(presses):
-        stop(False)
-        suite.wait_for(lambda: swarm.ask("read")["moving"] == swarm.robots, "all robots to move")
-        samples += measure_press(swarm, stop)
-    stop(False)
-    kept = [sample for sample in samples if None not in sample]
-    zeros_s, rests_s = (sorted(values) for values in zip(*kept))
-    row = {
-        "title": title,
-        "robots": swarm.robots,
-        "presses": presses,
-        "stopped": len(kept),
-        "of": len(samples),
-        "zero_ms": [percentile_ms(zeros_s, share) for share in (0.5, 1.0)],
-        "rest_ms": [percentile_ms(rests_s, share) for share in (0.5, 1.0)],
-        "rest_in_time": sum(rest_s <= REST_GOAL_S for rest_s in rests_s),
-    }
-    print(
-        "| %s | %d | %d of %d | %.1f / %.1f | %.0f / %.0f | %d |"
-        % (title, swarm.robots, len(kept), len(samples), *row["zero_ms"], *row["rest_ms"], row["rest_in_time"]),
-        flush=True,
-    )
-    return row
+class Lines:
+    """A program that answers each line with a line."""
+
+    def __init__(self, suite, *command):
+        """Start it."""
+        self.process = suite.start([sys.executable, *map(str, command)], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+
+    def ask(self, line):
+        """Return the answer."""
+        self.process.stdin.write(line + "\n")
+        self.process.stdin.flush()
+        return self.read()
+
+    def read(self):
+        """Return the next line."""
+        line = self.process.stdout.readline()
+        if not line:
+            raise SystemExit("bench: %s ended" % " ".join(self.process.args))
+        return line
 
 
-@contextlib.contextmanager
-def disturbed(suite, condition):
-    """Let something hang."""
-    with contextlib.ExitStack() as stack:
-        if condition == "hung master":
-            stack.enter_context(suspended(rosgraph.Master("/bench").getPid()))
-        elif condition == "hung driver":
-            pid = suite.start_second_driver()
-            time.sleep(SETTLE_S)
-            stack.enter_context(suspended(pid))
-        elif condition == "half-open connections":
-            uri = rosgraph.Master("/bench").lookupService("/hero_driver/stop")
-            host, port = uri[len("rosrpc://") :].rstrip("/").rsplit(":", 1)
-            for _ in range(HALF_OPEN):
-                stack.enter_context(socket.create_connection((host, int(port)))).sendall(b"\x10\x00")
-        yield
+def start_commander(suite, mode, count):
+    """Return a commander that is connected."""
+    commander = Lines(suite, HERE / "stop_commander.py", mode, count)
+    commander.read()
+    return commander
 
 
 class StopSuite(RunningSuite):
-    """A driver without robots of its own, and the methods to stop its robots."""
+    """A driver, the robots of all groups, and what asks for stops."""
 
-    def __init__(self, methods):
+    def __init__(self):
+        """Start the driver."""
+        folder = Path(tempfile.mkdtemp(prefix="stop_bench_"))
+        os.environ["ROS_HOME"] = str(folder)  # the driver keeps there that its robots are stopped
+        config = folder / "driver.yaml"
+        config.write_text("{allow_self_tuning: true, start_stopped: never}\n")
+        super().__init__(0, "config:=%s" % config)
+
+    def add_robots(self, robots_each):
+        """Start so many robots of each center and core."""
+        offs_us = CENTERS_OFF_US * robots_each
+        self.cells = [(off_us, core) for core in CORES for off_us in offs_us]  # of each robot
+        self._swarms = [self._start_swarm(core, index, offs_us) for index, core in enumerate(CORES)]
+
+    def add_requests(self, methods):
         """Start what the methods need, and nothing else: it would cost time that the stop is measured in."""
-        super().__init__(0)
         self._topic = rospy.Publisher("/hero_driver/stop_request", Bool, queue_size=1, tcp_nodelay=True)
-        if "program" in methods:
-            self._drivers = Drivers()
+        self._requests = {"topic": lambda: self._topic.publish(Bool(True)), "service": self._call}
         if "monitor" in methods:
             port = find_free_port()
             monitor = self.start(["rosrun", "hero_monitor", "monitor", "_port:=%d" % port], stdout=-1, stderr=-1)
             wait_for_port(port, monitor)
-            self._page = Page(port)
-        time.sleep(SETTLE_S)
+            self._requests["monitor"] = Page(port).stop
+        if "teleop" in methods:
+            self._requests["teleop"] = Teleop(self).stop
 
-    def start_second_driver(self):
-        """Return the process of a driver without robots."""
-        command = ["rosrun", "hero_driver", "hero_driver", "__name:=hero_driver_b", "_port:=%d" % find_free_port()]
-        return self.start(command, stdout=-1, stderr=-1).pid
+    def _start_swarm(self, core, index, offs_us):
+        """Return the robots of one core, in a process of their own."""
+        count = len(offs_us)
+        options = ["--count", count, "--first-id", index * count, "--port", self.port, "--servo-timing", core]
+        for number, off_us in enumerate(offs_us, index * count):
+            known = (number, 1500 + off_us, 1500 - off_us, DEAD_ZONE_US)
+            options += ["--error", "robot=%d,left_center_us=%d,right_center_us=%d,dead_zone_us=%d" % known]
+        return Lines(self, HERE / "stopped_swarm.py", "--arena", "empty", "--motors", "factory", "--quiet", *options)
 
-    def press(self, method, stopped):
-        """Ask for a stop, or a release, in one of METHODS."""
-        if method == "topic":
-            self._topic.publish(Bool(stopped))
-        elif method == "service":
-            rospy.ServiceProxy("/hero_driver/stop", SetBool)(stopped)
-        elif method == "program":
-            self._drivers.request_stop(stopped)
+    def ask_swarms(self, line):
+        """Return the answers of the robots of each core."""
+        return [json.loads(swarm.ask(line)) for swarm in self._swarms]
+
+    @staticmethod
+    def _call():
+        rospy.ServiceProxy("/hero_driver/stop", SetBool)(True)
+
+    def press(self, method, commander):
+        """Let the robots stop by one of METHODS; return when they should."""
+        pressed_s = time.monotonic()
+        if method in REQUESTS:
+            self._requests[method]()
+        elif method == "zero":
+            return float(commander.ask("zero"))
         else:
-            self._page.stop(stopped)
+            number = {"program": signal.SIGINT, "dead": signal.SIGKILL, "silent": signal.SIGSTOP}[method]
+            os.kill(commander.process.pid, number)
+            if method == "program":
+                return float(commander.read())
+        return pressed_s + GONE_AFTER_S.get(method, 0.0)
+
+    def release(self):
+        """Let the robots move again that were stopped by one of REQUESTS."""
+        self._topic.publish(Bool(False))
+
+    def move(self, method, commander):
+        """Let the robots move after a press; return when all do."""
+        if method in REQUESTS:
+            self.release()
+        if method == "silent":
+            os.kill(commander.process.pid, signal.SIGCONT)
+        commander.ask("go")
+        self.wait_for(lambda: sum(self.ask_swarms("moving")) == len(self.cells), "all robots to move")
+        if method in ENDS:
+            time.sleep(REGULAR_S)
+
+    def try_stop(self, method, commander):
+        """Stop the robots once; return what the swarms noted, with times from the moment at which they should stop."""
+        self.ask_swarms("mark")
+        due_s = self.press(method, commander)
+        while True:
+            time.sleep(POLL_S)
+            answers = self.ask_swarms("read %r" % due_s)
+            waited_s = time.monotonic() - due_s
+            rests_s = [rest_s for answer in answers for rest_s in answer["rest_s"]]
+            if waited_s > LIMIT_S or (waited_s > WATCH_S and None not in rests_s):
+                break
+        noted = {key: answers[0][key] + answers[1][key] for key in ("path_m", "gap_s", "pulses")}
+        noted["rest_s"] = [math.inf if at_s is None else max(0.0, at_s - due_s) for at_s in rests_s]
+        noted["stall_s"] = max(answer["stall_s"] for answer in answers)
+        return noted
+
+
+def measure_mode(suite, mode, methods, rounds):
+    """Yield the rows of one mode, a cell each: method, centers and core."""
+    commander = start_commander(suite, mode, len(suite.cells))
+    for method in methods:
+        if method in ENDS and mode in TUNINGS:
+            continue  # nobody commands a robot that tunes itself
+        commander, rows = measure_method(suite, method, mode, commander, rounds)
+        yield from rows
+    stop(commander.process, signal.SIGKILL)
+
+
+def measure_method(suite, method, mode, commander, rounds):
+    """Return the commander, which may be another one now, and the rows of one method."""
+    spare = None
+    cells: Dict[Tuple[int, str], Dict[str, List[float]]] = {
+        cell: collections.defaultdict(list) for cell in suite.cells
+    }
+    repeated = kept = 0
+    while kept < rounds:
+        suite.move(method, commander)
+        if method in RESTARTED:
+            spare = start_commander(suite, mode, len(suite.cells))
+        noted = suite.try_stop(method, commander)
+        if method in RESTARTED:
+            stop(commander.process)
+            commander = spare
+        if noted["stall_s"] > STALL_S and repeated < REPEATS * rounds:
+            repeated += 1
+            continue
+        kept += 1
+        for index, cell in enumerate(suite.cells):
+            for key in ("rest_s", "path_m", "gap_s", "pulses"):
+                cells[cell][key].append(noted[key][index])
+    if method in REQUESTS:
+        suite.release()
+    return commander, [summarize(method, mode, cell, repeated, values) for cell, values in cells.items()]
+
+
+def summarize(method, mode, cell, repeated, values):
+    """Return one row of the table."""
+    rests_s = sorted(values["rest_s"])
+    late = sum(
+        rest_s > REST_GOAL_S or path_m > PATH_GOAL_M or gap_s > GAP_GOAL_S
+        for rest_s, path_m, gap_s in zip(values["rest_s"], values["path_m"], values["gap_s"])
+    )
+    return {
+        "method": method, "mode": mode, "center_off_us": cell[0], "core": cell[1], "tries": len(rests_s),
+        "rest_p50_s": rests_s[len(rests_s) // 2], "rest_worst_s": rests_s[-1], "path_worst_m": max(values["path_m"]),
+        "gap_worst_s": max(values["gap_s"]), "pulses": sum(values["pulses"]), "late": late, "repeated": repeated,
+    }  # fmt: skip
+
+
+def print_row(row):
+    """Print one row of the table."""
+    print(
+        "| {method} | {mode} | {center_off_us} | {core} | {rest_p50_s:.2f} / {rest_worst_s:.2f} | {path_worst_m:.3f} | "
+        "{gap_worst_s:.2f} | {pulses} | {late} of {tries} |".format(**row),
+        flush=True,
+    )
 
 
 def main():
     """Run from the command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--count", type=int, default=20)
-    parser.add_argument("--presses", type=int, default=100, help="of each row")
+    parser.add_argument("--each", type=int, default=10, metavar="N", help="robots of each center and core (10)")
+    parser.add_argument("--rounds", type=int, default=20, help="stops of each kind (20)")
     parser.add_argument("--via", nargs="*", metavar="METHOD", choices=METHODS, default=METHODS)
-    parser.add_argument("--conditions", nargs="*", choices=CONDITIONS, default=CONDITIONS[:1])
+    parser.add_argument("--modes", nargs="*", metavar="MODE", choices=MODES, default=MODES)
     parser.add_argument("--json", metavar="FILE", help="write the figures there")
     options = parser.parse_args()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # ends what was started
     machine_us = measure_machine_us()
     print_machine(machine_us)
-    suite = StopSuite(options.via)
     rows = []
-    try:
-        swarm = Swarm(suite, options.count)
-        print("| | robots | stopped | press to zero, p50 / worst, ms | press to rest, p50 / worst, ms | within 0.3 s |")
-        print("|---|---|---|---|---|---|")
-        for condition in options.conditions:
-            with disturbed(suite, condition):
-                for method in options.via:
-                    if (condition, method) == ("hung master", "service"):
-                        continue  # a service is looked up with the master at each call
-                    title = method if condition == CONDITIONS[0] else "%s, %s" % (method, condition)
-                    press = lambda stopped, method=method: suite.press(method, stopped)  # noqa: E731
-                    rows.append(measure_row(suite, swarm, title, press, options.presses))
-    finally:
-        suite.close()
-    write_report(options.json, machine_us, rows=rows)
+    with StopSuite() as suite:
+        suite.add_requests(options.via)
+        suite.add_robots(options.each)
+        print("| by | mode | centers off, us | core | rest p50 / worst, s | path, m | gap, s | pulses | late |")
+        print("|---|---|---|---|---|---|---|---|---|")
+        for mode in options.modes:
+            for row in measure_mode(suite, mode, options.via, options.rounds):
+                print_row(row)
+                rows.append(row)
+            write_report(options.json, machine_us, rows=rows)
 
 
 if __name__ == "__main__":

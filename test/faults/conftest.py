@@ -27,6 +27,12 @@ class Effort:
         return long if self.is_long else short
 
 
+def pytest_terminal_summary(terminalreporter):
+    from simulated_robots import SEED
+
+    terminalreporter.write_line("the simulated robots were drawn with HERO_SEED=%d" % SEED)
+
+
 def pytest_addoption(parser):
     parser.addoption("--long", action="store_true", help="the long form, as script/soak runs it")
     parser.addoption("--minutes", type=float, default=1.0, help="length of the soak in the long form")

@@ -1,6 +1,12 @@
-"""Simulated robots for the fault suite: their ground truth, and programs that drive them."""
+"""Simulated robots for the fault suite: their ground truth, and programs that drive them.
+
+They are drawn from the spread of real robots: servo centers, the servo timing of their core, whether their flash knows
+the centers. Every run draws the same ones; the environment variable HERO_SEED draws others.
+"""
 
 import math
+import os
+import random
 
 import rospy
 from geometry_msgs.msg import Twist
@@ -12,6 +18,9 @@ from hero_test.waiting import wait_for
 
 SPEED_M_S = 0.1
 REST_M_S = 0.003
+SEED = int(os.environ.get("HERO_SEED", "0"))
+CENTERS_US = (1450, 1550)
+DEAD_ZONE_US = 15
 
 
 class GroundTruth:
@@ -56,10 +65,19 @@ class GroundTruth:
 
 
 def start_simulator(robots, port, *arguments, first_id=0):
-    """Return a simulator whose robots dial a port of this machine; it ends with `with`."""
+    """Return a simulator whose robots, drawn with SEED, dial a port of this machine; it ends with `with`."""
     command = [find_program("hero_sim", "hero_sim"), "--count", robots, "--first-id", first_id, "--port", port]
-    command += ["--arena", "empty", "--quiet", *arguments]
+    command += ["--arena", "empty", "--quiet", *_draw_robots(robots, first_id), *arguments]
     return Program(*map(str, command))
+
+
+def _draw_robots(robots, first_id):
+    rng = random.Random(SEED)
+    options = ["--seed", SEED, "--servo-timing", "drawn", "--motors", rng.choice(("calibrated", "factory"))]
+    for number in range(first_id, first_id + robots):
+        known = (number, rng.randint(*CENTERS_US), rng.randint(*CENTERS_US), DEAD_ZONE_US)
+        options += ["--error", "robot=%d,left_center_us=%d,right_center_us=%d,dead_zone_us=%d" % known]
+    return options
 
 
 def drive(ground_truths):
