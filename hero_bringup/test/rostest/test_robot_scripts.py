@@ -91,7 +91,7 @@ class RobotScriptsTest(unittest.TestCase):
         for script, (number, status) in zip(scripts, ends):
             script.send_signal(number)
             self.assertEqual((status, ""), self.end(script))
-        wait_for(lambda: all(log.speeds_m_s[-2:] == [0.0, 0.0] for log in logs), "two stops as the last commands")
+        wait_for(lambda: all(log.speeds_m_s[-1:] == [0.0] for log in logs), "a stop as the last command")
         wait_for(lambda: self.watch.at_rest(*range(len(ends))), "rest")
 
     def test_the_first_command_of_a_script_is_not_lost(self):

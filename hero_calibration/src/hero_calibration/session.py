@@ -15,8 +15,8 @@ from .probe import Probe
 POLL_S = 0.02
 SETTLE_S = 0.6
 COMMAND_PERIOD_S = 0.1
-STOP_GAP_S = 0.15
-"""Between two stops: the robot drops a command within 50 ms of another."""
+SEND_TIME_S = 0.1
+"""rospy sends on threads of its own and does not say when it has; this is many times what a send takes."""
 
 
 class Session(ABC):
@@ -123,14 +123,12 @@ class Session(ABC):
 
     def stop(self) -> None:
         """Stop all robots, including those that failed; works while the program ends."""
-        for _ in range(2):
-            for probe in self.probes:
-                probe.stop()
-            self.sleep(STOP_GAP_S)
+        for probe in self.probes:
+            probe.stop()
+        self.sleep(SEND_TIME_S)
 
     def settle(self) -> None:
         """Stop all robots and wait until they are at rest."""
-        for _ in range(2):
-            for probe in self.active:
-                probe.stop()
-            self.pause(SETTLE_S / 2.0)
+        for probe in self.active:
+            probe.stop()
+        self.pause(SETTLE_S)

@@ -11,9 +11,6 @@ pytest.importorskip("rospy", reason="teleoperation imports rospy")
 from hero_client.apps.joystick_teleop import JoystickMapping, JoystickTeleop
 from hero_client.apps.keyboard_teleop import KeyboardTeleop
 
-READ_PERIOD_MS = 51
-"""The robot reads commands so often, and drops one that comes within 50 ms of the one before it."""
-
 MAPPING = JoystickMapping(0.15, 2.0, linear_axis=1, angular_axis=0, enable_button=4, stop_button=1)
 
 
@@ -71,7 +68,7 @@ def hold(key, duration_s):
     return [(0.0, key)] + [(0.5 + 0.04 * number, key) for number in range(int((duration_s - 0.5) / 0.04))]
 
 
-def test_a_held_key_drives_and_letting_go_stops_with_repeated_zeros(swarm):
+def test_a_held_key_drives_and_letting_go_stops_it_with_one_command(swarm):
     teleop, sent = KeyboardTeleop(swarm, 0.1, 1.5), record_commands(swarm[0])
     use_keys(swarm, teleop, hold("w", 2.0), 2.0)
     assert swarm[0].velocity.linear_m_s > 0.08
@@ -80,7 +77,7 @@ def test_a_held_key_drives_and_letting_go_stops_with_repeated_zeros(swarm):
     use_keys(swarm, teleop, [], 2.0)
     assert true_paths.stop_within(swarm, 0.0)
     zeros_ms = [time_ms for time_ms, linear_m_s, angular_rad_s in sent if linear_m_s == angular_rad_s == 0.0]
-    assert zeros_ms[-1] - zeros_ms[0] > 2 * READ_PERIOD_MS
+    assert len(zeros_ms) == 1
     assert swarm.now_s * 1000.0 - zeros_ms[-1] > 1000.0  # then it is silent: other programs may drive
 
 
@@ -89,7 +86,7 @@ def test_keys_stop_the_robot_also_after_the_program_hung(swarm):
     use_keys(swarm, teleop, hold("w", 1.0), 1.0)
     hang(swarm)
     use_keys(swarm, teleop, [], 0.2)
-    assert [command[1:] for command in sent[-2:]] == [(0.0, 0.0)] * 2
+    assert sent[-1][1:] == (0.0, 0.0)
 
 
 @pytest.mark.parametrize("key", ["s", " "])
@@ -161,7 +158,7 @@ def test_a_stick_stops_the_robots_also_after_the_program_hung(swarm):
     use_stick(swarm, teleop, make_joy(1.0), 1.0)
     hang(swarm)
     use_stick(swarm, teleop, None, 0.3)
-    assert [command[1:] for command in sent[-2:]] == [(0.0, 0.0)] * 2
+    assert sent[-1][1:] == (0.0, 0.0)
 
 
 @pytest.mark.parametrize("is_heard_first", [True, False])

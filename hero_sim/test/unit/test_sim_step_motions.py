@@ -102,7 +102,9 @@ def test_goals_may_be_in_odometry_relative_or_in_the_world():
     there = [robot.true_pose for robot in swarm]
     swarm.go_to(0.08, 0.06, yaw_rad=1.0, frame="robot")
     for robot, pose in zip(swarm, there):
-        assert find_motion(pose, robot.true_pose) == pytest.approx((0.08, 0.06, 1.0), abs=0.03)
+        ahead_m, aside_m, turn_rad = find_motion(pose, robot.true_pose)
+        assert (ahead_m, aside_m) == pytest.approx((0.08, 0.06), abs=0.03)
+        assert turn_rad == pytest.approx(1.0, abs=0.06)
     swarm.robots[0].go_to(1.0, 2.0)  # of its odometry: where it was before the last goal
     assert travel_m(swarm.robots[0], before[0]) == pytest.approx(0.1, abs=0.02)
     with pytest.raises(FrameError, match="no transform from hero_0/odom to nowhere"):
@@ -175,26 +177,27 @@ def test_a_started_motion_ends_by_cancel_by_stop_and_by_another(monkeypatch):
         end(motion)
         with pytest.raises(GoalError, match=r"hero_0 did not reach \(5, 0\) in the frame robot: cancelled"):
             motion.result()
-        # Stopped at once, twice, and further apart than the firmware's 50 ms.
         assert sent[0] == (told_ms, 0, 0.0, 0.0)
-        stops_ms = find_stops(sent)
-        assert max(later - earlier for earlier, later in zip(stops_ms, stops_ms[1:])) >= 60
         assert not motion.cancel()
         assert is_at_rest(swarm)
 
 
-def test_a_cancel_between_the_two_stops_of_a_motion_cuts_nothing_short(monkeypatch):
-    swarm = StepSwarm(1)
+@pytest.mark.parametrize("wifi", ["ideal", "router"])
+def test_one_stop_brings_robots_to_rest_at_each_phase_of_their_loop(wifi, monkeypatch):
+    swarm = StepSwarm(4, wifi=wifi)
     sent = note_commands(swarm, monkeypatch)
-    motion = swarm[0].start_go_to(5.0, 0.0, timeout_s=0.5)
-    # The last command of the motion itself, and the first of the two that follow whatever that was.
-    while len(find_stops(sent)) < 2:
-        swarm.sleep(0.01)
-    motion.cancel()
-    with pytest.raises(GoalError, match="not there after 0.5 s"):
-        motion.result()
-    first_ms = find_stops(sent)[1]
-    assert find_stops(sent)[2:] == [first_ms + 60]
+    for phase_ms in range(0, 60, 4):
+        swarm.drive(0.1, 0.5)
+        swarm.sleep(0.5)
+        # A motion as late as a program can send one, so that the stop meets it in front of the robot.
+        swarm.drive(0.1, -0.5)
+        swarm.sleep(phase_ms / 1000.0)
+        del sent[:]
+        swarm.stop()
+        assert len(sent) == len(swarm)
+        swarm.sleep(0.5)
+        # Well before the firmware's watchdog of about 2 s would stop them.
+        assert is_at_rest(swarm)
 
 
 def test_motions_wait_for_simulated_time_only_as_long_as_they_are_told():
@@ -225,7 +228,7 @@ def test_a_swarm_moves_as_one_and_tells_who_did_not():
     assert is_at_rest(swarm)
 
 
-def test_a_timed_drive_takes_its_time_and_ends_with_two_stops(monkeypatch):
+def test_a_timed_drive_takes_its_time_and_ends_with_one_stop(monkeypatch):
     swarm = StepSwarm(1)
     sent = note_commands(swarm, monkeypatch)
     for duration_s in (0.3, 0.25, 1.0):
@@ -233,8 +236,8 @@ def test_a_timed_drive_takes_its_time_and_ends_with_two_stops(monkeypatch):
         begun_ms = swarm.rows.now_ms
         swarm[0].drive(0.1, 0.0, duration_s)
         stops_ms = [at_ms - begun_ms for at_ms in find_stops(sent)]
-        assert stops_ms == [duration_s * 1000.0, duration_s * 1000.0 + 60.0]
-        assert len(sent) - 2 == math.ceil(duration_s * 10.0)
+        assert stops_ms == [duration_s * 1000.0]
+        assert len(sent) - 1 == math.ceil(duration_s * 10.0)
         assert is_at_rest(swarm)
 
 

@@ -28,8 +28,8 @@ class CommandWatch:
         wait_for(lambda: any(condition(*command) for command in self.commands[robot_id][start:]), what)
 
     def wait_for_stops(self, *robot_ids):
-        """Wait until the last two commands of each robot are stops: one may be lost within 50 ms of another command."""
+        """Wait until the last command of each robot is a stop."""
         wait_for(
-            lambda: all(self.commands[robot_id][-2:] == [(0.0, 0.0)] * 2 for robot_id in robot_ids),
+            lambda: all(self.commands[robot_id][-1:] == [(0.0, 0.0)] for robot_id in robot_ids),
             lambda: "stops among %s" % {robot_id: self.commands[robot_id][-5:] for robot_id in robot_ids},
         )

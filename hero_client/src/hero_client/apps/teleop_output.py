@@ -1,4 +1,4 @@
-"""Which commands of a teleoperation are sent: every motion, some stops after it, and no motion of before a pause."""
+"""Which commands of a teleoperation are sent: every motion, one stop after it, and no motion of before a pause."""
 
 from ..values.geometry import STOP, Velocity
 
@@ -7,24 +7,18 @@ __all__ = ["PauseDetector", "TeleopOutput"]
 PAUSE_S = 0.5
 """A teleoperation takes a step every 0.05 to 0.1 s; after more than this it, or its PC, was suspended or too busy."""
 
-STOPS = 5
-"""How often a stop is sent. Counted, not timed: a program that hung after a motion sends them, too."""
-
 
 class TeleopOutput:
-    """Lets motions pass, and stops only after a motion: then other programs may drive the robots. Pure."""
+    """Lets motions pass, and one stop after a motion: then other programs may drive the robots. Pure."""
 
     def __init__(self) -> None:
         """Start silent."""
-        self._stops = 0
+        self._is_moving = False
 
     def passes(self, command: Velocity) -> bool:
         """Return whether to send a command, for which this is called each time that one is due."""
-        if command != STOP:
-            self._stops = STOPS
-            return True
-        self._stops -= 1
-        return self._stops >= 0
+        was_moving, self._is_moving = self._is_moving, command != STOP
+        return was_moving or self._is_moving
 
 
 class PauseDetector:

@@ -10,10 +10,7 @@ from ..values.errors import RobotNotReadyError
 
 __all__ = ["POLL_PERIOD_S", "READY_TIMEOUT_S", "REPEAT_PERIOD_S", "Group", "Member", "stop_after", "wait_for_all"]
 
-STOP_GAP_S = 0.06
-"""Between the two messages of a stop: the firmware drops a Twist that comes within 50 ms of the one before."""
-
-SEND_TIME_S = 0.05
+SEND_TIME_S = 0.1
 """rospy sends on threads of its own and does not say when it has; this is many times what a send takes."""
 
 REPEAT_PERIOD_S = 0.1
@@ -72,13 +69,12 @@ def wait_for_all(robots: Sequence[Member], timeout_s: float = READY_TIMEOUT_S) -
 
 
 def send_stops(robots: Sequence[Member]) -> Steps:
-    """Send every robot two stops; ends when they are sent."""
+    """Send every robot one stop, which the driver repeats; ends when they are sent.
+
+    A stop that a program fails to send is the driver's: it stops robots whose program hangs or has gone.
+    """
     if not robots:
         return
-    for robot in robots:
-        robot._send_velocity(0.0, 0.0)
-    # The first stop may itself come within 50 ms of the last command, and then only the second one counts.
-    yield Hold(STOP_GAP_S)
     for robot in robots:
         robot._send_velocity(0.0, 0.0)
     yield Hold(SEND_TIME_S)
@@ -146,7 +142,7 @@ class Group(Clock):
         )
 
     def stop(self) -> None:
-        """Stop at once and cancel motions from start_go_to(); returns once the stops are sent, after 0.11 s."""
+        """Stop at once and cancel motions from start_go_to(); returns once the stops are sent, after 0.1 s."""
         self._stop(self._members)
 
     def _stop(self, robots: Sequence[Member]) -> None:

@@ -14,7 +14,7 @@ Steps = Generator[float, bool, None]
 
 
 class Hold(float):
-    """A wait between steps that nothing cuts short, such as that between two stops."""
+    """A wait between steps that nothing cuts short, such as that for a stop to be sent."""
 
 
 def run_steps(steps: Steps, sleep: Sleep, hold: Sleep) -> None:

@@ -4,13 +4,10 @@ Silence stops it: a hidden page, a browser that crashed and a network that is go
 any clock that never steps.
 """
 
-from typing import Dict, List, NamedTuple
+from typing import Dict, List, NamedTuple, Set
 
 HOLD_TIMEOUT_S = 0.4
 """Pages report every 0.1 s while a button is held; a robot is stopped after this time without a report."""
-
-STOPS = 3
-"""How often a stop is sent, one step apart: a robot drops commands within 50 ms of the last one."""
 
 
 class Velocity(NamedTuple):
@@ -33,7 +30,7 @@ class DeadMan:
 
     def __init__(self) -> None:
         self._holds: Dict[str, Hold] = {}
-        self._stops: Dict[str, int] = {}
+        self._stops: Set[str] = set()
 
     def hold(self, page: int, velocity: Velocity, now_s: float) -> bool:
         """Note that a page drives a robot; return False if another page drives it already."""
@@ -41,7 +38,7 @@ class DeadMan:
         if held is not None and held.page != page:
             return False
         self._holds[velocity.namespace] = Hold(page, now_s)
-        self._stops.pop(velocity.namespace, None)
+        self._stops.discard(velocity.namespace)
         return True
 
     def release(self, page: int, namespace: str) -> None:
@@ -62,12 +59,11 @@ class DeadMan:
 
     def _begin_stop(self, namespace: str) -> None:
         del self._holds[namespace]
-        self._stops[namespace] = STOPS
+        self._stops.add(namespace)
 
     def take_stops(self, now_s: float) -> List[Velocity]:
-        """Return the stops that are due at this step; steps must be at least 0.06 s apart."""
+        """Return the stops that are due at this step, each once: the driver repeats them."""
         for namespace in [name for name, held in self._holds.items() if now_s - held.last_s > HOLD_TIMEOUT_S]:
             self._begin_stop(namespace)
-        due = [Velocity(namespace, 0.0, 0.0) for namespace in self._stops]
-        self._stops = {namespace: left - 1 for namespace, left in self._stops.items() if left > 1}
-        return due
+        due, self._stops = self._stops, set()
+        return [Velocity(namespace, 0.0, 0.0) for namespace in sorted(due)]
