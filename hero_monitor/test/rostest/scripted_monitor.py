@@ -92,12 +92,12 @@ class ScriptedMonitor:
             self.show(fleet=self.state["fleet"], stop=status if stopped else None)
 
     def _send_clock(self):
-        self._send({"clock_ms": read_clock_ms(), "served": self.served})
+        if not self.is_silent:
+            self._send({"clock_ms": read_clock_ms(), "served": self.served})
 
     def _send(self, updates):
-        if not self.is_silent:
-            for page in self._server.pages:
-                page.send(encode(updates))
+        for page in self._server.pages:
+            page.send(encode(updates))
 
     def show(self, **updates):
         """Show these updates on all pages."""

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """STOP ALL, Release and driving by touch and keyboard in a real browser, at every size of screen; without ROS.
 
-The page's clock is the test's: what a page does after a second depends on no load.
+The page's clock and its periodic timers are the test's: what a page does after a second depends on no load.
 """
 
 import unittest
@@ -36,16 +36,26 @@ STATES = {
     "unknown": {"fleet": make_fleet(*UNKNOWN, stopped=True), "losses": LOSSES},
 }
 
-# With small steps it is slower than a busy machine, which must not make the page miss what it waits for.
 TAKE_CLOCK = """
-let now = performance.now(), date = Date.now();
-window.stepMs = 0;
-performance.now = () => (now += window.stepMs);
+const timers = new Map();
+let now = 0, date = Date.now(), last = 0;
+performance.now = () => now;
 Date.now = () => date;
-window.advance = (ms) => { date += ms; now += ms; };
+window.setInterval = (act, periodMs) => (timers.set(++last, { act, periodMs, dueMs: now + periodMs }), last);
+window.clearInterval = (id) => timers.delete(id);
+// The page is suspended for a while.
+window.suspend = (ms) => {
+  now += ms;
+  date += ms;
+  for (const timer of timers.values()) {
+    if (timer.dueMs > now) continue;
+    timer.dueMs = now + timer.periodMs;
+    timer.act();
+  }
+};
+// A while passes on a page that runs.
+window.advance = (ms) => { for (const end = now + ms; now < end;) window.suspend(Math.min(50, end - now)); };
 """
-
-IS_HELD = "return !!document.querySelector('#release.holding')"
 
 FIND_BUTTONS = """
 const place = (id) => {
@@ -67,6 +77,7 @@ class TouchTest(unittest.TestCase):
         cls.is_touched = False
         cls.monitor = ScriptedMonitor()
         cls.page = MonitorPage(cls.monitor.url)
+        cls.page.browser.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": TAKE_CLOCK})
         cls.page.browser.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": True, "maxTouchPoints": 2})
 
     @classmethod
@@ -90,9 +101,22 @@ class TouchTest(unittest.TestCase):
         self.monitor.show(**STATES[name])
         return name
 
-    def take_clock(self):
-        """Stop the page's clock; window.stepMs makes it go on, window.advance() jump."""
-        self.page.run(TAKE_CLOCK)
+    def let_arrive(self, mark):
+        """Wait until the page has all that the monitor sent so far."""
+        self.monitor.tell(notice={"level": "info", "text": mark})
+        self.page.wait_for_notice(mark)
+
+    def silence_monitor(self):
+        self.monitor.is_silent = True
+        self.let_arrive("the last words")
+
+    def advance(self, ms):
+        """Let the page's time pass."""
+        self.page.run("window.advance(%d)" % ms)
+
+    def suspend(self, ms):
+        """Let time pass in which the page does not run."""
+        self.page.run("window.suspend(%d)" % ms)
 
     def touch(self, kind, *place):
         TouchTest.is_touched = kind == "touchStart"
@@ -117,31 +141,17 @@ class TouchTest(unittest.TestCase):
         self.tap(self.find("stop"))
         self.page.wait_for_text("#stop", "STOPPED")
 
-    def wait_until_armed(self):
-        self.page.run("window.advance(2100)")
-        # After the jump the page hears the monitor anew.
-        is_armed = "return !document.querySelector('#release.inert') && document.getElementById('losses').hidden"
-        wait_for(lambda: self.page.text("#link") == "live" and self.page.run(is_armed), "the end of the delay")
+    def pass_time(self, ms):
+        """Let the page's time pass; at its end the page hears the monitor again."""
+        self.advance(ms)
+        self.page.wait_for_text("#link", "live")
+
+    def is_held(self):
+        return self.page.run("return !!document.querySelector('#release.holding')")
 
     def hold_release(self):
-        """Return whether a hold has released the robots; press once more if the page has ended the hold.
-
-        It does if it hears of the stop only now, which makes Release inert for a while, or nothing on a busy machine.
-        """
-        if not self.monitor.requested("release") and not self.page.run(IS_HELD):
-            if self.is_touched:
-                self.touch("touchEnd")
-            self.page.run("window.advance(300)")
-            self.touch("touchStart", *self.find("release"))
-        return self.monitor.requested("release")
-
-    def hold_release_by_key(self):
-        """As hold_release(), by the keyboard."""
-        if not self.monitor.requested("release") and not self.page.run(IS_HELD):
-            self.press_key("keyUp", "Space")
-            self.page.run("window.advance(300)")
-            self.press_key("keyDown", "Space")
-        return self.monitor.requested("release")
+        self.touch("touchStart", *self.find("release"))
+        wait_for(self.is_held, "the hold")
 
     def check_that_nothing_was_released(self):
         """Stop once more, which the monitor hears of after all that was sent before."""
@@ -154,11 +164,13 @@ class TouchTest(unittest.TestCase):
         places = {size: set() for size in SIZES}
         for state in [*STATES, "silent"]:
             if state == "silent":
-                self.monitor.is_silent = True
+                self.silence_monitor()
+                self.advance(2000)
                 self.page.wait_for_text("#losses", "No answer from the monitor")
             else:
                 self.show(state)
-                self.page.run("return new Promise((done) => setTimeout(done, 150))")
+                self.let_arrive(state + " is shown")
+                self.advance(200)
             for size in SIZES:
                 self.page.resize(*size)
                 found = self.page.run(FIND_BUTTONS)
@@ -176,79 +188,76 @@ class TouchTest(unittest.TestCase):
         for size in SIZES:
             self.page.resize(*size)
             self.setUp()
-            self.take_clock()
             for _ in range(3):
                 self.tap(self.find("stop"))
             self.page.wait_for_text("#stop", "STOPPED")
-            self.wait_until_armed()
+            self.pass_time(2000)
             for _ in range(3):
                 self.tap(self.find("release"))
             self.check_that_nothing_was_released()
 
     def test_release_acts_when_a_finger_holds_it_for_a_second(self):
         self.page.resize(360, 740)
-        self.take_clock()
         self.stop()
-        self.wait_until_armed()
-        self.page.run("window.stepMs = 10")
-        wait_for(self.hold_release, "the request release")
+        self.pass_time(2000)
+        self.hold_release()
+        self.advance(950)
+        self.assertTrue(self.is_held())
+        self.advance(50)
+        self.monitor.wait_for_request("release")
         self.touch("touchEnd")
         self.page.wait_for_text("#stop", "STOP ALL")
 
     def test_release_does_nothing_for_two_seconds_after_a_stop(self):
-        self.take_clock()
         self.stop()
-        self.page.run("window.advance(1900)")
+        self.pass_time(1900)
         self.touch("touchStart", *self.find("release"))
-        self.page.run("window.stepMs = 10")
         self.page.wait_for_notice("Hold Release for 1 s")
-        self.page.run("window.advance(5000)")
+        self.pass_time(1500)
         self.touch("touchEnd")
         self.check_that_nothing_was_released()
 
     def test_a_stop_of_another_page_ends_a_hold_of_release(self):
-        self.take_clock()
         self.stop()
-        self.wait_until_armed()
-        self.touch("touchStart", *self.find("release"))
-        wait_for(lambda: self.page.run("return !!document.querySelector('#release.holding')"), "the hold")
+        self.pass_time(2000)
+        self.hold_release()
         self.show("stopping")
-        wait_for(lambda: self.page.run("return !document.querySelector('#release.holding')"), "the end of the hold")
+        self.page.wait_for_text("#stopping", "stopping")
+        self.advance(1000)
+        self.assertFalse(self.is_held())
         self.touch("touchEnd")
         self.check_that_nothing_was_released()
 
     def test_a_hold_of_release_ends_when_the_page_is_suspended(self):
-        self.take_clock()
         self.stop()
-        self.wait_until_armed()
-        self.touch("touchStart", *self.find("release"))
-        wait_for(lambda: self.page.run("return !!document.querySelector('#release.holding')"), "the hold")
-        self.page.run("window.advance(1500)")
-        wait_for(lambda: self.page.run("return !document.querySelector('#release.holding')"), "the end of the hold")
+        self.pass_time(2000)
+        self.hold_release()
+        self.suspend(1500)
+        self.assertFalse(self.is_held())
         self.touch("touchEnd")
         self.check_that_nothing_was_released()
 
     def test_the_keyboard_stops_at_a_press_and_releases_at_a_hold(self):
-        self.take_clock()
         self.page.run("document.getElementById('stop').focus()")
         for kind in ("keyDown", "keyUp"):
             self.press_key(kind, "Enter")
         self.page.wait_for_text("#stop", "STOPPED")
-        self.wait_until_armed()
+        self.pass_time(2000)
         self.page.run("document.getElementById('release').focus()")
         for key in ("Enter", "Space", "Enter"):
             for kind in ("keyDown", "keyUp"):
                 self.press_key(kind, key)
         self.assertEqual(self.monitor.requested("release"), [])
-        self.page.run("window.stepMs = 10")
-        wait_for(self.hold_release_by_key, "the request release")
+        self.press_key("keyDown", "Space")
+        wait_for(self.is_held, "the hold")
+        self.advance(1000)
+        self.monitor.wait_for_request("release")
         self.press_key("keyUp", "Space")
 
     def test_a_page_that_hears_nothing_shows_all_as_unknown_within_two_seconds(self):
-        self.take_clock()
         self.assertEqual({row["State"] for row in self.page.rows()}, {"READY"})
-        self.monitor.is_silent = True
-        self.page.run("window.advance(1750)")
+        self.silence_monitor()
+        self.advance(2000)
         self.page.wait_for_text("#losses", "No answer from the monitor since")
         self.assertEqual({row["State"] for row in self.page.rows()}, {"UNKNOWN"})
         self.assertIn("roslaunch hero_bringup monitor.launch", self.page.text("#losses"))
@@ -258,13 +267,12 @@ class TouchTest(unittest.TestCase):
         self.page.wait_for_text("#ready", "3 of 3 ready")
 
     def test_a_page_that_was_suspended_stops_driving_and_knows_nothing(self):
-        self.take_clock()
         self.page.choose("hero_0")
         button = self.page.find("#pad [aria-label='forward']").rect
         self.touch("touchStart", button["x"] + 9, button["y"] + 9)
         self.monitor.wait_for_request("drive")
-        self.monitor.is_silent = True
-        self.page.run("window.advance(3000)")
+        self.silence_monitor()
+        self.suspend(3000)
         self.monitor.wait_for_request("end_drive")
         self.page.wait_for_text("#ready", "3 of 3 unknown")
         self.assertEqual(self.monitor.requests[-1]["do"], "end_drive")
