@@ -148,3 +148,26 @@ def test_robots_are_found_anew_when_time_has_gone_back():
 def test_a_pose_of_a_robot_that_is_not_expected_is_refused():
     with pytest.raises(KeyError):
         Swarm(0).localizer.add_measurement(7, Measurement(0.0, Pose(0.0, 0.0, 0.0), COVARIANCE))
+
+
+def test_many_robots_lost_and_found_make_one_line_in_ten_seconds():
+    robots = range(8)
+    places = {robot_id: (0.1 * robot_id, 0.0, 0.0) for robot_id in robots}
+    swarm = Swarm(*robots).run(1.0, places, robots=robots)
+    swarm.lines.clear()
+    for _ in range(12):
+        swarm.run(1.5, robots=robots).run(1.0, places, robots=robots)
+    singles = [line for line in swarm.lines if " more lines " not in line]
+    assert len(singles) == 4 and all("lost: " in line for line in singles)
+    summaries = [line for line in swarm.lines if " more lines " in line]
+    assert len(summaries) == 2
+    assert summaries[1].startswith("64 more lines on robots lost or found again in 10 s: 8 robots (hero_0, ")
+
+
+def test_after_a_quiet_while_each_lost_robot_has_a_line_again():
+    robots = range(8)
+    places = {robot_id: (0.1 * robot_id, 0.0, 0.0) for robot_id in robots}
+    swarm = Swarm(*robots).run(1.0, places, robots=robots).run(1.5, robots=robots).run(25.0, places, robots=robots)
+    swarm.lines.clear()
+    others = {robot_id: place for robot_id, place in places.items() if robot_id}
+    assert swarm.run(1.5, others, robots=robots).lines == ["hero_0 lost: its pose follows its odometry"]

@@ -10,6 +10,7 @@ from typing import Dict, Iterable, List, NamedTuple, Optional
 from hero_client.values.geometry import Pose, measure_distance, wrap_angle
 
 from .heading_check import HeadingCheck, is_upside_down
+from .loss_lines import LossLines
 from .pose_filter import Estimate, Measurement, Outcome, PoseFilter
 
 __all__ = ["PUBLISH_RATE_HZ", "LocalizedRobot", "RobotState", "SwarmLocalizer"]
@@ -85,6 +86,7 @@ class SwarmLocalizer:
     def __init__(self) -> None:
         self._robots: Dict[int, _Robot] = {}
         self._now_s = -math.inf
+        self._losses = LossLines()
 
     def add_robots(self, robot_ids: Iterable[int]) -> None:
         """Expect these robots too."""
@@ -143,7 +145,8 @@ class SwarmLocalizer:
             return ["hero_%d was carried: set anew %s away, at %s" % (robot_id, step, _describe_pose(after))]
         if was_lost:
             unseen_s = measurement.stamp_s - used_s
-            return ["hero_%d found again after %.1f s, %s off its odometry" % (robot_id, unseen_s, step)]
+            line = "hero_%d found again after %.1f s, %s off its odometry" % (robot_id, unseen_s, step)
+            return self._losses.add(robot_id, line, self._now_s)
         return ["hero_%d corrected by %s" % (robot_id, step)] if step_m > ANNOUNCED_STEP_M else []
 
     def distrust(self, stamp_s: float, robot_ids: Iterable[int]) -> None:
@@ -165,12 +168,14 @@ class SwarmLocalizer:
         if now_s < self._now_s - LOST_S:
             lines.append("time went back by %.1f s: all robots are to be found anew" % (self._now_s - now_s))
             self._robots = {robot_id: _Robot() for robot_id in self._robots}
+            self._losses = LossLines()
         self._now_s = now_s
+        lines += self._losses.end_period(now_s)
         for robot_id, robot in sorted(self._robots.items()):
             seen_s = max(robot.filter.used_s, robot.untrusted_s)
             if not robot.is_lost and -math.inf < seen_s < now_s - LOST_S:
                 robot.is_lost = True
-                lines.append("hero_%d lost: its pose follows its odometry" % robot_id)
+                lines += self._losses.add(robot_id, "hero_%d lost: its pose follows its odometry" % robot_id, now_s)
         return lines
 
     def list_robots(self, now_s: float) -> List[LocalizedRobot]:
