@@ -4,6 +4,7 @@ import json
 import math
 
 import pytest
+import rospy
 from geometry_msgs.msg import Point32, Polygon, PolygonStamped
 from sensor_msgs.msg import CompressedImage
 
@@ -162,14 +163,32 @@ def test_a_picture_lies_on_the_map_of_its_frame_and_elsewhere_beside_it():
     assert picture.describe("map", 0.0) is None
     picture.receive(CompressedImage(data=JPEG), 10.0)
     assert picture.jpeg == JPEG
-    assert picture.describe("map", 10.1) == {"number": 1, "box": None}
+    assert picture.describe("map", 10.1) == {"number": 1, "box": None, "poses": {}}
     picture.receive(CompressedImage(data=JPEG), 10.15)  # sooner than pages fetch pictures
     picture.receive_outline(make_outline((-1.0, -0.5), (1.0, -0.5), (1.0, 0.5), (-1.0, 0.5)))
     picture.receive(CompressedImage(data=JPEG), 10.2)
-    assert picture.describe("map", 10.3) == {"number": 2, "box": [-1000, -500, 1000, 500]}
-    assert picture.describe("world", 10.3) == {"number": 2, "box": None}
+    assert picture.describe("map", 10.3) == {"number": 2, "box": [-1000, -500, 1000, 500], "poses": {}}
+    assert picture.describe("world", 10.3) == {"number": 2, "box": None, "poses": {}}
     picture.receive_outline(make_outline((0.0, 0.0), (math.nan, 1.0), (1.0, 1.0), (1e30, 0.0)))
-    assert picture.describe("map", 10.3) == {"number": 2, "box": None}
+    assert picture.describe("map", 10.3) == {"number": 2, "box": None, "poses": {}}
+
+
+def test_robots_on_a_picture_are_where_they_were_when_it_was_taken():
+    picture = CameraPicture()
+    picture.receive_outline(make_outline((-1.0, -0.5), (1.0, -0.5), (1.0, 0.5), (-1.0, 0.5)))
+    for stamp_s in (100.0, 100.1, 100.2, 100.3):
+        picture.follow("hero_0", stamp_s, Pose(stamp_s - 100.0, 0.5, math.pi if stamp_s < 100.15 else -math.pi + 0.2))
+        picture.follow("hero_1", stamp_s - 50.0, Pose(1.0, 1.0, 0.0))  # it is silent, or was switched off
+    image = CompressedImage(data=JPEG)
+    image.header.stamp = rospy.Time.from_sec(100.15)
+    picture.receive(image, 10.0)
+    assert picture.describe("map", 10.1)["poses"] == {"hero_0": [150, 500, round(1000 * (-math.pi + 0.1))]}
+    image.header.stamp = rospy.Time.from_sec(100.35)  # newer than the poses: the newest counts
+    picture.receive(image, 10.3)
+    assert picture.describe("map", 10.3)["poses"]["hero_0"][0] == 300
+    image.header.stamp = rospy.Time.from_sec(101.0)
+    picture.receive(image, 10.6)
+    assert picture.describe("map", 10.6)["poses"] == {}
 
 
 def test_a_picture_that_is_old_or_none_is_not_shown():

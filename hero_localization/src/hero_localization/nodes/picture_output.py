@@ -47,7 +47,7 @@ class PictureOutput:
         sightings = tracker.sightings
         unusable = set(sightings.unknown + sightings.doubled + list(sightings.misshapen)) if sightings else set()
         picture = self._view.draw(frame.gray, tracker.found, unusable)
-        header = Header(stamp=rospy.Time.from_sec(frame.stamp_s), frame_id=self._frame_id)
+        header = Header(stamp=rospy.Time.from_sec(tracker.taken_s(frame.stamp_s)), frame_id=self._frame_id)
         if self._image in publishers:
             height_px, width_px = picture.shape[:2]
             self._image.publish(Image(header, height_px, width_px, "bgr8", 0, 3 * width_px, picture.tobytes()))

@@ -1,12 +1,16 @@
 """The camera's picture as the tracker of hero_localization publishes it, from straight above. Pure.
 
-It lies under the robots if the map is in its frame; otherwise the page shows it beside them.
+It lies under the robots if the map is in its frame; otherwise the page shows it beside them. It is some 0.1 s old when
+it comes, more on a busy computer: the page draws robots on it where they were when it was taken.
 """
 
 import math
-from typing import Any, Dict, List, Optional
+from collections import deque
+from typing import Any, Deque, Dict, List, Optional, Tuple
 
-from .page_state import FARTHEST_M
+from hero_client.values.geometry import Pose, wrap_angle
+
+from .page_state import FARTHEST_M, encode_pose
 
 JPEG_START = b"\xff\xd8"
 BYTES_MAX = 2000000
@@ -17,6 +21,14 @@ PERIOD_S = 0.2
 
 SILENT_S = 3.0
 """The tracker publishes five pictures a second; an older one shows no robot where it is."""
+
+TRACK_POSES = 50
+"""Kept of each robot: the map reads ten a second."""
+
+AHEAD_S = 0.1
+"""A robot's newest pose shows where it was so long after it."""
+
+Track = Deque[Tuple[float, Pose]]
 
 
 class CameraPicture:
@@ -32,6 +44,8 @@ class CameraPicture:
         self._received_s = -math.inf
         self._frame = ""
         self._box_mm: Optional[List[int]] = None
+        self._stamp_s = -math.inf
+        self._tracks: Dict[str, Track] = {}
 
     def receive(self, picture: Any, now_s: float) -> None:
         """Take a sensor_msgs/CompressedImage, unless it comes too soon, or is none that a browser can show."""
@@ -42,6 +56,7 @@ class CameraPicture:
             self.jpeg = data
             self._number += 1
             self._received_s = now_s
+            self._stamp_s = picture.header.stamp.to_sec()
 
     def receive_outline(self, outline: Any) -> None:
         """Take the places of the picture's corners: a geometry_msgs/PolygonStamped."""
@@ -50,12 +65,37 @@ class CameraPicture:
         self._box_mm = [round(1e3 * value) for value in (min(xs), min(ys), max(xs), max(ys))] if is_known else None
         self._frame = outline.header.frame_id.lstrip("/")
 
+    def follow(self, name: str, stamp_s: float, pose: Pose) -> None:
+        """Remember a robot's pose in the common frame."""
+        track = self._tracks.setdefault(name, deque(maxlen=TRACK_POSES))
+        if track and stamp_s < track[-1][0]:
+            track.clear()  # a recording is played again
+        track.append((stamp_s, pose))
+
     def describe(self, map_frame: str, now_s: float) -> Optional[Dict[str, Any]]:
-        """Return the picture's number and box, None without a picture.
+        """Return the picture's number and box, and where robots were when it was taken; None without a picture.
 
         box: x min, y min, x max, y max in mm; None if its place on this map is unknown.
         """
         if now_s > self._received_s + SILENT_S:
             self.jpeg = b""
             return None
-        return {"number": self._number, "box": self._box_mm if self._frame == map_frame else None}
+        if self._frame != map_frame or self._box_mm is None:
+            return {"number": self._number, "box": None, "poses": {}}
+        poses = {name: encode_pose(find_pose(track, self._stamp_s)) for name, track in self._tracks.items()}
+        known = {name: pose for name, pose in poses.items() if pose is not None}
+        return {"number": self._number, "box": self._box_mm, "poses": known}
+
+
+def find_pose(track: Track, stamp_s: float) -> Optional[Pose]:
+    """Return where a robot was at a time, None if that is not known."""
+    for (start_s, start), (end_s, end) in zip(track, list(track)[1:]):
+        if start_s <= stamp_s <= end_s and start_s < end_s:
+            share = (stamp_s - start_s) / (end_s - start_s)
+            return Pose(
+                start.x_m + share * (end.x_m - start.x_m),
+                start.y_m + share * (end.y_m - start.y_m),
+                wrap_angle(start.yaw_rad + share * wrap_angle(end.yaw_rad - start.yaw_rad)),
+            )
+    newest_s, newest = track[-1]
+    return newest if newest_s <= stamp_s <= newest_s + AHEAD_S else None

@@ -70,6 +70,11 @@ export class FleetMap {
     this.draw();
   }
 
+  /** Poses as drawn: on a picture, those of the moment when it was taken. */
+  get poses() {
+    return this.picture.box ? { ...this.state.poses, ...this.picture.poses } : this.state.poses;
+  }
+
   // ------------------------------------------------------------ pointer
 
   listen() {
@@ -138,7 +143,7 @@ export class FleetMap {
     const [x, y] = this.toMap(px, py);
     let nearest = null;
     let least = Math.max(BODY_MM * 1.3, 22 / this.view.scale);
-    for (const [name, pose] of Object.entries(this.state.poses)) {
+    for (const [name, pose] of Object.entries(this.poses)) {
       if (pose === null) continue;
       const distance = Math.hypot(pose[0] - x, pose[1] - y);
       if (distance < least) [nearest, least] = [name, distance];
@@ -249,7 +254,7 @@ export class FleetMap {
     const { frame } = this.state.fleet;
     if (frame !== this.trailsFrame) this.trails.clear();
     this.trailsFrame = frame;
-    for (const [name, pose] of Object.entries(this.state.poses)) {
+    for (const [name, pose] of Object.entries(this.poses)) {
       if (pose === null) continue;
       const trail = this.trails.get(name) || [];
       this.trails.set(name, trail);

@@ -20,7 +20,8 @@ export class MapPainter {
 
   paint() {
     const { map, context } = this;
-    const { view, state, shows } = map;
+    const { view, shows } = map;
+    const state = { ...map.state, poses: map.poses };
     Object.assign(this, { view, state, width: map.width, height: map.height });
     this.isProjected = document.body.classList.contains("projector");
     // On a wall, robots are seen from afar.

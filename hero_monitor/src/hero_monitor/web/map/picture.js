@@ -9,8 +9,9 @@ export class CameraPicture {
   constructor(redraw) {
     this.redraw = redraw;
     this.box = null; // of the picture on the map, mm; null: it is shown in a panel, or not at all
+    this.poses = {}; // of robots when it was taken
     this.image = null;
-    this.wanted = null; // as the monitor describes it: number, and box on the map
+    this.wanted = null; // as the monitor describes it: number, box on the map, poses
     this.number = null;
     this.fetching = false;
   }
@@ -28,7 +29,7 @@ export class CameraPicture {
   fetch() {
     if (this.fetching || this.wanted === null || this.wanted.number === this.number) return;
     this.fetching = true;
-    const { number, box } = this.wanted;
+    const { number, box, poses } = this.wanted;
     const image = new Image();
     const end = () => {
       this.fetching = false;
@@ -38,7 +39,7 @@ export class CameraPicture {
     image.addEventListener("error", end);
     image.addEventListener("load", () => {
       if (this.wanted !== null) {
-        [this.image, this.box] = [image, box];
+        [this.image, this.box, this.poses] = [image, box, poses];
         this.place();
       }
       end();
