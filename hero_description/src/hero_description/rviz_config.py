@@ -17,6 +17,8 @@ CHOICE_TOPIC = "/hero_choice/chosen"
 POINT_TOPIC = "/hero_choice/point"
 GOAL_TOPIC = "/hero_choice/goal"
 ABOVE_PIXELS_PER_M = 400
+MAP_PIXELS_PER_M = 300
+"""An arena of 2.2 m fits into the window."""
 
 ORBITS = {"orbit": (2.6, 1.0, 4.71, 0.0), "close": (0.27, 0.45, 0.6, 0.02)}
 """Distance (m), pitch and yaw (rad) of the camera, height of the focal point above the fixed frame (m)."""
@@ -50,8 +52,8 @@ def make_robot_displays(name: str, color: str) -> List[Dict[str, Any]]:
                 "Value": "Arrow",
                 "Color": color,
                 "Alpha": 0.6,
-                "Shaft Length": 0.012,
-                "Shaft Radius": 0.002,
+                "Shaft Length": 0.016,
+                "Shaft Radius": 0.003,
                 "Head Length": 0.008,
                 "Head Radius": 0.005,
             },
@@ -127,7 +129,7 @@ def make_view(view: str) -> Dict[str, Any]:
     if view not in ORBITS:
         return {
             "Class": "rviz/TopDownOrtho",
-            "Scale": ABOVE_PIXELS_PER_M,
+            "Scale": MAP_PIXELS_PER_M if view == "map" else ABOVE_PIXELS_PER_M,
             "X": 0.0,
             "Y": 0.0,
             "Angle": 0.0,

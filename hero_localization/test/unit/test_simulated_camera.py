@@ -9,12 +9,20 @@ import pytest
 
 cv2 = pytest.importorskip("cv2")
 
+from hero_localization.errors import SettingsError  # noqa: E402 - without OpenCV there is no camera
 from hero_localization.prints.tag_images import draw_tag  # noqa: E402 - without OpenCV there is no camera
 from hero_localization.simulated_camera import camera_node  # noqa: E402
 from hero_localization.simulated_camera.frame_times import list_frames  # noqa: E402
+from hero_localization.simulated_camera.lab_setup import (  # noqa: E402
+    hang_above,
+    list_references,
+    write_camera_file,
+)
 from hero_localization.simulated_camera.renderer import CameraRenderer  # noqa: E402
 from hero_localization.simulated_camera.view import CameraOptions, PrintedTag, View, tag_corners  # noqa: E402
-from hero_sim.world.arena import build_rectangle  # noqa: E402
+from hero_localization.tracking import settings as camera_file  # noqa: E402
+from hero_sim.world.arena import build_default, build_rectangle  # noqa: E402
+from hero_sim.world.arena_file import load_arena  # noqa: E402
 
 SMALL = CameraOptions(
     width_px=640,
@@ -195,3 +203,37 @@ def test_wrong_ids_are_reported_in_one_line(monkeypatch, capsys):
         camera_node.main()
     assert end.value.code == 1
     assert capsys.readouterr().err == "simulated_camera: tags from 100 on are reference tags: take lower ids\n"
+
+
+@pytest.mark.parametrize(
+    "arena", [load_arena("empty"), load_arena("maze"), build_default(20), build_rectangle(0.5, 3.0, 1)]
+)
+def test_camera_hangs_so_high_that_no_reference_tag_is_cut_off(arena):
+    references = list_references(arena, "36h11")
+    camera = hang_above(CameraOptions(), arena, references, 0.04)
+    corners = View(camera).project(np.vstack([tag_corners(tag, np.zeros((1, 3)))[0] for tag in references]))
+    assert (corners > 10.0).all() and (corners < np.array((1910.0, 1070.0))).all()
+    assert camera.position_m[2] < 5.0
+
+
+def test_camera_above_a_small_arena_hangs_at_its_usual_height():
+    arena = build_default(4)
+    camera = hang_above(CameraOptions(), arena, list_references(arena, "36h11"), 0.04)
+    assert camera.position_m == CameraOptions().position_m
+
+
+def test_arena_that_is_too_large_for_the_camera_is_refused():
+    arena = build_rectangle(8.0, 6.0, 1)
+    with pytest.raises(SettingsError, match="8.0 x 6.0 m, tags of 40 mm measure less than 12 px: take"):
+        hang_above(CameraOptions(), arena, list_references(arena, "36h11"), 0.04)
+
+
+def test_written_camera_file_holds_the_view_and_the_tags(tmp_path):
+    references = list_references(ARENA, "36h11")
+    path = str(tmp_path / "camera.yaml")
+    write_camera_file(path, View(SMALL), SMALL, [TAG._replace(x_m=np.float64(0.002))], references)
+    settings = camera_file.load(path)
+    points_m = np.array([(0.3, 0.2, 0.076), (-1.0, 0.5, 0.0)])
+    assert np.abs(settings.camera.project(points_m) - View(SMALL).project(points_m)).max() < 1e-6
+    assert settings.layout.mounts[3].x_m == 0.002 and settings.layout.default_mount.size_m == 0.048
+    assert sorted(settings.seen_references) == sorted(settings.layout.references) == [100, 101, 102, 103]

@@ -144,6 +144,8 @@ def _log(lines: List[str]) -> None:
         rospy.loginfo(line)
 
 
+SD_TEXT = "standard deviation, in x and y each, of poses that come without covariance; `track` tells its own"
+
 PARAMETERS = {
     "robots": robot_ids("all", "ids; all: those of all drivers"),
     "frame": words("map", "the common frame"),
@@ -153,7 +155,7 @@ PARAMETERS = {
     ),
     "pose_frame": words("", "name of `~frame` in these poses, such as world; empty: the same"),
     "swarm_topic": words("/track/measured_poses", "hero_msgs/RobotPoses of `track`"),
-    "position_sd_m": number(0.002, 1e-5, 1.0, "m", "error of poses that come without covariance"),
+    "position_sd_m": number(0.002, 1e-5, 1.0, "m", SD_TEXT),
     "heading_sd_rad": number(0.01, 1e-5, 10.0, "rad", "the same of their yaw"),
     "rate_hz": number(PUBLISH_RATE_HZ, 1.0, 100.0, "Hz", "minimum publish rate; poses of an image come at once"),
 }

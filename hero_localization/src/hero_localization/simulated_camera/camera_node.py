@@ -13,9 +13,10 @@ from typing import Dict, List, Optional, Sequence, Tuple
 import cv2
 import numpy as np
 import rospy
-from geometry_msgs.msg import Point
+from geometry_msgs.msg import Point, TransformStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
+from tf2_msgs.msg import TFMessage
 
 from hero_node import command_line
 from hero_sim.errors import SimulatorError
@@ -24,9 +25,16 @@ from hero_sim.world.arena_file import load_arena
 
 from ..errors import LocalizationError, SettingsError
 from ..prints.boards import Board
-from ..prints.tag_images import FAMILIES, REFERENCE_SIZE_M
+from ..prints.tag_images import FAMILIES
 from .board_renderer import BoardRenderer, list_board_places
 from .frame_times import list_frames
+from .lab_setup import (
+    describe_references,
+    find_first_reference,
+    hang_above,
+    list_references,
+    write_camera_file,
+)
 from .renderer import CameraRenderer
 from .view import CameraOptions, PrintedTag, View
 
@@ -34,13 +42,6 @@ PROGRAM = "simulated_camera"
 NODE = "camera"
 FRAME_ID = "camera_optical"
 JPEG_QUALITY = 90
-
-REFERENCES = 4
-FIRST_REFERENCE_ID = 100
-"""Of families that have so many tags; otherwise the last ones are reference tags."""
-
-REFERENCE_GAP_M = 0.12
-"""Between the arena's bounds and the centers of the reference tags beside it."""
 
 MOUNT_ERROR_M, MOUNT_ERROR_RAD = 0.002, 0.03
 PLACE_ERROR_M = 0.001
@@ -91,10 +92,9 @@ class TrueRobots:
 class RobotScene:
     """The arena with its robots."""
 
-    def __init__(self, options: argparse.Namespace, camera: CameraOptions) -> None:
-        """Prepare the pictures. Raises: OptionError for an unusable arena."""
+    def __init__(self, options: argparse.Namespace, camera: CameraOptions, arena: Arena) -> None:
+        """Prepare the pictures."""
         self._ids = list(range(options.first_id, options.first_id + options.count))
-        arena = _load_arena(options)
         random = np.random.RandomState(options.seed)
         errors = np.array((MOUNT_ERROR_M, MOUNT_ERROR_M, MOUNT_ERROR_RAD)) * (not options.perfect)
         tags = [
@@ -111,6 +111,14 @@ class RobotScene:
         self._hand_m: Optional[Tuple[float, float]] = None
         self._true = TrueRobots(self._ids)
         rospy.Subscriber("~hand", Point, self._receive_hand)
+        if options.write_file:
+            write_camera_file(options.write_file, self._renderer.view, camera, tags, references)
+        # The reference tags lie at places of the simulator's world: for RViz, which shows its walls.
+        transform = TransformStamped(child_frame_id="world")
+        transform.header.stamp, transform.header.frame_id = rospy.get_rostime(), "map"
+        transform.transform.rotation.w = 1.0
+        self._world = rospy.Publisher("/tf_static", TFMessage, queue_size=1, latch=True)
+        self._world.publish(TFMessage([transform]))
 
     def _receive_hand(self, point: Point) -> None:
         self._hand_m = (point.x, point.y) if math.isfinite(point.x) and math.isfinite(point.y) else None
@@ -151,13 +159,17 @@ class CameraNode:
     """Publishers of one camera."""
 
     def __init__(self, options: argparse.Namespace) -> None:
-        """Prepare the pictures. Raises: OptionError for an unusable arena."""
+        """Prepare the pictures. Raises: OptionError for an unusable arena. SettingsError for one that is too large."""
         size = (options.width, round(options.width * 9 / 16))
-        self._options = _scale(CameraOptions(), *size)._replace(
+        camera = _scale(CameraOptions(), *size)._replace(
             rate_hz=options.rate, delay_s=options.delay, exposure_s=options.exposure
         )
+        arena = _load_arena(options)
+        self._options = hang_above(camera, arena, list_references(arena, options.family), options.tag_size)
         self._matrix = View(self._options).matrix
-        self._scene = BoardScene(options, self._options) if options.board else RobotScene(options, self._options)
+        self._scene = (
+            BoardScene(options, self._options) if options.board else RobotScene(options, self._options, arena)
+        )
         self._stamps_arrival = options.stamps == "arrival"
         self._seed = options.seed
         self._image = rospy.Publisher("camera/image_raw", Image, queue_size=1)
@@ -220,27 +232,6 @@ def _load_arena(options: argparse.Namespace) -> Arena:
     return load_arena(options.arena) if options.arena else build_default(options.count)
 
 
-def find_first_reference(family: str) -> int:
-    """Return the id of the first reference tag."""
-    return min(FIRST_REFERENCE_ID, FAMILIES[family].size - REFERENCES)
-
-
-def list_references(arena: Arena, family: str) -> List[PrintedTag]:
-    """Return the reference tags, on the floor beside the arena, where they are meant to lie: at whole millimeters."""
-    x_min_m, y_min_m, x_max_m, y_max_m = arena.bounds_m.tolist()
-    y_m = 0.8 * (y_max_m - y_min_m) / 2.0
-    middle_m = (y_min_m + y_max_m) / 2.0
-    places_m = [
-        (round(x_m, 3), round(middle_m + side * y_m, 3))
-        for x_m in (x_min_m - REFERENCE_GAP_M, x_max_m + REFERENCE_GAP_M)
-        for side in (-1.0, 1.0)
-    ]
-    return [
-        PrintedTag(find_first_reference(family) + index, REFERENCE_SIZE_M, 0.0, *place_m, family=family)
-        for index, place_m in enumerate(places_m)
-    ]
-
-
 def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(prog=PROGRAM, description="A simulated camera above the simulated robots.")
@@ -259,6 +250,7 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     add("--perfect", action="store_true", help="tags exactly in the robots' centers, reference tags at their places")
     text = "print where the reference tags lie, as the camera's file wants it, and end"
     add("--print-references", action="store_true", help=text)
+    add("--write-file", metavar="FILE", help="write a camera file, calibrated without error")
     add("--seed", type=int, default=0, help="of noise, dropped pictures and places of tags (%(default)s)")
     options = parser.parse_args(arguments)
     limits = {
@@ -283,9 +275,7 @@ def _run() -> None:
     if options.first_id + options.count > first_reference:
         raise SettingsError("tags from %d on are reference tags: take lower ids" % first_reference)
     if options.print_references:
-        tags = list_references(_load_arena(options), options.family)
-        places = ["%d: [%.3f, %.3f, 0]" % (tag.tag_id, tag.x_m, tag.y_m) for tag in tags]
-        print("references: {%s}" % ", ".join(places))
+        print(describe_references(list_references(_load_arena(options), options.family)))
         return
     rospy.init_node(NODE)
     CameraNode(options).run()
