@@ -1,8 +1,8 @@
 """Lines on robots that are lost and found again: each of a few robots, one summary of many. Pure."""
 
+import collections
 import math
-from collections import Counter
-from typing import List
+from typing import Counter, List
 
 PERIOD_S = 10.0
 SINGLE_LINES = 4
@@ -33,7 +33,7 @@ class LossLines:
         """Return the summary if one is due."""
         if now_s < self._start_s + PERIOD_S:
             return []
-        counts, self._summed = self._summed, Counter()
+        counts, self._summed = self._summed, collections.Counter()
         if not counts:
             self._singles_left = SINGLE_LINES
             return []
