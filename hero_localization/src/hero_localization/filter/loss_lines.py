@@ -17,7 +17,7 @@ class LossLines:
     def __init__(self) -> None:
         self._start_s = -math.inf
         self._singles_left = SINGLE_LINES
-        self._summed: Counter[int] = Counter()
+        self._summed: Counter[int] = collections.Counter()
 
     def add(self, robot_id: int, line: str, now_s: float) -> List[str]:
         """Return the line, or nothing if it is counted for the summary."""
