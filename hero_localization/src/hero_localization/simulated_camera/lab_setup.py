@@ -1,17 +1,17 @@
 """The simulated lab: its reference tags, the camera above its arena, and the camera file that describes both."""
 
+import math
+import os
 from typing import List, Sequence
 
 import numpy as np
+import yaml
 
-from hero_client.values.geometry import Pose
+from hero_node.safe_file import write_file
 from hero_sim.world.arena import Arena
 
-from ..camera.camera_model import Camera, Lens
 from ..errors import SettingsError
 from ..prints.tag_images import FAMILIES, REFERENCE_SIZE_M
-from ..tracking import settings as camera_file
-from ..tracking.tag_pose import DEFAULT_HEIGHT_M
 from .view import CameraOptions, PrintedTag, View, tag_corners
 
 REFERENCES = 4
@@ -20,6 +20,8 @@ FIRST_REFERENCE_ID = 100
 
 REFERENCE_GAP_M = 0.12
 """Between the arena's bounds and the centers of the reference tags beside it."""
+
+TAG_HEIGHT_M = PrintedTag(0).height_m
 
 SHEET = 1.3
 """Side of a reference tag with the white margin that detectors need, in sides of the tag."""
@@ -64,7 +66,7 @@ def hang_above(
     Raises: SettingsError if robots' tags would be too small from there.
     """
     x_min_m, y_min_m, x_max_m, y_max_m = arena.bounds_m.tolist()
-    corners_m = [(x_m, y_m, DEFAULT_HEIGHT_M) for x_m in (x_min_m, x_max_m) for y_m in (y_min_m, y_max_m)]
+    corners_m = [(x_m, y_m, TAG_HEIGHT_M) for x_m in (x_min_m, x_max_m) for y_m in (y_min_m, y_max_m)]
     sheets = [tag._replace(size_m=SHEET * tag.size_m) for tag in references]
     seen_m = np.vstack([corners_m, *(tag_corners(tag, np.zeros((1, 3)))[0] for tag in sheets)])
     off_x_m, off_y_m, height_m = camera.position_m
@@ -85,13 +87,28 @@ def write_camera_file(
     path: str, view: View, options: CameraOptions, tags: Sequence[PrintedTag], references: Sequence[PrintedTag]
 ) -> None:
     """Write a camera file as calibrations without any error would. Raises: SettingsError."""
-    lens = Lens(options.width_px, options.height_px, view.matrix, view.distortion)
-    seen = {tag.tag_id: Pose(tag.x_m, tag.y_m, tag.yaw_rad) for tag in references}
-    parts = {
+    content = {
         "family": tags[0].family,
         "tag_size_m": tags[0].size_m,
-        "references": {tag_id: camera_file.describe_pose(pose) for tag_id, pose in seen.items()},
-        "mounts": {tag.tag_id: camera_file.describe_pose(Pose(tag.x_m, tag.y_m, tag.yaw_rad)) for tag in tags},
-        **camera_file.describe_camera(Camera(lens, view.rotation, view.position_m), seen),
+        "references": {tag.tag_id: _describe_place(tag) for tag in references},
+        "mounts": {tag.tag_id: _describe_place(tag) for tag in tags},
+        "lens": {
+            "width_px": options.width_px,
+            "height_px": options.height_px,
+            "matrix": view.matrix.ravel().tolist(),
+            "distortion": view.distortion.tolist(),
+        },
+        "camera": {"rotation": view.rotation.ravel().tolist(), "position_m": view.position_m.tolist()},
+        "seen_references": {tag.tag_id: _describe_place(tag) for tag in references},
     }
-    camera_file.update(path, parts)
+    path = os.path.expanduser(path)
+    try:
+        os.makedirs(os.path.dirname(path) or ".", exist_ok=True)
+        write_file(path, str(yaml.safe_dump(content, sort_keys=False, default_flow_style=None)).encode())
+    except OSError as error:
+        raise SettingsError("%s cannot be written: %s" % (path, error.strerror)) from None
+
+
+def _describe_place(tag: PrintedTag) -> List[float]:
+    """Return x, y (m) and yaw (degrees) as the file holds them."""
+    return [round(float(tag.x_m), 5), round(float(tag.y_m), 5), round(math.degrees(tag.yaw_rad), 3)]
