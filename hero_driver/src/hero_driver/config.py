@@ -144,7 +144,7 @@ class DriverConfig:
             0.0,
             10.0,
             "s",
-            "silence of a program that commands a robot regularly (at least four times) after which the robot is"
+            "silence of a program that commands a robot regularly (at least six times) after which the robot is"
             " stopped, at least four periods of the program; 0: never",
         )
     )

@@ -438,7 +438,7 @@ class Gateway(LinkHandler):
         self._loop.call_later(COMMANDER_POLL_S, self._poll_commanders)
         now_s = time.monotonic()
         for bridge in self.bridges.values():
-            bridge.stop_if_silent(now_s)
+            bridge.watch_commanders(now_s)
 
     def _poll_fleet(self) -> None:
         self._loop.call_later(FLEET_POLL_S, self._poll_fleet)

@@ -20,7 +20,7 @@ import time
 from typing import Callable, Iterable, List, Optional
 
 from .commands.stop_progress import StopProgress, StopState
-from .commands.velocity_shaper import COMMAND_INTERVAL_S, STOP_PAYLOADS, ZERO_TWIST
+from .commands.velocity_shaper import STOP_PAYLOADS, ZERO_TWIST
 from .corrections.message_layouts import MD5SUMS
 from .peer import Peer
 from .ros.message_types import apply_aliases
@@ -32,6 +32,10 @@ BURST_LIGHTS = 62
 
 LIGHT_TYPE, LIGHT_MD5 = "std_msgs/ColorRGBA", "a29a96539573343b1310c73607334b00"
 LIGHT_SUFFIX = "/led"
+
+MOTION_AFTER_S = 0.1
+"""Motion goes out so long after a stop. A program's zero overtakes its own last commands, which come on connections of
+their own; the zero with which it makes sure follows after 0.05 to 0.06 s, and finds them waiting still."""
 
 POLL_S = 0.02
 REST_POLL_S = 0.1
@@ -195,7 +199,7 @@ class StopDelivery:
         peer.link.send_packet(encode_stop(peer, with_burst))
         peer.motion_mark = peer.link.handed_length
         if peer.bridge is not None:
-            peer.bridge.commands.discard_motion(now_s + COMMAND_INTERVAL_S)
+            peer.bridge.commands.discard_motion(now_s + MOTION_AFTER_S)
 
 
 def _is_pending(peer: Peer) -> bool:

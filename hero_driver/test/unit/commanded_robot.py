@@ -93,6 +93,7 @@ class CommandedRobot:
         self.lines = []
         self.is_stopped = False
         self._acknowledged_length = 0
+        self._hangs_until_s = 0.0
         self._buffer = b""
         self._reader = packets.PacketReader()
         context = robot_bridge.BridgeContext(
@@ -105,9 +106,9 @@ class CommandedRobot:
             commands=CommandSettings(False, True, 0.25, 0.5, 5.0, command_max_age_s=10.0, max_names=100),
         )
         self.bridge = robot_bridge.RobotBridge(identify("/hero_1/odom"), context)
-        self.bridge.attach()
         self.peer = Peer(self, Session(SessionLimits(), clock.now_s), None, bridge=self.bridge)
         self.bridge.corrections.restart(False, self.peer.wheels)
+        self.bridge.attach()
         self._names = {}
         self._senders = {}
         subscribed = FakeRobot(1, [entry for entry in STOCK_DECLARATIONS if entry.kind == SUB])
@@ -161,7 +162,14 @@ class CommandedRobot:
 
     # The robot.
 
+    def hang(self, for_s):
+        """Read nothing and send nothing for some time; TCP acknowledges what comes."""
+        self._hangs_until_s = self.clock.now_s + for_s
+
     def _read(self):
+        if self.clock.now_s < self._hangs_until_s:
+            self.clock.call_later(self._hangs_until_s - self.clock.now_s, self._read)
+            return
         data, self._buffer = self._buffer[:WINDOW_LENGTH], self._buffer[WINDOW_LENGTH:]
         now_s = self.clock.now_s
         self.motors.begin_read(now_s)
@@ -177,6 +185,9 @@ class CommandedRobot:
         self.clock.call_later(READ_CYCLE_S, self._read)
 
     def _send_reading(self):
+        if self.clock.now_s < self._hangs_until_s:
+            self.clock.call_later(self._hangs_until_s - self.clock.now_s, self._send_reading)
+            return
         ticks = self.motors.count_ticks(self.clock.now_s)
         self.peer.session.last_receive_s = self.clock.now_s
         self.peer.wheels.read_ticks(ticks, ticks)
@@ -190,7 +201,7 @@ class CommandedRobot:
     # The programs.
 
     def _watch_commanders(self):
-        self.bridge.stop_if_silent(self.clock.now_s)
+        self.bridge.watch_commanders(self.clock.now_s)
         self.clock.call_later(COMMANDER_POLL_S, self._watch_commanders)
 
     def publish(self, name, payload, node="/program", source=None, is_old=False):

@@ -2,6 +2,7 @@
 
 import pytest
 from commanded_robot import MOTORS, POSITION, VELOCITY, Clock, CommandedRobot
+from fake_motors import LAG_S, FakeMotors
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -53,13 +54,25 @@ def test_a_program_with_jitter_is_never_taken_for_a_hung_one(pauses_s):
     assert robot.lines == []
 
 
-def test_bursts_of_commands_with_pauses_stop_the_robot_once_at_most():
+def test_short_bursts_with_pauses_keep_the_meaning_that_the_firmware_gives_them():
     with Clock().is_the_drivers() as clock:
         robot = CommandedRobot(clock, has_readings=True)
         for _ in range(10):
             robot.publish_at(50, 0.1)
             clock.run(0.9)
-    assert len(robot.lines) == 1
+        assert robot.motors.is_turning
+    assert robot.lines == []
+
+
+@pytest.mark.parametrize("pause_s", [0.6, 1.0, 2.0, 3.9, 6.0])
+def test_a_program_that_hangs_twice_within_seconds_is_stopped_twice(pause_s):
+    with Clock().is_the_drivers() as clock:
+        robot = CommandedRobot(clock, has_readings=True)
+        for _ in range(2):
+            robot.publish_at(10, 0.7)
+            assert robot.motors.is_turning
+            clock.run(pause_s)
+            assert not robot.motors.is_turning
 
 
 def test_silence_does_not_count_while_the_driver_itself_did_not_run():
@@ -94,7 +107,32 @@ def test_a_commander_that_stopped_its_robot_may_be_silent():
     assert robot.lines == []
 
 
-# What a stop on one topic ends.
+# What a stop has to end.
+
+
+@pytest.mark.parametrize("name", [VELOCITY, POSITION])
+@pytest.mark.parametrize("hang_s", [0.05, 0.1, 0.2, 0.4, 0.7, 1.0, 2.0])
+@pytest.mark.parametrize("driven_s", [0.1, 0.3, 1.0])
+def test_a_robot_that_hangs_while_it_is_told_to_stop_stops_when_it_goes_on(name, hang_s, driven_s):
+    with Clock().is_the_drivers() as clock:
+        robot = CommandedRobot(clock, has_readings=True)
+        robot.publish_at(10, driven_s, name=name)
+        robot.hang(hang_s)
+        robot.publish_velocity(0.1, name=name)
+        clock.run(0.05)
+        robot.publish_velocity(0.0, name=name)
+        clock.run(max(hang_s, STOP_S) + 0.35)
+        assert not robot.motors.is_turning
+
+
+def test_an_ordinary_zero_is_sent_twice_and_no_more_if_it_works():
+    with Clock().is_the_drivers() as clock:
+        robot = CommandedRobot(clock, has_readings=True, motors=FakeMotors(lag_s=LAG_S))
+        robot.publish_at(10, 2.0)
+        written = len(robot.writes)
+        robot.publish_velocity(0.0)
+        clock.run(3.0)
+    assert len(robot.writes) == written + 2
 
 
 @pytest.mark.parametrize("mover", [VELOCITY, POSITION, MOTORS])
@@ -110,6 +148,26 @@ def test_a_stop_on_one_motion_topic_ends_what_came_through_another(mover, topic,
         robot.publish(topic, stop, node=node)
         clock.run(STOP_S)
         assert not robot.motors.is_turning
+
+
+@pytest.mark.parametrize("mover", [POSITION, MOTORS])
+@given(overtaken_s=st.floats(0.0, 0.05), again_s=st.floats(0.055, 0.095), phase_s=st.floats(0.0, 0.051))
+def test_what_a_programs_zero_overtook_does_not_move_the_robot(mover, overtaken_s, again_s, phase_s):
+    with Clock().is_the_drivers() as clock:
+        robot = CommandedRobot(clock, phase_s=phase_s, has_readings=True)
+        payload = b"\x78\x05\x40\x06" if mover == MOTORS else bytes(6) + b"\xf0\x3f" + bytes(40)
+        for _ in range(10):
+            robot.publish(mover, payload)
+            clock.run(0.1)
+        taken = len(robot.taken)
+        robot.publish(VELOCITY, ZERO_TWIST)
+        clock.run(overtaken_s)
+        robot.publish(mover, payload)
+        clock.run(again_s - overtaken_s)
+        robot.publish(VELOCITY, ZERO_TWIST)
+        clock.run(STOP_S)
+        assert not robot.motors.is_turning
+    assert {payload for _, _, payload in robot.taken[taken:]} <= {ZERO_TWIST}
 
 
 def test_a_stop_leaves_what_another_program_drives_at_this_moment():

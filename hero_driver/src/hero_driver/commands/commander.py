@@ -1,12 +1,13 @@
-"""Which programs command one robot on its motion topics, and how regularly. Pure."""
+"""Which programs command one robot on its motion topics, how regularly, and whether it takes their zeros. Pure."""
 
 import collections
-from typing import Any, Deque, Dict, Optional
+from typing import Any, Deque, Dict, NamedTuple, Optional
 
+from ..corrections.wheel_motion import WheelMotion
 from ..robot_constants import LONGEST_WATCHDOG_S
 
-REGULAR_INTERVALS = 3
-"""Between four commands: from then on a program commands regularly. Fewer may be single commands."""
+REGULAR_INTERVALS = 5
+"""Between six commands: from then on a program commands regularly. Fewer may be single commands, or a short burst."""
 
 INTERVALS_KEPT = 8
 """Its period is the longest of these intervals: a program with jitter, or with pauses, is not taken for a hung one."""
@@ -15,6 +16,18 @@ SILENT_PERIODS = 4
 
 RIVAL_SILENCE_S = 0.5
 """A program that commands regularly, and did so within this time or SILENT_PERIODS, drives the robot at this moment."""
+
+ZERO_SHOWS_S = 0.5
+"""So long after a zero the wheels of an ordinary robot rest, and at least so many of its readings show that:"""
+
+STILL_READINGS = 2
+
+
+class _Zero(NamedTuple):
+    """A zero that ended all motion, and how many readings of its wheels the robot had sent."""
+
+    now_s: float
+    readings: int
 
 
 class Commander:
@@ -39,8 +52,10 @@ class Commander:
     def note_command(self, moves: bool, now_s: float) -> None:
         """Its next command came."""
         interval_s = now_s - self.commanded_s
+        # What it does after a silence tells its period anew: the silence itself is none.
+        begins = interval_s > LONGEST_WATCHDOG_S or self.has_fallen_silent(RIVAL_SILENCE_S, now_s)
         self.moves, self.commanded_s = moves, now_s
-        if self._intervals_s is None or interval_s > LONGEST_WATCHDOG_S:
+        if self._intervals_s is None or begins:
             self._intervals_s = collections.deque(maxlen=INTERVALS_KEPT)
         else:
             self._intervals_s.append(interval_s)
@@ -63,15 +78,23 @@ class Commander:
 class Commanders:
     """The programs that command one robot: on each motion topic the one of the newest command."""
 
-    def __init__(self) -> None:
+    def __init__(self, wheels: WheelMotion) -> None:
+        """Take the robot's wheels."""
+        self._wheels = wheels
         self._by_topic: Dict[str, Commander] = {}
+        self._zero: Optional[_Zero] = None  # until its effect shows
 
     def note_command(self, name: str, commander: Commander, moves: bool, now_s: float) -> Commander:
         """A command came on the motion topic called name; return its commander, which may be known already."""
+        were_moving = self.are_moving
         known = self._by_topic.get(name)
         if known is None or (known.sender, known.source) != (commander.sender, commander.source):
             known = self._by_topic[name] = commander
         known.note_command(moves, now_s)
+        if self.are_moving:
+            self._zero = None
+        elif were_moving:
+            self._zero = _Zero(now_s, self._wheels.readings)
         return known
 
     def find(self, name: str) -> Optional[Commander]:
@@ -86,6 +109,7 @@ class Commanders:
 
     def stop(self) -> None:
         """The robot is being stopped, whatever was commanded."""
+        self._zero = None
         for commander in self._by_topic.values():
             commander.moves = False
 
@@ -93,6 +117,17 @@ class Commanders:
         """Count silence from now on."""
         for commander in self._by_topic.values():
             commander.forgive_silence(now_s)
+
+    def is_zero_missed(self, now_s: float) -> bool:
+        """Return, once, whether the wheels show that the robot did not take a zero.
+
+        One that hung for a moment reads the zeros together with the motion before them, and its firmware drops them.
+        """
+        if self._zero is None or now_s - self._zero.now_s < ZERO_SHOWS_S:
+            return False
+        wheels, is_heard = self._wheels, self._wheels.readings > self._zero.readings
+        self._zero = None
+        return wheels.readings > 0 and not (is_heard and wheels.still_readings >= STILL_READINGS)
 
     def find_silent(self, silence_s: float, now_s: float) -> Optional[Commander]:
         """Return a program that moves the robot and has fallen silent, None if there is none."""

@@ -70,6 +70,7 @@ class RobotCorrections:
     Attributes:
         odometry: the robot's tick odometry.
         transforms: the robot's transforms.
+        wheels: whether its wheels turn.
     """
 
     def __init__(
@@ -84,7 +85,6 @@ class RobotCorrections:
         sinks: of the topics that were chosen or derived, by their names; add_transform takes transforms of all
         robots.
         """
-        self._wheels = WheelMotion()
         self._sinks = sinks
         self._add_transform = add_transform
         self._namespace = namespace
@@ -93,6 +93,7 @@ class RobotCorrections:
         self._uses_ticks = settings.odometry == "ticks"
         self._offsets_ns: Deque[int] = collections.deque(maxlen=OFFSET_SAMPLES)
         self._seqs: DefaultDict[str, Iterator[int]] = collections.defaultdict(itertools.count)
+        self.wheels = WheelMotion()
         self.odometry = TickOdometry(settings.geometry)
         self.transforms = TransformCorrector(
             namespace, self._stamps, add_transform, self._take_odom_transform
@@ -120,7 +121,7 @@ class RobotCorrections:
 
         wheels is told of the encoder's readings, or of odometry where there is no encoder.
         """
-        self._wheels = wheels
+        self.wheels = wheels
         self._has_encoder = self._uses_estimate = self._hears_encoder = False
         self._is_first_reading = True
         self._encoder_stamp_ns = self._odom_stamp_ns = -BURST_NS
@@ -132,12 +133,12 @@ class RobotCorrections:
     def note_reboot(self) -> None:
         """The robot's counters begin anew; the pose stays."""
         self.odometry.expect_reset()
-        self._wheels.forget_ticks()
+        self.wheels.forget_ticks()
 
     def set_pose(self, pose: Pose) -> None:
         """The robot's odometry was set, which zeroes its counters."""
         self.odometry.set_pose(pose)
-        self._wheels.forget_ticks()
+        self.wheels.forget_ticks()
         self._packed_pose = self._pack_pose()
 
     @property
@@ -223,7 +224,7 @@ class RobotCorrections:
         if not self._hears_encoder:
             velocity = message_layouts.read_odometry_velocity(payload)
             if velocity is not None:
-                self._wheels.read_velocity(*velocity)
+                self.wheels.read_velocity(*velocity)
         corrected_ns = self._stamps.correct(self._odom_name, stamp_ns, arrival_ns)
         if self._has_encoder:
             if self._waiting:
@@ -241,7 +242,7 @@ class RobotCorrections:
             self._refused += 1
             return
         stamp_ns, left_ticks, right_ticks = reading
-        self._wheels.read_ticks(left_ticks, right_ticks)
+        self.wheels.read_ticks(left_ticks, right_ticks)
         self._encoder_stamp_ns = stamp_ns
         self._encoder_follows = abs(stamp_ns - self._odom_stamp_ns) <= BURST_NS
         if self._is_first_reading:

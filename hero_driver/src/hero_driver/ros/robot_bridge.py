@@ -108,7 +108,7 @@ class RobotBridge:
         self._ids: Dict[str, int] = {}
         self._layouts: Dict[str, Layout] = {}  # as declared last, of what the robot takes
         self._publisher_layouts: Dict[str, Layout] = {}  # and of what it sends
-        self._commanders = Commanders()
+        self._commanders = Commanders(self.corrections.wheels)
         self._subscribers: Dict[str, RawSubscriber] = {}
         self._newest_sender: Any = None  # connection of the newest motion command, and the name of its node
         self._newest_node = ""
@@ -125,7 +125,7 @@ class RobotBridge:
         self._connection += 1
         self._ids.clear()
         self._service_halves.clear()
-        self._commanders = Commanders()
+        self._commanders = Commanders(self.corrections.wheels)
         self.note_tuning(False)
         self._connected = True
 
@@ -305,8 +305,10 @@ class RobotBridge:
         """Whether a program has asked for motion, and not for a stop, since the last forget_motion()."""
         return self._commanders.are_moving
 
-    def stop_if_silent(self, now_s: float) -> None:
-        """Stop the robot if the program that commands it regularly has fallen silent: it hangs, or its network does."""
+    def watch_commanders(self, now_s: float) -> None:
+        """Stop the robot if it missed a program's zero, or if a program that commands it regularly has fallen silent."""
+        if self._commanders.is_zero_missed(now_s):
+            self._owner.stop_robot(self)
         silent = self._commanders.find_silent(self._settings.silent_stop_s, now_s)
         if silent is not None and self._settings.silent_stop_s > 0.0:
             silence_s = now_s - silent.commanded_s
