@@ -265,11 +265,16 @@ PARAMETERS: Dict[str, Parameter] = {
 }
 
 
+FORMER_STOP = "stopped"
+"""Set by version 0.2 itself, to keep a stop: a running ROS master may still hold it. It has no effect."""
+
+
 def read_config(given: Mapping[str, Any]) -> DriverConfig:
     """Return the checked configuration in the given parameters (names without "~").
 
     Raises: ProgramError.
     """
+    given = {name: value for name, value in given.items() if name != FORMER_STOP}
     config = DriverConfig(**check_parameters(PARAMETERS, given))
     if not config.host and not config.robots:
         raise ProgramError(

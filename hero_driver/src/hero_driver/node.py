@@ -26,7 +26,7 @@ from hero_node.ros.connections import limit_xmlrpc_connections, open_tcpros_serv
 from hero_node.ros.master import find_running_node
 from hero_node.ros.ros_node import end_ros_node
 
-from .config import DriverConfig, read_config
+from .config import FORMER_STOP, DriverConfig, read_config
 from .gateway import STOP_LIMIT_S, Gateway
 from .kept_stop import KeptStop
 from .reports import FleetStatus, Reporter
@@ -297,7 +297,12 @@ def _read_private_parameters() -> Any:
         parameters = rospy.get_param("~", {})
     except (rosgraph.MasterException, OSError) as error:
         raise ProgramError("the ROS master cannot be asked for parameters: %s" % error) from error
-    return parameters if isinstance(parameters, dict) else {}
+    if not isinstance(parameters, dict):
+        return {}
+    if FORMER_STOP in parameters:
+        text = "~%s, which an earlier version kept on the ROS master, is ignored: if it is true, stop the robots again"
+        rospy.logwarn(text, FORMER_STOP)
+    return parameters
 
 
 def _explain_bind_error(config: DriverConfig, error: OSError) -> str:

@@ -84,6 +84,10 @@ def test_an_unknown_parameter_is_refused_with_the_name_that_was_meant():
     assert "did you mean" not in refuse("xyzzy", 1)
 
 
+def test_a_stop_that_an_earlier_version_kept_on_the_master_is_no_error():
+    assert read_config({"stopped": True}) == DriverConfig()
+
+
 # Numbers.
 
 

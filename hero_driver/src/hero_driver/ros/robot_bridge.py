@@ -306,7 +306,7 @@ class RobotBridge:
         return self._commanders.are_moving
 
     def watch_commanders(self, now_s: float) -> None:
-        """Stop the robot if it missed a program's zero, or if a program that commands it regularly has fallen silent."""
+        """Stop the robot if it missed a zero, or if a program that commands it regularly has fallen silent."""
         if self._commanders.is_zero_missed(now_s):
             self._owner.stop_robot(self)
         silent = self._commanders.find_silent(self._settings.silent_stop_s, now_s)
