@@ -54,7 +54,7 @@ def test_a_program_with_jitter_is_never_taken_for_a_hung_one(pauses_s):
     assert robot.lines == []
 
 
-def test_short_bursts_with_pauses_keep_the_meaning_that_the_firmware_gives_them():
+def test_short_bursts_with_pauses_keep_the_firmwares_meaning():
     with Clock().is_the_drivers() as clock:
         robot = CommandedRobot(clock, has_readings=True)
         for _ in range(10):

@@ -30,6 +30,7 @@ def test_goals_in_map_are_reached_to_10_mm_although_odometry_drifts():
     [
         (lambda now_s, true: true._replace(yaw_rad=true.yaw_rad + math.pi), "heading of its pose .* upside down", 0.12),
         (lambda now_s, true: true._replace(yaw_rad=true.yaw_rad + 2.0), r"its pose is about 11\d degrees", 0.25),
+        (lambda now_s, true: true._replace(yaw_rad=true.yaw_rad - math.pi / 3.0), r"about -[56]\d degrees", 0.25),
         (lambda now_s, true: true._replace(x_m=true.x_m + now_s // 1.0 % 2.0), "its pose jumps, .* by 1.00 m", 0.35),
         (lambda now_s, true: true._replace(x_m=true.x_m + now_s // 0.2 % 2.0), "its pose jumps", 0.1),
         (lambda now_s, true: Pose(0.0, 0.0, 0.0), "wheels turn, but .* does the camera's image stand still", 0.35),
@@ -45,6 +46,22 @@ def test_a_robot_with_wrong_poses_stops_soon_and_says_what_is_wrong(measure, rea
         swarm.sleep(1.0)
         assert math.dist(start[:2], robot.true_pose[:2]) < farthest_m
         assert robot.velocity == (0.0, 0.0)
+
+
+@pytest.mark.parametrize(("place_sd_m", "yaw_sd_rad", "off_rad"), [(0.003, 0.05, 0.0), (0.002, 0.02, 0.5)])
+def test_a_robot_with_noisy_or_somewhat_turned_poses_reaches_its_goals(place_sd_m, yaw_sd_rad, off_rad):
+    rng = np.random.RandomState(3)
+    with StepSwarm(1, seed=3, arena="empty") as swarm:
+        robot = swarm[0]
+
+        def measure():
+            errors = rng.normal(0.0, (place_sd_m, place_sd_m, yaw_sd_rad)) + (0.0, 0.0, off_rad)
+            return Pose(*np.add(robot.true_pose, errors))
+
+        robot.localize_by(measure)
+        for goal in ((0.4, 0.1), (-0.3, 0.2), (0.0, -0.3)):
+            robot.go_to(*goal, frame="map", tolerance_m=0.03)
+            assert math.dist(robot.true_pose[:2], goal) < 0.04
 
 
 def test_a_robot_that_is_carried_once_still_reaches_its_goal():
