@@ -57,7 +57,7 @@ def _add_link_options(group: "argparse._ArgumentGroup") -> None:
 def _add_robot_options(group: "argparse._ArgumentGroup") -> None:
     add = group.add_argument
     add("--imu-hat", action="store_true", help="robots have the IMU hat")
-    add("--perfect", action="store_true", help="all robots alike: no wheel errors, no slip (sensors stay noisy)")
+    add("--perfect", action="store_true", help="identical robots: no wheel errors or slip (sensors stay noisy)")
     add(
         "--error",
         action="append",
@@ -65,7 +65,7 @@ def _add_robot_options(group: "argparse._ArgumentGroup") -> None:
         metavar="KEY=VALUE,..[,robot=ID]",
         help="a known error of a robot, or of all, e.g. robot=1,left_center_us=1530; may be repeated",
     )
-    add("--print-errors", action="store_true", help="print how the robots differ, as --error takes it, and end")
+    add("--print-errors", action="store_true", help="print the robots' differences as --error takes them, and exit")
     add(
         "--ir",
         choices=("calibrated", "factory", "erased"),
@@ -82,7 +82,7 @@ def _add_robot_options(group: "argparse._ArgumentGroup") -> None:
         "--servo-timing",
         choices=SERVO_TIMINGS,
         default=CORE_2,
-        help="of which ESP8266 core: 2.x never waits for a pulse, 3.x does; drawn: each robot its own (core2)",
+        help="of ESP8266 core 2.x or 3.x, or drawn for each robot (core2)",
     )
     add(
         "--flash-dir",

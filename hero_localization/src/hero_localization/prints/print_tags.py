@@ -66,7 +66,7 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument(
         "--reference-size", type=float, default=1e3 * REFERENCE_SIZE_M, metavar="MM", help=text
     )
-    parser.add_argument("--board", action="store_true", help="the chessboard to calibrate the lens with")
+    parser.add_argument("--board", action="store_true", help="the chessboard for calibrating the intrinsics")
     parser.add_argument("--paper", choices=sorted(PAPERS_MM), default="a4", help="(%(default)s)")
     parser.add_argument("--out", default="tags.pdf", metavar="FILE.pdf", help="(%(default)s)")
     return parser.parse_args(arguments)

@@ -158,7 +158,7 @@ PARAMETERS = {
     "robots": robot_ids("all", "ids; all: those that have joined a driver"),
     "frame": words("map", "frame of the poses: that of localize, or `world` for the simulator's ground truth"),
     "poses_topic": words("/localization/poses", "hero_msgs/RobotPoses of `localize`"),
-    "safety": choice("off", MODES, "what keeps robots apart: off, fence, or fence and robots"),
+    "safety": choice("off", MODES, "safety filter: off, fence, or fence and robots"),
     "fence": words("", "x min, y min, x max, y max of the fence, m"),
     "seed": whole_number(0, 0, 2**31 - 1, "", "of the behaviour's random numbers"),
     "time_s": number(0.0, 0.0, 1e6, "s", "stop after so long; 0 runs until Ctrl-C"),
