@@ -115,8 +115,8 @@ def make_localization_displays(names: Sequence[str]) -> List[Dict[str, Any]]:
 
 
 def make_picture_display() -> Dict[str, Any]:
-    """Return the display of the overhead camera's picture, which RViz enables even if its file says no."""
-    return {"Class": "rviz/Image", "Name": "camera's picture", "Enabled": True, "Image Topic": "/track/picture"}
+    """Return the display of the overhead camera's image, which RViz enables even if its file says no."""
+    return {"Class": "rviz/Image", "Name": "camera's image", "Enabled": True, "Image Topic": "/track/picture"}
 
 
 def make_marker_display(name: str, topic: str) -> Dict[str, Any]:

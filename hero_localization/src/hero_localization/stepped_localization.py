@@ -23,16 +23,16 @@ __all__ = ["CameraModel", "StepLocalization"]
 
 
 class CameraModel(NamedTuple):
-    """How well a camera measures robots; it takes a picture with each reading of odometry, 29 in a second."""
+    """How well a camera measures robots; it takes an image with each reading of odometry, 29 in a second."""
 
     delay_s: float = 0.1
-    """From the picture to the measured pose."""
+    """From the image to the measured pose."""
     bias_sd_m: float = 0.001
     bias_sd_rad: float = 0.005
     """Of one robot always the same: calibration, and how its tag sits. In x and y each."""
     noise_sd_m: float = 0.0005
     noise_sd_rad: float = 0.005
-    """Of each picture anew."""
+    """Of each image anew."""
 
 
 CAMERA = CameraModel()
@@ -58,7 +58,7 @@ class StepLocalization:
         swarm.rows.on_cycle.append(self._receive)
 
     def find_pose(self, row: int) -> Pose:
-        """Return where the robot at row is in map. Raises: FrameError before the first picture has come."""
+        """Return where the robot at row is in map. Raises: FrameError before the first image has come."""
         estimate = self._published[row]
         if estimate is None:
             raise FrameError("the robot at row %d has no pose in the frame map yet" % row)

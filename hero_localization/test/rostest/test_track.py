@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """From the simulated camera to poses: calibrate_camera as people run it, then track and localize as launched.
 
-The pictures pass through this test, which spoils them.
+The images pass through this test, which spoils them.
 """
 
 import json
@@ -39,18 +39,18 @@ STARTED_TURN_RAD = 0.3
 STOPPED_RAD_S = 0.01
 
 VIDEO_HZ, VIDEO_FRAMES = 30.0, 30
-"""As many pictures as the calibration needs."""
+"""As many images as the calibration needs."""
 
 SHIFT_PX = 12
 """20 mm on the floor."""
 
 
 class Spoiler:
-    """Hands the camera's pictures on, as /spoiled/image_raw/compressed, with what is wrong with them.
+    """Hands the camera's images on, as /spoiled/image_raw/compressed, with what is wrong with them.
 
     Attributes:
-        newest: the last picture that came.
-        change: what makes another picture of each; None: there are no pictures.
+        newest: the last image that came.
+        change: what makes another image of each; None: there are no images.
     """
 
     def __init__(self):
@@ -97,7 +97,7 @@ class TrackTest(unittest.TestCase):
         rospy.Subscriber("/localization/poses", RobotPoses, cls.receive_poses)
         rospy.Subscriber("/track/measured_poses", RobotPoses, cls.receive_measured)
         rospy.Subscriber("/track/objects", ObjectPoses, cls.receive_objects)
-        wait_for(lambda: cls.spoiler.newest is not None, "a picture")
+        wait_for(lambda: cls.spoiler.newest is not None, "an image")
 
     @classmethod
     def receive_truth(cls, message, robot_id):
@@ -174,7 +174,7 @@ class TrackTest(unittest.TestCase):
         options = ("__name:=track_video", "_device:=" + self.video, "_file:=" + self.path)
         program = Program(find_program("hero_localization", "track"), *options)
         self.addCleanup(program.close)
-        self.wait_for_problem("track_video: camera", "arena.avi gives no more pictures: the video has ended")
+        self.wait_for_problem("track_video: camera", "arena.avi gives no more images: the video has ended")
         self.assertEqual([robot.id for robot in reports[-1].robots], [0])
         self.wait_at_truth(lambda: reports[-1].robots[0], 0)
         self.wait_at_truth(lambda: objects[-1].objects[0], 1)
@@ -190,7 +190,7 @@ class TrackTest(unittest.TestCase):
 
         program = self.start_calibration("robots", "--robots", "1 0")
         wait_for(has_turned, program.text)
-        self.assertIn("hero_1: tag 5 is not in the picture, or too dark; the robot was not moved", program.text())
+        self.assertIn("hero_1: tag 5 is not in the image, or too dark; the robot was not moved", program.text())
         self.assertEqual(program.end(), 1, program.text())
         self.assertIn("ended before the calibration was complete: the file is as it was", program.text())
         self.assertEqual(self.read_file(), content)
@@ -208,7 +208,7 @@ class TrackTest(unittest.TestCase):
         self.wait_at_truth(lambda: message.pose.pose.position, 0)
 
     def test_4_diagnostics_name_the_camera_and_the_robot_without_a_tag(self):
-        wait_for(lambda: "pictures per second" in self.problems.get("track: camera", ""), lambda: self.problems)
+        wait_for(lambda: "images per second" in self.problems.get("track: camera", ""), lambda: self.problems)
         wait_for(lambda: "never measured" in self.problems.get("localization: hero_1", ""), lambda: self.problems)
 
     def test_5_what_was_found_is_shown_in_a_picture(self):
@@ -235,13 +235,13 @@ class TrackTest(unittest.TestCase):
         self.wait_for_problem("track: tag 0", "appears more than once in the image and is ignored")
         self.wait_for_problem("localization: hero_77", "its tag is seen, but no driver knows the robot")
         self.spoiler.change = lambda gray: gray // 8
-        self.wait_for_problem("track: camera", "pictures are too dark")
+        self.wait_for_problem("track: camera", "images are too dark")
         self.spoiler.change = lambda gray: np.roll(gray, SHIFT_PX, axis=1)
         self.wait_for_problem("track: camera", "the camera moved; calibrate the arena again")
 
     def test_8_a_camera_that_stops_is_named(self):
         self.spoiler.change = None
-        self.wait_for_problem("track: camera", "no picture for")
+        self.wait_for_problem("track: camera", "no image for")
         self.wait_for_problem("localization: hero_0", "is its tag covered")
 
     def test_9_a_second_camera_is_enough_and_check_reads_both(self):
@@ -251,14 +251,14 @@ class TrackTest(unittest.TestCase):
         self.addCleanup(program.close)
         self.wait_for_state(0, RobotPose.TRACKED)
         self.wait_at_truth(lambda: self.poses[0], 0)
-        wait_for(lambda: "pictures per second" in self.problems.get("track_2: camera", ""), lambda: self.problems)
+        wait_for(lambda: "images per second" in self.problems.get("track_2: camera", ""), lambda: self.problems)
         check = Program(find_program("hero_tools", "check"), "--json")
         self.addCleanup(check.close)
         check.wait_end()
         point = next(point for point in json.loads(check.text())["points"] if point["point"] == "localization")
         self.assertEqual(point["state"], "WARN")
-        self.assertRegex(point["text"], "track: no usable pictures; track_2: .* pictures per second")
-        self.assertRegex(point["remedy"][0], "track: camera: no picture for")
+        self.assertRegex(point["text"], "track: no usable images; track_2: .* images per second")
+        self.assertRegex(point["remedy"][0], "track: camera: no image for")
 
 
 if __name__ == "__main__":

@@ -29,7 +29,7 @@ def calibrate(tmp_path, monkeypatch):
 
     def watch(settings, pictures, program, robot_id, tag_id):
         if robot_id not in FOUND:
-            raise CalibrationError("tag %d is not in the picture" % tag_id)
+            raise CalibrationError("tag %d is not in the image" % tag_id)
         return FOUND[robot_id]
 
     monkeypatch.setattr(calibrate_camera, "_watch_robot", watch)
@@ -60,7 +60,7 @@ def test_robots_without_a_fault_are_good(calibrate, capsys):
 def test_a_robot_that_is_not_seen_does_not_keep_others_from_the_file(calibrate, capsys):
     status, found = calibrate("0 7")
     assert status == 1 and 0 in found.layout.mounts and 7 not in found.layout.mounts
-    assert "hero_7: tag 7 is not in the picture" in capsys.readouterr().out
+    assert "hero_7: tag 7 is not in the image" in capsys.readouterr().out
 
 
 def test_a_robot_whose_tag_is_another_ones_is_not_driven(calibrate, capsys):
@@ -75,7 +75,7 @@ def test_without_any_robot_seen_the_file_stays_as_it_was(calibrate):
 
 
 class Board:
-    """A board that is held still for two pictures at each place; the lens is known from `enough` views."""
+    """A board that is held still for two images at each place; the lens is known from `enough` views."""
 
     def __init__(self, enough, monkeypatch):
         self.enough, self.pictures, self.calibrated = enough, 0, []
@@ -115,4 +115,4 @@ def test_views_are_taken_until_the_lens_is_known(options, enough, status, calibr
 def test_too_few_views_are_refused_before_any_is_taken(capsys):
     with pytest.raises(SystemExit):
         calibrate_camera.parse_options(["lens", "--views", "7"])
-    assert "--views 7: it takes at least 8 pictures" in capsys.readouterr().err
+    assert "--views 7: it takes at least 8 images" in capsys.readouterr().err

@@ -8,7 +8,7 @@ from hero_localization.camera.camera_model import Camera, Lens
 MATRIX = np.array(((1390.0, 0.0, 955.0), (0.0, 1385.0, 545.0), (0.0, 0.0, 1.0)))
 DISTORTION = np.array((-0.12, 0.03, 0.0008, -0.0006, -0.002))
 DOWN = np.diag((1.0, -1.0, -1.0))
-"""Map's x axis to the right of the picture, its y axis up."""
+"""Map's x axis to the right of the image, its y axis up."""
 
 
 def overhead(distortion=DISTORTION, tilt_rad=0.0):

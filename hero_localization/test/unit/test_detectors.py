@@ -1,4 +1,4 @@
-"""Both detectors: place, order of corners and heading of tags in rendered pictures."""
+"""Both detectors: place, order of corners and heading of tags in rendered images."""
 
 import math
 import sys

@@ -1,4 +1,4 @@
-"""Pictures from topics and videos become gray; what cannot be used or opened is named; the newest picture counts."""
+"""Images from topics and videos become gray; what cannot be used or opened is named; the newest image counts."""
 
 import re
 
@@ -67,14 +67,14 @@ def test_pictures_with_too_few_bytes_are_named(source, change):
     for name, value in change.items():
         setattr(image, name, value)
     source.receive(image)
-    text = "pictures of %d x %d pixels come with %d bytes" % (image.width, image.height, len(image.data))
+    text = "images of %d x %d pixels come with %d bytes" % (image.width, image.height, len(image.data))
     assert source.poll(0.0) is None and source.problem.startswith(text)
 
 
 def test_compressed_pictures_are_decoded_and_broken_ones_named(receivers):
     source = TopicSource("/camera/image_raw/compressed")
     receive = receivers["/camera/image_raw/compressed"]
-    for data in (b"", b"no picture"):
+    for data in (b"", b"no image"):
         receive(CompressedImage(format="jpeg", data=data))
         assert source.poll(0.0) is None and "of the format 'jpeg' cannot be decoded" in source.problem
     message = CompressedImage(format="png", data=cv2.imencode(".png", GRAY)[1].tobytes())
@@ -126,7 +126,7 @@ def test_a_video_is_played_in_real_time_to_its_end(video, clock, tmp_path):
     assert video.arrived_s == frames[-1].stamp_s == clock[0]
     assert video.poll(TIMEOUT_S) is None
     assert clock[0] == pytest.approx(frames[-1].stamp_s + TIMEOUT_S)
-    assert video.problem == "%s gives no more pictures: the video has ended" % (tmp_path / "arena.avi")
+    assert video.problem == "%s gives no more images: the video has ended" % (tmp_path / "arena.avi")
 
 
 def test_a_picture_of_a_video_that_is_due_later_comes_later(video, clock):

@@ -1,4 +1,4 @@
-"""The lens from rendered pictures of a ChArUco board, and what too few or poor pictures are told."""
+"""The lens from rendered images of a ChArUco board, and what too few or poor images are told."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ BOARD = Board()
 
 
 def list_holds(count, tilt_rad, seed=0):
-    """Return turn and position of a board held all over the picture."""
+    """Return turn and position of a board held all over the image."""
     random = np.random.RandomState(seed)
     holds = []
     for index in range(count):
@@ -48,7 +48,7 @@ def views():
 
 
 def project(holds, noise_px=0.1, seed=0):
-    """Return views as exact as a good picture's, without rendering."""
+    """Return views as exact as a good image's, without rendering."""
     import cv2
 
     random, view = np.random.RandomState(seed), View(OPTIONS)
@@ -78,7 +78,7 @@ def test_lens_is_found_from_rendered_pictures(views):
     view = View(OPTIONS)
     true = view.project(np.column_stack((rays, np.ones(len(rays)))) @ view.rotation + view.position_m)
     shift = found.lens.distort(rays) - true
-    # A shift of the whole picture and a turn of the camera are one.
+    # A shift of the whole image and a turn of the camera are one.
     assert np.abs(shift - shift.mean(axis=0)).max() < 1.0
 
 
@@ -95,7 +95,7 @@ def test_picture_without_a_board_gives_none():
 
 
 def test_too_few_pictures_are_refused():
-    with pytest.raises(CalibrationError, match="found in 5 pictures; it takes 8"):
+    with pytest.raises(CalibrationError, match="found in 5 images; it takes 8"):
         calibrate(project(list_holds(5, 0.5)))
 
 

@@ -227,7 +227,7 @@ def test_a_robot_that_a_wall_holds_stays_where_it_is_measured(linear_m_s):
     wall_s = drive.samples[-1].stamp_s
     errors = follow(drive.push(3.0).run(3.0), pose_filter)
     stamps_s = np.array([sample.stamp_s for sample in drive.samples if sample.stamp_s > 1.0])
-    # Until a picture of the wall has come, and of the free drive after it, nothing tells of either.
+    # Until an image of the wall has come, and of the free drive after it, nothing tells of either.
     unknown_m = linear_m_s * (DELAY_S + 0.15)
     assert np.hypot(*errors[:, :2].T).max() < unknown_m + 0.005
     assert rms(errors[(stamps_s > wall_s + DELAY_S + 0.3) & (stamps_s < wall_s + 2.9)]) < 0.005

@@ -1,4 +1,4 @@
-"""A robot that is stepped below simulated cameras, from their rendered pictures to calibrations and poses."""
+"""A robot that is stepped below simulated cameras, from their rendered images to calibrations and poses."""
 
 import math
 from contextlib import nullcontext
@@ -41,7 +41,7 @@ starts_m_deg: [[0.1, 0.0, 0]]
 """
 PICTURE_S = 0.1
 MOST_OFF_M, MOST_OFF_RAD = 0.008, 0.04
-"""Two of the small pictures' pixels; a jump from one camera to the other by a mistake is far more."""
+"""Two of the small images' pixels; a jump from one camera to the other by a mistake is far more."""
 PLACES_M = ((-0.35, -0.16), (0.35, -0.16), (0.35, 0.16), (-0.35, 0.16))
 """Of a camera's reference tags, from the place below it."""
 
@@ -51,7 +51,7 @@ class Scene:
 
     Attributes:
         on_odometry: called with the stamp and the pose of each reading.
-        true_at: true pose at each of these stamps, and of each picture.
+        true_at: true pose at each of these stamps, and of each image.
     """
 
     def __init__(self, folder):
@@ -82,7 +82,7 @@ class Scene:
 
 
 class TrackedCamera:
-    """A camera at x_m, calibrated by its own pictures of four reference tags, and its tracker."""
+    """A camera at x_m, calibrated by its own images of four reference tags, and its tracker."""
 
     def __init__(self, scene, x_m, first_reference):
         options = OPTIONS._replace(position_m=(x_m, 0.0, HEIGHT_M))
@@ -100,7 +100,7 @@ class TrackedCamera:
         self.search = TagSearch(detector, options.width_px, options.height_px)
 
     def look(self, scene):
-        """Return what the next picture shows of robot 0, or None."""
+        """Return what the next image shows of robot 0, or None."""
         scene.true_at[scene.taken_s] = scene.true
         tags = self.search.search(scene.render(self.renderer), scene.taken_s)
         return self.tracker.take(tags, scene.taken_s, 0).robots.get(0)
@@ -137,7 +137,7 @@ def test_a_robot_that_changes_cameras_keeps_one_continuous_pose(tmp_path, gap_m)
 
 
 class SteppedPictures:
-    """Pictures of a scene for calibrate_camera; time passes while it waits for one."""
+    """Images of a scene for calibrate_camera; time passes while it waits for one."""
 
     def __init__(self, scene, renderer):
         self.scene, self.renderer = scene, renderer

@@ -1,4 +1,4 @@
-"""The simulated camera: where things appear in its pictures, and what spoils them."""
+"""The simulated camera: where things appear in its images, and what spoils them."""
 
 import itertools
 import math
@@ -47,7 +47,7 @@ def shade_at(image, view, point_m):
 
 
 def read_cells(image, view, tag, pose):
-    """Return the cells of a tag as the picture shows them."""
+    """Return the cells of a tag as the image shows them."""
     upper_left, upper_right, _, lower_left = tag_corners(tag, np.array([pose]))[0]
     count = len(draw_tag(tag.family, tag.tag_id))
     shares = (np.arange(count) + 0.5) / count

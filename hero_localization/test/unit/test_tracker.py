@@ -1,4 +1,4 @@
-"""What one camera's pictures show, where tags are expected, and what people are told of camera and tags."""
+"""What one camera's images show, where tags are expected, and what people are told of camera and tags."""
 
 import numpy as np
 import pytest
@@ -121,11 +121,11 @@ def test_pictures_that_are_left_out_are_told_as_a_rate():
     tracker = make_tracker()
     for number in range(0, 90, 3):
         tracker.take(see_references(0.0), number / 30.0, number)
-    text = "10.0 of 30.0 pictures per second are used: this computer is busy, or too slow for more"
+    text = "10.0 of 30.0 images per second are used: this computer is busy, or too slow for more"
     assert tracker.list_problems() == [Problem("camera", text, False)]
     for number in range(90, 120):
         tracker.take(see_references(0.0), number / 30.0, number)
-    assert tracker.list_problems() == [] and tracker.describe_rate() == "30.0 pictures per second"
+    assert tracker.list_problems() == [] and tracker.describe_rate() == "30.0 images per second"
 
 
 @pytest.mark.parametrize(

@@ -196,20 +196,20 @@ def test_the_installed_detectors_of_tags_are_named(installed, state, says, monke
 
 
 def test_what_tracker_and_filter_report_is_told():
-    rate = DiagnosticStatus(name="track: camera", message="29.9 pictures per second, 2 tags")
+    rate = DiagnosticStatus(name="track: camera", message="29.9 images per second, 2 tags")
     robots = [DiagnosticStatus(name="localization: hero_%d" % number, message="tracked") for number in (0, 1)]
     other = DiagnosticStatus(name="hero_driver: hero_0", level=DiagnosticStatus.ERROR, message="no bytes")
     finding = localization.describe_nodes(["track", "localization"], [rate, *robots, other])
-    text = "track: 29.9 pictures per second, 2 tags; localization: 2 of 2 robots without a problem"
+    text = "track: 29.9 images per second, 2 tags; localization: 2 of 2 robots without a problem"
     assert finding == (OK, text, ())
     robots[1].level, robots[1].message = DiagnosticStatus.WARN, "not measured for 3 s"
-    rate.level, rate.message = DiagnosticStatus.ERROR, "pictures are too dark"
+    rate.level, rate.message = DiagnosticStatus.ERROR, "images are too dark"
     finding = localization.describe_nodes(["track", "localization"], [rate, *robots])
     assert (finding.state, finding.text) == (
         WARN,
-        "track: no usable pictures; localization: 1 of 2 robots without a problem",
+        "track: no usable images; localization: 1 of 2 robots without a problem",
     )
-    assert finding.remedy == ("track: camera: pictures are too dark", "localization: hero_1: not measured for 3 s")
+    assert finding.remedy == ("track: camera: images are too dark", "localization: hero_1: not measured for 3 s")
 
 
 def test_a_tracker_that_reports_nothing_is_named():

@@ -97,7 +97,7 @@ def calibrate_arena(
     missing = sorted(set(references) - {tag.tag_id for tag in seen})
     if len(seen) < LEAST_TAGS:
         raise CalibrationError(
-            "the camera sees %d of %d reference tags, not %s: it takes %d; are they in the picture, whole, and lit?"
+            "the camera sees %d of %d reference tags, not %s: it takes %d; are they in the image, whole, and lit?"
             % (len(seen), len(references), ", ".join(map(str, missing)) or "more", LEAST_TAGS)
         )
     _check_extent(seen, references)

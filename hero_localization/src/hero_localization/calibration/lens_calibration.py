@@ -1,4 +1,4 @@
-"""The lens of a camera, from pictures of a ChArUco board. Pure but for OpenCV."""
+"""The lens of a camera, from images of a ChArUco board. Pure but for OpenCV."""
 
 import math
 from typing import List, NamedTuple, Optional, Sequence, Tuple
@@ -15,18 +15,18 @@ __all__ = ["BoardView", "LensCalibration", "calibrate_lens", "find_board", "is_m
 LEAST_VIEWS = 8
 JACKKNIFE_GROUPS = 6
 LEAST_CORNERS = 12
-"""In one picture; fewer fix no board."""
+"""In one image; fewer fix no board."""
 
 GOOD_RMS_PX = 0.5
 OUTLIER = 3.0
-"""A picture whose error is so many times the median is left out: blurred, or a bent board."""
+"""An image whose error is so many times the median is left out: blurred, or a bent board."""
 
 GOOD_FOCAL_ERROR = 0.003
 """Of the focal length, standard deviation. The arena's calibration takes most of it up, by the camera's height."""
 
 TILTED_RAD = 0.25
 LEAST_TILTED = 4
-"""Pictures with a tilted board: without them nearness cannot be told from focal length."""
+"""Images with a tilted board: without them nearness cannot be told from focal length."""
 
 _WINDOW_SHARE = 0.12
 """Half a window by the side of a square; the markers begin at 0.13 of it."""
@@ -40,7 +40,7 @@ LEAST_IN_REGION = 20
 
 
 class BoardView(NamedTuple):
-    """The board in one picture: ids of its inner corners (K,), and their pixels (K, 2)."""
+    """The board in one image: ids of its inner corners (K,), and their pixels (K, 2)."""
 
     ids: np.ndarray
     pixels: np.ndarray
@@ -64,7 +64,7 @@ class LensCalibration(NamedTuple):
 
 
 def find_board(gray: np.ndarray, board: Board) -> Optional[BoardView]:
-    """Return the board in a picture (H, W), 8 bit; None if too little of it is seen."""
+    """Return the board in an image (H, W), 8 bit; None if too little of it is seen."""
     made = create_board(board)
     if hasattr(cv2.aruco, "CharucoDetector"):  # since OpenCV 4.7
         pixels, ids, _, _ = cv2.aruco.CharucoDetector(made).detectBoard(gray)
@@ -100,11 +100,11 @@ def calibrate_lens(
 ) -> LensCalibration:
     """Return the lens through which the board was seen.
 
-    Raises: CalibrationError for fewer than eight pictures, or pictures that no lens explains.
+    Raises: CalibrationError for fewer than eight images, or images that no lens explains.
     """
     if len(views) < LEAST_VIEWS:
         raise CalibrationError(
-            "the board was found in %d pictures; it takes %d, from all sides and tilted"
+            "the board was found in %d images; it takes %d, from all sides and tilted"
             % (len(views), LEAST_VIEWS)
         )
     used = views
@@ -119,19 +119,19 @@ def calibrate_lens(
     problems = []
     if fit.rms_px > GOOD_RMS_PX:
         problems.append(
-            "error %.2f px rms is above %.1f px: is the board flat, are the pictures sharp?"
+            "error %.2f px rms is above %.1f px: is the board flat, are the images sharp?"
             % (fit.rms_px, GOOD_RMS_PX)
         )
     if (fit.tilts_rad > TILTED_RAD).sum() < LEAST_TILTED:
-        problems.append("the board is hardly tilted: take pictures with it tilted by 30 to 45 degrees")
+        problems.append("the board is hardly tilted: take images with it tilted by 30 to 45 degrees")
     elif focal_error > GOOD_FOCAL_ERROR:
         problems.append(
-            "the focal length is known to %.2f %% only: take more pictures with the board tilted by 30 to 45 degrees"
+            "the focal length is known to %.2f %% only: take more images with the board tilted by 30 to 45 degrees"
             % (100.0 * focal_error)
         )
     empty = _list_empty_regions(used, width_px, height_px)
     if empty:
-        problems.append("take pictures with the board there: %s" % ", ".join(empty))
+        problems.append("take images with the board there: %s" % ", ".join(empty))
     return LensCalibration(fit.lens, fit.rms_px, focal_error, left_out, problems)
 
 
@@ -156,10 +156,10 @@ def _fit(views: Sequence[BoardView], width_px: int, height_px: int, board: Board
         )
     except cv2.error as error:
         raise CalibrationError(
-            "no lens explains these pictures: %s" % str(error).strip().splitlines()[-1]
+            "no lens explains these images: %s" % str(error).strip().splitlines()[-1]
         ) from None
     if not np.isfinite(matrix).all() or not math.isfinite(rms_px):
-        raise CalibrationError("no lens explains these pictures: take them again")
+        raise CalibrationError("no lens explains these images: take them again")
     lens = Lens(width_px, height_px, matrix, np.asarray(distortion, dtype=float).ravel()[:5])
     tilts_rad = np.array([math.acos(min(abs(cv2.Rodrigues(turn)[0][2, 2]), 1.0)) for turn in turns])
     return _Fit(lens, float(rms_px), np.asarray(errors_px).ravel(), tilts_rad)

@@ -153,7 +153,7 @@ def _find_delay(
 def _fit_mount(tags: np.ndarray, at: np.ndarray) -> Tuple[float, float, float, float]:
     """Return x, y (m) and yaw (rad) of the tag in base_link, and the residual (m rms).
 
-    With the tag's yaw for the heading, what odometry drove between two pictures is known but for the tag's yaw on the
+    With the tag's yaw for the heading, what odometry drove between two images is known but for the tag's yaw on the
     robot and a factor: the tag's place is linear in the start, these two, and its place seen from itself.
     """
     steps = np.diff(at[:, 0] + 1j * at[:, 1])

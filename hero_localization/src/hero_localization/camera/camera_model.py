@@ -50,10 +50,10 @@ class Lens(NamedTuple):
         return cls(int(width_px), int(height_px), values.reshape(3, 3), padded)
 
     def check_size(self, height_px: int, width_px: int) -> None:
-        """Refuse pictures of another size. Raises: CalibrationError."""
+        """Refuse images of another size. Raises: CalibrationError."""
         if (width_px, height_px) != (self.width_px, self.height_px):
             raise CalibrationError(
-                "pictures have %d x %d pixels, but the lens was calibrated with %d x %d: set the camera to that, or"
+                "images have %d x %d pixels, but the lens was calibrated with %d x %d: set the camera to that, or"
                 " calibrate lens and arena again" % (width_px, height_px, self.width_px, self.height_px)
             )
 

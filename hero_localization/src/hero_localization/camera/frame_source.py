@@ -1,4 +1,4 @@
-"""Pictures of one camera, gray, with the time at which they were taken: from topics, a V4L2 device or a video file."""
+"""Images of one camera, gray, with the time at which they were taken: from topics, a V4L2 device or a video file."""
 
 import itertools
 import math
@@ -41,18 +41,18 @@ MIN_BACKOFF_S, MAX_BACKOFF_S = 0.5, 8.0
 """Between two attempts to open a camera that ended."""
 
 READ_BYTES = 2**20
-"""At once: of a picture in smaller parts, each costs a turn of the interpreter; a larger buffer costs page faults."""
+"""At once: of an image in smaller parts, each costs a turn of the interpreter; a larger buffer costs page faults."""
 
 
 class Frame(NamedTuple):
-    """One picture."""
+    """One image."""
 
     stamp_s: float
     """ROS time at which it was taken."""
     gray: np.ndarray
     """(H, W), 8 bit."""
     number: int
-    """Of the source's pictures: gaps are those that did not get here."""
+    """Of the source's images: gaps are those that did not get here."""
 
 
 class Newest(Generic[T]):
@@ -78,12 +78,12 @@ class Newest(Generic[T]):
 
 
 class FrameSource:
-    """Pictures of a camera.
+    """Images of a camera.
 
     Attributes:
         lens: as the camera's driver tells; None if it does not.
-        problem: why there are no usable pictures, for people; empty if there are.
-        arrived_s: when the newest picture came; before, when the source was opened.
+        problem: why there are no usable images, for people; empty if there are.
+        arrived_s: when the newest image came; before, when the source was opened.
     """
 
     def __init__(self) -> None:
@@ -92,7 +92,7 @@ class FrameSource:
         self.arrived_s = rospy.get_time()
 
     def poll(self, timeout_s: float) -> Any:
-        """Return the next picture, a Frame; None if none comes in time or is usable."""
+        """Return the next image, a Frame; None if none comes in time or is usable."""
         raise NotImplementedError
 
     def close(self) -> None:
@@ -100,7 +100,7 @@ class FrameSource:
 
 
 class LiveSource(FrameSource):
-    """Pictures that come by themselves: only the newest counts, and only those that are polled are decoded."""
+    """Images that come by themselves: only the newest counts, and only those that are polled are decoded."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -111,7 +111,7 @@ class LiveSource(FrameSource):
         self._newest.keep(picture)
 
     def poll(self, timeout_s: float) -> Any:
-        """Return the newest picture, unless an earlier call did; None if none comes in time or is usable."""
+        """Return the newest image, unless an earlier call did; None if none comes in time or is usable."""
         picture = self._newest.take(timeout_s)
         return None if picture is None else self._decode(picture)
 
@@ -120,7 +120,7 @@ class LiveSource(FrameSource):
 
 
 class TopicSource(LiveSource):
-    """Subscription to the pictures and camera_info of a camera driver."""
+    """Subscription to the images and camera_info of a camera driver."""
 
     def __init__(self, topic: str) -> None:
         """topic: sensor_msgs/Image, or CompressedImage if it ends in /compressed; camera_info lies beside it."""
@@ -149,11 +149,11 @@ class TopicSource(LiveSource):
         channels = _DEPTHS.get(message.encoding)
         size = message.step * message.height
         if channels is None:
-            text = "pictures have the encoding %r, but must have one of %s"
+            text = "images have the encoding %r, but must have one of %s"
             self.problem = text % (message.encoding, ", ".join(_DEPTHS))
             return None
         if not 0 < message.width * channels <= message.step or not 0 < size <= len(message.data):
-            text = "pictures of %d x %d pixels come with %d bytes: is the camera's driver in order?"
+            text = "images of %d x %d pixels come with %d bytes: is the camera's driver in order?"
             self.problem = text % (message.width, message.height, len(message.data))
             return None
         rows = np.frombuffer(message.data, np.uint8, size).reshape(message.height, message.step)
@@ -165,7 +165,7 @@ class TopicSource(LiveSource):
         data = np.frombuffer(message.data, np.uint8)
         gray: Optional[np.ndarray] = cv2.imdecode(data, cv2.IMREAD_GRAYSCALE) if len(data) else None
         if gray is None:
-            text = "compressed pictures of the format %r cannot be decoded: is the camera's driver in order?"
+            text = "compressed images of the format %r cannot be decoded: is the camera's driver in order?"
             self.problem = text % message.format
         return gray
 
@@ -219,7 +219,7 @@ class DeviceSource(LiveSource):
 
     @staticmethod
     def _find_age(taken_s: float) -> float:
-        """Return how long ago a picture was taken; 0 if the device does not tell."""
+        """Return how long ago an image was taken; 0 if the device does not tell."""
         age_s = time.monotonic() - taken_s
         return age_s if math.isfinite(age_s) and 0.0 <= age_s < PLAUSIBLE_AGE_S else 0.0
 
@@ -231,7 +231,7 @@ class DeviceSource(LiveSource):
 
 
 class VideoSource(FrameSource):
-    """A video file, played in real time; it waits for a program that is slower, so that no picture is lost."""
+    """A video file, played in real time; it waits for a program that is slower, so that no image is lost."""
 
     def __init__(self, path: str) -> None:
         """Raises: FrameSourceError if it cannot be opened."""
@@ -243,7 +243,7 @@ class VideoSource(FrameSource):
         self._next: Optional[Frame] = None
 
     def poll(self, timeout_s: float) -> Optional[Frame]:
-        """Return the next picture as soon as it is due; None if that is later than timeout_s, or there is none."""
+        """Return the next image as soon as it is due; None if that is later than timeout_s, or there is none."""
         if self._next is None:
             self._next = self._read()
         wait_s = timeout_s if self._next is None else self._next.stamp_s - rospy.get_time()
@@ -258,7 +258,7 @@ class VideoSource(FrameSource):
     def _read(self) -> Optional[Frame]:
         is_read, image = self._capture.read()
         if not is_read:
-            self.problem = "%s gives no more pictures: the video has ended" % self._path
+            self.problem = "%s gives no more images: the video has ended" % self._path
             return None
         stamp_s = self._start_s + self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0
         return Frame(stamp_s, _make_gray(image), next(self._numbers))
@@ -296,7 +296,7 @@ def _check_path(path: str) -> None:
 
 
 def open_source(image: str, device: str, size_px: str, rate_hz: float) -> FrameSource:
-    """Return the source of pictures: the device or video if one is named, else the topic image.
+    """Return the source of images: the device or video if one is named, else the topic image.
 
     Raises: FrameSourceError for a device or video that cannot be opened, or a size that is none.
     """
@@ -307,5 +307,5 @@ def open_source(image: str, device: str, size_px: str, rate_hz: float) -> FrameS
         return VideoSource(path)
     words = size_px.split("x")
     if len(words) != 2 or not all(word.strip().isdecimal() for word in words):
-        raise FrameSourceError("the size of pictures is %r, but must be such as 1920x1080" % size_px)
+        raise FrameSourceError("the size of images is %r, but must be such as 1920x1080" % size_px)
     return DeviceSource(path, (int(words[0]), int(words[1])), rate_hz)

@@ -20,7 +20,7 @@ OCCUPIED_SHARE, FREE_SHARE = 0.65, 0.196
 
 
 def save_map(path: str, grid: OccupancyGrid) -> str:
-    """Write the map to path, which ends in .yaml, and beside it the picture; return the picture's path.
+    """Write the map to path, which ends in .yaml, and beside it the image; return the image's path.
 
     Raises: OSError.
     """
@@ -29,7 +29,7 @@ def save_map(path: str, grid: OccupancyGrid) -> str:
     pixels[grid.occupied] = OCCUPIED
     picture = os.path.splitext(path)[0] + ".png"
     with replace_file(picture) as file:
-        Image.fromarray(pixels[::-1]).save(file, "PNG")  # the first row of a picture is its upper one
+        Image.fromarray(pixels[::-1]).save(file, "PNG")  # the first row of an image is its upper one
     content = {
         "image": os.path.basename(picture),
         "resolution": grid.cell_m,

@@ -1,6 +1,6 @@
 """Program calibrate_camera: lens, place of the camera, tags on robots. Each ends with a figure, a verdict and the file.
 
-rosrun hero_localization calibrate_camera lens                  move the printed board about in the picture
+rosrun hero_localization calibrate_camera lens                  move the printed board about in the image
 rosrun hero_localization calibrate_camera lens --yaml FILE      take camera_calibration's result
 rosrun hero_localization calibrate_camera arena                 by reference tags of known place
 rosrun hero_localization calibrate_camera robots --robots 0     robots turn and drive a little
@@ -49,7 +49,7 @@ from ..tracking.tag_pose import MountedTag, fit_squares
 MOST_VIEWS = 25
 ENOUGH_VIEWS = 20
 STILL_PX = 3.0
-"""A board that moves by more than this between two pictures is blurred."""
+"""A board that moves by more than this between two images is blurred."""
 
 NEW_PX = 40.0
 """A board whose corners are nearer than this to those of a view that was taken shows nothing new."""
@@ -58,7 +58,7 @@ ARENA_FRAMES = 30
 FRAME_S = 10.0
 WAIT_S = 0.1
 HINT_S = 10.0
-"""After so long without the board in a picture, what may be wrong is said."""
+"""After so long without the board in an image, what may be wrong is said."""
 
 READY_S = 10.0
 LOOK_S = 3.0
@@ -66,7 +66,7 @@ LOOK_S = 3.0
 
 
 class Pictures:
-    """The newest picture of the camera, for a program that works on one after another."""
+    """The newest image of the camera, for a program that works on one after another."""
 
     def __init__(self, options: argparse.Namespace, program: Program) -> None:
         """Open the camera. Raises: FrameSourceError."""
@@ -76,7 +76,7 @@ class Pictures:
         self._name = options.device or options.image
 
     def poll(self) -> Optional[Frame]:
-        """Return the next picture; None if none comes in a moment. Raises: ProgramError if the program is to end."""
+        """Return the next image; None if none comes in a moment. Raises: ProgramError if the program is to end."""
         self._check_running()
         frame: Optional[Frame] = self.source.poll(WAIT_S)
         return frame
@@ -86,16 +86,16 @@ class Pictures:
             raise ProgramError("ended before the calibration was complete: the file is as it was")
 
     def take(self) -> Frame:
-        """Wait for the next picture. Raises: CalibrationError if none comes; as poll()."""
+        """Wait for the next image. Raises: CalibrationError if none comes; as poll()."""
         for _ in range(round(FRAME_S / WAIT_S)):
             frame = self.poll()
             if frame is not None:
                 return frame
         reason = self.source.problem or "is the camera's driver running?"
-        raise CalibrationError("no picture from %s for %g s: %s" % (self._name, FRAME_S, reason))
+        raise CalibrationError("no image from %s for %g s: %s" % (self._name, FRAME_S, reason))
 
     def find_tags(self, settings: Settings, decimate: float, frame: Frame) -> List[TagCorners]:
-        """Return the tags in a picture; decimate of the first call counts.
+        """Return the tags in an image; decimate of the first call counts.
 
         Raises: CalibrationError for another size than the lens has, DetectorError; ProgramError as poll().
         """
@@ -125,7 +125,7 @@ class Pictures:
 def calibrate_lens_by_board(options: argparse.Namespace, pictures: Pictures, program: Program) -> int:
     """Collect views of the board, and calibrate. Return the exit code."""
     board = Board()
-    say("move the board slowly through the whole picture, near and far, tilted by 30 to 45 degrees; hold still between")
+    say("move the board slowly through the whole image, near and far, tilted by 30 to 45 degrees; hold still between")
     views: List[BoardView] = []
     wanted = options.views or MOST_VIEWS
     size = (0, 0)
@@ -142,7 +142,7 @@ def calibrate_lens_by_board(options: argparse.Namespace, pictures: Pictures, pro
             found_s = program.now_s
             if is_mirrored(frame.gray, board):
                 raise CalibrationError("images are mirrored: switch that off in the camera or its driver")
-            text = "no board in the pictures (mean shade %.0f of 255): hold it near, flat, in good light"
+            text = "no board in the images (mean shade %.0f of 255): hold it near, flat, in good light"
             say(text % frame.gray.mean())
         is_still = view is not None and last is not None and _measure_shift(view, last) < STILL_PX
         last = view
@@ -152,10 +152,10 @@ def calibrate_lens_by_board(options: argparse.Namespace, pictures: Pictures, pro
             continue
         views.append(view)
         if len(views) < ENOUGH_VIEWS:
-            say("%d of at least %d pictures" % (len(views), min(ENOUGH_VIEWS, wanted)))
+            say("%d of at least %d images" % (len(views), min(ENOUGH_VIEWS, wanted)))
             continue
         result = calibrate_lens(views, *size, board)
-        say("%d pictures: %s" % (len(views), result.problems[0] if result.problems else "enough"))
+        say("%d images: %s" % (len(views), result.problems[0] if result.problems else "enough"))
     result = result or calibrate_lens(views, *size, board)
     say("error %.2f px rms, focal length known to %.2f %%" % (result.rms_px, 100.0 * result.focal_error))
     return _finish(options.file, camera_file.describe_lens(result.lens), result.problems)
@@ -270,7 +270,7 @@ def _watch_robot(
         while not seen:
             count = max(count, watch(pictures.take()))
             if not seen and rospy.get_time() > look_until_s:
-                reason = "is there more than once" if count else "is not in the picture, or too dark"
+                reason = "appears more than once" if count else "is not in the image, or too dark"
                 raise CalibrationError("tag %d %s; the robot was not moved" % (tag_id, reason))
         say("hero_%d turns left and right, and drives forward and back" % robot_id)
         # Not an OdometryInput: rospy would give its raw messages to Robot as well.
@@ -319,7 +319,7 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     if options.part == "robots" and options.robots is None:
         parser.error("robots: name them, such as --robots 0-3; each turns on the spot and drives 0.12 m to and fro")
     if options.views and options.views < LEAST_VIEWS:
-        parser.error("--views %d: it takes at least %d pictures" % (options.views, LEAST_VIEWS))
+        parser.error("--views %d: it takes at least %d images" % (options.views, LEAST_VIEWS))
     return options
 
 

@@ -77,7 +77,7 @@ class LocalizationNode:
         _log(lines)
 
     def _receive_swarm(self, report: RobotPoses) -> None:
-        """Take the poses of all robots that one picture shows."""
+        """Take the poses of all robots that one image shows."""
         if report.header.frame_id.lstrip("/") not in ("", self._frame):
             text = "%s is in the frame %r, but must be in %r: give its publisher and this node the same ~frame"
             rospy.logwarn_throttle(10.0, text % (self._swarm_topic, report.header.frame_id, self._frame))
@@ -100,7 +100,7 @@ class LocalizationNode:
         _log(lines)
 
     def step(self, period_s: float) -> None:
-        """Wait for the poses of a picture, or for period_s, and publish."""
+        """Wait for the poses of an image, or for period_s, and publish."""
         self._picture.wait(period_s)
         self._picture.clear()
         if self._chosen is None:

@@ -121,7 +121,7 @@ class MapNode:
 
 def _check_path(path: str) -> str:
     if not path.endswith(".yaml"):
-        raise ProgramError("~file is %r, but must end in .yaml; the picture beside it in .png" % path)
+        raise ProgramError("~file is %r, but must end in .yaml; the image beside it in .png" % path)
     return os.path.abspath(os.path.expanduser(path))
 
 

@@ -1,4 +1,4 @@
-"""Program track: finds tagged robots and objects in the pictures of an overhead camera.
+"""Program track: finds tagged robots and objects in the images of an overhead camera.
 
 rosrun hero_localization track                                     /camera/image_raw
 rosrun hero_localization track _image:=/camera/image_raw/compressed
@@ -37,7 +37,7 @@ class TrackNode:
     """The tracker, its inputs and outputs."""
 
     def __init__(self, parameters: Dict[str, Any]) -> None:
-        """Read the camera's file and open its pictures. Raises: LocalizationError."""
+        """Read the camera's file and open its images. Raises: LocalizationError."""
         self._path = str(parameters["file"])
         self._settings = camera_file.load(self._path)
         self._file_s = camera_file.find_change_s(self._path)
@@ -63,9 +63,9 @@ class TrackNode:
         }
 
     def step(self) -> None:
-        """Work on the newest picture, or wait a moment for it.
+        """Work on the newest image, or wait a moment for it.
 
-        Raises: LocalizationError for a detector that cannot be started or has ended, and for unusable pictures.
+        Raises: LocalizationError for a detector that cannot be started or has ended, and for unusable images.
         """
         frame = self._source.poll(WAIT_S)
         if frame is not None and self._tracker is not None:
@@ -100,7 +100,7 @@ class TrackNode:
             self._process = DetectorProcess(
                 settings.detector, settings.family, settings.decimate, width_px, height_px, smallest_px
             )
-            return  # by now the picture is a second old
+            return  # by now the image is a second old
         expected = tracker.project(self._expected)
         tags = self._process.search(frame.gray, frame.stamp_s, expected)
         tracker.measure_shade(frame.gray)
@@ -151,7 +151,7 @@ class TrackNode:
             return [("camera", self._source.problem, True)]
         silent_s = now_s - self._source.arrived_s
         if silent_s > SILENT_S:
-            text = "no picture for %.0f s: is the camera's driver running?"
+            text = "no image for %.0f s: is the camera's driver running?"
             return [("camera", text % silent_s, True)]
         return [tuple(problem) for problem in self._tracker.list_problems()]
 

@@ -32,7 +32,7 @@ def create_board(board: Board) -> Any:
 
 
 def draw_board(board: Board, square_px: int) -> np.ndarray:
-    """Return the board's picture without a margin, gray, 8 bit."""
+    """Return the board's image without a margin, gray, 8 bit."""
     made = create_board(board)
     draw = getattr(made, "generateImage", None) or made.draw
     return draw((board.columns * square_px, board.rows * square_px))

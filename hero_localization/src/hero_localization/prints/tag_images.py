@@ -1,6 +1,6 @@
 """The cells of AprilTags as they are printed upright, from OpenCV's own dictionaries. Pure.
 
-Upright is as in AprilTag's own pictures. OpenCV 4 has all tags of these families turned by 180 degrees, others may not:
+Upright is as in AprilTag's own images. OpenCV 4 has all tags of these families turned by 180 degrees, others may not:
 one known tag tells how this version has them.
 """
 

@@ -16,7 +16,7 @@ Vector = Tuple[float, float, float]
 
 
 def list_board_places(options: CameraOptions, random: np.random.RandomState) -> Iterator[Tuple[Vector, Vector]]:
-    """Yield, without end, turns and places of a board that is held all over the picture, tilted: see render()."""
+    """Yield, without end, turns and places of a board that is held all over the image, tilted: see render()."""
     (fx, fy), (cx, cy) = options.focal_px, options.center_px
     index = 0
     while True:
@@ -30,7 +30,7 @@ def list_board_places(options: CameraOptions, random: np.random.RandomState) -> 
 
 
 class BoardRenderer:
-    """Pictures of a board that is held before the camera."""
+    """Images of a board that is held before the camera."""
 
     def __init__(self, options: CameraOptions, board: Board) -> None:
         """options: lens, blur and noise of the camera."""
@@ -44,7 +44,7 @@ class BoardRenderer:
     def render(
         self, turn_rad: Sequence[float], position_m: Sequence[float], random: np.random.RandomState
     ) -> np.ndarray:
-        """Return a picture (H, W), gray, 8 bit.
+        """Return an image (H, W), gray, 8 bit.
 
         Args:
             turn_rad: rotation vector of the board, in the optical frame.

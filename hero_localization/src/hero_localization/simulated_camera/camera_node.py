@@ -1,6 +1,6 @@
-"""The simulated overhead camera as a ROS node: pictures of the simulated robots, as a camera driver publishes them.
+"""The simulated overhead camera as a ROS node: images of the simulated robots, as a camera driver publishes them.
 
-With --board it shows the board for the lens instead, as if somebody held it into the picture. Needs OpenCV
+With --board it shows the board for the lens instead, as if somebody held it into the image. Needs OpenCV
 (python3-opencv). Renders only what somebody subscribes to.
 """
 
@@ -48,10 +48,10 @@ PLACE_ERROR_M = 0.001
 """Standard deviations of what people glue on robots by eye, and lay out by tape."""
 
 BOARD_PICTURES = 4
-"""The board is held for so many pictures at each place."""
+"""The board is held for so many images at each place."""
 
 MISSED_S = 0.1
-"""A picture that this machine is so late for is dropped, as a camera does whose program is too slow."""
+"""An image that this machine is so late for is dropped, as a camera does whose program is too slow."""
 
 
 class TrueRobots:
@@ -93,7 +93,7 @@ class RobotScene:
     """The arena with its robots."""
 
     def __init__(self, options: argparse.Namespace, camera: CameraOptions, arena: Arena) -> None:
-        """Prepare the pictures."""
+        """Prepare the images."""
         self._ids = list(range(options.first_id, options.first_id + options.count))
         random = np.random.RandomState(options.seed)
         errors = np.array((MOUNT_ERROR_M, MOUNT_ERROR_M, MOUNT_ERROR_RAD)) * (not options.perfect)
@@ -129,13 +129,13 @@ class RobotScene:
         return len(self._true.find(0.0)[0]) == len(self._ids)
 
     def render(self, taken_s: float) -> np.ndarray:
-        """Return the picture (H, W), 8 bit, that was taken at a time."""
+        """Return the image (H, W), 8 bit, that was taken at a time."""
         _, poses, speeds = self._true.find(taken_s)
         return self._renderer.render(poses, speeds, self._hand_m)
 
 
 class BoardScene:
-    """The board for the lens, held into the picture at one place after another."""
+    """The board for the lens, held into the image at one place after another."""
 
     is_complete = True
 
@@ -147,7 +147,7 @@ class BoardScene:
         self._shown = 0
 
     def render(self, taken_s: float) -> np.ndarray:
-        """Return the next picture (H, W), 8 bit."""
+        """Return the next image (H, W), 8 bit."""
         del taken_s
         if self._shown == BOARD_PICTURES:
             self._place, self._shown = next(self._places), 0
@@ -159,7 +159,7 @@ class CameraNode:
     """Publishers of one camera."""
 
     def __init__(self, options: argparse.Namespace) -> None:
-        """Prepare the pictures. Raises: OptionError for an unusable arena. SettingsError for one that is too large."""
+        """Prepare the images. Raises: OptionError for an unusable arena. SettingsError for one that is too large."""
         size = (options.width, round(options.width * 9 / 16))
         camera = _scale(CameraOptions(), *size)._replace(
             rate_hz=options.rate, delay_s=options.delay, exposure_s=options.exposure
@@ -177,7 +177,7 @@ class CameraNode:
         self._info = rospy.Publisher("camera/camera_info", CameraInfo, queue_size=1)
 
     def run(self) -> None:
-        """Publish pictures until ROS ends."""
+        """Publish images until ROS ends."""
         for frame in list_frames(self._options, rospy.get_time(), self._seed):
             wait_s = frame.arrival_s - rospy.get_time()
             if wait_s > 0.0:
@@ -251,7 +251,7 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     text = "print the reference tags for the camera file, and exit"
     add("--print-references", action="store_true", help=text)
     add("--write-file", metavar="FILE", help="write a camera file, calibrated without error")
-    add("--seed", type=int, default=0, help="of noise, dropped pictures and places of tags (%(default)s)")
+    add("--seed", type=int, default=0, help="of noise, dropped images and places of tags (%(default)s)")
     options = parser.parse_args(arguments)
     limits = {
         "count": (1, 500),

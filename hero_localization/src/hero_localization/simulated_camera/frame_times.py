@@ -1,4 +1,4 @@
-"""When the camera takes its pictures, and when they arrive. Pure; deterministic by seed."""
+"""When the camera takes its images, and when they arrive. Pure; deterministic by seed."""
 
 from typing import Iterator, NamedTuple
 
@@ -10,7 +10,7 @@ __all__ = ["Frame", "list_frames"]
 
 
 class Frame(NamedTuple):
-    """One picture that arrives."""
+    """One image that arrives."""
 
     stamp_s: float
     """The middle of its exposure: what its header says."""
@@ -18,7 +18,7 @@ class Frame(NamedTuple):
 
 
 def list_frames(options: CameraOptions, start_s: float = 0.0, seed: int = 0) -> Iterator[Frame]:
-    """Yield the pictures from start_s on, without end; dropped ones are left out. None overtakes another."""
+    """Yield the images from start_s on, without end; dropped ones are left out. None overtakes another."""
     random = np.random.RandomState(seed)
     index, arrival_s = 0, -np.inf
     while True:

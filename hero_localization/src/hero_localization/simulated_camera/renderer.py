@@ -1,6 +1,6 @@
-"""Pictures of the arena as the camera would take them. Pure but for OpenCV; deterministic by seed.
+"""Images of the arena as the camera would take them. Pure but for OpenCV; deterministic by seed.
 
-Only robots move: floor, walls and tags on the floor are rendered once. A robot's top is a picture of its own, already
+Only robots move: floor, walls and tags on the floor are rendered once. A robot's top is an image of its own, already
 as blurred as lens and pixels make it; for each frame it is sampled along the rays of the few pixels that show it, at
 several moments of the exposure if the robot moves.
 """
@@ -34,12 +34,12 @@ _SHIFT = 4
 
 
 class _Plate(NamedTuple):
-    """A flat picture with a tag in its middle.
+    """A flat image with a tag in its middle.
 
     Attributes:
         texture: shade times cover, and cover (0 to 1) of each texel, (T, T, 2), single precision.
         to_texel: turns a place on the robot (x, y, 1; m) into a texel, (3, 3).
-        reach_m: how far from the tag's center the picture reaches.
+        reach_m: how far from the tag's center the image reaches.
     """
 
     tag: PrintedTag
@@ -64,7 +64,7 @@ class CameraRenderer:
         floor_tags: Sequence[PrintedTag] = (),
         seed: int = 0,
     ) -> None:
-        """Prepare pictures of robots with robot_tags (None: without a tag), and of tags in the arena."""
+        """Prepare images of robots with robot_tags (None: without a tag), and of tags in the arena."""
         self.options = options
         self.view = View(options)
         self._random = np.random.RandomState(seed)
@@ -86,7 +86,7 @@ class CameraRenderer:
         return (1.0 - options.light_gradient * share).astype(np.float32)
 
     def _draw_noise(self) -> List[np.ndarray]:
-        """Return fields of noise a little larger than the picture; each frame takes one from another corner on."""
+        """Return fields of noise a little larger than the image; each frame takes one from another corner on."""
         if self.options.noise <= 0.0:
             return []
         shape = (self.options.height_px + 64, self.options.width_px + 64)
@@ -126,7 +126,7 @@ class CameraRenderer:
         cv2.fillConvexPoly(image, np.rint(hull * 2**_SHIFT).astype(np.int32), lit, cv2.LINE_AA, _SHIFT)
 
     def _print_plate(self, tag: PrintedTag, is_round: bool = True) -> _Plate:
-        """Return the picture of a tag: on a robot's round top, or on a square sheet with a white margin."""
+        """Return the image of a tag: on a robot's round top, or on a square sheet with a white margin."""
         cells = draw_tag(tag.family, tag.tag_id)
         margin_m = 2.0 * tag.size_m / len(cells)
         # On a robot the plate is the top itself, whose center is not the tag's.
@@ -202,7 +202,7 @@ class CameraRenderer:
         Args:
             poses: true poses (N, 3) at the middle of the exposure.
             speeds: linear (m/s) and angular speed (rad/s), (N, 2); None: all stand.
-            hand_m: a hand reaches into the picture, over this place.
+            hand_m: a hand reaches into the image, over this place.
         """
         poses = np.asarray(poses, dtype=float).reshape(-1, 3)
         moving = np.zeros((len(poses), 2)) if speeds is None else np.asarray(speeds, dtype=float)

@@ -40,9 +40,9 @@ class CameraOptions(NamedTuple):
     exposure_s: float = 0.008
     rate_hz: float = 30.0
     delay_s: float = 0.07
-    """From the middle of the exposure to the picture's arrival."""
+    """From the middle of the exposure to the image's arrival."""
     delay_jitter_s: float = 0.01
-    """Pictures are late by up to this much more."""
+    """Images are late by up to this much more."""
     dropped_share: float = 0.02
 
 

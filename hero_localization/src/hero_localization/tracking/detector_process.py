@@ -1,6 +1,6 @@
 """The search for tags in a process of its own: detectors hold the GIL for many milliseconds, and one takes SIGINT over.
 
-Pictures go over in shared memory, all else over a pipe. The process knows nothing of ROS, and ends with its parent.
+Images go over in shared memory, all else over a pipe. The process knows nothing of ROS, and ends with its parent.
 """
 
 import math
@@ -23,7 +23,7 @@ from .tag_search import TagSearch
 __all__ = ["DetectorProcess"]
 
 ANSWER_S = 60.0
-"""Long enough for a search of the whole picture on a machine that is busy with much else."""
+"""Long enough for a search of the whole image on a machine that is busy with much else."""
 END_S = 5.0
 
 

@@ -1,7 +1,7 @@
-"""Tags in gray pictures: two detectors behind one interface, with the same corners, the same order, the same heading.
+"""Tags in gray images: two detectors behind one interface, with the same corners, the same order, the same heading.
 
 Corners are in OpenCV's pixels (the center of the first pixel is (0, 0)), in the order upper left, upper right, lower
-right, lower left of the tag as AprilTag's own pictures show it upright. What the libraries do differently:
+right, lower left of the tag as AprilTag's own images show it upright. What the libraries do differently:
 python3-apriltag puts pixel centers at half integers and begins at the lower left; OpenCV 4 has all AprilTags turned by
 180 degrees, and rounds edges inwards by half a pixel unless it refines them.
 """
@@ -32,8 +32,8 @@ class TagDetector:
         """Return the tags in gray (H, W), 8 bit.
 
         Args:
-            gray: a picture, or a window of one.
-            origin: column and row of the window's first pixel in the picture that corners refer to.
+            gray: an image, or a window of one.
+            origin: column and row of the window's first pixel in the image that corners refer to.
         """
         raise NotImplementedError
 
@@ -68,7 +68,7 @@ class AprilTagDetector(TagDetector):
 
 
 class ArucoDetector(TagDetector):
-    """OpenCV's aruco, which always searches the whole picture: decimate is not used."""
+    """OpenCV's aruco, which always searches the whole image: decimate is not used."""
 
     def __init__(self, family: str, decimate: float) -> None:
         try:
@@ -122,7 +122,7 @@ def create_detector(backend: str = DEFAULT_BACKEND, family: str = "36h11", decim
     Args:
         backend: apriltag or aruco.
         family: 36h11, or 16h5 for prints made for the stock suite.
-        decimate: apriltag looks for squares in a picture so many times smaller; corners are refined in the whole one.
+        decimate: apriltag looks for squares in an image so many times smaller; corners are refined in the whole one.
 
     Raises: DetectorError for a backend that is unknown or not installed, an unknown family, a decimation below 1.
     """

@@ -46,7 +46,7 @@ class Settings(NamedTuple):
     lens: Optional[Lens] = None
     camera: Optional[Camera] = None
     delay_s: float = 0.0
-    """Pictures were taken so long before their stamps."""
+    """Images were taken so long before their stamps."""
     seen_references: Mapping[int, Pose] = {}
     """Where the calibration of the arena saw the reference tags."""
 

@@ -1,4 +1,4 @@
-"""The corners of a tag in a picture. Pure."""
+"""The corners of a tag in an image. Pure."""
 
 import math
 from typing import NamedTuple
@@ -9,7 +9,7 @@ __all__ = ["TagCorners"]
 
 
 class TagCorners(NamedTuple):
-    """A tag in a picture."""
+    """A tag in an image."""
 
     tag_id: int
     corners: np.ndarray

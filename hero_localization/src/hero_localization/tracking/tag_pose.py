@@ -1,4 +1,4 @@
-"""From corners in a picture to poses in `map`: of robots, objects and reference tags. Pure.
+"""From corners in an image to poses in `map`: of robots, objects and reference tags. Pure.
 
 The corners' rays are cut with the plane in which the tag lies, whose height is known. The pose of a single tag from its
 own perspective would need no height, but of a small tag seen from above it is ten times worse, and flips.
@@ -31,7 +31,7 @@ __all__ = [
 DEFAULT_HEIGHT_M = 0.076
 
 CORNER_PX = 0.1
-"""Standard deviation of a corner's place: twice what is measured on still pictures."""
+"""Standard deviation of a corner's place: twice what is measured on still images."""
 SYSTEMATIC_M, SYSTEMATIC_RAD = 0.0007, 0.003
 """What calibration leaves: of lens, camera, tag on the robot."""
 
@@ -125,7 +125,7 @@ class Sighting(NamedTuple):
 
 
 class Sightings(NamedTuple):
-    """What one picture shows.
+    """What one image shows.
 
     Attributes:
         robots: by number.
@@ -182,7 +182,7 @@ def find_smallest_side(camera: Camera, mount: MountedTag) -> float:
 
 
 def locate(camera: Camera, tags: Sequence[TagCorners], layout: TagLayout) -> Sightings:
-    """Return what the tags of one picture say."""
+    """Return what the tags of one image say."""
     sightings = Sightings({}, {}, {}, [], [], {})
     counts: Dict[int, int] = {}
     for tag in tags:

@@ -1,4 +1,4 @@
-"""Follows tags from frame to frame in small windows, and searches the whole picture for others, a tile at a time. Pure.
+"""Follows tags from frame to frame in small windows, and searches the whole image for others, a tile at a time. Pure.
 
 A detector takes 90 ms for a whole image of 1920 by 1080 and 0.2 ms for a window around one tag. So known tags are
 looked for where they are expected, in every frame, and the rest of the image is searched in turn, in two seconds. Where
@@ -257,7 +257,7 @@ class TagSearch:
 
 
 def _list_tiles(width_px: int, height_px: int, overlap_px: int) -> List[Tuple[int, int, int, int]]:
-    """Return left, top, right and bottom of tiles that cover the picture."""
+    """Return left, top, right and bottom of tiles that cover the image."""
     edges = [
         [round(size * index / math.ceil(size / tile)) for index in range(math.ceil(size / tile) + 1)]
         for size, tile in zip((width_px, height_px), TILE_PX)

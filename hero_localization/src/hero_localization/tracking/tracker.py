@@ -1,4 +1,4 @@
-"""From the pictures of one camera to poses in `map`, and what is wrong with camera and tags. Pure."""
+"""From the images of one camera to poses in `map`, and what is wrong with camera and tags. Pure."""
 
 import math
 from collections import deque
@@ -34,7 +34,7 @@ MISSING_S = 5.0
 """A hand that covers a reference tag goes away sooner."""
 
 LEAST_USED_SHARE = 0.8
-"""Of the pictures; tags that are searched less often move further between two searches."""
+"""Of the images; tags that are searched less often move further between two searches."""
 
 LEAST_SIDE_PX = 14.0
 """Of a tag's side; one cell of 36h11 is an eighth of it."""
@@ -61,7 +61,7 @@ class Tracker:
 
     Attributes:
         camera: lens and place.
-        found: the tags in the last picture.
+        found: the tags in the last image.
         sightings: what they stand for.
         is_moved: whether most reference tags were not at their places when they were seen last: no pose is right.
     """
@@ -81,7 +81,7 @@ class Tracker:
         self._reference_seen_s: Dict[int, float] = {}
 
     def measure_shade(self, gray: np.ndarray) -> None:
-        """Look how bright a picture (H, W), 8 bit, is."""
+        """Look how bright an image (H, W), 8 bit, is."""
         self._shade = float(gray[::16, ::16].mean())
 
     def take(
@@ -91,9 +91,9 @@ class Tracker:
         number: int,
         expected: Optional[Mapping[int, Tuple[float, float]]] = None,
     ) -> Sightings:
-        """Return what the tags of the next picture stand for.
+        """Return what the tags of the next image stand for.
 
-        stamp_s: as the picture bears it; number: counts the camera's pictures, with those that were left out; expected:
+        stamp_s: as the image bears it; number: counts the camera's images, with those that were left out; expected:
         as project() tells.
         """
         self._note_expected({tag.tag_id for tag in tags}, expected or {})
@@ -104,11 +104,11 @@ class Tracker:
         return sightings
 
     def taken_s(self, stamp_s: float) -> float:
-        """Return when a picture was taken: its stamp, less the delay that the robots' calibration found; at least 0."""
+        """Return when an image was taken: its stamp, less the delay that the robots' calibration found; at least 0."""
         return max(0.0, stamp_s - self._settings.delay_s)
 
     def project(self, robots: Mapping[int, Pose]) -> Dict[int, Tuple[float, float]]:
-        """Return where the centers of the tags of robots at these poses in map are in a picture, px, by tag."""
+        """Return where the centers of the tags of robots at these poses in map are in an image, px, by tag."""
         layout = self._settings.layout
         places: Dict[int, np.ndarray] = {}
         for robot, tag_id in layout.find_tags(robots).items():
@@ -155,7 +155,7 @@ class Tracker:
 
     @property
     def rates_hz(self) -> Tuple[float, float]:
-        """Pictures per second that were used, and those that the camera sent."""
+        """Images per second that were used, and those that the camera sent."""
         if len(self._pictures) < 2 or self._pictures[-1][0] <= self._pictures[0][0]:
             return 0.0, 0.0
         (first_s, first), (last_s, last) = self._pictures[0], self._pictures[-1]
@@ -163,9 +163,9 @@ class Tracker:
         return used / (last_s - first_s), max(used, last - first) / (last_s - first_s)
 
     def describe_rate(self) -> str:
-        """Return how many pictures per second are used, and of how many if some are not."""
+        """Return how many images per second are used, and of how many if some are not."""
         used_hz, sent_hz = self.rates_hz
-        return "%.1f%s pictures per second" % (used_hz, "" if used_hz == sent_hz else " of %.1f" % sent_hz)
+        return "%.1f%s images per second" % (used_hz, "" if used_hz == sent_hz else " of %.1f" % sent_hz)
 
     def list_problems(self) -> List[Problem]:
         """Return what is wrong with light, camera and tags."""
@@ -177,7 +177,7 @@ class Tracker:
             problems.append(Problem("camera", text, False))
         if self._shade < DARK or self._shade > BRIGHT:
             kind, remedy = ("dark", "more") if self._shade < DARK else ("bright", "less")
-            text = "pictures are too %s (mean %.0f of 255): give %s light or exposure" % (kind, self._shade, remedy)
+            text = "images are too %s (mean %.0f of 255): give %s light or exposure" % (kind, self._shade, remedy)
             problems.append(Problem("camera", text, True))
         sides_px = [tag.side_px for tag in self.found if self._settings.layout.find_robot(tag.tag_id) is not None]
         if sides_px and min(sides_px) < LEAST_SIDE_PX:

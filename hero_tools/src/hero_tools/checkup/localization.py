@@ -26,7 +26,7 @@ def check_camera(pattern: str = "/dev/video*") -> Finding:
     """List the camera devices of this PC, and whether this user may open them."""
     devices = sorted(glob.glob(pattern))
     if not devices:
-        return ok("no %s: pictures must come on a topic; without tags no camera is needed" % pattern)
+        return ok("no %s: images must come on a topic; without tags no camera is needed" % pattern)
     closed = [device for device in devices if not os.access(device, os.R_OK | os.W_OK)]
     if closed:
         text = "this user may not open %s" % ", ".join(closed)
@@ -47,7 +47,7 @@ def check_detectors() -> Finding:
 
 
 def check_nodes() -> Finding:
-    """Print what tracker and filter report, such as the rate of pictures and robots that are lost."""
+    """Print what tracker and filter report, such as the rate of images and robots that are lost."""
     publishers = dict(ask_master("getSystemState")[0]).get(DIAGNOSTICS_TOPIC, [])
     names = sorted(name.lstrip("/") for name in publishers)
     running = [name for name in names if name.partition("_")[0] == TRACKER]
@@ -81,7 +81,7 @@ def describe_nodes(running: Sequence[str], statuses: Sequence[DiagnosticStatus])
         else:
             camera = [status for status in own if status.name == name + ": camera"]
             is_usable = camera and camera[0].level < DiagnosticStatus.ERROR
-            texts.append("%s: %s" % (name, camera[0].message if is_usable else "no usable pictures"))
+            texts.append("%s: %s" % (name, camera[0].message if is_usable else "no usable images"))
         if not own:
             remedies.append("%s sends no diagnostics: rosnode ping %s tells whether it hangs" % (name, name))
         remedies += ["%s: %s" % (status.name, status.message) for status in own if status not in good]
