@@ -1,4 +1,4 @@
-"""What all tests of pytest share: hypothesis without time limits, chance or memory.
+"""What all tests of pytest share: markers, and hypothesis without time limits, chance or memory.
 
 A busy machine is not a failure. Every run tries the same examples, whatever earlier runs found or left behind.
 """
@@ -18,3 +18,8 @@ hypothesis.settings.register_profile(
 hypothesis.settings.load_profile("repeatable")
 # Its tables of characters; the sources stay clean.
 hypothesis.configuration.set_hypothesis_home_dir(str(Path(__file__).resolve().parent / ".work" / "hypothesis"))
+
+
+def pytest_configure(config):
+    """Define the markers."""
+    config.addinivalue_line("markers", "slow: left out of the stage noetic; quicker tests call the same of libraries")

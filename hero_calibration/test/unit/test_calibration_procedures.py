@@ -102,6 +102,7 @@ def is_moving(session):
 
 @pytest.mark.parametrize("seed", SEEDS)
 class TestAccuracy:
+    @pytest.mark.slow
     def test_centers_are_right_to_3_us_and_wheels_follow_better(self, seed):
         session = make_session(count=16, seed=seed)
         errors_before = self.measure_errors(session)
@@ -134,6 +135,7 @@ class TestAccuracy:
 
 
 class TestWifi:
+    @pytest.mark.slow
     def test_a_hotspot_changes_neither_centers_nor_gains(self):
         session = make_session(count=6, wifi="hotspot")
         motors = place_and(calibrate_motors, session)
@@ -142,12 +144,14 @@ class TestWifi:
         check_accuracy(session, motors)
         check_accuracy(session, velocity)
 
+    @pytest.mark.slow
     def test_a_hotspot_changes_no_ranges(self):
         session = make_session(count=6, at_wall=True, wifi="hotspot")
         results = place_and(calibrate_infrared, session, at_wall=True)
         assert len(results) == 6
         check_accuracy(session, results)
 
+    @pytest.mark.slow
     def test_on_a_bad_network_robots_are_calibrated_well_or_fail_with_a_reason(self):
         session = make_session(count=6, wifi="bad")
         motors = place_and(calibrate_motors, session)
@@ -163,6 +167,7 @@ class TestWifi:
     ("procedure", "at_wall"), [(calibrate_motors, False), (velocity_alone, False), (calibrate_infrared, True)]
 )
 class TestDisturbances:
+    @pytest.mark.slow
     def test_a_robot_that_is_lost_fails_alone(self, procedure, at_wall):
         session = make_session(at_wall=at_wall)
         session.events[8.0] = lambda: setattr(session.probes[1], "is_lost", True)
@@ -172,6 +177,7 @@ class TestDisturbances:
         assert re.search("nothing received on /hero_1/|is not answered", session.probes[1].failure)
         assert [probe.failure for probe in session.probes if probe.robot_id != 1] == [None] * 3
 
+    @pytest.mark.slow
     def test_a_network_that_stalls_for_2_s_changes_nothing(self, procedure, at_wall):
         session = make_session(at_wall=at_wall)
 
@@ -196,6 +202,7 @@ class TestDisturbances:
 
 
 class TestFaults:
+    @pytest.mark.slow
     def test_a_blocked_wheel_is_named_and_the_others_are_calibrated(self):
         session = make_session(known=["robot=1,right_gain=0", "robot=3,left_gain=0"])
         check_accuracy(session, place_and(calibrate_motors, session))
@@ -205,11 +212,13 @@ class TestFaults:
         session.sleep(0.5)
         assert is_moving(session) == [False] * 4
 
+    @pytest.mark.slow
     def test_a_center_outside_the_sweep_is_refused(self):
         session = make_session(count=2, known=["robot=1,left_center_us=1650"])
         assert list(place_and(calibrate_motors, session)) == [0]
         assert "the left wheel does not stop between" in session.probes[1].failure
 
+    @pytest.mark.slow
     def test_a_robot_that_does_not_turn_from_the_wall_is_named(self):
         session = make_session(at_wall=True, known=["robot=2,left_gain=0,right_gain=0"])
         assert sorted(place_and(calibrate_infrared, session, at_wall=True)) == [0, 1, 3]
@@ -278,6 +287,7 @@ class TestCalibration:
         assert "hero_0: ok\n  motors    centers" in table
         assert "hero_1: FAILED: motors: the left wheel does not turn" in table
 
+    @pytest.mark.slow
     def test_what_was_measured_before_an_early_end_is_saved(self, tmp_path, capsys):
         session = make_session(count=2)
         session.end_s = 60.0
@@ -293,6 +303,7 @@ class TestCalibration:
         assert self.run(session, tmp_path, "motors") == 130
         assert list(tmp_path.iterdir()) == []
 
+    @pytest.mark.slow
     def test_results_replace_a_damaged_file_where_a_question_fails(self, tmp_path):
         (tmp_path / "hero_0.yaml").write_text("robot: hero_0\nvelocity_gains: 2026-13-45\n")
         answers = [""]
@@ -307,6 +318,7 @@ class TestCalibration:
         assert set(self.load(tmp_path, 0)) == {"motor_centers_us", "dead_zones_us"}
         assert "2026-13-45" in (tmp_path / "hero_0.previous.yaml").read_text()
 
+    @pytest.mark.slow
     def test_the_same_seed_gives_the_same_results(self, tmp_path):
         for name in ("first", "second"):
             folder = tmp_path / name

@@ -46,6 +46,7 @@ def test_read_sensors_turns_and_prints_what_is_seen(capsys):
         assert len(re.findall(pattern, text)) == 10
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(10))
 def test_the_square_is_closed_and_the_light_blinks(seed):
     with StepSwarm(1, seed=seed) as swarm:
@@ -61,6 +62,7 @@ def test_the_square_is_closed_and_the_light_blinks(seed):
     assert lights[-1] == (0.0, 0.0, 0.0)
 
 
+@pytest.mark.slow
 def test_avoid_keeps_driving_and_touches_nothing_that_it_sees():
     with StepSwarm(1, seed=1, arena="obstacles", worlds=WORLDS) as swarm:
         paths = true_paths.run(swarm, step_all(swarm, avoid.step), 60.0)
@@ -79,6 +81,7 @@ def test_avoid_turns_away_from_the_side_on_which_something_is(tmp_path, sign):
         assert (path[-1, 0, 2] - path[0, 0, 2]) * sign < -0.3
 
 
+@pytest.mark.slow
 def test_keep_distance_ends_facing_the_nearest_thing_at_its_distance():
     with StepSwarm(1, seed=1, arena="obstacles", worlds=WORLDS) as swarm:
         paths = true_paths.run(swarm, step_all(swarm, keep_distance.step), 60.0)

@@ -38,6 +38,7 @@ def follow_curve(folder, starts, perfect, leader_s):
         return true_paths.run(swarm, step, leader_s + 8.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("starts", [{}, STARTS], ids=["tf", "starts"])
 def test_a_chain_follows_a_curve_keeps_its_gaps_and_stops(tmp_path, starts):
     for path in follow_curve(tmp_path, starts, True, leader_s=30.0):
@@ -49,6 +50,7 @@ def test_a_chain_follows_a_curve_keeps_its_gaps_and_stops(tmp_path, starts):
         assert np.ptp(path[-15:, :, :2], axis=0).max() < true_paths.REST
 
 
+@pytest.mark.slow
 def test_a_chain_whose_odometry_drifts_follows_without_touching(tmp_path):
     for path in follow_curve(tmp_path, {}, False, leader_s=15.0):
         assert true_paths.measure_lengths(path).min() > 0.8

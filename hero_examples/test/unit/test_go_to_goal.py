@@ -30,6 +30,7 @@ def start_each(swarm, choose_goal, **options):
     return [robot.start_go_to(*goal, frame="world", **options) for robot, goal in zip(swarm, goals)], goals
 
 
+@pytest.mark.slow
 def test_random_goals_are_reached_and_no_robot_swings_there():
     rng = random.Random(5)
     with StepSwarm(1, seed=1, arena="empty", perfect=True, worlds=WORLDS) as swarm:
@@ -48,6 +49,7 @@ def test_random_goals_are_reached_and_no_robot_swings_there():
         assert true_paths.stop_within(swarm)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("avoid", [True, False])
 def test_a_post_in_the_way_is_avoided_or_named_and_never_touched(tmp_path, avoid):
     arena = tmp_path / "post.yaml"

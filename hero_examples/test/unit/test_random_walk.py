@@ -33,6 +33,7 @@ def walk(swarm, duration_s):
     return true_paths.run(swarm, step, duration_s), lights
 
 
+@pytest.mark.slow
 def test_walkers_touch_nothing_that_they_see_and_visit_most_cells():
     arena = load_arena("obstacles")
     with StepSwarm(ROBOTS, seed=1, arena="obstacles", worlds=WORLDS) as swarm:

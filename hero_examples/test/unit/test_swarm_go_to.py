@@ -31,6 +31,7 @@ def form(swarm, goals, seed, **options):
     return formation, true_paths.run(swarm, step, 130.0, hz=1.0 / STEP_S)[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(100, 106))
 def test_ten_robots_swap_places_across_a_circle_without_touching(seed):
     with StepSwarm(10, seed=seed, arena=CIRCLE) as swarm:

@@ -46,6 +46,7 @@ def test_process_finds_what_a_search_in_this_process_does(process):
     assert [tag.tag_id for tag in found] == [5]
 
 
+@pytest.mark.slow
 def test_expected_places_go_over(process):
     for index in range(20):
         process.search(picture(60, 60), index / 30.0, {})
@@ -102,6 +103,7 @@ def run_program(lines):
     return ended.stdout.decode(), ended.returncode
 
 
+@pytest.mark.slow
 def test_ctrl_c_in_the_terminal_leaves_the_process_to_its_parent():
     printed, status = run_program(
         "signal.signal(signal.SIGINT, signal.SIG_IGN); os.killpg(0, signal.SIGINT);"
@@ -110,6 +112,7 @@ def test_ctrl_c_in_the_terminal_leaves_the_process_to_its_parent():
     assert (printed, status) == ("[]\n", 0)
 
 
+@pytest.mark.slow
 def test_process_ends_when_its_parent_is_killed():
     """The child holds the parent's standard output: its end of file tells that both have ended."""
     assert run_program("print('up', flush=True); os.kill(os.getpid(), signal.SIGKILL)") == (

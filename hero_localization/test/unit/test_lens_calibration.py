@@ -104,17 +104,20 @@ def test_board_that_is_never_tilted_is_told_to_be():
     assert any("tilted" in problem for problem in found.problems)
 
 
+@pytest.mark.slow
 def test_regions_without_a_board_are_named():
     holds = [hold for hold in list_holds(36, 0.5) if hold[1][0] > -0.1]
     problems = calibrate(project(holds)).problems
     assert any("middle left" in problem and "middle right" not in problem for problem in problems)
 
 
+@pytest.mark.slow
 def test_blurred_pictures_are_told():
     found = calibrate(project(list_holds(18, 0.5), noise_px=1.2))
     assert any("sharp" in problem for problem in found.problems)
 
 
+@pytest.mark.slow
 def test_one_bad_picture_is_left_out():
     views = project(list_holds(18, 0.5))
     random = np.random.RandomState(0)
@@ -125,6 +128,7 @@ def test_one_bad_picture_is_left_out():
     assert found.lens.matrix[0, 0] == pytest.approx(695.0, rel=0.003)
 
 
+@pytest.mark.slow
 def test_the_focal_length_is_no_worse_than_reported():
     """Of views whose corners are wrong together, as those of a board that is a little bent or blurred."""
     random, off, reported = np.random.RandomState(1), [], []

@@ -50,6 +50,7 @@ def grid():
     return explore(OccupancyGrid((-0.6, -0.6, 0.6, 0.6)))
 
 
+@pytest.mark.slow
 def test_occupied_cells_lie_on_the_walls_and_the_post(grid):
     distance_m = distance_to_surface(grid.centers_of(grid.occupied))
     assert len(distance_m) > 300

@@ -173,6 +173,7 @@ def test_after_two_seconds_unseen_the_robot_is_right_within_0_2_seconds(seed):
     assert rms(unseen) < 0.03
 
 
+@pytest.mark.slow
 def test_the_uncertainty_holds_the_true_error():
     inside = total = 0
     for seed in range(20):

@@ -106,6 +106,7 @@ class TrackedCamera:
         return self.tracker.take(tags, scene.taken_s, 0).robots.get(0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gap_m", [-0.2, 0.15])
 def test_a_robot_that_changes_cameras_keeps_one_continuous_pose(tmp_path, gap_m):
     scene = Scene(tmp_path)

@@ -69,6 +69,7 @@ def test_delays_of_all_sizes_are_found(delay_s):
     assert found.delay_s == pytest.approx(delay_s, abs=0.003)
 
 
+@pytest.mark.slow
 def test_error_of_the_delay_is_stated_as_large_as_it_is():
     errors = [calibrate_robot(*drive(seed=seed)) for seed in range(12)]
     spread_s = np.std([found.delay_s for found in errors])

@@ -13,6 +13,7 @@ from hero_localization.stepped_localization import CameraModel, StepLocalization
 from hero_sim.stepped.swarm import StepSwarm
 
 
+@pytest.mark.slow
 def test_goals_in_map_are_reached_to_10_mm_although_odometry_drifts():
     with StepSwarm(1, seed=3, arena="empty", worlds=4) as swarm:
         StepLocalization(swarm, seed=3)

@@ -70,6 +70,7 @@ def everywhere():
     return list(enumerate(np.column_stack((x.ravel(), y.ravel()))))
 
 
+@pytest.mark.slow
 def test_tags_anywhere_are_found_within_the_first_frames():
     watch = Watch()
     assert watch.see(everywhere(), frames=7) == list(range(400))
@@ -82,6 +83,7 @@ def test_new_tag_is_found_within_two_seconds():
     assert seen[-1]
 
 
+@pytest.mark.slow
 def test_known_tags_cost_windows_only():
     watch = Watch()
     tags = everywhere()[::8]
@@ -94,6 +96,7 @@ def test_known_tags_cost_windows_only():
     assert np.mean(searched_px) < 50 * 66**2 + 1.7 * WIDTH_PX * HEIGHT_PX / 60.0
 
 
+@pytest.mark.slow
 def test_standing_tags_cost_little_more_when_most_frames_are_missing():
     watch = Watch()
     tags = everywhere()[::8]
@@ -159,6 +162,7 @@ def test_tags_that_one_hand_covered_are_found_together():
     assert seen[-1] == list(range(8))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("is_leaving", [False, True])
 def test_lost_tags_cost_a_third_more_at_most(is_leaving):
     """One after another, one per second: covered for half a second, or driven out of the image."""

@@ -260,6 +260,7 @@ def test_plot_writes_png_files_beside_the_bag_and_prints_a_table(two_robots, cap
         assert str(path) in output
 
 
+@pytest.mark.slow
 def test_figures_can_be_chosen_and_written_as_pdf(two_robots, tmp_path, capsys):
     run_plot(capsys, two_robots, "--format", "pdf", "--out", tmp_path / "my", "--figures", "paths,delays")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["my_delays.pdf", "my_paths.pdf"]
@@ -276,6 +277,7 @@ def write_parts(path, robot_ids, *kinds):
     return path
 
 
+@pytest.mark.slow
 def test_figures_for_which_a_topic_is_missing_are_named_with_it(tmp_path, capsys):
     output = run_plot(capsys, write_parts(tmp_path / "part.bag", (0,), "/odom"))
     assert "no figure of errors: nothing of /hero_N/odom with /hero_N/ground_truth" in output

@@ -164,6 +164,7 @@ def test_robots_connect_declare_stream_and_drive(simulate, server):
     assert all(peer.reader.bad_packets == 0 for peer in server.peers)
 
 
+@pytest.mark.slow
 def test_a_robot_that_vanishes_sends_no_end_and_its_successor_boots(simulate, server):
     simulate("--port", str(server.port), "--fault", "vanish@16:for=1")
     request_when_ready(server, 1)
@@ -179,6 +180,7 @@ def test_a_robot_that_vanishes_sends_no_end_and_its_successor_boots(simulate, se
     assert not is_acknowledged(old.socket)
 
 
+@pytest.mark.slow
 def test_a_robot_that_leaves_closes_and_streams_on_when_it_is_back(simulate, server):
     simulate("--port", str(server.port), "--fault", "leave@16:for=2")
     request_when_ready(server, 1)
@@ -188,12 +190,14 @@ def test_a_robot_that_leaves_closes_and_streams_on_when_it_is_back(simulate, ser
     assert not any("Firmware" in text for text in server.peers[1].logs())
 
 
+@pytest.mark.slow
 def test_a_duplicate_takes_the_id_of_another_robot(simulate, server):
     simulate("--count", "2", "--port", str(server.port), "--fault", "duplicate@3:robot=1,of=0")
     server.run_until(lambda: len(server.peers) == 3 and server.peers[2].logs())
     assert "[/hero_0] Firmware" in server.peers[2].logs()[0]
 
 
+@pytest.mark.slow
 def test_zero_topics_are_declared_at_the_second_request_only(simulate, server):
     simulate("--port", str(server.port), "--fault", "zero-topics@0.1")
     server.run_until(lambda: server.peers and any("Conected" in text for text in server.peers[-1].logs()))
@@ -205,6 +209,7 @@ def test_zero_topics_are_declared_at_the_second_request_only(simulate, server):
     server.run_until(lambda: peer.count(packets.ID_PUBLISHER) == 5)
 
 
+@pytest.mark.slow
 def test_garbage_costs_at_most_the_packet_beside_it(simulate, server):
     simulate("--port", str(server.port), "--fault", "garbage@16")
     request_when_ready(server, 1)
@@ -215,6 +220,7 @@ def test_garbage_costs_at_most_the_packet_beside_it(simulate, server):
     assert not peer.closed
 
 
+@pytest.mark.slow
 def test_a_frozen_robot_is_silent_and_goes_on(simulate, server):
     simulate("--port", str(server.port), "--fault", "frozen@16:for=6")
     request_when_ready(server, 1)
@@ -229,6 +235,7 @@ def test_a_frozen_robot_is_silent_and_goes_on(simulate, server):
     assert not peer.closed
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="other systems have larger buffers")
 @pytest.mark.parametrize("fault", ["frozen@16:robot=0,for=12", "stall@16:robot=0,for=12"])
 def test_what_exceeds_the_receive_window_of_a_robot_stays_with_the_sender(simulate, server, fault):
@@ -245,6 +252,7 @@ def test_what_exceeds_the_receive_window_of_a_robot_stays_with_the_sender(simula
     wait_for(lambda: is_acknowledged(peer.socket), "the acknowledgement of what waited")
 
 
+@pytest.mark.slow
 def test_a_clock_that_jumps_shows_in_the_stamps(simulate, server):
     simulate("--port", str(server.port), "--fault", "clock-jump@16:by=-100")
     request_when_ready(server, 1)
@@ -252,6 +260,7 @@ def test_a_clock_that_jumps_shows_in_the_stamps(simulate, server):
     server.run_until(lambda: time.time() - read_odom(peer.last(ids.ID_ODOM))[0][0] > 98)
 
 
+@pytest.mark.slow
 def test_a_slow_service_answers_late(simulate, server):
     simulate("--port", str(server.port), "--fault", "slow-service@1:by=5")
     request_when_ready(server, 1)
@@ -262,6 +271,7 @@ def test_a_slow_service_answers_late(simulate, server):
     assert time.monotonic() - called_s > 1.0
 
 
+@pytest.mark.slow
 def test_a_robot_that_is_sent_a_deadly_id_restarts(simulate, server):
     program = simulate("--port", str(server.port))
     request_when_ready(server, 1)
@@ -271,6 +281,7 @@ def test_a_robot_that_is_sent_a_deadly_id_restarts(simulate, server):
     program.wait_line("hero_0 crashed: the server sent id 130")
 
 
+@pytest.mark.slow
 def test_a_server_that_comes_late_finds_the_robots_waiting(simulate):
     port = find_free_port()
     program = simulate("--count", "2", "--port", str(port))
@@ -281,6 +292,7 @@ def test_a_server_that_comes_late_finds_the_robots_waiting(simulate):
     server.close()
 
 
+@pytest.mark.slow
 def test_a_network_with_delays_still_carries_everything(simulate, server):
     simulate("--count", "2", "--port", str(server.port), "--wifi", "hotspot")
     request_when_ready(server, 2)
@@ -288,6 +300,7 @@ def test_a_network_with_delays_still_carries_everything(simulate, server):
     assert all(peer.reader.bad_packets == 0 and peer.reader.skipped_bytes == 0 for peer in server.peers)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_it_quietly(simulate, server, number):
     program = simulate("--count", "4", "--port", str(server.port))
@@ -333,6 +346,7 @@ def test_the_readme_lists_every_option_and_every_fault():
     assert [key for key in keys if "`%s`" % key not in text] == []
 
 
+@pytest.mark.slow
 def test_the_documented_command_copies_all_that_is_needed(tmp_path):
     pack, unpack = re.search(
         r"(tar -cz .*?)\\\n\s*\| ssh USER@MACHINE '(.*?)'", read_readme(), re.DOTALL

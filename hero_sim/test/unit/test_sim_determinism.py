@@ -3,6 +3,7 @@
 import hashlib
 
 import numpy as np
+import pytest
 
 from hero_sim.robot_constants import BODY_RADIUS_M
 from hero_sim.world import contacts
@@ -70,6 +71,7 @@ def test_a_world_in_a_batch_gives_the_same_bytes_as_alone():
     assert len(set(together)) == len(seeds)
 
 
+@pytest.mark.slow
 def test_it_changes_nothing_how_seldom_neighbors_are_looked_up(monkeypatch):
     usual, meetings = drive(7, steps=1500)
     for margin_m in 0.0, 0.2:

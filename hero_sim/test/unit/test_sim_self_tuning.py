@@ -109,6 +109,7 @@ def test_motion_pulses_and_a_lost_connection_do_not_end_self_tuning(controller):
     assert len(list_tuning_lines(driver, driver.swarm.now_ms - 500)) > 20
 
 
+@pytest.mark.slow
 @both_controllers
 @pytest.mark.parametrize(
     "filler, count, length",
@@ -121,6 +122,7 @@ def test_a_zero_behind_50_ms_of_packets_in_one_send_ends_it(controller, filler, 
     assert count_ended(controller, data, 51) == 51
 
 
+@pytest.mark.slow
 @both_controllers
 def test_a_zero_behind_30_ms_of_packets_ends_self_tuning_rarely(controller):
     assert 0 < count_ended(controller, end_with([controller], NEUTRAL_PULSES, 60), 60) <= 10
@@ -176,6 +178,7 @@ def test_both_zeros_behind_the_packets_end_the_tuning_of_both():
     assert driver.measure_speed(0) < 0.001
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "controller, least_s, most_s", [(VELOCITY, 41, 65), (POSITION, 11, 49)], ids=["velocity", "position"]
 )
@@ -196,6 +199,7 @@ def test_self_tuning_fails_by_itself_after_the_measured_times(controller, least_
     assert max(lasted_s) - min(lasted_s) > 1.0
 
 
+@pytest.mark.slow
 def test_after_a_failed_tuning_the_last_velocity_drives_for_a_second():
     driver = start()
     driver.drive(0, 0.1, 0.0, 500)

@@ -168,6 +168,7 @@ def test_a_zero_rests_wherever_the_centers_are_and_1500_us_do_not(robot):
     assert driver.measure_speed(0) < 0.001
 
 
+@pytest.mark.slow
 @settings(max_examples=4)
 @given(robot=robots, tuning=st.sampled_from(TUNINGS))
 def test_a_tuning_robot_without_time_answers_keeps_its_last_pulses(robot, tuning):

@@ -123,6 +123,7 @@ CASES = {
 SLOWER = {"cyclic_pursuit": {"wheel_m_s": 0.06}}  # at full speed the servos' lag breaks its ring up
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(CASES))
 def test_a_behavior_does_what_its_metric_says(name):
     metric, limit, is_above, robots, time_s, arena, size_m = CASES[name]

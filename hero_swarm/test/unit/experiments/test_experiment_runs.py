@@ -56,6 +56,7 @@ def test_the_table_has_the_same_bytes_for_all_batches_and_jobs(finished, options
     assert (folder / "runs.csv").read_bytes() == (finished / "runs.csv").read_bytes()
 
 
+@pytest.mark.slow
 def test_parts_together_give_the_same_bytes(finished, tmp_path):
     path = write(tmp_path)
     for part in ("2/3", "1/3", "3/3"):
@@ -64,6 +65,7 @@ def test_parts_together_give_the_same_bytes(finished, tmp_path):
     assert (folder / "runs.csv").read_bytes() == (finished / "runs.csv").read_bytes()
 
 
+@pytest.mark.slow
 def test_killed_anywhere_a_resumed_experiment_gives_the_same_bytes(finished, tmp_path):
     path = write(tmp_path)
     command = [sys.executable, "-m", "hero_swarm", "run", str(path), "--jobs", "1", "--batch", "1"]
@@ -186,6 +188,7 @@ def test_an_error_of_the_behavior_names_its_line_and_the_runs(tmp_path):
         run(write(tmp_path, text))
 
 
+@pytest.mark.slow
 def test_changed_code_of_the_behavior_is_noticed(tmp_path):
     own = tmp_path / "own.py"
     source = (
