@@ -33,7 +33,7 @@ def parse_yaml(text: str, loader: Type[Any] = yaml.SafeLoader) -> Any:
     if len(text) > MAX_CHARACTERS:
         raise YamlError("it has more than %d characters" % MAX_CHARACTERS)
     try:
-        return yaml.load(text, loader)  # nosec B506 - callers give SafeLoader, or one that is stricter
+        return yaml.load(text, loader)  # noqa: S506 - callers give SafeLoader, or one that is stricter
     except RecursionError:
         raise YamlError("lists or tables within each other, deeper than can be read") from None
     except Exception as error:  # noqa: BLE001 - PyYAML raises many kinds at dates and numbers that are none

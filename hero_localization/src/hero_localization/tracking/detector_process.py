@@ -6,7 +6,7 @@ Images go over in shared memory, all else over a pipe. The process knows nothing
 import math
 import mmap
 import os
-import subprocess  # nosec B404 - it starts this module
+import subprocess
 import sys
 from contextlib import suppress
 from multiprocessing import Pipe
@@ -52,7 +52,7 @@ class DetectorProcess:
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
         self._connection: Optional[Connection] = near
         with far:
-            self._process = subprocess.Popen(  # nosec B603 - no shell, nothing from outside
+            self._process = subprocess.Popen(
                 command,
                 env=environment,
                 pass_fds=(far.fileno(), memory),
