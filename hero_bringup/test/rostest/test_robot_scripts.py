@@ -103,7 +103,7 @@ class RobotScriptsTest(unittest.TestCase):
     def test_a_script_that_has_just_started_knows_that_robots_are_stopped(self):
         drivers = Drivers()
         self.addCleanup(drivers.request_stop, False)
-        code = "import hero_client, sys; sys.exit(hero_client.Robot(3).is_stopped)"
+        code = "import hero_client, sys; sys.exit(hero_client.Robot(3).wait_until_ready().is_stopped)"
         self.assertEqual((0, ""), self.end(self.start(code)))
         for is_stopped in (True, False):
             drivers.request_stop(is_stopped)

@@ -12,16 +12,15 @@ BaseRobot, which robots that are stepped in process (hero_sim.stepped) share.
 """
 
 import atexit
-import math
-from typing import Any
 
 from nav_msgs.msg import Odometry
+from sensor_msgs.msg import Imu
 
 from hero_msgs.msg import Encoder
 from hero_node.command_line import print_error
 from hero_node.ros.script import start_node
 
-from .robots.robot_base import COMMAND_S, NEXT_ODOM_S, BaseRobot, check_robot_id
+from .robots.robot_base import COMMAND_S, BaseRobot, check_robot_id
 from .ros.ros_link import RosLink
 
 __all__ = ["Robot"]
@@ -69,7 +68,8 @@ class Robot(BaseRobot):
 
         Raises: StaleDataError if it is older than 1 s.
         """
-        return self._read_message("odom")
+        self._check_fresh("odom")
+        return self._link.messages.read("odom")
 
     @property
     def encoder(self) -> Encoder:
@@ -77,11 +77,14 @@ class Robot(BaseRobot):
 
         The first use subscribes and waits up to 5 s. Raises: StaleDataError if it is older than 1 s.
         """
-        self._link.subscribe("encoder")
-        if self.age_s("encoder") == math.inf:
-            self._link.wait_for_next("encoder", NEXT_ODOM_S)
-        return self._read_message("encoder")
+        self._check_asked("encoder")
+        return self._link.messages.read("encoder")
 
-    def _read_message(self, topic: str) -> Any:
-        self._check_fresh(topic)
-        return self._link.messages.read(topic)
+    @property
+    def imu(self) -> Imu:
+        """The newest sensor_msgs/Imu of a robot with the IMU hat; what its numbers mean: docs/robot_interface.md.
+
+        The first use subscribes and waits up to 5 s. Raises: StaleDataError if it is older than 1 s.
+        """
+        self._check_asked("imu")
+        return self._link.messages.read("imu")

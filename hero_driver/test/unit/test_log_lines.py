@@ -51,10 +51,7 @@ def test_what_only_resembles_a_heartbeat_is_none(text):
     "text, clean",
     [
         ("\x1b[92m[hero_0] IMU hat detected!\x1b[0m", "IMU hat detected!"),
-        (
-            "\x1b[91m[hero_0] IMU is not working or not connected! Error: 1\x1b[0m",
-            "no IMU hat, so nothing on imu (IMU is not working or not connected! Error: 1)",
-        ),
+        ("\x1b[91m[hero_0] IMU is not working or not connected! Error: 1\x1b[0m", "no IMU hat, so nothing on imu"),
         ("[HERO] Odometry was changed!", "Odometry was changed!"),
         ("[/hero_0] Reseting PID... now", "Reseting PID... now"),
         ("Left  Motor PID = [1.00, 2.00, 3.00]", "Left  Motor PID = [1.00, 2.00, 3.00]"),

@@ -50,11 +50,11 @@ def test_read_sensors_turns_and_prints_what_is_seen(capsys):
 @pytest.mark.parametrize("seed", range(10))
 def test_the_square_is_closed_and_the_light_blinks(seed):
     with StepSwarm(1, seed=seed) as swarm:
-        log = swarm.log_poses()
+        log = swarm.log()
         lights = []
         swarm.rows.on_cycle.append(lambda rows: lights.append(swarm[0].light))
         drive_a_square.drive_a_square(swarm[0])
-    offsets = true_paths.split_worlds(swarm, log)[0][:, 0, :2] - log[0][0, 4:6]
+    offsets = log.true_pose[:, 0, 0, :2] - log.true_pose[0, 0, 0, :2]
     assert math.hypot(*offsets[-1]) < 0.05
     assert np.hypot(*offsets.T).max() == pytest.approx(0.2 * math.sqrt(2.0), abs=0.03)
     changes = sum(one != next_one for one, next_one in zip(lights, lights[1:]))

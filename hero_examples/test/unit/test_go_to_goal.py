@@ -34,13 +34,13 @@ def start_each(swarm, choose_goal, **options):
 def test_random_goals_are_reached_and_no_robot_swings_there():
     rng = random.Random(5)
     with StepSwarm(1, seed=1, arena="empty", perfect=True, worlds=WORLDS) as swarm:
-        log = swarm.log_poses()
+        log = swarm.log()
         motions, goals = start_each(
             swarm, lambda world: (rng.uniform(-0.6, 0.6), rng.uniform(-0.6, 0.6), rng.uniform(-math.pi, math.pi))
         )
         for motion in motions:
             motion.result()
-        for path, goal in zip(true_paths.split_worlds(swarm, log), goals):
+        for path, goal in zip(true_paths.split_worlds(log), goals):
             distances_m = np.hypot(*(path[:, 0, :2] - goal[:2]).T)
             assert distances_m[-1] < TRUE_TOLERANCE_M
             assert abs(math.remainder(path[-1, 0, 2] - goal[2], math.tau)) < 0.12
@@ -56,10 +56,10 @@ def test_a_post_in_the_way_is_avoided_or_named_and_never_touched(tmp_path, avoid
     arena.write_text(ROUND_THE_POST)
     rng = random.Random(7)
     with StepSwarm(1, seed=1, arena=str(arena), worlds=WORLDS) as swarm:
-        log = swarm.log_poses()
+        log = swarm.log()
         motions, goals = start_each(swarm, lambda world: (0.4, rng.uniform(-0.05, 0.05)), avoid=avoid)
         errors = [motion.exception() for motion in motions]
-        for path, goal, error in zip(true_paths.split_worlds(swarm, log), goals, errors):
+        for path, goal, error in zip(true_paths.split_worlds(log), goals, errors):
             assert true_paths.measure_wall_gaps(path, load_arena(str(arena))).min() > 0.005
             if avoid:
                 assert error is None and math.dist(path[-1, 0, :2], goal) < 0.1  # odometry has drifted

@@ -23,16 +23,16 @@ CREEP_M = 0.0005
 
 def run(swarm, step, duration_s, hz=10.0):
     """Call step(time_s) hz times per simulated second, until it returns True; return the paths, one per world."""
-    log = swarm.log_poses()
+    log = swarm.log()
     for time_s in swarm.rate(hz):
         if time_s >= duration_s or step(time_s):
             break
-    return split_worlds(swarm, log)
+    return split_worlds(log)
 
 
-def split_worlds(swarm, log):
-    """Return the paths in a log of StepSwarm.log_poses(), one per world."""
-    return np.split(np.array(log)[:, :, 4:7], len(swarm.worlds), axis=1)
+def split_worlds(log):
+    """Return the paths in a SwarmLog, one per world."""
+    return list(np.moveaxis(log.true_pose, 1, 0))
 
 
 def stop_within(swarm, settle_s=0.5):

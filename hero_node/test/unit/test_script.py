@@ -3,6 +3,8 @@
 import sys
 import threading
 
+import pytest
+
 from hero_node.errors import HeroError
 from hero_node.ros import script
 
@@ -32,6 +34,17 @@ def test_threads_that_open_robots_at_once_start_one_node(monkeypatch):
     for thread in threads:
         thread.join()
     assert started == ["hero_program"]
+
+
+@pytest.mark.parametrize("is_notebook", [True, False])
+def test_errors_of_scripts_are_one_line_and_notebooks_keep_theirs(monkeypatch, is_notebook):
+    monkeypatch.setattr(script, "check_master", lambda: None)
+    monkeypatch.setattr(script.rospy.core, "is_initialized", lambda: True)
+    monkeypatch.setattr(sys, "excepthook", sys.__excepthook__)
+    if is_notebook:
+        monkeypatch.setattr(sys, "ps1", "In : ", raising=False)  # as IPython sets it
+    script.start_node()
+    assert (sys.excepthook is sys.__excepthook__) == is_notebook
 
 
 def test_an_error_names_the_line_of_the_script(monkeypatch, capsys, tmp_path):

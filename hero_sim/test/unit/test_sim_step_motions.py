@@ -4,6 +4,7 @@ import gc
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from hero_client import FrameError, GoalError, RobotNotReadyError, StoppedError
@@ -131,13 +132,13 @@ def test_a_robot_told_to_avoid_drives_around_what_stops_it_else(tmp_path):
     with pytest.raises(GoalError, match="obstacle is in the way"):
         StepSwarm(1, arena=str(path))[0].go_to(0.4, 0.0, frame="world")
     swarm = StepSwarm(1, arena=str(path), worlds=MANY // 2)
-    log = swarm.log_poses()
+    log = swarm.log()
     swarm.go_to(0.4, 0.0, frame="world", avoid=True, timeout_s=60.0)
     for robot in swarm:
         # Wheels differ, and odometry drifts on the way.
         assert math.dist(robot.true_pose[:2], (0.4, 0.0)) < 0.06
-    gap_m = min(math.dist(pose, (0.0, 0.01)) for poses in log for pose in poses[:, 4:6]) - 0.05 - BODY_RADIUS_M
-    assert gap_m > 0.003
+    distances_m = np.hypot(*np.moveaxis(log.true_pose[..., :2] - (0.0, 0.01), -1, 0))
+    assert distances_m.min() - 0.05 - BODY_RADIUS_M > 0.003
 
 
 def test_a_robot_whose_wheels_do_not_turn_fails_and_says_so():

@@ -26,7 +26,7 @@ CORNERED = 4
 
 def wander_about(swarm, seed, duration_s=8.0):
     """Let robots walk at random, and one go to goals in the background; return the bytes of all their poses."""
-    log = swarm.log_poses()
+    log = swarm.log()
     dice = np.random.RandomState(seed)
     memories = {robot: WanderMemory() for robot in swarm}
     motion = swarm[0].start_go_to(0.1, 0.1, frame="robot")
@@ -39,28 +39,29 @@ def wander_about(swarm, seed, duration_s=8.0):
             robot.drive(*command)
         if motion.done():
             motion = swarm[0].start_go_to(*swarm[0].pose[:2], yaw_rad=float(dice.random_sample()))
-    return np.array(log).tobytes()
+    return log.pose.tobytes() + log.true_pose.tobytes()
 
 
 def test_the_same_seed_gives_the_same_bytes_and_another_seed_others():
     first, again, other = (wander_about(StepSwarm(6, seed=seed), 1) for seed in (5, 5, 6))
-    assert len(first) > 160 * 6 * 7 * 8
+    assert len(first) > 160 * 6 * 6 * 8
     assert first == again
     assert first != other
 
 
 def test_each_world_of_a_batch_is_that_of_its_seed_alone():
     batch = StepSwarm(3, seed=7, worlds=3)
-    log = batch.log_poses()
+    log = batch.log(ranges=True)
     for world in batch.worlds:
         world.start_go_to(0.15, 0.1, frame="robot")
     batch.sleep(6.0)
     for index in range(3):
         alone = StepSwarm(3, seed=7 + index)
-        alone_log = alone.log_poses()
+        alone_log = alone.log(ranges=True)
         alone.start_go_to(0.15, 0.1, frame="robot")
         alone.sleep(6.0)
-        assert np.array(log)[:, 3 * index : 3 * index + 3].tobytes() == np.array(alone_log).tobytes()
+        for name in ("pose", "true_pose", "velocity", "command", "range_m"):
+            np.testing.assert_array_equal(getattr(log, name)[:, [index]], getattr(alone_log, name))
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -79,7 +80,7 @@ def test_a_program_for_a_robot_runs_unchanged_in_process(seed):
 
 def test_over_wifi_data_are_older_and_motions_still_reach_their_goals():
     swarm = StepSwarm(1, wifi="hotspot", worlds=10)
-    log = swarm.log_poses()
+    log = swarm.log()
     ages_s = []
     motions = [robot.start_go_to(0.15, 0.1, yaw_rad=1.0, frame="robot") for robot in swarm]
     while not all(motion.done() for motion in motions):
@@ -89,10 +90,10 @@ def test_over_wifi_data_are_older_and_motions_still_reach_their_goals():
     assert [motion.exception() for motion in motions] == [None] * 10
     for row in range(10):
         alone = StepSwarm(1, seed=row, wifi="hotspot")
-        alone_log = alone.log_poses()
+        alone_log = alone.log()
         alone.start_go_to(0.15, 0.1, yaw_rad=1.0, frame="robot")
         alone.sleep(2.0)
-        assert [poses[0].tolist() for poses in alone_log] == [poses[row].tolist() for poses in log[: len(alone_log)]]
+        assert alone_log.pose.tolist() == log.pose[: len(alone_log), [row]].tolist()
 
 
 def test_robots_are_taken_by_their_ids_and_describe_themselves():
@@ -193,12 +194,12 @@ def test_lights_show_the_color_that_was_asked_for_and_blink():
     swarm.led("blue")
     swarm.sleep(2.0)
     assert {robot.light for robot in swarm} == {(0.0, 0.0, 1.0)}
-    for _ in swarm.rate(10):  # the robot alone would go dark after 15 s
-        swarm[0].led("blue")
-        assert swarm[0].light == (0.0, 0.0, 1.0)
-        if swarm.now_s > 25.0:
-            break
-    assert swarm[1].light == (0.0, 0.0, 0.0)
+    swarm[0].led("green")
+    swarm.sleep(20.0)  # a robot alone would go dark after 15 s
+    assert [robot.light for robot in swarm] == [(0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 1.0)]
+    swarm.close()
+    swarm.sleep(20.0)
+    assert {robot.light for robot in swarm} == {(0.0, 0.0, 0.0)}
     with pytest.raises(ValueError, match=r"pink.*there are: .*green"):
         swarm[0].led("pink")
     with pytest.raises(ValueError, match=r"at least 0.2 s"):
@@ -342,3 +343,47 @@ def test_robots_that_do_not_get_to_their_goals_are_named_and_stopped():
         assert swarm[1].velocity == (0.0, 0.0)
         with pytest.raises(KeyError, match="hero_7 is not in this swarm"):
             swarm.go_to_each({7: (0.0, 0.0)})
+
+
+def test_arrays_hold_what_the_robots_read_one_by_one():
+    with StepSwarm(3, seed=2, arena="obstacles") as swarm:
+        swarm.drive(0.1, 0.5, duration_s=1.0)
+        assert swarm.pose_array.tolist() == [list(robot.pose) for robot in swarm]
+        assert swarm.velocity_array.tolist() == [list(robot.velocity) for robot in swarm]
+        assert swarm.proximity_array.tolist() == [robot.proximity for robot in swarm]
+
+
+def test_wheel_speeds_and_infrared_counts_fit_velocity_and_ranges(tmp_path):
+    arena = tmp_path / "wall.yaml"
+    arena.write_text("walls_m: [[[-2, 0.1], [2, 0.1]]]\nstarts_m_deg: [[0, 0, 0]]\n")  # to the left
+    robot = StepSwarm(1, perfect=True, arena=str(arena))[0]
+    robot.drive(0.0, 2.0)
+    robot.sleep(0.15)  # hardly turned yet
+    counts = robot.infrared_counts
+    assert counts.index(max(counts)) == 2 and min(robot.proximity) == robot.proximity[2]
+    robot.sleep(1.0)
+    left_m_s, right_m_s = robot.wheel_speeds
+    assert left_m_s < 0.0 < right_m_s and right_m_s - left_m_s == pytest.approx(2.0 * 0.063, abs=0.04)  # whole ticks
+
+
+def test_a_dict_of_goals_drives_each_robot_to_its_own():
+    swarm = StepSwarm(2, seed=1)
+    goals = {robot.robot_id: (robot.true_pose.x_m, robot.true_pose.y_m + 0.1) for robot in swarm}
+    swarm.go_to(goals)
+    for robot in swarm:
+        assert robot.true_pose[:2] == pytest.approx(goals[robot.robot_id], abs=0.03)
+    with pytest.raises(TypeError, match=r"the goal of each robot: \{0: \(0.2, 0.1\)"):
+        swarm.go_to(0.2)
+
+
+def test_a_log_names_what_robots_did_by_time_world_and_robot():
+    with StepSwarm(3, seed=1, worlds=2) as swarm:
+        log = swarm.log()
+        swarm[1].drive(0.1, 0.5)
+        swarm.sleep(0.5)
+        assert log.time_s.tolist() == pytest.approx([index * 0.05 for index in range(11)])
+        assert log.true_pose.shape == log.pose.shape == (11, 2, 3, 3)
+        assert log.command[-1].tolist() == [[[0.0, 0.0], [0.1, 0.5], [0.0, 0.0]], [[0.0, 0.0]] * 3]
+        assert tuple(log.true_pose[-1, 0, 1]) == swarm[1].true_pose and log.velocity[-1, 0, 1, 0] > 0.0
+        with pytest.raises(AttributeError, match="range_m on request"):
+            assert log.range_m

@@ -45,7 +45,7 @@ class Member(Protocol):
 
     def _end_motion(self) -> None: ...
 
-    def _end_blinking(self) -> None: ...
+    def _end_light(self) -> None: ...
 
     def _send_velocity(self, linear_m_s: float, angular_rad_s: float) -> None: ...
 
@@ -152,9 +152,9 @@ class Group(Clock):
         self._run(send_stops(robots))
 
     def _leave(self) -> None:
-        """Stop the robots that were driven from here, and end blinking; for the end of a program."""
+        """Stop the robots that were driven from here, and end what their lights do; for the end of a program."""
         for robot in self._members:
-            robot._end_blinking()
+            robot._end_light()
         self._stop([robot for robot in self._members if robot.driven])
         self._clock.sleep(SEND_TIME_S)  # for a color that was asked for last
 

@@ -1,7 +1,6 @@
 """The light of one robot: a color, or blinking. Pure."""
 
 import itertools
-import math
 from typing import Optional, Tuple
 
 from ..values.background_motion import BackgroundMotion, Steps
@@ -10,7 +9,7 @@ from .robot_link import RobotLink
 
 __all__ = ["Light"]
 
-REPEAT_PERIOD_S = 2.0
+REPEAT_PERIOD_S = 5.0
 """Between two messages of the same color: the robot's light goes dark 15 s after the last one."""
 
 MIN_BLINK_PERIOD_S = 0.2
@@ -23,21 +22,24 @@ class Light:
     def __init__(self, link: RobotLink) -> None:
         """Be the light of the robot at link."""
         self._link = link
-        self._color: Optional[Color] = None
-        self._sent_s = -math.inf
+        self._shown = COLORS["off"]
+        self._keeping: Optional[BackgroundMotion] = None
         self._blinking: Optional[BackgroundMotion] = None
 
     def show(self, color: Color) -> None:
-        """Show a color; the same one again is sent every REPEAT_PERIOD_S only.
-
-        Raises: ValueError for a color that is not known.
-        """
+        """Show a color from now on. Raises: ValueError for a color that is not known."""
         rgb = parse_color(color)
         self._end_blinking()
-        now_s = self._link.clock.now_s
-        if color != self._color or now_s - self._sent_s >= REPEAT_PERIOD_S or not self._link.connected:
-            self._color, self._sent_s = color, now_s
-            self._link.send_color(rgb)
+        if self._keeping is not None and rgb == self._shown and self._link.connected:
+            return
+        self._shown = rgb
+        self._link.send_color(rgb)
+        if self._keeping is None:
+            self._keeping = self._link.start(self._repeat())
+
+    def _repeat(self) -> Steps:
+        while (yield REPEAT_PERIOD_S):
+            self._link.send_color(self._shown)
 
     def blink(self, color: Color, period_s: float) -> None:
         """Show the color for half of each period, in the background, until another color is asked for."""
@@ -45,7 +47,7 @@ class Light:
         if not period_s >= MIN_BLINK_PERIOD_S:
             raise ValueError("a period must be at least %g s, not %r" % (MIN_BLINK_PERIOD_S, period_s))
         self._end_blinking()
-        self._color = None
+        self._end_keeping()
         self._blinking = self._link.start(self._alternate(rgb, period_s))
 
     def _alternate(self, rgb: Tuple[float, float, float], period_s: float) -> Steps:
@@ -60,7 +62,13 @@ class Light:
             self._blinking.cancel_and_wait()
             self._blinking = None
 
+    def _end_keeping(self) -> None:
+        if self._keeping is not None:
+            self._keeping.cancel_and_wait()
+            self._keeping = None
+
     def close(self) -> None:
-        """Switch the light off if it blinks; safe twice."""
+        """Send nothing more: switch a light off that blinks, and leave another one to go dark. Safe twice."""
         if self._blinking is not None:
             self.show("off")
+        self._end_keeping()

@@ -7,7 +7,7 @@ front, y to the left, angles counter-clockwise from the front.
 import math
 from contextlib import suppress
 from functools import partial
-from typing import Callable, Generator, List, Optional
+from typing import Callable, Generator, List, Optional, Tuple
 
 from ..controllers.go_to_goal import DEFAULT_TOLERANCE_M, Goal, GoToGoalController
 from ..controllers.motion import DEFAULT_TIMEOUT_S, MotionController, State
@@ -17,7 +17,7 @@ from ..values.colors import Color
 from ..values.errors import GoalError, StaleDataError, StoppedError
 from ..values.geometry import Pose, Velocity, clamp, transform_pose, wrap_angle
 from ..values.readings import FRESH_S, Obstacle, find_nearest
-from ..values.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
+from ..values.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S, WHEEL_SEPARATION_M
 from .group import POLL_PERIOD_S, READY_TIMEOUT_S, REPEAT_PERIOD_S, Group, stop_after, wait_for_all
 from .light import Light
 from .robot_link import RobotLink
@@ -90,6 +90,13 @@ class BaseRobot(Group):
             raise StaleDataError("no message on %s yet: is the robot on, and does the driver run?" % name)
         raise StaleDataError("the last message on %s came %.1f s ago: has the robot gone?" % (name, age_s))
 
+    def _check_asked(self, topic: str) -> None:
+        """Check that a topic, which only its readers subscribe to, has fresh data. Raises: StaleDataError."""
+        self._link.subscribe(topic)
+        if self._link.age_s(topic) == math.inf:
+            self._link.wait_for_next(topic, NEXT_ODOM_S)
+        self._check_fresh(topic)
+
     @property
     def pose(self) -> Pose:
         """Where the robot is by its odometry, in the frame hero_N/odom: 0, 0, 0 where it was switched on.
@@ -134,6 +141,22 @@ class BaseRobot(Group):
         self._check_fresh("proximity")
         return self._link.read_ranges()
 
+    @property
+    def wheel_speeds(self) -> Tuple[float, float]:
+        """Speeds of the left and right wheel at the rim, m/s, by the odometry. Raises: StaleDataError as `pose`."""
+        linear_m_s, angular_rad_s = self.velocity
+        turning_m_s = angular_rad_s * WHEEL_SEPARATION_M / 2.0
+        return linear_m_s - turning_m_s, linear_m_s + turning_m_s
+
+    @property
+    def infrared_counts(self) -> List[float]:
+        """What the eight infrared sensors measure, less the ambient light, in counts; in the order of `proximity`.
+
+        The first use subscribes, and waits up to 5 s. Raises: StaleDataError if they are older than 1 s.
+        """
+        self._check_asked("laser")
+        return self._link.read_infrared_counts()
+
     def wait_for_scan(self, timeout_s: float = 2.0) -> List[float]:
         """Wait for the next scan, which comes 5 times a second, and return its ranges as `proximity` does.
 
@@ -146,6 +169,10 @@ class BaseRobot(Group):
     def fresh_pose(self) -> Optional[Pose]:
         """Return `pose` without waiting, or None if it is not fresh."""
         return self._link.read_pose() if self._link.age_s("odom") <= FRESH_S else None
+
+    def fresh_velocity(self) -> Optional[Velocity]:
+        """Return `velocity` without waiting, or None if it is not fresh."""
+        return self._link.read_velocity() if self._link.age_s("odom") <= FRESH_S else None
 
     def fresh_proximity(self) -> List[float]:
         """Return `proximity` without waiting, or eight times nan (not known) if it is not fresh."""
@@ -170,9 +197,8 @@ class BaseRobot(Group):
     def is_stopped(self) -> bool:
         """Whether the robot takes no motion because its driver has stopped all robots (emergency stop).
 
-        At the start of a program it waits until the robot's driver has reported, for about 6 s at most.
+        Never waits. False until the robot's driver has reported, which wait_until_ready() waits for.
         """
-        self._link.wait_until_settled()
         return self._link.is_stopped
 
     def missing(self) -> Optional[str]:
@@ -197,7 +223,9 @@ class BaseRobot(Group):
         stop. Without, send one command and return: the robot obeys it until the next one, for about 2 s at most.
         A robot speeds up within about 0.5 s, so 0.1 m/s for 2 s is a little less than 0.2 m: see forward().
 
-        One command that cannot have an effect is logged: if nothing subscribes to it, or all robots are stopped.
+        Without duration_s it never waits: a command that comes before the driver's subscription, as at the start of a
+        program, is sent with it. One that cannot have an effect is logged: if nothing subscribes to it within 3 s of
+        the start, or all robots are stopped.
 
         Raises: ValueError for velocities that are not finite. With duration_s also RobotNotReadyError if the robot is
         not there within 2 s, and StoppedError if all robots are stopped.
@@ -415,8 +443,7 @@ class BaseRobot(Group):
     def led(self, color: Color) -> None:
         """Show a color: a name such as "red" (see colors.COLORS), or (red, green, blue), each 0..1.
 
-        The robot's light goes dark 15 s later, so call this in every step of a loop: what the robot shows already is
-        sent every 2 s only. Raises: ValueError for a color that is not known.
+        It stays lit until the program ends, and for 15 s more. Raises: ValueError for a color that is not known.
         """
         self._light.show(color)
 
@@ -427,7 +454,7 @@ class BaseRobot(Group):
         """
         self._light.blink(color, period_s)
 
-    def _end_blinking(self) -> None:
+    def _end_light(self) -> None:
         self._light.close()
 
     # ------------------------------------------------------------------ end

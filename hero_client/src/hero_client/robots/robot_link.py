@@ -14,7 +14,7 @@ MAP = "map"
 
 
 class RobotLink(Protocol):
-    """One robot. Topics go by their names: "odom", "proximity"."""
+    """One robot. Topics go by their names: "odom", "proximity", "encoder", "laser"."""
 
     @property
     def clock(self) -> Clock:
@@ -47,6 +47,9 @@ class RobotLink(Protocol):
     def read_ranges(self) -> List[float]:
         """Return the newest proximity ranges, of which there are some: see Robot.proximity."""
 
+    def read_infrared_counts(self) -> List[float]:
+        """Return the newest counts of the infrared sensors, of which there are some: see Robot.infrared_counts."""
+
     def find_localized(self, frame: str, timeout_s: float) -> Optional[Pose]:
         """Return where hero_localization says that the robot is; None if that is in another frame, or does not run.
 
@@ -75,9 +78,6 @@ class RobotLink(Protocol):
 
     def describe_stop(self) -> str:
         """Return what has stopped all robots and how to release them, for users."""
-
-    def wait_until_settled(self) -> None:
-        """Wait until is_stopped can be known; at the start of a program that takes a moment."""
 
     # -- the program --------------------------------------------------------------------------------------
 

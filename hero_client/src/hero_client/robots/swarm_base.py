@@ -1,7 +1,10 @@
 """Several robots as one object, whatever connects them: see swarm. Pure."""
 
+import math
 from abc import abstractmethod
-from typing import Any, Dict, Generic, Iterator, List, Mapping, Optional, Sequence, Tuple, TypeVar
+from typing import Any, Dict, Generic, Iterator, List, Mapping, Optional, Sequence, Tuple, TypeVar, Union
+
+import numpy as np
 
 from hero_node.clock import Clock
 from hero_node.errors import HeroError
@@ -55,6 +58,24 @@ class BaseSwarm(Group, Generic[AnyRobot]):
         """
         return {robot_id: robot.pose_in(MAP) for robot_id, robot in self._by_id.items()}
 
+    @property
+    def pose_array(self) -> np.ndarray:
+        """Poses of the robots by their odometry (N, 3): x m, y m, yaw rad, each in hero_N/odom; nan where not fresh.
+
+        Rows are in the order of `robots`, as in velocity_array and proximity_array.
+        """
+        return np.array([robot.fresh_pose() or [math.nan] * 3 for robot in self.robots])
+
+    @property
+    def velocity_array(self) -> np.ndarray:
+        """Velocities of the robots by their odometry (N, 2): linear m/s, angular rad/s; nan where not fresh."""
+        return np.array([robot.fresh_velocity() or [math.nan] * 2 for robot in self.robots])
+
+    @property
+    def proximity_array(self) -> np.ndarray:
+        """Ranges of the robots (N, 8), m: see Robot.proximity; nan where not fresh."""
+        return np.array([robot.fresh_proximity() for robot in self.robots])
+
     def drive(self, linear_m_s: float, angular_rad_s: float, duration_s: Optional[float] = None) -> None:
         """Drive all robots with the same velocities: see Robot.drive()."""
         if duration_s is not None:
@@ -63,14 +84,25 @@ class BaseSwarm(Group, Generic[AnyRobot]):
         for robot in self.robots:
             robot.drive(linear_m_s, angular_rad_s)
 
-    def go_to(self, x_m: float, y_m: float, yaw_rad: Optional[float] = None, **options: Any) -> None:
+    def go_to(
+        self,
+        x_m: Union[float, Mapping[int, Tuple[float, float]]],
+        y_m: Optional[float] = None,
+        yaw_rad: Optional[float] = None,
+        **options: Any,
+    ) -> None:
         """Drive every robot to this place of its own frame, all at once; return when all have ended.
 
-        options: as in Robot.go_to(). With frame="robot" all robots make the same move. For goals of each robot, see
-        go_to_each().
+        options: as in Robot.go_to(). With frame="robot" all robots make the same move. With a dict of goals instead of
+        x_m and y_m, it is go_to_each().
 
         Raises: as Robot.go_to(), for the robots that failed; the others reach their goals.
         """
+        if isinstance(x_m, Mapping):
+            self.go_to_each(x_m, **options)
+            return
+        if y_m is None:
+            raise TypeError("go_to takes x_m and y_m, or the goal of each robot: {0: (0.2, 0.1), 1: (-0.2, 0.1)}")
         self._wait_for(self.start_go_to(x_m, y_m, yaw_rad, **options))
 
     def forward(self, distance_m: float, linear_m_s: float = 0.1) -> None:

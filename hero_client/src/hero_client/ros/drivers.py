@@ -32,8 +32,6 @@ SETTLE_LOOKS = 3
 """At the third look, 6 s after the first one, a driver that the master knows has reported, unless it hangs or died
 without unregistering. Looks, not seconds: a program that was kept from running has not heard anybody either."""
 
-SETTLE_POLL_S = 0.02
-
 FORGET_S = 5.0
 """Reports come once per second. Robots of a driver that is silent for longer than the others are no longer listed."""
 
@@ -252,12 +250,10 @@ class Drivers:
             return True
         return self._has_found and all(link.report is not None for link in self._find_known())
 
-    def wait_until_reported(self, namespace: str) -> None:
-        """Wait until a driver has reported the robot with this namespace, or is_settled."""
-        while not (self._is_reported(namespace) or self.is_settled or self._end.wait(SETTLE_POLL_S)):
-            pass
-
-    def _is_reported(self, namespace: str) -> bool:
+    def knows(self, namespace: str) -> bool:
+        """Return whether a driver has reported the robot with this namespace, or every driver had the time to."""
+        if self.is_settled:
+            return True
         reports = [link.report for link in self._links.values() if link.report is not None]
         return any(robot.namespace == namespace for report in reports for robot in report.robots)
 

@@ -13,7 +13,7 @@ __all__ = ["CommandTopic", "NewestMessages"]
 
 CONNECT_S = 3.0
 """A driver that has the robot connects to a new publisher within this time, mostly within 0.1 s; a command before
-would be lost."""
+waits."""
 
 POLL_PERIOD_S = 0.02
 """Between two looks whether the driver has connected."""
@@ -74,16 +74,19 @@ class NewestMessages:
         self._subscribers = {}
 
 
-class CommandTopic:
+class CommandTopic(rospy.SubscribeListener):
     """A topic on which a robot takes commands."""
 
     def __init__(self, name: str, message_class: Type[Any], explain_absence: Callable[[], str]) -> None:
         """explain_absence: tells users why nothing subscribes to the topic."""
+        super().__init__()
         self.name = name
         self._explain_absence = explain_absence
-        self._publisher = rospy.Publisher(name, message_class, queue_size=1)
         self._connect_deadline_s = time.monotonic() + CONNECT_S
         self._has_warned = False
+        self._turn = threading.Lock()
+        self._waiting: Optional[Any] = None
+        self._publisher = rospy.Publisher(name, message_class, subscriber_listener=self, queue_size=1)
 
     @property
     def connected(self) -> bool:
@@ -91,23 +94,54 @@ class CommandTopic:
         return bool(self._publisher.get_num_connections() > 0)
 
     def publish(self, message: Any) -> None:
-        """Send a command. One without a subscriber is warned about, once until there is one again.
+        """Send a command; returns at once. One without a subscriber is warned about, once until there is one again.
 
-        The first command after the start waits for the driver's subscription, for CONNECT_S at most.
+        In the first CONNECT_S after the start the newest command waits for the driver's subscription instead.
         """
-        while not self.connected and time.monotonic() < self._connect_deadline_s and not rospy.is_shutdown():
-            time.sleep(POLL_PERIOD_S)
+        left_s = self._connect_deadline_s - time.monotonic()
+        with self._turn:
+            if not self.connected and left_s > 0.0:
+                if self._waiting is None:
+                    timer = threading.Timer(left_s, self._give_up)
+                    timer.daemon = True
+                    timer.start()
+                self._waiting = message
+                return
         if self.connected:
             self._has_warned = False
-        elif not self._has_warned and not rospy.is_shutdown():
-            self._has_warned = True
-            rospy.logwarn("a command is lost: %s", self.describe_absence())
+        else:
+            self._warn()
         self.publish_if_connected(message)
 
+    def peer_subscribe(self, topic_name: str, topic_publish: Any, peer_publish: Any) -> None:
+        """Send the command that waited for this subscription; rospy calls it on a thread of its own."""
+        with self._turn:
+            if self._waiting is not None and not rospy.is_shutdown():
+                self._publisher.publish(self._waiting)
+            self._waiting = None
+
+    def _give_up(self) -> None:
+        with self._turn:
+            is_lost, self._waiting = self._waiting is not None, None
+        if is_lost:
+            self._warn()
+
+    def _warn(self) -> None:
+        if not self._has_warned and not rospy.is_shutdown():
+            self._has_warned = True
+            rospy.logwarn("a command is lost: %s", self.describe_absence())
+
+    def wait_until_connected(self) -> None:
+        """Wait for the driver's subscription, in the first CONNECT_S after the start."""
+        while not self.connected and time.monotonic() < self._connect_deadline_s and not rospy.is_shutdown():
+            time.sleep(POLL_PERIOD_S)
+
     def publish_if_connected(self, message: Any) -> None:
-        """Send a command without waiting or warning: a stop, which a robot that is not there does not need."""
-        if not rospy.is_shutdown():
-            self._publisher.publish(message)
+        """Send a command without warning, in place of one that waits: a stop, which an absent robot does not need."""
+        with self._turn:  # no command that waited may follow this one
+            self._waiting = None
+            if not rospy.is_shutdown():
+                self._publisher.publish(message)
 
     def describe_absence(self) -> str:
         """Return why there is no subscriber, for users."""

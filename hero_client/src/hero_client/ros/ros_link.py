@@ -7,7 +7,7 @@ from typing import List, Optional, Tuple
 import rospy
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
-from sensor_msgs.msg import LaserScan
+from sensor_msgs.msg import Imu, LaserScan
 from std_msgs.msg import ColorRGBA
 
 from hero_msgs.msg import Encoder
@@ -32,7 +32,7 @@ SERVICE_TIMEOUT_S = 2.0
 END_TIMEOUT_S = 3.0
 """A cancelled motion ends within 0.3 s; one that hangs must not hang its robot's next motion."""
 
-MESSAGE_CLASSES = {"odom": Odometry, "proximity": LaserScan, "encoder": Encoder}
+MESSAGE_CLASSES = {"odom": Odometry, "proximity": LaserScan, "laser": LaserScan, "encoder": Encoder, "imu": Imu}
 
 
 class ThreadMotion(BackgroundMotion):
@@ -101,6 +101,8 @@ class RosLink:
         silent = self.messages.find_silent(FRESH_S)
         if silent is not None:
             return "no message on %s/%s: is the robot on and in reach?" % (self._namespace, silent)
+        if not self._drivers.knows(self._namespace):
+            return "no driver has reported it yet, so whether it is stopped is not known"
         return None
 
     def subscribe(self, topic: str) -> None:
@@ -129,6 +131,11 @@ class RosLink:
         """See RobotLink."""
         return front_first(self.messages.read("proximity"))
 
+    def read_infrared_counts(self) -> List[float]:
+        """See RobotLink."""
+        counts = [float(count) for count in self.messages.read("laser").intensities[::2]]  # the others are averages
+        return counts[len(counts) // 2 :] + counts[: len(counts) // 2]
+
     def find_localized(self, frame: str, timeout_s: float) -> Optional[Pose]:
         """See RobotLink; the first call subscribes to /localization/poses, for all robots."""
         return share_poses().find(self._robot_id, frame, timeout_s)
@@ -148,6 +155,7 @@ class RosLink:
 
     def send_color(self, rgb: Tuple[float, float, float]) -> None:
         """See RobotLink."""
+        self._led.wait_until_connected()  # a script that ends with it would end before
         self._led.publish(ColorRGBA(*rgb, 1.0))
 
     def set_odometry(self, pose: Pose) -> None:
@@ -173,10 +181,6 @@ class RosLink:
             "the driver %s has stopped all robots. Release them with r in `rosrun hero_tools fleet`,"
             " Swarm.release_stop(), or: rosservice call %s/stop false" % (driver.strip("/"), driver)
         )
-
-    def wait_until_settled(self) -> None:
-        """See RobotLink; takes about 6 s at most."""
-        self._drivers.wait_until_reported(self._namespace)
 
     def start(self, steps: Steps) -> BackgroundMotion:
         """Take steps on another thread."""

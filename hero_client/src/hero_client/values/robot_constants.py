@@ -1,6 +1,6 @@
 """What is true of every HeRo robot; source: the firmware's config.h and RangeSensor.ino."""
 
-__all__ = ["BODY_RADIUS_M", "MAX_ANGULAR_RAD_S", "MAX_LINEAR_M_S", "MIN_RANGE_M"]
+__all__ = ["BODY_RADIUS_M", "MAX_ANGULAR_RAD_S", "MAX_LINEAR_M_S", "MIN_RANGE_M", "WHEEL_SEPARATION_M"]
 
 BODY_RADIUS_M = 0.0368
 """The firmware adds it to what its infrared sensors measure, so ranges count from the robot's center."""
@@ -13,3 +13,5 @@ MAX_LINEAR_M_S = 0.20
 
 MAX_ANGULAR_RAD_S = 8.0
 """The firmware clamps angular.z to this."""
+
+WHEEL_SEPARATION_M = 0.063

@@ -73,5 +73,5 @@ def read_log_line(text: str) -> LogLine:
     elif _TUNING_ENDED.search(body) is not None:
         tunes = False
     if body.startswith(_NO_IMU):
-        body = "no IMU hat, so nothing on imu (%s)" % body
+        body = "no IMU hat, so nothing on imu"
     return LogLine(body, boot, heartbeat, tunes, heartbeat is not None or body == _PID_RESET)

@@ -44,7 +44,7 @@ def start_node(name: str = "hero_program") -> None:
 
     Raises: NodeError if no ROS master answers within 3 s, also for a node that runs already.
     """
-    if sys.excepthook is sys.__excepthook__:
+    if sys.excepthook is sys.__excepthook__ and not hasattr(sys, "ps1"):  # no shell or notebook
         sys.excepthook = _print_exception
     with _START:
         if rospy.core.is_initialized():

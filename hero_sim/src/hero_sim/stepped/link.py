@@ -3,6 +3,8 @@
 import sys
 from typing import Callable, List, Optional, Tuple
 
+import numpy as np
+
 from hero_client.robots.robot_link import MAP
 from hero_client.values.background_motion import BackgroundMotion, Steps
 from hero_client.values.errors import FrameError, StaleDataError
@@ -38,7 +40,10 @@ class StepLink:
         self.is_stopped = False
         self._name = name
         self._rows = rows = clock.rows
-        self._arrivals_ms = {"odom": rows.odometry_ms, "encoder": rows.odometry_ms, "proximity": rows.scan_ms}
+        self._arrivals_ms = {
+            **dict.fromkeys(("odom", "encoder"), rows.odometry_ms),
+            **dict.fromkeys(("proximity", "laser"), rows.scan_ms),
+        }
         self._origin = self.true_pose
         self.localize: Callable[[], Pose] = lambda: self.true_pose
 
@@ -86,6 +91,11 @@ class StepLink:
         ranges_m: List[float] = self._rows.proximity_m[self.row].tolist()
         return ranges_m
 
+    def read_infrared_counts(self) -> List[float]:
+        """See RobotLink."""
+        counts: List[float] = np.roll(self._rows.counts[self.row], 4).tolist()
+        return counts
+
     def find_localized(self, frame: str, timeout_s: float) -> Optional[Pose]:
         """See RobotLink; there is always a localization."""
         return self.localize() if frame == MAP else None
@@ -115,9 +125,6 @@ class StepLink:
     def describe_stop(self) -> str:
         """See RobotLink."""
         return "all robots are stopped. Release them with StepSwarm.release_stop()"
-
-    def wait_until_settled(self) -> None:
-        """See RobotLink; it is known at once."""
 
     def start(self, steps: Steps) -> BackgroundMotion:
         """Take steps while the program waits."""

@@ -22,7 +22,7 @@ class StepRobot(BaseRobot):
 
     @property
     def row(self) -> int:
-        """Its row in the swarm's arrays: StepSwarm.rows, log_poses()."""
+        """Its row in the swarm's arrays: StepSwarm.rows."""
         return self._link.row
 
     @property

@@ -65,6 +65,7 @@ class RobotRows:
         ticks: of both wheels since the odometry was last set (R, 2), whole numbers, read every 34 ms.
         odometry_ms: when the program received these (R,).
         scan_ms: when the program received these (R,), every 205 ms.
+        commands: the velocity that was sent last, linear m/s and angular rad/s (R, 2).
         on_cycle, on_scan: called when the program has received odometry and ticks, and ranges.
     """
 
@@ -96,6 +97,7 @@ class RobotRows:
         self._velocity = WheelControllers(rows, VELOCITY_GAINS, VELOCITY_LIMIT_US, VELOCITY_WATCHDOG_MS)
         self._position = WheelControllers(rows, POSITION_GAINS, POSITION_LIMIT_US, POSITION_WATCHDOG_MS)
         self._start_ticks = np.zeros((2, rows))
+        self.commands = np.zeros((rows, 2))
         self._velocity_commands = CommandShaper(rows, 0.0)
         self._position_commands = CommandShaper(rows, 0.0)
         self._pulse_commands = CommandShaper(rows, MOTOR_CENTER_US)
@@ -122,6 +124,7 @@ class RobotRows:
         One value for all rows, or one for each. Raises: ValueError for one that is not finite.
         """
         self._velocity_commands.offer(self.now_ms, rows, linear_m_s, angular_rad_s)
+        self.commands[rows, 0], self.commands[rows, 1] = linear_m_s, angular_rad_s
 
     def send_position(self, rows: Rows, linear_m_s: Values, angular_rad_s: Values) -> None:
         """Send velocities to the position controller, which drives as far as they reach in a second."""

@@ -11,9 +11,7 @@
 
 import argparse
 import sys
-from typing import List, Optional, Sequence
-
-import numpy as np
+from typing import Optional, Sequence
 
 from hero_client.robots.swarm_base import BaseSwarm
 from hero_client.values.background_motion import Steps
@@ -25,6 +23,7 @@ from ..population import build_radios, build_world, check_population
 from .robot import StepRobot
 from .robot_rows import RobotRows
 from .step_clock import StepClock, StepMotion
+from .swarm_log import SwarmLog
 
 __all__ = ["StepSwarm", "StepWorld"]
 
@@ -99,17 +98,16 @@ class StepSwarm(StepWorld):
         self.worlds = [StepWorld(robots[first : first + count], clock) for first in range(0, len(robots), count)]
         self._by_id = self.worlds[0]._by_id
 
-    def log_poses(self) -> List[np.ndarray]:
-        """Return a list that from now on grows by an array (R, 7) every 0.05 s in which the program waits.
+    def log(self, ranges: bool = False) -> SwarmLog:
+        """Return a log that from now on grows by a row every 0.05 s in which the program waits.
 
-        Columns: time s; x m, y m, yaw rad in the newest odometry; x m, y m, yaw rad in world.
+        ranges: also log what the proximity sensors see, which takes longer.
         """
-        log: List[np.ndarray] = []
-        StepMotion(self._clock, self._note_poses(log))
+        log = SwarmLog(self.rows, len(self.worlds), ranges)
+        StepMotion(self._clock, self._note(log))
         return log
 
-    def _note_poses(self, log: List[np.ndarray]) -> Steps:
+    def _note(self, log: SwarmLog) -> Steps:
         while True:
-            times_s = np.full((len(self.robots), 1), self.now_s)
-            log.append(np.hstack((times_s, self.rows.odometry, self.rows.world.poses)))
+            log.note()
             yield LOG_PERIOD_S

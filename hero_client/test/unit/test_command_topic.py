@@ -1,0 +1,62 @@
+"""Commands before the driver has subscribed: the newest one waits, a stop takes its place, and nobody waits for it."""
+
+from types import SimpleNamespace
+
+import pytest
+
+pytest.importorskip("rospy", reason="topics are rospy's")
+from hero_client.ros import robot_topics
+from hero_client.ros.robot_topics import CONNECT_S, CommandTopic
+
+
+@pytest.fixture(name="ros")
+def make_ros(monkeypatch):
+    """The clock, the timers and the publisher that a CommandTopic uses."""
+    ros = SimpleNamespace(now_s=100.0, sent=[], warned=[], timers=[], subscribers=0)
+    publisher = SimpleNamespace(publish=ros.sent.append, get_num_connections=lambda: ros.subscribers)
+
+    def make_timer(after_s, call):
+        ros.timers.append(call)
+        return SimpleNamespace(start=lambda: None)
+
+    monkeypatch.setattr(robot_topics.rospy, "Publisher", lambda *arguments, **options: publisher)
+    monkeypatch.setattr(robot_topics.rospy, "is_shutdown", lambda: False)
+    monkeypatch.setattr(robot_topics.rospy, "logwarn", lambda text, *values: ros.warned.append(text % values))
+    monkeypatch.setattr(robot_topics.threading, "Timer", make_timer)
+    monkeypatch.setattr(robot_topics.time, "monotonic", lambda: ros.now_s)
+    monkeypatch.setattr(robot_topics.time, "sleep", lambda duration_s: pytest.fail("waits"))
+    ros.topic = CommandTopic("/hero_0/cmd_vel", object, lambda: "no driver answers")
+    return ros
+
+
+def subscribe(ros):
+    ros.subscribers = 1
+    ros.topic.peer_subscribe("/hero_0/cmd_vel", None, None)
+
+
+def test_the_newest_early_command_is_sent_with_the_subscription(ros):
+    ros.topic.publish("slow")
+    ros.topic.publish("fast")
+    assert ros.sent == []
+    subscribe(ros)
+    assert ros.sent == ["fast"]
+    ros.topic.publish("next")
+    ros.timers[0]()
+    assert ros.sent == ["fast", "next"] and ros.warned == []
+
+
+def test_a_stop_takes_the_place_of_an_early_command(ros):
+    ros.topic.publish("fast")
+    ros.topic.publish_if_connected("stop")
+    subscribe(ros)
+    assert ros.sent == ["stop"]  # which rospy drops without a subscriber
+
+
+def test_a_command_that_nobody_takes_is_warned_about_once(ros):
+    ros.topic.publish("fast")
+    ros.now_s += CONNECT_S
+    ros.timers[0]()
+    ros.topic.publish("fast")
+    assert ros.warned == ["a command is lost: nothing subscribes to /hero_0/cmd_vel: no driver answers"]
+    subscribe(ros)
+    assert "fast" not in ros.sent[1:]

@@ -1,0 +1,91 @@
+"""Runs a script for robots on simulated ones in its own process: `python3 -m hero_sim.in_process my_script.py`.
+
+Needs neither ROS nor a driver. Time is the robots': it passes only while the script waits, so a script takes as long as
+its computation, and gives the same each time.
+"""
+
+import argparse
+import runpy
+import sys
+import time
+from pathlib import Path
+from typing import Any, Iterable, NoReturn, Optional, Sequence
+
+import hero_client
+from hero_client.values.errors import RobotNotReadyError
+from hero_node.command_line import call, say
+from hero_node.errors import HeroError, ProgramError
+
+from .stepped.robot import StepRobot
+from .stepped.swarm import StepSwarm, StepWorld
+
+__all__ = ["main"]
+
+
+def main(argv: Optional[Sequence[str]] = None) -> int:
+    """Run a script with its arguments; return its exit status."""
+    parser = argparse.ArgumentParser(prog="python3 -m hero_sim.in_process", description=__doc__.partition("\n")[0])
+    parser.add_argument("--count", type=int, default=4, metavar="N", help="robots, hero_0 and on (%(default)s)")
+    parser.add_argument("--seed", type=int, default=0, metavar="S", help="of differences and noise (%(default)s)")
+    parser.add_argument("--arena", metavar="ARENA", help="as the simulator's")
+    parser.add_argument("--wifi", default="ideal", help="as the simulator's (%(default)s)")
+    parser.add_argument("--perfect", action="store_true", help="robots without differences and noise")
+    parser.add_argument("script", help="a script that uses Robot, Swarm and rate of hero_client")
+    parser.add_argument("arguments", nargs=argparse.REMAINDER, help="those of the script")
+    options = parser.parse_args(argv)
+    return call(lambda: run_script(options), HeroError)
+
+
+def run_script(options: argparse.Namespace) -> None:
+    """Run the script on its robots, and print where these are at its end."""
+    if not Path(options.script).is_file():
+        raise ProgramError("%s: no such script" % options.script)
+    swarm = StepSwarm(options.count, options.seed, options.arena, options.wifi, options.perfect)
+    replace_ros(swarm)
+    sys.argv = [options.script, *options.arguments]
+    sys.path.insert(0, str(Path(options.script).resolve().parent))
+    try:
+        runpy.run_path(options.script, run_name="__main__")
+    finally:
+        places = ["%s at (%.3f, %.3f) m" % (robot.name, *robot.true_pose[:2]) for robot in swarm if robot.driven]
+        say("; ".join(["%.1f s simulated" % swarm.now_s, *places]), sys.stderr)
+
+
+def replace_ros(swarm: StepSwarm) -> None:
+    """Let what a script imports from hero_client and time be that of these robots, in this process from now on."""
+
+    def find_robot(robot_id: int, odom: bool = True, proximity: bool = True) -> StepRobot:
+        if robot_id not in swarm._by_id:
+            raise RobotNotReadyError("hero_%s is not there: --count %d simulates fewer" % (robot_id, len(swarm)))
+        return swarm[robot_id]
+
+    class SimulatedSwarm(StepWorld):
+        """Some of the robots."""
+
+        def __init__(self, robot_ids: Iterable[int], odom: bool = True, proximity: bool = True) -> None:
+            super().__init__([find_robot(robot_id) for robot_id in robot_ids], swarm._clock)
+
+        @staticmethod
+        def discover(*arguments: Any, **options: Any) -> StepSwarm:
+            """Return all robots."""
+            return swarm
+
+    def refuse(*arguments: Any, **options: Any) -> NoReturn:
+        raise ProgramError("Program needs ROS: in process run scripts that use Robot, Swarm and rate")
+
+    replacements = {
+        "Robot": find_robot,
+        "Swarm": SimulatedSwarm,
+        "rate": swarm.rate,
+        "start_node": lambda name="": None,
+        "Program": refuse,
+    }
+    for name, replacement in replacements.items():
+        setattr(hero_client, name, replacement)
+    for name in ("time", "monotonic"):
+        setattr(time, name, lambda: swarm.now_s)
+    time.sleep = swarm.sleep
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,53 @@
+"""Scripts for robots, run on simulated ones in process: unchanged, in virtual time, and without ROS."""
+
+import subprocess
+import sys
+
+import pytest
+
+SCRIPT = """
+import sys, time
+from hero_client import Robot, Swarm, rate
+
+with Robot(1) as robot:
+    robot.forward(0.1)
+    print(sys.argv[1], robot.pose)
+with Swarm.discover() as swarm, Swarm([0, 1]) as pair:
+    begun_s = time.time()
+    while time.time() < begun_s + 100.0:
+        pair.drive(0.0, 1.0)
+        time.sleep(0.5)
+    for time_s in rate(10):
+        if time_s > 100.0:
+            break
+    print(len(swarm), len(pair), round(time.monotonic()))
+"""
+
+
+def run(tmp_path, text, *options):
+    script = tmp_path / "script.py"
+    script.write_text(text)
+    command = [sys.executable, "-m", "hero_sim.in_process", *options, str(script), "argument"]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def test_a_script_for_robots_runs_unchanged_on_stepped_ones(tmp_path):
+    first, again = (run(tmp_path, SCRIPT, "--count", "3") for _ in range(2))
+    assert first.returncode == 0, first.stderr
+    assert first.stdout.startswith("argument Pose(x_m=0.")
+    assert first.stdout.splitlines()[1].startswith("3 2 20")
+    assert "s simulated; hero_0 at (" in first.stderr and "hero_2" not in first.stderr
+    assert first.stdout == again.stdout
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("from hero_client import Robot\nRobot(7)", "script.py: hero_7 is not there: --count 4 simulates fewer"),
+        ("from hero_client import Program\nProgram('p')", "script.py: Program needs ROS: in process run scripts"),
+    ],
+)
+def test_what_simulated_robots_cannot_do_is_one_line(tmp_path, text, message):
+    ended = run(tmp_path, text)
+    assert ended.returncode == 1
+    assert message in ended.stderr and "Traceback" not in ended.stderr
