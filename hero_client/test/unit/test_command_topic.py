@@ -50,6 +50,7 @@ def test_a_stop_takes_the_place_of_an_early_command(ros):
     ros.topic.publish_if_connected("stop")
     subscribe(ros)
     assert ros.sent == ["stop"]  # which rospy drops without a subscriber
+    assert len(ros.warned) == 1
 
 
 def test_a_command_that_nobody_takes_is_warned_about_once(ros):

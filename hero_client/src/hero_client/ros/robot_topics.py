@@ -139,9 +139,11 @@ class CommandTopic(rospy.SubscribeListener):
     def publish_if_connected(self, message: Any) -> None:
         """Send a command without warning, in place of one that waits: a stop, which an absent robot does not need."""
         with self._turn:  # no command that waited may follow this one
-            self._waiting = None
+            is_lost, self._waiting = self._waiting is not None and not self.connected, None
             if not rospy.is_shutdown():
                 self._publisher.publish(message)
+        if is_lost:
+            self._warn()
 
     def describe_absence(self) -> str:
         """Return why there is no subscriber, for users."""
