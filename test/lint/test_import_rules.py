@@ -184,7 +184,7 @@ def test_real_cameras_and_their_calibration_need_no_simulator():
 
 def test_only_stepped_robots_need_the_client():
     # `python3 -m hero_sim` runs without ROS, and hero_client lies beside it only in a workspace.
-    others = [name for name in modules_below("hero_sim") if part_of(name, "hero_sim") != "stepped"]
+    others = [name for name in modules_below("hero_sim") if part_of(name, "hero_sim") not in ("stepped", "in_process")]
     check(describe(name, found) for name in others for found in imports_of(name) if found.top == "hero_client")
 
 

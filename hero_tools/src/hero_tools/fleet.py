@@ -41,9 +41,9 @@ CLEAR_LINE_END = "\x1b[K"
 CLEAR_SCREEN_END = "\x1b[J"
 PRINT_PERIOD_S = 5.0  # without a terminal
 STOP_KEYS = (*STOP_ALL_KEYS, "s")
-"""Those of teleop, and s, which there stops the robots that it drives."""
+"""Those of teleop; s, which there stops the robots that it drives, is not advertised here."""
 
-KEYS_HELP = "q quit   Enter, s STOP ALL ROBOTS   r release them   o order"
+KEYS_HELP = "q quit   Enter STOP ALL ROBOTS   r release them   o order"
 MAX_OPTION = 1e6
 
 
