@@ -6,7 +6,7 @@ from hero_client import CommonFrame, Program, ProgramError, Swarm, read_paramete
 from hero_client.controllers.unicycle import FollowLaw, follow
 from hero_client.values.geometry import STOP
 from hero_client.values.robot_constants import MAX_LINEAR_M_S
-from hero_node.parameters import number, parse_poses, robot_ids
+from hero_node.parameters import number, robot_ids
 
 
 def step(swarm, common, law):
@@ -23,7 +23,6 @@ def follow_leader():
             {
                 "robots": robot_ids("0 1"),
                 "frame": "world",
-                "starts": "",
                 "gap_m": number(FollowLaw().gap_m, 0.10, 2.0, "m"),
                 "linear_m_s": number(FollowLaw().max_linear_m_s, 0.01, MAX_LINEAR_M_S, "m/s"),
             }
@@ -32,7 +31,7 @@ def follow_leader():
         if ids is None or len(ids) < 2:
             raise ProgramError("~robots is %r, but must name a leader and at least one follower" % (ids or "all",))
         law = FollowLaw(gap_m=parameters["gap_m"], max_linear_m_s=parameters["linear_m_s"])
-        common = CommonFrame(parameters["frame"], parse_poses("starts", parameters["starts"], ids))
+        common = CommonFrame(parameters["frame"])
 
         # The leader is never driven from here, so leaving the swarm does not stop it.
         with Swarm(ids, proximity=False) as swarm:

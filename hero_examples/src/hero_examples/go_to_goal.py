@@ -22,7 +22,7 @@ def serve_goals():
             }
         )
         ids, once = parameters["robots"], parameters["once"]
-        goals = parse_poses("goals", parameters["goals"], ids, needs_heading=False)
+        goals = parse_poses("goals", parameters["goals"], ids)
         if once and not goals:
             raise ProgramError("~once is true, but ~goals is empty: there is nothing to do")
 

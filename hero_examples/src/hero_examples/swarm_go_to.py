@@ -7,7 +7,7 @@ from hero_client.apps.formations import assign_goals, place_formation
 from hero_client.controllers.orca import AvoidanceLaw
 from hero_client.controllers.swarm_go_to import SwarmGoToController
 from hero_client.values.robot_constants import MAX_LINEAR_M_S
-from hero_node.parameters import flag, number, parse_poses, robot_ids, whole_number
+from hero_node.parameters import flag, number, robot_ids, whole_number
 
 STEP_S = 0.1
 
@@ -46,7 +46,6 @@ def form():
                 "robots": robot_ids("all"),
                 "formation": {"shape": "circle"},
                 "frame": "world",
-                "starts": "",
                 "linear_m_s": number(AvoidanceLaw().max_linear_m_s, 0.01, MAX_LINEAR_M_S, "m/s"),
                 "tolerance_m": number(0.01, 0.005, 0.1, "m"),
                 "timeout_s": number(120.0, 1.0, 3600.0, "s"),
@@ -58,7 +57,7 @@ def form():
         ids, wanted = parameters["robots"], parameters["formation"]
         law = AvoidanceLaw(max_linear_m_s=parameters["linear_m_s"])
         place_formation(wanted, len(ids or [0]), law.min_spacing_m)  # fails before robots are waited for
-        common = CommonFrame(parameters["frame"], parse_poses("starts", parameters["starts"], ids))
+        common = CommonFrame(parameters["frame"])
         with open_swarm(program, ids) as swarm:
             poses = common.wait_for_poses(program, swarm)
             goals = place_formation(wanted, len(swarm), law.min_spacing_m)

@@ -16,18 +16,16 @@ ARENA = """
 bounds_m: [-2, -2, 2, 2]
 starts_m_deg: [[0, 0, 0], [-0.25, 0, 0], [-0.5, 0, 0]]
 """
-STARTS = {0: (1.0, 1.0, 0.0), 1: (0.75, 1.0, 0.0), 2: (0.5, 1.0, 0.0)}
-"""In a frame of its own, in which the robots stand as in the arena."""
 
 GAP_M = 0.15
 
 
-def follow_curve(folder, starts, perfect, leader_s):
+def follow_curve(folder, perfect, leader_s):
     """Let the leaders of 20 worlds drive a curve for leader_s and stop; return the paths."""
     arena = folder / "row.yaml"
     arena.write_text(ARENA)
     with StepSwarm(3, seed=1, arena=str(arena), perfect=perfect, worlds=20) as swarm:
-        commons = [CommonFrame("world", starts) for _ in swarm.worlds]
+        commons = [CommonFrame("world") for _ in swarm.worlds]
 
         def step(time_s):
             for world, common in zip(swarm.worlds, commons):
@@ -39,9 +37,8 @@ def follow_curve(folder, starts, perfect, leader_s):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("starts", [{}, STARTS], ids=["tf", "starts"])
-def test_a_chain_follows_a_curve_keeps_its_gaps_and_stops(tmp_path, starts):
-    for path in follow_curve(tmp_path, starts, True, leader_s=30.0):
+def test_a_chain_follows_a_curve_keeps_its_gaps_and_stops(tmp_path):
+    for path in follow_curve(tmp_path, True, leader_s=30.0):
         gaps_m = true_paths.measure_gaps(path)[:, [0, 1], [1, 2]] + 2.0 * BODY_RADIUS_M
         assert true_paths.measure_lengths(path).min() > 1.5
         assert gaps_m.min() > 2.0 * BODY_RADIUS_M + 0.01
@@ -52,7 +49,7 @@ def test_a_chain_follows_a_curve_keeps_its_gaps_and_stops(tmp_path, starts):
 
 @pytest.mark.slow
 def test_a_chain_whose_odometry_drifts_follows_without_touching(tmp_path):
-    for path in follow_curve(tmp_path, {}, False, leader_s=15.0):
+    for path in follow_curve(tmp_path, False, leader_s=15.0):
         assert true_paths.measure_lengths(path).min() > 0.8
         assert true_paths.measure_gaps(path).min() > 0.01
 

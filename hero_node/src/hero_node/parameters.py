@@ -192,18 +192,17 @@ def _parse_id_range(word: Any) -> Tuple[int, int]:
 
 
 def parse_poses(
-    name: str, text: Any, ids: Optional[Sequence[int]], needs_heading: bool = True
+    name: str, text: Any, ids: Optional[Sequence[int]]
 ) -> Dict[int, Tuple[float, float, Optional[float]]]:
-    """Return id -> (x_m, y_m, yaw_rad) from text such as "0 0 0; 0.3 0 90" (m, degrees), in the order of the ids.
+    """Return id -> (x_m, y_m, yaw_rad) from text such as "0 0; 0.3 0 90" (m, degrees), in the order of the ids.
 
-    needs_heading: False allows "x y" alone; yaw_rad is then None. No text: no poses.
+    Of "x y" alone yaw_rad is None. No text: no poses.
     Raises: ProgramError for anything else, or another number of poses than of ids.
     """
     parts = [part.split() for part in str(text).split(";") if part.strip()]
     if not parts:
         return {}
-    form = '"x y heading"' if needs_heading else '"x y" or "x y heading"'
-    remedy = 'must hold %s for each robot, in m and degrees, separated by ";"' % form
+    remedy = 'must hold "x y" or "x y heading" for each robot, in m and degrees, separated by ";"'
     if ids is None or len(parts) != len(ids):
         count = ALL_ROBOTS if ids is None else str(len(ids))
         raise ProgramError("~%s has %d poses for %s robots, but %s" % (name, len(parts), count, remedy))
@@ -213,8 +212,7 @@ def parse_poses(
             numbers = [float(word) for word in part]
         except ValueError:
             numbers = []
-        lengths = (3,) if needs_heading else (2, 3)
-        if len(numbers) not in lengths or not all(abs(entry) <= MAX_COORDINATE_M for entry in numbers):
+        if len(numbers) not in (2, 3) or not all(abs(entry) <= MAX_COORDINATE_M for entry in numbers):
             raise ProgramError("~%s holds %r, but %s" % (name, " ".join(part), remedy))
         yaw_rad = math.radians(numbers[2]) if len(numbers) == 3 else None
         poses[robot_id] = (numbers[0], numbers[1], yaw_rad)

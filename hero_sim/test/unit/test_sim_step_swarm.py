@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from driver_side import parse_options
 
-from hero_client import CommonFrame, GoalError, Pose, StaleDataError
+from hero_client import CommonFrame, GoalError, StaleDataError
 from hero_client.controllers.avoidance import WanderMemory, wander
 from hero_sim import main
 from hero_sim.errors import OptionError
@@ -161,10 +161,6 @@ def test_setting_the_odometry_moves_its_frame_and_not_the_robot():
     assert robot.true_pose == pytest.approx(before, abs=1e-6)
     assert common.pose_of(robot)[:2] == pytest.approx(before[:2], abs=1e-6)
     assert common.missing == {"hero_1": None}
-    starts = CommonFrame("arena", {1: (5.0, 5.0, 0.0)})
-    assert starts.pose_of(robot) == pytest.approx(Pose(5.0, 5.0, 0.0))
-    robot.turn(1.0)
-    assert starts.pose_of(robot).yaw_rad == pytest.approx(1.0, abs=0.05)
 
 
 def test_a_common_frame_that_nobody_knows_is_reported(capsys):
