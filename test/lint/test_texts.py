@@ -5,9 +5,9 @@ import re
 
 import sources
 
-LONGEST_FILE_LINES = 500
-LONGEST_TEST_NAME = 70
-LONGEST_PACE_S = 0.1
+MAX_FILE_LINES = 500
+MAX_TEST_NAME = 70
+MAX_PACE_S = 0.1
 SUFFIXES = ("", *".py .md .rst .launch .test .xml .yaml .yml .toml .txt .msg .srv .action .urdf".split())
 PYTHON = sources.list_python_files()
 TESTS = [path for path in PYTHON if "test" in path.parts]
@@ -30,14 +30,14 @@ def test_nothing_is_left_to_do_in_a_text():
 
 def test_files_are_short():
     for path in PYTHON:
-        assert len(path.read_text(encoding="utf-8").splitlines()) <= LONGEST_FILE_LINES, sources.name_of(path)
+        assert len(path.read_text(encoding="utf-8").splitlines()) <= MAX_FILE_LINES, sources.name_of(path)
 
 
 def test_names_of_tests_are_short():
     for path in TESTS:
         for node in ast.walk(sources.parse(path)):
             if isinstance(node, ast.FunctionDef) and node.name.startswith("test_"):
-                assert len(node.name) <= LONGEST_TEST_NAME, f"{sources.name_of(path)}: {node.name}"
+                assert len(node.name) <= MAX_TEST_NAME, f"{sources.name_of(path)}: {node.name}"
 
 
 def test_names_of_modules_say_what_they_hold():
@@ -55,6 +55,25 @@ def test_tests_wait_on_conditions_not_on_sleeps():
         for node in ast.walk(tree):
             if isinstance(node, ast.Call) and dotted_name(node.func) in ("time.sleep", "rospy.sleep"):
                 argument = node.args[0]
-                paces = isinstance(argument, ast.Constant) and argument.value <= LONGEST_PACE_S
+                paces = isinstance(argument, ast.Constant) and argument.value <= MAX_PACE_S
                 where = f"{sources.name_of(path)}:{node.lineno}"
                 assert paces or id(node) in in_loops, f"{where}: sleep as synchronisation"
+
+
+def test_names_of_bounds_begin_with_min_or_max():
+    private = re.compile(r"_?(LEAST|MOST|LARGEST|LONGEST|FARTHEST|SMALLEST|SHORTEST)_[A-Z]")
+    for path in PYTHON:
+        for node in ast.walk(sources.parse(path)):
+            if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+                assert not private.match(node.id), f"{sources.name_of(path)}: {node.id}: MIN_ or MAX_"
+
+
+def test_constants_of_the_robot_are_equal_in_all_packages():
+    """Driver, programs and simulator know the robot independently: a mistake in one must not hide in the others."""
+    known = {}
+    for path in [path for path in PYTHON if path.name == "robot_constants.py"]:
+        for node in sources.parse(path).body:
+            if isinstance(node, ast.Assign) and isinstance(node.value, (ast.Constant, ast.Tuple)):
+                (name,), value = [target.id for target in node.targets], ast.literal_eval(node.value)
+                assert known.setdefault(name, value) == value, f"{sources.name_of(path)}: {name}"
+    assert known

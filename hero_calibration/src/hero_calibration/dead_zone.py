@@ -34,7 +34,7 @@ takes the oldest."""
 DROPPED_S = 0.1
 """A command may still be dropped this long after a silence: the robot drops one within 50 ms of another."""
 
-LEAST_READINGS = 2
+MIN_READINGS = 2
 MISSING_SHARE = 0.5
 """Of the steps; with the simulated Wi-Fi of a PC that is the access point a third is missing."""
 
@@ -42,7 +42,7 @@ REST_M_S = 0.004
 """A slower wheel is at rest: two ticks (1.1 mm) in a step may be the servo that settles."""
 
 FIT_POINTS = 8
-LEAST_POINTS = 3
+MIN_POINTS = 3
 """Speeds beyond the dead zone that give its edge: further ones tell less of it, fewer are lost in noise."""
 
 AGREE_US = 8.0
@@ -90,7 +90,7 @@ def measure_sweep(readings: Readings, start_times_s: Sequence[float]) -> np.ndar
         is_seen = (readings.times_s[:-1] >= first_s) & (readings.times_s[1:] <= last_s)
         is_late = (silences_s[0] < first_s) & (silences_s[1] > start_s - DROPPED_S)
         kept = changes[:, is_seen & readings.is_even]
-        if kept.shape[1] >= LEAST_READINGS and not is_late.any():
+        if kept.shape[1] >= MIN_READINGS and not is_late.any():
             count, *distances_ticks = kept.sum(axis=1)
             speeds[:, step] = np.array(distances_ticks) * TICK_M / (count * readings.step_s)
     if np.isnan(speeds[0]).mean() > MISSING_SHARE:
@@ -126,7 +126,7 @@ def _find_zone(pulses: np.ndarray, speeds: np.ndarray) -> DeadZone:
     # Which side of the dead zone is forward depends on how the servo is mounted.
     speeds = speeds * np.sign(np.polyfit(pulses, speeds, 1)[0])
     below, above = np.flatnonzero(speeds < -REST_M_S), np.flatnonzero(speeds > REST_M_S)
-    if min(len(below), len(above)) < LEAST_POINTS or below[-1] >= above[0]:
+    if min(len(below), len(above)) < MIN_POINTS or below[-1] >= above[0]:
         raise CalibrationError(
             "does not stop between turning one way and the other at pulses from %s: is it blocked, or its servo worn?"
             % span

@@ -40,7 +40,7 @@ FAINT_COUNTS = 0.5
 NO_WALL_COUNTS = 4.0
 """A neighbor that sees the wall at 45 degrees reads 12; if both read less than this, neither sees it."""
 
-LARGEST_MISALIGNMENT_RAD = math.radians(12.0)
+MAX_MISALIGNMENT_RAD = math.radians(12.0)
 PLAUSIBLE_COUNTS_M2 = (0.15, 1.2)
 
 
@@ -106,7 +106,7 @@ def estimate_misalignment_rad(facing: Facing) -> float:
     slope = 2.0 * (beside - at) / step_rad
     # Turned to the left, the right neighbor comes closer to the wall's normal.
     misalignment_rad = math.log(right / left) / slope
-    if abs(misalignment_rad) > LARGEST_MISALIGNMENT_RAD:
+    if abs(misalignment_rad) > MAX_MISALIGNMENT_RAD:
         raise CalibrationError(
             "misaligned by %.0f degrees when sensor %s faces the wall: place it straight, or clean its wheels"
             % (abs(math.degrees(misalignment_rad)), name_beam(facing.sensor))

@@ -41,7 +41,7 @@ FIRST_PROPORTIONAL = 650.0
 HIGHEST_GAIN = 30000.0
 """The firmware prints gains into a buffer of 100 bytes without a check."""
 
-LEAST_SPEEDS = 20
+MIN_SPEEDS = 20
 APART = 3
 """Readings between which a speed is measured: they come every 34 ms, and a tick is 0.5 mm."""
 
@@ -113,7 +113,7 @@ def measure_speed(readings: Readings, ticks: np.ndarray, start: int, end_s: floa
     driven_s = min(STEP_S - 0.1, end_s - readings.times_s[start])
     seen = (times_s[:-APART] >= -0.1) & (times_s[APART:] <= driven_s)
     kept = np.flatnonzero(seen & readings.find_even(APART))
-    if len(kept) < LEAST_SPEEDS or times_s[kept[-1] + APART] < LATE_S + 0.2:
+    if len(kept) < MIN_SPEEDS or times_s[kept[-1] + APART] < LATE_S + 0.2:
         raise CalibrationError(
             "only %d speeds could be measured in %.1f s: is the network busy? try again" % (len(kept), STEP_S)
         )

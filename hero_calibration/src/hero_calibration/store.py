@@ -18,7 +18,7 @@ from .errors import CalibrationError
 PREVIOUS = ".previous"
 """Goes before the suffix of the previous file."""
 
-LONGEST_SHOWN = 60
+MAX_SHOWN = 60
 
 Range = Tuple[int, float, float, str]
 
@@ -125,7 +125,7 @@ def _read_numbers(path: str, key: str, found: Any, allowed: Range) -> List[float
 
 def _shorten(found: Any) -> str:
     """Return what was found, for an error; a list may even contain itself."""
-    return repr(found)[:LONGEST_SHOWN] if isinstance(found, (str, int, float, date)) else "a " + type(found).__name__
+    return repr(found)[:MAX_SHOWN] if isinstance(found, (str, int, float, date)) else "a " + type(found).__name__
 
 
 def _refuse(path: str, reason: str) -> CalibrationError:

@@ -15,6 +15,7 @@ from hero_client.controllers.avoidance import (
 )
 from hero_client.controllers.unicycle import FollowLaw, GoToLaw, follow, go_to_point, go_to_pose
 from hero_client.values.geometry import STOP, Pose, wrap_angle
+from hero_client.values.robot_constants import BODY_RADIUS_M
 
 INF = math.inf
 FREE = [INF] * 8
@@ -149,7 +150,7 @@ def test_a_wanderer_turns_away_from_the_nearer_side():
 def test_only_what_the_body_would_touch_is_in_its_path():
     assert find_in_path(FREE) == (INF, None) == find_in_path([math.nan] * 8)
     free_m, obstacle = find_in_path([0.12] + [INF] * 7)
-    assert free_m == pytest.approx(0.12 - 0.0368) and obstacle == (0.12, 0.0)
+    assert free_m == pytest.approx(0.12 - BODY_RADIUS_M) and obstacle == (0.12, 0.0)
     assert find_in_path([0.12] + [INF] * 7, backward=True) == (INF, None)
     rear = [INF] * 4 + [0.10, 0.05, INF, INF]
     assert find_in_path(rear, backward=True)[1] == pytest.approx((0.05, -0.75 * math.pi))

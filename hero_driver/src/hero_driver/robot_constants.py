@@ -1,6 +1,6 @@
 """Dimensions, limits and times of the HeRo and its firmware, each once, with its source."""
 
-BODY_RADIUS_M = 0.0368
+BODY_RADIUS_M = 0.036835
 """RangeSensor.ino:66; ranges count from the robot's center."""
 
 WHEEL_DIAMETER_M = 0.0492
@@ -11,10 +11,10 @@ TICKS_PER_TURN = 288.0
 MAX_WHEEL_SPEED_M_S = 1.0
 """Faster than any servo of the robot."""
 
-NEAREST_RANGE_M = 0.01
+MIN_RIM_RANGE_M = 0.01
 """The firmware's clamp, from the body's rim (RangeSensor.ino:123)."""
 
-FARTHEST_RANGE_M = 0.20
+MAX_RIM_RANGE_M = 0.20
 """The firmware's range_max, from the body's rim; ranges beyond it stand for nothing in range."""
 
 PROXIMITY_BEAMS = 8
@@ -26,17 +26,17 @@ STOCK_BEAMS = 16
 SCAN_TIME_S = 0.2
 """RangeSensor's rate is 5 Hz; it leaves scan_time zero."""
 
-LINEAR_LIMIT_M_S = 0.20
+MAX_LINEAR_M_S = 0.20
 """config.h:60."""
 
-ANGULAR_LIMIT_RAD_S = 8.0
+MAX_ANGULAR_RAD_S = 8.0
 """config.h:61."""
 
-MOTOR_CENTER_US = 1500
+SERVO_CENTER_US = 1500
 """Servo pulse at which a wheel stops, up to the servo's own center."""
 
-MOTOR_PULSES_US = (1000, 2000)
+PULSE_RANGE_US = (1000, 2000)
 """Shortest and longest servo pulse."""
 
-LONGEST_WATCHDOG_S = 4.0
+MAX_WATCHDOG_S = 4.0
 """After this time without a command the robot stops by itself (PositionControl.ino:105, MotorDriver.ino:111)."""

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from vectors import ENCODER_MESSAGE, GOOD, HANDSHAKE, ODOM_MESSAGE, TIME_REQUEST, VECTORS, build_packet
 
 from hero_driver.config import DriverConfig, read_config
-from hero_driver.fleet.log_lines import LONGEST_TEXT, read_log_line
+from hero_driver.fleet.log_lines import MAX_TEXT_LENGTH, read_log_line
 from hero_driver.fleet.namespaces import identify
 from hero_driver.rosserial.packets import DEFAULT_MAX_PAYLOAD_LENGTH, OVERHEAD_LENGTH, PacketReader
 from hero_driver.rosserial.session import MessagesReceived, SessionEnded
@@ -135,7 +135,7 @@ def test_any_parameters_are_taken_or_refused_in_one_line(parameters):
 @given(text=st.text(max_size=1000))
 def test_any_log_text_becomes_one_line_that_moves_no_cursor(text):
     line = read_log_line(text).text
-    assert len(line) <= LONGEST_TEXT
+    assert len(line) <= MAX_TEXT_LENGTH
     assert len(line.splitlines()) <= 1
     assert not any(unicodedata.category(character) == "Cc" for character in line), ascii(line)
 

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hero_driver.fleet.log_lines import LONGEST_TEXT, BootLine, Heartbeat, clean_text, read_log_line
+from hero_driver.fleet.log_lines import MAX_TEXT_LENGTH, BootLine, Heartbeat, clean_text, read_log_line
 
 BOOT = "\x1b[94m[/hero_0] Firmware: v3.8 | Hardware: v2.5 | Config: v2.3 | IP: 127.0.0.1 \x1b[0m"
 
@@ -89,7 +89,7 @@ def test_a_long_text_is_cut_and_says_so():
 @given(text=st.text(st.characters(blacklist_categories=("Cs",)), max_size=600))
 def test_any_text_becomes_one_short_line_without_control_characters(text):
     clean = read_log_line(text).text
-    assert len(clean) <= LONGEST_TEXT
+    assert len(clean) <= MAX_TEXT_LENGTH
     assert not any(ord(letter) < 32 or 127 <= ord(letter) < 160 for letter in clean)
     assert len(clean.splitlines()) <= 1
 

@@ -228,7 +228,7 @@ def test_proximity_has_eight_beams_at_the_true_angles():
     assert angle_max_rad == pytest.approx(angle_min_rad + 7.0 * increment_rad, abs=1e-6)
     assert angle_min_rad + 4.0 * increment_rad == pytest.approx(0.0, abs=1e-6)
     assert (time_increment_s, scan_time_s) == (0.0, float32(0.2))
-    assert (range_min_m, range_max_m) == (float32(0.0468), float32(0.2368))
+    assert (range_min_m, range_max_m) == (float32(0.046835), float32(0.236835))
     assert len(ranges_m) == len(intensities) == 8
 
 

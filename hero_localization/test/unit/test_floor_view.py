@@ -6,7 +6,7 @@ from test_camera_model import DISTORTION, MATRIX
 
 from hero_localization.camera.camera_model import Camera, Lens
 from hero_localization.errors import SettingsError
-from hero_localization.tracking.floor_view import LONGEST_SIDE_PX, FloorView
+from hero_localization.tracking.floor_view import MAX_SIDE_PX, FloorView
 from hero_localization.tracking.tag_corners import TagCorners
 
 HEIGHT_M = 0.076
@@ -31,7 +31,7 @@ def test_a_place_is_where_the_view_and_its_box_say(tilt_rad, yaw_rad):
         picture = np.zeros((1080, 1920), np.uint8)
         picture[v - 6 : v + 7, u - 6 : u + 7] = 255
         seen = view.rectify(picture)
-        assert max(seen.shape) == LONGEST_SIDE_PX
+        assert max(seen.shape) == MAX_SIDE_PX
         center = np.argwhere(seen > 127).mean(axis=0)[::-1]
         left_m, low_m, right_m, high_m = view.box_m
         height_px, width_px = seen.shape

@@ -40,7 +40,7 @@ walls_m: [[[-2, -1], [2, -1], [2, 1], [-2, 1], [-2, -1]]]
 starts_m_deg: [[0.1, 0.0, 0]]
 """
 PICTURE_S = 0.1
-MOST_OFF_M, MOST_OFF_RAD = 0.008, 0.04
+MAX_OFF_M, MAX_OFF_RAD = 0.008, 0.04
 """Two of the small images' pixels; a jump from one camera to the other by a mistake is far more."""
 PLACES_M = ((-0.35, -0.16), (0.35, -0.16), (0.35, 0.16), (-0.35, 0.16))
 """Of a camera's reference tags, from the place below it."""
@@ -128,8 +128,8 @@ def test_a_robot_that_changes_cameras_keeps_one_continuous_pose(tmp_path, gap_m)
         if robot.estimate is None:  # its first poses wait for odometry of their time
             continue
         true, pose = scene.true_at[robot.estimate.stamp_s], robot.estimate.pose
-        assert math.hypot(pose.x_m - true.x_m, pose.y_m - true.y_m) < MOST_OFF_M, seen_by
-        assert abs(geometry.wrap_angle(pose.yaw_rad - true.yaw_rad)) < MOST_OFF_RAD, seen_by
+        assert math.hypot(pose.x_m - true.x_m, pose.y_m - true.y_m) < MAX_OFF_M, seen_by
+        assert abs(geometry.wrap_angle(pose.yaw_rad - true.yaw_rad)) < MAX_OFF_RAD, seen_by
     assert seen_by[0] == (True, False)
     assert ((True, True) in seen_by) == (gap_m < 0.0)
     assert lines[0].startswith("hero_0 found at")

@@ -18,7 +18,7 @@ from hero_node.ros.program import Program, run
 
 from .background import Background
 from .control.commander import STOP_PERIOD_S, Commander
-from .control.dead_man import Velocity
+from .control.dead_man import DriveCommand
 from .control.freshness import CLOCK_PERIOD_S, explain_refused_release, is_fresh, read_clock_ms
 from .control.requests import RequestError, read_request
 from .fleet_feed.feed import FleetFeed
@@ -177,7 +177,7 @@ class Monitor:
         elif self._feed.stopped or not self._commander.may_drive():
             page.tell("error", "all robots are stopped: release them first")
         elif kind == "drive":
-            velocity = Velocity("/" + robot, float(request["linear"]), float(request["angular"]))
+            velocity = DriveCommand("/" + robot, float(request["linear"]), float(request["angular"]))
             if not self._commander.drive(page.number, velocity):
                 page.tell("error", "%s is driven from another page" % robot)
         elif self._pending_goals >= GOALS_AT_ONCE:

@@ -2,10 +2,10 @@
 
 import pytest
 
-from hero_monitor.control.dead_man import HOLD_TIMEOUT_S, DeadMan, Velocity
+from hero_monitor.control.dead_man import HOLD_TIMEOUT_S, DeadMan, DriveCommand
 
-FORWARD = Velocity("/hero_0", 0.1, 0.0)
-STOPPED = Velocity("/hero_0", 0.0, 0.0)
+FORWARD = DriveCommand("/hero_0", 0.1, 0.0)
+STOPPED = DriveCommand("/hero_0", 0.0, 0.0)
 
 
 @pytest.fixture()
@@ -34,14 +34,14 @@ def test_silence_stops_the_robot(held):
 
 
 def test_a_page_that_is_gone_stops_its_robots_and_no_others(held):
-    held.hold(1, Velocity("/hero_1", 0.1, 0.0), 10.0)
-    held.hold(2, Velocity("/hero_2", 0.1, 0.0), 10.0)
+    held.hold(1, DriveCommand("/hero_1", 0.1, 0.0), 10.0)
+    held.hold(2, DriveCommand("/hero_2", 0.1, 0.0), 10.0)
     held.drop_page(1)
     assert {velocity.namespace for velocity in held.take_stops(10.1)} == {"/hero_0", "/hero_1"}
 
 
 def test_the_end_of_the_program_stops_all(held):
-    held.hold(2, Velocity("/hero_2", 0.1, 0.0), 10.0)
+    held.hold(2, DriveCommand("/hero_2", 0.1, 0.0), 10.0)
     held.drop_all()
     assert {velocity.namespace for velocity in held.take_stops(10.1)} == {"/hero_0", "/hero_2"}
 

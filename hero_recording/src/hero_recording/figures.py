@@ -35,7 +35,7 @@ _OBSTACLES = {"edgecolor": "black", "linewidth": 1.5}
 # Okabe and Ito's palette (2008) without its yellow, which is hard to see on white.
 _FEW = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 
-MOST_NAMED = len(_FEW)
+MAX_NAMED = len(_FEW)
 """Up to this many robots have a color and a line in the legend; more have a shade and are labeled with their id."""
 
 STATE_COLORS = {"ready": "#009E73", "joining": "#56B4E9", "away": "#D55E00", "refused": "#000000"}
@@ -43,7 +43,7 @@ STATE_COLORS = {"ready": "#009E73", "joining": "#56B4E9", "away": "#D55E00", "re
 
 def choose_colors(robot_ids: Sequence[int]) -> Dict[int, Any]:
     """Return a color for each robot: distinct ones for few, a scale in order of their ids for many."""
-    if len(robot_ids) <= MOST_NAMED:
+    if len(robot_ids) <= MAX_NAMED:
         return dict(zip(robot_ids, _FEW))
     # The bright end of the scale is hard to see on white.
     return dict(zip(robot_ids, pyplot.get_cmap("viridis")(np.linspace(0.0, 0.85, len(robot_ids)))))
@@ -64,7 +64,7 @@ class Figures:
         self._colors = choose_colors(list(self._robots))
         self._start_s, self._duration_s = start_s, max(1e-3, end_s - start_s)
         self._title = title
-        self._has_legend = len(self._robots) <= MOST_NAMED
+        self._has_legend = len(self._robots) <= MAX_NAMED
         self._row_height = 1.6 + max(3, len(self._robots)) * (0.3 if len(self._robots) <= 20 else 0.16)
 
     # -- shared by all figures -----------------------------------------------------------------------------

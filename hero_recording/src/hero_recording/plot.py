@@ -27,7 +27,7 @@ FIGURES = {
 }
 """And the topics without which there is nothing to draw."""
 
-SHORTEST_DISTANCE_M = 0.05
+MIN_DISTANCE_M = 0.05
 """An error is not given as a share of less than this."""
 
 
@@ -106,7 +106,7 @@ def describe_robot(robot: RobotObservations) -> Dict[str, str]:
     error = "-"
     if errors is not None:
         error = "%.0f mm" % (errors.position_m[-1] * 1e3)
-        if path.length_m > SHORTEST_DISTANCE_M:
+        if path.length_m > MIN_DISTANCE_M:
             error += " (%.1f %% of the distance)" % (100.0 * errors.position_m[-1] / path.length_m)
     return {
         "DISTANCE": "%.2f m" % path.length_m,

@@ -4,7 +4,7 @@ from array import array
 
 import numpy as np
 
-LARGEST_VALUE = 1e6
+MAX_VALUE = 1e6
 
 
 class Series:
@@ -28,7 +28,7 @@ class Series:
 
     def add(self, *row: float) -> None:
         """Add a row, unless a value is absurd: a single one would set the scale of a whole figure."""
-        if all(abs(value) <= LARGEST_VALUE for value in row[self._times :]):
+        if all(abs(value) <= MAX_VALUE for value in row[self._times :]):
             self._numbers.extend(row)
         else:
             self.skipped += 1

@@ -21,7 +21,7 @@ from synthetic_bag import (
 from hero_recording import analysis, plot
 from hero_recording.bags import BagSet
 from hero_recording.errors import RecordingError
-from hero_recording.figures import MOST_NAMED, Figures, choose_colors
+from hero_recording.figures import MAX_NAMED, Figures, choose_colors
 from hero_recording.observations import Observations, Origin, RobotObservations, StateReport
 from hero_recording.topics import Message, find_robot_topic, is_fleet_topic, make_patterns
 
@@ -215,12 +215,12 @@ def test_a_command_that_is_not_repeated_ends_with_the_watchdog():
 
 
 def test_few_robots_have_distinct_colors_and_many_a_scale():
-    assert len(set(choose_colors(range(MOST_NAMED)).values())) == MOST_NAMED
+    assert len(set(choose_colors(range(MAX_NAMED)).values())) == MAX_NAMED
     assert len(set(map(tuple, choose_colors(range(50)).values()))) == 50
     assert len(choose_colors([4])) == 1
 
 
-@pytest.mark.parametrize("count", [1, 2 * MOST_NAMED])
+@pytest.mark.parametrize("count", [1, 2 * MAX_NAMED])
 def test_figures_of_one_and_of_many_robots_have_titles_units_and_ids(count, tmp_path):
     path = tmp_path / "fleet.bag"
     write_bag(path, robot_ids=range(count), seconds=1.5)

@@ -7,21 +7,21 @@ from typing import TYPE_CHECKING, Callable, Dict, List, NamedTuple, Optional, Tu
 
 from .errors import OptionError
 from .key_values import parse_values
-from .robot_constants import LARGEST_ID
+from .robot_constants import MAX_ID
 
 if TYPE_CHECKING:
     from .simulator import Simulator
 
-__all__ = ["KINDS", "LONGEST_S", "Fault", "FaultInjector", "parse_fault"]
+__all__ = ["KINDS", "MAX_DURATION_S", "Fault", "FaultInjector", "parse_fault"]
 
-LONGEST_S = 1e9
+MAX_DURATION_S = 1e9
 """Some thirty years."""
 
 _LIMITS = {
-    "robot": (0, LARGEST_ID),
-    "for": (0, LONGEST_S),
-    "by": (-LONGEST_S, LONGEST_S),
-    "of": (-1, LARGEST_ID),
+    "robot": (0, MAX_ID),
+    "for": (0, MAX_DURATION_S),
+    "by": (-MAX_DURATION_S, MAX_DURATION_S),
+    "of": (-1, MAX_ID),
     "bytes": (0, 65536),
 }
 """Least and most of each key: ids, s, bytes."""
@@ -118,7 +118,7 @@ def parse_fault(text: str) -> Fault:
     kind = KINDS.get(kind_name)
     if kind is None:
         raise OptionError("%s: unknown kind %r; known are %s" % (name, kind_name, ", ".join(KINDS)))
-    at = parse_values(name, "SECONDS=" + at_s if at_s else "", {"SECONDS": (0, LONGEST_S)})
+    at = parse_values(name, "SECONDS=" + at_s if at_s else "", {"SECONDS": (0, MAX_DURATION_S)})
     values = parse_values(name, tail, {key: _LIMITS[key] for key in ("robot", kind.key) if key is not None})
     robot_id = int(values["robot"]) if "robot" in values else None
     return Fault(kind_name, at.get("SECONDS", 0.0), robot_id, values.get(kind.key or "", kind.default))

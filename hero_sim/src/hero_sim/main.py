@@ -9,7 +9,7 @@ from hero_node.command_line import WRONG_ARGUMENTS, call
 
 from .build import build_simulator
 from .errors import OptionError, SimulatorError
-from .faults import LONGEST_S, FaultInjector, parse_fault
+from .faults import MAX_DURATION_S, FaultInjector, parse_fault
 from .population import SERVO_TIMINGS, build_errors, check_population
 from .robot.servo_pins import CORE_2
 from .simulator import Simulator
@@ -96,8 +96,8 @@ def check_options(options: argparse.Namespace) -> None:
     check_population(options)
     if not 1 <= options.port <= 65535:
         raise OptionError("--port %d: must be 1..65535" % options.port)
-    if options.seconds is not None and not 0 < options.seconds <= LONGEST_S:
-        raise OptionError("--seconds %g: must be more than 0, and at most %g" % (options.seconds, LONGEST_S))
+    if options.seconds is not None and not 0 < options.seconds <= MAX_DURATION_S:
+        raise OptionError("--seconds %g: must be more than 0, and at most %g" % (options.seconds, MAX_DURATION_S))
     if not 0.01 <= options.speed <= 100:
         raise OptionError("--speed %g: must be 0.01..100" % options.speed)
     for text in options.fault:

@@ -13,7 +13,7 @@ import numpy as np
 from .errors import OptionError
 from .link.wifi import PROFILES, Radio
 from .robot.servo_pins import CORE_2, CORE_3
-from .robot_constants import LARGEST_ID
+from .robot_constants import MAX_ID
 from .world.arena import Arena, build_default, place_robots
 from .world.arena_file import load_arena
 from .world.robot_errors import RobotErrors, draw_errors, set_known
@@ -24,7 +24,7 @@ __all__ = [
     "place_worlds",
 ]  # fmt: skip
 
-MOST_ROBOTS = 1000
+MAX_ROBOTS = 1000
 
 _DRAWN = "drawn"
 SERVO_TIMINGS = (CORE_2, CORE_3, _DRAWN)
@@ -67,10 +67,10 @@ def check_population(options: argparse.Namespace, worlds: int = 1) -> None:
         if not isinstance(value, numbers.Integral) or isinstance(value, bool):
             raise OptionError("%s %r: must be a whole number" % (name, value))
     count = options.count
-    if not 1 <= count <= MOST_ROBOTS:
-        raise OptionError("--count %d: must be 1..%d" % (count, MOST_ROBOTS))
-    if not 0 <= options.first_id <= LARGEST_ID - count + 1:
-        raise OptionError("--first-id %d: ids must be 0..%d (%d robots)" % (options.first_id, LARGEST_ID, count))
+    if not 1 <= count <= MAX_ROBOTS:
+        raise OptionError("--count %d: must be 1..%d" % (count, MAX_ROBOTS))
+    if not 0 <= options.first_id <= MAX_ID - count + 1:
+        raise OptionError("--first-id %d: ids must be 0..%d (%d robots)" % (options.first_id, MAX_ID, count))
     if worlds < 1:
         raise OptionError("worlds %d: must be 1 or more" % worlds)
     if not 0 <= options.seed <= 2**32 - worlds:

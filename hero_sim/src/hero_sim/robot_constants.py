@@ -2,7 +2,7 @@
 
 import math
 
-LARGEST_ID = 2**31 - 1
+MAX_ID = 2**31 - 1
 """Of hero_msgs/Robot."""
 
 WHEEL_DIAMETER_M = 0.0492
@@ -51,5 +51,5 @@ TIME_LOST_MS = 11000
 RECEIVE_WINDOW_LENGTH = 2144
 """Bytes that the ESP8266's TCP takes before the program reads them; the rest waits at the sender."""
 
-LARGEST_PARAMETER = 1e30
+MAX_PARAMETER = 1e30
 """Numbers beyond it are refused, as is NaN: what a robot does with them nobody knows."""

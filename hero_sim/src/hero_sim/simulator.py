@@ -14,10 +14,10 @@ from .world.world import STEP_MS
 
 __all__ = ["Simulator"]
 
-_LONGEST_WAIT_S = 0.05
+_MAX_WAIT_S = 0.05
 """Limits the delay of a stop by a signal or another thread."""
 
-_SHORTEST_WAIT_S = 0.0005
+_MIN_WAIT_S = 0.0005
 
 _FLAPPING_MS = 5000
 """A server that closes every connection at once gets one pair of lines per robot in this time."""
@@ -117,7 +117,7 @@ class Simulator(LinkHandler):
         """Return how long (s) to wait for the link until the swarm has to go on."""
         next_ms = min(self.swarm.next_due_ms, self.swarm.world.time_ms + STEP_MS)
         wait_s = (next_ms - self._anchor_ms) / 1000.0 / self._speed - (time.monotonic() - self._anchor_s)
-        return min(max(wait_s, _SHORTEST_WAIT_S), _LONGEST_WAIT_S)
+        return min(max(wait_s, _MIN_WAIT_S), _MAX_WAIT_S)
 
     # -- bytes between robots and link -----------------------------------------------------------------------
 

@@ -276,7 +276,7 @@ OPTIONS = {"count": "--count", "first_id": "--first-id", "seed": "--seed", "aren
     ids=str,
 )
 def test_wrong_options_are_refused_in_the_words_of_the_command_line(wrong, capsys, monkeypatch):
-    monkeypatch.setattr(arena, "_MOST_TRIES", 100)  # so that a full arena is soon found to be full
+    monkeypatch.setattr(arena, "_MAX_TRIES", 100)  # so that a full arena is soon found to be full
     options = {name: [value] if name == "error" else value for name, value in wrong.items()}
     with pytest.raises(OptionError) as refused:
         StepSwarm(**{"count": 1, **options})

@@ -29,7 +29,7 @@ SILENT_STEPS = 20
 """After so many steps without a pose, 2 s, the motion has failed: the robot is gone. Steps, not seconds: a program that
 was kept from running has not heard the robot either."""
 
-LONGEST_STEP_S = 0.2
+MAX_STEP_S = 0.2
 """What a step takes longer does not count as time in which the robot was seen: the PC was too busy to run all."""
 
 CLEARANCE_M = 0.02
@@ -107,7 +107,7 @@ class MotionController:
         """
         if self.state is not State.ACTIVE:
             return STOP
-        step_s, self._stepped_s = min(now_s - self._stepped_s, LONGEST_STEP_S), now_s
+        step_s, self._stepped_s = min(now_s - self._stepped_s, MAX_STEP_S), now_s
         if now_s - self._start_s > self._timeout_s:
             return self._fail(self._describe_timeout())
         if pose is None or not all(math.isfinite(value) for value in pose):

@@ -2,7 +2,7 @@
 
 __all__ = ["BODY_RADIUS_M", "MAX_ANGULAR_RAD_S", "MAX_LINEAR_M_S", "MIN_RANGE_M", "WHEEL_SEPARATION_M"]
 
-BODY_RADIUS_M = 0.0368
+BODY_RADIUS_M = 0.036835
 """The firmware adds it to what its infrared sensors measure, so ranges count from the robot's center."""
 
 MIN_RANGE_M = BODY_RADIUS_M + 0.01

@@ -4,7 +4,7 @@ import collections
 from typing import Any, Deque, Dict, NamedTuple, Optional
 
 from ..corrections.wheel_motion import WheelMotion
-from ..robot_constants import LONGEST_WATCHDOG_S
+from ..robot_constants import MAX_WATCHDOG_S
 
 REGULAR_INTERVALS = 5
 """Between six commands: from then on a program commands regularly. Fewer may be single commands, or a short burst."""
@@ -53,7 +53,7 @@ class Commander:
         """Its next command came."""
         interval_s = now_s - self.commanded_s
         # What it does after a silence tells its period anew: the silence itself is none.
-        begins = interval_s > LONGEST_WATCHDOG_S or self.has_fallen_silent(RIVAL_SILENCE_S, now_s)
+        begins = interval_s > MAX_WATCHDOG_S or self.has_fallen_silent(RIVAL_SILENCE_S, now_s)
         self.moves, self.commanded_s = moves, now_s
         if self._intervals_s is None or begins:
             self._intervals_s = collections.deque(maxlen=INTERVALS_KEPT)
@@ -144,7 +144,7 @@ class Commanders:
         others = [
             other
             for other in self._by_topic.values()
-            if other is not commander and other.moves and now_s - other.commanded_s < LONGEST_WATCHDOG_S
+            if other is not commander and other.moves and now_s - other.commanded_s < MAX_WATCHDOG_S
         ]
         return bool(others) and not any(
             other.node != commander.node

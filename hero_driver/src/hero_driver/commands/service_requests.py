@@ -9,7 +9,7 @@ import struct
 from typing import NamedTuple, Optional
 
 from ..corrections.tick_odometry import Pose
-from ..robot_constants import MOTOR_PULSES_US
+from ..robot_constants import PULSE_RANGE_US
 
 _SET_ODOM = struct.Struct("<3d")
 
@@ -29,7 +29,7 @@ _RULES = {
         1e6,
         "gains must be finite, from 0 to 1e6; of a set with a negative one the robot uses none and stores all",
     ),
-    "hero_msgs/SetMotor": _Rule(struct.Struct("<2h"), *MOTOR_PULSES_US, "pulses must lie within 1000..2000 us"),
+    "hero_msgs/SetMotor": _Rule(struct.Struct("<2h"), *PULSE_RANGE_US, "pulses must lie within 1000..2000 us"),
     "hero_msgs/SetIRCalibration": _Rule(
         struct.Struct("<8d"), 1e-6, 1e3, "gains must be finite, above 0 and at most 1e3 counts m^2"
     ),

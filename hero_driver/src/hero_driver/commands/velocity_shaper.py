@@ -11,7 +11,7 @@ import math
 import struct
 from typing import Optional
 
-from ..robot_constants import ANGULAR_LIMIT_RAD_S, LINEAR_LIMIT_M_S, MOTOR_CENTER_US
+from ..robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S, SERVO_CENTER_US
 
 COMMAND_INTERVAL_S = 0.06
 """Time between two commands to one controller: the firmware drops one within 50 ms of the last accepted one."""
@@ -24,7 +24,7 @@ _TWIST = struct.Struct("<6d")
 
 ZERO_TWIST = bytes(TWIST_LENGTH)
 
-STOPPED_MOTORS = struct.pack("<hh", MOTOR_CENTER_US, MOTOR_CENTER_US)
+STOPPED_MOTORS = struct.pack("<hh", SERVO_CENTER_US, SERVO_CENTER_US)
 
 STOP_PAYLOADS = {"geometry_msgs/Twist": ZERO_TWIST, "hero_msgs/Motor": STOPPED_MOTORS}
 """Message types that move a robot, and the payload of each that stops it."""
@@ -45,11 +45,11 @@ def check_twist(payload: bytes, clamp: bool) -> Optional[bytes]:
     linear_m_s, angular_rad_s = components[0], components[5]
     if linear_m_s == 0.0 and angular_rad_s == 0.0:
         return ZERO_TWIST
-    is_within = abs(linear_m_s) <= LINEAR_LIMIT_M_S and abs(angular_rad_s) <= ANGULAR_LIMIT_RAD_S
+    is_within = abs(linear_m_s) <= MAX_LINEAR_M_S and abs(angular_rad_s) <= MAX_ANGULAR_RAD_S
     if is_within or not clamp:
         return payload
-    clamped_m_s = max(-LINEAR_LIMIT_M_S, min(LINEAR_LIMIT_M_S, linear_m_s))
-    clamped_rad_s = max(-ANGULAR_LIMIT_RAD_S, min(ANGULAR_LIMIT_RAD_S, angular_rad_s))
+    clamped_m_s = max(-MAX_LINEAR_M_S, min(MAX_LINEAR_M_S, linear_m_s))
+    clamped_rad_s = max(-MAX_ANGULAR_RAD_S, min(MAX_ANGULAR_RAD_S, angular_rad_s))
     return _TWIST.pack(clamped_m_s, *components[1:5], clamped_rad_s)
 
 

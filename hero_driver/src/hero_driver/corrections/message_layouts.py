@@ -8,7 +8,7 @@ import math
 import struct
 from typing import Callable, List, NamedTuple, Optional, Sequence, Tuple
 
-from ..robot_constants import BODY_RADIUS_M, FARTHEST_RANGE_M, NEAREST_RANGE_M, PROXIMITY_BEAMS, STOCK_BEAMS
+from ..robot_constants import BODY_RADIUS_M, MAX_RIM_RANGE_M, MIN_RIM_RANGE_M, PROXIMITY_BEAMS, STOCK_BEAMS
 from .stamps import NS_PER_S
 
 _HEADER = struct.Struct("<IIII")  # seq, secs, nsecs, length of frame_id
@@ -232,7 +232,7 @@ def make_proximity(payload: bytes, seq: int, stamp_ns: int, scan_time_s: float) 
     fields = _STOCK_SCAN_TAIL.unpack_from(payload, header.end)
     if fields[7] != STOCK_BEAMS or fields[24] != STOCK_BEAMS:
         return None
-    range_min_m, range_max_m = BODY_RADIUS_M + NEAREST_RANGE_M, BODY_RADIUS_M + FARTHEST_RANGE_M
+    range_min_m, range_max_m = BODY_RADIUS_M + MIN_RIM_RANGE_M, BODY_RADIUS_M + MAX_RIM_RANGE_M
     ranges_m = []
     for range_m in fields[8:24:2]:
         if range_m >= range_max_m - CLAMP_TOLERANCE_M:

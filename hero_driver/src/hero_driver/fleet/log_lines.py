@@ -7,7 +7,7 @@ a cursor or color a terminal is taken out. Pure.
 import re
 from typing import NamedTuple, Optional
 
-LONGEST_TEXT = 400
+MAX_TEXT_LENGTH = 400
 
 _ANSI = re.compile(r"\x1b\[[0-?]*[ -/]*[@-~]|\x1b.")
 # Control characters, line separators and marks that are invisible or turn the direction of writing.
@@ -49,9 +49,9 @@ class LogLine(NamedTuple):
 
 
 def clean_text(text: str) -> str:
-    """Return untrusted text as one line without control characters, at most LONGEST_TEXT long."""
+    """Return untrusted text as one line without control characters, at most MAX_TEXT_LENGTH long."""
     clean = _CONTROL.sub(" ", _ANSI.sub("", text)).strip()
-    return clean if len(clean) <= LONGEST_TEXT else clean[: LONGEST_TEXT - 3] + "..."
+    return clean if len(clean) <= MAX_TEXT_LENGTH else clean[: MAX_TEXT_LENGTH - 3] + "..."
 
 
 def read_log_line(text: str) -> LogLine:

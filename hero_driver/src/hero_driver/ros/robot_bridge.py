@@ -19,7 +19,7 @@ from ..commands.velocity_shaper import STOP_PAYLOADS, check_motor_pulses, check_
 from ..corrections import message_layouts
 from ..corrections.robot_corrections import TRANSFORMS, CorrectionSettings, RobotCorrections
 from ..fleet.namespaces import Identity
-from ..robot_constants import LONGEST_WATCHDOG_S
+from ..robot_constants import MAX_WATCHDOG_S
 from ..rosserial.session import Topic, TopicKind
 from ..transport import EventLoop
 from . import message_types
@@ -414,7 +414,7 @@ class RobotBridge:
         commander = self._commanders.find(name)
         if commander is None or commander.source != source:
             return
-        if time.monotonic() - commander.commanded_s > LONGEST_WATCHDOG_S:
+        if time.monotonic() - commander.commanded_s > MAX_WATCHDOG_S:
             return
 
         def stop_orphan() -> None:

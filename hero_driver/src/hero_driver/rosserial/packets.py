@@ -27,7 +27,7 @@ __all__ = [
     "ID_SUBSCRIBER",
     "ID_TIME",
     "ID_TX_STOP",
-    "LONGEST_PAYLOAD_LENGTH",
+    "MAX_PAYLOAD_LENGTH",
     "OVERHEAD_LENGTH",
     "Bytes",
     "Packet",
@@ -50,7 +50,7 @@ OVERHEAD_LENGTH = 8
 _CHECKED_OFFSET = 5
 """Offset of the bytes that add up to 255 modulo 256, up to the end of the packet: id, payload and checksum."""
 
-LONGEST_PAYLOAD_LENGTH = 0xFFFF
+MAX_PAYLOAD_LENGTH = 0xFFFF
 """Limit of the 16-bit length field."""
 
 DEFAULT_MAX_PAYLOAD_LENGTH = 4096
@@ -115,7 +115,7 @@ def encode_packet(topic_id: int, payload: Bytes) -> bytes:
     if not 0 <= topic_id <= 0xFFFF:
         raise TopicIdError("topic id %r is outside 0..65535" % (topic_id,))
     length = len(payload)
-    if length > LONGEST_PAYLOAD_LENGTH:
+    if length > MAX_PAYLOAD_LENGTH:
         raise PacketTooLongError("a payload of %d bytes does not fit a packet (at most 65535)" % length)
     header = _HEADER.pack(SYNC, length, _LENGTH_CHECKSUMS[length], topic_id)
     checksum = 255 - (topic_id + (topic_id >> 8) + sum_bytes(payload) & 0xFF)

@@ -15,7 +15,7 @@ from ..tracking.tag_corners import TagCorners
 from ..tracking.tag_pose import ReferenceTag, TagPose, fit_squares
 
 __all__ = [
-    "LEAST_TAGS",
+    "MIN_TAGS",
     "ArenaCalibration",
     "average_tags",
     "calibrate_arena",
@@ -23,8 +23,8 @@ __all__ = [
     "measure_residuals",
 ]
 
-LEAST_TAGS = 4
-LEAST_EXTENT_M = 0.3
+MIN_TAGS = 4
+MIN_EXTENT_M = 0.3
 """Tags in a row leave the camera free to swing about it."""
 
 GOOD_RESIDUAL_M = 0.003
@@ -95,10 +95,10 @@ def calibrate_arena(
     """
     seen = [tag for tag in tags if tag.tag_id in references]
     missing = sorted(set(references) - {tag.tag_id for tag in seen})
-    if len(seen) < LEAST_TAGS:
+    if len(seen) < MIN_TAGS:
         raise CalibrationError(
             "the camera sees %d of %d reference tags, not %s: it takes %d; are they in the image, whole, and lit?"
-            % (len(seen), len(references), ", ".join(map(str, missing)) or "more", LEAST_TAGS)
+            % (len(seen), len(references), ", ".join(map(str, missing)) or "more", MIN_TAGS)
         )
     _check_extent(seen, references)
     camera = _fit(lens, seen, references)
@@ -148,7 +148,7 @@ def _find_wrong_tag(
     lens: Lens, seen: Sequence[TagCorners], references: Mapping[int, ReferenceTag]
 ) -> Optional[_WrongTag]:
     """Return the tag without which the others agree by far better; None if there is none, or none to spare."""
-    if len(seen) <= LEAST_TAGS:
+    if len(seen) <= MIN_TAGS:
         return None
     found: Optional[_WrongTag] = None
     least_m = math.inf
@@ -210,7 +210,7 @@ def _check_extent(seen: Sequence[TagCorners], references: Mapping[int, Reference
     if extent_m > MAX_FIELD_M:
         raise CalibrationError("the reference tags lie %g m apart: write their places in m, not in mm or cm" % extent_m)
     spread_m = np.linalg.svd(places_m - places_m.mean(axis=0), compute_uv=False)
-    if spread_m[1] < LEAST_EXTENT_M:
+    if spread_m[1] < MIN_EXTENT_M:
         raise CalibrationError(
             "all reference tags lie in a row: spread them over the field, best into its corners"
         )

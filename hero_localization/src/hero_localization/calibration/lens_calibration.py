@@ -12,9 +12,9 @@ from ..prints.boards import Board, create_board, list_board_corners
 
 __all__ = ["BoardView", "LensCalibration", "calibrate_lens", "find_board", "is_mirrored"]
 
-LEAST_VIEWS = 8
+MIN_VIEWS = 8
 JACKKNIFE_GROUPS = 6
-LEAST_CORNERS = 12
+MIN_CORNERS = 12
 """In one image; fewer fix no board."""
 
 GOOD_RMS_PX = 0.5
@@ -25,7 +25,7 @@ GOOD_FOCAL_ERROR = 0.003
 """Of the focal length, standard deviation. The arena's calibration takes most of it up, by the camera's height."""
 
 TILTED_RAD = 0.25
-LEAST_TILTED = 4
+MIN_TILTED = 4
 """Images with a tilted board: without them nearness cannot be told from focal length."""
 
 _WINDOW_SHARE = 0.12
@@ -36,7 +36,7 @@ REGIONS = (
     ("middle left", "middle", "middle right"),
     ("lower left", "lower middle", "lower right"),
 )
-LEAST_IN_REGION = 20
+MIN_IN_REGION = 20
 
 
 class BoardView(NamedTuple):
@@ -74,7 +74,7 @@ def find_board(gray: np.ndarray, board: Board) -> Optional[BoardView]:
         if markers is None:
             return None
         _, pixels, ids = cv2.aruco.interpolateCornersCharuco(corners, markers, gray, made)
-    if ids is None or len(ids) < LEAST_CORNERS:
+    if ids is None or len(ids) < MIN_CORNERS:
         return None
     return BoardView(
         np.asarray(ids).ravel(), _refine(gray, np.asarray(pixels, dtype=np.float32).reshape(-1, 2))
@@ -102,15 +102,15 @@ def calibrate_lens(
 
     Raises: CalibrationError for fewer than eight images, or images that no lens explains.
     """
-    if len(views) < LEAST_VIEWS:
+    if len(views) < MIN_VIEWS:
         raise CalibrationError(
             "the board was found in %d images; it takes %d, from all sides and tilted"
-            % (len(views), LEAST_VIEWS)
+            % (len(views), MIN_VIEWS)
         )
     used = views
     fit = _fit(used, width_px, height_px, board)
     left_out = np.flatnonzero(fit.errors_px > OUTLIER * np.median(fit.errors_px)).tolist()
-    if left_out and len(views) - len(left_out) >= LEAST_VIEWS:
+    if left_out and len(views) - len(left_out) >= MIN_VIEWS:
         used = [view for index, view in enumerate(views) if index not in left_out]
         fit = _fit(used, width_px, height_px, board)
     else:
@@ -122,7 +122,7 @@ def calibrate_lens(
             "error %.2f px rms is above %.1f px: is the board flat, are the images sharp?"
             % (fit.rms_px, GOOD_RMS_PX)
         )
-    if (fit.tilts_rad > TILTED_RAD).sum() < LEAST_TILTED:
+    if (fit.tilts_rad > TILTED_RAD).sum() < MIN_TILTED:
         problems.append("the board is hardly tilted: take images with it tilted by 30 to 45 degrees")
     elif focal_error > GOOD_FOCAL_ERROR:
         problems.append(
@@ -188,5 +188,5 @@ def _list_empty_regions(views: Sequence[BoardView], width_px: int, height_px: in
         name
         for row, names in enumerate(REGIONS)
         for column, name in enumerate(names)
-        if ((rows == row) & (columns == column)).sum() < LEAST_IN_REGION
+        if ((rows == row) & (columns == column)).sum() < MIN_IN_REGION
     ]

@@ -28,9 +28,9 @@ CALIBRATION_DRIVE = (
 )
 """What the robot drives: so long (s), m/s, rad/s. A turn to each side, and 0.12 m forward and back."""
 
-LEAST_POSES = 40
-LEAST_TURN_RAD = 4.0
-LEAST_DRIVE_M = 0.08
+MIN_POSES = 40
+MIN_TURN_RAD = 4.0
+MIN_DRIVE_M = 0.08
 DELAYS_S = (-0.1, 0.5)
 """Of the stamps, that are looked for."""
 
@@ -80,15 +80,15 @@ def calibrate_robot(
     low, high = odometry_s[0] + DELAYS_S[1], odometry_s[-1] + DELAYS_S[0]
     inside = (stamps_s >= low) & (stamps_s <= high)
     stamps_s, tags = stamps_s[inside], tags[inside]
-    if len(stamps_s) < LEAST_POSES:
+    if len(stamps_s) < MIN_POSES:
         raise CalibrationError(
             "the robot's tag was seen %d times, which is too few (%d): light, id, and size of the tag?"
-            % (len(stamps_s), LEAST_POSES)
+            % (len(stamps_s), MIN_POSES)
         )
-    if np.ptp(counted[:, 2]) < LEAST_TURN_RAD:
+    if np.ptp(counted[:, 2]) < MIN_TURN_RAD:
         raise CalibrationError(
             "the robot turned by %.0f degrees only; it takes %.0f"
-            % (math.degrees(np.ptp(counted[:, 2])), math.degrees(LEAST_TURN_RAD))
+            % (math.degrees(np.ptp(counted[:, 2])), math.degrees(MIN_TURN_RAD))
         )
     delay_s, delay_error_s = _find_delay(stamps_s, tags[:, 2], odometry_s, counted[:, 2])
     at = np.column_stack(
@@ -160,10 +160,10 @@ def _fit_mount(tags: np.ndarray, at: np.ndarray) -> Tuple[float, float, float, f
     headings = (at[:-1, 2] + at[1:, 2]) / 2.0
     yaws = (tags[:-1, 2] + tags[1:, 2]) / 2.0
     driven = np.concatenate(((0.0,), np.cumsum(steps * np.exp(1j * (yaws - headings)))))
-    if np.ptp(np.abs(driven)) < LEAST_DRIVE_M:
+    if np.ptp(np.abs(driven)) < MIN_DRIVE_M:
         raise CalibrationError(
             "the robot drove %.0f mm only; to see which way is forward it takes %.0f"
-            % (1e3 * np.ptp(np.abs(driven)), 1e3 * LEAST_DRIVE_M)
+            % (1e3 * np.ptp(np.abs(driven)), 1e3 * MIN_DRIVE_M)
         )
     places = tags[:, 0] + 1j * tags[:, 1]
     design = np.column_stack((np.ones(len(places)), driven, np.exp(1j * tags[:, 2])))

@@ -13,7 +13,7 @@ from ..errors import CalibrationError
 
 __all__ = ["Camera", "Lens"]
 
-_MOST_ROUNDS = 50
+_MAX_ROUNDS = 50
 _ROUNDING = 1e-10
 """Normalized image coordinates: a ten millionth of a pixel."""
 
@@ -75,7 +75,7 @@ class Lens(NamedTuple):
         rays = bent.copy()
         error = np.full(rays.shape, np.inf)
         with np.errstate(over="ignore", invalid="ignore"):  # where nothing converges
-            for _ in range(_MOST_ROUNDS):
+            for _ in range(_MAX_ROUNDS):
                 error = bent - _bend(rays, self.distortion)
                 rays = rays + error
                 if not (np.abs(error) > _ROUNDING).any():

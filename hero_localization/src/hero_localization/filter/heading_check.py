@@ -8,10 +8,10 @@ from hero_client.values.geometry import Pose, invert_pose, transform_pose, wrap_
 
 __all__ = ["HeadingCheck", "is_upside_down"]
 
-LEAST_DRIVE_M = 0.04
+MIN_DRIVE_M = 0.04
 """Poses are a millimeter off: over this distance, a direction is right to 2 degrees."""
-MOST_TURN_RAD = 0.15
-LEAST_SHARE = 0.5
+MAX_TURN_RAD = 0.15
+MIN_SHARE = 0.5
 """A robot that came less far than this share of what odometry counted was held, and shows no direction."""
 
 DRIVES = 3
@@ -30,12 +30,12 @@ class HeadingCheck:
         if self._start is not None:
             start_seen, start = self._start
             drive = transform_pose(invert_pose(start), odometry)
-            if abs(wrap_angle(drive.yaw_rad)) <= MOST_TURN_RAD:
+            if abs(wrap_angle(drive.yaw_rad)) <= MAX_TURN_RAD:
                 driven_m = math.hypot(drive.x_m, drive.y_m)
-                if driven_m < LEAST_DRIVE_M:
+                if driven_m < MIN_DRIVE_M:
                     return
                 moved = transform_pose(invert_pose(start_seen), seen)
-                if math.hypot(moved.x_m, moved.y_m) >= LEAST_SHARE * driven_m:
+                if math.hypot(moved.x_m, moved.y_m) >= MIN_SHARE * driven_m:
                     # Of a heading that exceeds the true one, the same drive leads to the right.
                     error_rad = math.atan2(drive.y_m, drive.x_m) - math.atan2(moved.y_m, moved.x_m)
                     self._errors_rad.append(error_rad)

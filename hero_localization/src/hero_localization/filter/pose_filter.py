@@ -53,7 +53,7 @@ SLIP_M, SLIP_RAD = 0.06, 0.6
 """At most so much of what odometry counted since the last measured pose may be slip; what exceeds that was a jump."""
 
 HELD_S = (0.09, 0.5)
-HELD_SHARE, LEAST_SLIP_M = 0.4, 0.005
+HELD_SHARE, MIN_SLIP_M = 0.4, 0.005
 """A robot that came less far than this share of what odometry counted, over a time between these, is held."""
 
 GATE = 16.3
@@ -225,7 +225,7 @@ class PoseFilter:
                     return False
                 counted_m = measure_distance(start.pose, end.pose)
                 came_m = measure_distance(step.measurement.pose, measurement.pose)
-                return counted_m > LEAST_SLIP_M and came_m < HELD_SHARE * counted_m
+                return counted_m > MIN_SLIP_M and came_m < HELD_SHARE * counted_m
         return False
 
     def _start(self, measurement: Measurement) -> None:

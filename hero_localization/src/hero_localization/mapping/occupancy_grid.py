@@ -30,7 +30,7 @@ SD_SHARE = 0.04
 """Error of a range: of one at the body, and what it grows by with the distance from the body."""
 
 SURE_M = 0.08
-LEAST_WEIGHT = 0.15
+MIN_WEIGHT = 0.15
 """Ranges up to here count fully, those at the end of the reach least: at an angle to a wall they are too long."""
 
 HIT_SD_RAD = 0.08
@@ -43,7 +43,7 @@ LIMIT_LOG_ODDS = 8.0
 KNOWN_LOG_ODDS = 0.5
 """A cell counts as free or occupied beyond this."""
 
-LEAST_FRONTIER_CELLS = 5
+MIN_FRONTIER_CELLS = 5
 """Shorter stretches are gaps between two robots' readings."""
 
 OTHERS_MARGIN_M = 0.03
@@ -91,7 +91,7 @@ class OccupancyGrid:
         nearest = nearest.astype(int) % BEAMS
         free_m, hit_m = self._judge(pose, ranges_m, others_m)
         sd_m = NEAR_SD_M + SD_SHARE * (free_m - BODY_RADIUS_M)
-        weight = np.clip((REACH_M - free_m) / (REACH_M - SURE_M), LEAST_WEIGHT, 1.0) * np.isfinite(hit_m)
+        weight = np.clip((REACH_M - free_m) / (REACH_M - SURE_M), MIN_WEIGHT, 1.0) * np.isfinite(hit_m)
         change = np.where(distance_m < (free_m - 2.0 * sd_m)[nearest], np.float32(FREE_LOG_ODDS), np.float32(0.0))
         change[np.abs(aside_rad) > CONE_RAD] = 0.0
         beyond = (distance_m - free_m[nearest]) / sd_m[nearest]
@@ -164,7 +164,7 @@ class OccupancyGrid:
         found = []
         for label in range(1, count + 1):
             cells_m = self.centers_of(labels == label)
-            if len(cells_m) >= LEAST_FRONTIER_CELLS:
+            if len(cells_m) >= MIN_FRONTIER_CELLS:
                 off_m = np.hypot(*(cells_m - cells_m.mean(axis=0)).T)
                 found.append((len(cells_m), cells_m[off_m.argmin()]))
         found.sort(key=lambda item: -item[0])

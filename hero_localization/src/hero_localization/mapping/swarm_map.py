@@ -13,7 +13,7 @@ from .occupancy_grid import OccupancyGrid
 __all__ = ["SwarmMap"]
 
 KEPT_S = 2.0
-MOST_WAITING = 20
+MAX_WAITING = 20
 """Scans of a robot that wait for its pose: four seconds of them."""
 
 
@@ -22,7 +22,7 @@ class _Robot:
 
     def __init__(self) -> None:
         self.poses: StampedHistory[Pose] = StampedHistory(KEPT_S, interpolate_pose)
-        self.scans: Deque[Tuple[float, Sequence[float]]] = deque(maxlen=MOST_WAITING)
+        self.scans: Deque[Tuple[float, Sequence[float]]] = deque(maxlen=MAX_WAITING)
 
 
 class Box(NamedTuple):

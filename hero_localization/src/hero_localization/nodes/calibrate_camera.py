@@ -24,9 +24,9 @@ from hero_node.command_line import say
 from hero_node.errors import HeroError
 from hero_node.parameters import robot_ids_option
 
-from ..calibration.arena_calibration import LEAST_TAGS, average_tags, calibrate_arena, fit_references
+from ..calibration.arena_calibration import MIN_TAGS, average_tags, calibrate_arena, fit_references
 from ..calibration.lens_calibration import (
-    LEAST_VIEWS,
+    MIN_VIEWS,
     BoardView,
     LensCalibration,
     calibrate_lens,
@@ -46,7 +46,7 @@ from ..tracking.settings import Settings
 from ..tracking.tag_corners import TagCorners
 from ..tracking.tag_pose import MountedTag, fit_squares
 
-MOST_VIEWS = 25
+MAX_VIEWS = 25
 ENOUGH_VIEWS = 20
 STILL_PX = 3.0
 """A board that moves by more than this between two images is blurred."""
@@ -127,7 +127,7 @@ def calibrate_lens_by_board(options: argparse.Namespace, pictures: Pictures, pro
     board = Board()
     say("move the board slowly through the whole image, near and far, tilted by 30 to 45 degrees; hold still between")
     views: List[BoardView] = []
-    wanted = options.views or MOST_VIEWS
+    wanted = options.views or MAX_VIEWS
     size = (0, 0)
     last: Optional[BoardView] = None
     found_s = program.now_s
@@ -318,8 +318,8 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     options = parser.parse_args(arguments)
     if options.part == "robots" and options.robots is None:
         parser.error("robots: name them, such as --robots 0-3; each turns on the spot and drives 0.12 m to and fro")
-    if options.views and options.views < LEAST_VIEWS:
-        parser.error("--views %d: it takes at least %d images" % (options.views, LEAST_VIEWS))
+    if options.views and options.views < MIN_VIEWS:
+        parser.error("--views %d: it takes at least %d images" % (options.views, MIN_VIEWS))
     return options
 
 
@@ -327,10 +327,10 @@ def _check_file(options: argparse.Namespace) -> None:
     """Refuse a file that lacks what a part needs. Raises: CalibrationError, SettingsError."""
     settings = camera_file.load(options.file)
     count = len(settings.layout.references)
-    if options.part == "arena" and count < LEAST_TAGS:
+    if options.part == "arena" and count < MIN_TAGS:
         raise CalibrationError(
             "%s names %d reference tags, but it takes %d: write their places into it (x, y in m, yaw in degrees), such"
-            " as  references: {100: [-0.9, -0.6, 0], 101: [0.9, -0.6, 0], ...}" % (options.file, count, LEAST_TAGS)
+            " as  references: {100: [-0.9, -0.6, 0], 101: [0.9, -0.6, 0], ...}" % (options.file, count, MIN_TAGS)
         )
     if options.part == "robots" and settings.camera is None:
         raise CalibrationError("%s holds no place of the camera: calibrate_camera arena comes first" % options.file)

@@ -17,7 +17,7 @@ from .tag_corners import TagCorners
 
 __all__ = ["BACKENDS", "DEFAULT_BACKEND", "TagDetector", "create_detector", "find_print_mistake"]
 
-_LEAST_MARGIN = {"36h11": 10.0, "16h5": 30.0}
+_MIN_MARGIN = {"36h11": 10.0, "16h5": 30.0}
 """How clearly black and white must differ, of 255: what 16h5 finds in noise and floor textures stays below."""
 
 
@@ -55,7 +55,7 @@ class AprilTagDetector(TagDetector):
         self._detector = apriltag(
             "tag" + family, threads=1, maxhamming=0 if family == "16h5" else 1, decimate=decimate
         )
-        self._least_margin = _LEAST_MARGIN[family]
+        self._least_margin = _MIN_MARGIN[family]
 
     def detect(self, gray: np.ndarray, origin: Tuple[int, int] = (0, 0)) -> List[TagCorners]:
         """Return the tags in gray."""

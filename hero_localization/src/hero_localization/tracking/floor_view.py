@@ -12,12 +12,12 @@ from .tag_corners import TagCorners
 
 __all__ = ["FloorView"]
 
-LONGEST_SIDE_PX = 1280
+MAX_SIDE_PX = 1280
 
 STEP_PX = 8
 """Pixels are found in such steps, with those between on a line: all of them would hold up the tracker."""
 
-MOST_REACH = 3.0
+MAX_REACH = 3.0
 """Of the view to each side of the camera, in heights of the camera: a tilted camera sees to the horizon."""
 
 _BORDER_POINTS = 17
@@ -39,7 +39,7 @@ class FloorView:
         self._height_m = height_m
         self.box_m = self._find_box()
         left_m, low_m, right_m, high_m = self.box_m
-        self._px_per_m = LONGEST_SIDE_PX / max(right_m - left_m, high_m - low_m)
+        self._px_per_m = MAX_SIDE_PX / max(right_m - left_m, high_m - low_m)
         width_px = round((right_m - left_m) * self._px_per_m)
         height_px = round((high_m - low_m) * self._px_per_m)
         across, down = ((np.arange(math.ceil(side / STEP_PX) + 2) - 0.5) * STEP_PX for side in (width_px, height_px))
@@ -59,7 +59,7 @@ class FloorView:
         points_m = points_m[np.isfinite(points_m).all(axis=1)]
         if not len(points_m):
             raise SettingsError("the camera does not look at the floor: calibrate the arena again")
-        center_m, reach_m = self.camera.position_m[:2], MOST_REACH * abs(self.camera.position_m[2])
+        center_m, reach_m = self.camera.position_m[:2], MAX_REACH * abs(self.camera.position_m[2])
         low = np.maximum(points_m.min(axis=0), center_m - reach_m)
         high = np.minimum(points_m.max(axis=0), center_m + reach_m)
         if not (low < high).all():

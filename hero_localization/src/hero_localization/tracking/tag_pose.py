@@ -35,7 +35,7 @@ CORNER_PX = 0.1
 SYSTEMATIC_M, SYSTEMATIC_RAD = 0.0007, 0.003
 """What calibration leaves: of lens, camera, tag on the robot."""
 
-LARGEST_SIZE_ERROR = 0.15
+MAX_SIZE_ERROR = 0.15
 """A tag that measures more than this share more or less than its print is none, or a print of another size."""
 
 
@@ -198,7 +198,7 @@ def locate(camera: Camera, tags: Sequence[TagCorners], layout: TagLayout) -> Sig
         robot = layout.find_robot(tag_id)
         if tag_id not in layout.references and tag_id not in layout.objects and robot is None:
             sightings.unknown.append(tag_id)
-        elif not abs(share - 1.0) <= LARGEST_SIZE_ERROR:
+        elif not abs(share - 1.0) <= MAX_SIZE_ERROR:
             sightings.misshapen[tag_id] = share
         elif tag_id in layout.references:
             sightings.references[tag_id] = Sighting(tag_id, found.pose, found.covariance, share)

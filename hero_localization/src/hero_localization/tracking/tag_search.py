@@ -42,7 +42,7 @@ RIM_SIDES = 1.5
 FINE_COST = 2.5
 """Of the fine detector, by that of the other one, for as many pixels."""
 
-LONGEST_STEP_S = 0.2
+MAX_STEP_S = 0.2
 """A longer gap between frames counts as this long, or all tiles would be searched at once."""
 
 KEPT_S = 1.0
@@ -56,7 +56,7 @@ WINDOW_SIDES = 0.9
 """Half a window's side, in sides of the tag: half its diagonal, and its white margin."""
 SLACK_PX = 3.0
 SLACK_SIDES_S = 6.0
-MOST_SLACK_SIDES = 2.5
+MAX_SLACK_SIDES = 2.5
 """A window is larger by how far the tag may have come since it was seen, 0.24 m/s for one of 40 mm: that costs less
 than the window that a guess of its motion would need when it turns."""
 
@@ -132,7 +132,7 @@ class TagSearch:
         for tag_id, place in places.items():
             # Lost for long: where it is expected, it costs no more than a window.
             if tag_id in self._sides_px and tag_id not in tracked:
-                self._look_for(gray, tag_id, place, self._sides_px[tag_id], LONGEST_STEP_S, stamp_s, found)
+                self._look_for(gray, tag_id, place, self._sides_px[tag_id], MAX_STEP_S, stamp_s, found)
         for detector, (left, top, right, bottom) in self._take_tiles(stamp_s):
             _add_new(found, detector.detect(gray[top:bottom, left:right], (left, top)))
         self._search_nearby(gray, stamp_s, places, found)
@@ -151,7 +151,7 @@ class TagSearch:
         found: List[TagCorners],
     ) -> bool:
         """Search a window for a tag, and return whether it is there; what else is there is added to found, too."""
-        slack_sides = min(SLACK_SIDES_S * max(elapsed_s, 0.0), MOST_SLACK_SIDES)
+        slack_sides = min(SLACK_SIDES_S * max(elapsed_s, 0.0), MAX_SLACK_SIDES)
         half_px = (WINDOW_SIDES + slack_sides) * side_px + SLACK_PX
         detectors = [self._detector]
         if self._fine is not None and side_px < FINE_BELOW_PX:
@@ -193,7 +193,7 @@ class TagSearch:
         if self._previous_s is None:
             self._previous_s = stamp_s
             return [(self._sweeps[0], tile) for tile in self._tiles]
-        elapsed_s = min(max(stamp_s - self._previous_s, 0.0), LONGEST_STEP_S)
+        elapsed_s = min(max(stamp_s - self._previous_s, 0.0), MAX_STEP_S)
         image_px = float(self._size_px.prod())
         self._nearby_px = min(self._nearby_px + NEARBY_IMAGES_S * elapsed_s * image_px, image_px)
         self._due += len(self._tiles) * elapsed_s / SWEEP_S

@@ -33,10 +33,10 @@ EXPECTED_FRAMES, MAX_MISSED_SHARE = 60, 0.2
 MISSING_S = 5.0
 """A hand that covers a reference tag goes away sooner."""
 
-LEAST_USED_SHARE = 0.8
+MIN_USED_SHARE = 0.8
 """Of the images; tags that are searched less often move further between two searches."""
 
-LEAST_SIDE_PX = 14.0
+MIN_SIDE_PX = 14.0
 """Of a tag's side; one cell of 36h11 is an eighth of it."""
 
 MARGIN_PX = 40.0
@@ -172,7 +172,7 @@ class Tracker:
         newest_s = self._pictures[-1][0] if self._pictures else -math.inf
         problems = []
         used_hz, sent_hz = self.rates_hz
-        if used_hz < LEAST_USED_SHARE * sent_hz and len(self._pictures) == RATE_FRAMES:
+        if used_hz < MIN_USED_SHARE * sent_hz and len(self._pictures) == RATE_FRAMES:
             text = "%s are used: this computer is busy, or too slow for more" % self.describe_rate()
             problems.append(Problem("camera", text, False))
         if self._shade < DARK or self._shade > BRIGHT:
@@ -180,9 +180,9 @@ class Tracker:
             text = "images are too %s (mean %.0f of 255): give %s light or exposure" % (kind, self._shade, remedy)
             problems.append(Problem("camera", text, True))
         sides_px = [tag.side_px for tag in self.found if self._settings.layout.find_robot(tag.tag_id) is not None]
-        if sides_px and min(sides_px) < LEAST_SIDE_PX:
+        if sides_px and min(sides_px) < MIN_SIDE_PX:
             text = "tags measure %.0f px, and get lost below %.0f: hang the camera lower, or print larger tags"
-            problems.append(Problem("camera", text % (min(sides_px), LEAST_SIDE_PX), False))
+            problems.append(Problem("camera", text % (min(sides_px), MIN_SIDE_PX), False))
         missed = [
             tag_id
             for tag_id, seen in sorted(self._expected.items())

@@ -17,7 +17,7 @@ from hero_node.errors import NodeError
 from hero_node.ros.master import ask_master
 
 from ..background import Background
-from .dead_man import DeadMan, Velocity
+from .dead_man import DeadMan, DriveCommand
 from .freshness import read_clock_ms
 
 GOAL_LISTENER_TIMEOUT_S = 2.0
@@ -47,7 +47,7 @@ class Commander:
         self._goals: Dict[str, rospy.Publisher] = {}
         self.stopped_ms: Optional[int] = None  # when a page last stopped all robots
 
-    def drive(self, page: int, velocity: Velocity) -> bool:
+    def drive(self, page: int, velocity: DriveCommand) -> bool:
         """Drive a robot for HOLD_TIMEOUT_S; return False if another page drives it."""
         if not self._dead_man.hold(page, velocity, time.monotonic()):
             return False
@@ -67,7 +67,7 @@ class Commander:
         for velocity in self._dead_man.take_stops(time.monotonic()):
             self._publish(velocity)
 
-    def _publish(self, velocity: Velocity) -> None:
+    def _publish(self, velocity: DriveCommand) -> None:
         publisher = self._velocities.get(velocity.namespace)
         if publisher is not None:
             message = Twist()

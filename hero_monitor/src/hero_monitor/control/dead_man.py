@@ -10,7 +10,7 @@ HOLD_TIMEOUT_S = 0.4
 """Pages report every 0.1 s while a button is held; a robot is stopped after this time without a report."""
 
 
-class Velocity(NamedTuple):
+class DriveCommand(NamedTuple):
     """The velocity of one robot, as in Twist."""
 
     namespace: str
@@ -32,7 +32,7 @@ class DeadMan:
         self._holds: Dict[str, Hold] = {}
         self._stops: Set[str] = set()
 
-    def hold(self, page: int, velocity: Velocity, now_s: float) -> bool:
+    def hold(self, page: int, velocity: DriveCommand, now_s: float) -> bool:
         """Note that a page drives a robot; return False if another page drives it already."""
         held = self._holds.get(velocity.namespace)
         if held is not None and held.page != page:
@@ -61,9 +61,9 @@ class DeadMan:
         del self._holds[namespace]
         self._stops.add(namespace)
 
-    def take_stops(self, now_s: float) -> List[Velocity]:
+    def take_stops(self, now_s: float) -> List[DriveCommand]:
         """Return the stops that are due at this step, each once: the driver repeats them."""
         for namespace in [name for name, held in self._holds.items() if now_s - held.last_s > HOLD_TIMEOUT_S]:
             self._begin_stop(namespace)
         due, self._stops = self._stops, set()
-        return [Velocity(namespace, 0.0, 0.0) for namespace in sorted(due)]
+        return [DriveCommand(namespace, 0.0, 0.0) for namespace in sorted(due)]

@@ -9,8 +9,8 @@ from typing import Any, Callable, Dict, Union
 
 from hero_client.values.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
 
-LONGEST_TEXT = 2000
-FARTHEST_GOAL_M = 1000.0
+MAX_TEXT_LENGTH = 2000
+MAX_GOAL_M = 1000.0
 
 
 class RequestError(Exception):
@@ -42,7 +42,7 @@ REQUESTS: Dict[str, Dict[str, Callable[[Any], bool]]] = {
         **_FRESH,
     },
     "end_drive": {"robot": _is_name},
-    "goal": {"robot": _is_name, "x": _is_number(FARTHEST_GOAL_M), "y": _is_number(FARTHEST_GOAL_M), **_FRESH},
+    "goal": {"robot": _is_name, "x": _is_number(MAX_GOAL_M), "y": _is_number(MAX_GOAL_M), **_FRESH},
     "show": {"ground_truth": _is_flag, "picture": _is_flag, "visible": _is_flag},
 }
 """What a page can request, by its field "do", with the fields that it needs and their checks.
@@ -57,7 +57,7 @@ _is_yaw = _is_number(2.0 * math.pi)
 
 def read_request(text: Union[str, bytes]) -> Dict[str, Any]:
     """Return the fields of the request in a text. Raises: RequestError."""
-    if isinstance(text, bytes) or len(text) > LONGEST_TEXT:
+    if isinstance(text, bytes) or len(text) > MAX_TEXT_LENGTH:
         raise RequestError("not a short text")
     try:
         fields = json.loads(text)

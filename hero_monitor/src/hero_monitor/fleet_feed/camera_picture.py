@@ -10,7 +10,7 @@ from typing import Any, Deque, Dict, List, Optional, Tuple
 
 from hero_client.values.geometry import Pose, wrap_angle
 
-from .page_state import FARTHEST_M, encode_pose
+from .page_state import MAX_DISTANCE_M, encode_pose
 
 JPEG_START = b"\xff\xd8"
 BYTES_MAX = 2000000
@@ -61,7 +61,7 @@ class CameraPicture:
     def receive_outline(self, outline: Any) -> None:
         """Take the places of the picture's corners: a geometry_msgs/PolygonStamped."""
         xs, ys = ([getattr(point, axis) for point in outline.polygon.points] for axis in "xy")
-        is_known = len(xs) == 4 and all(abs(value) <= FARTHEST_M for value in xs + ys)
+        is_known = len(xs) == 4 and all(abs(value) <= MAX_DISTANCE_M for value in xs + ys)
         self._box_mm = [round(1e3 * value) for value in (min(xs), min(ys), max(xs), max(ys))] if is_known else None
         self._frame = outline.header.frame_id.lstrip("/")
 

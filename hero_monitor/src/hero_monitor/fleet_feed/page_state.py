@@ -12,17 +12,17 @@ from typing import Any, Deque, Dict, List, NamedTuple, Optional, Sequence
 from hero_client.values.geometry import Pose
 from hero_node.texts import make_printable
 
-LONGEST_LINE = 400
+MAX_LINE_LENGTH = 400
 LOG_LINES_KEPT = 500
 """Lines that a new page gets."""
 
 LOG_LINES_AT_ONCE = 100
 """Lines in one message; a slow page gets the newest, and the number of those it missed."""
 
-FARTHEST_M = 10000.0
+MAX_DISTANCE_M = 10000.0
 """Coordinates and sizes beyond this are not drawn: the map would show nothing but an endless grid."""
 
-FARTHEST_RANGE_M = 100.0
+MAX_RIM_RANGE_M = 100.0
 
 
 class LogLine(NamedTuple):
@@ -42,13 +42,13 @@ def encode(value: Any) -> str:
 
 
 def shorten(text: str) -> str:
-    """Return a text cut to LONGEST_LINE, without unprintable characters."""
-    return make_printable(text if len(text) <= LONGEST_LINE else text[: LONGEST_LINE - 3] + "...")
+    """Return a text cut to MAX_LINE_LENGTH, without unprintable characters."""
+    return make_printable(text if len(text) <= MAX_LINE_LENGTH else text[: MAX_LINE_LENGTH - 3] + "...")
 
 
 def encode_pose(pose: Optional[Pose]) -> Optional[List[int]]:
     """Return a pose as mm, mm, mrad; None without one, or if it cannot be drawn."""
-    if pose is None or not all(abs(value) <= FARTHEST_M for value in pose):
+    if pose is None or not all(abs(value) <= MAX_DISTANCE_M for value in pose):
         return None
     return [round(value * 1000.0) for value in pose]
 
@@ -60,7 +60,7 @@ def encode_ranges(ranges_m: Sequence[float]) -> List[Optional[int]]:
 
 def encode_range(range_m: float) -> Optional[int]:
     """Return one range, see encode_ranges; infinities and NaN as in REP 117."""
-    if abs(range_m) <= FARTHEST_RANGE_M:
+    if abs(range_m) <= MAX_RIM_RANGE_M:
         return max(0, round(range_m * 1000.0))
     if math.isinf(range_m):
         return None if range_m > 0 else 0

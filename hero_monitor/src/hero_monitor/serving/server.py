@@ -56,7 +56,7 @@ WAITING_MAX = 5
 
 PING_INTERVAL_S = 3.0
 PING_TIMEOUT_S = 9.0
-LONGEST_REQUEST = 4096
+MAX_REQUEST_LENGTH = 4096
 LISTEN_BACKLOG = 4096
 """As many as the kernel keeps by default (net.core.somaxconn): a connection that finds the queue full may be reset."""
 
@@ -304,11 +304,11 @@ class Server:
             cookie_secret=secrets.token_urlsafe(32),
             websocket_ping_interval=PING_INTERVAL_S,
             websocket_ping_timeout=PING_TIMEOUT_S,
-            websocket_max_message_size=LONGEST_REQUEST,
+            websocket_max_message_size=MAX_REQUEST_LENGTH,
         )
         self._http = LimitedServer(
             self._application,
-            max_body_size=LONGEST_REQUEST,
+            max_body_size=MAX_REQUEST_LENGTH,
             max_header_size=16384,
             idle_connection_timeout=60.0,
         )

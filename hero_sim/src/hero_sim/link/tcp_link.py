@@ -19,10 +19,10 @@ __all__ = ["LinkHandler", "TcpLink"]
 
 _READ_LENGTH = 65536
 
-_MOST_UNSENT = 1 << 20
+_MAX_UNSENT = 1 << 20
 """Bytes kept for a driver that does not read; the robot is blocked long before, so more would be a bug of ours."""
 
-_MOST_ABANDONED = 200
+_MAX_ABANDONED = 200
 """Connections of robots that lost their power; after so many later ones the driver has given up the first one."""
 
 # Like the ESP8266, whose own send buffer is two segments: a server that does not read is noticed soon.
@@ -158,7 +158,7 @@ class TcpLink:
         if connection is None:
             return
         if connection.unsent:
-            if len(connection.unsent) < _MOST_UNSENT:
+            if len(connection.unsent) < _MAX_UNSENT:
                 connection.unsent += data
             return
         sent = self._try_send(connection, data)
@@ -273,7 +273,7 @@ class TcpLink:
         self._forget(connection)
         _drop_incoming(connection.socket)
         self._abandoned.append(connection.socket)
-        if len(self._abandoned) > _MOST_ABANDONED:
+        if len(self._abandoned) > _MAX_ABANDONED:
             self._abandoned.pop(0).close()
 
     def close_all(self) -> None:

@@ -10,7 +10,7 @@ from typing import Callable, Dict, Optional, Tuple
 from hero_driver.rosserial import packets
 
 from ..errors import CommandError
-from ..robot_constants import LARGEST_PARAMETER
+from ..robot_constants import MAX_PARAMETER
 from ..world.kinematics import Pose
 from . import declarations as ids
 from . import messages
@@ -97,7 +97,7 @@ class CommandTable:
             name = ids.find_type(packet.topic_id)
             raise CommandError("%s has %d bytes instead of %d" % (name, length, expected_length))
         values = struct.unpack(layout, packet.payload)
-        if not all(abs(value) < LARGEST_PARAMETER for value in values):
+        if not all(abs(value) < MAX_PARAMETER for value in values):
             name = ids.find_type(packet.topic_id)
             raise CommandError("%s with %s, with which a real robot would do anything" % (name, list(values)))
         return callback(*values)

@@ -365,7 +365,7 @@ class Firmware:
         if self._received:
             # A new reader each time: the firmware forgets a packet that is not complete after 20 ms
             # (SERIAL_MSG_TIMEOUT, node_handle.h:96), and looks again only after 51 or 101 ms.
-            reader = packets.PacketReader(packets.LONGEST_PAYLOAD_LENGTH)
+            reader = packets.PacketReader(packets.MAX_PAYLOAD_LENGTH)
             self._pending.extend(reader.receive_bytes(bytes(self._received[:RECEIVE_WINDOW_LENGTH])))
             del self._received[:RECEIVE_WINDOW_LENGTH]
 

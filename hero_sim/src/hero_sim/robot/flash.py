@@ -9,7 +9,7 @@ from contextlib import suppress
 from typing import Any, Optional, Sequence
 
 from ..errors import CommandError, OptionError
-from ..robot_constants import LARGEST_PARAMETER
+from ..robot_constants import MAX_PARAMETER
 
 __all__ = ["Flash"]
 
@@ -25,7 +25,7 @@ def _is_storable(value: Any, may_be_erased: bool) -> bool:
     """Return whether a value is a number that a robot computes with; only a sensor's constant may be erased (NaN)."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return False
-    return abs(value) < LARGEST_PARAMETER or (value != value and may_be_erased)
+    return abs(value) < MAX_PARAMETER or (value != value and may_be_erased)
 
 
 class Flash:

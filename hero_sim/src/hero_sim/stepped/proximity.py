@@ -6,7 +6,7 @@ Pure: numpy only; the corrections of make_proximity() in hero_driver's correctio
 import numpy as np
 
 from hero_driver.corrections.message_layouts import CLAMP_TOLERANCE_M
-from hero_driver.robot_constants import BODY_RADIUS_M, FARTHEST_RANGE_M, NEAREST_RANGE_M
+from hero_driver.robot_constants import BODY_RADIUS_M, MAX_RIM_RANGE_M, MIN_RIM_RANGE_M
 
 from ..robot.ranges import convert_to_ranges
 from ..world.range_sensors import BEAMS
@@ -29,8 +29,8 @@ def correct_ranges(ranges_m: np.ndarray) -> np.ndarray:
     """
     corrected_m = ranges_m.take(_FRONT_FIRST, axis=1)
     with np.errstate(invalid="ignore"):  # comparisons with NaN
-        near = corrected_m <= BODY_RADIUS_M + NEAREST_RANGE_M + CLAMP_TOLERANCE_M
-        far = corrected_m >= BODY_RADIUS_M + FARTHEST_RANGE_M - CLAMP_TOLERANCE_M
+        near = corrected_m <= BODY_RADIUS_M + MIN_RIM_RANGE_M + CLAMP_TOLERANCE_M
+        far = corrected_m >= BODY_RADIUS_M + MAX_RIM_RANGE_M - CLAMP_TOLERANCE_M
     corrected_m[near] = 0.0
     corrected_m[far] = np.inf
     return corrected_m

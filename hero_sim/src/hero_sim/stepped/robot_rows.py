@@ -9,7 +9,7 @@ from typing import Callable, List, Optional, Sequence
 
 import numpy as np
 
-from hero_driver.robot_constants import MOTOR_CENTER_US
+from hero_driver.robot_constants import SERVO_CENTER_US
 
 from ..link.wifi import Radio
 from ..robot.firmware import SPIN_MS
@@ -100,7 +100,7 @@ class RobotRows:
         self.commands = np.zeros((rows, 2))
         self._velocity_commands = CommandShaper(rows, 0.0)
         self._position_commands = CommandShaper(rows, 0.0)
-        self._pulse_commands = CommandShaper(rows, MOTOR_CENTER_US)
+        self._pulse_commands = CommandShaper(rows, SERVO_CENTER_US)
         self._topics = (
             (self._velocity_commands, self._receive_velocities),
             (self._position_commands, self._receive_positions),

@@ -18,7 +18,7 @@ __all__ = ["TickOdometryRows"]
 
 _TURN_RAD = 2.0 * math.pi
 
-_MOST_WAITING = 32
+_MAX_WAITING = 32
 
 
 class TickOdometryRows:
@@ -56,7 +56,7 @@ class TickOdometryRows:
         moved_ticks = ticks - self._window_ticks[self._newest]
         if np.count_nonzero(moved_ticks):
             self._moved_ticks.append(moved_ticks)
-            if len(self._moved_ticks) == _MOST_WAITING:
+            if len(self._moved_ticks) == _MAX_WAITING:
                 self._move()
         self._velocities = None
         self._newest = (self._newest + 1) % TWIST_WINDOW

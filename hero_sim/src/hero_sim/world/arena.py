@@ -17,7 +17,7 @@ __all__ = ["Arena", "build_default", "is_free", "measure_clearance", "outline", 
 START_GAP_M = 0.05
 """Free space kept around a robot that is placed at random."""
 
-_MOST_TRIES = 2000
+_MAX_TRIES = 2000
 
 
 class Arena(NamedTuple):
@@ -154,7 +154,7 @@ def place_robots(arena: Arena, robots: int, rng: np.random.RandomState) -> np.nd
 
 def _draw_place(arena: Arena, poses: List[Pose], rng: np.random.RandomState, robots: int) -> Pose:
     x_min, y_min, x_max, y_max = arena.bounds_m.tolist()
-    for _ in range(_MOST_TRIES):
+    for _ in range(_MAX_TRIES):
         # Not rng.uniform(): whether it rounds once or twice depends on how numpy was compiled.
         x_share, y_share, turn = rng.random_sample(3).tolist()
         pose = Pose(x_min + x_share * (x_max - x_min), y_min + y_share * (y_max - y_min), (2.0 * turn - 1.0) * math.pi)

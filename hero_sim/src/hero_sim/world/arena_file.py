@@ -22,7 +22,7 @@ __all__ = ["SHIPPED", "load_arena"]
 SHIPPED = ("empty", "obstacles", "maze")
 """Arenas that come with the simulator; --arena takes these names too."""
 
-_LARGEST_M = 1000.0
+_MAX_COORDINATE_M = 1000.0
 _KEYS = ("name", "bounds_m", "walls_m", "circles_m", "polygons_m", "starts_m_deg")
 
 
@@ -134,7 +134,7 @@ def _read_rows(key: str, value: Any, columns: int, least: int = 0) -> np.ndarray
     except (TypeError, ValueError):
         rows = np.full((1, columns), np.nan)
     nested = isinstance(value, list) and all(isinstance(row, list) and len(row) == columns for row in value)
-    if not nested or len(rows) < least or not (np.abs(rows) <= _LARGEST_M).all():
+    if not nested or len(rows) < least or not (np.abs(rows) <= _MAX_COORDINATE_M).all():
         raise ValueError(
             "%s: %s is not a list of %sentries of %d numbers, each from -1000 to 1000"
             % (key, reprlib.repr(value), "at least %d " % least if least else "", columns)

@@ -12,7 +12,7 @@ from .arena import Arena
 
 __all__ = ["build_map_arena"]
 
-_MOST_CELLS = 4_000_000
+_MAX_CELLS = 4_000_000
 
 
 def build_map_arena(name: str, content: Dict[str, Any], gray: np.ndarray) -> Arena:
@@ -31,8 +31,8 @@ def build_map_arena(name: str, content: Dict[str, Any], gray: np.ndarray) -> Are
         raise ValueError("origin must be finite and its yaw 0, not %r" % (origin,))
     if not 0.001 <= cell_m <= 1.0:
         raise ValueError("resolution must be from 0.001 to 1 m, not %g" % cell_m)
-    if gray.size > _MOST_CELLS:
-        raise ValueError("the picture has %d pixels, more than %d" % (gray.size, _MOST_CELLS))
+    if gray.size > _MAX_CELLS:
+        raise ValueError("the picture has %d pixels, more than %d" % (gray.size, _MAX_CELLS))
     shade = gray[::-1] / 255.0  # the first row of a picture is its upper one
     occupied_share = shade if content.get("negate", "0") == "1" else 1.0 - shade
     solid = occupied_share >= free_share

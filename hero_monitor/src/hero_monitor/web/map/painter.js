@@ -7,7 +7,7 @@ import { sourceOf, stateOf } from "../losses.js";
 export const BODY_MM = 36.85;
 export const TRAIL_MS = 60000;
 const WHEEL_MM = [24.6, 6, 31.5]; // radius, width, distance from the middle
-const LEAST_PX = 9; // radius of a robot, however far the view is
+const MIN_RADIUS_PX = 9; // radius of a robot, however far the view is
 const PROJECTED_PX = 26;
 const SENSOR_REACH_MM = 236.8;
 const TRAIL_INKS = [0.15, 0.28, 0.42, 0.6];
@@ -25,7 +25,7 @@ export class MapPainter {
     Object.assign(this, { view, state, width: map.width, height: map.height });
     this.isProjected = document.body.classList.contains("projector");
     // On a wall, robots are seen from afar.
-    this.enlarged = Math.max(1, (this.isProjected ? PROJECTED_PX : LEAST_PX) / (BODY_MM * view.scale));
+    this.enlarged = Math.max(1, (this.isProjected ? PROJECTED_PX : MIN_RADIUS_PX) / (BODY_MM * view.scale));
     const style = getComputedStyle(document.documentElement);
     this.ink = (name) => style.getPropertyValue(name).trim();
     context.save();
