@@ -3,4 +3,10 @@
 from catkin_pkg.python_setup import generate_distutils_setup
 from setuptools import setup
 
-setup(**generate_distutils_setup(packages=["hero_calibration"], package_dir={"": "src"}))
+ROOMS = ("models", "robots", "procedures")
+
+setup(
+    **generate_distutils_setup(
+        packages=["hero_calibration", *("hero_calibration." + room for room in ROOMS)], package_dir={"": "src"}
+    )
+)

@@ -19,11 +19,11 @@ from hero_node.parameters import robot_ids_option
 from hero_node.ros.program import Program
 
 from .calibration import INFRARED, PARTS, Calibration
-from .discovery import find_robots
 from .errors import CalibrationError
+from .procedures.restore import load_calibrations, restore
 from .questions import ask
-from .restore import load_calibrations, restore
-from .ros_session import RosSession
+from .robots.discovery import find_robots
+from .robots.ros_session import RosSession
 from .store import make_folder
 
 RESTORE = "restore"

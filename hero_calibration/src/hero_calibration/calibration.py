@@ -10,12 +10,12 @@ from hero_node.safe_file import replace_file
 
 from . import store
 from .errors import CalibrationError, EndedError
-from .infrared import calibrate_infrared
-from .motors import MotorResult, calibrate_motors
-from .placement import Ask, place_robots
-from .probe import Probe
-from .session import Session
-from .velocity import calibrate_velocity
+from .procedures.infrared import calibrate_infrared
+from .procedures.motors import MotorResult, calibrate_motors
+from .procedures.placement import Ask, place_robots
+from .procedures.velocity import calibrate_velocity
+from .robots.probe import Probe
+from .robots.session import Session
 
 MOTORS, VELOCITY, INFRARED = "motors", "velocity", "infrared"
 PARTS = (MOTORS, VELOCITY, INFRARED)

@@ -6,12 +6,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from .dead_zone import NOMINAL_CENTER_US
-from .infrared import InfraredResult
-from .infrared_model import BEAMS, name_beam
-from .motors import MotorResult
-from .step_response import STEP_M_S
-from .velocity import VelocityResult
+from .models.dead_zone import NOMINAL_CENTER_US
+from .models.infrared_model import BEAMS, name_beam
+from .models.step_response import STEP_M_S
+from .procedures.infrared import InfraredResult
+from .procedures.motors import MotorResult
+from .procedures.velocity import VelocityResult
 
 _LEFT, _RIGHT, _GREY = "#0072B2", "#D55E00", "0.55"  # two of Okabe and Ito's palette
 _WHEELS = (("left", _LEFT), ("right", _RIGHT))

@@ -21,8 +21,8 @@ from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 
 from hero_calibration.errors import CalibrationError
-from hero_calibration.infrared_model import FRONT
-from hero_calibration.ros_probe import RosProbe
+from hero_calibration.models.infrared_model import FRONT
+from hero_calibration.robots.ros_probe import RosProbe
 from hero_sim.srv import InjectFault
 from hero_test.processes import Program, find_program
 from hero_test.waiting import wait_for

@@ -1,8 +1,8 @@
 """Simulated robots under calibration, stepped in virtual time: a session and its probes without ROS."""
 
 from hero_calibration.errors import CalibrationError
-from hero_calibration.probe import Probe
-from hero_calibration.session import Session
+from hero_calibration.robots.probe import Probe
+from hero_calibration.robots.session import Session
 from hero_client.values.geometry import Pose
 
 

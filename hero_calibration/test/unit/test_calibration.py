@@ -6,11 +6,13 @@ import re
 import numpy as np
 import pytest
 
-from hero_calibration import calibrate, dead_zone, encoder_readings, infrared, step_response
-from hero_calibration import infrared_model as model
-from hero_calibration.encoder_readings import TICK_M
+from hero_calibration import calibrate
 from hero_calibration.errors import CalibrationError
-from hero_calibration.infrared_model import Facing
+from hero_calibration.models import dead_zone, encoder_readings, step_response
+from hero_calibration.models import infrared_model as model
+from hero_calibration.models.encoder_readings import TICK_M
+from hero_calibration.models.infrared_model import Facing
+from hero_calibration.procedures import infrared
 from hero_client.values.robot_constants import BODY_RADIUS_M
 
 

@@ -7,15 +7,16 @@ import numpy as np
 import pytest
 from stepped_session import StepSession
 
-from hero_calibration import infrared_model, store
+from hero_calibration import store
 from hero_calibration.calibration import Calibration
 from hero_calibration.errors import CalibrationError, EndedError
-from hero_calibration.infrared import calibrate_infrared
-from hero_calibration.motors import MotorResult, calibrate_motors
-from hero_calibration.placement import place_robots
-from hero_calibration.restore import restore
-from hero_calibration.step_response import ANGULAR_RAD_S, STEP_M_S
-from hero_calibration.velocity import VelocityResult, calibrate_velocity
+from hero_calibration.models import infrared_model
+from hero_calibration.models.step_response import ANGULAR_RAD_S, STEP_M_S
+from hero_calibration.procedures.infrared import calibrate_infrared
+from hero_calibration.procedures.motors import MotorResult, calibrate_motors
+from hero_calibration.procedures.placement import place_robots
+from hero_calibration.procedures.restore import restore
+from hero_calibration.procedures.velocity import VelocityResult, calibrate_velocity
 from hero_client.values.robot_constants import BODY_RADIUS_M
 from hero_sim.link.wifi import PROFILES, Radio
 from hero_sim.robot.ranges import FACTORY_CALIBRATION_COUNTS_M2, calibrate

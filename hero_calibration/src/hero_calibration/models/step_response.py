@@ -8,8 +8,8 @@ from typing import Dict, List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
+from ..errors import CalibrationError
 from .encoder_readings import TICK_M, Readings
-from .errors import CalibrationError
 
 WHEEL_SEPARATION_M = 0.063
 STEP_M_S = 0.08

@@ -9,10 +9,10 @@ import numpy as np
 from hero_client.values.geometry import Pose
 from hero_node.command_line import say
 
-from . import infrared_model as model
-from .errors import CalibrationError
-from .probe import Probe
-from .session import Session
+from ..errors import CalibrationError
+from ..models import infrared_model as model
+from ..robots.probe import Probe
+from ..robots.session import Session
 
 TURN_S = 2.5
 """For 45 degrees; the position controller ends 3 s after its command."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from hero_client.values.robot_constants import BODY_RADIUS_M
 
-from .errors import CalibrationError
+from ..errors import CalibrationError
 
 BEAMS = 8
 BEAM_STEP_RAD = math.pi / 4.0

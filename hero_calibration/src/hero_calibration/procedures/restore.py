@@ -4,10 +4,10 @@ from typing import Dict, List, Optional, Sequence
 
 from hero_node.command_line import say
 
-from . import store
-from .errors import CalibrationError
-from .probe import Probe
-from .session import Session
+from .. import store
+from ..errors import CalibrationError
+from ..robots.probe import Probe
+from ..robots.session import Session
 
 
 def load_calibrations(

@@ -7,7 +7,7 @@ from hero_client.ros.drivers import Drivers
 from hero_msgs.msg import Robot
 from hero_node.ros.program import Program
 
-from .errors import CalibrationError
+from ..errors import CalibrationError
 from .ros_probe import RosProbe
 
 TIMEOUT_S = 10.0

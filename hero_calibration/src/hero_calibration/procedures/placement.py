@@ -4,10 +4,10 @@ from typing import Callable, Dict, Optional
 
 from hero_node.command_line import say
 
-from .errors import CalibrationError, EndedError
-from .infrared_model import find_obstacle
-from .probe import Probe
-from .session import Session
+from ..errors import CalibrationError, EndedError
+from ..models.infrared_model import find_obstacle
+from ..robots.probe import Probe
+from ..robots.session import Session
 
 READY_TIMEOUT_S = 10.0
 SCANS_TO_CHECK = 5

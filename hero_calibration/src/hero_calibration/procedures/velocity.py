@@ -6,11 +6,8 @@ import numpy as np
 
 from hero_node.command_line import say
 
-from .encoder_readings import Readings
-from .motors import MotorResult
-from .probe import Probe
-from .session import COMMAND_PERIOD_S, Session
-from .step_response import (
+from ..models.encoder_readings import Readings
+from ..models.step_response import (
     ANGULAR_RAD_S,
     NOMINAL_GAIN_M_S_US,
     STEP_S,
@@ -21,6 +18,9 @@ from .step_response import (
     find_start,
     measure_speed,
 )
+from ..robots.probe import Probe
+from ..robots.session import COMMAND_PERIOD_S, Session
+from .motors import MotorResult
 
 TRIES = 6
 """A test takes 4 s."""

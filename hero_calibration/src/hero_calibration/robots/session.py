@@ -9,7 +9,7 @@ from typing import Callable, List, Optional, Sequence
 
 from hero_node.command_line import say
 
-from .errors import CalibrationError, EndedError
+from ..errors import CalibrationError, EndedError
 from .probe import Probe
 
 POLL_S = 0.02

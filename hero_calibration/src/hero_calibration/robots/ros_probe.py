@@ -12,8 +12,8 @@ from hero_msgs.msg import Encoder, Motor
 from hero_msgs.srv import SetIRCalibration, SetMotor, SetPID
 from hero_node.texts import one_line
 
-from .errors import CalibrationError
-from .infrared_model import read_signals
+from ..errors import CalibrationError
+from ..models.infrared_model import read_signals
 from .probe import Probe
 
 SERVICE_WAIT_S = 5.0

@@ -10,8 +10,8 @@ from typing import List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
+from ..errors import CalibrationError
 from .encoder_readings import TICK_M, Readings
-from .errors import CalibrationError
 
 NOMINAL_CENTER_US = 1500
 REACH_US = 120

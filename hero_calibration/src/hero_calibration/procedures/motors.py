@@ -6,10 +6,10 @@ import numpy as np
 
 from hero_node.command_line import say
 
-from . import dead_zone
-from .errors import CalibrationError
-from .probe import Probe
-from .session import Session
+from ..errors import CalibrationError
+from ..models import dead_zone
+from ..robots.probe import Probe
+from ..robots.session import Session
 
 TRIES = 3
 """A sweep takes 40 s."""

@@ -13,9 +13,9 @@ import numpy as np
 
 from hero_client.values.geometry import Pose
 
-from .encoder_readings import Readings, make_readings
-from .errors import CalibrationError
-from .infrared_model import BEAMS, average
+from ..errors import CalibrationError
+from ..models.encoder_readings import Readings, make_readings
+from ..models.infrared_model import BEAMS, average
 
 KEPT_READINGS = 4000
 """Two minutes of encoder readings."""

@@ -1,0 +1,1 @@
+"""What robots are taken through, one module for each part of a calibration. Pure."""
