@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hero_client.values.robot_constants import BODY_RADIUS_M
 from hero_swarm.experiments import report, runner
 from hero_swarm.experiments.batch import METRICS_ENDING, POSES_ENDING
 from hero_swarm.experiments.errors import ExperimentError
@@ -217,7 +218,7 @@ def test_changed_code_of_the_behavior_is_noticed(tmp_path):
 def test_starts_keep_their_gap_and_their_center(start, check):
     (poses,) = place_all(start, None, 9, [3])
     apart_m = np.hypot(*(poses[:, None, :2] - poses[:, :2]).T)[~np.eye(9, dtype=bool)]
-    assert check(apart_m - 0.0736)
+    assert check(apart_m - 2.0 * BODY_RADIUS_M)
     assert np.hypot(*poses[:, :2].mean(axis=0)) < 0.2
     assert (np.abs(poses[:, 2]) <= math.pi).all()
 
