@@ -28,6 +28,7 @@ class Parameters(NamedTuple):
     control: bool
     rate_hz: float
     map_frame: str
+    record_folder: str
 
 
 def read_token(host: str, file: str) -> Optional[str]:
@@ -65,6 +66,7 @@ def load_parameters() -> Parameters:
             "control": flag(False),
             "rate_hz": number(10.0, 1.0, 30.0, "Hz"),
             "map_frame": "world",
+            "record_folder": "~/hero_recordings",
         }
     )
     host = str(given["host"])
@@ -80,4 +82,5 @@ def load_parameters() -> Parameters:
         given["control"],
         given["rate_hz"],
         str(given["map_frame"]).lstrip("/"),
+        str(given["record_folder"]),
     )

@@ -5,22 +5,20 @@
 Everything runs on tornado's thread, except what may block (background).
 """
 
-import asyncio
 import platform
-from typing import TYPE_CHECKING, Any, Dict, Union
+from typing import TYPE_CHECKING, Any, Dict
 
 import rospy
 
-from hero_client.values.geometry import Pose
 from hero_node.errors import ProgramError
 from hero_node.file_limit import raise_file_limit
 from hero_node.ros.program import Program, run
 
 from .background import Background
 from .control.commander import STOP_PERIOD_S, Commander
-from .control.dead_man import DriveCommand
-from .control.freshness import CLOCK_PERIOD_S, explain_refused_release, is_fresh, read_clock_ms
-from .control.requests import RequestError, read_request
+from .control.freshness import CLOCK_PERIOD_S, read_clock_ms
+from .control.offers import describe_offers
+from .control.programs import find_programs
 from .fleet_feed.feed import FleetFeed
 from .fleet_feed.page_state import encode
 from .parameters import Parameters, load_parameters
@@ -35,8 +33,6 @@ LINGER_S = 10.0
 
 END_CHECK_PERIOD_S = 0.2
 
-GOALS_AT_ONCE = 20
-
 
 class Monitor:
     """Pages, the fleet that they show, and what they may do with it."""
@@ -45,6 +41,7 @@ class Monitor:
         # Here, so that a machine without tornado gets a line that says what to do.
         import tornado.ioloop
 
+        from .page_requests import PageRequests
         from .serving.server import Actions, Server
 
         self._parameters = parameters
@@ -53,7 +50,11 @@ class Monitor:
         self._feed = FleetFeed(parameters.map_frame, self._background)
         self._commander = Commander(self._feed.drivers, self._background)
         self._loop = tornado.ioloop.IOLoop.current()
-        actions = Actions(self._open_page, self._receive, self._close_page, lambda: self._feed.picture.jpeg)
+        self._requests = PageRequests(
+            parameters, self._feed, self._commander, self._background, self._broadcast_updates
+        )
+        self._programs = self._requests.programs
+        actions = Actions(self._open_page, self._requests.receive, self._close_page, lambda: self._feed.picture.jpeg)
         # The other half of the files is for ROS: some per robot.
         limits = ConnectionLimits(min(CONNECTIONS_MAX, raise_file_limit() // 2))
         self._server = Server(Access(parameters.token, parameters.host_names), limits, actions)
@@ -62,7 +63,6 @@ class Monitor:
         self._clock = tornado.ioloop.PeriodicCallback(self._send_clock, 1000.0 * CLOCK_PERIOD_S)
         self._end_check = tornado.ioloop.PeriodicCallback(self._check_end, 1000.0 * END_CHECK_PERIOD_S)
         self._leaving: Any = None
-        self._pending_goals = 0
 
     def run(self) -> None:
         """Serve pages until the program ends. Raises: ProgramError."""
@@ -80,14 +80,26 @@ class Monitor:
         hint = "" if wanted.control else " (view only; control:=true allows driving)"
         rospy.loginfo("fleet monitor: http://%s:%d%s", host, port, hint)
         self._end_check.start()
+        if wanted.control:
+            self._background.submit(self._find_programs)
         try:
             self._loop.start()
         finally:
+            self._programs.close()
             self._commander.close()
             self._server.close()
             self._background.close()
 
+    def _find_programs(self) -> None:
+        paths = find_programs()
+        self._loop.add_callback(self._offer, paths)
+
+    def _offer(self, paths: Dict[str, str]) -> None:
+        self._programs.paths = paths
+        self._feed.page_state.put("offers", {"programs": describe_offers(list(paths)), "record": "record" in paths})
+
     def _check_end(self) -> None:
+        self._programs.beat()
         if not self._program.running:
             self._loop.stop()
 
@@ -108,8 +120,11 @@ class Monitor:
             self._leaving = self._loop.call_later(LINGER_S, self._leave)
 
     def _leave(self) -> None:
-        """The last page has been gone for LINGER_S."""
+        """The last page has been gone for LINGER_S: no one there can stop what pages have started."""
         self._leaving = None
+        if self._programs.end_all():
+            self._leaving = self._loop.call_later(END_CHECK_PERIOD_S, self._leave)
+            return
         for repeated in (self._tick, self._stops, self._clock):
             repeated.stop()
         self._feed.update_subscriptions(has_pages=False, ground_truth=False, picture=False)
@@ -119,11 +134,13 @@ class Monitor:
         ground_truth, picture = (any(getattr(page, name) for page in pages) for name in ("ground_truth", "picture"))
         self._feed.update_subscriptions(True, ground_truth, picture)
         self._feed.read()
+        self._feed.page_state.put("programs", self._programs.describe())
         self._broadcast_updates()
 
     def _step(self) -> None:
         """Do what cannot wait for the next update of the pages."""
         self._commander.step()
+        self._requests.end_programs_of_stopped_robots()
         if self._feed.read_stop():
             self._broadcast_updates()
 
@@ -143,67 +160,6 @@ class Monitor:
                 updates = (state.take_updates if page in served else state.take_stop)(page.seen)
                 if updates is not None:
                     page.send(updates)
-
-    # ---------------------------------------------------------------- requests of pages
-
-    def _receive(self, page: "PageSocket", text: Union[str, bytes]) -> None:
-        try:
-            request = read_request(text)
-        except RequestError as error:
-            page.tell("error", "invalid request (%s): reload the page" % error)
-            return
-        kind, robot = request["do"], request.get("robot")
-        if kind == "show":
-            page.ground_truth, page.picture = request["ground_truth"], request["picture"]
-            page.visible = request["visible"]
-        elif kind == "stop":
-            self._request_stop(page, stop=True)
-        elif kind == "release":
-            refusal = explain_refused_release(request, read_clock_ms(), self._commander.stopped_ms)
-            if refusal:
-                page.tell("error", refusal)
-            else:
-                self._request_stop(page, stop=False)
-        elif kind == "end_drive":
-            self._commander.end_drive(page.number, "/" + robot)
-        elif not is_fresh(request, read_clock_ms()):
-            # A button that is still held sends the next one at once.
-            if kind != "drive":
-                page.tell("error", "the request was delayed: nothing was done")
-        elif not self._parameters.control:
-            page.tell("error", "this monitor is view only: start it with control:=true to drive robots")
-        elif robot not in self._feed.robots:
-            page.tell("error", "%s is not connected" % robot)
-        elif self._feed.stopped or not self._commander.may_drive():
-            page.tell("error", "all robots are stopped: release them first")
-        elif kind == "drive":
-            velocity = DriveCommand("/" + robot, float(request["linear"]), float(request["angular"]))
-            if not self._commander.drive(page.number, velocity):
-                page.tell("error", "%s is driven from another page" % robot)
-        elif self._pending_goals >= GOALS_AT_ONCE:
-            page.tell("error", "too many goals at once")
-        else:
-            self._loop.add_callback(self._send_goal, page, request)
-
-    def _request_stop(self, page: "PageSocket", stop: bool) -> None:
-        self._commander.request_stop(stop)
-        self._feed.read_stop()
-        verb = "stop" if stop else "release"
-        page.acknowledge(verb)
-        # After the acknowledgement has left.
-        self._loop.add_callback(self._broadcast_updates)
-        self._background.warn("a page requests to %s all robots" % verb)
-
-    async def _send_goal(self, page: "PageSocket", request: Dict[str, Any]) -> None:
-        """Send a goal in the background, and tell the page the outcome."""
-        robot, yaw_rad = request["robot"], request.get("yaw")
-        frame, goal = self._feed.placement.to_goal(robot, Pose(request["x"], request["y"], yaw_rad or 0.0))
-        self._pending_goals += 1
-        try:
-            sending = self._background.submit(self._commander.send_goal, "/" + robot, frame, goal, yaw_rad is not None)
-            page.tell(*await asyncio.wrap_future(sending))
-        finally:
-            self._pending_goals -= 1
 
 
 def _main() -> None:

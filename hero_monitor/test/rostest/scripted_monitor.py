@@ -7,6 +7,7 @@ import threading
 import tornado.ioloop
 
 from hero_monitor.control.freshness import CLOCK_PERIOD_S, read_clock_ms
+from hero_monitor.control.offers import OFFERS, describe_offers
 from hero_monitor.fleet_feed.page_state import encode
 from hero_monitor.serving.access import Access
 from hero_monitor.serving.connection_limits import ConnectionLimits
@@ -51,12 +52,30 @@ def make_fleet(*robots, **changes):
     return {**fleet, "frame": "world", "localized": False, **changes}
 
 
+def make_program(number, **changes):
+    """Return a program that runs on two robots; changes: of its fields."""
+    program = {
+        "number": number,
+        "program": "random_walk",
+        "title": "random walk",
+        "robots": ["hero_0", "hero_1"],
+        "places": [],
+        "seconds": 65,
+        "bytes": 0,
+        "folder": "/tmp/recordings",
+        "ending": False,
+        "failure": "",
+    }
+    return {**program, **changes}
+
+
 class ScriptedMonitor:
     """The server on a free port, until close()."""
 
     def __init__(self):
         self.requests = []
-        self.state = {"hello": {"control": True}, "fleet": make_fleet(), "losses": [], "stop": None}
+        offers = {"programs": describe_offers(list(OFFERS)), "record": True}
+        self.state = {"hello": {"control": True}, "offers": offers, "fleet": make_fleet(), "losses": [], "stop": None}
         self.served = True
         self.is_silent = False
         self._ready = threading.Event()

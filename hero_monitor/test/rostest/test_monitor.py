@@ -113,6 +113,26 @@ class PageTest(unittest.TestCase):
         self.assertNotIn("\u202e", self.page.text("#lines"))
         self.assertEqual(self.page.errors(), [])
 
+    def test_a_stop_of_all_robots_ends_the_program_of_a_page(self):
+        self.page.choose("hero_0")
+        self.page.wait_for_text("#program", "random walk")
+        self.page.find("#program [value='random_walk']").click()
+
+        def is_started():
+            if not self.page.text("#running"):  # a busy PC has delayed the request
+                self.page.click("#start")
+            return self.page.text("#running").startswith("random walk, hero_0")
+
+        wait_for(is_started, self.page.notices)
+        self.wait_until_moving(0)
+        self.page.press_stop()
+        wait_for(lambda: self.page.text("#running") == "", "the end of the program")
+        self.page.hold_release()
+        publishers = [name for _, names in rosgraph.Master("/test").getSystemState()[0] for name in names]
+        self.assertEqual([name for name in publishers if "random_walk" in name], [])
+        wait_for(lambda: self.command == Twist(), "a stop")
+        self.wait_until_standing(0)
+
     def test_a_robot_drives_while_a_button_is_held_and_stops_on_release(self):
         self.page.choose("hero_0")
         self.drive("forward")

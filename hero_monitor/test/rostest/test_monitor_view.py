@@ -8,7 +8,7 @@ from pathlib import Path
 
 import rostest
 from monitor_page import MonitorPage
-from scripted_monitor import ScriptedMonitor, make_fleet, make_robot
+from scripted_monitor import ScriptedMonitor, make_fleet, make_program, make_robot
 
 from hero_test.browser import MISSING
 from hero_test.waiting import wait_for
@@ -64,6 +64,8 @@ class ViewTest(unittest.TestCase):
 
     def setUp(self):
         self.show([make_robot(number) for number in range(4)])
+        self.monitor.show(programs=[])
+        self.monitor.requests.clear()
         self.page.open()
         self.page.wait_for_text("#ready", "4 of 4 ready")
 
@@ -167,6 +169,65 @@ class ViewTest(unittest.TestCase):
         self.page.click("#projector")
         wait_for(lambda: self.page.find("#fleet").is_displayed(), "the whole page")
         self.assertEqual(self.page.find("#stop").rect, place)
+
+    def send_until(self, kind, act):
+        """Act, again where a busy PC let the page take it for a late input; return the request."""
+
+        def is_sent():
+            if not self.monitor.requested(kind):
+                act()
+            return self.monitor.requested(kind)
+
+        return wait_for(is_sent, "the request " + kind)[-1]
+
+    def test_a_loop_shift_and_all_choose_robots_that_are_driven_and_stopped(self):
+        from selenium.webdriver.common.keys import Keys
+
+        def shown():
+            return self.page.text("#name")
+
+        canvas = self.page.find("#canvas")
+        self.page.click("#fit")
+        loop = self.page.actions().key_down(Keys.SHIFT).move_to_element_with_offset(canvas, -420, -90).click_and_hold()
+        for place in ((420, -90), (420, 90), (-420, 90)):
+            loop.move_to_element_with_offset(canvas, *place)
+        loop.release().key_up(Keys.SHIFT).perform()
+        wait_for(lambda: shown() == "4 robots", shown)
+        row = self.page.find("#fleet tbody tr:nth-child(3) button")
+        self.page.actions().key_down(Keys.SHIFT).click(row).key_up(Keys.SHIFT).perform()
+        wait_for(lambda: shown() == "3 robots", shown)
+        three = ["hero_0", "hero_1", "hero_3"]
+        self.page.hold("forward", lambda: self.monitor.requested("drive"), "the request drive")
+        self.page.actions().release().perform()
+        self.assertEqual(self.monitor.requested("drive")[-1]["robots"], three)
+        stop = self.send_until("stop_some", lambda: self.page.click("#stop_some"))
+        self.assertEqual(stop["robots"], three)
+        self.page.click("#all")
+        wait_for(lambda: shown() == "4 robots", shown)
+
+    def test_a_program_starts_with_its_parameters_and_is_shown_until_it_ends(self):
+        self.page.choose("hero_1")
+        self.page.find("#program [value='random_walk']").click()
+        self.page.run("document.querySelector('[name=linear_m_s]').value = 0.9")
+        self.page.click("#start")  # refused by the page: beyond the limit
+        self.page.run("document.querySelector('[name=linear_m_s]').value = 0.05")
+        request = self.send_until("start", lambda: self.page.click("#start"))
+        self.assertEqual((request["program"], request["robots"]), ("random_walk", ["hero_1"]))
+        self.assertEqual(request["values"], {"linear_m_s": 0.05, "angular_rad_s": 1.5})
+        self.monitor.requests.clear()
+        self.page.find("#program [value='swarm_go_to']").click()
+        self.page.click("#start")
+        request = self.send_until("start", lambda: self.page.click("#canvas"))
+        self.assertEqual((request["values"]["shape"], request["values"]["turn_deg"]), ("circle", 0))
+        self.assertEqual(self.page.find("#hint").is_displayed(), False)
+        self.monitor.show(programs=[make_program(7), make_program(8, program="record", bytes=2400000)])
+        self.page.wait_for_text("#running", "random walk, 2 robots, 1:05")
+        self.page.wait_for_text("#recorded", "1:05, 2.4 MB in /tmp/recordings")
+        self.assertEqual(self.send_until("end", lambda: self.page.click("#running button"))["number"], 7)
+        self.assertFalse(self.send_until("record", lambda: self.page.click("#record"))["on"])
+        self.monitor.show(programs=[make_program(7, failure="no pose of hero_1")])
+        self.page.wait_for_text("#running", "random walk failed: no pose of hero_1")
+        self.assertFalse(self.page.find("#rec").is_displayed())
 
     def test_messages_that_differ_only_in_numbers_are_one_line(self):
         texts = ["hero_%d: silent for %d.5 s" % (number % 3, number) for number in range(6)]

@@ -64,7 +64,7 @@ def test_a_request_that_a_socket_held_moves_no_robot(kind):
 
 def test_a_stop_counts_at_any_age():
     assert is_fresh({"do": "stop", "heard_ms": 0}, 1000000)
-    assert is_fresh({"do": "end_drive", "robot": "hero_0"}, 1000000)
+    assert is_fresh({"do": "end_drive", "robots": ["hero_0"]}, 1000000)
 
 
 def test_no_release_counts_shortly_after_a_stop_of_any_page():

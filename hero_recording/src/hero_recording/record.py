@@ -23,6 +23,7 @@ import roslib.packages
 from hero_node import command_line
 from hero_node.errors import NodeError
 from hero_node.parameters import robot_ids_option
+from hero_node.processes import end_process
 from hero_node.ros.master import ask_master, check_master
 
 from .disk_guard import MB, find_reason_to_stop, prepare_folder
@@ -100,7 +101,7 @@ class Recording:
         try:
             reason = self._watch(recorder, start_s)
         finally:
-            code = end_process(recorder)
+            code = end_process(recorder, CLOSING_S)
             repaired = self._repair_leftovers()
         self._summarize(time.monotonic() - start_s)
         if reason is not None:
@@ -152,16 +153,6 @@ class Recording:
 def format_size(size: float) -> str:
     """Return a number of bytes as text."""
     return "%.1f GB" % (size / 1e9) if size >= 1e9 else "%.1f MB" % (size / 1e6)
-
-
-def end_process(process: "subprocess.Popen[bytes]") -> int:
-    """End a process, by force if SIGINT does not, and return its exit code."""
-    for number, timeout_s in ((signal.SIGINT, CLOSING_S), (signal.SIGTERM, 2.0)):
-        process.send_signal(number)
-        with suppress(subprocess.TimeoutExpired):
-            return process.wait(timeout_s)
-    process.kill()
-    return process.wait()
 
 
 def _end_with_parent() -> None:

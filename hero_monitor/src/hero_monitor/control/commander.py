@@ -20,8 +20,8 @@ from ..background import Background
 from .dead_man import DeadMan, DriveCommand
 from .freshness import read_clock_ms
 
-GOAL_LISTENER_TIMEOUT_S = 2.0
-"""To connect to a program that takes goals; about 0.1 s is usual."""
+LISTENER_TIMEOUT_S = 2.0
+"""To connect to a driver or a program that takes goals; about 0.1 s is usual."""
 
 STOP_PERIOD_S = 0.06
 
@@ -62,25 +62,41 @@ class Commander:
         """Stop all robots that this page drives."""
         self._dead_man.drop_page(page)
 
+    def prepare(self, namespace: str) -> None:
+        """Open a robot's topic, which takes a moment."""
+        if namespace not in self._velocities:
+            self._velocities[namespace] = None
+            self._background.submit(self._open_velocity, namespace)
+
+    def stop_robot(self, namespace: str) -> None:
+        """Stop a robot, whoever drives it."""
+        self._dead_man.stop(namespace)
+
     def step(self) -> None:
         """Send the stops that are due; to be called every STOP_PERIOD_S."""
         for velocity in self._dead_man.take_stops(time.monotonic()):
-            self._publish(velocity)
+            if not self._publish(velocity):
+                self._dead_man.stop(velocity.namespace)
 
-    def _publish(self, velocity: DriveCommand) -> None:
+    def _publish(self, velocity: DriveCommand) -> bool:
+        """Send a velocity; return False while the topic is being opened."""
         publisher = self._velocities.get(velocity.namespace)
         if publisher is not None:
             message = Twist()
             message.linear.x, message.angular.z = velocity.linear_m_s, velocity.angular_rad_s
             publisher.publish(message)
-        elif velocity.namespace not in self._velocities:
-            self._velocities[velocity.namespace] = None
-            self._background.submit(self._open_velocity, velocity.namespace)
+        else:
+            self.prepare(velocity.namespace)
+        return publisher is not None
 
     def _open_velocity(self, namespace: str) -> None:
-        self._velocities[namespace] = rospy.Publisher(
-            namespace + "/velocity_controller/cmd_vel", Twist, queue_size=1, tcp_nodelay=True
-        )
+        topic = namespace + "/velocity_controller/cmd_vel"
+        publisher = rospy.Publisher(topic, Twist, queue_size=1, tcp_nodelay=True)
+        # A stop is sent once: it must not be lost before the driver is connected.
+        deadline_s = time.monotonic() + LISTENER_TIMEOUT_S
+        while publisher.get_num_connections() == 0 and time.monotonic() < deadline_s:
+            time.sleep(0.02)
+        self._velocities[namespace] = publisher
 
     def send_goal(self, namespace: str, frame: str, goal: Pose, with_heading: bool) -> Notice:
         """Send a goal in a frame to the program that takes goals for this robot; may take seconds."""
@@ -88,7 +104,7 @@ class Commander:
         try:
             if not self._has_listener(topic):
                 launch = "roslaunch hero_examples go_to_goal.launch robots:=%s" % name.rpartition("_")[2]
-                return Notice("error", "no program takes goals for %s: %s" % (name, launch))
+                return Notice("error", "no program takes goals for %s: start one here, or %s" % (name, launch))
         except NodeError as error:
             return Notice("error", str(error))
         message = PoseStamped()
@@ -110,7 +126,7 @@ class Commander:
         if topic not in self._goals:
             # Not latched: a program that starts later must not find an old goal.
             self._goals[topic] = rospy.Publisher(topic, PoseStamped, queue_size=2, tcp_nodelay=True)
-        deadline_s = time.monotonic() + GOAL_LISTENER_TIMEOUT_S
+        deadline_s = time.monotonic() + LISTENER_TIMEOUT_S
         # This node subscribes too, to show goals, and counts.
         while self._goals[topic].get_num_connections() < len(others) + 1 and time.monotonic() < deadline_s:
             time.sleep(0.02)

@@ -57,8 +57,12 @@ class DeadMan:
         for namespace in list(self._holds):
             self._begin_stop(namespace)
 
+    def stop(self, namespace: str) -> None:
+        """Stop a robot, whoever drives it."""
+        self._begin_stop(namespace)
+
     def _begin_stop(self, namespace: str) -> None:
-        del self._holds[namespace]
+        self._holds.pop(namespace, None)
         self._stops.add(namespace)
 
     def take_stops(self, now_s: float) -> List[DriveCommand]:

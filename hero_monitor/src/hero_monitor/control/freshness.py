@@ -12,7 +12,7 @@ from .dead_man import HOLD_TIMEOUT_S
 CLOCK_PERIOD_S = 0.12
 """Between two values of the clock."""
 
-AGE_MAX_S = {"drive": HOLD_TIMEOUT_S, "goal": 1.0, "release": 1.0}
+AGE_MAX_S = {"drive": HOLD_TIMEOUT_S, "goal": 1.0, "start": 1.0, "record": 1.0, "release": 1.0}
 """Of the requests that make robots move."""
 
 INERT_S = 2.0

@@ -9,7 +9,9 @@ from typing import Any, Callable, Dict, Union
 
 from hero_client.values.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
 
-MAX_TEXT_LENGTH = 2000
+MAX_TEXT_LENGTH = 16000
+"""A group of a thousand robots."""
+
 MAX_GOAL_M = 1000.0
 
 
@@ -30,26 +32,40 @@ def _is_number(limit: float) -> Callable[[Any], bool]:
     return lambda value: isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= limit
 
 
+def _is_names(value: Any) -> bool:
+    return isinstance(value, list) and value != [] and all(map(_is_name, value)) and len(set(value)) == len(value)
+
+
+def _is_single(value: Any) -> bool:
+    return _is_names(value) and len(value) == 1
+
+
 _FRESH = {"heard_ms": _is_number(1e15)}
 
 REQUESTS: Dict[str, Dict[str, Callable[[Any], bool]]] = {
     "stop": {},
     "release": _FRESH,
     "drive": {
-        "robot": _is_name,
+        "robots": _is_names,
         "linear": _is_number(MAX_LINEAR_M_S),
         "angular": _is_number(MAX_ANGULAR_RAD_S),
         **_FRESH,
     },
-    "end_drive": {"robot": _is_name},
-    "goal": {"robot": _is_name, "x": _is_number(MAX_GOAL_M), "y": _is_number(MAX_GOAL_M), **_FRESH},
+    "end_drive": {"robots": _is_names},
+    "stop_some": {"robots": _is_names},
+    "goal": {"robots": _is_single, "x": _is_number(MAX_GOAL_M), "y": _is_number(MAX_GOAL_M), **_FRESH},
+    "start": {"program": _is_name, "robots": _is_names, "values": lambda value: isinstance(value, dict), **_FRESH},
+    "end": {"number": _is_number(1e9)},
+    "record": {"on": _is_flag, **_FRESH},
     "show": {"ground_truth": _is_flag, "picture": _is_flag, "visible": _is_flag},
 }
 """What a page can request, by its field "do", with the fields that it needs and their checks.
 
 stop: stop all robots. release: release them. drive: a button is held; velocity in m/s and rad/s. end_drive: it is let
-go. goal: a pose on the map in m; yaw (rad) may be added. show: whether anyone can see the page, and what it shows in
-addition to the fleet. heard_ms: the monitor's clock, as the page last heard it (freshness).
+go. stop_some: end what drives these robots, and stop them. goal: a pose on the map in m; yaw (rad) may be added.
+start: a program of offers.OFFERS, with values for its fields. end: a program, by its number. record: begin or end the
+recording. show: whether anyone can see the page, and what it shows in addition to the fleet. heard_ms: the monitor's
+clock, as the page last heard it (freshness).
 """
 
 _is_yaw = _is_number(2.0 * math.pi)

@@ -56,7 +56,7 @@ WAITING_MAX = 5
 
 PING_INTERVAL_S = 3.0
 PING_TIMEOUT_S = 9.0
-MAX_REQUEST_LENGTH = 4096
+MAX_REQUEST_LENGTH = 16384
 LISTEN_BACKLOG = 4096
 """As many as the kernel keeps by default (net.core.somaxconn): a connection that finds the queue full may be reset."""
 

@@ -9,6 +9,7 @@ import { showLosses, stateOf } from "./losses.js";
 import { FleetMap } from "./map/map.js";
 import { LogView } from "./panels/log.js";
 import { RobotPanel } from "./panels/robot.js";
+import { ProgramPanel } from "./panels/programs.js";
 import { Chart } from "./panels/chart.js";
 import { showSummary } from "./panels/summary.js";
 import { Projector } from "./projector.js";
@@ -18,7 +19,7 @@ const NOTICE_MS = 6000;
 
 const element = (id) => document.getElementById(id);
 
-/** As received, whether it is up to date, and the name of the chosen robot. */
+/** As received, whether it is up to date, and the names of the chosen robots. */
 const state = {
   hello: { control: false },
   fleet: { driver: false, listening: "", stopped: false, frame: "", localized: false, robots: [] },
@@ -31,8 +32,11 @@ const state = {
   picture: null,
   arena: { boxes: [], circles: [] },
   isFresh: false,
-  chosen: null,
+  offers: { programs: [], record: false },
+  programs: [],
+  chosen: new Set(),
 };
+const SHOWN_BY_ALL = ["fleet", "hello", "losses", "offers", "programs"];
 const RECEIVED = Object.keys(state).filter((name) => name !== "isFresh" && name !== "chosen");
 
 const connection = new Connection({
@@ -54,12 +58,18 @@ const connection = new Connection({
 });
 const send = (request) => connection.send(request);
 
-function choose(name) {
-  state.chosen = name;
+/** Choose these robots alone, or in addition; one that is chosen already is then left out again. */
+function choose(names, isAdded) {
+  const chosen = new Set(isAdded ? state.chosen : []);
+  for (const name of names) {
+    if (names.length === 1 && chosen.has(name)) chosen.delete(name);
+    else chosen.add(name);
+  }
+  state.chosen = chosen;
   table.show(state);
   showPanel();
   map.draw();
-  log.choose(name);
+  log.choose(chosen);
 }
 
 function notice(level, text) {
@@ -75,21 +85,27 @@ function notice(level, text) {
 }
 
 const history = new History();
-const map = new FleetMap(state, { choose, send, notice });
+const map = new FleetMap(state, { choose, send });
 const table = new FleetTable({ choose, history });
 const log = new LogView();
 const chart = new Chart(history);
 new Projector(() => map.draw());
 const panel = new RobotPanel({ connection, map, notice });
+const programs = new ProgramPanel({ connection, map, notice });
 const stop = new StopPanel({ connection, endDrive: () => panel.endDrive(), notice });
 
-/** The chosen robot, or all of them in numbers; and the chart of either. */
+const listPresent = () => state.fleet.robots.filter((robot) => robot.state !== "REFUSED");
+
+/** The chosen robot, or several of them, without a choice all, in numbers; and their chart. */
 function showPanel() {
-  panel.show(state);
-  const robots = state.fleet.robots.filter((robot) => robot.state !== "REFUSED");
-  element("summary").hidden = state.chosen !== null;
+  const present = listPresent();
+  const chosen = present.filter((robot) => state.chosen.has(robot.name));
+  const robots = chosen.length ? chosen : present;
+  panel.show(state, chosen);
+  programs.show(state, [...state.chosen]);
+  element("summary").hidden = chosen.length === 1;
   showSummary({ ...state, fleet: { ...state.fleet, robots } }, history);
-  chart.show(robots.filter((robot) => state.chosen === null || robot.name === state.chosen));
+  chart.show(robots);
 }
 
 function showHead() {
@@ -113,7 +129,8 @@ function showHead() {
 /** Show the state in all panels. */
 function showAll() {
   state.isFresh = connection.isFresh && connection.served;
-  if (state.chosen !== null && !state.fleet.robots.some((robot) => robot.name === state.chosen)) choose(null);
+  const present = [...state.chosen].filter((name) => state.fleet.robots.some((robot) => robot.name === name));
+  if (present.length < state.chosen.size) choose(present);
   table.show(state);
   showPanel();
   showHead();
@@ -128,12 +145,17 @@ function receive(updates) {
   history.update(state);
   if ("notice" in updates) notice(updates.notice.level, updates.notice.text);
   if ("log" in updates) log.append(updates.log);
-  if ("fleet" in updates || "hello" in updates || "losses" in updates) showAll();
-  else if ("poses" in updates) panel.show(state);
+  if (SHOWN_BY_ALL.some((name) => name in updates)) showAll();
+  else if ("poses" in updates) panel.show(state, listPresent().filter((robot) => state.chosen.has(robot.name)));
   map.update(updates);
 }
 
 document.addEventListener("visibilitychange", () => map.requestShown());
+
+element("all").addEventListener("click", () => {
+  const names = listPresent().map((robot) => robot.name);
+  choose(state.chosen.size < names.length ? names : []);
+});
 
 // Phones show the map's buttons on request.
 element("layers").addEventListener("click", () => {

@@ -13,11 +13,10 @@ const EDGE_PX = 36; // covered by tools above and hints below
 const element = (id) => document.getElementById(id);
 
 export class FleetMap {
-  constructor(state, { choose, send, notice }) {
+  constructor(state, { choose, send }) {
     this.state = state;
     this.choose = choose;
     this.send = send;
-    this.notice = notice;
     this.canvas = element("canvas");
     this.painter = new MapPainter(this);
     this.shows = { trails: true, beams: true, names: true, ground_truth: false, picture: false };
@@ -27,8 +26,10 @@ export class FleetMap {
     this.pinned = false; // then the view stays until Fit is pressed
     this.trails = new Map();
     this.pointers = new Map();
-    this.going = false;
+    this.onPlace = null; // while a place is asked for
     this.aim = null;
+    this.selecting = false; // then clicks and drags choose robots in addition, as with Shift
+    this.lasso = null;
     this.waiting = false;
     for (const name of Object.keys(this.shows)) {
       element(name).setAttribute("aria-pressed", String(this.shows[name]));
@@ -37,6 +38,10 @@ export class FleetMap {
     element("fit").addEventListener("click", () => {
       this.pinned = false;
       this.fit();
+    });
+    element("select").addEventListener("click", () => {
+      this.selecting = !this.selecting;
+      element("select").setAttribute("aria-pressed", String(this.selecting));
     });
     element("zoomin").addEventListener("click", () => this.zoom(1.4));
     element("zoomout").addEventListener("click", () => this.zoom(1 / 1.4));
@@ -59,14 +64,13 @@ export class FleetMap {
     this.send({ do: "show", ground_truth, picture, visible: !document.hidden });
   }
 
-  setGoing(going) {
-    this.going = going;
+  /** Ask for places, with a hint, until a hint of null: onPlace({x, y, yaw}) in m and rad, yaw after a drag alone. */
+  askPlace(hint, onPlace = null) {
+    this.onPlace = hint === null ? null : onPlace;
     this.aim = null;
-    this.canvas.classList.toggle("going", going);
-    element("hint").hidden = !going;
-    element("hint").textContent = going
-      ? `Click the goal of ${this.state.chosen}; drag to set its final heading.`
-      : "";
+    this.canvas.classList.toggle("going", hint !== null);
+    element("hint").hidden = hint === null;
+    element("hint").textContent = hint ?? "";
     this.draw();
   }
 
@@ -84,18 +88,24 @@ export class FleetMap {
       this.pointers.set(event.pointerId, [event.offsetX, event.offsetY]);
       this.start = [event.offsetX, event.offsetY];
       this.moved = this.pointers.size > 1;
-      if (this.going) this.aim = { from: this.toMap(event.offsetX, event.offsetY), to: null };
+      const here = this.toMap(event.offsetX, event.offsetY);
+      this.lasso = null;
+      if (this.onPlace) this.aim = { from: here, to: null };
+      else if (!this.moved && (this.selecting || event.shiftKey)) this.lasso = [here];
     });
     canvas.addEventListener("pointermove", (event) => this.move(event));
     canvas.addEventListener("pointerup", (event) => {
       const only = this.pointers.size === 1;
       this.pointers.delete(event.pointerId);
-      if (this.going && only && this.aim && !isLate(event)) this.sendGoal();
-      else if (only && !this.moved) this.pick(event.offsetX, event.offsetY);
+      if (this.onPlace && only && this.aim && !isLate(event)) this.takePlace();
+      else if (only && !this.moved) this.pick(event);
+      else if (only && this.lasso) this.choose(this.findInLasso(), true);
+      this.lasso = null;
+      this.draw();
     });
     canvas.addEventListener("pointercancel", (event) => {
       this.pointers.delete(event.pointerId);
-      this.aim = null;
+      this.aim = this.lasso = null;
     });
     canvas.addEventListener("pointerleave", () => (element("place").textContent = ""));
     canvas.addEventListener(
@@ -129,8 +139,11 @@ export class FleetMap {
       const after = Math.hypot(here[0] - other[0], here[1] - other[1]);
       this.pan((here[0] - last[0]) / 2, (here[1] - last[1]) / 2);
       if (before > 0) this.zoom(after / before, (here[0] + other[0]) / 2, (here[1] + other[1]) / 2);
-      this.aim = null;
-    } else if (this.going) {
+      this.aim = this.lasso = null;
+    } else if (this.lasso) {
+      this.lasso.push([x, y]);
+      this.draw();
+    } else if (this.onPlace) {
       if (this.aim && this.moved) this.aim.to = [x, y];
       this.draw();
     } else if (this.moved) {
@@ -139,8 +152,8 @@ export class FleetMap {
     this.pointers.set(event.pointerId, here);
   }
 
-  pick(px, py) {
-    const [x, y] = this.toMap(px, py);
+  pick(event) {
+    const [x, y] = this.toMap(event.offsetX, event.offsetY);
     let nearest = null;
     let least = Math.max(BODY_MM * 1.3, 22 / this.view.scale);
     for (const [name, pose] of Object.entries(this.poses)) {
@@ -148,15 +161,25 @@ export class FleetMap {
       const distance = Math.hypot(pose[0] - x, pose[1] - y);
       if (distance < least) [nearest, least] = [name, distance];
     }
-    this.choose(nearest);
+    const isAdded = this.lasso !== null || event.ctrlKey || event.metaKey;
+    if (nearest !== null || !isAdded) this.choose(nearest === null ? [] : [nearest], isAdded);
   }
 
-  sendGoal() {
+  /** Robots inside the loop: a ray from them to the right crosses it an odd number of times. */
+  findInLasso() {
+    const isInside = ([x, y]) =>
+      this.lasso.filter(([ax, ay], index) => {
+        const [bx, by] = this.lasso[(index + 1) % this.lasso.length];
+        return ay > y !== by > y && x < ax + ((y - ay) / (by - ay)) * (bx - ax);
+      }).length % 2 === 1;
+    return Object.keys(this.state.poses).filter((name) => this.state.poses[name] && isInside(this.state.poses[name]));
+  }
+
+  takePlace() {
     const { from, to } = this.aim;
     this.aim = null;
-    const request = { do: "goal", robot: this.state.chosen, x: from[0] / 1000, y: from[1] / 1000 };
-    if (to) request.yaw = Math.atan2(to[1] - from[1], to[0] - from[0]);
-    if (!this.send(request)) this.notice("error", "no connection to the monitor: the goal was not sent");
+    const place = { x: from[0] / 1000, y: from[1] / 1000 };
+    this.onPlace(to ? { ...place, yaw: Math.atan2(to[1] - from[1], to[0] - from[0]) } : place);
     this.draw();
   }
 
@@ -212,11 +235,12 @@ export class FleetMap {
     if (!xs.length) return false;
     const [left, right, low, high] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
     const room = 1 - MARGIN;
+    const edge = Math.max(EDGE_PX, element("frame").offsetHeight + 14);
     this.view.x = (left + right) / 2;
     this.view.y = (low + high) / 2;
     this.view.scale = Math.min(
       (this.width * room) / Math.max(right - left, 300),
-      ((this.height - 2 * EDGE_PX) * room) / Math.max(high - low, 300),
+      ((this.height - 2 * edge) * room) / Math.max(high - low, 300),
     );
     this.draw();
     return true;

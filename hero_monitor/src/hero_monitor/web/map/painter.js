@@ -40,10 +40,12 @@ export class MapPainter {
     const robots = state.fleet.robots.filter((robot) => robot.state !== "REFUSED" && state.poses[robot.name]);
     if (shows.trails) for (const robot of robots) this.paintTrail(robot);
     if (shows.ground_truth) for (const robot of robots) this.paintGroundTruth(robot);
+    this.paintPlaces();
     for (const robot of robots) this.paintGoal(robot);
     if (shows.beams) for (const robot of robots) this.paintBeams(robot);
     for (const robot of robots) this.paintRobot(robot);
     if (map.aim) this.paintAim(map.aim);
+    if (map.lasso) this.paintLasso(map.lasso);
     context.restore();
     if (shows.names) this.paintNames(robots);
     this.paintScale();
@@ -164,6 +166,30 @@ export class MapPainter {
     }
   }
 
+  /** Where robots of a formation go. */
+  paintPlaces() {
+    const { context, view } = this;
+    context.strokeStyle = this.ink("--accent");
+    context.lineWidth = Math.max(3, 1.5 / view.scale);
+    for (const [x, y] of this.state.programs.flatMap(({ places }) => places)) {
+      context.beginPath();
+      context.arc(x, y, BODY_MM * this.enlarged, 0, 2 * Math.PI);
+      context.stroke();
+    }
+  }
+
+  paintLasso(points) {
+    const { context, view } = this;
+    context.strokeStyle = this.ink("--accent");
+    context.lineWidth = 2 / view.scale;
+    context.setLineDash([6 / view.scale, 4 / view.scale]);
+    context.beginPath();
+    for (const [x, y] of points) context.lineTo(x, y);
+    context.closePath();
+    context.stroke();
+    context.setLineDash([]);
+  }
+
   paintBeams(robot) {
     const ranges = this.state.ranges[robot.name];
     if (!ranges || stateOf(robot, this.state) !== "READY") return;
@@ -236,7 +262,7 @@ export class MapPainter {
       context.arc(0, 0, BODY_MM * (light ? 0.58 : 0.3), 0, 2 * Math.PI);
       context.fill();
       context.globalAlpha = 1;
-      if (robot.name === state.chosen) {
+      if (state.chosen.has(robot.name)) {
         context.strokeStyle = this.ink("--accent");
         context.lineWidth = 2.5 / view.scale / this.enlarged;
         context.beginPath();
@@ -273,10 +299,11 @@ export class MapPainter {
     const labels = robots.map((robot) => {
       const [x, y] = this.map.toScreen(...state.poses[robot.name]);
       // Numbers alone where names would be too many, and for an audience.
-      const isShort = robot.id >= 0 && robot.name !== state.chosen && (isCrowded || this.isProjected);
+      const isChosen = state.chosen.has(robot.name);
+      const isShort = robot.id >= 0 && !(isChosen && state.chosen.size === 1) && (isCrowded || this.isProjected);
       const text = isShort ? String(robot.id) : robot.name;
-      const isNeeded = robot.name === state.chosen || stateOf(robot, state) !== "READY";
-      return { x, y, radius: radius * 1.15, width: context.measureText(text).width, height: size, isNeeded, text, robot };
+      const isNeeded = isChosen || stateOf(robot, state) !== "READY";
+      return { x, y, radius: isChosen ? radius * 1.5 + 6 : radius * 1.15, width: context.measureText(text).width, height: size, isNeeded, text, robot };
     });
     placeLabels(labels).forEach((corner, index) => {
       if (!corner) return;

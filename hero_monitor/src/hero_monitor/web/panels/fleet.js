@@ -121,7 +121,7 @@ export class FleetTable {
       let target = cell;
       if (index === 0) {
         cell.scope = "row";
-        const button = document.createElement("button");
+        const button = (row.button = document.createElement("button"));
         button.type = "button";
         row.chip = document.createElement("span");
         row.chip.className = "chip";
@@ -136,7 +136,7 @@ export class FleetTable {
       line.append(cell);
       row.targets.push(target);
     });
-    line.addEventListener("click", () => row.robot.state !== "REFUSED" && this.choose(row.robot.name));
+    line.addEventListener("click", (event) => row.robot.state !== "REFUSED" && this.choose([row.robot.name], event.shiftKey || event.ctrlKey || event.metaKey));
     this.rows.set(id, row);
     return row;
   }
@@ -160,7 +160,9 @@ export class FleetTable {
     });
     row.chip.style.background = colorOf(robot.id);
     row.line.classList.toggle("unknown", shownState === "UNKNOWN");
-    row.line.classList.toggle("chosen", robot.name === state.chosen && robot.state !== "REFUSED");
+    const isChosen = state.chosen.has(robot.name) && robot.state !== "REFUSED";
+    row.line.classList.toggle("chosen", isChosen);
+    row.button.setAttribute("aria-pressed", String(isChosen));
   }
 }
 

@@ -20,7 +20,7 @@ export class LogView {
     this.level = document.getElementById("level");
     this.mine = document.getElementById("mine");
     this.words = document.getElementById("words");
-    this.chosen = null;
+    this.chosen = new Set();
     this.groups = new Map(); // by message without its numbers: the line that shows it, how often it came, and of whom
     for (const input of [this.level, this.mine, this.words]) {
       input.addEventListener("input", () => this.filter());
@@ -32,8 +32,8 @@ export class LogView {
     this.list.replaceChildren();
   }
 
-  choose(name) {
-    this.chosen = name;
+  choose(names) {
+    this.chosen = names;
     if (this.mine.checked) this.filter();
   }
 
@@ -79,7 +79,7 @@ export class LogView {
   admits(entry) {
     if (entry === null) return true;
     if (entry.level < Number(this.level.value)) return false;
-    if (this.mine.checked && this.chosen !== null && !entry.robots.has(this.chosen)) return false;
+    if (this.mine.checked && this.chosen.size && ![...entry.robots].some((robot) => this.chosen.has(robot))) return false;
     return entry.words.includes(this.words.value.trim().toLowerCase());
   }
 

@@ -1,7 +1,7 @@
-// The chosen robot: its data, and controls for driving it if the monitor allows that.
+// The chosen robots: data of one, and controls for driving them if the monitor allows that.
 //
 // Dead man's switch: while a button or key is held, the page sends a command every 100 ms. It stops sending when the
-// button is let go, the page is hidden or loses focus, was suspended, or the network stalls. The monitor stops the robot
+// button is let go, the page is hidden or loses focus, was suspended, or the network stalls. The monitor stops robots
 // on "end_drive", after 0.4 s of silence, or when the socket closes.
 
 import { colorOf } from "../map/colors.js";
@@ -23,7 +23,7 @@ export class RobotPanel {
     this.connection = connection;
     this.notice = notice;
     this.map = map;
-    this.name = null;
+    this.names = [];
     this.driving = null;
     this.timer = null;
     this.keys = new Set();
@@ -64,14 +64,18 @@ export class RobotPanel {
       element(id).addEventListener("input", show);
       show();
     }
-    element("goto").addEventListener("click", () => this.setGoing(!this.map.going));
+    element("goto").addEventListener("click", () => this.setGoing(element("goto").getAttribute("aria-pressed") !== "true"));
     addEventListener("keydown", (event) => event.key === "Escape" && this.setGoing(false));
   }
 
   setGoing(going) {
-    this.map.setGoing(going && this.name !== null);
-    element("goto").setAttribute("aria-pressed", String(this.map.going));
-    element("goto").textContent = this.map.going ? "Choosing a goal" : "Go to goal";
+    const [name] = this.names;
+    this.map.askPlace(going ? `Click the goal of ${name}; drag to set its final heading.` : null, (place) => {
+      const sent = this.connection.send({ do: "goal", robots: [name], ...place });
+      if (!sent) this.notice("error", "no connection to the monitor: the goal was not sent");
+    });
+    element("goto").setAttribute("aria-pressed", String(going));
+    element("goto").textContent = going ? "Choosing a goal" : "Go to goal";
   }
 
   pressKey(event) {
@@ -95,8 +99,8 @@ export class RobotPanel {
   }
 
   hold(direction) {
-    if (this.name === null) return;
-    this.driving = { robot: this.name, direction };
+    if (!this.names.length) return;
+    this.driving = { robots: this.names, direction };
     this.sentMs = Date.now();
     this.sendCommand();
     if (this.timer === null) this.timer = setInterval(() => this.sendCommand(), HOLD_MS);
@@ -112,10 +116,10 @@ export class RobotPanel {
     }
     this.sentMs = now;
     if (this.connection.isCongested) return;
-    const { robot, direction } = this.driving;
+    const { robots, direction } = this.driving;
     // Backwards the turn is inverted, as in a car.
     const angular = direction[1] * (direction[0] < 0 ? -1 : 1) * Number(element("angular").value);
-    this.connection.send({ do: "drive", robot, linear: direction[0] * Number(element("linear").value), angular });
+    this.connection.send({ do: "drive", robots, linear: direction[0] * Number(element("linear").value), angular });
   }
 
   endDrive() {
@@ -123,27 +127,30 @@ export class RobotPanel {
     for (const button of element("pad").querySelectorAll(".down")) button.classList.remove("down");
     if (this.timer !== null) clearInterval(this.timer);
     this.timer = null;
-    if (this.driving !== null) this.connection.send({ do: "end_drive", robot: this.driving.robot });
+    if (this.driving !== null) this.connection.send({ do: "end_drive", robots: this.driving.robots });
     this.driving = null;
   }
 
-  show(state) {
-    const robot = state.fleet.robots.find((one) => one.name === state.chosen && one.state !== "REFUSED") || null;
-    const name = robot === null ? null : robot.name;
-    if (name !== this.name) {
+  /** robots: those that are chosen. */
+  show(state, robots) {
+    const robot = robots.length === 1 ? robots[0] : null;
+    const names = robots.map(({ name }) => name);
+    if (String(names) !== String(this.names)) {
       this.endDrive();
-      this.name = name;
+      this.names = names;
       this.setGoing(false);
     }
     const chip = document.querySelector("#robot .chip");
     chip.hidden = robot === null;
     if (robot) chip.style.background = colorOf(robot.id);
-    element("name").textContent = robot ? robot.name : "All robots";
+    element("name").textContent = robot ? robot.name : robots.length ? `${robots.length} robots` : "All robots";
     const shown = robot ? stateOf(robot, state) : "";
     element("state").textContent = shown;
     element("state").dataset.state = shown;
-    element("control").hidden = robot === null || !state.hello.control || shown === "UNKNOWN";
-    element("advice").hidden = robot === null || state.hello.control;
+    const isKnown = robots.some((one) => stateOf(one, state) !== "UNKNOWN");
+    element("control").hidden = !isKnown || !state.hello.control;
+    element("goto").hidden = robot === null;
+    element("advice").hidden = robots.length === 0 || state.hello.control;
     element("advice").textContent = "View only. control:=true lets the monitor drive robots.";
     const trouble = robot ? healthOf(robot) : "";
     element("trouble").hidden = !trouble;

@@ -1,0 +1,197 @@
+"""Which programs pages may start, with what, and how they end: with the monitor, by a stop, or by themselves."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+import yaml
+
+from hero_client.apps.formations import FormationError
+from hero_monitor.control import programs as programs_module
+from hero_monitor.control.offers import BEHAVIORS, OFFERS, check_values, make_arguments, place_robots
+from hero_monitor.control.programs import Child, Programs
+from hero_monitor.control.requests import RequestError
+from hero_swarm.behaviors import list_names
+
+PACKAGES = Path(__file__).resolve().parents[3]
+DEADLINE_S = 300.0
+
+CIRCLE = {"shape": "circle", "spacing_m": 0.3, "turn_deg": 90.0, "x_m": 1.0, "y_m": -0.5, "linear_m_s": 0.08}
+
+OBEDIENT = (
+    "import signal; signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT]);"
+    "print('runs', flush=True); signal.sigwait([signal.SIGINT]); print('robots are stopped')"
+)
+DEAF = "import signal, time; signal.signal(signal.SIGINT, signal.SIG_IGN); print('deaf', flush=True); time.sleep(900)"
+
+
+def read_launch_arguments(package, program):
+    text = (PACKAGES / package / "launch" / (program + ".launch")).read_text(encoding="utf-8")
+    return [line.split('name="')[1].split('"')[0] for line in text.splitlines() if "<arg " in line]
+
+
+@pytest.mark.parametrize("program", OFFERS)
+def test_all_that_pages_may_set_are_parameters_of_the_program(program):
+    offer = OFFERS[program]
+    defaults = {name: field.default for name, field in offer.fields.items()}
+    check_values(program, defaults)
+    arguments = dict(text[1:].split(":=", 1) for text in make_arguments(program, [0, 12], "map", defaults))
+    assert set(arguments) <= set(read_launch_arguments(offer.package, program))
+    assert yaml.safe_load(arguments["robots"]) == "0 12"
+    assert ("frame" in arguments) == offer.has_frame
+
+
+def test_all_built_in_behaviors_are_offered():
+    assert sorted(BEHAVIORS) == list_names()
+
+
+def test_a_formation_is_placed_where_the_map_was_clicked():
+    (formation,) = [text for text in make_arguments("swarm_go_to", [0], "map", CIRCLE) if "formation" in text]
+    assert yaml.safe_load(formation.split(":=")[1]) == {
+        "shape": "circle", "spacing_m": 0.3, "turn_deg": 90.0, "center": [1.0, -0.5]
+    }  # fmt: skip
+    (first, second) = place_robots(CIRCLE, 2)
+    assert first == pytest.approx((1.0, -0.35))
+    assert second == pytest.approx((1.0, -0.65))
+    assert place_robots({"linear_m_s": 0.1}, 2) == []
+    with pytest.raises(FormationError):
+        place_robots({**CIRCLE, "spacing_m": 0.05}, 2)
+
+
+@pytest.mark.parametrize(
+    ("program", "values"),
+    [
+        ("teleop", {}),
+        ("../bin/sh", {}),
+        ("random_walk", {}),
+        ("random_walk", {"linear_m_s": 0.1, "angular_rad_s": 1.0, "seed": 3}),
+        ("random_walk", {"linear_m_s": 0.3, "angular_rad_s": 1.0}),
+        ("random_walk", {"linear_m_s": True, "angular_rad_s": 1.0}),
+        ("random_walk", {"linear_m_s": float("nan"), "angular_rad_s": 1.0}),
+        ("random_walk", {"linear_m_s": "0.1", "angular_rad_s": 1.0}),
+        ("go_to_goal", {"avoid": "true"}),
+        ("behavior", {"behavior": "/tmp/mine.py", "safety": "off"}),
+        ("swarm_go_to", {**CIRCLE, "shape": ["circle"]}),
+    ],
+)
+def test_no_other_program_and_no_other_value_is_accepted(program, values):
+    with pytest.raises(RequestError):
+        check_values(program, values)
+
+
+class Started:
+    """Programs whose guards run Python code."""
+
+    def __init__(self):
+        self.ended, self._is_ended = [], threading.Event()
+        self.programs = Programs("/hero_monitor", self.hand_over, self.ended.append)
+        self.programs.paths = {name: sys.executable for name in (*OFFERS, "record")}
+
+    def hand_over(self, function, *arguments):
+        function(*arguments)
+        self._is_ended.set()
+
+    def start(self, code, program="random_walk", robots=("hero_0", "hero_1"), folder=None):
+        child = Child(program, robots, folder=folder)
+        self.programs.start(child, ["-c", code])
+        return child
+
+    def wait(self):
+        assert self._is_ended.wait(DEADLINE_S)
+        self._is_ended.clear()
+
+
+@pytest.fixture()
+def started():
+    one = Started()
+    yield one
+    one.programs.close()
+
+
+def wait_for_output(monkeypatch):
+    """Let the test see when a program runs: its output is a pipe's."""
+    read, write = os.pipe()
+    real = subprocess.Popen
+
+    def start(command, **options):
+        return real(command, **{**options, "stdout": write} if "stdout" in options else options)
+
+    monkeypatch.setattr(programs_module.subprocess, "Popen", start)
+    return os.fdopen(read, "rb").readline
+
+
+def test_a_program_that_a_page_ends_gets_sigint_and_its_robots_are_stopped(started, monkeypatch):
+    read = wait_for_output(monkeypatch)
+    child = started.start(OBEDIENT)
+    assert read() == b"runs\n"
+    assert started.programs.find_driver(["hero_1"]) == "random walk drives hero_1: end it first"
+    started.programs.end(1)
+    started.wait()
+    assert read() == b"robots are stopped\n"
+    assert (started.ended, child.driven, child.failure) == ([child], ["hero_0", "hero_1"], "")
+    assert started.programs.describe() == []
+
+
+def test_a_program_that_ignores_sigint_is_ended_by_force(started, monkeypatch):
+    read = wait_for_output(monkeypatch)
+    monkeypatch.setattr(programs_module, "USUAL_PATIENCE_S", 0.1)
+    started.start(DEAF)
+    assert read() == b"deaf\n"
+    started.programs.end_those_of(["hero_0"])
+    started.wait()
+    assert started.programs.count == 0
+
+
+def test_a_program_whose_guard_is_killed_ends_too(started, monkeypatch):
+    read = wait_for_output(monkeypatch)
+    started.start("import os; print(os.getppid(), flush=True); import signal; signal.pause()")
+    os.kill(int(read()), signal.SIGKILL)
+    started.wait()
+    assert started.programs.describe()[0]["failure"]
+
+
+def test_why_a_program_failed_is_shown_until_another_one_starts(started):
+    started.start("import sys; sys.exit('swarm_go_to: no way')")
+    started.wait()
+    assert [row["failure"] for row in started.programs.describe()] == ["swarm_go_to: no way"]
+    started.start("print()")
+    started.wait()
+    assert started.programs.describe() == []
+
+
+def test_the_end_of_the_monitor_ends_the_program(monkeypatch):
+    # As the kernel does with the pipe of a monitor that was killed.
+    read = wait_for_output(monkeypatch)
+    child = Child("random_walk", ["hero_0"])
+    thread = threading.Thread(target=child.run, args=([sys.executable, "-c", OBEDIENT],))
+    thread.start()
+    assert read() == b"runs\n"
+    os.close(child._monitor_end)
+    child.is_ending = True
+    thread.join(DEADLINE_S)
+    assert read() == b"robots are stopped\n"
+
+
+def test_a_stop_of_all_robots_ends_programs_but_not_the_recording(started, monkeypatch, tmp_path):
+    read = wait_for_output(monkeypatch)
+    (tmp_path / "hero_0.bag").write_bytes(b"x" * 7)
+    monkeypatch.setattr(programs_module, "SIZE_PERIOD_S", 0.01)
+    recording = started.start(OBEDIENT, "record", robots=(), folder=tmp_path)
+    assert read() == b"runs\n"
+    assert not started.programs.end_all()
+    assert started.programs.find_recording() is recording
+    recording.end()
+    started.wait()
+    assert recording.bytes == 7
+    assert started.programs.find_recording() is None
+
+
+@pytest.mark.parametrize(("program", "driven"), [("follow", ["hero_1"]), ("led_show", [])])
+def test_robots_that_a_program_does_not_drive_are_left_alone(program, driven):
+    child = Child(program, ["hero_0", "hero_1"])
+    child.end()
+    assert child.driven == driven
