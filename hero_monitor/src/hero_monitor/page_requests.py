@@ -1,18 +1,17 @@
-"""Carries out the requests of pages, or tells them why not; on tornado's thread."""
+"""Carries out the requests of pages, or tells them why not; on the thread of the pages."""
 
-import asyncio
 import time
+from concurrent.futures import Future
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Callable, Dict, Union
 
 import rospy
-import tornado.ioloop
 
 from hero_client.apps.formations import FormationError
 from hero_client.values.geometry import Pose
 
 from .background import Background
-from .control.commander import Commander
+from .control.commander import Commander, Notice
 from .control.dead_man import DriveCommand
 from .control.freshness import explain_refused_release, is_fresh, read_clock_ms
 from .control.offers import OFFERS, check_values, make_arguments, place_robots
@@ -41,13 +40,13 @@ class PageRequests:
         feed: FleetFeed,
         commander: Commander,
         background: Background,
+        hand_over: Callable[..., Any],
         broadcast: Callable[[], None],
     ) -> None:
-        """broadcast: sends to pages what is new to them."""
+        """hand_over: calls a function later, on this thread. broadcast: sends to pages what is new to them."""
         self._parameters, self._feed, self._commander = parameters, feed, commander
-        self._background, self._broadcast = background, broadcast
-        self._loop = tornado.ioloop.IOLoop.current()
-        self.programs = Programs(rospy.get_name(), self._loop.add_callback, self._stop_robots_of)
+        self._background, self._hand_over, self._broadcast = background, hand_over, broadcast
+        self.programs = Programs(rospy.get_name(), hand_over, self._stop_robots_of)
         self._pending_goals = 0
         self._carry_out: Dict[str, Callable[[PageSocket, Request], str]] = {
             "show": self._show,
@@ -118,7 +117,7 @@ class PageRequests:
         verb = "stop" if stop else "release"
         page.acknowledge(verb)
         # After the acknowledgement has left.
-        self._loop.add_callback(self._broadcast)
+        self._hand_over(self._broadcast)
         self._background.warn("a page requests to %s all robots" % verb)
 
     def end_programs_of_stopped_robots(self) -> None:
@@ -152,19 +151,16 @@ class PageRequests:
     def _goal(self, page: "PageSocket", request: Request) -> str:
         if self._pending_goals >= GOALS_AT_ONCE:
             return "too many goals at once"
-        self._loop.add_callback(self._send_goal, page, request)
-        return ""
-
-    async def _send_goal(self, page: "PageSocket", request: Request) -> None:
-        """Send a goal in the background, and tell the page the outcome."""
         (robot,), yaw_rad = request["robots"], request.get("yaw")
         frame, goal = self._feed.placement.to_goal(robot, Pose(request["x"], request["y"], yaw_rad or 0.0))
         self._pending_goals += 1
-        try:
-            sending = self._background.submit(self._commander.send_goal, "/" + robot, frame, goal, yaw_rad is not None)
-            page.tell(*await asyncio.wrap_future(sending))
-        finally:
-            self._pending_goals -= 1
+        sending = self._background.submit(self._commander.send_goal, "/" + robot, frame, goal, yaw_rad is not None)
+        sending.add_done_callback(lambda sent: self._hand_over(self._tell_outcome, page, sent))
+        return ""
+
+    def _tell_outcome(self, page: "PageSocket", sent: "Future[Notice]") -> None:
+        self._pending_goals -= 1
+        page.tell(*sent.result())
 
     # ---------------------------------------------------------------- programs
 

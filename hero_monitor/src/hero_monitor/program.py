@@ -21,6 +21,7 @@ from .control.offers import describe_offers
 from .control.programs import find_programs
 from .fleet_feed.feed import FleetFeed
 from .fleet_feed.page_state import encode
+from .page_requests import PageRequests
 from .parameters import Parameters, load_parameters
 from .serving.access import Access
 from .serving.connection_limits import CONNECTIONS_MAX, ConnectionLimits
@@ -41,7 +42,6 @@ class Monitor:
         # Here, so that a machine without tornado gets a line that says what to do.
         import tornado.ioloop
 
-        from .page_requests import PageRequests
         from .serving.server import Actions, Server
 
         self._parameters = parameters
@@ -51,7 +51,12 @@ class Monitor:
         self._commander = Commander(self._feed.drivers, self._background)
         self._loop = tornado.ioloop.IOLoop.current()
         self._requests = PageRequests(
-            parameters, self._feed, self._commander, self._background, self._broadcast_updates
+            parameters,
+            self._feed,
+            self._commander,
+            self._background,
+            self._loop.add_callback,
+            self._broadcast_updates,
         )
         self._programs = self._requests.programs
         actions = Actions(self._open_page, self._requests.receive, self._close_page, lambda: self._feed.picture.jpeg)
