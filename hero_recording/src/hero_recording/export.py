@@ -1,4 +1,4 @@
-"""Program export: writes what bags hold of the robots as CSV, a folder per robot and a file per kind of message.
+"""Program export: writes robots' messages in bags as CSV, a folder per robot and a file per message type.
 
 The tables are in FOLDER.part until all of them are complete.
 """

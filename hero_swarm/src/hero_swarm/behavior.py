@@ -1,4 +1,4 @@
-"""What a behaviour is: a class with sensors, a rate, parameters with units, and step() for one robot or for all.
+"""What a behavior is: a class with sensors, a rate, parameters with units, and step() for one robot or for all.
 
 Pure: numpy only. R robots are the rows of all arrays, world after world.
 
@@ -48,12 +48,12 @@ class Random:
 
 
 class Sensed:
-    """What R robots sense, as attributes: those below, and one for each sensor of the behaviour, by its name.
+    """What R robots sense, as attributes: those below, and one for each sensor of the behavior, by its name.
 
     A Binary gives an array (R,) of bool, Neighbors a Neighborhood.
 
     Attributes:
-        time_s: since the behaviour began.
+        time_s: since the behavior began.
         is_known: whether each robot's own pose is known (R,); one whose pose is not known senses nothing.
         poses: x m, y m, yaw rad (R, 3) in the common frame; NaN where it is not known.
         numbers: each robot's number in its world, 0 to N - 1 (R,).
@@ -73,11 +73,11 @@ class Sensed:
         try:
             return self.__dict__["_readings"][name]
         except KeyError:
-            raise AttributeError("the behaviour has no sensor %r" % name) from None
+            raise AttributeError("the behavior has no sensor %r" % name) from None
 
 
 class Behavior:
-    """One behaviour; subclasses say what it senses and does. Instances may set other parameters: Milling(rate_hz=10).
+    """One behavior; subclasses say what it senses and does. Instances may set other parameters: Milling(rate_hz=10).
 
     Attributes:
         rate_hz: steps per second.
@@ -88,7 +88,7 @@ class Behavior:
     metric: str = "dispersion_ratio"
 
     def __init__(self, **parameters: Any) -> None:
-        """Set parameters by name. Raises: TypeError for one that the behaviour does not have."""
+        """Set parameters by name. Raises: TypeError for one that the behavior does not have."""
         for name, value in parameters.items():
             if name.startswith("_") or not hasattr(self, name) or callable(getattr(self, name)):
                 raise TypeError("%s has no parameter %r; it has %s" % (type(self).__name__, name, self.parameters()))
@@ -113,7 +113,7 @@ class Behavior:
 
 
 def sense(behavior: Behavior, time_s: float, poses: np.ndarray, random: Random) -> Sensed:
-    """Return what the sensors of a behaviour tell about poses (W, N, 3); NaN for those that are not known."""
+    """Return what the sensors of a behavior tell about poses (W, N, 3); NaN for those that are not known."""
     readings: Dict[str, Any] = {}
     for name, sensor in behavior.sensors().items():
         read: Any = sense_binary if isinstance(sensor, Binary) else sense_neighbors

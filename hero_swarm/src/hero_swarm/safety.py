@@ -1,4 +1,4 @@
-"""Keeps robots apart and inside a fence, between a behaviour and its commands: barrier functions on the steered point.
+"""Keeps robots apart and inside a fence, between a behavior and its commands: barrier functions on the steered point.
 
 Pure: numpy only, over W worlds with N robots each. A point in front of the axle can move any way at once, so a
 command is a velocity of this point; the nearest one is taken at which no two robots, and no robot and the fence,

@@ -1,4 +1,4 @@
-"""Runs a behaviour on stepped robots: many worlds at once, in virtual time. Pure.
+"""Runs a behavior on stepped robots: many worlds at once, in virtual time. Pure.
 
     trial = Trial(Milling(), arena=build_rectangle(1.71, 1.42, 1), robots=20, seeds=range(10))
     for time_s, poses in trial.run(200.0):
@@ -47,13 +47,13 @@ def scatter(robots: int, width_m: float, height_m: float, seed: int, gap_m: floa
 
 
 class Trial:
-    """One behaviour on W worlds with N robots each.
+    """One behavior on W worlds with N robots each.
 
     Attributes:
         rows: the robots, as arrays.
         poses: true poses (W, N, 3), as of the last control step.
         velocities: how they changed since the control step before, per second (W, N, 3).
-        memory: what the behaviour remembers.
+        memory: what the behavior remembers.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Each built-in behaviour by its metric, beside robots that stand still and robots that walk at random."""
+"""Each built-in behavior by its metric, beside robots that stand still and robots that walk at random."""
 
 import inspect
 

@@ -1,4 +1,4 @@
-"""Reports what would keep robots from being driven from this PC, each with its remedy.
+"""Checks whether this PC can drive robots, and names the remedy for each problem.
 
     rosrun hero_tools check            a line per point: OK, WARN or FAIL, and what to do
     rosrun hero_tools check --json     the same as one line of JSON
@@ -71,7 +71,7 @@ def format_findings(findings: Dict[str, Finding]) -> List[str]:
 def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(
-        prog="check", description="Reports what would keep robots from being driven from this PC."
+        prog="check", description="Checks whether this PC can drive robots."
     )
     parser.add_argument("--json", action="store_true", help="print one line of JSON")
     parser.add_argument(

@@ -1,8 +1,8 @@
-"""Program calibrate_camera: lens, place of the camera, tags on robots. Each ends with a figure, a verdict and the file.
+"""Program calibrate_camera: intrinsics (lens), extrinsics (arena), tags on robots. Prints errors and a verdict.
 
-rosrun hero_localization calibrate_camera lens                  move the printed board about in the image
+rosrun hero_localization calibrate_camera lens                  move the printed board through the image
 rosrun hero_localization calibrate_camera lens --yaml FILE      take camera_calibration's result
-rosrun hero_localization calibrate_camera arena                 by reference tags of known place
+rosrun hero_localization calibrate_camera arena                 from reference tags at known positions
 rosrun hero_localization calibrate_camera robots --robots 0     robots turn and drive a little
 """
 
@@ -333,7 +333,7 @@ def _check_file(options: argparse.Namespace) -> None:
             " as  references: {100: [-0.9, -0.6, 0], 101: [0.9, -0.6, 0], ...}" % (options.file, count, MIN_TAGS)
         )
     if options.part == "robots" and settings.camera is None:
-        raise CalibrationError("%s holds no place of the camera: calibrate_camera arena comes first" % options.file)
+        raise CalibrationError("%s has no camera pose (extrinsics): run calibrate_camera arena first" % options.file)
 
 
 def run(arguments: Sequence[str]) -> int:

@@ -1,4 +1,4 @@
-"""Program localize: where all robots are in one frame, from their odometry and poses that something measures.
+"""Program localize: filters odometry and measured poses into poses of all robots in one frame.
 
 rosrun hero_localization localize                                      poses on /hero_N/measured_pose
 rosrun hero_localization localize _pose_topic:=/vrpn_client_node/hero_{id}/pose

@@ -1,4 +1,4 @@
-"""Program map_arena: the robots of a swarm map the arena, by their poses from localize and their proximity sensors.
+"""Program map_arena: occupancy grid of the arena from all robots' poses and proximity sensors.
 
 rosrun hero_localization map_arena
 rosrun hero_localization map_arena _bounds_m:="-1.5 -1 1.5 1"

@@ -145,7 +145,7 @@ class TrackNode:
 
     def _list_problems(self, now_s: float) -> List[Tuple[str, str, bool]]:
         if self._tracker is None:
-            text = "not calibrated: %s holds no place of the camera; rosrun hero_localization calibrate_camera"
+            text = "not calibrated: %s has no camera pose (extrinsics); rosrun hero_localization calibrate_camera"
             return [("camera", text % self._path, True)]
         if self._source.problem:
             return [("camera", self._source.problem, True)]

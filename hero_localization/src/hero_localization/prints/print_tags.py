@@ -1,4 +1,4 @@
-"""Program print_tags: makes a PDF with tags of true size, to be printed at 100 % and cut out.
+"""Program print_tags: makes a PDF of tags in true size, to print at 100 % and cut out.
 
 rosrun hero_localization print_tags --robots 0-9 --references 100-103
 rosrun hero_localization print_tags --board

@@ -1,7 +1,7 @@
 """The simulated overhead camera as a ROS node: images of the simulated robots, as a camera driver publishes them.
 
-With --board it shows the board for the lens instead, as if somebody held it into the image. Needs OpenCV
-(python3-opencv). Renders only what somebody subscribes to.
+With --board it shows the calibration board at changing poses instead. Needs OpenCV (python3-opencv). Renders only
+images that are subscribed to.
 """
 
 import argparse

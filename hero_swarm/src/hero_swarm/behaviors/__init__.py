@@ -1,4 +1,4 @@
-"""The behaviours that come with the suite, by the names that programs and launch files take."""
+"""The behaviors that come with the suite, by the names that programs and launch files take."""
 
 import importlib
 import importlib.util
@@ -30,12 +30,12 @@ _MODULES: Dict[str, str] = {
 
 
 def list_names() -> List[str]:
-    """Return the names of all behaviours."""
+    """Return the names of all behaviors."""
     return sorted(_MODULES)
 
 
 def find_behavior(name: str) -> Type[Behavior]:
-    """Return a behaviour by its name, its module.Class, FILE.py or FILE.py:Class.
+    """Return a behavior by its name, its module.Class, FILE.py or FILE.py:Class.
 
     Raises: ValueError that says what there is.
     """

@@ -1,4 +1,4 @@
-"""Behaviours of one bit that were evolved: two pairs of wheel speeds, for nothing and for a robot seen.
+"""Behaviors of one bit that were evolved: two pairs of wheel speeds, for nothing and for a robot seen.
 
 Source: D. S. Brown et al., Discovery and Exploration of Novel Swarm Behaviors given Limited Robot Capabilities, DARS
 2016; C. Mattson and D. S. Brown, Leveraging Human Feedback to Evolve and Discover Novel Emergent Behaviors in Robot

@@ -1,4 +1,4 @@
-"""Behaviours by agreement with neighbors: rendezvous, leader and followers, formation by distances."""
+"""Behaviors by agreement with neighbors: rendezvous, leader and followers, formation by distances."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Behaviours by forces between neighbors: dispersion and segregation."""
+"""Behaviors by forces between neighbors: dispersion and segregation."""
 
 from typing import Any
 

@@ -1,1 +1,1 @@
-"""What runs behaviours on robots and in the real-time simulator: everything that imports rospy."""
+"""What runs behaviors on robots and in the real-time simulator: everything that imports rospy."""

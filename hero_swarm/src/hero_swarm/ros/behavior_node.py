@@ -1,4 +1,4 @@
-"""Program behavior: runs one behaviour on robots, by the poses that localize or the simulator gives them.
+"""Program behavior: runs one behavior on robots, by the poses that localize or the simulator gives them.
 
 rosrun hero_swarm behavior _behavior:=milling _robots:=0-9 _frame:=map
 """
@@ -52,7 +52,7 @@ def _parse_fence(text: str) -> Optional[np.ndarray]:
 
 
 class BehaviorNode:
-    """One behaviour on one swarm."""
+    """One behavior on one swarm."""
 
     def __init__(self, swarm: Swarm, parameters: Any) -> None:
         """Begin; robots are stopped until their poses are known. Raises: ProgramError for a wrong parameter."""
@@ -154,19 +154,19 @@ class BehaviorNode:
 
 
 PARAMETERS = {
-    "behavior": words("aggregation", "a built-in behaviour, FILE.py, or FILE.py:Class"),
+    "behavior": words("aggregation", "a built-in behavior, FILE.py, or FILE.py:Class"),
     "robots": robot_ids("all", "ids; all: those that have joined a driver"),
     "frame": words("map", "frame of the poses: that of localize, or `world` for the simulator's ground truth"),
     "poses_topic": words("/localization/poses", "hero_msgs/RobotPoses of `localize`"),
     "safety": choice("off", MODES, "safety filter: off, fence, or fence and robots"),
     "fence": words("", "x min, y min, x max, y max of the fence, m"),
-    "seed": whole_number(0, 0, 2**31 - 1, "", "of the behaviour's random numbers"),
+    "seed": whole_number(0, 0, 2**31 - 1, "", "of the behavior's random numbers"),
     "time_s": number(0.0, 0.0, 1e6, "s", "stop after so long; 0 runs until Ctrl-C"),
 }
 
 
 def behavior() -> None:
-    """Run the behaviour until the program is to end. Raises: ProgramError for a wrong parameter."""
+    """Run the behavior until the program is to end. Raises: ProgramError for a wrong parameter."""
     with Program("behavior") as program:
         parameters = read_parameters(PARAMETERS)
         _make_behavior(parameters["behavior"])
