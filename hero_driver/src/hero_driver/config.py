@@ -5,7 +5,9 @@ config/hero_driver.yaml are generated.
 """
 
 import dataclasses
+import glob
 import ipaddress
+import os
 from dataclasses import dataclass
 from typing import Any, Dict, Mapping, Tuple
 
@@ -20,6 +22,8 @@ from hero_node.parameters import (
     whole_number,
     words,
 )
+from hero_node.texts import one_line
+from hero_node.yaml_text import parse_yaml, read_text
 
 from .commands.command_settings import CommandSettings
 from .corrections.robot_corrections import CorrectionSettings
@@ -173,6 +177,12 @@ class DriverConfig:
     ticks_per_turn: float = _declare(
         number(TICKS_PER_TURN, 1.0, 1000000.0, "", "encoder ticks per revolution of a wheel")
     )
+    calibration_folder: str = _declare(
+        words(
+            "~/hero_calibration",
+            "folder of calibrate's files, hero_N.yaml, whose wheels replace the ones above for that robot; empty: none",
+        )
+    )
     pose_covariance: Tuple[float, ...] = _declare(
         Parameter(
             (1e-4, 1e-4, 1e-9, 1e-9, 1e-9, 1e-2),
@@ -239,6 +249,7 @@ class DriverConfig:
             self.stamps,
             self.max_future_s,
             self.max_age_s,
+            read_wheel_files(self.calibration_folder, self.ticks_per_turn),
         )
 
     @property
@@ -258,6 +269,25 @@ class DriverConfig:
     def wheel_geometry(self) -> WheelGeometry:
         """Converts ticks into meters."""
         return WheelGeometry(self.wheel_diameter_m, self.wheel_separation_m, self.ticks_per_turn)
+
+
+def read_wheel_files(folder: str, ticks_per_turn: float) -> Dict[str, WheelGeometry]:
+    """Return the wheels in a folder's files by robot. Raises: ProgramError for a file that is none of calibrate's."""
+    geometries = {}
+    for path in sorted(glob.glob(os.path.join(os.path.expanduser(folder), "hero_*.yaml"))) if folder else []:
+        try:
+            content = parse_yaml(read_text(path))
+            if isinstance(content, dict) and "wheels_m" in content:
+                left_m, right_m, separation_m = wheels_m = [float(length) for length in content["wheels_m"]]
+                if not all(0.01 <= length_m <= 1.0 for length_m in wheels_m):
+                    raise ValueError("wheels_m must be from 0.01 to 1 m")
+                geometries[str(content.get("robot"))] = WheelGeometry(
+                    (left_m + right_m) / 2.0, separation_m, ticks_per_turn, right_m / left_m
+                )
+        except (OSError, TypeError, ValueError) as error:
+            text = "%s: %s; correct the file, move it away, or set ~calibration_folder"
+            raise ProgramError(text % (path, one_line(error))) from None
+    return geometries
 
 
 PARAMETERS: Dict[str, Parameter] = {
@@ -281,4 +311,5 @@ def read_config(given: Mapping[str, Any]) -> DriverConfig:
             "~host is empty and ~robots too: the driver would neither listen nor dial;"
             " give an address to listen on (0.0.0.0 for all) or robots to dial"
         )
+    read_wheel_files(config.calibration_folder, config.ticks_per_turn)  # refused before anything starts
     return config

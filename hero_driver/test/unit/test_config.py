@@ -80,7 +80,7 @@ def test_values_come_where_they_belong():
 
 def test_an_unknown_parameter_is_refused_with_the_name_that_was_meant():
     assert "did you mean ~silence_timeout_s?" in refuse("silence_timeout", 5.0)
-    assert "known are: allow, allow_self_tuning, clamp," in refuse("xyzzy", 1)
+    assert "known are: allow, allow_self_tuning, calibration_folder, clamp," in refuse("xyzzy", 1)
     assert "did you mean" not in refuse("xyzzy", 1)
 
 
@@ -206,3 +206,22 @@ def test_any_value_is_taken_or_refused_in_one_line(name, value):
     except ProgramError as error:
         assert "~" + name in str(error)
         assert "\n" not in str(error)
+
+
+def test_wheels_of_calibrated_robots_are_read_from_their_files(tmp_path):
+    (tmp_path / "hero_3.yaml").write_text("robot: hero_3\nwheels_m: [0.049, 0.0495, 0.0641]\n")
+    (tmp_path / "hero_4.yaml").write_text("robot: hero_4\nmotor_centers_us: [1500, 1510]\n")
+    settings = read_config({"calibration_folder": str(tmp_path)}).correction_settings
+    assert list(settings.own_geometries) == ["hero_3"]
+    wheels = settings.own_geometries["hero_3"]
+    assert wheels.wheel_diameter_m == pytest.approx(0.04925) and wheels.wheel_separation_m == 0.0641
+    assert wheels.diameter_ratio == pytest.approx(0.0495 / 0.049) and wheels.ticks_per_turn == 288.0
+
+
+@pytest.mark.parametrize(
+    "wheels", ["[0.049, 0.0495]", "[0.049, 0.0495, .nan]", "[49, 49.5, 63]", "no", "{", "[[], 1, 2]"]
+)
+def test_a_file_with_impossible_wheels_is_refused_by_its_name(tmp_path, wheels):
+    (tmp_path / "hero_3.yaml").write_text("robot: hero_3\nwheels_m: %s\n" % wheels)
+    with pytest.raises(ProgramError, match="hero_3.yaml: .*; correct the file, move it away, or set"):
+        read_config({"calibration_folder": str(tmp_path)})

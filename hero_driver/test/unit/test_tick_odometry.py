@@ -48,7 +48,7 @@ def assert_pose(odometry, x_m, y_m, yaw_rad):
 
 
 def test_a_tick_is_half_a_millimeter():
-    assert pytest.approx(0.000537, abs=1e-6) == STOCK.tick_m
+    assert STOCK.ticks_m == pytest.approx((0.000537, 0.000537), abs=1e-6)
 
 
 def test_the_first_reading_moves_nothing():
@@ -56,6 +56,19 @@ def test_the_first_reading_moves_nothing():
     odometry.integrate(12345.0, -678.0, START_S)
     assert (odometry.x_m, odometry.y_m, odometry.yaw_rad) == (0.0, 0.0, 0.0)
     assert (odometry.linear_m_s, odometry.angular_rad_s) == (0.0, 0.0)
+
+
+def test_wheels_of_unequal_size_drive_an_arc():
+    wheels = WheelGeometry(0.05, 0.06, 288.0, diameter_ratio=1.02)
+    odometry = make_odometry(wheels)
+    left_m, right_m = wheels.ticks_m
+    assert (left_m + right_m) / 2.0 == pytest.approx(math.pi * 0.05 / 288.0)
+    assert right_m / left_m == pytest.approx(1.02)
+    odometry.integrate(0.0, 0.0, START_S)
+    odometry.integrate(10.0, 10.0, START_S + 0.034)
+    assert odometry.yaw_rad == pytest.approx(10.0 * (right_m - left_m) / 0.06)
+    assert odometry.angular_rad_s == pytest.approx(odometry.yaw_rad / 0.034, rel=1e-4)
+    assert odometry.linear_m_s == pytest.approx(10.0 * (left_m + right_m) / 2.0 / 0.034, rel=1e-4)
 
 
 def test_equal_wheels_go_straight_ahead():

@@ -6,7 +6,7 @@ Takes payloads and times of arrival, and publishes payloads. Topics that are not
 import collections
 import functools
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Callable, DefaultDict, Deque, Dict, Iterator, List, Mapping, Protocol, Tuple
 
 from ..robot_constants import SCAN_TIME_S
@@ -62,6 +62,8 @@ class CorrectionSettings:
     stamps: str
     max_future_s: float
     max_age_s: float
+    own_geometries: Mapping[str, WheelGeometry] = field(default_factory=dict)
+    """Of robots whose wheels were calibrated, by name, such as hero_3."""
 
 
 class RobotCorrections:
@@ -94,7 +96,7 @@ class RobotCorrections:
         self._offsets_ns: Deque[int] = collections.deque(maxlen=OFFSET_SAMPLES)
         self._seqs: DefaultDict[str, Iterator[int]] = collections.defaultdict(itertools.count)
         self.wheels = WheelMotion()
-        self.odometry = TickOdometry(settings.geometry)
+        self.odometry = TickOdometry(settings.own_geometries.get(namespace.strip("/"), settings.geometry))
         self.transforms = TransformCorrector(
             namespace, self._stamps, add_transform, self._take_odom_transform
         )

@@ -34,13 +34,17 @@ class WheelGeometry:
     """What turns ticks into meters."""
 
     wheel_diameter_m: float = WHEEL_DIAMETER_M
+    """Mean of both wheels."""
     wheel_separation_m: float = WHEEL_SEPARATION_M
     ticks_per_turn: float = TICKS_PER_TURN
+    diameter_ratio: float = 1.0
+    """The right wheel's to the left wheel's."""
 
     @property
-    def tick_m(self) -> float:
-        """Distance of the wheel's rim per tick."""
-        return math.pi * self.wheel_diameter_m / self.ticks_per_turn
+    def ticks_m(self) -> Tuple[float, float]:
+        """Distances of the left and the right wheel's rim per tick."""
+        left_m = math.pi * self.wheel_diameter_m / self.ticks_per_turn * 2.0 / (1.0 + self.diameter_ratio)
+        return left_m, left_m * self.diameter_ratio
 
 
 class Pose(NamedTuple):
@@ -67,7 +71,7 @@ class TickOdometry:
         self.linear_m_s = self.angular_rad_s = 0.0
         self.resets = 0
         self.has_reading = False
-        self._tick_m = geometry.tick_m
+        self._left_tick_m, self._right_tick_m = geometry.ticks_m
         self._separation_m = geometry.wheel_separation_m
         self._ticks: Optional[Tuple[float, float]] = None
         self._stamp_s = 0.0
@@ -108,8 +112,8 @@ class TickOdometry:
         if last is None:
             self._window.append((stamp_s, left_ticks, right_ticks))
             return False
-        left_m = (left_ticks - last[0]) * self._tick_m
-        right_m = (right_ticks - last[1]) * self._tick_m
+        left_m = (left_ticks - last[0]) * self._left_tick_m
+        right_m = (right_ticks - last[1]) * self._right_tick_m
         is_moving = left_m != 0.0 or right_m != 0.0
         if is_moving:
             gap_s = MIN_GAP_S if elapsed_s <= MIN_GAP_S else min(elapsed_s, MAX_GAP_S)
@@ -126,8 +130,8 @@ class TickOdometry:
         self._window.append((stamp_s, left_ticks, right_ticks))
         first_s, first_left, first_right = self._window[0]
         if first_s != stamp_s:
-            speed = self._tick_m / (stamp_s - first_s)
-            left_m_s, right_m_s = (left_ticks - first_left) * speed, (right_ticks - first_right) * speed
+            left_m_s = (left_ticks - first_left) * self._left_tick_m / (stamp_s - first_s)
+            right_m_s = (right_ticks - first_right) * self._right_tick_m / (stamp_s - first_s)
             self.linear_m_s = (left_m_s + right_m_s) / 2.0
             self.angular_rad_s = (right_m_s - left_m_s) / self._separation_m
         return is_moving
