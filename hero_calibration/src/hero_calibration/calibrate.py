@@ -2,6 +2,7 @@
 
 rosrun hero_calibration calibrate                        all three, with questions
 rosrun hero_calibration calibrate motors velocity --yes  without
+rosrun hero_calibration calibrate wheels                 diameters and distance of the wheels, by camera or --tape
 rosrun hero_calibration calibrate restore                write the files into the robots again
 """
 
@@ -18,7 +19,7 @@ from hero_node.errors import ProgramError
 from hero_node.parameters import robot_ids_option
 from hero_node.ros.program import Program
 
-from .calibration import INFRARED, PARTS, Calibration
+from .calibration import DEFAULT_PARTS, INFRARED, PARTS, WHEELS, Calibration
 from .errors import CalibrationError
 from .procedures.restore import load_calibrations, restore
 from .questions import ask
@@ -34,21 +35,24 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="calibrate", description="Calibrate robots, all at once, or restore earlier calibrations."
     )
-    parts_help = "motors, velocity, infrared (all three); or: restore [FILE ...]"
+    parts_help = "motors, velocity, infrared (all three); wheels; or: restore [FILE ...]"
     parser.add_argument("parts", nargs="*", metavar="PART", help=parts_help)
     robots_help = "ids, e.g. '0 1 2' or 0-3 (all that are connected)"
     parser.add_argument("--robots", type=robot_ids_option, default="all", help=robots_help)
     parser.add_argument("--yes", action="store_true", help="ask nothing: the robots are placed already")
+    parser.add_argument("--tape", action="store_true", help="wheels: by a tape measure, without a camera")
     parser.add_argument("--folder", default="~/hero_calibration", help="of files and pictures (%(default)s)")
     options = parser.parse_args(arguments)
     options.restore = options.parts[:1] == [RESTORE]
     options.files = options.parts[1:] if options.restore else []
-    options.parts = [] if options.restore else options.parts or list(PARTS)
+    options.parts = [] if options.restore else options.parts or list(DEFAULT_PARTS)
     for part in options.parts:
         if part not in PARTS:
             parser.error("%s: parts are %s; or: restore [FILE ...]" % (part, ", ".join(PARTS)))
     if options.yes and INFRARED in options.parts and len(options.parts) > 1:
         parser.error("--yes: motors and velocity need room around the robots, infrared a wall: name one or the other")
+    if options.tape and WHEELS not in options.parts:
+        parser.error("--tape is for wheels")
     options.folder = os.path.abspath(os.path.expanduser(options.folder))
     return options
 
@@ -67,7 +71,9 @@ def run(arguments: Sequence[str]) -> int:
         session = RosSession(program, find_robots(program, robot_ids))
         if options.restore:
             return restore(session, calibrations)
-        return Calibration(session, options.parts, options.folder, None if options.yes else partial(ask, program)).run()
+        question = partial(ask, program)
+        tape = question if options.tape else None
+        return Calibration(session, options.parts, options.folder, None if options.yes else question, tape).run()
 
 
 def main() -> None:

@@ -14,18 +14,26 @@ from .procedures.infrared import calibrate_infrared
 from .procedures.motors import MotorResult, calibrate_motors
 from .procedures.placement import Ask, place_robots
 from .procedures.velocity import calibrate_velocity
+from .procedures.wheels import ROOM, WheelResult, calibrate_wheels
 from .robots.probe import Probe
 from .robots.session import Session
 
-MOTORS, VELOCITY, INFRARED = "motors", "velocity", "infrared"
-PARTS = (MOTORS, VELOCITY, INFRARED)
+MOTORS, VELOCITY, INFRARED, WHEELS = "motors", "velocity", "infrared", "wheels"
+DEFAULT_PARTS = (MOTORS, VELOCITY, INFRARED)
+PARTS = (*DEFAULT_PARTS, WHEELS)
 
 
 class Calibration:
     """One run over all robots."""
 
-    def __init__(self, session: Session, parts: Sequence[str], folder: str, ask: Optional[Ask]) -> None:
-        """Calibrate parts of PARTS, with files in folder; ask: None if the robots are placed already."""
+    def __init__(
+        self, session: Session, parts: Sequence[str], folder: str, ask: Optional[Ask], tape: Optional[Ask] = None
+    ) -> None:
+        """Calibrate parts of PARTS, with files in folder; ask: None if the robots are placed already.
+
+        tape: asks for what is measured with a tape; None: localize tells where robots are.
+        """
+        self._tape = tape
         self._session = session
         self._parts = parts
         self._folder = folder
@@ -63,6 +71,10 @@ class Calibration:
             self._store(MOTORS, motors)
         if VELOCITY in parts and session.active:
             self._store(VELOCITY, calibrate_velocity(session, motors))
+        if WHEELS in parts and session.active:
+            say(ROOM)
+            place_robots(session, at_wall=False, ask=self._ask)
+            self._store(WHEELS, calibrate_wheels(session, self._tape))
         if INFRARED in parts and session.active:
             place_robots(session, at_wall=True, ask=self._ask)
             self._store(INFRARED, calibrate_infrared(session))
@@ -83,9 +95,11 @@ class Calibration:
             if importlib.util.find_spec("matplotlib") is not None:
                 from .figures import draw_robot
 
-                with replace_file(picture) as file:
-                    draw_robot(probe.name, list(results)).savefig(file, dpi=120, format="png")
-                self._files[probe.robot_id].append(picture)
+                drawn = [result for result in results if not isinstance(result, WheelResult)]
+                if drawn:
+                    with replace_file(picture) as file:
+                        draw_robot(probe.name, drawn).savefig(file, dpi=120, format="png")
+                    self._files[probe.robot_id].append(picture)
         except CalibrationError as error:
             probe.failure = probe.failure or str(error)
         except OSError as error:

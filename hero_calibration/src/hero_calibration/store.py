@@ -30,6 +30,7 @@ SETTINGS: Dict[str, Range] = {
 """What can be written to the robot: how many numbers, the lowest and the highest allowed, and their meaning."""
 
 RESULTS: Dict[str, Range] = {
+    "wheels_m": (3, 0.01, 1.0, "diameters of the left and the right wheel, distance between them"),
     "dead_zones_us": (4, 0.0, 3000.0, "edges of the left wheel, then of the right"),
     "velocity_errors": (2, 0.0, 100.0, "before, after"),
     "range_errors_before_m": (8, -10.0, 10.0, "by index of proximity"),

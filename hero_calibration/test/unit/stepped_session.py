@@ -20,8 +20,8 @@ class StepProbe(Probe):
         self.written = {}
         self.readings = 0
 
-    def drive(self, angular_rad_s):
-        self.send(self.robots.send_velocity, 0.0, angular_rad_s)
+    def drive(self, angular_rad_s, linear_m_s=0.0):
+        self.send(self.robots.send_velocity, linear_m_s, angular_rad_s)
 
     def turn(self, angle_rad):
         self.send(self.robots.send_position, 0.0, angle_rad)

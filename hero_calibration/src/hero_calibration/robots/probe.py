@@ -46,6 +46,7 @@ class Probe(ABC):
         self._last_seq = 0
         self._count = 0
         self._scans: Deque[Tuple[Sequence[float], Sequence[float]]] = deque(maxlen=KEPT_SCANS)
+        self._places: Deque[Tuple[float, Pose]] = deque(maxlen=KEPT_SCANS)
         self._heard_s: Dict[str, float] = dict.fromkeys(("encoder", "laser", "odom"), -math.inf)
 
     # -- received data -------------------------------------------------------------------------------------
@@ -70,6 +71,21 @@ class Probe(ABC):
         """Keep a pose of the odometry."""
         self.pose = pose
         self._heard_s["odom"] = heard_s
+
+    def receive_place(self, heard_s: float, place: Pose) -> None:
+        """Keep a measured pose in the common frame."""
+        with self._lock:
+            self._places.append((heard_s, place))
+
+    def find_place(self, since_s: float) -> Optional[Pose]:
+        """Return the average of the measured poses since a time at which it stopped; None without any."""
+        with self._lock:
+            places = [place for heard_s, place in self._places if heard_s >= since_s]
+        if not places:
+            return None
+        x_m, y_m, yaw_rad = np.array(places).T
+        mean_rad = math.atan2(np.sin(yaw_rad).sum(), np.cos(yaw_rad).sum())
+        return Pose(float(x_m.mean()), float(y_m.mean()), mean_rad)
 
     # -- readings ------------------------------------------------------------------------------------------
 
@@ -116,8 +132,8 @@ class Probe(ABC):
     # -- commands ------------------------------------------------------------------------------------------
 
     @abstractmethod
-    def drive(self, angular_rad_s: float) -> None:
-        """Turn on the spot under the velocity controller."""
+    def drive(self, angular_rad_s: float, linear_m_s: float = 0.0) -> None:
+        """Turn on the spot, or drive, under the velocity controller."""
 
     @abstractmethod
     def turn(self, angle_rad: float) -> None:

@@ -8,7 +8,7 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 
 from hero_client.values.geometry import Pose, yaw_of
-from hero_msgs.msg import Encoder, Motor
+from hero_msgs.msg import Encoder, Motor, RobotPose, RobotPoses
 from hero_msgs.srv import SetIRCalibration, SetMotor, SetPID
 from hero_node.texts import one_line
 
@@ -42,6 +42,8 @@ class RosProbe(Probe):
         ):
             rospy.Subscriber("/%s/%s" % (self.name, topic), kind, receive, queue_size=20, tcp_nodelay=True)
 
+        rospy.Subscriber("/localization/poses", RobotPoses, self._take_places, queue_size=2, tcp_nodelay=True)
+
     def _advertise(self, topic: str, kind: Any) -> rospy.Publisher:
         return rospy.Publisher("/%s/%s" % (self.name, topic), kind, queue_size=2, tcp_nodelay=True)
 
@@ -58,6 +60,11 @@ class RosProbe(Probe):
         position = message.pose.pose.position
         self.receive_pose(rospy.get_time(), Pose(position.x, position.y, yaw_of(message.pose.pose.orientation)))
 
+    def _take_places(self, report: RobotPoses) -> None:
+        for robot in report.robots:
+            if robot.id == self.robot_id and robot.state == RobotPose.TRACKED:
+                self.receive_place(rospy.get_time(), Pose(robot.x, robot.y, robot.yaw))
+
     def find_silence(self, now_s: float) -> Optional[str]:
         """Return what is missing of the robot or its driver, as text; None if all its topics are alive."""
         silence = super().find_silence(now_s)
@@ -66,13 +73,13 @@ class RosProbe(Probe):
                 silence = "nothing subscribes to %s: is the driver running?" % publisher.name
         return silence
 
-    def drive(self, angular_rad_s: float) -> None:
-        """Turn on the spot under the velocity controller."""
-        self._velocity.publish(_make_turn(angular_rad_s))
+    def drive(self, angular_rad_s: float, linear_m_s: float = 0.0) -> None:
+        """Turn on the spot, or drive, under the velocity controller."""
+        self._velocity.publish(_make_twist(angular_rad_s, linear_m_s))
 
     def turn(self, angle_rad: float) -> None:
         """Turn by an angle under the position controller."""
-        self._position.publish(_make_turn(angle_rad))
+        self._position.publish(_make_twist(angle_rad))
 
     def set_pulses(self, pulse_us: int) -> None:
         """Set the pulse of both servos."""
@@ -96,7 +103,8 @@ class RosProbe(Probe):
             raise CalibrationError("%s: the robot answers: %s" % (name, answer.message))
 
 
-def _make_turn(angular: float) -> Twist:
+def _make_twist(angular: float, linear: float = 0.0) -> Twist:
     twist = Twist()
+    twist.linear.x = linear
     twist.angular.z = angular
     return twist

@@ -1,0 +1,209 @@
+"""Procedure wheels: diameters of both wheels and the distance between them, by what the robots drive.
+
+Robots drive a square to the left and one to the right, for errors of diameter and of distance bend one of them more and
+the other one less. A camera tells where a robot is at each corner; with a tape measure the user tells where each square
+ends, and how long a straight path is. Source: J. Borenstein, L. Feng, Measurement and Correction of Systematic Odometry
+Errors in Mobile Robots (UMBmark), IEEE Transactions on Robotics and Automation 12, 1996; here by least squares.
+"""
+
+import math
+from functools import partial
+from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple
+
+import numpy as np
+
+from hero_client.values.geometry import Pose, invert_pose, transform_pose, wrap_angle
+from hero_node.command_line import say
+
+from ..errors import CalibrationError, EndedError
+from ..models.encoder_readings import TICK_M
+from ..models.step_response import WHEEL_SEPARATION_M
+from ..robots.probe import Probe
+from ..robots.session import COMMAND_PERIOD_S, Session
+from .placement import Ask
+
+ROOM = "Wheels: each robot drives squares of 30 cm to its left and right: give it 50 cm of room to all sides."
+
+SPEED_M_S, SIDE_S = 0.1, 3.0
+ANGULAR_RAD_S, CORNER_S = 1.5, math.pi / 2.0 / 1.5
+STRAIGHT_S = 6.0
+MEASURE_S = 0.6
+TRIES = 2
+
+CAMERA_SD = (0.001, 0.001, 0.005)
+TAPE_SD = (0.002, 0.002, math.inf)
+STRAIGHT_SD = (0.002, math.inf, math.inf)
+"""Errors of a measured x, y (m) and yaw (rad); inf: not measured."""
+
+MAX_CHANGE = 0.1
+"""Wheels that differ from the nominal ones by a larger share are none: the robot slipped, or was carried."""
+
+DIAMETER_M = TICK_M * 288.0 / math.pi
+NOMINAL_M = np.array((DIAMETER_M, DIAMETER_M, WHEEL_SEPARATION_M))
+
+Drive = Tuple[float, float, float]
+"""m/s, rad/s, s."""
+
+
+class Leg(NamedTuple):
+    """What a robot drove from one stop to another."""
+
+    ticks: np.ndarray
+    """Of the left and the right wheel, (K, 2)."""
+    moved: Pose
+    """Measured: from the first stop to the second, in the robot's frame at the first."""
+    sd: Tuple[float, float, float] = CAMERA_SD
+
+
+class WheelResult(NamedTuple):
+    """Diameters of the left and the right wheel and their distance (3,), m; deviations of the legs, in sd, rms."""
+
+    wheels_m: np.ndarray
+    before: float
+    after: float
+
+    def to_file(self) -> Dict[str, List[float]]:
+        """Return what is kept in the robot's file."""
+        return {"wheels_m": [round(float(length_m), 6) for length_m in self.wheels_m]}
+
+    def describe(self) -> str:
+        """Return the result as a line of text."""
+        text = "diameters %.2f and %.2f mm, distance %.2f mm; paths differ by %.1f sd before, %.1f after"
+        return text % (*(1e3 * self.wheels_m), self.before, self.after)
+
+
+def follow_ticks(ticks: np.ndarray, wheels_m: np.ndarray) -> Pose:
+    """Return where ticks (K, 2) lead a robot with these wheels (3,) from 0, 0, 0."""
+    left_m, right_m = (np.diff(ticks, axis=0) * (TICK_M / DIAMETER_M * wheels_m[:2])).T
+    turns_rad = (right_m - left_m) / wheels_m[2]
+    yaws_rad = np.cumsum(turns_rad) - turns_rad / 2.0
+    distance_m = (left_m + right_m) / 2.0
+    x_m, y_m = (distance_m * np.cos(yaws_rad)).sum(), (distance_m * np.sin(yaws_rad)).sum()
+    return Pose(float(x_m), float(y_m), wrap_angle(float(turns_rad.sum())))
+
+
+def fit_wheels(legs: Sequence[Leg]) -> WheelResult:
+    """Return the wheels that explain the legs best. Raises: CalibrationError for implausible ones."""
+
+    def measure_deviations(scales: np.ndarray) -> np.ndarray:
+        deviations = []
+        for leg in legs:
+            x_m, y_m, yaw_rad = follow_ticks(leg.ticks, NOMINAL_M * scales)
+            off = (x_m - leg.moved.x_m, y_m - leg.moved.y_m, wrap_angle(yaw_rad - leg.moved.yaw_rad))
+            deviations.append(np.divide(off, leg.sd))
+        return np.concatenate(deviations)
+
+    scales = np.ones(3)
+    before = measure_deviations(scales)
+    for _ in range(5):
+        here = measure_deviations(scales)
+        steps = 1e-4 * np.eye(3)
+        jacobian = np.column_stack([(measure_deviations(scales + step) - here) / 1e-4 for step in steps])
+        scales = scales - np.linalg.lstsq(jacobian, here, rcond=None)[0]
+    if not (np.abs(scales - 1.0) < MAX_CHANGE).all():
+        found_mm = "%.1f, %.1f and %.1f mm" % tuple(1e3 * NOMINAL_M * scales)
+        raise CalibrationError("wheels and distance would be %s: did it slip, or was it touched?" % found_mm)
+    rms = [float(np.sqrt(np.mean(np.square(values)))) for values in (before, measure_deviations(scales))]
+    return WheelResult(NOMINAL_M * scales, *rms)
+
+
+def calibrate_wheels(session: Session, ask: Optional[Ask] = None) -> Dict[int, WheelResult]:
+    """Calibrate all active robots; return the results by robot.
+
+    ask: asks for what the user measures with a tape; None: localize tells where robots are.
+    """
+    results: Dict[int, WheelResult] = {}
+    if ask is not None:
+        legs = _drive_for_tape(session, ask)
+        session.for_each("wheels", lambda probe: results.update({probe.robot_id: fit_wheels(legs[probe.robot_id])}))
+        return results
+    say("wheels: squares to the left and to the right, about 1 min")
+    stops_s: List[float] = []
+    places: List[Dict[int, Optional[Pose]]] = []
+
+    def drive(probes: Sequence[Probe]) -> None:
+        stops_s.clear()
+        places.clear()
+        _stop_and_look(session, stops_s, places)
+        for part in [*_list_square(1.0), *_list_square(-1.0)]:
+            _drive(session, probes, part)
+            _stop_and_look(session, stops_s, places)
+
+    def evaluate(probe: Probe, _is_last: bool) -> None:
+        poses = [seen[probe.robot_id] for seen in places]
+        if None in poses:
+            raise CalibrationError("localize does not track it: is its tag in view? Or measure by --tape")
+        spans = zip(stops_s, stops_s[1:], poses, poses[1:])
+        legs = [
+            Leg(_take_ticks(probe, start_s, end_s), transform_pose(invert_pose(start), end))
+            for start_s, end_s, start, end in spans
+            if start is not None and end is not None
+        ]
+        results[probe.robot_id] = fit_wheels(legs)
+
+    session.repeat("wheels", TRIES, drive, evaluate)
+    return results
+
+
+def _list_square(side: float) -> List[Drive]:
+    return [(SPEED_M_S, 0.0, SIDE_S), (0.0, side * ANGULAR_RAD_S, CORNER_S)] * 4
+
+
+def _drive(session: Session, probes: Sequence[Probe], part: Drive) -> None:
+    linear_m_s, angular_rad_s, duration_s = part
+    end_s = session.now_s() + duration_s
+    while session.now_s() < end_s:
+        for probe in probes:
+            probe.drive(angular_rad_s, linear_m_s)
+        session.pause(min(COMMAND_PERIOD_S, max(0.0, end_s - session.now_s())))
+    session.settle()
+
+
+def _stop_and_look(session: Session, stops_s: List[float], places: List[Dict[int, Optional[Pose]]]) -> None:
+    session.pause(MEASURE_S)
+    stops_s.append(session.now_s())
+    places.append({probe.robot_id: probe.find_place(session.now_s() - MEASURE_S / 2.0) for probe in session.probes})
+
+
+def _take_ticks(probe: Probe, start_s: float, end_s: float) -> np.ndarray:
+    """Return the ticks (K, 2) from one stop to another. Raises: CalibrationError if readings are missing."""
+    readings = probe.read_wheels()
+    kept = (readings.heard_s > start_s - MEASURE_S / 2.0) & (readings.heard_s <= end_s)
+    if kept.sum() < 2:
+        raise CalibrationError("no encoder readings came: is the network busy? try again")
+    return np.column_stack((readings.left_ticks, readings.right_ticks))[kept]
+
+
+def _drive_for_tape(session: Session, ask: Ask) -> Dict[int, List[Leg]]:
+    """Let robots drive, and the user measure; return the legs by robot."""
+    legs: Dict[int, List[Leg]] = {probe.robot_id: [] for probe in session.active}
+    straight = [(SPEED_M_S, 0.0, STRAIGHT_S)]
+    for name, parts, sd in (
+        ("straight ahead", straight, STRAIGHT_SD),
+        ("a square to the left", _list_square(1.0), TAPE_SD),
+        ("a square to the right", _list_square(-1.0), TAPE_SD),
+    ):
+        if ask("Mark center and heading of each robot for %s; then Enter, q to end: " % name) == "q":
+            raise EndedError
+        start_s = session.now_s()
+        for part in parts:
+            _drive(session, session.active, part)
+        session.pause(MEASURE_S)
+        session.for_each("wheels", partial(_add_leg, legs, ask, start_s, session.now_s(), sd))
+    return legs
+
+
+def _add_leg(
+    legs: Dict[int, List[Leg]], ask: Ask, start_s: float, end_s: float, sd: Tuple[float, float, float], probe: Probe
+) -> None:
+    wanted = 1 if math.isinf(sd[1]) else 2
+    what = "ahead" if wanted == 1 else "ahead and to the left, such as 12 -5"
+    question = "%s: mm from its mark, %s: " % (probe.name, what)
+    while True:
+        words = ask(question).replace(",", " ").split()
+        try:
+            x_m, y_m, *_ = [float(word) / 1e3 for word in words] + [0.0] * (2 - wanted)
+        except ValueError:
+            continue  # asked again
+        legs[probe.robot_id].append(Leg(_take_ticks(probe, start_s, end_s), Pose(x_m, y_m, 0.0), sd))
+        return

@@ -1,0 +1,106 @@
+"""Wheels: simulated robots with hidden wheels are calibrated, and drift less on paths that were not used for it."""
+
+import numpy as np
+import pytest
+from test_calibration_procedures import make_session
+
+from hero_calibration.errors import CalibrationError
+from hero_calibration.procedures.wheels import NOMINAL_M, Leg, calibrate_wheels, fit_wheels, follow_ticks
+from hero_client.values.geometry import Pose, invert_pose, transform_pose, wrap_angle
+
+HELD_OUT = [(0.12, 0.9, 2.0), (0.15, -0.5, 3.0), (0.0, 2.0, 1.5), (0.1, 0.0, 3.0), (0.12, -1.2, 2.5), (0.1, 0.6, 3.0)]
+ROOMY = {row: (2.0 * row, -1.0, 90.0) for row in range(4)}
+
+
+@pytest.fixture
+def session():
+    return make_session(4, seed=2, places_m_deg=ROOMY)
+
+
+def see(session, noise, row):
+    x_m, y_m, yaw_rad = session.robots.world.poses[row] + noise.normal(0.0, (0.001, 0.001, 0.003))
+    return Pose(x_m, y_m, wrap_angle(yaw_rad))
+
+
+def watch(session):
+    """Let a camera measure robots with an error of 1 mm and 3 mrad."""
+    noise = np.random.RandomState(5)
+
+    def measure(rows):
+        for row in rows:
+            session.probes[row].receive_place(session.now_s(), see(session, noise, row))
+
+    session.robots.on_cycle.append(measure)
+
+
+def measure_drift(session, wheels_m):
+    """Drive paths of their own; return how far (m) odometry with these wheels ends from the truth, by robot."""
+    starts, ticks = session.robots.world.poses.copy(), [[robot.copy()] for robot in session.robots.ticks]
+    session.robots.on_cycle.append(lambda rows: [ticks[row].append(session.robots.ticks[row].copy()) for row in rows])
+    for linear_m_s, angular_rad_s, duration_s in HELD_OUT:
+        end_s = session.now_s() + duration_s
+        while session.now_s() < end_s:
+            for probe in session.probes:
+                probe.drive(angular_rad_s, linear_m_s)
+            session.sleep(0.1)
+    session.stop()
+    session.sleep(1.0)
+    drifts = []
+    for row, (start, end) in enumerate(zip(starts, session.robots.world.poses)):
+        true = transform_pose(invert_pose(Pose(*start)), Pose(*end))
+        drifts.append(
+            [
+                float(np.hypot(found.x_m - true.x_m, found.y_m - true.y_m))
+                for found in (follow_ticks(np.array(ticks[row]), wheels) for wheels in (NOMINAL_M, wheels_m[row]))
+            ]
+        )
+    session.robots.on_cycle.pop()
+    return np.array(drifts)
+
+
+def test_calibrated_wheels_drift_a_third_as_far_on_other_paths(session):
+    watch(session)
+    results = calibrate_wheels(session)
+    drifts_m = measure_drift(session, [results[row].wheels_m for row in range(4)])
+    before_m, after_m = np.sqrt(np.mean(np.square(drifts_m), axis=0))
+    assert before_m > 0.03
+    assert after_m < before_m / 3.0, drifts_m
+    assert all(result.after < 1.5 < result.before for result in results.values())
+
+
+def test_a_tape_measure_finds_the_wheels_too(session):
+    wheels_m = {}
+
+    def ask(question):
+        """Place robots on marks, and measure from them with an error of a millimeter."""
+        if question.startswith("Mark"):
+            ask.marks = session.robots.world.poses.copy()
+            return ""
+        row = int(question[len("hero_")])
+        mark, here = Pose(*ask.marks[row]), Pose(*session.robots.world.poses[row])
+        moved = transform_pose(invert_pose(mark), here)
+        return "%.0f %.0f" % (1e3 * moved.x_m, 1e3 * moved.y_m) if "left" in question else "%.0f" % (1e3 * moved.x_m)
+
+    for row, result in calibrate_wheels(session, ask).items():
+        wheels_m[row] = result.wheels_m
+    before_m, after_m = np.sqrt(np.mean(np.square(measure_drift(session, wheels_m)), axis=0))
+    assert after_m < before_m / 3.0
+
+
+def test_answers_that_are_no_numbers_are_asked_for_again(session):
+    session.probes[:] = session.probes[:1]
+    answers = iter(["", "ten", "590", "", "5", "5 x", "5, -3", "", "0 0"])
+    calibrate_wheels(session, lambda question: next(answers))
+    assert list(answers) == []
+
+
+def test_robots_that_no_camera_sees_fail_with_the_remedy(session):
+    assert calibrate_wheels(session) == {}
+    assert "localize does not track it: is its tag in view? Or measure by --tape" in session.probes[0].failure
+
+
+def test_wheels_that_no_robot_has_are_refused():
+    ticks = np.column_stack([np.arange(0.0, 600.0, 10.0)] * 2)
+    legs = [Leg(ticks, Pose(0.1, 0.0, 0.0)), Leg(ticks * (-1.0, 1.0), Pose(0.0, 0.0, 1.5))]
+    with pytest.raises(CalibrationError, match="did it slip, or was it touched"):
+        fit_wheels(legs)
