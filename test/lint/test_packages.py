@@ -214,6 +214,31 @@ def test_launch_arguments_are_documented_there_and_in_the_readme():
             assert f"`{name}`" in readme or f"`~{name}`" in readme, f"{path.name}: no `{name}` in the README"
 
 
+def find_parameters(package, program):
+    """Return the names of the parameters that a program reads; none if these are not written where it begins."""
+    path = sources.ROOT / package / "src" / package / f"{program}.py"
+    if not path.exists():
+        return set()
+    calls = [node for node in ast.walk(sources.parse(path)) if isinstance(node, ast.Call)]
+    tables = [call.args[0] for call in calls if getattr(call.func, "id", "") == "read_parameters"]
+    return {key.value for table in tables for key in getattr(table, "keys", []) if isinstance(key, ast.Constant)}
+
+
+def test_launch_files_set_exactly_the_parameters_that_programs_read():
+    found = 0
+    for path in LAUNCH_FILES:
+        arguments = {argument["name"] for argument in read_arguments(path)}
+        for node in ElementTree.parse(path).getroot().iter("node"):
+            read = find_parameters(node.get("pkg"), node.get("type"))
+            if read and path.stem == node.get("type"):
+                found += 1
+                entries = [*node.iter("param"), *node.iter("rosparam")]
+                given = {entry.get("name") or entry.get("param") for entry in entries} - {None}
+                assert given == read, f"{sources.name_of(path)}: {given ^ read}"
+                assert read <= arguments, f"{sources.name_of(path)}: no argument {read - arguments}"
+    assert found > 5
+
+
 def test_launched_nodes_say_where_their_output_goes():
     for path in LAUNCH_FILES:
         for node in ElementTree.parse(path).getroot().iter("node"):
