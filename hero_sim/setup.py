@@ -5,7 +5,7 @@ from setuptools import setup
 
 setup(
     **generate_distutils_setup(
-        packages=["hero_sim"] + ["hero_sim." + room for room in ("link", "robot", "stepped", "world")],
+        packages=["hero_sim"] + ["hero_sim." + room for room in ("link", "robot", "stepped", "world", "world.pushing")],
         package_dir={"": "src"},
         package_data={"hero_sim.world": ["arenas/*.yaml"]},
     )

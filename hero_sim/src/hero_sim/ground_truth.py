@@ -20,6 +20,7 @@ from .robot_constants import BODY_RADIUS_M
 from .simulator import Simulator
 from .world.arena import Arena
 from .world.kinematics import Pose
+from .world.pushing.shapes import Body, Disc
 
 __all__ = ["GroundTruth"]
 
@@ -37,6 +38,7 @@ WALL_HEIGHT_M = 0.05
 _WALL_THICKNESS_M = 0.005
 
 _WALL_COLOR = ColorRGBA(0.6, 0.6, 0.6, 1.0)
+_OBJECT_COLOR = ColorRGBA(0.8, 0.5, 0.2, 1.0)
 _DARK_COLOR = ColorRGBA(0.15, 0.15, 0.15, 1.0)
 _NOSE_COLOR = ColorRGBA(1.0, 1.0, 1.0, 1.0)
 
@@ -72,6 +74,7 @@ class GroundTruth:
                 self._publish_odom_frames(self._static, stamp)
         if time_ms % MARKER_PERIOD_MS == 0 and self._markers.get_num_connections():
             markers = [marker for robot in self._swarm.robots for marker in self._draw_robot(robot, time_ms)]
+            markers += [_draw_object(index, body) for index, body in enumerate(self._swarm.world.list_objects())]
             for marker in markers:
                 marker.header.stamp = stamp
             self._markers.publish(MarkerArray(markers))
@@ -117,6 +120,22 @@ class GroundTruth:
         name.scale.z = 0.03
         name.text = robot.name
         return [body, nose, name]
+
+
+def _draw_object(index: int, body: Body) -> Marker:
+    """Return a disc, or the outline of a polygon, where it is."""
+    is_disc = isinstance(body.shape, Disc)
+    center = Pose(body.x_m, body.y_m, 0.0)
+    kind = Marker.CYLINDER if is_disc else Marker.LINE_STRIP
+    marker = _make_marker("objects", index, kind, _OBJECT_COLOR, center, WALL_HEIGHT_M / 2.0)
+    if is_disc:
+        marker.scale.x = marker.scale.y = 2.0 * body.shape.reach_m
+        marker.scale.z = WALL_HEIGHT_M
+    else:
+        marker.scale.x = 2.0 * _WALL_THICKNESS_M
+        corners_m = [*body.corners_m, body.corners_m[0]]
+        marker.points = [Point(x_m - body.x_m, y_m - body.y_m, 0.0) for x_m, y_m in corners_m]
+    return marker
 
 
 def _rotate_about_z(angle_rad: float) -> Quaternion:

@@ -11,13 +11,32 @@ import numpy as np
 from ..errors import OptionError
 from ..robot_constants import BODY_RADIUS_M
 from .kinematics import Pose
+from .pushing.pushed_body import PushedBody
+from .pushing.shapes import Shape, touch_circle
 
-__all__ = ["Arena", "build_default", "is_free", "measure_clearance", "outline", "place_robots"]
+__all__ = ["Arena", "MovableObject", "build_default", "is_free", "measure_clearance", "outline", "place_robots"]
 
 START_GAP_M = 0.05
 """Free space kept around a robot that is placed at random."""
 
 _MAX_TRIES = 2000
+
+
+class MovableObject(NamedTuple):
+    """A thing that robots can push, as it is at the start: its shape, and its center and heading in the world.
+
+    Attributes:
+        friction: coefficient between it and the floor.
+    """
+
+    shape: Shape
+    pose: Pose
+    mass_kg: float
+    friction: float
+
+    def put_down(self) -> PushedBody:
+        """Return it as a body of one world."""
+        return PushedBody(self.shape, self.pose, self.mass_kg, self.friction)
 
 
 class Arena(NamedTuple):
@@ -30,6 +49,7 @@ class Arena(NamedTuple):
         starts: free poses of the first robots; the others are placed at random.
         bounds_m: x min, y min, x max, y max of the area in which robots are placed, shape (4,).
         polygons_m: the corners of each solid polygon, whose edges are among the segments.
+        objects: what robots can push, where it is at the start.
     """
 
     name: str
@@ -38,6 +58,7 @@ class Arena(NamedTuple):
     starts: Tuple[Pose, ...]
     bounds_m: np.ndarray
     polygons_m: Tuple[np.ndarray, ...] = ()
+    objects: Tuple[MovableObject, ...] = ()
 
 
 def square_length(ways_m: np.ndarray) -> np.ndarray:
@@ -169,6 +190,8 @@ def _draw_place(arena: Arena, poses: List[Pose], rng: np.random.RandomState, rob
 def is_free(pose: Pose, poses: Sequence[Pose], arena: Arena, radius_m: float) -> bool:
     """Return whether a robot with radius_m fits at pose, beside stock robots at poses."""
     if measure_clearance(np.array([pose[:2]]), arena)[0] < radius_m:
+        return False
+    if any(touch_circle(*pose[:2], radius_m, thing.put_down().body).depth_m > 0.0 for thing in arena.objects):
         return False
     if not len(poses):
         return True

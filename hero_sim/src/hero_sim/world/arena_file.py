@@ -13,9 +13,10 @@ import yaml
 
 from ..errors import OptionError
 from ..robot_constants import BODY_RADIUS_M
-from .arena import Arena, is_free, outline
+from .arena import Arena, MovableObject, is_free, outline
 from .kinematics import Pose
 from .map_file import build_map_arena
+from .pushing.shapes import Disc, Polygon, Shape
 
 __all__ = ["SHIPPED", "load_arena"]
 
@@ -23,7 +24,8 @@ SHIPPED = ("empty", "obstacles", "maze")
 """Arenas that come with the simulator; --arena takes these names too."""
 
 _MAX_COORDINATE_M = 1000.0
-_KEYS = ("name", "bounds_m", "walls_m", "circles_m", "polygons_m", "starts_m_deg")
+_KEYS = ("name", "bounds_m", "walls_m", "circles_m", "polygons_m", "objects", "starts_m_deg")
+_OBJECT_KEYS = ("circle_m", "polygon_m", "mass_kg", "friction")
 
 
 def load_arena(name: str) -> Arena:
@@ -95,7 +97,8 @@ def _build_arena(content: Any, file_name: str) -> Arena:
     edges_m += [outline(corners_m) for corners_m in polygons_m]
     segments_m = np.vstack([np.empty((0, 4)), *edges_m])
     bounds_m = _read_bounds(content, segments_m)
-    arena = Arena(name, segments_m, circles_m, (), bounds_m, tuple(polygons_m))
+    objects = tuple(_read_object(item) for item in _list_items(content, "objects"))
+    arena = Arena(name, segments_m, circles_m, (), bounds_m, tuple(polygons_m), objects)
     starts: List[Pose] = []
     for x_m, y_m, heading_deg in _read_rows("starts_m_deg", _list_items(content, "starts_m_deg"), 3).tolist():
         start = Pose(x_m, y_m, math.radians(heading_deg))
@@ -106,6 +109,27 @@ def _build_arena(content: Any, file_name: str) -> Arena:
             )
         starts.append(start)
     return arena._replace(starts=tuple(starts))
+
+
+def _read_object(item: Any) -> MovableObject:
+    """Return what robots can push. Raises: ValueError."""
+    known = isinstance(item, dict) and set(item) <= set(_OBJECT_KEYS)
+    if not known or ("circle_m" in item) == ("polygon_m" in item):
+        raise ValueError(
+            "objects: %s must be a mapping with circle_m or polygon_m, mass_kg and friction" % reprlib.repr(item)
+        )
+    mass_kg, friction = (_read_rows(key, [[item.get(key)]], 1)[0, 0] for key in ("mass_kg", "friction"))
+    shape: Shape
+    if "circle_m" in item:
+        x_m, y_m, radius_m = _read_rows("circle_m", [item["circle_m"]], 3)[0].tolist()
+        shape, center = Disc(radius_m), Pose(x_m, y_m, 0.0)
+    else:
+        corners_m = _read_rows("polygon_m", item["polygon_m"], 2, least=3).tolist()
+        shape = Polygon([(x_m, y_m) for x_m, y_m in corners_m])
+        center = Pose(corners_m[0][0] - shape.corners_m[0][0], corners_m[0][1] - shape.corners_m[0][1], 0.0)
+    thing = MovableObject(shape, center, float(mass_kg), float(friction))
+    thing.put_down()  # raises for what can be no body
+    return thing
 
 
 def _read_bounds(content: Dict[str, Any], segments_m: np.ndarray) -> np.ndarray:

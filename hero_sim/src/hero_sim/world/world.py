@@ -15,6 +15,8 @@ from .arena import Arena, Segments
 from .body_motion import BodyMotion
 from .kinematics import join_wheels
 from .noise import draw_normal
+from .pushing.pushing import Pushing
+from .pushing.shapes import Body
 from .range_sensors import BEAMS, NOISE_COUNTS, measure_signals
 from .robot_errors import MAX_WHEEL_M_S, SERVO_GAIN_M_S_US, RobotErrors
 
@@ -36,17 +38,23 @@ _REST_M_S = 1e-6
 Rows = Union[int, slice, np.ndarray]  # the number of one row, or several of them
 
 
+Obstacles = Tuple[Segments, np.ndarray]
+"""Walls, and circles (C, 3), x y radius, of one world."""
+
+
 class View(NamedTuple):
     """The bodies at one time, for sensors that are read later.
 
     Attributes:
         number: which view of the world it is; the noise of its readings depends on it alone.
         places_m, headings: x and y, cosine and sine of all robots (R, 2).
+        obstacles: of each world with objects; empty if the arena has none.
     """
 
     number: int
     places_m: np.ndarray
     headings: np.ndarray
+    obstacles: List[Obstacles]
 
 
 class World:
@@ -165,7 +173,20 @@ class World:
     def observe(self) -> View:
         """Return where all bodies are now."""
         self._views += 1
-        return View(self._views, self.poses[:, :2].copy(), self._bodies.headings.T.copy())
+        places_m = self.poses[:, :2].copy()
+        obstacles = [self._list_obstacles(pushing) for pushing in self._bodies.pushing]
+        return View(self._views, places_m, self._bodies.headings.T.copy(), obstacles)
+
+    def _list_obstacles(self, pushing: Pushing) -> Obstacles:
+        """Return the walls and the circles of a world, with its objects where they are now."""
+        edges_m, discs_m = pushing.list_outlines()
+        walls_m = np.vstack((self.arena.segments_m, np.reshape(edges_m, (-1, 4))))
+        return Segments.from_ends(walls_m), np.vstack((self.arena.circles_m, np.reshape(discs_m, (-1, 3))))
+
+    def list_objects(self) -> List[Body]:
+        """Return the objects of the first world, where they are at time_ms."""
+        self._move_bodies()
+        return [pushed.body for pushing in self._bodies.pushing[:1] for pushed in pushing.bodies]
 
     def read_infrared(self, which: np.ndarray, view: Optional[View] = None) -> np.ndarray:
         """Return one noisy reading (whole counts, 0..1023) of the eight sensors of the robots which, (K, 8).
@@ -188,12 +209,18 @@ class World:
         return draw_normal(self._scan_rng, (robots, BEAMS))
 
     def _measure_signals(self, which: np.ndarray, view: View) -> np.ndarray:
+        if not view.obstacles:
+            return self._look(which, view, (self._walls, self.arena.circles_m))
+        worlds = which // self._robots
+        each = worlds[np.append(True, worlds[1:] != worlds[:-1])].tolist()
+        return np.concatenate([self._look(which[worlds == world], view, view.obstacles[world]) for world in each])
+
+    def _look(self, which: np.ndarray, view: View, obstacles: Obstacles) -> np.ndarray:
         return measure_signals(
             view.places_m[which],
             view.headings[which],
             view.places_m.reshape(self.worlds, self._robots, 2)[which // self._robots],
-            self._walls,
-            self.arena.circles_m,
+            *obstacles,
             self.errors.alpha_counts_m2[which],
             self.errors.beta_counts[which],
         )

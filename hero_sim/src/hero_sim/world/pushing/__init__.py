@@ -1,0 +1,1 @@
+"""Things that robots can push: their shapes, where these touch, and how they move. Pure."""
