@@ -136,6 +136,7 @@ def test_a_release_right_after_a_stop_leaves_no_robot_moving(stopped):
             robot.stops.begin(robot.peer)
             clock.run(0.005)
             robot.is_stopped = False
+            robot.stops.release()
             clock.run(CONFIRMED_S)
             assert not robot.motors.is_turning, offset_ms
             assert robot.peer.stop is None, offset_ms
