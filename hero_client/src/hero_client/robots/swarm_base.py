@@ -221,7 +221,7 @@ class BaseSwarm(Group, Generic[AnyRobot]):
             raise TypeError("swarm[3] is hero_3; for several robots: [swarm[robot_id] for robot_id in (0, 1)]")
         if robot_id not in self._by_id:
             names = ", ".join(robot.name for robot in self.robots)
-            raise KeyError("swarm[%r]: a robot is taken by its number, of which there are here: %s" % (robot_id, names))
+            raise KeyError("hero_%s is not in this swarm: %s" % (robot_id, names))
         return self._by_id[robot_id]
 
     def __iter__(self) -> Iterator[AnyRobot]:
