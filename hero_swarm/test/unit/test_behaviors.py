@@ -135,7 +135,7 @@ def test_a_behavior_does_what_its_metric_says(name):
 @pytest.mark.parametrize("behavior", [StandingStill, RandomWalk])
 def test_standing_still_and_random_walks_fail_every_metric(name, behavior):
     metric, limit, is_above, robots, _, arena, size_m = CASES[name]
-    values = measure(behavior(), metric, robots, 15, arena, size_m, last_s=5)
+    values = measure(behavior(), metric, robots, 6, arena, size_m, last_s=3)
     assert (values < limit if is_above else values > limit).all(), values
 
 
