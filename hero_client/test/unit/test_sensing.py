@@ -54,6 +54,20 @@ def test_range_counts_from_the_front_rim_to_the_surface():
     assert not sense_binary(pair(0.4 + 2.0 * BODY_RADIUS_M + 1e-6, 0.0), sensor)[0]
 
 
+def test_a_beam_ends_on_the_round_surface_of_a_body_beside_its_axis():
+    left_m = 0.8 * BODY_RADIUS_M
+    poses = np.array([[(0.0, 0.0, 0.0), (1.0, left_m, 0.0)]])
+    surface_m = 1.0 - 0.6 * BODY_RADIUS_M - BODY_RADIUS_M  # from the front rim
+    assert sense_binary(poses, Binary(range_m=surface_m + 1e-6))[0]
+    assert not sense_binary(poses, Binary(range_m=surface_m - 1e-6))[0]
+
+
+def test_noise_of_the_bearing_turns_what_is_sensed_and_keeps_its_range():
+    sensed = sense_neighbors(pair(0.5, 0.3), Neighbors(bearing_noise_rad=0.1), Fixed(1.0))
+    assert sensed.range_m[0, 1] == pytest.approx(0.5)
+    assert sensed.bearing_rad[0, 1] == pytest.approx(0.4)
+
+
 def test_a_cone_sees_a_body_that_reaches_into_it():
     far_m = 10.0
     spread_rad = math.asin(BODY_RADIUS_M / far_m)
