@@ -158,9 +158,10 @@ def test_the_permitted_rate_can_be_sent_for_ever():
 
 
 def test_a_pause_earns_no_more_than_one_second_of_tokens():
-    limit = make_rate_limit(100, 10000)
-    assert limit.admit(100, 10000, 100.0) is None
-    assert limit.admit(1, 8, 100.0) is not None
+    for packets_per_s, bytes_per_s in ((100, 10**6), (10**6, 10000)):
+        limit = make_rate_limit(packets_per_s, bytes_per_s)
+        assert limit.admit(100, 10000, 100.0) is None
+        assert limit.admit(1, 8, 100.0) is not None
 
 
 def test_an_address_may_send_only_so_many_bytes_outside_of_packets():
