@@ -369,6 +369,8 @@ def test_headings_in_another_frame_stay_within_a_half_turn():
         assert swarm[0].pose_in("world").yaw_rad == pytest.approx(6.0 - math.tau, abs=0.02)
 
 
-def test_a_slice_of_a_swarm_is_refused_with_what_to_write():
-    with StepSwarm(2) as swarm, pytest.raises(TypeError, match=r"swarm\[3\] is hero_3; for several robots"):
-        swarm[0:2]
+def test_slices_and_names_of_a_swarm_are_refused_with_what_to_write():
+    with StepSwarm(2) as swarm:
+        for key in (slice(0, 2), "hero_0"):
+            with pytest.raises(TypeError, match=r"swarm\[3\] is hero_3; for several robots"):
+                swarm[key]

@@ -217,7 +217,7 @@ class BaseSwarm(Group, Generic[AnyRobot]):
             robot.leave_topics()
 
     def __getitem__(self, robot_id: int) -> AnyRobot:
-        if isinstance(robot_id, slice):
+        if isinstance(robot_id, (slice, str)):
             raise TypeError("swarm[3] is hero_3; for several robots: [swarm[robot_id] for robot_id in (0, 1)]")
         if robot_id not in self._by_id:
             names = ", ".join(robot.name for robot in self.robots)
