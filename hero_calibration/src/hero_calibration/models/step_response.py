@@ -8,10 +8,11 @@ from typing import Dict, List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
+from hero_client.values.robot_constants import WHEEL_SEPARATION_M
+
 from ..errors import CalibrationError
 from .encoder_readings import TICK_M, Readings
 
-WHEEL_SEPARATION_M = 0.063
 STEP_M_S = 0.08
 """Speed of the wheels in a test."""
 

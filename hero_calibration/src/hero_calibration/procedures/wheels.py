@@ -13,11 +13,11 @@ from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple
 import numpy as np
 
 from hero_client.values.geometry import Pose, invert_pose, transform_pose, wrap_angle
+from hero_client.values.robot_constants import WHEEL_SEPARATION_M
 from hero_node.command_line import say
 
 from ..errors import CalibrationError, EndedError
 from ..models.encoder_readings import TICK_M
-from ..models.step_response import WHEEL_SEPARATION_M
 from ..robots.probe import Probe
 from ..robots.session import COMMAND_PERIOD_S, Session
 from .placement import Ask

@@ -7,6 +7,7 @@ clock of this computer: a subclass has the time (ros_session).
 from abc import ABC, abstractmethod
 from typing import Callable, List, Optional, Sequence
 
+from hero_client.values.background_motion import SEND_TIME_S
 from hero_node.command_line import say
 
 from ..errors import CalibrationError, EndedError
@@ -15,8 +16,6 @@ from .probe import Probe
 POLL_S = 0.02
 SETTLE_S = 0.6
 COMMAND_PERIOD_S = 0.1
-SEND_TIME_S = 0.1
-"""rospy sends on threads of its own and does not say when it has; this is many times what a send takes."""
 
 
 class Session(ABC):

@@ -5,13 +5,10 @@ from typing import Optional, Protocol, Sequence, TypeVar
 
 from hero_node.clock import Clock
 
-from ..values.background_motion import BackgroundMotion, Hold, Sleep, Steps, run_steps
+from ..values.background_motion import SEND_TIME_S, BackgroundMotion, Hold, Sleep, Steps, run_steps
 from ..values.errors import RobotNotReadyError
 
 __all__ = ["POLL_PERIOD_S", "READY_TIMEOUT_S", "REPEAT_PERIOD_S", "Group", "Member", "stop_after", "wait_for_all"]
-
-SEND_TIME_S = 0.1
-"""rospy sends on threads of its own and does not say when it has; this is many times what a send takes."""
 
 REPEAT_PERIOD_S = 0.1
 """Between the commands of a motion: well within the robot's watchdog of about 2 s."""
@@ -69,12 +66,10 @@ def wait_for_all(robots: Sequence[Member], timeout_s: float = READY_TIMEOUT_S) -
 
 
 def send_stops(robots: Sequence[Member]) -> Steps:
-    """Send every robot one stop, which the driver repeats; ends when they are sent.
+    """Send every robot one stop, which the driver repeats; ends when they, and what was published before, are sent.
 
     A stop that a program fails to send is the driver's: it stops robots whose program hangs or has gone.
     """
-    if not robots:
-        return
     for robot in robots:
         robot._send_velocity(0.0, 0.0)
     yield Hold(SEND_TIME_S)
@@ -156,7 +151,6 @@ class Group(Clock):
         for robot in self._members:
             robot._end_light()
         self._stop([robot for robot in self._members if robot.driven])
-        self._clock.sleep(SEND_TIME_S)  # for a color that was asked for last
 
     def __enter__(self: Self) -> Self:
         return self

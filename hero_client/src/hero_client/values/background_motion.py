@@ -4,7 +4,10 @@ from abc import abstractmethod
 from concurrent.futures import Future
 from typing import Callable, Generator
 
-__all__ = ["BackgroundMotion", "Hold", "Sleep", "Steps", "run_steps"]
+__all__ = ["SEND_TIME_S", "BackgroundMotion", "Hold", "Sleep", "Steps", "run_steps"]
+
+SEND_TIME_S = 0.1
+"""rospy sends on threads of its own and does not say when it has; this is many times what a send takes."""
 
 Sleep = Callable[[float], bool]
 """Waits for so many seconds and returns whether to continue; Clock.sleep is one."""

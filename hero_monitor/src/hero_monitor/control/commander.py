@@ -12,6 +12,7 @@ import rospy
 from geometry_msgs.msg import PoseStamped, Twist
 
 from hero_client.ros.drivers import Drivers
+from hero_client.values.background_motion import SEND_TIME_S
 from hero_client.values.geometry import Pose
 from hero_node.errors import NodeError
 from hero_node.ros.master import ask_master
@@ -24,9 +25,6 @@ LISTENER_TIMEOUT_S = 2.0
 """To connect to a driver or a program that takes goals; about 0.1 s is usual."""
 
 STOP_PERIOD_S = 0.06
-
-SEND_TIME_S = 0.1
-"""rospy sends on threads of its own and does not say when it has; this is many times what a send takes."""
 
 
 class Notice(NamedTuple):
