@@ -28,7 +28,7 @@ from stop_commander import MODES, TUNINGS
 from tornado.httpclient import HTTPRequest
 from tornado.websocket import websocket_connect
 
-from hero_test.processes import find_free_port
+from hero_test.processes import Dialog, find_free_port
 
 HERE = Path(__file__).resolve().parent
 REQUESTS = ("topic", "service", "monitor", "teleop")
@@ -115,25 +115,15 @@ class Teleop:
         os.write(self._keys, b"\r")
 
 
-class Lines:
-    """A program that answers each line with a line."""
+class Lines(Dialog):
+    """A script that answers each line with a line; the benchmark ends with it."""
+
+    Ended = SystemExit
 
     def __init__(self, suite, *command):
         """Start it."""
-        self.process = suite.start([sys.executable, *map(str, command)], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
-
-    def ask(self, line):
-        """Return the answer."""
-        self.process.stdin.write(line + "\n")
-        self.process.stdin.flush()
-        return self.read()
-
-    def read(self):
-        """Return the next line."""
-        line = self.process.stdout.readline()
-        if not line:
-            raise SystemExit("bench: %s ended" % " ".join(self.process.args))
-        return line
+        command = [sys.executable, *map(str, command)]
+        super().__init__(suite.start(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE))
 
 
 def start_commander(suite, mode, count):
@@ -240,7 +230,7 @@ def measure_mode(suite, mode, methods, rounds):
     commander = start_commander(suite, mode, len(suite.cells))
     for method in methods:
         if method in ENDS and mode in TUNINGS:
-            continue  # nobody commands a robot that tunes itself
+            continue  # robots that tune themselves have no commander
         commander, rows = measure_method(suite, method, mode, commander, rounds)
         yield from rows
     stop(commander.process, signal.SIGKILL)

@@ -29,7 +29,6 @@ CALLS = 3
 """A robot that a stop keeps deaf answers the second or third."""
 
 
-
 class Commander:
     """The publishers of one topic per robot, or the services of one per robot."""
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import rosgraph
 import rospy
 
-from hero_test.processes import find_free_port
+from hero_test.processes import Dialog, find_free_port
 from hero_test.waiting import wait_for
 
 HERE = Path(__file__).resolve().parent
@@ -23,17 +23,19 @@ STOCK_NAMES = 19
 """Topics and services of an emulated robot and of one with the complete stock firmware, odom_raw included."""
 
 
-class Program:
+class Program(Dialog):
     """A program that answers each line that it gets with one line of JSON; it ends with `with`."""
 
     def __init__(self, *command, prefix=(), environment=None):
-        self.process = subprocess.Popen(
-            [*prefix, *command],
-            env={**os.environ, **(environment or {})},
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            universal_newlines=True,
-            start_new_session=True,
+        super().__init__(
+            subprocess.Popen(
+                [*prefix, *command],
+                env={**os.environ, **(environment or {})},
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                universal_newlines=True,
+                start_new_session=True,
+            )
         )
 
     def __enter__(self):
@@ -44,18 +46,9 @@ class Program:
             os.killpg(self.process.pid, signal.SIGKILL)
         self.process.communicate()
 
-    def ask(self, line):
-        """Send one line; return the answer."""
-        self.process.stdin.write(line + "\n")
-        self.process.stdin.flush()
-        return self.read()
-
     def read(self):
         """Return the next line that it prints, as what its JSON holds."""
-        line = self.process.stdout.readline()
-        if not line:
-            raise AssertionError("%s ended with %s" % (self.process.args, self.process.wait()))
-        return json.loads(line)
+        return json.loads(super().read())
 
     def interrupt(self):
         """Send SIGINT; return the last line that it prints."""

@@ -53,6 +53,29 @@ def has_traceback(text):
     return "Traceback" in re.sub(r"(?s)Traceback.*?has no attribute 'isAlive'", "", text)
 
 
+class Dialog:
+    """A process that answers each line that it gets with a line; Ended is raised if it ends instead."""
+
+    Ended = AssertionError
+
+    def __init__(self, process):
+        """process: with pipes of text to its standard input and from its output."""
+        self.process = process
+
+    def ask(self, line):
+        """Send one line; return the answer."""
+        self.process.stdin.write(line + "\n")
+        self.process.stdin.flush()
+        return self.read()
+
+    def read(self):
+        """Return the next line that it prints."""
+        line = self.process.stdout.readline()
+        if not line:
+            raise self.Ended("%s ended with %s" % (self.process.args, self.process.wait()))
+        return line
+
+
 class Program:
     """A program in a session of its own, and the lines that it prints, errors among them."""
 
