@@ -1,4 +1,4 @@
-"""Commands before the driver has subscribed: the newest one waits, a stop takes its place, and nobody waits for it."""
+"""Commands before the driver has subscribed: the newest one waits, a stop takes its place, and no call blocks."""
 
 from types import SimpleNamespace
 
