@@ -44,7 +44,7 @@ class Path(NamedTuple):
 
 
 class PoseErrors(NamedTuple):
-    """Errors of the odometry over time."""
+    """Errors of odometry or localization over time."""
 
     times_s: np.ndarray
     position_m: np.ndarray
@@ -101,15 +101,28 @@ def wrap(angle_rad: np.ndarray) -> np.ndarray:
     return np.arctan2(np.sin(angle_rad), np.cos(angle_rad))
 
 
-def compute_errors(robot: RobotObservations) -> Optional[PoseErrors]:
+def compute_odometry_errors(robot: RobotObservations) -> Optional[PoseErrors]:
     """Return the difference between odometry and ground truth of the same stamp; None without ground truth.
 
     Without an origin, odometry is aligned with the ground truth at its first pose.
     """
-    if not len(robot.odometry) or len(robot.ground_truth) < 2:
+    return _compare(read_path(robot), robot.odometry, robot.ground_truth, is_aligned=not robot.origins)
+
+
+def compute_localization_errors(robot: RobotObservations) -> Optional[PoseErrors]:
+    """Return the difference between poses by localization and ground truth of the same stamp; None without either.
+
+    Their frames count as one: the simulator's map is its world.
+    """
+    return _compare(read_localized_path(robot), robot.poses, robot.ground_truth, is_aligned=False)
+
+
+def _compare(path: Path, poses: Series, ground_truth: Series, is_aligned: bool) -> Optional[PoseErrors]:
+    """Return the errors of a path whose stamps are those of poses, after aligning their first ones on request."""
+    if not len(poses) or len(ground_truth) < 2:
         return None
-    stamp_s = robot.odometry.columns()[1]
-    _, true_stamp_s, true_x_m, true_y_m, true_yaw_rad, _, _ = robot.ground_truth.columns()
+    stamp_s = poses.columns()[1]
+    _, true_stamp_s, true_x_m, true_y_m, true_yaw_rad, _, _ = ground_truth.columns()
     order = np.argsort(true_stamp_s, kind="stable")
     true_stamp_s = true_stamp_s[order]
     after = np.clip(np.searchsorted(true_stamp_s, stamp_s), 1, len(true_stamp_s) - 1)
@@ -120,8 +133,8 @@ def compute_errors(robot: RobotObservations) -> Optional[PoseErrors]:
     x_m = np.interp(stamp_s[known], true_stamp_s, true_x_m[order])
     y_m = np.interp(stamp_s[known], true_stamp_s, true_y_m[order])
     yaw_rad = np.interp(stamp_s[known], true_stamp_s, np.unwrap(true_yaw_rad[order]))
-    path = Path(*(column[known] for column in read_path(robot)))
-    if not robot.origins:
+    path = Path(*(column[known] for column in path))
+    if is_aligned:
         turn_rad = yaw_rad[0] - path.yaw_rad[0]
         turned = transform_path(path, [Origin(0.0, 0.0, 0.0, turn_rad)])
         shift = Origin(0.0, x_m[0] - turned.x_m[0], y_m[0] - turned.y_m[0], 0.0)

@@ -295,22 +295,30 @@ class Figures:
     # -- errors --------------------------------------------------------------------------------------------
 
     def draw_errors(self) -> Optional[Figure]:
-        """Draw the difference between odometry and ground truth."""
-        errors = {key: analysis.compute_errors(robot) for key, robot in self._robots.items()}
-        known = {key: error for key, error in errors.items() if error is not None}
+        """Draw the errors of odometry, and those of localization beside them, each against ground truth."""
+        sources = {
+            "odometry": {key: analysis.compute_odometry_errors(robot) for key, robot in self._robots.items()},
+            "localization": {key: analysis.compute_localization_errors(robot) for key, robot in self._robots.items()},
+        }
+        known = {name: {key: error for key, error in errors.items() if error is not None} for name, errors in sources.items()}
+        known = {name: errors for name, errors in known.items() if errors}
         if not known:
             return None
-        figure, grid = self._begin(6.0, "Errors of odometry against ground truth", 2, 1, sharex=True)
-        position_axes, yaw_axes = grid[:, 0]
-        times_s = {key: error.times_s for key, error in known.items()}
-        self._draw_error_curves(position_axes, times_s, {key: error.position_m * 1e3 for key, error in known.items()})
-        self._draw_error_curves(yaw_axes, times_s, {key: np.degrees(error.yaw_rad) for key, error in known.items()})
-        position_axes.set_ylabel("position error (mm)")
-        position_axes.set_ylim(0.0, None)
-        yaw_axes.set_ylabel("heading error (degrees),\npositive: counter-clockwise")
-        yaw_axes.set_xlabel("time (s)")
-        yaw_axes.axhline(0.0, color=_GREY, linewidth=0.5)
-        self._add_legend(position_axes)
+        title = "Errors of %s against ground truth" % " and ".join(known)
+        figure, grid = self._begin(6.0, title, 2, len(known), sharex=True)
+        for (position_axes, yaw_axes), (name, errors) in zip(grid.T, known.items()):
+            times_s = {key: error.times_s for key, error in errors.items()}
+            positions_mm = {key: error.position_m * 1e3 for key, error in errors.items()}
+            yaws_deg = {key: np.degrees(error.yaw_rad) for key, error in errors.items()}
+            self._draw_error_curves(position_axes, times_s, positions_mm)
+            self._draw_error_curves(yaw_axes, times_s, yaws_deg)
+            position_axes.set_title(name, fontsize=8)
+            position_axes.set_ylim(0.0, None)
+            yaw_axes.set_xlabel("time (s)")
+            yaw_axes.axhline(0.0, color=_GREY, linewidth=0.5)
+        grid[0, 0].set_ylabel("position error (mm)")
+        grid[1, 0].set_ylabel("heading error (degrees),\npositive: counter-clockwise")
+        self._add_legend(grid[0, -1])
         return figure
 
     def _draw_error_curves(self, axes: Axes, times_s: Dict[int, Any], values: Dict[int, Any]) -> None:

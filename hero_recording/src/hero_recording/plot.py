@@ -23,7 +23,7 @@ FIGURES = {
     "speeds": "/hero_N/odom",
     "delays": "/hero_N/odom",
     "connections": "/hero_driver/robots",
-    "errors": "/hero_N/odom with /hero_N/ground_truth",
+    "errors": "/hero_N/odom or /hero_N/pose with /hero_N/ground_truth",
 }
 """And the topics without which there is nothing to draw."""
 
@@ -102,7 +102,8 @@ def describe_robot(robot: RobotObservations) -> Dict[str, str]:
     steady_s = intervals_s[intervals_s <= analysis.ODOMETRY_GAP_S]
     delays_ms = analysis.compute_message_delays(robot) * 1e3
     motion_delays_ms = analysis.compute_motion_delays(robot) * 1e3
-    errors = analysis.compute_errors(robot)
+    errors = analysis.compute_odometry_errors(robot)
+    localization = analysis.compute_localization_errors(robot)
     error = "-"
     if errors is not None:
         error = "%.0f mm" % (errors.position_m[-1] * 1e3)
@@ -117,7 +118,12 @@ def describe_robot(robot: RobotObservations) -> Dict[str, str]:
         "COMMAND TO MOTION": "%.0f ms" % np.median(motion_delays_ms) if len(motion_delays_ms) else "-",
         "RECONNECTS": "%d" % robot.states[-1].reconnects if robot.states else "-",
         "FINAL ERROR": error,
+        "LOCALIZATION RMS": "-" if localization is None else "%.1f mm" % (1e3 * _compute_rms(localization.position_m)),
     }
+
+
+def _compute_rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
 
 
 def run(options: argparse.Namespace) -> None:

@@ -163,7 +163,7 @@ def test_the_table_holds_rate_gaps_delays_and_error(two_robots):
 def test_without_an_origin_odometry_is_aligned_with_ground_truth(two_robots):
     robot = observe(two_robots).robots[3]
     robot.origins.clear()
-    errors = analysis.compute_errors(robot)
+    errors = analysis.compute_odometry_errors(robot)
     assert errors.position_m.max() < 1e-5
     assert errors.yaw_rad == pytest.approx(0.0, abs=1e-5)
 
@@ -176,7 +176,18 @@ def test_a_true_heading_that_passes_pi_between_two_readings_is_no_error():
         for series, shift in ((robot.ground_truth, 0.0), (robot.odometry, 0.5)):  # stamps half way between
             turn_rad = math.remainder(yaw_rad + 0.25 * shift, math.tau)
             series.add(stamp_s, stamp_s + 0.1 * shift, 0.0, 0.0, turn_rad, 0.0, 0.0)
-    assert np.abs(analysis.compute_errors(robot).yaw_rad[:-1]).max() < 1e-6
+    assert np.abs(analysis.compute_odometry_errors(robot).yaw_rad[:-1]).max() < 1e-6
+
+
+def test_poses_by_localization_have_errors_of_their_own(two_robots):
+    robot = observe(two_robots).robots[3]
+    times_s = robot.ground_truth.columns()[1]
+    for time_s, x_m, y_m, yaw_rad in zip(times_s, *robot.ground_truth.columns()[2:5]):
+        robot.poses.add(time_s, time_s, x_m + 0.003, y_m - 0.004, yaw_rad + 2.0 * math.pi - 0.01)
+    errors = analysis.compute_localization_errors(robot)
+    assert errors.position_m == pytest.approx(0.005)
+    assert errors.yaw_rad == pytest.approx(-0.01)
+    assert plot.describe_robot(robot)["LOCALIZATION RMS"] == "5.0 mm"
 
 
 def test_commands_to_a_moving_robot_have_no_motion_delay():
@@ -280,7 +291,7 @@ def write_parts(path, robot_ids, *kinds):
 @pytest.mark.slow
 def test_figures_for_which_a_topic_is_missing_are_named_with_it(tmp_path, capsys):
     output = run_plot(capsys, write_parts(tmp_path / "part.bag", (0,), "/odom"))
-    assert "no figure of errors: nothing of /hero_N/odom with /hero_N/ground_truth" in output
+    assert "no figure of errors: nothing of /hero_N/odom or /hero_N/pose with /hero_N/ground_truth" in output
     output = run_plot(capsys, write_parts(tmp_path / "part.bag", (0,), "/robots"))
     assert output.count("no figure of") == 4
     assert "part_connections.png" in output
