@@ -296,12 +296,12 @@ class Figures:
 
     def draw_errors(self) -> Optional[Figure]:
         """Draw the errors of odometry, and those of localization beside them, each against ground truth."""
-        sources = {
-            "odometry": {key: analysis.compute_odometry_errors(robot) for key, robot in self._robots.items()},
-            "localization": {key: analysis.compute_localization_errors(robot) for key, robot in self._robots.items()},
-        }
-        known = {name: {key: error for key, error in errors.items() if error is not None} for name, errors in sources.items()}
-        known = {name: errors for name, errors in known.items() if errors}
+        known = {}
+        computers = {"odometry": analysis.compute_odometry_errors, "localization": analysis.compute_localization_errors}
+        for name, compute in computers.items():
+            errors = {key: compute(robot) for key, robot in self._robots.items()}
+            if any(errors.values()):
+                known[name] = {key: error for key, error in errors.items() if error is not None}
         if not known:
             return None
         title = "Errors of %s against ground truth" % " and ".join(known)

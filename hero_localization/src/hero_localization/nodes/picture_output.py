@@ -33,7 +33,7 @@ class PictureOutput:
         self._outline = rospy.Publisher("~picture/outline", PolygonStamped, queue_size=1, latch=True)
 
     def show(self, tracker: Tracker, frame: Frame, now_s: float) -> None:
-        """Publish an image and the tags in it, if there is a subscriber, and PERIOD_S after the last one at the earliest.
+        """Publish an image and the tags in it if there is a subscriber, PERIOD_S after the last one at the earliest.
 
         Raises: SettingsError if the camera cannot see the floor.
         """
