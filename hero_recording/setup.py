@@ -3,4 +3,4 @@
 from catkin_pkg.python_setup import generate_distutils_setup
 from setuptools import setup
 
-setup(**generate_distutils_setup(packages=["hero_recording"], package_dir={"": "src"}))
+setup(**generate_distutils_setup(packages=["hero_recording", "hero_recording.formats"], package_dir={"": "src"}))

@@ -45,6 +45,7 @@ ROOMS = {
     "hero_localization.mapping": {"errors", "filter"},
     "hero_localization.calibration": {"errors", "prints", "camera", "tracking", "filter"},
     "hero_localization.simulated_camera": {"errors", "prints"},
+    "hero_recording.formats": {"bags", "errors", "tables"},
     "hero_swarm.behaviors": {"behavior", "steering"},
     "hero_swarm.experiments": {"behavior", "behaviors", "metrics", "trial"},
     "hero_swarm.metrics": set(),

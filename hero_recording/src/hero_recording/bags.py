@@ -1,7 +1,7 @@
 """Reads the messages of bag files in order of time; a file that cannot be read is refused in one line."""
 
 import os
-from typing import Callable, Dict, List, Sequence, Tuple
+from typing import Any, Callable, Dict, List, NamedTuple, Sequence, Tuple
 
 import rosbag
 from rosbag.bag import ROSBagUnindexedException
@@ -10,6 +10,17 @@ from tqdm import tqdm
 from .errors import RecordingError, explain_bag_errors
 from .repair import ACTIVE_SUFFIX
 from .topics import Message
+
+
+class RawMessage(NamedTuple):
+    """A message as bytes, as it was recorded."""
+
+    topic: str
+    header: Dict[str, str]
+    """Of the connection: type, md5sum, message_definition; callerid and latching, if the publisher sent them."""
+    content: bytes
+    time_ns: int
+    """When the recorder received it, since 1970."""
 
 
 class BagSet:
@@ -45,16 +56,32 @@ class BagSet:
         wanted = [topic for topic, message_type in self.topics.items() if is_wanted(topic, message_type)]
         if not wanted:
             return
+
+        def decode(topic: str, content: Any, time: Any) -> None:
+            receive(Message(topic, content._type, content, time.to_sec()))
+
+        self._read(wanted, decode)
+
+    def read_raw(self, receive: Callable[[RawMessage], None]) -> None:
+        """Pass every message of every topic to receive, without decoding it. Raises: RecordingError."""
+
+        def pass_on(topic: str, raw: Any, time: Any, header: Dict[str, Any]) -> None:
+            texts = {name: value.decode() if isinstance(value, bytes) else value for name, value in header.items()}
+            receive(RawMessage(topic, texts, raw[1], time.to_nsec()))
+
+        self._read(list(self.topics), pass_on, raw=True, return_connection_header=True)
+
+    def _read(self, topics: Sequence[str], receive: Callable[..., None], **how: bool) -> None:
         for path in self.paths:
-            total = sum(self._counts[path].get(topic, 0) for topic in wanted)
+            total = sum(self._counts[path].get(topic, 0) for topic in topics)
             # receive() fails as well where a message definition in the bag is damaged.
             with open_bag(path) as bag, explain_bag_errors("%s cannot be read" % path):
-                messages = bag.read_messages(wanted)
+                messages = bag.read_messages(topics, **how)
                 # disable=None: no bar in a log.
-                for topic, content, time in tqdm(
+                for message in tqdm(
                     messages, os.path.basename(path), total, unit=" messages", leave=False, disable=None
                 ):
-                    receive(Message(topic, content._type, content, time.to_sec()))
+                    receive(*message)
 
     def describe_topics(self) -> str:
         """Return some of the topics for an error message."""

@@ -97,6 +97,9 @@ TABLES: Dict[str, Columns] = {
 }
 """By kind, which is also the name of the file."""
 
+TEXT_COLUMNS = {"state", "address", "last_error"}
+"""All other columns are numbers."""
+
 
 def is_exported(topic: str, message_type: str) -> bool:
     """Return whether read_rows() makes rows of a topic."""

@@ -2,7 +2,9 @@
 
 import csv
 import math
+import sys
 
+import numpy as np
 import pytest
 import rosbag
 from synthetic_bag import DELAY_S, START_S, make_localized, write_bag
@@ -90,7 +92,7 @@ def test_an_interrupted_export_leaves_nothing_behind(bag, tmp_path, capsys, monk
 
 
 def test_all_buffered_rows_are_written(bag, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("hero_recording.export.BATCH_ROWS", 10)
+    monkeypatch.setattr("hero_recording.formats.table_files.BATCH_ROWS", 10)
     run_export(capsys, bag, "--out", tmp_path / "out", "--tables", "odometry")
     assert len(read_csv(tmp_path / "out" / "hero_0" / "odometry.csv")) == 117
 
@@ -101,3 +103,64 @@ def test_wrong_options_of_export_are_refused_by_name(bag, capsys):
             export.parse_options([str(bag), *arguments])
         assert caught.value.code == 2
         assert arguments[0] in capsys.readouterr().err
+
+
+def test_npz_tables_hold_the_values_of_csv(bag, tmp_path, capsys):
+    run_export(capsys, bag, "--out", tmp_path / "csv")
+    run_export(capsys, bag, "--out", tmp_path / "npz", "--format", "npz")
+    assert not list((tmp_path / "npz").rglob("*.csv"))
+    for path in (tmp_path / "csv").rglob("*.csv"):
+        rows = read_csv(path)
+        with np.load(str(tmp_path / "npz" / path.parent.name / (path.stem + ".npz"))) as arrays:
+            assert list(arrays) == list(rows[0])
+            for name, column in arrays.items():
+                values = [row[name] for row in rows]
+                expected = values if name in ("state", "address", "last_error") else [float(value) for value in values]
+                np.testing.assert_array_equal(column, expected)
+
+
+def test_parquet_tables_hold_all_rows_and_columns(bag, tmp_path, capsys):
+    parquet = pytest.importorskip("pyarrow.parquet", reason="the optional package pyarrow is missing")
+    run_export(capsys, bag, "--out", tmp_path / "out", "--format", "parquet")
+    table = parquet.read_table(str(tmp_path / "out" / "hero_3" / "odometry.parquet"))
+    assert table.num_rows == 117
+    assert table.column_names[:3] == ["time_s", "stamp_s", "x_m"]
+
+
+def test_mcap_holds_every_message_as_recorded(bag, tmp_path, capsys):
+    reader = pytest.importorskip("mcap.reader", reason="the optional package mcap is missing")
+    output = run_export(capsys, bag, "--out", tmp_path / "out.mcap", "--format", "mcap")
+    with rosbag.Bag(str(bag)) as recorded:
+        expected = [(topic, raw[0], raw[1], time.to_nsec()) for topic, raw, time in recorded.read_messages(raw=True)]
+    with open(str(tmp_path / "out.mcap"), "rb") as file:
+        messages = reader.make_reader(file).iter_messages()
+        copied = [(channel.topic, schema.name, message.data, message.log_time) for schema, channel, message in messages]
+    assert sorted(copied) == sorted(expected)
+    assert "%d messages" % len(expected) in output
+
+
+def test_a_ros_2_bag_holds_as_many_messages_of_each_topic(bag, tmp_path, capsys):
+    reason = "the optional package rosbags is missing, or older than 0.10"
+    rosbag2 = pytest.importorskip("rosbags.rosbag2", reason=reason)
+    if not hasattr(rosbag2, "StoragePlugin"):
+        pytest.skip(reason)
+    run_export(capsys, bag, "--out", tmp_path / "out", "--ros2")
+    with rosbag.Bag(str(bag)) as recorded:
+        counts = {topic: info.message_count for topic, info in recorded.get_type_and_topic_info().topics.items()}
+    with rosbag2.Reader(tmp_path / "out") as reader:
+        assert {topic: info.msgcount for topic, info in reader.topics.items()} == counts
+
+
+@pytest.mark.parametrize(("kind", "package"), [("parquet", "pyarrow"), ("mcap", "mcap"), ("ros2", "rosbags")])
+def test_a_missing_library_is_named_and_nothing_is_left(bag, tmp_path, capsys, monkeypatch, kind, package):
+    for module in ("pyarrow", "mcap.writer", "rosbags.rosbag2"):
+        monkeypatch.setitem(sys.modules, module, None)
+    with pytest.raises(RecordingError, match="-m pip install '%s" % package):
+        run_export(capsys, bag, "--out", tmp_path / "out", "--format", kind)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_choice_of_robots_is_refused_where_every_message_is_copied(bag, capsys):
+    with pytest.raises(SystemExit):
+        export.parse_options([str(bag), "--format", "mcap", "--robots", "3"])
+    assert "--robots and --tables choose tables" in capsys.readouterr().err
