@@ -20,7 +20,7 @@ BURST_NS = 34 * 10**6
 
 
 class NoSink:
-    """A topic that somebody listens to, at no cost."""
+    """A topic with a subscriber that costs nothing."""
 
     is_wanted = True
 

@@ -57,7 +57,7 @@ def find_listener(port):
                 if fields[3] == LISTENING and int(fields[1].rpartition(":")[2], 16) == port:
                     sockets.add("socket:[%s]" % fields[9])
     for entry in Path("/proc").iterdir():
-        # A process that ends, or somebody else's, shows no files.
+        # A process that ends, or that of another user, shows no files.
         with contextlib.suppress(OSError):
             if entry.name.isdigit() and any(os.readlink(file) in sockets for file in (entry / "fd").iterdir()):
                 return int(entry.name)
@@ -301,7 +301,7 @@ def main():
     parser.add_argument("--rounds", type=int, default=1, help="runs of each server, whose median is printed")
     parser.add_argument("--drivers", type=int, default=1, help="servers, each with its share of the robots")
     parser.add_argument("--speed", type=float, default=1.0, help="multiplies the rates of the robots")
-    parser.add_argument("--unheard", action="store_true", help="nobody listens or commands, but for /tf")
+    parser.add_argument("--unheard", action="store_true", help="no subscribers or commands, but for /tf")
     parser.add_argument(
         "--nagle", action="store_true", help="robots' TCP holds small writes back, as HeRo's does"
     )

@@ -77,3 +77,10 @@ def test_constants_of_the_robot_are_equal_in_all_packages():
                 (name,), value = [target.id for target in node.targets], ast.literal_eval(node.value)
                 assert known.setdefault(name, value) == value, f"{sources.name_of(path)}: {name}"
     assert known
+
+
+def test_texts_of_programs_name_whom_they_mean():
+    private = re.compile(r"\b(nobody|somebody|anybody|everybody|whoever)\b", re.IGNORECASE)
+    for path in [*sources.list_source_modules().values(), *sources.list_files(".md")]:
+        found = private.search(path.read_text(encoding="utf-8"))
+        assert not found, f"{sources.name_of(path)}: {found.group()}: a program, user, robot or subscriber?"

@@ -1,4 +1,4 @@
-"""Saves what RViz and the fleet monitor show, on screens that nobody looks at. Started by script/pictures.
+"""Saves what RViz and the fleet monitor show, on virtual screens. Started by script/pictures.
 
 The robots are simulated and walk; every picture has a ROS master, a driver and a simulator of its own.
 """

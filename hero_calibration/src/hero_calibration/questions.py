@@ -7,16 +7,16 @@ from hero_node.ros.program import Program
 
 from .errors import CalibrationError, EndedError
 
-NOBODY = "nobody is there to answer: start it in a terminal, or with --yes"
+NO_TERMINAL = "no terminal to answer questions: start it in a terminal, or with --yes"
 
 
 def ask(program: Program, question: str) -> str:
     """Ask the user; return the answer in lower case.
 
-    Raises: EndedError if the program is to end meanwhile, CalibrationError where nobody can answer.
+    Raises: EndedError if the program is to end meanwhile, CalibrationError without a terminal.
     """
     if sys.stdin is None:
-        raise CalibrationError(NOBODY)
+        raise CalibrationError(NO_TERMINAL)
     say(question, end="")
     # input() would go on waiting after Ctrl-C: signals only set a flag here.
     while not program.wait_readable([sys.stdin.fileno()], 1.0):
@@ -28,5 +28,5 @@ def ask(program: Program, question: str) -> str:
     except UnicodeDecodeError:
         return ""  # a key that is no letter, as Enter
     if not answer:
-        raise CalibrationError(NOBODY)
+        raise CalibrationError(NO_TERMINAL)
     return answer.strip().lower()

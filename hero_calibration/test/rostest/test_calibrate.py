@@ -191,7 +191,7 @@ class CalibrateTest(unittest.TestCase):
     def test_without_an_answer_or_with_bad_files_it_ends_with_the_reason(self):
         file = keep(self.files, 1, motor_centers_us=[1511, 9000])
         cases = [
-            (self.start("motors", "--robots", "1"), "nobody is there to answer"),
+            (self.start("motors", "--robots", "1"), "no terminal to answer"),
             (self.start("restore"), "hero_1.yaml: motor_centers_us must be 2 numbers"),
             (self.start("motors", "--folder", file), "hero_1.yaml cannot be created: File exists"),
         ]

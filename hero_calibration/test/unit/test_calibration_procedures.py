@@ -311,10 +311,10 @@ class TestCalibration:
 
         def ask(question):
             if not answers:
-                raise CalibrationError("nobody is there to answer")
+                raise CalibrationError("no terminal to answer")
             return answers.pop()
 
-        with pytest.raises(CalibrationError, match="nobody"):
+        with pytest.raises(CalibrationError, match="no terminal"):
             self.run(make_session(count=1), tmp_path, "motors", "infrared", ask=ask)
         assert set(self.load(tmp_path, 0)) == {"motor_centers_us", "dead_zones_us"}
         assert "2026-13-45" in (tmp_path / "hero_0.previous.yaml").read_text()

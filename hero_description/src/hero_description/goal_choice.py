@@ -62,7 +62,7 @@ class GoalChoice:
         publisher = self._publishers[self._chosen]
         if not publisher.get_num_connections():
             rospy.logwarn(
-                'nobody takes goals for %s: roslaunch hero_examples go_to_goal.launch robots:="%s"',
+                'no program takes goals for %s: roslaunch hero_examples go_to_goal.launch robots:="%s"',
                 self._chosen,
                 self._chosen.rpartition("_")[2],
             )

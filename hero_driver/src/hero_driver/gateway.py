@@ -188,7 +188,7 @@ class Gateway(LinkHandler):
             self.last_refusal = "%s: %s" % (link.address, reason)
             self._log.log_throttled(
                 "debug" if reason == THE_DRIVER_ENDS else "warn",
-                "nobody " + link.address.host + reason[:12],
+                "unidentified " + link.address.host + reason[:12],
                 "unidentified connection of %s ended: %s" % (link.address, reason),
             )
             return

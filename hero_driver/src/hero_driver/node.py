@@ -278,7 +278,7 @@ def _enter_ros(argv: Optional[List[str]], log: LogRelay) -> None:
 def _wait_for_master() -> None:
     """Return when a ROS master answers; rospy would wait too, but could not be interrupted.
 
-    Raises: ValueError or OSError where ROS_MASTER_URI can be nobody's.
+    Raises: ValueError or OSError where ROS_MASTER_URI is no address.
     """
     # Not a name that may exist later on: UnicodeError is a ValueError.
     (urllib.parse.urlparse(rosgraph.get_master_uri()).hostname or "").encode("idna")

@@ -87,7 +87,7 @@ class Reporter:
             self._rates.pop(namespace, None)
 
     def diagnose(self) -> None:
-        """Publish /diagnostics, where somebody listens."""
+        """Publish /diagnostics, if there are subscribers."""
         robots = {robot.name: robot for robot in self._status.robots}
         for name in set(self._known) - set(robots):
             self._updater.removeByName(name)

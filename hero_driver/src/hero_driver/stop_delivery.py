@@ -1,7 +1,7 @@
 """Stops robots, and confirms by their wheels that they are at rest.
 
 One stop is one write with a zero for every motion topic that the connection declared, whatever was used before, and
-whoever the connection says it is. It is repeated until the wheels are at rest or a newer command moves the robot,
+whichever id it declares. It is repeated until the wheels are at rest or a newer command moves the robot,
 because the firmware drops a Twist that comes within 50 ms of the last one (VelocityControl.ino:159), and because only
 the wheels show what a robot has taken. The two controllers know nothing of each other, so each gets its zero. A zero
 Twist also ends servo pulses (cmd_motor): it switches the servos off. Pulses of 1500 us would not: they turn a wheel

@@ -121,7 +121,7 @@ class PageRequests:
         self._background.warn("a page requests to %s all robots" % verb)
 
     def end_programs_of_stopped_robots(self) -> None:
-        """End all programs while all robots are stopped, whoever stopped them: a release then moves no robot."""
+        """End all programs while all robots are stopped, from whichever source: a release then moves no robot."""
         if self._feed.stopped or not self._commander.may_drive():
             self.programs.end_all()
 

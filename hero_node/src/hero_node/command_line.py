@@ -75,7 +75,7 @@ def call(main: Callable[[], Optional[int]], *errors: Type[Exception]) -> int:
 
 
 def say(text: str, stream: Optional[IO[str]] = None, end: str = "\n") -> None:
-    """Write a line at once, to stdout unless stream is given; the program continues even if nobody reads it.
+    """Write a line at once, to stdout unless stream is given; the program continues even if its output is closed.
 
     For work that must not end because of its output: a recording, robots that are being measured.
     """

@@ -161,7 +161,7 @@ def _end_with_parent() -> None:
 
 
 def say(text: str) -> None:
-    """Write a line; the recording goes on where nobody reads it."""
+    """Write a line; the recording goes on if its output is closed."""
     command_line.say("record: " + text)
 
 

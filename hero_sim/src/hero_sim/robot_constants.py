@@ -52,4 +52,4 @@ RECEIVE_WINDOW_LENGTH = 2144
 """Bytes that the ESP8266's TCP takes before the program reads them; the rest waits at the sender."""
 
 MAX_PARAMETER = 1e30
-"""Numbers beyond it are refused, as is NaN: what a robot does with them nobody knows."""
+"""Numbers beyond it are refused, as is NaN: what a robot does with them is unknown."""

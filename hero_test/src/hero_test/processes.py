@@ -15,7 +15,7 @@ from hero_test.waiting import TIMEOUT_S, wait_for
 
 
 def find_free_port():
-    """Return a TCP port that nobody uses now."""
+    """Return a TCP port that is free now."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return probe.getsockname()[1]

@@ -25,7 +25,7 @@ def run_fleet(*arguments, **options):
 
 
 class ProgramTerminal:
-    """A terminal with a program, which is read all the time: a program that nobody reads stands still."""
+    """A terminal with a program, which is read all the time: a program whose output is not read blocks."""
 
     def __init__(self, package, program, *arguments):
         self._leader, self._follower = pty.openpty()

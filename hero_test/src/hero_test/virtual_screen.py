@@ -1,4 +1,4 @@
-"""A screen that nobody looks at (Xvfb), and what is drawn on it as an array.
+"""A virtual screen (Xvfb), and what is drawn on it as an array.
 
 Xvfb keeps its screen in a file in the format of xwd (X11/XWDFile.h): numbers of 32 bits, big end first, then pixels.
 """

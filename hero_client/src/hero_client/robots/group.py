@@ -80,7 +80,7 @@ def stop_after(steps: Steps, robots: Sequence[Member]) -> Steps:
     try:
         yield from steps
     except GeneratorExit:
-        raise  # nobody takes steps any more: the program has dropped its stepped robots
+        raise  # no steps are taken any more: the program has dropped its stepped robots
     except BaseException:
         yield from send_stops(robots)
         raise

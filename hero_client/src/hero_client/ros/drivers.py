@@ -30,7 +30,7 @@ FIND_PERIOD_S = 3.0
 REPEAT_PERIOD_S = 0.1
 SETTLE_LOOKS = 3
 """At the third look, 6 s after the first one, a driver that the master knows has reported, unless it hangs or died
-without unregistering. Looks, not seconds: a program that was kept from running has not heard anybody either."""
+without unregistering. Looks, not seconds: a program that was kept from running has heard no driver either."""
 
 FORGET_S = 5.0
 """Reports come once per second. Robots of a driver that is silent for longer than the others are no longer listed."""

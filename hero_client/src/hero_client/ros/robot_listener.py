@@ -1,6 +1,6 @@
 """What a table or a map shows of one robot: rate, pose, distance driven and nearest obstacle, from its topics.
 
-Unlike Robot it decodes messages only when asked: a swarm sends far more of them than anybody looks at.
+Unlike Robot it decodes messages only when asked: a swarm sends far more of them than a program reads.
 """
 
 import math

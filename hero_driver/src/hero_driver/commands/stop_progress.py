@@ -34,7 +34,7 @@ STUBBORN_AFTER_S = 0.5
 STUBBORN_INTERVAL_S = 0.25
 TIRED_AFTER_S = 5.0
 TIRED_INTERVAL_S = 1.0
-"""Wheels that go on turning, of a robot that somebody pushes perhaps, get fewer stops, but get them for ever."""
+"""Wheels that go on turning, of a robot that is pushed perhaps, get fewer stops, but get them for ever."""
 
 
 READING_S = 0.034
@@ -76,7 +76,7 @@ class StopProgress:
         self._rest_readings = REST_READINGS
 
     def renew(self, now_s: float) -> None:
-        """Somebody asked once more: send the next stop at once, unless the wheels are at rest."""
+        """A stop was requested again: send the next stop at once, unless the wheels are at rest."""
         if self.state is not StopState.AT_REST:
             self._next_s = now_s
             self._began_s = now_s

@@ -37,10 +37,10 @@ class Sink(Protocol):
 
     @property
     def is_wanted(self) -> bool:
-        """Whether somebody listens."""
+        """Whether there are subscribers."""
 
     def publish(self, payload: bytes) -> None:
-        """Send payload to everybody who listens."""
+        """Send payload to all subscribers."""
 
 
 Handler = Callable[[bytes, int], None]

@@ -58,7 +58,7 @@ class WheelMotion:
         self._has_anchor = False
 
     def read_ticks(self, left_ticks: float, right_ticks: float) -> None:
-        """Take a reading of the wheels' counters; of one that is not finite, nobody can tell a turn."""
+        """Take a reading of the wheels' counters; one that is not finite shows no turn."""
         if not math.isfinite(left_ticks + right_ticks):
             return
         self.readings += 1
@@ -71,7 +71,7 @@ class WheelMotion:
             self.still_readings += 1
             self._moves.append(0.0)
             return
-        # Of the first reading nobody can tell.
+        # The first reading has none before it to compare with.
         if self._has_anchor:
             self.still_readings = 0
             self._moves.append(abs(left_ticks - self._left_ticks) + abs(right_ticks - self._right_ticks))

@@ -82,7 +82,7 @@ _NOT_SERVED = {
 
 
 def _ignore(payload: bytes, arrival_ns: int) -> None:
-    """Take a message that nobody has asked for."""
+    """Take a message without a receiver."""
 
 
 @dataclass
@@ -90,8 +90,8 @@ class Topic:
     """One declared id of this conversation.
 
     Attributes:
-        receive: what takes the payloads of this topic, with the time of arrival (ns); for whoever declares it
-            further on, nothing until then.
+        receive: what takes the payloads of this topic, with the time of arrival (ns); set by the
+            receiver after the declaration, nothing until then.
     """
 
     info: TopicInfo

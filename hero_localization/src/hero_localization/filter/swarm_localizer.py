@@ -76,7 +76,7 @@ class _Robot:
 
     @property
     def disagrees(self) -> bool:
-        """Whether it is measured elsewhere, as while somebody carries it."""
+        """Whether it is measured elsewhere, as while it is carried."""
         return self.outliers >= DISAGREEING_POSES and self.measured_s - self.filter.used_s >= DISAGREEING_S
 
 

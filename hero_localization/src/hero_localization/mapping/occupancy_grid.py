@@ -154,7 +154,7 @@ class OccupancyGrid:
 
     @property
     def frontiers(self) -> np.ndarray:
-        """Which free cells are next to one that nobody has seen, away from obstacles (rows, columns)."""
+        """Which free cells are next to an unknown one, away from obstacles (rows, columns)."""
         unknown = np.abs(self.log_odds) <= KNOWN_LOG_ODDS
         return np.asarray(self.free & _widen(unknown & ~_widen(_widen(self.log_odds > KNOWN_LOG_ODDS))))
 

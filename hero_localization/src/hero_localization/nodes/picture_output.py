@@ -1,4 +1,4 @@
-"""Publishes what the tracker sees, from straight above, while somebody looks."""
+"""Publishes what the tracker sees, from straight above, while there are subscribers."""
 
 import math
 from typing import Optional

@@ -52,7 +52,7 @@ class Settings(NamedTuple):
 
 
 def load(path: str) -> Settings:
-    """Return the settings of a file; of one that does not exist, those of a camera that nobody calibrated.
+    """Return the settings of a file; of one that does not exist, those of an uncalibrated camera.
 
     Raises: SettingsError with the file, the key and what it must be.
     """

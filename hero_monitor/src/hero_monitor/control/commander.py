@@ -67,7 +67,7 @@ class Commander:
             self._background.submit(self._open_velocity, namespace)
 
     def stop_robot(self, namespace: str) -> None:
-        """Stop a robot, whoever drives it."""
+        """Stop a robot, whichever program drives it."""
         self._dead_man.stop(namespace)
 
     def step(self) -> None:

@@ -58,7 +58,7 @@ class DeadMan:
             self._begin_stop(namespace)
 
     def stop(self, namespace: str) -> None:
-        """Stop a robot, whoever drives it."""
+        """Stop a robot, whichever program drives it."""
         self._begin_stop(namespace)
 
     def _begin_stop(self, namespace: str) -> None:

@@ -147,7 +147,7 @@ class Programs:
         """Start a program."""
         number = next(self._numbers)
         self._running[number] = child
-        self._failed.clear()  # it was read by whoever started the next one
+        self._failed.clear()  # the user who starts the next one has read it
         name = "__name:=%s_%s_%d" % (self._node_name, child.program, number)
         command = [self.paths[child.program], *arguments, name]
         child.thread = threading.Thread(target=self._run, args=(number, child, command), daemon=True)

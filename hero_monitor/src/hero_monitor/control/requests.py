@@ -64,7 +64,7 @@ REQUESTS: Dict[str, Dict[str, Callable[[Any], bool]]] = {
 stop: stop all robots. release: release them. drive: a button is held; velocity in m/s and rad/s. end_drive: it is let
 go. stop_some: end what drives these robots, and stop them. goal: a pose on the map in m; yaw (rad) may be added.
 start: a program of offers.OFFERS, with values for its fields. end: a program, by its number. record: begin or end the
-recording. show: whether anyone can see the page, and what it shows in addition to the fleet. heard_ms: the monitor's
+recording. show: whether the page is visible, and what it shows in addition to the fleet. heard_ms: the monitor's
 clock, as the page last heard it (freshness).
 """
 

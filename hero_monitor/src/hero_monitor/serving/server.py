@@ -46,7 +46,7 @@ SOCKETS_MAX = 200
 """Pages in all."""
 
 STUCK_S = 5.0
-"""A page that has taken nothing for this time is not seen by anyone."""
+"""A page that has taken nothing for this time counts as not visible."""
 
 SEND_BUFFER = 65536
 """Bytes that the kernel may buffer for one page: about a second of a large swarm."""

@@ -40,7 +40,7 @@ def start_node(name: str = "hero_program") -> None:
     """Start a ROS node for a plain script, unless one runs already; Robot and Swarm call this.
 
     Ctrl-C raises KeyboardInterrupt as in every Python program, SIGTERM and SIGHUP raise SystemExit: `with` blocks stop
-    their robots before ROS shuts down. A HeroError that nobody catches is printed as one line, with exit status 1.
+    their robots before ROS shuts down. An uncaught HeroError is printed as one line, with exit status 1.
 
     Raises: NodeError if no ROS master answers within 3 s, also for a node that runs already.
     """

@@ -127,7 +127,7 @@ class TcpLink:
         sock = socket.socket(self._family, socket.SOCK_STREAM)
         try:
             sock.setblocking(False)
-            # Linux then takes about so many bytes that nobody reads, as the robot does.
+            # Linux then takes about so many unread bytes, as the robot does.
             sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_WINDOW_LENGTH)
             if own_address.startswith("127."):
                 sock.bind((own_address, 0))

@@ -121,7 +121,7 @@ class Radio:
         return bool(self.up.queue or self.down.queue)
 
     def is_transparent(self, now_ms: int) -> bool:
-        """Return whether bytes pass at once, so that nobody needs to queue them."""
+        """Return whether bytes pass at once, without a queue."""
         return self._is_ideal and now_ms >= self.stalled_until_ms and not self.is_carrying
 
     def find_arrival(self, at_ms: float) -> float:

@@ -176,7 +176,7 @@ class Firmware:
         self._end_connecting(now_ms)
 
     def connection_failed(self, now_ms: int) -> None:
-        """Nobody answers; the next spin tries again."""
+        """No server answers; the next spin tries again."""
         self._end_connecting(now_ms)
 
     def _end_connecting(self, now_ms: int) -> None:

@@ -92,7 +92,7 @@ class RobotRows:
         self._odometry = TickOdometryRows(rows)
         self.ticks, self.odometry_ms = received.ticks, received.odometry_ms
         self.scan_ms = received.scan_ms
-        self._view: Optional[View] = None  # of the newest scan, until somebody reads it
+        self._view: Optional[View] = None  # of the newest scan, until it is read
         self._servos = ServoPulses(world, np.rint(errors.servo_center_us.T))
         self._velocity = WheelControllers(rows, VELOCITY_GAINS, VELOCITY_LIMIT_US, VELOCITY_WATCHDOG_MS)
         self._position = WheelControllers(rows, POSITION_GAINS, POSITION_LIMIT_US, POSITION_WATCHDOG_MS)
@@ -253,7 +253,7 @@ class RobotRows:
         return has_scan
 
     def _read_scan(self) -> Readings:
-        """Compute the newest scan, which takes long, when somebody reads it; return what was received."""
+        """Compute the newest scan, which takes long, when it is read; return what was received."""
         if self._view is not None:
             measured = self._measured
             measured.counts[:] = self.world.read_infrared(self._rows, self._view)

@@ -22,7 +22,7 @@ _MAX_WAITING = 32
 
 
 class TickOdometryRows:
-    """The odometry of all robots; it is computed when somebody looks, from several readings at once."""
+    """The odometry of all robots; it is computed when it is read, from several readings at once."""
 
     def __init__(self, rows: int) -> None:
         """Begin at the origin, without a reading."""

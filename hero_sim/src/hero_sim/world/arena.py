@@ -105,7 +105,7 @@ def outline(corners_m: np.ndarray) -> np.ndarray:
 def build_rectangle(width_m: float, height_m: float, robots: int) -> Arena:
     """Return a rectangular field around the origin with robots spread over it in rows.
 
-    Each start is headed along the rim, counter-clockwise, so that nobody drives at a neighbor or a wall at once.
+    Each start is headed along the rim, counter-clockwise, so that no robot drives at a neighbor or a wall at once.
     """
     x_m, y_m = width_m / 2.0, height_m / 2.0
     columns = _count_columns(robots)

@@ -1,6 +1,6 @@
 """Arenas from maps as map_server keeps them, such as those that robots made of a real arena: a YAML file and a picture.
 
-What is not free is solid: obstacles, and cells that nobody has seen. Source: wiki.ros.org/map_server.
+What is not free is solid: obstacles, and unknown cells. Source: wiki.ros.org/map_server.
 """
 
 import math

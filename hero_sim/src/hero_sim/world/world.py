@@ -98,7 +98,7 @@ class World:
         # The share of the difference to its command by which a servo's speed changes in one step.
         shares = -np.expm1(-_STEP_S / errors.servo_lag_s.T).astype(np.float32)
         self._servo_shares = np.tile(shares.astype(float), (2, 1))  # of each wheel: faster than broadcast in each step
-        # Of the steps in a block, those that the wheels have taken, and the bodies: these wait until somebody looks.
+        # Of the steps in a block, those that the wheels have taken, and the bodies: these wait until they are read.
         self._block_step = self._body_step = _BLOCK_STEPS
         self._ground_m = np.empty((_BLOCK_STEPS, 2, rows))
         self._walls = Segments.from_ends(arena.segments_m)
@@ -204,7 +204,7 @@ class World:
         return np.minimum(np.maximum(counts_read, 0.0), 1023.0) + 0.0
 
     def _draw_scan_noise(self, world: int, view: View, robots: int) -> np.ndarray:
-        """Return the noise of a view (robots, 8): motion is the same whether somebody reads it or not."""
+        """Return the noise of a view (robots, 8): motion is the same whether it is read or not."""
         self._scan_rng.seed((self._scan_seeds[world], view.number))
         return draw_normal(self._scan_rng, (robots, BEAMS))
 
