@@ -5,7 +5,13 @@ from setuptools import setup
 
 setup(
     **generate_distutils_setup(
-        packages=["hero_monitor", "hero_monitor.control", "hero_monitor.fleet_feed", "hero_monitor.serving"],
+        packages=[
+            "hero_monitor",
+            "hero_monitor.control",
+            "hero_monitor.fleet_feed",
+            "hero_monitor.foxglove",
+            "hero_monitor.serving",
+        ],
         package_dir={"": "src"},
         package_data={"hero_monitor": ["web/*", "web/*/*"]},
     )

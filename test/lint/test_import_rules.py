@@ -15,6 +15,7 @@ SOCKET_OWNERS = (
     "hero_sim.link.tcp_link",
     "hero_tools.checkup.network",
     "hero_monitor.serving.server",
+    "hero_monitor.foxglove.endpoint",
     "hero_monitor.program",
 )
 
@@ -65,6 +66,8 @@ PURE_ROOMS = (
     "hero_client.robots",
     "hero_client.apps.formations",
     "hero_client.apps.goals",
+    "hero_monitor.foxglove.hub",
+    "hero_monitor.foxglove.protocol",
     "hero_node.clock",
     "hero_node.errors",
     "hero_node.parameters",

@@ -29,6 +29,7 @@ class Parameters(NamedTuple):
     rate_hz: float
     map_frame: str
     record_folder: str
+    foxglove_origins: List[str]
 
 
 def read_token(host: str, file: str) -> Optional[str]:
@@ -67,6 +68,7 @@ def load_parameters() -> Parameters:
             "rate_hz": number(10.0, 1.0, 30.0, "Hz"),
             "map_frame": "world",
             "record_folder": "~/hero_recordings",
+            "foxglove_origins": "",
         }
     )
     host = str(given["host"])
@@ -83,4 +85,5 @@ def load_parameters() -> Parameters:
         given["rate_hz"],
         str(given["map_frame"]).lstrip("/"),
         str(given["record_folder"]),
+        re.findall(r"[^\s,]+", str(given["foxglove_origins"])),
     )

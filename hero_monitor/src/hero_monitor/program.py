@@ -42,6 +42,8 @@ class Monitor:
         # Here, so that a machine without tornado gets a line that says what to do.
         import tornado.ioloop
 
+        from .foxglove.endpoint import FoxgloveEndpoint, TopicSource
+        from .foxglove.ros_topics import RosTopics
         from .serving.server import Actions, Server
 
         self._parameters = parameters
@@ -62,7 +64,11 @@ class Monitor:
         actions = Actions(self._open_page, self._requests.receive, self._close_page, lambda: self._feed.picture.jpeg)
         # The other half of the files is for ROS: some per robot.
         limits = ConnectionLimits(min(CONNECTIONS_MAX, raise_file_limit() // 2))
-        self._server = Server(Access(parameters.token, parameters.host_names), limits, actions)
+        topics = RosTopics(self._background)
+        source = TopicSource(topics.find_types, topics.want, topics.take)
+        self._foxglove = FoxgloveEndpoint(source, parameters.foxglove_origins)
+        access = Access(parameters.token, parameters.host_names)
+        self._server = Server(access, limits, actions, self._foxglove.route)
         self._tick = tornado.ioloop.PeriodicCallback(self._update_pages, 1000.0 / parameters.rate_hz)
         self._stops = tornado.ioloop.PeriodicCallback(self._step, 1000.0 * STOP_PERIOD_S)
         self._clock = tornado.ioloop.PeriodicCallback(self._send_clock, 1000.0 * CLOCK_PERIOD_S)
@@ -92,6 +98,7 @@ class Monitor:
         finally:
             self._programs.close()
             self._commander.close()
+            self._foxglove.close()
             self._server.close()
             self._background.close()
 

@@ -13,7 +13,7 @@ import socket
 import time
 from collections import deque
 from pathlib import Path
-from typing import Any, Awaitable, Callable, Deque, Dict, List, NamedTuple, Optional, Tuple, Union
+from typing import Any, Awaitable, Callable, Deque, Dict, List, NamedTuple, Optional, Tuple, Type, Union
 
 import tornado.httpserver
 import tornado.ioloop
@@ -70,6 +70,14 @@ class Actions(NamedTuple):
     receive: Callable[["PageSocket", Union[str, bytes]], None]
     close_page: Callable[["PageSocket"], None]
     read_picture: Callable[[], bytes]
+
+
+class Route(NamedTuple):
+    """A handler besides those of the page."""
+
+    pattern: str
+    handler: Type[tornado.web.RequestHandler]
+    values: Dict[str, Any]
 
 
 class BaseHandler(tornado.web.RequestHandler):
@@ -288,16 +296,18 @@ class LimitedServer(tornado.httpserver.HTTPServer):
 class Server:
     """The server, from its start to its end."""
 
-    def __init__(self, access: Access, limits: ConnectionLimits, actions: Actions) -> None:
+    def __init__(self, access: Access, limits: ConnectionLimits, actions: Actions, *routes: Route) -> None:
         # tornado logs each invalid request and cookie: any client could fill the disk.
         logging.getLogger("tornado.general").setLevel(logging.ERROR)
         self.pages: List[PageSocket] = []
         shared: Dict[str, Any] = {"access": access, "limits": limits}
+        with_attempts = {**shared, "attempts": TokenAttempts()}
         self._application = tornado.web.Application(
             [
                 (r"/live", PageSocket, {**shared, "actions": actions, "pages": self.pages}),
-                (r"/login", LoginHandler, {**shared, "attempts": TokenAttempts()}),
+                (r"/login", LoginHandler, with_attempts),
                 (r"/picture", PictureHandler, {**shared, "actions": actions}),
+                *((route.pattern, route.handler, {**with_attempts, **route.values}) for route in routes),
                 (r"/(.*)", FileHandler, shared),
             ],
             log_function=ignore_request,

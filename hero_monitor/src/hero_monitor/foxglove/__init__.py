@@ -1,0 +1,1 @@
+"""Live topics for Foxglove, Lichtblick and PlotJuggler, over their WebSocket protocol."""

@@ -1,0 +1,165 @@
+"""Which client gets which topic: channels as topics appear and vanish, subscriptions, a queue per client. Pure."""
+
+from collections import deque
+from typing import Callable, Deque, Dict, Iterable, List, NamedTuple, Set, Union
+
+from .protocol import (
+    SERVER_INFO,
+    WARNING,
+    Channel,
+    ProtocolError,
+    encode_message,
+    make_advertise,
+    make_status,
+    make_unadvertise,
+    read_request,
+)
+
+QUEUE_BYTES_MAX = 4_000_000
+"""Of one client: about a second of a large swarm with a camera's images."""
+
+SUBSCRIPTIONS_MAX = 10_000
+
+NO_PUBLISHING = "this server takes no messages and calls: stop and drive robots on the monitor's page"
+
+
+class TopicType(NamedTuple):
+    """Type of a topic and its full definition."""
+
+    name: str
+    definition: str
+
+
+class TopicMessage(NamedTuple):
+    """A message as it arrived."""
+
+    topic: str
+    content: bytes
+    time_ns: int
+    latched_by: str
+    """The publisher, if it latches the topic; empty otherwise."""
+
+
+class Client:
+    """One connection: its subscriptions, and what waits to be sent; beyond QUEUE_BYTES_MAX the oldest is dropped."""
+
+    def __init__(self, send_text: Callable[[str], None]) -> None:
+        self.send_text = send_text
+        self.subscriptions: Dict[int, Channel] = {}
+        self._queue: Deque[bytes] = deque()
+        self._queued_bytes = 0
+        self._has_dropped = False
+
+    def put(self, subscription: int, message: TopicMessage) -> None:
+        """Queue a message for a subscription."""
+        frame = encode_message(subscription, message.time_ns, message.content)
+        self._queue.append(frame)
+        self._queued_bytes += len(frame)
+        while self._queued_bytes > QUEUE_BYTES_MAX and len(self._queue) > 1:
+            self._queued_bytes -= len(self._queue.popleft())
+            if not self._has_dropped:
+                self._has_dropped = True
+                self.send_text(make_status(WARNING, "this client is slower than its topics: old messages are dropped"))
+
+    def take(self) -> List[bytes]:
+        """Return all frames that wait, oldest first, and forget them."""
+        frames = list(self._queue)
+        self._queue.clear()
+        self._queued_bytes = 0
+        return frames
+
+
+class Hub:
+    """All clients and channels."""
+
+    def __init__(self) -> None:
+        self.clients: Set[Client] = set()
+        self._channels: Dict[str, Channel] = {}
+        self._latched: Dict[str, Dict[str, TopicMessage]] = {}
+        self._next_id = 1
+
+    @property
+    def wanted_topics(self) -> Set[str]:
+        """Topics that a client subscribes to."""
+        return {channel.topic for client in self.clients for channel in client.subscriptions.values()}
+
+    def add(self, client: Client) -> None:
+        """Greet a client."""
+        self.clients.add(client)
+        client.send_text(SERVER_INFO)
+        if self._channels:
+            client.send_text(make_advertise(self._channels.values()))
+
+    def remove(self, client: Client) -> None:
+        """Forget a client; safe twice."""
+        self.clients.discard(client)
+        self._forget_latched()
+
+    def update_topics(self, topics: Dict[str, TopicType]) -> None:
+        """Offer the topics that appeared, and withdraw those that vanished or changed their type."""
+        gone = [known for known in self._channels.values() if topics.get(known.topic) != (known.type, known.definition)]
+        for channel in gone:
+            del self._channels[channel.topic]
+            for client in self.clients:
+                kept = {number: known for number, known in client.subscriptions.items() if known is not channel}
+                client.subscriptions = kept
+        new = []
+        for topic in sorted(set(topics) - set(self._channels)):
+            new.append(Channel(self._next_id, topic, *topics[topic]))
+            self._channels[topic] = new[-1]
+            self._next_id += 1
+        if gone:
+            self._tell_all(make_unadvertise(channel.id for channel in gone))
+            self._forget_latched()
+        if new:
+            self._tell_all(make_advertise(new))
+
+    def _tell_all(self, text: str) -> None:
+        for client in self.clients:
+            client.send_text(text)
+
+    def receive(self, client: Client, message: Union[str, bytes]) -> None:
+        """Carry out a client's request, or tell it why not."""
+        try:
+            request = read_request(message)
+        except ProtocolError as error:
+            client.send_text(make_status(WARNING, str(error)))
+            return
+        if request.op == "subscribe":
+            channels = {channel.id: channel for channel in self._channels.values()}
+            for number, channel_id in request.subscriptions:
+                self._subscribe(client, number, channel_id, channels)
+        elif request.op == "unsubscribe":
+            for number, _ in request.subscriptions:
+                client.subscriptions.pop(number, None)
+            self._forget_latched()
+        else:
+            client.send_text(make_status(WARNING, NO_PUBLISHING))
+
+    def _subscribe(self, client: Client, number: int, channel_id: int, channels: Dict[int, Channel]) -> None:
+        channel = channels.get(channel_id)
+        if channel is None or number in client.subscriptions or len(client.subscriptions) >= SUBSCRIPTIONS_MAX:
+            client.send_text(make_status(WARNING, "subscription %d to channel %d refused" % (number, channel_id)))
+            return
+        client.subscriptions[number] = channel
+        # ROS sends a latched message once per node: a later client gets it from here.
+        for message in self._latched.get(channel.topic, {}).values():
+            client.put(number, message)
+
+    def deliver(self, messages: Iterable[TopicMessage]) -> None:
+        """Queue messages for the clients that subscribe to their topics."""
+        for message in messages:
+            channel = self._channels.get(message.topic)
+            if channel is None:
+                continue
+            if message.latched_by:
+                self._latched.setdefault(message.topic, {})[message.latched_by] = message
+            for client in self.clients:
+                for subscription, subscribed in client.subscriptions.items():
+                    if subscribed is channel:
+                        client.put(subscription, message)
+
+    def _forget_latched(self) -> None:
+        """Keep latched messages only while ROS sends new ones."""
+        wanted = self.wanted_topics
+        self._latched = {topic: kept for topic, kept in self._latched.items() if topic in wanted}
