@@ -101,6 +101,20 @@ def test_a_tuning_that_is_known_ends_with_one_write_that_fits_the_window(control
     assert robot.list_motor_packets() == []
 
 
+def test_repeated_stops_do_not_fill_the_window_of_a_tuning_robot():
+    with Clock().is_the_drivers() as clock:
+        robot = make_moving(clock, "velocity_controller")
+        robot.bridge.note_tuning(True)
+        del robot.writes[:]
+        stop(robot)
+        for _ in range(4):
+            clock.run(0.03)
+            stop(robot)
+        assert count_bursts(robot) == 1
+        clock.run(CONFIRMED_S)
+        assert robot.peer.stop.state is StopState.AT_REST
+
+
 def test_after_a_burst_the_light_has_the_color_that_it_had_before():
     with Clock().is_the_drivers() as clock:
         robot = make_moving(clock, "velocity_controller")

@@ -6,6 +6,7 @@ from hero_driver.commands.stop_progress import (
     SILENT_AFTER_S,
     STOPS_UNREAD,
     TIRED_AFTER_S,
+    TIRED_INTERVAL_S,
     UNREAD_AFTER_S,
     StopProgress,
     StopState,
@@ -185,9 +186,11 @@ def test_no_burst_before_the_robot_has_acknowledged_a_stop():
 def test_asking_again_brings_the_next_stop_forward():
     robot = Robot(lambda now_s: 186.0)
     robot.run(8.2)
+    half_way_s = robot.sent_s[-1] + TIRED_INTERVAL_S / 2.0
+    robot.run(half_way_s)
     sent = len(robot.sent_s)
     robot.stop.renew(robot.now_s)
-    robot.run(8.21)
+    robot.run(half_way_s + 0.01)
     assert len(robot.sent_s) == sent + 1
 
 

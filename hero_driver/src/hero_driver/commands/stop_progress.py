@@ -70,15 +70,20 @@ class StopProgress:
         self._began_s = now_s
         self._stops = 0
         self._next_s = now_s
+        self._burst_ends_s = now_s
         self._mark = wheels.readings
         self._acknowledged: Optional[_Mark] = None  # when a stop first was
         self._watched: Optional[_Mark] = None  # when one first was after the last burst
         self._rest_readings = REST_READINGS
 
     def renew(self, now_s: float) -> None:
-        """A stop was requested again: send the next stop at once, unless the wheels are at rest."""
+        """A stop was requested again: send the next stop at once, unless the wheels are at rest.
+
+        A robot that tunes itself first finishes the burst that it has: a second one would fill its TCP window, and the
+        zeros would come late.
+        """
         if self.state is not StopState.AT_REST:
-            self._next_s = now_s
+            self._next_s = max(now_s, self._burst_ends_s)
             self._began_s = now_s
 
     def is_due(self, is_acknowledged: bool, now_s: float) -> bool:
@@ -110,6 +115,7 @@ class StopProgress:
             self._mark = self._wheels.readings
         if was_burst:
             self._watched = None
+            self._burst_ends_s = now_s + TUNING_INTERVAL_S
         elapsed_s = now_s - self._began_s
         interval_s = TUNING_INTERVAL_S if was_burst else INTERVAL_S
         if elapsed_s >= TIRED_AFTER_S:
