@@ -1,7 +1,7 @@
 """Which client gets which topic: channels as topics appear and vanish, subscriptions, a queue per client. Pure."""
 
-from collections import deque
-from typing import Callable, Deque, Dict, Iterable, List, NamedTuple, Set, Union
+from collections import defaultdict, deque
+from typing import Callable, DefaultDict, Deque, Dict, Iterable, List, NamedTuple, Set, Tuple, Union
 
 from .protocol import (
     SERVER_INFO,
@@ -148,16 +148,17 @@ class Hub:
 
     def deliver(self, messages: Iterable[TopicMessage]) -> None:
         """Queue messages for the clients that subscribe to their topics."""
+        subscribers: DefaultDict[str, List[Tuple[Client, int]]] = defaultdict(list)
+        for client in self.clients:
+            for number, channel in client.subscriptions.items():
+                subscribers[channel.topic].append((client, number))
         for message in messages:
-            channel = self._channels.get(message.topic)
-            if channel is None:
+            if message.topic not in self._channels:
                 continue
             if message.latched_by:
                 self._latched.setdefault(message.topic, {})[message.latched_by] = message
-            for client in self.clients:
-                for subscription, subscribed in client.subscriptions.items():
-                    if subscribed is channel:
-                        client.put(subscription, message)
+            for client, number in subscribers[message.topic]:
+                client.put(number, message)
 
     def _forget_latched(self) -> None:
         """Keep latched messages only while ROS sends new ones."""
