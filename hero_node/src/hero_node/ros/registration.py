@@ -16,8 +16,7 @@ __all__ = ["is_registered", "register_again"]
 
 
 def is_registered() -> bool:
-    """Return whether the ROS master knows this node. Raises: NodeError if it does not answer."""
-    ask_master("getPid")
+    """Return whether the ROS master knows this node, and answers."""
     try:
         return bool(ask_master("lookupNode", rospy.get_name()))
     except NodeError:
