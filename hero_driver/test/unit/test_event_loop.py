@@ -49,9 +49,9 @@ class Handler(LinkHandler):
 def start():
     loops = []
 
-    def start_loop():
+    def start_loop(host="127.0.0.1"):
         handler = Handler()
-        handler.loop = EventLoop(TransportSettings("127.0.0.1", 0, (), 1.0))
+        handler.loop = EventLoop(TransportSettings(host, 0, (), 1.0))
         handler.loop.open(handler)
         thread = threading.Thread(target=handler.loop.run, daemon=True)
         thread.start()
@@ -73,6 +73,26 @@ def test_a_connection_that_breaks_is_closed_at_once_with_the_reason(start):
     far.close()
     handler.wait(lambda: handler.endings)
     assert handler.endings == ["read failed: Connection reset by peer"]
+
+
+def has_ipv6():
+    """Whether this PC has addresses of IPv6; containers often have none."""
+    try:
+        with socket.socket(socket.AF_INET6) as sock:
+            sock.bind(("::1", 0))
+    except OSError:
+        return False
+    return True
+
+
+@pytest.mark.skipif(not has_ipv6(), reason="this PC has no IPv6")
+def test_robots_are_heard_on_all_addresses_of_ipv6_and_ipv4(start):
+    handler, far = start("::")
+    assert str(handler.loop.listening) == "[::]:%d" % handler.loop.listening.port
+    with far, socket.create_connection(("127.0.0.1", handler.loop.listening.port)) as near:
+        far.sendall(b"six")
+        near.sendall(b"four")
+        handler.wait(lambda: {data for data, _ in handler.reads} == {b"six", b"four"})
 
 
 def test_the_end_of_the_loop_closes_every_file_that_it_opened(start):
