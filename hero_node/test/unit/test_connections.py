@@ -99,7 +99,7 @@ def test_half_open_calls_take_no_more_threads_than_allowed(monkeypatch):
     monkeypatch.setattr(connections, "XMLRPC_CONNECTIONS_MAX", 3)
     server = connections.LimitedXmlRpcServer(("127.0.0.1", 0), 0)
     server.register_function(lambda: "pong", "ping")
-    serving = threading.Thread(target=server.serve_forever)
+    serving = threading.Thread(target=server.serve_forever, daemon=True)
     serving.start()
     clients = []
     for _ in range(8):
