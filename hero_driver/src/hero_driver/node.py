@@ -18,13 +18,12 @@ import urllib.parse
 from typing import Any, Callable, List, Optional
 
 import rosgraph
-import rosgraph.roslogging
 import rospy
 
 from hero_node.errors import ProgramError
 from hero_node.ros.connections import limit_xmlrpc_connections, open_tcpros_server
 from hero_node.ros.master import find_running_node
-from hero_node.ros.ros_node import end_ros_node
+from hero_node.ros.ros_node import end_ros_node, init_ros_node
 
 from .config import FORMER_STOP, DriverConfig, read_config
 from .gateway import STOP_LIMIT_S, Gateway
@@ -265,12 +264,7 @@ def _enter_ros(argv: Optional[List[str]], log: LogRelay) -> None:
     limit_xmlrpc_connections()
     open_tcpros_server(lambda host, text: log.log_throttled("warn", "handshake " + host, text, host=host))
     keep_publishers_connected()
-    try:
-        rospy.init_node(NODE_NAME, argv=argv, disable_signals=True)
-    except (rosgraph.roslogging.LoggingException, NotADirectoryError, PermissionError) as error:
-        raise ProgramError(
-            "no log file can be written (%s): set ROS_LOG_DIR to a folder that can be written to" % error
-        ) from error
+    init_ros_node(NODE_NAME, arguments=argv)
     leave_topics_out_of_rosout()
     tell_of_lost_log_lines()
 

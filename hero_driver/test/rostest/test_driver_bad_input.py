@@ -63,6 +63,13 @@ class TestDriverBadInput(OwnDriverCase):
         for host in ("no-such-host.invalid", "10.42.0..1"):
             self.assert_start_fails({"host": host}, "'%s' cannot be found" % host, "ip address")
 
+    def test_an_address_that_yaml_reads_as_no_text_is_refused_in_one_line(self):
+        driver = DriverProcess(arguments=["_host:=::"])
+        self.addCleanup(driver.fleet.close)
+        self.assertEqual(driver.wait_end(), USAGE_ERROR, driver.lines)
+        self.assertEqual(len(driver.lines), 1, driver.lines)
+        self.assertIn("quote it twice, as in _host:='\"::\"'", driver.lines[0])
+
     def test_another_name_of_all_addresses_is_warned_about_too(self):
         self.start(host="0").wait_line("any host in the networks of this PC can pose as a robot")
 

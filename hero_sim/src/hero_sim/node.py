@@ -11,12 +11,12 @@ from typing import Tuple
 
 import rosgraph
 import rosgraph.network
-import rosgraph.roslogging
 import rospy
 
 from hero_node.command_line import call
+from hero_node.errors import NodeError
 from hero_node.ros.master import find_running_node
-from hero_node.ros.ros_node import end_ros_node
+from hero_node.ros.ros_node import end_ros_node, init_ros_node
 
 from . import main as command_line
 from .errors import OptionError, SimulatorError
@@ -80,7 +80,7 @@ def check_environment() -> None:
 
 def main() -> None:
     """Run the simulator until ROS or a signal ends it."""
-    status = call(_run, SimulatorError)
+    status = call(_run, SimulatorError, NodeError)
     end_ros_node("hero_sim ends", MASTER_WAIT_S)
     os._exit(status)
 
@@ -93,13 +93,10 @@ def _run() -> None:
     check_environment()
     # Until the master answers, init_node() waits for as long as it takes: let a signal end that.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
-    try:
-        running = find_running_node(NODE_NAME)
-        if running:
-            raise OptionError("simulated robots already run as %s: end them, or give these another name:=" % running)
-        rospy.init_node(NODE_NAME, disable_signals=True)
-    except rosgraph.roslogging.LoggingException as error:
-        raise OptionError("%s: set ROS_LOG_DIR to a directory" % error) from error
+    running = find_running_node(NODE_NAME)
+    if running:
+        raise OptionError("simulated robots already run as %s: end them, or give these another name:=" % running)
+    init_ros_node(NODE_NAME)
     with command_line.simulate(options, rospy.loginfo) as (simulator, injector):
         rospy.on_shutdown(lambda: setattr(simulator, "stopping", True))
         GroundTruth(simulator, options.clock, not options.no_tf)

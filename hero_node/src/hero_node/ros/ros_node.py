@@ -5,7 +5,7 @@ node wait for. rospy has no setting for either, so this file uses its internals.
 """
 
 import threading
-from typing import Any
+from typing import Any, List, Optional
 
 import rosgraph
 import rosgraph.roslogging
@@ -17,7 +17,7 @@ from ..texts import one_line
 from .connections import limit_xmlrpc_connections, open_tcpros_server
 from .master import SUCCESS, LimitedTransport, check_master, find_running_node
 
-__all__ = ["end_ros_node", "end_without_delay", "limit_master_calls", "start_ros_node"]
+__all__ = ["end_ros_node", "end_without_delay", "init_ros_node", "limit_master_calls", "start_ros_node"]
 
 
 class NodeMaster(rospy.core._LockedServerProxy):
@@ -49,15 +49,26 @@ def start_ros_node(name: str, anonymous: bool = False) -> None:
     limit_master_calls()
     limit_xmlrpc_connections()
     open_tcpros_server(lambda host, text: rospy.logwarn(text))
+    init_ros_node(name, anonymous)
+    end_without_delay()
+
+
+def init_ros_node(name: str, anonymous: bool = False, arguments: Optional[List[str]] = None) -> None:
+    """Call rospy.init_node(), which waits for a master without limit; signals stay with the caller.
+
+    arguments: ROS's, in place of those of the command line.
+    Raises: NodeError without a directory for logs, or for wrong remappings.
+    """
     try:
-        rospy.init_node(name, anonymous=anonymous, disable_signals=True)
-    except rosgraph.roslogging.LoggingException as error:
-        raise NodeError("%s: set ROS_LOG_DIR to a directory" % error) from None
+        rospy.init_node(name, argv=arguments, anonymous=anonymous, disable_signals=True)
+    except (rosgraph.roslogging.LoggingException, NotADirectoryError, PermissionError) as error:
+        raise NodeError("no log can be written (%s): set ROS_LOG_DIR to a directory" % one_line(error)) from None
     except TypeError:  # of the parameter server, which takes no nil: _x:= and _x:=~ hold none, nor does _x:=::
-        raise NodeError("a private parameter (_name:=value) has no value: put it in quotes") from None
+        raise NodeError(
+            "a private parameter (_name:=value) has no value for YAML: quote it twice, as in _host:='\"::\"'"
+        ) from None
     except (rospy.ROSInitException, OSError, ValueError) as error:
         raise NodeError(one_line(error)) from None
-    end_without_delay()
 
 
 def end_without_delay() -> None:
