@@ -83,8 +83,11 @@ class Driven:
         )
 
     def close(self):
-        """Say nothing any more."""
+        """Stop the robot, so that the next test finds it at rest, and say nothing any more."""
         self._timer.shutdown()
+        self._timer.join()
+        self.publisher.publish(Twist())
+        wait_for(lambda: self.is_at_rest, "the robot to stop")
 
 
 class DriverDrivesTest(unittest.TestCase):
@@ -106,7 +109,6 @@ class DriverDrivesTest(unittest.TestCase):
     def take(self, number):
         robot = Driven(number)
         self.addCleanup(robot.close)
-        self.addCleanup(robot.drive, 0.0)
         return robot
 
     def call(self, name, service_class, *arguments):
@@ -173,7 +175,8 @@ class DriverDrivesTest(unittest.TestCase):
         robots = [self.take(number) for number in ROBOTS]
         for robot in robots:
             wait_for(
-                lambda r=robot: math.hypot(r.odom.newest.pose.pose.position.x - 1.0, 0.0) < 0.01, "x = 1 m"
+                lambda r=robot: abs(r.odom.newest.pose.pose.position.x - 1.0) < 0.01,
+                lambda r=robot: "x = 1 m, where odom says %s" % r.odom.newest.pose.pose,
             )
             robot.drive(0.0, 1.5)
         for robot in robots:
