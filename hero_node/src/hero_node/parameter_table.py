@@ -10,10 +10,11 @@ __all__ = ["make_table", "write_default"]
 
 
 def make_table(declared: Mapping[str, Parameter]) -> List[str]:
-    """Return the lines of a table in Markdown: name, default, unit, what is allowed, meaning."""
-    lines = ["| Parameter | Default | Unit | Range | Meaning |", "|---|---|---|---|---|"]
+    """Return the lines of a table in Markdown: name, default, what is allowed with its unit, meaning."""
+    lines = ["| Parameter | Default | Range | Meaning |", "|---|---|---|---|"]
     for name, parameter in declared.items():
-        cells = ("`%s`" % write_default(parameter), parameter.unit, _describe(parameter), parameter.text)
+        allowed = " ".join(part for part in (_describe(parameter), parameter.unit) if part)
+        cells = ("`%s`" % write_default(parameter), allowed, parameter.text)
         lines.append("| `~%s` | %s |" % (name, " | ".join(cells)))
     return lines
 
@@ -27,7 +28,7 @@ def write_default(parameter: Parameter) -> str:
 
 def _describe(parameter: Parameter) -> str:
     if parameter.limits is not None:
-        return "%s to %s" % tuple(f"{limit:,}".replace(",", " ") for limit in parameter.limits)
+        return "%s to %s" % tuple(f"{limit:,}" for limit in parameter.limits)
     if isinstance(parameter.default, bool):
         return "true, false"
     return ", ".join("`%s`" % option for option in parameter.choices)

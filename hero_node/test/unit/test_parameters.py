@@ -46,7 +46,7 @@ def test_a_wrong_value_is_one_line_with_what_is_allowed(name, value, allowed):
 
 def test_a_table_says_what_is_declared():
     lines = make_table(DECLARED)
-    assert "| `~rate_hz` | `10.0` | Hz | 1.0 to 30.0 | of updates |" in lines
-    assert "| `~port` | `8088` |  | 0 to 65 535 |  |" in lines
-    assert "| `~control` | `false` |  | true, false | whether pages may drive |" in lines
-    assert "| `~view` | `orbit` |  | `orbit`, `top` |  |" in lines
+    assert "| `~rate_hz` | `10.0` | 1.0 to 30.0 Hz | of updates |" in lines
+    assert "| `~port` | `8088` | 0 to 65,535 |  |" in lines
+    assert "| `~control` | `false` | true, false | whether pages may drive |" in lines
+    assert "| `~view` | `orbit` | `orbit`, `top` |  |" in lines
