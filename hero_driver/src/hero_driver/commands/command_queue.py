@@ -135,7 +135,9 @@ class CommandQueue:
 
         Not for newer ones: another program's stream of zeros would hold it up for ever.
         """
-        return shaper.has_motion and any(
+        if len(self._shapers) == 1 or not shaper.has_motion:
+            return False
+        return any(
             other is not shaper and other.has_stop and self._offered_s[other_name] < self._waits_since_s[name]
             for other_name, other in self._shapers.items()
         )

@@ -71,8 +71,10 @@ class Commander:
 
     def has_fallen_silent(self, silence_s: float, now_s: float) -> bool:
         """Return whether it commanded regularly, and has been silent for silence_s and for SILENT_PERIODS."""
+        if now_s - self.commanded_s < silence_s:
+            return False
         period_s = self.find_period_s()
-        return period_s is not None and now_s - self.commanded_s >= max(silence_s, SILENT_PERIODS * period_s)
+        return period_s is not None and now_s - self.commanded_s >= SILENT_PERIODS * period_s
 
 
 class Commanders:
@@ -84,18 +86,20 @@ class Commanders:
         self._by_topic: Dict[str, Commander] = {}
         self._zero: Optional[_Zero] = None  # until its effect shows
 
-    def note_command(self, name: str, commander: Commander, moves: bool, now_s: float) -> Commander:
-        """A command came on the motion topic called name; return its commander, which may be known already."""
-        were_moving = self.are_moving
-        known = self._by_topic.get(name)
-        if known is None or (known.sender, known.source) != (commander.sender, commander.source):
-            known = self._by_topic[name] = commander
-        known.note_command(moves, now_s)
-        if self.are_moving:
+    def note_command(
+        self, name: str, source: str, sender: Any, node: str, moves: bool, now_s: float
+    ) -> Commander:
+        """A command came on the motion topic called name; return its commander. The others are Commander's attributes."""
+        commander = self._by_topic.get(name)
+        ends_motion = not moves and self.are_moving
+        if commander is None or commander.sender is not sender or commander.source != source:
+            commander = self._by_topic[name] = Commander(sender, node, source)
+        commander.note_command(moves, now_s)
+        if moves:
             self._zero = None
-        elif were_moving:
+        elif ends_motion and not self.are_moving:
             self._zero = _Zero(now_s, self._wheels.readings)
-        return known
+        return commander
 
     def find(self, name: str) -> Optional[Commander]:
         """Return what moves the robot on a motion topic, None where its newest command was a stop."""
@@ -105,7 +109,10 @@ class Commanders:
     @property
     def are_moving(self) -> bool:
         """Whether a program has asked for motion, and not for a stop, since the last stop()."""
-        return any(commander.moves for commander in self._by_topic.values())
+        for commander in self._by_topic.values():
+            if commander.moves:
+                return True
+        return False
 
     def stop(self) -> None:
         """The robot is being stopped, whatever was commanded."""

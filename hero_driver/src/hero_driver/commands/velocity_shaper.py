@@ -86,7 +86,7 @@ class VelocityShaper:
     @property
     def is_idle(self) -> bool:
         """Whether nothing waits to be sent."""
-        return not self.has_stop and not self.has_motion
+        return self._newest is None and not self._stop_pending and not self._repeats_left
 
     def offer(self, payload: bytes) -> None:
         """Take a checked command; it replaces one that waits, except a stop."""

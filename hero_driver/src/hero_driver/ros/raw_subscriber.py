@@ -155,8 +155,10 @@ class MessageStream(Reader):
         if self._rest:
             data = self._rest + data
         subscriber = self._subscriber
-        old_end = self._old_length and self._old_length + len(self._rest)
-        self._old_length = max(0, self._old_length - length_read)
+        old_end = 0
+        if self._old_length:
+            old_end = self._old_length + len(self._rest)
+            self._old_length = max(0, self._old_length - length_read)
         position, end = 0, len(data)
         while end - position >= _LENGTH.size:
             length: int = _LENGTH.unpack_from(data, position)[0]

@@ -13,7 +13,7 @@ from typing import Any, Callable, Dict, List, NamedTuple, Optional, Protocol, Se
 
 from ..commands.command_queue import CommandQueue
 from ..commands.command_settings import CommandSettings
-from ..commands.commander import Commander, Commanders
+from ..commands.commander import Commanders
 from ..commands.service_requests import find_request_error, is_success, read_set_odom_pose
 from ..commands.velocity_shaper import STOP_PAYLOADS, check_motor_pulses, check_twist
 from ..corrections import message_layouts
@@ -387,7 +387,7 @@ class RobotBridge:
             sender = subscriber.last_sender
             if sender is not self._newest_sender:
                 self._change_sender(sender, now_s)
-            commander = self._commanders.note_command(name, Commander(sender, self._newest_node, source), moves, now_s)
+            commander = self._commanders.note_command(name, source, sender, self._newest_node, moves, now_s)
             if not moves and (self.tunes(now_s) or self._commanders.has_more_to_stop(commander, now_s)):
                 self._owner.stop_robot(self)
                 return
