@@ -5,18 +5,13 @@ Every picture is recorded in a process of its own, with a ROS master, a driver a
 
 import json
 import math
-import os
-import pty
 import sys
-import threading
-import time
 from pathlib import Path
 
 import rospy
 from drawing import draw_lights, draw_paths
 from geometry_msgs.msg import PoseStamped
 from picture_program import make_pictures
-from sensor_msgs.msg import Joy
 
 from hero_client import Robot
 from hero_sim.world.arena_file import load_arena
@@ -181,60 +176,7 @@ def measure_delay(picture):
             raise SystemExit("measure_delay ended with %d" % program.returncode)
 
 
-def teleop(picture):
-    """A robot that is driven through a terminal with keys."""
-    with Recording(1, arena_file("examples")) as recording:
-        master_fd, slave_fd = pty.openpty()
-        recording.stage.start_example("teleop", stdin=slave_fd, stdout=slave_fd)
-        threading.Thread(target=drain, args=(master_fd,), daemon=True).start()
-        recording.stage.wait_for(lambda: press(master_fd, "w") or recording.watch.rows[0][-1][4] > 0.05, "motion")
-        for keys, seconds in (("w", 2.0), ("q", 3.0), ("w", 2.0), ("e", 3.0), ("a", 1.0), ("w", 3.0), ("x", 1.5)):
-            end_s = time.monotonic() + seconds
-            while time.monotonic() < end_s:
-                press(master_fd, keys)
-                time.sleep(0.05)
-        press(master_fd, "s")
-        recording.wait_until_all_rest("rest", 10.0)
-        draw_one_path(picture, "teleop: keys w, q, w, e, a, w, x, s", recording)
-
-
-def teleop_joy(picture):
-    """A robot that is driven with a stick that goes round."""
-    with Recording(1, arena_file("examples")) as recording:
-        recording.stage.start_example("teleop_joy")
-        stick = rospy.Publisher("/joy", Joy, queue_size=1)
-        recording.stage.wait_for(lambda: stick.get_num_connections(), "teleop_joy")
-        start_s = time.monotonic()
-        while time.monotonic() < start_s + 16.0:
-            phase = (time.monotonic() - start_s) / 16.0 * 2.0 * math.pi
-            stick.publish(Joy(axes=[0.45 * math.copysign(1.0, math.sin(phase)), 0.7], buttons=[0, 0, 0, 0, 1]))
-            time.sleep(0.05)
-        recording.wait_until_all_rest("rest after the stick fell silent", 10.0)
-        draw_one_path(picture, "teleop_joy: stick ahead, to the left, then to the right", recording)
-
-
-def press(master_fd, keys):
-    """Type keys."""
-    os.write(master_fd, keys.encode())
-
-
-def drain(master_fd):
-    """Read what the program shows, or it would wait for a reader."""
-    while os.read(master_fd, 65536):
-        continue
-
-
-def draw_one_path(picture, title, recording):
-    """Draw the path of hero_0, near to it."""
-    rows = recording.paths(0)[0]
-    near = [(float(column.min()) - 0.15, float(column.max()) + 0.15) for column in (rows[:, 1], rows[:, 2])]
-    draw_paths(picture, title, recording.arena, {0: rows}, only_m=near, size_inch=(6, 4.5))
-
-
-PICTURES = {
-    item.__name__: item
-    for item in (random_walk, go_to_goal, swarm_go_to, follow, led_show, measure_delay, teleop, teleop_joy)
-}
+PICTURES = {item.__name__: item for item in (random_walk, go_to_goal, swarm_go_to, follow, led_show, measure_delay)}
 
 
 if __name__ == "__main__":
