@@ -2,32 +2,37 @@
 
 # hero_add_program(NAME [MODULE]): a program NAME for rosrun that calls main() of a module of the package (default: NAME).
 # hero_add_node(NAME [MODULE]): one that takes ROS parameters only; --help prints the docstring of its module.
+# hero_add_script(FILE [ARGUMENT ...]): one that runs a script of plain rospy, as students write it; without arguments of
+# its own the script is a node. --help prints its docstring.
 #
 # Its first line names the interpreter of the build, in the devel and the install space: catkin_install_python() would
 # write "env python3" for the install space, and the first python3 on PATH (pyenv, conda) may have no rospy. A module that is
 # not installed is named in one line. The rospy of Debian 11 calls Thread.isAlive(), which its Python 3.9 no longer has.
 function(hero_add_program name)
-  _hero_write_program(${name} "" ${ARGN})
+  set(module ${name} ${ARGN})
+  list(GET module -1 module)
+  _hero_write_program(${name} "from ${PROJECT_NAME}.${module} import main" "sys.exit(main())")
 endfunction()
 
 function(hero_add_node name)
-  _hero_write_program(${name} "import argparse
-
-argparse.ArgumentParser(
-    prog='${name}',
-    usage='rosrun ${PROJECT_NAME} ${name} [_PARAMETER:=VALUE ...] [TOPIC:=TOPIC ...]',
-    description=sys.modules[main.__module__].__doc__,
-    epilog='Parameters and topics: ${PROJECT_NAME}/README.md',
-    formatter_class=argparse.RawDescriptionHelpFormatter,
-).parse_args([word for word in sys.argv[1:] if ':=' not in word])
-" ${ARGN})
+  set(module ${name} ${ARGN})
+  list(GET module -1 module)
+  _hero_write_program(${name} "from hero_node.command_line import check_node_arguments
+    from ${PROJECT_NAME}.${module} import main" "\
+check_node_arguments('${PROJECT_NAME}', '${name}', sys.modules[main.__module__].__doc__)
+sys.exit(main())")
 endfunction()
 
-function(_hero_write_program name check_arguments)
-  set(module ${name})
-  if(ARGC GREATER 2)
-    set(module ${ARGV2})
-  endif()
+function(hero_add_script file)
+  get_filename_component(name ${file} NAME)
+  get_filename_component(folder ${file} DIRECTORY)
+  string(REPLACE ";" " " arguments "${ARGN}")
+  _hero_write_program(${name} "from hero_node.ros.script import run_script" "\
+run_script('${PROJECT_NAME}', '${file}', '${arguments}'.split())")
+  install(FILES ${file} DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION}/${folder})
+endfunction()
+
+function(_hero_write_program name import call)
   set(program ${CMAKE_CURRENT_BINARY_DIR}/programs/${name})
   # Modules load for a second or more: Ctrl-C then ends the program at once, without a traceback.
   file(WRITE ${program} "#!${PYTHON_EXECUTABLE}
@@ -40,13 +45,11 @@ if not hasattr(Thread, 'isAlive'):
 
 handler = signal.signal(signal.SIGINT, signal.SIG_DFL)
 try:
-    from ${PROJECT_NAME}.${module} import main
+    ${import}
 except ModuleNotFoundError as error:
     sys.exit('${name}: %s; script/bootstrap (or rosdep) installs what all programs need' % error)
-
-${check_arguments}
 signal.signal(signal.SIGINT, handler)
-sys.exit(main())
+${call}
 ")
   install(PROGRAMS ${program} DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
   file(COPY ${program} DESTINATION ${CATKIN_DEVEL_PREFIX}/${CATKIN_PACKAGE_BIN_DESTINATION}

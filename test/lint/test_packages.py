@@ -59,6 +59,9 @@ def find_needs(package, in_tests):
                 needed = needed_package(found.module, package)
                 if needed:
                     needs.setdefault(needed, f"{sources.name_of(path)}:{found.line}")
+    build = sources.ROOT / package / "CMakeLists.txt"
+    if not in_tests and re.search(r"^hero_add_(node|script)\(", build.read_text(encoding="utf-8"), re.MULTILINE):
+        needs.setdefault("hero_node", sources.name_of(build))  # reads their arguments
     return needs
 
 

@@ -31,10 +31,10 @@ PROGRAMS = [
     (path.parent.name, program)
     for path in sorted(ROOT.glob("*/CMakeLists.txt"))
     for program in re.findall(
-        r"hero_add_(?:program|node)\((\w+)", path.read_text().replace("${PROJECT_NAME}", path.parent.name)
+        r"hero_add_(?:program|node|script)\((?:nodes/)?([\w.]+)",
+        path.read_text().replace("${PROJECT_NAME}", path.parent.name),
     )
 ]
-TUTORIALS = sorted(path.name for path in ROOT.glob("hero_tutorial/nodes/*.py"))
 # Debian 13's catkin takes only the second name.
 CMAKE_ARGUMENTS = f"-DPYTHON_EXECUTABLE={sys.executable} -DPython_EXECUTABLE={sys.executable}"
 
@@ -232,15 +232,6 @@ def test_a_module_that_is_not_installed_is_named_in_one_line(workspace):
     (missing / "tqdm.py").write_text("raise ModuleNotFoundError(\"No module named 'tqdm'\")\n")
     output = workspace.run(f"PYTHONPATH={missing}:$PYTHONPATH rosrun hero_recording export 2>&1 || true")
     assert output.startswith("export: No module named 'tqdm'; script/bootstrap") and output.count("\n") == 1
-
-
-def test_tutorial_scripts_are_found_and_import(workspace):
-    """They know no --help, so they are not run but read as modules, which does all but main()."""
-    names = " ".join(TUTORIALS)
-    program = "import runpy, sys\nfor name in sys.argv[1:]:\n    runpy.run_path(name, run_name='read')"
-    workspace.run(
-        f"cd $(catkin_find --first-only --libexec hero_tutorial) && {sys.executable} - {names} <<'END'\n{program}\nEND"
-    )
 
 
 def test_driver_and_simulated_robots_start_and_odometry_arrives(workspace):

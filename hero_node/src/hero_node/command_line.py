@@ -4,13 +4,14 @@ Exit status: 0 done, 1 failed (the line on stderr says why), 2 wrong arguments (
 the output is gone (as shells report a program that ends by a closed pipe). Knows neither ROS nor robots.
 """
 
+import argparse
 import errno
 import io
 import os
 import signal
 import sys
 from contextlib import suppress
-from typing import IO, Callable, NoReturn, Optional, Type
+from typing import IO, Callable, NoReturn, Optional, Sequence, Type
 
 from .texts import make_printable
 
@@ -21,6 +22,7 @@ __all__ = [
     "PIPE_CLOSED",
     "WRONG_ARGUMENTS",
     "call",
+    "check_node_arguments",
     "print_error",
     "run",
     "say",
@@ -72,6 +74,23 @@ def call(main: Callable[[], Optional[int]], *errors: Type[Exception]) -> int:
             lost = _report(error)
             status = status or lost
     return status
+
+
+def check_node_arguments(
+    package: str, name: str, text: Optional[str], arguments: Sequence[str] = ()
+) -> None:
+    """End the process for --help, which prints text, and for arguments other than these and remappings (_x:=1)."""
+    usage = " ".join(arguments) or "[_PARAMETER:=VALUE ...] [TOPIC:=TOPIC ...]"
+    parser = argparse.ArgumentParser(
+        prog=name,
+        usage="rosrun %s %s %s" % (package, name, usage),
+        description=text,
+        epilog="" if arguments else "Parameters and topics: %s/README.md" % package,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    for argument in arguments:
+        parser.add_argument(argument, help=argparse.SUPPRESS)
+    parser.parse_args([word for word in sys.argv[1:] if ":=" not in word])
 
 
 def say(text: str, stream: Optional[IO[str]] = None, end: str = "\n") -> None:

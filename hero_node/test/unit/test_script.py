@@ -47,6 +47,47 @@ def test_errors_of_scripts_are_one_line_and_notebooks_keep_theirs(monkeypatch, i
     assert (sys.excepthook is sys.__excepthook__) == is_notebook
 
 
+def run_lesson(monkeypatch, capsys, tmp_path, *words, arguments=()):
+    """Run a script that prints what it is started with; return its exit status, output and errors."""
+    (tmp_path / "lesson.py").write_text('"""Counts to three."""\nimport sys\nprint(__name__, sys.argv[1:])\n')
+    monkeypatch.setattr(script.rospkg.RosPack, "get_path", lambda self, package: str(tmp_path))
+    monkeypatch.setattr(sys, "argv", ["lesson.py", *words])
+    with pytest.raises(SystemExit) as end:
+        script.run_script("hero_tutorial", "lesson.py", arguments)
+    return (end.value.code, *capsys.readouterr())
+
+
+def test_a_script_of_plain_rospy_prints_its_docstring_for_help(monkeypatch, capsys, tmp_path):
+    status, output, errors = run_lesson(monkeypatch, capsys, tmp_path, "--help")
+    assert (status, errors) == (0, "")
+    assert output.startswith("usage: rosrun hero_tutorial lesson.py") and "Counts to three." in output
+
+
+def test_a_script_of_plain_rospy_refuses_arguments_it_does_not_take(monkeypatch, capsys, tmp_path):
+    status, output, errors = run_lesson(monkeypatch, capsys, tmp_path, "--unknown", "_robot:=1")
+    assert (status, output) == (2, "")
+    assert errors.endswith("lesson.py: error: unrecognized arguments: --unknown\n")
+
+
+def test_a_script_of_plain_rospy_ends_in_one_line_without_a_master(monkeypatch, capsys, tmp_path):
+    monkeypatch.setenv("ROS_MASTER_URI", "http://127.0.0.1:1")
+    status, output, errors = run_lesson(monkeypatch, capsys, tmp_path)
+    assert (status, output) == (1, "")
+    assert errors.startswith("lesson.py: no ROS master at 'http://127.0.0.1:1'") and errors.count("\n") == 1
+
+
+def test_a_script_of_plain_rospy_runs_as_the_main_module(monkeypatch, capsys, tmp_path):
+    monkeypatch.setattr(script, "check_master", lambda: None)
+    assert run_lesson(monkeypatch, capsys, tmp_path, "_x:=1") == (0, "__main__ ['_x:=1']\n", "")
+
+
+def test_a_script_with_arguments_needs_no_master(monkeypatch, capsys, tmp_path):
+    monkeypatch.setenv("ROS_MASTER_URI", "http://127.0.0.1:1")
+    words = ("a.bag", "/odom")
+    answer = run_lesson(monkeypatch, capsys, tmp_path, *words, arguments=("BAG", "TOPIC"))
+    assert answer == (0, "__main__ ['a.bag', '/odom']\n", "")
+
+
 def test_an_error_names_the_line_of_the_script(monkeypatch, capsys, tmp_path):
     path = tmp_path / "square.py"
     path.write_text("def side():\n    raise error\n\n\nside()\n")

@@ -1,22 +1,25 @@
 """The frame of a plain script: a ROS node that starts by itself, errors as one line, a loop with a rate."""
 
+import ast
 import os
+import runpy
 import signal
 import sys
 import threading
 from traceback import walk_tb
 from types import FrameType
-from typing import Any, Iterator, Optional, Type
+from typing import Any, Iterator, NoReturn, Optional, Sequence, Type
 
+import rospkg
 import rospy
 
-from ..command_line import print_error
+from ..command_line import check_node_arguments, print_error, run
 from ..errors import HeroError
 from .master import check_master
 from .ros_clock import ROS_CLOCK
 from .ros_node import start_ros_node
 
-__all__ = ["rate", "start_node"]
+__all__ = ["rate", "run_script", "start_node"]
 
 
 _START = threading.Lock()
@@ -54,6 +57,24 @@ def start_node(name: str = "hero_program") -> None:
             signal.signal(signal.SIGTERM, _raise_exit)
             signal.signal(signal.SIGHUP, _raise_exit)
         start_ros_node(name, anonymous=True)
+
+
+def run_script(package: str, file: str, arguments: Sequence[str]) -> NoReturn:
+    """Run a file of a package, a script of plain rospy, and end the process.
+
+    Without arguments of its own the script is a node, for which a ROS master must answer: rospy would wait for one.
+    """
+    path = os.path.join(rospkg.RosPack().get_path(package), file)
+
+    def main() -> None:
+        with open(path, encoding="utf-8") as script:
+            text = ast.get_docstring(ast.parse(script.read()))
+        check_node_arguments(package, os.path.basename(file), text, arguments)
+        if not arguments:
+            check_master()
+        runpy.run_path(path, run_name="__main__")
+
+    run(main, HeroError)
 
 
 def _print_exception(kind: Type[BaseException], error: BaseException, traceback: Any) -> None:
