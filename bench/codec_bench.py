@@ -1,6 +1,5 @@
 """Times the pure layers on the bytes of one stock robot: packets, session, corrections. One core, no sockets."""
 
-import collections
 import struct
 import time
 import timeit
@@ -62,12 +61,13 @@ def main():
     messages = [event.messages for event in received if isinstance(event, MessagesReceived)]
 
     def correct():
-        sinks = collections.defaultdict(NoSink)
-        corrections = RobotCorrections("/hero_0", settings, sinks, NoSink().publish)
+        sink = NoSink()
+        corrections = RobotCorrections("/hero_0", settings, sink.publish)
         for event in declared:
             if isinstance(event, TopicDeclared) and event.topic.kind.is_from_robot:
                 info = event.topic.info
-                event.topic.receive = corrections.handler_for(info.name, apply_aliases(info.message_type))
+                ros_type = apply_aliases(info.message_type)
+                event.topic.receive = corrections.handler_for(info.name, ros_type, (sink, sink))
         for index, of_burst in enumerate(messages):
             for topic, payload in of_burst:
                 topic.receive(payload, start_ns + index * BURST_NS)

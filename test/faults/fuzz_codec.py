@@ -3,7 +3,6 @@
 fuzz_codec.py [-max_total_time=60] [CORPUS_DIR]
 """
 
-import collections
 import sys
 
 import atheris
@@ -12,7 +11,6 @@ with atheris.instrument_imports():
     from hero_driver.corrections import message_layouts
     from hero_driver.corrections.robot_corrections import CorrectionSettings, RobotCorrections
     from hero_driver.corrections.tick_odometry import WheelGeometry
-    from hero_driver.corrections.wheel_motion import WheelMotion
     from hero_driver.fleet import log_lines
     from hero_driver.rosserial.packets import DEFAULT_MAX_PAYLOAD_LENGTH, OVERHEAD_LENGTH
     from hero_driver.rosserial.session import LogReceived, MessagesReceived, Session, SessionLimits
@@ -39,14 +37,14 @@ def try_bytes(data):
     """Let one robot send data, cut as its first byte says, and correct the messages in it."""
     session = Session(SessionLimits(max_topics=MAX_TOPICS), 0.0)
     sink = Sink()
-    corrections = RobotCorrections("/hero_0", SETTINGS, collections.defaultdict(Sink), sink.publish, WheelMotion())
+    corrections = RobotCorrections("/hero_0", SETTINGS, sink.publish)
     step = 1 + (data[0] if data else 0)
     for index, start in enumerate(range(1, len(data), step)):
         for event in session.receive_bytes(data[start : start + step], 0.01 * index, 1795240942.0):
             if isinstance(event, MessagesReceived):
                 for topic, payload in event.messages:
                     message_type = TYPES.get(topic.info.message_type, topic.info.message_type)
-                    corrections.handler_for(topic.info.name, message_type)(payload, ARRIVAL_NS)
+                    corrections.handler_for(topic.info.name, message_type, (sink, sink))(payload, ARRIVAL_NS)
             elif type(event) is LogReceived:
                 log_lines.read_log_line(event.log.text)
         session.poll(0.01 * index)

@@ -8,7 +8,6 @@ import time
 from typing import Callable, Optional
 
 from .peer import Peer
-from .ros.robot_bridge import RobotBridge
 from .rosserial.errors import RosserialError
 
 HEARD_S = 0.5
@@ -22,11 +21,11 @@ class CommandSender:
     def __init__(
         self,
         call_later: Callable[[float, Callable[[], None]], None],
-        find_peer: Callable[[RobotBridge], Optional[Peer]],
+        find_peer: Callable[[str], Optional[Peer]],
         is_stopped: Callable[[], bool],
         warn_robot: Callable[[Peer, str], None],
     ) -> None:
-        """Take the loop's functions; find_peer gives a robot's connection, warn_robot reports its trouble.
+        """Take the loop's functions; find_peer(namespace) gives a robot's connection, warn_robot reports its trouble.
 
         is_stopped(): whether no robot may get anything but stops.
         """
@@ -46,9 +45,9 @@ class CommandSender:
             return
         peer.link.send_packet(packet)
 
-    def send_commands(self, bridge: RobotBridge) -> None:
+    def send_commands(self, namespace: str) -> None:
         """Send the commands of a robot that may go out; come back for the remainder."""
-        peer = self._find_peer(bridge)
+        peer = self._find_peer(namespace)
         if peer is None:
             return
         if peer.send_due:
@@ -62,7 +61,7 @@ class CommandSender:
         if peer.bridge is None or peer.link.closed:
             return
         now_s = time.monotonic()
-        delay_s = peer.bridge.commands.due_in_s(self._send_ready(peer, now_s), now_s)
+        delay_s = peer.bridge.commands.queue.due_in_s(self._send_ready(peer, now_s), now_s)
         if delay_s is not None:
             peer.send_due = True
             self._call_later(delay_s, lambda: self._send_and_come_back(peer))
@@ -74,14 +73,14 @@ class CommandSender:
             return True
         if self._is_stopped():
             # What a thread of rospy's offered just before the stop.
-            bridge.commands.discard_motion(now_s)
+            bridge.commands.queue.discard_motion(now_s)
         stops_only = peer.wheels.readings > 0 and now_s - peer.session.last_receive_s > HEARD_S
         in_flight = link.read_unacknowledged_length()
         acknowledged = link.handed_length - in_flight >= peer.motion_mark
-        for name, payload in bridge.commands.take(in_flight, acknowledged, stops_only, now_s):
+        for name, payload in bridge.commands.queue.take(in_flight, acknowledged, stops_only, now_s):
             topic_id = bridge.find_id(name)
             if topic_id is None:
-                bridge.refused_commands += 1
+                bridge.commands.refused += 1
                 continue
             self.send_message(peer, topic_id, payload)
             if bridge.is_motion(name):

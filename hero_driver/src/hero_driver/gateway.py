@@ -1,7 +1,7 @@
 """The owner of all conversations: connects links, sessions, the fleet and the robots' bridges.
 
     in    transport -> receive_data() -> session -> events -> fleet -> robot bridge
-    out   robot bridge -> command queue -> send_commands() -> session -> transport
+    out   robot commands -> command queue -> send_commands() -> session -> transport
 
 Everything here runs on the thread of the sockets, except what says otherwise. It never blocks.
 """
@@ -160,7 +160,7 @@ class Gateway(LinkHandler):
     def resume(self, now_s: float) -> None:
         """Keep robots that could not be heard meanwhile, forget commands that waited, and go on with stops at once."""
         for bridge in self.bridges.values():
-            bridge.resume(now_s)
+            bridge.commands.resume(now_s)
         for peer in self.peers.values():
             peer.session.forgive_silence(now_s)
             if peer.stop is not None:
@@ -344,9 +344,9 @@ class Gateway(LinkHandler):
             if peer.refused and peer.record is record and may_come(peer.link.address.host):
                 peer.link.close("the robot with the same id left; this one may try again")
 
-    def _find_peer(self, bridge: RobotBridge) -> Optional[Peer]:
-        """Return the connection of a bridge's robot, None if it is away."""
-        record = self.fleet.robots.get(bridge.identity.namespace)
+    def _find_peer(self, namespace: str) -> Optional[Peer]:
+        """Return the connection of a robot, None if it is away."""
+        record = self.fleet.robots.get(namespace)
         if record is None or record.link is None or record.link.closed:
             return None
         peer: Peer = record.link.peer
@@ -414,15 +414,15 @@ class Gateway(LinkHandler):
     def _list_stoppable(self) -> List[Peer]:
         return [peer for peer in self.peers.values() if can_move(peer)]
 
-    # What bridges ask for.
+    # What the robots' commands ask for.
 
-    def send_commands(self, bridge: RobotBridge) -> None:
+    def send_commands(self, namespace: str) -> None:
         """Send the commands that wait, as soon as the robot can take them."""
-        self._sender.send_commands(bridge)
+        self._sender.send_commands(namespace)
 
-    def stop_robot(self, bridge: RobotBridge) -> None:
-        """Stop the bridge's robot, if it is connected."""
-        peer = self._find_peer(bridge)
+    def stop_robot(self, namespace: str) -> None:
+        """Stop the robot, if it is connected."""
+        peer = self._find_peer(namespace)
         if peer is not None:
             self._stops.begin(peer)
 
@@ -438,7 +438,7 @@ class Gateway(LinkHandler):
         self._loop.call_later(COMMANDER_POLL_S, self._poll_commanders)
         now_s = time.monotonic()
         for bridge in self.bridges.values():
-            bridge.watch_commanders(now_s)
+            bridge.commands.watch_commanders(now_s)
 
     def _poll_fleet(self) -> None:
         self._loop.call_later(FLEET_POLL_S, self._poll_fleet)

@@ -9,7 +9,8 @@ from .corrections.wheel_motion import WheelMotion
 from .fleet import log_lines
 from .fleet.admission import RateLimit
 from .fleet.registry import RobotRecord
-from .ros.robot_bridge import NO_LIGHT, RobotBridge
+from .ros.robot_bridge import RobotBridge
+from .ros.robot_commands import NO_LIGHT
 from .rosserial.payloads import Log
 from .rosserial.session import Session, Topic
 from .transport import Link
@@ -47,7 +48,7 @@ class Peer:
     @property
     def light(self) -> bytes:
         """The color (std_msgs/ColorRGBA) that the robot's light was given last; dark if none is known."""
-        return NO_LIGHT if self.bridge is None else self.bridge.light
+        return NO_LIGHT if self.bridge is None else self.bridge.commands.light
 
     def watch_wheels(self, topic: Topic) -> None:
         """Let the encoder's readings of a robot without a bridge tell of its wheels."""

@@ -43,8 +43,8 @@ class RobotLog:
         if line.boot is not None:
             record.firmware, record.hardware, record.config = line.boot
         if line.tunes is not None:
-            peer.bridge.note_tuning(line.tunes)
-            if line.tunes and not peer.bridge.was_told_to_tune and peer.stop is None:
+            peer.bridge.commands.note_tuning(line.tunes)
+            if line.tunes and not peer.bridge.commands.was_told_to_tune and peer.stop is None:
                 # Left by an earlier driver or connection: nothing else would end it.
                 self._log.log("warn", "%s tunes itself, though not told to by this driver: stopped" % peer.label)
                 self._stop(peer)

@@ -53,7 +53,7 @@ def describe_robot(
     dropped = record.dropped_messages
     problem = ""
     if bridge is not None:
-        dropped += bridge.refused_commands + bridge.commands.dropped + bridge.corrections.refused
+        dropped += bridge.commands.refused + bridge.commands.queue.dropped + bridge.corrections.refused
         problem = bridge.last_error
     packets, bad_packets, received_length = record.packets, record.bad_packets, record.received_length
     if peer is not None:
@@ -82,7 +82,7 @@ def describe_robot(
         record.since_s,
         packets,
         received_length,
-        bridge is not None and bridge.tunes(now_s),
+        bridge is not None and bridge.commands.tunes(now_s),
         problem,
         0 if corrections is None else corrections.corrected_stamps,
         0 if corrections is None else corrections.odometry.resets,

@@ -104,7 +104,7 @@ class StopDelivery:
             return
         now_s = time.monotonic()
         if peer.bridge is not None:
-            peer.bridge.forget_motion()
+            peer.bridge.commands.stop()
         if peer.stop is None:
             peer.stop = StopProgress(now_s, peer.wheels)
             self._peers.append(peer)
@@ -166,7 +166,7 @@ class StopDelivery:
             if peer.stop is None or peer.link.closed:
                 continue
             # While robots may move, a stop is over when the robot is driven again, or at rest.
-            is_driven = not self._is_stopped() and peer.bridge is not None and peer.bridge.is_commanded
+            is_driven = not self._is_stopped() and peer.bridge is not None and peer.bridge.commands.is_commanded
             if not is_driven:
                 self._advance(peer, now_s)
             if is_driven or not (self._is_stopped() or _is_pending(peer)):
@@ -184,14 +184,14 @@ class StopDelivery:
             return
         before = stop.state
         if stop.is_due(peer.has_acknowledged_motion(), now_s):
-            burst = stop.needs_burst(peer.bridge is not None and peer.bridge.tunes(now_s), now_s)
+            burst = stop.needs_burst(peer.bridge is not None and peer.bridge.commands.tunes(now_s), now_s)
             self._send(peer, burst, now_s)
             stop.note_sent(burst, now_s)
         if stop.state is not before:
             if stop.state is StopState.MOVING:
                 self._warn_robot(peer, "its wheels turn although it was stopped")
             elif stop.state is StopState.AT_REST and peer.bridge is not None:
-                peer.bridge.note_tuning(False)
+                peer.bridge.commands.note_tuning(False)
             self._on_change()
 
     @staticmethod
@@ -199,7 +199,7 @@ class StopDelivery:
         peer.link.send_packet(encode_stop(peer, with_burst))
         peer.motion_mark = peer.link.handed_length
         if peer.bridge is not None:
-            peer.bridge.commands.discard_motion(now_s + MOTION_AFTER_S)
+            peer.bridge.commands.queue.discard_motion(now_s + MOTION_AFTER_S)
 
 
 def _is_pending(peer: Peer) -> bool:

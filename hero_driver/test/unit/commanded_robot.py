@@ -20,7 +20,7 @@ from hero_driver.commands.velocity_shaper import STOP_PAYLOADS
 from hero_driver.fleet.namespaces import identify
 from hero_driver.gateway import COMMANDER_POLL_S
 from hero_driver.peer import Peer
-from hero_driver.ros import robot_bridge
+from hero_driver.ros import robot_bridge, robot_commands
 from hero_driver.rosserial import packets
 from hero_driver.rosserial.session import Session, SessionLimits
 
@@ -67,7 +67,7 @@ class Clock:
     def is_the_drivers(self):
         """Let the driver's parts see this time."""
         with contextlib.ExitStack() as stack:
-            for module in (command_sender, stop_delivery, robot_bridge):
+            for module in (command_sender, stop_delivery, robot_commands):
                 stack.enter_context(mock.patch.object(module, "time", self))
             yield self
 
@@ -126,14 +126,14 @@ class CommandedRobot:
         if has_readings:
             clock.call_later(phase_s, self._send_reading)
 
-    # What the bridge asks of the gateway.
+    # What commands ask of the gateway.
 
     @property
     def stopped(self):
         return self.is_stopped
 
-    def send_commands(self, bridge):
-        self.sender.send_commands(bridge)
+    def send_commands(self, namespace):
+        self.sender.send_commands(namespace)
 
     def stop_robot(self, _):
         self.stops.begin(self.peer)
@@ -201,16 +201,16 @@ class CommandedRobot:
     # The programs.
 
     def _watch_commanders(self):
-        self.bridge.watch_commanders(self.clock.now_s)
+        self.bridge.commands.watch_commanders(self.clock.now_s)
         self.clock.call_later(COMMANDER_POLL_S, self._watch_commanders)
 
     def publish(self, name, payload, node="/program", source=None, is_old=False):
         """Let a node publish on a motion topic, or on an alias of it (source)."""
         source = source or name
         sender = self._senders.setdefault((node, source), SimpleNamespace(header={"callerid": node}))
-        self.bridge._subscribers[source] = SimpleNamespace(last_sender=sender, is_old=is_old)
+        self.bridge.commands._subscribers[source] = SimpleNamespace(last_sender=sender, is_old=is_old)
         ros_type = "hero_msgs/Motor" if name == MOTORS else "geometry_msgs/Twist"
-        self.bridge._choose_receiver(name, source, ros_type)(payload)
+        self.bridge.commands.choose_receiver(name, source, ros_type)(payload)
 
     def publish_velocity(self, linear_m_s, name=VELOCITY, **settings):
         """Let a node publish a Twist."""
@@ -225,8 +225,8 @@ class CommandedRobot:
     def command(self, name, payload):
         """Offer a motion command, as the subscriber to its topic does."""
         kind = "hero_msgs/Motor" if name == MOTORS else "geometry_msgs/Twist"
-        self.bridge.commands.offer_motion(name, payload, STOP_PAYLOADS[kind], self.clock.now_s)
-        self.sender.send_commands(self.bridge)
+        self.bridge.commands.queue.offer_motion(name, payload, STOP_PAYLOADS[kind], self.clock.now_s)
+        self.sender.send_commands(self.bridge.identity.namespace)
 
     def drive(self, linear_m_s, name=VELOCITY):
         """Offer a Twist."""

@@ -46,26 +46,15 @@ class ListSink:
         self._outputs.append((self._name, payload))
 
 
-class ListSinks(dict):
-    """The sink of every topic."""
-
-    def __init__(self, outputs, is_wanted):
-        super().__init__()
-        self._outputs = outputs
-        self._is_wanted = is_wanted
-
-    def __missing__(self, name):
-        return ListSink(name, self._outputs, self._is_wanted(name))
+def make_corrections(namespace, outputs, **settings):
+    """Return corrections whose transforms come to the list outputs, as (name, payload)."""
+    return RobotCorrections(namespace, make_settings(**settings), ListSink(TRANSFORMS, outputs).publish)
 
 
-def make_corrections(namespace, outputs, is_wanted=lambda name: True, **settings):
-    """Return corrections of which everything comes to the list outputs, as (name, payload)."""
-    return RobotCorrections(
-        namespace,
-        make_settings(**settings),
-        ListSinks(outputs, is_wanted),
-        ListSink(TRANSFORMS, outputs).publish,
-    )
+def make_handler(corrections, name, message_type, outputs, is_wanted=lambda name: True):
+    """Return the handler of a topic whose messages, and those derived from them, come to the list outputs, too."""
+    names = (name, *corrections.derive_topics(name, message_type))
+    return corrections.handler_for(name, message_type, [ListSink(name, outputs, is_wanted(name)) for name in names])
 
 
 class CorrectedRobot:
@@ -77,12 +66,16 @@ class CorrectedRobot:
 
     def __init__(self, types=None, is_wanted=lambda name: True, **settings):
         self.outputs = []
-        self.corrections = make_corrections("/hero_0", self.outputs, is_wanted, **settings)
+        self._is_wanted = is_wanted
+        self.corrections = make_corrections("/hero_0", self.outputs, **settings)
         self.declare(TYPES if types is None else types)
 
     def declare(self, types):
         """Declare topics, as at the start of a connection."""
-        self._clean = {name: self.corrections.handler_for(name, message_type) for name, message_type in types.items()}
+        self._clean = {
+            name: make_handler(self.corrections, name, message_type, self.outputs, self._is_wanted)
+            for name, message_type in types.items()
+        }
 
     def reconnect(self, rebooted):
         """Begin a new connection with the stock topics."""

@@ -79,7 +79,7 @@ def test_silence_does_not_count_while_the_driver_itself_did_not_run():
     with Clock().is_the_drivers() as clock:
         robot = CommandedRobot(clock, has_readings=True)
         robot.publish_at(10, 2.0)
-        robot.bridge.resume(clock.now_s + 0.5)
+        robot.bridge.commands.resume(clock.now_s + 0.5)
         clock.run(0.8)
         assert robot.motors.is_turning
         clock.run(0.2 + STOP_S)
@@ -200,13 +200,13 @@ def test_an_ordinary_stop_ends_a_tuning_that_the_driver_knows_of(controller, nam
         clock.run(1.0)
         calibration = "/hero_1/%s/pid_calibration" % controller
         robot.bridge._ids[calibration] = 1000
-        assert robot.bridge._send_request(calibration, "std_srvs/Trigger", b"") is None
+        assert robot.bridge.commands.offer_request(calibration, "std_srvs/Trigger", b"") is None
         robot.motors.start_tuning(controller)
         clock.run(2.0)
         robot.publish(name, payload)
         clock.run(1.0)
         assert not robot.motors.is_turning
-        assert not robot.bridge.tunes(clock.now_s)
+        assert not robot.bridge.commands.tunes(clock.now_s)
 
 
 def test_a_command_of_before_the_robot_was_there_does_not_move_it():
@@ -226,6 +226,6 @@ def test_after_a_pause_of_the_driver_a_command_that_waited_is_forgotten():
         robot = CommandedRobot(clock, network_s=0.3, has_readings=True)
         robot.publish_velocity(0.05)
         robot.publish_velocity(0.1)
-        robot.bridge.resume(clock.now_s)
+        robot.bridge.commands.resume(clock.now_s)
         clock.run(2.0)
     assert [speed for _, speed in robot.list_speeds()] == [0.05]

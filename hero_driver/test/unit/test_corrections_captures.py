@@ -5,7 +5,7 @@ import struct
 from collections import Counter
 
 import pytest
-from corrected_robot import make_corrections
+from corrected_robot import make_corrections, make_handler
 from robot_messages import NOW_NS, read_odometry, read_stamp_ns, read_transform
 
 from hero_driver.corrections.robot_corrections import TRANSFORMS
@@ -27,7 +27,7 @@ def clean(data, namespace, start_ns, **settings):
         for event in session.receive_bytes(data[start : start + 1000], 0.0, 0.0):
             if type(event) is TopicDeclared:
                 info = event.topic.info
-                event.topic.receive = corrections.handler_for(info.name, apply_aliases(info.message_type))
+                event.topic.receive = make_handler(corrections, info.name, apply_aliases(info.message_type), outputs)
             elif isinstance(event, MessagesReceived):
                 for topic, payload in event.messages:
                     if topic.info.name.endswith("/set_odom"):

@@ -23,7 +23,7 @@ def make_peer():
     return SimpleNamespace(
         label="hero_1",
         link=SimpleNamespace(address=SimpleNamespace(host="10.0.0.1")),
-        bridge=SimpleNamespace(corrections=SimpleNamespace(note_reboot=lambda: None)),
+        bridge=SimpleNamespace(corrections=SimpleNamespace(note_reboot=lambda: None), commands=SimpleNamespace()),
         record=SimpleNamespace(booted_s=None, dropped_messages=0),
         refused=False,
         boot=None,
@@ -54,8 +54,8 @@ def test_a_robot_that_says_again_and_again_that_it_rebooted_gives_one_line(lines
 @pytest.mark.parametrize(("was_told", "stops"), [(False, 1), (True, 0)])
 def test_a_robot_that_tunes_itself_without_being_told_to_is_stopped(lines, was_told, stops):
     peer, stopped = make_peer(), []
-    peer.bridge.was_told_to_tune, peer.stop = was_told, None
-    peer.bridge.note_tuning = lambda tunes: None
+    peer.bridge.commands.was_told_to_tune, peer.stop = was_told, None
+    peer.bridge.commands.note_tuning = lambda tunes: None
 
     def stop(robot):
         stopped.append(robot)

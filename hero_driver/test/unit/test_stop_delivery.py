@@ -91,12 +91,12 @@ def test_a_motion_just_before_a_stop_does_not_swallow_it():
 def test_a_tuning_that_is_known_ends_with_one_write_that_fits_the_window(controller, phase_s, network_s):
     with Clock().is_the_drivers() as clock:
         robot = make_moving(clock, controller, phase_s=phase_s, network_s=network_s)
-        robot.bridge.note_tuning(True)
+        robot.bridge.commands.note_tuning(True)
         del robot.writes[:]
         stop(robot)
         clock.run(CONFIRMED_S + 0.5 + 4 * network_s)
         assert robot.peer.stop.state is StopState.AT_REST
-        assert not robot.bridge.tunes(clock.now_s)
+        assert not robot.bridge.commands.tunes(clock.now_s)
     assert WINDOW_LENGTH >= max(len(data) for _, data in robot.writes) >= BURST_LIGHTS * 24 + 2 * 56
     assert robot.list_motor_packets() == []
 
@@ -104,7 +104,7 @@ def test_a_tuning_that_is_known_ends_with_one_write_that_fits_the_window(control
 def test_repeated_stops_do_not_fill_the_window_of_a_tuning_robot():
     with Clock().is_the_drivers() as clock:
         robot = make_moving(clock, "velocity_controller")
-        robot.bridge.note_tuning(True)
+        robot.bridge.commands.note_tuning(True)
         del robot.writes[:]
         stop(robot)
         for _ in range(4):
@@ -119,8 +119,8 @@ def test_after_a_burst_the_light_has_the_color_that_it_had_before():
     with Clock().is_the_drivers() as clock:
         robot = make_moving(clock, "velocity_controller")
         for color in (b"old color......!", b"16 bytes of red!"):
-            robot.bridge._receive_command(LIGHT, color)
-        robot.bridge.was_told_to_tune = True
+            robot.bridge.commands._receive_command(LIGHT, color)
+        robot.bridge.commands.was_told_to_tune = True
         clock.run(0.5)
         stop(robot)
         clock.run(3.0)

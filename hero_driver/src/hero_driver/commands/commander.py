@@ -1,7 +1,7 @@
 """Which programs command one robot on its motion topics, how regularly, and whether it takes their zeros. Pure."""
 
 import collections
-from typing import Any, Deque, Dict, NamedTuple, Optional
+from typing import Deque, Dict, NamedTuple, Optional
 
 from ..corrections.wheel_motion import WheelMotion
 from ..robot_constants import MAX_WATCHDOG_S
@@ -41,7 +41,7 @@ class Commander:
         commanded_s: when that came.
     """
 
-    def __init__(self, sender: Any, node: str, source: str) -> None:
+    def __init__(self, sender: object, node: str, source: str) -> None:
         self.sender = sender
         self.node = node
         self.source = source
@@ -87,9 +87,9 @@ class Commanders:
         self._zero: Optional[_Zero] = None  # until its effect shows
 
     def note_command(
-        self, name: str, source: str, sender: Any, node: str, moves: bool, now_s: float
+        self, name: str, source: str, sender: object, node: str, moves: bool, now_s: float
     ) -> Commander:
-        """A command came on the motion topic called name; return its commander. The others are Commander's attributes."""
+        """A command came on the motion topic called name; return its commander. The others are its attributes."""
         commander = self._by_topic.get(name)
         ends_motion = not moves and self.are_moving
         if commander is None or commander.sender is not sender or commander.source != source:

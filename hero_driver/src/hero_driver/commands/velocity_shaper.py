@@ -3,7 +3,7 @@
 The firmware drops a velocity that arrives within 50 ms of the last accepted one, stops included
 (VelocityControl.ino:159, PositionControl.ino:160). So: the newest command wins, commands are spaced, and a
 stop is always sent, twice. Programs therefore send a stop once; one that they fail to send, because they hang or have
-gone, is begun in robot_bridge. Servo pulses (cmd_motor) are shaped alike: the robot reads every 51 ms, so only the
+gone, is begun in robot_commands. Servo pulses (cmd_motor) are shaped alike: the robot reads every 51 ms, so only the
 newest matters, and none may pile up in front of a stop. Pure: payloads and time go in, payloads come out.
 """
 

@@ -7,7 +7,7 @@ import collections
 import functools
 import itertools
 from dataclasses import dataclass, field
-from typing import Any, Callable, DefaultDict, Deque, Dict, Iterator, List, Mapping, Protocol, Tuple
+from typing import Any, Callable, DefaultDict, Deque, Dict, Iterator, List, Mapping, Protocol, Sequence, Tuple
 
 from ..robot_constants import SCAN_TIME_S
 from . import message_layouts
@@ -43,6 +43,15 @@ class Sink(Protocol):
         """Send payload to all subscribers."""
 
 
+class _NoSink:
+    """Of odometry before it is declared."""
+
+    is_wanted = False
+
+    def publish(self, payload: bytes) -> None:
+        """Drop payload."""
+
+
 Handler = Callable[[bytes, int], None]
 """Takes a payload and its arrival (ns)."""
 
@@ -75,19 +84,8 @@ class RobotCorrections:
         wheels: whether its wheels turn.
     """
 
-    def __init__(
-        self,
-        namespace: str,
-        settings: CorrectionSettings,
-        sinks: Mapping[str, Sink],
-        add_transform: AddTransform,
-    ) -> None:
-        """Correct the messages of the robot in namespace.
-
-        sinks: of the topics that were chosen or derived, by their names; add_transform takes transforms of all
-        robots.
-        """
-        self._sinks = sinks
+    def __init__(self, namespace: str, settings: CorrectionSettings, add_transform: AddTransform) -> None:
+        """Correct the messages of the robot in namespace; add_transform takes the transforms of all robots."""
         self._add_transform = add_transform
         self._namespace = namespace
         self._stamps = StampFilter(settings.stamps == "arrival", settings.max_future_s, settings.max_age_s)
@@ -107,8 +105,7 @@ class RobotCorrections:
         self._odom_seqs = self._seqs[self._odom_name]
         self._raw_name = namespace + "/odom_raw"
         self._proximity_name = namespace + "/proximity"
-        self._odom_sink: Sink
-        self._raw_sink: Sink
+        self._odom_sink: Sink = _NoSink()
         self._has_encoder = False
         self._hears_encoder = False
         self._is_first_reading = True
@@ -169,21 +166,24 @@ class RobotCorrections:
             return {self._proximity_name: message_type}
         return {}
 
-    def handler_for(self, name: str, message_type: str) -> Handler:
-        """Return what takes the payloads of the topic called name."""
+    def handler_for(self, name: str, message_type: str, sinks: Sequence[Sink]) -> Handler:
+        """Return what takes the payloads of the topic called name.
+
+        sinks: of this topic, and of those that derive_topics() gives, in its order; none for TRANSFORMS.
+        """
         if name == TRANSFORMS and message_type == "tf2_msgs/TFMessage":
             return self.transforms.correct
-        sink = self._sinks[name]
+        sink = sinks[0]
         if name == self._odom_name and message_type == "nav_msgs/Odometry":
-            self._odom_sink, self._raw_sink = sink, self._sinks[self._raw_name]
-            return self._correct_odometry
+            self._odom_sink = sink
+            return functools.partial(self._correct_odometry, sinks[1])
         if name == self._namespace + "/encoder" and message_type == "hero_msgs/Encoder":
             self._hears_encoder = True
             self._has_encoder = self._uses_ticks
             self._uses_estimate = self._has_encoder and self.odometry.has_reading
             return functools.partial(self._correct_encoder, name, sink)
         if name == self._namespace + "/laser" and message_type == "sensor_msgs/LaserScan":
-            return functools.partial(self._correct_laser, sink, self._sinks[self._proximity_name])
+            return functools.partial(self._correct_laser, sink, sinks[1])
         if name == self._namespace + "/imu" and message_type == "sensor_msgs/Imu":
             return functools.partial(self._correct_stamped, name, sink)
         return lambda payload, _: sink.publish(payload)
@@ -216,13 +216,13 @@ class RobotCorrections:
     # odom and its transform wait for the reading. Where none follows, because it was lost or because another
     # firmware has another order, nothing waits for longer than until the next odom.
 
-    def _correct_odometry(self, payload: bytes, arrival_ns: int) -> None:
+    def _correct_odometry(self, raw_sink: Sink, payload: bytes, arrival_ns: int) -> None:
         stamp_ns = message_layouts.read_stamp_ns(payload)
         if stamp_ns is None:
             self._refused += 1
             return
         self._offsets_ns.append(stamp_ns - arrival_ns)
-        self._raw_sink.publish(payload)
+        raw_sink.publish(payload)
         if not self._hears_encoder:
             velocity = message_layouts.read_odometry_velocity(payload)
             if velocity is not None:

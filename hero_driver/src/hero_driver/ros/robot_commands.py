@@ -1,0 +1,259 @@
+"""Commands on their way to one robot: from the subscriber that receives them to the queue that they are sent from.
+
+    make_subscriber() -> _receive_motion() or _receive_command() -> CommandQueue
+
+Knows which program moves the robot, and stops the robot when that program ends, falls silent or sends no valid command.
+Thread of the sockets.
+"""
+
+import functools
+import math
+import threading
+import time
+from typing import Callable, Dict, Optional, Protocol
+
+from ..commands.command_queue import CommandQueue
+from ..commands.command_settings import CommandSettings
+from ..commands.commander import Commanders
+from ..commands.service_requests import find_request_error
+from ..commands.velocity_shaper import STOP_PAYLOADS, check_motor_pulses, check_twist
+from ..corrections.wheel_motion import WheelMotion
+from ..robot_constants import MAX_WATCHDOG_S
+from ..transport import EventLoop
+from .log_relay import LogRelay
+from .raw_subscriber import RawSubscriber
+from .rospy_internals import read_caller
+
+MOTOR_TYPE = "hero_msgs/Motor"
+CALIBRATION_SUFFIX = "/pid_calibration"
+
+LIGHT_SUFFIX = "/led"
+NO_LIGHT = bytes(16)
+
+TURNS_S = 1.0
+"""A program that commands again so soon after another one has not ended; robots stop 2 s after the last command."""
+
+TUNING_HEARD_S = 1.0
+"""A robot that tunes itself logs up to 47 lines per second (VelocityControl.ino:118)."""
+
+
+class CommandOwner(Protocol):
+    """What commands need of the gateway."""
+
+    stopped: bool
+    """Whether all robots are stopped."""
+
+    def send_commands(self, namespace: str) -> None:
+        """Send the commands that wait for the robot, as soon as it can take them."""
+
+    def stop_robot(self, namespace: str) -> None:
+        """Stop the robot."""
+
+
+class RobotCommands:
+    """The commands of all programs to one robot.
+
+    Attributes:
+        queue: those that wait to be sent.
+        refused: how many the robot was not given.
+        light: the color (std_msgs/ColorRGBA) that its light was given last.
+        was_told_to_tune: whether a program called the service that starts its self-tuning.
+    """
+
+    def __init__(
+        self, namespace: str, owner: CommandOwner, loop: EventLoop, log: LogRelay, settings: CommandSettings
+    ) -> None:
+        """Take the commands for the robot in namespace."""
+        self.queue = CommandQueue(settings.command_max_age_s, threading.Lock())
+        self.refused = 0
+        self.light = NO_LIGHT
+        self.was_told_to_tune = False
+        self._namespace = namespace
+        self._label = namespace.lstrip("/")
+        self._owner = owner
+        self._loop = loop
+        self._log = log
+        self._settings = settings
+        self._connected = False
+        self._commanders = Commanders(WheelMotion())
+        self._subscribers: Dict[str, RawSubscriber] = {}
+        self._newest_sender: object = None  # connection of the newest motion command, and the name of its node
+        self._newest_node = ""
+        self._superseded = ("", -math.inf)  # name of the node that commanded before, and until when
+        self._tuning_heard_s = -math.inf
+
+    # The robot's connection.
+
+    def attach(self, wheels: WheelMotion) -> None:
+        """The robot is connected; wheels shows whether it moves."""
+        self._commanders = Commanders(wheels)
+        self.note_tuning(False)
+        self._connected = True
+
+    def detach(self) -> None:
+        """The robot is away; what waits is dropped."""
+        self._connected = False
+        self.queue.clear()
+
+    # From a program.
+
+    def make_subscriber(self, name: str, source: str, ros_type: str) -> RawSubscriber:
+        """Return the subscriber to source, which is name, a topic that the robot subscribes to, or an alias of it."""
+        receive = self.choose_receiver(name, source, ros_type)
+        subscriber = RawSubscriber(
+            receive, self._loop, functools.partial(self._lose_sender, name, source), ros_type in STOP_PAYLOADS
+        )
+        self._subscribers[source] = subscriber
+        return subscriber
+
+    def choose_receiver(self, name: str, source: str, ros_type: str) -> Callable[[bytes], None]:
+        """Return what takes the messages that come on source."""
+        stop_payload = STOP_PAYLOADS.get(ros_type)
+        if stop_payload is None:
+            return functools.partial(self._receive_command, name)
+        check: Callable[[bytes], Optional[bytes]] = check_motor_pulses
+        if ros_type != MOTOR_TYPE:
+            check = functools.partial(check_twist, clamp=self._settings.clamp)
+        return functools.partial(self._receive_motion, name, source, check, stop_payload)
+
+    def _receive_motion(
+        self,
+        name: str,
+        source: str,
+        check: Callable[[bytes], Optional[bytes]],
+        stop_payload: bytes,
+        payload: bytes,
+    ) -> None:
+        command = check(payload)
+        if command is None:
+            self.refused += 1
+            self._log.log_throttled(
+                "warn",
+                source,
+                "%s: a command on %s is not finite and was refused; correct the program that sends it"
+                % (self._label, source),
+            )
+            if self._commanders.find(name) is not None or self.tunes(time.monotonic()):
+                # It must not go on with what it was told before.
+                self._owner.stop_robot(self._namespace)
+            return
+        moves, subscriber = command != stop_payload, self._subscribers[source]
+        if moves and subscriber.is_old:
+            self.refused += 1
+            self._log.log_throttled(
+                "warn",
+                "old " + source,
+                "%s: a command on %s was refused, because it may be from before the robot, or the driver, was there"
+                " or ran; send it again" % (self._label, source),
+            )
+        elif not self._connected or (moves and self._owner.stopped):
+            self.refused += 1
+        else:
+            now_s = time.monotonic()
+            sender = subscriber.last_sender
+            if sender is not self._newest_sender:
+                self._change_sender(sender, now_s)
+            commander = self._commanders.note_command(name, source, sender, self._newest_node, moves, now_s)
+            if not moves and (self.tunes(now_s) or self._commanders.has_more_to_stop(commander, now_s)):
+                self._owner.stop_robot(self._namespace)
+                return
+            self.queue.offer_motion(name, command, stop_payload, now_s)
+            self._owner.send_commands(self._namespace)
+
+    def _change_sender(self, sender: object, now_s: float) -> None:
+        """Another connection brings the newest command: warn if two programs take turns, not one follows another."""
+        before, after = self._newest_node, read_caller(sender)
+        self._newest_sender, self._newest_node = sender, after
+        if not before or not after or before == after:
+            return
+        if after == self._superseded[0] and now_s - self._superseded[1] < TURNS_S:
+            self._log.log_throttled(
+                "warn",
+                "two programs " + self._label,
+                "%s is commanded by %s and %s at once and obeys the newest command: end one of them"
+                % (self._label, *sorted((before, after))),
+            )
+        self._superseded = before, now_s
+
+    def _receive_command(self, name: str, payload: bytes) -> None:
+        if not self._connected:
+            self.refused += 1
+            return
+        if name.endswith(LIGHT_SUFFIX) and len(payload) == len(NO_LIGHT):
+            self.light = payload
+        self.queue.offer(name, payload)
+        self._owner.send_commands(self._namespace)
+
+    def offer_request(self, name: str, service_type: str, request: bytes) -> Optional[str]:
+        """Take a request of a service; return why it cannot be sent, if so."""
+        fault = find_request_error(service_type, request)
+        if fault is not None:
+            return fault
+        if name.endswith(CALIBRATION_SUFFIX):
+            if not self._settings.allow_self_tuning:
+                return (
+                    "self-tuning spins the robot for up to a minute and finds no gains that the firmware keeps; measure"
+                    " them with hero_calibration calibrate, or set ~allow_self_tuning"
+                )
+            if self._owner.stopped:
+                return "it moves the robot, and all robots are stopped (~stop)"
+            self.was_told_to_tune = True
+        self.queue.offer(name, request)
+        self._owner.send_commands(self._namespace)
+        return None
+
+    def _lose_sender(self, name: str, source: str) -> None:
+        """The program that sent the newest command on source has gone."""
+        commander = self._commanders.find(name)
+        if commander is None or commander.source != source:
+            return
+        if time.monotonic() - commander.commanded_s > MAX_WATCHDOG_S:
+            return
+
+        def stop_orphan() -> None:
+            # Any newer command is another commander's.
+            if self._commanders.find(name) is commander:
+                self._owner.stop_robot(self._namespace)
+
+        self._loop.call_later(self._settings.orphan_stop_s, stop_orphan)
+
+    # From the driver.
+
+    def stop(self) -> None:
+        """Drop the motion commands that wait: the robot is being stopped."""
+        self._commanders.stop()
+        self.queue.discard_motion(time.monotonic())
+
+    def resume(self, now_s: float) -> None:
+        """The driver runs again after a pause: what waits is old, and silence counts from now on."""
+        self.queue.discard_motion(now_s)
+        self._commanders.forgive_silence(now_s)
+
+    @property
+    def is_commanded(self) -> bool:
+        """Whether a program has asked for motion, and not for a stop, since the last stop()."""
+        return self._commanders.are_moving
+
+    def watch_commanders(self, now_s: float) -> None:
+        """Stop the robot if it missed a zero, or if a program that commands it regularly has fallen silent."""
+        if self._commanders.is_zero_missed(now_s):
+            self._owner.stop_robot(self._namespace)
+        silent = self._commanders.find_silent(self._settings.silent_stop_s, now_s)
+        if silent is not None and self._settings.silent_stop_s > 0.0:
+            silence_s = now_s - silent.commanded_s
+            text = "%s is stopped: %s, which commands it regularly, has been silent for %.1f s (~silent_stop_s)"
+            self._log.log_throttled(
+                "warn", "silent " + self._label, text % (self._label, silent.node or "a program", silence_s)
+            )
+            self._owner.stop_robot(self._namespace)
+
+    # Self-tuning.
+
+    def note_tuning(self, tunes: bool) -> None:
+        """The robot said that it tunes itself, or it is known that it has ended that."""
+        self._tuning_heard_s = time.monotonic() if tunes else -math.inf
+        self.was_told_to_tune = self.was_told_to_tune and tunes
+
+    def tunes(self, now_s: float) -> bool:
+        """Return whether the robot tunes itself, as far as its log and the calls to its services tell."""
+        return self.was_told_to_tune or now_s - self._tuning_heard_s < TUNING_HEARD_S
