@@ -1,6 +1,7 @@
 """House rules that can be read off the text of a file; ruff knows the others."""
 
 import ast
+import os
 import re
 
 import sources
@@ -9,7 +10,8 @@ MAX_FILE_LINES = 500
 MAX_TEST_NAME = 70
 MAX_PACE_S = 0.1
 SUFFIXES = ("", *".py .md .rst .launch .test .xml .yaml .yml .toml .txt .msg .srv .action .urdf".split())
-PYTHON = sources.list_python_files()
+CHOSEN = os.environ.get("HERO_LINT_FILES", "").split("\n")  # of script/lint FILE ...
+PYTHON = [path for path in sources.list_python_files() if CHOSEN == [""] or sources.name_of(path) in CHOSEN]
 TESTS = [path for path in PYTHON if "test" in path.parts]
 
 
@@ -71,7 +73,7 @@ def test_names_of_bounds_begin_with_min_or_max():
 def test_constants_of_the_robot_are_equal_in_all_packages():
     """Driver, programs and simulator know the robot independently: a mistake in one must not hide in the others."""
     known = {}
-    for path in [path for path in PYTHON if path.name == "robot_constants.py"]:
+    for path in [path for path in sources.list_python_files() if path.name == "robot_constants.py"]:
         for node in sources.parse(path).body:
             if isinstance(node, ast.Assign) and isinstance(node.value, (ast.Constant, ast.Tuple)):
                 (name,), value = [target.id for target in node.targets], ast.literal_eval(node.value)
