@@ -180,7 +180,7 @@ ROWS = (
     ("cmd_vel delivered, %", "command_delivered_percent", "%.2f"),
     ("cmd_vel latency p50, ms", "command_p50_ms", "%.2f"),
     ("cmd_vel latency p99, ms", "command_p99_ms", "%.2f"),
-    ("last robot synchronised, s", "joined_s", "%.2f"),
+    ("last robot synchronized, s", "joined_s", "%.2f"),
     ("robots thrown out", "thrown_out", "%d"),
     ("server memory, MB", "memory_mb", "%.0f"),
     ("bursts taken of those due, %", "bursts_sent_percent", "%.1f"),

@@ -109,7 +109,7 @@ class EmulatedRobot:
         self.socket = socket.create_connection(address)
         self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, not nagle)
         self.socket.setblocking(False)
-        self.synchronised_s = None
+        self.synchronized_s = None
         self.closed = False
         self.bursts = self.lasers = self.stalls = 0
         self.commands = 0
@@ -118,7 +118,7 @@ class EmulatedRobot:
 
     def count_due(self, now_s):
         """Return how many bursts there should have been at the stock rate."""
-        return 0.0 if self.synchronised_s is None else (now_s - self.synchronised_s) / BURST_PERIOD_S
+        return 0.0 if self.synchronized_s is None else (now_s - self.synchronized_s) / BURST_PERIOD_S
 
     def send(self, data):
         """Send all of data; a server that does not read is counted and waited for."""
@@ -151,8 +151,8 @@ class EmulatedRobot:
         for topic_id, payload in self.reader.receive_bytes(data):
             if topic_id == packets.ID_PUBLISHER:
                 self.send(declare(self.number))
-            elif topic_id == packets.ID_TIME and self.synchronised_s is None:
-                self.synchronised_s = now_s
+            elif topic_id == packets.ID_TIME and self.synchronized_s is None:
+                self.synchronized_s = now_s
                 is_new = True
             elif topic_id == declarations.ID_VELOCITY_CMD_VEL and payload != ZERO:
                 # Zeros are the driver's own: it stops robots whose commander has gone.
@@ -194,7 +194,7 @@ def run(
             if robot.closed:
                 selector.unregister(robot.socket)
         if all_joined_s is None:
-            joined_s = [robot.synchronised_s for robot in robots if robot.synchronised_s is not None]
+            joined_s = [robot.synchronized_s for robot in robots if robot.synchronized_s is not None]
             if len(joined_s) == len(robots):
                 all_joined_s = max(joined_s)
                 measure_end_s = time.monotonic() + seconds

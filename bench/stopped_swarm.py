@@ -103,15 +103,15 @@ class Watch:
         first = int(np.searchsorted(times_s, due_s))
         if first == len(steps):
             return {"rest_s": [None] * len(self._pulses), "path_m": [0.0] * len(self._pulses)}
-        travelled_m = np.diff(np.array([travel_m for _, travel_m in steps[max(first - 1, 0) :]]), axis=0)
-        fast = np.abs(travelled_m).max(axis=2) > REST_M_S * STEP_MS / 1000.0
+        traveled_m = np.diff(np.array([travel_m for _, travel_m in steps[max(first - 1, 0) :]]), axis=0)
+        fast = np.abs(traveled_m).max(axis=2) > REST_M_S * STEP_MS / 1000.0
         last_fast = len(fast) - 1 - fast[::-1].argmax(axis=0)
         ends_s = times_s[first:]
         rests_s = [
             None if moves[-1] else float(ends_s[last] if moves.any() else due_s)
             for moves, last in zip(fast.T, last_fast)
         ]
-        return {"rest_s": rests_s, "path_m": np.abs(travelled_m.mean(axis=2)).sum(axis=0).tolist()}
+        return {"rest_s": rests_s, "path_m": np.abs(traveled_m.mean(axis=2)).sum(axis=0).tolist()}
 
 
 def main():

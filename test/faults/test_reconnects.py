@@ -30,7 +30,7 @@ class Swarm:
         for link in links:
             link.socket.setblocking(True)
             link.socket.settimeout(60.0)
-            while link.synchronised_s is None and not link.closed:
+            while link.synchronized_s is None and not link.closed:
                 link.receive(1.0)
             assert not link.closed, link.number
             link.send_burst(link.templates.make_burst(0, struct.pack("<II", 1, 0)))

@@ -59,7 +59,7 @@ def test_tests_wait_on_conditions_not_on_sleeps():
                 argument = node.args[0]
                 paces = isinstance(argument, ast.Constant) and argument.value <= MAX_PACE_S
                 where = f"{sources.name_of(path)}:{node.lineno}"
-                assert paces or id(node) in in_loops, f"{where}: sleep as synchronisation"
+                assert paces or id(node) in in_loops, f"{where}: sleep as synchronization"
 
 
 def test_names_of_bounds_begin_with_min_or_max():

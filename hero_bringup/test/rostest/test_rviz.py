@@ -38,13 +38,13 @@ def find_blob(picture, color):
 
 
 def find_walls(picture, side_m):
-    """Return the middle (right, down) of a square of grey walls, None if it is not there."""
-    grey = (np.ptp(picture.astype(int), axis=2) < 12) & (picture.mean(axis=2) < 190) & (picture.mean(axis=2) > 60)
+    """Return the middle (right, down) of a square of gray walls, None if it is not there."""
+    gray = (np.ptp(picture.astype(int), axis=2) < 12) & (picture.mean(axis=2) < 190) & (picture.mean(axis=2) > 60)
     length = side_m * ABOVE_PIXELS_PER_M
     middle = []
     for axis in (0, 1):
-        lines = np.flatnonzero(grey.sum(axis=axis) > WALL_SHARE * length)
-        # Edges of panels are grey lines, too; walls are two lines that are as far apart as they should be.
+        lines = np.flatnonzero(gray.sum(axis=axis) > WALL_SHARE * length)
+        # Edges of panels are gray lines, too; walls are two lines that are as far apart as they should be.
         pairs = [(one + other) / 2.0 for one in lines for other in lines if abs(other - one - length) <= WALL_PIXELS]
         if not pairs:
             return None

@@ -13,7 +13,7 @@ from .procedures.infrared import InfraredResult
 from .procedures.motors import MotorResult
 from .procedures.velocity import VelocityResult
 
-_LEFT, _RIGHT, _GREY = "#0072B2", "#D55E00", "0.55"  # two of Okabe and Ito's palette
+_LEFT, _RIGHT, _GRAY = "#0072B2", "#D55E00", "0.55"  # two of Okabe and Ito's palette
 _WHEELS = (("left", _LEFT), ("right", _RIGHT))
 
 
@@ -38,7 +38,7 @@ def _draw_motors(axes: Axes, result: MotorResult) -> None:
         axes.plot(result.pulses_us, speeds, ".-", color=color, linewidth=0.8, markersize=4, label=wheel)
         axes.axvspan(zone.low_us, zone.high_us, color=color, alpha=0.12)
         axes.axvline(zone.center_us, color=color, linewidth=1.2, label="center %.0f us" % zone.center_us)
-    axes.axvline(NOMINAL_CENTER_US, color=_GREY, linestyle=":", label="nominal %d us" % NOMINAL_CENTER_US)
+    axes.axvline(NOMINAL_CENTER_US, color=_GRAY, linestyle=":", label="nominal %d us" % NOMINAL_CENTER_US)
     axes.set_title("Servos: dead zones", fontsize=9)
     axes.set_xlabel("pulse (us)")
     axes.set_ylabel("speed of the wheel (m/s)")
@@ -51,7 +51,7 @@ def _draw_velocity(axes: Axes, result: VelocityResult) -> None:
             for times_s, speeds_m_s in response.curves:
                 axes.plot(times_s, speeds_m_s, style, color=color, linewidth=1.0, label=label)
                 label = ""
-    axes.axhline(STEP_M_S, color=_GREY, linewidth=0.8)
+    axes.axhline(STEP_M_S, color=_GRAY, linewidth=0.8)
     axes.set_title("Wheels: step response", fontsize=9)
     axes.set_xlabel("time since the command (s)")
     axes.set_ylabel("speed, both directions (m/s)")
@@ -60,14 +60,14 @@ def _draw_velocity(axes: Axes, result: VelocityResult) -> None:
 def _draw_ranges(axes: Axes, result: InfraredResult) -> None:
     sensors = np.arange(BEAMS)
     for errors_m, marker, color, label in (
-        (result.before_m, "o", _GREY, "before"),
+        (result.before_m, "o", _GRAY, "before"),
         (result.after_m, "D", _LEFT, "after"),
     ):
         known = np.isfinite(errors_m)
         # A sensor without a calibration has no range.
         label += "" if known.any() else ": no calibration"
         axes.plot(sensors[known], errors_m[known] * 1e3, marker, color=color, markersize=5, label=label)
-    axes.axhline(0.0, color=_GREY, linewidth=0.8)
+    axes.axhline(0.0, color=_GRAY, linewidth=0.8)
     axes.set_xticks(sensors)
     axes.set_xticklabels([name_beam(index).replace(" ", "\n") for index in sensors], fontsize=7)
     axes.set_title("Infrared: range error at 10 cm", fontsize=9)

@@ -2,7 +2,7 @@
 
 Pure: time enters in seconds. It stands on the codec alone. Source: firmware v3.8 as measured: a controller drops
 each Twist that comes within 50 ms after its watchdog was set; an accepted motion sets the watchdog, self-tuning
-keeps setting it, and an accepted zero resets it. Of the motion watchdogs (2, 4 and 1 s) nothing is modelled.
+keeps setting it, and an accepted zero resets it. Of the motion watchdogs (2, 4 and 1 s) nothing is modeled.
 """
 
 import collections

@@ -48,7 +48,7 @@ def test_a_stamp_that_passed_passes_for_nobody_elses_frames():
         assert receive_transforms(robot, ("map", "hero_0/odom"), stamp_ns=stamp_ns) == []
 
 
-def test_a_stamp_of_too_many_nanoseconds_is_normalised():
+def test_a_stamp_of_too_many_nanoseconds_is_normalized():
     robot = CorrectedRobot()
     pair = ("hero_0/base_link", "hero_0/hat_link")
     receive_transforms(robot, pair, stamp_ns=NOW_NS - NS_PER_S)

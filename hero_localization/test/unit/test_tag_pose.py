@@ -67,8 +67,8 @@ def test_covariance_holds_what_noise_of_the_corners_does():
     found = fit_squares(CAMERA, tags, [0.04] * 2000, [0.076] * 2000)
     spread = np.std([fit.pose for fit in found], axis=0)
     systematic = np.array((SYSTEMATIC_M, SYSTEMATIC_M, SYSTEMATIC_RAD))
-    modelled = np.sqrt(np.diagonal(found[0].covariance) - systematic**2)
-    assert spread == pytest.approx(modelled, rel=0.2)
+    modeled = np.sqrt(np.diagonal(found[0].covariance) - systematic**2)
+    assert spread == pytest.approx(modeled, rel=0.2)
 
 
 def test_tag_off_the_robots_center_makes_its_place_depend_on_the_heading():

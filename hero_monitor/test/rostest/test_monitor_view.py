@@ -72,9 +72,9 @@ class ViewTest(unittest.TestCase):
     def tearDown(self):
         self.assertEqual(self.page.errors(), [])
 
-    def show(self, robots, travelled_m=0.0, **fleet):
+    def show(self, robots, traveled_m=0.0, **fleet):
         poses = {
-            robot["name"]: [300 * (index % 10) + round(1000 * travelled_m), 300 * (index // 10), 0]
+            robot["name"]: [300 * (index % 10) + round(1000 * traveled_m), 300 * (index // 10), 0]
             for index, robot in enumerate(robots)
         }
         ranges = {robot["name"]: [None, 120, 0, -1] for robot in robots}

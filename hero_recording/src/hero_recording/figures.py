@@ -28,7 +28,7 @@ NO_COMMANDS = "no commands recorded:\nnothing on /hero_N/velocity_controller/cmd
 
 DELAY_TICKS_MS = (-50, 0, 50, 100, 300, 1000, 3000, 10000)
 
-_GREY = "0.45"
+_GRAY = "0.45"
 _OBSTACLES = {"edgecolor": "black", "linewidth": 1.5}
 """Walls and round obstacles alike."""
 
@@ -75,7 +75,7 @@ class Figures:
         figure = Figure(figsize=(WIDTH_IN, height_in), constrained_layout=True)
         axes = figure.subplots(rows, columns, squeeze=False, **options)
         figure.suptitle(text + "\n", fontsize=12, fontweight="bold")
-        title = {"ha": "center", "va": "top", "fontsize": 8, "color": _GREY, "linespacing": 2.2}
+        title = {"ha": "center", "va": "top", "fontsize": 8, "color": _GRAY, "linespacing": 2.2}
         figure.text(0.5, 0.995, "\n" + self._title, **title)
         return figure, axes
 
@@ -120,11 +120,11 @@ class Figures:
             axes.add_patch(patches.Circle((x_m, y_m), radius_m, fill=False, **_OBSTACLES))
         begin = {"marker": "o", "markerfacecolor": "white", "markersize": 4, "linestyle": ""}
         legend = [
-            Line2D([], [], color=_GREY, label="start", **begin),
-            Line2D([], [], color=_GREY, marker="o", markersize=9, linestyle="", label="end"),
+            Line2D([], [], color=_GRAY, label="start", **begin),
+            Line2D([], [], color=_GRAY, marker="o", markersize=9, linestyle="", label="end"),
         ]
         if any(map(_has_comparable_truth, drawn.values())):
-            legend.append(Line2D([], [], color=_GREY, linewidth=2.2, alpha=0.4, label="ground truth"))
+            legend.append(Line2D([], [], color=_GRAY, linewidth=2.2, alpha=0.4, label="ground truth"))
         if self._seen.walls_m or self._seen.circles_m:
             legend.append(Line2D([], [], color="black", linewidth=1.5, label="walls, obstacles"))
         for robot_id, robot in drawn.items():
@@ -187,7 +187,7 @@ class Figures:
             arrival_s, _, _, _, _, *speeds = robot.odometry.columns()
             command_s, *commands = analysis.end_commands(*robot.commands.columns())
             for axes, measured, commanded in zip(row, speeds, commands):
-                axes.step(self._since_start(command_s), commanded, where="post", color=_GREY, linewidth=0.8)
+                axes.step(self._since_start(command_s), commanded, where="post", color=_GRAY, linewidth=0.8)
                 times_s, values = analysis.break_at_gaps(arrival_s, measured)
                 axes.plot(self._since_start(times_s), values, color=self._colors[robot_id], linewidth=0.8)
                 self._set_time_axis(axes)
@@ -199,7 +199,7 @@ class Figures:
         is_commanded = any(len(robot.commands) for robot in drawn.values())
         handles = [
             Line2D([], [], color="black", linewidth=0.8, label="odometry"),
-            Line2D([], [], color=_GREY, linewidth=0.8, label="commanded" if is_commanded else NO_COMMANDS),
+            Line2D([], [], color=_GRAY, linewidth=0.8, label="commanded" if is_commanded else NO_COMMANDS),
         ]
         figure.legend(handles=handles, loc="upper right", fontsize=8, frameon=False, ncol=2)
         return figure
@@ -272,20 +272,20 @@ class Figures:
         axes = grid[0][0]
         for row, robot in enumerate(self._robots.values()):
             for span in analysis.find_spans(robot.states):
-                width_s, color = max(0.02, span.end_s - span.start_s), STATE_COLORS.get(span.state, _GREY)
+                width_s, color = max(0.02, span.end_s - span.start_s), STATE_COLORS.get(span.state, _GRAY)
                 axes.barh(row, width_s, left=self._since_start(span.start_s), height=0.7, color=color)
             times_s = self._since_start(robot.odometry.columns()[0])
             for start_s, end_s in analysis.find_gaps(times_s):
                 axes.hlines(row, start_s, end_s, color="white", linewidth=2.5)
             if not robot.states and len(times_s):
-                axes.hlines(row, times_s[0], times_s[-1], color=_GREY, linewidth=0.8)
+                axes.hlines(row, times_s[0], times_s[-1], color=_GRAY, linewidth=0.8)
         self._label_rows(axes)
         axes.set_xlim(0.0, self._duration_s)
         axes.set_xlabel("time (s)")
         seen = {report.state for robot in self._robots.values() for report in robot.states}
         handles = [patches.Patch(color=STATE_COLORS[key], label=key) for key in STATE_COLORS if key in seen]
         gap = "no odom for\nmore than %g s" % analysis.ODOMETRY_GAP_S
-        handles.append(patches.Patch(facecolor="white", edgecolor=_GREY, label=gap))
+        handles.append(patches.Patch(facecolor="white", edgecolor=_GRAY, label=gap))
         if not seen:
             text = "the driver's reports (/hero_driver/robots) were not recorded: lines show odometry"
             axes.set_title(text, fontsize=8)
@@ -315,7 +315,7 @@ class Figures:
             position_axes.set_title(name, fontsize=8)
             position_axes.set_ylim(0.0, None)
             yaw_axes.set_xlabel("time (s)")
-            yaw_axes.axhline(0.0, color=_GREY, linewidth=0.5)
+            yaw_axes.axhline(0.0, color=_GRAY, linewidth=0.5)
         grid[0, 0].set_ylabel("position error (mm)")
         grid[1, 0].set_ylabel("heading error (degrees),\npositive: counter-clockwise")
         self._add_legend(grid[0, -1])

@@ -25,13 +25,13 @@ class SimulatedTimeTest(unittest.TestCase):
         wait_for(lambda: len(cls.odom) > 20, "odometry")
 
     def test_stamps_are_simulated_time_and_increase(self):
-        def is_synchronised():
+        def is_synchronized():
             return abs((self.odom[-1].header.stamp - self.clock[-1].clock).to_sec()) < 1.0
 
-        wait_for(is_synchronised, "stamp near the simulated time")
+        wait_for(is_synchronized, "stamp near the simulated time")
         later = self.odom[-1].header.stamp + rospy.Duration(20.0)
         # Not always: where the machine is busy, robots get their time late and set their clocks.
-        wait_for(lambda: self.odom[-1].header.stamp > later and is_synchronised(), "stamp near it 20 s later")
+        wait_for(lambda: self.odom[-1].header.stamp > later and is_synchronized(), "stamp near it 20 s later")
         stamps = [message.header.stamp for message in self.odom]
         self.assertEqual(stamps, sorted(set(stamps)))
 

@@ -1,4 +1,4 @@
-"""Waiting for a condition, which is how tests synchronise."""
+"""Waiting for a condition, which is how tests synchronize."""
 
 import time
 

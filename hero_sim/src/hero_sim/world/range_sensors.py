@@ -36,7 +36,7 @@ NOISE_COUNTS = 1.3
 REACH_M = 0.65
 """Farther than this from a robot's center nothing is looked for: it adds less than the noise of one reading."""
 
-# The diode sees a cone, whose rim is modelled by two more rays of less weight. Half angle and weight are assumptions.
+# The diode sees a cone, whose rim is modeled by two more rays of less weight. Half angle and weight are assumptions.
 _CONE_RAD = np.array([[0.0], [-0.21], [0.21]])
 _CONE_WEIGHT = np.array([[1.0], [0.7], [0.7]])
 _RAYS_X, _RAYS_Y = find_heading((BEAM_ANGLES_RAD + _CONE_RAD).ravel())
