@@ -29,7 +29,7 @@ def build_parser() -> argparse.ArgumentParser:
     add = parser.add_argument
     add("--count", type=int, default=1, metavar="N", help="number of robots (1)")
     add("--first-id", type=int, default=0, metavar="K", help="id of the first robot (0)")
-    add("--arena", metavar="FILE", help="YAML file, or empty, obstacles, maze (a square field that fits the robots)")
+    add("--arena", metavar="FILE", help="YAML file, or empty, obstacles, maze, box, discs (a square that fits them)")
     add("--seed", type=int, default=0, help="seed of all random numbers (0)")
     add("--seconds", type=float, metavar="S", help="end after S simulated seconds")
     add("--speed", type=float, default=1.0, metavar="X", help="simulated seconds per second (%(default)s)")

@@ -6,7 +6,7 @@ The same options give the same robots behind sockets and stepped in process.
 import argparse
 import copy
 import numbers
-from typing import Any, List, Sequence
+from typing import Any, List, Optional, Sequence
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from .errors import OptionError
 from .link.wifi import PROFILES, Radio
 from .robot.servo_pins import CORE_2, CORE_3
 from .robot_constants import MAX_ID
-from .world.arena import Arena, build_default, place_robots
+from .world.arena import Arena, MovableObject, build_default, place_robots
 from .world.arena_file import load_arena
 from .world.robot_errors import RobotErrors, draw_errors, set_known
 from .world.world import World
@@ -112,12 +112,21 @@ def build_world(options: argparse.Namespace, worlds: int = 1) -> World:
     return World(arena, np.concatenate(poses), [rng.world for rng in rngs], errors)
 
 
-def place_worlds(arena: Arena, poses: np.ndarray, seeds: Sequence[int], errors: float) -> World:
-    """Return one world of robots at poses (W, N, 3) for each seed; errors: 0 for robots as on the drawing, 1 usual."""
+def place_worlds(
+    arena: Arena,
+    poses: np.ndarray,
+    seeds: Sequence[int],
+    errors: float,
+    objects: Optional[Sequence[Sequence[MovableObject]]] = None,
+) -> World:
+    """Return one world of robots at poses (W, N, 3) for each seed; errors: 0 for robots as on the drawing, 1 usual.
+
+    objects: of each world; None: those of the arena.
+    """
     worlds, robots, _ = poses.shape
     drawn = draw_errors((_reseed([seed, robot]) for seed in seeds for robot in range(robots)), errors)
     rngs = [np.random.RandomState(seed) for seed in seeds]
-    return World(arena, poses.reshape(worlds * robots, 3), rngs, drawn)
+    return World(arena, poses.reshape(worlds * robots, 3), rngs, drawn, objects)
 
 
 def build_radios(options: argparse.Namespace, worlds: int = 1) -> List[Radio]:

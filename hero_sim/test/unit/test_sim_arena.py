@@ -81,7 +81,7 @@ def test_a_wrong_file_is_refused_with_file_and_reason(tmp_path, text, words):
 
 
 def test_a_file_that_is_not_there_is_refused_with_the_shipped_names():
-    with pytest.raises(OptionError, match="empty, obstacles, maze"):
+    with pytest.raises(OptionError, match="empty, obstacles, maze, box, discs"):
         load_arena("/nowhere/at/all.yaml")
 
 

@@ -18,12 +18,26 @@ from typing import Any, Dict, Optional, Sequence, Tuple
 
 import numpy as np
 
+from hero_client.values.object_sensing import (
+    NO_OBJECTS,
+    Objects,
+    ObjectsInSight,
+    Sight,
+    Things,
+    sense_objects,
+    sense_sight,
+)
 from hero_client.values.sensing import Binary, Neighborhood, Neighbors, sense_binary, sense_neighbors
 
-__all__ = ["Behavior", "Binary", "Command", "Neighborhood", "Neighbors", "Random", "Sensed", "derive_seed", "sense"]
+__all__ = [
+    "Behavior", "Binary", "Command", "Neighborhood", "Neighbors", "Objects", "ObjectsInSight", "Random", "Sensed",
+    "Sight", "derive_seed", "sense",
+]  # fmt: skip
 
 Command = Tuple[Any, Any, Any]
 """linear m/s and angular rad/s, each a number or an array (R,), and the memory for the next step."""
+
+SENSORS = (Binary, Neighbors, Objects, Sight)
 
 
 class Random:
@@ -50,7 +64,8 @@ class Random:
 class Sensed:
     """What R robots sense, as attributes: those below, and one for each sensor of the behavior, by its name.
 
-    A Binary gives an array (R,) of bool, Neighbors a Neighborhood.
+    A Binary gives an array (R,) of bool, Neighbors a Neighborhood, a Sight an array (R,) of NOTHING, OBJECT or ROBOT,
+    and Objects an ObjectsInSight.
 
     Attributes:
         time_s: since the behavior began.
@@ -101,7 +116,7 @@ class Behavior:
 
     def sensors(self) -> Dict[str, Any]:
         """Return the sensors by name."""
-        return {name: value for name, value in self.parameters().items() if isinstance(value, (Binary, Neighbors))}
+        return {name: value for name, value in self.parameters().items() if isinstance(value, SENSORS)}
 
     def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:
         """Return the commands of all robots and what to remember; memory is None in the first step."""
@@ -112,12 +127,19 @@ class Behavior:
         return None
 
 
-def sense(behavior: Behavior, time_s: float, poses: np.ndarray, random: Random) -> Sensed:
-    """Return what the sensors of a behavior tell about poses (W, N, 3); NaN for those that are not known."""
+def sense(
+    behavior: Behavior, time_s: float, poses: np.ndarray, random: Random, things: Things = NO_OBJECTS
+) -> Sensed:
+    """Return what the sensors of a behavior tell about things and poses (W, N, 3), NaN for unknown ones."""
     readings: Dict[str, Any] = {}
     for name, sensor in behavior.sensors().items():
-        read: Any = sense_binary if isinstance(sensor, Binary) else sense_neighbors
-        readings[name] = read(poses, sensor, random)
+        if isinstance(sensor, Sight):
+            readings[name] = sense_sight(poses, things, sensor)
+        elif isinstance(sensor, Objects):
+            readings[name] = sense_objects(poses, things, sensor)
+        else:
+            read: Any = sense_binary if isinstance(sensor, Binary) else sense_neighbors
+            readings[name] = read(poses, sensor, random)
     return Sensed(time_s, poses, readings)
 
 

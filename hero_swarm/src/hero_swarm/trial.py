@@ -7,18 +7,20 @@
 
 import math
 from collections import deque
-from typing import Any, Deque, Iterator, Optional, Sequence, Tuple
+from typing import Any, Deque, Iterator, List, Optional, Sequence, Tuple
 
 import numpy as np
 
+from hero_client.values.object_sensing import Things
 from hero_client.values.robot_constants import BODY_RADIUS_M
 from hero_sim.population import place_worlds
 from hero_sim.stepped.robot_rows import RobotRows
-from hero_sim.world.arena import Arena
+from hero_sim.world.arena import Arena, MovableObject, measure_clearance
+from hero_sim.world.kinematics import Pose
 
 from .behavior import Behavior, Random, derive_seed, sense
 
-__all__ = ["OPEN", "Trial", "scatter"]
+__all__ = ["OPEN", "Trial", "scatter", "scatter_objects"]
 
 OPEN = Arena("open", np.empty((0, 4)), np.empty((0, 3)), (), np.array([-50.0, -50.0, 50.0, 50.0]))
 """A plane without walls."""
@@ -46,6 +48,30 @@ def scatter(robots: int, width_m: float, height_m: float, seed: int, gap_m: floa
     raise ValueError("%d robots find no place in %g m x %g m" % (robots, width_m, height_m))
 
 
+def scatter_objects(arena: Arena, robots: np.ndarray, seed: int) -> List[MovableObject]:
+    """Return the arena's objects at places drawn from seed: inside its bounds, clear of all else and of robots (N, 3).
+
+    Raises: ValueError if they find no place.
+    """
+    random = np.random.RandomState(derive_seed(seed, "objects"))
+    low_m, high_m = arena.bounds_m[:2], arena.bounds_m[2:]
+    placed: List[MovableObject] = []
+    taken = [(x_m, y_m, BODY_RADIUS_M) for x_m, y_m in robots[:, :2].tolist()]
+    for thing in arena.objects:
+        reach_m = thing.shape.reach_m
+        for _ in range(_MAX_TRIES):
+            x_share, y_share, turn = random.random_sample(3)
+            x_m, y_m = (low_m + (high_m - low_m) * (x_share, y_share)).tolist()
+            free = measure_clearance(np.array([[x_m, y_m]]), arena)[0] > reach_m
+            if free and all(math.hypot(x_m - x, y_m - y) > reach_m + radius_m for x, y, radius_m in taken):
+                taken.append((x_m, y_m, reach_m))
+                placed.append(thing._replace(pose=Pose(x_m, y_m, math.pi * (2.0 * turn - 1.0))))
+                break
+        else:
+            raise ValueError("%d objects find no place in arena %s" % (len(arena.objects), arena.name))
+    return placed
+
+
 class Trial:
     """One behavior on W worlds with N robots each.
 
@@ -67,25 +93,34 @@ class Trial:
         delay_s: float = 0.0,
         filter_commands: Any = None,
         starts: Optional[np.ndarray] = None,
+        objects: Optional[Sequence[Sequence[MovableObject]]] = None,
     ) -> None:
         """Put robots at starts (W, N, 3), or scatter them over size_m, or over the arena. Each seed is one world.
 
         errors: 0 for robots as on the drawing, 1 for usual ones. delay_s: age of the poses that robots sense each
         other by. filter_commands: called with poses (W, N, 3), linear and angular speeds (W, N), returns speeds.
+        objects: of each world; None: those of the arena, where it has them.
         """
         x_min, y_min, x_max, y_max = arena.bounds_m
         width_m, height_m = (x_max - x_min, y_max - y_min) if size_m is None else size_m
         if starts is None:
             starts = np.array([scatter(robots, width_m, height_m, seed) for seed in seeds])
         self.behavior = behavior
-        self.rows = RobotRows(place_worlds(arena, starts, seeds, errors))
+        self.rows = RobotRows(place_worlds(arena, starts, seeds, errors, objects))
         self.poses, self.velocities = starts, np.zeros_like(starts)
         self.memory: Any = None
         self._random = Random([derive_seed(seed, "behavior") for seed in seeds], robots)
         self._delay_s = delay_s
         self._filter = filter_commands
         self._seen: Deque[Tuple[float, np.ndarray]] = deque([(-math.inf, starts)])
+        objects = [arena.objects] if objects is None else objects
+        self._radii_m = np.array([thing.shape.reach_m for thing in objects[0]])
         self._all = np.arange(starts.shape[0] * robots)
+
+    @property
+    def things(self) -> Things:
+        """The objects of all worlds, where they are now."""
+        return Things(self.rows.world.object_poses, self._radii_m)
 
     def step(self) -> float:
         """Take one control step, let its time pass, and return the time (s)."""
@@ -97,7 +132,7 @@ class Trial:
         while len(self._seen) > 1 and self._seen[1][0] <= now_s - self._delay_s + 1e-9:
             self._seen.popleft()
         sensed_poses = self._seen[0][1]
-        sensed = sense(self.behavior, now_s, sensed_poses, self._random)
+        sensed = sense(self.behavior, now_s, sensed_poses, self._random, self.things)
         linear_m_s, angular_rad_s, self.memory = self.behavior.step(sensed, self.memory, self._random)
         if self._filter is not None:
             shape = self.poses.shape[:2]

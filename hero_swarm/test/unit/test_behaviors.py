@@ -5,16 +5,19 @@ import inspect
 import numpy as np
 import pytest
 
-from hero_sim.world.arena import build_rectangle
+from hero_sim.world.arena import build_rectangle, place_robots
+from hero_sim.world.arena_file import load_arena
 from hero_swarm import metrics
 from hero_swarm.behavior import Behavior
 from hero_swarm.behaviors import find_behavior, list_names
 from hero_swarm.behaviors.consensus import Formation, LeaderFollowers
 from hero_swarm.behaviors.coverage import VoronoiCoverage
-from hero_swarm.trial import OPEN, Trial
+from hero_swarm.trial import OPEN, Trial, scatter_objects
 
 ARENA = build_rectangle(1.71, 1.42, 1)
 SQUARE = build_rectangle(2.0, 2.0, 1)
+BOX = load_arena("box")
+DISCS = build_rectangle(1.6, 1.6, 1)._replace(objects=load_arena("discs").objects[:8])
 SEEDS = (1, 2)
 
 
@@ -31,7 +34,12 @@ class RandomWalk(Behavior):
 
 def measure(behavior, metric, robots, time_s, arena=OPEN, size_m=(1.5, 1.5), last_s=30):
     """Return the median of a metric (poses, velocities, trial) over the last seconds, for each seed."""
-    trial = Trial(behavior, arena, robots, SEEDS, size_m)
+    starts = objects = None
+    if arena.objects:
+        starts = np.array([place_robots(arena, robots, np.random.RandomState(seed)) for seed in SEEDS])
+    if arena is DISCS:
+        objects = [scatter_objects(arena, poses, seed) for poses, seed in zip(starts, SEEDS)]
+    trial = Trial(behavior, arena, robots, SEEDS, size_m, starts=starts, objects=objects)
     values = [
         metric(poses, trial.velocities, trial) for time, poses in trial.run(time_s) if time >= time_s - last_s
     ]
@@ -39,7 +47,7 @@ def measure(behavior, metric, robots, time_s, arena=OPEN, size_m=(1.5, 1.5), las
 
 
 def by_name(name):
-    return lambda poses, velocities, trial: metrics.METRICS[name](poses, velocities)
+    return lambda poses, velocities, trial: metrics.METRICS[name](poses, velocities, trial.things.poses)
 
 
 def measure_side_error(poses, velocities, trial):
@@ -115,6 +123,9 @@ CASES = {
     "leader_followers": (measure_gap_error, 0.06, False, 5, 60, OPEN, (1.0, 1.0)),
     "formation": (measure_side_error, 0.1, False, 6, 60, OPEN, (0.8, 0.8)),
     "coverage": (measure_way_to_center, 0.03, False, 12, 60, SQUARE, (0.8, 0.8)),
+    "object_clustering": (by_name("object_cluster_fraction"), 0.8, True, 4, 90, DISCS, None),
+    "box_pushing": (by_name("object_distance"), 0.1, False, 2, 70, BOX, None),
+    "cooperative_transport": (by_name("object_distance"), 0.1, False, 4, 60, BOX, None),
     "voter": (measure_agreement, 0.8, True, 6, 200, SQUARE, None),
     "majority": (measure_agreement, 0.85, True, 9, 160, SQUARE, None),
 }

@@ -12,7 +12,7 @@ import numpy as np
 
 from .robot_constants import BODY_RADIUS_M
 
-__all__ = ["Binary", "Neighborhood", "Neighbors", "sense_binary", "sense_neighbors"]
+__all__ = ["Binary", "Neighborhood", "Neighbors", "look_at", "sense_binary", "sense_neighbors"]
 
 
 class Binary(NamedTuple):
@@ -78,11 +78,10 @@ class Neighborhood(NamedTuple):
         return (values * self.seen).sum(axis=1) / np.maximum(self.counts, 1)
 
 
-def _look(poses: np.ndarray, forward_m: float) -> Any:
-    """Return where all robots are (W, N, N), to the front and to the left, from a point forward_m in front of each."""
-    x_m, y_m, yaw_rad = np.moveaxis(poses, -1, 0)
-    cosine, sine = np.cos(yaw_rad)[..., None], np.sin(yaw_rad)[..., None]
-    to_x_m, to_y_m = x_m[:, None, :] - x_m[..., None], y_m[:, None, :] - y_m[..., None]
+def look_at(poses: np.ndarray, others: np.ndarray, forward_m: float) -> Any:
+    """Return where others (W, M, 3) are, to the front and to the left (W, N, M), forward_m ahead of each robot."""
+    cosine, sine = np.cos(poses[..., 2])[..., None], np.sin(poses[..., 2])[..., None]
+    to_x_m, to_y_m = (others[:, None, :, axis] - poses[:, :, None, axis] for axis in (0, 1))
     return cosine * to_x_m + sine * to_y_m - forward_m, cosine * to_y_m - sine * to_x_m
 
 
@@ -91,7 +90,7 @@ def sense_binary(poses: np.ndarray, sensor: Binary, random: Optional[Any] = None
 
     random: needed for a sensor with errors; random.random() returns one number from 0 to 1 for each robot (W * N,).
     """
-    ahead_m, left_m = _look(poses, BODY_RADIUS_M)
+    ahead_m, left_m = look_at(poses, poses, BODY_RADIUS_M)
     with np.errstate(invalid="ignore"):
         square_m2 = ahead_m * ahead_m + left_m * left_m
         # The tangents to a body span an angle whose sine is its radius over the distance of its center.
@@ -120,7 +119,7 @@ def sense_neighbors(poses: np.ndarray, sensor: Neighbors, random: Optional[Any] 
     random: needed for noise and drop-outs; random.normal(N) and random.random(N) return arrays (W * N, N).
     """
     worlds, robots, _ = poses.shape
-    forward_m, left_m = _look(poses, 0.0)
+    forward_m, left_m = look_at(poses, poses, 0.0)
     with np.errstate(invalid="ignore"):
         range_m = np.hypot(forward_m, left_m)
         seen = range_m <= sensor.range_m

@@ -20,7 +20,7 @@ from .pushing.shapes import Disc, Polygon, Shape
 
 __all__ = ["SHIPPED", "load_arena"]
 
-SHIPPED = ("empty", "obstacles", "maze")
+SHIPPED = ("empty", "obstacles", "maze", "box", "discs")
 """Arenas that come with the simulator; --arena takes these names too."""
 
 _MAX_COORDINATE_M = 1000.0

@@ -4,11 +4,11 @@ Pure: numpy only, over all robots of all worlds at once, quantities first and ro
 """
 
 import math
-from typing import Iterable, List
+from typing import Iterable, List, Sequence
 
 import numpy as np
 
-from .arena import Arena
+from .arena import Arena, MovableObject
 from .contacts import Contacts
 from .kinematics import find_heading, follow_arcs, join_wheels
 from .pushing.pushing import Place, Pushing
@@ -26,17 +26,16 @@ class BodyMotion:
     Attributes:
         poses: x m, y m, theta rad in the frame world (3, R); updated in place.
         headings: cosine and sine of theta (2, R); updated in place.
-        pushing: of each world with objects; empty if the arena has none.
+        pushing: of each world with objects; empty if there are none.
     """
 
-    def __init__(self, arena: Arena, worlds: int, poses: np.ndarray) -> None:
-        """Place the bodies at poses (3, R)."""
+    def __init__(self, arena: Arena, objects: Sequence[Sequence[MovableObject]], poses: np.ndarray) -> None:
+        """Place the bodies at poses (3, R), and the objects of each world."""
         self.poses = poses
         self.headings = np.array(find_heading(poses[2]))
-        self.contacts = Contacts(arena, worlds, poses.shape[1])
+        self.contacts = Contacts(arena, len(objects), poses.shape[1])
         obstacles = arena.segments_m.tolist(), arena.circles_m.tolist()
-        objects = [[thing.put_down() for thing in arena.objects] for _ in range(worlds if arena.objects else 0)]
-        self.pushing = [Pushing(bodies, *obstacles) for bodies in objects]
+        self.pushing = [Pushing([thing.put_down() for thing in things], *obstacles) for things in objects if things]
 
     def roll(self, ground_m: np.ndarray) -> None:
         """Move all bodies by K steps of their left and right wheels over the ground (K, 2, R)."""

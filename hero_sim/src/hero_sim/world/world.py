@@ -11,7 +11,7 @@ from typing import List, NamedTuple, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
-from .arena import Arena, Segments
+from .arena import Arena, MovableObject, Segments
 from .body_motion import BodyMotion
 from .kinematics import join_wheels
 from .noise import draw_normal
@@ -70,9 +70,17 @@ class World:
     """
 
     def __init__(
-        self, arena: Arena, poses: np.ndarray, rngs: Sequence[np.random.RandomState], errors: RobotErrors
+        self,
+        arena: Arena,
+        poses: np.ndarray,
+        rngs: Sequence[np.random.RandomState],
+        errors: RobotErrors,
+        objects: Optional[Sequence[Sequence[MovableObject]]] = None,
     ) -> None:
-        """Place robots at poses (R, 3); slip, ripple and sensor noise of each world are drawn from one of rngs."""
+        """Place robots at poses (R, 3); slip, ripple and sensor noise of each world are drawn from one of rngs.
+
+        objects: of each world, where they are in it; None: those of the arena.
+        """
         # Inside, quantities come first and robots last: whole rows of memory are computed with.
         rows = len(poses)
         self.arena = arena
@@ -84,7 +92,8 @@ class World:
         self._views = 0
         self._scan_seeds = [int(rng.randint(0, 2**31 - 1)) for rng in rngs]
         self._scan_rng = np.random.RandomState(0)
-        self._bodies = BodyMotion(arena, self.worlds, np.array(poses, dtype=float).reshape(rows, 3).T.copy())
+        objects = [arena.objects] * self.worlds if objects is None else objects
+        self._bodies = BodyMotion(arena, objects, np.array(poses, dtype=float).reshape(rows, 3).T.copy())
         self._poses = self._bodies.poses.T
         self._poses.flags.writeable = False
         self._commands = np.zeros((2, rows))
@@ -182,6 +191,13 @@ class World:
         edges_m, discs_m = pushing.list_outlines()
         walls_m = np.vstack((self.arena.segments_m, np.reshape(edges_m, (-1, 4))))
         return Segments.from_ends(walls_m), np.vstack((self.arena.circles_m, np.reshape(discs_m, (-1, 3))))
+
+    @property
+    def object_poses(self) -> np.ndarray:
+        """True poses of the objects at time_ms (W, M, 3), as of robots; each world has as many."""
+        self._move_bodies()
+        worlds = [[pushed.pose for pushed in pushing.bodies] for pushing in self._bodies.pushing]
+        return np.array(worlds, dtype=float).reshape(self.worlds, -1, 3) if worlds else np.empty((self.worlds, 0, 3))
 
     def list_objects(self) -> List[Body]:
         """Return the objects of the first world, where they are at time_ms."""

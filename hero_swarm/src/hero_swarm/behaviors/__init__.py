@@ -24,6 +24,9 @@ _MODULES: Dict[str, str] = {
     "leader_followers": "consensus.LeaderFollowers",
     "formation": "consensus.Formation",
     "coverage": "coverage.VoronoiCoverage",
+    "object_clustering": "pushing.ObjectClustering",
+    "box_pushing": "pushing.BoxPushing",
+    "cooperative_transport": "pushing.CooperativeTransport",
     "voter": "voting.Voter",
     "majority": "voting.Majority",
 }

@@ -16,14 +16,14 @@ from hero_sim.errors import OptionError
 from hero_sim.world.arena import Arena
 from hero_sim.world.arena_file import load_arena
 
-from ..behavior import Behavior
+from ..behavior import Behavior, Objects
 from ..behaviors import find_behavior
 from ..metrics import METRICS
 from ..trial import OPEN, Trial
 from .errors import ExperimentError
 from .experiment_file import ERRORS, Cell, Experiment, Metric, parse_experiment
 from .results_folder import Run
-from .starts import place_all
+from .starts import place_all, place_objects
 from .streams import Stream, open_stream
 
 __all__ = [
@@ -57,8 +57,12 @@ def load_checked(experiment: Experiment) -> None:
     Raises: ExperimentError.
     """
     for cell in experiment.cells:
-        _build_behavior(experiment, cell)
-        place_all(experiment.start, _load_arena(cell), cell.settings["robots"], experiment.seeds[:1])
+        behavior = _build_behavior(experiment, cell)
+        arena, seeds = _load_arena(cell), experiment.seeds[:1]
+        if not arena.objects and any(isinstance(sensor, Objects) for sensor in behavior.sensors().values()):
+            raise ExperimentError("%s pushes objects: choose an arena with them, such as box" % experiment.behavior)
+        starts = place_all(experiment.start, arena, cell.settings["robots"], seeds)
+        place_objects(cell.settings.get("objects", "arena"), arena, starts, seeds)
 
 
 def _build_behavior(experiment: Experiment, cell: Cell) -> Behavior:
@@ -89,12 +93,14 @@ def compute_batch(
     experiment = parse_experiment(text, "the experiment", METRICS)
     cell = experiment.cells[cell_index]
     behavior, arena = _build_behavior(experiment, cell), _load_arena(cell)
+    starts = place_all(experiment.start, arena, cell.settings["robots"], seeds)
     trial = Trial(
         behavior,
         arena,
         cell.settings["robots"],
         seeds,
-        starts=place_all(experiment.start, arena, cell.settings["robots"], seeds),
+        starts=starts,
+        objects=place_objects(cell.settings.get("objects", "arena"), arena, starts, seeds),
         errors=ERRORS[cell.settings.get("errors", "default")],
         delay_s=cell.settings.get("delay_s", 0.0),
     )
@@ -154,7 +160,8 @@ def _run(experiment: Experiment, trial: Trial, stem: str, with_poses: bool) -> T
             poses_file.append(np.where(running[:, None, None], poses, np.nan))
         sample = math.floor(now_s / SAMPLE_S + 1e-6)
         if sample < samples and np.isnan(series[sample]).all():
-            series[sample] = np.column_stack([METRICS[name](poses, velocities) for name in names])
+            objects = trial.things.poses
+            series[sample] = np.column_stack([METRICS[name](poses, velocities, objects) for name in names])
             if until is not None:
                 held = running & until.holds(series[sample, :, names.index(until.metric)])
                 ends[held], running[held] = sample, False

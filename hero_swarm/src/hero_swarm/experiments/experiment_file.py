@@ -26,9 +26,11 @@ MAX_SEED = 2**31 - 1
 MAX_RUNS = 1_000_000
 
 START_KINDS = ("uniform", "grid", "circle", "file", "arena")
-SETTINGS = ("robots", "errors", "delay_s", "arena")
+SETTINGS = ("robots", "errors", "delay_s", "arena", "objects")
 ERRORS = {"perfect": 0.0, "default": 1.0}
 """How far robots are from the drawing, as the simulator takes it."""
+OBJECTS = ("arena", "scattered")
+"""Where what robots push is at the start: as in the arena, or at places drawn from each seed."""
 TESTS = ("wilcoxon",)
 _REQUIRED = ("behavior", "time_s", "seeds", "metrics")
 _KEYS = (
@@ -90,7 +92,7 @@ class Cell(NamedTuple):
 
     Attributes:
         varied: name -> value, in the order of the file: the columns of the results.
-        settings: robots, errors, delay_s (age of the poses that robots sense each other by), arena.
+        settings: robots, errors, delay_s (age of the poses that robots sense each other by), arena, objects.
         parameters: name -> value, of the behavior.
     """
 
@@ -204,6 +206,8 @@ def _parse_setting(name: str, entry: Entry) -> Any:
         return entry.whole(1, MAX_ROBOTS)
     if name == "delay_s":
         return entry.number(0.0, 10.0, "s")
+    if name == "objects":
+        return entry.choice(OBJECTS)
     return entry.choice(tuple(ERRORS)) if name == "errors" else entry.text()
 
 

@@ -1,20 +1,20 @@
 """Where the robots of a run begin, which depends on seed and number alone. Pure but for a file."""
 
 import math
-from typing import List, Sequence
+from typing import List, Optional, Sequence
 
 import numpy as np
 
 from hero_client.values.robot_constants import BODY_RADIUS_M
 from hero_sim.errors import OptionError
-from hero_sim.world.arena import Arena, place_robots
+from hero_sim.world.arena import Arena, MovableObject, place_robots
 
 from ..behavior import derive_seed
-from ..trial import scatter
+from ..trial import scatter, scatter_objects
 from .errors import ExperimentError
 from .experiment_file import Start
 
-__all__ = ["place_all"]
+__all__ = ["place_all", "place_objects"]
 
 _DIAMETER_M = 2.0 * BODY_RADIUS_M
 
@@ -28,6 +28,21 @@ def place_all(start: Start, arena: Arena, robots: int, seeds: Sequence[int]) -> 
         return np.array([_place(start, arena, robots, seed) for seed in seeds])
     except (OptionError, ValueError) as error:
         raise ExperimentError("start: %s" % error) from error
+
+
+def place_objects(
+    where: str, arena: Arena, starts: np.ndarray, seeds: Sequence[int]
+) -> Optional[List[List[MovableObject]]]:
+    """Return the objects of one world for each seed, with robots at starts (W, N, 3); None: as they are in the arena.
+
+    Raises: ExperimentError if they find no place.
+    """
+    if where == "arena":
+        return None
+    try:
+        return [scatter_objects(arena, poses, seed) for poses, seed in zip(starts, seeds)]
+    except ValueError as error:
+        raise ExperimentError("objects: %s" % error) from error
 
 
 def _place(start: Start, arena: Arena, robots: int, seed: int) -> np.ndarray:

@@ -6,33 +6,38 @@ import numpy as np
 
 from .graphs import algebraic_connectivity, cluster_fraction, collisions, nearest_neighbor
 from .motion import consensus_error, order, rotation
+from .objects import object_cluster_fraction, object_distance
 from .shapes import coverage, dispersion, dispersion_ratio, fatness, hull_area
 
 __all__ = [
     "METRICS", "UNITS", "algebraic_connectivity", "cluster_fraction", "collisions", "consensus_error",
     "coverage", "dispersion",
-    "dispersion_ratio", "fatness", "hull_area", "nearest_neighbor", "order", "rotation", "time_until",
+    "dispersion_ratio", "fatness", "hull_area", "nearest_neighbor",
+    "object_cluster_fraction", "object_distance", "order", "rotation", "time_until",
 ]  # fmt: skip
 
-Metric = Callable[[np.ndarray, np.ndarray], np.ndarray]
-"""Of poses and of velocities (W, N, 3), both in the common frame; returns one number for each world (W,)."""
+Metric = Callable[..., np.ndarray]
+"""Of poses and velocities (W, N, 3), both in the common frame, and of the poses of objects (W, M, 3), which may be left
+out where none count; returns one number for each world (W,)."""
 
 METRICS: Dict[str, Metric] = {
-    "algebraic_connectivity": lambda poses, velocities: algebraic_connectivity(poses[..., :2], 0.5),
-    "cluster_fraction": lambda poses, velocities: cluster_fraction(poses[..., :2]),
-    "collisions": lambda poses, velocities: collisions(poses[..., :2]).astype(float),
-    "consensus_error": lambda poses, velocities: consensus_error(poses[..., :2]),
-    "dispersion": lambda poses, velocities: dispersion(poses[..., :2]),
-    "dispersion_ratio": lambda poses, velocities: dispersion_ratio(poses[..., :2]),
-    "fatness": lambda poses, velocities: fatness(poses[..., :2]),
-    "hull_area": lambda poses, velocities: hull_area(poses[..., :2]),
-    "nearest_neighbor": lambda poses, velocities: nearest_neighbor(poses[..., :2]),
-    "order": lambda poses, velocities: order(poses[..., 2]),
-    "rotation": lambda poses, velocities: rotation(poses[..., :2], velocities[..., :2]),
+    "algebraic_connectivity": lambda poses, velocities, objects=None: algebraic_connectivity(poses[..., :2], 0.5),
+    "cluster_fraction": lambda poses, velocities, objects=None: cluster_fraction(poses[..., :2]),
+    "collisions": lambda poses, velocities, objects=None: collisions(poses[..., :2]).astype(float),
+    "consensus_error": lambda poses, velocities, objects=None: consensus_error(poses[..., :2]),
+    "dispersion": lambda poses, velocities, objects=None: dispersion(poses[..., :2]),
+    "dispersion_ratio": lambda poses, velocities, objects=None: dispersion_ratio(poses[..., :2]),
+    "fatness": lambda poses, velocities, objects=None: fatness(poses[..., :2]),
+    "hull_area": lambda poses, velocities, objects=None: hull_area(poses[..., :2]),
+    "nearest_neighbor": lambda poses, velocities, objects=None: nearest_neighbor(poses[..., :2]),
+    "object_cluster_fraction": lambda poses, velocities, objects: object_cluster_fraction(objects[..., :2]),
+    "object_distance": lambda poses, velocities, objects: object_distance(objects[..., :2]),
+    "order": lambda poses, velocities, objects=None: order(poses[..., 2]),
+    "rotation": lambda poses, velocities, objects=None: rotation(poses[..., :2], velocities[..., :2]),
 }
 """Those that need poses and velocities alone, by name."""
 
-UNITS = {"consensus_error": "m", "dispersion": "m", "hull_area": "m^2", "nearest_neighbor": "m"}
+UNITS = {"consensus_error": "m", "dispersion": "m", "hull_area": "m^2", "nearest_neighbor": "m", "object_distance": "m"}
 """Of those that have one."""
 
 

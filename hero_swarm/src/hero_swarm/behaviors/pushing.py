@@ -1,0 +1,173 @@
+"""Behaviors that push objects: gathering them, and moving one of them to a goal, alone or together."""
+
+from typing import Any, NamedTuple, Tuple
+
+import numpy as np
+
+from hero_client.values.object_sensing import OBJECT, ROBOT
+from hero_client.values.robot_constants import BODY_RADIUS_M
+from hero_sim.world.kinematics import join_wheels
+
+from ..behavior import Behavior, Command, Neighbors, Objects, Random, Sensed, Sight
+from ..steering import steer
+
+__all__ = ["BoxPushing", "CooperativeTransport", "ObjectClustering"]
+
+Velocity = Tuple[np.ndarray, np.ndarray]
+"""Forward and left (R,), m/s."""
+
+
+class ObjectClustering(Behavior):
+    """Robots gather objects by what one beam touches: nothing, an object or a robot.
+
+    The pairs of wheel speeds are those of M. Gauci et al., Clustering objects with robots that do not compute, AAMAS
+    2014, as shares of wheel_m_s.
+    """
+
+    sees = Sight()
+    metric = "object_cluster_fraction"
+    wheel_m_s = 0.12
+    left_nothing, right_nothing = 0.5, 1.0
+    left_object, right_object = 1.0, 0.5
+    left_robot, right_robot = 0.1, 0.5
+
+    def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:
+        """See Behavior."""
+        is_object, is_robot = sensed.sees == OBJECT, sensed.sees == ROBOT
+        left = np.where(is_object, self.left_object, np.where(is_robot, self.left_robot, self.left_nothing))
+        right = np.where(is_object, self.right_object, np.where(is_robot, self.right_robot, self.right_nothing))
+        return (*join_wheels(self.wheel_m_s * left, self.wheel_m_s * right), memory)
+
+
+class _Way(NamedTuple):
+    """The way of the first object to the goal, as each robot sees it (R,).
+
+    Attributes:
+        forward_m, left_m: where the object is.
+        along, across: direction of its way, forward and left.
+        length_m: of its way.
+        behind_m, aside_m: how far the robot is behind the object on this way, and how far to its right.
+    """
+
+    forward_m: np.ndarray
+    left_m: np.ndarray
+    along: np.ndarray
+    across: np.ndarray
+    length_m: np.ndarray
+    behind_m: np.ndarray
+    aside_m: np.ndarray
+
+
+class PushToGoal(Behavior):
+    """What behaviors share that push the first object to a goal, a place in the common frame.
+
+    Attributes:
+        goal_radius_m: the object's center has arrived within it.
+        gap_m: free space that robots keep from each other, and from the object on their way around it.
+    """
+
+    objects = Objects()
+    near = Neighbors(range_m=0.25)
+    metric = "object_distance"
+    goal_x_m = goal_y_m = 0.0
+    goal_radius_m = 0.05
+    linear_m_s = 0.08
+    gap_m = 0.05
+
+    def _find_way(self, sensed: Sensed) -> _Way:
+        forward_m, left_m = sensed.objects.forward_m[:, 0], sensed.objects.left_m[:, 0]
+        to_x_m, to_y_m = self.goal_x_m - sensed.poses[:, 0], self.goal_y_m - sensed.poses[:, 1]
+        cosine, sine = np.cos(sensed.poses[:, 2]), np.sin(sensed.poses[:, 2])
+        way_forward_m = cosine * to_x_m + sine * to_y_m - forward_m
+        way_left_m = cosine * to_y_m - sine * to_x_m - left_m
+        length_m = np.maximum(np.hypot(way_forward_m, way_left_m), 1e-6)
+        along, across = way_forward_m / length_m, way_left_m / length_m
+        behind_m, aside_m = forward_m * along + left_m * across, along * left_m - across * forward_m
+        return _Way(forward_m, left_m, along, across, length_m, behind_m, aside_m)
+
+    def _go_around(self, sensed: Sensed, way: _Way) -> Velocity:
+        """Return the velocity around the object, on the shorter side, until the robot is behind it."""
+        range_m = np.maximum(np.hypot(way.forward_m, way.left_m), 1e-6)
+        side = np.where(way.aside_m > 0.0, 1.0, -1.0)
+        inward = np.clip(4.0 * (range_m - sensed.objects.radii_m[0] - BODY_RADIUS_M - self.gap_m), -1.0, 1.0)
+        forward = (inward * way.forward_m - side * way.left_m) / range_m
+        left = (inward * way.left_m + side * way.forward_m) / range_m
+        return self.linear_m_s * forward, self.linear_m_s * left
+
+    def _command(self, sensed: Sensed, way: _Way, wanted: Velocity, gap_m: float) -> Tuple[np.ndarray, np.ndarray]:
+        """Return speeds for a velocity that is wanted, away from robots nearer than gap_m, at rest at the goal."""
+        near = sensed.near
+        range_m = np.maximum(near.range_m, 1e-6)
+        push_m_s = 2.0 * np.maximum(2.0 * BODY_RADIUS_M + gap_m - range_m, 0.0) * near.seen / range_m
+        forward_m_s = wanted[0] - (push_m_s * near.forward_m).sum(axis=1)
+        left_m_s = wanted[1] - (push_m_s * near.left_m).sum(axis=1)
+        moves = sensed.objects.seen[:, 0] & sensed.is_known & (way.length_m > self.goal_radius_m)
+        linear_m_s, angular_rad_s = steer(forward_m_s, left_m_s, self.linear_m_s)
+        return linear_m_s * moves, angular_rad_s * moves
+
+
+class CooperativeTransport(PushToGoal):
+    """Robots push an object where it hides the goal from them, and go around it until it does.
+
+    J. Chen et al., Occlusion-based cooperative transport with a swarm of miniature mobile robots, IEEE T-RO 2015.
+
+    Attributes:
+        shade: half of the strip behind the object that counts as hidden, as a share of its radius.
+    """
+
+    shade = 0.6
+
+    def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:
+        """See Behavior."""
+        way = self._find_way(sensed)
+        hidden = (way.behind_m > 0.0) & (np.abs(way.aside_m) < self.shade * sensed.objects.radii_m[0])
+        share_m_s = self.linear_m_s / np.maximum(np.hypot(way.forward_m, way.left_m), 1e-6)
+        around_forward_m_s, around_left_m_s = self._go_around(sensed, way)
+        wanted = (
+            np.where(hidden, share_m_s * way.forward_m, around_forward_m_s),
+            np.where(hidden, share_m_s * way.left_m, around_left_m_s),
+        )
+        return (*self._command(sensed, way, wanted, self.gap_m), memory)
+
+
+class BoxPushing(PushToGoal):
+    """Robots line up behind a box, side by side across its way to the goal, and push when all are in place.
+
+    Side by side as the robots of M. Mataric et al., Cooperative multi-robot box-pushing, IROS 1995. The memory tells of
+    each robot whether its world pushes.
+
+    Attributes:
+        spacing_m: between robots of the row.
+        tolerance_m: a robot is in place so near to its own; one that is farther off ends the push.
+    """
+
+    spacing_m = 0.085
+    tolerance_m = 0.03
+
+    def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:
+        """See Behavior."""
+        way = self._find_way(sensed)
+        row_m = sensed.objects.radii_m[0] + BODY_RADIUS_M + self.gap_m
+        # From right to left as they are now, so that no two ways cross.
+        ranks = (-way.aside_m).reshape(-1, sensed.count).argsort(axis=1).argsort(axis=1).ravel()
+        off_m = way.aside_m + (ranks - (sensed.count - 1) / 2.0) * self.spacing_m
+        lag_m = way.behind_m - row_m
+        ready = (np.abs(off_m) < self.tolerance_m) & (np.abs(lag_m) < self.tolerance_m)
+        holds = (np.abs(off_m) < 3.0 * self.tolerance_m) & (way.behind_m > 0.0)
+        pushes = self._agree(ready, sensed.count) | (memory & self._agree(holds, sensed.count) if memory is not None
+                                                     else False)
+        # A robot that is not behind the object yet goes around it; from there it drives to its place, or on.
+        arrived = way.behind_m > 0.5 * row_m
+        ahead_m_s = np.where(pushes, self.linear_m_s, 1.5 * lag_m)
+        aside_m_s = 1.5 * off_m
+        around_forward_m_s, around_left_m_s = self._go_around(sensed, way)
+        wanted = (
+            np.where(arrived | pushes, ahead_m_s * way.along - aside_m_s * way.across, around_forward_m_s),
+            np.where(arrived | pushes, ahead_m_s * way.across + aside_m_s * way.along, around_left_m_s),
+        )
+        return (*self._command(sensed, way, wanted, self.spacing_m - 2.0 * BODY_RADIUS_M), pushes)
+
+    @staticmethod
+    def _agree(values: np.ndarray, count: int) -> np.ndarray:
+        """Return for each robot (R,) whether values hold for all of its world."""
+        return np.repeat(values.reshape(-1, count).all(axis=1), count)
