@@ -97,7 +97,7 @@ def explore():
                 Explorer(robot, common, None if seed < 0 else seed + robot.robot_id) for robot in swarm
             ]
             busy_s = program.now_s
-            while program.pace(0.1):
+            for _ in program.rate(10):  # Hz
                 del newest[:-1]
                 frontiers = [(pose.position.x, pose.position.y) for message in newest for pose in message.poses]
                 explore_together(explorers, frontiers, program.now_s)

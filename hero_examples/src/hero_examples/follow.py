@@ -37,7 +37,7 @@ def follow_leader():
         with Swarm(ids, proximity=False) as swarm:
             leader, *followers = swarm
             rospy.loginfo("%s leads, and %s follow", leader.name, ", ".join(robot.name for robot in followers))
-            while program.pace(0.1):
+            for _ in program.rate(10):  # Hz
                 step(swarm, common, law)
                 swarm.report_missing(common.missing)
 

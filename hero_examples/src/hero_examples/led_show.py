@@ -43,10 +43,8 @@ def show_pattern():
         pattern = PATTERNS[parameters["pattern"]]
         with open_swarm(program, parameters["robots"], odom=False, proximity=False) as swarm:
             rospy.loginfo("%s on %s", parameters["pattern"], ", ".join(robot.name for robot in swarm))
-            start_s = program.now_s
-            while program.pace(0.2):
-                phase = (program.now_s - start_s) / parameters["period_s"] % 1.0
-                step(swarm, pattern, phase, parameters["brightness"])
+            for time_s in program.rate(5):  # Hz
+                step(swarm, pattern, time_s / parameters["period_s"] % 1.0, parameters["brightness"])
                 swarm.report_missing()
             swarm.led("off")
 

@@ -52,7 +52,7 @@ def walk():
         with open_swarm(program, parameters["robots"], odom=False) as swarm:
             rospy.loginfo("random walk of %s", ", ".join(robot.name for robot in swarm))
             walkers = [Walker(robot, law, None if seed < 0 else seed + robot.robot_id) for robot in swarm]
-            while program.pace(0.1):
+            for _ in program.rate(10):  # Hz
                 missing = {walker.robot.name: walker.step() for walker in walkers}
                 swarm.report_missing(missing)
             swarm.led("off")

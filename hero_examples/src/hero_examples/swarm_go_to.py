@@ -9,11 +9,11 @@ from hero_client.controllers.swarm_go_to import SwarmGoToController
 from hero_client.values.robot_constants import MAX_LINEAR_M_S
 from hero_node.parameters import flag, number, robot_ids, whole_number
 
-STEP_S = 0.1
+STEP_HZ = 10.0
 
 
 class Formation:
-    """A swarm on its way to one goal for each robot; call step() every STEP_S.
+    """A swarm on its way to one goal for each robot; call step() at STEP_HZ.
 
     Attributes:
         done: whether all robots have been in place at once.
@@ -21,7 +21,7 @@ class Formation:
 
     def __init__(self, swarm, common, goals, law, seed=0, tolerance_m=0.01, timeout_s=120.0):
         self.swarm, self.common, self.timeout_s = swarm, common, timeout_s
-        self.controller = SwarmGoToController(goals, law, STEP_S, seed, tolerance_m)
+        self.controller = SwarmGoToController(goals, law, 1.0 / STEP_HZ, seed, tolerance_m)
         self.done = False
 
     def step(self, elapsed_s):
@@ -65,10 +65,11 @@ def form():
                 goals = [goals[index] for index in assign_goals([pose[:2] for pose in poses], goals)]
             options = [parameters[name] for name in ("seed", "tolerance_m", "timeout_s")]
             formation = Formation(swarm, common, goals, law, *options)
-            start_s = program.now_s
-            while not (formation.done and parameters["once"]) and program.pace(STEP_S):
-                formation.step(program.now_s - start_s)
+            for time_s in program.rate(STEP_HZ):
+                formation.step(time_s)
                 swarm.report_missing(common.missing)
+                if formation.done and parameters["once"]:
+                    break
             return 1 if parameters["once"] and not formation.done else 0
 
 

@@ -14,7 +14,7 @@ from hero_sim.stepped.swarm import StepSwarm
 from hero_sim.world.arena_file import load_arena
 
 pytest.importorskip("rospy", reason="the program imports rospy")
-from hero_examples.swarm_go_to import STEP_S, Formation
+from hero_examples.swarm_go_to import STEP_HZ, Formation
 
 CIRCLE = str(Path(__file__).resolve().parents[3] / "hero_test" / "arenas" / "circle_arena.yaml")
 LAW = AvoidanceLaw()
@@ -28,7 +28,7 @@ def form(swarm, goals, seed, **options):
         formation.step(time_s)
         return formation.done
 
-    return formation, true_paths.run(swarm, step, 130.0, hz=1.0 / STEP_S)[0]
+    return formation, true_paths.run(swarm, step, 130.0, hz=STEP_HZ)[0]
 
 
 @pytest.mark.slow

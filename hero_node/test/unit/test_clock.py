@@ -28,6 +28,14 @@ def test_a_rate_yields_its_times_until_the_program_is_to_end():
         next(Watch().rate(0))
 
 
+def test_a_rate_waits_for_the_rest_of_the_period_only():
+    watch, times_s = Watch(0.35), []
+    for time_s in watch.rate(10):
+        times_s.append(time_s)
+        watch.time_s += 0.07
+    assert times_s == pytest.approx([0.0, 0.1, 0.2, 0.3])
+
+
 def test_a_slow_body_does_not_let_a_rate_run_faster_later():
     watch, times_s = Watch(), []
     for time_s in watch.rate(10):
@@ -37,17 +45,3 @@ def test_a_slow_body_does_not_let_a_rate_run_faster_later():
         if len(times_s) == 4:
             break
     assert times_s == pytest.approx([0.0, 0.1, 0.45, 0.55])
-
-
-def test_pace_waits_for_the_rest_of_the_period_only():
-    watch = Watch()
-    watch.pace(0.1)
-    for begun_s in (0.2, 0.3):
-        watch.time_s += 0.07
-        watch.pace(0.1)
-        assert watch.now_s == pytest.approx(begun_s)
-    watch.time_s += 0.35  # this is not made up for
-    watch.pace(0.1)
-    at_s = watch.now_s
-    watch.pace(0.1)
-    assert watch.now_s == pytest.approx(at_s + 0.1)

@@ -18,7 +18,7 @@ from .teleop_output import PauseDetector, TeleopOutput
 
 __all__ = ["JoystickMapping", "JoystickTeleop"]
 
-PERIOD_S = 0.1
+STEP_HZ = 10.0
 
 SILENCE_S = 0.5
 """Without a message for this time the robot stops: joy_node repeats held axes by autorepeat_rate of the launch file."""
@@ -99,7 +99,7 @@ class JoystickTeleop:
             self._mapping.stop_button,
         )
         rospy.Subscriber("/joy", Joy, self.receive, queue_size=10, tcp_nodelay=True)
-        while program.pace(PERIOD_S):
+        for _ in program.rate(STEP_HZ):
             self.step(self._swarm.now_s)
         self._swarm.drivers.check_stop()
 

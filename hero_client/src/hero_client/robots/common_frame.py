@@ -12,7 +12,7 @@ from .swarm_base import AnyRobot, BaseSwarm
 
 __all__ = ["CommonFrame"]
 
-POLL_PERIOD_S = 0.1
+POLL_HZ = 10.0
 
 
 class CommonFrame:
@@ -44,7 +44,7 @@ class CommonFrame:
 
         Raises: ProgramError if the program is to end before.
         """
-        while clock.pace(POLL_PERIOD_S):
+        for _ in clock.rate(POLL_HZ):
             poses = [pose for pose in map(self.pose_of, swarm) if pose is not None]
             swarm.report_missing(self.missing)
             if len(poses) == len(swarm):

@@ -31,7 +31,7 @@ from ..mapping.map_files import save_map
 from ..mapping.occupancy_grid import BEAMS, OccupancyGrid
 from ..mapping.swarm_map import SwarmMap
 
-PERIOD_S = 0.1
+STEP_HZ = 10.0
 PUBLISH_STEPS = 10
 """Steps between two publications: one second."""
 
@@ -80,7 +80,7 @@ class MapNode:
                 self._map.add_ranges(robot_id, scan.header.stamp.to_sec(), ranges_m)
 
     def step(self) -> None:
-        """Put in what has come, and publish once a second; call it every PERIOD_S."""
+        """Put in what has come, and publish once a second; call it at STEP_HZ."""
         with self._lock:
             self._map.update()
         self._steps += 1
@@ -152,7 +152,7 @@ def map_arena() -> None:
     with Program("map_arena") as program:
         parameters = read_parameters(PARAMETERS)
         node = MapNode(parameters)
-        while program.pace(PERIOD_S):
+        for _ in program.rate(STEP_HZ):
             node.step()
 
 

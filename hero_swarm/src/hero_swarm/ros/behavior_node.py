@@ -174,8 +174,10 @@ def behavior() -> None:
         with (Swarm.discover(odom=False, proximity=False, sleep=program.sleep) if ids is None
               else Swarm(ids, odom=False, proximity=False)) as swarm:  # fmt: skip
             node = BehaviorNode(swarm, parameters)
-            end_s = time.monotonic() + (parameters["time_s"] or np.inf)
-            while time.monotonic() < end_s and program.pace(node.period_s):
+            end_s = parameters["time_s"] or np.inf
+            for time_s in program.rate(1.0 / node.period_s):
+                if time_s >= end_s:
+                    break
                 node.step()
 
 
