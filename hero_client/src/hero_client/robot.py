@@ -45,7 +45,7 @@ class Robot(BaseRobot):
 
         Raises: ValueError for a number that no robot can have. NodeError if no ROS master answers within 3 s.
         """
-        check_robot_id(robot_id)
+        robot_id = check_robot_id(robot_id)
         start_node()
         super().__init__(robot_id, RosLink(robot_id))
         if odom:
@@ -84,7 +84,7 @@ class Robot(BaseRobot):
     def imu(self) -> Imu:
         """The newest sensor_msgs/Imu of a robot with the IMU hat; what its numbers mean: docs/robot_interface.md.
 
-        The first use subscribes and waits up to 5 s. Raises: StaleDataError if it is older than 1 s.
+        The first use subscribes and waits up to 5 s. Raises: StaleDataError if it is older than 1 s, as without the hat.
         """
         self._check_asked("imu")
         return self._link.messages.read("imu")

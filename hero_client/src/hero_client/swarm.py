@@ -11,6 +11,7 @@ from hero_node.ros.ros_clock import ROS_CLOCK
 from hero_node.ros.script import start_node
 
 from .robot import Robot
+from .robots.robot_base import check_robot_id
 from .robots.swarm_base import REPORT_PERIOD_S, BaseSwarm
 from .ros.drivers import USUAL_TOPIC, share_drivers
 from .ros.stop_status import StopStatus
@@ -38,12 +39,12 @@ class Swarm(BaseSwarm[Robot]):
 
         Raises: ValueError for an invalid or repeated id. NodeError if no ROS master answers within 3 s.
         """
-        if isinstance(robot_ids, (int, str)):
+        if isinstance(robot_ids, str) or not isinstance(robot_ids, Iterable):
             raise ValueError("a swarm is named by numbers, such as [0, 1, 2] or range(3), not by %r" % (robot_ids,))
-        numbers = list(robot_ids)
+        numbers = [check_robot_id(number) for number in robot_ids]
         for number in numbers:
             if numbers.count(number) > 1:
-                raise ValueError("robot %r is named more than once" % (number,))
+                raise ValueError("robot %d is named more than once" % number)
         start_node()
         super().__init__([Robot(number, odom, proximity) for number in numbers], ROS_CLOCK)
         self.drivers = share_drivers()

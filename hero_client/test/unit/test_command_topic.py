@@ -6,7 +6,8 @@ import pytest
 
 pytest.importorskip("rospy", reason="topics are rospy's")
 from hero_client.ros import robot_topics
-from hero_client.ros.robot_topics import CONNECT_S, CommandTopic
+from hero_client.ros.robot_topics import CONNECT_S, CommandTopic, NewestMessages
+from hero_client.ros.ros_link import NEEDED
 
 
 @pytest.fixture(name="ros")
@@ -61,3 +62,12 @@ def test_a_command_that_nobody_takes_is_warned_about_once(ros):
     assert ros.warned == ["a command is lost: nothing subscribes to /hero_0/cmd_vel: no driver answers"]
     subscribe(ros)
     assert "fast" not in ros.sent[1:]
+
+
+def test_a_robot_without_the_imu_that_was_asked_for_is_ready(monkeypatch):
+    monkeypatch.setattr(robot_topics.rospy, "Subscriber", lambda *arguments, **options: None)
+    messages = NewestMessages("/hero_0")
+    messages.subscribe("imu", object)
+    assert messages.find_silent(NEEDED, 1.0) is None
+    messages.subscribe("odom", object)
+    assert messages.find_silent(NEEDED, 1.0) == "odom"

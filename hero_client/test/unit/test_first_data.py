@@ -2,9 +2,10 @@
 
 import math
 
+import numpy as np
 import pytest
 
-from hero_client.robots.robot_base import BaseRobot
+from hero_client.robots.robot_base import BaseRobot, check_robot_id
 from hero_client.values.errors import StaleDataError
 from hero_client.values.geometry import Pose
 from hero_node.clock import Clock
@@ -50,6 +51,17 @@ def test_the_first_data_are_waited_for():
     robot = BaseRobot(0, link)
     assert robot.pose == (1.0, 2.0, 3.0) and robot.proximity == [0.1] * 8
     assert link.clock.now_s == 100.7
+
+
+@pytest.mark.parametrize("number", [np.int64(3), np.arange(4)[3]])
+def test_a_number_of_numpy_names_a_robot(number):
+    assert check_robot_id(number) == 3 and type(check_robot_id(number)) is int
+
+
+@pytest.mark.parametrize("wrong", ["hero_0", -1, 1.0, True, None, [0]])
+def test_what_names_no_robot_is_refused(wrong):
+    with pytest.raises(ValueError, match="a robot is named by its number, 0 or more, not by"):
+        check_robot_id(wrong)
 
 
 def test_data_that_never_come_are_waited_for_once():

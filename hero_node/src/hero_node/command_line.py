@@ -11,6 +11,7 @@ import os
 import signal
 import sys
 from contextlib import suppress
+from traceback import walk_tb
 from typing import IO, Callable, NoReturn, Optional, Sequence, Type
 
 from .texts import make_printable
@@ -23,6 +24,7 @@ __all__ = [
     "WRONG_ARGUMENTS",
     "call",
     "check_node_arguments",
+    "find_line",
     "print_error",
     "run",
     "say",
@@ -51,7 +53,7 @@ def call(main: Callable[[], Optional[int]], *errors: Type[Exception]) -> int:
     try:
         status = main() or 0
     except errors as error:
-        print_error(str(error))
+        print_error(str(error) + find_line(error))
         status = FAILED
     except KeyboardInterrupt:
         status = INTERRUPTED
@@ -108,6 +110,15 @@ def say(text: str, stream: Optional[IO[str]] = None, end: str = "\n") -> None:
     except OSError as error:
         _discard(stream)
         _report(error)
+
+
+def find_line(error: BaseException, script: Optional[str] = None) -> str:
+    """Return where in the user's script an error was raised, for the end of a message; nothing for other programs."""
+    main = sys.modules["__main__"]
+    if script is None and main.__spec__ is None:  # not python3 -m
+        script = getattr(main, "__file__", None)
+    lines = [line for frame, line in walk_tb(error.__traceback__) if frame.f_code.co_filename == script]
+    return " (%s, line %d)" % (os.path.basename(script), lines[-1]) if script and lines else ""
 
 
 def print_error(text: str) -> None:

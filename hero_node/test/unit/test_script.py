@@ -5,6 +5,7 @@ import threading
 
 import pytest
 
+from hero_node.command_line import find_line
 from hero_node.errors import HeroError
 from hero_node.ros import script
 
@@ -92,8 +93,17 @@ def test_an_error_names_the_line_of_the_script(monkeypatch, capsys, tmp_path):
     path = tmp_path / "square.py"
     path.write_text("def side():\n    raise error\n\n\nside()\n")
     monkeypatch.setattr(sys.modules["__main__"], "__file__", str(path), raising=False)
+    monkeypatch.setattr(sys.modules["__main__"], "__spec__", None)
     try:
         exec(compile(path.read_text(), str(path), "exec"), {"error": HeroError("hero_0 did not move")})
     except HeroError as error:
         script._print_exception(type(error), error, error.__traceback__)
     assert capsys.readouterr().err.endswith("hero_0 did not move (square.py, line 2)\n")
+
+
+def test_the_line_of_an_error_in_a_program_of_a_package_is_not_named():
+    error = HeroError("no")
+    try:
+        raise error
+    except HeroError:
+        assert find_line(error) == "" and find_line(error, __file__).startswith(" (test_script.py, line ")

@@ -13,7 +13,7 @@ from typing import Any, Iterable, NoReturn, Optional, Sequence
 
 import hero_client
 from hero_client.values.errors import RobotNotReadyError
-from hero_node.command_line import call, say
+from hero_node.command_line import call, find_line, say
 from hero_node.errors import HeroError, ProgramError
 
 from .stepped.robot import StepRobot
@@ -46,6 +46,8 @@ def run_script(options: argparse.Namespace) -> None:
     sys.path.insert(0, str(Path(options.script).resolve().parent))
     try:
         runpy.run_path(options.script, run_name="__main__")
+    except HeroError as error:
+        raise ProgramError(str(error) + find_line(error, options.script)) from None
     finally:
         places = ["%s at (%.3f, %.3f) m" % (robot.name, *robot.true_pose[:2]) for robot in swarm if robot.driven]
         say("; ".join(["%.1f s simulated" % swarm.now_s, *places]), sys.stderr)

@@ -44,6 +44,7 @@ def test_a_script_for_robots_runs_unchanged_on_stepped_ones(tmp_path):
     ("text", "message"),
     [
         ("from hero_client import Robot\nRobot(7)", "script.py: hero_7 is not there: --count 4 simulates fewer"),
+        ("from hero_client import Robot\nRobot(7)", "simulates fewer (script.py, line 2)"),
         ("from hero_client import Program\nProgram('p')", "script.py: Program needs ROS: in process run scripts"),
     ],
 )

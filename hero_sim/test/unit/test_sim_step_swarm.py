@@ -339,6 +339,21 @@ def test_robots_that_do_not_get_to_their_goals_are_named_and_stopped():
         assert swarm[1].velocity == (0.0, 0.0)
         with pytest.raises(KeyError, match="hero_7 is not in this swarm"):
             swarm.go_to_each({7: (0.0, 0.0)})
+        with pytest.raises(TypeError, match="the goal of hero_1 must be"):
+            swarm.go_to_each({1: 0.2})
+        begun_s = swarm.now_s
+        for goals in ({0: swarm[1].true_pose[:2]}, {0: (5.0, 0.1), 1: (5.0, 0.0)}):
+            with pytest.raises(GoalError, match=r"hero_0 and hero_1 are 0.\d+ m apart: robots need 0.18 m"):
+                swarm.go_to_each(goals)
+        assert swarm.now_s - begun_s < 1.0
+
+
+def test_a_swarm_is_indexed_by_the_ids_of_its_robots():
+    swarm = StepSwarm(2, first_id=3)
+    assert 3 in swarm and swarm[4] in swarm and 0 not in swarm and "hero_3" not in swarm
+    for wrong in ("hero_3", slice(2), [3, 4], (3, 4)):
+        with pytest.raises(TypeError, match=r"swarm\[3\] is hero_3, not swarm\["):
+            assert swarm[wrong]
 
 
 def test_arrays_hold_what_the_robots_read_one_by_one():

@@ -129,6 +129,8 @@ class Group(Clock):
         return self
 
     def _drive_for(self, linear_m_s: float, angular_rad_s: float, duration_s: float) -> None:
+        if not duration_s >= 0.0:
+            raise ValueError("a duration must be 0 s or more, not %r" % (duration_s,))
         for robot in self._members:
             robot._end_motion()
         self._run(wait_for_all(self._members))

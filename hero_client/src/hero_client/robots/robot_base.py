@@ -7,7 +7,8 @@ front, y to the left, angles counter-clockwise from the front.
 import math
 from contextlib import suppress
 from functools import partial
-from typing import Callable, Generator, List, Optional, Tuple
+from operator import index
+from typing import Callable, Generator, List, Optional, SupportsIndex, Tuple
 
 from ..controllers.go_to_goal import DEFAULT_TOLERANCE_M, Goal, GoToGoalController
 from ..controllers.motion import DEFAULT_TIMEOUT_S, MotionController, State
@@ -35,10 +36,13 @@ COMMAND_S = 2.0
 OnStep = Callable[[GoToGoalController], None]
 
 
-def check_robot_id(robot_id: int) -> None:
-    """Raises: ValueError for a number that no robot can have."""
-    if isinstance(robot_id, bool) or not isinstance(robot_id, int) or robot_id < 0:
-        raise ValueError("a robot is named by its number, 0 or more, not by %r" % (robot_id,))
+def check_robot_id(robot_id: SupportsIndex) -> int:
+    """Return the number, also one of numpy, as int. Raises: ValueError for one that no robot can have."""
+    with suppress(TypeError):
+        number = index(robot_id)
+        if number >= 0 and not isinstance(robot_id, bool):
+            return number
+    raise ValueError("a robot is named by its number, 0 or more, not by %r" % (robot_id,))
 
 
 class BaseRobot(Group):
@@ -77,12 +81,15 @@ class BaseRobot(Group):
         """
         return self._link.age_s(topic)
 
-    def _check_fresh(self, topic: str) -> None:
-        age_s = self._link.age_s(topic)
-        if age_s == math.inf and self.now_s < self._first_data_s:
-            with suppress(StaleDataError):  # reported below
+    def await_first(self, topic: str) -> None:
+        """Wait for the first message of "odom" or "proximity", in the first 2 s of this object only."""
+        if self._link.age_s(topic) == math.inf and self.now_s < self._first_data_s:
+            with suppress(StaleDataError):  # reported by those who read it
                 self._link.wait_for_next(topic, self._first_data_s - self.now_s)
-            age_s = self._link.age_s(topic)
+
+    def _check_fresh(self, topic: str) -> None:
+        self.await_first(topic)
+        age_s = self._link.age_s(topic)
         if age_s <= FRESH_S:
             return
         name = "%s/%s" % (self.namespace, topic)

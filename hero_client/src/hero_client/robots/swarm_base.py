@@ -2,6 +2,7 @@
 
 import math
 from abc import abstractmethod
+from itertools import combinations
 from typing import Any, Dict, Generic, Iterator, List, Mapping, Optional, Sequence, Tuple, TypeVar, Union
 
 import numpy as np
@@ -62,19 +63,27 @@ class BaseSwarm(Group, Generic[AnyRobot]):
     def pose_array(self) -> np.ndarray:
         """Poses of the robots by their odometry (N, 3): x m, y m, yaw rad, each in hero_N/odom; nan where not fresh.
 
-        Rows are in the order of `robots`, as in velocity_array and proximity_array.
+        Rows are in the order of `robots`, as in velocity_array and proximity_array. In the first 2 s of a Swarm they
+        wait for the first data, as Robot.pose does.
         """
+        self._await_first("odom")
         return np.array([robot.fresh_pose() or [math.nan] * 3 for robot in self.robots])
 
     @property
     def velocity_array(self) -> np.ndarray:
         """Velocities of the robots by their odometry (N, 2): linear m/s, angular rad/s; nan where not fresh."""
+        self._await_first("odom")
         return np.array([robot.fresh_velocity() or [math.nan] * 2 for robot in self.robots])
 
     @property
     def proximity_array(self) -> np.ndarray:
         """Ranges of the robots (N, 8), m: see Robot.proximity; nan where not fresh."""
+        self._await_first("proximity")
         return np.array([robot.fresh_proximity() for robot in self.robots])
+
+    def _await_first(self, topic: str) -> None:
+        for robot in self.robots:
+            robot.await_first(topic)
 
     def drive(self, linear_m_s: float, angular_rad_s: float, duration_s: Optional[float] = None) -> None:
         """Drive all robots with the same velocities: see Robot.drive()."""
@@ -129,13 +138,16 @@ class BaseSwarm(Group, Generic[AnyRobot]):
 
             swarm.go_to_each({0: (0.2, 0.1), 1: (-0.2, 0.1)})
 
-        goals: robot's id -> (x m, y m), at least 0.18 m apart; robots without a goal stay where they are, and
-        the others drive around them. Law: controllers.swarm_go_to.
+        goals: robot's id -> (x m, y m), at least 0.18 m apart, also from robots without a goal: they stay where they
+        are, and the others drive around them. Law: controllers.swarm_go_to.
 
-        Raises: GoalError with those that are not there after timeout_s. KeyError for a robot of no swarm. FrameError,
-        StoppedError and RobotNotReadyError as Robot.go_to(). All robots are stopped then.
+        Raises: GoalError for goals too near to each other, and with the robots that are not there after timeout_s.
+        KeyError for a robot of no swarm. FrameError, StoppedError and RobotNotReadyError as Robot.go_to(). All robots
+        are stopped then.
         """
-        for robot_id in goals:
+        for robot_id, goal in goals.items():
+            if np.shape(goal) != (2,):
+                raise TypeError("the goal of hero_%s must be (x m, y m), not %r" % (robot_id, goal))
             self[robot_id]._end_motion()
         self._run(stop_after(self._go_to_each(goals, frame, timeout_s, tolerance_m), self._members))
 
@@ -143,8 +155,16 @@ class BaseSwarm(Group, Generic[AnyRobot]):
         self, goals: Mapping[int, Tuple[float, float]], frame: str, timeout_s: float, tolerance_m: float
     ) -> Steps:
         yield from wait_for_all(self._members)
-        places = [goals.get(robot.robot_id) or robot.pose_in(frame)[:2] for robot in self.robots]
-        controller = SwarmGoToController(places, AvoidanceLaw(), REPEAT_PERIOD_S, seed=0, tolerance_m=tolerance_m)
+        places = [
+            goals[robot.robot_id] if robot.robot_id in goals else robot.pose_in(frame)[:2] for robot in self.robots
+        ]
+        law = AvoidanceLaw()
+        for (one, place), (other, beside) in combinations(zip(self.robots, places), 2):
+            apart_m = math.dist(place, beside)
+            if apart_m < law.min_spacing_m and {one.robot_id, other.robot_id} & set(goals):
+                text = "the places of %s and %s are %.2f m apart: robots need %.2f m"
+                raise GoalError(text % (one.name, other.name, apart_m, law.min_spacing_m))
+        controller = SwarmGoToController(places, law, REPEAT_PERIOD_S, seed=0, tolerance_m=tolerance_m)
         end_s = self.now_s + timeout_s
         while not all(controller.arrived):
             poses: List[Optional[Pose]] = []
@@ -217,12 +237,17 @@ class BaseSwarm(Group, Generic[AnyRobot]):
             robot.leave_topics()
 
     def __getitem__(self, robot_id: int) -> AnyRobot:
-        if isinstance(robot_id, (slice, str)):
-            raise TypeError("swarm[3] is hero_3; for several robots: [swarm[robot_id] for robot_id in (0, 1)]")
+        if isinstance(robot_id, (slice, str, tuple, list)):
+            text = "swarm[3] is hero_3, not swarm[%r]; for several robots: [swarm[robot_id] for robot_id in (0, 1)]"
+            raise TypeError(text % (robot_id,))
         if robot_id not in self._by_id:
             names = ", ".join(robot.name for robot in self.robots)
-            raise KeyError("hero_%s is not in this swarm: %s" % (robot_id, names))
+            raise KeyError("hero_%s is not in this swarm: %s" % (robot_id, names or "it has no robots"))
         return self._by_id[robot_id]
+
+    def __contains__(self, robot: object) -> bool:
+        """Return whether a robot, or its id, is in the swarm."""
+        return robot in self.robots or robot in self._by_id
 
     def __iter__(self) -> Iterator[AnyRobot]:
         return iter(self.robots)
@@ -233,5 +258,5 @@ class BaseSwarm(Group, Generic[AnyRobot]):
     def __repr__(self) -> str:
         """Return the robots' names, and how many are ready."""
         ready = sum(robot.missing() is None for robot in self.robots)
-        names = ", ".join(robot.name for robot in self.robots)
+        names = ", ".join(robot.name for robot in self.robots) or "no robots"
         return "<Swarm of %s: %d of %d ready>" % (names, ready, len(self.robots))

@@ -10,6 +10,8 @@ from functools import lru_cache
 import rospy
 import tf2_ros
 
+from hero_node.texts import one_line
+
 from ..values.errors import FrameError
 from ..values.geometry import Pose, yaw_of
 
@@ -38,8 +40,8 @@ class FrameListener:
             except tf2_ros.TransformException as error:
                 if time.monotonic() >= deadline_s or rospy.is_shutdown():
                     raise FrameError(
-                        "no transform from %s to %s (%s): start what publishes it, such as localize for map"
-                        % (frame, within, error)
+                        "no transform from %s to %s (%s): start what publishes it, such as localize for map;"
+                        " simulated robots have the frame world" % (frame, within, one_line(error).rstrip(" ."))
                     ) from None
             time.sleep(POLL_PERIOD_S)
 

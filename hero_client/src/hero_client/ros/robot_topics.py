@@ -3,7 +3,7 @@
 import math
 import threading
 import time
-from typing import Any, Callable, Dict, Optional, Tuple, Type
+from typing import Any, Callable, Dict, Iterable, Optional, Tuple, Type
 
 import rospy
 
@@ -63,9 +63,9 @@ class NewestMessages:
             if not self._arrival.wait_for(lambda: self._counts.get(topic, 0) >= wanted, timeout_s):
                 raise StaleDataError("no message on %s/%s within %.1f s" % (self._namespace, topic, timeout_s))
 
-    def find_silent(self, limit_s: float) -> Optional[str]:
-        """Return the first topic without a message in the last limit_s; None if all have one."""
-        return next((topic for topic in self._subscribers if self.age_s(topic) > limit_s), None)
+    def find_silent(self, topics: Iterable[str], limit_s: float) -> Optional[str]:
+        """Return the first of the subscribed topics without a message in the last limit_s; None if all have one."""
+        return next((topic for topic in topics if topic in self._subscribers and self.age_s(topic) > limit_s), None)
 
     def close(self) -> None:
         """Unsubscribe; safe twice."""

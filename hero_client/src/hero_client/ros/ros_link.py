@@ -32,6 +32,9 @@ SERVICE_TIMEOUT_S = 2.0
 END_TIMEOUT_S = 3.0
 """A cancelled motion ends within 0.3 s; one that hangs must not hang its robot's next motion."""
 
+NEEDED = ("odom", "proximity")
+"""What a robot that can be driven sends, where it is subscribed to; others, such as the IMU, it may lack."""
+
 MESSAGE_CLASSES = {"odom": Odometry, "proximity": LaserScan, "laser": LaserScan, "encoder": Encoder, "imu": Imu}
 
 
@@ -98,7 +101,7 @@ class RosLink:
         """See RobotLink."""
         if not self.connected:
             return self._cmd_vel.describe_absence()
-        silent = self.messages.find_silent(FRESH_S)
+        silent = self.messages.find_silent(NEEDED, FRESH_S)
         if silent is not None:
             return "no message on %s/%s: is the robot on and in reach?" % (self._namespace, silent)
         if not self._drivers.knows(self._namespace):

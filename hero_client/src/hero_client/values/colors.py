@@ -1,5 +1,6 @@
 """Colors of a robot's light, by name or as numbers. Pure."""
 
+from contextlib import suppress
 from typing import Dict, Sequence, Tuple, Union
 
 COLORS: Dict[str, Tuple[float, float, float]] = {
@@ -26,7 +27,8 @@ def parse_color(color: Color) -> Tuple[float, float, float]:
         if color not in COLORS:
             raise ValueError("no color %r; there are: %s" % (color, ", ".join(COLORS)))
         return COLORS[color]
-    values = [float(value) for value in color]
-    if len(values) != 3 or not all(0.0 <= value <= 1.0 for value in values):
-        raise ValueError("a color is a name or three numbers 0..1, not %r" % (color,))
-    return values[0], values[1], values[2]
+    with suppress(TypeError, ValueError):
+        red, green, blue = map(float, color)
+        if all(0.0 <= value <= 1.0 for value in (red, green, blue)):
+            return red, green, blue
+    raise ValueError("a color is a name or three numbers 0..1, not %r" % (color,))

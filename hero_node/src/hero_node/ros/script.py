@@ -6,14 +6,13 @@ import runpy
 import signal
 import sys
 import threading
-from traceback import walk_tb
 from types import FrameType
 from typing import Any, Iterator, NoReturn, Optional, Sequence, Type
 
 import rospkg
 import rospy
 
-from ..command_line import check_node_arguments, print_error, run
+from ..command_line import check_node_arguments, find_line, print_error, run
 from ..errors import HeroError
 from .master import check_master
 from .ros_clock import ROS_CLOCK
@@ -80,16 +79,9 @@ def run_script(package: str, file: str, arguments: Sequence[str]) -> NoReturn:
 def _print_exception(kind: Type[BaseException], error: BaseException, traceback: Any) -> None:
     """Print a HeroError as one line and Ctrl-C not at all; a mistake in the script keeps its traceback."""
     if issubclass(kind, HeroError):
-        print_error(str(error) + _find_line(traceback))
+        print_error(str(error) + find_line(error))
     elif not issubclass(kind, KeyboardInterrupt):
         sys.__excepthook__(kind, error, traceback)
-
-
-def _find_line(traceback: Any) -> str:
-    """Return where in the script an error was raised, for the end of a message; nothing without a script."""
-    script = getattr(sys.modules["__main__"], "__file__", None)
-    lines = [line for frame, line in walk_tb(traceback) if frame.f_code.co_filename == script]
-    return " (%s, line %d)" % (os.path.basename(script), lines[-1]) if script and lines else ""
 
 
 def _raise_exit(number: int, frame: Optional[FrameType]) -> None:
