@@ -38,7 +38,7 @@ _KEYS = (
 )  # fmt: skip
 
 
-FALLING = ("collisions", "consensus_error", "dispersion", "dispersion_ratio", "fatness", "hull_area")
+FALLING = ("collisions", "consensus_error", "dispersion", "dispersion_ratio", "fatness", "hull_area", "object_distance")
 """Metrics that a bound without <= or >= is reached from above; the others rise to it."""
 
 

@@ -1,0 +1,1 @@
+"""Simulated robots as an environment for multi-agent reinforcement learning."""
