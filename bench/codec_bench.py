@@ -8,6 +8,7 @@ import emulated_swarm
 from measuring import measure_machine_us, print_machine
 
 from hero_driver.corrections.robot_corrections import CorrectionSettings, RobotCorrections
+from hero_driver.corrections.robot_models import STOCK
 from hero_driver.corrections.tick_odometry import WheelGeometry
 from hero_driver.ros.message_types import apply_aliases
 from hero_driver.rosserial import packets
@@ -41,7 +42,7 @@ def main():
     burst_packets = packets.PacketReader().receive_bytes(bursts[0])
     session = Session(SessionLimits(), 0.0)
     declared = session.receive_bytes(emulated_swarm.declare(0), 0.0, 0.0)
-    settings = CorrectionSettings("ticks", WheelGeometry(), (0.0,) * 6, (0.0,) * 6, "robot", 0.05, 5.0)
+    settings = CorrectionSettings("ticks", {STOCK: WheelGeometry()}, (0.0,) * 6, (0.0,) * 6, "robot", 0.05, 5.0)
 
     def write():
         for _ in bursts:

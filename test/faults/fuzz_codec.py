@@ -10,6 +10,7 @@ import atheris
 with atheris.instrument_imports():
     from hero_driver.corrections import message_layouts
     from hero_driver.corrections.robot_corrections import CorrectionSettings, RobotCorrections
+    from hero_driver.corrections.robot_models import STOCK
     from hero_driver.corrections.tick_odometry import WheelGeometry
     from hero_driver.fleet import log_lines
     from hero_driver.rosserial.packets import DEFAULT_MAX_PAYLOAD_LENGTH, OVERHEAD_LENGTH
@@ -18,7 +19,7 @@ with atheris.instrument_imports():
 MAX_TOPICS = 64
 ARRIVAL_NS = 1795240942 * 10**9
 SETTINGS = CorrectionSettings(
-    "ticks", WheelGeometry(0.0492, 0.063, 288.0), (1e-4,) * 6, (1e-4,) * 6, "robot", 0.05, 5.0
+    "ticks", {STOCK: WheelGeometry()}, (1e-4,) * 6, (1e-4,) * 6, "robot", 0.05, 5.0
 )
 TYPES = {"hero_common/Encoder": "hero_msgs/Encoder", "tf/tfMessage": "tf2_msgs/TFMessage"}
 

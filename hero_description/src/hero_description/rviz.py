@@ -9,14 +9,22 @@ import os
 import shutil
 import sys
 import tempfile
+from typing import Any, Sequence
+
+import rospy
 
 from hero_node.errors import ProgramError
-from hero_node.parameters import choice, flag
+from hero_node.parameters import Parameter, choice, flag
 from hero_node.ros.private_parameters import read_parameters
 from hero_node.ros.program import Program, run
 
-from .robots_parameter import given_robots
-from .rviz_config import FRAMES, make_config
+from .hero_plus import make_hero_plus
+from .robots_parameter import check_given, given_robots
+from .rviz_config import FRAMES, PLUS_DESCRIPTION, make_config
+
+
+def _read_ids(name: str, value: Any) -> Sequence[int]:
+    return check_given(name, value) if value not in ("", ()) else ()
 
 
 def start_rviz() -> None:
@@ -33,11 +41,17 @@ def start_rviz() -> None:
                 "fixed_frame": "",
                 "view": choice("orbit", sorted(FRAMES)),
                 "picture": flag(False),
+                "hero_plus": Parameter((), _read_ids),
             }
         )
-    names = ["hero_%d" % robot_id for robot_id in parameters["robots"]]
+        if parameters["hero_plus"]:
+            rospy.set_param(PLUS_DESCRIPTION, make_hero_plus(str(rospy.get_param("robot_description"))))
+    names, plus_names = (
+        ["hero_%d" % robot_id for robot_id in parameters[name]] for name in ("robots", "hero_plus")
+    )
     with tempfile.NamedTemporaryFile("w", prefix="hero_", suffix=".rviz", delete=False) as file:
-        file.write(make_config(names, str(parameters["fixed_frame"]), parameters["view"], parameters["picture"]))
+        settings = str(parameters["fixed_frame"]), parameters["view"], parameters["picture"]
+        file.write(make_config(names, *settings, hero_plus=plus_names))
     os.execv(rviz, [rviz, "-d", file.name, *sys.argv[1:]])
 
 

@@ -5,7 +5,7 @@ included: with other robots nothing is published on their topics. Source of the 
 reduced to what differs from its defaults.
 """
 
-from typing import Any, Dict, List, Sequence
+from typing import Any, Collection, Dict, List, Sequence
 
 import yaml
 
@@ -20,6 +20,9 @@ ABOVE_PIXELS_PER_M = 400
 MAP_PIXELS_PER_M = 300
 """An arena of 2.2 m fits into the window."""
 
+PLUS_DESCRIPTION = "hero_plus_description"
+"""Parameter that holds the URDF of HeRo+."""
+
 ORBITS = {"orbit": (2.6, 1.0, 4.71, 0.0), "close": (0.27, 0.45, 0.6, 0.02)}
 """Distance (m), pitch and yaw (rad) of the camera, height of the focal point above the fixed frame (m)."""
 
@@ -27,14 +30,16 @@ FRAMES = {"orbit": "world", "close": "world", "above": "world", "map": "map"}
 """Fixed frame of each view, unless another is given."""
 
 
-def make_robot_displays(name: str, color: str) -> List[Dict[str, Any]]:
-    """Return the displays of one robot: model, path by odometry, proximity."""
+def make_robot_displays(name: str, color: str, is_plus: bool) -> List[Dict[str, Any]]:
+    """Return the displays of one robot: model, path by odometry, proximity, and of a HeRo+ the distance ahead."""
+    distance = {"Class": "rviz/Range", "Name": name + " distance", "Enabled": True, "Topic": "/%s/range" % name}
     return [
+        *([{**distance, "Color": color, "Alpha": 0.3}] if is_plus else []),
         {
             "Class": "rviz/RobotModel",
             "Name": name,
             "Enabled": True,
-            "Robot Description": "robot_description",
+            "Robot Description": PLUS_DESCRIPTION if is_plus else "robot_description",
             "TF Prefix": name,
             "Update Interval": 0,
         },
@@ -146,8 +151,14 @@ def make_view(view: str) -> Dict[str, Any]:
     }
 
 
-def make_config(names: Sequence[str], fixed_frame: str = "", view: str = "orbit", picture: bool = False) -> str:
-    """Return the configuration for robots with these names (hero_0, ...).
+def make_config(
+    names: Sequence[str],
+    fixed_frame: str = "",
+    view: str = "orbit",
+    picture: bool = False,
+    hero_plus: Collection[str] = (),
+) -> str:
+    """Return the configuration for robots with these names (hero_0, ...), of which hero_plus are HeRo+.
 
     view: one of FRAMES, which holds the fixed frame if none is given; picture: with that of the overhead camera.
     """
@@ -166,7 +177,7 @@ def make_config(names: Sequence[str], fixed_frame: str = "", view: str = "orbit"
         make_marker_display("selected robot", CHOICE_TOPIC),
     ]
     for index, name in enumerate(names):
-        displays += make_robot_displays(name, COLORS[index % len(COLORS)])
+        displays += make_robot_displays(name, COLORS[index % len(COLORS)], name in hero_plus)
     displays.append(
         {
             "Class": "rviz/Group",

@@ -9,7 +9,7 @@ import glob
 import ipaddress
 import os
 from dataclasses import dataclass
-from typing import Any, Dict, Mapping, Tuple
+from typing import Any, Dict, Mapping, Optional, Tuple
 
 from hero_node.errors import ProgramError
 from hero_node.parameters import (
@@ -19,6 +19,7 @@ from hero_node.parameters import (
     flag,
     make_error,
     number,
+    parse_robot_ids,
     whole_number,
     words,
 )
@@ -26,7 +27,8 @@ from hero_node.texts import one_line
 from hero_node.yaml_text import parse_yaml, read_text
 
 from .commands.command_settings import CommandSettings
-from .corrections.robot_corrections import CorrectionSettings
+from .corrections.robot_corrections import CorrectionSettings, OwnWheels
+from .corrections.robot_models import HERO_PLUS, PLUS_WHEELS, STOCK
 from .corrections.tick_odometry import WheelGeometry
 from .fleet.admission import AdmissionLimits, Network
 from .robot_constants import TICKS_PER_TURN, WHEEL_DIAMETER_M, WHEEL_SEPARATION_M
@@ -78,6 +80,14 @@ def _read_diagonal(name: str, value: Any) -> Tuple[float, ...]:
         if isinstance(entry, bool) or not isinstance(entry, (int, float)) or not 0.0 <= entry < float("inf"):
             raise make_error(name, value, allowed)
     return tuple(float(entry) for entry in value)
+
+
+def _read_names(name: str, value: Any) -> Tuple[str, ...]:
+    """Return the names of the robots with the ids in value."""
+    ids = [] if value in ("", [], ()) else parse_robot_ids(name, value)
+    if ids is None:
+        raise make_error(name, value, 'ids such as "0 2" or "4-7"')
+    return tuple("hero_%d" % robot_id for robot_id in ids)
 
 
 def _declare(parameter: Parameter) -> Any:
@@ -170,12 +180,22 @@ class DriverConfig:
     odometry: str = _declare(
         choice("ticks", ("ticks", "robot"), "source of odom: encoder ticks, or the robot's own estimate")
     )
-    wheel_diameter_m: float = _declare(number(WHEEL_DIAMETER_M, 0.001, 1.0, "m", "diameter of a wheel"))
+    hero_plus: Tuple[str, ...] = _declare(
+        Parameter(
+            (),
+            _read_names,
+            "ids of robots, such as 0 2 or 4-7, that are HeRo+ (96 ticks per turn, wheels of 50 mm, 65 mm apart)"
+            " without the Encoder message that tells so",
+        )
+    )
+    wheel_diameter_m: float = _declare(
+        number(WHEEL_DIAMETER_M, 0.001, 1.0, "m", "diameter of a wheel, but of HeRo+")
+    )
     wheel_separation_m: float = _declare(
-        number(WHEEL_SEPARATION_M, 0.001, 1.0, "m", "distance between the wheels")
+        number(WHEEL_SEPARATION_M, 0.001, 1.0, "m", "distance between the wheels, but of HeRo+")
     )
     ticks_per_turn: float = _declare(
-        number(TICKS_PER_TURN, 1.0, 1000000.0, "", "encoder ticks per revolution of a wheel")
+        number(TICKS_PER_TURN, 1.0, 1000000.0, "", "encoder ticks per revolution of a wheel, but of HeRo+")
     )
     calibration_folder: str = _declare(
         words(
@@ -243,13 +263,14 @@ class DriverConfig:
         """How the data of robots are corrected."""
         return CorrectionSettings(
             self.odometry,
-            self.wheel_geometry,
+            {STOCK: self.wheel_geometry, HERO_PLUS: PLUS_WHEELS},
             self.pose_covariance,
             self.twist_covariance,
             self.stamps,
             self.max_future_s,
             self.max_age_s,
-            read_wheel_files(self.calibration_folder, self.ticks_per_turn),
+            read_wheel_files(self.calibration_folder),
+            frozenset(self.hero_plus),
         )
 
     @property
@@ -267,13 +288,13 @@ class DriverConfig:
 
     @property
     def wheel_geometry(self) -> WheelGeometry:
-        """Converts ticks into meters."""
+        """Converts ticks of stock robots into meters."""
         return WheelGeometry(self.wheel_diameter_m, self.wheel_separation_m, self.ticks_per_turn)
 
 
-def read_wheel_files(folder: str, ticks_per_turn: float) -> Dict[str, WheelGeometry]:
+def read_wheel_files(folder: str) -> Dict[str, OwnWheels]:
     """Return the wheels in a folder's files by robot. Raises: ProgramError for a file that is none of calibrate's."""
-    geometries = {}
+    wheels = {}
     for path in sorted(glob.glob(os.path.join(os.path.expanduser(folder), "hero_*.yaml"))) if folder else []:
         try:
             content = parse_yaml(read_text(path))
@@ -281,13 +302,16 @@ def read_wheel_files(folder: str, ticks_per_turn: float) -> Dict[str, WheelGeome
                 left_m, right_m, separation_m = wheels_m = [float(length) for length in content["wheels_m"]]
                 if not all(0.01 <= length_m <= 1.0 for length_m in wheels_m):
                     raise ValueError("wheels_m must be from 0.01 to 1 m")
-                geometries[str(content.get("robot"))] = WheelGeometry(
-                    (left_m + right_m) / 2.0, separation_m, ticks_per_turn, right_m / left_m
+                ticks_per_turn: Optional[float] = content.get("ticks_per_turn")
+                if ticks_per_turn is not None and not float(ticks_per_turn) >= 1.0:
+                    raise ValueError("ticks_per_turn must be 1 or more")
+                wheels[str(content.get("robot"))] = OwnWheels(
+                    (left_m + right_m) / 2.0, separation_m, right_m / left_m, ticks_per_turn and float(ticks_per_turn)
                 )
         except (OSError, TypeError, ValueError) as error:
             text = "%s: %s; correct the file, move it away, or set ~calibration_folder"
             raise ProgramError(text % (path, one_line(error))) from None
-    return geometries
+    return wheels
 
 
 PARAMETERS: Dict[str, Parameter] = {
@@ -311,5 +335,5 @@ def read_config(given: Mapping[str, Any]) -> DriverConfig:
             "~host is empty and ~robots too: the driver would neither listen nor dial;"
             " give an address to listen on (0.0.0.0 for all) or robots to dial"
         )
-    read_wheel_files(config.calibration_folder, config.ticks_per_turn)  # refused before anything starts
+    read_wheel_files(config.calibration_folder)  # refused before anything starts
     return config

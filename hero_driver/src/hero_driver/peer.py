@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from typing import List, Optional
 
 from .commands.stop_progress import StopProgress
-from .corrections.message_layouts import read_encoder
+from .corrections.message_layouts import CONVERSIONS, read_encoder
 from .corrections.wheel_motion import WheelMotion
 from .fleet import log_lines
 from .fleet.admission import RateLimit
@@ -53,9 +53,10 @@ class Peer:
     def watch_wheels(self, topic: Topic) -> None:
         """Let the encoder's readings of a robot without a bridge tell of its wheels."""
         if topic.info.message_type.endswith("/Encoder"):
-            topic.receive = self._read_wheels
+            convert = CONVERSIONS.get(("hero_msgs/Encoder", topic.info.md5sum), bytes)
+            topic.receive = lambda payload, _arrival_ns: self._read_wheels(convert(payload))
 
-    def _read_wheels(self, payload: bytes, _arrival_ns: int) -> None:
+    def _read_wheels(self, payload: bytes) -> None:
         reading = read_encoder(payload)
         if reading is not None:
             self.wheels.read_ticks(reading[1], reading[2])

@@ -26,6 +26,13 @@ STOCK_BEAMS = 16
 SCAN_TIME_S = 0.2
 """RangeSensor's rate is 5 Hz; it leaves scan_time zero."""
 
+MIN_DISTANCE_M = 0.04
+MAX_DISTANCE_M = 2.9
+"""Of HeRo+'s VL53L1X in its medium mode, in the dark (data sheet)."""
+
+DISTANCE_CONE_RAD = 0.26
+"""Its field of view with the 4 x 4 detectors that the firmware uses (15 degrees, ST UM2555)."""
+
 MAX_LINEAR_M_S = 0.20
 """config.h:60."""
 

@@ -70,6 +70,7 @@ def describe_robot(
         firmware=record.firmware,
         hardware=record.hardware,
         config=record.config,
+        model="" if corrections is None else corrections.model,
         uptime=rospy.Duration.from_sec(0.0 if record.booted_s is None or peer is None else now_s - record.booted_s),
         reconnects=record.reconnects,
         dropped_messages=dropped,

@@ -2,6 +2,7 @@
 """What ROS programs get of what robots send: scans, odometry, transforms and stamps that can be trusted."""
 
 import math
+import struct
 
 import rospy
 import rostest
@@ -10,7 +11,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from driver_case import DriverCase, DriverProcess, Recorder
 from fake_robot import STOCK_DECLARATIONS, FakeRobot, boot_line, encode_answer, heartbeat_line
 from nav_msgs.msg import Odometry
-from sensor_msgs.msg import Imu, LaserScan
+from sensor_msgs.msg import Imu, LaserScan, Range
 from stock_messages import TICK_M, WHEEL_SEPARATION_M, send_burst
 from tf2_msgs.msg import TFMessage
 
@@ -258,6 +259,32 @@ class TestDriverMessages(DriverCase):
             robot.send("odom", stock_messages.make_odom("hero_16", rospy.Time.now()))
         odoms.wait_count(2 + 4)
         self.assert_pose(odoms.messages[-1], 10 * TICK_M, 0.0, 0.0)
+
+    # HeRo+.
+
+    def test_hero_plus_gets_its_ticks_stock_encoder_messages_and_ranges(self):
+        changed = {
+            "imu": ("/{}/distance", "std_msgs/Float32", "73fcbf46b49191e672908e50842a83d4"),
+            "encoder": ("/{}/encoder", "hero_common/Encoder", "ec5c02e99365233af779a0f9f54cb0df"),
+        }
+        declared = []
+        for entry in STOCK_DECLARATIONS:
+            name, message_type, md5sum = changed.get(entry.name.rpartition("/")[2], entry[2:5])
+            declared.append(entry._replace(name=name, message_type=message_type, md5sum=md5sum))
+        robot = self.join(28, declarations=declared)
+        encoders, ranges = Recorder("/hero_28/encoder", Encoder), Recorder("/hero_28/range", Range)
+        odoms = Recorder("/hero_28/odom", Odometry)
+        start = rospy.Time.now()
+        for index, ticks in enumerate((0.0, 10.0)):
+            stamp = start + rospy.Duration(index * STEP_S)
+            robot.send("odom", stock_messages.make_odom("hero_28", stamp))
+            stock = stock_messages.make_encoder("hero_28", stamp, ticks, ticks)
+            robot.send("encoder", stock[:-40] + bytes(8) + stock[-40:])
+        robot.send("distance", struct.pack("<f", 0.5))
+        self.assertEqual([message.left_ticks for message in encoders.wait_count(2)], [0.0, 10.0])
+        self.assert_pose(odoms.wait_count(2)[1], 10 * math.pi * 0.050 / 96, 0.0, 0.0)
+        self.assertEqual(ranges.wait_count(1)[0].range, 0.5)
+        self.fleet.wait("/hero_28", Robot.READY, "as hero_plus", lambda entry: entry.model == "hero_plus")
 
     # Stamps.
 

@@ -3,6 +3,7 @@
 from robot_messages import build_burst, read_odometry, read_transform
 
 from hero_driver.corrections.robot_corrections import TRANSFORMS, CorrectionSettings, RobotCorrections
+from hero_driver.corrections.robot_models import HERO_PLUS, PLUS_WHEELS, STOCK
 from hero_driver.corrections.tick_odometry import WheelGeometry
 from hero_driver.corrections.wheel_motion import WheelMotion
 
@@ -19,7 +20,7 @@ def make_settings(**changes):
     """Return the driver's default settings with changes."""
     values = {
         "odometry": "ticks",
-        "geometry": WheelGeometry(),
+        "geometries": {STOCK: WheelGeometry(), HERO_PLUS: PLUS_WHEELS},
         "pose_covariance": (1e-4, 1e-4, 1e-9, 1e-9, 1e-9, 1e-2),
         "twist_covariance": (1e-4, 1e-9, 1e-9, 1e-9, 1e-9, 1e-2),
         "stamps": "robot",

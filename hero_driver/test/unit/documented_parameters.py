@@ -30,7 +30,7 @@ GROUPS = {
     "Limits": ("max_*",),
     "Timeouts": ("*_timeout_s", "grace_s", "command_max_age_s"),
     "Commands": ("clamp", "orphan_stop_s", "silent_stop_s", "start_stopped", "allow_self_tuning"),
-    "Odometry": ("odometry", "wheel_*", "ticks_per_turn", "calibration_folder", "pose_covariance", "twist_covariance"),
+    "Odometry": ("odometry", "hero_plus", "wheel_*", "ticks_per_turn", "calibration_folder", "*_covariance"),
     "Stamps, transforms, reports": ("stamps", "max_future_s", "max_age_s", "*_period_s"),
     "Others": ("*",),
 }

@@ -212,10 +212,23 @@ def test_wheels_of_calibrated_robots_are_read_from_their_files(tmp_path):
     (tmp_path / "hero_3.yaml").write_text("robot: hero_3\nwheels_m: [0.049, 0.0495, 0.0641]\n")
     (tmp_path / "hero_4.yaml").write_text("robot: hero_4\nmotor_centers_us: [1500, 1510]\n")
     settings = read_config({"calibration_folder": str(tmp_path)}).correction_settings
-    assert list(settings.own_geometries) == ["hero_3"]
-    wheels = settings.own_geometries["hero_3"]
+    assert list(settings.own_wheels) == ["hero_3"]
+    wheels = settings.find_geometry("hero_3", "hero")
     assert wheels.wheel_diameter_m == pytest.approx(0.04925) and wheels.wheel_separation_m == 0.0641
     assert wheels.diameter_ratio == pytest.approx(0.0495 / 0.049) and wheels.ticks_per_turn == 288.0
+
+
+def test_hero_plus_has_its_own_wheels_and_keeps_its_ticks_when_calibrated(tmp_path):
+    (tmp_path / "hero_7.yaml").write_text("robot: hero_7\nwheels_m: [0.0501, 0.0499, 0.0652]\n")
+    (tmp_path / "hero_8.yaml").write_text("robot: hero_8\nwheels_m: [0.05, 0.05, 0.065]\nticks_per_turn: 100\n")
+    given = {"calibration_folder": str(tmp_path), "hero_plus": "4 7-8", "ticks_per_turn": 300.0}
+    settings = read_config(given).correction_settings
+    assert settings.given_plus == {"hero_4", "hero_7", "hero_8"}
+    assert settings.find_geometry("hero_4", "hero_plus").ticks_per_turn == 96.0
+    assert settings.find_geometry("hero_5", "hero").ticks_per_turn == 300.0
+    assert settings.find_geometry("hero_7", "hero_plus").wheel_separation_m == 0.0652
+    assert settings.find_geometry("hero_7", "hero_plus").ticks_per_turn == 96.0
+    assert settings.find_geometry("hero_8", "hero_plus").ticks_per_turn == 100.0
 
 
 @pytest.mark.parametrize(

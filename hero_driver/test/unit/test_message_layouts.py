@@ -22,6 +22,7 @@ from robot_messages import (
     read_stamp_ns,
     read_transform,
 )
+from sensor_msgs.msg import Range
 
 from hero_driver.corrections import message_layouts
 
@@ -35,6 +36,30 @@ def make_diagonal(values):
 
 def make_writer():
     return message_layouts.OdometryWriter(POSE_DIAGONAL, TWIST_DIAGONAL)
+
+
+# Another model.
+
+
+def test_an_encoder_of_hero_plus_becomes_the_stock_one():
+    payload = build_encoder(NOW_NS, 10.0, 7.0)
+    plus = payload[:-40] + struct.pack("<d", 3.0) + payload[-40:]
+    assert message_layouts.drop_tick_difference(plus) == payload
+    assert message_layouts.read_encoder(message_layouts.drop_tick_difference(plus[:-1])) is None
+    assert message_layouts.read_encoder(message_layouts.drop_tick_difference(b"")) is None
+
+
+@pytest.mark.parametrize(
+    "distance_m, shown_m", [(0.25, 0.25), (3.5, math.inf), (0.01, -math.inf), (math.nan, math.nan)]
+)
+def test_a_distance_becomes_a_range_by_rep_117(distance_m, shown_m):
+    message = Range()
+    message.deserialize(message_layouts.make_range(struct.pack("<f", distance_m), 3, NOW_NS + 5, b"hero_0/hat_link"))
+    assert (message.header.seq, message.header.stamp.to_nsec()) == (3, NOW_NS + 5)
+    assert (message.header.frame_id, message.radiation_type) == ("hero_0/hat_link", Range.INFRARED)
+    assert message.range == pytest.approx(shown_m, nan_ok=True)
+    assert message.min_range < 0.1 < 2.0 < message.max_range and 0.1 < message.field_of_view < 0.5
+    assert message_layouts.make_range(b"12345", 0, 0, b"") is None
 
 
 # Headers.

@@ -19,6 +19,7 @@ from robot_messages import (
     read_stamp_ns,
 )
 
+from hero_driver.corrections.robot_models import PLUS_ENCODER_MD5
 from hero_driver.corrections.tick_odometry import Pose
 
 PERIOD_NS = 34 * MS
@@ -254,3 +255,24 @@ def test_arbitrary_bytes_never_raise_and_are_counted(name, payload):
     robot = CorrectedRobot()
     outputs = robot.receive(name, payload, NOW_NS)
     assert outputs or robot.corrections.refused == 1
+
+
+# Models.
+
+
+@pytest.mark.parametrize(
+    "md5sum, given_plus, model",
+    [
+        (PLUS_ENCODER_MD5, (), "hero_plus"),
+        ("b5586cdbae9b740afc6a1f403a2d7dde", ("hero_0",), "hero_plus"),
+        ("b5586cdbae9b740afc6a1f403a2d7dde", (), "hero"),
+    ],
+)
+def test_ticks_are_those_of_the_model_that_the_robot_is(md5sum, given_plus, model):
+    robot = CorrectedRobot(given_plus=frozenset(given_plus))
+    robot.corrections.note_encoder(md5sum)
+    robot.receive_burst(NOW_NS, (0.0, 0.0))
+    (odometry,) = list_odometry(robot.receive_burst(NOW_NS + 34 * MS, (20.0, 20.0)))
+    tick_m = {"hero": math.pi * 0.0492 / 288, "hero_plus": math.pi * 0.050 / 96}[model]
+    assert robot.corrections.model == model
+    assert odometry[2] == pytest.approx(20 * tick_m)

@@ -8,6 +8,7 @@ import pytest
 from hero_client.values.geometry import Pose
 from hero_localization.mapping.occupancy_grid import BEAMS, OccupancyGrid
 from hero_sim.robot.ranges import calibrate, convert_to_ranges
+from hero_sim.robot_constants import BODY_RADIUS_M
 from hero_sim.world import range_sensors
 from hero_sim.world.arena import Segments, build_rectangle
 
@@ -24,7 +25,8 @@ def measure(pose, bodies_m=(POST_M,)):
     alpha, beta = np.full((1, BEAMS), range_sensors.ALPHA_COUNTS_M2), np.array([[range_sensors.BETA_COUNTS]])
     place_m, heading = np.array([pose[:2]]), np.array([(math.cos(pose.yaw_rad), math.sin(pose.yaw_rad))])
     walls, circles_m = Segments.from_ends(ROOM.segments_m), np.array(bodies_m).reshape(-1, 3)
-    counts = range_sensors.measure_signals(place_m, heading, place_m[:, None], walls, circles_m, alpha, beta)
+    bodies = place_m[:, None], np.array([BODY_RADIUS_M])
+    counts = range_sensors.measure_signals(place_m, heading, *bodies, walls, circles_m, alpha, beta)
     ranges_m = np.roll(convert_to_ranges(np.rint(counts[0]).clip(0.0), calibrate(alpha[0], beta[0])), -BEAMS // 2)
     return [math.inf if range_m > 0.2368 else range_m for range_m in ranges_m]
 

@@ -12,6 +12,7 @@ from .link.tcp_link import TcpLink
 from .population import Rngs, build_radios, build_world, draw_servo_timing
 from .robot.firmware import Firmware
 from .robot.flash import Flash
+from .robot.models import parse_models
 from .robot.ranges import FACTORY_CALIBRATION_COUNTS_M2, calibrate
 from .simulator import Simulator
 from .swarm import Swarm
@@ -49,12 +50,17 @@ def build_swarm(options: argparse.Namespace, addresses: List[str], report: Repor
     """
     rngs = Rngs(options)
     world = build_world(options)
+    models = parse_models(options.model, options.first_id, options.count)
     robots: List[Firmware] = []
     for index, address in enumerate(addresses):
         body, flash = Body(world, index), _build_flash(options, world.errors, index)
         robot_id = options.first_id + index
         timing = draw_servo_timing(options, robot_id)
-        robots.append(Firmware(robot_id, body, flash, rngs.robots[index], address, options.imu_hat, timing, report))
+        robots.append(
+            Firmware(
+                robot_id, body, flash, rngs.robots[index], address, options.imu_hat, timing, report, models[index]
+            )
+        )
     swarm = Swarm(world, robots)
     swarm.switch_on(rngs.boot, BOOT_SPREAD_MS)
     return swarm

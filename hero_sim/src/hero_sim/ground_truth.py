@@ -112,7 +112,7 @@ class GroundTruth:
         lit = alpha > 0.0 and max(red, green, blue) > 0.0
         color = ColorRGBA(red, green, blue, 1.0) if lit else _DARK_COLOR
         body = _make_marker("robots", index, Marker.CYLINDER, color, pose, BODY_HEIGHT_M / 2.0)
-        body.scale.x = body.scale.y = 2.0 * BODY_RADIUS_M
+        body.scale.x = body.scale.y = 2.0 * robot.model.radius_m
         body.scale.z = BODY_HEIGHT_M
         nose = _make_marker("headings", index, Marker.ARROW, _NOSE_COLOR, pose, BODY_HEIGHT_M + 0.002)
         nose.scale.x, nose.scale.y, nose.scale.z = BODY_RADIUS_M, 0.008, 0.004

@@ -56,6 +56,13 @@ def _add_link_options(group: "argparse._ArgumentGroup") -> None:
 
 def _add_robot_options(group: "argparse._ArgumentGroup") -> None:
     add = group.add_argument
+    add(
+        "--model",
+        action="append",
+        default=[],
+        metavar="MODEL[,robot=ID]",
+        help="of all robots or of one: hero, hero_plus, or v3.0 (older stock firmware); may be repeated (hero)",
+    )
     add("--imu-hat", action="store_true", help="robots have the IMU hat")
     add("--perfect", action="store_true", help="identical robots: no wheel errors or slip (sensors stay noisy)")
     add(

@@ -12,6 +12,7 @@ import numpy as np
 
 from .errors import OptionError
 from .link.wifi import PROFILES, Radio
+from .robot.models import build_body, parse_models
 from .robot.servo_pins import CORE_2, CORE_3
 from .robot_constants import MAX_ID
 from .world.arena import Arena, MovableObject, build_default, place_robots
@@ -86,6 +87,8 @@ def build_errors(options: argparse.Namespace) -> RobotErrors:
     ids = range(options.first_id, options.first_id + options.count)
     rngs = (_reseed([options.seed, robot_id % 2**32]) for robot_id in ids)
     errors = draw_errors(rngs, 0.0 if options.perfect else 1.0)
+    for row, model in enumerate(parse_models(options.model, options.first_id, options.count)):
+        build_body(model, errors, row)
     for text in options.error:
         set_known(errors, options.first_id, text)
     return errors
@@ -107,8 +110,8 @@ def build_world(options: argparse.Namespace, worlds: int = 1) -> World:
     arena = load_arena(options.arena) if options.arena else build_default(options.count)
     each = _list_worlds(options, worlds)
     rngs = list(map(Rngs, each))
-    poses = [place_robots(arena, options.count, rng.places) for rng in rngs]
     errors = RobotErrors(*map(np.concatenate, zip(*map(build_errors, each))))
+    poses = [place_robots(arena, options.count, rng.places, float(errors.radius_m.max())) for rng in rngs]
     return World(arena, np.concatenate(poses), [rng.world for rng in rngs], errors)
 
 

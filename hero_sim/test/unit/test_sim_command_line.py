@@ -321,6 +321,8 @@ def test_a_signal_ends_it_quietly(simulate, server, number):
         (("--error", "slip=much"), "slip=much"),
         (("--print-errors", "--error", "robot=4,slip=0"), "robot must be 0..0, not 4"),
         (("--flash-dir", "/proc/flash"), "/proc/flash"),
+        (("--print-errors", "--model", "turtle"), "must be one of hero, v3.0, hero_plus"),
+        (("--print-errors", "--model", "hero_plus,robot=3"), "robot must be 0..0, not 3"),
     ],
 )
 def test_a_wrong_option_gets_one_clear_line(arguments, named, capsys):

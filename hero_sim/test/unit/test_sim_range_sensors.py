@@ -33,7 +33,8 @@ def measure_all(arena, poses, alpha, beta, which):
     headings = np.column_stack(find_heading(poses[which, 2]))
     everybody = np.repeat(poses[None, :, :2], len(which), axis=0)
     walls = Segments.from_ends(arena.segments_m)
-    return range_sensors.measure_signals(poses[which, :2], headings, everybody, walls, arena.circles_m, alpha, beta)
+    bodies = everybody, np.full(len(poses), BODY_RADIUS_M)
+    return range_sensors.measure_signals(poses[which, :2], headings, *bodies, walls, arena.circles_m, alpha, beta)
 
 
 @pytest.mark.parametrize("distance_m", [0.03, 0.05, 0.08, 0.10, 0.15, 0.18])

@@ -6,9 +6,19 @@ transforms, laser scans. Field order is that of the ROS message definitions. Pur
 
 import math
 import struct
-from typing import Callable, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
-from ..robot_constants import BODY_RADIUS_M, MAX_RIM_RANGE_M, MIN_RIM_RANGE_M, PROXIMITY_BEAMS, STOCK_BEAMS
+from ..robot_constants import (
+    BODY_RADIUS_M,
+    DISTANCE_CONE_RAD,
+    MAX_DISTANCE_M,
+    MAX_RIM_RANGE_M,
+    MIN_DISTANCE_M,
+    MIN_RIM_RANGE_M,
+    PROXIMITY_BEAMS,
+    STOCK_BEAMS,
+)
+from .robot_models import PLUS_ENCODER_MD5
 from .stamps import NS_PER_S
 
 _HEADER = struct.Struct("<IIII")  # seq, secs, nsecs, length of frame_id
@@ -28,8 +38,10 @@ MD5SUMS = {
     "sensor_msgs/Imu": "6a62c6daae103f4ff57a132d6f95cec2",
     "geometry_msgs/Twist": "9f195f881246fdfa2798d1d3eebca84a",
     "hero_msgs/Motor": "44d4249d207ce6a89de3d72080e4d0b5",
+    "std_msgs/Float32": "73fcbf46b49191e672908e50842a83d4",
+    "sensor_msgs/Range": "c005c34273dc426c67a020a87bc24148",
 }
-"""The layouts that are read or written here; another md5 is another layout."""
+"""The layouts that are read or written here; another md5 is another layout, which CONVERSIONS may translate."""
 
 STAMP_OFFSET = 4  # of a message that begins with a header
 TRANSFORM_TAIL_LENGTH = _POSE.size  # translation and rotation
@@ -84,6 +96,19 @@ def read_encoder(payload: bytes) -> Optional[Tuple[int, float, float]]:
     left, right = _ENCODER_TICKS.unpack_from(payload, end)
     return secs * NS_PER_S + nsecs, left, right
 
+
+_BEHIND_DISTANCES = -5 * 8  # timestep and the four speeds
+
+
+def drop_tick_difference(payload: bytes) -> bytes:
+    """Return the hero_msgs/Encoder in that of HeRo+, which has |left_ticks - right_ticks| before timestep."""
+    return payload[: _BEHIND_DISTANCES - 8] + payload[_BEHIND_DISTANCES:]
+
+
+CONVERSIONS: Dict[Tuple[str, str], Callable[[bytes], bytes]] = {
+    ("hero_msgs/Encoder", PLUS_ENCODER_MD5): drop_tick_difference
+}
+"""By type and md5 of a layout that some robots have: what makes the known layout of it."""
 
 _ODOMETRY_FRAMES = slice(_SEQ_AND_STAMP.size, -ODOMETRY_TAIL_LENGTH)
 _ODOMETRY_POSE = slice(-ODOMETRY_TAIL_LENGTH, _POSE.size - ODOMETRY_TAIL_LENGTH)
@@ -255,6 +280,25 @@ def make_proximity(payload: bytes, seq: int, stamp_ns: int, scan_time_s: float) 
         *fields[25:41:2],
     )
     return restamp(payload[: header.end], seq, stamp_ns) + tail
+
+
+_DISTANCE = struct.Struct("<f")
+_RANGE = struct.Struct("<B4f")
+_INFRARED = 1  # sensor_msgs/Range.INFRARED
+
+
+def make_range(payload: bytes, seq: int, stamp_ns: int, frame_id: bytes) -> Optional[bytes]:
+    """Return the sensor_msgs/Range of a distance (m) in a std_msgs/Float32, by REP 117; None if it is not one."""
+    if len(payload) != _DISTANCE.size:
+        return None
+    distance_m: float = _DISTANCE.unpack(payload)[0]
+    if distance_m > MAX_DISTANCE_M:
+        distance_m = math.inf
+    elif distance_m < MIN_DISTANCE_M:
+        distance_m = -math.inf
+    secs, nsecs = divmod(stamp_ns, NS_PER_S)
+    head = _HEADER.pack(seq & 0xFFFFFFFF, secs, nsecs, len(frame_id)) + frame_id
+    return head + _RANGE.pack(_INFRARED, DISTANCE_CONE_RAD, MIN_DISTANCE_M, MAX_DISTANCE_M, distance_m)
 
 
 def pack_pose(x_m: float, y_m: float, yaw_rad: float) -> bytes:

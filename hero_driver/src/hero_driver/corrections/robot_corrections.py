@@ -1,4 +1,4 @@
-"""Corrects the messages of one robot: odometry from encoder ticks, proximity from its scan, stamps, transforms.
+"""Corrects the messages of one robot: odometry from ticks, proximity from its scan, ranges, stamps, transforms.
 
 Takes payloads and times of arrival, and publishes payloads. Topics that are not named here pass unchanged.
 """
@@ -7,10 +7,26 @@ import collections
 import functools
 import itertools
 from dataclasses import dataclass, field
-from typing import Any, Callable, DefaultDict, Deque, Dict, Iterator, List, Mapping, Protocol, Sequence, Tuple
+from typing import (
+    AbstractSet,
+    Any,
+    Callable,
+    DefaultDict,
+    Deque,
+    Dict,
+    Iterator,
+    List,
+    Mapping,
+    NamedTuple,
+    Optional,
+    Protocol,
+    Sequence,
+    Tuple,
+)
 
 from ..robot_constants import SCAN_TIME_S
 from . import message_layouts
+from .robot_models import HERO_PLUS, PLUS_ENCODER_MD5, STOCK
 from .stamps import NS_PER_S, StampFilter
 from .tick_odometry import Pose, TickOdometry, WheelGeometry
 from .transforms import AddTransform, TransformCorrector
@@ -60,25 +76,47 @@ _Waiting = Tuple[Callable[[Any, bytes], None], Any, bytes]
 """Odometry, or its transform, that waits for the encoder reading of its burst: what writes it, and its arguments."""
 
 
+class OwnWheels(NamedTuple):
+    """A robot's calibrated wheels."""
+
+    diameter_m: float
+    separation_m: float
+    diameter_ratio: float
+    ticks_per_turn: Optional[float] = None
+    """None: as all of its model."""
+
+
 @dataclass(frozen=True)
 class CorrectionSettings:
     """The parameters that matter here, as in config.DriverConfig."""
 
     odometry: str
-    geometry: WheelGeometry
+    geometries: Mapping[str, WheelGeometry]
+    """Wheels by model."""
     pose_covariance: Tuple[float, ...]
     twist_covariance: Tuple[float, ...]
     stamps: str
     max_future_s: float
     max_age_s: float
-    own_geometries: Mapping[str, WheelGeometry] = field(default_factory=dict)
+    own_wheels: Mapping[str, OwnWheels] = field(default_factory=dict)
     """Of robots whose wheels were calibrated, by name, such as hero_3."""
+    given_plus: AbstractSet[str] = frozenset()
+    """Names of robots that are HeRo+ without the Encoder message that tells so."""
+
+    def find_geometry(self, name: str, model: str) -> WheelGeometry:
+        """Return the wheels of the robot called name, which is of this model."""
+        geometry, own = self.geometries[model], self.own_wheels.get(name)
+        if own is None:
+            return geometry
+        diameter_m, separation_m, ratio, ticks_per_turn = own
+        return WheelGeometry(diameter_m, separation_m, ticks_per_turn or geometry.ticks_per_turn, ratio)
 
 
 class RobotCorrections:
     """The data of one robot; one per robot, kept over its reconnects.
 
     Attributes:
+        model: of the robot, one of robot_models.
         odometry: the robot's tick odometry.
         transforms: the robot's transforms.
         wheels: whether its wheels turn.
@@ -94,7 +132,10 @@ class RobotCorrections:
         self._offsets_ns: Deque[int] = collections.deque(maxlen=OFFSET_SAMPLES)
         self._seqs: DefaultDict[str, Iterator[int]] = collections.defaultdict(itertools.count)
         self.wheels = WheelMotion()
-        self.odometry = TickOdometry(settings.own_geometries.get(namespace.strip("/"), settings.geometry))
+        self._settings = settings
+        self._name = namespace.strip("/")
+        self.model = HERO_PLUS if self._name in settings.given_plus else STOCK
+        self.odometry = TickOdometry(settings.find_geometry(self._name, self.model))
         self.transforms = TransformCorrector(
             namespace, self._stamps, add_transform, self._take_odom_transform
         )
@@ -105,6 +146,7 @@ class RobotCorrections:
         self._odom_seqs = self._seqs[self._odom_name]
         self._raw_name = namespace + "/odom_raw"
         self._proximity_name = namespace + "/proximity"
+        self._range_name = namespace + "/range"
         self._odom_sink: Sink = _NoSink()
         self._has_encoder = False
         self._hears_encoder = False
@@ -158,12 +200,22 @@ class RobotCorrections:
         """Stamps that were replaced so far."""
         return self._stamps.corrected
 
+    def note_encoder(self, md5sum: str) -> None:
+        """The robot declares an Encoder message of this md5, which tells its model."""
+        is_plus = md5sum == PLUS_ENCODER_MD5 or self._name in self._settings.given_plus
+        model = HERO_PLUS if is_plus else STOCK
+        if model != self.model:
+            self.model = model
+            self.odometry.change_wheels(self._settings.find_geometry(self._name, model))
+
     def derive_topics(self, name: str, message_type: str) -> Dict[str, str]:
         """Return the topics, with types, that exist besides the one called name."""
         if name == self._odom_name and message_type == "nav_msgs/Odometry":
             return {self._raw_name: message_type}
         if name == self._namespace + "/laser" and message_type == "sensor_msgs/LaserScan":
             return {self._proximity_name: message_type}
+        if name == self._namespace + "/distance" and message_type == "std_msgs/Float32":
+            return {self._range_name: "sensor_msgs/Range"}
         return {}
 
     def handler_for(self, name: str, message_type: str, sinks: Sequence[Sink]) -> Handler:
@@ -184,6 +236,8 @@ class RobotCorrections:
             return functools.partial(self._correct_encoder, name, sink)
         if name == self._namespace + "/laser" and message_type == "sensor_msgs/LaserScan":
             return functools.partial(self._correct_laser, sink, sinks[1])
+        if name == self._namespace + "/distance" and message_type == "std_msgs/Float32":
+            return functools.partial(self._add_range, sink, sinks[1])
         if name == self._namespace + "/imu" and message_type == "sensor_msgs/Imu":
             return functools.partial(self._correct_stamped, name, sink)
         return lambda payload, _: sink.publish(payload)
@@ -211,6 +265,18 @@ class RobotCorrections:
             self._refused += 1
         else:
             proximity_sink.publish(proximity)
+
+    def _add_range(self, sink: Sink, range_sink: Sink, payload: bytes, arrival_ns: int) -> None:
+        sink.publish(payload)
+        if not range_sink.is_wanted:
+            return
+        # The sensor is on the hat, whose place the robot sends on /tf.
+        frame_id = (self._name + "/hat_link").encode()
+        message = message_layouts.make_range(payload, next(self._seqs[self._range_name]), arrival_ns, frame_id)
+        if message is None:
+            self._refused += 1
+        else:
+            range_sink.publish(message)
 
     # Odometry. In one burst the robot sends odom, tf and then the encoder reading that belongs to them, so
     # odom and its transform wait for the reading. Where none follows, because it was lost or because another

@@ -71,11 +71,15 @@ class TickOdometry:
         self.linear_m_s = self.angular_rad_s = 0.0
         self.resets = 0
         self.has_reading = False
-        self._left_tick_m, self._right_tick_m = geometry.ticks_m
-        self._separation_m = geometry.wheel_separation_m
+        self.change_wheels(geometry)
         self._ticks: Optional[Tuple[float, float]] = None
         self._stamp_s = 0.0
         self._window: Deque[Tuple[float, float, float]] = collections.deque(maxlen=TWIST_WINDOW)
+
+    def change_wheels(self, geometry: WheelGeometry) -> None:
+        """Measure with other wheels from now on."""
+        self._left_tick_m, self._right_tick_m = geometry.ticks_m
+        self._separation_m = geometry.wheel_separation_m
 
     def expect_reset(self) -> None:
         """The robot rebooted: its counters begin anew, the pose stays where it was."""

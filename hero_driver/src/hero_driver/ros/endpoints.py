@@ -9,6 +9,7 @@ from typing import Any, Callable, Dict, NamedTuple, Optional, Sequence, Tuple
 
 import rospy
 
+from ..corrections.message_layouts import MD5SUMS
 from . import message_types
 from .message_types import MessageTypeError
 from .raw_publisher import RawPublisher
@@ -58,7 +59,7 @@ class Endpoints:
         self,
         name: str,
         layout: Layout,
-        publishers: Sequence[Tuple[str, RawPublisher]],
+        publishers: Sequence[Tuple[str, str, RawPublisher]],
         replaced: Sequence[RawPublisher],
     ) -> None:
         """Register the topics that the messages of a declared one become; what was there instead goes first."""
@@ -68,9 +69,13 @@ class Endpoints:
         message_class = self._find_class("topic", name, layout)
         if message_class is None:
             return
-        for publisher_name, publisher in publishers:
-            if not publisher.is_open:
-                publisher.open(publisher_name, message_types.make_raw_class(message_class))
+        for publisher_name, message_type, publisher in publishers:
+            derived_class = message_class
+            if message_type != layout.message_type:
+                derived = Layout(message_type, (MD5SUMS[message_type],))
+                derived_class = self._find_class("topic", publisher_name, derived)
+            if derived_class is not None and not publisher.is_open:
+                publisher.open(publisher_name, message_types.make_raw_class(derived_class))
 
     def subscribe(self, name: str, layout: Layout, make_subscriber: Callable[[str], RawSubscriber]) -> bool:
         """Subscribe to a topic with the subscriber that make_subscriber(type) gives; return whether it can be used."""

@@ -31,6 +31,7 @@ VELOCITY_ALIAS = "/cmd_vel"
 """What teleop_twist_keyboard, move_base and the like publish on: the same commands as VELOCITY_CONTROLLER's, as if two
 programs published on one topic. The newest command wins."""
 
+ENCODER_TYPE = "hero_msgs/Encoder"
 TRANSFORM_TYPE = "tf2_msgs/TFMessage"
 TWIST_TYPE = "geometry_msgs/Twist"
 SET_ODOM_TYPE = "hero_msgs/SetOdom"
@@ -121,10 +122,15 @@ class RobotBridge:
                 return
             self._names.add(name)
         ros_type = message_types.apply_aliases(info.message_type)
-        layout = Layout(ros_type, (info.md5sum,))
+        convert = message_layouts.CONVERSIONS.get((ros_type, info.md5sum))
+        layout = Layout(ros_type, (message_layouts.MD5SUMS[ros_type] if convert else info.md5sum,))
         if kind is TopicKind.PUBLISHER:
+            if ros_type == ENCODER_TYPE:
+                self.corrections.note_encoder(info.md5sum)
             replaced = self._replace_publisher(name, layout)
             publishers = self._choose_publishers(topic, name, layout)
+            if convert:
+                topic.receive = _convert_first(convert, topic.receive)
             self._submit(lambda: self._endpoints.advertise(name, layout, publishers, replaced))
         elif kind is TopicKind.SUBSCRIBER:
             self._subscribed_types[name] = ros_type
@@ -176,8 +182,8 @@ class RobotBridge:
         known, self._publisher_layouts[name] = self._publisher_layouts.get(name, layout), layout
         return [self._publishers.pop(name)] if known != layout and name in self._publishers else []
 
-    def _choose_publishers(self, topic: Topic, name: str, layout: Layout) -> List[Tuple[str, RawPublisher]]:
-        """Set up the way of a topic's messages; return the topics that they become, with their publishers."""
+    def _choose_publishers(self, topic: Topic, name: str, layout: Layout) -> List[Tuple[str, str, RawPublisher]]:
+        """Set up the way of a topic's messages; return the topics that they become, types and publishers."""
         ros_type = layout.message_type
         if not _has_known_layout(layout):
             # The registrar will refuse it with both md5s.
@@ -189,12 +195,12 @@ class RobotBridge:
             else:
                 topic.receive = self.corrections.handler_for(name, ros_type, ())
             return []
-        names = (name, *self.corrections.derive_topics(name, ros_type))
-        for publisher_name in names:
+        topics = {name: ros_type, **self.corrections.derive_topics(name, ros_type)}
+        for publisher_name in topics:
             self._publishers.setdefault(publisher_name, RawPublisher(QUEUE_LENGTH, self._loop.call_later))
-        publishers = [self._publishers[publisher_name] for publisher_name in names]
+        publishers = [self._publishers[publisher_name] for publisher_name in topics]
         topic.receive = self.corrections.handler_for(name, ros_type, publishers)
-        return list(zip(names, publishers))
+        return list(zip(topics, topics.values(), publishers))
 
     def _declare_service_half(self, topic: Topic, name: str) -> None:
         self._service_halves[name, topic.kind] = topic
@@ -256,6 +262,13 @@ class RobotBridge:
 
         if not self._registrar.submit(run):
             self._endpoints.report_error("registrar", "too many topics wait for the ROS master; is it reachable?")
+
+
+def _convert_first(
+    convert: Callable[[bytes], bytes], receive: Callable[[bytes, int], None]
+) -> Callable[[bytes, int], None]:
+    """Return what converts a payload before receive() takes it."""
+    return lambda payload, arrival_ns: receive(convert(payload), arrival_ns)
 
 
 def _has_known_layout(layout: Layout) -> bool:

@@ -197,6 +197,7 @@ class FleetFeed:
             "known": self._is_known(row.namespace),
             "stop": "" if refused else STOP_STATES.get(row.stop_state, str(row.stop_state)),
             "firmware": shorten(row.firmware),
+            "model": shorten(row.model),
             "hardware": shorten(row.hardware),
             "config": shorten(row.config),
             "since": round(self._fleet_stamp_s - since_s) if self._fleet_stamp_s is not None and since_s else None,

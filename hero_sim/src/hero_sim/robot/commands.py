@@ -15,6 +15,7 @@ from ..world.kinematics import Pose
 from . import declarations as ids
 from . import messages
 from .flash import Flash
+from .models import HERO, RobotModel
 from .motor_control import Controller, MotorControl
 from .sensing import Sensing
 
@@ -32,7 +33,7 @@ _TWIST = "<d32xd"  # linear.x (m/s) and angular.z (rad/s); the firmware uses no 
 
 
 class CommandTable:
-    """The callbacks of one robot, by topic id.
+    """The callbacks of one robot, by the stock robot's topic ids.
 
     Attributes:
         blocked_us: how long the last callback blocked the robot's loop.
@@ -46,8 +47,10 @@ class CommandTable:
         flash: Flash,
         log: Callable[[str], None],
         warn: Callable[[str], None],
+        model: RobotModel = HERO,
     ) -> None:
         """Serve the parts of the robot called name; log takes lines for the server, warn lines for people."""
+        self._own_ids = model.own_ids
         self._name = name
         self._sensing = sensing
         self._motors = motors
@@ -127,7 +130,7 @@ class CommandTable:
     def _set_odom(self, x_m: float, y_m: float, theta_rad: float) -> bytes:
         self._sensing.set_odometry(Pose(x_m, y_m, theta_rad))
         self._log("[HERO] Odometry was changed!")
-        return _answer(ids.ID_SET_ODOM_ANSWER, True, "Odometry was changed!")
+        return self._answer(ids.ID_SET_ODOM_ANSWER, True, "Odometry was changed!")
 
     def _set_motors(self, *centers_us: int) -> bytes:
         self._flash.motor_centers_us = [float(center_us) for center_us in centers_us]
@@ -137,7 +140,7 @@ class CommandTable:
     def _record(self, answer_id: int, text: str) -> bytes:
         self._save_flash()
         self._log(text)
-        return _answer(answer_id, True, text)
+        return self._answer(answer_id, True, text)
 
     def _set_gains(self, controller: Controller, answer_id: int, *gains: float) -> bytes:
         text = "PID Parameters has been succesfully recorded!"
@@ -147,7 +150,7 @@ class CommandTable:
         self._log_green("Recording values in the flash... ")
         self._save_flash()
         self._log_green(text + " ")
-        return _answer(answer_id, True, text)
+        return self._answer(answer_id, True, text)
 
     def _save_flash(self) -> None:
         """Write the flash; where that fails, the robot goes on with its new parameters, and people are told."""
@@ -163,8 +166,7 @@ class CommandTable:
         self._motors.start_tuning(controller, self._millis, self._now_ms)
         self.blocked_us = PULSES_US
         # The firmware never sets success here (VelocityControl.ino:229-245).
-        return _answer(answer_id, False, "PID Autotuning!")
+        return self._answer(answer_id, False, "PID Autotuning!")
 
-
-def _answer(topic_id: int, success: bool, text: str) -> bytes:
-    return packets.encode_packet(topic_id, messages.encode_answer(success, text))
+    def _answer(self, stock_id: int, success: bool, text: str) -> bytes:
+        return packets.encode_packet(self._own_ids[stock_id], messages.encode_answer(success, text))

@@ -4,7 +4,7 @@ Pure. Source: TopicInfo packets of the stock robot (firmware v3.8); ids are give
 from 125 (100 + 25 subscriber slots) and subscribers from 100 (ros.h of the firmware).
 """
 
-from typing import Tuple
+from typing import Optional, Sequence, Tuple
 
 from hero_driver.rosserial import packets, payloads
 
@@ -46,6 +46,7 @@ _ANSWER_MD5 = "937c9679a518e3a18d831e57125ea522"
 _TYPES = {
     # md5sums of the messages, and of the requests of services
     "sensor_msgs/LaserScan": "90c7ef2dc6895d81024acba2ac42f369",
+    "std_msgs/Float32": "73fcbf46b49191e672908e50842a83d4",
     "sensor_msgs/Imu": "6a62c6daae103f4ff57a132d6f95cec2",
     "hero_common/Encoder": "b5586cdbae9b740afc6a1f403a2d7dde",
     "tf/tfMessage": "94810edda583a504dfda3829e70d7eec",
@@ -61,38 +62,40 @@ _TYPES = {
     "std_srvs/Trigger": "d41d8cd98f00b204e9800998ecf8427e",
 }
 
-_PUB = packets.ID_PUBLISHER
-_SUB = packets.ID_SUBSCRIBER
-_ANS = packets.ID_SERVICE_SERVER_PUBLISHER
-_REQ = packets.ID_SERVICE_SERVER_SUBSCRIBER
+PUB = packets.ID_PUBLISHER
+SUB = packets.ID_SUBSCRIBER
+ANS = packets.ID_SERVICE_SERVER_PUBLISHER
+REQ = packets.ID_SERVICE_SERVER_SUBSCRIBER
 
-DECLARATIONS: Tuple[Tuple[int, int, str, str], ...] = (
+Declaration = Tuple[int, int, str, str]
+
+DECLARATIONS: Tuple[Declaration, ...] = (
     # id of the packet that declares it, id, name (%s: hero_N), type
-    (_PUB, ID_LASER, "/%s/laser", "sensor_msgs/LaserScan"),
-    (_ANS, ID_IR_CALIBRATION_ANSWER, "/%s/ir_calibration", "hero_common/SetIRCalibration"),
-    (_PUB, ID_IMU, "/%s/imu", "sensor_msgs/Imu"),
-    (_PUB, ID_ENCODER, "/%s/encoder", "hero_common/Encoder"),
-    (_PUB, ID_TF, "/tf", "tf/tfMessage"),
-    (_PUB, ID_ODOM, "/%s/odom", "nav_msgs/Odometry"),
-    (_ANS, ID_SET_ODOM_ANSWER, "/%s/set_odom", "hero_common/SetOdom"),
-    (_ANS, ID_MOTORS_PARAMETERS_ANSWER, "/%s/motors_parameters", "hero_common/SetMotor"),
-    (_ANS, ID_POSITION_PID_PARAMETERS_ANSWER, "/%s/position_controller/pid_parameters", "hero_common/SetPID"),
-    (_ANS, ID_POSITION_PID_CALIBRATION_ANSWER, "/%s/position_controller/pid_calibration", "std_srvs/Trigger"),
-    (_ANS, ID_VELOCITY_PID_PARAMETERS_ANSWER, "/%s/velocity_controller/pid_parameters", "hero_common/SetPID"),
-    (_ANS, ID_VELOCITY_PID_CALIBRATION_ANSWER, "/%s/velocity_controller/pid_calibration", "std_srvs/Trigger"),
-    (_SUB, ID_LED, "/%s/led", "std_msgs/ColorRGBA"),
+    (PUB, ID_LASER, "/%s/laser", "sensor_msgs/LaserScan"),
+    (ANS, ID_IR_CALIBRATION_ANSWER, "/%s/ir_calibration", "hero_common/SetIRCalibration"),
+    (PUB, ID_IMU, "/%s/imu", "sensor_msgs/Imu"),
+    (PUB, ID_ENCODER, "/%s/encoder", "hero_common/Encoder"),
+    (PUB, ID_TF, "/tf", "tf/tfMessage"),
+    (PUB, ID_ODOM, "/%s/odom", "nav_msgs/Odometry"),
+    (ANS, ID_SET_ODOM_ANSWER, "/%s/set_odom", "hero_common/SetOdom"),
+    (ANS, ID_MOTORS_PARAMETERS_ANSWER, "/%s/motors_parameters", "hero_common/SetMotor"),
+    (ANS, ID_POSITION_PID_PARAMETERS_ANSWER, "/%s/position_controller/pid_parameters", "hero_common/SetPID"),
+    (ANS, ID_POSITION_PID_CALIBRATION_ANSWER, "/%s/position_controller/pid_calibration", "std_srvs/Trigger"),
+    (ANS, ID_VELOCITY_PID_PARAMETERS_ANSWER, "/%s/velocity_controller/pid_parameters", "hero_common/SetPID"),
+    (ANS, ID_VELOCITY_PID_CALIBRATION_ANSWER, "/%s/velocity_controller/pid_calibration", "std_srvs/Trigger"),
+    (SUB, ID_LED, "/%s/led", "std_msgs/ColorRGBA"),
     # The one name that the firmware sends without a leading slash (RangeSensor.ino:79).
-    (_SUB, ID_LASER_ENABLE, "%s/laser_enable", "std_msgs/Bool"),
-    (_REQ, ID_IR_CALIBRATION, "/%s/ir_calibration", "hero_common/SetIRCalibration"),
-    (_REQ, ID_SET_ODOM, "/%s/set_odom", "hero_common/SetOdom"),
-    (_SUB, ID_CMD_MOTOR, "/%s/cmd_motor", "hero_common/Motor"),
-    (_REQ, ID_MOTORS_PARAMETERS, "/%s/motors_parameters", "hero_common/SetMotor"),
-    (_SUB, ID_POSITION_CMD_VEL, "/%s/position_controller/cmd_vel", "geometry_msgs/Twist"),
-    (_REQ, ID_POSITION_PID_PARAMETERS, "/%s/position_controller/pid_parameters", "hero_common/SetPID"),
-    (_REQ, ID_POSITION_PID_CALIBRATION, "/%s/position_controller/pid_calibration", "std_srvs/Trigger"),
-    (_SUB, ID_VELOCITY_CMD_VEL, "/%s/velocity_controller/cmd_vel", "geometry_msgs/Twist"),
-    (_REQ, ID_VELOCITY_PID_PARAMETERS, "/%s/velocity_controller/pid_parameters", "hero_common/SetPID"),
-    (_REQ, ID_VELOCITY_PID_CALIBRATION, "/%s/velocity_controller/pid_calibration", "std_srvs/Trigger"),
+    (SUB, ID_LASER_ENABLE, "%s/laser_enable", "std_msgs/Bool"),
+    (REQ, ID_IR_CALIBRATION, "/%s/ir_calibration", "hero_common/SetIRCalibration"),
+    (REQ, ID_SET_ODOM, "/%s/set_odom", "hero_common/SetOdom"),
+    (SUB, ID_CMD_MOTOR, "/%s/cmd_motor", "hero_common/Motor"),
+    (REQ, ID_MOTORS_PARAMETERS, "/%s/motors_parameters", "hero_common/SetMotor"),
+    (SUB, ID_POSITION_CMD_VEL, "/%s/position_controller/cmd_vel", "geometry_msgs/Twist"),
+    (REQ, ID_POSITION_PID_PARAMETERS, "/%s/position_controller/pid_parameters", "hero_common/SetPID"),
+    (REQ, ID_POSITION_PID_CALIBRATION, "/%s/position_controller/pid_calibration", "std_srvs/Trigger"),
+    (SUB, ID_VELOCITY_CMD_VEL, "/%s/velocity_controller/cmd_vel", "geometry_msgs/Twist"),
+    (REQ, ID_VELOCITY_PID_PARAMETERS, "/%s/velocity_controller/pid_parameters", "hero_common/SetPID"),
+    (REQ, ID_VELOCITY_PID_CALIBRATION, "/%s/velocity_controller/pid_calibration", "std_srvs/Trigger"),
 )
 
 
@@ -102,12 +105,18 @@ def find_type(topic_id: int) -> str:
 
 
 def encode_declarations(name: str, with_services: bool = True) -> bytes:
-    """Return the packets with which the robot called name (hero_N) declares everything, in one burst."""
+    """Return the packets with which the stock robot called name (hero_N) declares everything, in one burst."""
+    kept = [entry for entry in DECLARATIONS if with_services or entry[0] not in (ANS, REQ)]
+    return encode_entries(name, kept)
+
+
+def encode_entries(name: str, entries: Sequence[Declaration], encoder_md5: Optional[str] = None) -> bytes:
+    """Return the packets that declare entries for the robot called name; encoder_md5: of another model's Encoder."""
     burst = b""
-    for kind, topic_id, pattern, message_type in DECLARATIONS:
-        if kind in (_ANS, _REQ) and not with_services:
-            continue
-        md5sum = _ANSWER_MD5 if kind == _ANS else _TYPES[message_type]
+    for kind, topic_id, pattern, message_type in entries:
+        md5sum = _ANSWER_MD5 if kind == ANS else _TYPES[message_type]
+        if encoder_md5 is not None and message_type == "hero_common/Encoder":
+            md5sum = encoder_md5
         info = payloads.TopicInfo(topic_id, pattern.replace("%s", name), message_type, md5sum, BUFFER_LENGTH)
         burst += packets.encode_packet(kind, payloads.encode_topic_info(info))
     return burst

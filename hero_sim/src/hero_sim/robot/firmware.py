@@ -21,13 +21,12 @@ from . import declarations
 from .clock import RobotClock
 from .commands import CommandTable
 from .flash import Flash
+from .models import HERO, RobotModel
 from .motor_control import MotorControl
 from .sensing import Sensing
 from .servo_pins import ServoPins
 
 __all__ = ["Firmware"]
-
-VERSIONS = "Firmware: v3.8 | Hardware: v2.5 | Config: v2.3"
 
 BOOT_MS = 518
 """From power-on to the attempt to connect (Wi-Fi that is there at once)."""
@@ -90,8 +89,11 @@ class Firmware:
         has_imu_hat: bool,
         servo_timing: str,
         report: Callable[[str], None],
+        model: RobotModel = HERO,
     ) -> None:
         """Build a robot that is switched off; address is for its boot line, report takes lines for people."""
+        self.model = model
+        self._stock_ids = {own: stock for stock, own in model.own_ids.items()}
         self.robot_id = robot_id
         self.name = "hero_%d" % robot_id
         self.flash = flash
@@ -115,11 +117,11 @@ class Firmware:
         """Give everything that lives in RAM its first value."""
         name, body, flash = self.name, self.body, self.flash
         self.clock = RobotClock()
-        self.sensing = Sensing(name, body, self._has_imu_hat, flash)
+        self.sensing = Sensing(name, body, self._has_imu_hat, flash, self.model)
         pins = ServoPins(self._servo_timing)
         self.motors = MotorControl(name, body, self.sensing.odometry, flash, pins, self.rng, self.log)
-        self._commands = CommandTable(name, self.sensing, self.motors, flash, self.log, self.warn)
-        self._declarations = declarations.encode_declarations(name)
+        self._commands = CommandTable(name, self.sensing, self.motors, flash, self.log, self.warn, self.model)
+        self._declarations = self.model.encode_declarations(name)
         self.configured = False
         self.crash_reason: Optional[str] = None
         self.outbox.clear()
@@ -262,7 +264,7 @@ class Firmware:
     def _begin_setup(self, now_ms: int) -> None:
         """Go on with setup() after the attempt to connect (ROSHandle.ino:92-94, firmware.ino:114-140)."""
         self._phase = _PHASE_SETUP
-        self.log("\x1b[94m[/%s] %s | IP: %s \x1b[0m" % (self.name, VERSIONS, self._address))
+        self.log("\x1b[94m[/%s] %s | IP: %s \x1b[0m" % (self.name, self.model.versions, self._address))
         # The first spin comes before anything is advertised; a request that is in by then meets no topics.
         first_spin_ms = now_ms + int(self.rng.randint(0, 3))
         self._setup = [
@@ -287,7 +289,9 @@ class Firmware:
     def _log_imu(self, now_ms: int) -> None:
         del now_ms
         self._advertised = True
-        if self._has_imu_hat:
+        if self.model.measures_distance:
+            self.log("\x1b[92m[%s] TOF sensor initialized!\x1b[0m" % self.name)
+        elif self._has_imu_hat:
             self.log("\x1b[92m[%s] IMU hat detected!\x1b[0m" % self.name)
         else:
             self.log("\x1b[91m[%s] IMU is not working or not connected! Error: 1\x1b[0m" % self.name)
@@ -328,7 +332,7 @@ class Firmware:
     def _find_due(self) -> int:
         due_ms = min(self._next_log_ms, self._next_spin_ms)
         if self.configured:
-            due_ms = min(due_ms, self._booted_at_ms + self.sensing.due_ms)
+            due_ms = min(due_ms, self._booted_at_ms + min(self.sensing.due_ms, self.sensing.distance_due_ms))
             if self.motors.due_ms is not None:
                 due_ms = min(due_ms, self._booted_at_ms + self.motors.due_ms)
         return min(due_ms, self._answers[0][0]) if self._answers else due_ms
@@ -342,6 +346,8 @@ class Firmware:
         if millis >= self.sensing.due_ms:
             # Sending a cycle takes about a millisecond; a controller that is due waits for it.
             self.send(self.sensing.run_cycle(millis, now_ms, self.clock.stamp(millis)))
+        elif millis >= self.sensing.distance_due_ms:
+            self.send(self.sensing.measure_distance(millis))
         elif self._is_controller_due(millis):
             self.motors.run(millis, now_ms, self.sensing.read_encoders)
 
@@ -414,7 +420,8 @@ class Firmware:
 
     def _receive_command(self, packet: packets.Packet, millis: int, now_ms: int) -> None:
         try:
-            answer = self._commands.receive(packet, millis, now_ms)
+            stock_id = self._stock_ids.get(packet.topic_id, declarations.ID_LAST_SUBSCRIBER_SLOT)
+            answer = self._commands.receive(packet._replace(topic_id=stock_id), millis, now_ms)
             self._blocked_us += self._commands.blocked_us
         except CommandError as error:
             self.warn(str(error))

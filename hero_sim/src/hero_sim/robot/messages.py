@@ -15,6 +15,7 @@ from hero_driver.rosserial import packets
 from ..robot_constants import TICKS_PER_TURN, WHEEL_SEPARATION_M
 from ..world.kinematics import Pose
 from . import declarations
+from .models import HERO, RobotModel
 
 SEQ_NEVER_COUNTED = 0xFFFFFFFF
 """header.seq of odom, encoder and imu: set to -1 and never counted (Odometry.ino:60, WheelEncoder.ino:62)."""
@@ -26,6 +27,7 @@ _POSE = struct.Struct("<7d")
 _TWIST = struct.Struct("<6d")
 _QUATERNION = struct.Struct("<4d")
 _ENCODER = struct.Struct("<11d")
+_PLUS_ENCODER = struct.Struct("<12d")
 _COVARIANCE_LENGTH = 36 * 8
 _SUMMED_OFFSET = 5  # sync, length and its checksum are not part of a packet's last checksum
 
@@ -97,12 +99,14 @@ class _Template:
 class CycleMessages:
     """One odom packet, five transforms and one encoder packet: what a robot sends 29 times a second."""
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, model: RobotModel = HERO) -> None:
         """Build the templates of the robot called name (hero_N)."""
+        own_ids = model.own_ids
+        self._encoder_form = _ENCODER if model.encoder_md5 is None else _PLUS_ENCODER
         odom_id, base_id = name + "/odom", name + "/base_link"
         odom = _header(SEQ_NEVER_COUNTED, odom_id) + _text(base_id)
         odom += bytes(_POSE.size + _COVARIANCE_LENGTH + _TWIST.size + _COVARIANCE_LENGTH)
-        encoder = _header(SEQ_NEVER_COUNTED, name + "/encoder") + bytes(_ENCODER.size)
+        encoder = _header(SEQ_NEVER_COUNTED, name + "/encoder") + bytes(self._encoder_form.size)
         transforms = [
             _build_transform(odom_id, base_id, (0.0, 0.0, 0.0)),
             _build_transform(base_id, name + "/left_wheel_link", (0.0, _WHEEL_Y_M, _WHEEL_Z_M)),
@@ -110,9 +114,9 @@ class CycleMessages:
             _build_transform(base_id, name + "/hat_link", _HAT_M),
             _build_transform(base_id, name + "/laser_link", _LASER_M),
         ]
-        messages = [(declarations.ID_ODOM, odom)]
-        messages += [(declarations.ID_TF, transform) for transform in transforms]
-        messages += [(declarations.ID_ENCODER, encoder)]
+        messages = [(own_ids[declarations.ID_ODOM], odom)]
+        messages += [(own_ids[declarations.ID_TF], transform) for transform in transforms]
+        messages += [(own_ids[declarations.ID_ENCODER], encoder)]
         self._template = _Template(messages)
         starts = self._template.payload_starts
         ends = [start + len(payload) for start, (_, payload) in zip(starts, messages)]
@@ -122,7 +126,7 @@ class CycleMessages:
         self._poses = (self._twist - _COVARIANCE_LENGTH - _POSE.size, ends[1] - _POSE.size)
         self._left_wheel = ends[2] - _QUATERNION.size
         self._right_wheel = ends[3] - _QUATERNION.size
-        self._encoder = ends[6] - _ENCODER.size
+        self._encoder = ends[6] - self._encoder_form.size
 
     def encode(
         self,
@@ -147,7 +151,9 @@ class CycleMessages:
         _TWIST.pack_into(data, self._twist, linear, 0.0, 0.0, 0.0, 0.0, angular)
         _QUATERNION.pack_into(data, self._left_wheel, 0.0, left_y, 0.0, left_w)
         _QUATERNION.pack_into(data, self._right_wheel, 0.0, right_y, 0.0, right_w)
-        _ENCODER.pack_into(data, self._encoder, *values)
+        if self._encoder_form is _PLUS_ENCODER:
+            values.insert(6, abs(values[0] - values[1]))
+        self._encoder_form.pack_into(data, self._encoder, *values)
         return self._template.seal()
 
 
@@ -198,11 +204,11 @@ def _interpolate(values: Sequence[float]) -> List[float]:
 class ImuMessages:
     """The Imu of the hat: angular speeds in raw counts, acceleration in counts / 1000 (IMUSensor.ino:182-188)."""
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, model: RobotModel = HERO) -> None:
         """Build the template of the robot called name (hero_N)."""
         head = _header(SEQ_NEVER_COUNTED, name + "/hat_link")
         values = [0.0] * (4 + 9 + 3) + list(_ANGULAR_COVARIANCE) + [0.0] * 3 + list(_LINEAR_COVARIANCE)
-        self._template = _Template([(declarations.ID_IMU, head + struct.pack("<37d", *values))])
+        self._template = _Template([(model.own_ids[declarations.ID_IMU], head + struct.pack("<37d", *values))])
         start = self._template.payload_starts[0]
         self._stamp = start + 4
         self._quaternion = start + len(head)

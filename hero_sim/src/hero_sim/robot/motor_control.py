@@ -18,7 +18,6 @@ from ..robot_constants import (
     POSITION_LIMIT_US,
     POSITION_WATCHDOG_MS,
     PULSE_RANGE_US,
-    TICK_M,
     VELOCITY_LIMIT_US,
     VELOCITY_WATCHDOG_MS,
 )
@@ -239,7 +238,7 @@ class MotorControl:
         targets = _limit_to_wheels(linear_m_s, angular_rad_s)
         if controller is self.position:
             self._start_ticks = self._count_ticks(world_ms)
-            targets = (targets[0] / TICK_M, targets[1] / TICK_M)
+            targets = (targets[0] / self._odometry.tick_m, targets[1] / self._odometry.tick_m)
         stops = not any(targets)
         if stops:
             self._log("\x1b[93m[/%s] Reseting PID...\x1b[0m" % self._name)

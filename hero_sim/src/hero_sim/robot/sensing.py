@@ -4,16 +4,20 @@ Pure. Order within a cycle and gates as measured on the stock robot: imu, laser,
 encoder.
 """
 
+import struct
 from typing import List, Tuple
 
 import numpy as np
 
+from hero_driver.rosserial import packets
+
 from ..robot_constants import LED_WATCHDOG_MS
 from ..world.body import Body
 from ..world.kinematics import Pose
-from . import messages
+from . import declarations, messages
 from .flash import Flash
 from .imu_hat import ImuHat
+from .models import HERO, RobotModel
 from .ranges import convert_to_ranges
 from .wheel_odometry import WheelOdometry
 
@@ -27,6 +31,9 @@ LASER_GATE_MS = 200
 
 LASER_READ_MS = 1
 """How long reading the infrared sensors delays the cycle; with it /laser comes every 205 ms, as measured."""
+
+DISTANCE_MS = 50
+"""Between two readings of the distance sensor (tof.ino of HeRo+: continuous, every 50 ms)."""
 
 BLUE_MS = 2000
 """How long the light is blue after the robot came up."""
@@ -43,22 +50,28 @@ class Sensing:
     """Odometry, encoders, infrared sensors, IMU and light of one robot; times are the robot's own.
 
     Attributes:
-        due_ms: when run_cycle() has to be called.
+        due_ms, distance_due_ms: when run_cycle() and measure_distance() have to be called.
         laser_enabled: whether /laser is sent; not kept over a restart.
         odometry: the robot's own view of its wheels.
     """
 
-    def __init__(self, name: str, body: Body, has_imu_hat: bool, flash: Flash) -> None:
+    def __init__(
+        self, name: str, body: Body, has_imu_hat: bool, flash: Flash, model: RobotModel = HERO
+    ) -> None:
         """Build the sensors of the robot called name (hero_N)."""
+        self.distance_due_ms = 0 if model.measures_distance else _FOREVER_MS
+        self._distance_id = model.own_ids[declarations.ID_IMU]
         self.due_ms = 0
         self.laser_enabled = True
-        self.odometry = WheelOdometry(*body.travels_m)
+        left_m, right_m = body.travels_m
+        self.odometry = WheelOdometry(left_m, right_m, model.tick_m)
         self._body = body
         self._flash = flash
+        has_imu_hat = has_imu_hat and not model.measures_distance
         self._imu = ImuHat(body.true_pose.theta_rad) if has_imu_hat else None
-        self._cycle_messages = messages.CycleMessages(name)
+        self._cycle_messages = messages.CycleMessages(name, model)
         self._laser_messages = messages.LaserMessages(name)
-        self._imu_messages = messages.ImuMessages(name)
+        self._imu_messages = messages.ImuMessages(name, model)
         self._laser_seq = 0
         self._laser_at_ms = 0
         self._light = _DARK
@@ -107,6 +120,11 @@ class Sensing:
         if self.laser_enabled and self.due_ms - self._laser_at_ms > LASER_GATE_MS:
             self.due_ms += LASER_READ_MS
         return b"".join(parts)
+
+    def measure_distance(self, millis: int) -> bytes:
+        """Return the packet of the distance sensor."""
+        self.distance_due_ms = millis + DISTANCE_MS
+        return packets.encode_packet(self._distance_id, struct.pack("<f", self._body.read_distance()))
 
     def _measure_laser(self, stamp: Tuple[int, int]) -> bytes:
         self._laser_seq += 1

@@ -38,17 +38,19 @@ class WheelOdometry:
     """Encoders and odometry of one robot.
 
     Attributes:
+        tick_m: travel per tick.
         pose: what the robot takes for its pose.
         ticks: counts of the left and right wheel since the last set_pose(), as last read.
         filtered_m_s: speeds of the left and right wheel, behind the filter, as last read.
     """
 
-    def __init__(self, left_m: float, right_m: float) -> None:
-        """Count from wheel travels left_m and right_m on."""
+    def __init__(self, left_m: float, right_m: float, tick_m: float = TICK_M) -> None:
+        """Count from wheel travels left_m and right_m on; tick_m: travel per tick."""
+        self.tick_m = tick_m
         self.pose = Pose(0.0, 0.0, 0.0)
         self.ticks = (0, 0)
         self.filtered_m_s = (0.0, 0.0)
-        self._counted_ticks = (math.floor(left_m / TICK_M), math.floor(right_m / TICK_M))
+        self._counted_ticks = (math.floor(left_m / self.tick_m), math.floor(right_m / self.tick_m))
         self._base_ticks = self._counted_ticks
         self._diff_ticks = (0, 0)
         self._read_at_us = 0
@@ -58,7 +60,8 @@ class WheelOdometry:
 
     def read_encoders(self, now_us: int, left_m: float, right_m: float) -> None:
         """Take the wheels' travel (m) at now_us of the robot's own clock; overwrites the last interval."""
-        left, right = math.floor(left_m / TICK_M), math.floor(right_m / TICK_M)
+        tick_m = self.tick_m
+        left, right = math.floor(left_m / tick_m), math.floor(right_m / tick_m)
         self._counted_ticks = (left, right)
         ticks = (left - self._base_ticks[0], right - self._base_ticks[1])
         self._diff_ticks = (ticks[0] - self.ticks[0], ticks[1] - self.ticks[1])
@@ -66,22 +69,22 @@ class WheelOdometry:
         self._timestep_s = (now_us - self._read_at_us) / 1e6
         self._read_at_us = now_us
         if self._timestep_s > 0.0:
-            left_m_s = self._diff_ticks[0] * TICK_M / self._timestep_s
-            right_m_s = self._diff_ticks[1] * TICK_M / self._timestep_s
+            left_m_s = self._diff_ticks[0] * self.tick_m / self._timestep_s
+            right_m_s = self._diff_ticks[1] * self.tick_m / self._timestep_s
             self._speeds_m_s = (left_m_s, right_m_s)
             self.filtered_m_s = (self._filters[0].update(left_m_s), self._filters[1].update(right_m_s))
 
     def count_ticks(self, left_m: float, right_m: float) -> List[int]:
         """Return the counters at these travels (m), without reading the encoders for a message."""
         left_base, right_base = self._base_ticks
-        return [math.floor(left_m / TICK_M) - left_base, math.floor(right_m / TICK_M) - right_base]
+        return [math.floor(left_m / self.tick_m) - left_base, math.floor(right_m / self.tick_m) - right_base]
 
     def integrate(self) -> None:
         """Add the last interval to the pose."""
         left, right = self._diff_ticks
         if left == right == 0:
             return
-        travel_m, rotation_rad = join_wheels(left * TICK_M, right * TICK_M)
+        travel_m, rotation_rad = join_wheels(left * self.tick_m, right * self.tick_m)
         x_m, y_m, theta_rad = self.pose
         heading_rad = theta_rad + rotation_rad / 2.0
         self.pose = Pose(
@@ -109,5 +112,5 @@ class WheelOdometry:
     def list_encoder_values(self) -> Tuple[float, ...]:
         """Return the eleven values of an Encoder message, in the order of its fields."""
         left, right = self._diff_ticks
-        travels_m = (left * TICK_M, right * TICK_M)
+        travels_m = (left * self.tick_m, right * self.tick_m)
         return (*self.ticks, left, right, *travels_m, self._timestep_s, *self._speeds_m_s, *self.filtered_m_s)

@@ -86,7 +86,14 @@ class StepSwarm(StepWorld):
         Raises: hero_sim.errors.OptionError for an option that cannot be used.
         """
         options = argparse.Namespace(
-            count=count, seed=seed, arena=arena, wifi=wifi, perfect=perfect, first_id=first_id, error=list(error)
+            count=count,
+            seed=seed,
+            arena=arena,
+            wifi=wifi,
+            perfect=perfect,
+            first_id=first_id,
+            error=list(error),
+            model=[],
         )
         check_population(options, worlds)
         if wifi not in PROFILES:

@@ -162,24 +162,28 @@ def _lies_inside(points_m: np.ndarray, corners_m: np.ndarray) -> np.ndarray:
     return (straddles & (points_m[:, 0, None] < cross_x_m)).sum(axis=1) % 2 == 1
 
 
-def place_robots(arena: Arena, robots: int, rng: np.random.RandomState) -> np.ndarray:
+def place_robots(
+    arena: Arena, robots: int, rng: np.random.RandomState, radius_m: float = BODY_RADIUS_M
+) -> np.ndarray:
     """Return start poses, shape (robots, 3): the arena's own first, then free places drawn from rng.
 
-    Raises: OptionError if no free place is left.
+    radius_m: of the largest robot. Raises: OptionError if no free place is left.
     """
     poses: List[Pose] = list(arena.starts[:robots])
     while len(poses) < robots:
-        poses.append(_draw_place(arena, poses, rng, robots))
+        poses.append(_draw_place(arena, poses, rng, robots, radius_m))
     return np.array(poses, dtype=float)
 
 
-def _draw_place(arena: Arena, poses: List[Pose], rng: np.random.RandomState, robots: int) -> Pose:
+def _draw_place(
+    arena: Arena, poses: List[Pose], rng: np.random.RandomState, robots: int, radius_m: float
+) -> Pose:
     x_min, y_min, x_max, y_max = arena.bounds_m.tolist()
     for _ in range(_MAX_TRIES):
         # Not rng.uniform(): whether it rounds once or twice depends on how numpy was compiled.
         x_share, y_share, turn = rng.random_sample(3).tolist()
         pose = Pose(x_min + x_share * (x_max - x_min), y_min + y_share * (y_max - y_min), (2.0 * turn - 1.0) * math.pi)
-        if is_free(pose, poses, arena, BODY_RADIUS_M + START_GAP_M):
+        if is_free(pose, poses, arena, radius_m + START_GAP_M, radius_m):
             return pose
     raise OptionError(
         "arena %s: no free place for robot %d of %d; take fewer robots or a larger arena"
@@ -187,8 +191,10 @@ def _draw_place(arena: Arena, poses: List[Pose], rng: np.random.RandomState, rob
     )
 
 
-def is_free(pose: Pose, poses: Sequence[Pose], arena: Arena, radius_m: float) -> bool:
-    """Return whether a robot with radius_m fits at pose, beside stock robots at poses."""
+def is_free(
+    pose: Pose, poses: Sequence[Pose], arena: Arena, radius_m: float, other_radius_m: float = BODY_RADIUS_M
+) -> bool:
+    """Return whether a robot with radius_m fits at pose, beside robots with other_radius_m at poses."""
     if measure_clearance(np.array([pose[:2]]), arena)[0] < radius_m:
         return False
     if any(touch_circle(*pose[:2], radius_m, thing.put_down().body).depth_m > 0.0 for thing in arena.objects):
@@ -196,5 +202,5 @@ def is_free(pose: Pose, poses: Sequence[Pose], arena: Arena, radius_m: float) ->
     if not len(poses):
         return True
     apart_x_m, apart_y_m = np.array(poses)[:, 0] - pose.x_m, np.array(poses)[:, 1] - pose.y_m
-    least_m = radius_m + BODY_RADIUS_M
+    least_m = radius_m + other_radius_m
     return bool((apart_x_m * apart_x_m + apart_y_m * apart_y_m).min() >= least_m * least_m)

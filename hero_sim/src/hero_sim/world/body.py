@@ -41,7 +41,8 @@ class Body:
     @property
     def angular_rad_s(self) -> float:
         """How fast the robot turns, as its wheels have it."""
-        _, angular_rad_s = join_wheels(*self._world.speeds_m_s[self.index].tolist())
+        left_m_s, right_m_s = self._world.speeds_m_s[self.index].tolist()
+        _, angular_rad_s = join_wheels(left_m_s, right_m_s, self._world.errors.wheel_separation_m[self.index, 0])
         return float(angular_rad_s)
 
     def set_odometry(self, pose: Pose) -> None:
@@ -57,6 +58,10 @@ class Body:
     def read_infrared(self) -> np.ndarray:
         """Return one noisy reading (whole counts, 0..1023) of the eight sensors."""
         return self._world.read_infrared(np.array([self.index]))[0]
+
+    def read_distance(self) -> float:
+        """Return one noisy reading (m) of the distance sensor ahead, from the robot's center."""
+        return self._world.read_distance(self.index)
 
     def write_pulses(self, left_us: int, right_us: int) -> None:
         """Set the servos' pulses; below its center the left wheel rolls forward."""

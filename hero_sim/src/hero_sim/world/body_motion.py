@@ -29,17 +29,32 @@ class BodyMotion:
         pushing: of each world with objects; empty if there are none.
     """
 
-    def __init__(self, arena: Arena, objects: Sequence[Sequence[MovableObject]], poses: np.ndarray) -> None:
-        """Place the bodies at poses (3, R), and the objects of each world."""
+    def __init__(
+        self,
+        arena: Arena,
+        objects: Sequence[Sequence[MovableObject]],
+        poses: np.ndarray,
+        radii_m: np.ndarray,
+        separations_m: np.ndarray,
+    ) -> None:
+        """Place the bodies, of radii_m (R,) and with wheels separations_m (R,) apart, at poses (3, R), and objects.
+
+        objects: of each world.
+        """
         self.poses = poses
         self.headings = np.array(find_heading(poses[2]))
-        self.contacts = Contacts(arena, len(objects), poses.shape[1])
+        self._separations_m = separations_m
+        self.contacts = Contacts(arena, len(objects), radii_m)
         obstacles = arena.segments_m.tolist(), arena.circles_m.tolist()
-        self.pushing = [Pushing([thing.put_down() for thing in things], *obstacles) for things in objects if things]
+        self.pushing = [
+            Pushing([thing.put_down() for thing in things], *obstacles, radii_m=own_m)
+            for things, own_m in zip(objects, radii_m.reshape(len(objects), -1).tolist())
+            if things
+        ]
 
     def roll(self, ground_m: np.ndarray) -> None:
         """Move all bodies by K steps of their left and right wheels over the ground (K, 2, R)."""
-        travels_m, rotations_rad = join_wheels(ground_m[:, 0], ground_m[:, 1])
+        travels_m, rotations_rad = join_wheels(ground_m[:, 0], ground_m[:, 1], self._separations_m)
         fastest_m = np.abs(travels_m).max(axis=1).tolist()
         ways_m, self.headings[:] = follow_arcs(self.headings, travels_m, rotations_rad)
         places_m, theta_rad = self.poses[:2], self.poses[2]

@@ -11,13 +11,10 @@ from typing import Any, Tuple
 
 import numpy as np
 
-from ..robot_constants import BODY_RADIUS_M
 from .arena import Arena, list_obstacles, measure_clearance, square_length
 from .compiled import compile_loop
 
 __all__ = ["Contacts"]
-
-_DIAMETER_M = 2.0 * BODY_RADIUS_M
 
 _PASSES = 100
 _SETTLED_M = 2e-5
@@ -106,14 +103,16 @@ class Contacts:
     is kept. So what happens does not depend on when it is looked up.
     """
 
-    def __init__(self, arena: Arena, worlds: int, rows: int) -> None:
-        """Expect so many rows, spread evenly over the worlds."""
+    def __init__(self, arena: Arena, worlds: int, radii_m: np.ndarray) -> None:
+        """Expect bodies of radii_m (R,), spread evenly over the worlds."""
+        rows = len(radii_m)
+        self._radii_m = radii_m
         self._arena = arena
         self._shape = (worlds, rows // worlds)
         # Of each two robots the earlier one is the first.
         self._ordered = np.triu(np.ones((self._shape[1], self._shape[1]), dtype=bool), k=1)
-        self._obstacles, radii_m = list_obstacles(arena)
-        self._free_m = radii_m + BODY_RADIUS_M
+        self._obstacles, obstacle_radii_m = list_obstacles(arena)
+        self._free_m = radii_m[:, None] + obstacle_radii_m
         self._relax = compile_loop(_relax, rows)
         # How far all may still move until the lists are incomplete, and until two robots, and until a
         # robot and an obstacle could touch.
@@ -121,6 +120,7 @@ class Contacts:
         # Two robots that are near each other (2, P) and how far each was pushed in the last step; a robot, an obstacle
         # near it, how far away its center has to be, and how far it was pushed.
         self._pairs, self._pushes_m = np.empty((2, 0), dtype=int), _NO_M
+        self._touching_m = _NO_M  # distance of each two that touch
         self._beside, self._wall_pushes_m = np.empty((2, 0), dtype=int), _NO_M
         self._near, self._near_free_m = self._obstacles.take(_NONE), _NO_M
         self._world_ends = np.arange(1, worlds + 1) * self._shape[1]
@@ -141,10 +141,10 @@ class Contacts:
             firsts, seconds = self._pairs
             apart_m = positions_m.take(firsts, axis=1) - positions_m.take(seconds, axis=1)
             distance_m = np.sqrt(square_length(apart_m))
-            touches, pairs, gap_m = _find_touching((distance_m - _DIAMETER_M) / 2.0, self._pushes_m)
+            touches, pairs, gap_m = _find_touching((distance_m - self._touching_m) / 2.0, self._pushes_m)
             self._robots_gap_m = min(gap_m, self._reach_m)
             # Robots that were placed into each other come apart step by step, never through a wall.
-            wanted_m = np.minimum(distance_m[pairs] + _SHIFT_M, _DIAMETER_M)
+            wanted_m = np.minimum(distance_m[pairs] + _SHIFT_M, self._touching_m[pairs])
         if self._walls_gap_m < _SHIFT_M:
             rows = self._beside[0]
             away_m = self._near.point_away(positions_m.take(rows, axis=1))
@@ -187,15 +187,15 @@ class Contacts:
         """List which robots are near each other, and near what."""
         self._reach_m = _MARGIN_M
         near_m = _SHIFT_M + _MARGIN_M
-        pairs = self._find_pairs(positions_m, _DIAMETER_M + 2.0 * near_m)
+        pairs = self._find_pairs(positions_m, 2.0 * float(self._radii_m.max()) + 2.0 * near_m)
         self._pushes_m = _carry_over(self._pairs, self._pushes_m, pairs, positions_m.shape[1])
-        self._pairs = pairs
+        self._pairs, self._touching_m = pairs, self._radii_m.take(pairs).sum(axis=0)
         away_m = self._obstacles.for_each_place().point_away(positions_m[..., None])
         free_m = self._free_m + near_m
         entries = np.array((square_length(away_m) < free_m * free_m).nonzero())
-        self._wall_pushes_m = _carry_over(self._beside, self._wall_pushes_m, entries, len(self._free_m))
+        self._wall_pushes_m = _carry_over(self._beside, self._wall_pushes_m, entries, self._free_m.shape[1])
         self._beside = entries
-        self._near, self._near_free_m = self._obstacles.take(entries[1]), self._free_m[entries[1]]
+        self._near, self._near_free_m = self._obstacles.take(entries[1]), self._free_m[entries[0], entries[1]]
 
     def _find_pairs(self, positions_m: np.ndarray, distance_m: float) -> np.ndarray:
         """Return the rows (2, P) of the first and the second of all two robots less than distance_m apart."""
@@ -207,11 +207,12 @@ class Contacts:
 
     def measure_overlaps(self, positions_m: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
         """Return how deep (m) each robot is in another robot at most (R,), and in a wall or obstacle (R,)."""
-        pairs = self._find_pairs(positions_m, _DIAMETER_M)
-        depths_m = _DIAMETER_M - np.sqrt(square_length(positions_m[:, pairs[0]] - positions_m[:, pairs[1]]))
+        pairs = self._find_pairs(positions_m, 2.0 * float(self._radii_m.max()))
+        distances_m = np.sqrt(square_length(positions_m[:, pairs[0]] - positions_m[:, pairs[1]]))
+        depths_m = np.maximum(self._radii_m.take(pairs).sum(axis=0) - distances_m, 0.0)
         robots_m = np.zeros(positions_m.shape[1])
         np.maximum.at(robots_m, pairs, depths_m)
-        return robots_m, np.maximum(BODY_RADIUS_M - measure_clearance(positions_m.T, self._arena), 0.0)
+        return robots_m, np.maximum(self._radii_m - measure_clearance(positions_m.T, self._arena), 0.0)
 
 
 def _push(

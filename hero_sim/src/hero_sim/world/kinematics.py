@@ -48,9 +48,9 @@ def split_to_wheels(linear_m_s: Number, angular_rad_s: Number) -> Tuple[Number, 
     return linear_m_s - half_m_s, linear_m_s + half_m_s
 
 
-def join_wheels(left: Number, right: Number) -> Tuple[Number, Number]:
+def join_wheels(left: Number, right: Number, separation_m: Number = WHEEL_SEPARATION_M) -> Tuple[Number, Number]:
     """Return the body's travel (m) and rotation (rad) for wheel travels (m); speeds give speeds."""
-    return (left + right) / 2.0, (right - left) / WHEEL_SEPARATION_M
+    return (left + right) / 2.0, (right - left) / separation_m
 
 
 def _sum_series(terms: Sequence[float], variable: Number) -> Number:

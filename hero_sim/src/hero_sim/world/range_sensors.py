@@ -36,6 +36,12 @@ NOISE_COUNTS = 1.3
 REACH_M = 0.65
 """Farther than this from a robot's center nothing is looked for: it adds less than the noise of one reading."""
 
+DISTANCE_REACH_M = 4.0
+"""Of HeRo+'s VL53L1X, which shows this where it sees nothing (assumption)."""
+
+DISTANCE_NOISE_M = 0.005
+"""Standard deviation of one of its readings (assumption)."""
+
 # The diode sees a cone, whose rim is modeled by two more rays of less weight. Half angle and weight are assumptions.
 _CONE_RAD = np.array([[0.0], [-0.21], [0.21]])
 _CONE_WEIGHT = np.array([[1.0], [0.7], [0.7]])
@@ -54,16 +60,16 @@ class Rays:
         cosine: of the angle of incidence on it (K, A).
     """
 
-    def __init__(self, x: np.ndarray, y: np.ndarray) -> None:
-        """Begin with rays that have met nothing."""
-        self.x, self.y = x, y
+    def __init__(self, x: np.ndarray, y: np.ndarray, reach_m: float = REACH_M) -> None:
+        """Begin with rays that have met nothing, and look for nothing beyond reach_m from the robot's center."""
+        self.x, self.y, self._reach_m = x, y, reach_m
         self.distance_m, self.cosine = np.full(x.shape, _FAR_M), np.zeros(x.shape)
 
     def meet_walls(self, x_m: np.ndarray, y_m: np.ndarray, walls: Segments) -> None:
         """Let rays from x_m and y_m (K, 1), which have met nothing yet, end at walls."""
         start_x, start_y = walls.start_m[0] - x_m, walls.start_m[1] - y_m
         area_m2 = start_x * walls.along_m[1] - start_y * walls.along_m[0]
-        robots, seen = (area_m2 * area_m2 < (REACH_M * REACH_M) * walls.length_m2).nonzero()
+        robots, seen = (area_m2 * area_m2 < (self._reach_m * self._reach_m) * walls.length_m2).nonzero()
         if not len(robots):
             return
         ray_x, ray_y = self.x[robots], self.y[robots]
@@ -86,7 +92,7 @@ class Rays:
 
         A circle around the robot's own center, its body, is not seen.
         """
-        center_m2, reach_m = to_x_m * to_x_m + to_y_m * to_y_m, REACH_M + radii_m
+        center_m2, reach_m = to_x_m * to_x_m + to_y_m * to_y_m, self._reach_m + radii_m
         robots, circles = ((center_m2 < reach_m * reach_m) & (center_m2 > 0.0)).nonzero()
         if not len(robots):
             return
@@ -109,6 +115,7 @@ def measure_signals(
     places_m: np.ndarray,
     headings: np.ndarray,
     bodies_m: np.ndarray,
+    radii_m: np.ndarray,
     walls: Segments,
     circles_m: np.ndarray,
     alpha_counts_m2: np.ndarray,
@@ -117,20 +124,48 @@ def measure_signals(
     """Return the noiseless signal (counts) of the eight sensors of each robot, shape (K, 8).
 
     places_m (K, 2) and headings (K, 2), cosine and sine, of the robots that look; bodies_m (K, N, 2) the places of
-    the robots that each could see, itself among them; circles_m (C, 3), x y radius; alpha_counts_m2 (K, 8) of each
-    sensor, beta_counts (K, 1) of each robot.
+    the robots that each could see, itself among them, radii_m (N,) theirs; circles_m (C, 3), x y radius;
+    alpha_counts_m2 (K, 8) of each sensor, beta_counts (K, 1) of each robot.
     """
     cosine, sine = headings[:, :1], headings[:, 1:]
     rays = Rays(cosine * _RAYS_X - sine * _RAYS_Y, sine * _RAYS_X + cosine * _RAYS_Y)
-    x_m, y_m = places_m[:, :1], places_m[:, 1:]
-    rays.meet_walls(x_m, y_m, walls)
-    rays.meet_circles(bodies_m[..., 0] - x_m, bodies_m[..., 1] - y_m, np.full(bodies_m.shape[1], BODY_RADIUS_M))
-    if len(circles_m):
-        rays.meet_circles(circles_m[:, 0] - x_m, circles_m[:, 1] - y_m, circles_m[:, 2])
+    _meet_all(rays, places_m, bodies_m, radii_m, walls, circles_m)
     distance_m = np.maximum(rays.distance_m - BODY_RADIUS_M, 1e-3)
     bright = rays.cosine / (distance_m * distance_m)
     bright = (bright.reshape(-1, len(_CONE_RAD), BEAMS) * _CONE_WEIGHT).max(axis=1)
     return np.minimum(alpha_counts_m2 * bright + _offset(bright, beta_counts), SATURATION_COUNTS)
+
+
+def measure_distance(
+    place_m: np.ndarray,
+    heading: np.ndarray,
+    bodies_m: np.ndarray,
+    radii_m: np.ndarray,
+    walls: Segments,
+    circles_m: np.ndarray,
+) -> float:
+    """Return how far (m) ahead of the center of the robot at place_m (2,) something is, DISTANCE_REACH_M at most.
+
+    heading (2,), cosine and sine; bodies_m (N, 2) the places of all robots, the others as in measure_signals().
+    """
+    rays = Rays(heading[None, :1], heading[None, 1:], DISTANCE_REACH_M)
+    _meet_all(rays, place_m[None], bodies_m[None], radii_m, walls, circles_m)
+    return min(float(rays.distance_m[0, 0]), DISTANCE_REACH_M)
+
+
+def _meet_all(
+    rays: Rays,
+    places_m: np.ndarray,
+    bodies_m: np.ndarray,
+    radii_m: np.ndarray,
+    walls: Segments,
+    circles_m: np.ndarray,
+) -> None:
+    x_m, y_m = places_m[:, :1], places_m[:, 1:]
+    rays.meet_walls(x_m, y_m, walls)
+    rays.meet_circles(bodies_m[..., 0] - x_m, bodies_m[..., 1] - y_m, radii_m)
+    if len(circles_m):
+        rays.meet_circles(circles_m[:, 0] - x_m, circles_m[:, 1] - y_m, circles_m[:, 2])
 
 
 def _offset(bright: np.ndarray, beta_counts: np.ndarray) -> np.ndarray:

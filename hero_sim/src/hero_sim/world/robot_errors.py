@@ -9,6 +9,7 @@ from typing import Dict, Iterable, List, NamedTuple
 import numpy as np
 
 from ..key_values import parse_values
+from ..robot_constants import BODY_RADIUS_M, WHEEL_SEPARATION_M
 from .noise import draw_normal
 from .range_sensors import ALPHA_COUNTS_M2, BEAMS, BETA_COUNTS
 
@@ -59,6 +60,8 @@ KINDS: Dict[str, Kind] = {
     "lag_s": Kind("servo_lag_s", _ALL, 0.001, 5),
     "left_wheel": Kind("wheel_scale", _LEFT, 0.5, 2),
     "right_wheel": Kind("wheel_scale", _RIGHT, 0.5, 2),
+    "wheel_separation_m": Kind("wheel_separation_m", _ALL, 0.02, 0.2),
+    "radius_m": Kind("radius_m", _ALL, 0.03, 0.2),
     "slip": Kind("slip", _ALL, 0, 0.5),
     "ripple_m_s": Kind("ripple_m_s", _ALL, 0, 0.1),
     "alpha_counts_m2": Kind("alpha_counts_m2", _ALL, 0.01, 10),
@@ -76,6 +79,8 @@ class RobotErrors(NamedTuple):
     servo_gain: np.ndarray
     servo_lag_s: np.ndarray
     wheel_scale: np.ndarray
+    wheel_separation_m: np.ndarray
+    radius_m: np.ndarray
     slip: np.ndarray
     ripple_m_s: np.ndarray
     alpha_counts_m2: np.ndarray
@@ -96,6 +101,8 @@ def draw_errors(rngs: Iterable[np.random.RandomState], scale: float = 1.0) -> Ro
         servo_gain=1.0 + 0.03 * drawn[:, 2:4],
         servo_lag_s=same * SERVO_LAG_S,
         wheel_scale=1.0 + 0.003 * drawn[:, 4:6],
+        wheel_separation_m=same * WHEEL_SEPARATION_M,
+        radius_m=same * BODY_RADIUS_M,
         slip=same * 0.02 * scale,
         ripple_m_s=same * 0.003 * scale,
         alpha_counts_m2=ALPHA_COUNTS_M2 * (1.0 + 0.02 * drawn[:, 6:]),

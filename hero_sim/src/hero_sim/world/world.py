@@ -17,7 +17,14 @@ from .kinematics import join_wheels
 from .noise import draw_normal
 from .pushing.pushing import Pushing
 from .pushing.shapes import Body
-from .range_sensors import BEAMS, NOISE_COUNTS, measure_signals
+from .range_sensors import (
+    BEAMS,
+    DISTANCE_NOISE_M,
+    DISTANCE_REACH_M,
+    NOISE_COUNTS,
+    measure_distance,
+    measure_signals,
+)
 from .robot_errors import MAX_WHEEL_M_S, SERVO_GAIN_M_S_US, RobotErrors
 
 __all__ = ["STEP_MS", "View", "World"]
@@ -93,7 +100,8 @@ class World:
         self._scan_seeds = [int(rng.randint(0, 2**31 - 1)) for rng in rngs]
         self._scan_rng = np.random.RandomState(0)
         objects = [arena.objects] * self.worlds if objects is None else objects
-        self._bodies = BodyMotion(arena, objects, np.array(poses, dtype=float).reshape(rows, 3).T.copy())
+        poses = np.array(poses, dtype=float).reshape(rows, 3).T.copy()
+        self._bodies = BodyMotion(arena, objects, poses, errors.radius_m[:, 0], errors.wheel_separation_m[:, 0])
         self._poses = self._bodies.poses.T
         self._poses.flags.writeable = False
         self._commands = np.zeros((2, rows))
@@ -177,7 +185,8 @@ class World:
 
     def measure_body_speeds(self) -> np.ndarray:
         """Return linear (m/s) and angular speed (rad/s) of each robot (R, 2), as its wheels have it."""
-        return np.column_stack(join_wheels(*self._speeds))
+        left_m_s, right_m_s = self._speeds
+        return np.column_stack(join_wheels(left_m_s, right_m_s, self.errors.wheel_separation_m[:, 0]))
 
     def observe(self) -> View:
         """Return where all bodies are now."""
@@ -236,7 +245,18 @@ class World:
             view.places_m[which],
             view.headings[which],
             view.places_m.reshape(self.worlds, self._robots, 2)[which // self._robots],
+            self.errors.radius_m[: self._robots, 0],
             *obstacles,
             self.errors.alpha_counts_m2[which],
             self.errors.beta_counts[which],
         )
+
+    def read_distance(self, row: int) -> float:
+        """Return one noisy reading (m) of a distance sensor that looks ahead from the middle of the robot in a row."""
+        view, world = self.observe(), row // self._robots
+        bodies_m = view.places_m[world * self._robots : (world + 1) * self._robots]
+        obstacles = view.obstacles[world] if view.obstacles else (self._walls, self.arena.circles_m)
+        radii_m = self.errors.radius_m[: self._robots, 0]
+        distance_m = measure_distance(view.places_m[row], view.headings[row], bodies_m, radii_m, *obstacles)
+        noise = float(self._draw_scan_noise(world, view, 1)[0, 0])
+        return min(max(round(distance_m + noise * DISTANCE_NOISE_M, 3), 0.001), DISTANCE_REACH_M)

@@ -7,6 +7,7 @@ import { sourceOf, stateOf } from "../losses.js";
 export const BODY_MM = 36.85;
 export const TRAIL_MS = 60000;
 const WHEEL_MM = [24.6, 6, 31.5]; // radius, width, distance from the middle
+const SHIELD_MM = 60; // radius of a HeRo+'s bump shield
 const MIN_RADIUS_PX = 9; // radius of a robot, however far the view is
 const PROJECTED_PX = 26;
 const SENSOR_REACH_MM = 236.8;
@@ -238,6 +239,13 @@ export class MapPainter {
       context.fillStyle = this.ink("--tyre");
       for (const side of [-1, 1]) {
         context.fillRect(-WHEEL_MM[0], side * WHEEL_MM[2] - WHEEL_MM[1] / 2, 2 * WHEEL_MM[0], WHEEL_MM[1]);
+      }
+      if (robot.model === "hero_plus") {
+        context.strokeStyle = this.ink("--tyre");
+        context.lineWidth = 3;
+        context.beginPath();
+        context.arc(0, 0, SHIELD_MM, 0, 2 * Math.PI);
+        context.stroke();
       }
       // From the rim to the middle: identity, a dark gap, and the light, which glows only within the gap.
       context.fillStyle = this.ink("--shell");

@@ -173,6 +173,7 @@ export class RobotPanel {
       ["odometry", robot.odom === null ? "-" : `${robot.odom.toFixed(1)} Hz`],
       ["from robot", `${robot.packets.toFixed(0)} packets/s, ${(robot.bytes / 1000).toFixed(1)} kB/s`],
       ["address", robot.address],
+      ["model", robot.model || "unknown"],
       ["versions", [robot.firmware, robot.hardware, robot.config].filter(Boolean).join(", ") || "unknown"],
       ["up for", robot.uptime ? spanOf(robot.uptime) : "-"],
       ["state since", spanOf(robot.since)],

@@ -5,6 +5,7 @@ again (Gauss-Seidel), with a friction cone at each. A robot has traction for MAX
 more from one of them, the bodies stay, and its wheels slip. Nothing moves without being pushed: no energy is created.
 """
 
+import itertools
 import math
 from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple
 
@@ -64,8 +65,10 @@ class Pushing:
         bodies: Sequence[PushedBody],
         walls_m: Sequence[Tuple[float, float, float, float]],
         circles_m: Sequence[Tuple[float, float, float]] = (),
+        radii_m: Optional[Sequence[float]] = None,
     ) -> None:
-        """walls_m: x1 y1 x2 y2 of each; circles_m: round obstacles, x y radius."""
+        """walls_m: x1 y1 x2 y2 of each; circles_m: round obstacles, x y radius; radii_m: of robots, None for stock."""
+        self._radii_m = itertools.repeat(BODY_RADIUS_M) if radii_m is None else radii_m
         self.bodies = list(bodies)
         self._walls_m = list(walls_m)
         self._circles_m = list(circles_m)
@@ -100,17 +103,17 @@ class Pushing:
 
     def push_out(self, places_m: Sequence[Place]) -> List[Place]:
         """Return places of robots out of the bodies that they reach into: their wheels slip."""
-        return [self._leave(place_m) for place_m in places_m]
+        return [self._leave(place_m, radius_m) for place_m, radius_m in zip(places_m, self._radii_m)]
 
     def _list_pushes(self, before_m: Sequence[Place], after_m: Sequence[Place]) -> List[_Touch]:
         pushes = []
-        for robot, (place_m, old_m) in enumerate(zip(after_m, before_m)):
+        for robot, (place_m, old_m, radius_m) in enumerate(zip(after_m, before_m, self._radii_m)):
             for index, pushed in enumerate(self.bodies):
                 body = pushed.body
-                reach_m = BODY_RADIUS_M + body.shape.reach_m
+                reach_m = radius_m + body.shape.reach_m
                 away_x, away_y = body.x_m - place_m[0], body.y_m - place_m[1]
                 if away_x * away_x + away_y * away_y < reach_m * reach_m:
-                    contact = touch_circle(place_m[0], place_m[1], BODY_RADIUS_M, body)
+                    contact = touch_circle(place_m[0], place_m[1], radius_m, body)
                     if contact.depth_m > 0.0:
                         moved_m = (place_m[0] - old_m[0], place_m[1] - old_m[1])
                         pushes.append(_Touch(contact, None, index, robot, moved_m))
@@ -229,13 +232,13 @@ class Pushing:
             return False
         return max(loads.values()) * friction_j <= MAX_PUSH_N * pushed_j
 
-    def _leave(self, place_m: Place) -> Place:
+    def _leave(self, place_m: Place, radius_m: float) -> Place:
         for pushed in self.bodies:
-            reach_m = BODY_RADIUS_M + pushed.body.shape.reach_m
+            reach_m = radius_m + pushed.body.shape.reach_m
             away_x, away_y = pushed.body.x_m - place_m[0], pushed.body.y_m - place_m[1]
             if away_x * away_x + away_y * away_y >= reach_m * reach_m:
                 continue
-            contact = touch_circle(place_m[0], place_m[1], BODY_RADIUS_M, pushed.body)
+            contact = touch_circle(place_m[0], place_m[1], radius_m, pushed.body)
             if contact.depth_m > 0.0:
                 place_m = (
                     place_m[0] - contact.normal_x * contact.depth_m,
