@@ -4,6 +4,7 @@ Public names are imported on first use (PEP 562), so that pure modules of this p
 """
 
 from importlib import import_module
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # for editors and mypy
@@ -102,4 +103,11 @@ _MODULES = {
 def __getattr__(name: str) -> Any:
     if name not in _MODULES:
         raise AttributeError("hero_client has no attribute %r" % name)
-    return getattr(import_module(_MODULES[name]), name)
+    try:
+        module = import_module(_MODULES[name])
+    except ModuleNotFoundError as error:
+        if find_spec("rospy") is not None:
+            raise
+        text = "hero_client.%s needs ROS; without it run the script on simulated robots: python3 -m hero_sim.in_process"
+        raise ModuleNotFoundError(text % name, name=error.name) from None
+    return getattr(module, name)

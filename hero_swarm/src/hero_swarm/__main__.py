@@ -1,10 +1,9 @@
 """Runs a program of the package without ROS: python3 -m hero_swarm run e.yaml."""
 
 import sys
+from importlib import import_module
 
-from .experiments import report, runner
-
-PROGRAMS = {"run": runner.main, "report": report.main}
+PROGRAMS = {"run": "runner", "report": "report"}
 
 
 def main() -> None:
@@ -12,7 +11,11 @@ def main() -> None:
     name = sys.argv[1] if len(sys.argv) > 1 else ""
     if name not in PROGRAMS:
         sys.exit("python3 -m hero_swarm: the first argument must be one of: %s" % ", ".join(PROGRAMS))
-    PROGRAMS[name](sys.argv[2:])
+    try:
+        program = import_module("hero_swarm.experiments." + PROGRAMS[name])
+    except ModuleNotFoundError as error:
+        sys.exit("python3 -m hero_swarm %s: %s is missing; install python3-%s" % (name, error.name, error.name))
+    program.main(sys.argv[2:])
 
 
 if __name__ == "__main__":
