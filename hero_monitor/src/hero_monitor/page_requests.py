@@ -11,6 +11,7 @@ from hero_client.apps.formations import FormationError
 from hero_client.values.geometry import Pose
 
 from .background import Background
+from .control.client_commands import read_command
 from .control.commander import Commander, Notice
 from .control.dead_man import DriveCommand
 from .control.freshness import explain_refused_release, is_fresh, read_clock_ms
@@ -77,6 +78,27 @@ class PageRequests:
         refusal = refusal or self._carry_out[request["do"]](page, request)
         if refusal:
             page.tell("error", refusal)
+
+    def publish(self, client: int, topic: str, message_type: str, content: bytes) -> str:
+        """Carry out a message of a Foxglove client by the rules of the page; return why it is refused, empty if not."""
+        command = read_command(topic, message_type, content)
+        if command is None:
+            return "%s: only /hero_N/cmd_vel (geometry_msgs/Twist) and stop_request (std_msgs/Bool) are taken" % topic
+        if isinstance(command, bool):
+            if not command:
+                return "robots are released on the page only"
+            self._commander.request_stop(True)
+            self.end_programs_of_stopped_robots()
+            self._background.warn("a Foxglove client requests to stop all robots")
+            return ""
+        robot = command.namespace.strip("/")
+        if not (command.linear_m_s or command.angular_rad_s):
+            self._commander.end_drive(client, command.namespace)
+            return ""
+        refusal = self._explain_refusal({"do": "drive", "robots": [robot]})
+        if not refusal and not self._commander.drive(client, command):
+            refusal = "%s is driven from another page" % robot
+        return refusal
 
     def _explain_refusal(self, request: Request) -> str:
         """Return why a request is refused; empty if it is not."""

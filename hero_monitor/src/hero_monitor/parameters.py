@@ -30,6 +30,7 @@ class Parameters(NamedTuple):
     map_frame: str
     record_folder: str
     foxglove_origins: List[str]
+    foxglove_publish: bool
 
 
 def read_token(host: str, file: str) -> Optional[str]:
@@ -69,6 +70,7 @@ def load_parameters() -> Parameters:
             "map_frame": "world",
             "record_folder": "~/hero_recordings",
             "foxglove_origins": "",
+            "foxglove_publish": flag(False),
         }
     )
     host = str(given["host"])
@@ -86,4 +88,5 @@ def load_parameters() -> Parameters:
         str(given["map_frame"]).lstrip("/"),
         str(given["record_folder"]),
         re.findall(r"[^\s,]+", str(given["foxglove_origins"])),
+        given["foxglove_publish"],
     )

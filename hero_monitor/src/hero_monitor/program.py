@@ -42,7 +42,7 @@ class Monitor:
         # Here, so that a machine without tornado gets a line that says what to do.
         import tornado.ioloop
 
-        from .foxglove.endpoint import FoxgloveEndpoint, TopicSource
+        from .foxglove.endpoint import FoxgloveEndpoint, Publisher, TopicSource
         from .foxglove.ros_topics import RosTopics
         from .serving.server import Actions, Server
 
@@ -66,7 +66,10 @@ class Monitor:
         limits = ConnectionLimits(min(CONNECTIONS_MAX, raise_file_limit() // 2))
         topics = RosTopics(self._background)
         source = TopicSource(topics.find_types, topics.want, topics.take)
-        self._foxglove = FoxgloveEndpoint(source, parameters.foxglove_origins)
+        publisher = Publisher(self._open_client, self._requests.publish, self._close_client)
+        self._foxglove = FoxgloveEndpoint(
+            source, parameters.foxglove_origins, publisher if parameters.foxglove_publish else None
+        )
         access = Access(parameters.token, parameters.host_names)
         self._server = Server(access, limits, actions, self._foxglove.route)
         self._tick = tornado.ioloop.PeriodicCallback(self._update_pages, 1000.0 / parameters.rate_hz)
@@ -74,6 +77,7 @@ class Monitor:
         self._clock = tornado.ioloop.PeriodicCallback(self._send_clock, 1000.0 * CLOCK_PERIOD_S)
         self._end_check = tornado.ioloop.PeriodicCallback(self._check_end, 1000.0 * END_CHECK_PERIOD_S)
         self._leaving: Any = None
+        self._clients = 0  # that may publish
 
     def run(self) -> None:
         """Serve pages until the program ends. Raises: ProgramError."""
@@ -118,17 +122,33 @@ class Monitor:
     # ---------------------------------------------------------------- pages come and go
 
     def _open_page(self, page: "PageSocket") -> None:
+        page.send(encode({"hello": {"control": self._parameters.control}}))
+        self._enter()
+
+    def _close_page(self, page: "PageSocket") -> None:
+        self._commander.drop_page(page.number)
+        self._leave_later()
+
+    def _open_client(self) -> None:
+        """A client that may publish is there: as for a page, robots are watched and stopped when it falls silent."""
+        self._clients += 1
+        self._enter()
+
+    def _close_client(self, number: int) -> None:
+        self._clients -= 1
+        self._commander.drop_page(number)
+        self._leave_later()
+
+    def _enter(self) -> None:
         if self._leaving is not None:
             self._loop.remove_timeout(self._leaving)
             self._leaving = None
-        page.send(encode({"hello": {"control": self._parameters.control}}))
         if not self._tick.is_running():
             for repeated in (self._tick, self._stops, self._clock):
                 repeated.start()
 
-    def _close_page(self, page: "PageSocket") -> None:
-        self._commander.drop_page(page.number)
-        if not self._server.pages and self._leaving is None:
+    def _leave_later(self) -> None:
+        if not self._server.pages and not self._clients and self._leaving is None:
             self._leaving = self._loop.call_later(LINGER_S, self._leave)
 
     def _leave(self) -> None:

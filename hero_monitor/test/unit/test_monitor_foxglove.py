@@ -1,10 +1,13 @@
 """Topics for Foxglove clients, without sockets: what is offered, who gets what, what is dropped."""
 
 import json
+import math
 import struct
 
 import pytest
 
+from hero_monitor.control.client_commands import read_command
+from hero_monitor.control.dead_man import DriveCommand
 from hero_monitor.foxglove import hub as hub_module
 from hero_monitor.foxglove.hub import Client, Hub, TopicMessage, TopicType
 
@@ -37,7 +40,17 @@ class Reader:
 
     def take(self):
         """Return messages as (opcode, subscription, time in ns, content)."""
-        return [(*struct.unpack("<BIQ", frame[:13]), frame[13:]) for frame in self.client.take()]
+        messages = [read_frame(frame) for frame in self.client.take()]
+        return [(*struct.unpack("<BIQ", message[:13]), message[13:]) for message in messages]
+
+
+def read_frame(frame):
+    """Return what a whole, unmasked, binary frame of a WebSocket carries (RFC 6455, 5.2)."""
+    assert frame[0] == 0x82
+    form, size = {126: ("!H", 2), 127: ("!Q", 8)}.get(frame[1], ("", 0))
+    length = struct.unpack_from(form, frame, 2)[0] if size else frame[1]
+    assert len(frame) == 2 + size + length
+    return frame[2 + size :]
 
 
 def make_message(topic, content=b"content", time_ns=5, latched_by=""):
@@ -125,7 +138,7 @@ def test_a_slow_client_loses_the_oldest_and_others_lose_nothing(hub, monkeypatch
     for number in range(50):
         hub.deliver([make_message("/pose", b"%07d" % number)])
         received += fast.take()
-    assert [int(content) for *_, content in slow.take()] == [45, 46, 47, 48, 49]
+    assert [int(content) for *_, content in slow.take()] == [46, 47, 48, 49]
     assert [int(content) for *_, content in received] == list(range(50))
     assert ["dropped" in text["message"] for text in slow.find("status")] == [True]
 
@@ -144,11 +157,70 @@ def test_a_slow_client_loses_the_oldest_and_others_lose_nothing(hub, monkeypatch
         '{"op": "subscribe", "subscriptions": [{"id": 1, "channelId": 4000000000}]}',
         '{"op": "unsubscribe", "subscriptionIds": 3}',
         '{"op": "advertise", "channels": []}',
+        '{"op": "advertise", "channels": [{"id": 1}]}',
+        '{"op": "advertise", "channels": [{"id": 1, "topic": "/a", "schemaName": "b", "encoding": "json"}]}',
+        '{"op": "subscribeConnectionGraph"}',
         b"\x01whatever",
+        b"\x02whatever",
+        b"\x01",
     ],
 )
-def test_other_requests_are_answered_by_a_status(hub, text):
+@pytest.mark.parametrize("publishes", [False, True])
+def test_other_requests_are_answered_by_a_status(text, publishes):
+    hub = Hub((lambda *message: "") if publishes else None)
+    if publishes and text == '{"op": "advertise", "channels": []}':
+        return
     reader = Reader(hub)
     hub.receive(reader.client, text)
     assert len(reader.find("status")) == 1
     assert hub.wanted_topics == set()
+
+
+@pytest.mark.parametrize("length", [0, 112, 113, 65522, 65523, 70000])
+def test_messages_of_every_length_are_whole_frames(hub, length):
+    reader = Reader(hub)
+    reader.subscribe(1, "/pose")
+    hub.deliver([make_message("/pose", bytes(length))])
+    assert reader.take() == [(1, 1, 5, bytes(length))]
+
+
+# Publishing.
+
+
+def test_messages_of_clients_are_passed_on_and_a_refusal_is_said_once():
+    heard, refusals = [], ["", "view only", "view only", ""]
+    hub = Hub(lambda *message: heard.append(message) or refusals[len(heard) - 1])
+    reader = Reader(hub)
+    assert reader.texts[0]["capabilities"] == ["clientPublish"]
+    channel = {"id": 7, "topic": "/hero_0/cmd_vel", "schemaName": "geometry_msgs/Twist", "encoding": "ros1"}
+    reader.send(op="advertise", channels=[channel])
+    for _ in refusals:
+        hub.receive(reader.client, struct.pack("<BI", 1, 7) + b"twist")
+    assert heard == [(0, "/hero_0/cmd_vel", "geometry_msgs/Twist", b"twist")] * 4
+    assert [text["message"] for text in reader.find("status")] == ["view only"]
+    reader.send(op="unadvertise", channelIds=[7])
+    hub.receive(reader.client, struct.pack("<BI", 1, 7) + b"twist")
+    assert len(heard) == 4 and "not advertised" in reader.find("status")[-1]["message"]
+
+
+TWIST = "geometry_msgs/Twist"
+
+
+@pytest.mark.parametrize(
+    "topic, message_type, content, command",
+    [
+        ("/hero_3/cmd_vel", TWIST, (0.1, 0, 0, 0, 0, -2.0), DriveCommand("/hero_3", 0.1, -2.0)),
+        ("/hero_3/velocity_controller/cmd_vel", TWIST, (9.0, 0, 0, 0, 0, 99.0), DriveCommand("/hero_3", 0.2, 8.0)),
+        ("/hero_3/cmd_vel", "geometry_msgs/msg/Twist", (0.0,) * 6, DriveCommand("/hero_3", 0.0, 0.0)),
+        ("/hero_3/cmd_vel", TWIST, (math.nan, 0, 0, 0, 0, 0), None),
+        ("/hero_3/cmd_vel", TWIST, (0.1,), None),
+        ("/hero_3/position_controller/cmd_vel", TWIST, (0.1, 0, 0, 0, 0, 0), None),
+        ("/turtle/cmd_vel", TWIST, (0.1, 0, 0, 0, 0, 0), None),
+        ("/hero_driver/stop_request", "std_msgs/Bool", b"\1", True),
+        ("/hero_driver/stop_request", "std_msgs/Bool", b"\0", False),
+        ("/hero_driver/stop_request", "std_msgs/Bool", b"", None),
+    ],
+)
+def test_only_velocities_and_stops_are_commands(topic, message_type, content, command):
+    content = content if isinstance(content, bytes) else struct.pack("<%dd" % len(content), *content)
+    assert read_command(topic, message_type, content) == command

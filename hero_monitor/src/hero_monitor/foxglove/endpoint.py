@@ -1,15 +1,17 @@
-"""The WebSocket /foxglove: one connection per client, with the access rules of the page. Clients only read."""
+"""The WebSocket /foxglove: one connection per client, with the access rules of the page."""
 
+import contextlib
 import time
 from typing import Any, Awaitable, Callable, Dict, FrozenSet, List, NamedTuple, Optional, Set, Union
 
 import tornado.ioloop
+import tornado.iostream
 import tornado.web
 import tornado.websocket
 
 from ..serving.connection_limits import TokenAttempts
-from ..serving.server import BaseHandler, Route
-from .hub import Client, Hub, TopicMessage, TopicType
+from ..serving.server import BaseHandler, PageSocket, Route
+from .hub import Client, Hub, Publish, TopicMessage, TopicType
 from .protocol import SUBPROTOCOLS
 
 CLIENTS_MAX = 10
@@ -24,6 +26,14 @@ class TopicSource(NamedTuple):
     find_types: Callable[[], Dict[str, TopicType]]
     want: Callable[[Set[str]], bool]
     take: Callable[[], List[TopicMessage]]
+
+
+class Publisher(NamedTuple):
+    """What takes the messages of clients; all return at once."""
+
+    open_client: Callable[[], None]
+    publish: Publish
+    close_client: Callable[[int], None]
 
 
 class FoxgloveSocket(tornado.websocket.WebSocketHandler, BaseHandler):
@@ -81,7 +91,7 @@ class FoxgloveSocket(tornado.websocket.WebSocketHandler, BaseHandler):
         """Greet a client."""
         self._sending: Any = None
         self.set_nodelay(True)
-        self.client = Client(self._write)
+        self.client = Client(self._write, next(PageSocket.numbers))
         self.endpoint.add(self)
 
     def on_message(self, message: Union[str, bytes]) -> None:
@@ -94,23 +104,27 @@ class FoxgloveSocket(tornado.websocket.WebSocketHandler, BaseHandler):
 
     def send_waiting(self) -> None:
         """Send what waits, unless the client is still receiving the last of it."""
-        if self._sending is None or self._sending.done():
-            for frame in self.client.take():
-                self._write(frame)
-
-    def _write(self, message: Union[str, bytes]) -> None:
-        try:
-            self._sending = self.write_message(message, binary=isinstance(message, bytes))
-        except tornado.websocket.WebSocketClosedError:
+        stream = getattr(self.ws_connection, "stream", None)
+        if stream is None or not (self._sending is None or self._sending.done()):
             return
+        frames = self.client.take()
+        if frames:
+            # One write for all: tornado's write_message() takes longer for each frame than all else that it passes.
+            with contextlib.suppress(tornado.iostream.StreamClosedError):
+                self._sending = stream.write(b"".join(frames))
+
+    def _write(self, text: str) -> None:
+        with contextlib.suppress(tornado.websocket.WebSocketClosedError):
+            self.write_message(text)
 
 
 class FoxgloveEndpoint:
     """All clients; topics are looked up and subscribed to only while there is one."""
 
-    def __init__(self, source: TopicSource, origins: List[str]) -> None:
-        """origins: of other servers whose pages may connect."""
-        self.hub = Hub()
+    def __init__(self, source: TopicSource, origins: List[str], publisher: Optional[Publisher] = None) -> None:
+        """origins: of other servers whose pages may connect; publisher: takes messages, None: clients only read."""
+        self.hub = Hub(None if publisher is None else publisher.publish)
+        self._publisher = publisher
         self._source = source
         self._sockets: List[FoxgloveSocket] = []
         self._tick = tornado.ioloop.PeriodicCallback(self._update, 1000.0 * FLUSH_PERIOD_S)
@@ -121,6 +135,8 @@ class FoxgloveEndpoint:
         """Serve a client."""
         self._sockets.append(socket)
         self.hub.add(socket.client)
+        if self._publisher is not None:
+            self._publisher.open_client()
         if not self._tick.is_running():
             self._tick.start()
 
@@ -129,6 +145,8 @@ class FoxgloveEndpoint:
         if socket in self._sockets:
             self._sockets.remove(socket)
             self.hub.remove(socket.client)
+            if self._publisher is not None:
+                self._publisher.close_client(socket.client.number)
 
     def _update(self) -> None:
         is_done = self._source.want(self.hub.wanted_topics)

@@ -1,15 +1,16 @@
 """Which client gets which topic: channels as topics appear and vanish, subscriptions, a queue per client. Pure."""
 
 from collections import defaultdict, deque
-from typing import Callable, DefaultDict, Deque, Dict, Iterable, List, NamedTuple, Set, Tuple, Union
+from typing import Callable, DefaultDict, Deque, Dict, Iterable, List, NamedTuple, Optional, Set, Tuple, Union
 
 from .protocol import (
-    SERVER_INFO,
     WARNING,
     Channel,
     ProtocolError,
+    Request,
     encode_message,
     make_advertise,
+    make_server_info,
     make_status,
     make_unadvertise,
     read_request,
@@ -19,8 +20,12 @@ QUEUE_BYTES_MAX = 4_000_000
 """Of one client: about a second of a large swarm with a camera's images."""
 
 SUBSCRIPTIONS_MAX = 10_000
+PUBLISHED_MAX = 1_000
 
-NO_PUBLISHING = "this server takes no messages and calls: stop and drive robots on the monitor's page"
+NO_PUBLISHING = "this server takes no messages: start the monitor with foxglove_publish:=true"
+
+Publish = Callable[[int, str, str, bytes], str]
+"""Takes number of the client, topic, type and content of a message; returns why it is refused, empty if it is not."""
 
 
 class TopicType(NamedTuple):
@@ -43,8 +48,12 @@ class TopicMessage(NamedTuple):
 class Client:
     """One connection: its subscriptions, and what waits to be sent; beyond QUEUE_BYTES_MAX the oldest is dropped."""
 
-    def __init__(self, send_text: Callable[[str], None]) -> None:
+    def __init__(self, send_text: Callable[[str], None], number: int = 0) -> None:
+        """number: no other client's, and no page's."""
         self.send_text = send_text
+        self.number = number
+        self.published: Dict[int, Channel] = {}
+        self.refusal = ""  # why the last message was refused; said once
         self.subscriptions: Dict[int, Channel] = {}
         self._queue: Deque[bytes] = deque()
         self._queued_bytes = 0
@@ -72,7 +81,9 @@ class Client:
 class Hub:
     """All clients and channels."""
 
-    def __init__(self) -> None:
+    def __init__(self, publish: Optional[Publish] = None) -> None:
+        """publish: takes messages of clients; None: they only read."""
+        self._publish = publish
         self.clients: Set[Client] = set()
         self._channels: Dict[str, Channel] = {}
         self._latched: Dict[str, Dict[str, TopicMessage]] = {}
@@ -86,7 +97,7 @@ class Hub:
     def add(self, client: Client) -> None:
         """Greet a client."""
         self.clients.add(client)
-        client.send_text(SERVER_INFO)
+        client.send_text(make_server_info(self._publish is not None))
         if self._channels:
             client.send_text(make_advertise(self._channels.values()))
 
@@ -133,8 +144,31 @@ class Hub:
             for number, _ in request.subscriptions:
                 client.subscriptions.pop(number, None)
             self._forget_latched()
-        else:
+        elif self._publish is None:
             client.send_text(make_status(WARNING, NO_PUBLISHING))
+        elif request.op == "advertise":
+            client.published.update((channel.id, channel) for channel in request.channels[:PUBLISHED_MAX])
+            while len(client.published) > PUBLISHED_MAX:
+                client.published.popitem()
+        elif request.op == "unadvertise":
+            for channel in request.channels:
+                client.published.pop(channel.id, None)
+        elif request.op == "publish":
+            self._pass_on(client, request, self._publish)
+        else:
+            client.send_text(make_status(WARNING, "this server does not know %s" % request.op))
+
+    @staticmethod
+    def _pass_on(client: Client, request: Request, publish: Publish) -> None:
+        """Pass a message on, or tell the client once why not."""
+        channel = client.published.get(request.channel_id)
+        if channel is None:
+            refusal = "channel %d is not advertised" % request.channel_id
+        else:
+            refusal = publish(client.number, channel.topic, channel.type, request.content)
+        if refusal and refusal != client.refusal:
+            client.send_text(make_status(WARNING, refusal))
+        client.refusal = refusal
 
     def _subscribe(self, client: Client, number: int, channel_id: int, channels: Dict[int, Channel]) -> None:
         channel = channels.get(channel_id)

@@ -15,11 +15,10 @@ INFO, WARNING, ERROR = 0, 1, 2
 
 MESSAGE_DATA = 0x01
 _HEADER = struct.Struct("<BIQ")  # opcode, id of the subscription, time of arrival in ns
+_CLIENT_HEADER = struct.Struct("<BI")  # opcode, id of the client's channel
+_BINARY = 0x82  # first byte of a WebSocket frame that is a whole binary message
+_SHORT_FRAME, _FRAME, _LONG_FRAME = struct.Struct("!BB"), struct.Struct("!BBH"), struct.Struct("!BBQ")
 
-SERVER_INFO = json.dumps(
-    {"op": "serverInfo", "name": "hero_monitor", "capabilities": [], "supportedEncodings": ["ros1"], "metadata": {}}
-)
-"""Without capabilities: clients can neither publish nor call services."""
 
 
 class ProtocolError(Exception):
@@ -27,7 +26,7 @@ class ProtocolError(Exception):
 
 
 class Channel(NamedTuple):
-    """A topic that clients can subscribe to."""
+    """A topic that clients can subscribe to, or that a client publishes."""
 
     id: int
     topic: str
@@ -39,8 +38,19 @@ class Request(NamedTuple):
     """What a client sent."""
 
     op: str
-    subscriptions: List[Tuple[int, int]]
+    subscriptions: List[Tuple[int, int]] = []
     """Of subscribe: ids of subscription and channel; of unsubscribe: id of the subscription, and 0."""
+    channels: List[Channel] = []
+    """Of advertise, without definitions; of unadvertise, only with ids."""
+    channel_id: int = 0
+    content: bytes = b""
+    """Of publish."""
+
+
+def make_server_info(takes_messages: bool) -> str:
+    """Return the greeting; clients never call services."""
+    info = {"op": "serverInfo", "name": "hero_monitor", "metadata": {}, "supportedEncodings": ["ros1"]}
+    return json.dumps({**info, "capabilities": ["clientPublish"] if takes_messages else []})
 
 
 def make_advertise(channels: Iterable[Channel]) -> str:
@@ -70,14 +80,24 @@ def make_status(level: int, text: str) -> str:
 
 
 def encode_message(subscription: int, time_ns: int, content: bytes) -> bytes:
-    """Return the frame that carries a message."""
-    return _HEADER.pack(MESSAGE_DATA, subscription, time_ns) + content
+    """Return the WebSocket frame that carries a message, as servers send it: whole and not masked (RFC 6455, 5.2)."""
+    length = _HEADER.size + len(content)
+    if length < 126:
+        head = _SHORT_FRAME.pack(_BINARY, length)
+    elif length < 65536:
+        head = _FRAME.pack(_BINARY, 126, length)
+    else:
+        head = _LONG_FRAME.pack(_BINARY, 127, length)
+    return head + _HEADER.pack(MESSAGE_DATA, subscription, time_ns) + content
 
 
 def read_request(message: Union[str, bytes]) -> Request:
     """Parse what a client sent. Raises: ProtocolError."""
     if isinstance(message, bytes):
-        return Request("publish", [])  # all binary requests carry messages or calls, which no capability allows
+        if len(message) < _CLIENT_HEADER.size or message[0] != MESSAGE_DATA:
+            raise ProtocolError("invalid request: neither text nor a message")
+        channel_id = _CLIENT_HEADER.unpack_from(message)[1]
+        return Request("publish", channel_id=channel_id, content=message[_CLIENT_HEADER.size :])
     try:
         value = json.loads(message)
         op = value["op"]
@@ -85,9 +105,20 @@ def read_request(message: Union[str, bytes]) -> Request:
             return Request(op, [(_read_id(each["id"]), _read_id(each["channelId"])) for each in value["subscriptions"]])
         if op == "unsubscribe":
             return Request(op, [(_read_id(each), 0) for each in value["subscriptionIds"]])
+        if op == "advertise":
+            return Request(op, channels=[_read_channel(each) for each in value["channels"]])
+        if op == "unadvertise":
+            return Request(op, channels=[Channel(_read_id(each), "", "", "") for each in value["channelIds"]])
     except (ValueError, TypeError, KeyError, RecursionError) as error:
         raise ProtocolError("invalid request: %s" % type(error).__name__) from None
-    return Request(str(op)[:40], [])
+    return Request(str(op)[:40])
+
+
+def _read_channel(value: Any) -> Channel:
+    topic, kind, encoding = (str(value[name]) for name in ("topic", "schemaName", "encoding"))
+    if encoding != "ros1":
+        raise ProtocolError("%s: this server takes messages as ros1, not as %s" % (topic[:80], encoding[:40]))
+    return Channel(_read_id(value["id"]), topic, kind, "")
 
 
 def _read_id(value: Any) -> int:

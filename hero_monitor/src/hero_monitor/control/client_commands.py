@@ -1,0 +1,30 @@
+"""Reads what Foxglove clients may publish: a stop of all robots, and velocities, as on the page. Pure."""
+
+import math
+import re
+import struct
+from typing import Optional, Union
+
+from hero_client.values.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
+
+from .dead_man import DriveCommand
+
+_VELOCITY_TOPIC = re.compile(r"/(hero_[0-9]+)(?:/velocity_controller)?/cmd_vel")
+_STOP_TOPIC = re.compile(r"/(?:[A-Za-z0-9_/]+/)?stop_request")
+_TWIST = struct.Struct("<6d")
+
+
+def read_command(topic: str, message_type: str, content: bytes) -> Optional[Union[bool, DriveCommand]]:
+    """Return the velocity in a message within the firmware's limits, or whether it asks for a stop; None for others."""
+    message_type = message_type.replace("/msg/", "/")  # as some clients write it
+    velocity_topic = _VELOCITY_TOPIC.fullmatch(topic)
+    if velocity_topic and message_type == "geometry_msgs/Twist" and len(content) == _TWIST.size:
+        linear_m_s, _, _, _, _, angular_rad_s = _TWIST.unpack(content)
+        if not math.isfinite(linear_m_s + angular_rad_s):
+            return None
+        linear_m_s = max(-MAX_LINEAR_M_S, min(MAX_LINEAR_M_S, linear_m_s))
+        angular_rad_s = max(-MAX_ANGULAR_RAD_S, min(MAX_ANGULAR_RAD_S, angular_rad_s))
+        return DriveCommand("/" + velocity_topic[1], linear_m_s, angular_rad_s)
+    if _STOP_TOPIC.fullmatch(topic) and message_type == "std_msgs/Bool" and len(content) == 1:
+        return content != b"\0"
+    return None
