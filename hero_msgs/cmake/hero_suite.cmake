@@ -34,7 +34,9 @@ endfunction()
 
 function(_hero_write_program name import call)
   set(program ${CMAKE_CURRENT_BINARY_DIR}/programs/${name})
-  # Modules load for a second or more: Ctrl-C then ends the program at once, without a traceback.
+  string(REPLACE "\n" "\n    " call "${call}")
+  # Modules load for a second or more: Ctrl-C then ends the program at once, without a traceback. Processes that
+  # multiprocessing spawns load the program, too, and must not start it.
   file(WRITE ${program} "#!${PYTHON_EXECUTABLE}
 import signal
 import sys
@@ -49,7 +51,8 @@ try:
 except ModuleNotFoundError as error:
     sys.exit('${name}: %s; script/bootstrap (or rosdep) installs what all programs need' % error)
 signal.signal(signal.SIGINT, handler)
-${call}
+if __name__ == '__main__':
+    ${call}
 ")
   install(PROGRAMS ${program} DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
   file(COPY ${program} DESTINATION ${CATKIN_DEVEL_PREFIX}/${CATKIN_PACKAGE_BIN_DESTINATION}

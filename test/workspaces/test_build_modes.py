@@ -234,6 +234,15 @@ def test_a_module_that_is_not_installed_is_named_in_one_line(workspace):
     assert output.startswith("export: No module named 'tqdm'; script/bootstrap") and output.count("\n") == 1
 
 
+@pytest.mark.parametrize("workspace", ["install"], indirect=True)
+def test_workers_of_a_program_do_not_start_it_again(workspace):
+    """Processes that multiprocessing spawns load the program that spawned them."""
+    experiment = workspace.directory / "short.yaml"
+    experiment.write_text("behavior: aggregation\nrobots: 2\ntime_s: 1\nseeds: {count: 1}\nmetrics: [dispersion]\n")
+    workspace.run(f"rosrun hero_swarm run {experiment} --jobs 1")
+    assert (workspace.directory / "short" / "runs.csv").is_file()
+
+
 def test_driver_and_simulated_robots_start_and_odometry_arrives(workspace):
     """The main path of the suite, on ports of its own, from this workspace."""
     program = textwrap.dedent(
