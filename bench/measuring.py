@@ -96,7 +96,7 @@ def wait_for_port(port, process):
 
 
 def start(command, environment, **options):
-    """Start a program in a process group of its own."""
+    """Start a program in its own process group."""
     try:
         return subprocess.Popen(command, env=environment, start_new_session=True, text=True, **options)
     except OSError as error:

@@ -60,7 +60,7 @@ REPEATS = 3
 
 
 class Page:
-    """One page of the monitor, on a thread of its own."""
+    """One page of the monitor, on its own thread."""
 
     def __init__(self, port):
         """Connect as a page does."""
@@ -92,7 +92,7 @@ class Page:
 
 
 class Teleop:
-    """Teleoperation in a terminal of its own."""
+    """Teleoperation in its own terminal."""
 
     def __init__(self, suite):
         """Start it."""

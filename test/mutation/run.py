@@ -2,7 +2,7 @@
 
 Usage: run.py [--sample N] [--seed N] WORK_DIR [PACKAGE ...]
 The workspace must be sourced. Changed are all modules that know nothing of ROS, and of the others what unit tests run:
-the rest of those is left to rostests. Every change is tried in a process of its own, with the tests that execute its
+the rest of those is left to rostests. Every change is tried in its own process, with the tests that execute its
 line, the fastest first; the sources stay as they are. Verdicts are kept in WORK_DIR, so that a run continues where the
 last one ended: a change that was noticed is tried again when its module changes, one that was not also when the tests
 change.

@@ -1,6 +1,6 @@
 """Runs the example programs with simulated robots and draws what these truly did. Started by script/pictures.
 
-Every picture is recorded in a process of its own, with a ROS master, a driver and a simulator of its own.
+Every picture is recorded in its own process, with a ROS master, a driver and a simulator of its own.
 """
 
 import json

@@ -1,4 +1,4 @@
-"""Names of pictures on a command line -> the pictures, each made in a process of its own."""
+"""Names of pictures on a command line -> the pictures, each made in its own process."""
 
 import argparse
 import subprocess

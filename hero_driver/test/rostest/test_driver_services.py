@@ -31,7 +31,7 @@ STOCK_CALLS = {
 
 
 class Call:
-    """One call of a service on a thread of its own."""
+    """One call of a service on its own thread."""
 
     def __init__(self, service, *arguments):
         self.answer = None

@@ -40,7 +40,7 @@ class Handler(LinkHandler):
 
 
 class Bench:
-    """A raw subscriber, a real loop on a thread of its own, and publishers behind rospy's own connections."""
+    """A raw subscriber, a real loop on its own thread, and publishers behind rospy's own connections."""
 
     def __init__(self, monkeypatch):
         self.handler = Handler()

@@ -95,7 +95,7 @@ class Terminal:
 
 class TeleopTest(unittest.TestCase):
     def start(self, robot_id):
-        """Start a teleop of this robot in a terminal of its own; node teleop_N."""
+        """Start a teleop of this robot in its own terminal; node teleop_N."""
         terminal = Terminal("__name:=teleop_%d" % robot_id, "_robots:=%d" % robot_id)
         self.addCleanup(terminal.close)
         return terminal

@@ -140,9 +140,9 @@ class LocalizationTest(unittest.TestCase):
         wait_for(lambda: self.find(0, RobotPose.TRACKED), "hero_0 tracked")
         self.wait_for_line("hero_0 found again")
 
-    def test_5_a_robot_that_was_carried_is_set_anew(self):
+    def test_5_the_pose_of_a_robot_moved_by_hand_is_reset(self):
         self.capture.set(shift_m={1: 0.4})
-        self.wait_for_line("hero_1 was carried: set anew 400 mm")
+        self.wait_for_line("hero_1 was moved by hand: pose reset by 400 mm")
         wait_for(
             lambda: self.is_at_truth(self.newest(1)[0] - 0.4, self.newest(1)[1], 1), lambda: "%s" % (self.newest(1),)
         )

@@ -242,7 +242,7 @@ class TrackTest(unittest.TestCase):
     def test_8_a_camera_that_stops_is_named(self):
         self.spoiler.change = None
         self.wait_for_problem("track: camera", "no image for")
-        self.wait_for_problem("localization: hero_0", "is its tag covered")
+        self.wait_for_problem("localization: hero_0", "is its tag occluded")
 
     def test_9_a_second_camera_is_enough_and_check_reads_both(self):
         names = ("__name:=track_2", "~measured_poses:=/track/measured_poses")

@@ -1,4 +1,4 @@
-"""The filter of one robot: accuracy, late and wrong poses, robots that are carried or restart."""
+"""The filter of one robot: accuracy, late and wrong poses, robots moved by hand or restarted."""
 
 import math
 from typing import NamedTuple
@@ -208,7 +208,7 @@ def test_wrong_poses_that_disagree_never_move_the_robot():
     assert pose_filter.estimate().pose == before
 
 
-def test_a_robot_that_is_carried_away_is_set_anew_and_that_is_said():
+def test_the_pose_of_a_robot_moved_by_hand_is_reset_and_reported():
     drive, pose_filter = Drive(4).run(5.0), PoseFilter()
     follow(drive, pose_filter)
     outcomes = []

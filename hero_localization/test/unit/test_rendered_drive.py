@@ -134,7 +134,7 @@ def test_a_robot_that_changes_cameras_keeps_one_continuous_pose(tmp_path, gap_m)
     assert ((True, True) in seen_by) == (gap_m < 0.0)
     assert lines[0].startswith("hero_0 found at")
     assert any("lost" in line for line in lines) == (gap_m > 0.0), lines
-    assert not [line for line in lines if "carried" in line or "corrected" in line], lines
+    assert not [line for line in lines if "moved by hand" in line or "corrected" in line], lines
 
 
 class SteppedPictures:

@@ -34,7 +34,7 @@ def test_goals_in_map_are_reached_to_10_mm_although_odometry_drifts():
         (lambda now_s, true: true._replace(yaw_rad=true.yaw_rad - math.radians(55.0)), r"about -5\d degrees", 0.25),
         (lambda now_s, true: true._replace(x_m=true.x_m + now_s // 1.0 % 2.0), "its pose jumps, .* by 1.00 m", 0.35),
         (lambda now_s, true: true._replace(x_m=true.x_m + now_s // 0.2 % 2.0), "its pose jumps", 0.1),
-        (lambda now_s, true: Pose(0.0, 0.0, 0.0), "wheels turn, but .* does the camera's image stand still", 0.35),
+        (lambda now_s, true: Pose(0.0, 0.0, 0.0), "wheels turn, but .* is the camera's image frozen", 0.35),
     ],
 )
 def test_a_robot_with_wrong_poses_stops_soon_and_says_what_is_wrong(measure, reason, farthest_m):

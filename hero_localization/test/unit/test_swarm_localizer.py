@@ -58,10 +58,11 @@ def test_a_robot_out_of_view_is_lost_and_found_again():
     ]
 
 
-def test_a_carried_robot_is_set_anew_and_said_to_be():
+def test_the_pose_of_a_robot_moved_by_hand_is_reset_and_reported():
     swarm = Swarm(0).run(1.0, {0: (1.0, 2.0, 0.0)}).run(0.5, {0: (1.3, 2.4, 0.0)})
     assert swarm[0].estimate.pose == pytest.approx((1.3, 2.4, 0.0), abs=1e-3)
-    assert swarm.lines[1:] == ["hero_0 was carried: set anew 500 mm and 0 degrees away, at (1.300, 2.400) m, 0 degrees"]
+    step = "500 mm and 0 degrees to (1.300, 2.400) m, 0 degrees"
+    assert swarm.lines[1:] == ["hero_0 was moved by hand: pose reset by " + step]
 
 
 def test_single_outliers_are_a_problem_until_a_pose_fits_again():
@@ -89,7 +90,7 @@ def test_robots_of_a_moved_camera_are_lost_without_a_line():
         swarm.run(0.5)
         swarm.localizer.distrust(swarm.now_s, [0])
     assert len(swarm.lines) == 1
-    assert "is its tag covered" in swarm.run(2.0)[0].problem, "no images come any more"
+    assert "is its tag occluded" in swarm.run(2.0)[0].problem, "no images come any more"
     assert swarm.run(0.1, {0: (1.0, 2.0, 0.0)})[0].state is RobotState.TRACKED
 
 

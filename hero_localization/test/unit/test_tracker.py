@@ -83,7 +83,7 @@ def test_dark_and_bright_pictures_are_named(shade, word):
 def test_small_tags_are_named():
     tracker = make_tracker()
     tracker.take([see(0, 0.0, 0.0, size_m=0.012)], 1.0, 0)
-    text = "tags measure 8 px, and get lost below 14: hang the camera lower, or print larger tags"
+    text = "tags measure only 8 px, less than 14: mount the camera lower, or print larger tags"
     assert Problem("camera", text, False) in tracker.list_problems()
 
 
@@ -132,7 +132,7 @@ def test_pictures_that_are_left_out_are_told_as_a_rate():
     ("seen", "name", "text"),
     [
         ([100], "camera", "2 of 3 reference tags are not seen: is there light enough, and did the camera move?"),
-        ([100, 101], "tag 102", "this reference tag is not seen: is it covered, gone, or too dark?"),
+        ([100, 101], "tag 102", "this reference tag is not seen: is it occluded, removed, or too dark?"),
     ],
 )
 def test_reference_tags_that_are_not_seen_for_long_are_named(seen, name, text):

@@ -1,4 +1,4 @@
-"""A command's end: its output, one line on stderr, its exit status; each in a process of its own."""
+"""A command's end: its output, one line on stderr, its exit status; each in its own process."""
 
 import os
 import subprocess

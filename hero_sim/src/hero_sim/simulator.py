@@ -107,7 +107,7 @@ class Simulator(LinkHandler):
         if not self._reported_late:
             self._reported_late = True
             self._report(
-                "this machine was busy or asleep for %.1f s; the robots stood still meanwhile (reported once; "
+                "this machine was busy or asleep for %.1f s; the robots were paused meanwhile (reported once; "
                 "if it is too slow, take fewer robots or a lower --speed)" % late_s
             )
         self._anchor_clock()

@@ -77,7 +77,7 @@ class Dialog:
 
 
 class Program:
-    """A program in a session of its own, and the lines that it prints, errors among them."""
+    """A program in its own session, and the lines that it prints, errors among them."""
 
     def __init__(self, *command, environment=None, stdin=subprocess.DEVNULL):
         """environment: variables besides ours."""

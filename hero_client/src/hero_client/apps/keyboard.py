@@ -105,7 +105,7 @@ def split_keys(text: str) -> Tuple[List[str], str]:
 def open_terminal() -> IO[bytes]:
     """Return the terminal for reading and setting, unbuffered.
 
-    Standard input, if it is one. A node under roslaunch is in a session of its own, where /dev/tty does not open,
+    Standard input, if it is one. A node under roslaunch is in its own session, where /dev/tty does not open,
     but it has roslaunch's standard streams.
 
     Raises: NoTerminalError with what to do.

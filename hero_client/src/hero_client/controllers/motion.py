@@ -172,7 +172,7 @@ class MotionController:
         elif seen_s - self._moved_s >= STALL_S:
             if odometry is not None and _has_moved(self._moved_odometry, odometry):
                 self._fail(
-                    "its wheels turn, but its pose stays the same: does the camera's image stand still, or is the robot"
+                    "its wheels turn, but its pose stays the same: is the camera's image frozen, or is the robot"
                     " held?"
                 )
                 return

@@ -31,7 +31,7 @@ JUMP_M = 0.1
 """In one step of 0.1 s a robot drives 0.02 m at most."""
 
 JUMPS, JUMP_WINDOW_S = 3, 10.0
-"""So many jumps within this time: a robot that is carried, or found again, jumps once."""
+"""So many jumps within this time: a robot that is moved by hand, or found again, jumps once."""
 
 
 class PoseCheck:
@@ -54,7 +54,7 @@ class PoseCheck:
             self._start = self._last
             self._jumps_s.append(now_s)
             if len(self._jumps_s) == JUMPS and now_s - self._jumps_s[0] <= JUMP_WINDOW_S:
-                text = "its pose jumps, the last time by %.2f m: is its tag there twice, or is the robot carried?"
+                text = "its pose jumps, the last time by %.2f m: is its tag there twice, or is the robot moved by hand?"
                 return text % jump_m
             return ""
         start_pose, start_odometry = self._start

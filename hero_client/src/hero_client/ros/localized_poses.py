@@ -85,7 +85,7 @@ class LocalizedPoses:
             )
         if not robot.position_sd <= MAX_POSITION_SD_M:
             raise StaleDataError(
-                "the pose of %s in the frame %s is uncertain by %.0f mm: it drove unseen: is its tag covered or out of"
+                "the pose of %s in the frame %s is uncertain by %.0f mm: it drove unseen: is its tag occluded or out of"
                 " view?" % (name, report.frame, 1e3 * robot.position_sd)
             )
         return pose

@@ -114,7 +114,7 @@ class CommandTopic(rospy.SubscribeListener):
         self.publish_if_connected(message)
 
     def peer_subscribe(self, topic_name: str, topic_publish: Any, peer_publish: Any) -> None:
-        """Send the command that waited for this subscription; rospy calls it on a thread of its own."""
+        """Send the command that waited for this subscription; rospy calls it on its own thread."""
         with self._turn:
             if self._waiting is not None and not rospy.is_shutdown():
                 self._publisher.publish(self._waiting)

@@ -39,7 +39,7 @@ MESSAGE_CLASSES = {"odom": Odometry, "proximity": LaserScan, "laser": LaserScan,
 
 
 class ThreadMotion(BackgroundMotion):
-    """A motion on a thread of its own."""
+    """A motion on its own thread."""
 
     def __init__(self, steps: Steps) -> None:
         """Start it; it ends soon after a step was sent that it is not to continue."""

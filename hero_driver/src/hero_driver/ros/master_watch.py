@@ -1,7 +1,7 @@
 """Notices that the ROS master was started again, and registers everything with it once more.
 
 rospy registers a topic once; a master that ends takes all registrations with it, and programs that start
-afterwards find no robots. Connections that stand go on by themselves. Runs on a thread of its own, because the
+afterwards find no robots. Connections that stand go on by themselves. Runs on its own thread, because the
 master may hang.
 """
 

@@ -1,6 +1,6 @@
 """Subscribes to a topic and passes on raw messages, read by the event loop's thread.
 
-rospy reads each publisher of a topic on a thread of its own; waking it, and then the thread of the sockets,
+rospy reads each publisher of a topic on its own thread; waking it, and then the thread of the sockets,
 for every command costs several times what the command itself costs. Here rospy does the registration and the
 handshake and hands over the first message; then its thread rests, and the publisher's socket is read by the
 loop until it ends. After that rospy goes on by its own rules: it closes, or it connects again.

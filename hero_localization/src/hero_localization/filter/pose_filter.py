@@ -62,7 +62,7 @@ freedom, one of 1,000 true ones."""
 
 MOVED_POSES = 4
 MOVED_S = 0.1
-"""So many outliers in a row, over so long, that agree with each other: the robot was carried to another place."""
+"""So many outliers in a row, over so long, that agree with each other: the robot was moved by hand (kidnapped)."""
 
 REPLAYED_S = 1.0
 """Poses that arrive later than this after a newer one are left out."""
@@ -95,7 +95,7 @@ class Outcome(enum.Enum):
     """For odometry of its time."""
     OUTLIER = "outlier"
     MOVED = "moved"
-    """Used as a new start: the robot was carried."""
+    """Used as a new start: the robot was moved by hand (kidnapped)."""
     TOO_LATE = "too late"
     NO_ODOMETRY = "no odometry"
 

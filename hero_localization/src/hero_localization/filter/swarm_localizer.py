@@ -76,7 +76,7 @@ class _Robot:
 
     @property
     def disagrees(self) -> bool:
-        """Whether it is measured elsewhere, as while it is carried."""
+        """Whether it is measured elsewhere, as while it is moved by hand."""
         return self.outliers >= DISAGREEING_POSES and self.measured_s - self.filter.used_s >= DISAGREEING_S
 
 
@@ -142,7 +142,7 @@ class SwarmLocalizer:
         step_deg = math.degrees(abs(wrap_angle(after.yaw_rad - before.yaw_rad)))
         step = "%.0f mm and %.0f degrees" % (1e3 * step_m, step_deg)
         if outcome is Outcome.MOVED:
-            return ["hero_%d was carried: set anew %s away, at %s" % (robot_id, step, _describe_pose(after))]
+            return ["hero_%d was moved by hand: pose reset by %s to %s" % (robot_id, step, _describe_pose(after))]
         if was_lost:
             unseen_s = measurement.stamp_s - used_s
             line = "hero_%d found again after %.1f s, %s off its odometry" % (robot_id, unseen_s, step)
@@ -209,7 +209,7 @@ class SwarmLocalizer:
         if robot.untrusted_s > now_s - LOST_S:
             return "the camera that sees it moved: calibrate_camera arena"
         if robot.is_lost:
-            return "not measured for %.0f s: is its tag covered or out of view?" % (now_s - robot.filter.used_s)
+            return "not measured for %.0f s: is its tag occluded or out of view?" % (now_s - robot.filter.used_s)
         error_rad = robot.heading.error_rad
         if error_rad is not None and abs(error_rad) > WRONG_HEADING_RAD:
             kind = "upside down" if is_upside_down(error_rad) else "turned"

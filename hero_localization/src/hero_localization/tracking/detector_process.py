@@ -1,4 +1,4 @@
-"""The search for tags in a process of its own: detectors hold the GIL for many milliseconds, and one takes SIGINT over.
+"""The search for tags in its own process: detectors hold the GIL for many milliseconds, and one takes SIGINT over.
 
 Images go over in shared memory, all else over a pipe. The process knows nothing of ROS, and ends with its parent.
 """

@@ -41,7 +41,7 @@ class TagDetector:
 class AprilTagDetector(TagDetector):
     """python3-apriltag, AprilTag 3's own detector: the more accurate one.
 
-    It holds the GIL and takes SIGINT over while it detects: programs with other threads run it in a process of its own.
+    It holds the GIL and takes SIGINT over while it detects: programs with other threads run it in its own process.
     """
 
     def __init__(self, family: str, decimate: float) -> None:

@@ -181,7 +181,7 @@ class Tracker:
             problems.append(Problem("camera", text, True))
         sides_px = [tag.side_px for tag in self.found if self._settings.layout.find_robot(tag.tag_id) is not None]
         if sides_px and min(sides_px) < MIN_SIDE_PX:
-            text = "tags measure %.0f px, and get lost below %.0f: hang the camera lower, or print larger tags"
+            text = "tags measure only %.0f px, less than %.0f: mount the camera lower, or print larger tags"
             problems.append(Problem("camera", text % (min(sides_px), MIN_SIDE_PX), False))
         missed = [
             tag_id
@@ -189,7 +189,7 @@ class Tracker:
             if len(seen) == EXPECTED_FRAMES and seen.count(False) > MAX_MISSED_SHARE * EXPECTED_FRAMES
         ]
         if missed:
-            text = "tags %s are often missed where their robots are: covered, too dark, too small, or taken off?"
+            text = "tags %s are often missed where their robots are: occluded, too dark, too small, or removed?"
             problems.append(Problem("camera", text % ", ".join(map(str, missed)), False))
         moved = [tag_id for tag_id, since_s in self._moved_since_s.items() if since_s <= newest_s - MOVED_S]
         missing = [tag_id for tag_id, seen_s in self._reference_seen_s.items() if seen_s < newest_s - MISSING_S]
@@ -205,7 +205,7 @@ class Tracker:
             problems.append(Problem("camera", text % (len(missing), len(self._reference_seen_s)), False))
         else:
             for tag_id in sorted(missing):
-                text = "this reference tag is not seen: is it covered, gone, or too dark?"
+                text = "this reference tag is not seen: is it occluded, removed, or too dark?"
                 problems.append(Problem("tag %d" % tag_id, text, False))
         for tag_id, (stamp_s, text) in sorted(self._tag_problems.items()):
             if abs(newest_s - stamp_s) <= KEPT_S:  # time goes back when a recording is played again

@@ -37,7 +37,7 @@ class LimitedXmlRpcServer(rosgraph.xmlrpc.ThreadingXMLRPCServer):
         super().__init__(*arguments)
 
     def process_request(self, request: Any, client_address: Any) -> None:
-        """Serve a connection on a thread of its own, which the oldest one may lose for it."""
+        """Serve a connection on its own thread, which the oldest one may lose for it."""
         self._limit.add(request, client_address)
         super().process_request(request, client_address)
 

@@ -284,7 +284,7 @@ export class FleetMap {
       this.trails.set(name, trail);
       const last = trail[trail.length - 1];
       const step = last ? Math.hypot(pose[0] - last[0], pose[1] - last[1]) : Infinity;
-      // The robot was carried, or its odometry was set: no line across the map.
+      // The robot was moved by hand, or its odometry was set: no line across the map.
       if (last && step > 500) trail.length = 0;
       if (step > TRAIL_STEP_MM) trail.push([pose[0], pose[1], now]);
     }
