@@ -70,6 +70,7 @@ PURE_ROOMS = (
     "hero_monitor.foxglove.protocol",
     "hero_node.clock",
     "hero_node.errors",
+    "hero_node.geometry",
     "hero_node.parameters",
     "hero_node.texts",
     "hero_node.token_bucket",

@@ -15,11 +15,12 @@ from std_msgs.msg import ColorRGBA
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
+from hero_node.geometry import Pose
+
 from .robot.firmware import Firmware
 from .robot_constants import BODY_RADIUS_M
 from .simulator import Simulator
 from .world.arena import Arena
-from .world.kinematics import Pose
 from .world.pushing.shapes import Body, Disc
 
 __all__ = ["GroundTruth"]
@@ -92,7 +93,7 @@ class GroundTruth:
             message.header.frame_id = FRAME
             message.child_frame_id = robot.name + "/base_link"
             message.pose.pose.position = Point(pose.x_m, pose.y_m, 0.0)
-            message.pose.pose.orientation = _rotate_about_z(pose.theta_rad)
+            message.pose.pose.orientation = _rotate_about_z(pose.yaw_rad)
             message.twist.twist.linear.x, message.twist.twist.angular.z = speeds[index]
             self._poses[index].publish(message)
 
@@ -150,7 +151,7 @@ def _place_odom(robot: Firmware, stamp: rospy.Time) -> TransformStamped:
     transform.child_frame_id = robot.name + "/odom"
     transform.transform.translation.x = origin.x_m
     transform.transform.translation.y = origin.y_m
-    transform.transform.rotation = _rotate_about_z(origin.theta_rad)
+    transform.transform.rotation = _rotate_about_z(origin.yaw_rad)
     return transform
 
 
@@ -176,6 +177,6 @@ def _make_marker(namespace: str, number: int, kind: int, color: ColorRGBA, pose:
     marker.header.frame_id = FRAME
     marker.ns, marker.id, marker.type, marker.action = namespace, number, kind, Marker.ADD
     marker.pose.position = Point(pose.x_m, pose.y_m, z_m)
-    marker.pose.orientation = _rotate_about_z(pose.theta_rad)
+    marker.pose.orientation = _rotate_about_z(pose.yaw_rad)
     marker.color = color
     return marker

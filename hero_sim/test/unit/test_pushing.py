@@ -5,11 +5,11 @@ import random
 
 import pytest
 
+from hero_node.geometry import Pose
 from hero_sim.errors import OptionError
 from hero_sim.robot_constants import BODY_RADIUS_M
 from hero_sim.stepped.swarm import StepSwarm
 from hero_sim.world.arena_file import load_arena
-from hero_sim.world.kinematics import Pose
 from hero_sim.world.pushing import pushing as pushing_module
 from hero_sim.world.pushing.pushed_body import PushedBody
 from hero_sim.world.pushing.pushing import MAX_PUSH_N, Pushing
@@ -26,9 +26,9 @@ GRAVITY_M_S2 = 9.81
 FRICTION = 0.3
 
 
-def place(shape, x_m=0.0, y_m=0.0, theta_rad=0.0, push_n=0.5):
+def place(shape, x_m=0.0, y_m=0.0, yaw_rad=0.0, push_n=0.5):
     """A body on which push_n through its center is just enough."""
-    return PushedBody(shape, Pose(x_m, y_m, theta_rad), push_n / (FRICTION * GRAVITY_M_S2), FRICTION)
+    return PushedBody(shape, Pose(x_m, y_m, yaw_rad), push_n / (FRICTION * GRAVITY_M_S2), FRICTION)
 
 
 def drive_north(pushing, places_m, steps):
@@ -57,17 +57,17 @@ def test_what_is_no_convex_polygon_is_refused(corners):
         Polygon(corners)
 
 
-@pytest.mark.parametrize("theta_rad", [0.0, 0.3, -2.0])
-def test_a_push_through_the_center_turns_nothing(theta_rad):
+@pytest.mark.parametrize("yaw_rad", [0.0, 0.3, -2.0])
+def test_a_push_through_the_center_turns_nothing(yaw_rad):
     # Two robots beside the center line hold the direction; the box is turned, and so are they.
-    cosine, sine = math.cos(theta_rad), math.sin(theta_rad)
-    box = place(BOX, 0.0, 0.0, theta_rad)
+    cosine, sine = math.cos(yaw_rad), math.sin(yaw_rad)
+    box = place(BOX, 0.0, 0.0, yaw_rad)
     pushing = Pushing([box], [])
     place_m = (-sine * BELOW_M, cosine * BELOW_M)
     for _ in range(200):
         after_m = (place_m[0] - sine * STEP_M, place_m[1] + cosine * STEP_M)
         (place_m,) = pushing.step([place_m], [after_m])
-    assert abs(math.degrees(box.pose.theta_rad - theta_rad)) < 1.0
+    assert abs(math.degrees(box.pose.yaw_rad - yaw_rad)) < 1.0
     assert box.pose.x_m == pytest.approx(-sine * 0.2, abs=2e-3)
     assert box.pose.y_m == pytest.approx(cosine * 0.2, abs=2e-3)
 
@@ -82,7 +82,7 @@ def test_without_contact_friction_the_twist_is_that_of_the_limit_surface(offset_
     y_m = STEP_M / (1.0 + offset_m * rotation_by_m)
     assert box.pose.x_m == pytest.approx(0.0, abs=1e-9)
     assert box.pose.y_m == pytest.approx(y_m, rel=0.01)
-    assert box.pose.theta_rad == pytest.approx(y_m * rotation_by_m, rel=0.01)
+    assert box.pose.yaw_rad == pytest.approx(y_m * rotation_by_m, rel=0.01)
 
 
 @pytest.mark.parametrize("offset_m", [0.02, 0.05, 0.1])
@@ -109,7 +109,7 @@ def test_a_body_that_needs_n_robots_moves_for_n_and_not_for_one_less(needed):
         if robots < needed:
             assert body.pose == (0.0, 0.0, 0.0)
         else:
-            assert body.pose.y_m > 0.1 and abs(body.pose.theta_rad) < math.radians(1.0)
+            assert body.pose.y_m > 0.1 and abs(body.pose.yaw_rad) < math.radians(1.0)
 
 
 def test_what_nobody_touches_stays():

@@ -5,10 +5,10 @@ import pytest
 from driver_side import DriverSide, read_encoder, read_odom
 
 from hero_driver.rosserial import packets
+from hero_node.geometry import Pose, find_frame
 from hero_sim.robot import declarations as ids
 from hero_sim.robot.imu_hat import ImuHat
 from hero_sim.robot_constants import RECEIVE_WINDOW_LENGTH
-from hero_sim.world.kinematics import Pose, find_frame
 
 both_controllers = pytest.mark.parametrize(
     "controller", [ids.ID_VELOCITY_CMD_VEL, ids.ID_POSITION_CMD_VEL], ids=["velocity", "position"]

@@ -55,11 +55,3 @@ def test_headings_are_the_cosine_and_sine_of_any_angle():
 def test_wheels_and_body_speeds_are_inverse():
     assert kinematics.join_wheels(*kinematics.split_to_wheels(0.1, 2.5)) == pytest.approx((0.1, 2.5))
     assert pytest.approx(0.000537, abs=1e-6) == TICK_M
-
-
-def test_a_frame_is_found_from_where_something_in_it_is_and_is_seen():
-    # A quarter turn to the left and one meter forward of a frame at (1, 0), which is turned to the left, too.
-    pose = kinematics.Pose(1.0, 1.0, math.pi)
-    frame = kinematics.find_frame(pose, kinematics.Pose(1.0, 0.0, math.pi / 2))
-    assert frame == pytest.approx((1.0, 0.0, math.pi / 2))
-    assert kinematics.find_frame(pose, kinematics.Pose(0.0, 0.0, 0.0)) == pytest.approx(pose)

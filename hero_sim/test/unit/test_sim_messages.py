@@ -6,8 +6,8 @@ import driver_side
 import pytest
 
 from hero_driver.rosserial import packets, payloads
+from hero_node.geometry import Pose
 from hero_sim.robot import declarations, messages
-from hero_sim.world.kinematics import Pose
 
 ROOT = os.path.dirname(os.path.abspath(__file__)) + "/../../.."
 CAPTURES = os.environ.get("HERO_CAPTURES", os.path.join(ROOT, "..", "shared", "captures"))
@@ -107,13 +107,13 @@ def test_the_stock_cycles_are_rebuilt_byte_for_byte(capture):
         if packet.topic_id != 130 or len(cycle) < 7:
             continue
         stamp, _, pose, twist = driver_side.read_odom(packet.payload)
-        theta_rad = 2.0 * math.atan2(pose[2], pose[3])
+        yaw_rad = 2.0 * math.atan2(pose[2], pose[3])
         ticks = []
         for transform in cycle[2:4]:
             values = struct.unpack_from("<4d", transform.payload, len(transform.payload) - 32)
             ticks.append(round(2.0 * math.atan2(values[1], values[3]) * 288 / (2 * math.pi)) - 1)
         data = encoder.encode(
-            stamp, Pose(pose[0], pose[1], theta_rad), twist, ticks, driver_side.read_encoder(cycle[6].payload)
+            stamp, Pose(pose[0], pose[1], yaw_rad), twist, ticks, driver_side.read_encoder(cycle[6].payload)
         )
         for ours, theirs in zip(read_packets(data), cycle):
             assert ours.topic_id == theirs.topic_id

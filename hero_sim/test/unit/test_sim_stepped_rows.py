@@ -15,8 +15,9 @@ from hero_driver.commands.velocity_shaper import (
     check_twist,
 )
 from hero_driver.corrections.message_layouts import make_proximity
-from hero_driver.corrections.tick_odometry import Pose, TickOdometry, WheelGeometry
+from hero_driver.corrections.tick_odometry import TickOdometry, WheelGeometry
 from hero_driver.rosserial import packets, payloads
+from hero_node.geometry import Pose
 from hero_sim.robot import declarations as ids
 from hero_sim.robot.commands import CommandTable
 from hero_sim.robot.firmware import Firmware

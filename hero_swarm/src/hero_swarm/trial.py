@@ -13,10 +13,10 @@ import numpy as np
 
 from hero_client.values.object_sensing import Things
 from hero_client.values.robot_constants import BODY_RADIUS_M
+from hero_node.geometry import Pose
 from hero_sim.population import place_worlds
 from hero_sim.stepped.robot_rows import RobotRows
 from hero_sim.world.arena import Arena, MovableObject, measure_clearance
-from hero_sim.world.kinematics import Pose
 
 from .behavior import Behavior, Random, derive_seed, sense
 

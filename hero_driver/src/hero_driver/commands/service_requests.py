@@ -8,7 +8,8 @@ import math
 import struct
 from typing import NamedTuple, Optional
 
-from ..corrections.tick_odometry import Pose
+from hero_node.geometry import Pose
+
 from ..robot_constants import PULSE_RANGE_US
 
 _SET_ODOM = struct.Struct("<3d")
@@ -51,8 +52,8 @@ def find_request_error(service_type: str, request: bytes) -> Optional[str]:
 
 def read_set_odom_pose(request: bytes) -> Pose:
     """Return the pose in a checked request of hero_msgs/SetOdom."""
-    x_m, y_m, theta_rad = _SET_ODOM.unpack(request)
-    return Pose(x_m, y_m, math.remainder(theta_rad, 2.0 * math.pi))
+    x_m, y_m, yaw_rad = _SET_ODOM.unpack(request)
+    return Pose(x_m, y_m, math.remainder(yaw_rad, 2.0 * math.pi))
 
 
 def is_success(answer: bytes) -> bool:

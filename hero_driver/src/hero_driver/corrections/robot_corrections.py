@@ -24,11 +24,13 @@ from typing import (
     Tuple,
 )
 
+from hero_node.geometry import Pose
+
 from ..robot_constants import SCAN_TIME_S
 from . import message_layouts
 from .robot_models import HERO_PLUS, PLUS_ENCODER_MD5, STOCK
 from .stamps import NS_PER_S, StampFilter
-from .tick_odometry import Pose, TickOdometry, WheelGeometry
+from .tick_odometry import TickOdometry, WheelGeometry
 from .transforms import AddTransform, TransformCorrector
 from .wheel_motion import WheelMotion
 

@@ -9,7 +9,9 @@ by REP 103 (x ahead, y left, yaw counter-clockwise).
 import collections
 import math
 from dataclasses import dataclass
-from typing import Deque, NamedTuple, Optional, Tuple
+from typing import Deque, Optional, Tuple
+
+from hero_node.geometry import Pose
 
 from ..robot_constants import MAX_WHEEL_SPEED_M_S, TICKS_PER_TURN, WHEEL_DIAMETER_M, WHEEL_SEPARATION_M
 
@@ -45,14 +47,6 @@ class WheelGeometry:
         """Distances of the left and the right wheel's rim per tick."""
         left_m = math.pi * self.wheel_diameter_m / self.ticks_per_turn * 2.0 / (1.0 + self.diameter_ratio)
         return left_m, left_m * self.diameter_ratio
-
-
-class Pose(NamedTuple):
-    """A pose in frame hero_N/odom."""
-
-    x_m: float
-    y_m: float
-    yaw_rad: float
 
 
 class TickOdometry:

@@ -7,7 +7,7 @@ Robots without a place are drawn side by side, and the page says so.
 
 from typing import Dict, Iterable, List, Tuple
 
-from hero_client.values.geometry import Pose, invert_pose, transform_pose, wrap_angle
+from hero_client.values.geometry import Pose, invert_pose, transform_pose
 
 APART_M = 1.0
 """Between the origins of robots that are drawn side by side: farther than a short drive."""
@@ -67,14 +67,10 @@ class Placement:
 
     def to_map(self, robot: str, pose: Pose) -> Pose:
         """Return a pose in hero_N/odom as a pose on the map."""
-        return _wrap(transform_pose(self._anchor_of(robot), pose))
+        return transform_pose(self._anchor_of(robot), pose)
 
     def to_goal(self, robot: str, pose: Pose) -> Tuple[str, Pose]:
         """Return frame and pose of a robot's goal on the map: localized robots follow the corrections of their pose."""
         if robot in self._localized:
             return self._localized_frame, pose
-        return robot + "/odom", _wrap(transform_pose(invert_pose(self._anchor_of(robot)), pose))
-
-
-def _wrap(pose: Pose) -> Pose:
-    return pose._replace(yaw_rad=wrap_angle(pose.yaw_rad))
+        return robot + "/odom", transform_pose(invert_pose(self._anchor_of(robot)), pose)

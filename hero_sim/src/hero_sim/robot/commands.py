@@ -8,10 +8,10 @@ from functools import partial
 from typing import Callable, Dict, Optional, Tuple
 
 from hero_driver.rosserial import packets
+from hero_node.geometry import Pose
 
 from ..errors import CommandError
 from ..robot_constants import MAX_PARAMETER
-from ..world.kinematics import Pose
 from . import declarations as ids
 from . import messages
 from .flash import Flash
@@ -127,8 +127,8 @@ class CommandTable:
         text = "IR calibration parameters have been successfully recorded!"
         return self._record(ids.ID_IR_CALIBRATION_ANSWER, text)
 
-    def _set_odom(self, x_m: float, y_m: float, theta_rad: float) -> bytes:
-        self._sensing.set_odometry(Pose(x_m, y_m, theta_rad))
+    def _set_odom(self, x_m: float, y_m: float, yaw_rad: float) -> bytes:
+        self._sensing.set_odometry(Pose(x_m, y_m, yaw_rad))
         self._log("[HERO] Odometry was changed!")
         return self._answer(ids.ID_SET_ODOM_ANSWER, True, "Odometry was changed!")
 

@@ -11,9 +11,9 @@ import struct
 from typing import List, Sequence, Tuple
 
 from hero_driver.rosserial import packets
+from hero_node.geometry import Pose
 
 from ..robot_constants import TICKS_PER_TURN, WHEEL_SEPARATION_M
-from ..world.kinematics import Pose
 from . import declarations
 from .models import HERO, RobotModel
 
@@ -137,7 +137,7 @@ class CycleMessages:
         encoder: Sequence[float],
     ) -> bytes:
         """Return the burst: twist (m/s, rad/s), ticks as the wheels' transforms show them, the values of Encoder."""
-        half_rad = pose.theta_rad / 2.0
+        half_rad = pose.yaw_rad / 2.0
         left_rad, right_rad = _wheel_half_angle(tf_ticks[0]), _wheel_half_angle(tf_ticks[1])
         x_m, y_m, yaw_z, yaw_w, linear, angular, left_y, left_w, right_y, right_w, *values = round_to_float32(
             (pose.x_m, pose.y_m, math.sin(half_rad), math.cos(half_rad), *twist)

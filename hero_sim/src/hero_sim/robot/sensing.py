@@ -10,10 +10,10 @@ from typing import List, Tuple
 import numpy as np
 
 from hero_driver.rosserial import packets
+from hero_node.geometry import Pose
 
 from ..robot_constants import LED_WATCHDOG_MS
 from ..world.body import Body
-from ..world.kinematics import Pose
 from . import declarations, messages
 from .flash import Flash
 from .imu_hat import ImuHat
@@ -68,7 +68,7 @@ class Sensing:
         self._body = body
         self._flash = flash
         has_imu_hat = has_imu_hat and not model.measures_distance
-        self._imu = ImuHat(body.true_pose.theta_rad) if has_imu_hat else None
+        self._imu = ImuHat(body.true_pose.yaw_rad) if has_imu_hat else None
         self._cycle_messages = messages.CycleMessages(name, model)
         self._laser_messages = messages.LaserMessages(name)
         self._imu_messages = messages.ImuMessages(name, model)
@@ -133,6 +133,6 @@ class Sensing:
         return self._laser_messages.encode(self._laser_seq, stamp, ranges_m.tolist(), counts.tolist())
 
     def _measure_imu(self, imu: ImuHat, millis: int, stamp: Tuple[int, int]) -> bytes:
-        reading = imu.read(millis, self._body.true_pose.theta_rad, self._body.angular_rad_s)
+        reading = imu.read(millis, self._body.true_pose.yaw_rad, self._body.angular_rad_s)
         self.odometry.set_heading(reading.heading_rad)
         return self._imu_messages.encode(stamp, reading.quaternion, reading.angular_counts, reading.acceleration)

@@ -8,8 +8,10 @@ velocity controller reads too (47 times a second), a third and more of the path 
 import math
 from typing import List, Tuple
 
+from hero_node.geometry import Pose
+
 from ..robot_constants import TICK_M
-from ..world.kinematics import Pose, join_wheels
+from ..world.kinematics import join_wheels
 
 __all__ = ["WheelOdometry"]
 
@@ -85,12 +87,12 @@ class WheelOdometry:
         if left == right == 0:
             return
         travel_m, rotation_rad = join_wheels(left * self.tick_m, right * self.tick_m)
-        x_m, y_m, theta_rad = self.pose
-        heading_rad = theta_rad + rotation_rad / 2.0
+        x_m, y_m, yaw_rad = self.pose
+        heading_rad = yaw_rad + rotation_rad / 2.0
         self.pose = Pose(
             x_m + travel_m * math.cos(heading_rad),
             y_m + travel_m * math.sin(heading_rad),
-            math.remainder(theta_rad + rotation_rad, 2.0 * math.pi),
+            math.remainder(yaw_rad + rotation_rad, 2.0 * math.pi),
         )
 
     def set_pose(self, pose: Pose) -> None:
@@ -99,9 +101,9 @@ class WheelOdometry:
         self._base_ticks = self._counted_ticks
         self.ticks = self._diff_ticks = (0, 0)
 
-    def set_heading(self, theta_rad: float) -> None:
+    def set_heading(self, yaw_rad: float) -> None:
         """Overrule the heading, as the robot does when it has an IMU."""
-        self.pose = Pose(self.pose.x_m, self.pose.y_m, theta_rad)
+        self.pose = Pose(self.pose.x_m, self.pose.y_m, yaw_rad)
 
     @property
     def twist(self) -> Tuple[float, float]:

@@ -8,12 +8,10 @@ import numpy as np
 from hero_client.robots.robot_link import MAP
 from hero_client.values.background_motion import BackgroundMotion, Steps
 from hero_client.values.errors import FrameError, StaleDataError
-from hero_client.values.geometry import Pose, Velocity
 from hero_client.values.readings import FRESH_S
 from hero_node.command_line import say
+from hero_node.geometry import Pose, Velocity, find_frame
 
-from ..world.kinematics import Pose as WorldPose
-from ..world.kinematics import find_frame
 from .step_clock import StepClock, StepMotion
 
 __all__ = ["StepLink"]
@@ -120,7 +118,7 @@ class StepLink:
     def set_odometry(self, pose: Pose) -> None:
         """See RobotLink."""
         self._rows.set_odometry(self.row, *pose)
-        self._origin = Pose(*find_frame(WorldPose(*self.true_pose), WorldPose(*pose)))
+        self._origin = find_frame(self.true_pose, pose)
 
     def describe_stop(self) -> str:
         """See RobotLink."""

@@ -8,9 +8,10 @@ from typing import Any, List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
+from hero_node.geometry import Pose
+
 from ..errors import OptionError
 from ..robot_constants import BODY_RADIUS_M
-from .kinematics import Pose
 from .pushing.pushed_body import PushedBody
 from .pushing.shapes import Shape, touch_circle
 
@@ -117,8 +118,8 @@ def build_rectangle(width_m: float, height_m: float, robots: int) -> Arena:
         # On a diagonal two walls are equally near: the one that follows counter-clockwise counts.
         wall = math.floor(math.atan2(start_y_m, start_x_m) / (math.pi / 2.0) + 0.5 + 1e-9)
         at_center = math.hypot(start_x_m, start_y_m) < 1e-9
-        theta_rad = 0.0 if at_center else math.remainder((wall + 1) * (math.pi / 2.0), 2.0 * math.pi)
-        starts.append(Pose(start_x_m, start_y_m, theta_rad))
+        yaw_rad = 0.0 if at_center else math.remainder((wall + 1) * (math.pi / 2.0), 2.0 * math.pi)
+        starts.append(Pose(start_x_m, start_y_m, yaw_rad))
     walls = outline(np.array([(-x_m, -y_m), (x_m, -y_m), (x_m, y_m), (-x_m, y_m)]))
     bounds_m = np.array([-x_m, -y_m, x_m, y_m])
     return Arena("rectangle", walls, np.empty((0, 3)), tuple(starts), bounds_m)

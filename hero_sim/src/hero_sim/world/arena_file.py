@@ -11,10 +11,11 @@ from typing import Any, Dict, List
 import numpy as np
 import yaml
 
+from hero_node.geometry import Pose
+
 from ..errors import OptionError
 from ..robot_constants import BODY_RADIUS_M
 from .arena import Arena, MovableObject, is_free, outline
-from .kinematics import Pose
 from .map_file import build_map_arena
 from .pushing.shapes import Disc, Polygon, Shape
 

@@ -7,7 +7,9 @@ from typing import List
 
 import numpy as np
 
-from .kinematics import Pose, find_frame, join_wheels
+from hero_node.geometry import Pose, find_frame
+
+from .kinematics import join_wheels
 from .world import World
 
 __all__ = ["Body"]

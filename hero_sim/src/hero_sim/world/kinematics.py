@@ -1,4 +1,4 @@
-"""Kinematics of a differential drive, for one robot or for an array of them, and poses in the plane.
+"""Kinematics of a differential drive, for one robot or for an array of them.
 
 Pure: numbers and numpy only. Body frame as in REP 103: x forward, y left, angles counter-clockwise.
 What a simulated world is computed with uses only + - * / and rounding, which IEEE 754 defines to the last bit:
@@ -6,13 +6,13 @@ numpy's sine and cosine differ between versions and processors.
 """
 
 import math
-from typing import Any, NamedTuple, Sequence, Tuple
+from typing import Any, Sequence, Tuple
 
 import numpy as np
 
 from ..robot_constants import WHEEL_SEPARATION_M
 
-__all__ = ["Pose", "find_frame", "find_heading", "follow_arcs", "join_wheels", "split_to_wheels"]
+__all__ = ["find_heading", "follow_arcs", "join_wheels", "split_to_wheels"]
 
 # Half pi in two parts, of which the first, with 33 bits, gives exact products with small whole numbers.
 _HALF_PI_HIGH = float.fromhex("0x1.921fb544p+0")
@@ -24,22 +24,6 @@ _HALF_TANGENT_TERMS = [1.0 / 2.0, 1.0 / 24.0, 1.0 / 240.0, 17.0 / 40320.0]
 """Taylor series in the square of the angle; the last is that of tan(angle / 2), divided by the angle."""
 
 Number = Any  # a float or an array of float64; both work everywhere below
-
-
-class Pose(NamedTuple):
-    """A place and heading in the plane."""
-
-    x_m: float
-    y_m: float
-    theta_rad: float
-
-
-def find_frame(pose: Pose, seen: Pose) -> Pose:
-    """Return where a frame lies in which something at pose is seen at seen."""
-    theta_rad = pose.theta_rad - seen.theta_rad
-    cosine, sine = math.cos(theta_rad), math.sin(theta_rad)
-    x_m = pose.x_m - cosine * seen.x_m + sine * seen.y_m
-    return Pose(x_m, pose.y_m - sine * seen.x_m - cosine * seen.y_m, theta_rad)
 
 
 def split_to_wheels(linear_m_s: Number, angular_rad_s: Number) -> Tuple[Number, Number]:

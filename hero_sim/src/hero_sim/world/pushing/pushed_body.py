@@ -8,7 +8,8 @@ and Papadopoulos 1991; Lynch and Mason 1996): a force f through its center and a
 import math
 from typing import Tuple
 
-from ..kinematics import Pose
+from hero_node.geometry import Pose
+
 from .shapes import Body, Shape, place
 
 __all__ = ["PushedBody"]
@@ -39,7 +40,7 @@ class PushedBody:
         self.friction_n = mass_kg * friction * GRAVITY_M_S2
         self._shape = shape
         self._radius_m2 = shape.friction_radius_m * shape.friction_radius_m
-        self._heading = (math.cos(pose.theta_rad), math.sin(pose.theta_rad))
+        self._heading = (math.cos(pose.yaw_rad), math.sin(pose.yaw_rad))
         self._set(pose)
 
     def _set(self, pose: Pose) -> None:
@@ -68,4 +69,4 @@ class PushedBody:
         cosine, sine = cosine * turn_cosine - sine * turn_sine, cosine * turn_sine + sine * turn_cosine
         length = math.sqrt(cosine * cosine + sine * sine)
         self._heading = cosine / length, sine / length
-        self._set(Pose(self.pose.x_m + x_m, self.pose.y_m + y_m, self.pose.theta_rad + rotation_rad))
+        self._set(Pose(self.pose.x_m + x_m, self.pose.y_m + y_m, self.pose.yaw_rad + rotation_rad))
