@@ -1,0 +1,43 @@
+"""docs/migration.md says of each name of the stock packages what has become of it, and what stayed is there."""
+
+import re
+
+import documents
+import pytest
+import sources
+import yaml
+
+from hero_sim.robot.models import MODELS
+
+PAGE = sources.ROOT / "docs" / "migration.md"
+NAMES = yaml.safe_load((sources.ROOT / "test" / "lint" / "stock_names.yaml").read_text())
+FORMS = {"launch": "%s.launch", "topics": "/hero_N/%s", "types": "%s"}
+CASES = [(fate, kind, name) for fate, kinds in NAMES.items() for kind, names in kinds.items() for name in names]
+
+
+def read_fates():
+    """Return what the page's tables say of each name in backticks in their first column."""
+    rows = [line.text.split("|")[1:3] for line in documents.read_lines(PAGE) if line.text.startswith("| ")]
+    return {name: now.strip() for names, now in rows for name in documents.INLINE.findall(names)}
+
+
+@pytest.mark.parametrize("fate, kind, name", CASES)
+def test_each_name_of_the_stock_packages_has_its_row(fate, kind, name):
+    now = read_fates()[FORMS[kind] % name]
+    found = re.match("same|none", now)
+    assert fate == (found.group() if found else "other"), now
+
+
+@pytest.mark.parametrize("name", NAMES["same"]["launch"])
+def test_launch_files_that_are_the_same_exist(name):
+    assert list(sources.ROOT.glob("hero_*/launch/%s.launch" % name))
+
+
+def test_topics_and_services_that_are_the_same_are_those_of_the_robots():
+    robots = [pattern for model in MODELS.values() for _, _, pattern, _ in model.declarations]
+    assert {"/%s/" + name for name in NAMES["same"]["topics"]} <= {"/" + pattern.lstrip("/") for pattern in robots}
+
+
+@pytest.mark.parametrize("name", NAMES["other"]["types"])
+def test_types_of_the_stock_packages_are_in_hero_msgs(name):
+    assert list((sources.ROOT / "hero_msgs").glob("*/%s.*" % name))
