@@ -1,11 +1,15 @@
-"""Shows the colors that robots were told to display as spheres on their hats, for RViz.
+"""Shows robots' names, rings in their own color, and lights (spheres on their hats) in RViz.
 
     rosrun hero_description lights _robots:=0-3
 
 Robots do not report their light: it is the last color on /hero_N/led, for as long as the firmware displays it.
 """
 
+import math
+from typing import List
+
 import rospy
+from geometry_msgs.msg import Point
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -13,7 +17,7 @@ from hero_node.ros.private_parameters import read_parameters
 from hero_node.ros.program import Program, run
 
 from .robots_parameter import given_robots
-from .rviz_config import LIGHTS_TOPIC
+from .rviz_config import LIGHTS_TOPIC, color_of
 
 LIGHT_S = 15.0
 """The firmware switches the light off this long after the last command (LEDStatus.ino:76)."""
@@ -23,32 +27,60 @@ LIT_DIAMETER_M = 0.019
 """Covers the model's dark light in hat_link (urdf/hero.urdf)."""
 
 
-def make_marker(robot_id: int, color: ColorRGBA) -> Marker:
-    """Return the sphere of one robot; it follows the robot's frame, and disappears when the light goes out."""
-    marker = Marker(type=Marker.SPHERE, ns="lights", id=robot_id, frame_locked=True)
-    marker.header.frame_id = "hero_%d/hat_link" % robot_id
+NAME_Z_M = 0.11
+NAME_SIZE_M = 0.045
+RING_RADIUS_M = 0.045
+RING_WIDTH_M = 0.006
+RING_POINTS = 25
+REPEAT_S = 2.0
+"""Between two messages of names and rings: RViz may start at any time."""
+
+
+def make_marker(robot_id: int, kind: int, namespace: str, frame: str, color: ColorRGBA) -> Marker:
+    """Return a marker that follows a frame of the robot."""
+    marker = Marker(type=kind, ns=namespace, id=robot_id, frame_locked=True, color=color)
+    marker.header.frame_id = "hero_%d/%s" % (robot_id, frame)
+    marker.pose.orientation.w = 1.0
+    return marker
+
+
+def make_light(robot_id: int, color: ColorRGBA) -> Marker:
+    """Return the sphere of one robot, which disappears when the light goes out."""
+    marker = make_marker(robot_id, Marker.SPHERE, "lights", "hat_link", ColorRGBA(color.r, color.g, color.b, 1.0))
     marker.action = Marker.ADD if max(color.r, color.g, color.b) > 0.0 else Marker.DELETE
     marker.pose.position.z = LIGHT_Z_M
-    marker.pose.orientation.w = 1.0
     marker.scale.x = marker.scale.y = marker.scale.z = LIT_DIAMETER_M
-    marker.color = ColorRGBA(color.r, color.g, color.b, 1.0)
     marker.lifetime = rospy.Duration(LIGHT_S)
     return marker
 
 
+def make_identity(robot_id: int) -> List[Marker]:
+    """Return the name above one robot, and the ring around it."""
+    name = make_marker(robot_id, Marker.TEXT_VIEW_FACING, "names", "base_link", ColorRGBA(0.1, 0.1, 0.1, 1.0))
+    name.text = "hero_%d" % robot_id
+    name.pose.position.z = NAME_Z_M
+    name.scale.z = NAME_SIZE_M
+    ring = make_marker(robot_id, Marker.LINE_STRIP, "rings", "base_link", ColorRGBA(*color_of(robot_id), 1.0))
+    angles_rad = [math.tau * index / (RING_POINTS - 1) for index in range(RING_POINTS)]
+    ring.points = [Point(RING_RADIUS_M * math.cos(angle), RING_RADIUS_M * math.sin(angle), 0.0) for angle in angles_rad]
+    ring.scale.x = RING_WIDTH_M
+    return [name, ring]
+
+
 def show_lights() -> None:
-    """Publish a sphere for each color."""
+    """Publish names and rings again and again, and a sphere for each color."""
     with Program("hero_lights") as program:
         robots = read_parameters({"robots": given_robots()})["robots"]
         publisher = rospy.Publisher(LIGHTS_TOPIC, MarkerArray, queue_size=len(robots) + 10)
 
         def show(color: ColorRGBA, robot_id: int) -> None:
-            publisher.publish(MarkerArray([make_marker(robot_id, color)]))
+            publisher.publish(MarkerArray([make_light(robot_id, color)]))
 
         for robot_id in robots:
             rospy.Subscriber("/hero_%d/led" % robot_id, ColorRGBA, show, robot_id, queue_size=5)
-        while program.sleep(10.0):
-            pass
+        identities = MarkerArray([marker for robot_id in robots for marker in make_identity(robot_id)])
+        for _ in program.rate(1.0 / REPEAT_S):
+            publisher.publish(identities)
 
 
 def main() -> None:

@@ -5,11 +5,10 @@ included: with other robots nothing is published on their topics. Source of the 
 reduced to what differs from its defaults.
 """
 
-from typing import Any, Collection, Dict, List, Sequence
+from colorsys import hls_to_rgb
+from typing import Any, Collection, Dict, List, Sequence, Tuple
 
 import yaml
-
-COLORS = ("230; 90; 30", "40; 120; 220", "40; 160; 80", "200; 60; 160", "220; 180; 30", "80; 180; 190")
 
 LIGHTS_TOPIC = "/hero_lights"
 # Between RViz and the node goal_choice.
@@ -30,8 +29,14 @@ FRAMES = {"orbit": "world", "close": "world", "above": "world", "map": "map"}
 """Fixed frame of each view, unless another is given."""
 
 
-def make_robot_displays(name: str, color: str, is_plus: bool) -> List[Dict[str, Any]]:
+def color_of(robot_id: int) -> Tuple[float, float, float]:
+    """Return a robot's own color, red, green, blue, each 0..1; hues are a golden angle apart, as in hero_monitor."""
+    return hls_to_rgb((robot_id * 137.508 + 24.0) % 360.0 / 360.0, 0.42, 0.7)
+
+
+def make_robot_displays(name: str, is_plus: bool) -> List[Dict[str, Any]]:
     """Return the displays of one robot: model, path by odometry, proximity, and of a HeRo+ the distance ahead."""
+    color = "; ".join("%d" % (255 * part) for part in color_of(int(name.rpartition("_")[2])))
     distance = {"Class": "rviz/Range", "Name": name + " distance", "Enabled": True, "Topic": "/%s/range" % name}
     return [
         *([{**distance, "Color": color, "Alpha": 0.3}] if is_plus else []),
@@ -51,16 +56,17 @@ def make_robot_displays(name: str, color: str, is_plus: bool) -> List[Dict[str, 
             "Unreliable": False,
             "Keep": 300,
             "Position Tolerance": 0.02,
-            "Angle Tolerance": 0.2,
+            "Angle Tolerance": 7.0,
             "Covariance": {"Value": False},
+            # Arrows without heads, each as long as the way to the next: a line.
             "Shape": {
                 "Value": "Arrow",
                 "Color": color,
-                "Alpha": 0.6,
-                "Shaft Length": 0.016,
-                "Shaft Radius": 0.003,
-                "Head Length": 0.008,
-                "Head Radius": 0.005,
+                "Alpha": 0.8,
+                "Shaft Length": 0.025,
+                "Shaft Radius": 0.0025,
+                "Head Length": 0.0001,
+                "Head Radius": 0.0001,
             },
         },
         {
@@ -173,11 +179,11 @@ def make_config(
             "Alpha": 0.5,
         },
         make_marker_display("arena (simulated)", "/hero_sim/arena"),
-        make_marker_display("lights", LIGHTS_TOPIC),
+        make_marker_display("names, rings, lights", LIGHTS_TOPIC),
         make_marker_display("selected robot", CHOICE_TOPIC),
     ]
-    for index, name in enumerate(names):
-        displays += make_robot_displays(name, COLORS[index % len(COLORS)], name in hero_plus)
+    for name in names:
+        displays += make_robot_displays(name, name in hero_plus)
     displays.append(
         {
             "Class": "rviz/Group",

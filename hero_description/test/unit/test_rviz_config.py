@@ -4,7 +4,7 @@ import pytest
 import yaml
 
 from hero_description.robots_parameter import check_given
-from hero_description.rviz_config import GOAL_TOPIC, POINT_TOPIC, make_config
+from hero_description.rviz_config import GOAL_TOPIC, POINT_TOPIC, color_of, make_config, make_robot_displays
 from hero_node.errors import ProgramError
 
 TOPIC_KEYS = ("TF Prefix", "Topic", "Marker Topic", "Image Topic")
@@ -32,6 +32,16 @@ def test_rviz_displays_robots_arena_and_lights():
         assert ("rviz/LaserScan", "/%s/proximity" % name) in shown
     assert ("rviz/MarkerArray", "/hero_sim/arena") in shown
     assert ("rviz/MarkerArray", "/hero_lights") in shown
+
+
+def test_robots_have_their_names_and_rings_in_the_color_of_their_paths():
+    lights = pytest.importorskip("hero_description.lights", reason="imports rospy")
+    name, ring = lights.make_identity(7)
+    assert name.text == "hero_7" and name.header.frame_id == ring.header.frame_id == "hero_7/base_link"
+    assert len(ring.points) == lights.RING_POINTS
+    path = make_robot_displays("hero_7", False)[1]["Shape"]["Color"]
+    assert path == "; ".join("%d" % (255 * part) for part in (ring.color.r, ring.color.g, ring.color.b))
+    assert len({color_of(robot_id) for robot_id in range(100)}) == 100
 
 
 def test_the_view_of_the_map_shows_poses_and_grid_and_on_request_a_picture():

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 Request = Dict[str, Any]
 
-GOALS_AT_ONCE = 20
+GOALS_AT_ONCE = 100
 
 MOVING = ("drive", "goal", "start")
 """Requests that make robots move: fresh, with control:=true, of robots that are connected and not stopped."""

@@ -109,10 +109,10 @@ class MapTest(unittest.TestCase):
     def test_localized_robots_are_drawn_in_their_frame_while_it_lasts(self):
         alone = "own odometry: position on the map unknown"
         self.wait_for_facts("-0.250 0.000 m, 0", alone)
-        self.page.wait_for_text("#frame", "frame world, by odometry, which drifts")
+        self.page.wait_for_text("#frame", "frame world, odometry drifts")
         localization = Repeater("/localization/poses", self.poses)
         self.wait_for_facts("-0.900 0.400 m, 90", "camera")
-        self.page.wait_for_text("#frame", "frame map, by localization")
+        self.page.wait_for_text("#frame", "frame map, localized")
         self.page.choose("hero_1")
         wait_for(lambda: self.page.facts().get("pose source") == alone, "a robot of which nothing is known")
         self.page.choose("hero_0")
@@ -127,7 +127,7 @@ class MapTest(unittest.TestCase):
         self.page.wait_for_text("#losses", "Localization is silent: positions are unknown")
         self.page.wait_for_text("#link", "localization lost")
         self.wait_for_facts("-0.250 0.000 m, 0", alone)
-        self.page.wait_for_text("#frame", "frame world, by odometry, which drifts")
+        self.page.wait_for_text("#frame", "frame world, odometry drifts")
 
     def test_the_cameras_picture_lies_at_its_place_while_it_is_switched_on(self):
         outline = PolygonStamped(polygon=Polygon([Point32(x, y, 0.0) for x in (-1.0, 1.0) for y in (-0.5, 0.5)]))

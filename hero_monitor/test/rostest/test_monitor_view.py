@@ -205,6 +205,24 @@ class ViewTest(unittest.TestCase):
         self.page.click("#all")
         wait_for(lambda: shown() == "4 robots", shown)
 
+    def test_the_keyboard_chooses_robots_that_then_move_as_they_stand(self):
+        from selenium.webdriver.common.keys import Keys
+
+        self.page.find("#fleet tbody tr:nth-child(2) button").send_keys(Keys.SPACE)
+        self.page.actions().key_down(Keys.SHIFT).send_keys(Keys.ARROW_DOWN).key_up(Keys.SHIFT).perform()
+        self.assertEqual(self.page.text("#name"), "2 robots")
+        self.page.click("#select")
+        self.page.find("#fleet tbody tr:nth-child(4) button").send_keys(Keys.ENTER)
+        self.assertEqual(self.page.text("#name"), "3 robots")
+        self.page.click("#goto")
+        self.page.click("#canvas")
+        wait_for(lambda: len(self.monitor.requested("goal")) == 3, "a goal for each")
+        goals = {request["robots"][0]: (request["x"], request["y"]) for request in self.monitor.requested("goal")}
+        self.assertEqual(sorted(goals), ["hero_1", "hero_2", "hero_3"])
+        for left, right in (("hero_1", "hero_2"), ("hero_2", "hero_3")):
+            self.assertAlmostEqual(goals[right][0] - goals[left][0], 0.3)
+            self.assertAlmostEqual(goals[right][1], goals[left][1])
+
     def test_a_program_starts_with_its_parameters_and_is_shown_until_it_ends(self):
         self.page.choose("hero_1")
         self.page.find("#program [value='random_walk']").click()
@@ -251,6 +269,16 @@ class ViewTest(unittest.TestCase):
         for panel in ("fleet", "robot", "log"):
             self.page.click("[data-panel=%s]" % panel)
             self.assertEqual(self.page.run(FIND_CUT), [], panel)
+        self.page.click("[data-panel=fleet]")
+        loss = {"source": "driver", "cause": "No answer from hero_driver", "remedy": "Start it again: " + 9 * "word "}
+        status = {"level": "error", "text": "NOT STOPPED: hero_3 moves" + 20 * " word", "is_final": True, "reads": 0}
+        self.show([make_robot(number, stop="MOVING") for number in range(4)], stopped=True)
+        self.monitor.show(losses=[loss], stop=status)
+        wait_for(lambda: self.page.find("#losses").is_displayed(), "both banners")
+        row = self.page.find("#fleet tbody tr:nth-child(2) button")
+        self.page.run("document.querySelector('#fleet tbody tr:nth-child(2)').scrollIntoView()")
+        self.page.actions().move_to_element(row).click().perform()  # fails unless it can be reached
+        self.page.wait_for_text("#name", "hero_1")
 
     def test_no_state_of_the_page_breaks_a_rule_of_wcag_aa(self):
         robots = [make_robot(number, stop="at rest") for number in range(3)]

@@ -1,5 +1,7 @@
 // Exchanges the token for a cookie.
 
+import "./theme.js";
+
 const form = document.getElementById("form");
 const answer = document.getElementById("answer");
 

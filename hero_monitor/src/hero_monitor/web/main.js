@@ -3,6 +3,7 @@
 // Names and texts come from robots, programs and the network: they are inserted as text, never as markup.
 
 import { Connection } from "./connection.js";
+import { isDark, onTheme, showTheme } from "./theme.js";
 import { FleetTable } from "./panels/fleet.js";
 import { History } from "./history.js";
 import { showLosses, stateOf } from "./losses.js";
@@ -86,7 +87,7 @@ function notice(level, text) {
 
 const history = new History();
 const map = new FleetMap(state, { choose, send });
-const table = new FleetTable({ choose, history });
+const table = new FleetTable({ choose, history, isAdding: () => map.selecting });
 const log = new LogView();
 const chart = new Chart(history);
 new Projector(() => map.draw());
@@ -118,7 +119,7 @@ function showHead() {
   const unknown = count("UNKNOWN");
   element("ready").textContent = unknown ? `${unknown} of ${robots.length} unknown` : `${count("READY")} of ${robots.length} ready`;
   element("listening").textContent = isLive && listening ? `driver on ${listening}` : "";
-  const source = localized ? "by localization" : "by odometry, which drifts";
+  const source = localized ? "localized" : "odometry drifts";
   element("frame").textContent = robots.length ? `frame ${frame}, ${source}` : "";
   document.body.classList.toggle("stale", !state.isFresh);
   element("empty").hidden = robots.length > 0 || !isLive;
@@ -174,21 +175,12 @@ for (const button of document.querySelectorAll("#tabs button")) {
 }
 document.body.dataset.panel = "fleet";
 
-const THEMES = ["", "light", "dark"];
-function setTheme(theme) {
-  if (theme) document.documentElement.dataset.theme = theme;
-  else delete document.documentElement.dataset.theme;
-  map.draw();
-}
-setTheme(localStorage.getItem("theme") || "");
+onTheme(() => map.draw());
 element("theme").addEventListener("click", () => {
-  const dark = matchMedia("(prefers-color-scheme: dark)").matches;
-  const now = document.documentElement.dataset.theme || (dark ? "dark" : "light");
-  const next = THEMES[now === "dark" ? 1 : 2];
-  localStorage.setItem("theme", next);
-  setTheme(next);
+  localStorage.setItem("theme", isDark() ? "light" : "dark");
+  showTheme();
+  map.draw();
 });
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => map.draw());
 
 showHead();
 connection.open();

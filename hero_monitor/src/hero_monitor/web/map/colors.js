@@ -1,9 +1,6 @@
 // One hue per robot, a golden angle apart: robots with neighbouring ids differ most.
 
-export function isDark() {
-  const theme = document.documentElement.dataset.theme;
-  return theme ? theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
-}
+import { isDark } from "../theme.js";
 
 export function colorOf(id, alpha = 1) {
   const hue = (((id * 137.508 + 24) % 360) + 360) % 360;

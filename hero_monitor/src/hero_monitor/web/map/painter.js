@@ -1,8 +1,9 @@
 // Paints the map: grid, arena, trails, goals, beams and robots. Lengths in mm, angles in mrad.
 
-import { colorOf, isDark } from "./colors.js";
+import { colorOf } from "./colors.js";
 import { placeLabels } from "./labels.js";
 import { sourceOf, stateOf } from "../losses.js";
+import { isDark } from "../theme.js";
 
 export const BODY_MM = 36.85;
 export const TRAIL_MS = 60000;

@@ -11,6 +11,11 @@ export function spanOf(seconds) {
   return `${Math.floor(seconds / 3600)} h ${Math.floor((seconds % 3600) / 60)} min`;
 }
 
+const LIGHTS = {
+  "#ff0000": "red", "#00ff00": "green", "#0000ff": "blue", "#ffff00": "yellow",
+  "#ff00ff": "magenta", "#00ffff": "cyan", "#ffffff": "white", "#ff6600": "orange",
+};
+
 const number = (value, digits, unit) => (value === null ? "-" : `${value.toFixed(digits)}${unit}`);
 
 export const healthOf = (robot) => robot.error || (robot.health[0] > 0 ? robot.health[1] : "");
@@ -28,7 +33,7 @@ const COLUMNS = [
   { title: "Robot", value: (robot) => robot.id, text: (id, robot) => robot.name || robot.address, lasting: true },
   { title: "State", value: stateText, tag: "state", lasting: true },
   { title: "Stop", value: (robot, state) => (stateOf(robot, state) === "UNKNOWN" ? "" : robot.stop), tag: "stop", lasting: true },
-  { title: "Light", value: (robot, state) => state.lights[robot.name] || "", text: (light) => light || "off" },
+  { title: "Light", value: (robot, state) => state.lights[robot.name] || "", text: (light) => LIGHTS[light] || light || "off" },
   { title: "Nearest", value: nearestRange, text: (mm) => number(mm === null ? null : mm / 1000, 2, " m"), isNumber: true },
   { title: "Speed", value: speedOf, text: (speed) => number(speed, 2, " m/s"), isNumber: true },
   { title: "Pose", value: sourceOf, text: (source) => source || "own odometry", tag: "source", lasting: true },
@@ -48,8 +53,10 @@ function compare(a, b) {
 }
 
 export class FleetTable {
-  constructor({ choose, history }) {
+  /** isAdding(): whether clicks choose robots in addition, without Shift, too. */
+  constructor({ choose, history, isAdding }) {
     this.choose = choose;
+    this.isAdding = isAdding;
     this.history = history;
     this.column = COLUMNS[0];
     this.down = false;
@@ -136,7 +143,17 @@ export class FleetTable {
       line.append(cell);
       row.targets.push(target);
     });
-    line.addEventListener("click", (event) => row.robot.state !== "REFUSED" && this.choose([row.robot.name], event.shiftKey || event.ctrlKey || event.metaKey));
+    const choose = (isAdded) => row.robot.state !== "REFUSED" && this.choose([row.robot.name], isAdded);
+    line.addEventListener("click", (event) => choose(this.isAdding() || event.shiftKey || event.ctrlKey || event.metaKey));
+    // The loop of the keyboard: arrows go from row to row, with Shift they add robots on their way.
+    line.addEventListener("keydown", (event) => {
+      const next = { ArrowDown: line.nextElementSibling, ArrowUp: line.previousElementSibling }[event.key];
+      if (!next) return;
+      event.preventDefault();
+      if (event.shiftKey && row.button.getAttribute("aria-pressed") === "false") choose(true);
+      next.querySelector("button").focus();
+      if (event.shiftKey && next.querySelector("[aria-pressed=false]")) next.dispatchEvent(new MouseEvent("click", { shiftKey: true }));
+    });
     this.rows.set(id, row);
     return row;
   }
@@ -155,7 +172,7 @@ export class FleetTable {
       const target = row.targets[index];
       target.textContent = shown;
       if (tag) target.dataset[tag] = shown;
-      if (title === "Light") target.style.setProperty("--light", shown.startsWith("#") ? shown : "transparent");
+      if (title === "Light") target.style.setProperty("--light", isHidden || !now ? "transparent" : now);
       if (title === "Last error") target.title = shown;
     });
     row.chip.style.background = colorOf(robot.id);

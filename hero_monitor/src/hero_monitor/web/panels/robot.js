@@ -69,13 +69,23 @@ export class RobotPanel {
   }
 
   setGoing(going) {
-    const [name] = this.names;
-    this.map.askPlace(going ? `Click the goal of ${name}; drag to set its final heading.` : null, (place) => {
-      const sent = this.connection.send({ do: "goal", robots: [name], ...place });
-      if (!sent) this.notice("error", "no connection to the monitor: the goal was not sent");
-    });
+    const count = this.names.length;
+    const whose = count === 1 ? `the goal of ${this.names[0]}` : `where the middle of these ${count} goes, as they stand`;
+    this.map.askPlace(going ? `Click ${whose}; drag to set the final heading.` : null, (place) => this.sendGoals(place));
     element("goto").setAttribute("aria-pressed", String(going));
     element("goto").textContent = going ? "Choosing a goal" : "Go to goal";
+  }
+
+  /** Send each robot to its place around {x, y}: that which it has now around the middle of all. */
+  sendGoals({ x, y, ...heading }) {
+    const placed = this.names.filter((name) => this.map.poses[name]);
+    const mean = (axis) => placed.reduce((sum, name) => sum + this.map.poses[name][axis], 0) / placed.length;
+    const middle = [mean(0), mean(1)];
+    for (const name of placed) {
+      const [right, up] = this.map.poses[name].map((value, axis) => (value - middle[axis]) / 1000);
+      const sent = this.connection.send({ do: "goal", robots: [name], x: x + right, y: y + up, ...heading });
+      if (!sent) return this.notice("error", "no connection to the monitor: the goal was not sent");
+    }
   }
 
   pressKey(event) {
@@ -149,7 +159,6 @@ export class RobotPanel {
     element("state").dataset.state = shown;
     const isKnown = robots.some((one) => stateOf(one, state) !== "UNKNOWN");
     element("control").hidden = !isKnown || !state.hello.control;
-    element("goto").hidden = robot === null;
     element("advice").hidden = robots.length === 0 || state.hello.control;
     element("advice").textContent = "View only. control:=true lets the monitor drive robots.";
     const trouble = robot ? healthOf(robot) : "";

@@ -20,7 +20,8 @@ export function showSummary(state, history) {
     element(`count_${name}`).textContent = count;
     element(`count_${name}`).parentElement.classList.toggle("zero", count === 0);
   }
-  const speeds = state.fleet.robots.map((robot) => history.speedOf(robot.name)).filter((speed) => speed !== null);
+  const known = state.fleet.robots.filter((robot) => stateOf(robot, state) === "READY");
+  const speeds = known.map((robot) => history.speedOf(robot.name)).filter((speed) => speed !== null);
   const mean = speeds.reduce((sum, speed) => sum + speed, 0) / speeds.length;
   element("mean_speed").textContent = speeds.length ? `mean speed ${mean.toFixed(2)} m/s` : "mean speed unknown";
 }
