@@ -348,25 +348,6 @@ def test_the_readme_lists_every_option_and_every_fault():
     assert [key for key in keys if "`%s`" % key not in text] == []
 
 
-@pytest.mark.slow
-def test_the_documented_command_copies_all_that_is_needed(tmp_path):
-    pack, unpack = re.search(
-        r"(tar -cz .*?)\\\n\s*\| ssh USER@MACHINE '(.*?)'", read_readme(), re.DOTALL
-    ).groups()
-    subprocess.run("(cd %s && %s) | (%s)" % (ROOT, pack, unpack), shell=True, check=True, cwd=str(tmp_path))
-    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
-    result = subprocess.run(
-        [sys.executable, "-m", "hero_sim", *"--count 3 --arena maze --port 9 --seconds 0.3".split()],
-        cwd=str(tmp_path / "hero_sim_robots"),
-        env=environment,
-        capture_output=True,
-        text=True,
-        timeout=LIMIT_S,
-        check=False,
-    )
-    assert (result.returncode, result.stderr) == (0, "")
-
-
 def test_numpy_that_is_missing_is_named():
     code = "import runpy, sys; sys.modules['numpy'] = None; runpy.run_module('hero_sim', run_name='__main__')"
     result = subprocess.run(
