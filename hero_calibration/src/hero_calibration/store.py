@@ -27,7 +27,7 @@ SETTINGS: Dict[str, Range] = {
     "velocity_gains": (6, 0.0, 1e5, "P I D of the left wheel, then of the right"),
     "infrared_counts_m2": (8, 1e-3, 100.0, "by index of proximity"),
 }
-"""What can be written to the robot: how many numbers, the lowest and the highest allowed, and their meaning."""
+"""Settings of a robot: number of values, limits, meaning."""
 
 RESULTS: Dict[str, Range] = {
     "wheels_m": (3, 0.01, 1.0, "diameters of the left and the right wheel, distance between them"),

@@ -23,7 +23,7 @@ from .robots_parameter import given_robots
 from .rviz_config import CHOICE_TOPIC, GOAL_TOPIC, POINT_TOPIC
 
 LISTEN_S = 0.5
-"""How long it listens to /tf after a click; reading a swarm's /tf all the time would cost too much."""
+"""Time of listening to /tf after a click; reading a swarm's /tf all the time would cost too much."""
 
 REACH_M = 0.15
 """A click farther from a robot's center selects none."""

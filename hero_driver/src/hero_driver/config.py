@@ -260,7 +260,7 @@ class DriverConfig:
 
     @property
     def correction_settings(self) -> CorrectionSettings:
-        """How the data of robots are corrected."""
+        """Settings of corrections."""
         return CorrectionSettings(
             self.odometry,
             {STOCK: self.wheel_geometry, HERO_PLUS: PLUS_WHEELS},
@@ -275,7 +275,7 @@ class DriverConfig:
 
     @property
     def command_settings(self) -> CommandSettings:
-        """What robots may be told."""
+        """Settings of commands."""
         return CommandSettings(
             self.clamp,
             self.allow_self_tuning,

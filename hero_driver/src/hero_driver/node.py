@@ -54,7 +54,7 @@ REPORT_CHECK_S = 0.1
 MASTER_CHECK_S = 0.5
 
 LEAVE_WAIT_S = 3.0
-"""How long the ROS master may take to forget this node; 50 robots take it 0.5 s."""
+"""Time limit for unregistering at the ROS master; 50 robots take 0.5 s."""
 
 
 def make_ros_clock() -> Callable[[], int]:

@@ -38,7 +38,7 @@ class Peer:
 
     @property
     def label(self) -> str:
-        """How log lines call this peer."""
+        """Name of this peer in log lines."""
         if self.bridge is not None:
             return self.bridge.label
         if self.record is not None:

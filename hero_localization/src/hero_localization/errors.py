@@ -1,4 +1,4 @@
-"""What can be wrong with a camera, its detector and its calibration, for people."""
+"""Errors of a camera, its detector and its calibration."""
 
 __all__ = ["CalibrationError", "DetectorError", "FrameSourceError", "LocalizationError", "SettingsError"]
 

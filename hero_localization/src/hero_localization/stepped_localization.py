@@ -23,7 +23,7 @@ __all__ = ["CameraModel", "StepLocalization"]
 
 
 class CameraModel(NamedTuple):
-    """How well a camera measures robots; it takes an image with each reading of odometry, 29 in a second."""
+    """Errors and timing of a simulated camera; it takes an image with each reading of odometry, 29 in a second."""
 
     delay_s: float = 0.1
     """From the image to the measured pose."""

@@ -33,7 +33,7 @@ MOVING = ("drive", "goal", "start")
 
 
 class PageRequests:
-    """What pages may do with robots, programs and the recording."""
+    """Requests of pages for robots, programs and the recording."""
 
     def __init__(
         self,

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from .serving.server import PageSocket
 
 LINGER_S = 10.0
-"""How long subscriptions outlive the last page, which may only reload."""
+"""Time that subscriptions outlive the last page, which may only reload."""
 
 END_CHECK_PERIOD_S = 0.2
 

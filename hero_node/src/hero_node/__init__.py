@@ -1,1 +1,1 @@
-"""What every node and program of the suite is made of. Only modules in `ros` import ROS."""
+"""Common parts of all nodes and programs of the suite. Only modules in `ros` import ROS."""

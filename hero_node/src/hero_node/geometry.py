@@ -31,7 +31,7 @@ class Pose(NamedTuple):
 
 
 class Velocity(NamedTuple):
-    """How a robot moves, or is to move, in its own frame hero_N/base_link."""
+    """Velocity of a robot, measured or commanded, in its frame hero_N/base_link."""
 
     linear_m_s: float
     """Positive forward."""

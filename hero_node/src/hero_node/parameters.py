@@ -40,7 +40,7 @@ class Parameter(NamedTuple):
     check: Callable[[str, Any], Any]
     """Name, value -> the checked value. Raises: ProgramError."""
     text: str = ""
-    """What it means."""
+    """Meaning, for documents."""
     unit: str = ""
     limits: Optional[Tuple[float, float]] = None
     choices: Tuple[str, ...] = ()

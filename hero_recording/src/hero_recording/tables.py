@@ -18,7 +18,7 @@ Columns = Dict[str, Callable[[Any], Any]]
 """Name of each column after time_s, and the function that reads its value from a message."""
 
 STATUS = "status"
-"""What the driver reports of a robot, once a second and at every change."""
+"""Driver's report on a robot, once a second and at every change."""
 
 BEAMS = ("rear", "rear_right", "right", "front_right", "front", "front_left", "left", "rear_left")
 """Of /hero_N/proximity by index: counter-clockwise from the rear."""

@@ -1,4 +1,4 @@
-"""What can go wrong in the simulator, as one small tree."""
+"""Errors of the simulator."""
 
 
 class SimulatorError(Exception):

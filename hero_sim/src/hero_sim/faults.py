@@ -1,4 +1,4 @@
-"""What can go wrong with a robot on request: `KIND[@SECONDS][:robot=ID,key=value]`.
+"""Faults of a robot on request: `KIND[@SECONDS][:robot=ID,key=value]`.
 
 The same text is used on the command line (--fault) and in the ROS service.
 """

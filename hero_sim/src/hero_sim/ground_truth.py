@@ -32,7 +32,7 @@ MARKER_PERIOD_MS = 100
 """Simulated time between two publications."""
 
 CLOCK_START_S = 1600000000
-"""What /clock shows at the start: late enough not to be taken for a robot's uptime."""
+"""Initial time of /clock: late enough not to be taken for a robot's uptime."""
 
 BODY_HEIGHT_M = 0.045
 WALL_HEIGHT_M = 0.05

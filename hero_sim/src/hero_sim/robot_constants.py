@@ -23,7 +23,7 @@ PULSE_RANGE_US = (1000, 2000)
 
 VELOCITY_LIMIT_US = 250.0
 POSITION_LIMIT_US = 130.0
-"""How far from the center the PID of each controller goes."""
+"""Limit of each controller's PID output, from the center."""
 
 COMMAND_GAP_MS = 50
 """A Twist that arrives earlier after its controller's watchdog was set is dropped, a zero too

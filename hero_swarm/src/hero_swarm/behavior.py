@@ -1,4 +1,4 @@
-"""What a behavior is: a class with sensors, a rate, parameters with units, and step() for one robot or for all.
+"""Behaviors: a class with sensors, a rate, parameters with units, and step() for one robot or for all.
 
 Pure: numpy only. R robots are the rows of all arrays, world after world.
 
@@ -62,7 +62,7 @@ class Random:
 
 
 class Sensed:
-    """What R robots sense, as attributes: those below, and one for each sensor of the behavior, by its name.
+    """Readings of R robots, as attributes: those below, and one for each sensor of the behavior, by its name.
 
     A Binary gives an array (R,) of bool, Neighbors a Neighborhood, a Sight an array (R,) of NOTHING, OBJECT or ROBOT,
     and Objects an ObjectsInSight.

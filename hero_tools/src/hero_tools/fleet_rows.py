@@ -1,4 +1,4 @@
-"""What the table of the fleet shows of each robot, and how the robots are ordered and judged. Pure."""
+"""Rows of the fleet's table: cells of each robot, order, and classification. Pure."""
 
 import math
 from typing import Dict, List, NamedTuple, Sequence

@@ -1,1 +1,1 @@
-"""What readings tell of a robot: dead zones, step responses, infrared constants. Pure."""
+"""Models of a robot from its readings: dead zones, step responses, infrared constants. Pure."""

@@ -55,7 +55,7 @@ Curve = Tuple[np.ndarray, np.ndarray]
 
 
 class Response(NamedTuple):
-    """How a wheel followed a step.
+    """Response of a wheel to a step.
 
     Attributes:
         mean_error: mean deviation from the target speed, as a share of it.

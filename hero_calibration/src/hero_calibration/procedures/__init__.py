@@ -1,1 +1,1 @@
-"""What robots are taken through, one module for each part of a calibration. Pure."""
+"""Procedures of a calibration, one module for each part. Pure."""

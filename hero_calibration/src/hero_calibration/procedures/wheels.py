@@ -46,7 +46,7 @@ Drive = Tuple[float, float, float]
 
 
 class Leg(NamedTuple):
-    """What a robot drove from one stop to another."""
+    """Motion of a robot from one stop to the next."""
 
     ticks: np.ndarray
     """Of the left and the right wheel, (K, 2)."""

@@ -23,7 +23,7 @@ SERVICES: Dict[str, Tuple[str, Any, Callable[[float], float]]] = {
     "velocity_gains": ("velocity_controller/pid_parameters", SetPID, float),
     "infrared_counts_m2": ("ir_calibration", SetIRCalibration, float),
 }
-"""What writes each of store.SETTINGS, and the type of its numbers."""
+"""Service that writes each of store.SETTINGS, and the type of its numbers."""
 
 
 class RosProbe(Probe):

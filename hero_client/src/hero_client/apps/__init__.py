@@ -1,1 +1,1 @@
-"""What the programs of this package and of hero_examples are made of."""
+"""Parts of the programs of this package and of hero_examples."""

@@ -100,7 +100,7 @@ class GoalRequest(NamedTuple):
 
 
 class GoalOutcome(NamedTuple):
-    """How a goal ended."""
+    """Outcome of a goal."""
 
     reached: bool
     gave_up: bool

@@ -23,7 +23,7 @@ ARROWS = {
     "\x1bOC": "right",
     "\x1bOD": "left",
 }
-"""What terminals send for the arrow keys, in normal and in application mode."""
+"""Sequences that terminals send for the arrow keys, in normal and in application mode."""
 
 
 class NoTerminalError(ProgramError):

@@ -62,7 +62,7 @@ def find_in_path(ranges: Sequence[float], backward: bool = False) -> Tuple[float
 
 
 class WanderLaw(NamedTuple):
-    """How a robot wanders. The distances suit beams that see about 0.24 m and come 5 times a second."""
+    """Settings of wandering. The distances suit beams that see about 0.24 m and come 5 times a second."""
 
     cruise_m_s: float = 0.10
     angular_rad_s: float = 1.5
@@ -85,7 +85,7 @@ STOP_STEPS = 2
 
 
 class WanderMemory(NamedTuple):
-    """What a wandering robot keeps from one step to the next."""
+    """State of a wandering robot between steps."""
 
     escape_sign: int = 0
     """+1 or -1 while it turns on the spot, to the left or right; 0 while it walks."""
@@ -135,7 +135,7 @@ def wander(
 
 
 class DetourLaw(NamedTuple):
-    """How a robot drives around what its sensors see."""
+    """Settings of driving around obstacles."""
 
     influence_m: float = 0.18
     """Obstacles nearer than this push."""

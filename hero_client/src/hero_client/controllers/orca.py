@@ -36,7 +36,7 @@ _SLACK_HALVINGS = 12
 
 
 class AvoidanceLaw(NamedTuple):
-    """How robots keep apart."""
+    """Settings of collision avoidance."""
 
     body_m: float = BODY_RADIUS_M
     lookahead_m: float = 0.03

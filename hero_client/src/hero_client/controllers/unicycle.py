@@ -22,7 +22,7 @@ __all__ = [
 
 
 class GoToLaw(NamedTuple):
-    """How a robot goes to a point: as quickly as its motors (0.5 s to a new speed) follow without swinging."""
+    """Gains and limits of going to a point: as quickly as its motors (0.5 s to a new speed) follow without swinging."""
 
     linear_gain: float = 0.8
     """Speed in m/s per meter of distance, 1/s."""
@@ -54,7 +54,7 @@ def go_to_point(pose: Pose, x_m: float, y_m: float, law: GoToLaw = GO_TO) -> Vel
 
 
 class GoToPoseLaw(NamedTuple):
-    """How a robot goes to a point and ends with a heading."""
+    """Gains and limits of going to a point and ending with a heading."""
 
     k1: float = 1.0
     """How early the robot bends towards the final heading."""
@@ -113,7 +113,7 @@ def go_to_pose(pose: Pose, goal: Pose, law: GoToPoseLaw = SMOOTH, at_goal: bool 
 
 
 class FollowLaw(NamedTuple):
-    """How a robot keeps behind another one."""
+    """Gains and limits of following another robot."""
 
     gap_m: float = 0.15
     """Between the centers; two bodies touch at 0.074 m."""

@@ -1,4 +1,4 @@
-"""What a robot and a swarm have in common: a robot is a group of one. Pure."""
+"""Common base of robot and swarm: a robot is a group of one. Pure."""
 
 import math
 from typing import Optional, Protocol, Sequence, TypeVar
@@ -14,7 +14,7 @@ REPEAT_PERIOD_S = 0.1
 """Between the commands of a motion: well within the robot's watchdog of about 2 s."""
 
 READY_TIMEOUT_S = 2.0
-"""How long a motion waits for a robot that is not ready; it takes about 0.1 s after the start of a program."""
+"""Time that a motion waits for a robot that is not ready; it takes about 0.1 s after the start of a program."""
 
 POLL_PERIOD_S = 0.02
 """Between two checks whether a robot is ready."""

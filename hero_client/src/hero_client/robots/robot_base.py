@@ -131,7 +131,7 @@ class BaseRobot(Group):
 
     @property
     def velocity(self) -> Velocity:
-        """How the robot moves by its odometry, in hero_N/base_link. Raises: StaleDataError as `pose`."""
+        """Velocity by odometry, in hero_N/base_link. Raises: StaleDataError as `pose`."""
         self._check_fresh("odom")
         return self._link.read_velocity()
 
@@ -157,7 +157,7 @@ class BaseRobot(Group):
 
     @property
     def infrared_counts(self) -> List[float]:
-        """What the eight infrared sensors measure, less the ambient light, in counts; in the order of `proximity`.
+        """Readings of the eight infrared sensors without ambient light, in counts; in the order of `proximity`.
 
         The first use subscribes, and waits up to 5 s. Raises: StaleDataError if they are older than 1 s.
         """

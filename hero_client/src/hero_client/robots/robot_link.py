@@ -1,4 +1,4 @@
-"""What a Robot needs of the robot that it drives: over ROS topics, or stepped in the same process. Pure."""
+"""Interface between a Robot and the robot that it drives: over ROS topics, or stepped in the same process. Pure."""
 
 from typing import List, Optional, Protocol, Tuple
 

@@ -1,4 +1,4 @@
-"""What a table or a map shows of one robot: rate, pose, distance driven and nearest obstacle, from its topics.
+"""Display values of one robot: rate, pose, distance driven and nearest obstacle, from its topics.
 
 Unlike Robot it decodes messages only when asked: a swarm sends far more of them than a program reads.
 """
@@ -72,7 +72,7 @@ class RateMeter:
 
 
 class RobotTrack:
-    """What odometry and proximity of one robot have shown so far."""
+    """Readings of one robot's odometry and proximity so far."""
 
     def __init__(self) -> None:
         self.odometry = RateMeter()

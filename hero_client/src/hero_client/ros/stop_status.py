@@ -35,7 +35,7 @@ class StopStatus(NamedTuple):
 
 
 class DriverReply(NamedTuple):
-    """What a driver has reported since the request."""
+    """Report of a driver since the request."""
 
     name: str
     report: Optional[RobotArray]

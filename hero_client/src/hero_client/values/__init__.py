@@ -1,1 +1,1 @@
-"""What programs compute with: poses, readings, colors, errors, times. Pure."""
+"""Values of programs: poses, readings, colors, errors, times. Pure."""

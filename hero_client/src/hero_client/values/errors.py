@@ -1,4 +1,4 @@
-"""What goes wrong with robots. The text is one line: what, why, and what to do. Pure."""
+"""Errors of robots. The text is one line: what, why, and what to do. Pure."""
 
 from hero_node.errors import HeroError
 

@@ -25,7 +25,7 @@ __all__ = [
 ]  # fmt: skip
 
 NOTHING, OBJECT, ROBOT = 0, 1, 2
-"""What a Sight gives."""
+"""Values of a Sight."""
 
 
 class Things(NamedTuple):
@@ -57,7 +57,7 @@ class Objects(NamedTuple):
 
 
 class ObjectsInSight(NamedTuple):
-    """What R robots sense of the M objects of their world.
+    """Objects sensed by R robots in a world with M objects.
 
     Attributes:
         seen: which are sensed (R, M); the other arrays are 0 where it is False.

@@ -1,4 +1,4 @@
-"""What is true of every HeRo robot; source: the firmware's config.h and RangeSensor.ino."""
+"""Constants of every HeRo robot; source: the firmware's config.h and RangeSensor.ino."""
 
 __all__ = ["BODY_RADIUS_M", "MAX_ANGULAR_RAD_S", "MAX_LINEAR_M_S", "MIN_RANGE_M", "WHEEL_SEPARATION_M"]
 

@@ -1,4 +1,4 @@
-"""What robots sense of each other, computed from their poses: one function for each sensor.
+"""Sensors of neighbors, computed from poses: one function for each sensor.
 
 Pure: numpy only, over all robots of W worlds with N robots each; robots of different worlds never sense each other.
 Poses are (W, N, 3), x m, y m, yaw rad, in one frame; NaN for a robot whose pose is not known, which senses nothing
@@ -43,7 +43,7 @@ class Neighbors(NamedTuple):
 
 
 class Neighborhood(NamedTuple):
-    """What R robots sense of their neighbors; each array has one column for every robot of the same world (R, N).
+    """Neighbors sensed by R robots; each array has one column for every robot of the same world (R, N).
 
     Attributes:
         seen: which neighbors are sensed; never the robot itself. The other arrays are 0 where it is False.
@@ -70,7 +70,7 @@ class Neighborhood(NamedTuple):
 
     @property
     def counts(self) -> np.ndarray:
-        """How many neighbors each robot senses (R,)."""
+        """Number of neighbors that each robot senses (R,)."""
         return self.seen.sum(axis=1)
 
     def average(self, values: np.ndarray) -> np.ndarray:

@@ -18,13 +18,13 @@ IN_FLIGHT_MAX = 2048
 """Bytes that the robot has not acknowledged beyond which nothing is written: about its TCP window (2144 B)."""
 
 RETRY_S = 0.01
-"""How soon to look again whether the robot has acknowledged."""
+"""Period of checks for the robot's acknowledgement."""
 
 Command = Tuple[str, bytes]
 
 
 class CommandQueue:
-    """What waits to be sent to one robot."""
+    """Commands that wait to be sent to one robot."""
 
     def __init__(self, max_age_s: float, lock: ContextManager[Any]) -> None:
         """max_age_s: shaped motion commands older than this are dropped.

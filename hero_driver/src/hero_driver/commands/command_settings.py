@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 
 class CommandSettings(NamedTuple):
-    """What a robot may be told, and how long it may take."""
+    """Permissions and time limits of commands."""
 
     clamp: bool
     allow_self_tuning: bool

@@ -17,7 +17,7 @@ COMMAND_INTERVAL_S = 0.06
 """Time between two commands to one controller: the firmware drops one within 50 ms of the last accepted one."""
 
 STOP_REPEATS = 1
-"""How often a stop is sent again."""
+"""Number of repetitions of a stop."""
 
 TWIST_LENGTH = 48
 _TWIST = struct.Struct("<6d")

@@ -1,1 +1,1 @@
-"""What a robot's messages need before ROS programs can use them: odometry, stamps, transforms, ranges. Pure."""
+"""Corrections of a robot's messages: odometry, stamps, transforms, ranges. Pure."""

@@ -33,7 +33,7 @@ MAX_STEP_S = 1.0
 
 @dataclass(frozen=True)
 class WheelGeometry:
-    """What turns ticks into meters."""
+    """Conversion of ticks into meters."""
 
     wheel_diameter_m: float = WHEEL_DIAMETER_M
     """Mean of both wheels."""

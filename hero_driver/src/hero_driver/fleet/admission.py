@@ -107,7 +107,7 @@ class Admission:
 
     @property
     def unidentified(self) -> int:
-        """How many connections have not said which robot they are."""
+        """Number of unidentified connections."""
         return sum(self._unidentified.values())
 
     def _find_own_refusal(self, host: str) -> Optional[str]:
@@ -132,7 +132,7 @@ def _decrement(counts: "Counter[str]", host: str) -> None:
 
 
 class RateLimit:
-    """What one connection may send per second.
+    """Limits of one connection's packets and bytes per second.
 
     Two token buckets of one second each, as the times up to which the permitted rates are used: one call per read.
     """

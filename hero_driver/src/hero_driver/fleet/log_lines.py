@@ -25,7 +25,7 @@ _HEARTBEAT = re.compile(r"^Conn?ected at time (?P<millis>\d{1,10})$")
 
 
 class BootLine(NamedTuple):
-    """What a robot says of itself when it starts; config is empty with firmware before v3.8."""
+    """Versions that a robot logs at its start; config is empty with firmware before v3.8."""
 
     firmware: str
     hardware: str
@@ -33,7 +33,7 @@ class BootLine(NamedTuple):
 
 
 class Heartbeat(NamedTuple):
-    """What a robot says once a second."""
+    """Status that a robot logs once a second."""
 
     uptime_s: float
 

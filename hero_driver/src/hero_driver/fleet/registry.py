@@ -36,7 +36,7 @@ class RobotState(enum.Enum):
 
 
 class RobotEvent(enum.Enum):
-    """What changes the state of a robot."""
+    """Events of a robot's state."""
 
     CONNECTED = "a connection said that it is this robot, and was let in"
     DECLARED = "the robot declared a topic"
@@ -57,7 +57,7 @@ but what duplicates are shown as."""
 
 
 class Verdict(enum.Enum):
-    """What becomes of a connection that claims an identity."""
+    """Decision on a connection that claims an identity."""
 
     ARRIVED = "arrived"  # first time
     RETURNED = "returned"  # was away
@@ -67,7 +67,7 @@ class Verdict(enum.Enum):
 
 @dataclass
 class RobotRecord:
-    """What is known of one robot, over all its connections."""
+    """State of one robot over all its connections."""
 
     identity: Identity
     host: str

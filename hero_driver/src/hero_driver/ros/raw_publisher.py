@@ -14,7 +14,7 @@ from typing import Any, Callable, Deque, Dict, List
 from .rospy_internals import NO_CONNECTIONS, open_publisher, send, unregister
 
 RETRY_S = 0.01
-"""How soon a subscriber whose socket was full is tried again."""
+"""Delay before a subscriber whose socket was full is tried again."""
 
 _LENGTH = struct.Struct("<I")
 

@@ -38,7 +38,7 @@ SET_ODOM_TYPE = "hero_msgs/SetOdom"
 
 
 class BridgeContext(NamedTuple):
-    """What all bridges share."""
+    """Objects that all bridges share."""
 
     owner: CommandOwner
     loop: EventLoop

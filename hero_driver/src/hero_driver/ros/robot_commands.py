@@ -38,7 +38,7 @@ TUNING_HEARD_S = 1.0
 
 
 class CommandOwner(Protocol):
-    """What commands need of the gateway."""
+    """Interface of the gateway for commands."""
 
     stopped: bool
     """Whether all robots are stopped."""

@@ -182,7 +182,7 @@ def unregister(topic: Any) -> None:
 
 
 class Registrations(NamedTuple):
-    """What this node has registered with the ROS master: pairs of a name, and a type or a service's URI."""
+    """Registrations of this node at the ROS master: pairs of a name, and a type or a service's URI."""
 
     publications: List[Tuple[str, str]]
     subscriptions: List[Tuple[str, str]]

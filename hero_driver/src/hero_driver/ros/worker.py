@@ -21,7 +21,7 @@ class Worker:
 
     @property
     def refused(self) -> int:
-        """How many calls were refused, because too many waited or the worker was closed."""
+        """Number of calls refused because too many waited or the worker was closed."""
         return self._calls.refused
 
     def submit(self, call: Callable[[], None], always: bool = False) -> bool:

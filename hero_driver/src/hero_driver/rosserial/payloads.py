@@ -41,7 +41,7 @@ LOG_FATAL = 4
 
 
 class TopicInfo(NamedTuple):
-    """What a peer declares about one topic, or about one direction of one service."""
+    """Declaration of one topic, or of one direction of one service."""
 
     topic_id: int
     name: str  # as sent: with or without a leading slash

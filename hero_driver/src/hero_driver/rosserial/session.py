@@ -57,7 +57,7 @@ _NAME = re.compile(r"[/~]?[a-zA-Z][a-zA-Z0-9_/]*\Z")
 
 
 class TopicKind(enum.Enum):
-    """What a declared id carries, seen from the robot; the value is the id of the declaring packet."""
+    """Topic or service of a declared id, seen from the robot; the value is the id of the declaring packet."""
 
     PUBLISHER = packets.ID_PUBLISHER
     SUBSCRIBER = packets.ID_SUBSCRIBER
@@ -78,7 +78,7 @@ _NOT_SERVED = {
     packets.ID_SERVICE_CLIENT_SUBSCRIBER: "wants to call a service of ROS, which robots cannot",
     packets.ID_PARAMETER_REQUEST: "asks for a parameter of ROS, which robots cannot read",
 }
-"""What no HeRo does, but rosserial allows."""
+"""Requests that rosserial allows and no HeRo makes."""
 
 
 def _ignore(payload: bytes, arrival_ns: int) -> None:
@@ -147,7 +147,7 @@ Event = Union[
 
 
 class SessionState(enum.Enum):
-    """What the session waits for."""
+    """State of the handshake."""
 
     ASKING = "asking"  # the robot has declared nothing yet: ask for its topics again and again
     DECLARED = "declared"
@@ -181,7 +181,7 @@ _NEXT_STATES = {
 
 @dataclass(frozen=True)
 class SessionLimits:
-    """What one peer may do before it is refused."""
+    """Limits of one peer."""
 
     max_payload_length: int = packets.DEFAULT_MAX_PAYLOAD_LENGTH
     max_topics: int = 64

@@ -1,4 +1,4 @@
-"""How threads hand work to one another: a bounded queue of calls, which the receiving thread makes in order.
+"""Work handed between threads: a bounded queue of calls, which the receiving thread makes in order.
 
 When the queue is full the new call is refused and counted, and its sender is told. The loop of the sockets has one such
 queue, and so has every worker.

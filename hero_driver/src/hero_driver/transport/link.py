@@ -44,7 +44,7 @@ def find_socket_address(address: Address, flags: int = 0) -> Any:
 
 
 class LinkHandler:
-    """What the transport calls, always on the loop's thread."""
+    """Callbacks of the transport, always on the loop's thread."""
 
     def open_link(self, link: "Link") -> Optional[str]:
         """A connection stands; return a reason to refuse it, or None."""
@@ -80,7 +80,7 @@ class LinkHandler:
 
 
 class LinkOwner:
-    """What a link needs of the loop that owns it."""
+    """Interface of the loop that owns a link."""
 
     def call_soon(self, call: Callable[[], None]) -> None:
         """Run call on the loop's thread, soon; from any thread."""

@@ -1,4 +1,4 @@
-"""What a calibrated camera sees of the arena, and where in the arena a pixel lies. Pure.
+"""Projection between arena and pixels of a calibrated camera. Pure.
 
 Pixels are OpenCV's: u right, v down, the center of the first pixel is (0, 0). The optical frame is REP 103's: x right,
 y down, z forward. Lenses are sensor_msgs/CameraInfo's `plumb_bob`. Source: OpenCV, Camera Calibration and 3D
@@ -19,7 +19,7 @@ _ROUNDING = 1e-10
 
 
 class Lens(NamedTuple):
-    """How directions in the optical frame fall on pixels."""
+    """Intrinsics: projection of directions in the optical frame to pixels."""
 
     width_px: int
     height_px: int

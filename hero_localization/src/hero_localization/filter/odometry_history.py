@@ -25,7 +25,7 @@ JUMP_MARGIN_RAD = 0.3
 
 
 class Odometry(NamedTuple):
-    """What a robot has driven."""
+    """Odometry of a robot."""
 
     pose: Pose
     """In a frame that starts as hero_N/odom and never jumps."""
@@ -37,7 +37,7 @@ class Odometry(NamedTuple):
 
 
 class OdometryHistory:
-    """What a robot drove.
+    """Odometry increment of a robot.
 
     Attributes:
         jumps: how often the robot's odometry jumped, by a restart or because a program set it.

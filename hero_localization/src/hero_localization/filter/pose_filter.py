@@ -32,13 +32,13 @@ TURN_SCALE_SD = 0.014
 DISTANCE_VARIANCE_M2_M = 1.5e-5
 YAW_VARIANCE_RAD2_M = 1e-3
 YAW_VARIANCE_RAD2_RAD = 2e-4
-"""What chance adds: 4 mm (standard deviation) and 0.03 rad after a meter, 0.014 rad after a radian."""
+"""Process noise: 4 mm (standard deviation) and 0.03 rad after a meter, 0.014 rad after a radian."""
 
 SYSTEMATIC_M, SYSTEMATIC_RAD = 0.0007, 0.003
 """Of measured poses (standard deviations in x, y, and of yaw), what stays however many are joined: calibration."""
 
 UNTOLD_M_S, UNTOLD_RAD_S = 0.2, 2.0
-"""How fast a robot may move while its odometry is missing."""
+"""Assumed maximum speed while odometry is missing."""
 
 SYSTEMATIC = np.array((SYSTEMATIC_M**2, SYSTEMATIC_M**2, SYSTEMATIC_RAD**2))
 
@@ -87,7 +87,7 @@ class Estimate(NamedTuple):
 
 
 class Outcome(enum.Enum):
-    """What became of a measured pose."""
+    """Outcome of a measured pose."""
 
     FIRST = "first"
     USED = "used"
@@ -101,7 +101,7 @@ class Outcome(enum.Enum):
 
 
 class Correction(NamedTuple):
-    """What became of a measured pose that had waited, and where the robot was taken to be before it."""
+    """Outcome of a measured pose that had waited, and the pose estimated before it."""
 
     measurement: Measurement
     outcome: Outcome

@@ -1,4 +1,4 @@
-"""What something was over the last moments, at any time between two stamps. Pure."""
+"""History of a value, interpolated between stamps. Pure."""
 
 import bisect
 import math

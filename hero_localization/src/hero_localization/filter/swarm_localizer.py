@@ -34,11 +34,11 @@ AHEAD_S = 0.2
 """A simulated clock may go in steps of 0.1 s."""
 
 PUBLISH_RATE_HZ = 25.0
-"""How often localize publishes by default."""
+"""Default publish rate of localize."""
 
 
 class RobotState(enum.IntEnum):
-    """How well a robot's place is known."""
+    """Quality of a robot's pose."""
 
     UNKNOWN = 0
     """Never measured."""
@@ -48,7 +48,7 @@ class RobotState(enum.IntEnum):
 
 
 class LocalizedRobot(NamedTuple):
-    """What is known of one robot now."""
+    """Estimate of one robot."""
 
     robot_id: int
     state: RobotState
@@ -56,7 +56,7 @@ class LocalizedRobot(NamedTuple):
     odom_origin: Optional[Pose]
     """Of the frame hero_N/odom in map."""
     problem: str
-    """What is wrong, for people; empty if nothing is."""
+    """Problem as text; empty if there is none."""
 
 
 class _Robot:

@@ -47,7 +47,7 @@ MIN_FRONTIER_CELLS = 5
 """Shorter stretches are gaps between two robots' readings."""
 
 OTHERS_MARGIN_M = 0.03
-"""What is seen within this of another robot's body is that robot."""
+"""Ranges that end this near another robot's body are that robot."""
 
 
 class OccupancyGrid:

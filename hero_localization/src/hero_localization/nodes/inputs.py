@@ -1,4 +1,4 @@
-"""What comes in from ROS: odometry of robots, and poses measured by motion capture, a camera or anything else."""
+"""Inputs from ROS: odometry of robots, and poses measured by motion capture, a camera or anything else."""
 
 import math
 import struct

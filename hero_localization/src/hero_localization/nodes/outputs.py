@@ -1,4 +1,4 @@
-"""What goes out to ROS: poses of robots in the common frame, as messages and on tf, and diagnostics."""
+"""Outputs to ROS: poses of robots in the common frame, as messages and on tf, and diagnostics."""
 
 import math
 from typing import Dict, Sequence

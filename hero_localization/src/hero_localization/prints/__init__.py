@@ -1,1 +1,1 @@
-"""What is printed: tags, boards, and the sheets that hold them. Knows neither cameras nor robots."""
+"""Prints: tags, boards, and the sheets that hold them. Knows neither cameras nor robots."""

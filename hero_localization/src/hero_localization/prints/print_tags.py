@@ -23,7 +23,7 @@ __all__ = ["Sheet", "draw_page", "list_sheets", "parse_options", "split_pages"]
 
 PAPERS_MM = {"a4": (210.0, 297.0), "letter": (215.9, 279.4)}
 EDGE_MM = 12.0
-"""What printers leave white."""
+"""Unprintable margin."""
 FOOTER_MM = 16.0
 GAP_MM = 4.0
 ROBOT_DIAMETER_MM = 73.0

@@ -26,7 +26,7 @@ MIN_MISTAKEN_TAGS = 3
 
 
 class TagDetector:
-    """What finds tags of one family."""
+    """Detector of tags of one family."""
 
     def detect(self, gray: np.ndarray, origin: Tuple[int, int] = (0, 0)) -> List[TagCorners]:
         """Return the tags in gray (H, W), 8 bit.

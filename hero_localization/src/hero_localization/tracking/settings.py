@@ -37,7 +37,7 @@ DEFAULT_PATH = "~/hero_localization/camera.yaml"
 
 
 class Settings(NamedTuple):
-    """What a camera's file holds; None: not calibrated yet."""
+    """Contents of a camera file; None: not calibrated yet."""
 
     detector: str = DEFAULT_BACKEND
     family: str = "36h11"

@@ -33,14 +33,14 @@ DEFAULT_HEIGHT_M = 0.076
 CORNER_PX = 0.1
 """Standard deviation of a corner's place: twice what is measured on still images."""
 SYSTEMATIC_M, SYSTEMATIC_RAD = 0.0007, 0.003
-"""What calibration leaves: of lens, camera, tag on the robot."""
+"""Errors that remain after calibration: intrinsics, extrinsics, tag on the robot."""
 
 MAX_SIZE_ERROR = 0.15
 """A tag that measures more than this share more or less than its print is none, or a print of another size."""
 
 
 class MountedTag(NamedTuple):
-    """How a tag sits on its robot or object: place in base_link, and yaw of the print's upper edge."""
+    """Pose of a tag on its robot or object: position in base_link, yaw of the print's upper edge."""
 
     size_m: float = DEFAULT_SIZE_M
     height_m: float = DEFAULT_HEIGHT_M
@@ -59,7 +59,7 @@ class ReferenceTag(NamedTuple):
 
 
 class TagLayout(NamedTuple):
-    """What each tag stands for. An id is looked up among references, objects, robots, in this order.
+    """Meaning of each tag. An id is looked up among references, objects, robots, in this order.
 
     Attributes:
         tag_robots: robots whose tag has another id, by the tag's id. All others wear the tag of their own id, so that
@@ -125,7 +125,7 @@ class Sighting(NamedTuple):
 
 
 class Sightings(NamedTuple):
-    """What one image shows.
+    """Detections in one image.
 
     Attributes:
         robots: by number.

@@ -23,7 +23,7 @@ FINE_S = 2.0
 """So long the fine detector alone looks for a tag that only it found."""
 
 SWEEP_S = 2.0
-"""How long a search of the whole image takes."""
+"""Time in which the whole image is searched."""
 
 NEARBY_S = 3.0
 NEARBY_EXPECTED_S = 1.0

@@ -35,7 +35,7 @@ class Notice(NamedTuple):
 
 
 class Commander:
-    """What pages make robots do. All methods return at once, except send_goal()."""
+    """Commands of pages to robots. All methods return at once, except send_goal()."""
 
     def __init__(self, drivers: Drivers, background: Background) -> None:
         self._drivers = drivers

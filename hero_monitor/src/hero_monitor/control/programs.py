@@ -129,7 +129,7 @@ class Programs:
 
     @property
     def count(self) -> int:
-        """How many run."""
+        """Number of running programs."""
         return len(self._running)
 
     def find_driver(self, robots: Sequence[str]) -> str:

@@ -59,7 +59,7 @@ REQUESTS: Dict[str, Dict[str, Callable[[Any], bool]]] = {
     "record": {"on": _is_flag, **_FRESH},
     "show": {"ground_truth": _is_flag, "picture": _is_flag, "visible": _is_flag},
 }
-"""What a page can request, by its field "do", with the fields that it needs and their checks.
+"""Requests of a page by its field "do", with the fields that it needs and their checks.
 
 stop: stop all robots. release: release them. drive: a button is held; velocity in m/s and rad/s. end_drive: it is let
 go. stop_some: end what drives these robots, and stop them. goal: a pose on the map in m; yaw (rad) may be added.

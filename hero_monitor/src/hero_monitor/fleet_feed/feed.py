@@ -65,7 +65,7 @@ MARKERS_MAX = 2000
 """Of the arena, or of ground truth."""
 
 LABEL = re.compile(r"(\S+?):? ")
-"""How a driver's lines about one robot begin: "hero_0: voltage low", "hero_0 left (10.42.0.7:4242): ..."."""
+"""Beginning of a driver's lines about one robot: "hero_0: voltage low", "hero_0 left (10.42.0.7:4242): ..."."""
 
 
 class FleetFeed:

@@ -1,4 +1,4 @@
-"""What pages cannot know at present, with cause and remedy: driver, ROS master, localization, camera. Pure.
+"""Losses that pages report, with cause and remedy: driver, ROS master, localization, camera. Pure.
 
 A source that was never heard is not lost: without a camera none is missed. Times enter as now_s, any clock that never
 steps.

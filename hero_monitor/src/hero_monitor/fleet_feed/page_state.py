@@ -1,4 +1,4 @@
-"""What pages show, in named parts of JSON, of which each page gets those that are new to it: its updates. Pure.
+"""Page state, in named parts of JSON, of which each page gets those that are new to it: its updates. Pure.
 
 Every part is complete in itself: a page that missed some needs none of them to understand the next. Lengths are
 integers in mm and angles in mrad: short, and finer than a screen can show.
@@ -100,7 +100,7 @@ class LogRing:
 
 
 class Received:
-    """What one page has received."""
+    """State sent to one page."""
 
     def __init__(self) -> None:
         self.versions: Dict[str, int] = {}

@@ -21,7 +21,7 @@ MAX_REQUEST_LENGTH = 1_000_000
 
 
 class TopicSource(NamedTuple):
-    """What the endpoint reads topics from (RosTopics); all return at once."""
+    """Source of topics for the endpoint (RosTopics); all return at once."""
 
     find_types: Callable[[], Dict[str, TopicType]]
     want: Callable[[Set[str]], bool]
@@ -29,7 +29,7 @@ class TopicSource(NamedTuple):
 
 
 class Publisher(NamedTuple):
-    """What takes the messages of clients; all return at once."""
+    """Receiver of clients' messages; all return at once."""
 
     open_client: Callable[[], None]
     publish: Publish

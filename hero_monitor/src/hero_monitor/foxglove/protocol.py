@@ -35,7 +35,7 @@ class Channel(NamedTuple):
 
 
 class Request(NamedTuple):
-    """What a client sent."""
+    """Message of a client."""
 
     op: str
     subscriptions: List[Tuple[int, int]] = []

@@ -24,7 +24,7 @@ TOKEN_PERIOD_S = 5.0
 
 
 class Connection(Protocol):
-    """What is needed of tornado's IOStream."""
+    """Interface used of tornado's IOStream."""
 
     def close(self) -> None:
         """Close the connection."""

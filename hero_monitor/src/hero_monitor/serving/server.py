@@ -32,7 +32,7 @@ FILES = {path.relative_to(WEB).as_posix(): path for path in WEB.glob("**/*") if 
 
 COOKIE = "hero_monitor"
 SESSION_DAYS = 0.5
-"""How long a login lasts."""
+"""Lifetime of a login."""
 
 CONTENT_SECURITY_POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; "
@@ -64,7 +64,7 @@ EXPIRE_PERIOD_S = 1.0
 
 
 class Actions(NamedTuple):
-    """What the server calls; all return at once."""
+    """Callbacks of the server; all return at once."""
 
     open_page: Callable[["PageSocket"], None]
     receive: Callable[["PageSocket", Union[str, bytes]], None]

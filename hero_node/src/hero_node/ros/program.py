@@ -28,7 +28,7 @@ __all__ = ["Program", "run"]
 ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 SHUTDOWN_WAIT_S = 1.0
-"""How long `rosnode kill` is held up while the loop ends and stops its robots; stopping takes about 0.2 s."""
+"""Delay of `rosnode kill` while the loop ends and stops its robots; stopping takes about 0.2 s."""
 
 
 class Program(Clock):

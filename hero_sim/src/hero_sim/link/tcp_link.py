@@ -35,7 +35,7 @@ _DROP_ALL = struct.pack("HBBI", 0x06, 0, 0, 0)
 
 
 class LinkHandler:
-    """What happens to the connections, robot by robot; called in connect(), send() and poll()."""
+    """Callbacks on connections, robot by robot; called in connect(), send() and poll()."""
 
     def connection_made(self, index: int) -> None:
         """The driver accepted."""

@@ -14,7 +14,7 @@ __all__ = ["PROFILES", "Radio", "WifiProfile"]
 
 
 class WifiProfile(NamedTuple):
-    """How good a network is; times in ms, each drawn anew."""
+    """Quality of a network; times in ms, each drawn at random."""
 
     base_ms: float  # least delay in one direction
     jitter_ms: float  # mean of the exponential delay on top
@@ -64,7 +64,7 @@ class _Direction:
 
     @property
     def length(self) -> int:
-        """How many bytes are on their way."""
+        """Number of bytes in flight."""
         return sum(len(data) for _, data in self.queue)
 
     def send(self, now_ms: int, length: int) -> float:

@@ -11,7 +11,7 @@ _NS_PER_S = 10**9
 
 
 class RobotClock:
-    """What one robot takes for the time; before the first answer that is its uptime."""
+    """Clock of one robot; before the first time response it is its uptime."""
 
     def __init__(self) -> None:
         """Begin without an answer."""

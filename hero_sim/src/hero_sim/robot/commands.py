@@ -1,4 +1,4 @@
-"""What packets from the server do to a robot, and the answers of its services.
+"""Effects of the server's packets on a robot, and responses of its services.
 
 Pure. Texts and behavior are the firmware's (files named in messages and flash); ids as declared.
 """
@@ -22,7 +22,7 @@ from .sensing import Sensing
 __all__ = ["CommandTable"]
 
 PULSES_US = 500
-"""How long writing pulses blocks the loop (MotorDriver.ino: measured as 500 us per cmd_motor)."""
+"""Time that writing pulses blocks the loop (MotorDriver.ino: measured as 500 us per cmd_motor)."""
 
 STOP_US = 1000
 LIGHT_US = 1000

@@ -1,4 +1,4 @@
-"""What one robot declares: its topics and services in the stock order, with the stock ids.
+"""Declarations of one robot: its topics and services in the stock order, with the stock ids.
 
 Pure. Source: TopicInfo packets of the stock robot (firmware v3.8); ids are given in call order, publishers
 from 125 (100 + 25 subscriber slots) and subscribers from 100 (ros.h of the firmware).

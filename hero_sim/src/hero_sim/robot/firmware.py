@@ -200,7 +200,7 @@ class Firmware:
 
     @property
     def received_length(self) -> int:
-        """How many bytes wait in the radio's buffer."""
+        """Number of bytes in the radio's buffer."""
         return len(self._received)
 
     def block_writing(self, now_ms: int) -> None:

@@ -1,4 +1,4 @@
-"""What the IMU hat reports of a robot's heading, in the firmware's units and with its delay.
+"""Heading as the IMU hat reports it, in the firmware's units and with its delay.
 
 Pure. Source: IMUSensor.ino. The hat fills a queue 100 times a second and the firmware takes one reading per
 cycle, so its readings grow older, up to 0.24 s, until the queue overflows and is emptied.

@@ -17,7 +17,7 @@ __all__ = ["HERO", "MODELS", "RobotModel", "build_body", "parse_models"]
 
 
 class RobotModel(NamedTuple):
-    """What distinguishes robots of one model."""
+    """Properties of a model of robots."""
 
     versions: str
     """In the line that it logs at boot."""

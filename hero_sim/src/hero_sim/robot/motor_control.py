@@ -98,7 +98,7 @@ class MotorDriver:
 
 
 class Controller:
-    """What velocity and position controller have in common.
+    """Common base of velocity and position controller.
 
     Attributes:
         pids: of the left and right wheel.

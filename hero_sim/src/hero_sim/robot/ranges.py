@@ -1,4 +1,4 @@
-"""How the firmware turns infrared counts into ranges (RangeSensor.ino). Pure."""
+"""Conversion of infrared counts into ranges by the firmware (RangeSensor.ino). Pure."""
 
 import numpy as np
 

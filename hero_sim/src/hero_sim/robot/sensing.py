@@ -30,13 +30,13 @@ LASER_GATE_MS = 200
 """/laser comes with the first cycle after more than this."""
 
 LASER_READ_MS = 1
-"""How long reading the infrared sensors delays the cycle; with it /laser comes every 205 ms, as measured."""
+"""Delay of the cycle by reading the infrared sensors; with it /laser comes every 205 ms, as measured."""
 
 DISTANCE_MS = 50
 """Between two readings of the distance sensor (tof.ino of HeRo+: continuous, every 50 ms)."""
 
 BLUE_MS = 2000
-"""How long the light is blue after the robot came up."""
+"""Time that the light is blue after startup."""
 
 Color = Tuple[float, ...]  # red, green, blue, alpha (0..1)
 

@@ -1,4 +1,4 @@
-"""How long servo pulses hold a robot's loop, by the ESP8266 Arduino core that its firmware was built with. Pure.
+"""Time that servo pulses block a robot's loop, by the ESP8266 Arduino core that its firmware was built with. Pure.
 
 Cores 2.x (2.5.0 to 2.7.4) change a pulse at once. Since core 3.0.0 all pins share one mailbox for a change of their
 pulse, which the pin empties as its next period begins: the next write of either servo waits for that, also where it

@@ -1,4 +1,4 @@
-"""What stepped robots did, as arrays over time, worlds and robots. Pure."""
+"""Log of stepped robots, as arrays over time, worlds and robots. Pure."""
 
 from typing import Dict, List
 

@@ -42,7 +42,7 @@ class Body:
 
     @property
     def angular_rad_s(self) -> float:
-        """How fast the robot turns, as its wheels have it."""
+        """Angular velocity by the wheels."""
         left_m_s, right_m_s = self._world.speeds_m_s[self.index].tolist()
         _, angular_rad_s = join_wheels(left_m_s, right_m_s, self._world.errors.wheel_separation_m[self.index, 0])
         return float(angular_rad_s)

@@ -26,7 +26,7 @@ _SHIFT_M = 0.006
 """How much nearer two robots, or a robot and an obstacle, come at most while a step's contacts are solved."""
 
 _MARGIN_M = 0.03
-"""How far bodies may move until their neighbors are listed anew; a larger margin makes each step slower."""
+"""Distance that bodies may move until their neighbors are listed again; a larger margin makes each step slower."""
 
 _NONE, _NO_M = np.empty(0, dtype=int), np.empty(0)
 

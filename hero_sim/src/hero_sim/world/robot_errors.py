@@ -1,4 +1,4 @@
-"""How each robot differs from the drawing: drawn from a seed, or set to known values.
+"""Differences between robots: drawn from a seed, or set to known values.
 
 `KEY=VALUE,...[,robot=ID]` on the command line (--error); the README says what each key means. Pure. A robot's own
 calibration is in its flash, not here.
@@ -31,7 +31,7 @@ SERVO_LAG_S = 0.08
 """Time constant of a servo with its wheel. Assumption; a stop then takes the 0.2 s of the stock robot."""
 
 MAX_WHEEL_M_S = 0.28
-"""What a servo reaches without load, whatever the pulse (assumption)."""
+"""Maximum speed of a servo without load (assumption)."""
 
 
 class Kind(NamedTuple):

@@ -59,7 +59,7 @@ class _Way(NamedTuple):
 
 
 class PushToGoal(Behavior):
-    """What behaviors share that push the first object to a goal, a place in the common frame.
+    """Base of behaviors that push the first object to a goal, a place in the common frame.
 
     Attributes:
         goal_radius_m: the object's center has arrived within it.

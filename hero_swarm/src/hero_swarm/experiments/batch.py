@@ -45,7 +45,7 @@ after a run's end."""
 
 
 class BatchResult(NamedTuple):
-    """What one batch gave, and how long that took."""
+    """Results of one batch, and its duration."""
 
     runs: List[Run]
     wall_s: float

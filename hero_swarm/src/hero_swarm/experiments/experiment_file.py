@@ -28,7 +28,7 @@ MAX_RUNS = 1_000_000
 START_KINDS = ("uniform", "grid", "circle", "file", "arena")
 SETTINGS = ("robots", "errors", "delay_s", "arena", "objects")
 ERRORS = {"perfect": 0.0, "default": 1.0}
-"""How far robots are from the drawing, as the simulator takes it."""
+"""Differences between robots, as an option of the simulator."""
 OBJECTS = ("arena", "scattered")
 """Where what robots push is at the start: as in the arena, or at places drawn from each seed."""
 TESTS = ("wilcoxon",)
@@ -70,7 +70,7 @@ class Metric(NamedTuple):
 
 
 class Start(NamedTuple):
-    """How robots are placed; lengths in m.
+    """Placement of robots; lengths in m.
 
     Attributes:
         kind: uniform in a square of which the bodies cover a share; grid or circle with gaps between bodies;

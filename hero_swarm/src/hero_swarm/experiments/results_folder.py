@@ -40,7 +40,7 @@ RunKey = Tuple[int, int]
 
 
 class Run(NamedTuple):
-    """What one run gave.
+    """Results of one run.
 
     Attributes:
         cell: index of the cell.

@@ -1,4 +1,4 @@
-"""What runs say: medians with intervals, comparisons, and remarks on both. Pure."""
+"""Summary of runs: medians with intervals, comparisons, and remarks on both. Pure."""
 
 from typing import Any, Dict, List, NamedTuple, Sequence, Tuple
 
@@ -39,7 +39,7 @@ class Compared(NamedTuple):
 
 
 class Report(NamedTuple):
-    """What the runs of an experiment say.
+    """Summary of an experiment's runs.
 
     Attributes:
         remarks: what a reader should know before believing it.

@@ -1,4 +1,4 @@
-"""How well a swarm does: pure functions on arrays, over W worlds with N robots each at once."""
+"""Metrics of swarms: pure functions on arrays, over W worlds with N robots each at once."""
 
 from typing import Callable, Dict
 

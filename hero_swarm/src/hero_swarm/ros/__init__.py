@@ -1,1 +1,1 @@
-"""What runs behaviors on robots and in the real-time simulator: everything that imports rospy."""
+"""Programs that run behaviors on robots and in the real-time simulator: everything that imports rospy."""

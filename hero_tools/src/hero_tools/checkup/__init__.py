@@ -1,1 +1,1 @@
-"""What the program check inspects: one module per area, each point a function that returns a finding."""
+"""Points of the program check: one module per area, each point a function that returns a finding."""

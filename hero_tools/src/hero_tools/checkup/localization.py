@@ -1,4 +1,4 @@
-"""What finding robots by a camera needs: a device, a detector of tags, and what its nodes report."""
+"""Points on localization: a camera device, a detector of tags, reports of its nodes."""
 
 import glob
 import importlib.util

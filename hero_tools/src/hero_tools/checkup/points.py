@@ -17,7 +17,7 @@ TOOL_PATH = "/usr/sbin:/sbin"
 
 
 class Finding(NamedTuple):
-    """What a point found, and the remedy: lines to read or to paste."""
+    """Finding of a point, and the remedy: lines to read or to paste."""
 
     state: str
     text: str

@@ -1,4 +1,4 @@
-"""How robots push bodies, bodies each other, and walls stop them, in one world and one step after the other. Pure.
+"""Contacts of robots, pushed bodies and walls, in one world and one step after the other. Pure.
 
 The motion that takes all bodies out of what presses on them is found contact by contact in a fixed order, again and
 again (Gauss-Seidel), with a friction cone at each. A robot has traction for MAX_PUSH_N only: if the least motion needs
