@@ -274,10 +274,9 @@ class ViewTest(unittest.TestCase):
         status = {"level": "error", "text": "NOT STOPPED: hero_3 moves" + 20 * " word", "is_final": True, "reads": 0}
         self.show([make_robot(number, stop="MOVING") for number in range(4)], stopped=True)
         self.monitor.show(losses=[loss], stop=status)
-        wait_for(lambda: self.page.find("#losses").is_displayed(), "both banners")
-        row = self.page.find("#fleet tbody tr:nth-child(2) button")
-        self.page.run("document.querySelector('#fleet tbody tr:nth-child(2)').scrollIntoView()")
-        self.page.actions().move_to_element(row).click().perform()  # fails unless it can be reached
+        for banner in ("#losses", "#stopping", "#release_bar"):
+            wait_for(self.page.find(banner).is_displayed, banner)
+        self.page.click("#fleet tbody tr:nth-child(2) button")  # scrolls, and fails unless it can be reached
         self.page.wait_for_text("#name", "hero_1")
 
     def test_no_state_of_the_page_breaks_a_rule_of_wcag_aa(self):

@@ -13,8 +13,9 @@ FORMATION_KEYS = ("shape", "spacing_m", "turn_deg", "x_m", "y_m")
 """Of the formation; all others are parameters of the program."""
 
 BEHAVIORS = (
-    "aggregation", "coverage", "cyclic_pursuit", "dispersal", "dispersion", "evolved_aggregation", "flocking",
-    "formation", "leader_followers", "majority", "milling", "rendezvous", "segregation", "voter", "wall_following",
+    "aggregation", "box_pushing", "cooperative_transport", "coverage", "cyclic_pursuit", "dispersal", "dispersion",
+    "evolved_aggregation", "flocking", "formation", "leader_followers", "majority", "milling", "object_clustering",
+    "rendezvous", "segregation", "voter", "wall_following",
 )  # fmt: skip
 
 
