@@ -7,10 +7,9 @@ from contextlib import suppress
 from datetime import date
 from typing import Any, Dict, List, NamedTuple, Tuple
 
-import yaml
-
 from hero_node.safe_file import lock_file, write_file
 from hero_node.texts import make_printable
+from hero_node.yaml_edit import replace_values
 from hero_node.yaml_text import YamlError, parse_yaml, read_text
 
 from .errors import CalibrationError
@@ -67,14 +66,14 @@ def list_files(folder: str) -> List[str]:
 
 
 def save(path: str, calibration: Calibration) -> None:
-    """Write a file; the previous one is kept beside it, and its values that were not measured again stay.
+    """Write a file; the previous one is kept beside it. Its comments and values that were not measured again stay.
 
     A damaged previous file, or one of another robot, does not prevent the new one.
 
     Raises: CalibrationError.
     """
     base, suffix = os.path.splitext(path)
-    values = calibration.values
+    values, text = calibration.values, ""
     try:
         with lock_file(path):
             if os.path.exists(path):
@@ -82,10 +81,10 @@ def save(path: str, calibration: Calibration) -> None:
                     write_file(base + PREVIOUS + suffix, file.read())
                 with suppress(CalibrationError):
                     old = load(path)
-                    values = {**old.values, **values} if old.robot_id == calibration.robot_id else values
+                    if old.robot_id == calibration.robot_id:
+                        values, text = {**old.values, **values}, read_text(path)
             content = {"robot": "hero_%d" % calibration.robot_id, "date": calibration.date, **values}
-            text: str = yaml.safe_dump(content, sort_keys=False, default_flow_style=None)
-            write_file(path, text.encode())
+            write_file(path, replace_values(text, content).encode())
     except OSError as error:
         raise CalibrationError("%s cannot be written: %s" % (path, error.strerror)) from error
 

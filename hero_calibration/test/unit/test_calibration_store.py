@@ -51,6 +51,18 @@ def test_values_that_were_not_measured_again_stay_and_the_old_file_is_kept(tmp_p
     assert len(os.listdir(str(tmp_path))) == 2
 
 
+def test_comments_stay_when_a_robot_is_calibrated_again(tmp_path):
+    path = store.name_file(str(tmp_path), 3)
+    store.save(path, store.Calibration(3, "2026-11-01", {"motor_centers_us": [1500.0, 1510.0]}))
+    with open(path, encoding="utf-8") as file:
+        text = "# new servos\n" + file.read().replace("1510.0]", "1510.0]  # by hand")
+    with open(path, "w", encoding="utf-8") as file:
+        file.write(text)
+    store.save(path, store.Calibration(3, "2026-11-02", {"motor_centers_us": [1505.0, 1510.0]}))
+    with open(path, encoding="utf-8") as file:
+        assert file.read() == text.replace("[1500.0", "[1505.0").replace("11-01", "11-02")
+
+
 @pytest.mark.parametrize(
     "content",
     [b"", b"\xff\x00\x01", b"[" * 600, b"robot: hero_3\nvelocity_gains: 2020-13-45\n", b"robot: hero_4"],

@@ -5,15 +5,14 @@ Pure but for the file. Lengths in m, angles in degrees, pixels as in camera_mode
 
 import math
 import os
-import re
 from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional
 
 import numpy as np
-import yaml
 
 from hero_client.values.geometry import Pose
 from hero_node.safe_file import lock_file, write_file
 from hero_node.texts import shorten
+from hero_node.yaml_edit import replace_values
 from hero_node.yaml_text import YamlError, parse_yaml, read_text
 
 from ..camera.camera_model import Camera, Lens
@@ -72,41 +71,15 @@ def find_change_s(path: str) -> float:
 
 
 def update(path: str, parts: Mapping[str, Any]) -> None:
-    """Replace the text of these parts in a file, or begin it; all other text stays. Raises: SettingsError."""
+    """Write these parts into a file, or begin it; its comments and all other text stay. Raises: SettingsError."""
     path = os.path.expanduser(path)
     try:
         os.makedirs(os.path.dirname(path) or ".", exist_ok=True)
         with lock_file(path):
-            write_file(path, _replace_parts(path, _read(path), parts).encode())
+            text = _read(path)
+            write_file(path, replace_values(text, {**_parse(path, text), **parts}).encode())
     except OSError as error:
         raise SettingsError("%s cannot be written: %s" % (path, error.strerror)) from None
-
-
-def _replace_parts(path: str, text: str, parts: Mapping[str, Any]) -> str:
-    content = {**_parse(path, text), **parts}
-    text += "\n" if text and not text.endswith("\n") else ""
-    for key, part in parts.items():
-        # The line of a key without indentation, and those below it that are indented.
-        found = re.search("(?m)^%s *:.*\n(\n*[ \t]+.*\n)*" % key, text)
-        start, end = found.span() if found else (len(text), len(text))
-        text = text[:start] + _dump(key, part) + text[end:]
-    if not _holds(text, content):
-        text = "".join(map(_dump, content, content.values()))  # the text was YAML of another form, such as JSON
-    return text
-
-
-def _dump(key: str, part: Any) -> str:
-    # PyYAML puts innermost collections into one line, also that of a key and a number.
-    flow_style = None if isinstance(part, (dict, list)) else False
-    return str(yaml.safe_dump({key: part}, sort_keys=False, default_flow_style=flow_style))
-
-
-def _holds(text: str, content: Mapping[str, Any]) -> bool:
-    try:
-        # As texts: values may be shared, which takes as long as all of them written out, or hold themselves.
-        return str(yaml.safe_dump(_parse("", text))) == str(yaml.safe_dump(content))
-    except SettingsError:
-        return False
 
 
 def describe_lens(lens: Lens) -> Dict[str, Any]:
