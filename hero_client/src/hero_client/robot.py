@@ -84,7 +84,7 @@ class Robot(BaseRobot):
     def imu(self) -> Imu:
         """The newest sensor_msgs/Imu of a robot with the IMU hat; what its numbers mean: docs/robot_interface.md.
 
-        The first use subscribes and waits up to 5 s. Raises: StaleDataError if it is older than 1 s, as without the hat.
+        The first use subscribes and waits up to 5 s. Raises: StaleDataError if it is older than 1 s, or without a hat.
         """
         self._check_asked("imu")
         return self._link.messages.read("imu")

@@ -109,7 +109,7 @@ class Commanders:
     @property
     def are_moving(self) -> bool:
         """Whether a program has asked for motion, and not for a stop, since the last stop()."""
-        for commander in self._by_topic.values():
+        for commander in self._by_topic.values():  # noqa: SIM110 - any() costs four times as much, per command
             if commander.moves:
                 return True
         return False
