@@ -182,12 +182,12 @@ def test_a_restarted_master_learns_of_every_robot(master, served, effort, record
     for _ in range(tries):
         service.verify()
         master.kill()
-        # What is connected goes on without it.
+        # Existing connections keep working without it.
         service.verify(20)
         master.start()
         wait_for(lambda: len(list_driver_topics("/hero_1", driver.node)) == STOCK_NAMES, "all topics again")
         service.verify()
-    driver.wait_line("the ROS master was started again: .* registered anew")
+    driver.wait_line("the ROS master was started again: .* registered again")
     # A program that starts now finds the robot, and a publisher that is registered now reaches it.
     with start_python("many_subscribers.py", "/hero_1/encoder", 1) as program:
         assert program.read() == 1

@@ -46,7 +46,7 @@ class RobotLog:
             peer.bridge.commands.note_tuning(line.tunes)
             if line.tunes and not peer.bridge.commands.was_told_to_tune and peer.stop is None:
                 # Left by an earlier driver or connection: nothing else would end it.
-                self._log.log("warn", "%s tunes itself, though not told to by this driver: stopped" % peer.label)
+                self._log.log("warn", "%s tunes itself, without a request from this driver: stopped" % peer.label)
                 self._stop(peer)
         if line.heartbeat is not None:
             self._receive_heartbeat(peer, record, line.heartbeat.uptime_s, now_s)

@@ -106,7 +106,7 @@ def test_a_tag_that_is_on_upside_down_is_named_once_the_robot_drives():
     for index in range(80):
         forward_m = 0.004 * index
         swarm.run(PERIOD_S, {0: (1.0 - forward_m, 2.0, 0.0)}, (forward_m, 0.0, 0.0))
-    assert "180 degrees off the way it drives: is its tag on upside down" in swarm[0].problem
+    assert "180 degrees off its direction of travel: is its tag on upside down" in swarm[0].problem
 
 
 def test_a_restart_is_said_and_does_not_move_the_robot():
@@ -139,7 +139,7 @@ def test_robots_are_found_anew_when_time_has_gone_back():
     swarm.now_s -= 50.0
     swarm.run(1.0, {0: (1.5, 2.0, 0.0)})
     assert swarm.lines[1:] == [
-        "time went back by 50.0 s: all robots are to be found anew",
+        "time jumped back by 50.0 s: all robots are localized again",
         "hero_0 found at (1.500, 2.000) m, 0 degrees",
     ]
     assert swarm[0].problem == "" and swarm[0].estimate.pose == pytest.approx((1.5, 2.0, 0.0))

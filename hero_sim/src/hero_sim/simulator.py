@@ -257,6 +257,6 @@ class Simulator(LinkHandler):
         if not self._reported_unreachable:
             self._reported_unreachable = True
             self._report(
-                "no driver answers at %s:%d (%s); the robots go on trying, as real ones do"
+                "no driver answers at %s:%d (%s); the robots keep trying, as real ones do"
                 % (self.link.host, self.link.port, reason)
             )

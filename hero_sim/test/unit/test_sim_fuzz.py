@@ -113,7 +113,7 @@ def test_any_flash_file_is_read_or_refused_with_file_and_remedy(path, script):
     try:
         flash.keep_in(str(path))
     except OptionError as error:
-        assert re.fullmatch(r"flash file %s.*; delete it to begin anew.*" % re.escape(str(path)), str(error))
+        assert re.fullmatch(r"flash file %s.*; delete it to start over.*" % re.escape(str(path)), str(error))
     kept = (*flash.motor_centers_us, *flash.velocity_pid, *flash.position_pid)
     assert all(map(math.isfinite, kept)) and not any(map(math.isinf, flash.ir_calibration_counts_m2))
 

@@ -41,7 +41,7 @@ def place_robots(session: Session, at_wall: bool, ask: Optional[Ask]) -> None:
             say("%s: %s" % (probe.name, reason))
         if ask is None or answer == "s" or not problems:
             break
-        question = "Enter to check again after correcting that, s to go on without these, q to end: "
+        question = "Enter to check again after correcting that, s to continue without these, q to end: "
     for probe, reason in problems.items():
         probe.failure = "place: " + reason
 

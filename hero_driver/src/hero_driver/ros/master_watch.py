@@ -49,7 +49,7 @@ class MasterWatch:
                     self._is_away = True
                     self._log(
                         "error",
-                        "the ROS master at %s does not answer (%s): what is connected goes on; programs that"
+                        "the ROS master at %s does not answer (%s): existing connections keep working; programs that"
                         " start now find no robots" % (rosgraph.get_master_uri(), error),
                     )
 
@@ -63,7 +63,7 @@ class MasterWatch:
                 topics, services = self._register(master)
                 self._log(
                     "warn",
-                    "the ROS master was started again: %d topics and %d services are registered anew; restart"
+                    "the ROS master was started again: %d topics and %d services are registered again; restart"
                     " the programs that were there before" % (topics, services),
                 )
         self._is_away = False

@@ -38,7 +38,7 @@ CALLS_MAX = 10000
 """Calls of other threads that may wait: each of them has a bound of its own, so more come only if the loop hangs."""
 
 ACCEPT_PAUSE_S = 0.5
-"""Rest of the listener when the process has no file descriptors left; those connected go on."""
+"""Rest of the listener when the process has no file descriptors left; connected robots are not affected."""
 
 
 FILES_RESERVED = 64
@@ -340,7 +340,7 @@ class EventLoop(LinkOwner):
         if error.errno in (errno.EMFILE, errno.ENFILE):
             remedy = "; raise the limit of open files (ulimit -n) and start again"
         self._handler.warn_network(
-            "cannot take more connections (%s)%s; those connected go on" % (describe_error(error), remedy)
+            "cannot take more connections (%s)%s; connected robots are not affected" % (describe_error(error), remedy)
         )
         self._unregister(listener.fileno())
 

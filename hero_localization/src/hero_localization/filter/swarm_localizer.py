@@ -166,7 +166,7 @@ class SwarmLocalizer:
         """
         lines = []
         if now_s < self._now_s - LOST_S:
-            lines.append("time went back by %.1f s: all robots are to be found anew" % (self._now_s - now_s))
+            lines.append("time jumped back by %.1f s: all robots are localized again" % (self._now_s - now_s))
             self._robots = {robot_id: _Robot() for robot_id in self._robots}
             self._losses = LossLines()
         self._now_s = now_s
@@ -213,7 +213,7 @@ class SwarmLocalizer:
         error_rad = robot.heading.error_rad
         if error_rad is not None and abs(error_rad) > WRONG_HEADING_RAD:
             kind = "upside down" if is_upside_down(error_rad) else "turned"
-            text = "its measured heading is %.0f degrees off the way it drives: is its tag on %s?"
+            text = "its measured heading is %.0f degrees off its direction of travel: is its tag on %s?"
             return text % (math.degrees(error_rad), kind) + " calibrate_camera robots measures it"
         if robot.outliers:
             return "%d measured poses in a row disagree with its odometry" % robot.outliers

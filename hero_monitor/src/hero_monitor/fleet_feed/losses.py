@@ -82,7 +82,7 @@ def list_losses(
             Loss(
                 "master",
                 "No ROS master (%s): robots and programs that start now do not appear" % master,
-                "What is connected goes on, and STOP ALL works; start it again: " + NO_DRIVER,
+                "Existing connections keep working, and STOP ALL works; start it again: " + NO_DRIVER,
             )
         )
     if localization.is_lost(now_s):

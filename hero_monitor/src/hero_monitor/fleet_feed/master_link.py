@@ -45,7 +45,7 @@ class MasterLink:
             if is_another or self._has_failed or not is_registered():
                 self._has_failed = True
                 register_again()
-                rospy.logwarn("the ROS master is back: the monitor is registered anew")
+                rospy.logwarn("the ROS master is back: the monitor is registered again")
             self._master_pid, self._has_failed = pid, False
         except NodeError:
             self._has_failed = True

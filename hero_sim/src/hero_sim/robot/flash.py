@@ -18,7 +18,7 @@ _LENGTHS = {"ir_calibration_counts_m2": 8, "motor_centers_us": 2, "velocity_pid"
 _ERASED_PID = [-1.0] * 6
 """The firmware then uses the gains of the program."""
 
-_REMEDY = "delete it to begin anew"
+_REMEDY = "delete it to start over"
 
 
 def _is_storable(value: Any, may_be_erased: bool) -> bool:

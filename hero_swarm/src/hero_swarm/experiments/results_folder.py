@@ -117,7 +117,7 @@ class ResultsFolder:
             by_seed = {int(line["seed"]): line for line in lines}
         except (ValueError, KeyError, TypeError):
             return []
-        remedy = "start anew with --fresh, or choose another --out"
+        remedy = "start over with --fresh, or choose another --out"
         if self._code not in (None, code) and kind == SIMULATED:
             raise ExperimentError(
                 "%s: computed by other code (%s, now %s); %s" % (path, code, self._code, remedy)
