@@ -1,7 +1,8 @@
-"""Drives robots with a joystick on /joy while the enable button is held; another button stops all robots."""
+"""Drives robots with a joystick on /joy while the enable button is held; other buttons choose some, or stop all."""
 
 from hero_client import Program, ProgramError, open_swarm, read_parameters, run
 from hero_client.apps.joystick_teleop import JoystickMapping, JoystickTeleop
+from hero_client.apps.robot_choice import ChoiceButtons
 from hero_client.values.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
 from hero_node.parameters import number, robot_ids, whole_number
 
@@ -17,14 +18,19 @@ def drive():
                 "angular_axis": whole_number(0, 0, 63),
                 "enable_button": whole_number(4, 0, 63),
                 "stop_button": whole_number(1, 0, 63),
+                "next_button": whole_number(5, 0, 63),
+                "keep_button": whole_number(2, 0, 63),
+                "all_button": whole_number(3, 0, 63),
             }
         )
         ids = parameters.pop("robots")
+        choice = ChoiceButtons(**{name: parameters.pop(name) for name in ChoiceButtons._fields})
         mapping = JoystickMapping(**parameters)
-        if mapping.stop_button == mapping.enable_button:
-            raise ProgramError("~stop_button is %d, the same as ~enable_button" % mapping.stop_button)
+        for name, button in (("enable_button", mapping.enable_button), *choice._asdict().items()):
+            if mapping.stop_button == button:
+                raise ProgramError("~stop_button is %d, the same as ~%s" % (button, name))
         with open_swarm(program, ids, odom=False, proximity=False) as swarm:
-            JoystickTeleop(swarm, mapping).run(program)
+            JoystickTeleop(swarm, mapping, choice).run(program)
 
 
 def main():

@@ -120,8 +120,9 @@ def test_enter_stops_all_robots_of_all_drivers_and_r_releases_them(swarm, capsys
     assert swarm.drivers.requests == [True, False]
 
 
-def make_joy(linear, enabled=True, stop=False):
-    return SimpleNamespace(axes=[0.0, linear], buttons=[0, int(stop), 0, 0, int(enabled)])
+def make_joy(linear, enabled=True, stop=False, pressed=()):
+    buttons = [0, int(stop), 0, 0, int(enabled), 0]
+    return SimpleNamespace(axes=[0.0, linear], buttons=[int(bool(on) or n in pressed) for n, on in enumerate(buttons)])
 
 
 def use_stick(swarm, teleop, joy, duration_s):
@@ -191,3 +192,22 @@ def test_a_short_press_of_the_stop_button_stops_all_robots_once(swarm):
     teleop.receive(make_joy(0.0, stop=True))
     teleop.receive(make_joy(0.0))
     assert swarm.drivers.requests == [True]
+
+
+NEXT, KEEP, ALL = 5, 2, 3
+
+
+def press(swarm, teleop, button):
+    use_stick(swarm, teleop, make_joy(1.0, pressed=[button]), 0.2)
+    use_stick(swarm, teleop, make_joy(1.0), 0.8)
+    return [robot.robot_id for robot in swarm if robot.velocity.linear_m_s > 0.05]
+
+
+def test_buttons_choose_one_robot_some_or_all_and_lights_show_it():
+    with StepSwarm(3, perfect=True) as swarm:
+        swarm.drivers = Drivers()
+        teleop = JoystickTeleop(swarm, MAPPING)
+        assert [press(swarm, teleop, button) for button in (NEXT, NEXT, KEEP, NEXT)] == [[0], [1], [1], [1, 2]]
+        assert [robot.light[:3] == (1.0, 1.0, 1.0) for robot in swarm] == [False, True, True]
+        assert press(swarm, teleop, ALL) == [0, 1, 2]
+        assert not any(any(robot.light[:3]) for robot in swarm)

@@ -38,6 +38,13 @@ const context = canvas.getContext("2d");
 const read = (x, y) => [...context.getImageData(x * ratio, y * ratio, 1, 1).data].slice(0, 3);
 return arguments[0].map(([right, up]) => read(width / 2 + right, height / 2 - up));
 """
+FAKE_GAMEPAD = """
+const buttons = Array.from({ length: 17 }, () => ({ pressed: false }));
+window.gamepad = { connected: true, mapping: "standard", axes: [0, -1, 0, 0], buttons };
+window.polls = 0;
+navigator.getGamepads = () => { window.polls += 1; return [null, window.gamepad]; };
+dispatchEvent(new Event("gamepadconnected"));
+"""
 FIND_CUT = """
 const cut = (one) => one.clientWidth > 0 && one.scrollWidth > one.clientWidth + 1;
 return [document.body, ...document.querySelectorAll("header, main section, .scroll, .filters, #tabs, .counts")]
@@ -222,6 +229,20 @@ class ViewTest(unittest.TestCase):
         for left, right in (("hero_1", "hero_2"), ("hero_2", "hero_3")):
             self.assertAlmostEqual(goals[right][0] - goals[left][0], 0.3)
             self.assertAlmostEqual(goals[right][1], goals[left][1])
+
+    def test_a_gamepad_chooses_drives_and_stops_by_the_rules_of_the_buttons(self):
+        self.page.run(FAKE_GAMEPAD)
+        press = "window.gamepad.buttons[%d].pressed = %s; window.polls = 0"
+        for state in ("true", "false", "true", "false"):
+            self.page.run(press % (15, state))
+            wait_for(lambda: self.page.run("return window.polls > 1"), "the page to read the gamepad")
+        wait_for(lambda: self.page.text("#name") == "hero_1", lambda: self.page.text("#name"))
+        request = self.send_until("drive", lambda: self.page.run(press % (4, "true")))
+        self.assertEqual(request["robots"], ["hero_1"])
+        self.assertGreater(request["linear"], 0.0)
+        self.page.run(press % (4, "false"))
+        self.monitor.wait_for_request("end_drive")
+        self.send_until("stop", lambda: self.page.run(press % (1, "true")))
 
     def test_a_program_starts_with_its_parameters_and_is_shown_until_it_ends(self):
         self.page.choose("hero_1")

@@ -1,10 +1,11 @@
 """Drives robots with a joystick (sensor_msgs/Joy): only while the enable button is held and /joy is alive.
 
-Another button stops all robots of all drivers.
+Other buttons choose which ones, and stop all robots of all drivers.
 """
 
 import math
-from typing import NamedTuple, Optional
+from collections import deque
+from typing import Deque, NamedTuple, Optional, Sequence
 
 import rospy
 from sensor_msgs.msg import Joy
@@ -14,6 +15,7 @@ from hero_node.ros.program import Program
 
 from ..swarm import REPORT_PERIOD_S, Swarm
 from ..values.geometry import STOP, Velocity
+from .robot_choice import ChoiceButtons, RobotChoice
 from .teleop_output import PauseDetector, TeleopOutput
 
 __all__ = ["JoystickMapping", "JoystickTeleop"]
@@ -25,6 +27,9 @@ SILENCE_S = 0.5
 
 DRAIN_S = 0.3
 """So long after a pause of the program what comes on /joy may be what waited meanwhile."""
+
+PRESSES_MAX = 100
+"""Messages between two steps whose buttons count."""
 
 FIRST_WARNING_S = 2.0
 """joy_node may start later."""
@@ -61,10 +66,12 @@ class JoystickMapping(NamedTuple):
 
 
 class JoystickTeleop:
-    """Sends the joystick's commands to all robots of a swarm."""
+    """Sends the joystick's commands to all robots of a swarm, or those that its buttons choose."""
 
-    def __init__(self, swarm: Swarm, mapping: JoystickMapping) -> None:
+    def __init__(self, swarm: Swarm, mapping: JoystickMapping, choice: Optional[ChoiceButtons] = None) -> None:
         """Start stopped."""
+        self._choice = RobotChoice(list(swarm), ChoiceButtons() if choice is None else choice)
+        self._presses: Deque[Sequence[int]] = deque(maxlen=PRESSES_MAX)
         self._swarm = swarm
         self._mapping = mapping
         self._newest: Optional[Joy] = None
@@ -84,6 +91,7 @@ class JoystickTeleop:
         if is_pressed and not self._is_stop_pressed:
             self._swarm.drivers.request_stop(True)
         self._is_stop_pressed = is_pressed
+        self._presses.append(joy.buttons)
         now_s = self._swarm.now_s
         if now_s >= self._fresh_s and not self._pauses.is_paused(now_s):
             self._newest, self._arrival_s = joy, now_s
@@ -116,8 +124,11 @@ class JoystickTeleop:
         elif now_s >= self._next_warning_s:
             self._next_warning_s = now_s + REPORT_PERIOD_S
             rospy.logwarn("nothing on /joy: is a joystick plugged in, and does its driver (package joy) run?")
+        while self._presses:
+            for robot in self._choice.read(self._presses.popleft()):
+                robot.drive(*STOP)
         if self._output.passes(command):
-            for robot in self._swarm:
+            for robot in self._choice.robots:
                 robot.drive(*command)
         self._report_stop()
         self._swarm.report_missing()

@@ -5,6 +5,7 @@
 import { Connection } from "./connection.js";
 import { isDark, onTheme, showTheme } from "./theme.js";
 import { FleetTable } from "./panels/fleet.js";
+import { GamepadInput } from "./gamepad.js";
 import { History } from "./history.js";
 import { showLosses, stateOf } from "./losses.js";
 import { FleetMap } from "./map/map.js";
@@ -96,6 +97,16 @@ const programs = new ProgramPanel({ connection, map, notice });
 const stop = new StopPanel({ connection, endDrive: () => panel.endDrive(), notice });
 
 const listPresent = () => state.fleet.robots.filter((robot) => robot.state !== "REFUSED");
+new GamepadInput({ panel, stop: () => stop.press(), move: moveChoice });
+
+/** Choose the robot so many places behind the chosen one; 0: all robots. */
+function moveChoice(step) {
+  const names = listPresent().map(({ name }) => name);
+  if (!names.length) return;
+  const place = names.findIndex((name) => state.chosen.has(name));
+  if (step === 0) choose(names, false);
+  else choose([names[(Math.max(place, step < 0 ? 0 : -1) + step + names.length) % names.length]], false);
+}
 
 /** The chosen robot, or several of them, without a choice all, in numbers; and their chart. */
 function showPanel() {

@@ -116,6 +116,13 @@ export class RobotPanel {
     if (this.timer === null) this.timer = setInterval(() => this.sendCommand(), HOLD_MS);
   }
 
+  /** A stick is held in a direction, of which each part is -1 to 1; it begins to drive only with a new press. */
+  steer(direction, isNew) {
+    if (element("control").hidden) return;
+    if (isNew) this.hold(direction);
+    else if (this.driving !== null) this.driving.direction = direction;
+  }
+
   sendCommand() {
     const now = Date.now();
     if (document.hidden || !document.hasFocus()) return this.endDrive();
