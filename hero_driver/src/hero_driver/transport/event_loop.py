@@ -17,7 +17,7 @@ from typing import Callable, Dict, List, NamedTuple, Optional, Set, Tuple, TypeV
 from hero_node.file_limit import raise_file_limit
 
 from .call_queue import CallQueue
-from .dialler import start_dialler
+from .dialer import start_dialer
 from .link import Address, Link, LinkHandler, LinkOwner, describe_error, find_socket_address
 
 T = TypeVar("T")
@@ -105,7 +105,7 @@ class EventLoop(LinkOwner):
         self._wake_receiver.setblocking(False)
         self._wake_sender.setblocking(False)
         self._is_running = True
-        self._ended = threading.Event()  # for the diallers
+        self._ended = threading.Event()  # for the dialers
         self._file_limit = raise_file_limit()
         self.listening: Optional[Address] = None
 
@@ -121,7 +121,7 @@ class EventLoop(LinkOwner):
             self._listen_on(self._listener)
         self._register(self._wake_receiver.fileno(), READ, self._take_wake)
         for address in self._settings.dial:
-            start_dialler(address, self._hand_over, self._warn_network, self._ended)
+            start_dialer(address, self._hand_over, self._warn_network, self._ended)
         self.call_later(POLL_INTERVAL_S, self._poll_links)
 
     def run(self) -> None:
@@ -374,7 +374,7 @@ class EventLoop(LinkOwner):
         self._wake_receiver.close()
         self._wake_sender.close()
 
-    # What diallers call, on their threads.
+    # What dialers call, on their threads.
 
     def _hand_over(self, sock: socket.socket, address: Address, on_close: Callable[[], None]) -> None:
         self.call_soon(lambda: self._add_link(sock, address, on_close))

@@ -5,8 +5,8 @@ import types
 
 import pytest
 
-from hero_driver.transport import dialler
-from hero_driver.transport.dialler import BACKOFF_MAX_S, STABLE_S, start_dialler
+from hero_driver.transport import dialer
+from hero_driver.transport.dialer import BACKOFF_MAX_S, STABLE_S, start_dialer
 
 ADDRESS = ("127.0.0.1", 11411)
 CALLS = 8
@@ -35,14 +35,14 @@ class Ended:
 )
 def test_the_driver_backs_off_from_a_robot_that_hangs_up_at_once(monkeypatch, lasts_s, expected_s):
     clock = types.SimpleNamespace(now_s=0.0)
-    monkeypatch.setattr(dialler, "time", types.SimpleNamespace(monotonic=lambda: clock.now_s))
-    monkeypatch.setattr(dialler, "_connect", lambda address: None)
+    monkeypatch.setattr(dialer, "time", types.SimpleNamespace(monotonic=lambda: clock.now_s))
+    monkeypatch.setattr(dialer, "_connect", lambda address: None)
 
     def hand_over(sock, address, note_closed):
         clock.now_s += lasts_s
         note_closed()
 
     ended = Ended()
-    start_dialler(ADDRESS, hand_over, lambda text: None, ended)
+    start_dialer(ADDRESS, hand_over, lambda text: None, ended)
     assert ended.is_over.wait(60.0)
     assert ended.waits_s == expected_s

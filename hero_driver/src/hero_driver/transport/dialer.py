@@ -22,10 +22,10 @@ HandOver = Callable[[socket.socket, Address, Callable[[], None]], None]
 """Takes a connected socket, its address, and what to call when it is closed again."""
 
 
-def start_dialler(address: Address, hand_over: HandOver, warn: Callable[[str], None], ended: threading.Event) -> None:
-    """Keep a connection to address until ended is set; hand_over() and warn() are called on the dialler's thread."""
+def start_dialer(address: Address, hand_over: HandOver, warn: Callable[[str], None], ended: threading.Event) -> None:
+    """Keep a connection to address until ended is set; hand_over() and warn() are called on the dialer's thread."""
     arguments = (address, hand_over, warn, ended)
-    threading.Thread(target=_dial_until_end, args=arguments, name="dialler", daemon=True).start()
+    threading.Thread(target=_dial_until_end, args=arguments, name="dialer", daemon=True).start()
 
 
 def _dial_until_end(
