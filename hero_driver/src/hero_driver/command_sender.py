@@ -5,10 +5,10 @@ delays no other.
 """
 
 import time
-from typing import Callable, Optional
 
-from .peer import Peer
+from .peer import Peer, PeerOwner
 from .rosserial.errors import RosserialError
+from .transport import CallLater
 
 HEARD_S = 0.5
 """A robot that has stopped sending for so long gets no motion commands: it would take them late, all at once. Pauses of
@@ -18,21 +18,10 @@ HEARD_S = 0.5
 class CommandSender:
     """The way out of the driver."""
 
-    def __init__(
-        self,
-        call_later: Callable[[float, Callable[[], None]], None],
-        find_peer: Callable[[str], Optional[Peer]],
-        is_stopped: Callable[[], bool],
-        warn_robot: Callable[[Peer, str], None],
-    ) -> None:
-        """Take the loop's functions; find_peer(namespace) gives a robot's connection, warn_robot reports its trouble.
-
-        is_stopped(): whether no robot may get anything but stops.
-        """
+    def __init__(self, call_later: CallLater, owner: PeerOwner) -> None:
+        """Take the loop's call_later(delay_s, call)."""
         self._call_later = call_later
-        self._find_peer = find_peer
-        self._is_stopped = is_stopped
-        self._warn_robot = warn_robot
+        self._owner = owner
 
     def send_message(self, peer: Peer, topic_id: int, payload: bytes) -> None:
         """Send one message now, if the connection declared its id and it fits."""
@@ -41,13 +30,13 @@ class CommandSender:
         try:
             packet = peer.session.encode_message(topic_id, payload)
         except RosserialError as error:
-            self._warn_robot(peer, str(error))
+            self._owner.warn_robot(peer, str(error))
             return
         peer.link.send_packet(packet)
 
     def send_commands(self, namespace: str) -> None:
         """Send the commands of a robot that may go out; come back for the remainder."""
-        peer = self._find_peer(namespace)
+        peer = self._owner.find_peer(namespace)
         if peer is None:
             return
         if peer.send_due:
@@ -71,7 +60,7 @@ class CommandSender:
         link, bridge = peer.link, peer.bridge
         if bridge is None:
             return True
-        if self._is_stopped():
+        if self._owner.stopped:
             # What a thread of rospy's offered just before the stop.
             bridge.commands.queue.discard_motion(now_s)
         stops_only = peer.wheels.readings > 0 and now_s - peer.session.last_receive_s > HEARD_S

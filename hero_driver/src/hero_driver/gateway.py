@@ -71,8 +71,8 @@ class Gateway(LinkHandler):
         self._on_change = on_change
         self._node = node
         self._admission = Admission(config.admission_limits)
-        self._sender = CommandSender(loop.call_later, self._find_peer, lambda: self.stopped, self._warn_robot)
-        self._stops = StopDelivery(loop.call_later, lambda: self.stopped, on_change, self._warn_robot)
+        self._sender = CommandSender(loop.call_later, self)
+        self._stops = StopDelivery(loop.call_later, self)
         self._robot_log = RobotLog(log, self._stops.begin)
         self._transforms = TransformPublisher(config.transform_period_s, loop.call_later)
         self._context = BridgeContext(
@@ -194,7 +194,7 @@ class Gateway(LinkHandler):
             return
         if peer.refused:
             peer.record.refused.pop(str(link.address), None)
-            self._on_change()
+            self.note_change()
             return
         record = peer.record
         record.packets += peer.session.reader.packets
@@ -210,7 +210,7 @@ class Gateway(LinkHandler):
                 "%s left (%s): %s" % (peer.label, link.address, reason),
                 host=link.address.host,
             )
-            self._on_change()
+            self.note_change()
         if peer.bridge is not None:
             peer.bridge.detach(reason)
         self._admit_duplicates(record, lambda host: not self.fleet.is_reserved(record, host))
@@ -236,17 +236,9 @@ class Gateway(LinkHandler):
         elif isinstance(event, LogReceived):
             self._robot_log.receive(peer, event.log, now_s)
         elif isinstance(event, Problem):
-            self._warn_robot(peer, event.text)
+            self.warn_robot(peer, event.text)
         elif isinstance(event, SessionEnded):
             peer.link.close(event.reason)
-
-    def _warn_robot(self, peer: Peer, text: str) -> None:
-        if peer.record is not None:
-            peer.record.dropped_messages += 1
-            peer.record.last_error = text
-        group = peer.label if peer.bridge is not None else peer.link.address.host
-        line = "%s: %s" % (peer.label, text)
-        self._log.log_throttled("error", peer.label + text[:80], line, group, peer.link.address.host)
 
     def _declare(self, peer: Peer, topic: Topic, now_s: float) -> None:
         if self.stopped and find_stop_payload(topic) is not None:
@@ -263,7 +255,7 @@ class Gateway(LinkHandler):
             return
         peer.bridge.declare(topic, name)
         if peer.record.receive(RobotEvent.DECLARED, now_s):
-            self._on_change()
+            self.note_change()
 
     def _stop_late(self, peer: Peer) -> None:
         """Stop a robot that has joined while all are stopped."""
@@ -275,7 +267,7 @@ class Gateway(LinkHandler):
         info = topic.info
         refusal = namespaces.find_refusal(info.name, info.message_type, identity, self._node)
         if refusal is not None:
-            self._warn_robot(peer, "topic %s refused: %s" % (ascii(info.name), refusal))
+            self.warn_robot(peer, "topic %s refused: %s" % (ascii(info.name), refusal))
             return None
         return namespaces.resolve(info.name, identity)
 
@@ -287,7 +279,7 @@ class Gateway(LinkHandler):
             if topic.info.name in namespaces.TF_TOPICS:
                 peer.early_topics = [*peer.early_topics[-7:], topic]
             else:
-                self._warn_robot(peer, "topic %s refused: not a name below /hero_N" % ascii(topic.info.name))
+                self.warn_robot(peer, "topic %s refused: not a name below /hero_N" % ascii(topic.info.name))
             return
         if self._resolve(peer, topic, identity) is None:
             return
@@ -310,7 +302,7 @@ class Gateway(LinkHandler):
             self._log.log_throttled(
                 "error", "duplicate " + identity.namespace + address.host, decision.reason
             )
-            self._on_change()
+            self.note_change()
             return
         self._join(peer, decision)
 
@@ -330,7 +322,7 @@ class Gateway(LinkHandler):
         bridge.attach()
         text = "%s %s (%s)" % (bridge.label, decision.verdict.value, peer.link.address)
         self._log.log_throttled("info", "joined " + bridge.label, text, host=peer.link.address.host)
-        self._on_change()
+        self.note_change()
         early_topics, peer.early_topics = peer.early_topics, []
         for topic in early_topics:
             self._declare(peer, topic, record.joined_s)
@@ -343,14 +335,6 @@ class Gateway(LinkHandler):
         for peer in list(self.peers.values()):
             if peer.refused and peer.record is record and may_come(peer.link.address.host):
                 peer.link.close("the robot with the same id left; this one may try again")
-
-    def _find_peer(self, namespace: str) -> Optional[Peer]:
-        """Return the connection of a robot, None if it is away."""
-        record = self.fleet.robots.get(namespace)
-        if record is None or record.link is None or record.link.closed:
-            return None
-        peer: Peer = record.link.peer
-        return peer
 
     # Reports.
 
@@ -385,7 +369,7 @@ class Gateway(LinkHandler):
                 self._stops.begin(peer)
         else:
             self._stops.release()
-        self._on_change()
+        self.note_change()
 
     def stop_and_wait(self, answer: Callable[[None], None]) -> None:
         """Stop every robot; say which may still move and call answer(None) when all rest, or after STOP_LIMIT_S."""
@@ -414,7 +398,28 @@ class Gateway(LinkHandler):
     def _list_stoppable(self) -> List[Peer]:
         return [peer for peer in self.peers.values() if can_move(peer)]
 
-    # What the robots' commands ask for.
+    # What stops and the robots' commands ask for.
+
+    def find_peer(self, namespace: str) -> Optional[Peer]:
+        """Return the connection of a robot, None if it is away."""
+        record = self.fleet.robots.get(namespace)
+        if record is None or record.link is None or record.link.closed:
+            return None
+        peer: Peer = record.link.peer
+        return peer
+
+    def warn_robot(self, peer: Peer, text: str) -> None:
+        """Log what is wrong with a robot, and keep it for reports."""
+        if peer.record is not None:
+            peer.record.dropped_messages += 1
+            peer.record.last_error = text
+        group = peer.label if peer.bridge is not None else peer.link.address.host
+        line = "%s: %s" % (peer.label, text)
+        self._log.log_throttled("error", peer.label + text[:80], line, group, peer.link.address.host)
+
+    def note_change(self) -> None:
+        """A robot's state changed."""
+        self._on_change()
 
     def send_commands(self, namespace: str) -> None:
         """Send the commands that wait, as soon as the robot can take them."""
@@ -422,7 +427,7 @@ class Gateway(LinkHandler):
 
     def stop_robot(self, namespace: str) -> None:
         """Stop the robot, if it is connected."""
-        peer = self._find_peer(namespace)
+        peer = self.find_peer(namespace)
         if peer is not None:
             self._stops.begin(peer)
 
@@ -450,4 +455,4 @@ class Gateway(LinkHandler):
                 text = "%s is gone; its topics and services are taken down" % bridge.label
                 self._log.log_throttled("info", "gone " + bridge.label, text, host=record.host)
             self._admit_duplicates(record, lambda host: True)
-            self._on_change()
+            self.note_change()

@@ -1,7 +1,7 @@
 """One connection and what is known of it. Thread of the sockets."""
 
 from dataclasses import dataclass, field
-from typing import List, Optional
+from typing import List, Optional, Protocol
 
 from .commands.stop_progress import StopProgress
 from .corrections.message_layouts import CONVERSIONS, read_encoder
@@ -64,3 +64,19 @@ class Peer:
     def has_acknowledged_motion(self) -> bool:
         """Return whether the robot's TCP has acknowledged the last motion command."""
         return self.link.handed_length - self.link.read_unacknowledged_length() >= self.motion_mark
+
+
+class PeerOwner(Protocol):
+    """What stops and commands need of the gateway, on the thread of the sockets."""
+
+    stopped: bool
+    """Whether all robots are stopped until they are released."""
+
+    def find_peer(self, namespace: str) -> Optional[Peer]:
+        """Return the connection of a robot, None if it is away."""
+
+    def warn_robot(self, peer: Peer, text: str) -> None:
+        """Log what is wrong with a robot."""
+
+    def note_change(self) -> None:
+        """A robot's state changed."""

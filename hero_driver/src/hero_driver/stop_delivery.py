@@ -22,10 +22,11 @@ from typing import Callable, Iterable, List, Optional
 from .commands.stop_progress import StopProgress, StopState
 from .commands.velocity_shaper import STOP_PAYLOADS, ZERO_TWIST
 from .corrections.message_layouts import MD5SUMS
-from .peer import Peer
+from .peer import Peer, PeerOwner
 from .ros.message_types import apply_aliases
 from .rosserial.errors import RosserialError
 from .rosserial.session import Topic
+from .transport import CallLater
 
 BURST_LIGHTS = 62
 """Light commands in front of the zeros that end a self-tuning: 1488 bytes. Measured: 40 of 40 tunings ended."""
@@ -80,21 +81,10 @@ def encode_stop(peer: Peer, with_burst: bool) -> bytes:
 class StopDelivery:
     """The stops of all robots of one driver."""
 
-    def __init__(
-        self,
-        call_later: Callable[[float, Callable[[], None]], None],
-        is_stopped: Callable[[], bool],
-        on_change: Callable[[], None],
-        warn_robot: Callable[[Peer, str], None],
-    ) -> None:
-        """call_later(delay_s, call) is the loop's; is_stopped(): whether all robots are stopped until released.
-
-        on_change() is told of every change of a robot's state; warn_robot(peer, text) logs.
-        """
+    def __init__(self, call_later: CallLater, owner: PeerOwner) -> None:
+        """Take the loop's call_later(delay_s, call)."""
         self._call_later = call_later
-        self._is_stopped = is_stopped
-        self._on_change = on_change
-        self._warn_robot = warn_robot
+        self._owner = owner
         self._peers: List[Peer] = []
         self._is_scheduled = False
 
@@ -114,7 +104,7 @@ class StopDelivery:
         if not self._is_scheduled:
             self._is_scheduled = True
             self._call_later(POLL_S, self._poll)
-        self._on_change()
+        self._owner.note_change()
 
     def release(self) -> None:
         """Robots may move: a stop that is over must not end a self-tuning that begins before the next poll."""
@@ -127,7 +117,7 @@ class StopDelivery:
         """Return what is known of the stop of a robot; peer is None for one that is away."""
         if peer is not None and peer.stop is not None:
             return peer.stop.state
-        return StopState.STOPPING if self._is_stopped() else StopState.NOT_STOPPED
+        return StopState.STOPPING if self._owner.stopped else StopState.NOT_STOPPED
 
     def await_rest(
         self, peers: Iterable[Peer], deadline_s: float, then: Callable[[List[Peer]], None]
@@ -166,12 +156,12 @@ class StopDelivery:
             if peer.stop is None or peer.link.closed:
                 continue
             # While robots may move, a stop is over when the robot is driven again, or at rest.
-            is_driven = not self._is_stopped() and peer.bridge is not None and peer.bridge.commands.is_commanded
+            is_driven = not self._owner.stopped and peer.bridge is not None and peer.bridge.commands.is_commanded
             if not is_driven:
                 self._advance(peer, now_s)
-            if is_driven or not (self._is_stopped() or _is_pending(peer)):
+            if is_driven or not (self._owner.stopped or _is_pending(peer)):
                 peer.stop = None
-                self._on_change()
+                self._owner.note_change()
         self._peers = [peer for peer in self._peers if peer.stop is not None and not peer.link.closed]
         self._is_scheduled = bool(self._peers)
         if self._is_scheduled:
@@ -189,10 +179,10 @@ class StopDelivery:
             stop.note_sent(burst, now_s)
         if stop.state is not before:
             if stop.state is StopState.MOVING:
-                self._warn_robot(peer, "its wheels turn although it was stopped")
+                self._owner.warn_robot(peer, "its wheels turn although it was stopped")
             elif stop.state is StopState.AT_REST and peer.bridge is not None:
                 peer.bridge.commands.note_tuning(False)
-            self._on_change()
+            self._owner.note_change()
 
     @staticmethod
     def _send(peer: Peer, with_burst: bool, now_s: float) -> None:

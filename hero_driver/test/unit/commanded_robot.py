@@ -91,7 +91,7 @@ class CommandedRobot:
         self.handed_length = 0
         self.warnings = []
         self.lines = []
-        self.is_stopped = False
+        self.stopped = False
         self._acknowledged_length = 0
         self._hangs_until_s = 0.0
         self._buffer = b""
@@ -115,22 +115,14 @@ class CommandedRobot:
         for event in self.peer.session.receive_bytes(subscribed.encode_declarations(), clock.now_s, 0.0):
             self.bridge.declare(event.topic, event.topic.info.name)
             self._names[event.topic.info.topic_id] = event.topic.info.name
-        self.sender = command_sender.CommandSender(
-            clock.call_later, lambda _: self.peer, lambda: False, self._warn
-        )
-        self.stops = stop_delivery.StopDelivery(
-            clock.call_later, lambda: self.is_stopped, lambda: None, self._warn
-        )
+        self.sender = command_sender.CommandSender(clock.call_later, self)
+        self.stops = stop_delivery.StopDelivery(clock.call_later, self)
         clock.call_later(phase_s, self._read)
         clock.call_later(0.0, self._watch_commanders)
         if has_readings:
             clock.call_later(phase_s, self._send_reading)
 
-    # What commands ask of the gateway.
-
-    @property
-    def stopped(self):
-        return self.is_stopped
+    # What commands and stops ask of the gateway.
 
     def send_commands(self, namespace):
         self.sender.send_commands(namespace)
@@ -138,7 +130,13 @@ class CommandedRobot:
     def stop_robot(self, _):
         self.stops.begin(self.peer)
 
-    def _warn(self, _, text):
+    def find_peer(self, _):
+        return self.peer
+
+    def note_change(self):
+        pass
+
+    def warn_robot(self, _, text):
         self.warnings.append(text)
 
     # What the driver's parts know of a link.

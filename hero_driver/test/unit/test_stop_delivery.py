@@ -37,7 +37,7 @@ def make_moving(clock, mover, lag_s=0.0, **settings):
 
 
 def stop(robot):
-    robot.is_stopped = True
+    robot.stopped = True
     robot.stops.begin(robot.peer)
 
 
@@ -146,10 +146,10 @@ def test_a_release_right_after_a_stop_leaves_no_robot_moving(stopped):
             clock.run(1.0)
             robot.publish_velocity(0.1)
             clock.run(0.001 * offset_ms)
-            robot.is_stopped = stopped == "all"
+            robot.stopped = stopped == "all"
             robot.stops.begin(robot.peer)
             clock.run(0.005)
-            robot.is_stopped = False
+            robot.stopped = False
             robot.stops.release()
             clock.run(CONFIRMED_S)
             assert not robot.motors.is_turning, offset_ms
@@ -206,7 +206,7 @@ def test_a_tuning_that_begins_right_after_a_release_goes_on():
         robot = make_moving(clock, "pulses")
         stop(robot)
         clock.run(2.0)
-        robot.is_stopped = False
+        robot.stopped = False
         robot.stops.release()
         assert robot.peer.stop is None
         robot.motors.start_tuning("velocity_controller")
@@ -218,7 +218,7 @@ def test_a_motion_after_the_release_ends_the_zeros_of_the_stop():
     with Clock().is_the_drivers() as clock:
         robot = make_moving(clock, "both controllers")
         stop(robot)
-        robot.is_stopped = False
+        robot.stopped = False
         written = len(robot.writes)
         robot.publish_velocity(0.1)
         clock.run(5.0)

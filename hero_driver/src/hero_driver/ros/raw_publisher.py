@@ -11,14 +11,13 @@ import collections
 import struct
 from typing import Any, Callable, Deque, Dict, List
 
+from ..transport import CallLater
 from .rospy_internals import NO_CONNECTIONS, open_publisher, send, unregister
 
 RETRY_S = 0.01
 """Delay before a subscriber whose socket was full is tried again."""
 
 _LENGTH = struct.Struct("<I")
-
-CallLater = Callable[[float, Callable[[], None]], None]
 
 
 class RawPublisher:

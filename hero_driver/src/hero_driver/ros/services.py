@@ -11,7 +11,7 @@ from typing import Callable, Deque, Optional, Tuple
 
 import rospy
 
-from ..transport import NoAnswerError
+from ..transport import CallLater, NoAnswerError
 
 Answer = Tuple[bytes, str]
 """The robot's answer, and empty text; or nothing, and why there is none."""
@@ -40,7 +40,7 @@ class RobotService:
         timeout_s: float,
         send: Callable[[bytes], Optional[str]],
         ask: Callable[[Callable[[Callable[[Answer], None]], None], float], Answer],
-        call_later: Callable[[float, Callable[[], None]], None],
+        call_later: CallLater,
     ) -> None:
         """send(request) returns why it cannot be sent, None if it is on its way; ask and call_later are the loop's."""
         self.name = name

@@ -9,8 +9,9 @@ from typing import Callable, List
 from tf2_msgs.msg import TFMessage
 
 from ..corrections import message_layouts
+from ..transport import CallLater
 from .message_types import make_raw_class
-from .raw_publisher import CallLater, RawPublisher
+from .raw_publisher import RawPublisher
 
 QUEUE_LENGTH = 200
 """Two seconds of messages for a listener that is slow."""

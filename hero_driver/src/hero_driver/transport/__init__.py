@@ -5,13 +5,14 @@ is written with one send. Other threads hand over work with EventLoop.call_soon(
 """
 
 from .call_queue import Call, CallQueue
-from .event_loop import THE_DRIVER_ENDS, EventLoop, NoAnswerError, Reader, TransportSettings
+from .event_loop import THE_DRIVER_ENDS, CallLater, EventLoop, NoAnswerError, Reader, TransportSettings
 from .link import Address, HostNotFoundError, Link, LinkHandler
 
 __all__ = [
     "THE_DRIVER_ENDS",
     "Address",
     "Call",
+    "CallLater",
     "CallQueue",
     "EventLoop",
     "HostNotFoundError",

@@ -22,6 +22,9 @@ from .link import Address, Link, LinkHandler, LinkOwner, describe_error, find_so
 
 T = TypeVar("T")
 
+CallLater = Callable[[float, Callable[[], None]], None]
+"""EventLoop.call_later() as its users get it."""
+
 READ = select.EPOLLIN
 WRITE = select.EPOLLOUT
 
