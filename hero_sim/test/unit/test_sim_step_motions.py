@@ -372,5 +372,5 @@ def test_headings_in_another_frame_stay_within_a_half_turn():
 def test_slices_and_names_of_a_swarm_are_refused_with_what_to_write():
     with StepSwarm(2) as swarm:
         for key in (slice(0, 2), "hero_0"):
-            with pytest.raises(TypeError, match=r"swarm\[3\] is hero_3; for several robots"):
+            with pytest.raises(TypeError, match=r"swarm\[3\] is hero_3, not swarm.*; for several robots"):
                 swarm[key]
