@@ -39,7 +39,7 @@ def start_reader(driver, topic):
     return reader
 
 
-def test_a_suspended_subscriber_affects_nobody_else(served, effort, record):
+def test_a_suspended_subscriber_affects_no_other(served, effort, record):
     driver, robot, service = served
     reader = start_reader(driver, "/hero_1/laser")
     # The buffers of the system hold some MB; this is more.
@@ -58,7 +58,7 @@ def test_a_suspended_subscriber_affects_nobody_else(served, effort, record):
     record(fault, rounds, rounds, "its own oldest messages; " + growth)
 
 
-def test_dying_subscribers_affect_nobody_else(served, effort, record):
+def test_dying_subscribers_affect_no_other(served, effort, record):
     driver, _, service = served
     deaths = effort.choose(4, 40)
     service.verify()
@@ -104,7 +104,7 @@ def test_subscribers_that_come_and_go_leak_nothing(served, effort, record):
     )
 
 
-def test_a_publisher_at_1_khz_delays_nobody_and_its_stop_arrives(served, effort, record):
+def test_a_publisher_at_1_khz_delays_no_other_and_its_stop_arrives(served, effort, record):
     _, robot, service = served
     publisher = make_publisher("/hero_1/velocity_controller/cmd_vel", Twist)
     count = effort.choose(2000, 20000)

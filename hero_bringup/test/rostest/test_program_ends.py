@@ -99,7 +99,7 @@ class ProgramEndsTest(unittest.TestCase):
             self.assertIn(__file__, lines[0])
             self.assertIn("ROS_LOG_DIR", lines[0])
 
-    def test_a_pipe_that_nobody_reads_ends_programs_silently(self):
+    def test_a_pipe_without_a_reader_ends_programs_silently(self):
         read_end, write_end = os.pipe()
         os.close(read_end)
         with os.fdopen(write_end, "wb") as pipe:

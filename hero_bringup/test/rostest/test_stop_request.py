@@ -221,7 +221,7 @@ class StopRequestTest(unittest.TestCase):
                 self.assertEqual([robot.id for robot in listener.read().robots], [0, 1])
         self.assertEqual(listener.names(), ["/hero_driver", "/hero_driver_b"])
 
-    def test_nobody_takes_drivers_for_known_before_the_master_has_answered(self):
+    def test_drivers_are_unknown_until_the_master_has_answered(self):
         known = set(threading.enumerate())
         settled = []
 

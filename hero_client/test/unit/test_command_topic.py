@@ -54,7 +54,7 @@ def test_a_stop_takes_the_place_of_an_early_command(ros):
     assert len(ros.warned) == 1
 
 
-def test_a_command_that_nobody_takes_is_warned_about_once(ros):
+def test_a_command_without_subscribers_is_warned_about_once(ros):
     ros.topic.publish("fast")
     ros.now_s += CONNECT_S
     ros.timers[0]()

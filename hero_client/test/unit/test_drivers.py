@@ -46,7 +46,7 @@ def test_a_robot_that_went_to_another_driver_is_there_once_where_it_is_now():
         assert merged.robots[0].address == "10.42.0.3:1"
 
 
-def test_who_was_refused_and_who_has_no_name_yet_is_nobody_else():
+def test_refused_and_unidentified_peers_are_no_other_robot():
     reports = [
         make_report(1, [(3, Robot.READY), (None, Robot.JOINING)]),
         make_report(2, [(3, Robot.REFUSED), (None, Robot.JOINING)]),

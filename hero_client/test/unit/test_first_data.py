@@ -73,7 +73,7 @@ def test_data_that_never_come_are_waited_for_once():
     assert link.clock.now_s == 102.0
 
 
-def test_nobody_waits_who_asks_for_what_is_known_now():
+def test_requests_for_known_values_do_not_wait():
     link = LateLink(0.7)
     robot = BaseRobot(0, link)
     assert robot.fresh_pose() is None and all(map(math.isnan, robot.fresh_proximity()))

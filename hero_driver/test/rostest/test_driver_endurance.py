@@ -49,7 +49,7 @@ class TestDriverEndurance(OwnDriverCase):
     def send_encoder(self, robot, ticks):
         robot.send("encoder", stock_messages.make_encoder(robot.name, rospy.Time.now(), ticks, ticks))
 
-    def test_a_master_that_does_not_answer_stops_nobody_who_is_there(self):
+    def test_a_hanging_master_affects_no_connected_program(self):
         driver = self.start()
         robot = self.dial(driver, 1)
         encoders = Recorder("/hero_1/encoder", Encoder)
@@ -70,7 +70,7 @@ class TestDriverEndurance(OwnDriverCase):
         self.send_encoder(newcomer, 9.0)
         self.assertEqual(late.wait_count(1)[0].left_ticks, 9.0)
 
-    def test_a_subscriber_that_does_not_read_keeps_nobody_waiting(self):
+    def test_a_subscriber_that_does_not_read_delays_no_other(self):
         driver = self.start(max_packets_per_s=1000000, max_bytes_per_s=100000000)
         loud, other = self.dial(driver, 1), self.dial(driver, 2)
         scans = Recorder("/hero_1/laser", rospy.AnyMsg)

@@ -204,7 +204,7 @@ class TestDriverServices(DriverCase):
         del robot.answers["set_odom"]
         self.assertTrue(make_service(robot, "set_odom", SetOdom)(0.0, 0.0, 0.0).success)
 
-    def test_an_answer_that_nobody_asked_for_is_ignored(self):
+    def test_an_unrequested_answer_is_ignored(self):
         robot = self.join(16)
         service = make_service(robot, "set_odom", SetOdom)
         robot.answer("set_odom", encode_answer(True, "unasked"))

@@ -127,7 +127,7 @@ class TestDriverStop(OwnDriverCase):
             self.wait_at_rest(driver, robot)
             self.call_stop(driver, False)
 
-    def test_a_self_tuning_that_nobody_announced_is_seen_by_the_wheels(self):
+    def test_an_unannounced_self_tuning_is_recognized_by_the_wheels(self):
         driver = self.share()
         robot = self.dial_stock(driver, 53)
         robot.is_silent = True
@@ -316,7 +316,7 @@ class TestDriverStop(OwnDriverCase):
         releases.publish(Bool(False))
         wait_for(lambda: not driver.fleet.newest.stopped, "the release")
 
-    def test_the_end_of_a_program_that_moves_nothing_stops_nobody(self):
+    def test_the_end_of_a_program_that_moves_nothing_stops_no_robot(self):
         driver = self.share(orphan_stop_s=0.0)
         robot = self.dial_stock(driver, 41)
         idle = make_publisher("/hero_41/velocity_controller/cmd_vel", Twist)
@@ -330,7 +330,7 @@ class TestDriverStop(OwnDriverCase):
         wait_for(lambda: robot.payloads_on("led"), "the next command")
         self.assertTrue(robot.motors.is_turning)
 
-    def test_the_end_of_an_older_program_on_cmd_vel_stops_nobody(self):
+    def test_the_end_of_an_older_program_on_cmd_vel_stops_no_robot(self):
         driver = self.share(orphan_stop_s=0.0)
         robot = self.dial_stock(driver, 43)
         older = make_publisher("/hero_43/cmd_vel", Twist)

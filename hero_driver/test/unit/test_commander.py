@@ -45,7 +45,7 @@ def test_a_program_that_commands_once_a_second_is_left_to_the_firmware():
 
 
 @given(pauses_s=st.lists(st.floats(0.0, 0.45), min_size=5, max_size=40))
-def test_a_program_with_jitter_is_never_taken_for_a_hung_one(pauses_s):
+def test_a_program_with_jitter_is_never_classified_as_hung(pauses_s):
     with Clock().is_the_drivers() as clock:
         robot = CommandedRobot(clock, has_readings=True)
         for pause_s in pauses_s:

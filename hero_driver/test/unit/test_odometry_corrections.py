@@ -163,7 +163,7 @@ def test_the_robots_own_odometry_is_taken_where_that_is_asked_for():
     assert [name for name, _ in outputs] == ["/hero_0/encoder"]
 
 
-def test_a_reading_that_nobody_listens_to_moves_the_odometry_all_the_same():
+def test_a_reading_without_subscribers_moves_the_odometry():
     robot = CorrectedRobot(is_wanted=lambda name: name != "/hero_0/encoder")
     robot.receive_burst(NOW_NS, (0.0, 0.0))
     outputs = robot.receive_burst(NOW_NS + PERIOD_NS, (10.0, 10.0))

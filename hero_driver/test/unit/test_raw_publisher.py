@@ -138,7 +138,7 @@ def test_every_subscriber_gets_every_message_with_its_length_in_front(bench):
     assert bench.timers == []
 
 
-def test_a_publisher_is_wanted_while_somebody_subscribes(bench):
+def test_a_publisher_is_wanted_while_it_has_subscribers(bench):
     assert bench.publisher.is_open
     assert not bench.publisher.is_wanted
     bench.publisher.publish(b"to nobody")

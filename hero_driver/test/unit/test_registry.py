@@ -58,7 +58,7 @@ def test_a_robot_that_leaves_is_away_with_the_reason():
     assert record.last_error == "silent for 6.1 s"
 
 
-def test_a_connection_that_never_said_who_it_is_leaves_nobody():
+def test_an_unidentified_connection_leaves_no_robot():
     fleet = make_fleet()
     identify(fleet, 1, T0)
     assert fleet.leave(7, "closed", T0 + 1.0) is None

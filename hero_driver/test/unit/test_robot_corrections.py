@@ -96,7 +96,7 @@ def test_a_scan_that_is_not_the_stock_one_passes_and_gives_no_proximity():
     assert robot.corrections.refused == 1
 
 
-def test_proximity_is_not_made_when_nobody_wants_it():
+def test_proximity_is_not_made_without_subscribers():
     robot = CorrectedRobot(is_wanted=lambda name: name != "/hero_0/proximity")
     laser = build_laser(NOW_NS, [0.1] * 16, [50.0] * 16)
     assert robot.receive("/hero_0/laser", laser, NOW_NS) == [("/hero_0/laser", laser)]

@@ -148,7 +148,7 @@ def test_a_new_connection_ends_the_wait_for_a_late_answer(robot):
     assert robot.answers[b"second"] == b"answer"
 
 
-def test_an_answer_that_nobody_asked_for_is_ignored(robot):
+def test_an_unrequested_answer_is_ignored(robot):
     assert robot.service.receive_answer(b"unasked") is None
     robot.call(b"request")
     robot.service.receive_answer(b"answer")

@@ -66,7 +66,7 @@ def test_topics_grow_each_on_its_own():
     assert stamps.correct("/b", NOW_NS - MS, NOW_NS) == NOW_NS - MS
 
 
-def test_stamps_follow_when_ros_time_begins_anew():
+def test_stamps_follow_a_restart_of_ros_time():
     stamps = make_filter()
     stamps.correct("/a", NOW_NS, NOW_NS)
     stamps.correct("/b", NOW_NS, NOW_NS)

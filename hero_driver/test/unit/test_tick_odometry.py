@@ -258,7 +258,7 @@ def test_a_reboot_keeps_the_pose_and_ends_the_velocity():
     assert odometry.resets == 0
 
 
-def test_counters_that_begin_anew_unannounced_move_nothing_and_are_counted():
+def test_an_unannounced_reset_of_counters_moves_nothing_and_is_counted():
     odometry = make_odometry()
     drive(odometry, 0.1, 0.1, 300)
     odometry.integrate(0.0, 0.0, START_S + 301 * PERIOD_S)

@@ -40,7 +40,7 @@ def test_a_repeated_transform_gets_a_later_stamp():
     assert list_pairs(outputs) == [hat, laser, laser, hat]
 
 
-def test_a_stamp_that_passed_passes_for_nobody_elses_frames():
+def test_a_stamp_that_passed_passes_only_for_its_own_frames():
     robot = CorrectedRobot()
     hat = ("hero_0/base_link", "hero_0/hat_link")
     for stamp_ns in (NOW_NS - MS, NOW_NS):

@@ -25,7 +25,7 @@ def test_a_wheel_on_the_edge_of_a_tick_is_at_rest():
 
 
 @pytest.mark.parametrize("turned", [(7.0, 7.0), (5.0, 9.0), (3.0, 7.0)])
-def test_a_turn_of_either_wheel_starts_the_count_anew(turned):
+def test_a_turn_of_either_wheel_restarts_the_count(turned):
     wheels = WheelMotion()
     read_all(wheels, [(5.0, 7.0)] * 4 + [turned])
     assert wheels.still_readings == 0

@@ -179,7 +179,7 @@ def test_the_time_limit_of_a_goal_begins_with_it_and_names_it(goals):
     assert "reach (79, 0): not there after 2 s" in goals.listener.outcomes[-1].reason
 
 
-def test_goals_in_another_frame_begin_anew(goals):
+def test_goals_in_another_frame_start_over(goals):
     stream(goals, 2, lambda number: goals.put(0.2, 0.0, frame=("", "robot")[number]))
     assert [request.frame for request in goals.listener.accepted] == ["", "robot"]
     assert goals.queue.reached and goals.swarm[0].pose.x_m > 0.2

@@ -163,7 +163,7 @@ def test_a_stick_stops_the_robots_also_after_the_program_hung(swarm):
 
 
 @pytest.mark.parametrize("is_heard_first", [True, False])
-def test_what_a_stick_sent_during_a_pause_of_the_program_drives_nobody(swarm, is_heard_first):
+def test_stick_input_during_a_pause_of_the_program_drives_no_robot(swarm, is_heard_first):
     teleop, sent = JoystickTeleop(swarm, MAPPING), record_commands(swarm[0])
     use_stick(swarm, teleop, make_joy(1.0), 1.0)
     hang(swarm)

@@ -39,7 +39,7 @@ def read(path):
         return yaml.safe_load(file)
 
 
-def test_without_a_file_there_is_a_camera_that_nobody_calibrated(path):
+def test_without_a_file_the_camera_is_uncalibrated(path):
     found = settings.load(path)
     assert found.lens is None and found.camera is None
     assert (found.family, found.detector) == ("36h11", DEFAULT_BACKEND)

@@ -32,7 +32,7 @@ def test_values_that_come_late_are_left_out(history):
     assert history.newest_s == pytest.approx(4.0) and history.find(3.95) == pytest.approx((3.95, 1.0, 3.95 - math.tau))
 
 
-def test_a_history_begins_anew_when_time_has_gone_back(history):
+def test_a_history_restarts_after_a_jump_back_in_time(history):
     history.add(0.5, Pose(0.0, 0.0, 0.0))
     history.add(0.6, Pose(1.0, 0.0, 0.0))
     assert history.find(0.55) == pytest.approx((0.5, 0.0, 0.0))

@@ -65,7 +65,7 @@ def test_a_robot_with_noisy_or_somewhat_turned_poses_reaches_its_goals(place_sd_
             assert math.dist(robot.true_pose[:2], goal) < 0.04
 
 
-def test_a_robot_that_is_carried_once_still_reaches_its_goal():
+def test_a_robot_moved_by_hand_once_still_reaches_its_goal():
     with StepSwarm(1, seed=3, arena="empty") as swarm:
         robot = swarm[0]
         robot.localize_by(lambda: robot.true_pose._replace(x_m=robot.true_pose.x_m - 0.3 * (swarm.now_s > 1.0)))

@@ -71,7 +71,7 @@ def test_single_outliers_are_a_problem_until_a_pose_fits_again():
     assert swarm.run(0.1, {0: (1.0, 2.0, 0.0)})[0].problem == ""
 
 
-def test_a_robot_that_is_carried_in_view_is_not_tracked_after_0_15_seconds():
+def test_a_robot_moved_by_hand_in_view_is_not_tracked_after_0_15_seconds():
     swarm = Swarm(0).run(1.0, {0: (1.0, 2.0, 0.0)})
     for index in range(3):
         swarm.run(PERIOD_S, {0: (1.1 + 0.1 * index, 2.0 + 0.2 * index, 0.5 * index)})
@@ -134,7 +134,7 @@ def test_stamps_of_another_clock_are_named():
     assert swarm[0].problem == "measured poses come with stamps 5.0 s ahead: do the clocks agree?"
 
 
-def test_robots_are_found_anew_when_time_has_gone_back():
+def test_robots_are_localized_again_after_a_jump_back_in_time():
     swarm = Swarm(0, 1).run(1.0, {0: (1.0, 2.0, 0.0)})
     swarm.now_s -= 50.0
     swarm.run(1.0, {0: (1.5, 2.0, 0.0)})

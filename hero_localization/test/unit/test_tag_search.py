@@ -146,7 +146,7 @@ def test_tag_that_drove_on_unseen_is_found_within_300_ms():
     assert seen[-1] == [1]
 
 
-def test_tag_that_is_carried_by_hand_is_seen_within_100_ms():
+def test_a_tag_moved_by_hand_is_seen_within_100_ms():
     watch = Watch()
     watch.see([(1, (900.0, 500.0))], frames=40)
     seen = [watch.see([(1, (900.0 + 23.0 * index, 500.0))]) for index in range(1, 16)]

@@ -37,7 +37,7 @@ def full_disk():
 
 
 @pytest.mark.parametrize("printing", [FEW, MANY])
-def test_a_pipe_that_nobody_reads_ends_a_command_silently(closed_pipe, printing):
+def test_a_pipe_without_a_reader_ends_a_command_silently(closed_pipe, printing):
     assert run_python("command_line.run(lambda: %s)" % printing, closed_pipe) == (141, "")
 
 
@@ -52,12 +52,12 @@ def test_a_full_disk_is_told_also_by_a_command_that_failed(full_disk):
     assert (status, errors) == (2, "-c: the output cannot be written: No space left on device\n")
 
 
-def test_help_to_a_pipe_that_nobody_reads_ends_silently(closed_pipe):
+def test_help_to_a_pipe_without_a_reader_ends_silently(closed_pipe):
     code = "import argparse; command_line.run(lambda: argparse.ArgumentParser().parse_args(['--help']))"
     assert run_python(code, closed_pipe) == (141, "")
 
 
-def test_work_goes_on_to_its_end_though_nobody_reads_its_lines(closed_pipe):
+def test_work_is_finished_although_its_output_has_no_reader(closed_pipe):
     assert run_python(TO_ITS_END + "command_line.run(main)", closed_pipe) == (0, "end\n")
 
 

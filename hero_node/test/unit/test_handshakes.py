@@ -79,7 +79,7 @@ def test_a_header_in_two_pieces_is_served_once_it_is_whole(server, length):
     assert server.take()[2] == HEADER
 
 
-def test_a_hundred_that_wait_in_the_middle_hold_up_nobody(server):
+def test_a_hundred_waiting_in_the_middle_delay_no_other(server):
     server.open()
     for _ in range(100):
         server.connect(b"\x10\x00")
@@ -87,7 +87,7 @@ def test_a_hundred_that_wait_in_the_middle_hold_up_nobody(server):
     assert server.take()[1] == client.getsockname()
 
 
-def test_a_connection_that_is_served_slowly_holds_up_nobody(server):
+def test_a_connection_that_is_served_slowly_delays_no_other(server):
     first_is_served, released = threading.Event(), threading.Event()
 
     def serve(sock, address, header):

@@ -204,7 +204,7 @@ class SimulatorTest(unittest.TestCase):
         wait_for(lambda: self.is_ready(3) and self.find(3).reconnects > reconnects, "return of hero_3")
         odom.wait_for_more()
 
-    def test_wrong_bytes_are_counted_and_hurt_nobody(self):
+    def test_wrong_bytes_are_counted_and_harm_no_robot(self):
         odoms = [Newest("/hero_%d/odom" % number, Odometry) for number in (2, 4)]
         for odom in odoms:
             odom.wait()

@@ -112,7 +112,7 @@ def test_a_body_that_needs_n_robots_moves_for_n_and_not_for_one_less(needed):
             assert body.pose.y_m > 0.1 and abs(body.pose.yaw_rad) < math.radians(1.0)
 
 
-def test_what_nobody_touches_stays():
+def test_an_untouched_object_stays():
     bodies = [place(BOX), place(Disc(0.05), 0.0, 0.15)]
     drive_north(Pushing(bodies, []), [(0.5, -0.2)], 50)
     assert bodies[0].pose == (0.0, 0.0, 0.0) and bodies[1].pose == (0.0, 0.15, 0.0)

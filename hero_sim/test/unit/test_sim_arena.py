@@ -16,7 +16,7 @@ def write(tmp_path, text):
 
 
 @pytest.mark.parametrize("robots", [1, 2, 4, 10, 50, 100])
-def test_the_default_field_has_room_to_drive_for_everybody(robots):
+def test_the_default_field_has_room_to_drive_for_every_robot(robots):
     arena = arenas.build_default(robots)
     poses = arenas.place_robots(arena, robots, np.random.RandomState(0))
     assert arenas.measure_clearance(poses[:, :2], arena).min() > 0.15
@@ -104,7 +104,7 @@ def test_too_many_robots_are_refused(tmp_path):
         arenas.place_robots(arena, 30, np.random.RandomState(0))
 
 
-def test_nobody_is_placed_inside_an_obstacle(tmp_path):
+def test_no_robot_is_placed_inside_an_obstacle(tmp_path):
     square = "[[0.1, 0.1], [0.9, 0.1], [0.9, 0.9], [0.1, 0.9]]"
     arena = load_arena(write(tmp_path, "bounds_m: [0, 0, 1, 1]\npolygons_m: [%s]\ncircles_m: []\n" % square))
     inside = arenas.measure_clearance(np.array([[0.5, 0.5], [0.05, 0.5]]), arena)

@@ -133,7 +133,7 @@ wheel_speeds = st.floats(-0.28, 0.28, allow_nan=False)
     seed=st.integers(0, 2**31),
     commands=st.lists(st.lists(wheel_speeds, min_size=18, max_size=18), min_size=1, max_size=6),
 )
-def test_nobody_is_ever_inside_a_wall_or_another_robot(arena, robots, seed, commands):
+def test_no_robot_is_ever_inside_a_wall_or_another_robot(arena, robots, seed, commands):
     arena = build_default(robots) if arena == "default" else load_arena(arena)
     world = build_world(place_robots(arena, robots, np.random.RandomState(seed)), arena, 1.0, seed)
     x_min, y_min, x_max, y_max = arena.bounds_m

@@ -163,7 +163,7 @@ def test_setting_the_odometry_moves_its_frame_and_not_the_robot():
     assert common.missing == {"hero_1": None}
 
 
-def test_a_common_frame_that_nobody_knows_is_reported(capsys):
+def test_an_unknown_common_frame_is_reported(capsys):
     swarm, common = StepSwarm(1), CommonFrame("mars")
     assert common.pose_of(swarm[0]) is None
     assert "no transform from hero_0/odom to mars" in common.missing["hero_0"]

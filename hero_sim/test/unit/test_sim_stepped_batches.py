@@ -246,7 +246,7 @@ def test_odometry_does_not_depend_on_how_often_it_is_read():
     assert often.odometry.tolist() == seldom.odometry.tolist() and often.odometry[:2].all()
 
 
-def test_a_velocity_begins_anew_when_odometry_is_set():
+def test_the_velocity_is_reset_when_odometry_is_set():
     robots = RobotRows(build_world(1, 0, scale=0.0))
     robots.world.write_pulses(np.arange(1), np.array([(1300, 1700)]))
     robots.advance(2000)

@@ -207,7 +207,7 @@ def test_a_session_ends_after_silence_and_not_before():
     assert ended.reason.startswith("silent for 6.1 s")
 
 
-def test_silence_counts_only_while_somebody_listens():
+def test_silence_counts_only_while_there_are_subscribers():
     session = open_declared_session(silence_timeout_s=6.0)
     session.forgive_silence(T0 + 60.0)
     assert session.poll(T0 + 65.9) == []
