@@ -83,7 +83,7 @@ class Swarm(BaseSwarm[Robot]):
         return self._ask_drivers(True)
 
     def release_stop(self) -> StopStatus:
-        """Let all robots of all drivers move again; returns the outcome as emergency_stop() does."""
+        """Release all robots of all drivers; returns the outcome as emergency_stop() does."""
         return self._ask_drivers(False)
 
     def _ask_drivers(self, stopped: bool) -> StopStatus:

@@ -148,7 +148,7 @@ class Gateway(LinkHandler):
                     break
 
     def poll_link(self, link: Link, now_s: float) -> None:
-        """Let the session do what is due."""
+        """Perform what is due in the session."""
         peer: Peer = link.peer
         for event in peer.session.poll(now_s):
             self._receive_event(peer, event, now_s)

@@ -135,7 +135,7 @@ class DriverNode:
         return 0
 
     def end(self) -> None:
-        """Let spin() return; from any thread or signal handler."""
+        """Make spin() return; from any thread or signal handler."""
         self._ends.put(None)
 
     def close(self) -> None:

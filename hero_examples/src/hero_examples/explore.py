@@ -70,7 +70,7 @@ def is_near(place, others, distance_m):
 
 
 def explore_together(explorers, frontiers, now_s):
-    """Let all explorers take a step."""
+    """Step all explorers."""
     for explorer in explorers:
         taken = [other.goal for other in explorers if other is not explorer and other.goal]
         explorer.step(frontiers, taken, now_s)

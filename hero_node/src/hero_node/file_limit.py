@@ -7,7 +7,7 @@ __all__ = ["raise_file_limit"]
 
 
 def raise_file_limit() -> int:
-    """Let this process open as many files as it may without privileges; return how many."""
+    """Raise the limit of open files to what needs no privileges; return it."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     if soft != hard:
         resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))

@@ -156,7 +156,7 @@ def format_size(size: float) -> str:
 
 
 def _end_with_parent() -> None:
-    """Let this process, the recorder to be, close its files and end if the program is killed."""
+    """Make this process, the recorder to be, close its files and end if the program is killed."""
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGINT)
 
 

@@ -23,7 +23,7 @@ Ask = Callable[[str], str]
 
 
 def place_robots(session: Session, at_wall: bool, ask: Optional[Ask]) -> None:
-    """Let the user place the robots, and check their places; badly placed robots fail.
+    """Ask the user to place the robots, and check their places; badly placed robots fail.
 
     ask: None if they are placed already.
 

@@ -175,7 +175,7 @@ def _take_ticks(probe: Probe, start_s: float, end_s: float) -> np.ndarray:
 
 
 def _drive_for_tape(session: Session, ask: Ask) -> Dict[int, List[Leg]]:
-    """Let robots drive, and the user measure; return the legs by robot."""
+    """Drive robots while the user measures; return the legs by robot."""
     legs: Dict[int, List[Leg]] = {probe.robot_id: [] for probe in session.active}
     straight = [(SPEED_M_S, 0.0, STRAIGHT_S)]
     for name, parts, sd in (

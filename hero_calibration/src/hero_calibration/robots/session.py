@@ -37,7 +37,7 @@ class Session(ABC):
 
     @abstractmethod
     def sleep(self, duration_s: float) -> None:
-        """Let about duration_s pass."""
+        """Simulate about duration_s."""
 
     @property
     @abstractmethod

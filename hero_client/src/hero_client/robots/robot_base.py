@@ -455,7 +455,7 @@ class BaseRobot(Group):
         self._light.show(color)
 
     def blink(self, color: Color, period_s: float = 1.0) -> None:
-        """Let the light blink, half of each period on, until led() or the end of the program; returns at once.
+        """Blink the light, half of each period on, until led() or the end of the program; returns at once.
 
         Raises: ValueError for a color that is not known, or a period of less than 0.2 s.
         """

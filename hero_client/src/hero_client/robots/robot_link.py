@@ -68,7 +68,7 @@ class RobotLink(Protocol):
         """Send the color of the light, each part 0..1."""
 
     def set_odometry(self, pose: Pose) -> None:
-        """Let the robot be at pose of hero_N/odom. Raises: RobotError if it does not answer or refuses."""
+        """Set the odometry to this pose, in hero_N/odom. Raises: RobotError if it does not answer or refuses."""
 
     # -- stop of all robots -------------------------------------------------------------------------------
 

@@ -204,7 +204,7 @@ class BaseSwarm(Group, Generic[AnyRobot]):
             robot.led(color)
 
     def blink(self, color: Color, period_s: float = 1.0) -> None:
-        """Let all lights blink: see Robot.blink()."""
+        """Blink all lights: see Robot.blink()."""
         for robot in self.robots:
             robot.blink(color, period_s)
 

@@ -43,7 +43,7 @@ class BackgroundMotion(Future):
 
     @abstractmethod
     def cancel(self) -> bool:
-        """Let the robot stop; result() then raises GoalError. Returns False if the motion had ended already."""
+        """Stop the robot; result() then raises GoalError. Returns False if the motion had ended already."""
 
     @abstractmethod
     def cancel_and_wait(self) -> None:

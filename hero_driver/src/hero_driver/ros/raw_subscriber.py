@@ -177,7 +177,7 @@ class MessageStream(Reader):
         return True
 
     def close(self) -> None:
-        """Let rospy's thread go on."""
+        """Resume rospy's thread."""
         self._socket.close()
         self.ended.set()
         if self._subscriber.last_sender is self._connection:

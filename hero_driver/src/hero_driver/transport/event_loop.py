@@ -81,7 +81,7 @@ class Reader:
         """What can be read now may have come in a pause in which the loop did not run."""
 
     def close(self) -> None:
-        """Let go of the socket: read() returned False or raised, or the loop ends."""
+        """Release the socket: read() returned False or raised, or the loop ends."""
         raise NotImplementedError
 
 
@@ -178,7 +178,7 @@ class EventLoop(LinkOwner):
         return time.monotonic() - self._resumed_s < duration_s
 
     def stop(self) -> None:
-        """Let run() return; from any thread."""
+        """Make run() return; from any thread."""
         self.call_soon(self._end)
 
     def call_soon(self, call: Callable[[], None]) -> None:

@@ -203,7 +203,7 @@ def calibrate_place(options: argparse.Namespace, pictures: Pictures) -> int:
 
 
 def calibrate_robot_tags(options: argparse.Namespace, pictures: Pictures, program: Program) -> int:
-    """Let robots turn and drive, one after another, and find how their tags sit. Return the exit code."""
+    """Turn and drive robots, one after another, and measure how their tags sit. Return the exit code."""
     settings = camera_file.load(options.file)
     robots: Sequence[int] = options.robots
     tags = settings.layout.find_tags(robots)

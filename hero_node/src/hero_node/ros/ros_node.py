@@ -72,7 +72,7 @@ def init_ros_node(name: str, anonymous: bool = False, arguments: Optional[List[s
 
 
 def end_without_delay() -> None:
-    """Let this node end as soon as its topics are closed.
+    """End this node as soon as its topics are closed.
 
     rospy's registration thread, for which the interpreter waits, looks for the end only every 0.5 s: it is woken as
     the shutdown begins, too early, and sleeps again before rospy says that the node is down. Here it is woken after.

@@ -298,7 +298,7 @@ def _resolve(host: str, port: int) -> Tuple[int, Tuple]:
 
 
 def _drop_incoming(sock: socket.socket) -> None:
-    """Let the system drop every segment for this socket, so that nothing is acknowledged."""
+    """Make the system drop every segment for this socket, so that nothing is acknowledged."""
     if not sys.platform.startswith("linux"):
         return
     drop_all = ctypes.create_string_buffer(_DROP_ALL)

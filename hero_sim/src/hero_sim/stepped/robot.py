@@ -31,7 +31,7 @@ class StepRobot(BaseRobot):
         return self._link.true_pose
 
     def localize_by(self, localize: Callable[[], Pose]) -> None:
-        """Let localize tell where the robot is in the frame map, instead of the ground truth.
+        """Use the poses of localize in the frame map instead of ground truth.
 
         localize: returns a pose, or raises FrameError or StaleDataError as Robot.pose_in() does.
         """
@@ -44,7 +44,7 @@ class StepRobot(BaseRobot):
         return red, green, blue
 
     def set_stopped(self, stopped: bool) -> None:
-        """Let the robot take no motion, as after an emergency stop, or let it move again."""
+        """Block the robot's motions, as after an emergency stop, or release it."""
         if stopped:
             self._link.send_velocity(0.0, 0.0)  # the driver's shaping repeats it
         self._link.is_stopped = stopped

@@ -224,7 +224,7 @@ class RobotRows:
         self.now_ms = until_ms
 
     def _run_cycle(self, now_ms: int) -> None:
-        """Let the robots send their readings."""
+        """Send the robots' readings."""
         has_scan = self._measure(now_ms)
         if self._is_ideal:
             self._call_hooks(self._rows, has_scan)

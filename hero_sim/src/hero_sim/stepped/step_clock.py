@@ -40,7 +40,7 @@ class StepClock(Clock):
         return self.rows.now_ms / 1000.0
 
     def sleep(self, duration_s: float) -> bool:
-        """Let the robots live for duration_s, in whole milliseconds, of which it takes one at least; return True."""
+        """Simulate the robots for duration_s, in whole milliseconds, of which it takes one at least; return True."""
         self.advance(self.rows.now_ms + _to_ms(duration_s))
         return True
 
@@ -55,7 +55,7 @@ class StepClock(Clock):
         self.rows.advance(max(until_ms, self.rows.now_ms))
 
     def schedule(self, motion: "StepMotion") -> None:
-        """Let a motion take its next step at its due_ms."""
+        """Schedule a motion's next step at its due_ms."""
         heapq.heappush(self._queue, (motion.due_ms, next(self._order), motion))
 
 
@@ -108,7 +108,7 @@ class StepMotion(BackgroundMotion):
         self._wait(None)
 
     def result(self, timeout: Optional[float] = None) -> Any:
-        """Let time pass until the motion has ended; then as concurrent.futures.Future, timeout in simulated s."""
+        """Simulate until the motion has ended; then as concurrent.futures.Future, timeout in simulated s."""
         self._wait(timeout)
         return super().result(0)
 

@@ -48,7 +48,7 @@ class StepWorld(BaseSwarm[StepRobot]):
             robot.set_stopped(True)
 
     def release_stop(self) -> None:
-        """Let all robots move again."""
+        """Release all robots."""
         for robot in self.robots:
             robot.set_stopped(False)
 

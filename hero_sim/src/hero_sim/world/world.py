@@ -174,7 +174,7 @@ class World:
         self._speeds[np.abs(self._speeds) < _REST_M_S] = 0.0
 
     def _move_bodies(self) -> None:
-        """Let the bodies take the steps that the wheels have taken."""
+        """Move the bodies by the wheels' steps."""
         if self._body_step < self._block_step:
             self._bodies.roll(self._ground_m[self._body_step : self._block_step])
             self._body_step = self._block_step

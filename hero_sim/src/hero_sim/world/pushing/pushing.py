@@ -157,7 +157,7 @@ class Pushing:
     def _relax(
         self, touch: _Touch, pressure: Tuple[float, float], limit: float, motions: Dict[int, Motion]
     ) -> Tuple[Tuple[float, float], float]:
-        """Let one touch press as it has to; return its pressure, and how far that moved anything."""
+        """Resolve the pressure of one touch; return its pressure, and how far that moved anything."""
         contact = touch.contact
         normal = contact.normal_x, contact.normal_y
         tangent = -contact.normal_y, contact.normal_x
