@@ -36,7 +36,7 @@ def follow_leader():
         # The leader is never driven from here, so leaving the swarm does not stop it.
         with Swarm(ids, proximity=False) as swarm:
             leader, *followers = swarm
-            rospy.loginfo("%s leads, and %s follow", leader.name, ", ".join(robot.name for robot in followers))
+            rospy.loginfo("%s leads %s", leader.name, ", ".join(robot.name for robot in followers))
             for _ in program.rate(10):  # Hz
                 step(swarm, common, law)
                 swarm.report_missing(common.missing)
