@@ -82,6 +82,14 @@ def test_a_script_of_plain_rospy_runs_as_the_main_module(monkeypatch, capsys, tm
     assert run_lesson(monkeypatch, capsys, tmp_path, "_x:=1") == (0, "__main__ ['_x:=1']\n", "")
 
 
+def test_a_module_that_a_script_lacks_is_named_in_one_line(monkeypatch, capsys, tmp_path):
+    monkeypatch.setattr(script, "check_master", lambda: None)
+    monkeypatch.setitem(sys.modules, "sys", None)  # what the script imports
+    status, output, errors = run_lesson(monkeypatch, capsys, tmp_path)
+    assert (status, output) == (1, "")
+    assert errors.startswith("lesson.py: import of sys halted") and "script/bootstrap" in errors
+
+
 def test_a_script_with_arguments_needs_no_master(monkeypatch, capsys, tmp_path):
     monkeypatch.setenv("ROS_MASTER_URI", "http://127.0.0.1:1")
     words = ("a.bag", "/odom")

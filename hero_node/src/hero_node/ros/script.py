@@ -13,7 +13,7 @@ import rospkg
 import rospy
 
 from ..command_line import check_node_arguments, find_line, print_error, run
-from ..errors import HeroError
+from ..errors import HeroError, ProgramError
 from .master import check_master
 from .ros_clock import ROS_CLOCK
 from .ros_node import start_ros_node
@@ -71,7 +71,10 @@ def run_script(package: str, file: str, arguments: Sequence[str]) -> NoReturn:
         check_node_arguments(package, os.path.basename(file), text, arguments)
         if not arguments:
             check_master()
-        runpy.run_path(path, run_name="__main__")
+        try:
+            runpy.run_path(path, run_name="__main__")
+        except ModuleNotFoundError as error:
+            raise ProgramError("%s; script/bootstrap (or rosdep) installs what all programs need" % error) from error
 
     run(main, HeroError)
 
