@@ -15,7 +15,7 @@ from ..values.errors import FrameError, StaleDataError
 from ..values.geometry import Pose
 from ..values.readings import FRESH_S, is_plausible
 
-__all__ = ["TOPIC", "LocalizedPoses", "PoseListener", "share_poses"]
+__all__ = ["MAX_POSITION_SD_M", "TOPIC", "LocalizedPoses", "PoseListener", "share_poses"]
 
 TOPIC = "/localization/poses"
 

@@ -8,6 +8,7 @@ import numpy as np
 import rospy
 from nav_msgs.msg import Odometry
 
+from hero_client.ros.localized_poses import MAX_POSITION_SD_M
 from hero_client.values.geometry import yaw_of
 from hero_msgs.msg import RobotPose, RobotPoses
 
@@ -18,8 +19,6 @@ SIMULATOR_FRAME = "world"
 
 MAX_AGE_S = 0.5
 """A robot whose pose is older than this senses nothing, and is stopped."""
-
-MAX_POSITION_SD_M = 0.05
 
 
 class PoseSource:
