@@ -185,7 +185,7 @@ class DriverConfig:
             (),
             _read_names,
             "ids of robots, such as 0 2 or 4-7, that are HeRo+ (96 ticks per turn, wheels of 50 mm, 65 mm apart)"
-            " without the Encoder message that tells so",
+            " without the Encoder message that identifies them",
         )
     )
     wheel_diameter_m: float = _declare(
