@@ -8,7 +8,8 @@ import math
 import os
 import time
 import traceback
-from typing import List, NamedTuple, Optional, Sequence, Tuple
+from contextlib import contextmanager
+from typing import Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from hero_sim.errors import OptionError
 from hero_sim.world.arena import Arena
 from hero_sim.world.arena_file import load_arena
 
-from ..behavior import Behavior, Objects
+from ..behavior import Objects
 from ..behaviors import find_behavior
 from ..metrics import METRICS
 from ..trial import OPEN, Trial
@@ -56,20 +57,34 @@ def load_checked(experiment: Experiment) -> None:
 
     Raises: ExperimentError.
     """
+    seeds = experiment.seeds[:1]
+    with _at(experiment, "behavior"):
+        behavior = find_behavior(experiment.behavior)()
+        allowed = [name for name, value in behavior.parameters().items() if isinstance(value, (int, float))]
+        pushes = any(isinstance(sensor, Objects) for sensor in behavior.sensors().values())
     for cell in experiment.cells:
-        behavior = _build_behavior(experiment, cell)
-        arena, seeds = _load_arena(cell), experiment.seeds[:1]
-        if not arena.objects and any(isinstance(sensor, Objects) for sensor in behavior.sensors().values()):
-            raise ExperimentError("%s pushes objects: choose an arena with them, such as box" % experiment.behavior)
-        starts = place_all(experiment.start, arena, cell.settings["robots"], seeds)
-        place_objects(cell.settings.get("objects", "arena"), arena, starts, seeds)
+        for name in cell.parameters:
+            if name not in allowed:
+                text = "%s: %s has no parameter %r; it has %s"
+                raise ExperimentError(text % (experiment.places[name], experiment.behavior, name, ", ".join(allowed)))
+        with _at(experiment, "arena"):
+            arena = _load_arena(cell)
+            if pushes and not arena.objects:
+                raise ExperimentError("%s pushes objects: arena must have them, as box does" % experiment.behavior)
+        with _at(experiment, "start"):
+            starts = place_all(experiment.start, arena, cell.settings["robots"], seeds)
+        with _at(experiment, "objects"):
+            place_objects(cell.settings.get("objects", "arena"), arena, starts, seeds)
 
 
-def _build_behavior(experiment: Experiment, cell: Cell) -> Behavior:
+@contextmanager
+def _at(experiment: Experiment, name: str) -> Iterator[None]:
+    """Name the line of what is wrong; what is not in the file is the behavior's need."""
     try:
-        return find_behavior(experiment.behavior)(**cell.parameters)
-    except (TypeError, ValueError) as error:
-        raise ExperimentError(str(error)) from error
+        yield
+    except (ExperimentError, TypeError, ValueError) as error:
+        place = experiment.places.get(name, experiment.places["behavior"])
+        raise ExperimentError("%s: %s" % (place, error)) from error
 
 
 def _load_arena(cell: Cell) -> Arena:
@@ -92,7 +107,7 @@ def compute_batch(
     began_s = time.monotonic()
     experiment = parse_experiment(text, "the experiment", METRICS)
     cell = experiment.cells[cell_index]
-    behavior, arena = _build_behavior(experiment, cell), _load_arena(cell)
+    behavior, arena = find_behavior(experiment.behavior)(**cell.parameters), _load_arena(cell)
     starts = place_all(experiment.start, arena, cell.settings["robots"], seeds)
     trial = Trial(
         behavior,

@@ -13,7 +13,7 @@ Each combination of the values that vary is a cell; each cell runs with every se
 import itertools
 import json
 import math
-from typing import Any, Collection, Dict, List, NamedTuple, Optional, Tuple
+from typing import Any, Collection, Dict, List, Mapping, NamedTuple, Optional, Tuple
 
 from .errors import ExperimentError
 from .marked_yaml import Entry, read_entries
@@ -122,6 +122,7 @@ class Experiment(NamedTuple):
         metrics: columns of the results.
         until: a run ends when this holds.
         record_hz: of trajectories; 0: none.
+        places: name of a key, parameter or varied value -> file and line, for errors.
     """
 
     behavior: str
@@ -133,6 +134,7 @@ class Experiment(NamedTuple):
     metrics: Tuple[Metric, ...]
     record_hz: float
     compare: Optional[Comparing]
+    places: Mapping[str, str]
 
     def describe_cell(self, cell: Cell) -> str:
         """Return all that a run of cell depends on besides its seed and the code, as JSON."""
@@ -174,7 +176,9 @@ def parse_experiment(text: str, file: str, known_metrics: Collection[str]) -> Ex
         record_hz = root["record"].mapping(("hz",), ("hz",))["hz"].number(0.01, 20.0, "Hz")
     compare = _parse_comparing(root["compare"], names, cells) if "compare" in root else None
     behavior = root["behavior"].text()
-    return Experiment(behavior, cells, start, time_s, until, seeds, metrics, record_hz, compare)
+    inner = [root[name].mapping() for name in ("vary", "parameters") if name in root]
+    places = {name: entry.place for entries in (root, *inner) for name, entry in entries.items()}
+    return Experiment(behavior, cells, start, time_s, until, seeds, metrics, record_hz, compare, places)
 
 
 def _parse_start(entry: Optional[Entry]) -> Start:
@@ -278,5 +282,7 @@ def _parse_metric(entry: Entry, known_metrics: Collection[str]) -> Metric:
 
 def _parse_comparing(entry: Entry, metrics: List[str], cells: Tuple[Cell, ...]) -> Comparing:
     given = entry.mapping(("metric", "between", "test"), ("metric", "between"))
+    if not cells[0].varied:
+        raise ExperimentError("%s: compare needs something that varies, such as vary: {robots: [10, 20]}" % entry.place)
     test = given["test"].choice(TESTS) if "test" in given else TESTS[0]
     return Comparing(given["metric"].choice(metrics), given["between"].choice(list(cells[0].varied)), test)
