@@ -5,7 +5,7 @@ Frame of everything: `world`, the arena's own.
 """
 
 import math
-from typing import List
+from typing import List, Sequence
 
 import rospy
 from geometry_msgs.msg import Point, Quaternion, TransformStamped
@@ -15,6 +15,7 @@ from std_msgs.msg import ColorRGBA
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
+from hero_msgs.msg import ObjectPose, ObjectPoses
 from hero_node.geometry import Pose
 
 from .robot.firmware import Firmware
@@ -53,6 +54,9 @@ class GroundTruth:
         self._clock = rospy.Publisher("/clock", Clock, queue_size=10) if with_clock else None
         self._markers = rospy.Publisher("~markers", MarkerArray, queue_size=2)
         self._arena = rospy.Publisher("~arena", MarkerArray, queue_size=1, latch=True)
+        self._objects = rospy.Publisher("~objects", ObjectPoses, queue_size=2)
+        self._object_markers = rospy.Publisher("~object_markers", MarkerArray, queue_size=1, latch=True)
+        self._drawn: List[List[float]] = []
         self._static = rospy.Publisher("/tf_static", TFMessage, queue_size=1, latch=True) if with_tf else None
         self._poses = [
             rospy.Publisher("/%s/ground_truth" % robot.name, Odometry, queue_size=2) for robot in self._swarm.robots
@@ -73,9 +77,9 @@ class GroundTruth:
             self._publish_poses(stamp)
             if self._static is not None:
                 self._publish_odom_frames(self._static, stamp)
+            self._publish_objects(stamp)
         if time_ms % MARKER_PERIOD_MS == 0 and self._markers.get_num_connections():
             markers = [marker for robot in self._swarm.robots for marker in self._draw_robot(robot, time_ms)]
-            markers += [_draw_object(index, body) for index, body in enumerate(self._swarm.world.list_objects())]
             for marker in markers:
                 marker.header.stamp = stamp
             self._markers.publish(MarkerArray(markers))
@@ -96,6 +100,18 @@ class GroundTruth:
             message.pose.pose.orientation = _rotate_about_z(pose.yaw_rad)
             message.twist.twist.linear.x, message.twist.twist.angular.z = speeds[index]
             self._poses[index].publish(message)
+
+    def _publish_objects(self, stamp: rospy.Time) -> None:
+        """Publish where objects are, and draw them anew when they have moved."""
+        poses = self._swarm.world.object_poses[0].tolist()
+        if not poses:
+            return
+        message = ObjectPoses(objects=[ObjectPose("object_%d" % index, *pose) for index, pose in enumerate(poses)])
+        message.header.stamp, message.header.frame_id = stamp, FRAME
+        self._objects.publish(message)
+        if poses != self._drawn:
+            self._drawn = poses
+            self._object_markers.publish(MarkerArray(_draw_objects(self._swarm.world.list_objects())))
 
     def _publish_odom_frames(self, publisher: rospy.Publisher, stamp: rospy.Time) -> None:
         """Place each robot's odom frame in the world, anew whenever its odometry was set."""
@@ -123,20 +139,16 @@ class GroundTruth:
         return [body, nose, name]
 
 
-def _draw_object(index: int, body: Body) -> Marker:
-    """Return a disc, or the outline of a polygon, where it is."""
-    is_disc = isinstance(body.shape, Disc)
-    center = Pose(body.x_m, body.y_m, 0.0)
-    kind = Marker.CYLINDER if is_disc else Marker.LINE_STRIP
-    marker = _make_marker("objects", index, kind, _OBJECT_COLOR, center, WALL_HEIGHT_M / 2.0)
-    if is_disc:
-        marker.scale.x = marker.scale.y = 2.0 * body.shape.reach_m
-        marker.scale.z = WALL_HEIGHT_M
-    else:
-        marker.scale.x = 2.0 * _WALL_THICKNESS_M
-        corners_m = [*body.corners_m, body.corners_m[0]]
-        marker.points = [Point(x_m - body.x_m, y_m - body.y_m, 0.0) for x_m, y_m in corners_m]
-    return marker
+def _draw_objects(bodies: Sequence[Body]) -> List[Marker]:
+    """Return discs, and the edges of polygons, where they are."""
+    markers: List[Marker] = []
+    for body in bodies:
+        if isinstance(body.shape, Disc):
+            circle = (body.x_m, body.y_m, body.shape.reach_m)
+            markers.append(_draw_circle("objects", len(markers), circle, _OBJECT_COLOR))
+        for start_m, end_m in zip(body.corners_m, [*body.corners_m[1:], *body.corners_m[:1]]):
+            markers.append(_draw_wall("objects", len(markers), (*start_m, *end_m), _OBJECT_COLOR))
+    return markers
 
 
 def _rotate_about_z(angle_rad: float) -> Quaternion:
@@ -156,20 +168,25 @@ def _place_odom(robot: Firmware, stamp: rospy.Time) -> TransformStamped:
 
 
 def _draw_arena(arena: Arena) -> List[Marker]:
-    markers = []
-    for index, (x1_m, y1_m, x2_m, y2_m) in enumerate(arena.segments_m.tolist()):
-        middle = Pose((x1_m + x2_m) / 2.0, (y1_m + y2_m) / 2.0, math.atan2(y2_m - y1_m, x2_m - x1_m))
-        marker = _make_marker("walls", index, Marker.CUBE, _WALL_COLOR, middle, WALL_HEIGHT_M / 2.0)
-        marker.scale.x = math.hypot(x2_m - x1_m, y2_m - y1_m) + _WALL_THICKNESS_M
-        marker.scale.y, marker.scale.z = _WALL_THICKNESS_M, WALL_HEIGHT_M
-        markers.append(marker)
-    for index, (x_m, y_m, radius_m) in enumerate(arena.circles_m.tolist()):
-        center = Pose(x_m, y_m, 0.0)
-        marker = _make_marker("obstacles", index, Marker.CYLINDER, _WALL_COLOR, center, WALL_HEIGHT_M / 2.0)
-        marker.scale.x = marker.scale.y = 2.0 * radius_m
-        marker.scale.z = WALL_HEIGHT_M
-        markers.append(marker)
-    return markers
+    walls = [_draw_wall("walls", *item, _WALL_COLOR) for item in enumerate(arena.segments_m.tolist())]
+    return walls + [_draw_circle("obstacles", *item, _WALL_COLOR) for item in enumerate(arena.circles_m.tolist())]
+
+
+def _draw_wall(namespace: str, number: int, ends_m: Sequence[float], color: ColorRGBA) -> Marker:
+    x1_m, y1_m, x2_m, y2_m = ends_m
+    middle = Pose((x1_m + x2_m) / 2.0, (y1_m + y2_m) / 2.0, math.atan2(y2_m - y1_m, x2_m - x1_m))
+    marker = _make_marker(namespace, number, Marker.CUBE, color, middle, WALL_HEIGHT_M / 2.0)
+    marker.scale.x = math.hypot(x2_m - x1_m, y2_m - y1_m) + _WALL_THICKNESS_M
+    marker.scale.y, marker.scale.z = _WALL_THICKNESS_M, WALL_HEIGHT_M
+    return marker
+
+
+def _draw_circle(namespace: str, number: int, circle_m: Sequence[float], color: ColorRGBA) -> Marker:
+    x_m, y_m, radius_m = circle_m
+    marker = _make_marker(namespace, number, Marker.CYLINDER, color, Pose(x_m, y_m, 0.0), WALL_HEIGHT_M / 2.0)
+    marker.scale.x = marker.scale.y = 2.0 * radius_m
+    marker.scale.z = WALL_HEIGHT_M
+    return marker
 
 
 def _make_marker(namespace: str, number: int, kind: int, color: ColorRGBA, pose: Pose, z_m: float) -> Marker:

@@ -52,6 +52,7 @@ SCENE_TYPES = {
     "/diagnostics": DiagnosticArray,
     "/hero_sim/arena": MarkerArray,
     "/hero_sim/markers": MarkerArray,
+    "/hero_sim/object_markers": MarkerArray,
     "/localization/poses": RobotPoses,
     "/track/picture/compressed": CompressedImage,
     "/track/picture/outline": PolygonStamped,
@@ -256,6 +257,8 @@ class FleetFeed:
             self.placement.set_robots(self.robots)
         if taken.get("/hero_sim/arena") is not None:
             self.page_state.put("arena", describe_arena(taken["/hero_sim/arena"]))
+        if taken.get("/hero_sim/object_markers") is not None:
+            self.page_state.put("objects", describe_arena(taken["/hero_sim/object_markers"]))
         if taken.get("/diagnostics") is not None:
             for status in taken["/diagnostics"].status:
                 name = status.name.rpartition(": ")[2]
@@ -330,7 +333,7 @@ def describe_stop_of_others(stopped: bool, moving: Sequence[str]) -> Optional[St
 
 
 def describe_arena(message: MarkerArray) -> Dict[str, List[List[int]]]:
-    """Return boxes (x, y, yaw, length, width) and circles (x, y, radius) of the arena, in mm and mrad."""
+    """Return boxes (x, y, yaw, length, width) and circles (x, y, radius) of the arena or of objects, in mm and mrad."""
     boxes, circles = [], []
     for marker in message.markers[:MARKERS_MAX]:
         pose = encode_pose(read_pose(marker.pose))

@@ -13,14 +13,15 @@ from std_msgs.msg import ColorRGBA, Float32
 from visualization_msgs.msg import Marker, MarkerArray
 
 from hero_client import Program, ProgramError, Swarm, read_parameters, run
+from hero_client.values.object_sensing import Things
 from hero_client.values.robot_constants import BODY_RADIUS_M
 from hero_node.parameters import choice, number, robot_ids, whole_number, words
 
-from ..behavior import Behavior, Binary, Random, Sensed, sense
+from ..behavior import Behavior, Binary, Objects, Random, Sensed, Sight, sense
 from ..behaviors import find_behavior
 from ..metrics import METRICS
 from ..safety import MODES, SafetyFilter
-from .pose_source import PoseSource
+from .pose_source import ObjectSource, PoseSource
 
 BEAM_M = 3.0
 """Length at which a beam of endless range is drawn."""
@@ -61,6 +62,9 @@ class BehaviorNode:
         self._frame = parameters["frame"]
         ids = [robot.robot_id for robot in swarm]
         self._source = PoseSource(ids, self._frame, parameters["poses_topic"])
+        are_needed = any(isinstance(sensor, Objects) for sensor in self._behavior.sensors().values())
+        topic, radius_m = parameters["objects_topic"], parameters["object_radius_m"]
+        self._objects = ObjectSource(self._frame, topic, radius_m, are_needed)
         self._filter = SafetyFilter(parameters["safety"], _parse_fence(parameters["fence"]))
         self._random = Random([parameters["seed"]], len(ids))
         self._memory: Any = None
@@ -79,8 +83,11 @@ class BehaviorNode:
     def step(self) -> None:
         """Sense, decide, and command all robots."""
         poses, ages_s = self._source.read()
+        things = self._objects.read()
+        if self._objects.are_needed and not len(things.radii_m):
+            poses, things = np.full_like(poses, np.nan), Things(np.full((1, 1, 3), np.nan), np.ones(1))
         now_s = rospy.get_time()
-        sensed = sense(self._behavior, now_s - self._start_s, poses[None], self._random)
+        sensed = sense(self._behavior, now_s - self._start_s, poses[None], self._random, things)
         linear_m_s, angular_rad_s, self._memory = self._behavior.step(sensed, self._memory, self._random)
         shape = (1, len(poses))
         wanted = [np.broadcast_to(values, len(poses)).reshape(shape) for values in (linear_m_s, angular_rad_s)]
@@ -94,12 +101,12 @@ class BehaviorNode:
         self._show_colors()
         if time.monotonic() >= self._next_report_s and not known.all():
             self._next_report_s = time.monotonic() + REPORT_PERIOD_S
-            rospy.logwarn(self._source.describe_missing(poses))
+            rospy.logwarn(self._objects.describe_missing() or self._source.describe_missing(poses))
         if time.monotonic() >= self._next_show_s and known.all():
             velocities = np.zeros_like(poses) if self._last is None else (poses - self._last) / SHOW_PERIOD_S
             self._next_show_s = time.monotonic() + SHOW_PERIOD_S
             self._last = poses
-            value = float(METRICS[self._behavior.metric](poses[None], velocities[None])[0])
+            value = float(METRICS[self._behavior.metric](poses[None], velocities[None], things.poses)[0])
             self._metric.publish(Float32(value))
             if self._markers.get_num_connections():
                 self._markers.publish(MarkerArray([*self._draw_beams(poses, sensed), self._draw_text(poses, value)]))
@@ -128,7 +135,7 @@ class BehaviorNode:
             marker.scale.x = 0.004
             reading = getattr(sensed, name)
             for row, (x_m, y_m, yaw_rad) in enumerate(poses.tolist()):
-                if isinstance(sensor, Binary):
+                if isinstance(sensor, (Binary, Sight)):
                     length_m = min(sensor.range_m, BEAM_M)
                     ends = [(BODY_RADIUS_M + length_m, 0.0)]
                     color = _SEEN_COLOR if reading[row] else _FREE_COLOR
@@ -158,6 +165,8 @@ PARAMETERS = {
     "robots": robot_ids("all", "ids; all: those that have joined a driver"),
     "frame": words("map", "frame of the poses: that of localize, or `world` for the simulator's ground truth"),
     "poses_topic": words("/localization/poses", "hero_msgs/RobotPoses of `localize`"),
+    "objects_topic": words("", "hero_msgs/ObjectPoses; empty: of hero_sim for the frame world, of track else"),
+    "object_radius_m": number(0.05, 0.001, 5.0, "m", "of the circle around an object"),
     "safety": choice("off", MODES, "safety filter: off, fence, or fence and robots"),
     "fence": words("", "x min, y min, x max, y max of the fence, m"),
     "seed": whole_number(0, 0, 2**31 - 1, "", "of the behavior's random numbers"),

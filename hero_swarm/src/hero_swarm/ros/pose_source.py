@@ -10,9 +10,10 @@ from nav_msgs.msg import Odometry
 
 from hero_client.ros.localized_poses import MAX_POSITION_SD_M
 from hero_client.values.geometry import yaw_of
-from hero_msgs.msg import RobotPose, RobotPoses
+from hero_client.values.object_sensing import NO_OBJECTS, Things
+from hero_msgs.msg import ObjectPoses, RobotPose, RobotPoses
 
-__all__ = ["SIMULATOR_FRAME", "PoseSource"]
+__all__ = ["SIMULATOR_FRAME", "ObjectSource", "PoseSource"]
 
 SIMULATOR_FRAME = "world"
 """The frame of the simulator's ground truth, /hero_N/ground_truth; all other frames are those of localize."""
@@ -74,3 +75,37 @@ class PoseSource:
         names = ", ".join("hero_%d" % robot_id for robot_id in missing[:8]) + (", ..." if len(missing) > 8 else "")
         source = "the simulator" if self._frame == SIMULATOR_FRAME else "localize"
         return "no pose of %s in the frame %s: does %s run? They are stopped meanwhile" % (names, self._frame, source)
+
+
+class ObjectSource:
+    """The newest poses of objects: from the simulator, or from the tags that track sees on them.
+
+    Attributes:
+        are_needed: whether the behavior can do nothing without one.
+    """
+
+    def __init__(self, frame: str, topic: str, radius_m: float, are_needed: bool) -> None:
+        """Subscribe to the topic; empty: that of the frame's source. radius_m: of the circle around each object."""
+        self.are_needed = are_needed
+        self._frame, self._radius_m = frame, radius_m
+        self._topic = topic or ("/hero_sim/objects" if frame == SIMULATOR_FRAME else "/track/objects")
+        self._known: Dict[str, Tuple[float, float, float]] = {}  # replaced as a whole by rospy's thread
+        rospy.Subscriber(self._topic, ObjectPoses, self._receive, queue_size=1, tcp_nodelay=True)
+
+    def _receive(self, report: ObjectPoses) -> None:
+        if report.header.frame_id == self._frame:
+            # One that a picture does not show is where it was: it moves only while it is pushed.
+            self._known = {**self._known, **{thing.name: (thing.x, thing.y, thing.yaw) for thing in report.objects}}
+
+    def read(self) -> Things:
+        """Return the objects, in the order of their names."""
+        known = self._known
+        if not known:
+            return NO_OBJECTS
+        return Things(np.array([[known[name] for name in sorted(known)]]), np.full(len(known), self._radius_m))
+
+    def describe_missing(self) -> str:
+        """Return that there are no objects that are needed, for users; empty if there are."""
+        if self._known or not self.are_needed:
+            return ""
+        return "no object on %s in the frame %s: the robots are stopped meanwhile" % (self._topic, self._frame)

@@ -94,13 +94,18 @@ export class MapPainter {
   }
 
   paintArena() {
-    const { context, state, view } = this;
-    context.fillStyle = this.ink("--wall");
-    for (const [x, y, yaw, length, width] of state.arena.boxes) {
+    this.paintShapes(this.state.arena, "--wall");
+    this.paintShapes(this.state.objects, "--object");
+  }
+
+  paintShapes({ boxes, circles }, ink) {
+    const { context, view } = this;
+    context.fillStyle = this.ink(ink);
+    for (const [x, y, yaw, length, width] of boxes) {
       const thick = Math.max(width, 3 / view.scale);
       this.at([x, y, yaw], () => context.fillRect(-length / 2, -thick / 2, length, thick));
     }
-    for (const [x, y, radius] of state.arena.circles) {
+    for (const [x, y, radius] of circles) {
       context.beginPath();
       context.arc(x, y, radius, 0, 2 * Math.PI);
       context.fill();
