@@ -68,6 +68,7 @@ TABLES: Dict[str, Columns] = {
         "stamp_s": _read_stamp,
         **{beam + "_m": _range_reader(index) for index, beam in enumerate(BEAMS)},
     },
+    topics.RANGE: {"stamp_s": _read_stamp, "range_m": attrgetter("range")},
     topics.VELOCITY_COMMAND: _TWIST,
     topics.POSITION_COMMAND: _TWIST,
     topics.MOTOR_COMMAND: {"left_us": attrgetter("left_motor_pwm"), "right_us": attrgetter("right_motor_pwm")},

@@ -11,6 +11,7 @@ GROUND_TRUTH = "ground_truth"
 POSE = "pose"
 ENCODER = "encoder"
 PROXIMITY = "proximity"
+RANGE = "range"
 VELOCITY_COMMAND = "velocity_command"
 POSITION_COMMAND = "position_command"
 MOTOR_COMMAND = "motor_command"
@@ -23,6 +24,7 @@ ROBOT_TOPICS = {
     "pose": (POSE, "geometry_msgs/PoseWithCovarianceStamped"),
     "encoder": (ENCODER, "hero_msgs/Encoder"),
     "proximity": (PROXIMITY, "sensor_msgs/LaserScan"),
+    "range": (RANGE, "sensor_msgs/Range"),
     "cmd_vel": (VELOCITY_COMMAND, "geometry_msgs/Twist"),
     "velocity_controller/cmd_vel": (VELOCITY_COMMAND, "geometry_msgs/Twist"),
     "position_controller/cmd_vel": (POSITION_COMMAND, "geometry_msgs/Twist"),

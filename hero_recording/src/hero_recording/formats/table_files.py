@@ -76,8 +76,9 @@ def npz_converter() -> Callable[[str], None]:
 
 def parquet_converter() -> Callable[[str], None]:
     """Return what turns a CSV file into a .parquet file. Raises: RecordingError without pyarrow."""
-    arrow = import_optional("pyarrow", "pyarrow")
-    parquet = import_optional("pyarrow.parquet", "pyarrow")
+    requirement = "pyarrow<20"  # which takes the numpy of Debian 12, too
+    arrow = import_optional("pyarrow", requirement)
+    parquet = import_optional("pyarrow.parquet", requirement)
     return lambda path: _replace(
         path, ".parquet", lambda target, columns: parquet.write_table(arrow.table(columns), target)
     )
