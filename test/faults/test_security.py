@@ -227,4 +227,4 @@ def test_new_robot_names_are_rate_limited_per_address(start_driver, record):
     driver.fleet.wait_ready("/hero_2")
     other.close()
     friend.close()
-    record("ever new names from one address", 1, int(len(known) > 3), "what was beyond the limit")
+    record("new names from one address", 1, int(len(known) > 3), "what was beyond the limit")

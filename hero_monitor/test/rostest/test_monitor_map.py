@@ -114,7 +114,7 @@ class MapTest(unittest.TestCase):
         self.wait_for_facts("-0.900 0.400 m, 90", "camera")
         self.page.wait_for_text("#frame", "frame map, localized")
         self.page.choose("hero_1")
-        wait_for(lambda: self.page.facts().get("pose source") == alone, "a robot of which nothing is known")
+        wait_for(lambda: self.page.facts().get("pose source") == alone, "a robot without a transform")
         self.page.choose("hero_0")
         poses = self.poses.robots[0]
         poses.state = RobotPose.LOST

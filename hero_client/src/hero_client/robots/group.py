@@ -76,7 +76,7 @@ def send_stops(robots: Sequence[Member]) -> Steps:
 
 
 def stop_after(steps: Steps, robots: Sequence[Member]) -> Steps:
-    """Take steps and then stop the robots, whatever ends the steps."""
+    """Take steps and then stop the robots, however the steps end."""
     try:
         yield from steps
     except GeneratorExit:

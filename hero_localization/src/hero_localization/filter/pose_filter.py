@@ -118,7 +118,7 @@ class _Step(NamedTuple):
     """At that time."""
     measurement: Optional[Measurement]
     is_held: bool = False
-    """Whether the wheels turn in vain: then odometry does not tell where the robot goes next."""
+    """Whether the wheels slip in place, as at a wall: odometry then does not predict the motion."""
 
 
 class PoseFilter:
