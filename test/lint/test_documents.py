@@ -202,6 +202,17 @@ def test_every_promise_names_a_test_that_exists():
             assert name in defined, f"{page} names {name}, which no file defines"
 
 
+def test_every_function_that_stands_beside_its_file_is_in_it():
+    shown = []
+    for page in sources.list_files(".md"):
+        text = page.read_text(encoding="utf-8")
+        shown += [(page, *found) for found in re.findall(r"\]\(([\w/.]+\.py)\),\s+`(\w+)\(\)`", text)]
+    assert shown
+    for page, file, name in shown:
+        code = (page.parent / file).read_text(encoding="utf-8")
+        assert re.search(rf"^ *def {name}\(", code, re.MULTILINE), f"{page.name}: {file} defines no {name}()"
+
+
 def test_the_api_page_shows_every_public_name_of_hero_client():
     shown = re.findall(r"^::: ([\w.]+)$", (sources.ROOT / "docs" / "api.md").read_text(encoding="utf-8"), re.MULTILINE)
     tree = sources.parse(sources.ROOT / "hero_client" / "src" / "hero_client" / "__init__.py")
