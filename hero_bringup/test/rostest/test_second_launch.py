@@ -98,6 +98,15 @@ class SecondLaunchTest(unittest.TestCase):
         self.assertEqual(master.getPid(), pid)
         self.assertEqual(first.find_lines("hero_0 left|killing on exit|has died"), [])
 
+    def test_robots_of_a_launch_whose_port_is_taken_join_no_other_swarm(self):
+        first = self.launch_fleet("count:=1")
+        first.wait_for_text("hero_0 arrived")
+        environment = {"ROS_MASTER_URI": "http://localhost:%d" % find_free_port()}
+        second = self.launch_fleet("count:=1", "first_id:=10", environment=environment)
+        second.wait_for_text("is in use: end the other program")
+        second.wait_end()
+        self.assertEqual(first.find_lines("hero_10"), [])
+
     def test_a_fleet_of_another_name_and_port_runs_beside_the_first(self):
         for name in "/hero_driver", "/hero_driver_b":
             self.watch_driver(name)

@@ -200,6 +200,7 @@ class ViewTest(unittest.TestCase):
             loop.move_to_element_with_offset(canvas, *place)
         loop.release().key_up(Keys.SHIFT).perform()
         wait_for(lambda: shown() == "4 robots", shown)
+        wait_for(lambda: self.page.run(FIND_CUT) == [], lambda: self.page.run(FIND_CUT))
         row = self.page.find("#fleet tbody tr:nth-child(3) button")
         self.page.actions().key_down(Keys.SHIFT).click(row).key_up(Keys.SHIFT).perform()
         wait_for(lambda: shown() == "3 robots", shown)

@@ -42,10 +42,23 @@ def test_errors_of_scripts_are_one_line_and_notebooks_keep_theirs(monkeypatch, i
     monkeypatch.setattr(script, "check_master", lambda: None)
     monkeypatch.setattr(script.rospy.core, "is_initialized", lambda: True)
     monkeypatch.setattr(sys, "excepthook", sys.__excepthook__)
+    monkeypatch.setattr(threading, "excepthook", threading.excepthook)
     if is_notebook:
         monkeypatch.setattr(sys, "ps1", "In : ", raising=False)  # as IPython sets it
     script.start_node()
     assert (sys.excepthook is sys.__excepthook__) == is_notebook
+
+
+def test_an_error_that_ends_a_thread_is_one_line(monkeypatch, capsys):
+    monkeypatch.setattr(threading, "excepthook", script._print_thread_exception)
+
+    def fail():
+        raise HeroError("hero_0 did not move")
+
+    thread = threading.Thread(target=fail)
+    thread.start()
+    thread.join()
+    assert capsys.readouterr().err.count("\n") == 1
 
 
 def run_lesson(monkeypatch, capsys, tmp_path, *words, arguments=()):

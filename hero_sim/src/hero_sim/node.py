@@ -7,12 +7,14 @@ import os
 import queue
 import signal
 import sys
+from contextlib import suppress
 from typing import Tuple
 
 import rosgraph
 import rosgraph.network
 import rospy
 
+from hero_msgs.msg import RobotArray
 from hero_node.command_line import call
 from hero_node.errors import NodeError
 from hero_node.ros.master import find_running_node
@@ -32,6 +34,9 @@ SERVICE_LIMIT_S = 2.0
 
 MASTER_WAIT_S = 0.7
 """A master that is gone must not delay the end for longer."""
+
+DRIVER_WAIT_S = 1.0
+"""Between two looks whether this node is to end."""
 
 LINGER_S = 2.5
 """roslaunch ends all of its nodes at once; the driver takes up to 2 s to stop its robots."""
@@ -78,6 +83,19 @@ def check_environment() -> None:
     raise OptionError("ROS_MASTER_URI is %r, but must be like http://ADDRESS:11311" % uri)
 
 
+def wait_for_driver(name: str) -> bool:
+    """Wait for the first report of the driver with this node name; return whether it came before the end.
+
+    Its port may be that of a driver of another ROS master, whose swarm these robots must not join.
+    """
+    rospy.loginfo("waiting for the driver %s", name)
+    while not rospy.is_shutdown():
+        with suppress(rospy.ROSException):
+            rospy.wait_for_message(name + "/robots", RobotArray, DRIVER_WAIT_S)
+            return True
+    return False
+
+
 def main() -> None:
     """Run the simulator until ROS or a signal ends it."""
     status = call(_run, SimulatorError, NodeError)
@@ -89,6 +107,7 @@ def _run() -> None:
     parser = command_line.build_parser()
     parser.add_argument("--clock", action="store_true", help="publish /clock: nodes with use_sim_time follow")
     parser.add_argument("--no-tf", action="store_true", help="leave the odom frames to a localization")
+    parser.add_argument("--driver", metavar="NODE", help="connect once this driver, of the same ROS master, reports")
     options = command_line.parse_options(parser, rospy.myargv(sys.argv)[1:])
     check_environment()
     # Until the master answers, init_node() waits for as long as it takes: let a signal end that.
@@ -97,6 +116,8 @@ def _run() -> None:
     if running:
         raise OptionError("simulated robots already run as %s: end them, or give these another name:=" % running)
     init_ros_node(NODE_NAME)
+    if options.driver and not wait_for_driver(options.driver):
+        return
     with command_line.simulate(options, rospy.loginfo) as (simulator, injector):
         rospy.on_shutdown(lambda: setattr(simulator, "stopping", True))
         GroundTruth(simulator, options.clock, not options.no_tf)

@@ -31,7 +31,6 @@ export class Chart {
     }
     this.select.addEventListener("input", () => this.show(this.robots || []));
     setInterval(() => this.draw(), PERIOD_MS);
-    new ResizeObserver(() => this.resize()).observe(element("chart"));
   }
 
   /** Show the lines of these robots. */
@@ -49,6 +48,8 @@ export class Chart {
     if (names.length > LINES_MAX && times.length) values = summarize(values);
     const key = `${this.select.value} ${document.documentElement.dataset.theme} ${names.slice(0, LINES_MAX + 1)}`;
     if (key !== this.key) this.rebuild(key, quantity);
+    const width = element("chart").clientWidth;
+    if (this.plot.width !== width) this.plot.setSize({ width, height: HEIGHT_PX });
     this.plot.setData([times, ...values]);
     const known = values.map((line) => line[line.length - 1]).filter((value) => value !== null && value !== undefined);
     const mean = known.reduce((sum, value) => sum + value, 0) / known.length;
@@ -81,11 +82,6 @@ export class Chart {
       element("chart"),
     );
     element("chart").setAttribute("aria-label", `${quantity.title} over the last minute, ${quantity.unit}`);
-  }
-
-  resize() {
-    const width = element("chart").clientWidth;
-    if (this.plot && width) this.plot.setSize({ width, height: HEIGHT_PX });
   }
 }
 
