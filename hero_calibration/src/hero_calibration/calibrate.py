@@ -41,7 +41,7 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--robots", type=robot_ids_option, default="all", help=robots_help)
     parser.add_argument("--yes", action="store_true", help="ask nothing: the robots are placed already")
     parser.add_argument("--tape", action="store_true", help="wheels: by a tape measure, without a camera")
-    parser.add_argument("--folder", default="~/hero_calibration", help="of files and pictures (%(default)s)")
+    parser.add_argument("--folder", default="~/hero_calibration", help="folder of files and pictures (%(default)s)")
     options = parser.parse_args(arguments)
     options.restore = options.parts[:1] == [RESTORE]
     options.files = options.parts[1:] if options.restore else []

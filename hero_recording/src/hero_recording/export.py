@@ -31,7 +31,7 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(prog="export", description="Export recordings to tables or other bags.")
     parser.add_argument("bags", nargs="+", metavar="FILE.bag", help="the bags of one recording, in any order")
-    parser.add_argument("--out", metavar="PATH", help="what is written (the first bag's name); must not exist")
+    parser.add_argument("--out", metavar="PATH", help="output path (the first bag's name); must not exist")
     parser.add_argument("--robots", type=robot_ids_option, default="all", help="ids, e.g. '0 1 2' or 0-3 (all)")
     every, text = ",".join(TABLES), "which, separated by commas (%(default)s)"
     parser.add_argument("--tables", type=list_of(TABLES), default=every, metavar="LIST", help=text)

@@ -38,7 +38,7 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--robots", type=robot_ids_option, default="all", help="ids, e.g. '0 1 2' or 0-3 (all)")
     every, text = ",".join(FIGURES), "which, separated by commas (%(default)s)"
     parser.add_argument("--figures", type=list_of(FIGURES), default=every, metavar="LIST", help=text)
-    parser.add_argument("--format", choices=("png", "pdf"), default="png", help="of the files (png)")
+    parser.add_argument("--format", choices=("png", "pdf"), default="png", help="format of the files (png)")
     parser.add_argument("--out", metavar="PREFIX", help="prefix of the file names (the first bag's name)")
     return parser.parse_args(arguments)
 

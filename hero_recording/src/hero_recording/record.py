@@ -222,7 +222,7 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="record", description="Record all robots into bags.", allow_abbrev=False
     )
-    parser.add_argument("--folder", default=".", help="where the bags go (here); created if missing")
+    parser.add_argument("--folder", default=".", help="folder of the bags (here); created if missing")
     parser.add_argument("--name", default="hero", help="prefix of the file names, NAME_DATE_0.bag (hero)")
     parser.add_argument("--robots", type=robot_ids_option, default="all", help="ids, e.g. '0 1 2' or 0-3 (all)")
     parser.add_argument("--topics", default="", help="more topics: regular expressions separated by spaces")
@@ -230,7 +230,7 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--split-mb", type=int, default=256, metavar="MB", help="size of a file (256)")
     parser.add_argument("--max-files", type=int, default=0, metavar="N", help="keep only the newest N (0: all)")
     parser.add_argument("--min-free-mb", type=float, default=1000.0, metavar="MB", help="stop below this (1000)")
-    parser.add_argument("--compression", choices=("lz4", "bz2", "none"), default="lz4", help="of the bags (lz4)")
+    parser.add_argument("--compression", choices=("lz4", "bz2", "none"), default="lz4", help="bag compression (lz4)")
     parser.add_argument("--seconds", type=float, metavar="S", help="stop after S seconds")
     parser.add_argument("--repair", nargs="+", metavar="FILE", help="repair recordings that were cut off, and exit")
     options = parser.parse_args(arguments)

@@ -26,12 +26,12 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     """Run a script with its arguments; return its exit status."""
     parser = argparse.ArgumentParser(prog="python3 -m hero_sim.in_process", description=__doc__.partition("\n")[0])
     parser.add_argument("--count", type=int, default=4, metavar="N", help="robots, hero_0 and on (%(default)s)")
-    parser.add_argument("--seed", type=int, default=0, metavar="S", help="of differences and noise (%(default)s)")
-    parser.add_argument("--arena", metavar="ARENA", help="as the simulator's")
-    parser.add_argument("--wifi", default="ideal", help="as the simulator's (%(default)s)")
+    parser.add_argument("--seed", type=int, default=0, metavar="S", help="seed of differences and noise (%(default)s)")
+    parser.add_argument("--arena", metavar="ARENA", help="arena, as for the simulator")
+    parser.add_argument("--wifi", default="ideal", help="network, as for the simulator (%(default)s)")
     parser.add_argument("--perfect", action="store_true", help="robots without differences and noise")
     parser.add_argument("script", help="a script that uses Robot, Swarm and rate of hero_client")
-    parser.add_argument("arguments", nargs=argparse.REMAINDER, help="those of the script")
+    parser.add_argument("arguments", nargs=argparse.REMAINDER, help="arguments of the script")
     options = parser.parse_args(argv)
     return call(lambda: run_script(options), HeroError)
 

@@ -41,7 +41,7 @@ def build_parser() -> argparse.ArgumentParser:
 
 def _add_link_options(group: "argparse._ArgumentGroup") -> None:
     add = group.add_argument
-    add("--host", default="127.0.0.1", help="where the driver runs (%(default)s)")
+    add("--host", default="127.0.0.1", help="host of the driver (%(default)s)")
     add("--port", type=int, default=DEFAULT_PORT, help="port of the driver (%(default)s)")
     profiles = ("ideal", "router", "hotspot", "bad")
     add("--wifi", choices=profiles, default="ideal", help="quality of the network (ideal)")
@@ -61,7 +61,7 @@ def _add_robot_options(group: "argparse._ArgumentGroup") -> None:
         action="append",
         default=[],
         metavar="MODEL[,robot=ID]",
-        help="of all robots or of one: hero, hero_plus, or v3.0 (older stock firmware); may be repeated (hero)",
+        help="model of all robots or of one: hero, hero_plus, or v3.0 (older stock firmware); may be repeated (hero)",
     )
     add("--imu-hat", action="store_true", help="robots have the IMU hat")
     add("--perfect", action="store_true", help="identical robots: no wheel errors or slip (sensors stay noisy)")
@@ -89,7 +89,7 @@ def _add_robot_options(group: "argparse._ArgumentGroup") -> None:
         "--servo-timing",
         choices=SERVO_TIMINGS,
         default=CORE_2,
-        help="of ESP8266 core 2.x or 3.x, or drawn for each robot (core2)",
+        help="timing of ESP8266 core 2.x or 3.x, or drawn for each robot (core2)",
     )
     add(
         "--flash-dir",

@@ -106,7 +106,7 @@ def main() -> None:
 def _run() -> None:
     parser = command_line.build_parser()
     parser.add_argument("--clock", action="store_true", help="publish /clock: nodes with use_sim_time follow")
-    parser.add_argument("--no-tf", action="store_true", help="leave the odom frames to a localization")
+    parser.add_argument("--no-tf", action="store_true", help="leave transforms to odom frames to localization")
     parser.add_argument("--driver", metavar="NODE", help="connect once this driver, of the same ROS master, reports")
     options = command_line.parse_options(parser, rospy.myargv(sys.argv)[1:])
     check_environment()

@@ -58,7 +58,7 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     text = "squares for the floor, e.g. 100-103"
     parser.add_argument("--references", type=_read_ids, default=(), metavar="IDS", help=text)
     parser.add_argument(
-        "--family", default="36h11", help="of tags: 36h11 (default), or 16h5 as the stock suite has"
+        "--family", default="36h11", help="family of the tags: 36h11 (default), or 16h5 as in the stock suite"
     )
     text = "side of the black square on robots, mm (%(default)g)"
     parser.add_argument("--size", type=float, default=1e3 * DEFAULT_SIZE_M, metavar="MM", help=text)

@@ -239,19 +239,19 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     add("--count", type=int, default=1, metavar="N", help="number of robots (%(default)s)")
     add("--first-id", type=int, default=0, metavar="K", help="id of the first robot (%(default)s)")
     add("--arena", metavar="FILE", help="the simulator's arena")
-    add("--width", type=int, default=1920, metavar="PX", help="of the images, 16:9 (%(default)s)")
+    add("--width", type=int, default=1920, metavar="PX", help="width of the images, 16:9 (%(default)s)")
     add("--rate", type=float, default=30.0, metavar="HZ", help="images per second (%(default)s)")
-    add("--delay", type=float, default=0.07, metavar="S", help="from capture to arrival (%(default)s)")
+    add("--delay", type=float, default=0.07, metavar="S", help="delay from capture to arrival (%(default)s)")
     add("--exposure", type=float, default=0.008, metavar="S", help="exposure time (%(default)s)")
     add("--stamps", choices=("capture", "arrival"), default="capture", help="timestamp source (%(default)s)")
-    add("--family", choices=sorted(FAMILIES), default="36h11", help="of the tags (%(default)s)")
+    add("--family", choices=sorted(FAMILIES), default="36h11", help="family of the tags (%(default)s)")
     add("--tag-size", type=float, default=0.04, metavar="M", help="side of the robots' tags (%(default)s)")
     add("--board", action="store_true", help="show the calibration board at changing poses")
     add("--perfect", action="store_true", help="place all tags exactly")
     text = "print the reference tags for the camera file, and exit"
     add("--print-references", action="store_true", help=text)
     add("--write-file", metavar="FILE", help="write a camera file, calibrated without error")
-    add("--seed", type=int, default=0, help="of noise, dropped images and places of tags (%(default)s)")
+    add("--seed", type=int, default=0, help="seed of noise, dropped images and tag placement (%(default)s)")
     options = parser.parse_args(arguments)
     limits = {
         "count": (1, 500),

@@ -29,7 +29,7 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="report", description="Medians, intervals and plots of an experiment."
     )
-    parser.add_argument("folder", metavar="FOLDER", help="the results of run")
+    parser.add_argument("folder", metavar="FOLDER", help="folder with the results of run")
     return parser.parse_args(arguments)
 
 

@@ -61,10 +61,10 @@ def _whole(low: int, high: int) -> Callable[[str], int]:
 def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(prog="run", description="Run an experiment: all seeds of all cells.")
-    parser.add_argument("file", metavar="EXPERIMENT.yaml", help="what to run")
-    parser.add_argument("--out", metavar="FOLDER", help="of the results (the file's name without .yaml)")
+    parser.add_argument("file", metavar="EXPERIMENT.yaml", help="experiment file")
+    parser.add_argument("--out", metavar="FOLDER", help="folder of the results (the file's name without .yaml)")
     parser.add_argument(
-        "--jobs", type=_whole(1, 1024), default=os.cpu_count() or 1, help="processes (%(default)s)"
+        "--jobs", type=_whole(1, 1024), default=os.cpu_count() or 1, help="worker processes (%(default)s)"
     )
     parser.add_argument(
         "--batch", type=_whole(1, MAX_BATCH), help="runs that are computed together (1 to 5 s of work)"
