@@ -214,7 +214,7 @@ def locate(camera: Camera, tags: Sequence[TagCorners], layout: TagLayout) -> Sig
 def _find_base(tag: TagPose, mount: MountedTag, size_share: float) -> Sighting:
     pose = transform_pose(tag.pose, invert_pose(Pose(mount.x_m, mount.y_m, mount.yaw_rad)))
     # A wrong heading moves the robot's center round the tag's.
-    lever = np.eye(3)
-    lever[0, 2], lever[1, 2] = tag.pose.y_m - pose.y_m, pose.x_m - tag.pose.x_m
+    jacobian = np.eye(3)
+    jacobian[0, 2], jacobian[1, 2] = tag.pose.y_m - pose.y_m, pose.x_m - tag.pose.x_m
     pose = pose._replace(yaw_rad=wrap_angle(pose.yaw_rad))
-    return Sighting(tag.tag_id, pose, lever @ tag.covariance @ lever.T, size_share)
+    return Sighting(tag.tag_id, pose, jacobian @ tag.covariance @ jacobian.T, size_share)
