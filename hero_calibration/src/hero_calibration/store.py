@@ -7,6 +7,7 @@ from contextlib import suppress
 from datetime import date
 from typing import Any, Dict, List, NamedTuple, Tuple
 
+from hero_node.number_checks import is_number
 from hero_node.safe_file import lock_file, write_file
 from hero_node.texts import make_printable
 from hero_node.yaml_edit import replace_values
@@ -116,9 +117,8 @@ def _read_numbers(path: str, key: str, found: Any, allowed: Range) -> List[float
     if not isinstance(found, list) or len(found) != count:
         raise _refuse(path, "%s, not %s" % (text, _shorten(found)))
     for number in found:
-        is_number = isinstance(number, (int, float)) and not isinstance(number, bool)
         is_unknown = key in RESULTS and isinstance(number, float) and math.isnan(number)
-        if not (is_unknown or (is_number and low <= number <= high)):
+        if not is_unknown and not is_number(number, low, high):
             raise _refuse(path, "%s, not %s" % (text, _shorten(number)))
     return [float(number) for number in found]
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any, Dict, Mapping, Optional, Tuple
 
 from hero_node.errors import ProgramError
+from hero_node.number_checks import is_number, is_whole_number
 from hero_node.parameters import (
     Parameter,
     check_parameters,
@@ -51,7 +52,7 @@ def _read_robots(name: str, value: Any) -> Tuple[Address, ...]:
         ):
             raise make_error(name, entry, allowed)
         port = entry.get("port", DEFAULT_PORT)
-        if isinstance(port, bool) or not isinstance(port, int) or not 1 <= port <= 65535 or not entry["host"]:
+        if not is_whole_number(port, 1, 65535) or not entry["host"]:
             raise make_error(name, entry, allowed)
         addresses.append(Address(entry["host"], port))
     if len(set(addresses)) != len(addresses):
@@ -76,9 +77,8 @@ def _read_diagonal(name: str, value: Any) -> Tuple[float, ...]:
     allowed = "a list of 6 numbers that are not negative"
     if not isinstance(value, (list, tuple)) or len(value) != 6:
         raise make_error(name, value, allowed)
-    for entry in value:
-        if isinstance(entry, bool) or not isinstance(entry, (int, float)) or not 0.0 <= entry < float("inf"):
-            raise make_error(name, value, allowed)
+    if not all(is_number(entry, low=0.0) for entry in value):
+        raise make_error(name, value, allowed)
     return tuple(float(entry) for entry in value)
 
 

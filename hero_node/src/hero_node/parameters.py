@@ -9,6 +9,7 @@ import math
 from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 from .errors import ProgramError
+from .number_checks import is_number
 
 __all__ = [
     "Parameter",
@@ -57,8 +58,7 @@ def whole_number(default: int, low: int, high: int, unit: str = "", text: str = 
     """Declare a whole number in low..high."""
 
     def check(name: str, value: Any) -> int:
-        is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
-        if not is_number or not low <= value <= high or value != int(value):
+        if not is_number(value, low, high) or value != int(value):
             raise make_error(name, value, _describe_limits("a whole number", low, high, unit))
         return int(value)
 
@@ -132,7 +132,7 @@ def check_number(name: str, value: Any, low: float, high: float, unit: str = "")
 
     Raises: ProgramError with the name, the value and the range.
     """
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
+    if not is_number(value, low, high):
         raise make_error(name, value, _describe_limits("a number", low, high, unit))
     return float(value)
 

@@ -14,6 +14,7 @@ from typing import Any, Dict, List, Sequence, Tuple
 import numpy as np
 
 from hero_node.errors import ProgramError
+from hero_node.number_checks import is_number, is_whole_number
 from hero_node.texts import shorten
 from hero_node.yaml_text import YamlError, parse_yaml
 
@@ -80,7 +81,7 @@ def _circle(count: int, spacing_m: float) -> List[Point]:
 
 def _grid(count: int, spacing_m: float, formation: Dict[str, Any]) -> List[Point]:
     columns = formation.get("columns", math.ceil(math.sqrt(count)))
-    if isinstance(columns, bool) or not isinstance(columns, int) or columns < 1:
+    if not is_whole_number(columns, low=1):
         raise FormationError("formation: columns is %s, but must be a whole number, 1 or more" % shorten(columns))
     rows = math.ceil(count / columns)
     return [
@@ -111,7 +112,7 @@ def _check_spacing(places: List[Point], least_spacing_m: float) -> None:
 
 
 def _read_number(key: str, value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+    if not is_number(value):
         raise FormationError("formation: %s is %s, but must be a number" % (key, shorten(value)))
     return float(value)
 

@@ -10,6 +10,7 @@ from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional
 import numpy as np
 
 from hero_client.values.geometry import Pose
+from hero_node.number_checks import is_number, is_whole_number
 from hero_node.safe_file import lock_file, write_file
 from hero_node.texts import shorten
 from hero_node.yaml_edit import replace_values
@@ -174,7 +175,7 @@ def _build(content: Mapping[str, Any]) -> Settings:
 
 def _number(content: Mapping[str, Any], key: str, default: float, low: float, high: float) -> float:
     value = content.get(key, default)
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
+    if not is_number(value, low, high):
         raise ValueError("%s is %s, but must be a number from %g to %g" % (key, shorten(value), low, high))
     return float(value)
 
@@ -198,9 +199,9 @@ def _by_tag(content: Mapping[str, Any], key: str, form: str, read: Callable[[Any
 
 
 def _whole_number(value: Any) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or value < 0:
+    if not is_whole_number(value, low=0):
         raise ValueError
-    return value
+    return int(value)
 
 
 def _name(value: Any) -> str:

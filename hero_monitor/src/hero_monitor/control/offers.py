@@ -6,6 +6,7 @@ from typing import Any, Dict, List, NamedTuple, Sequence, Union
 from hero_client.apps.formations import Point, place_formation
 from hero_client.controllers.orca import AvoidanceLaw
 from hero_client.values.robot_constants import MAX_LINEAR_M_S
+from hero_node.number_checks import is_number
 
 from .requests import MAX_GOAL_M, RequestError
 
@@ -35,7 +36,7 @@ class Field(NamedTuple):
             return isinstance(value, bool)
         if self.options:
             return isinstance(value, str) and value in self.options
-        return isinstance(value, (int, float)) and not isinstance(value, bool) and self.low <= value <= self.high
+        return is_number(value, self.low, self.high)
 
 
 class Offer(NamedTuple):

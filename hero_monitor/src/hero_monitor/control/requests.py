@@ -8,6 +8,7 @@ import math
 from typing import Any, Callable, Dict, Union
 
 from hero_client.values.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
+from hero_node.number_checks import is_number
 
 MAX_TEXT_LENGTH = 16000
 """A group of a thousand robots."""
@@ -29,7 +30,7 @@ def _is_name(value: Any) -> bool:
 
 def _is_number(limit: float) -> Callable[[Any], bool]:
     """Return a check for numbers within -limit..limit."""
-    return lambda value: isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= limit
+    return lambda value: is_number(value, -limit, limit)
 
 
 def _is_names(value: Any) -> bool:

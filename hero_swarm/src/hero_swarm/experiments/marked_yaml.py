@@ -8,6 +8,7 @@ from typing import Any, Callable, Collection, Dict, List, NamedTuple, NoReturn, 
 
 import yaml
 
+from hero_node.number_checks import is_number, is_whole_number
 from hero_node.texts import one_line
 from hero_node.yaml_text import MAX_CHARACTERS
 
@@ -51,8 +52,7 @@ class Entry(NamedTuple):
     def number(self, low: float, high: float, unit: str) -> float:
         """Return a number in low..high."""
         value = self.value
-        is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
-        if not is_number or not math.isfinite(value) or not low <= value <= high:
+        if not is_number(value) or not low <= value <= high:
             limits = " from %g to %g" % (low, high) if math.isfinite(high - low) else ""
             self.refuse("a number%s%s" % (limits, " " + unit if unit else ""))
         return float(value)
@@ -60,7 +60,7 @@ class Entry(NamedTuple):
     def whole(self, low: int, high: int) -> int:
         """Return a whole number in low..high."""
         value = self.value
-        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+        if not is_whole_number(value, low, high):
             self.refuse("a whole number from %d to %d" % (low, high))
         return int(value)
 
