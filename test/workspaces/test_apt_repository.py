@@ -70,5 +70,6 @@ def test_apt_finds_the_packages_with_the_key_and_refuses_them_with_another(envir
 
 def test_a_key_that_gpg_does_not_have_is_named_with_the_remedy(environment, tmp_path):
     command = [str(ROOT / "script" / "apt_repository"), str(tmp_path / "repository"), "--key", "nobody@example.org"]
-    result = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=environment)
-    assert result.returncode != 0 and "gpg --list-secret-keys" in result.stdout
+    with pytest.raises(subprocess.CalledProcessError) as refused:
+        run(*command, env=environment)
+    assert "gpg --list-secret-keys" in refused.value.output

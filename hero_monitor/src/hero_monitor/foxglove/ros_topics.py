@@ -1,4 +1,4 @@
-"""The topics that exist, and the bytes of those that clients want; decodes nothing.
+"""The topics that exist, and the bytes of those that clients want; decodes only drivers' reports.
 
 The ROS master is asked in the background, because it may block.
 """
@@ -6,11 +6,13 @@ The ROS master is asked in the background, because it may block.
 import time
 from collections import deque
 from concurrent.futures import Future
-from typing import Deque, Dict, List, Optional, Set
+from io import BytesIO
+from typing import Any, Deque, Dict, List, Optional, Set
 
 import roslib.message
 import rospy
 
+from hero_msgs.msg import RobotArray
 from hero_node.errors import NodeError
 from hero_node.ros.master import ask_master
 
@@ -23,9 +25,9 @@ WAITING_MAX = 20_000
 
 WARN_PERIOD_S = 10.0
 
-DECODED_TYPES = {"hero_msgs/RobotArray"}
-"""Not offered: the monitor subscribes to drivers' reports by type, and rospy gives all subscribers of a topic in one
-process the class of the first. As bytes they would be lost to STOP ALL."""
+DECODED = {RobotArray._type: RobotArray}
+"""Written again as they were: the monitor subscribes to drivers' reports, and rospy gives all subscribers of a topic in
+one process the class of the first. As bytes they would be lost to STOP ALL."""
 
 
 class RosTopics:
@@ -57,8 +59,6 @@ class RosTopics:
             return  # the known ones remain: their publishers go on without a master
         types: Dict[str, TopicType] = {}
         for topic, type_name in published:
-            if type_name in DECODED_TYPES:
-                continue
             message_class = roslib.message.get_message_class(type_name)
             if message_class is None:
                 self._background.warn("%s: %s is not built here: not offered" % (topic, type_name), WARN_PERIOD_S)
@@ -80,15 +80,24 @@ class RosTopics:
         for topic in set(self._subscribers) - topics:
             self._subscribers.pop(topic).unregister()
         for topic in topics - set(self._subscribers):
-            self._subscribers[topic] = rospy.Subscriber(topic, rospy.AnyMsg, self._keep, topic, queue_size=100)
+            known = self._types.get(topic)
+            message_class = rospy.AnyMsg if known is None else DECODED.get(known.name, rospy.AnyMsg)
+            self._subscribers[topic] = rospy.Subscriber(topic, message_class, self._keep, topic, queue_size=100)
 
-    def _keep(self, message: rospy.AnyMsg, topic: str) -> None:
+    def _keep(self, message: Any, topic: str) -> None:
         header = message._connection_header
+        content = message._buff if isinstance(message, rospy.AnyMsg) else _write(message)
         # Bytes of another definition than the one offered would be shown as wrong numbers.
         if header["md5sum"] == self._md5.get(topic):
             latched_by = header["callerid"] if header.get("latching") == "1" else ""
-            self._messages.append(TopicMessage(topic, message._buff, time.time_ns(), latched_by))
+            self._messages.append(TopicMessage(topic, content, time.time_ns(), latched_by))
 
     def take(self) -> List[TopicMessage]:
         """Return what has arrived since the last call."""
         return [self._messages.popleft() for _ in range(len(self._messages))]
+
+
+def _write(message: Any) -> bytes:
+    buffer = BytesIO()
+    message.serialize(buffer)
+    return buffer.getvalue()
