@@ -1,6 +1,5 @@
-"""Prints the unit tests of a package that, with all of ours that they import, use a library that ROS Noetic has older.
+"""Prints the unit tests that, with all of ours that they import, use a library that ROS Noetic has older.
 
-Usage: library_tests.py PACKAGE
 What uses none runs there as in the stage unit: ROS is the same, and mypy knows the standard library of Python 3.8.
 """
 
@@ -26,12 +25,12 @@ def uses_library(path, modules, seen):
 
 def main():
     """Run from the command line."""
-    tests = ROOT / sys.argv[1] / "test" / "unit"
-    # A directory of tests is on the path: its modules go by their stem.
-    modules = {**sources.list_source_modules(), **{path.stem: path for path in tests.rglob("*.py")}}
-    for path in sorted(tests.rglob("test_*.py")):
-        if uses_library(path, modules, set()):
-            print(path)
+    for tests in sorted(ROOT.glob("*/test/unit")):
+        # A directory of tests is on the path: its modules go by their stem.
+        modules = {**sources.list_source_modules(), **{path.stem: path for path in tests.rglob("*.py")}}
+        for path in sorted(tests.rglob("test_*.py")):
+            if uses_library(path, modules, set()):
+                print(path)
 
 
 if __name__ == "__main__":

@@ -101,7 +101,7 @@ def build_with_catkin_build():
 
 def build_and_install():
     workspace = new_workspace("install_space")
-    run(f"catkin_make {CMAKE_ARGUMENTS} install", workspace, BUILD_TIMEOUT_S)
+    run(f"catkin_make {CMAKE_ARGUMENTS} -DCATKIN_ENABLE_TESTING=OFF install", workspace, BUILD_TIMEOUT_S)
     for gone in ("src", "build", "devel"):
         shutil.rmtree(str(workspace / gone))
     return Workspace(workspace / "install" / "setup.bash", workspace)
@@ -117,6 +117,10 @@ BUILDERS = {
 def build(mode):
     """Return the workspace of a build mode, built once, in whatever order pytest wants them."""
     return BUILDERS[mode]()
+
+
+INSTALLED = pytest.mark.parametrize("workspace", ["install"], indirect=True)
+"""Modules and launch files of a devel space are those of the sources, which all other tests use."""
 
 
 @pytest.fixture(params=sorted(BUILDERS))
@@ -144,6 +148,7 @@ def test_every_package_is_found_only_in_the_workspace(workspace):
     assert all(path.startswith(str(workspace.directory)) for path in found), found
 
 
+@INSTALLED
 def test_every_module_can_be_imported(workspace):
     modules = []
     for package in PACKAGES:
@@ -157,6 +162,7 @@ def test_every_module_can_be_imported(workspace):
     workspace.run(f"{sys.executable} - <<'END'\n{program}\nEND")
 
 
+@INSTALLED
 def test_every_launch_file_can_be_read(workspace):
     names = " ".join(f"{path.parents[1].name}/{path.name}" for path in LAUNCH_FILES)
     program = textwrap.dedent(
@@ -193,7 +199,7 @@ def test_programs_are_found_and_name_the_python_of_the_build(workspace):
     assert first_lines == [f"#!{sys.executable}"] * len(PROGRAMS)
 
 
-@pytest.mark.parametrize("workspace", ["install"], indirect=True)
+@INSTALLED
 def test_a_program_answers_whatever_python3_is_first(workspace):
     # As with pyenv or conda: the first python3 on PATH is another one, without rospy.
     other = workspace.directory / "other_python"
@@ -203,7 +209,7 @@ def test_a_program_answers_whatever_python3_is_first(workspace):
     assert workspace.run(f"PATH={other}:$PATH {find_programs(workspace)[0]} --help").startswith("usage: ")
 
 
-@pytest.mark.parametrize("workspace", ["install"], indirect=True)
+@INSTALLED
 def test_programs_answer_help_without_a_master(workspace):
     answers = workspace.run(
         f"ROS_MASTER_URI=http://localhost:1 {sys.executable} {ASK_PROGRAMS} {' '.join(find_programs(workspace))}"
@@ -217,7 +223,7 @@ def test_programs_answer_help_without_a_master(workspace):
         assert errors.splitlines()[-1].startswith(f"{Path(program).name}: error: "), f"{program}: {errors}"
 
 
-@pytest.mark.parametrize("workspace", ["install"], indirect=True)
+@INSTALLED
 def test_a_package_with_messages_and_programs_builds_on_what_is_installed(workspace):
     overlay = workspace.directory / "overlay"
     shutil.copytree(str(ROOT / "hero_sim"), str(overlay / "src" / "hero_sim"))
@@ -225,7 +231,7 @@ def test_a_package_with_messages_and_programs_builds_on_what_is_installed(worksp
     assert os.access(str(overlay / "devel" / "lib" / "hero_sim" / "hero_sim"), os.X_OK)
 
 
-@pytest.mark.parametrize("workspace", ["install"], indirect=True)
+@INSTALLED
 def test_a_module_that_is_not_installed_is_named_in_one_line(workspace):
     missing = workspace.directory / "missing"
     missing.mkdir()

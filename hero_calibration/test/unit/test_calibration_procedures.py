@@ -128,6 +128,7 @@ class TestAccuracy:
         session.settle()
         return np.abs(np.array(speeds_m_s) / STEP_M_S - 1.0).mean(axis=(0, 2))
 
+    @pytest.mark.slow
     def test_ranges_are_right_to_3_mm_and_constants_to_4_percent(self, seed):
         session = make_session(count=16, seed=seed, at_wall=True)
         results = place_and(calibrate_infrared, session, at_wall=True)

@@ -58,6 +58,7 @@ def measure_drift(session, wheels_m):
     return np.array(drifts)
 
 
+@pytest.mark.slow
 def test_calibrated_wheels_drift_a_third_as_far_on_other_paths(session):
     watch(session)
     results = calibrate_wheels(session)
@@ -68,6 +69,7 @@ def test_calibrated_wheels_drift_a_third_as_far_on_other_paths(session):
     assert all(result.after < 1.5 < result.before for result in results.values())
 
 
+@pytest.mark.slow
 def test_a_tape_measure_finds_the_wheels_too(session):
     wheels_m = {}
 

@@ -10,6 +10,7 @@ import pytest
 import hero_client
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("statement", ["Robot(0)", "Swarm([0, 1])", "Swarm.discover()"])
 def test_a_plain_script_without_a_master_ends_with_one_line(monkeypatch, statement):
     monkeypatch.setenv("ROS_MASTER_URI", "localhost")

@@ -68,6 +68,7 @@ def calibrate(views):
     return calibrate_lens(views, OPTIONS.width_px, OPTIONS.height_px, BOARD)
 
 
+@pytest.mark.slow
 def test_lens_is_found_from_rendered_pictures(views):
     found = calibrate(views)
     assert found.problems == []

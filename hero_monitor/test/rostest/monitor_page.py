@@ -75,8 +75,8 @@ class MonitorPage:
     def hold_release(self):
         """Hold Release until robots are released; it does nothing for a while after a stop."""
         wait_for(lambda: not self.run("return document.querySelector('#release.inert')"), "the end of the delay")
-        self.actions().click_and_hold(self.find("#release")).perform()
-        wait_for(lambda: self.run("return document.getElementById('release_bar').hidden"), "the release")
+        is_released = "return document.getElementById('release_bar').hidden"
+        self._hold(self.find("#release"), "#release.holding", lambda: self.run(is_released), "the release")
         self.actions().release().perform()
 
     def choose(self, robot):
@@ -86,13 +86,22 @@ class MonitorPage:
 
     def hold(self, direction, condition, what):
         """Hold a button of the pad until a condition is true; again where a busy PC has ended the hold."""
-        button = self.find("#pad [aria-label='%s']" % direction)
+        self._hold(self.find("#pad [aria-label='%s']" % direction), "#pad .down", condition, what)
+
+    def _hold(self, button, held, condition, what):
+        """Hold a button, which the selector `held` finds meanwhile, until a condition is true; again where it ended."""
+
+        def press():
+            self.actions().release().click_and_hold(button).perform()
 
         def is_true():
-            if not self.run("return !!document.querySelector('#pad .down')"):
-                self.actions().release().click_and_hold(button).perform()
-            return condition()
+            if condition():
+                return True
+            if not self.run("return !!document.querySelector('%s')" % held):
+                press()
+            return False
 
+        press()
         wait_for(is_true, what)
 
     def wait_for_text(self, selector, text):

@@ -144,6 +144,7 @@ def test_a_pushed_body_pushes_others_and_their_friction_adds_up():
     assert push_row(3) == [0.0, 0.1, 0.2]  # 1.05 times its traction
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_in_a_pile_nothing_overlaps_or_outruns_its_pushers(seed):
     rng = random.Random(seed)

@@ -144,6 +144,7 @@ def request_when_ready(server, count):
     server.run_until(lambda: all(peer.count(ids.ID_ODOM) > 3 for peer in server.peers))
 
 
+@pytest.mark.slow
 def test_robots_connect_declare_stream_and_drive(simulate, server):
     simulate("--count", "3", "--first-id", "5", "--port", str(server.port))
     request_when_ready(server, 3)

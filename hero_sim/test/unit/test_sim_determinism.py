@@ -63,6 +63,7 @@ def test_a_world_gives_the_same_bytes_on_every_machine():
     assert meetings > 100
 
 
+@pytest.mark.slow
 def test_a_world_in_a_batch_gives_the_same_bytes_as_alone():
     seeds = (3, 7, 5)
     together, meetings = drive(*seeds, steps=1000)

@@ -126,6 +126,7 @@ def test_a_goal_behind_a_wall_is_an_error_that_tells_of_the_wall(seed):
         robot.forward(0.3)
 
 
+@pytest.mark.slow
 def test_a_robot_told_to_avoid_drives_around_what_stops_it_else(tmp_path):
     path = tmp_path / "post.yaml"
     path.write_text(POST)

@@ -78,6 +78,7 @@ def test_a_program_for_a_robot_runs_unchanged_in_process(seed):
     assert swarm[0].light == (0.0, 0.0, 0.0)
 
 
+@pytest.mark.slow
 def test_over_wifi_data_are_older_and_motions_still_reach_their_goals():
     swarm = StepSwarm(1, wifi="hotspot", worlds=10)
     log = swarm.log()

@@ -161,6 +161,7 @@ def test_wifi_delays_readings_but_changes_none_of_them():
         assert received == readings[0][row][: len(received)] and len(received) > 450
 
 
+@pytest.mark.slow
 def test_wifi_gaps_are_those_of_the_profile():
     robots, times_ms = RobotRows(build_world(3, 0), build_radios("hotspot", 3)), [[], [], []]
     robots.on_cycle.append(lambda rows: [times_ms[row].append(robots.now_ms) for row in rows.tolist()])
@@ -170,6 +171,7 @@ def test_wifi_gaps_are_those_of_the_profile():
     assert p50 == 34 and 43 <= p95 <= 50 and 50 <= p99 <= 70 and 400 <= longest <= 1300
 
 
+@pytest.mark.slow
 def test_a_stop_is_sent_through_wifi_that_stalls_and_motion_behind_it():
     robots = RobotRows(build_world(1, 0, scale=0.0), build_radios("bad", 1))
     moved = []

@@ -51,6 +51,7 @@ def finished(tmp_path_factory):
     return run(write(tmp_path_factory.mktemp("finished")))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [["--batch", "1"], ["--batch", "2", "--jobs", "2"]])
 def test_the_table_has_the_same_bytes_for_all_batches_and_jobs(finished, options, tmp_path):
     folder = run(write(tmp_path), *options)
@@ -100,6 +101,7 @@ def test_what_is_recorded_over_time_agrees_with_the_table(finished):
     assert all(np.isfinite(array).all() for array in poses)
 
 
+@pytest.mark.slow
 def test_a_run_ends_when_its_condition_holds_and_others_go_on(tmp_path):
     text = FILE.replace("time_s: 3", "time_s: 3\nuntil: {dispersion_ratio: 2.5}").replace("hz: 2", "hz: 1")
     folder = run(write(tmp_path, text))
