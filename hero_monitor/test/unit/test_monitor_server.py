@@ -1,0 +1,121 @@
+"""What the server answers to requests, without a network."""
+
+import asyncio
+import json
+from unittest import mock
+
+import pytest
+import tornado.httputil
+import tornado.web
+
+from hero_monitor.serving.access import Access
+from hero_monitor.serving.connection_limits import TOKEN_BURST, ConnectionLimits, TokenAttempts
+from hero_monitor.serving.server import (
+    SOCKETS_MAX,
+    FileHandler,
+    LoginHandler,
+    PageSocket,
+    PictureHandler,
+    choose_served,
+)
+
+TOKEN = "a secret of more than sixteen letters"
+OURS = {"Origin": "http://localhost"}
+ASKS_TO_UPGRADE = 426
+"""The answer to one that is let in, because it names no version of the protocol."""
+
+
+def ask(handler_class, *arguments, headers=(), host="localhost", token=None, method="GET", body=b"", **values):
+    """Return status, headers and text of the answer to a request."""
+    connection = mock.Mock()
+    all_headers = tornado.httputil.HTTPHeaders({"Host": host, **dict(headers)})
+    request = tornado.httputil.HTTPServerRequest(
+        method=method, uri="/", host=host, headers=all_headers, body=body, connection=connection
+    )
+    request.remote_ip = "192.168.1.7"
+    application = tornado.web.Application(cookie_secret="secret")
+    handler = handler_class(application, request, access=Access(token, []), limits=ConnectionLimits(400), **values)
+
+    async def execute():
+        await handler._execute([], *arguments)
+
+    asyncio.run(execute())
+    (start_line, answered, text), _ = connection.write_headers.call_args
+    return start_line.code, answered, (text or b"").decode()
+
+
+def ask_for_socket(pages=0, headers=OURS, **options):
+    headers = {"Upgrade": "websocket", "Connection": "Upgrade", **headers}
+    return ask(PageSocket, headers=headers, actions=None, pages=[None] * pages, **options)
+
+
+@pytest.mark.parametrize("pages", [SOCKETS_MAX, SOCKETS_MAX + 1])
+def test_a_page_beyond_the_limit_is_told_how_to_stop_all_robots(pages):
+    status, _, text = ask_for_socket(pages)
+    assert status == 503
+    assert text == "too many pages are open; to stop all robots: rosservice call /hero_driver/stop true\n"
+    assert ask_for_socket(SOCKETS_MAX - 1)[0] == ASKS_TO_UPGRADE
+
+
+def test_only_our_own_page_may_open_a_socket():
+    assert ask_for_socket()[0] == ASKS_TO_UPGRADE
+    assert ask_for_socket(token=TOKEN)[0] == 403
+    assert ask_for_socket(headers={})[0] == 403
+    assert ask_for_socket(headers={"Origin": "http://evil.example"})[0] == 403
+    status, _, text = ask_for_socket(host="evil.example")
+    assert status == 421
+    assert "host_names" in text
+
+
+def test_every_answer_keeps_foreign_content_out():
+    answers = [ask(FileHandler, "style.css"), ask(FileHandler, "../server.py"), ask_for_socket(SOCKETS_MAX)]
+    for status, headers, _ in answers:
+        assert status in (200, 404, 503)
+        assert headers["Content-Security-Policy"].startswith("default-src 'none'; script-src 'self';")
+        assert headers["X-Frame-Options"] == "DENY"
+        assert headers["X-Content-Type-Options"] == "nosniff"
+        assert headers["Cache-Control"] == "no-store"
+        assert "Server" not in headers
+
+
+def test_files_are_sent_with_their_types_and_no_others():
+    for name, kind in [("main.js", "text/javascript"), ("icon.svg", "image/svg+xml"), ("style.css", "text/css")]:
+        status, headers, text = ask(FileHandler, name)
+        assert (status, headers["Content-Type"]) == (200, kind + "; charset=utf-8")
+        assert text
+    assert ask(FileHandler, "server.py")[0] == 404
+    page, login = ask(FileHandler, "")[2], ask(FileHandler, "", token=TOKEN)[2]
+    assert 'id="stop"' in page
+    assert 'id="stop"' not in login
+
+
+def test_the_picture_is_for_those_who_are_logged_in():
+    actions = mock.Mock(read_picture=lambda: b"jpeg")
+    assert ask(PictureHandler, actions=actions)[::2] == (200, "jpeg")
+    assert ask(PictureHandler, actions=actions, token=TOKEN)[0] == 403
+    assert ask(PictureHandler, actions=mock.Mock(read_picture=lambda: b""))[0] == 404
+
+
+@pytest.mark.parametrize("body", ["{", "[]", "{}", '{"token": 1}', '{"token": "wrong"}', "[" * 100000])
+def test_wrong_tokens_are_refused_and_counted(body):
+    attempts = TokenAttempts()
+
+    def log_in(body):
+        return ask(LoginHandler, headers=OURS, method="POST", body=body.encode(), token=TOKEN, attempts=attempts)
+
+    right = json.dumps({"token": TOKEN})
+    status, headers, _ = log_in(right)
+    assert status == 204
+    assert "HttpOnly" in headers["Set-Cookie"]
+    assert "SameSite=Strict" in headers["Set-Cookie"]
+    assert [log_in(body)[0] for _ in range(TOKEN_BURST)] == [403] * TOKEN_BURST
+    status, headers, text = log_in(right)
+    assert status == 429
+    assert "Set-Cookie" not in headers
+    assert "wait 5 s" in text
+
+
+def test_pages_that_can_be_seen_are_served_first():
+    pages = [mock.Mock(is_idle=number < 3) for number in range(40)]
+    assert choose_served(pages) == pages[3:33]
+    assert choose_served(pages[:10]) == [*pages[3:10], *pages[:3]]
