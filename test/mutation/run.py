@@ -18,6 +18,7 @@ import importlib.machinery
 import json
 import os
 import random
+import re
 import resource
 import signal
 import sys
@@ -219,10 +220,11 @@ def kill_session(child):
         os.killpg(child, signal.SIGKILL)
 
 
-def read_equivalent():
-    """Return the keys of the changes that change no behavior, each with a reason behind a tab."""
-    lines = EQUIVALENT.read_text(encoding="utf-8").splitlines()
-    return {line.partition("\t")[0] for line in lines if line and not line.startswith("#")}
+def compile_equivalent():
+    """Return a pattern of the keys of all changes that change no behavior, each with a reason behind a tab."""
+    lines = [line for line in EQUIVALENT.read_text(encoding="utf-8").splitlines() if line and not line.startswith("#")]
+    keys = [line.partition("\t")[0] for line in lines]
+    return re.compile("|".join(key[1:] if key.startswith("/") else re.escape(key) for key in keys) or "(?!)")
 
 
 def read_verdicts(path, tests_hash, hashes):
@@ -244,8 +246,8 @@ def try_package(package, work_dir, sample, seed):
     for name in reached["imported"]:
         with contextlib.suppress(Exception):  # only saves the children time
             importlib.import_module(name)
-    equivalent = read_equivalent()
-    mutants = [mutant for mutant in list_mutants(paths, reached) if mutant.key not in equivalent]
+    equivalent = compile_equivalent()
+    mutants = [mutant for mutant in list_mutants(paths, reached) if not equivalent.fullmatch(mutant.key)]
     chosen = random.Random(seed).sample(mutants, min(sample or len(mutants), len(mutants)))
     hashes = {path: hash_files([path]) for path in paths}
     verdicts = read_verdicts(state / "verdicts.jsonl", reached["hash"], set(hashes.values()))

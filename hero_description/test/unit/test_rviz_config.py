@@ -1,5 +1,9 @@
 """What the configuration of RViz displays, and which robots it takes."""
 
+import re
+from colorsys import hls_to_rgb
+from pathlib import Path
+
 import pytest
 import yaml
 
@@ -33,6 +37,37 @@ def test_rviz_displays_robots_arena_and_lights():
     for topic in ("/hero_sim/arena", "/hero_sim/object_markers"):
         assert ("rviz/MarkerArray", topic) in shown
     assert ("rviz/MarkerArray", "/hero_lights") in shown
+
+
+def list_switches(displays):
+    """Return which displays, also of those in groups, are enabled, by name."""
+    switches = {}
+    for display in displays:
+        assert display["Name"] not in switches
+        switches[display["Name"]] = display["Enabled"]
+        switches.update(list_switches(display.get("Displays", [])))
+    return switches
+
+
+@pytest.mark.parametrize("view", ["orbit", "above", "map"])
+def test_displays_are_enabled_and_named_after_what_they_show(view):
+    config = yaml.safe_load(make_config(["hero_3"], view=view, hero_plus=["hero_3"]))
+    shown = ["hero_3", *("hero_3 " + what for what in ("distance", "path", "proximity", "ground truth"))]
+    shown += ["Grid", "arena (simulated)", "names, rings, lights", "selected robot", "ground truth (simulated)"]
+    switches = list_switches(config["Visualization Manager"]["Displays"])
+    localization = {name: switches.pop(name) for name in ("localization", "occupancy grid", "hero_3 pose")}
+    assert switches == dict.fromkeys(shown, True)
+    assert localization == {"localization": view == "map", "occupancy grid": True, "hero_3 pose": True}
+
+
+def test_robots_have_the_hues_of_the_monitor():
+    script = Path(__file__).resolve().parents[3] / "hero_monitor" / "src" / "hero_monitor" / "web" / "map" / "colors.js"
+    text = script.read_text(encoding="utf-8")
+    step, start = map(float, re.search(r"id \* ([\d.]+) \+ ([\d.]+)", text).groups())
+    saturation, lightness = (float(number) / 100 for number in re.search(r"(\d+)% \$.*: (\d+)}%", text).groups())
+    for robot_id in (0, 1, 7, 250):
+        hue = (step * robot_id + start) % 360.0
+        assert color_of(robot_id) == pytest.approx(hls_to_rgb(hue / 360.0, lightness, saturation))
 
 
 def test_robots_have_their_names_and_rings_in_the_color_of_their_paths():
@@ -78,7 +113,19 @@ def test_rviz_has_tools_to_choose_a_robot_and_send_it_a_goal():
 
 def test_the_view_above_looks_straight_down():
     config = yaml.safe_load(make_config(["hero_0"], "world", "above"))
-    assert config["Visualization Manager"]["Views"]["Current"]["Class"] == "rviz/TopDownOrtho"
+    view = config["Visualization Manager"]["Views"]["Current"]
+    assert view["Class"] == "rviz/TopDownOrtho"
+    assert (view["X"], view["Y"], view["Angle"]) == (0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("view", ["orbit", "close"])
+def test_other_views_look_down_on_the_middle_of_the_world(view):
+    manager = yaml.safe_load(make_config(["hero_0"], view=view))["Visualization Manager"]
+    camera = manager["Views"]["Current"]
+    assert manager["Global Options"]["Fixed Frame"] == "world"
+    assert camera["Class"] == "rviz/Orbit"
+    assert (camera["Focal Point"]["X"], camera["Focal Point"]["Y"]) == (0.0, 0.0)
+    assert 0.3 < camera["Pitch"] < 1.2
 
 
 @pytest.mark.parametrize("value", ["all", "1 x", "", "3-1"])
