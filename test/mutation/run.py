@@ -120,9 +120,9 @@ def fork(act):
         os._exit(code)
 
 
-def run_pytest(package, *plugins, options=()):
-    """Run the unit tests of a package in this process; return pytest's exit code."""
-    arguments = ["-q", "-p", "no:cacheprovider", f"--rootdir={ROOT}", str(ROOT / package / "test" / "unit")]
+def run_pytest(paths, *plugins, options=()):
+    """Run these tests in this process; return pytest's exit code."""
+    arguments = ["-q", "-p", "no:cacheprovider", f"--rootdir={ROOT}", *map(str, paths)]
     return int(pytest.main([*arguments, *options], plugins=list(plugins)))
 
 
@@ -137,7 +137,7 @@ def find_reached_lines(package, paths, state):
 
     def measure():
         plugin = ReachedLines(map(str, paths))
-        code = run_pytest(package, plugin)
+        code = run_pytest([ROOT / package / "test" / "unit"], plugin)
         imported = [
             name
             for name, module in sys.modules.items()
@@ -182,7 +182,7 @@ def list_mutants(paths, reached):
     return mutants
 
 
-def try_mutant(package, mutant):
+def try_mutant(mutant):
     """Run the tests with the change; return pytest's exit code. In a process of its own."""
     limit_s = int(CPU_LIMIT_FACTOR * mutant.seconds) + CPU_LIMIT_LEAST_S
     resource.setrlimit(resource.RLIMIT_CPU, (limit_s, limit_s))
@@ -191,10 +191,11 @@ def try_mutant(package, mutant):
     tree = ast.parse(mutant.path.read_text(encoding="utf-8"))
     list_mutations(tree)[mutant.index].apply()
     sys.meta_path.insert(0, MutatingFinder(mutant.path, ast.fix_missing_locations(tree)))
-    return run_pytest(package, Chosen(mutant.tests), options=("-x",))
+    files = sorted({ROOT / test.partition("::")[0] for test in mutant.tests})
+    return run_pytest(files, Chosen(mutant.tests), options=("-x",))
 
 
-def try_all(package, mutants, note):
+def try_all(mutants, note):
     """Try the mutants, as many at once as there are cores; note(mutant, verdict) each."""
     waiting, running = list(reversed(mutants)), {}
     try:
@@ -204,7 +205,7 @@ def try_all(package, mutants, note):
                 if not mutant.tests:
                     note(mutant, NOT_REACHED)
                     continue
-                running[fork(lambda mutant=mutant: try_mutant(package, mutant))] = mutant
+                running[fork(lambda mutant=mutant: try_mutant(mutant))] = mutant
             if running:
                 child, status = os.wait()
                 kill_session(child)
@@ -259,7 +260,7 @@ def try_package(package, work_dir, sample, seed):
             kept.write(json.dumps(row) + "\n")
             kept.flush()
 
-        try_all(package, [mutant for mutant in chosen if mutant.key not in verdicts], note)
+        try_all([mutant for mutant in chosen if mutant.key not in verdicts], note)
     return len(mutants), [(mutant, verdicts[mutant.key]) for mutant in chosen]
 
 

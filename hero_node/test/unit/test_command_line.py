@@ -6,6 +6,8 @@ import sys
 
 import pytest
 
+from hero_node import command_line
+
 HEADER = "import sys; from hero_node import command_line\n"
 FEW, MANY = "print('text')", "print('text' * 100000)"
 TO_ITS_END = "def main():\n    for _ in range(100): command_line.say('text')\n    print('end', file=sys.stderr)\n"
@@ -91,3 +93,72 @@ def test_an_end_in_between_keeps_its_exit_status(end, status):
 
 def test_names_that_are_no_text_are_printed_all_the_same():
     assert run_python(r"command_line.run(lambda: print('\udcff'))") == (0, "")
+
+
+def raise_error(error):
+    raise error
+
+
+@pytest.mark.parametrize(
+    "main, status, errors",
+    [
+        (lambda: None, 0, ""),
+        (lambda: 3, 3, ""),
+        (lambda: raise_error(ValueError("a reason")), 1, "a reason"),
+        (lambda: raise_error(KeyboardInterrupt()), 130, ""),
+        (lambda: sys.exit(4), 4, ""),
+        (lambda: sys.exit(), 0, ""),
+        (lambda: sys.exit("a text"), 1, "a text"),
+        (lambda: os.listdir("/no/file"), 1, "/no/file: No such file or directory"),
+        (lambda: raise_error(OSError(5, "Input/output error", "/a/file")), 1, "/a/file: Input/output error"),
+        (lambda: raise_error(OSError("no number")), 1, "no number"),
+        (lambda: raise_error(OSError(28, "No space left on device")), 1, "the output cannot be written: No space left"),
+        (lambda: raise_error(BrokenPipeError(32, "Broken pipe")), 141, ""),
+        (lambda: print("text"), 1, "the output cannot be written: No space left on device"),
+        (lambda: print("text") or 2, 2, "the output cannot be written: No space left on device"),
+        (lambda: command_line.say("text"), 0, "the output cannot be written: No space left on device"),
+    ],
+)
+def test_every_end_has_its_status_and_at_most_one_line(monkeypatch, capsys, main, status, errors):
+    monkeypatch.setattr(sys, "argv", ["/some/folder/program"])
+    with open("/dev/full", "w", encoding="utf-8") as output:
+        monkeypatch.setattr(sys, "stdout", output)
+        assert command_line.call(main, ValueError) == status
+    told = capsys.readouterr().err
+    assert told.startswith("program: " + errors) if errors else not told
+    assert told.count("\n") == bool(errors)
+
+
+@pytest.mark.parametrize("program, name", [("/a/tool", "tool"), ("/a/hero_sim/__main__.py", "hero_sim")])
+def test_errors_begin_with_the_name_of_the_program(monkeypatch, capsys, program, name):
+    monkeypatch.setattr(sys, "argv", [program])
+    command_line.print_error("a reason")
+    assert capsys.readouterr().err == name + ": a reason\n"
+
+
+def test_what_is_said_is_written_at_once(monkeypatch, tmp_path):
+    with open(str(tmp_path / "output"), "w", encoding="utf-8") as output:
+        command_line.say("text", output)
+        command_line.say("more", output, end="")
+        assert (tmp_path / "output").read_text() == "text\nmore"
+    monkeypatch.setattr(sys, "stdout", None)
+    command_line.say("to no one")
+    assert command_line.call(lambda: 0) == 0
+
+
+def test_arguments_that_a_node_does_not_know_end_it(monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["node", "_rate:=3", "topic:=other"])
+    command_line.check_node_arguments("hero_x", "node", "What it does.")
+    for word, status in (("--help", 0), ("word", 2)):
+        monkeypatch.setattr(sys, "argv", ["node", "_rate:=3", word])
+        with pytest.raises(SystemExit) as ended:
+            command_line.check_node_arguments("hero_x", "node", "What it does.")
+        assert ended.value.code == status
+    told = capsys.readouterr()
+    assert "usage: rosrun hero_x node [_PARAMETER:=VALUE ...]" in told.out
+    assert "Parameters and topics: hero_x/README.md" in told.out
+    command_line.check_node_arguments("hero_x", "node", None, ["word"])
+    monkeypatch.setattr(sys, "argv", ["node", "--help"])
+    with pytest.raises(SystemExit):
+        command_line.check_node_arguments("hero_x", "node", None, ["word"])
+    assert "README" not in capsys.readouterr().out

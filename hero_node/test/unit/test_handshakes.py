@@ -64,7 +64,7 @@ def test_a_whole_header_is_served_and_what_follows_is_left_on_the_socket(server)
     client = server.connect(HEADER + b"a request")
     sock, address, header = server.take()
     assert (address, header) == (client.getsockname(), HEADER)
-    assert sock.getblocking()
+    assert sock.gettimeout() is None
     assert sock.recv(100) == b"a request"
 
 
@@ -118,6 +118,13 @@ def test_a_length_that_no_header_has_ends_the_connection_at_once(server, length)
     client = server.connect(struct.pack("<I", length))
     assert is_closed(client)
     assert server.served.empty()
+
+
+def test_the_longest_header_is_served(server):
+    server.open()
+    longest = struct.pack("<I", HEADER_LENGTH_MAX) + bytes(HEADER_LENGTH_MAX)
+    server.connect(longest)
+    assert server.take()[2] == longest
 
 
 def test_one_too_many_closes_the_oldest_of_the_address_with_the_most(server):

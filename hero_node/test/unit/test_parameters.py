@@ -1,10 +1,26 @@
 """Parameters are declared once: checked values, one line for wrong ones, and the documents' table."""
 
+import argparse
+import math
+
 import pytest
 
 from hero_node.errors import ProgramError
 from hero_node.parameter_table import make_table
-from hero_node.parameters import check_parameters, choice, flag, number, robot_ids, whole_number, words
+from hero_node.parameters import (
+    MAX_COORDINATE_M,
+    MAX_ROBOTS_IN_RANGE,
+    check_parameters,
+    choice,
+    flag,
+    number,
+    parse_poses,
+    parse_robot_ids,
+    robot_ids,
+    robot_ids_option,
+    whole_number,
+    words,
+)
 
 DECLARED = {
     "rate_hz": number(10.0, 1.0, 30.0, "Hz", "of updates"),
@@ -50,3 +66,92 @@ def test_a_table_says_what_is_declared():
     assert "| `~port` | `8088` | 0 to 65,535 |  |" in lines
     assert "| `~control` | `false` | true, false | whether pages may drive |" in lines
     assert "| `~view` | `orbit` | `orbit`, `top` |  |" in lines
+
+
+@pytest.mark.parametrize("low, high, unit", [(1.0, 30.0, ""), (-1.0, 1.0, "m")])
+def test_limits_belong_to_what_is_allowed(low, high, unit):
+    for make in (number, whole_number):
+        check = make(low, low, high, unit).check
+        assert (check("x", low), check("x", high)) == (low, high)
+        for value in (low - 1, high + 1, "1", None, True):
+            with pytest.raises(ProgramError, match="~x is .* from %g to %g( m)?$" % (low, high)):
+                check("x", value)
+
+
+def test_declared_values_without_a_check_are_taken_as_they_are():
+    assert check_parameters({"x": None, "y": number(1.0, 0.0, 2.0)}, {"x": "any", "y": 2}) == {"x": "any", "y": 2.0}
+    assert check_parameters({"x": 7}, {}) == {"x": 7}
+    with pytest.raises(ProgramError, match="^unknown parameter ~zzz; known are: x$"):
+        check_parameters({"x": 7}, {"zzz": 1})
+
+
+@pytest.mark.parametrize(
+    "value, ids",
+    [
+        ("all", None),
+        (3, [3]),
+        ("0", [0]),
+        ([4, "2-3"], [4, 2, 3]),
+        ((0, 1), [0, 1]),
+        ("0 1,2", [0, 1, 2]),
+        ("2-2", [2]),
+        ("1-%d" % MAX_ROBOTS_IN_RANGE, list(range(1, MAX_ROBOTS_IN_RANGE + 1))),
+    ],
+)
+def test_robots_are_given_in_many_ways(value, ids):
+    assert parse_robot_ids("robots", value) == ids
+    assert robot_ids_option(value) == ids
+
+
+@pytest.mark.parametrize(
+    "value, reason",
+    [
+        ("", "is empty"),
+        ([], "is empty"),
+        (-1, "holds -1"),
+        ("1-%d" % (MAX_ROBOTS_IN_RANGE + 1), "holds '1-1001'"),
+        ("3-2", "holds '3-2'"),
+        ("1-", "holds '1-'"),
+        ("-1", "holds '-1'"),
+        ("x", "holds 'x'"),
+        (True, "holds True"),
+        (1.5, "holds 1.5"),
+        ("0-2 1", "names robot 1 more than once"),
+    ],
+)
+def test_what_are_no_ids_of_robots_is_named(value, reason):
+    with pytest.raises(ProgramError) as raised:
+        parse_robot_ids("robots", value)
+    assert str(raised.value).startswith("~robots " + reason)
+    with pytest.raises(argparse.ArgumentTypeError, match="^it "):
+        robot_ids_option(value)
+
+
+def test_poses_belong_to_robots_in_their_order():
+    far = "%g -%g" % (MAX_COORDINATE_M, MAX_COORDINATE_M)
+    poses = parse_poses("poses", "0 0.5; 0.3 -1 90;%s;" % far, [4, 2, 0])
+    assert poses == {
+        4: (0.0, 0.5, None), 2: (0.3, -1.0, math.pi / 2.0), 0: (MAX_COORDINATE_M, -MAX_COORDINATE_M, None)
+    }  # fmt: skip
+    assert list(poses) == [4, 2, 0]
+    assert parse_poses("poses", " ; ", None) == {}
+
+
+@pytest.mark.parametrize(
+    "text, ids, reason",
+    [
+        ("0 0", None, "has 1 poses for all robots"),
+        ("0 0; 1 1", [3], "has 2 poses for 1 robots"),
+        ("0 0", [], "has 1 poses for 0 robots"),
+        ("0", [3], "holds '0'"),
+        ("0 0 0 0", [3], "holds '0 0 0 0'"),
+        ("0 x", [3], "holds '0 x'"),
+        ("0 nan", [3], "holds '0 nan'"),
+        ("0 1e7", [3], "holds '0 1e7'"),
+    ],
+)
+def test_what_are_no_poses_is_named_with_the_remedy(text, ids, reason):
+    with pytest.raises(ProgramError) as raised:
+        parse_poses("poses", text, ids)
+    assert str(raised.value).startswith("~poses %s" % reason)
+    assert 'must hold "x y" or "x y heading"' in str(raised.value)
