@@ -53,7 +53,8 @@ def list_switches(displays):
 def test_displays_are_enabled_and_named_after_what_they_show(view):
     config = yaml.safe_load(make_config(["hero_3"], view=view, hero_plus=["hero_3"]))
     shown = ["hero_3", *("hero_3 " + what for what in ("distance", "path", "proximity", "ground truth"))]
-    shown += ["Grid", "arena (simulated)", "names, rings, lights", "selected robot", "ground truth (simulated)"]
+    shown += ["Grid", "names, rings, lights", "selected robot"]
+    shown += [what + " (simulated)" for what in ("arena", "objects", "ground truth")]
     switches = list_switches(config["Visualization Manager"]["Displays"])
     localization = {name: switches.pop(name) for name in ("localization", "occupancy grid", "hero_3 pose")}
     assert switches == dict.fromkeys(shown, True)
