@@ -34,6 +34,7 @@ PUBLISHED = {
     "odom": "nav_msgs/Odometry",
     "odom_raw": "nav_msgs/Odometry",
 }
+OF_HERO_PLUS = {"distance": "std_msgs/Float32", "range": "sensor_msgs/Range"}
 SUBSCRIBED = {
     "led": "std_msgs/ColorRGBA",
     "laser_enable": "std_msgs/Bool",
@@ -77,7 +78,7 @@ class TestDriverTopics(DriverCase):
             if line.startswith("| `/hero_N/"):
                 names, ros_type = line.split("|")[1:3]
                 listed.update(dict.fromkeys(re.findall("`/hero_N/([a-z_/]+)`", names), ros_type.strip()))
-        self.assertEqual(listed, {**PUBLISHED, **SUBSCRIBED, **SERVICES})
+        self.assertEqual(listed, {**PUBLISHED, **OF_HERO_PLUS, **SUBSCRIBED, **SERVICES})
 
     def test_what_a_robot_publishes_arrives_with_its_content(self):
         robot = self.join(2)
