@@ -29,9 +29,10 @@ SERVICES: Dict[str, Tuple[str, Any, Callable[[float], float]]] = {
 class RosProbe(Probe):
     """One robot; times are ROS time."""
 
-    def __init__(self, robot_id: int) -> None:
-        """Connect to the topics of /hero_{robot_id}."""
+    def __init__(self, robot_id: int, stock_ticks: float = 1.0) -> None:
+        """Connect to the topics of /hero_{robot_id}; stock_ticks: ticks of the stock robot in one of this robot's."""
         super().__init__(robot_id)
+        self._stock_ticks = stock_ticks
         self._velocity = self._advertise("velocity_controller/cmd_vel", Twist)
         self._position = self._advertise("position_controller/cmd_vel", Twist)
         self._motors = self._advertise("cmd_motor", Motor)
@@ -49,9 +50,8 @@ class RosProbe(Probe):
 
     def _take_encoder(self, message: Encoder) -> None:
         header = message.header
-        self.receive_encoder(
-            rospy.get_time(), header.stamp.to_sec(), header.seq, message.left_ticks, message.right_ticks
-        )
+        left_ticks, right_ticks = (ticks * self._stock_ticks for ticks in (message.left_ticks, message.right_ticks))
+        self.receive_encoder(rospy.get_time(), header.stamp.to_sec(), header.seq, left_ticks, right_ticks)
 
     def _take_scan(self, message: LaserScan) -> None:
         self.receive_scan(rospy.get_time(), read_signals(message.intensities), read_signals(message.ranges))
