@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:  # for editors and mypy
     from hero_node.clock import Clock
     from hero_node.errors import HeroError, NodeError, ProgramError
+    from hero_node.geometry import Pose, Velocity
     from hero_node.ros.private_parameters import read_parameters
     from hero_node.ros.program import Program, run
     from hero_node.ros.script import rate, start_node
@@ -32,7 +33,6 @@ if TYPE_CHECKING:  # for editors and mypy
         StaleDataError,
         StoppedError,
     )
-    from .values.geometry import Pose, Velocity
     from .values.readings import Obstacle
 
 __all__ = [
@@ -81,7 +81,7 @@ _MODULES = {
     "HeroError": "hero_node.errors",
     "NodeError": "hero_node.errors",
     "Obstacle": "hero_client.values.readings",
-    "Pose": "hero_client.values.geometry",
+    "Pose": "hero_node.geometry",
     "Program": "hero_node.ros.program",
     "ProgramError": "hero_node.errors",
     "Robot": "hero_client.robot",
@@ -91,7 +91,7 @@ _MODULES = {
     "StopStatus": "hero_client.ros.stop_status",
     "StoppedError": "hero_client.values.errors",
     "Swarm": "hero_client.swarm",
-    "Velocity": "hero_client.values.geometry",
+    "Velocity": "hero_node.geometry",
     "open_swarm": "hero_client.swarm",
     "rate": "hero_node.ros.script",
     "read_parameters": "hero_node.ros.private_parameters",
