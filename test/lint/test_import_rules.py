@@ -49,6 +49,7 @@ ROOMS = {
     "hero_recording.formats": {"bags", "errors", "tables"},
     "hero_swarm.behaviors": {"behavior", "steering"},
     "hero_swarm.experiments": {"behavior", "behaviors", "metrics", "trial"},
+    "hero_swarm.learning": {"behavior", "experiments", "metrics"},
     "hero_swarm.metrics": set(),
 }
 PURE_ROOMS = (

@@ -3,7 +3,7 @@
 import sys
 from importlib import import_module
 
-PROGRAMS = {"run": "runner", "report": "report"}
+PROGRAMS = {"run": "experiments.runner", "report": "experiments.report", "show": "show"}
 
 
 def main() -> None:
@@ -12,7 +12,7 @@ def main() -> None:
     if name not in PROGRAMS:
         sys.exit("python3 -m hero_swarm: the first argument must be one of: %s" % ", ".join(PROGRAMS))
     try:
-        program = import_module("hero_swarm.experiments." + PROGRAMS[name])
+        program = import_module("hero_swarm." + PROGRAMS[name])
     except ModuleNotFoundError as error:
         sys.exit("python3 -m hero_swarm %s: %s is missing; install python3-%s" % (name, error.name, error.name))
     program.main(sys.argv[2:])

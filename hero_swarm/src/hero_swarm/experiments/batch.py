@@ -32,6 +32,7 @@ __all__ = [
     "POSES_ENDING",
     "SAMPLE_S",
     "BatchResult",
+    "build_trial",
     "compute_batch",
     "list_sources",
     "load_checked",
@@ -95,6 +96,22 @@ def _load_arena(cell: Cell) -> Arena:
         raise ExperimentError(str(error)) from error
 
 
+def build_trial(experiment: Experiment, cell: Cell, seeds: Sequence[int]) -> Trial:
+    """Return the worlds of a cell with these seeds, at their start."""
+    behavior, arena = find_behavior(experiment.behavior)(**cell.parameters), _load_arena(cell)
+    starts = place_all(experiment.start, arena, cell.settings["robots"], seeds)
+    return Trial(
+        behavior,
+        arena,
+        cell.settings["robots"],
+        seeds,
+        starts=starts,
+        objects=place_objects(cell.settings.get("objects", "arena"), arena, starts, seeds),
+        errors=ERRORS[cell.settings.get("errors", "default")],
+        delay_s=cell.settings.get("delay_s", 0.0),
+    )
+
+
 def compute_batch(
     text: str, cell_index: int, seeds: Sequence[int], stem: str, with_poses: bool
 ) -> BatchResult:
@@ -107,18 +124,7 @@ def compute_batch(
     began_s = time.monotonic()
     experiment = parse_experiment(text, "the experiment", METRICS)
     cell = experiment.cells[cell_index]
-    behavior, arena = find_behavior(experiment.behavior)(**cell.parameters), _load_arena(cell)
-    starts = place_all(experiment.start, arena, cell.settings["robots"], seeds)
-    trial = Trial(
-        behavior,
-        arena,
-        cell.settings["robots"],
-        seeds,
-        starts=starts,
-        objects=place_objects(cell.settings.get("objects", "arena"), arena, starts, seeds),
-        errors=ERRORS[cell.settings.get("errors", "default")],
-        delay_s=cell.settings.get("delay_s", 0.0),
-    )
+    trial = build_trial(experiment, cell, seeds)
     try:
         series, ends = _run(experiment, trial, stem, with_poses)
     except Exception as error:

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from hero_client.values.robot_constants import BODY_RADIUS_M
-from hero_swarm.experiments import report, runner
+from hero_swarm import metrics, show
+from hero_swarm.experiments import batch, report, runner
 from hero_swarm.experiments.batch import METRICS_ENDING, POSES_ENDING
 from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.experiment_file import Start
@@ -252,3 +253,42 @@ def test_a_wrong_option_is_refused_by_name(arguments, capsys):
         runner.parse_options(["e.yaml", *arguments])
     assert caught.value.code == 2
     assert arguments[0] in capsys.readouterr().err
+
+
+def replay(*arguments):
+    show.show_run(show.parse_options(list(map(str, arguments))))
+
+
+def test_a_run_is_replayed_as_a_video_that_ends_as_the_run_did(finished, tmp_path, capsys):
+    image = pytest.importorskip("PIL.Image", reason="writes .gif")
+    replay(finished, "--seed", 13, "--cell", 4, "--video", tmp_path / "run.gif")
+    assert "robots 5, errors default, seed 13" in capsys.readouterr().out
+    assert image.open(str(tmp_path / "run.gif")).n_frames == 30
+    experiment = runner.read_experiment(str(finished / "experiment.yaml"))[1]
+    trial = batch.build_trial(experiment, experiment.cells[3], [13])
+    for _ in trial.run(3.0):
+        pass
+    rows = {(row["robots"], row["errors"], row["seed"]): row for row in read_table(finished)}
+    assert metrics.dispersion(trial.rows.world.poses[None, :, :2])[0] == float(rows["5", "default", "13"]["dispersion"])
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--seed", 10], "--seed 10: the experiment has seeds 11 to 15"),
+        (["--cell", 5], "--cell 5: must be one of 1: robots 3, errors perfect; 2:"),
+        (["--speed", 0], "--speed 0: must be from"),
+        (["--video", "/nowhere/run.gif"], "cannot be written"),
+    ],
+)
+def test_what_cannot_be_shown_is_refused_in_one_line(options, words, finished):
+    with pytest.raises(ExperimentError) as caught:
+        replay(finished, *options)
+    assert words in str(caught.value)
+
+
+def test_a_run_of_other_code_is_shown_with_a_note(finished, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(show, "hash_code", lambda behavior: "0ther")
+    monkeypatch.setattr("hero_swarm.experiments.video.write_video", lambda *arguments: None)
+    replay(finished, "--video", tmp_path / "run.gif")
+    assert "may differ" in capsys.readouterr().err

@@ -1,0 +1,108 @@
+"""Writes one run as a video, seen from above: .gif with Pillow, all others with ffmpeg."""
+
+import os
+from typing import Any, List, Tuple
+
+import numpy as np
+from matplotlib.animation import FFMpegWriter, PillowWriter
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import EllipseCollection, LineCollection
+from matplotlib.figure import Figure
+
+from hero_client.values.robot_constants import BODY_RADIUS_M
+
+from ..trial import OPEN, Trial
+from .errors import ExperimentError
+
+__all__ = ["write_video"]
+
+FRAMES_PER_S = 10
+
+_SIZE_IN, _DPI = 6.0, 100
+_MARGIN_M = 0.2
+
+
+def write_video(trial: Trial, time_s: float, speed: float, path: str) -> None:
+    """Run trial, of one world, for time_s, and write it to path, speed times as fast as it was.
+
+    Raises: ExperimentError if the format needs ffmpeg, or the file cannot be written.
+    """
+    writer: Any = PillowWriter if path.lower().endswith(".gif") else FFMpegWriter
+    if not writer.isAvailable():
+        needed = "python3-pil" if writer is PillowWriter else "ffmpeg, or write a .gif"
+        raise ExperimentError("--video %s: apt install %s" % (path, needed))
+    folder = os.path.dirname(path) or "."
+    if not os.access(folder, os.W_OK):
+        raise ExperimentError("--video %s: the folder cannot be written to" % path)
+    run = trial.run(time_s, speed / FRAMES_PER_S)
+    frames = [(poses[0].copy(), _list_circles(trial), _list_edges(trial)) for _, poses in run]
+    figure = Figure(figsize=(_SIZE_IN, _SIZE_IN))
+    FigureCanvasAgg(figure)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    axes.set_axis_off()
+    low_m, high_m = _find_limits(trial, frames)
+    axes.set_xlim(low_m[0], high_m[0])
+    axes.set_ylim(low_m[1], high_m[1])
+    axes.set_aspect("equal")
+    axes.add_collection(LineCollection(trial.rows.world.arena.segments_m.reshape(-1, 2, 2), colors="0.4", linewidths=2))
+    moving = Film(axes)
+    output = writer(fps=FRAMES_PER_S)
+    with output.saving(figure, path, _DPI):
+        for number, frame in enumerate(frames):
+            moving.show(number * speed / FRAMES_PER_S, *frame)
+            output.grab_frame()
+
+
+def _list_circles(trial: Trial) -> np.ndarray:
+    """Return x y radius of round obstacles and of objects that are discs (C, 3)."""
+    bodies = trial.rows.world.list_objects()
+    discs = [(body.x_m, body.y_m, body.shape.reach_m) for body in bodies if not len(body.corners_m)]
+    return np.vstack((trial.rows.world.arena.circles_m, np.reshape(discs, (-1, 3))))
+
+
+def _list_edges(trial: Trial) -> List[Any]:
+    """Return the outlines of objects with corners."""
+    outlines = (list(body.corners_m) for body in trial.rows.world.list_objects() if len(body.corners_m))
+    return [[*corners_m, corners_m[0]] for corners_m in outlines]
+
+
+def _find_limits(trial: Trial, frames: List[Any]) -> Tuple[np.ndarray, np.ndarray]:
+    """Return the lower left and the upper right corner (m) of what is shown: the arena, or where robots were."""
+    arena = trial.rows.world.arena
+    if arena is not OPEN:
+        return arena.bounds_m[:2] - _MARGIN_M, arena.bounds_m[2:] + _MARGIN_M
+    places_m = np.concatenate([poses[:, :2] for poses, _, _ in frames])
+    return places_m.min(axis=0) - _MARGIN_M, places_m.max(axis=0) + _MARGIN_M
+
+
+class Film:
+    """What moves in the picture."""
+
+    def __init__(self, axes: Any) -> None:
+        """Draw nothing yet."""
+        self._axes = axes
+        self._parts: List[Any] = []
+
+    def show(self, time_s: float, poses: np.ndarray, circles_m: np.ndarray, outlines_m: List[Any]) -> None:
+        """Draw robots, objects and the time in place of what was drawn before."""
+        for part in self._parts:
+            part.remove()
+        places_m, headings = poses[:, :2], np.column_stack((np.cos(poses[:, 2]), np.sin(poses[:, 2])))
+        noses_m = np.stack((places_m, places_m + BODY_RADIUS_M * headings), axis=1)
+        round_m = np.full(len(poses), 2.0 * BODY_RADIUS_M)
+        self._parts = [
+            self._axes.add_collection(collection)
+            for collection in (
+                LineCollection(outlines_m, colors="#c07a2e", linewidths=2),
+                self._make_circles(2.0 * circles_m[:, 2], circles_m[:, :2], "#c07a2e"),
+                self._make_circles(round_m, places_m, "#0072B2"),
+                LineCollection(noses_m, colors="white", linewidths=1),
+            )
+        ]
+        self._parts.append(self._axes.text(0.02, 0.97, "%.1f s" % time_s, transform=self._axes.transAxes, va="top"))
+
+    def _make_circles(self, diameters_m: np.ndarray, places_m: np.ndarray, color: str) -> EllipseCollection:
+        return EllipseCollection(
+            diameters_m, diameters_m, np.zeros(len(diameters_m)), units="x", offsets=places_m,
+            transOffset=self._axes.transData, facecolors=color,
+        )  # fmt: skip

@@ -1,0 +1,30 @@
+"""Publishes one run as the simulator publishes its world: markers of robots, objects and arena, in real time."""
+
+import rospy
+from visualization_msgs.msg import MarkerArray
+
+from hero_client import Program
+from hero_node.geometry import Pose
+from hero_sim.scene_markers import draw_arena, draw_objects, draw_robot
+
+from ..trial import Trial
+
+__all__ = ["replay"]
+
+PERIOD_S = 0.1
+
+
+def replay(trial: Trial, time_s: float, speed: float) -> None:
+    """Run trial, of one world, for time_s, speed times as fast as time passes, or until the program is to end."""
+    with Program("show") as program:
+        arena, objects, robots = (
+            rospy.Publisher("/hero_sim/" + name, MarkerArray, queue_size=2, latch=True)
+            for name in ("arena", "object_markers", "markers")
+        )
+        world = trial.rows.world
+        arena.publish(MarkerArray(draw_arena(world.arena)))
+        for (_, poses), _ in zip(trial.run(time_s, PERIOD_S * speed), program.rate(1.0 / PERIOD_S)):
+            lights = trial.rows.lights.tolist()
+            drawn = [draw_robot(n, "hero_%d" % n, Pose(*pose), lights[n]) for n, pose in enumerate(poses[0].tolist())]
+            robots.publish(MarkerArray([marker for markers in drawn for marker in markers]))
+            objects.publish(MarkerArray(draw_objects(world.list_objects())))

@@ -1,0 +1,75 @@
+"""Program show: replays one run of an experiment in RViz and on the monitor's map, or writes it as a video.
+
+A run is computed again: seed and code give the same bytes, and nothing has to have been recorded.
+"""
+
+import argparse
+import json
+import os
+import sys
+from typing import Optional, Sequence
+
+from hero_node import command_line
+from hero_node.errors import HeroError
+
+from .experiments.batch import build_trial
+from .experiments.code_version import hash_code
+from .experiments.errors import ExperimentError
+from .experiments.experiment_file import Cell, Experiment
+from .experiments.runner import read_experiment
+
+__all__ = ["main", "show_run"]
+
+
+def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
+    """Read the command line."""
+    parser = argparse.ArgumentParser(prog="show", description="Replay one run of an experiment.")
+    parser.add_argument("folder", metavar="FOLDER", help="the results of run")
+    parser.add_argument("--seed", type=int, help="of the run (the first one)")
+    parser.add_argument("--cell", type=int, default=1, metavar="K", help="number of the cell, from 1 (1)")
+    parser.add_argument("--speed", type=float, default=1.0, help="simulated seconds per second (1)")
+    parser.add_argument("--video", metavar="FILE", help="write an .mp4 or .gif instead, without ROS")
+    return parser.parse_args(arguments)
+
+
+def _choose_cell(experiment: Experiment, number: int) -> Cell:
+    if not 1 <= number <= len(experiment.cells):
+        known = "; ".join("%d: %s" % item for item in enumerate((cell.label for cell in experiment.cells), 1))
+        raise ExperimentError("--cell %d: must be one of %s" % (number, known))
+    return experiment.cells[number - 1]
+
+
+def show_run(options: argparse.Namespace) -> None:
+    """Replay the run that options name. Raises: ExperimentError."""
+    file = os.path.join(options.folder, "experiment.yaml")
+    if not os.path.isfile(file):
+        raise ExperimentError("%s: no experiment.yaml in it, so not a folder of run" % options.folder)
+    if not 0.01 <= options.speed <= 100.0:
+        raise ExperimentError("--speed %g: must be from 0.01 to 100" % options.speed)
+    _, experiment = read_experiment(file)
+    cell = _choose_cell(experiment, options.cell)
+    seed = experiment.seeds[0] if options.seed is None else options.seed
+    if seed not in experiment.seeds:
+        raise ExperimentError(
+            "--seed %d: the experiment has seeds %d to %d" % (seed, experiment.seeds[0], experiment.seeds[-1])
+        )
+    with open(os.path.join(options.folder, "about.json"), encoding="utf-8") as about:
+        code = json.load(about)["code"]
+    if code != hash_code(experiment.behavior):
+        print("note: the results are of other code (%s), so this run may differ from theirs" % code, file=sys.stderr)
+    trial = build_trial(experiment, cell, [seed])
+    print("%s, seed %d, %g s" % (cell.label, seed, experiment.time_s))
+    if options.video:
+        from .experiments.video import write_video
+
+        write_video(trial, experiment.time_s, options.speed, options.video)
+        print(options.video)
+    else:
+        from .ros.replay import replay
+
+        replay(trial, experiment.time_s, options.speed)
+
+
+def main(arguments: Optional[Sequence[str]] = None) -> None:
+    """Run the program."""
+    command_line.run(lambda: show_run(parse_options(sys.argv[1:] if arguments is None else arguments)), HeroError)
