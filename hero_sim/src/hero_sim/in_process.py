@@ -9,14 +9,20 @@ import runpy
 import sys
 import time
 from pathlib import Path
-from typing import Any, Iterable, NoReturn, Optional, Sequence
+from typing import Any, Dict, Iterable, Mapping, Optional, Sequence
+
+import yaml
 
 import hero_client
+from hero_client.values.background_motion import Steps
 from hero_client.values.errors import RobotNotReadyError
+from hero_node import command_line
 from hero_node.command_line import call, find_line, say
 from hero_node.errors import HeroError, ProgramError
+from hero_node.parameters import check_parameters
 
 from .stepped.robot import StepRobot
+from .stepped.step_clock import StepMotion
 from .stepped.swarm import StepSwarm, StepWorld
 
 __all__ = ["main"]
@@ -29,8 +35,9 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="seed of differences and noise (%(default)s)")
     parser.add_argument("--arena", metavar="ARENA", help="arena, as for the simulator")
     parser.add_argument("--wifi", default="ideal", help="network, as for the simulator (%(default)s)")
+    parser.add_argument("--seconds", type=float, metavar="S", help="end the script at this simulated time")
     parser.add_argument("--perfect", action="store_true", help="robots without differences and noise")
-    parser.add_argument("script", help="a script that uses Robot, Swarm and rate of hero_client")
+    parser.add_argument("script", help="a script that uses hero_client")
     parser.add_argument("arguments", nargs=argparse.REMAINDER, help="arguments of the script")
     options = parser.parse_args(argv)
     return call(lambda: run_script(options), HeroError)
@@ -42,6 +49,8 @@ def run_script(options: argparse.Namespace) -> None:
         raise ProgramError("%s: no such script" % options.script)
     swarm = StepSwarm(options.count, options.seed, options.arena, options.wifi, options.perfect)
     replace_ros(swarm)
+    if options.seconds is not None:
+        StepMotion(swarm._clock, end_at(options.seconds))
     sys.argv = [options.script, *options.arguments]
     sys.path.insert(0, str(Path(options.script).resolve().parent))
     try:
@@ -51,6 +60,12 @@ def run_script(options: argparse.Namespace) -> None:
     finally:
         places = ["%s at (%.3f, %.3f) m" % (robot.name, *robot.true_pose[:2]) for robot in swarm if robot.driven]
         say("; ".join(["%.1f s simulated" % swarm.now_s, *places]), sys.stderr)
+
+
+def end_at(duration_s: float) -> Steps:
+    """End the script, as a signal would: `with` blocks stop their robots."""
+    yield duration_s
+    raise SystemExit(0)
 
 
 def replace_ros(swarm: StepSwarm) -> None:
@@ -72,15 +87,30 @@ def replace_ros(swarm: StepSwarm) -> None:
             """Return all robots."""
             return swarm
 
-    def refuse(*arguments: Any, **options: Any) -> NoReturn:
-        raise ProgramError("Program needs ROS: in process run scripts that use Robot, Swarm and rate")
+    class SimulatedProgram(StepWorld):
+        """The frame of a program, in the robots' time."""
+
+        running = True
+
+        def __init__(self, name: str, anonymous: bool = False) -> None:
+            super().__init__([], swarm._clock)
+
+    def open_swarm(program: Any, robot_ids: Optional[Sequence[int]], *arguments: Any, **options: Any) -> StepWorld:
+        return swarm if robot_ids is None else SimulatedSwarm(robot_ids)
+
+    def read_parameters(declared: Mapping[str, Any]) -> Dict[str, Any]:
+        words = [word[1:].partition(":=") for word in sys.argv[1:] if word.startswith("_")]
+        return check_parameters(declared, {name: yaml.safe_load(value) for name, _, value in words})
 
     replacements = {
         "Robot": find_robot,
         "Swarm": SimulatedSwarm,
         "rate": swarm.rate,
         "start_node": lambda name="": None,
-        "Program": refuse,
+        "Program": SimulatedProgram,
+        "open_swarm": open_swarm,
+        "read_parameters": read_parameters,
+        "run": lambda main, *errors: command_line.run(main, HeroError, *errors),
     }
     for name, replacement in replacements.items():
         setattr(hero_client, name, replacement)

@@ -24,10 +24,10 @@ with Swarm.discover() as swarm, Swarm([0, 1]) as pair:
 """
 
 
-def run(tmp_path, text, *options):
+def run(tmp_path, text, *options, arguments=("argument",)):
     script = tmp_path / "script.py"
     script.write_text(text)
-    command = [sys.executable, "-m", "hero_sim.in_process", *options, str(script), "argument"]
+    command = [sys.executable, "-m", "hero_sim.in_process", *options, str(script), *arguments]
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
@@ -40,12 +40,41 @@ def test_a_script_for_robots_runs_unchanged_on_stepped_ones(tmp_path):
     assert first.stdout == again.stdout
 
 
+PROGRAM = """
+from hero_client import Program, open_swarm, read_parameters, run
+from hero_node.parameters import number, robot_ids
+
+def drive():
+    with Program("my_program") as program:
+        parameters = read_parameters({"robots": robot_ids("all"), "linear_m_s": number(0.05, 0.0, 0.2, "m/s")})
+        with open_swarm(program, parameters["robots"]) as swarm:
+            for _ in program.rate(10):
+                swarm.drive(parameters["linear_m_s"], 0.0)
+                swarm.report_missing()
+
+run(drive)
+"""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "message"),
+    [
+        ((), 0, "3.2 s simulated; hero_0 at ("),
+        (("_robots:=1", "_linear_m_s:=0.1"), 0, "3.2 s simulated; hero_1 at ("),
+        (("_linear_m_s:=3",), 1, "~linear_m_s is 3, but must be a number from 0 to 0.2 m/s (script.py, line 7)"),
+    ],
+)
+def test_a_program_with_parameters_runs_until_its_time_is_over(tmp_path, arguments, status, message):
+    ended = run(tmp_path, PROGRAM, "--count", "2", "--seconds", "3", arguments=arguments)
+    assert ended.returncode == status, ended.stderr
+    assert message in ended.stderr and "Traceback" not in ended.stderr
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
         ("from hero_client import Robot\nRobot(7)", "script.py: hero_7 is not there: --count 4 simulates fewer"),
         ("from hero_client import Robot\nRobot(7)", "simulates fewer (script.py, line 2)"),
-        ("from hero_client import Program\nProgram('p')", "script.py: Program needs ROS: in process run scripts"),
     ],
 )
 def test_what_simulated_robots_cannot_do_is_one_line(tmp_path, text, message):
