@@ -59,7 +59,8 @@ def find_unit_tests(paths=()):
 def make_workspace_jobs(results_dir):
     """Return one job for each build mode, and one for each other file."""
     parts = [("test_build_modes.py", mode, COMPUTING_LOAD) for mode in ("catkin_build", "install")]
-    parts += [("test_demo.py", "", WAITING_LOAD), ("test_rosinstall.py", "", WAITING_LOAD)]
+    others = {path.name for path in (ROOT / "test" / "workspaces").glob("test_*.py")}
+    parts += [(name, "", WAITING_LOAD) for name in sorted(others - {"test_build_modes.py", "test_core.py"})]
     jobs = [make_core_job(results_dir / "core", "not unit_tests")]  # they have run, with all packages
     environment = {"PATH": run_rostests.make_program_path(results_dir)}
     for file, mode, load in parts:

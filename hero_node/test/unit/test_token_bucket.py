@@ -24,3 +24,12 @@ def test_the_oldest_of_too_many_buckets_is_forgotten():
         assert buckets.take(str(number), 2.0, 0.0)
     assert buckets.count("0", 0.0) == 2.0, "forgotten"
     assert buckets.count("1", 0.0) == 0.0 and buckets.count(str(BUCKETS_MAX), 0.0) == 0.0
+
+
+def test_buckets_that_are_full_again_are_forgotten_before_others():
+    buckets = TokenBuckets(2.0, 1.0)
+    assert buckets.take("empty", 2.0, 0.0)
+    for number in range(1, BUCKETS_MAX):
+        assert buckets.take(str(number), 0.5, 0.0)
+    assert buckets.take("new", 1.0, 1.0)
+    assert buckets.count("empty", 1.0) == 1.0, "it was forgotten though it was not full"

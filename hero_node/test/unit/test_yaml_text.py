@@ -40,3 +40,4 @@ def test_values_are_shown_in_some_words():
     for value in (endless, "x" * 10000, {number: [number] * 100 for number in range(100)}, "\x1b[2J", 10**4000):
         assert len(shorten(value)) < 200 and shorten(value).isprintable()
     assert shorten([1, 2.5, "a"]) == "[1, 2.5, 'a']"
+    assert shorten([[[1]]]) == "[[[...]]]"
