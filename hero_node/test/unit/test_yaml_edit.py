@@ -53,6 +53,18 @@ def test_only_values_that_differ_change_in_the_text(changes, before, after):
     assert replace_values(TEXT, {**CONTENT, **changes}) == TEXT.replace(before, after)
 
 
+def test_values_of_other_lengths_change_side_by_side():
+    text = "a: 1  # first\nb: {c: 1}  # second\nd:\n  e: 1  # third\n  f: 1\n"
+    after = text.replace("a: 1", "a: [1000, 2000]").replace("{c: 1}", "{}").replace("f: 1", "f: 20\n  g: 3")
+    content = {"a": [1000, 2000], "b": {}, "d": {"e": 1, "f": 20, "g": 3}, "h": 1}
+    assert replace_values(text, content) == after + "h: 1\n"
+
+
+def test_a_long_value_stays_in_one_line():
+    content = {"a": [0.123456789] * 100}
+    assert replace_values("a: 1  # mine\n", content) == "a: %r  # mine\n" % content["a"]
+
+
 def test_a_text_of_comments_keeps_them():
     assert replace_values("# mine", {"a": [1, 2]}) == "# mine\na: [1, 2]\n"
 
