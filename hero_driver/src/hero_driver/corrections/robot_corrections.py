@@ -105,9 +105,14 @@ class CorrectionSettings:
     given_plus: AbstractSet[str] = frozenset()
     """Names of robots that are HeRo+ without the Encoder message that tells so."""
 
-    def find_geometry(self, name: str, model: str) -> WheelGeometry:
-        """Return the wheels of the robot called name, which is of this model."""
-        geometry, own = self.geometries[model], self.own_wheels.get(name)
+    def find_model(self, namespace: str, encoder_md5: str) -> str:
+        """Return the model of the robot in namespace, whose Encoder message has this md5."""
+        is_plus = encoder_md5 == PLUS_ENCODER_MD5 or namespace.strip("/") in self.given_plus
+        return HERO_PLUS if is_plus else STOCK
+
+    def find_geometry(self, namespace: str, model: str) -> WheelGeometry:
+        """Return the wheels of the robot in namespace, which is of this model."""
+        geometry, own = self.geometries[model], self.own_wheels.get(namespace.strip("/"))
         if own is None:
             return geometry
         diameter_m, separation_m, ratio, ticks_per_turn = own
@@ -135,9 +140,8 @@ class RobotCorrections:
         self._seqs: DefaultDict[str, Iterator[int]] = collections.defaultdict(itertools.count)
         self.wheels = WheelMotion()
         self._settings = settings
-        self._name = namespace.strip("/")
-        self.model = HERO_PLUS if self._name in settings.given_plus else STOCK
-        self.odometry = TickOdometry(settings.find_geometry(self._name, self.model))
+        self.model = settings.find_model(namespace, "")
+        self.odometry = TickOdometry(settings.find_geometry(namespace, self.model))
         self.transforms = TransformCorrector(
             namespace, self._stamps, add_transform, self._take_odom_transform
         )
@@ -148,7 +152,6 @@ class RobotCorrections:
         self._odom_seqs = self._seqs[self._odom_name]
         self._raw_name = namespace + "/odom_raw"
         self._proximity_name = namespace + "/proximity"
-        self._range_name = namespace + "/range"
         self._odom_sink: Sink = _NoSink()
         self._has_encoder = False
         self._hears_encoder = False
@@ -204,11 +207,10 @@ class RobotCorrections:
 
     def note_encoder(self, md5sum: str) -> None:
         """The robot declares an Encoder message of this md5, which tells its model."""
-        is_plus = md5sum == PLUS_ENCODER_MD5 or self._name in self._settings.given_plus
-        model = HERO_PLUS if is_plus else STOCK
+        model = self._settings.find_model(self._namespace, md5sum)
         if model != self.model:
             self.model = model
-            self.odometry.change_wheels(self._settings.find_geometry(self._name, model))
+            self.odometry.change_wheels(self._settings.find_geometry(self._namespace, model))
 
     def derive_topics(self, name: str, message_type: str) -> Dict[str, str]:
         """Return the topics, with types, that exist besides the one called name."""
@@ -217,7 +219,7 @@ class RobotCorrections:
         if name == self._namespace + "/laser" and message_type == "sensor_msgs/LaserScan":
             return {self._proximity_name: message_type}
         if name == self._namespace + "/distance" and message_type == "std_msgs/Float32":
-            return {self._range_name: "sensor_msgs/Range"}
+            return {self._namespace + "/range": "sensor_msgs/Range"}
         return {}
 
     def handler_for(self, name: str, message_type: str, sinks: Sequence[Sink]) -> Handler:
@@ -273,8 +275,8 @@ class RobotCorrections:
         if not range_sink.is_wanted:
             return
         # The sensor is on the hat, whose place the robot sends on /tf.
-        frame_id = (self._name + "/hat_link").encode()
-        message = message_layouts.make_range(payload, next(self._seqs[self._range_name]), arrival_ns, frame_id)
+        frame_id = (self._namespace.strip("/") + "/hat_link").encode()
+        message = message_layouts.make_range(payload, next(self._seqs["range"]), arrival_ns, frame_id)
         if message is None:
             self._refused += 1
         else:
