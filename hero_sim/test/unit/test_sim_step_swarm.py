@@ -384,6 +384,15 @@ def test_a_dict_of_goals_drives_each_robot_to_its_own():
     swarm.go_to(goals)
     for robot in swarm:
         assert robot.true_pose[:2] == pytest.approx(goals[robot.robot_id], abs=0.03)
+    timeouts_s, read = [], swarm[0].pose_in
+
+    def pose_in(frame, timeout_s=2.0):
+        timeouts_s.append(timeout_s)
+        return read(frame, timeout_s)
+
+    swarm[0].pose_in = pose_in
+    swarm.go_to(goals)
+    assert timeouts_s[0] == 2.0  # at the start of a program, tf and localization take their time
     with pytest.raises(TypeError, match=r"the goal of each robot: \{0: \(0.2, 0.1\)"):
         swarm.go_to(0.2)
 

@@ -155,9 +155,8 @@ class BaseSwarm(Group, Generic[AnyRobot]):
         self, goals: Mapping[int, Tuple[float, float]], frame: str, timeout_s: float, tolerance_m: float
     ) -> Steps:
         yield from wait_for_all(self._members)
-        places = [
-            goals[robot.robot_id] if robot.robot_id in goals else robot.pose_in(frame)[:2] for robot in self.robots
-        ]
+        starts = [robot.pose_in(frame)[:2] for robot in self.robots]  # waits for tf or localization, unlike below
+        places = [goals.get(robot.robot_id, start) for robot, start in zip(self.robots, starts)]
         law = AvoidanceLaw()
         for (one, place), (other, beside) in combinations(zip(self.robots, places), 2):
             apart_m = math.dist(place, beside)

@@ -1,9 +1,10 @@
 """One robot that is stepped in process: what a program uses of hero_client's Robot, and the ground truth. Pure."""
 
-from typing import Callable, Tuple
+from typing import Any, Callable, Tuple
 
 from hero_client.robots.robot_base import BaseRobot
 from hero_client.values.geometry import Pose
+from hero_node.errors import ProgramError
 
 from .link import StepLink
 from .step_clock import StepClock
@@ -19,6 +20,12 @@ class StepRobot(BaseRobot):
     def __init__(self, robot_id: int, clock: StepClock, row: int) -> None:
         """Be the robot at row of the clock's robots."""
         super().__init__(robot_id, StepLink(clock, row, "hero_%d" % robot_id))
+
+    def __getattr__(self, name: str) -> Any:
+        if name in ("encoder", "imu", "odometry"):
+            text = "%s of %s is a ROS message, which robots in process do not send: see wheel_speeds, pose, velocity"
+            raise ProgramError(text % (name, self.name))
+        raise AttributeError("%r object has no attribute %r" % (type(self).__name__, name))
 
     @property
     def row(self) -> int:
