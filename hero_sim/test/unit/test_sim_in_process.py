@@ -73,7 +73,7 @@ def test_a_program_with_parameters_runs_until_its_time_is_over(tmp_path, argumen
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("from hero_client import Robot\nRobot(1).encoder", "encoder of hero_1 is a ROS message, which robots in process"),
+        ("from hero_client import Robot\nRobot(1).encoder", "encoder of hero_1 is a ROS message, which robots"),
         ("from hero_client import Robot\nRobot(7)", "script.py: hero_7 is not there: --count 4 simulates fewer"),
         ("from hero_client import Robot\nRobot(7)", "simulates fewer (script.py, line 2)"),
     ],
