@@ -119,8 +119,8 @@ class PageTest(unittest.TestCase):
         self.page.find("#program [value='random_walk']").click()
 
         def is_started():
-            if not self.page.text("#running"):  # a busy PC has delayed the request
-                self.page.click("#start")
+            if not self.page.text("#running"):  # a busy PC has delayed the request, or hides the button for a moment
+                self.page.run("document.getElementById('start').click()")
             return self.page.text("#running").startswith("random walk, hero_0")
 
         wait_for(is_started, self.page.notices)
