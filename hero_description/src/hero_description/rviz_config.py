@@ -183,6 +183,7 @@ def make_config(
         make_marker_display("objects (simulated)", "/hero_sim/object_markers"),
         make_marker_display("names, rings, lights", LIGHTS_TOPIC),
         make_marker_display("selected robot", CHOICE_TOPIC),
+        make_marker_display("swarm behavior", "/behavior/markers"),
     ]
     for name in names:
         displays += make_robot_displays(name, name in hero_plus)

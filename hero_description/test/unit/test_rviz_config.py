@@ -37,6 +37,7 @@ def test_rviz_displays_robots_arena_and_lights():
     for topic in ("/hero_sim/arena", "/hero_sim/object_markers"):
         assert ("rviz/MarkerArray", topic) in shown
     assert ("rviz/MarkerArray", "/hero_lights") in shown
+    assert ("rviz/MarkerArray", "/behavior/markers") in shown
 
 
 def list_switches(displays):

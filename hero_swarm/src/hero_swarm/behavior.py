@@ -30,9 +30,11 @@ from hero_client.values.object_sensing import (
 from hero_client.values.sensing import Binary, Neighborhood, Neighbors, sense_binary, sense_neighbors
 
 __all__ = [
-    "Behavior", "Binary", "Command", "Neighborhood", "Neighbors", "Objects", "ObjectsInSight", "Random", "Sensed",
-    "Sight", "derive_seed", "sense",
+    "DRIVES", "PULSES", "VELOCITY", "Behavior", "Binary", "Command", "Neighborhood", "Neighbors", "Objects",
+    "ObjectsInSight", "Random", "Sensed", "Sight", "derive_seed", "sense",
 ]  # fmt: skip
+
+VELOCITY, PULSES = DRIVES = ("velocity", "pulses")
 
 Command = Tuple[Any, Any, Any]
 """linear m/s and angular rad/s, each a number or an array (R,), and the memory for the next step."""
@@ -97,17 +99,22 @@ class Behavior:
     Attributes:
         rate_hz: steps per second.
         metric: name of the metric (hero_swarm.metrics) that shows how well it does.
+        drive: how its speeds reach the wheels: "velocity", the firmware's velocity controller, or "pulses", servo
+            pulses, which wheels follow sooner (see wheel_pulses) and which robots with calibrated motors take.
     """
 
     rate_hz: float = 20.0
     metric: str = "dispersion_ratio"
+    drive: str = VELOCITY
 
     def __init__(self, **parameters: Any) -> None:
-        """Set parameters by name. Raises: TypeError for one that the behavior does not have."""
+        """Set parameters by name. Raises: TypeError for one that the behavior does not have; ValueError for drive."""
         for name, value in parameters.items():
             if name.startswith("_") or not hasattr(self, name) or callable(getattr(self, name)):
                 raise TypeError("%s has no parameter %r; it has %s" % (type(self).__name__, name, self.parameters()))
             setattr(self, name, value)
+        if self.drive not in DRIVES:
+            raise ValueError("%s: drive is %r, but must be %s" % (type(self).__name__, self.drive, " or ".join(DRIVES)))
 
     def parameters(self) -> Dict[str, Any]:
         """Return all parameters and sensors with their values."""

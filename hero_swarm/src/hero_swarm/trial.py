@@ -18,7 +18,8 @@ from hero_sim.population import place_worlds
 from hero_sim.stepped.robot_rows import RobotRows
 from hero_sim.world.arena import Arena, MovableObject, measure_clearance
 
-from .behavior import Behavior, Random, derive_seed, sense
+from .behavior import PULSES, Behavior, Random, derive_seed, sense
+from .wheel_pulses import find_pulses, list_dead_zones
 
 __all__ = ["OPEN", "Trial", "scatter", "scatter_objects"]
 
@@ -107,6 +108,7 @@ class Trial:
             starts = np.array([scatter(robots, width_m, height_m, seed) for seed in seeds])
         self.behavior = behavior
         self.rows = RobotRows(place_worlds(arena, starts, seeds, errors, objects))
+        self._dead_zones_us = list_dead_zones(self.rows.world.errors)
         self.poses, self.velocities = starts, np.zeros_like(starts)
         self.memory: Any = None
         self._random = Random([derive_seed(seed, "behavior") for seed in seeds], robots)
@@ -138,7 +140,10 @@ class Trial:
             shape = self.poses.shape[:2]
             speeds = (np.broadcast_to(values, self._all.shape).reshape(shape) for values in (linear_m_s, angular_rad_s))
             linear_m_s, angular_rad_s = (values.ravel() for values in self._filter(sensed_poses, *speeds))
-        rows.send_velocity(self._all, linear_m_s, angular_rad_s)
+        if self.behavior.drive == PULSES:
+            rows.send_pulses(self._all, *find_pulses(linear_m_s, angular_rad_s, self._dead_zones_us))
+        else:
+            rows.send_velocity(self._all, linear_m_s, angular_rad_s)
         colors = self.behavior.colors(self.memory)
         if colors is not None:
             rows.send_light(self._all, np.column_stack((colors, np.ones(len(colors)))))

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from ..behavior import Behavior, Binary, Command, Random, Sensed
+from ..behavior import PULSES, Behavior, Binary, Command, Random, Sensed
 
 __all__ = ["Aggregation"]
 
@@ -15,6 +15,7 @@ class Aggregation(Behavior):
 
     sees = Binary(half_angle_rad=0.0, range_m=math.inf)
     rate_hz = 20.0
+    drive = PULSES
     metric = "dispersion_ratio"
     v0_m_s, w0_rad_s = -0.108, -0.75  # nothing seen
     v1_m_s, w1_rad_s = 0.0, -5.02  # a robot seen

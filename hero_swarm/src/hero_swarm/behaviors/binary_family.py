@@ -11,7 +11,7 @@ import numpy as np
 
 from hero_sim.world.kinematics import join_wheels
 
-from ..behavior import Behavior, Binary, Command, Random, Sensed
+from ..behavior import PULSES, VELOCITY, Behavior, Binary, Command, Random, Sensed
 
 __all__ = ["CyclicPursuit", "Dispersal", "EvolvedAggregation", "Milling", "WallFollowing"]
 
@@ -20,6 +20,8 @@ class WheelGenome(Behavior):
     """Wheel speeds of the left and right wheel, as shares of wheel_m_s: with nothing seen (0) and a robot seen (1)."""
 
     sees = Binary()
+    drive = PULSES
+    rate_hz = 1000.0 / 60.0  # as often as the driver sends commands
     wheel_m_s = 0.12
     left0 = right0 = left1 = right1 = 0.0
 
@@ -62,4 +64,6 @@ class WallFollowing(WheelGenome):
     """Robots follow the walls: 9 robots, 1.71 m x 1.42 m; more of them jam."""
 
     metric = "nearest_neighbor"
+    rate_hz = 20.0
+    drive = VELOCITY  # a turn so slight needs wheels of equal speed, which servo pulses alone do not give
     left0, right0, left1, right1 = 1.0, 0.95, 1.0, 1.0

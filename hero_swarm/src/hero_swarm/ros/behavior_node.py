@@ -4,32 +4,27 @@ rosrun hero_swarm behavior _behavior:=milling _robots:=0-9 _frame:=map
 """
 
 import time
-from typing import Any, List, Optional
+from typing import Any, Optional, Tuple
 
 import numpy as np
 import rospy
-from geometry_msgs.msg import Point
-from std_msgs.msg import ColorRGBA, Float32
-from visualization_msgs.msg import Marker, MarkerArray
+from std_msgs.msg import Float32
+from visualization_msgs.msg import MarkerArray
 
 from hero_client import Program, ProgramError, Swarm, read_parameters, run
 from hero_client.values.object_sensing import Things
-from hero_client.values.robot_constants import BODY_RADIUS_M
 from hero_node.parameters import choice, number, robot_ids, whole_number, words
 
-from ..behavior import Behavior, Binary, Objects, Random, Sensed, Sight, sense
+from ..behavior import Behavior, Objects, Random, sense
 from ..behaviors import find_behavior
 from ..metrics import METRICS
 from ..safety import MODES, SafetyFilter
+from .behavior_markers import BehaviorMarkers
 from .pose_source import ObjectSource, PoseSource
-
-BEAM_M = 3.0
-"""Length at which a beam of endless range is drawn."""
+from .wheel_commands import WheelCommands
 
 REPORT_PERIOD_S = 5.0
 SHOW_PERIOD_S = 0.1
-
-_FREE_COLOR, _SEEN_COLOR = ColorRGBA(0.4, 0.6, 1.0, 0.5), ColorRGBA(1.0, 0.3, 0.1, 0.9)
 
 
 def _make_behavior(name: str) -> Behavior:
@@ -66,13 +61,15 @@ class BehaviorNode:
         topic, radius_m = parameters["objects_topic"], parameters["object_radius_m"]
         self._objects = ObjectSource(self._frame, topic, radius_m, are_needed)
         self._filter = SafetyFilter(parameters["safety"], _parse_fence(parameters["fence"]))
+        self._commands = WheelCommands(swarm, self._behavior.drive, parameters["calibration_folder"])
         self._random = Random([parameters["seed"]], len(ids))
         self._memory: Any = None
         self._start_s = rospy.get_time()
-        self._last: Optional[np.ndarray] = None
+        self._last: Optional[Tuple[float, np.ndarray]] = None
         self._next_report_s = self._next_show_s = 0.0
         self._colors: Optional[np.ndarray] = None
         self._metric = rospy.Publisher("~metric", Float32, queue_size=5)
+        self._drawing = BehaviorMarkers(self._behavior, self._frame)
         self._markers = rospy.Publisher("~markers", MarkerArray, queue_size=2)
 
     @property
@@ -93,23 +90,21 @@ class BehaviorNode:
         wanted = [np.broadcast_to(values, len(poses)).reshape(shape) for values in (linear_m_s, angular_rad_s)]
         speeds = self._filter(poses[None], wanted[0], wanted[1], ages_s[None])
         known = sensed.is_known
-        for robot, is_known, linear, angular in zip(self._swarm, known, speeds[0][0].tolist(), speeds[1][0].tolist()):
-            if is_known and np.isfinite(linear) and np.isfinite(angular):
-                robot.drive(linear, angular)
-            else:
-                robot.drive(0.0, 0.0)
+        self._commands.send(speeds[0][0], speeds[1][0], known & np.isfinite(speeds).all(axis=(0, 1)))
         self._show_colors()
         if time.monotonic() >= self._next_report_s and not known.all():
             self._next_report_s = time.monotonic() + REPORT_PERIOD_S
             rospy.logwarn(self._objects.describe_missing() or self._source.describe_missing(poses))
         if time.monotonic() >= self._next_show_s and known.all():
-            velocities = np.zeros_like(poses) if self._last is None else (poses - self._last) / SHOW_PERIOD_S
+            last_s, last = self._last or (now_s - SHOW_PERIOD_S, poses)
+            velocities = (poses - last) / max(now_s - last_s, 1e-3)
             self._next_show_s = time.monotonic() + SHOW_PERIOD_S
-            self._last = poses
+            self._last = now_s, poses
             value = float(METRICS[self._behavior.metric](poses[None], velocities[None], things.poses)[0])
             self._metric.publish(Float32(value))
+            markers = self._drawing.draw(poses, sensed, value)
             if self._markers.get_num_connections():
-                self._markers.publish(MarkerArray([*self._draw_beams(poses, sensed), self._draw_text(poses, value)]))
+                self._markers.publish(MarkerArray(markers))
 
     def _show_colors(self) -> None:
         colors = self._behavior.colors(self._memory)
@@ -119,45 +114,6 @@ class BehaviorNode:
             if self._colors is None or (self._colors[row] != color).any():
                 robot.led(tuple(color.tolist()))
         self._colors = colors.copy()
-
-    def _make_marker(self, name: str, kind: int) -> Marker:
-        marker = Marker()
-        marker.header.frame_id, marker.header.stamp = self._frame, rospy.Time.now()
-        marker.ns, marker.type, marker.action = name, kind, Marker.ADD
-        marker.pose.orientation.w = 1.0
-        return marker
-
-    def _draw_beams(self, poses: np.ndarray, sensed: Sensed) -> List[Marker]:
-        """Return lines along the beams, or to the neighbors that are sensed."""
-        markers = []
-        for name, sensor in self._behavior.sensors().items():
-            marker = self._make_marker(name, Marker.LINE_LIST)
-            marker.scale.x = 0.004
-            reading = getattr(sensed, name)
-            for row, (x_m, y_m, yaw_rad) in enumerate(poses.tolist()):
-                if isinstance(sensor, (Binary, Sight)):
-                    length_m = min(sensor.range_m, BEAM_M)
-                    ends = [(BODY_RADIUS_M + length_m, 0.0)]
-                    color = _SEEN_COLOR if reading[row] else _FREE_COLOR
-                else:
-                    columns = reading.seen[row].nonzero()[0]
-                    ends = list(zip(reading.forward_m[row, columns], reading.left_m[row, columns]))
-                    color = _FREE_COLOR
-                cosine, sine = np.cos(yaw_rad), np.sin(yaw_rad)
-                for forward_m, left_m in ends:
-                    marker.points.append(Point(x_m, y_m, 0.03))
-                    end_x_m, end_y_m = cosine * forward_m - sine * left_m, sine * forward_m + cosine * left_m
-                    marker.points.append(Point(x_m + end_x_m, y_m + end_y_m, 0.03))
-                    marker.colors += [color, color]
-            markers.append(marker)
-        return markers
-
-    def _draw_text(self, poses: np.ndarray, value: float) -> Marker:
-        marker = self._make_marker("metric", Marker.TEXT_VIEW_FACING)
-        marker.text = "%s %.2f" % (self._behavior.metric, value)
-        marker.scale.z, marker.color = 0.08, ColorRGBA(1.0, 1.0, 1.0, 1.0)
-        marker.pose.position = Point(float(poses[:, 0].mean()), float(poses[:, 1].max()) + 0.25, 0.1)
-        return marker
 
 
 PARAMETERS = {
@@ -169,6 +125,7 @@ PARAMETERS = {
     "object_radius_m": number(0.05, 0.001, 5.0, "m", "of the circle around an object"),
     "safety": choice("off", MODES, "safety filter: off, fence, or fence and robots"),
     "fence": words("", "x min, y min, x max, y max of the fence, m"),
+    "calibration_folder": words("~/hero_calibration", "of `calibrate`; behaviors with drive = pulses need its files"),
     "seed": whole_number(0, 0, 2**31 - 1, "", "of the behavior's random numbers"),
     "time_s": number(0.0, 0.0, 1e6, "s", "stop after so long; 0 runs until Ctrl-C"),
 }

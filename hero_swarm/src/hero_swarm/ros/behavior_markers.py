@@ -1,0 +1,96 @@
+"""What RViz shows of a behavior: beams of its sensors, and its metric as a line over time."""
+
+from collections import deque
+from typing import Deque, List, Tuple
+
+import numpy as np
+import rospy
+from geometry_msgs.msg import Point
+from std_msgs.msg import ColorRGBA
+from visualization_msgs.msg import Marker
+
+from hero_client.values.robot_constants import BODY_RADIUS_M
+
+from ..behavior import Behavior, Binary, Sensed, Sight
+
+__all__ = ["BehaviorMarkers"]
+
+BEAM_M = 3.0
+"""Length at which a beam of endless range is drawn."""
+
+PLOT_S = 120.0
+PLOT_M = (1.0, 0.3)
+"""Time and size, wide and high, of the metric's line, which scales itself to its values."""
+
+_FREE_COLOR, _SEEN_COLOR = ColorRGBA(0.4, 0.6, 1.0, 0.5), ColorRGBA(1.0, 0.3, 0.1, 0.9)
+_PLOT_COLOR, _AXES_COLOR = ColorRGBA(0.9, 0.5, 0.0, 1.0), ColorRGBA(0.5, 0.5, 0.5, 1.0)
+
+
+class BehaviorMarkers:
+    """The markers of one behavior in one frame."""
+
+    def __init__(self, behavior: Behavior, frame: str) -> None:
+        self._behavior = behavior
+        self._frame = frame
+        self._history: Deque[Tuple[float, float]] = deque()
+        self._corner = (np.nan, np.nan)
+
+    def draw(self, poses: np.ndarray, sensed: Sensed, value: float) -> List[Marker]:
+        """Return all markers for poses (R, 3), all known, and the metric's value."""
+        self._history.append((sensed.time_s, value))
+        while self._history[0][0] < sensed.time_s - PLOT_S:
+            self._history.popleft()
+        if not np.isfinite(self._corner[0]):
+            self._corner = (float(poses[:, 0].mean()) - PLOT_M[0] / 2.0, float(poses[:, 1].max()) + 0.3)
+        beams = [self._draw_sensor(name, poses, sensed) for name in self._behavior.sensors()]
+        return [*beams, *self._draw_plot(sensed.time_s, value)]
+
+    def _make_marker(self, name: str, kind: int) -> Marker:
+        marker = Marker()
+        marker.header.frame_id, marker.header.stamp = self._frame, rospy.Time.now()
+        marker.ns, marker.type, marker.action = name, kind, Marker.ADD
+        marker.pose.orientation.w = 1.0
+        return marker
+
+    def _draw_sensor(self, name: str, poses: np.ndarray, sensed: Sensed) -> Marker:
+        """Return lines along the beams, or to what is sensed."""
+        marker = self._make_marker(name, Marker.LINE_LIST)
+        marker.scale.x = 0.004
+        sensor, reading = self._behavior.sensors()[name], getattr(sensed, name)
+        for row, (x_m, y_m, yaw_rad) in enumerate(poses.tolist()):
+            if isinstance(sensor, (Binary, Sight)):
+                ends = [(BODY_RADIUS_M + min(sensor.range_m, BEAM_M), 0.0)]
+                color = _SEEN_COLOR if reading[row] else _FREE_COLOR
+            else:
+                columns = reading.seen[row].nonzero()[0]
+                ends = list(zip(reading.forward_m[row, columns], reading.left_m[row, columns]))
+                color = _FREE_COLOR
+            cosine, sine = np.cos(yaw_rad), np.sin(yaw_rad)
+            for forward_m, left_m in ends:
+                marker.points.append(Point(x_m, y_m, 0.03))
+                end_x_m, end_y_m = cosine * forward_m - sine * left_m, sine * forward_m + cosine * left_m
+                marker.points.append(Point(x_m + end_x_m, y_m + end_y_m, 0.03))
+                marker.colors += [color, color]
+        return marker
+
+    def _draw_plot(self, now_s: float, value: float) -> List[Marker]:
+        """Return the metric's line over the last PLOT_S, its axes, and their scale and value as text."""
+        (left_m, low_m), (width_m, height_m) = self._corner, PLOT_M
+        times_s, values = np.array(self._history).T
+        least, most = float(values.min()), float(values.max())
+        x_m = left_m + width_m * (1.0 + (times_s - now_s) / PLOT_S)
+        y_m = low_m + height_m * (values - least) / max(most - least, 1e-9)
+        line = self._make_marker("metric_line", Marker.LINE_STRIP)
+        line.scale.x, line.color = 0.008, _PLOT_COLOR
+        line.points = [Point(x, y, 0.02) for x, y in zip(x_m.tolist(), y_m.tolist())]
+        axes = self._make_marker("metric_axes", Marker.LINE_STRIP)
+        axes.scale.x, axes.color = 0.004, _AXES_COLOR
+        axes.points = [
+            Point(x, y, 0.02) for x, y in ((left_m, low_m + height_m), (left_m, low_m), (left_m + width_m, low_m))
+        ]
+        text = self._make_marker("metric", Marker.TEXT_VIEW_FACING)
+        text.text = "%s %.2f (%.2f to %.2f in %.0f s)" % (self._behavior.metric, value, least, most, PLOT_S)
+        text.scale.z, text.color = 0.06, _PLOT_COLOR
+        text.pose.position = Point(left_m + width_m / 2.0, low_m + height_m + 0.08, 0.1)
+        # A line of one point is none that RViz draws.
+        return [axes, text, *([line] if len(line.points) > 1 else [])]

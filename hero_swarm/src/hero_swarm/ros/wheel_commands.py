@@ -1,0 +1,78 @@
+"""Speeds to robots over ROS: velocities, or servo pulses if `calibrate motors` has measured their dead zones."""
+
+import glob
+import math
+import os
+from typing import Dict, List, Optional
+
+import numpy as np
+import rospy
+
+from hero_client import ProgramError, Swarm
+from hero_msgs.msg import Motor
+from hero_node.texts import one_line
+from hero_node.yaml_text import parse_yaml, read_text
+
+from ..behavior import PULSES
+from ..wheel_pulses import find_pulses
+
+__all__ = ["WheelCommands"]
+
+
+def _read_dead_zones(folder: str) -> Dict[str, List[float]]:
+    """Return the dead zones in a folder's files of `calibrate` by robot. Raises: ProgramError for an unusable file."""
+    found = {}
+    for path in sorted(glob.glob(os.path.join(os.path.expanduser(folder), "hero_*.yaml"))) if folder else []:
+        try:
+            content = parse_yaml(read_text(path))
+            if isinstance(content, dict) and "dead_zones_us" in content and ".previous." not in path:
+                edges_us = [float(edge_us) for edge_us in content["dead_zones_us"]]
+                if len(edges_us) != 4 or not all(map(math.isfinite, edges_us)):
+                    raise ValueError("dead_zones_us must be four numbers")
+                found[str(content.get("robot"))] = edges_us
+        except (OSError, TypeError, ValueError) as error:
+            text = "%s: %s; calibrate the robot again, or move the file away"
+            raise ProgramError(text % (path, one_line(error))) from None
+    return found
+
+
+class WheelCommands:
+    """Commands to all robots of a swarm."""
+
+    def __init__(self, swarm: Swarm, drive: str, folder: str) -> None:
+        """Take the dead zones from folder if drive is "pulses". Raises: ProgramError for an unusable file."""
+        self._swarm = swarm
+        self._publishers: List[rospy.Publisher] = []
+        self._dead_zones_us: Optional[np.ndarray] = None
+        if drive != PULSES:
+            return
+        found, names = _read_dead_zones(folder), ["hero_%d" % robot.robot_id for robot in swarm]
+        missing = [name for name in names if name not in found]
+        if missing:
+            shown = ", ".join(missing[:8]) + (", ..." if len(missing) > 8 else "")
+            rospy.logwarn(
+                "the motors of %s are not calibrated (~calibration_folder %r): all robots are driven by their velocity"
+                " controllers, which the wheels follow late; see rosrun hero_calibration calibrate motors",
+                shown, folder,
+            )  # fmt: skip
+            return
+        self._dead_zones_us = np.array([found[name] for name in names])
+        self._publishers = [
+            rospy.Publisher("/%s/cmd_motor" % name, Motor, queue_size=1, tcp_nodelay=True) for name in names
+        ]
+
+    def send(self, linear_m_s: np.ndarray, angular_rad_s: np.ndarray, may_move: np.ndarray) -> None:
+        """Send speeds (R,) to the robots that may move (R,), and stop the others."""
+        speeds = np.where(may_move, (linear_m_s, angular_rad_s), 0.0)
+        if self._dead_zones_us is None:
+            for robot, speed in zip(self._swarm, speeds.T.tolist()):
+                robot.drive(*speed)
+            return
+        pulses_us = np.array(find_pulses(*speeds, self._dead_zones_us), dtype=int)
+        moves = speeds.any(axis=0).tolist()
+        for robot, publisher, moves_on, pulse_us in zip(self._swarm, self._publishers, moves, pulses_us.T.tolist()):
+            if moves_on:
+                publisher.publish(Motor(*pulse_us))
+            else:
+                # A zero velocity switches the servos off: a wheel rests wherever its center is.
+                robot.drive(0.0, 0.0)
