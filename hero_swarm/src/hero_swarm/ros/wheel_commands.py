@@ -68,11 +68,11 @@ class WheelCommands:
             for robot, speed in zip(self._swarm, speeds.T.tolist()):
                 robot.drive(*speed)
             return
-        pulses_us = np.array(find_pulses(*speeds, self._dead_zones_us), dtype=int)
+        left_us, right_us = find_pulses(speeds[0], speeds[1], self._dead_zones_us)
         moves = speeds.any(axis=0).tolist()
-        for robot, publisher, moves_on, pulse_us in zip(self._swarm, self._publishers, moves, pulses_us.T.tolist()):
-            if moves_on:
-                publisher.publish(Motor(*pulse_us))
+        for row, (robot, publisher) in enumerate(zip(self._swarm, self._publishers)):
+            if moves[row]:
+                publisher.publish(Motor(int(left_us[row]), int(right_us[row])))
             else:
                 # A zero velocity switches the servos off: a wheel rests wherever its center is.
                 robot.drive(0.0, 0.0)
