@@ -244,7 +244,7 @@ class BaseRobot(Group):
         self._send_velocity(linear_m_s, angular_rad_s)
         if (linear_m_s or angular_rad_s) and self._link.is_stopped and self.now_s >= self._next_warning_s:
             self._next_warning_s = self.now_s + STOPPED_WARNING_PERIOD_S
-            self._link.log_error(self._describe_stop())
+            self._link.log_warning(self._describe_stop())
 
     def _send_velocity(self, linear_m_s: float, angular_rad_s: float) -> None:
         if not (math.isfinite(linear_m_s) and math.isfinite(angular_rad_s)):
@@ -254,7 +254,7 @@ class BaseRobot(Group):
         self._last_move_s = self.now_s
         if not self._is_clipped and (abs(linear_m_s) > MAX_LINEAR_M_S or abs(angular_rad_s) > MAX_ANGULAR_RAD_S):
             self._is_clipped = True
-            self._link.log_error(
+            self._link.log_warning(
                 "%s cannot drive %g m/s and %g rad/s: it is limited to %g m/s and %g rad/s"
                 % (self.name, linear_m_s, angular_rad_s, MAX_LINEAR_M_S, MAX_ANGULAR_RAD_S)
             )
@@ -302,7 +302,7 @@ class BaseRobot(Group):
         _check_speed(angle_rad, angular_rad_s)
         if abs(angle_rad) > math.tau and float(angle_rad).is_integer():
             text = "%s turns by %g rad, %.1f full turns: for degrees, turn(math.radians(%g))"
-            self._link.log_error(text % (self.name, angle_rad, abs(angle_rad) / math.tau, angle_rad))
+            self._link.log_warning(text % (self.name, angle_rad, abs(angle_rad) / math.tau, angle_rad))
         controller = TurnController(angle_rad, self.now_s, angular_rad_s)
         return self._follow(controller, lambda: "turn %g rad" % angle_rad)
 

@@ -84,8 +84,8 @@ class RobotLink(Protocol):
     def start(self, steps: Steps) -> BackgroundMotion:
         """Take steps in the background."""
 
-    def log_error(self, text: str) -> None:
-        """Tell users of an error that ends nothing."""
+    def log_warning(self, text: str) -> None:
+        """Warn users of what ends nothing."""
 
     def close(self) -> None:
         """Leave the robot; safe twice."""

@@ -189,9 +189,9 @@ class RosLink:
         """Take steps on another thread."""
         return ThreadMotion(steps)
 
-    def log_error(self, text: str) -> None:
+    def log_warning(self, text: str) -> None:
         """See RobotLink."""
-        rospy.logerr(text)
+        rospy.logwarn(text)
 
     def close(self) -> None:
         """Unsubscribe; safe twice."""

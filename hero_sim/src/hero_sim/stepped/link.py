@@ -128,7 +128,7 @@ class StepLink:
         """Take steps while the program waits."""
         return StepMotion(self.clock, steps)
 
-    def log_error(self, text: str) -> None:
+    def log_warning(self, text: str) -> None:
         """See RobotLink."""
         say(text, sys.stderr)
 
