@@ -97,3 +97,19 @@ def test_a_peer_that_reads_little_by_little_is_closed_at_unsent_max():
         link.send_packet(packet)
     assert owner.calls
     assert len(sock.taken) == 10 * (UNSENT_MAX // len(packet))
+
+
+def test_a_link_that_is_discarded_frees_its_socket_and_what_waits(pair):
+    near, far = pair
+    link = Link(Owner(), near, Address("127.0.0.1", 1))
+    far.sendall(b"seven b")
+    assert link.read() == b"seven b"
+    far.sendall(b"more")
+    assert link.read() == b"more"
+    assert link.received_length == 11
+    link._unsent.append(b"rest")
+    for _ in range(2):
+        link.discard()
+        assert link.closed and not link.is_full
+        assert near.fileno() == -1
+    assert far.recv(1) == b"", "the robot does not see the end"

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from hero_driver.robot_log import RobotLog
+from hero_driver.robot_log import LINES_PER_S, REBOOT_SLACK_S, RobotLog
 from hero_driver.ros.log_relay import LogRelay
 from hero_driver.rosserial.payloads import LOG_INFO, Log
 
@@ -32,8 +32,8 @@ def make_peer():
     )
 
 
-def say_uptime(robot_log, peer, uptime_ms):
-    robot_log.receive(peer, Log(LOG_INFO, "[/hero_1] Conected at time %d" % uptime_ms), NOW_S)
+def say_uptime(robot_log, peer, uptime_ms, now_s=NOW_S):
+    robot_log.receive(peer, Log(LOG_INFO, "[/hero_1] Conected at time %d" % uptime_ms), now_s)
 
 
 def test_a_robot_whose_uptime_falls_has_rebooted(lines):
@@ -65,3 +65,26 @@ def test_a_robot_that_tunes_itself_without_being_told_to_is_stopped(lines, was_t
     for _ in range(5):
         robot_log.receive(peer, Log(LOG_INFO, "[/hero_1] Tunning Motor Set: [0,0]"), NOW_S)
     assert stopped == [peer] * stops
+
+
+def test_a_message_that_is_late_is_no_reboot_and_changes_no_boot_time(lines):
+    robot_log, peer = RobotLog(LogRelay(), None), make_peer()
+    reboots = []
+    peer.bridge.corrections.note_reboot = lambda: reboots.append(peer.record.booted_s)
+    for late_s in (0.5, 0.0, REBOOT_SLACK_S - 0.1, 0.2):
+        say_uptime(robot_log, peer, 60000, NOW_S + late_s)
+        say_uptime(robot_log, peer, 61000, NOW_S + 1.0 + late_s)
+    assert peer.record.booted_s == NOW_S - 60.0
+    assert not reboots
+    say_uptime(robot_log, peer, 60000, NOW_S + REBOOT_SLACK_S + 0.1)
+    assert len(reboots) == 1
+    assert peer.record.booted_s == pytest.approx(NOW_S - 60.0 + REBOOT_SLACK_S + 0.1)
+
+
+def test_more_lines_than_fit_a_second_are_counted_and_not_passed_on(lines):
+    robot_log, peer = RobotLog(LogRelay(), None), make_peer()
+    for second in range(3):
+        for number in range(LINES_PER_S + 7):
+            robot_log.receive(peer, Log(LOG_INFO, "line %d" % number), NOW_S + second + 0.005 * number)
+        assert len(lines) == LINES_PER_S * (second + 1)
+        assert peer.record.dropped_messages == 7 * (second + 1)

@@ -198,3 +198,15 @@ def test_asking_again_brings_the_next_stop_forward():
 def test_no_speed_above_a_tick_per_rest_window_passes_for_rest(ticks_per_s):
     robot = Robot(lambda now_s: ticks_per_s)
     assert StopState.AT_REST not in robot.run(3.0)
+
+
+def test_a_stop_that_is_requested_again_is_sent_as_often_as_the_first():
+    robot = Robot(lambda now_s: 186.0)
+    robot.run(TIRED_AFTER_S + 5.0)
+    robot.stop.renew(robot.now_s)
+    began_s = robot.now_s - 100.0
+    robot.run(began_s + 2.0)
+    renewed_s = [sent_s for sent_s in robot.sent_s if sent_s >= began_s]
+    assert renewed_s[0] < began_s + 2 * STEP_S
+    assert all(later - earlier < 1.0 for earlier, later in zip(renewed_s, renewed_s[1:]))
+    assert renewed_s[-1] > began_s + 1.0

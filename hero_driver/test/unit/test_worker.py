@@ -160,3 +160,16 @@ def test_a_call_made_by_a_call_waits_for_the_next_time():
     assert made == []
     queue.make_calls()
     assert made == ["second"]
+
+
+@pytest.mark.parametrize("drain", [False, True])
+def test_a_closed_queue_takes_no_call_and_keeps_what_waits_only_to_drain(drain):
+    made, wakes = [], []
+    queue = CallQueue(2, lambda: wakes.append(1), made.append)
+    assert [queue.submit(lambda: made.append("call")) for _ in range(3)] == [True, True, False]
+    assert queue.submit(lambda: made.append("call"), always=True)
+    queue.close(**({"drain": True} if drain else {}))
+    assert not queue.submit(lambda: made.append("late"), always=True)
+    assert (queue.refused, len(wakes)) == (2, 4)
+    queue.make_calls()
+    assert made == ["call"] * (3 if drain else 0)
