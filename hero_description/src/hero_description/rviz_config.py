@@ -54,6 +54,7 @@ def make_robot_displays(name: str, is_plus: bool) -> List[Dict[str, Any]]:
             "Enabled": True,
             "Topic": "/%s/odom" % name,
             "Unreliable": False,
+            "Queue Size": 100,  # of slow graphics, which draw a few times a second
             "Keep": 300,
             "Position Tolerance": 0.02,
             "Angle Tolerance": 7.0,
