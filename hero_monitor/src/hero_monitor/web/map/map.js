@@ -107,6 +107,7 @@ export class FleetMap {
       this.pointers.delete(event.pointerId);
       this.aim = this.lasso = null;
     });
+    for (const change of ["focus", "blur"]) canvas.addEventListener(change, () => this.draw());
     canvas.addEventListener("pointerleave", () => (element("place").textContent = ""));
     canvas.addEventListener(
       "wheel",
@@ -121,6 +122,10 @@ export class FleetMap {
       if (step) this.pan(-step[0], -step[1]);
       else if (event.key === "+") this.zoom(1.4);
       else if (event.key === "-") this.zoom(1 / 1.4);
+      else if (event.key === "Enter" && this.onPlace && !event.repeat && !isLate(event)) {
+        this.aim = { from: [this.view.x, this.view.y], to: null };
+        this.takePlace();
+      }
       else return;
       event.preventDefault();
     });

@@ -47,6 +47,7 @@ export class MapPainter {
     if (shows.beams) for (const robot of robots) this.paintBeams(robot);
     for (const robot of robots) this.paintRobot(robot);
     if (map.aim) this.paintAim(map.aim);
+    else if (map.onPlace && map.canvas.matches(":focus-visible")) this.paintAim({ from: [view.x, view.y] }); // where Enter puts it
     if (map.lasso) this.paintLasso(map.lasso);
     context.restore();
     if (shows.names) this.paintNames(robots);
