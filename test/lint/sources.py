@@ -1,7 +1,7 @@
 """What lies in this repository (packages, modules, imports), for the tests of its rules. Changes nothing.
 
-Run as a program it prints the modules that script/lint gives to mypy: those that know nothing of ROS, and those that
-must fit a Protocol of theirs; with the argument `others`, all others.
+Run as a program it prints the modules that script/lint gives to mypy: `strict` before those that know nothing of ROS, and
+those that must fit a Protocol of theirs; `others` before all others.
 """
 
 import ast
@@ -173,6 +173,5 @@ def read_dependencies(package: str, *kinds: str) -> List[str]:
 
 if __name__ == "__main__":
     strict = {*list_pure_modules(), *(list_source_modules()[name] for name in FIT_A_PROTOCOL)}
-    others = set(list_source_modules().values()) - strict
-    for checked in sorted(others if sys.argv[1:] == ["others"] else strict):
-        print(checked.relative_to(ROOT))
+    for checked in sorted(list_source_modules().values()):
+        print("strict" if checked in strict else "others", checked.relative_to(ROOT))
