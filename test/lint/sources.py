@@ -1,7 +1,7 @@
 """What lies in this repository (packages, modules, imports), for the tests of its rules. Changes nothing.
 
-Run as a program it prints the modules that script/lint gives to mypy: `strict` before those that know nothing of ROS, and
-those that must fit a Protocol of theirs; `others` before all others.
+Run as a program it prints the modules that script/lint gives to mypy: `strict` before those that know nothing of ROS,
+and those that must fit a Protocol of theirs; `others` before all others.
 """
 
 import ast
