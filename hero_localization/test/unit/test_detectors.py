@@ -8,11 +8,13 @@ import pytest
 
 pytest.importorskip("cv2")
 
+import cv2
+
 from hero_localization.errors import DetectorError
 from hero_localization.prints.tag_images import draw_tag
 from hero_localization.simulated_camera.renderer import CameraRenderer
 from hero_localization.simulated_camera.view import CameraOptions, PrintedTag, tag_corners
-from hero_localization.tracking.detectors import create_detector, find_print_mistake
+from hero_localization.tracking.detectors import create_detector, create_fine_detectors, find_print_mistake
 from hero_localization.tracking.tag_corners import TagCorners
 from hero_sim.world.arena import build_rectangle
 
@@ -86,6 +88,19 @@ def test_nothing_is_found_in_noise_or_in_an_empty_picture(backend):
         detector = create_detector(backend, family)
         assert detector.detect(np.full((480, 640), 120, np.uint8)) == []
         assert detector.detect(noise) == []
+
+
+def test_fine_detectors_find_blurred_tags_of_16_px_and_none_in_noise():
+    pytest.importorskip("apriltag")
+    picture_px = cv2.resize(picture(5), None, fx=1.0 / 6.0, fy=1.0 / 6.0, interpolation=cv2.INTER_AREA)
+    blurred = cv2.GaussianBlur(picture_px, (0, 0), 1.0)
+    noise = np.random.RandomState(0).randint(0, 256, (240, 320)).astype(np.uint8)
+    assert create_detector("apriltag", decimate=1.0).detect(blurred) == []
+    for detector in create_fine_detectors("36h11"):
+        (tag,) = detector.detect(blurred, (100, 50))
+        assert tag.tag_id == 5 and np.abs(tag.center - (113.5, 63.5)).max() < 0.3
+    for family in ("36h11", "16h5"):
+        assert not any(detector.detect(noise) for detector in create_fine_detectors(family))
 
 
 def test_center_is_where_the_diagonals_cross():

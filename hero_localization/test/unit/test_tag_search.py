@@ -1,5 +1,7 @@
 """The search for tags over the frames of a drive: followed in windows, found anywhere, lost and found again."""
 
+import sys
+
 import numpy as np
 import pytest
 
@@ -43,14 +45,14 @@ class Watch:
     """A search, and the number of the frame."""
 
     def __init__(self, with_fine=False, smallest_px=20.0):
-        self.detector, self.fine, self.index = SeenTags(), SeenTags(), -1
-        fine = self.fine if with_fine else None
+        self.detector, self.fine, self.finest, self.index = SeenTags(), SeenTags(), SeenTags(), -1
+        fine = [self.fine, self.finest] if with_fine else []
         self.search = TagSearch(self.detector, WIDTH_PX, HEIGHT_PX, fine, smallest_px)
 
     def see(self, tags, expected=None, frames=1):
         for _ in range(frames):
             self.index += 1
-            for detector in (self.detector, self.fine):
+            for detector in (self.detector, self.fine, self.finest):
                 detector.place(tags)
                 detector.searched_px = 0
             found = self.search.search(FRAME, self.index * FRAME_S, expected)
@@ -189,6 +191,15 @@ def test_small_tags_that_the_detector_misses_are_found_by_the_fine_one():
         assert watch.see(tags) == [tag_id for tag_id, _ in tags]
     # 13 windows, and every other turn of the tiles.
     assert watch.fine.searched_px < 14 * 80**2 + 2 * 1.7 * WIDTH_PX * HEIGHT_PX / 12.0
+
+
+@pytest.mark.parametrize(("side_px", "found"), [(18.0, [1]), (22.0, [])])
+def test_the_smallest_tags_are_found_by_the_finest_detector(side_px, found, monkeypatch):
+    monkeypatch.setattr(sys.modules[__name__], "SIDE_PX", side_px)
+    watch, tags = Watch(with_fine=True), [(1, (800.0, 500.0))]
+    watch.see(tags, frames=30)
+    watch.detector.blind = watch.fine.blind = {1}
+    assert watch.see(tags, frames=30) == found
 
 
 def test_large_tags_need_no_fine_detector():

@@ -16,7 +16,7 @@ from typing import Any, List, Mapping, Optional, Tuple
 import numpy as np
 
 from ..errors import DetectorError
-from .detectors import create_detector
+from .detectors import create_detector, create_fine_detectors
 from .tag_corners import TagCorners
 from .tag_search import TagSearch
 
@@ -112,7 +112,7 @@ def serve(connection: Connection, memory: int) -> None:
     backend, family, decimate, width_px, height_px, smallest_px = connection.recv()
     frame = np.frombuffer(mmap.mmap(memory, width_px * height_px), np.uint8).reshape(height_px, width_px)
     try:
-        fine = create_detector(backend, family, 1.0) if backend == "apriltag" and decimate > 1.0 else None
+        fine = create_fine_detectors(family) if backend == "apriltag" else []
         search = TagSearch(create_detector(backend, family, decimate), width_px, height_px, fine, smallest_px)
     except DetectorError as error:
         connection.send(str(error))

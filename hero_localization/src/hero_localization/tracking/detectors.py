@@ -9,17 +9,27 @@ python3-apriltag puts pixel centers at half integers and begins at the lower lef
 from importlib.util import find_spec
 from typing import Dict, List, Tuple
 
+import cv2
 import numpy as np
 
 from ..errors import DetectorError
 from ..prints.tag_images import FAMILIES, draw_tag
 from .tag_corners import TagCorners
 
-__all__ = ["BACKENDS", "DEFAULT_BACKEND", "TagDetector", "create_detector", "find_print_mistake"]
+__all__ = [
+    "BACKENDS",
+    "DEFAULT_BACKEND",
+    "TagDetector",
+    "create_detector",
+    "create_fine_detectors",
+    "find_print_mistake",
+]
 
 _MIN_MARGIN = {"36h11": 10.0, "16h5": 30.0}
 """How clearly black and white must differ, of 255: what 16h5 finds in noise and floor textures stays below."""
 
+SHARPEN_PX = 1.0
+"""Radius of the unsharp mask of fine detectors: cells of 2 px are as wide as the blur of a webcam."""
 
 MIN_MISTAKEN_TAGS = 3
 """Fewer may be noise."""
@@ -44,7 +54,8 @@ class AprilTagDetector(TagDetector):
     It holds the GIL and takes SIGINT over while it detects: programs with other threads run it in its own process.
     """
 
-    def __init__(self, family: str, decimate: float) -> None:
+    def __init__(self, family: str, decimate: float, enlarge: int = 0) -> None:
+        """enlarge: sharpen images first, so many times enlarged; 0: take them as they are."""
         try:
             from apriltag import apriltag
         except ImportError:
@@ -56,12 +67,16 @@ class AprilTagDetector(TagDetector):
             "tag" + family, threads=1, maxhamming=0 if family == "16h5" else 1, decimate=decimate
         )
         self._least_margin = _MIN_MARGIN[family]
+        self._enlarge = enlarge
 
     def detect(self, gray: np.ndarray, origin: Tuple[int, int] = (0, 0)) -> List[TagCorners]:
         """Return the tags in gray."""
-        shift = np.array(origin) - 0.5
+        shift, scale = np.array(origin) - 0.5, max(self._enlarge, 1)
+        if self._enlarge:
+            gray = cv2.resize(gray, None, fx=scale, fy=scale, interpolation=cv2.INTER_CUBIC)
+            gray = cv2.addWeighted(gray, 2.0, cv2.GaussianBlur(gray, (0, 0), scale * SHARPEN_PX), -1.0, 0.0)
         return [
-            TagCorners(int(found["id"]), np.asarray(found["lb-rb-rt-lt"], dtype=float)[::-1] + shift)
+            TagCorners(int(found["id"]), np.asarray(found["lb-rb-rt-lt"], dtype=float)[::-1] / scale + shift)
             for found in self._detector.detect(np.ascontiguousarray(gray))
             if found["margin"] >= self._least_margin
         ]
@@ -71,10 +86,6 @@ class ArucoDetector(TagDetector):
     """OpenCV's aruco, which always searches the whole image: decimate is not used."""
 
     def __init__(self, family: str, decimate: float) -> None:
-        try:
-            import cv2
-        except ImportError:
-            raise DetectorError("the detector aruco is not installed: apt install python3-opencv") from None
         dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, FAMILIES[family].dictionary))
         is_new = hasattr(cv2.aruco, "ArucoDetector")  # since OpenCV 4.7
         options = cv2.aruco.DetectorParameters() if is_new else cv2.aruco.DetectorParameters_create()
@@ -133,6 +144,12 @@ def create_detector(backend: str = DEFAULT_BACKEND, family: str = "36h11", decim
     if not decimate >= 1.0:
         raise DetectorError("decimation %s: it must be at least 1" % decimate)
     return BACKENDS[backend](family, decimate)
+
+
+def create_fine_detectors(family: str) -> List[TagDetector]:
+    """Return detectors that find smaller and smaller tags, at more and more cost: of 18 px, then of 16 px."""
+    # Enlarged noise looks like tags of 16h5, whose cells are larger anyway.
+    return [AprilTagDetector(family, 1.0, enlarge) for enlarge in ((1, 2) if family == "36h11" else (1,))]
 
 
 def find_print_mistake(gray: np.ndarray, family: str) -> str:

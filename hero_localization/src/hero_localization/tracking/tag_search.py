@@ -2,12 +2,12 @@
 
 A detector takes 90 ms for a whole image of 1920 by 1080 and 0.2 ms for a window around one tag. So known tags are
 looked for where they are expected, in every frame, and the rest of the image is searched in turn, in two seconds. Where
-tags are small, a second detector that uses all pixels looks where the first one found nothing, and takes every other
+tags are small, finer detectors that use all pixels look where the first one found nothing, and one takes every other
 turn. A tag that was seen steadily and is lost is also searched around its place, at most one image's pixels per second.
 """
 
 import math
-from typing import Dict, List, Mapping, NamedTuple, Optional, Tuple
+from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -16,11 +16,12 @@ from .tag_corners import TagCorners
 
 __all__ = ["FINE_BELOW_PX", "TagSearch"]
 
-FINE_BELOW_PX = 28.0
-"""In an image at half its size, one tag in ten of less than this is missed, or more in bad light."""
+FINE_BELOW_PX, FINEST_BELOW_PX = 28.0, 20.0
+"""In an image at half its size, one tag in ten of less than this is missed, or more in bad light; at full size, below
+the second."""
 
 FINE_S = 2.0
-"""So long the fine detector alone looks for a tag that only it found."""
+"""So long coarser detectors do not look for a tag that only a finer one found."""
 
 SWEEP_S = 2.0
 """Time in which the whole image is searched."""
@@ -82,15 +83,14 @@ class TagSearch:
         detector: TagDetector,
         width_px: int,
         height_px: int,
-        fine_detector: Optional[TagDetector] = None,
+        fine_detectors: Sequence[TagDetector] = (),
         smallest_px: float = math.inf,
         overlap_px: int = OVERLAP_PX,
     ) -> None:
-        """fine_detector: finds smaller tags at more cost; smallest_px: side of the smallest tag to be expected."""
-        self._detector, self._fine = detector, fine_detector
-        self._sweeps = [detector]
-        if fine_detector is not None and smallest_px < FINE_BELOW_PX:
-            self._sweeps.insert(0, fine_detector)
+        """fine_detectors: two that find smaller tags at more cost; smallest_px: side of the smallest tag expected."""
+        self._detector = detector
+        self._detectors = [detector, *fine_detectors]
+        self._sweeps = [*fine_detectors[:1], detector] if smallest_px < FINE_BELOW_PX else [detector]
         self._tracks: List[_Track] = []
         self._lost: Dict[int, _Track] = {}
         self._size_px = np.array((width_px, height_px))
@@ -100,7 +100,8 @@ class TagSearch:
         self._nearby_px = 0.0
         self._previous_s: Optional[float] = None
         self._sides_px: Dict[int, float] = {}
-        self._fine_until_s: Dict[int, float] = {}
+        self._hard: Dict[int, Tuple[int, float]] = {}
+        """The detector that found a tag which coarser ones missed, and when; by tag."""
 
     def search(
         self, gray: np.ndarray, stamp_s: float, expected: Optional[Mapping[int, Tuple[float, float]]] = None
@@ -115,7 +116,7 @@ class TagSearch:
         """
         if self._previous_s is not None and stamp_s < self._previous_s - KEPT_S:
             # Time went back, as when a recording is replayed: stamps tell no more for how long a tag is lost.
-            self._tracks, self._lost, self._fine_until_s = [], {}, {}
+            self._tracks, self._lost, self._hard = [], {}, {}
         places = {tag_id: np.array(place, dtype=float) for tag_id, place in (expected or {}).items()}
         found: List[TagCorners] = []
         for track in self._tracks:
@@ -153,14 +154,14 @@ class TagSearch:
         """Search a window for a tag, and return whether it is there; what else is there is added to found, too."""
         slack_sides = min(SLACK_SIDES_S * max(elapsed_s, 0.0), MAX_SLACK_SIDES)
         half_px = (WINDOW_SIDES + slack_sides) * side_px + SLACK_PX
-        detectors = [self._detector]
-        if self._fine is not None and side_px < FINE_BELOW_PX:
-            is_hard = stamp_s < self._fine_until_s.get(tag_id, -math.inf)
-            detectors = [self._fine] if is_hard else [self._detector, self._fine]
-        for detector in detectors:
+        count = 1 + (side_px < FINE_BELOW_PX) + (side_px < FINEST_BELOW_PX)
+        first, found_s = self._hard.get(tag_id, (0, -math.inf))
+        for index, detector in enumerate(self._detectors[:count]):
+            if index < first and stamp_s < found_s + FINE_S:
+                continue
             if self._detect(detector, gray, center, half_px, side_px, tag_id, found):
-                if len(detectors) > 1 and detector is self._fine:
-                    self._fine_until_s[tag_id] = stamp_s + FINE_S
+                if index != first or stamp_s >= found_s + FINE_S:
+                    self._hard[tag_id] = index, stamp_s
                 return True
         return False
 
