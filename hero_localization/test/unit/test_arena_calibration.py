@@ -15,9 +15,12 @@ from hero_localization.calibration.arena_calibration import (  # noqa: E402
     average_tags,
     calibrate_arena,
     measure_residuals,
+    refine_corners,
 )
 from hero_localization.camera.camera_model import Camera, Lens  # noqa: E402
 from hero_localization.errors import CalibrationError  # noqa: E402
+from hero_localization.prints.tag_images import draw_tag  # noqa: E402
+from hero_localization.tracking.detectors import create_detector  # noqa: E402
 from hero_localization.tracking.moved_references import find_moved_references  # noqa: E402
 from hero_localization.tracking.tag_corners import TagCorners  # noqa: E402
 from hero_localization.tracking.tag_pose import ReferenceTag  # noqa: E402
@@ -71,6 +74,29 @@ def place_error_m(camera):
     points_m = np.column_stack((x.ravel(), y.ravel(), np.full(x.size, 0.076)))
     found_m = camera.intersect(CAMERA.project(points_m), 0.076)
     return np.linalg.norm(found_m - points_m[:, :2], axis=1).max()
+
+
+@pytest.mark.parametrize("seed", [9, 15, 21, 33, 36])
+def test_four_tags_may_lie_turned_each_in_its_own_way(seed):
+    random = np.random.RandomState(seed)
+    ids = sorted(random.choice(tuple(PLACES), 4, replace=False).tolist())
+    yaws_rad, tilt_rad = random.uniform(-math.pi, math.pi, 4).tolist(), random.uniform(-0.1, 0.1, 2)
+    lens = LENS._replace(distortion=np.array((-0.32, 0.11, 0.0, 0.0, 0.0)))
+    camera = hang((*tilt_rad, 0.1))._replace(lens=lens)
+    tags = [see(tag_id, Pose(*PLACES[tag_id], yaw_rad), camera=camera) for tag_id, yaw_rad in zip(ids, yaws_rad)]
+    found = calibrate_arena(lens, tags, {tag_id: REFERENCES[tag_id] for tag_id in ids})
+    assert found.camera.position_m == pytest.approx(camera.position_m, abs=1e-3)
+
+
+def test_corners_keep_their_distance_where_the_camera_brightens():
+    fine = np.kron(np.pad(draw_tag("36h11", 101), 3, constant_values=255), np.ones((24, 24), np.uint8))
+    light = cv2.resize(fine / 255.0 * 0.8 + 0.06, None, fx=0.25, fy=0.25, interpolation=cv2.INTER_AREA)
+    gray = np.rint(255.0 * cv2.GaussianBlur(light, (0, 0), 0.8) ** (1.0 / 2.2)).astype(np.uint8)
+    (tag,) = create_detector(decimate=1.0).detect(gray)
+    (refined,) = refine_corners(gray, [tag], "36h11")
+    assert tag.side_px < 0.993 * 48.0, "refused as out of scale"
+    assert refined.side_px == pytest.approx(48.0, rel=0.004)
+    assert refined.center == pytest.approx(tag.center)
 
 
 @pytest.mark.parametrize("count", [4, 6])

@@ -11,6 +11,7 @@ from hero_client.values.geometry import Pose
 
 from ..camera.camera_model import Camera, Lens
 from ..errors import CalibrationError
+from ..prints.tag_images import draw_tag
 from ..tracking.tag_corners import TagCorners
 from ..tracking.tag_pose import ReferenceTag, TagPose, fit_squares
 
@@ -21,6 +22,7 @@ __all__ = [
     "calibrate_arena",
     "fit_references",
     "measure_residuals",
+    "refine_corners",
 ]
 
 MIN_TAGS = 4
@@ -43,6 +45,7 @@ HEIGHTS_M = (0.2, 20.0)
 MAX_FIELD_M = 30.0
 
 _YAW_ROUNDS = 4
+_MIN_CROSSINGS, _MIN_CELL_PX = 3, 4.0
 _SEEN_SHARE = 0.5
 """A tag must be found in at least this share of the frames."""
 
@@ -66,6 +69,34 @@ class ArenaCalibration(NamedTuple):
     def rms_m(self) -> float:
         """Root mean square of the residuals of the tags used."""
         return _compute_rms(self.residuals_m, self.left_out)
+
+
+def refine_corners(gray: np.ndarray, tags: Sequence[TagCorners], family: str) -> List[TagCorners]:
+    """Return tags of an image (H, W) with corners in true distance from their centers.
+
+    Where a camera brightens (gamma) or overexposes, white grows, and black squares measure 1 % less. Points within the
+    print at which white and black cells cross stay, and tell by how much.
+    """
+    return [_refine(gray, tag, draw_tag(family, tag.tag_id)) for tag in tags]
+
+
+def _refine(gray: np.ndarray, tag: TagCorners, cells: np.ndarray) -> TagCorners:
+    count, cell_px = len(cells), tag.side_px / len(cells)
+    upper_left, lower_right = cells[:-1, :-1], cells[1:, 1:]
+    is_crossing = (upper_left == lower_right) & (cells[:-1, 1:] == cells[1:, :-1]) & (upper_left != cells[1:, :-1])
+    rows, columns = np.nonzero(is_crossing)
+    if len(rows) < _MIN_CROSSINGS or cell_px < _MIN_CELL_PX:
+        return tag
+    square = np.array(((0, 0), (count, 0), (count, count), (0, count)), np.float32)
+    homography = cv2.getPerspectiveTransform(square, tag.corners.astype(np.float32))
+    crossings = np.column_stack((columns, rows)).astype(np.float32)[:, None] + 1.0
+    expected = cv2.perspectiveTransform(crossings, homography)
+    half_px = max(2, int(0.4 * cell_px))
+    criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 30, 0.001)
+    found = cv2.cornerSubPix(gray, expected.copy(), (half_px, half_px), (-1, -1), criteria)
+    away, found_away = expected - tag.center, found - tag.center
+    scale = float((away * found_away).sum() / (away**2).sum())
+    return tag._replace(corners=tag.center + scale * (tag.corners - tag.center))
 
 
 def average_tags(frames: Sequence[Sequence[TagCorners]]) -> List[TagCorners]:
@@ -219,16 +250,10 @@ def _check_extent(seen: Sequence[TagCorners], references: Mapping[int, Reference
 def _fit(lens: Lens, seen: Sequence[TagCorners], references: Mapping[int, ReferenceTag]) -> Optional[Camera]:
     """Return the camera above the floor that sees the tags like this best; None if there is none."""
     known = [references[tag.tag_id] for tag in seen]
-    pixels = np.vstack([tag.corners for tag in seen])
-    yaws_rad = [tag.pose.yaw_rad for tag in known]
-    camera: Optional[Camera] = None
+    # The yaws are not known: centers first.
+    points_m = np.array([(*tag.pose[:2], tag.height_m) for tag in known])
+    pixels = np.array([tag.center for tag in seen])
     for _ in range(_YAW_ROUNDS):
-        points_m = np.vstack(
-            [
-                _list_corners(tag._replace(pose=tag.pose._replace(yaw_rad=yaw)))
-                for tag, yaw in zip(known, yaws_rad)
-            ]
-        )
         try:
             is_found, turn, shift = cv2.solvePnP(points_m, pixels, lens.matrix, lens.distortion)
         except cv2.error:
@@ -238,7 +263,9 @@ def _fit(lens: Lens, seen: Sequence[TagCorners], references: Mapping[int, Refere
         rotation = cv2.Rodrigues(turn)[0]
         camera = Camera(lens, rotation, (-rotation.T @ shift).ravel())
         yaws_rad = [fit.pose.yaw_rad for fit in fit_references(camera, seen, references)]
-    assert camera is not None
+        turned = [tag._replace(pose=tag.pose._replace(yaw_rad=yaw)) for tag, yaw in zip(known, yaws_rad)]
+        points_m = np.vstack([_list_corners(tag) for tag in turned])
+        pixels = np.vstack([tag.corners for tag in seen])
     return camera if HEIGHTS_M[0] <= camera.position_m[2] <= HEIGHTS_M[1] else None
 
 

@@ -24,7 +24,13 @@ from hero_node.command_line import say
 from hero_node.errors import HeroError
 from hero_node.parameters import robot_ids_option
 
-from ..calibration.arena_calibration import MIN_TAGS, average_tags, calibrate_arena, fit_references
+from ..calibration.arena_calibration import (
+    MIN_TAGS,
+    average_tags,
+    calibrate_arena,
+    fit_references,
+    refine_corners,
+)
 from ..calibration.lens_calibration import (
     MIN_VIEWS,
     BoardView,
@@ -182,7 +188,7 @@ def calibrate_place(options: argparse.Namespace, pictures: Pictures) -> int:
     frames: List[Sequence[TagCorners]] = []
     while len(frames) < ARENA_FRAMES:
         frame = pictures.take()
-        frames.append(pictures.find_tags(settings, 1.0, frame))
+        frames.append(refine_corners(frame.gray, pictures.find_tags(settings, 1.0, frame), settings.family))
     lens = pictures.find_lens(settings)
     if lens is None:
         raise CalibrationError("%s holds no lens: calibrate_camera lens comes first" % options.file)
