@@ -7,7 +7,6 @@ and those that must fit a Protocol of theirs; `others` before all others.
 import ast
 import re
 import subprocess
-import sys
 import xml.etree.ElementTree as ElementTree
 from functools import lru_cache
 from pathlib import Path
