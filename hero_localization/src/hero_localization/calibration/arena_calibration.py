@@ -91,7 +91,7 @@ def _refine(gray: np.ndarray, tag: TagCorners, cells: np.ndarray) -> TagCorners:
     homography = cv2.getPerspectiveTransform(square, tag.corners.astype(np.float32))
     crossings = np.column_stack((columns, rows)).astype(np.float32)[:, None] + 1.0
     expected = cv2.perspectiveTransform(crossings, homography)
-    half_px = max(2, int(0.4 * cell_px))
+    half_px = max(2, int(0.5 * cell_px))
     criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 30, 0.001)
     found = cv2.cornerSubPix(gray, expected.copy(), (half_px, half_px), (-1, -1), criteria)
     away, found_away = expected - tag.center, found - tag.center
