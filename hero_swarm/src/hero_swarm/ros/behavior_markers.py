@@ -19,7 +19,7 @@ BEAM_M = 3.0
 """Length at which a beam of endless range is drawn."""
 
 PLOT_S = 120.0
-PLOT_M = (1.0, 0.3)
+PLOT_M = (0.8, 0.12)
 """Time and size, wide and high, of the metric's line, which scales itself to its values."""
 
 _FREE_COLOR, _SEEN_COLOR = ColorRGBA(0.4, 0.6, 1.0, 0.5), ColorRGBA(1.0, 0.3, 0.1, 0.9)
@@ -41,7 +41,7 @@ class BehaviorMarkers:
         while self._history[0][0] < sensed.time_s - PLOT_S:
             self._history.popleft()
         if not np.isfinite(self._corner[0]):
-            self._corner = (float(poses[:, 0].mean()) - PLOT_M[0] / 2.0, float(poses[:, 1].max()) + 0.3)
+            self._corner = (float(poses[:, 0].mean()) - PLOT_M[0] / 2.0, float(poses[:, 1].max()) + 0.12)
         beams = [self._draw_sensor(name, poses, sensed) for name in self._behavior.sensors()]
         return [*beams, *self._draw_plot(sensed.time_s, value)]
 
@@ -81,7 +81,7 @@ class BehaviorMarkers:
         x_m = left_m + width_m * (1.0 + (times_s - now_s) / PLOT_S)
         y_m = low_m + height_m * (values - least) / max(most - least, 1e-9)
         line = self._make_marker("metric_line", Marker.LINE_STRIP)
-        line.scale.x, line.color = 0.008, _PLOT_COLOR
+        line.scale.x, line.color = 0.006, _PLOT_COLOR
         line.points = [Point(x, y, 0.02) for x, y in zip(x_m.tolist(), y_m.tolist())]
         axes = self._make_marker("metric_axes", Marker.LINE_STRIP)
         axes.scale.x, axes.color = 0.004, _AXES_COLOR
@@ -90,7 +90,7 @@ class BehaviorMarkers:
         ]
         text = self._make_marker("metric", Marker.TEXT_VIEW_FACING)
         text.text = "%s %.2f (%.2f to %.2f in %.0f s)" % (self._behavior.metric, value, least, most, PLOT_S)
-        text.scale.z, text.color = 0.06, _PLOT_COLOR
-        text.pose.position = Point(left_m + width_m / 2.0, low_m + height_m + 0.08, 0.1)
+        text.scale.z, text.color = 0.045, _PLOT_COLOR
+        text.pose.position = Point(left_m + width_m / 2.0, low_m + height_m + 0.04, 0.1)
         # A line of one point is none that RViz draws.
         return [axes, text, *([line] if len(line.points) > 1 else [])]
