@@ -16,8 +16,8 @@ from .tag_corners import TagCorners
 
 __all__ = ["FINE_BELOW_PX", "TagSearch"]
 
-FINE_BELOW_PX, FINEST_BELOW_PX = 28.0, 20.0
-"""In an image at half its size, one tag in ten of less than this is missed, or more in bad light; at full size, below
+FINE_BELOW_PX, FINEST_BELOW_PX = 36.0, 20.0
+"""In an image at half its size, tags of less than this are missed with blur and gamma; at full size, some below
 the second."""
 
 FINE_S = 2.0
