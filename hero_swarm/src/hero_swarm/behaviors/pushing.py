@@ -20,8 +20,8 @@ Velocity = Tuple[np.ndarray, np.ndarray]
 class ObjectClustering(Behavior):
     """Robots gather objects by what one beam touches: nothing, an object or a robot.
 
-    The pairs of wheel speeds are those of M. Gauci et al., Clustering objects with robots that do not compute, AAMAS
-    2014, as shares of wheel_m_s.
+    After M. Gauci et al., Clustering objects with robots that do not compute, AAMAS 2014. The pairs of wheel speeds, as
+    shares of wheel_m_s, were not compared with the paper.
     """
 
     sees = Sight()
