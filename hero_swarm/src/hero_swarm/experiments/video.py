@@ -1,10 +1,16 @@
-"""Writes one run as a video, seen from above: .gif with Pillow, all others with ffmpeg."""
+"""Writes one run as a video, seen from above: .gif with Pillow, all others with ffmpeg.
 
+Without matplotlib.animation: that of Noetic calls `convert` of ImageMagick when it is imported, and fails if that does.
+"""
+
+import contextlib
+import itertools
 import os
-from typing import Any, List, Tuple
+import shutil
+import subprocess
+from typing import Any, Iterator, List, Tuple
 
 import numpy as np
-from matplotlib.animation import FFMpegWriter, PillowWriter
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import EllipseCollection, LineCollection
 from matplotlib.figure import Figure
@@ -27,17 +33,16 @@ def write_video(trial: Trial, time_s: float, speed: float, path: str) -> None:
 
     Raises: ExperimentError if the format needs ffmpeg, or the file cannot be written.
     """
-    writer: Any = PillowWriter if path.lower().endswith(".gif") else FFMpegWriter
-    if not writer.isAvailable():
-        needed = "python3-pil" if writer is PillowWriter else "ffmpeg, or write a .gif"
-        raise ExperimentError("--video %s: apt install %s" % (path, needed))
+    is_gif = path.lower().endswith(".gif")
+    if not is_gif and shutil.which("ffmpeg") is None:
+        raise ExperimentError("--video %s: apt install ffmpeg, or write a .gif" % path)
     folder = os.path.dirname(path) or "."
     if not os.access(folder, os.W_OK):
         raise ExperimentError("--video %s: the folder cannot be written to" % path)
     run = trial.run(time_s, speed / FRAMES_PER_S)
     frames = [(poses[0].copy(), _list_circles(trial), _list_edges(trial)) for _, poses in run]
     figure = Figure(figsize=(_SIZE_IN, _SIZE_IN))
-    FigureCanvasAgg(figure)
+    canvas = FigureCanvasAgg(figure)
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set_axis_off()
     low_m, high_m = _find_limits(trial, frames)
@@ -46,11 +51,36 @@ def write_video(trial: Trial, time_s: float, speed: float, path: str) -> None:
     axes.set_aspect("equal")
     axes.add_collection(LineCollection(trial.rows.world.arena.segments_m.reshape(-1, 2, 2), colors="0.4", linewidths=2))
     moving = Film(axes)
-    output = writer(fps=FRAMES_PER_S)
-    with output.saving(figure, path, _DPI):
+
+    def draw_frames() -> Iterator[np.ndarray]:
         for number, frame in enumerate(frames):
             moving.show(number * speed / FRAMES_PER_S, *frame)
-            output.grab_frame()
+            canvas.draw()
+            yield np.asarray(canvas.buffer_rgba())[..., :3].copy()
+
+    (_write_gif if is_gif else _write_with_ffmpeg)(path, draw_frames())
+
+
+def _write_gif(path: str, frames: Iterator[np.ndarray]) -> None:
+    try:
+        from PIL import Image
+    except ImportError as error:
+        raise ExperimentError("--video %s: apt install python3-pil" % path) from error
+    images = map(Image.fromarray, frames)
+    next(images).save(path, save_all=True, append_images=images, duration=1000 // FRAMES_PER_S, loop=0)
+
+
+def _write_with_ffmpeg(path: str, frames: Iterator[np.ndarray]) -> None:
+    first = next(frames)
+    size = "%dx%d" % (first.shape[1], first.shape[0])
+    command = ["ffmpeg", "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size]
+    command += ["-r", str(FRAMES_PER_S), "-i", "-", "-pix_fmt", "yuv420p", path]
+    # Where ffmpeg ends early, it says why.
+    with contextlib.suppress(BrokenPipeError), subprocess.Popen(command, stdin=subprocess.PIPE) as process:
+        for frame in itertools.chain((first,), frames):
+            process.stdin.write(frame.tobytes())  # type: ignore[union-attr]
+    if process.returncode:
+        raise ExperimentError("--video %s: ffmpeg cannot write it" % path)
 
 
 def _list_circles(trial: Trial) -> np.ndarray:
