@@ -1,5 +1,6 @@
 """The fleet monitor's page in a real browser without a screen, for tests and pictures."""
 
+import contextlib
 import os
 from pathlib import Path
 
@@ -90,9 +91,12 @@ class MonitorPage:
 
     def _hold(self, button, held, condition, what):
         """Hold a button, which the selector `held` finds meanwhile, until a condition is true; again where it ended."""
+        from selenium.common.exceptions import ElementNotInteractableException
 
         def press():
-            self.actions().release().click_and_hold(button).perform()
+            # A button that has gone since has done what it was held for, which the condition is about to tell.
+            with contextlib.suppress(ElementNotInteractableException):
+                self.actions().release().click_and_hold(button).perform()
 
         def is_true():
             if condition():
