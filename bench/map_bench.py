@@ -23,7 +23,7 @@ from hero_client.controllers.avoidance import WanderLaw
 from hero_client.controllers.orca import AvoidanceLaw
 from hero_examples.explore import Explorer, explore_together
 from hero_examples.random_walk import Walker
-from hero_examples.swarm_go_to import STEP_S, Formation
+from hero_examples.swarm_go_to import STEP_HZ, Formation
 from hero_localization.mapping.occupancy_grid import OccupancyGrid
 from hero_localization.mapping.swarm_map import SwarmMap
 from hero_localization.stepped_localization import StepLocalization
@@ -51,7 +51,7 @@ def measure_formation(shape, frame, seed):
         formation = Formation(swarm, CommonFrame(frame), goals, law, seed)
         took_s = math.inf
         try:
-            for time_s in swarm.rate(1.0 / STEP_S):
+            for time_s in swarm.rate(STEP_HZ):
                 formation.step(time_s)
                 if formation.done:
                     took_s = time_s

@@ -223,7 +223,7 @@ class TrackTest(unittest.TestCase):
         self.poses.clear()
         self.problems.clear()
         self.wait_for_state(0, RobotPose.LOST)
-        wait_for(lambda: "covered" in self.problems.get("localization: hero_0", ""), lambda: self.problems)
+        wait_for(lambda: "occluded" in self.problems.get("localization: hero_0", ""), lambda: self.problems)
         hand.publish(Point(math.nan, math.nan, 0.0))
         wait_for(lambda: 0 in self.measured_ids, lambda: self.measured_ids)
         self.poses.clear()

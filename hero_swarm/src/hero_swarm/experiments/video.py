@@ -14,6 +14,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import EllipseCollection, LineCollection
 from matplotlib.figure import Figure
+from PIL import Image
 
 from hero_client.values.robot_constants import BODY_RADIUS_M
 
@@ -62,10 +63,6 @@ def write_video(trial: Trial, time_s: float, speed: float, path: str) -> None:
 
 
 def _write_gif(path: str, frames: Iterator[np.ndarray]) -> None:
-    try:
-        from PIL import Image
-    except ImportError as error:
-        raise ExperimentError("--video %s: apt install python3-pil" % path) from error
     images = map(Image.fromarray, frames)
     next(images).save(path, save_all=True, append_images=images, duration=1000 // FRAMES_PER_S, loop=0)
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from hero_client.values.robot_constants import BODY_RADIUS_M
 from hero_swarm import metrics, show
@@ -260,10 +261,9 @@ def replay(*arguments):
 
 
 def test_a_run_is_replayed_as_a_video_that_ends_as_the_run_did(finished, tmp_path, capsys):
-    image = pytest.importorskip("PIL.Image", reason="writes .gif")
     replay(finished, "--seed", 13, "--cell", 4, "--video", tmp_path / "run.gif")
     assert "robots 5, errors default, seed 13" in capsys.readouterr().out
-    assert image.open(str(tmp_path / "run.gif")).n_frames == 30
+    assert Image.open(str(tmp_path / "run.gif")).n_frames == 30
     experiment = runner.read_experiment(str(finished / "experiment.yaml"))[1]
     trial = batch.build_trial(experiment, experiment.cells[3], [13])
     for _ in trial.run(3.0):
