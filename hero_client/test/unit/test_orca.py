@@ -81,24 +81,24 @@ def swap(count, radius_m, seed):
     goals = [(-pose.x_m, -pose.y_m) for pose in poses]
     bodies = [Body(pose) for pose in poses]
     steering = SwarmGoToController(goals, AvoidanceLaw(), STEP_S, seed)
-    least_m = math.inf
+    min_distance_m = math.inf
     for _ in range(1500):
         commands = steering.step([body.pose for body in bodies])
         for body, command in zip(bodies, commands):
             body.step(command)
         places = np.array([body.pose[:2] for body in bodies])
         apart = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1)) + np.eye(count)
-        least_m = min(least_m, float(apart.min()))
+        min_distance_m = min(min_distance_m, float(apart.min()))
         if all(command == STOP for command in commands):
             break
-    return least_m, [body.pose for body in bodies], goals
+    return min_distance_m, [body.pose for body in bodies], goals
 
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("count, radius_m", [(2, 0.4), (3, 0.4), (10, 0.6)])
 def test_robots_swap_places_across_a_circle_without_touching(count, radius_m, seed):
-    least_m, poses, goals = swap(count, radius_m, seed)
-    assert least_m > 2.0 * BODY_RADIUS_M
+    min_distance_m, poses, goals = swap(count, radius_m, seed)
+    assert min_distance_m > 2.0 * BODY_RADIUS_M
     for pose, goal in zip(poses, goals):
         assert math.hypot(pose.x_m - goal[0], pose.y_m - goal[1]) < 0.02
 

@@ -53,7 +53,7 @@ class GoToGoalController(MotionController):
         self._avoid = avoid
         self._side = 0
         self._last_bent_s = -math.inf
-        self._least_m, self._progress_s = math.inf, now_s
+        self._min_distance_m, self._progress_s = math.inf, now_s
         if avoid:
             self._patience_s = PROGRESS_S
 
@@ -61,7 +61,7 @@ class GoToGoalController(MotionController):
         """Drive to another goal of the same frame from now on; its time limit begins now."""
         self.goal, self._tolerance_m, self._timeout_s = goal, tolerance_m, timeout_s
         self._start_s, self._at_goal, self._stopped_since_s = now_s, False, None
-        self._least_m, self._progress_s = math.inf, self._seen_s
+        self._min_distance_m, self._progress_s = math.inf, self._seen_s
 
     def _offset(self, pose: Pose) -> float:
         self.distance_m = math.hypot(self.goal.x_m - pose.x_m, self.goal.y_m - pose.y_m)
@@ -89,8 +89,8 @@ class GoToGoalController(MotionController):
         if side:
             self._side, self._last_bent_s = side, seen_s
             self._obstacle = find_nearest(ranges, 0.0, math.tau / len(ranges))
-        if self.distance_m < self._least_m - PROGRESS_M:
-            self._least_m, self._progress_s = self.distance_m, seen_s
+        if self.distance_m < self._min_distance_m - PROGRESS_M:
+            self._min_distance_m, self._progress_s = self.distance_m, seen_s
         elif seen_s - self._progress_s > PROGRESS_S:
             self._fail("no nearer for %g s%s; %s" % (PROGRESS_S, self._describe_distance(), self._describe_obstacle()))
         return bent

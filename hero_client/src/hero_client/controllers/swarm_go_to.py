@@ -121,7 +121,7 @@ class _Jam:
 
     def __init__(self) -> None:
         self.turn_rad = 0.0
-        self._least_m = math.inf
+        self._min_distance_m = math.inf
         self._waited_s = 0.0
 
     @property
@@ -133,7 +133,7 @@ class _Jam:
         """Take the distance to the goal; return whether to begin going aside now."""
         was_aside = self.aside
         self._waited_s += step_s
-        if self._waited_s > PATIENCE_S + ASIDE_S or (not was_aside and distance_m < self._least_m - PROGRESS_M):
-            self._least_m = distance_m
+        if self._waited_s > PATIENCE_S + ASIDE_S or (not was_aside and distance_m < self._min_distance_m - PROGRESS_M):
+            self._min_distance_m = distance_m
             self._waited_s = 0.0
         return self.aside and not was_aside

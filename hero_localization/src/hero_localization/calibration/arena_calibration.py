@@ -182,7 +182,7 @@ def _find_wrong_tag(
     if len(seen) <= MIN_TAGS:
         return None
     found: Optional[_WrongTag] = None
-    least_m = math.inf
+    min_rest_m = math.inf
     for tag in seen:
         others = [other for other in seen if other is not tag]
         camera = _fit(lens, others, references)
@@ -190,8 +190,8 @@ def _find_wrong_tag(
             continue
         rest_m = _compute_rms(measure_residuals(camera, others, references), ())
         alone_m = measure_residuals(camera, [tag], references)[tag.tag_id]
-        if rest_m < least_m:
-            least_m = rest_m
+        if rest_m < min_rest_m:
+            min_rest_m = rest_m
             is_wrong = alone_m > WRONG_PLACE_M and alone_m > WRONG_SHARE * rest_m
             found = _WrongTag(tag.tag_id, camera) if is_wrong else None
     return found

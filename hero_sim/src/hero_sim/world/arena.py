@@ -203,5 +203,5 @@ def is_free(
     if not len(poses):
         return True
     apart_x_m, apart_y_m = np.array(poses)[:, 0] - pose.x_m, np.array(poses)[:, 1] - pose.y_m
-    least_m = radius_m + other_radius_m
-    return bool((apart_x_m * apart_x_m + apart_y_m * apart_y_m).min() >= least_m * least_m)
+    min_distance_m = radius_m + other_radius_m
+    return bool((apart_x_m * apart_x_m + apart_y_m * apart_y_m).min() >= min_distance_m * min_distance_m)

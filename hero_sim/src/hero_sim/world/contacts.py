@@ -89,11 +89,11 @@ def _find_touching(gaps_m: np.ndarray, pushes_m: np.ndarray) -> Tuple[bool, np.n
 
     gaps_m: between each two bodies, negative if they overlap. pushes_m: of each in the last step.
     """
-    least_m = float(np.minimum.reduce(gaps_m, initial=np.inf))
-    if least_m >= -_TOUCH_M and not np.count_nonzero(pushes_m):
-        return False, (gaps_m < _SHIFT_M).nonzero()[0], least_m
+    min_gap_m = float(np.minimum.reduce(gaps_m, initial=np.inf))
+    if min_gap_m >= -_TOUCH_M and not np.count_nonzero(pushes_m):
+        return False, (gaps_m < _SHIFT_M).nonzero()[0], min_gap_m
     pushed = pushes_m != 0.0
-    return True, ((gaps_m < _SHIFT_M) | pushed).nonzero()[0], least_m
+    return True, ((gaps_m < _SHIFT_M) | pushed).nonzero()[0], min_gap_m
 
 
 class Contacts:
