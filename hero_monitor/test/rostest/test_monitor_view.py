@@ -153,7 +153,11 @@ class ViewTest(unittest.TestCase):
             points = [[radius * math.cos(2.2), radius * math.sin(2.2)] for radius in radii]
             return self.page.browser.execute_script(READ_PIXELS, points)
 
-        dark = wait_for(read, "pixels")
+        def read_drawn():
+            pixels = read()
+            return pixels if pixels[2] != pixels[3] else None
+
+        dark = wait_for(read_drawn, read)
         self.monitor.show(lights={"hero_0": "#00ff00"})
         lit = wait_for(lambda: read() if read()[0] == [0, 255, 0] else None, read)
         self.assertEqual(lit[1], [0, 255, 0])
