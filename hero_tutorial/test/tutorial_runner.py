@@ -231,6 +231,9 @@ class Terminal:
         self.exit_code = 0
         self.is_busy = True
         self.wait_for_end(DEADLINE_S)
+        # Without job control, which would take a command that something suspends for a moment for one left with Ctrl-Z.
+        self.type_line("set +m")
+        self.wait_for_end(DEADLINE_S)
 
     def type_line(self, command: str) -> None:
         """Type a command and press Return."""
