@@ -153,13 +153,15 @@ class ViewTest(unittest.TestCase):
             points = [[radius * math.cos(2.2), radius * math.sin(2.2)] for radius in radii]
             return self.page.browser.execute_script(READ_PIXELS, points)
 
-        def read_drawn():
+        def read_when(is_lit):
             pixels = read()
-            return pixels if pixels[2] != pixels[3] else None
+            return pixels if (pixels[0] == [0, 255, 0]) == is_lit else None
 
-        dark = wait_for(read_drawn, read)
+        # By its light it is known that the robot is drawn, and after Fit.
         self.monitor.show(lights={"hero_0": "#00ff00"})
-        lit = wait_for(lambda: read() if read()[0] == [0, 255, 0] else None, read)
+        lit = wait_for(lambda: read_when(True), read)
+        self.monitor.show(lights={})
+        dark = wait_for(lambda: read_when(False), read)
         self.assertEqual(lit[1], [0, 255, 0])
         self.assertEqual(lit[2:], dark[2:])
         self.assertNotIn(lit[3], (lit[0], lit[2]))
