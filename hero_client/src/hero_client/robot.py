@@ -22,6 +22,7 @@ from hero_node.ros.script import start_node
 
 from .robots.robot_base import COMMAND_S, BaseRobot, check_robot_id
 from .ros.ros_link import RosLink
+from .values.errors import StaleDataError
 
 __all__ = ["Robot"]
 
@@ -86,5 +87,8 @@ class Robot(BaseRobot):
 
         The first use subscribes and waits up to 5 s. Raises: StaleDataError if it is older than 1 s, or without a hat.
         """
-        self._check_asked("imu")
+        try:
+            self._check_asked("imu")
+        except StaleDataError as error:
+            raise StaleDataError("%s: only robots with the IMU hat publish it" % error) from None
         return self._link.messages.read("imu")

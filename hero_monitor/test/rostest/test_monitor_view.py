@@ -101,7 +101,7 @@ class ViewTest(unittest.TestCase):
         return {name: int(self.page.text("#count_" + name)) for name in ("ready", "driving", "stopped", "lost")}
 
     def test_the_summary_counts_each_robot_once(self):
-        states = [{}, {"stop": "at rest"}, {"state": "AWAY"}, {"known": False}, {"state": "REFUSED"}]
+        states = [{}, {"stop": "at rest"}, {"state": "AWAY"}, {"known": False}, {"state": "REFUSED"}, {"state": "JOINING"}]
         self.show([make_robot(number, **changes) for number, changes in enumerate(states)])
         wait_for(lambda: self.counts() == {"ready": 1, "driving": 0, "stopped": 1, "lost": 2}, self.counts)
 
@@ -306,6 +306,16 @@ class ViewTest(unittest.TestCase):
             wait_for(self.page.find(banner).is_displayed, banner)
         self.page.click("#fleet tbody tr:nth-child(2) button")  # scrolls, and fails unless it can be reached
         self.page.wait_for_text("#name", "hero_1")
+
+    def test_a_phone_on_its_side_shows_map_and_table_side_by_side(self):
+        self.addCleanup(self.page.resize, 1440, 900)
+        for width, height in ((568, 320), (844, 390)):
+            self.page.resize(width, height)
+            wait_for(lambda: self.page.find("#fleet .scroll").rect["height"] >= height / 3, (width, height))
+            for panel in ("fleet", "robot", "log"):
+                self.page.click("[data-panel=%s]" % panel)
+                self.assertEqual(self.page.run(FIND_CUT), [], panel)
+            self.page.click("[data-panel=fleet]")
 
     def test_no_state_of_the_page_breaks_a_rule_of_wcag_aa(self):
         robots = [make_robot(number, stop="at rest") for number in range(3)]

@@ -316,8 +316,29 @@ def test_speeds_and_distances_that_mean_nothing_are_refused():
             robot.forward(0.1, speed)
         with pytest.raises(ValueError, match="the speed positive"):
             robot.turn(0.1, speed)
-    with pytest.raises(ValueError, match="speeds must be finite"):
-        robot.drive(math.nan, 0.0)
+    for wrong in (math.nan, "0.1", None):
+        with pytest.raises(ValueError, match="speeds must be finite"):
+            robot.drive(wrong, 0.0)
+        with pytest.raises(ValueError, match="the speed positive"):
+            robot.forward(wrong)
+        with pytest.raises(ValueError, match="0 s or more"):
+            robot.drive(0.1, 0.0, "2" if wrong is None else math.nan)
+
+
+def test_goals_and_poses_that_mean_nothing_are_refused_at_once():
+    swarm = StepSwarm(2)
+    for wrong in (math.nan, math.inf, "1", [1.0]):
+        with pytest.raises(ValueError, match="of a goal must be finite"):
+            swarm[0].go_to(0.1, wrong)
+        with pytest.raises(ValueError, match="of a goal must be finite"):
+            swarm[0].start_go_to(0.1, 0.1, yaw_rad=wrong)
+        with pytest.raises(ValueError, match="of a pose must be finite"):
+            swarm[0].set_pose(0.0, 0.0, wrong)
+    for wrong in (math.nan, "1"):
+        with pytest.raises(ValueError, match="goal of hero_1 must be finite"):
+            swarm.go_to({0: (0.0, 0.3), 1: (wrong, 0.0)})
+    swarm[0].go_to(np.float32(0.05), np.int64(0))
+    assert swarm.now_s < 5.0
 
 
 def test_dropping_a_swarm_with_a_motion_on_its_way_is_no_error(recwarn):

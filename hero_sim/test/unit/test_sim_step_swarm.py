@@ -344,7 +344,7 @@ def test_robots_that_do_not_get_to_their_goals_are_named_and_stopped():
             swarm.go_to_each({1: 0.2})
         begun_s = swarm.now_s
         for goals in ({0: swarm[1].true_pose[:2]}, {0: (5.0, 0.1), 1: (5.0, 0.0)}):
-            with pytest.raises(GoalError, match=r"hero_0 and hero_1 are 0.\d+ m apart: robots need 0.18 m"):
+            with pytest.raises(GoalError, match=r"hero_0 and hero_1 are 0.\d+ m apart: robots need 0.178 m"):
                 swarm.go_to_each(goals)
         assert swarm.now_s - begun_s < 1.0
 

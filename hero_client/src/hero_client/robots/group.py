@@ -1,6 +1,7 @@
 """Common base of robot and swarm: a robot is a group of one. Pure."""
 
 import math
+from numbers import Real
 from typing import Optional, Protocol, Sequence, TypeVar
 
 from hero_node.clock import Clock
@@ -129,7 +130,7 @@ class Group(Clock):
         return self
 
     def _drive_for(self, linear_m_s: float, angular_rad_s: float, duration_s: float) -> None:
-        if not duration_s >= 0.0:
+        if not (isinstance(duration_s, Real) and duration_s >= 0.0):
             raise ValueError("a duration must be 0 s or more, not %r" % (duration_s,))
         for robot in self._members:
             robot._end_motion()

@@ -14,6 +14,7 @@ from ..controllers.go_to_goal import DEFAULT_TOLERANCE_M, Goal, GoToGoalControll
 from ..controllers.motion import DEFAULT_TIMEOUT_S, MotionController, State
 from ..controllers.straight_and_turn import ForwardController, TurnController
 from ..values.background_motion import BackgroundMotion, Sleep, Steps
+from ..values.checks import check_finite, is_finite
 from ..values.colors import Color
 from ..values.errors import GoalError, StaleDataError, StoppedError
 from ..values.geometry import Pose, Velocity, clamp, transform_pose, wrap_angle
@@ -217,6 +218,7 @@ class BaseRobot(Group):
 
         Raises: RobotError if the robot does not answer or refuses. StaleDataError if no odometry follows.
         """
+        check_finite("x, y and yaw of a pose", x_m, y_m, yaw_rad)
         self._link.set_odometry(Pose(x_m, y_m, yaw_rad))
         self._link.subscribe("odom")
         self._link.wait_for_next("odom", NEXT_ODOM_S, count=2)  # one may have been on its way before the answer
@@ -247,8 +249,7 @@ class BaseRobot(Group):
             self._link.log_warning(self._describe_stop())
 
     def _send_velocity(self, linear_m_s: float, angular_rad_s: float) -> None:
-        if not (math.isfinite(linear_m_s) and math.isfinite(angular_rad_s)):
-            raise ValueError("speeds must be finite, not %r m/s and %r rad/s" % (linear_m_s, angular_rad_s))
+        check_finite("speeds", linear_m_s, angular_rad_s)
         self.driven = True
         self._moves_sent = self._moves_sent + 1 if linear_m_s or angular_rad_s else 0
         self._last_move_s = self.now_s
@@ -342,8 +343,8 @@ class BaseRobot(Group):
         that do not turn, no pose for 2 s, or timeout_s. RobotNotReadyError if the robot is not there within 2 s.
         StoppedError if all robots are stopped. FrameError as pose_in(). The robot is stopped then.
         """
+        steps = self._pursue(_make_goal(x_m, y_m, yaw_rad), frame, avoid, timeout_s, tolerance_m, on_step)
         self._end_motion()
-        steps = self._pursue(Goal(x_m, y_m, yaw_rad), frame, avoid, timeout_s, tolerance_m, on_step)
         self._run(steps, sleep)
 
     def start_go_to(
@@ -362,7 +363,7 @@ class BaseRobot(Group):
         motion.cancel(), stop() or another motion of this robot ends it, and result() then raises GoalError. Several
         robots at once: start all, then ask each motion for its result().
         """
-        return self.start_motion(self._pursue(Goal(x_m, y_m, yaw_rad), frame, avoid, timeout_s, tolerance_m))
+        return self.start_motion(self._pursue(_make_goal(x_m, y_m, yaw_rad), frame, avoid, timeout_s, tolerance_m))
 
     def _pursue(
         self,
@@ -482,6 +483,11 @@ class BaseRobot(Group):
         return "<%s: %s%s>" % (self.name, state, ", %r" % (pose,) if pose else "")
 
 
+def _make_goal(x_m: float, y_m: float, yaw_rad: Optional[float]) -> Goal:
+    check_finite("x, y and yaw of a goal", x_m, y_m, 0.0 if yaw_rad is None else yaw_rad)
+    return Goal(x_m, y_m, yaw_rad)
+
+
 def _check_speed(distance: float, speed: float) -> None:
-    if not (math.isfinite(distance) and 0.0 < speed < math.inf):
+    if not (is_finite(distance) and is_finite(speed) and speed > 0.0):
         raise ValueError("distance or angle must be finite, the speed positive, not %r and %r" % (distance, speed))

@@ -15,6 +15,7 @@ from ..controllers.motion import DEFAULT_TIMEOUT_S
 from ..controllers.orca import AvoidanceLaw
 from ..controllers.swarm_go_to import SwarmGoToController
 from ..values.background_motion import BackgroundMotion, Steps
+from ..values.checks import check_finite
 from ..values.colors import Color
 from ..values.errors import GoalError, StaleDataError
 from ..values.geometry import Pose
@@ -148,6 +149,7 @@ class BaseSwarm(Group, Generic[AnyRobot]):
         for robot_id, goal in goals.items():
             if np.shape(goal) != (2,):
                 raise TypeError("the goal of hero_%s must be (x m, y m), not %r" % (robot_id, goal))
+            check_finite("x and y of the goal of hero_%s" % (robot_id,), *goal)
             self[robot_id]._end_motion()
         self._run(stop_after(self._go_to_each(goals, frame, timeout_s, tolerance_m), self._members))
 
@@ -161,7 +163,7 @@ class BaseSwarm(Group, Generic[AnyRobot]):
         for (one, place), (other, beside) in combinations(zip(self.robots, places), 2):
             apart_m = math.dist(place, beside)
             if apart_m < law.min_spacing_m and {one.robot_id, other.robot_id} & set(goals):
-                text = "the places of %s and %s are %.2f m apart: robots need %.2f m"
+                text = "the places of %s and %s are %.3f m apart: robots need %.3f m"
                 raise GoalError(text % (one.name, other.name, apart_m, law.min_spacing_m))
         controller = SwarmGoToController(places, law, REPEAT_PERIOD_S, seed=0, tolerance_m=tolerance_m)
         end_s = self.now_s + timeout_s

@@ -6,16 +6,20 @@ const DRIVING_M_S = 0.01;
 
 const element = (id) => document.getElementById(id);
 
-/** Each robot counts once: lost before stopped, stopped before driving. */
+/** Each robot counts once: lost before stopped, stopped before driving; one that still joins does not count yet. */
 function classify(robot, state, history) {
-  if (stateOf(robot, state) !== "READY") return "lost";
+  const shown = stateOf(robot, state);
+  if (shown !== "READY") return shown === "JOINING" ? null : "lost";
   if (robot.stop) return "stopped";
   return (history.speedOf(robot.name) ?? 0) >= DRIVING_M_S ? "driving" : "ready";
 }
 
 export function showSummary(state, history) {
   const counts = { ready: 0, driving: 0, stopped: 0, lost: 0 };
-  for (const robot of state.fleet.robots) counts[classify(robot, state, history)] += 1;
+  for (const robot of state.fleet.robots) {
+    const name = classify(robot, state, history);
+    if (name) counts[name] += 1;
+  }
   for (const [name, count] of Object.entries(counts)) {
     element(`count_${name}`).textContent = count;
     element(`count_${name}`).parentElement.classList.toggle("zero", count === 0);
