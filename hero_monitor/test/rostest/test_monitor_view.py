@@ -55,6 +55,8 @@ const tags = [...document.querySelectorAll("tbody [data-state]")];
 return tags.map((tag) => getComputedStyle(tag).backgroundColor);
 """
 BODY_MM = 36.85
+LATE = ((103, "late"), (101, "early"), (102, "middle"), (50, "back"))
+"""Seconds and name of lines in the order in which they come; at the last one the clock was set back."""
 
 
 @unittest.skipIf(MISSING, "not installed: %s (script/bootstrap --test)" % ", ".join(MISSING))
@@ -284,6 +286,13 @@ class ViewTest(unittest.TestCase):
         self.assertEqual(len(shown), 2)
         for text in ("3 robots", "silent for 5.5 s", "6 times"):
             self.assertIn(text, shown[0])
+
+    def test_lines_that_come_late_are_shown_in_the_order_of_time(self):
+        lines = [[number, float(at_s), 4, "node", "", "%s line" % name] for number, (at_s, name) in enumerate(LATE)]
+        self.monitor.tell(log={"missed": 0, "lines": lines})
+        read = "return [...document.querySelectorAll('#lines .text')].map((one) => one.textContent)"
+        expected = ["%s line" % name for name in ("early", "middle", "late", "back")]
+        wait_for(lambda: self.page.run(read)[-4:] == expected, lambda: self.page.run(read))
 
     def test_a_phone_cuts_nothing_off_and_shows_layers_on_request(self):
         self.page.resize(320, 568)

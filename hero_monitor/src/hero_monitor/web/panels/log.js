@@ -1,10 +1,11 @@
-// Log lines of nodes and robots, newest at the bottom; a message that comes again, for any robot, stays one line.
+// Log lines of nodes and robots by their time, newest at the bottom; a message that comes again, for any robot, stays one line.
 
 import { colorOf } from "../map/colors.js";
 
 const LINES_MAX = 500;
 const LEVELS = { 1: "debug", 2: "info", 4: "warn", 8: "error", 16: "fatal" };
 const AT_END_PX = 30;
+const DELAY_MAX_S = 10; // of lines on their way from other nodes; later, a clock was set back
 const NUMBER = /\d+(\.\d+)?/g;
 
 function cell(className, text) {
@@ -13,6 +14,8 @@ function cell(className, text) {
   part.textContent = text;
   return part;
 }
+
+const isLate = (seconds, entry) => entry && seconds < entry.seconds && seconds > entry.seconds - DELAY_MAX_S;
 
 export class LogView {
   constructor() {
@@ -54,16 +57,17 @@ export class LogView {
     if (atEnd) this.list.scrollTop = this.list.scrollHeight;
   }
 
-  /** Show a line at the end; what differs from one before only in numbers joins it. */
+  /** Show a line in its place; what differs from one before only in numbers joins it. */
   add({ seconds, level, node, robot, text }) {
     const key = `${level} ${node} ${text.replace(NUMBER, "#")}`;
     const former = this.groups.get(key);
     former?.line.remove();
+    if (former && isLate(seconds, former.line.entry)) seconds = former.line.entry.seconds;
     const robots = new Set(former?.robots).add(robot);
     const count = (former?.count ?? 0) + 1;
     const line = document.createElement("li");
     line.className = LEVELS[level] || "info";
-    line.entry = { key, level, robots, words: `${node} ${text}`.toLowerCase() };
+    line.entry = { key, seconds, level, robots, words: `${node} ${text}`.toLowerCase() };
     const time = new Date(seconds * 1000);
     line.append(cell("time", time.toTimeString().slice(0, 8)), cell("level", LEVELS[level] || "?"));
     const source = cell("node", robots.size > 1 ? `${robots.size} robots` : robot || node);
@@ -73,7 +77,13 @@ export class LogView {
     if (count > 1) line.lastElementChild.append(cell("count", `${count} times`));
     line.hidden = !this.admits(line.entry);
     this.groups.set(key, { line, count, robots });
-    this.list.append(line);
+    this.list.insertBefore(line, this.findNext(seconds));
+  }
+
+  findNext(seconds) {
+    let last = this.list.lastElementChild;
+    while (isLate(seconds, last?.entry)) last = last.previousElementSibling;
+    return last ? last.nextElementSibling : this.list.firstElementChild;
   }
 
   admits(entry) {
