@@ -152,6 +152,22 @@ def test_a_pc_that_runs_nothing_for_a_while_fails_no_motion():
     assert controller.state is State.ACTIVE, controller.reason
 
 
+def test_wheels_may_start_anew_after_a_pause_of_the_program():
+    """The driver stops a robot whose program is silent; a stock robot then needs up to 3 s for the slowest turn."""
+    controller = TurnController(0.1, 0.0, 1.5)
+    now_s = 0.0
+    for pause_s in (0.0, 0.6):
+        now_s += pause_s
+        for _ in range(int(0.7 * STALL_S / STEP_S)):
+            now_s += STEP_S
+            controller.step(HERE, None, now_s)
+        assert controller.state is State.ACTIVE, controller.reason
+    for _ in range(int(0.4 * STALL_S / STEP_S)):
+        now_s += STEP_S
+        controller.step(HERE, None, now_s)
+    assert "wheels do not turn" in controller.reason
+
+
 @pytest.mark.parametrize("way_m", [0.3, -0.2, 0.01])
 def test_forward_drives_its_distance_and_keeps_the_heading(way_m):
     body = Body(Pose(0.1, 0.2, 0.7))

@@ -44,8 +44,12 @@ BLOCKED_M_S = 0.01
 BLOCKED_S = 2.0
 """After so long behind an obstacle the motion has failed; one that drives on, such as a robot, is waited for."""
 
-STALL_S = 3.0
-"""After so long without motion of the wheels although they were told to move, the motion has failed."""
+STALL_S = 5.0
+"""After so long without motion of the wheels although they were told to move, the motion has failed. The slowest command
+moves wheels after up to 3 s, when the robot's own controller has overcome friction."""
+
+SILENCE_S = 0.4
+"""The driver may have stopped a robot whose program took longer for a step; its wheels then start anew."""
 
 STALL_LINEAR_M_S = 0.02
 STALL_ANGULAR_RAD_S = 0.2
@@ -107,6 +111,8 @@ class MotionController:
         """
         if self.state is not State.ACTIVE:
             return STOP
+        if now_s - self._stepped_s > SILENCE_S:
+            self._moved_pose = None
         step_s, self._stepped_s = min(now_s - self._stepped_s, MAX_STEP_S), now_s
         if now_s - self._start_s > self._timeout_s:
             return self._fail(self._describe_timeout())
