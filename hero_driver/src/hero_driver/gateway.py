@@ -103,7 +103,6 @@ class Gateway(LinkHandler):
         now_s = time.monotonic()
         session = Session(self._config.session_limits, now_s)
         peer = Peer(link, session, self._admission.limit_rate(now_s))
-        link.peer = peer
         self.peers[link] = peer
         self.poll_link(link, now_s)
         return None
@@ -121,7 +120,7 @@ class Gateway(LinkHandler):
 
     def receive_data(self, link: Link, data: bytes, now_s: float) -> None:
         """Pass bytes to the session and its events on; the hot path of the driver."""
-        peer: Peer = link.peer
+        peer = self.peers[link]
         session = peer.session
         reader = session.reader
         packets, skipped_bytes = reader.packets, reader.skipped_bytes
@@ -149,7 +148,7 @@ class Gateway(LinkHandler):
 
     def poll_link(self, link: Link, now_s: float) -> None:
         """Perform what is due in the session."""
-        peer: Peer = link.peer
+        peer = self.peers[link]
         for event in peer.session.poll(now_s):
             self._receive_event(peer, event, now_s)
         if peer.record is None and now_s - peer.session.opened_s > self._config.declare_timeout_s:
@@ -286,7 +285,7 @@ class Gateway(LinkHandler):
         known = self.fleet.robots.get(identity.namespace)
         if known is not None and known.link is not None:
             # Only needed here, and every read would cost more.
-            known.last_heard_s = known.link.peer.session.last_receive_s
+            known.last_heard_s = self.peers[known.link].session.last_receive_s
         if known is None:
             refusal = self._admission.admit_new_robot(address.host, now_s)
             if refusal is not None:
@@ -346,7 +345,7 @@ class Gateway(LinkHandler):
         }
         for record in self.fleet.robots.values():
             bridge = self.bridges.get(record.identity.namespace)
-            peer: Optional[Peer] = record.link.peer if record.link is not None else None
+            peer = None if record.link is None else self.peers.get(record.link)
             stop_state = self._stops.find_state(peer)
             statuses.append(describe_robot(record, bridge, peer, stop_state, duplicate_stops, now_s))
         return sorted(statuses, key=lambda status: (status.message.id, status.message.namespace))
@@ -405,8 +404,7 @@ class Gateway(LinkHandler):
         record = self.fleet.robots.get(namespace)
         if record is None or record.link is None or record.link.closed:
             return None
-        peer: Peer = record.link.peer
-        return peer
+        return self.peers.get(record.link)
 
     def warn_robot(self, peer: Peer, text: str) -> None:
         """Log what is wrong with a robot, and keep it for reports."""

@@ -87,23 +87,14 @@ class DriverNode:
         )
         self._thread = threading.Thread(target=self._run_loop, name="sockets", daemon=True)
         self._crash: Optional[BaseException] = None
-        self._reporter: Reporter
         self._kept = KeptStop(rospy.get_name())
-        self._stop_interface = StopInterface(
-            self._loop,
-            self._gateway.set_stopped,
-            lambda: self._gateway.stopped,
-            self._gateway.list_stops,
-            self._kept,
-            self._log,
-        )
+        self._stop_interface = StopInterface(self._loop, self._gateway, self._kept, self._log)
         self._master_watch = MasterWatch("~stop", self._log.log)
 
     def open(self) -> None:
         """Listen, dial and serve. Raises: OSError if the port cannot be had."""
         self._loop.open(self._gateway)
         self._gateway.open()
-        self._reporter = Reporter()
         since = self._kept.read_since() if self._config.start_stopped == "as_before" else ""
         self._stop_interface.open(bool(since) or self._config.start_stopped == "always", since)
         self._thread.start()
@@ -119,6 +110,7 @@ class DriverNode:
 
     def spin(self) -> int:
         """Report until end() is called; return the exit code."""
+        reporter = Reporter()
         next_report_s = time.monotonic()
         # The first reports of a burst of changes may be put off a little, so that 50 robots make a few.
         while not self._has_ended(REPORT_CHECK_S):
@@ -126,7 +118,7 @@ class DriverNode:
             is_due = now_s >= next_report_s
             if is_due or self._changed.is_set():
                 self._changed.clear()
-                self._report(is_due)
+                self._report(reporter, is_due)
             if is_due:
                 next_report_s = now_s + self._config.report_period_s
         if self._crash is not None:
@@ -171,28 +163,26 @@ class DriverNode:
     def _describe_start(self) -> str:
         parts = []
         if self._loop.listening is not None:
-            parts.append(
-                "listening on %s" % (self._loop.listening,)
-            )
+            parts.append("listening on %s" % (self._loop.listening,))
         if self._config.robots:
             parts.append("dialling %s" % ", ".join(str(address) for address in self._config.robots))
         return "hero_driver: %s" % "; ".join(parts)
 
-    def _report(self, is_periodic: bool) -> None:
+    def _report(self, reporter: Reporter, is_periodic: bool) -> None:
         try:
             status = self._loop.ask(lambda answer: answer(self._take_status()), 1.0)
         except NoAnswerError:
             return
         if is_periodic:
-            self._reporter.measure_rates(status)
+            reporter.measure_rates(status)
         try:
-            self._reporter.publish(status)
+            reporter.publish(status)
         except rospy.ROSException:
             if not rospy.is_shutdown():
                 raise
             return  # another program ends the node (rosnode kill): rospy closes topics before it calls end()
         if is_periodic:
-            self._reporter.diagnose()
+            reporter.diagnose()
 
     def _take_status(self) -> FleetStatus:
         """Runs on the thread of the sockets."""

@@ -5,7 +5,7 @@ until ~robots says that the robots are stopped. Whether they are is kept in a fi
 """
 
 import weakref
-from typing import Any, Callable, FrozenSet, List, Optional, Tuple
+from typing import Any, Callable, FrozenSet, List, Optional, Protocol, Tuple
 
 import rospy
 from std_msgs.msg import Bool
@@ -26,45 +26,44 @@ Stops = List[Tuple[str, Optional[StopState]]]
 """Name and stop of each connection that can move a robot, and None for each robot that is away."""
 
 
+class StoppableFleet(Protocol):
+    """The gateway as this module uses it, on the thread of the sockets."""
+
+    stopped: bool
+
+    def set_stopped(self, stopped: bool) -> None:
+        """Stop all robots until they are released, or release them."""
+
+    def list_stops(self) -> Stops:
+        """Return the stops of all robots."""
+
+
 class StopInterface:
     """The stop of all robots, as ROS sees it."""
 
-    def __init__(
-        self,
-        loop: EventLoop,
-        set_stopped: Callable[[bool], None],
-        is_stopped: Callable[[], bool],
-        list_stops: Callable[[], Stops],
-        kept: KeptStop,
-        log: LogRelay,
-    ) -> None:
-        """The three functions are called on the thread of the sockets."""
+    def __init__(self, loop: EventLoop, fleet: StoppableFleet, kept: KeptStop, log: LogRelay) -> None:
         self._loop = loop
-        self._set_stopped = set_stopped
-        self._is_stopped = is_stopped
-        self._list_stops = list_stops
+        self._fleet = fleet
         self._kept = kept
         self._log = log
         self._request_topic = rospy.resolve_name("~stop_request")
         self._earlier: Optional[FrozenSet[str]] = frozenset()  # publishers that were there before
         self._heard: weakref.WeakSet[Any] = weakref.WeakSet()  # connections that have brought a request
-        self._publisher: rospy.Publisher
-        self._service: rospy.Service
+        self._publisher = rospy.Publisher("~stopped", Bool, queue_size=1, latch=True)
         self._keeper = Worker("stop keeper", 100, self._report_not_kept)
 
     def open(self, stopped: bool, since: str) -> None:
         """Serve; begin as stopped says. The loop does not run yet. since: since when they are, if that was kept."""
-        self._set_stopped(stopped)
+        self._fleet.set_stopped(stopped)
         self._keep(stopped)
         if stopped:
             begin = "since " + since if since else "from the start (~start_stopped)"
             text = "all robots are stopped %s; this releases them: rosservice call %s false"
             self._log.log("warn", text % (begin, rospy.resolve_name("~stop")))
-        self._publisher = rospy.Publisher("~stopped", Bool, queue_size=1, latch=True)
         self._publisher.publish(Bool(stopped))
         self._earlier = list_publishers(self._request_topic, Bool._type)
         rospy.Subscriber("~stop_request", Bool, self._take_request, queue_size=10, tcp_nodelay=True)
-        self._service = rospy.Service("~stop", SetBool, self._serve)
+        rospy.Service("~stop", SetBool, self._serve)
 
     def _keep(self, stopped: bool) -> None:
         self._keeper.submit(lambda: self._kept.write(stopped))
@@ -78,7 +77,7 @@ class StopInterface:
 
         def set_and_answer(answer: Callable[[Stops], None]) -> None:
             self._set(stopped)
-            answer(self._list_stops())
+            answer(self._fleet.list_stops())
 
         try:
             stops = self._loop.ask(set_and_answer, ANSWER_WAIT_S)
@@ -100,10 +99,10 @@ class StopInterface:
 
     def _set(self, stopped: bool) -> None:
         """Runs on the thread of the sockets."""
-        changed = stopped is not self._is_stopped()
+        changed = stopped is not self._fleet.stopped
         if not changed and not stopped:
             return
-        self._set_stopped(stopped)
+        self._fleet.set_stopped(stopped)
         if changed:
             # Published and written elsewhere: both may block.
             self._keep(stopped)

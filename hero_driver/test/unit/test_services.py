@@ -21,9 +21,9 @@ class Robot:
         self.now_s = 100.0
         self.timers = []
         monkeypatch.setattr(services.time, "monotonic", lambda: self.now_s)
-        self.service = RobotService(NAME, "hero_msgs/SetOdom", TIMEOUT_S, self.send, self.ask, self.call_later)
+        self.service = RobotService(NAME, "hero_msgs/SetOdom", TIMEOUT_S, self, self)
 
-    def send(self, request):
+    def send_request(self, service, request):
         self.requests.append(request)
         return self.refusal
 
@@ -63,7 +63,7 @@ def test_a_call_returns_the_robots_answer(robot):
 
 
 def test_a_caller_gets_the_answer_that_came_while_the_request_was_sent(robot):
-    robot.service._send = lambda request: robot.service.receive_answer(b"quick") and None
+    robot.send_request = lambda service, request: service.receive_answer(b"quick") and None
     assert robot.service.call(b"request") == b"quick"
 
 
@@ -91,7 +91,7 @@ def test_a_call_fails_where_the_loop_does_not_answer(robot):
     def hang(call, timeout_s):
         raise NoAnswerError("no answer within %g s" % timeout_s)
 
-    robot.service._ask = hang
+    robot.ask = hang
     with pytest.raises(rospy.ServiceException, match="/hero_0/set_odom was not answered: no answer within 7 s"):
         robot.service.call(b"request")
 

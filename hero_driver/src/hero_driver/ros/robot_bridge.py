@@ -225,16 +225,17 @@ class RobotBridge:
         self._take_input(requests, name, layout, lambda: self._endpoints.serve(name, layout, known_service.call))
 
     def _make_service(self, name: str, ros_type: str) -> RobotService:
-        def send(request: bytes) -> Optional[str]:
-            if self._services.get(name) is not service:
-                return "the robot declared it with another type"
-            if name not in self._ids:
-                return "the robot is not connected"
-            return self.commands.offer_request(name, ros_type, request)
-
-        loop, timeout_s = self._loop, self._settings.service_timeout_s
-        service = self._services[name] = RobotService(name, ros_type, timeout_s, send, loop.ask, loop.call_later)
+        service = RobotService(name, ros_type, self._settings.service_timeout_s, self, self._loop)
+        self._services[name] = service
         return service
+
+    def send_request(self, service: RobotService, request: bytes) -> Optional[str]:
+        """Send a request of one of the robot's services; return why it cannot be sent, None if it is on its way."""
+        if self._services.get(service.name) is not service:
+            return "the robot declared it with another type"
+        if service.name not in self._ids:
+            return "the robot is not connected"
+        return self.commands.offer_request(service.name, service.service_type, request)
 
     def _receive_answer(self, service: RobotService, payload: bytes) -> None:
         request = service.receive_answer(payload)

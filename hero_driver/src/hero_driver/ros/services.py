@@ -7,11 +7,11 @@ the next call. Everything here runs on the thread of the sockets, except RobotSe
 
 import collections
 import time
-from typing import Callable, Deque, Optional, Tuple
+from typing import Callable, Deque, Optional, Protocol, Tuple
 
 import rospy
 
-from ..transport import CallLater, NoAnswerError
+from ..transport import EventLoop, NoAnswerError
 
 Answer = Tuple[bytes, str]
 """The robot's answer, and empty text; or nothing, and why there is none."""
@@ -30,6 +30,13 @@ class _Call:
         self.answer((b"", reason))
 
 
+class ServiceOwner(Protocol):
+    """The robot's end of its services, on the thread of the sockets."""
+
+    def send_request(self, service: "RobotService", request: bytes) -> Optional[str]:
+        """Send a request to the robot; return why it cannot be sent, None if it is on its way."""
+
+
 class RobotService:
     """One service of one robot, over all its connections."""
 
@@ -38,17 +45,15 @@ class RobotService:
         name: str,
         service_type: str,
         timeout_s: float,
-        send: Callable[[bytes], Optional[str]],
-        ask: Callable[[Callable[[Callable[[Answer], None]], None], float], Answer],
-        call_later: CallLater,
+        owner: ServiceOwner,
+        loop: EventLoop,
     ) -> None:
-        """send(request) returns why it cannot be sent, None if it is on its way; ask and call_later are the loop's."""
+        """owner sends the requests of calls that come on other threads than loop's."""
         self.name = name
         self.service_type = service_type
         self._timeout_s = timeout_s
-        self._send = send
-        self._ask = ask
-        self._call_later = call_later
+        self._owner = owner
+        self._loop = loop
         self._waiting: Deque[_Call] = collections.deque()
         self._current: Optional[_Call] = None
         self._late_request: Optional[bytes] = None  # of the call that timed out, until its answer has come
@@ -61,7 +66,7 @@ class RobotService:
         """
         limit_s = 1.5 * self._timeout_s + HANG_WAIT_S
         try:
-            payload, failure = self._ask(lambda answer: self._begin(request, answer), limit_s)
+            payload, failure = self._loop.ask(lambda answer: self._begin(request, answer), limit_s)
         except NoAnswerError as error:
             failure = "was not answered: %s" % error
         if failure:
@@ -89,7 +94,7 @@ class RobotService:
     def _begin(self, request: bytes, answer: Callable[[Answer], None]) -> None:
         call = _Call(request, answer, time.monotonic() + self._timeout_s)
         self._waiting.append(call)
-        self._call_later(self._timeout_s, lambda: self._expire(call))
+        self._loop.call_later(self._timeout_s, lambda: self._expire(call))
         self._send_next()
 
     def _send_next(self) -> None:
@@ -105,7 +110,7 @@ class RobotService:
             self._current = call
             # A call that had to wait for its turn gets half of the time limit at least.
             call.due_s = max(call.due_s, now_s + self._timeout_s / 2.0)
-            refusal = self._send(call.request)
+            refusal = self._owner.send_request(self, call.request)
             if refusal is not None:
                 self._current = None
                 call.fail("cannot be called: %s" % refusal)
@@ -118,7 +123,7 @@ class RobotService:
         elif call is self._current:
             now_s = time.monotonic()
             if now_s < call.due_s:
-                self._call_later(call.due_s - now_s, lambda: self._expire(call))
+                self._loop.call_later(call.due_s - now_s, lambda: self._expire(call))
                 return
             self._current = None
             self._late_request = call.request

@@ -108,7 +108,6 @@ class Link:
         """on_close() is called once, after the end."""
         self.address = address
         self.closed = False
-        self.peer: Any = None  # the handler's own record of who is at the other end
         self.handed_length = 0  # bytes of all packets given to send_packet()
         self.received_length = 0  # bytes of all that read() has returned
         self.on_close = on_close
