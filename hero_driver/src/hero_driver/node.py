@@ -38,7 +38,7 @@ from .ros.rospy_internals import (
 )
 from .ros.worker import Worker
 from .stop_interface import StopInterface
-from .transport import Address, EventLoop, HostNotFoundError, NoAnswerError, TransportSettings
+from .transport import EventLoop, HostNotFoundError, NoAnswerError, TransportSettings
 
 NODE_NAME = "hero_driver"
 
@@ -170,7 +170,7 @@ class DriverNode:
 
     def _report(self, reporter: Reporter, is_periodic: bool) -> None:
         try:
-            status = self._loop.ask(lambda answer: answer(self._take_status()), 1.0)
+            status = self._loop.ask(self._take_status, 1.0)
         except NoAnswerError:
             return
         if is_periodic:
@@ -184,11 +184,11 @@ class DriverNode:
         if is_periodic:
             reporter.diagnose()
 
-    def _take_status(self) -> FleetStatus:
+    def _take_status(self, answer: Callable[[FleetStatus], None]) -> None:
         """Runs on the thread of the sockets."""
         now_s = time.monotonic()
-        listening: Optional[Address] = self._loop.listening
-        return FleetStatus(
+        listening = self._loop.listening
+        status = FleetStatus(
             now_s,
             "" if listening is None else str(listening),
             self._gateway.stopped,
@@ -197,6 +197,7 @@ class DriverNode:
             self._gateway.last_refusal,
             self._gateway.list_robots(now_s),
         )
+        answer(status)
 
 
 def main(argv: Optional[List[str]] = None) -> int:

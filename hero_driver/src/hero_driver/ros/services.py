@@ -6,6 +6,7 @@ the next call. Everything here runs on the thread of the sockets, except RobotSe
 """
 
 import collections
+import functools
 import time
 from typing import Callable, Deque, Optional, Protocol, Tuple
 
@@ -40,15 +41,8 @@ class ServiceOwner(Protocol):
 class RobotService:
     """One service of one robot, over all its connections."""
 
-    def __init__(
-        self,
-        name: str,
-        service_type: str,
-        timeout_s: float,
-        owner: ServiceOwner,
-        loop: EventLoop,
-    ) -> None:
-        """owner sends the requests of calls that come on other threads than loop's."""
+    def __init__(self, name: str, service_type: str, timeout_s: float, owner: ServiceOwner, loop: EventLoop) -> None:
+        """owner sends the requests of calls, which come on other threads than loop's."""
         self.name = name
         self.service_type = service_type
         self._timeout_s = timeout_s
@@ -66,9 +60,10 @@ class RobotService:
         """
         limit_s = 1.5 * self._timeout_s + HANG_WAIT_S
         try:
-            payload, failure = self._loop.ask(lambda answer: self._begin(request, answer), limit_s)
+            answer: Answer = self._loop.ask(functools.partial(self._begin, request), limit_s)
         except NoAnswerError as error:
-            failure = "was not answered: %s" % error
+            answer = (b"", "was not answered: %s" % error)
+        payload, failure = answer
         if failure:
             raise rospy.ServiceException("%s %s" % (self.name, failure))
         return payload
@@ -106,7 +101,7 @@ class RobotService:
                     "has not answered the call before this one yet; try again in %.1f s" % (self._late_until_s - now_s)
                 )
                 continue
-            # An answer may come before send() returns.
+            # An answer may come before send_request() returns.
             self._current = call
             # A call that had to wait for its turn gets half of the time limit at least.
             call.due_s = max(call.due_s, now_s + self._timeout_s / 2.0)

@@ -1,0 +1,132 @@
+"""The gateway's own decisions: which connection is a robot's, and which of two is refused; without sockets or time."""
+
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from hero_driver import gateway
+from hero_driver.config import read_config
+from hero_driver.gateway import Gateway
+from hero_driver.transport import Address
+
+sys.path.append(str(Path(__file__).parents[1] / "rostest"))
+from fake_robot import PUB, STOCK_DECLARATIONS, FakeRobot
+
+PUBLISHED = [entry for entry in STOCK_DECLARATIONS if entry.kind == PUB]
+HELLO = FakeRobot(0, PUBLISHED).encode_declarations()
+HOST, OTHER_HOST = "10.42.0.17", "10.42.0.18"
+
+
+class FakeLink:
+    """A robot's connection."""
+
+    def __init__(self, driver, host):
+        self.address = Address(host, 50000)
+        self.closed = False
+        self.received_length = 0
+        self._driver = driver
+
+    def send_packet(self, packet):
+        pass
+
+    def close(self, reason):
+        if not self.closed:
+            self.closed = True
+            self._driver.close_link(self, reason)
+
+
+class Driver:
+    """A gateway, and links that bring it what robots send."""
+
+    def __init__(self, monkeypatch):
+        self.now_s = 100.0
+        monkeypatch.setattr(gateway.time, "monotonic", lambda: self.now_s)
+        self.lines = []
+        self.gateway = Gateway(
+            read_config({}),
+            SimpleNamespace(call_later=lambda delay_s, call: None, call_soon=lambda call: None),
+            SimpleNamespace(log_throttled=lambda level, key, text, *_, **__: self.lines.append(text)),
+            SimpleNamespace(submit=lambda job, **_: True),  # nothing is registered with a master
+            "/hero_driver",
+            lambda: int(self.now_s * 1e9),
+            lambda: None,
+        )
+
+    def connect(self, host):
+        """Open a link from host."""
+        link = FakeLink(self.gateway, host)
+        assert self.gateway.open_link(link) is None
+        return link
+
+    def receive(self, link, data=HELLO):
+        self.gateway.receive_data(link, data, self.now_s)
+
+    def join(self, host):
+        """Connect a robot from host that says it is hero_0."""
+        link = self.connect(host)
+        self.receive(link)
+        return link
+
+    def find_link(self):
+        """Return the link that the driver takes for hero_0's."""
+        peer = self.gateway.find_peer("/hero_0")
+        return None if peer is None else peer.link
+
+
+@pytest.fixture
+def driver(monkeypatch):
+    return Driver(monkeypatch)
+
+
+def test_a_robot_is_found_by_its_name_while_it_is_connected(driver):
+    assert driver.find_link() is None
+    driver.connect(OTHER_HOST)
+    link = driver.connect(HOST)
+    assert driver.find_link() is None
+    driver.receive(link)
+    assert driver.find_link() is link
+    link.close("closed by the robot")
+    assert driver.find_link() is None
+
+
+def test_a_link_that_has_closed_is_no_robots(driver):
+    link = driver.join(HOST)
+    link.closed = True  # before the gateway is told
+    assert driver.find_link() is None
+
+
+def test_a_robot_that_connects_again_is_found_by_its_new_link(driver):
+    old = driver.join(HOST)
+    driver.now_s += 10.0
+    new = driver.join(HOST)
+    assert old.closed
+    assert driver.find_link() is new
+
+
+def test_a_robot_that_was_just_heard_keeps_its_id_from_another_host(driver):
+    first = driver.join(HOST)
+    driver.now_s += 60.0
+    driver.receive(first)
+    second = driver.join(OTHER_HOST)
+    assert driver.find_link() is first
+    assert not second.closed
+    assert "two robots call themselves /hero_0: 10.42.0.17:50000 was first" in driver.lines[-1]
+
+
+def test_a_robot_that_fell_silent_loses_its_id_to_another_host(driver):
+    first = driver.join(HOST)
+    driver.now_s += 60.0
+    second = driver.join(OTHER_HOST)
+    assert first.closed
+    assert driver.find_link() is second
+
+
+def test_a_report_counts_what_a_robots_link_brought(driver):
+    driver.join(HOST)
+    driver.join(OTHER_HOST)
+    (status,) = driver.gateway.list_robots(driver.now_s)
+    assert status.message.address == "10.42.0.17:50000"
+    assert status.packets == len(PUBLISHED)
+    assert [address for address, _, _ in status.duplicates] == ["10.42.0.18:50000"]
