@@ -17,8 +17,7 @@ from typing import Dict, List, Optional, Sequence, Set
 
 import rospy
 
-from hero_client.apps.keyboard import Keyboard, NoTerminalError
-from hero_client.apps.keyboard_teleop import RELEASE_KEY, STOP_ALL_KEYS
+from hero_client.apps.keyboard import RELEASE_KEY, STOP_ALL_KEYS, Keyboard, NoTerminalError
 from hero_client.ros.drivers import Drivers
 from hero_client.ros.robot_listener import RobotListener, RobotTrack
 from hero_client.ros.stop_status import StopStatus, paint

@@ -11,7 +11,7 @@ from typing import IO, Any, List, Optional, Tuple
 
 from hero_node.errors import ProgramError
 
-__all__ = ["ARROWS", "Keyboard", "NoTerminalError", "open_terminal", "split_keys"]
+__all__ = ["ARROWS", "RELEASE_KEY", "STOP_ALL_KEYS", "Keyboard", "NoTerminalError", "open_terminal", "split_keys"]
 
 ARROWS = {
     "\x1b[A": "up",
@@ -24,6 +24,10 @@ ARROWS = {
     "\x1bOD": "left",
 }
 """Sequences that terminals send for the arrow keys, in normal and in application mode."""
+
+STOP_ALL_KEYS = ("\r", "\n")
+RELEASE_KEY = "r"
+"""The keys that stop and release all robots, the same in every program."""
 
 
 class NoTerminalError(ProgramError):

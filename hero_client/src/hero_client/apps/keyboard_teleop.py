@@ -18,7 +18,7 @@ from ..swarm import Swarm
 from ..values.errors import StaleDataError
 from ..values.geometry import STOP, Velocity
 from ..values.robot_constants import MAX_LINEAR_M_S
-from .keyboard import Keyboard
+from .keyboard import RELEASE_KEY, STOP_ALL_KEYS, Keyboard
 from .teleop_output import PauseDetector, TeleopOutput
 
 __all__ = ["MAX_ANGULAR_RAD_S", "MIN_ANGULAR_RAD_S", "MIN_LINEAR_M_S", "KeyDrive", "KeyboardTeleop"]
@@ -54,8 +54,6 @@ MOTIONS: Dict[str, Tuple[int, int]] = {
 STOP_KEYS = ("s", " ", "\x1a")
 """s, space, and Ctrl-Z, whose user wants the program to pause."""
 
-STOP_ALL_KEYS = ("\r", "\n")
-RELEASE_KEY = "r"
 END_KEY = "\x04"  # Ctrl-D
 
 HELP = """\
