@@ -19,6 +19,9 @@ MAX_SPEED_M_S = 0.6
 MAX_TURN_RAD_S = 20.0
 """Twice what wheels reach; a faster change is not a motion."""
 
+JITTER_M = 0.002
+"""A robot that turns on the spot seems to come and go by ticks of its encoders: that is no distance."""
+
 JUMP_MARGIN_M = 0.02
 JUMP_MARGIN_RAD = 0.3
 """Readings arrive in bunches with stamps that are a few hundredths of a second off."""
@@ -49,6 +52,8 @@ class OdometryHistory:
         self.raw_pose: Optional[Pose] = None
         self._readings: StampedHistory[Odometry] = StampedHistory(KEPT_S, _interpolate)
         self._offset = Pose(0.0, 0.0, 0.0)
+        self._counted = self._offset
+        """Up to where the length of the path is counted."""
 
     @property
     def newest_s(self) -> float:
@@ -66,10 +71,14 @@ class OdometryHistory:
             if _is_jump(step_m, step_rad, stamp_s - self.newest_s):
                 self.jumps += 1
                 self._offset = transform_pose(last, invert_pose(raw))
-                pose, step_m, step_rad = last, 0.0, 0.0
-            distance_m += step_m
+                pose, step_rad = last, 0.0
+            counted_m = measure_distance(self._counted, pose)
+            if counted_m >= JITTER_M:
+                distance_m, self._counted = distance_m + counted_m, pose
             turned_rad += abs(step_rad)
             heading_rad += step_rad
+        else:
+            self._counted = pose
         self.raw_pose = raw
         self._readings.add(stamp_s, Odometry(pose, distance_m, turned_rad, heading_rad))
 
