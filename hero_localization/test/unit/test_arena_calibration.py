@@ -15,8 +15,8 @@ from hero_localization.calibration.arena_calibration import (  # noqa: E402
     average_tags,
     calibrate_arena,
     measure_residuals,
-    refine_corners,
 )
+from hero_localization.calibration.print_fit import refine_corners  # noqa: E402
 from hero_localization.camera.camera_model import Camera, Lens  # noqa: E402
 from hero_localization.errors import CalibrationError  # noqa: E402
 from hero_localization.prints.tag_images import draw_tag  # noqa: E402
@@ -88,14 +88,18 @@ def test_four_tags_may_lie_turned_each_in_its_own_way(seed):
     assert found.camera.position_m == pytest.approx(camera.position_m, abs=1e-3)
 
 
-def test_corners_keep_their_distance_where_the_camera_brightens():
-    fine = np.kron(np.pad(draw_tag("36h11", 101), 3, constant_values=255), np.ones((24, 24), np.uint8))
-    light = cv2.resize(fine / 255.0 * 0.8 + 0.06, None, fx=0.25, fy=0.25, interpolation=cv2.INTER_AREA)
-    gray = np.rint(255.0 * cv2.GaussianBlur(light, (0, 0), 0.8) ** (1.0 / 2.2)).astype(np.uint8)
+@pytest.mark.parametrize("cell_px", [3.5, 6.0])
+@pytest.mark.parametrize("gamma", [0.6, 1.0, 2.2])
+def test_prints_have_their_size_where_the_camera_brightens_or_darkens(cell_px, gamma):
+    fine = np.kron(np.pad(draw_tag("36h11", 101), 4, constant_values=255), np.ones((24, 24), np.uint8))
+    scale = cell_px / 24.0
+    light = cv2.resize(fine / 255.0 * 0.8 + 0.06, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+    gray = np.rint(255.0 * cv2.GaussianBlur(light, (0, 0), 0.8) ** (1.0 / gamma)).astype(np.uint8)
     (tag,) = create_detector(decimate=1.0).detect(gray)
     (refined,) = refine_corners(gray, [tag], "36h11")
-    assert tag.side_px < 0.993 * 48.0, "refused as out of scale"
-    assert refined.side_px == pytest.approx(48.0, rel=0.004)
+    if gamma == 2.2:
+        assert tag.side_px < 0.993 * 8.0 * cell_px, "refused as out of scale"
+    assert refined.side_px == pytest.approx(8.0 * cell_px, rel=0.004)
     assert refined.center == pytest.approx(tag.center)
 
 

@@ -11,7 +11,6 @@ from hero_client.values.geometry import Pose
 
 from ..camera.camera_model import Camera, Lens
 from ..errors import CalibrationError
-from ..prints.tag_images import draw_tag
 from ..tracking.tag_corners import TagCorners
 from ..tracking.tag_pose import ReferenceTag, TagPose, fit_squares
 
@@ -22,7 +21,6 @@ __all__ = [
     "calibrate_arena",
     "fit_references",
     "measure_residuals",
-    "refine_corners",
 ]
 
 MIN_TAGS = 4
@@ -45,7 +43,6 @@ HEIGHTS_M = (0.2, 20.0)
 MAX_FIELD_M = 30.0
 
 _YAW_ROUNDS = 4
-_MIN_CROSSINGS, _MIN_CELL_PX = 3, 4.0
 _SEEN_SHARE = 0.5
 """A tag must be found in at least this share of the frames."""
 
@@ -69,34 +66,6 @@ class ArenaCalibration(NamedTuple):
     def rms_m(self) -> float:
         """Root mean square of the residuals of the tags used."""
         return _compute_rms(self.residuals_m, self.left_out)
-
-
-def refine_corners(gray: np.ndarray, tags: Sequence[TagCorners], family: str) -> List[TagCorners]:
-    """Return tags of an image (H, W) with corners in true distance from their centers.
-
-    Where a camera brightens (gamma) or overexposes, white grows, and black squares measure 1 % less. Points within the
-    print at which white and black cells cross stay, and tell by how much.
-    """
-    return [_refine(gray, tag, draw_tag(family, tag.tag_id)) for tag in tags]
-
-
-def _refine(gray: np.ndarray, tag: TagCorners, cells: np.ndarray) -> TagCorners:
-    count, cell_px = len(cells), tag.side_px / len(cells)
-    upper_left, lower_right = cells[:-1, :-1], cells[1:, 1:]
-    is_crossing = (upper_left == lower_right) & (cells[:-1, 1:] == cells[1:, :-1]) & (upper_left != cells[1:, :-1])
-    rows, columns = np.nonzero(is_crossing)
-    if len(rows) < _MIN_CROSSINGS or cell_px < _MIN_CELL_PX:
-        return tag
-    square = np.array(((0, 0), (count, 0), (count, count), (0, count)), np.float32)
-    homography = cv2.getPerspectiveTransform(square, tag.corners.astype(np.float32))
-    crossings = np.column_stack((columns, rows)).astype(np.float32)[:, None] + 1.0
-    expected = cv2.perspectiveTransform(crossings, homography)
-    half_px = max(2, int(0.5 * cell_px))
-    criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 30, 0.001)
-    found = cv2.cornerSubPix(gray, expected.copy(), (half_px, half_px), (-1, -1), criteria)
-    away, found_away = expected - tag.center, found - tag.center
-    scale = float((away * found_away).sum() / (away**2).sum())
-    return tag._replace(corners=tag.center + scale * (tag.corners - tag.center))
 
 
 def average_tags(frames: Sequence[Sequence[TagCorners]]) -> List[TagCorners]:

@@ -29,7 +29,6 @@ from ..calibration.arena_calibration import (
     average_tags,
     calibrate_arena,
     fit_references,
-    refine_corners,
 )
 from ..calibration.lens_calibration import (
     MIN_VIEWS,
@@ -39,6 +38,7 @@ from ..calibration.lens_calibration import (
     find_board,
     is_mirrored,
 )
+from ..calibration.print_fit import refine_corners
 from ..calibration.robot_calibration import CALIBRATION_DRIVE, RobotCalibration, calibrate_robot
 from ..camera.camera_model import Lens
 from ..camera.frame_source import Frame, open_source
@@ -188,12 +188,12 @@ def calibrate_place(options: argparse.Namespace, pictures: Pictures) -> int:
     frames: List[Sequence[TagCorners]] = []
     while len(frames) < ARENA_FRAMES:
         frame = pictures.take()
-        frames.append(refine_corners(frame.gray, pictures.find_tags(settings, 1.0, frame), settings.family))
+        frames.append(pictures.find_tags(settings, 1.0, frame))
     lens = pictures.find_lens(settings)
     if lens is None:
         raise CalibrationError("%s holds no lens: calibrate_camera lens comes first" % options.file)
     lens.check_size(*frame.gray.shape)
-    tags = average_tags(frames)
+    tags = refine_corners(frame.gray, average_tags(frames), settings.family)
     try:
         result = calibrate_arena(lens, tags, settings.layout.references)
     except CalibrationError as error:
