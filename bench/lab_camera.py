@@ -1,21 +1,26 @@
 """Images as a webcam in a lab takes them: a renderer apart from the simulated camera's, so that none hides a mistake.
 
-Each tag is sampled along the rays of 4 x 4 points of each pixel and of several moments of the exposure; the lens is
-inverted by Newton's method along the radius. Then, in this order: vignette, blur, gamma, noise, JPEG.
+Each tag, and a calibration board, is sampled along the rays of 4 x 4 points of each pixel and of several moments of the
+exposure; the lens is inverted by a table along the radius. Then, in this order: vignette, blur, gamma, noise, JPEG.
 """
 
 import math
-from typing import NamedTuple, Sequence, Tuple
+from typing import List, NamedTuple, Sequence, Tuple
 
 import cv2
 import numpy as np
 
+from hero_localization.prints.boards import Board, draw_board
 from hero_localization.prints.tag_images import draw_tag
 
 __all__ = ["LENS_A", "LENS_B", "LabCamera", "LabLens", "LabTag"]
 
 SAMPLES = 4
 MOMENTS = 5
+MAX_RADIUS, RADIUS_STEP = 1.6, 1e-4
+"""Of rays, per unit of depth."""
+BOARD_CELLS_PX, BOARD_MARGIN = 60, 1
+"""Of a square of the board; white squares around it."""
 BODY_RADIUS_M, PLATE_RADIUS_M = 0.0375, 0.0365
 FLOOR, BODY, BLACK, WHITE = 0.45, 0.05, 0.06, 0.85
 """Reflected shares of the light."""
@@ -73,20 +78,27 @@ class LabCamera(NamedTuple):
     def project(self, points_m: np.ndarray) -> np.ndarray:
         """Return the pixels (N, 2) of points (N, 3)."""
         seen = (points_m - self.position_m) @ self.rotation.T
-        rays = seen[:, :2] / seen[:, 2:]
+        return self._bend(seen[:, :2] / seen[:, 2:])
+
+    def _bend(self, rays: np.ndarray) -> np.ndarray:
+        """Return the pixels (N, 2) that show rays (N, 2), per unit of depth."""
         r2 = (rays**2).sum(axis=1, keepdims=True)
         return rays * (1.0 + self.lens.k1 * r2 + self.lens.k2 * r2**2) * self.lens.focal_px + self.center_px
 
-    def find_points(self, pixels: np.ndarray, height_m: float) -> np.ndarray:
-        """Return the points (N, 2) of the plane at height_m that pixels (N, 2) show."""
+    def _find_rays(self, pixels: np.ndarray) -> np.ndarray:
+        """Return the rays (N, 2), per unit of depth, that pixels (N, 2) show; those beyond the lens's rim are its."""
         bent = (pixels - self.center_px) / self.lens.focal_px
         bent_r = np.hypot(*bent.T)
-        radius = bent_r.copy()
-        for _ in range(8):
-            r2 = radius**2
-            value = radius * (1.0 + self.lens.k1 * r2 + self.lens.k2 * r2**2) - bent_r
-            radius -= value / (1.0 + 3.0 * self.lens.k1 * r2 + 5.0 * self.lens.k2 * r2**2)
-        rays = bent * (radius / np.maximum(bent_r, 1e-12))[:, None]
+        radius = np.arange(0.0, MAX_RADIUS, RADIUS_STEP)
+        image_r = radius * (1.0 + self.lens.k1 * radius**2 + self.lens.k2 * radius**4)
+        rising = int(np.argmax(np.append(np.diff(image_r) <= 0.0, True))) + 1
+        found_r = np.interp(bent_r, image_r[:rising], radius[:rising])
+        rays: np.ndarray = bent * (found_r / np.maximum(bent_r, 1e-12))[:, None]
+        return rays
+
+    def find_points(self, pixels: np.ndarray, height_m: float) -> np.ndarray:
+        """Return the points (N, 2) of the plane at height_m that pixels (N, 2) show."""
+        rays = self._find_rays(pixels)
         directions = np.column_stack((rays, np.ones(len(rays)))) @ self.rotation
         share = (height_m - self.position_m[2]) / directions[:, 2]
         return np.array(self.position_m[:2]) + share[:, None] * directions[:, :2]
@@ -97,8 +109,43 @@ class LabCamera(NamedTuple):
         light = np.full((height, width), FLOOR)
         for tag in tags:
             self._draw(light, tag)
+        return self._expose(light, random)
+
+    def render_board(
+        self, turn_rad: Sequence[float], position_m: Sequence[float], random: np.random.RandomState
+    ) -> np.ndarray:
+        """Return an image (H, W), 8 bit, of the calibration board.
+
+        turn_rad: rotation vector, position_m: of its center, both in the optical frame.
+        """
+        board = Board()
+        printed = np.pad(draw_board(board, BOARD_CELLS_PX), BOARD_MARGIN * BOARD_CELLS_PX, constant_values=255)
+        cells_m = BOARD_CELLS_PX / board.square_m
+        rotation = cv2.Rodrigues(np.array(turn_rad, dtype=float))[0]
+        # A ray meets the board at x, y of the board, and at the depth that this matrix brings to 1.
+        to_ray = np.column_stack((rotation[:, :2], np.array(position_m, dtype=float)))
+        half_m = np.array(printed.shape[::-1]) / cells_m / 2.0
+        rim = np.array([(x, y) for x in np.linspace(-1, 1, 9) for y in np.linspace(-1, 1, 9)]) * half_m
+        seen = np.column_stack((rim, np.ones(len(rim)))) @ to_ray.T
+        rim_px = self._bend(seen[:, :2] / seen[:, 2:])
+        low = np.maximum(np.floor(rim_px.min(axis=0)).astype(int) - 4, 0)
+        high = np.minimum(np.ceil(rim_px.max(axis=0)).astype(int) + 4, self.lens.size_px)
+        u, v = np.meshgrid(*_list_samples(low, high))
+        rays = self._find_rays(np.column_stack((u.ravel(), v.ravel())))
+        found = np.column_stack((rays, np.ones(len(rays)))) @ np.linalg.inv(to_ray).T
+        column, row = ((found[:, :2] / found[:, 2:] + half_m) * cells_m).astype(int).T
+        inside = (np.minimum(column, row) > 0) & (column < printed.shape[1]) & (row < printed.shape[0])
+        shade = np.full(len(rays), FLOOR)
+        shade[inside] = np.where(printed[row[inside], column[inside]] > 127, WHITE, BLACK)
+        light = np.full(self.lens.size_px[::-1], FLOOR)
+        light[low[1] : high[1], low[0] : high[0]] = _average(shade, low, high)
+        return self._expose(light, random)
+
+    def _expose(self, light: np.ndarray, random: np.random.RandomState) -> np.ndarray:
+        """Return the image that the camera makes of the light (H, W) that is reflected."""
+        width, height = self.lens.size_px
         u, v = np.meshgrid(np.linspace(-1.0, 1.0, width), np.linspace(-1.0, 1.0, height))
-        light *= 1.0 - self.vignette * (0.7 * (u**2 + v**2) / 2.0 + 0.15 * (1.0 + u))
+        light = light * (1.0 - self.vignette * (0.7 * (u**2 + v**2) / 2.0 + 0.15 * (1.0 + u)))
         light = cv2.GaussianBlur(light, (0, 0), self.blur_px)
         image = 255.0 * light ** (1.0 / self.gamma) + random.normal(0.0, self.noise, light.shape)
         gray = np.clip(np.rint(image), 0, 255).astype(np.uint8)
@@ -115,9 +162,7 @@ class LabCamera(NamedTuple):
         high = np.minimum(np.ceil(corners.max(axis=0)).astype(int) + 1, self.lens.size_px)
         if (high - low < 1).any():
             return
-        columns, rows = high - low
-        fine = [(np.arange(SAMPLES * n) + 0.5) / SAMPLES - 0.5 + start for n, start in zip((columns, rows), low)]
-        u, v = np.meshgrid(*fine)
+        u, v = np.meshgrid(*_list_samples(low, high))
         points_m = self.find_points(np.column_stack((u.ravel(), v.ravel())), tag.height_m)
         moments = MOMENTS if tag.speed_m_s or tag.turn_rad_s else 1
         patch = np.zeros(len(points_m))
@@ -128,8 +173,19 @@ class LabCamera(NamedTuple):
             moved_m = tag.speed_m_s * time_s
             place_m = (tag.x_m + moved_m * math.cos(yaw_rad), tag.y_m + moved_m * math.sin(yaw_rad))
             patch += _shade(points_m - place_m, yaw_rad, tag.size_m, cells, is_robot, under) / moments
-        mean = patch.reshape(rows, SAMPLES, columns, SAMPLES).mean(axis=(1, 3))
-        light[low[1] : high[1], low[0] : high[0]] = mean
+        light[low[1] : high[1], low[0] : high[0]] = _average(patch, low, high)
+
+
+def _list_samples(low: Sequence[int], high: Sequence[int]) -> List[np.ndarray]:
+    """Return the samples' columns and rows, px, from the pixels low to before high."""
+    return [(np.arange(SAMPLES * (end - start)) + 0.5) / SAMPLES - 0.5 + start for start, end in zip(low, high)]
+
+
+def _average(samples: np.ndarray, low: Sequence[int], high: Sequence[int]) -> np.ndarray:
+    """Return the means (rows, columns) over each pixel of the samples of _list_samples()."""
+    columns, rows = np.subtract(high, low)
+    mean: np.ndarray = samples.reshape(rows, SAMPLES, columns, SAMPLES).mean(axis=(1, 3))
+    return mean
 
 
 def _shade(

@@ -1,0 +1,383 @@
+"""Localization under the faults of a real lab: lenses that distort, people's mistakes, hands, knocks, late poses.
+
+Images are those of lab_camera; ages and uncertainties are measured with robots stepped in process. Only the CPU times
+depend on the machine. Started by script/bench.
+"""
+
+import argparse
+import math
+import time
+from typing import Callable, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
+
+import cv2
+import numpy as np
+from lab_camera import LENS_A, LENS_B, LabCamera, LabLens, LabTag
+from lab_filter import measure_ages, measure_uncertainty
+from measuring import measure_machine_us, print_machine
+
+from hero_client.values.geometry import Pose
+from hero_localization.calibration.arena_calibration import average_tags, calibrate_arena
+from hero_localization.calibration.lens_calibration import BoardView, calibrate_lens, find_board
+from hero_localization.calibration.print_fit import refine_corners
+from hero_localization.camera.camera_model import Camera, Lens
+from hero_localization.errors import CalibrationError
+from hero_localization.filter.pose_filter import Measurement
+from hero_localization.filter.swarm_localizer import RobotState, SwarmLocalizer
+from hero_localization.prints.boards import Board
+from hero_localization.tracking.detectors import create_detector, create_fine_detectors
+from hero_localization.tracking.settings import Settings
+from hero_localization.tracking.tag_corners import TagCorners
+from hero_localization.tracking.tag_pose import MountedTag, ReferenceTag, TagLayout, find_smallest_side
+from hero_localization.tracking.tag_search import TagSearch
+from hero_localization.tracking.tracker import Tracker
+
+FRAME_S = 1.0 / 30.0
+TAGS = 50
+WARM_FRAMES, FRAMES, RENDERED = 75, 40, 10
+"""Before counting, the whole image has been searched once."""
+
+REFERENCES_M = ((-1.15, -0.58), (1.15, -0.58), (1.15, 0.58), (-1.15, 0.58), (0.0, -0.62), (0.0, 0.62))
+REFERENCE_M = 0.1
+TAPE_SD_M = 0.0007
+"""In x and y each, of places that people measured."""
+
+CAMERAS = {
+    "f 1391, k1 -0.32": LabCamera(),
+    "f 1391, k1 -0.32, gamma 2.2": LabCamera(gamma=2.2),
+    "f 900, k1 -0.38": LabCamera(LENS_B, (0.02, -0.03, 1.5)),
+    "f 900, k1 -0.38, gamma 2.2": LabCamera(LENS_B, (0.02, -0.03, 1.5), gamma=2.2),
+    "f 1391, tilted by 12 degrees": LabCamera(tilt_rad=(0.157, 0.14, 0.3)),
+    "f 1150, k1 -0.28": LabCamera(LabLens(1150.0, -0.28, 0.09)),
+}
+
+ROBOT_PLACES_M = [(x_m, y_m) for x_m in (-0.8, -0.3, 0.3, 0.8) for y_m in (-0.3, 0.2)]
+HAND_M_S = 0.5
+
+
+def find_camera(lab: LabCamera) -> Camera:
+    """Return the lab's camera as a perfect calibration would find it."""
+    lens = lab.lens
+    matrix = np.array(((lens.focal_px, 0, lab.center_px[0]), (0, lens.focal_px, lab.center_px[1]), (0, 0, 1.0)))
+    model = Lens(*lens.size_px, matrix, np.array((lens.k1, lens.k2, 0.0, 0.0, 0.0)))
+    return Camera(model, lab.rotation, np.array(lab.position_m))
+
+
+def place_tags(lab: LabCamera, random: np.random.RandomState) -> List[LabTag]:
+    """Return robots' tags wholly within the image, by chance."""
+    size_px, tags = np.array(lab.lens.size_px), []  # type: np.ndarray, List[LabTag]
+    angles = np.linspace(0.0, math.tau, 16)
+    rim_m = 0.0375 * np.column_stack((np.cos(angles), np.sin(angles)))
+    while len(tags) < TAGS:
+        place = lab.find_points(random.uniform((0.0, 0.0), size_px)[None], 0.076)[0]
+        rim = place + rim_m
+        pixels = lab.project(np.column_stack((rim, np.full(len(rim), 0.076))))
+        is_whole = (pixels > 2).all() and (pixels < size_px - 3).all()
+        # Beyond the rim of the lens's model, no pixel shows a point.
+        is_whole &= bool(np.abs(lab.find_points(pixels, 0.076) - rim).max() < 1e-4)
+        if is_whole and all(math.dist(place, (tag.x_m, tag.y_m)) > 0.085 for tag in tags):
+            tags.append(LabTag(len(tags), float(place[0]), float(place[1]), random.uniform(-math.pi, math.pi)))
+    return tags
+
+
+def create_search(lab: LabCamera) -> TagSearch:
+    """Return the search as track runs it."""
+    smallest_px = find_smallest_side(find_camera(lab), MountedTag())
+    return TagSearch(
+        create_detector("apriltag", "36h11", 2.0), *lab.lens.size_px, create_fine_detectors("36h11"), smallest_px
+    )
+
+
+def project_tags(lab: LabCamera, tags: Sequence[LabTag]) -> Dict[int, Tuple[float, float]]:
+    """Return the pixels of the tags' centers, by id."""
+    pixels = lab.project(np.array([(tag.x_m, tag.y_m, tag.height_m) for tag in tags]))
+    return {tag.tag_id: (float(u), float(v)) for tag, (u, v) in zip(tags, pixels)}
+
+
+def run_search(
+    lab: LabCamera, tags: Sequence[LabTag], images: Sequence[np.ndarray], frames: int, is_losing: bool = False
+) -> Tuple[float, float]:
+    """Return the share of tags that are found, and ms of CPU per image; is_losing: one after another is covered."""
+    search, expected = create_search(lab), project_tags(lab, tags)
+    found, cpu_s = 0, 0.0
+    for index in range(WARM_FRAMES + frames):
+        image = images[index % len(images)]
+        if is_losing and index >= WARM_FRAMES and index % 30 < 15:
+            u, v = map(int, expected[(index // 30 * 7) % len(tags)])
+            image = image.copy()
+            image[max(0, v - 35) : v + 35, max(0, u - 35) : u + 35] = 110
+        start_s = time.process_time()
+        seen = search.search(image, index * FRAME_S, expected)
+        if index >= WARM_FRAMES:
+            cpu_s += time.process_time() - start_s
+            found += len({tag.tag_id for tag in seen} & set(expected))
+    return found / (frames * len(tags)), 1e3 * cpu_s / frames
+
+
+def measure_tags(seeds: int) -> None:
+    """Print the share of tags that are found, with each camera; then the cost while tags are lost."""
+    print("tags found of %d, ms of CPU per image, smallest side" % TAGS)
+    for name, lab in CAMERAS.items():
+        results = []
+        for seed in range(seeds):
+            random = np.random.RandomState(seed)
+            tags = place_tags(lab, random)
+            results.append(run_search(lab, tags, [lab.render(tags, random) for _ in range(RENDERED)], FRAMES))
+        share, cpu_ms = np.mean(results, axis=0)
+        smallest_px = find_smallest_side(find_camera(lab), MountedTag())
+        print("  %-32s %6.2f %% %6.1f ms %5.0f px" % (name, 100.0 * share, cpu_ms, smallest_px), flush=True)
+
+
+def measure_losses(seeds: int) -> None:
+    """Print the cost while a tag after another is covered for half a second, by that of none."""
+    lab = CAMERAS["f 1391, k1 -0.32"]
+    for seed in range(seeds):
+        random = np.random.RandomState(seed)
+        tags = place_tags(lab, random)
+        images = [lab.render(tags, random) for _ in range(6)]
+        costs_ms = [run_search(lab, tags, images, 180, is_losing)[1] for is_losing in (False, True)]
+        text = "losses: %.1f ms per image with none lost, %.1f ms with one each second, ratio %.2f"
+        print(text % (*costs_ms, costs_ms[1] / costs_ms[0]), flush=True)
+
+
+# -- mistakes ---------------------------------------------------------------------------------------------------
+
+
+class Scene(NamedTuple):
+    """A lab's reference tags as the camera sees them, and their measured places."""
+
+    camera: Camera
+    seen: List[TagCorners]
+    places: Dict[int, ReferenceTag]
+
+
+def _make_lab(random: np.random.RandomState, lens: LabLens, height_m: float, **faults: float) -> LabCamera:
+    angle_rad, tilt_rad = random.uniform(0.0, math.tau), math.radians(6.0)
+    tilt = (tilt_rad * math.cos(angle_rad), tilt_rad * math.sin(angle_rad), random.uniform(-0.3, 0.3))
+    lab = LabCamera(lens, (0.0, 0.0, height_m), tilt, **faults)
+    aimed_m = lab.find_points(np.array(lens.size_px)[None] / 2.0, 0.0)[0]
+    return lab._replace(position_m=(*-aimed_m, height_m))  # its middle shows that of the field
+
+
+def see_references(seed: int, lens: LabLens, height_m: float, **faults: float) -> Scene:
+    """Render and detect the reference tags."""
+    random = np.random.RandomState(seed)
+    lab = _make_lab(random, lens, height_m, **faults)
+    tags = [
+        LabTag(100 + index, x_m, y_m, random.uniform(-3, 3), REFERENCE_M, 0.0)
+        for index, (x_m, y_m) in enumerate(REFERENCES_M)
+    ]
+    detector, frames = create_detector("apriltag", "36h11", 1.0), []
+    for _ in range(3):
+        image = lab.render(tags, random)
+        frames.append(detector.detect(image))
+    errors_m = random.normal(0.0, TAPE_SD_M, (len(tags), 2))
+    places = {
+        tag.tag_id: ReferenceTag(Pose(tag.x_m + x_m, tag.y_m + y_m, 0.0), REFERENCE_M)
+        for tag, (x_m, y_m) in zip(tags, errors_m)
+    }
+    return Scene(find_camera(lab), refine_corners(image, average_tags(frames), "36h11"), places)
+
+
+def _move(places: Dict[int, ReferenceTag], change: Callable[[int, float, float], Tuple[float, float]]):  # type: ignore
+    return {
+        tag_id: tag._replace(pose=Pose(*change(tag_id, tag.pose.x_m, tag.pose.y_m), 0.0))
+        for tag_id, tag in places.items()
+    }
+
+
+def list_mistakes(
+    places: Dict[int, ReferenceTag], random: np.random.RandomState
+) -> Iterator[Tuple[str, str, Dict[int, ReferenceTag]]]:
+    """Yield mistakes of people, what a message must name, and the places with it; an empty one: nothing is wrong."""
+    one, other = sorted(random.choice(sorted(places), 2, replace=False))
+    yield "no mistake", "", places
+    yield "tape 2 % long", "of their size", _move(places, lambda _, x, y: (x / 1.02, y / 1.02))
+    yield "tape 1 % long", "of their size", _move(places, lambda _, x, y: (x / 1.01, y / 1.01))
+    yield "tape 1 % short", "of their size", _move(places, lambda _, x, y: (x * 1.01, y * 1.01))
+    swapped = {**places, one: places[other], other: places[one]}
+    yield "two swapped", "tags %d and %d swapped" % (one, other), swapped
+    yield "y the wrong way", "y the wrong way", _move(places, lambda _, x, y: (x, -y))
+    yield "mm", "in m, not in mm", _move(places, lambda _, x, y: (1e3 * x, 1e3 * y))
+    yield "cm", "in m, not in mm or cm", _move(places, lambda _, x, y: (1e2 * x, 1e2 * y))
+    for off_mm in (5, 6, 8, 10, 20, 100):
+        angle_rad, wrong = random.uniform(0.0, math.tau), int(random.choice(sorted(places)))
+        right, off_m = places[wrong], 1e-3 * off_mm
+        x_m, y_m = right.pose.x_m + off_m * math.cos(angle_rad), right.pose.y_m + off_m * math.sin(angle_rad)
+        moved = {**places, wrong: right._replace(pose=Pose(x_m, y_m, 0.0))}
+        yield "one %d mm off" % off_mm, "tag %d was left out" % wrong, moved
+
+
+def measure_mistakes(seeds: int) -> None:
+    """Print how often each mistake is named."""
+    setups = {
+        "f 1391, 2.2 m": (LENS_A, 2.2, {}),
+        "f 1391, 2.2 m, gamma 2.2, blur 1.2 px": (LENS_A, 2.2, {"gamma": 2.2, "blur_px": 1.2}),
+        "f 900, 1.9 m": (LENS_B, 1.9, {}),
+        "f 900, 2.2 m, gamma 2.2": (LENS_B, 2.2, {"gamma": 2.2}),
+    }
+    for name, (lens, height_m, faults) in setups.items():
+        counts: Dict[str, List[bool]] = {}
+        for seed in range(seeds):
+            scene = see_references(seed, lens, height_m, **faults)
+            for mistake, words, places in list_mistakes(scene.places, np.random.RandomState(seed)):
+                try:
+                    text = "; ".join(calibrate_arena(scene.camera.lens, scene.seen, places).problems)
+                except CalibrationError as error:
+                    text = str(error)
+                counts.setdefault(mistake, []).append(words in text if words else not text)
+        sides_px = [tag.side_px for tag in scene.seen]
+        print("mistakes named, %s (tags of %.0f to %.0f px)" % (name, min(sides_px), max(sides_px)))
+        shares = ["%s %d/%d" % (what, sum(right), len(right)) for what, right in counts.items()]
+        print("  " + ", ".join(shares), flush=True)
+
+
+# -- hands and knocks -------------------------------------------------------------------------------------------
+
+
+class Lab:
+    """Robots at rest below a camera, followed as track and localize do."""
+
+    def __init__(self, seed: int) -> None:
+        self.random = np.random.RandomState(seed)
+        self.lab, self.now_s, self.lines = LabCamera(), 0.0, []  # type: LabCamera, float, List[str]
+        self.robots = [
+            LabTag(index, *place, self.random.uniform(-3, 3)) for index, place in enumerate(ROBOT_PLACES_M)
+        ]
+        self.floor = [LabTag(100 + i, *place, 0.0, REFERENCE_M, 0.0) for i, place in enumerate(REFERENCES_M)]
+        references = {tag.tag_id: ReferenceTag(Pose(tag.x_m, tag.y_m, 0.0), REFERENCE_M) for tag in self.floor}
+        seen = {tag_id: tag.pose for tag_id, tag in references.items()}
+        settings = Settings(layout=TagLayout(references=references), seen_references=seen)
+        self.tracker, self.search = Tracker(settings, find_camera(self.lab)), create_search(self.lab)
+        self.localizer = SwarmLocalizer()
+        self.localizer.add_robots(range(len(self.robots)))
+        for _ in range(round(2.5 / FRAME_S)):
+            self.step()
+        self.lines.clear()
+
+    def step(self) -> None:
+        """Take an image."""
+        self.now_s += FRAME_S
+        for tag in self.robots:
+            self.lines += self.localizer.add_odometry(tag.tag_id, self.now_s, Pose(0.0, 0.0, 0.0))
+        expected = self.tracker.project(
+            {robot.robot_id: robot.estimate.pose for robot in self.localizer.list_robots(self.now_s) if robot.estimate}
+        )
+        image = self.lab.render(self.robots + self.floor, self.random)
+        tags = self.search.search(image, self.now_s, expected)
+        sightings = self.tracker.take(tags, self.now_s, 0, expected)
+        for robot_id, seen in sightings.robots.items():
+            if not self.tracker.is_moved:
+                measurement = Measurement(self.now_s, seen.pose, seen.covariance)
+                self.lines += self.localizer.add_measurement(robot_id, measurement)
+        if self.tracker.is_moved:
+            self.localizer.distrust(self.now_s, list(sightings.robots))
+        self.lines += self.localizer.find_lost(self.now_s)
+
+    def list_wrong(self, limit_m: float = 0.01) -> List[int]:
+        """Return the robots that are off by more than this, and not marked."""
+        return [
+            robot.robot_id
+            for robot in self.localizer.list_robots(self.now_s)
+            if robot.state is RobotState.TRACKED
+            and robot.estimate is not None
+            and math.dist(robot.estimate.pose[:2], self.robots[robot.robot_id][1:3]) > limit_m
+        ]
+
+
+def measure_knocks(seeds: int) -> None:
+    """Print how long after a knock the camera is named, and what else is said."""
+    knocks = {
+        "1 cm aside": {"position_m": (0.03, -0.03, 2.2)},
+        "0.5 degrees": {"tilt_rad": (math.radians(5.5), math.radians(-3.3), 0.02)},
+    }
+    for name, change in knocks.items():
+        for seed in range(seeds):
+            lab = Lab(seed)
+            lab.lab, start_s = lab.lab._replace(**change), lab.now_s
+            named_s: Optional[float] = None
+            wrong = 0.0
+            for _ in range(45):
+                lab.step()
+                wrong += FRAME_S * bool(lab.list_wrong(0.006))
+                problems = lab.tracker.list_problems()
+                if named_s is None and any("the camera moved" in problem.text for problem in problems):
+                    named_s = lab.now_s - start_s
+            text = "knock, %s: named after %s s; a pose over 6 mm off was TRACKED for %.2f s; lines on robots: %s"
+            print(text % (name, "%.2f" % named_s if named_s else "never", wrong, lab.lines or "none"), flush=True)
+
+
+def measure_hands(seeds: int) -> None:
+    """Print for how long a robot that is carried in open view is marked as tracked though it is elsewhere."""
+    for seed in range(seeds):
+        lab, wrong_s, longest_s = Lab(seed), 0.0, 0.0
+        for index in range(45):
+            if index < 20:
+                tag = lab.robots[3]
+                lab.robots[3] = tag._replace(x_m=tag.x_m + HAND_M_S * FRAME_S, yaw_rad=tag.yaw_rad + 0.03)
+            lab.step()
+            wrong_s = wrong_s + FRAME_S if lab.list_wrong() else 0.0
+            longest_s = max(longest_s, wrong_s)
+        text = "hand: over 10 mm off and TRACKED for %.2f s at most; wrong at the end: %s; %s"
+        print(text % (longest_s, lab.list_wrong() or "none", "; ".join(lab.lines)), flush=True)
+
+
+# -- the lens ---------------------------------------------------------------------------------------------------
+
+
+def collect_views(lab: LabCamera, random: np.random.RandomState, count: int) -> List[BoardView]:
+    """Return the board held all over the image, tilted, as people do it."""
+    views: List[BoardView] = []
+    size_px = np.array(lab.lens.size_px)
+    while len(views) < count:
+        index = len(views)
+        at = size_px * (0.2 + 0.3 * (index % 3), 0.22 + 0.28 * (index // 3 % 3)) + random.normal(0.0, 60.0, 2)
+        distance_m = random.uniform(0.3, 0.55) * lab.lens.focal_px / 1391.0
+        tilt_rad = random.choice((-1.0, 1.0), 2) * random.uniform(0.1, 0.6, 2)
+        ray = (at - lab.center_px) / lab.lens.focal_px
+        position_m = (*(ray * distance_m), distance_m)
+        view = find_board(lab.render_board((*tilt_rad, random.uniform(-0.4, 0.4)), position_m, random), Board())
+        if view is not None:
+            views.append(view)
+    return views
+
+
+def measure_lenses(seeds: int) -> None:
+    """Print the true and the told error of the focal length of each calibration."""
+    for name, lens in {"f 1391, k1 -0.32": LENS_A, "f 900, k1 -0.38": LENS_B}.items():
+        true, told = [], []
+        for seed in range(seeds):
+            random = np.random.RandomState(seed)
+            result = calibrate_lens(collect_views(LabCamera(lens), random, 20), *lens.size_px, Board())
+            true += (np.diagonal(result.lens.matrix)[:2] / lens.focal_px - 1.0).tolist()
+            told.append(result.focal_error)
+        rms_true, rms_told = (100.0 * math.sqrt(np.mean(np.square(values))) for values in (true, told))
+        text = "lens, %s, %d calibrations of 20 images: focal length off by %.3f %% rms, told %.3f %%, ratio %.2f"
+        print(text % (name, seeds, rms_true, rms_told, rms_true / rms_told), flush=True)
+
+
+PARTS: Dict[str, Callable[[int], None]] = {
+    "tags": measure_tags,
+    "losses": measure_losses,
+    "mistakes": measure_mistakes,
+    "knocks": measure_knocks,
+    "hands": measure_hands,
+    "ages": lambda seeds: measure_ages(),
+    "uncertainty": measure_uncertainty,
+    "lenses": measure_lenses,
+}
+
+
+def main() -> None:
+    """Run the program."""
+    parser = argparse.ArgumentParser(prog="script/bench lab_camera", description=__doc__)
+    parser.add_argument("--only", nargs="+", choices=PARTS, default=list(PARTS))
+    parser.add_argument("--seeds", type=int, default=2, help="scenes of each kind (%(default)s)")
+    options = parser.parse_args()
+    cv2.setNumThreads(1)
+    print_machine(measure_machine_us())
+    for name in options.only:
+        PARTS[name](options.seeds)
+
+
+if __name__ == "__main__":
+    main()
