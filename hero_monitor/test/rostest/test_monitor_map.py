@@ -8,9 +8,10 @@ import unittest
 import rospy
 import rostest
 from geometry_msgs.msg import Point, Point32, Polygon, PolygonStamped, Quaternion
+from geometry_msgs.msg import Pose as PoseMessage
 from monitor_page import MonitorPage
 from monitor_process import HOST, end, start_scripted_driver, wait_until_it_answers
-from nav_msgs.msg import Odometry
+from nav_msgs.msg import MapMetaData, OccupancyGrid, Odometry
 from PIL import Image
 from sensor_msgs.msg import CompressedImage
 
@@ -20,6 +21,12 @@ from hero_test.waiting import wait_for
 
 COLORS = {"red": (255, 0, 0), "green": (0, 160, 0), "blue": (0, 0, 255), "magenta": (255, 0, 255)}
 """Of the picture's quarters: upper left, upper right, lower left, lower right."""
+
+WALL = (123, 134, 150)
+"""The page's color of what is occupied, in light."""
+
+MIN_WALL_SHARE = 0.15
+"""Of the map; names have pixels of that color, too."""
 
 STEP_PX = 4
 """Between the pixels that are looked at."""
@@ -38,6 +45,18 @@ for (let row = 0; row < height; row += step) for (let column = 0; column < width
   }
 }
 return found;
+"""
+
+MEASURE_COLOR = """
+const [color, step] = arguments, canvas = document.getElementById("canvas"), { width, height } = canvas;
+const data = canvas.getContext("2d").getImageData(0, 0, width, height).data;
+let [count, x, y] = [0, 0, 0];
+for (let row = 0; row < height; row += step) for (let column = 0; column < width; column += step) {
+  const at = 4 * (row * width + column);
+  if (color.some((value, part) => Math.abs(data[at + part] - value) > 12)) continue;
+  [count, x, y] = [count + 1, x + column, y + row];
+}
+return [(count * step * step) / (width * height), x / (count || 1) / width, y / (count || 1) / height];
 """
 
 COUNT_FETCHES = (
@@ -164,6 +183,29 @@ class MapTest(unittest.TestCase):
         wait_for(lambda: not self.page.find("#panel").is_displayed(), "no panel")
         localization.close()
         self.assertEqual(self.page.errors(), [])
+
+    def test_the_map_that_robots_measure_lies_at_its_place(self):
+        grid = OccupancyGrid(data=([100] * 10 + [0] * 10) * 10)
+        grid.header.frame_id = "map"
+        grid.info = MapMetaData(resolution=0.1, width=20, height=10)
+        grid.info.origin = PoseMessage(Point(-1.0, -0.5, 0.0), Quaternion(0.0, 0.0, 0.0, 1.0))
+        latched = rospy.Publisher("/map", OccupancyGrid, queue_size=1, latch=True)
+        latched.publish(grid)
+        localization = Repeater("/localization/poses", self.poses)
+        wait_for(lambda: self.measure_wall()[0] > MIN_WALL_SHARE, "the occupied half")
+        self.page.save("monitor_occupancy.png")
+        share, x, y = self.measure_wall()
+        width, height = self.page.run("return [canvas.width, canvas.height]")
+        side = math.sqrt(share * width * height)
+        # The view fits the whole grid, of which the left half is occupied.
+        self.assertAlmostEqual(x * width, width / 2.0 - side / 2.0, delta=0.1 * side)
+        self.assertAlmostEqual(y * height, height / 2.0, delta=0.1 * side)
+        localization.close()
+        wait_for(lambda: self.measure_wall()[0] < MIN_WALL_SHARE, "a map in its own frame only")
+
+    def measure_wall(self):
+        """Return the share of the map in the color of walls, and their mean place by its width and height."""
+        return self.page.browser.execute_script(MEASURE_COLOR, WALL, STEP_PX)
 
 
 if __name__ == "__main__":

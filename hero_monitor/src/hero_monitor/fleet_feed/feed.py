@@ -14,6 +14,7 @@ import genpy
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PolygonStamped
+from nav_msgs.msg import OccupancyGrid
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import CompressedImage
 from tf2_msgs.msg import TFMessage
@@ -31,6 +32,7 @@ from ..background import Background
 from .camera_picture import CameraPicture
 from .losses import SILENT_S, LocalizationWatch, list_losses
 from .master_link import MasterLink
+from .occupancy import encode_grid
 from .page_state import LOG_LINES_KEPT, PageState, encode_pose, encode_ranges, shorten
 from .placement import Placement
 from .robot_feed import RobotFeed
@@ -54,6 +56,7 @@ SCENE_TYPES = {
     "/hero_sim/markers": MarkerArray,
     "/hero_sim/object_markers": MarkerArray,
     "/localization/poses": RobotPoses,
+    "/map": OccupancyGrid,
     "/track/picture/compressed": CompressedImage,
     "/track/picture/outline": PolygonStamped,
 }
@@ -85,6 +88,8 @@ class FleetFeed:
         self._fleet_stamp_s: Optional[float] = None
         self._answering: Dict[str, bool] = {}
         self._localization = LocalizationWatch()
+        self._grid: Optional[OccupancyGrid] = None
+        self._grid_frame = ""
         self._tracked: Set[str] = set()
         self._master = MasterLink(background)
         self._pending_reads = 0
@@ -259,6 +264,11 @@ class FleetFeed:
             self.page_state.put("arena", describe_arena(taken["/hero_sim/arena"]))
         if taken.get("/hero_sim/object_markers") is not None:
             self.page_state.put("objects", describe_arena(taken["/hero_sim/object_markers"]))
+        grid = taken.get("/map") or self._grid
+        if (grid, self.placement.frame) != (self._grid, self._grid_frame):
+            # A map_server publishes once, perhaps before the robots are localized.
+            self._grid, self._grid_frame = grid, self.placement.frame
+            self.page_state.put("grid", grid and encode_grid(grid, self._grid_frame))
         if taken.get("/diagnostics") is not None:
             for status in taken["/diagnostics"].status:
                 name = status.name.rpartition(": ")[2]

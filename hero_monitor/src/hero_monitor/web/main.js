@@ -33,6 +33,7 @@ const state = {
   ground_truth: {},
   picture: null,
   arena: { boxes: [], circles: [] },
+  grid: null,
   objects: { boxes: [], circles: [] },
   isFresh: false,
   offers: { programs: [], record: false },

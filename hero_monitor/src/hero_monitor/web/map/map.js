@@ -1,6 +1,7 @@
 // The map, seen from above: x to the right, y up, as in ROS. Lengths in mm, angles in mrad.
 
 import { isLate } from "../connection.js";
+import { Occupancy } from "./occupancy.js";
 import { CameraPicture } from "./picture.js";
 import { BODY_MM, MapPainter, TRAIL_MS } from "./painter.js";
 
@@ -232,6 +233,7 @@ export class FleetMap {
       ys.push(y - (length * sine + width * cosine) / 2, y + (length * sine + width * cosine) / 2);
     }
     for (const [x, y, radius] of this.state.arena.circles) add(x, y, radius);
+    for (const [x, y] of this.state.grid ? Occupancy.corners(this.state.grid) : []) add(x, y, 0);
     if (this.picture.box) {
       const [left, low, right, high] = this.picture.box;
       xs.push(left, right);
@@ -275,7 +277,7 @@ export class FleetMap {
 
   /** What there is to see: when it changes, the view fits it again. */
   sceneKey(count) {
-    return `${count} ${this.state.fleet.frame} ${this.picture.box} ${this.state.arena.boxes.length} ${this.state.fleet.robots.filter((robot) => robot.source).length}`;
+    return `${count} ${this.state.fleet.frame} ${this.picture.box} ${this.state.grid?.columns} ${this.state.arena.boxes.length} ${this.state.fleet.robots.filter((robot) => robot.source).length}`;
   }
 
   keepTrails() {

@@ -2,6 +2,7 @@
 
 import { colorOf } from "./colors.js";
 import { placeLabels } from "./labels.js";
+import { Occupancy } from "./occupancy.js";
 import { sourceOf, stateOf } from "../losses.js";
 import { isDark } from "../theme.js";
 
@@ -12,12 +13,14 @@ const SHIELD_MM = 60; // radius of a HeRo+'s bump shield
 const MIN_RADIUS_PX = 9; // radius of a robot, however far the view is
 const PROJECTED_PX = 26;
 const SENSOR_REACH_MM = 236.8;
+const UNKNOWN_ALPHA = 70;
 const TRAIL_INKS = [0.15, 0.28, 0.42, 0.6];
 
 export class MapPainter {
   constructor(map) {
     this.map = map;
     this.context = map.canvas.getContext("2d");
+    this.occupancy = new Occupancy();
   }
 
   paint() {
@@ -36,6 +39,7 @@ export class MapPainter {
     context.translate(this.width / 2, this.height / 2);
     context.scale(view.scale, -view.scale);
     context.translate(-view.x, -view.y);
+    this.paintOccupancy();
     if (map.picture.box) this.paintPicture(map.picture);
     this.paintGrid();
     this.paintArena();
@@ -61,6 +65,12 @@ export class MapPainter {
     context.rotate(pose[2] / 1000);
     paint(context);
     context.restore();
+  }
+
+  paintOccupancy() {
+    const read = (name, alpha) => [...this.ink(name).match(/[0-9a-f]{2}/gi).map((part) => parseInt(part, 16)), alpha];
+    const colors = { unknown: read("--wall", UNKNOWN_ALPHA), free: [0, 0, 0, 0], occupied: read("--wall", 255) };
+    this.occupancy.paint(this.context, this.state.grid, colors);
   }
 
   paintPicture({ image, box: [left, low, right, high] }) {
