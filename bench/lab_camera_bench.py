@@ -15,7 +15,6 @@ from lab_camera import LENS_A, LENS_B, LabCamera, LabLens, LabTag
 from lab_filter import measure_ages, measure_uncertainty
 from measuring import measure_machine_us, print_machine
 
-from hero_client.values.geometry import Pose
 from hero_localization.calibration.arena_calibration import average_tags, calibrate_arena
 from hero_localization.calibration.lens_calibration import BoardView, calibrate_lens, find_board
 from hero_localization.calibration.print_fit import refine_corners
@@ -30,6 +29,7 @@ from hero_localization.tracking.tag_corners import TagCorners
 from hero_localization.tracking.tag_pose import MountedTag, ReferenceTag, TagLayout, find_smallest_side
 from hero_localization.tracking.tag_search import TagSearch
 from hero_localization.tracking.tracker import Tracker
+from hero_node.geometry import Pose
 
 FRAME_S = 1.0 / 30.0
 TAGS = 50

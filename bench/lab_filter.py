@@ -9,8 +9,8 @@ from typing import Callable, Dict, List, Tuple
 
 import numpy as np
 
-from hero_client.values.geometry import Pose, wrap_angle
 from hero_localization.filter.pose_filter import Measurement, Outcome, PoseFilter, make_covariance
+from hero_node.geometry import Pose, wrap_angle
 from hero_sim.stepped.swarm import StepSwarm
 
 __all__ = ["measure_ages", "measure_uncertainty"]

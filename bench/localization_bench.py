@@ -18,7 +18,6 @@ import numpy as np
 from localization_nodes import measure_nodes
 from measuring import measure_machine_us, print_machine
 
-from hero_client.values.geometry import Pose, measure_distance, wrap_angle
 from hero_localization.calibration.arena_calibration import average_tags, calibrate_arena
 from hero_localization.calibration.lens_calibration import calibrate_lens, find_board
 from hero_localization.calibration.robot_calibration import CALIBRATION_DRIVE, calibrate_robot
@@ -33,6 +32,7 @@ from hero_localization.tracking.detectors import create_detector
 from hero_localization.tracking.tag_corners import TagCorners
 from hero_localization.tracking.tag_pose import MountedTag, ReferenceTag, TagLayout, fit_squares, locate
 from hero_localization.tracking.tag_search import TagSearch
+from hero_node.geometry import Pose, measure_distance, wrap_angle
 from hero_sim.stepped.swarm import StepSwarm
 from hero_sim.world.arena_file import load_arena
 

@@ -3,7 +3,7 @@
 from hero_calibration.errors import CalibrationError
 from hero_calibration.robots.probe import Probe
 from hero_calibration.robots.session import Session
-from hero_client.values.geometry import Pose
+from hero_node.geometry import Pose
 
 
 class StepProbe(Probe):

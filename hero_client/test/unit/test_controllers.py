@@ -14,8 +14,8 @@ from hero_client.controllers.avoidance import (
     wander,
 )
 from hero_client.controllers.unicycle import FollowLaw, GoToLaw, follow, go_to_point, go_to_pose
-from hero_client.values.geometry import STOP, Pose, wrap_angle
 from hero_client.values.robot_constants import BODY_RADIUS_M
+from hero_node.geometry import STOP, Pose, wrap_angle
 
 INF = math.inf
 FREE = [INF] * 8

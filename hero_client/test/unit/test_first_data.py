@@ -7,8 +7,8 @@ import pytest
 
 from hero_client.robots.robot_base import BaseRobot, check_robot_id
 from hero_client.values.errors import StaleDataError
-from hero_client.values.geometry import Pose
 from hero_node.clock import Clock
+from hero_node.geometry import Pose
 
 
 class FakeClock(Clock):

@@ -8,7 +8,7 @@ from test_controllers import STEP_S, Body, cast_in_box
 from hero_client.controllers.go_to_goal import PROGRESS_S, Goal, GoToGoalController
 from hero_client.controllers.motion import BLOCKED_S, SILENT_STEPS, STALL_S, State
 from hero_client.controllers.straight_and_turn import ForwardController, TurnController
-from hero_client.values.geometry import STOP, Pose
+from hero_node.geometry import STOP, Pose
 
 HERE = Pose(0.0, 0.0, 0.0)
 

@@ -16,7 +16,7 @@ from hero_client.apps.goals import (
 )
 from hero_client.controllers.go_to_goal import Goal, GoToGoalController
 from hero_client.controllers.motion import SILENT_STEPS, State
-from hero_client.values.geometry import STOP, Pose
+from hero_node.geometry import STOP, Pose
 
 INF, NAN = math.inf, math.nan
 

@@ -15,8 +15,8 @@ from hero_client.controllers.orca import (
     steered_point,
 )
 from hero_client.controllers.swarm_go_to import SwarmGoToController
-from hero_client.values.geometry import STOP, Pose
 from hero_client.values.robot_constants import BODY_RADIUS_M
+from hero_node.geometry import STOP, Pose
 
 
 def test_the_steered_point_moves_with_the_velocity_that_is_asked_for():

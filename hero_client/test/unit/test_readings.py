@@ -9,8 +9,8 @@ from geometry_msgs.msg import Pose as PoseMessage
 from sensor_msgs.msg import LaserScan
 
 from hero_client.values.colors import parse_color
-from hero_client.values.geometry import Pose, invert_pose, transform_pose
 from hero_client.values.readings import MAX_RANGES, find_nearest, front_first, read_pose, read_ranges
+from hero_node.geometry import Pose, invert_pose, transform_pose
 
 INF = math.inf
 EIGHTH_RAD = math.pi / 4

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from hero_client.ros.robot_listener import RateMeter, RobotTrack
-from hero_client.values.geometry import Pose
+from hero_node.geometry import Pose
 
 
 def test_a_rate_is_the_count_divided_by_the_time():

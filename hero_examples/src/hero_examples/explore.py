@@ -10,7 +10,7 @@ from hero_client import CommonFrame, Program, open_swarm, read_parameters, run
 from hero_client.controllers.avoidance import WanderLaw, WanderMemory, wander
 from hero_client.controllers.go_to_goal import Goal, GoToGoalController
 from hero_client.controllers.motion import State
-from hero_client.values.geometry import STOP
+from hero_node.geometry import STOP
 from hero_node.parameters import flag, number, robot_ids, whole_number
 
 NEAR_M = 0.35

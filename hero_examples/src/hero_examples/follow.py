@@ -4,8 +4,8 @@ import rospy
 
 from hero_client import CommonFrame, Program, ProgramError, Swarm, read_parameters, run
 from hero_client.controllers.unicycle import FollowLaw, follow
-from hero_client.values.geometry import STOP
 from hero_client.values.robot_constants import MAX_LINEAR_M_S
+from hero_node.geometry import STOP
 from hero_node.parameters import number, robot_ids
 
 

@@ -5,7 +5,7 @@ import rospy
 from nav_msgs.msg import Odometry
 
 from hero_client import Program, ProgramError, open_swarm, read_parameters, run
-from hero_client.values.geometry import wrap_angle, yaw_of
+from hero_node.geometry import wrap_angle, yaw_of
 from hero_node.parameters import robot_ids, whole_number
 
 

@@ -7,8 +7,8 @@ import rospy
 
 from hero_client import Program, open_swarm, read_parameters, run
 from hero_client.controllers.avoidance import WanderLaw, WanderMemory, wander
-from hero_client.values.geometry import STOP
 from hero_client.values.robot_constants import MAX_LINEAR_M_S
+from hero_node.geometry import STOP
 from hero_node.parameters import number, robot_ids, whole_number
 
 

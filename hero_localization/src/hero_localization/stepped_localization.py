@@ -12,7 +12,7 @@ from typing import Deque, List, NamedTuple, Optional, Tuple
 import numpy as np
 
 from hero_client.values.errors import FrameError
-from hero_client.values.geometry import Pose
+from hero_node.geometry import Pose
 from hero_sim.stepped.swarm import StepSwarm
 
 from .filter.pose_filter import Estimate, Measurement, PoseFilter, make_covariance

@@ -17,8 +17,8 @@ from std_msgs.msg import Float32
 from std_srvs.srv import Trigger
 
 from hero_client import FrameError, Robot, StaleDataError, Swarm
-from hero_client.values.geometry import yaw_of
 from hero_msgs.msg import RobotPose, RobotPoses
+from hero_node.geometry import yaw_of
 from hero_sim.world.arena_file import load_arena
 from hero_test.waiting import wait_for
 

@@ -7,10 +7,6 @@ import pytest
 
 cv2 = pytest.importorskip("cv2")
 
-from hero_client.values.geometry import (  # noqa: E402 - without OpenCV there is no calibration
-    Pose,
-    transform_pose,
-)
 from hero_localization.calibration.arena_calibration import (  # noqa: E402
     average_tags,
     calibrate_arena,
@@ -24,6 +20,10 @@ from hero_localization.tracking.detectors import create_detector  # noqa: E402
 from hero_localization.tracking.moved_references import find_moved_references  # noqa: E402
 from hero_localization.tracking.tag_corners import TagCorners  # noqa: E402
 from hero_localization.tracking.tag_pose import ReferenceTag  # noqa: E402
+from hero_node.geometry import (  # noqa: E402 - without OpenCV there is no calibration
+    Pose,
+    transform_pose,
+)
 
 LENS = Lens(
     1920,

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from hero_client.values.geometry import Pose
 from hero_localization.mapping.occupancy_grid import BEAMS, OccupancyGrid
+from hero_node.geometry import Pose
 from hero_sim.robot.ranges import calibrate, convert_to_ranges
 from hero_sim.robot_constants import BODY_RADIUS_M
 from hero_sim.world import range_sensors

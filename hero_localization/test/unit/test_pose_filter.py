@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from hero_client.values.geometry import Pose, invert_pose, transform_pose, wrap_angle
 from hero_localization.filter.pose_filter import Measurement, Outcome, PoseFilter
 from hero_localization.filter.stamped_history import interpolate_pose
+from hero_node.geometry import Pose, invert_pose, transform_pose, wrap_angle
 
 ODOMETRY_S = 0.034
 CAMERA_S = 1.0 / 30.0

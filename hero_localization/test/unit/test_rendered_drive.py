@@ -10,7 +10,6 @@ from geometry_msgs.msg import Point, Pose, PoseWithCovariance, Quaternion
 from nav_msgs.msg import Odometry
 from std_msgs.msg import Header
 
-from hero_client.values import geometry
 from hero_localization.calibration.arena_calibration import average_tags, calibrate_arena
 from hero_localization.camera.camera_model import Camera, Lens
 from hero_localization.camera.frame_source import Frame
@@ -25,6 +24,7 @@ from hero_localization.tracking.settings import Settings
 from hero_localization.tracking.tag_pose import ReferenceTag, TagLayout
 from hero_localization.tracking.tag_search import TagSearch
 from hero_localization.tracking.tracker import Tracker
+from hero_node import geometry
 from hero_sim.stepped.swarm import StepSwarm
 from hero_sim.world.arena_file import load_arena
 

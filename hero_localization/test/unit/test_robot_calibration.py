@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from hero_client.values.geometry import Pose, transform_pose, wrap_angle
 from hero_localization.calibration.robot_calibration import calibrate_robot
 from hero_localization.errors import CalibrationError
+from hero_node.geometry import Pose, transform_pose, wrap_angle
 
 STEP_S = 0.01
 FULL = (

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 import yaml
 
-from hero_client.values.geometry import Pose
 from hero_localization.camera.camera_model import Camera, Lens
 from hero_localization.errors import SettingsError
 from hero_localization.tracking import settings
 from hero_localization.tracking.detectors import DEFAULT_BACKEND
+from hero_node.geometry import Pose
 from hero_test.bad_yaml import make_bad_yaml
 
 MATRIX = (1390.0, 0.0, 950.0, 0.0, 1391.0, 550.0, 0.0, 0.0, 1.0)

@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from hero_client.values.geometry import Pose
 from hero_localization.filter.stamped_history import StampedHistory, interpolate_pose
+from hero_node.geometry import Pose
 
 
 @pytest.fixture

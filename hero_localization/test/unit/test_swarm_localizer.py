@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from hero_client.values.geometry import Pose
 from hero_localization.filter.pose_filter import Measurement
 from hero_localization.filter.swarm_localizer import RobotState, SwarmLocalizer
+from hero_node.geometry import Pose
 
 COVARIANCE = np.diag((1e-6, 1e-6, 1e-4))
 PERIOD_S = 0.05

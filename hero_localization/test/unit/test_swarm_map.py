@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from hero_client.values.geometry import Pose
 from hero_localization.mapping.map_files import save_map
 from hero_localization.mapping.occupancy_grid import OccupancyGrid
 from hero_localization.mapping.swarm_map import SwarmMap
+from hero_node.geometry import Pose
 from hero_sim.world.arena import measure_clearance
 from hero_sim.world.arena_file import load_arena
 

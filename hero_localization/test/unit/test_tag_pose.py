@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 
-from hero_client.values.geometry import Pose, transform_pose, wrap_angle
 from hero_localization.camera.camera_model import Camera, Lens
 from hero_localization.filter.heading_check import HeadingCheck, is_upside_down
 from hero_localization.tracking.tag_corners import TagCorners
@@ -18,6 +17,7 @@ from hero_localization.tracking.tag_pose import (
     fit_squares,
     locate,
 )
+from hero_node.geometry import Pose, transform_pose, wrap_angle
 
 LENS = Lens(
     1920,

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from hero_client.values.geometry import Pose, wrap_angle
 from hero_localization.filter.pose_filter import Measurement, Outcome, PoseFilter, make_covariance
 from hero_localization.nodes.outputs import make_robot_pose
+from hero_node.geometry import Pose, wrap_angle
 from hero_sim.stepped.swarm import StepSwarm
 
 COUNT = 24

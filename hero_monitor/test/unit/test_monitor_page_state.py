@@ -9,7 +9,6 @@ from geometry_msgs.msg import Point32, Polygon, PolygonStamped
 from nav_msgs.msg import MapMetaData, OccupancyGrid
 from sensor_msgs.msg import CompressedImage
 
-from hero_client.values.geometry import Pose
 from hero_monitor.control.requests import RequestError, read_request
 from hero_monitor.fleet_feed.camera_picture import BYTES_MAX, SILENT_S, CameraPicture
 from hero_monitor.fleet_feed.occupancy import MAX_CELLS, encode_grid
@@ -23,6 +22,7 @@ from hero_monitor.fleet_feed.page_state import (
     encode_ranges,
 )
 from hero_monitor.fleet_feed.placement import APART_M, Placement
+from hero_node.geometry import Pose
 
 
 def test_a_page_gets_each_part_of_the_state_once_until_it_changes():

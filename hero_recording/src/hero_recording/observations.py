@@ -7,7 +7,7 @@ import math
 from collections import defaultdict
 from typing import Any, DefaultDict, Iterable, List, NamedTuple, Optional, Set, Tuple
 
-from hero_client.values.geometry import yaw_of
+from hero_node.geometry import yaw_of
 
 from .series import Series
 from .tables import STATUS, TABLES, Row, read_rows

@@ -9,7 +9,7 @@ from operator import attrgetter
 from typing import Any, Callable, Dict, List, Tuple
 
 from hero_client.ros.drivers import STATES
-from hero_client.values.geometry import yaw_of
+from hero_node.geometry import yaw_of
 
 from . import topics
 

@@ -6,8 +6,8 @@ from typing import Dict, List, NamedTuple, Sequence
 
 import numpy as np
 
-from hero_client.values.geometry import Pose
 from hero_node.command_line import say
+from hero_node.geometry import Pose
 
 from ..errors import CalibrationError
 from ..models import infrared_model as model

@@ -12,9 +12,9 @@ from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from hero_client.values.geometry import Pose, invert_pose, transform_pose, wrap_angle
 from hero_client.values.robot_constants import WHEEL_SEPARATION_M
 from hero_node.command_line import say
+from hero_node.geometry import Pose, invert_pose, transform_pose, wrap_angle
 
 from ..errors import CalibrationError, EndedError
 from ..models.encoder_readings import TICK_M

@@ -7,9 +7,9 @@ from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 
-from hero_client.values.geometry import Pose, yaw_of
 from hero_msgs.msg import Encoder, Motor, RobotPose, RobotPoses
 from hero_msgs.srv import SetIRCalibration, SetMotor, SetPID
+from hero_node.geometry import Pose, yaw_of
 from hero_node.texts import one_line
 
 from ..errors import CalibrationError

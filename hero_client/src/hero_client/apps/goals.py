@@ -11,11 +11,11 @@ import queue
 from typing import Any, Callable, NamedTuple, Protocol, Tuple
 
 from hero_node.errors import HeroError
+from hero_node.geometry import yaw_of
 
 from ..controllers.go_to_goal import Goal, GoToGoalController
 from ..controllers.motion import State
 from ..robots.robot_base import BaseRobot
-from ..values.geometry import yaw_of
 
 __all__ = [
     "FEEDBACK_PERIOD_S",

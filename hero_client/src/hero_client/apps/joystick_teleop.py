@@ -11,10 +11,10 @@ import rospy
 from sensor_msgs.msg import Joy
 
 from hero_node.errors import ProgramError
+from hero_node.geometry import STOP, Velocity
 from hero_node.ros.program import Program
 
 from ..swarm import REPORT_PERIOD_S, Swarm
-from ..values.geometry import STOP, Velocity
 from .robot_choice import ChoiceButtons, RobotChoice
 from .teleop_output import PauseDetector, TeleopOutput
 

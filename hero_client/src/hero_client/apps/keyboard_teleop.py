@@ -10,13 +10,13 @@ import os
 import sys
 from typing import Dict, List, Optional, Tuple
 
+from hero_node.geometry import STOP, Velocity
 from hero_node.ros.program import Program
 
 from ..robot import Robot
 from ..ros.stop_status import paint
 from ..swarm import Swarm
 from ..values.errors import StaleDataError
-from ..values.geometry import STOP, Velocity
 from ..values.robot_constants import MAX_LINEAR_M_S
 from .keyboard import RELEASE_KEY, STOP_ALL_KEYS, Keyboard
 from .teleop_output import PauseDetector, TeleopOutput

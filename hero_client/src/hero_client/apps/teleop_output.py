@@ -1,6 +1,6 @@
 """Which commands of a teleoperation are sent: every motion, one stop after it, and no motion of before a pause."""
 
-from ..values.geometry import STOP, Velocity
+from hero_node.geometry import STOP, Velocity
 
 __all__ = ["PauseDetector", "TeleopOutput"]
 

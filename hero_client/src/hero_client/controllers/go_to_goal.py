@@ -6,7 +6,8 @@ Poses and the goal are in one frame, normally hero_N/odom.
 import math
 from typing import NamedTuple, Optional, Sequence
 
-from ..values.geometry import STOP, Pose, Velocity, wrap_angle
+from hero_node.geometry import STOP, Pose, Velocity, wrap_angle
+
 from ..values.readings import find_nearest
 from .avoidance import bend_around
 from .motion import AIM_SHARE, DEFAULT_TIMEOUT_S, MotionController

@@ -10,7 +10,8 @@ import enum
 import math
 from typing import Optional, Sequence
 
-from ..values.geometry import STOP, Pose, Velocity, measure_distance, wrap_angle
+from hero_node.geometry import STOP, Pose, Velocity, measure_distance, wrap_angle
+
 from ..values.readings import Obstacle
 from .avoidance import find_in_path
 from .pose_check import PoseCheck
@@ -45,8 +46,8 @@ BLOCKED_S = 2.0
 """After so long behind an obstacle the motion has failed; one that drives on, such as a robot, is waited for."""
 
 STALL_S = 5.0
-"""After so long without motion of the wheels although they were told to move, the motion has failed. The slowest command
-moves wheels after up to 3 s, when the robot's own controller has overcome friction."""
+"""After so long without motion of the wheels although they were told to move, the motion has failed. The slowest
+command moves wheels after up to 3 s, when the robot's own controller has overcome friction."""
 
 SILENCE_S = 0.4
 """The driver may have stopped a robot whose program took longer for a step; its wheels then start anew."""

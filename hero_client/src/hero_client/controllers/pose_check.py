@@ -8,7 +8,7 @@ import math
 from collections import deque
 from typing import Deque, Optional, Tuple
 
-from ..values.geometry import Pose, invert_pose, measure_distance, transform_pose, wrap_angle
+from hero_node.geometry import Pose, invert_pose, measure_distance, transform_pose, wrap_angle
 
 __all__ = ["PoseCheck"]
 

@@ -3,7 +3,8 @@
 import math
 from typing import Optional, Sequence
 
-from ..values.geometry import Pose, Velocity, clamp, wrap_angle
+from hero_node.geometry import Pose, Velocity, clamp, wrap_angle
+
 from .motion import DEFAULT_TIMEOUT_S, MotionController
 
 __all__ = ["ForwardController", "TurnController"]

@@ -5,7 +5,8 @@ from typing import List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from ..values.geometry import STOP, Pose, Velocity
+from hero_node.geometry import STOP, Pose, Velocity
+
 from .motion import AIM_SHARE
 from .orca import AvoidanceLaw, avoid_others, avoid_sensed, steer, steered_point
 from .unicycle import GoToLaw, go_to_point

@@ -4,9 +4,9 @@ from typing import Dict, List, Optional
 
 from hero_node.clock import Clock
 from hero_node.errors import ProgramError
+from hero_node.geometry import Pose
 
 from ..values.errors import FrameError, StaleDataError
-from ..values.geometry import Pose
 from .robot_base import BaseRobot
 from .swarm_base import AnyRobot, BaseSwarm
 

@@ -10,6 +10,8 @@ from functools import partial
 from operator import index
 from typing import Callable, Generator, List, Optional, SupportsIndex, Tuple
 
+from hero_node.geometry import Pose, Velocity, clamp, transform_pose, wrap_angle
+
 from ..controllers.go_to_goal import DEFAULT_TOLERANCE_M, Goal, GoToGoalController
 from ..controllers.motion import DEFAULT_TIMEOUT_S, MotionController, State
 from ..controllers.straight_and_turn import ForwardController, TurnController
@@ -17,7 +19,6 @@ from ..values.background_motion import BackgroundMotion, Sleep, Steps
 from ..values.checks import check_finite, is_finite
 from ..values.colors import Color
 from ..values.errors import GoalError, StaleDataError, StoppedError
-from ..values.geometry import Pose, Velocity, clamp, transform_pose, wrap_angle
 from ..values.readings import FRESH_S, Obstacle, find_nearest
 from ..values.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S, WHEEL_SEPARATION_M
 from .group import POLL_PERIOD_S, READY_TIMEOUT_S, REPEAT_PERIOD_S, Group, stop_after, wait_for_all

@@ -3,9 +3,9 @@
 from typing import List, Optional, Protocol, Tuple
 
 from hero_node.clock import Clock
+from hero_node.geometry import Pose, Velocity
 
 from ..values.background_motion import BackgroundMotion, Steps
-from ..values.geometry import Pose, Velocity
 
 __all__ = ["MAP", "RobotLink"]
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from hero_node.clock import Clock
 from hero_node.errors import HeroError
+from hero_node.geometry import Pose
 
 from ..controllers.go_to_goal import DEFAULT_TOLERANCE_M
 from ..controllers.motion import DEFAULT_TIMEOUT_S
@@ -18,7 +19,6 @@ from ..values.background_motion import BackgroundMotion, Steps
 from ..values.checks import check_finite
 from ..values.colors import Color
 from ..values.errors import GoalError, StaleDataError
-from ..values.geometry import Pose
 from .group import REPEAT_PERIOD_S, Group, stop_after, wait_for_all
 from .robot_base import BaseRobot
 from .robot_link import MAP

@@ -10,10 +10,10 @@ from functools import lru_cache
 import rospy
 import tf2_ros
 
+from hero_node.geometry import Pose, yaw_of
 from hero_node.texts import one_line
 
 from ..values.errors import FrameError
-from ..values.geometry import Pose, yaw_of
 
 __all__ = ["FrameListener", "share_frames"]
 

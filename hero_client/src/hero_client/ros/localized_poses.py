@@ -9,10 +9,10 @@ import rospy
 
 from hero_msgs.msg import RobotPose, RobotPoses
 from hero_node.errors import NodeError
+from hero_node.geometry import Pose
 from hero_node.ros.master import ask_master
 
 from ..values.errors import FrameError, StaleDataError
-from ..values.geometry import Pose
 from ..values.readings import FRESH_S, is_plausible
 
 __all__ = ["MAX_POSITION_SD_M", "TOPIC", "LocalizedPoses", "PoseListener", "share_poses"]

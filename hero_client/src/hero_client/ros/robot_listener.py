@@ -12,7 +12,8 @@ import rospy
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 
-from ..values.geometry import Pose, measure_distance, wrap_angle
+from hero_node.geometry import Pose, measure_distance, wrap_angle
+
 from ..values.readings import Obstacle, find_nearest, is_plausible, read_pose, read_ranges
 
 __all__ = ["NewestMessage", "RateMeter", "RobotListener", "RobotTrack"]

@@ -13,12 +13,12 @@ from std_msgs.msg import ColorRGBA
 from hero_msgs.msg import Encoder
 from hero_msgs.srv import SetOdom
 from hero_node.errors import HeroError
+from hero_node.geometry import Pose, Velocity, yaw_of
 from hero_node.ros.ros_clock import ROS_CLOCK
 from hero_node.texts import one_line
 
 from ..values.background_motion import BackgroundMotion, Steps, run_steps
 from ..values.errors import RobotError
-from ..values.geometry import Pose, Velocity, yaw_of
 from ..values.readings import FRESH_S, front_first
 from .drivers import share_drivers
 from .frames import share_frames

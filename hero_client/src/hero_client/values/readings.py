@@ -6,7 +6,7 @@ Messages are only read; their meaning: REP 105 (frames), REP 117 (ranges).
 import math
 from typing import Any, List, NamedTuple, Optional, Sequence
 
-from .geometry import Pose, wrap_angle, yaw_of
+from hero_node.geometry import Pose, wrap_angle, yaw_of
 
 __all__ = [
     "FRESH_S",

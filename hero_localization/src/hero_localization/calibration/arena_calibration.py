@@ -7,7 +7,7 @@ from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence
 import cv2
 import numpy as np
 
-from hero_client.values.geometry import Pose
+from hero_node.geometry import Pose
 
 from ..camera.camera_model import Camera, Lens
 from ..errors import CalibrationError

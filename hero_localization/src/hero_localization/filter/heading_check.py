@@ -4,7 +4,7 @@ import math
 from collections import deque
 from typing import Deque, Optional, Tuple
 
-from hero_client.values.geometry import Pose, invert_pose, transform_pose, wrap_angle
+from hero_node.geometry import Pose, invert_pose, transform_pose, wrap_angle
 
 __all__ = ["HeadingCheck", "is_upside_down"]
 

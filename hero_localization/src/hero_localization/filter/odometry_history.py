@@ -6,7 +6,7 @@ is continuous: it goes on from where it was.
 
 from typing import NamedTuple, Optional
 
-from hero_client.values.geometry import Pose, invert_pose, measure_distance, transform_pose, wrap_angle
+from hero_node.geometry import Pose, invert_pose, measure_distance, transform_pose, wrap_angle
 
 from .stamped_history import StampedHistory, interpolate_pose
 

@@ -18,7 +18,7 @@ from typing import List, NamedTuple, Optional, Sequence
 
 import numpy as np
 
-from hero_client.values.geometry import Pose, invert_pose, measure_distance, transform_pose, wrap_angle
+from hero_node.geometry import Pose, invert_pose, measure_distance, transform_pose, wrap_angle
 
 from .odometry_history import Odometry, OdometryHistory
 

@@ -7,7 +7,7 @@ import enum
 import math
 from typing import Dict, Iterable, List, NamedTuple, Optional
 
-from hero_client.values.geometry import Pose, measure_distance, wrap_angle
+from hero_node.geometry import Pose, measure_distance, wrap_angle
 
 from .heading_check import HeadingCheck, is_upside_down
 from .loss_lines import LossLines

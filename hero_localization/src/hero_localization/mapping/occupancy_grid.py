@@ -10,8 +10,8 @@ from typing import Sequence, Tuple
 import numpy as np
 from scipy import ndimage
 
-from hero_client.values.geometry import Pose
 from hero_client.values.robot_constants import BODY_RADIUS_M, MIN_RANGE_M
+from hero_node.geometry import Pose
 
 __all__ = ["OccupancyGrid"]
 

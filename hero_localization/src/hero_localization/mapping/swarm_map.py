@@ -5,7 +5,7 @@ from typing import Deque, Dict, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
-from hero_client.values.geometry import Pose
+from hero_node.geometry import Pose
 
 from ..filter.stamped_history import StampedHistory, interpolate_pose
 from .occupancy_grid import OccupancyGrid

@@ -17,11 +17,11 @@ import rospy
 from nav_msgs.msg import Odometry
 
 from hero_client import Program, ProgramError, Robot
-from hero_client.values.geometry import Pose
 from hero_client.values.readings import is_plausible, read_pose
 from hero_node import command_line
 from hero_node.command_line import say
 from hero_node.errors import HeroError
+from hero_node.geometry import Pose
 from hero_node.parameters import robot_ids_option
 
 from ..calibration.arena_calibration import (

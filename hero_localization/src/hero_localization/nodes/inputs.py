@@ -11,8 +11,8 @@ from geometry_msgs.msg import Pose as PoseMessage
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry
 
-from hero_client.values.geometry import Pose
 from hero_client.values.readings import is_plausible, read_pose
+from hero_node.geometry import Pose
 
 from ..filter.pose_filter import Measurement
 

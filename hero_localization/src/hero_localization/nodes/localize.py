@@ -13,9 +13,9 @@ from diagnostic_msgs.msg import DiagnosticStatus
 
 from hero_client import Program, ProgramError, read_parameters, run
 from hero_client.ros.drivers import share_drivers
-from hero_client.values.geometry import Pose
 from hero_client.values.readings import is_plausible
 from hero_msgs.msg import RobotPose, RobotPoses
+from hero_node.geometry import Pose
 from hero_node.parameters import number, robot_ids, words
 
 from ..filter.pose_filter import Measurement, make_covariance

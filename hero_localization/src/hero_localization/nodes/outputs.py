@@ -10,8 +10,8 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseWithCovarianceStamped, Quaternion, TransformStamped
 from tf2_msgs.msg import TFMessage
 
-from hero_client.values.geometry import Pose
 from hero_msgs.msg import RobotPose, RobotPoses
+from hero_node.geometry import Pose
 
 from ..filter.swarm_localizer import LocalizedRobot
 

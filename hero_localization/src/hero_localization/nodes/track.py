@@ -13,8 +13,8 @@ import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
 from hero_client import Program, read_parameters, run
-from hero_client.values.geometry import Pose
 from hero_msgs.msg import ObjectPose, ObjectPoses, RobotPose, RobotPoses
+from hero_node.geometry import Pose
 from hero_node.parameters import number, words
 
 from ..camera.frame_source import Frame, open_source

@@ -2,7 +2,7 @@
 
 from typing import Dict, Mapping
 
-from hero_client.values.geometry import Pose, measure_distance
+from hero_node.geometry import Pose, measure_distance
 
 __all__ = ["find_moved_references"]
 

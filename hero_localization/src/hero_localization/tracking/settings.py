@@ -9,7 +9,7 @@ from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional
 
 import numpy as np
 
-from hero_client.values.geometry import Pose
+from hero_node.geometry import Pose
 from hero_node.number_checks import is_number, is_whole_number
 from hero_node.safe_file import lock_file, write_file
 from hero_node.texts import shorten

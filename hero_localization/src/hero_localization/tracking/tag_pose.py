@@ -9,7 +9,7 @@ from typing import Dict, Iterable, List, Mapping, NamedTuple, Optional, Sequence
 
 import numpy as np
 
-from hero_client.values.geometry import Pose, invert_pose, transform_pose, wrap_angle
+from hero_node.geometry import Pose, invert_pose, transform_pose, wrap_angle
 
 from ..camera.camera_model import Camera
 from ..prints.tag_images import DEFAULT_SIZE_M, REFERENCE_SIZE_M

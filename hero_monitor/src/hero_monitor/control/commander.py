@@ -13,8 +13,8 @@ from geometry_msgs.msg import PoseStamped, Twist
 
 from hero_client.ros.drivers import Drivers
 from hero_client.values.background_motion import SEND_TIME_S
-from hero_client.values.geometry import Pose
 from hero_node.errors import NodeError
+from hero_node.geometry import Pose
 from hero_node.ros.master import ask_master
 
 from ..background import Background

@@ -8,7 +8,7 @@ import math
 from collections import deque
 from typing import Any, Deque, Dict, List, Optional, Tuple
 
-from hero_client.values.geometry import Pose, wrap_angle
+from hero_node.geometry import Pose, wrap_angle
 
 from .page_state import MAX_DISTANCE_M, encode_pose
 

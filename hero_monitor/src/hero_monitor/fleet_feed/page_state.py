@@ -9,7 +9,7 @@ import math
 from collections import deque
 from typing import Any, Deque, Dict, List, NamedTuple, Optional, Sequence
 
-from hero_client.values.geometry import Pose
+from hero_node.geometry import Pose
 from hero_node.texts import make_printable
 
 MAX_LINE_LENGTH = 400

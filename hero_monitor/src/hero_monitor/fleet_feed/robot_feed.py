@@ -7,8 +7,8 @@ from geometry_msgs.msg import PoseStamped
 from std_msgs.msg import ColorRGBA
 
 from hero_client.ros.robot_listener import NewestMessage, RobotListener
-from hero_client.values.geometry import Pose
 from hero_client.values.readings import read_pose
+from hero_node.geometry import Pose
 
 from .page_state import encode_color
 from .placement import Placement

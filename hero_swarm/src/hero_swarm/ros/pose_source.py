@@ -9,9 +9,9 @@ import rospy
 from nav_msgs.msg import Odometry
 
 from hero_client.ros.localized_poses import MAX_POSITION_SD_M
-from hero_client.values.geometry import yaw_of
 from hero_client.values.object_sensing import NO_OBJECTS, Things
 from hero_msgs.msg import ObjectPoses, RobotPose, RobotPoses
+from hero_node.geometry import yaw_of
 
 __all__ = ["SIMULATOR_FRAME", "ObjectSource", "PoseSource"]
 
