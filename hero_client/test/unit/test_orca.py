@@ -94,13 +94,13 @@ def swap(count, radius_m, seed):
     return min_distance_m, [body.pose for body in bodies], goals
 
 
-@pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("count, radius_m", [(2, 0.4), (3, 0.4), (10, 0.6)])
-def test_robots_swap_places_across_a_circle_without_touching(count, radius_m, seed):
-    min_distance_m, poses, goals = swap(count, radius_m, seed)
-    assert min_distance_m > 2.0 * BODY_RADIUS_M
-    for pose, goal in zip(poses, goals):
-        assert math.hypot(pose.x_m - goal[0], pose.y_m - goal[1]) < 0.02
+def test_robots_swap_places_across_a_circle_without_touching():
+    for count, radius_m, seeds in ((2, 0.4, 4), (3, 0.4, 4), (10, 0.6, 1)):
+        for seed in range(seeds):
+            min_distance_m, poses, goals = swap(count, radius_m, seed)
+            assert min_distance_m > 2.0 * BODY_RADIUS_M
+            for pose, goal in zip(poses, goals):
+                assert math.hypot(pose.x_m - goal[0], pose.y_m - goal[1]) < 0.02
 
 
 def test_what_is_seen_near_is_not_driven_at_but_passed_on_the_right():

@@ -63,7 +63,6 @@ class SwarmGoToController:
         self._dock_law = GoToLaw(tolerance_m=AIM_SHARE * tolerance_m, max_linear_m_s=law.max_linear_m_s)
         self._random = np.random.RandomState(seed)
         self._last_places: Optional[np.ndarray] = None
-        self._velocities = np.zeros((len(self.goals), 2))
         self._jams = [_Jam() for _ in self.goals]
 
     def step(
@@ -74,30 +73,33 @@ class SwarmGoToController:
         ranges: what the proximity sensors of each robot see, as in avoidance; None: go by the poses alone.
         """
         known = [pose for pose in poses if pose is not None]
-        return self._steer(known, ranges) if len(known) == len(poses) else [STOP] * len(poses)
+        if len(known) < len(poses):
+            self._last_places = None  # what they drive until the next step is no speed
+            return [STOP] * len(poses)
+        return self._steer(known, ranges)
 
     def _steer(self, poses: Sequence[Pose], ranges: Optional[Sequence[Sequence[float]]]) -> List[Velocity]:
         places = np.array([steered_point(pose, self.law.lookahead_m) for pose in poses])
-        if self._last_places is not None:
-            # Measured, not commanded: the motors take half a second to follow.
-            self._velocities = (places - self._last_places) / self.step_s
+        last_places = places if self._last_places is None else self._last_places
+        # Measured, not commanded: the motors take half a second to follow.
+        velocities = (places - last_places) / self.step_s
         self._last_places = places
         distances_m = [math.dist(goal, pose[:2]) for goal, pose in zip(self.goals, poses)]
         self.arrived = [
             distance_m < (self._tolerance_m if done else self._dock_law.tolerance_m)
             for done, distance_m in zip(self.arrived, distances_m)
         ]
-        wanted = np.array([self._want(*item) for item in zip(self.goals, poses, distances_m, self._jams)])
-        seen = []
+        straight = np.array([self._want(*item) for item in zip(self.goals, poses, distances_m, self._jams)])
+        wanted, seen = straight.copy(), []
         for index, pose in enumerate(poses):
             sensed = [] if ranges is None else ranges[index]
             wanted[index], normals, bounds = avoid_sensed(pose, sensed, wanted[index], self.law)
             seen.append((normals, bounds))
         moving = [index for index, done in enumerate(self.arrived) if not done]
-        allowed = avoid_others(places, self._velocities, wanted, self.law, self.step_s, moving, seen)
+        allowed = avoid_others(places, velocities, wanted, self.law, self.step_s, moving, seen)
         commands = [STOP] * len(poses)
         for velocity, index in zip(allowed, moving):
-            free = float(np.hypot(*(velocity - wanted[index]))) < 0.25 * float(np.hypot(*wanted[index]))
+            free = float(np.hypot(*(velocity - straight[index]))) < 0.25 * float(np.hypot(*straight[index]))
             if distances_m[index] < DOCKING_M and free:
                 commands[index] = go_to_point(poses[index], *self.goals[index], self._dock_law)
             else:

@@ -1,4 +1,4 @@
-"""What robots sense of objects, against hand-computed places, and the metrics of where objects are."""
+"""What robots sense of objects, against hand-computed places."""
 
 import math
 
@@ -17,9 +17,6 @@ from hero_client.values.object_sensing import (
     sense_sight,
 )  # fmt: skip
 from hero_client.values.robot_constants import BODY_RADIUS_M
-from hero_sim.world.arena_file import load_arena
-from hero_swarm import metrics
-from hero_swarm.trial import scatter_objects
 
 
 def sense(robots, objects, sensor=None, radius_m=0.05):
@@ -53,19 +50,3 @@ def test_objects_are_sensed_in_the_body_frame():
     np.testing.assert_allclose((seen.forward_m[0, 0], seen.left_m[0, 0]), (1.0, 0.0), atol=1e-12)
     assert seen.heading_rad[0, 0] == pytest.approx(math.pi / 2.0)
     assert seen.radii_m.tolist() == [0.1, 0.2]
-
-
-def test_metrics_of_objects_count_clusters_and_distances():
-    objects = np.array([[(0.0, 0.0, 0.0), (0.19, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)]])
-    none = np.empty((1, 1, 3))
-    assert metrics.METRICS["object_cluster_fraction"](none, none, objects) == [0.5]
-    assert metrics.METRICS["object_distance"](none, none, objects) == pytest.approx(2.19 / 4.0)
-
-
-def test_scattered_objects_differ_by_seed_and_overlap_nothing():
-    arena, robots = load_arena("discs"), np.zeros((1, 3))
-    places_m = [np.array([thing.pose[:2] for thing in scatter_objects(arena, robots, seed)]) for seed in (1, 1, 2)]
-    assert (places_m[0] == places_m[1]).all() and (places_m[0] != places_m[2]).any()
-    apart_m = np.hypot(*np.moveaxis(places_m[2][:, None] - places_m[2], -1, 0)) + np.eye(20)
-    assert apart_m.min() > 0.1 and np.hypot(*places_m[2].T).min() > 0.05 + BODY_RADIUS_M
-    assert np.abs(places_m[2]).max() < 1.45

@@ -1,0 +1,181 @@
+"""Many robots to their goals: what each wants, when it has arrived, and what ends a jam."""
+
+import math
+
+import numpy as np
+import pytest
+
+from hero_client.controllers.orca import (
+    AvoidanceLaw,
+    avoid_others,
+    avoid_sensed,
+    half_plane,
+    nearest_allowed,
+    steer,
+)
+from hero_client.controllers.swarm_go_to import (
+    ASIDE_S,
+    DOCKING_M,
+    NUDGE_RAD,
+    PATIENCE_S,
+    SwarmGoToController,
+    _Jam,
+)
+from hero_client.values.geometry import STOP, Pose
+from hero_client.values.robot_constants import BODY_RADIUS_M
+
+LAW = AvoidanceLaw()
+STEP_S = 0.1
+HERE = Pose(0.0, 0.0, 0.0)
+
+
+def make(*goals, **options):
+    return SwarmGoToController(goals, LAW, STEP_S, 0, **options)
+
+
+def test_all_stop_while_one_pose_is_not_known_and_no_speed_follows_from_it():
+    controller = make((2.0, 0.0), (-2.0, 0.5))
+    far = Pose(9.0, 9.0, 0.0)
+    first = controller.step([HERE, far])
+    assert first[0].linear_m_s > 0.07
+    assert controller.step([HERE, None]) == [STOP, STOP]
+    # hero_1 was carried to a place 1 m ahead, out of reach of one that stands.
+    assert controller.step([HERE, Pose(1.0, 0.0, math.pi)])[0] == pytest.approx((0.08, 0.0), abs=0.14)
+
+
+def test_a_robot_that_comes_fast_is_avoided_by_its_measured_speed():
+    for came_m, is_avoided in ((0.0, False), (0.02, True)):
+        controller = make((2.0, 0.0), (-2.0, 0.0))
+        controller.step([HERE, Pose(0.7 + came_m, 0.0, math.pi)])
+        command = controller.step([Pose(0.008, 0.0, 0.0), Pose(0.7, 0.0, math.pi)])[0]
+        assert (command.linear_m_s < 0.075) == is_avoided
+
+
+def test_a_robot_wants_straight_to_its_goal_but_for_a_nudge():
+    controller = make((1.0, 0.0), (0.0, 3.0))
+    for distance_m, speed_m_s in ((1.0, 0.08), (0.1, 0.08), (0.05, 0.04)):
+        turns_rad = []
+        for _ in range(200):
+            wanted = controller._want((distance_m, 0.0), HERE, distance_m, _Jam())
+            assert np.hypot(*wanted) == pytest.approx(speed_m_s)
+            turns_rad.append(math.atan2(wanted[1], wanted[0]))
+        assert min(turns_rad) == pytest.approx(-NUDGE_RAD, abs=0.005) and max(turns_rad) <= NUDGE_RAD
+        assert max(turns_rad) > 0.9 * NUDGE_RAD
+    assert controller._want((0.0, 0.0), HERE, 0.0, _Jam()).tolist() == [0.0, 0.0]
+
+
+def test_a_jam_is_left_to_the_side_for_two_seconds_and_then_judged_anew():
+    controller, jam = make((1.0, 0.0)), _Jam()
+    aside = []
+    for _ in range(130):
+        wanted = controller._want((1.0, 0.0), HERE, 1.0, jam)
+        turn_rad = math.atan2(wanted[1], wanted[0])
+        aside.append(abs(turn_rad) > NUDGE_RAD)
+        assert not aside[-1] or 0.5 <= abs(turn_rad) <= 2.5
+        assert np.hypot(*wanted) == pytest.approx(0.08)
+    begins = [index for index in range(1, 130) if aside[index] and not aside[index - 1]]
+    assert [begins[0] * STEP_S, (begins[1] - begins[0]) * STEP_S] == pytest.approx(
+        [PATIENCE_S, PATIENCE_S + ASIDE_S], abs=0.21
+    )
+    assert sum(aside[: begins[1]]) * STEP_S == pytest.approx(ASIDE_S, abs=0.11)
+    for nearer_m, is_jam in ((0.009, True), (0.011, False)):
+        jam = _Jam()
+        for index in range(60):
+            jam.look(1.0 if index < 30 else 1.0 - nearer_m, STEP_S)
+        assert jam.aside == is_jam
+
+
+def test_a_robot_arrives_within_a_share_of_the_tolerance_and_leaves_beyond():
+    controller = make((0.0, 0.0), (5.0, 0.0))
+    other = Pose(4.0, 0.0, 0.0)
+    for x_m, has_arrived in (
+        (0.02, False),
+        (0.009, False),
+        (0.006, True),
+        (0.009, True),
+        (0.011, False),
+        (0.009, False),
+    ):
+        commands = controller.step([Pose(x_m, 0.0, 0.0), other])
+        assert controller.arrived == [has_arrived, False]
+        assert (commands[0] == STOP) == has_arrived and commands[1] != STOP
+
+
+def test_near_its_goal_a_free_robot_steers_its_center():
+    # Beside its goal, 0.03 m to the left: the point ahead of the axle would go sideways at once.
+    for distance_m, is_docking in ((DOCKING_M - 0.001, True), (DOCKING_M + 0.001, False)):
+        controller = make((0.0, distance_m))
+        command = controller.step([HERE])[0]
+        # The center's law turns by 1.5 rad/s per rad; the steered point would move along its left at 0.8 * distance.
+        expected_rad_s = 1.5 * math.pi / 2.0 if is_docking else 0.8 * distance_m / LAW.lookahead_m
+        assert command.angular_rad_s == pytest.approx(min(expected_rad_s, 1.5 if is_docking else 2.5), abs=0.02)
+    # With something in the way it stays with what is allowed.
+    blocked = make((DOCKING_M - 0.01, 0.0))
+    ranges = [[BODY_RADIUS_M + 0.03] + [math.inf] * 7]
+    assert blocked.step([HERE], ranges)[0].linear_m_s == pytest.approx(0.0, abs=0.003)
+
+
+def test_what_is_sensed_turns_the_wanted_velocity_to_the_right():
+    for gap_m, speed_m_s, expected in (
+        (0.10, 0.08, (0.08, 0.0)),
+        (0.0999, 0.08, (0.0699, -0.0101)),
+        (0.05, 0.08, (0.02, -0.06)),
+        (0.03, 0.08, (0.0, -0.08)),
+        (0.02, 0.08, (-0.01, -0.08)),
+        (0.0, 0.08, (-0.02, -0.08)),
+        (0.0, 0.0, (-0.02, 0.0)),
+        (0.0, -0.03, (-0.03, 0.0)),
+    ):
+        ranges = [BODY_RADIUS_M + gap_m] + [math.inf] * 7
+        wanted, normals, bounds = avoid_sensed(HERE, ranges, np.array([speed_m_s, 0.0]), LAW)
+        assert wanted == pytest.approx(expected)
+        assert len(bounds) == len(normals) == (gap_m < LAW.sense_m)
+        if len(bounds):
+            assert normals[0] == pytest.approx((-1.0, 0.0)) and bounds[0] == pytest.approx(-max(gap_m - 0.03, -0.02))
+
+
+def test_robots_that_overlap_come_apart_within_a_step():
+    for offset in ((0.1, 0.0), (0.0, -0.05)):
+        offset, radius_m = np.array(offset), 0.15
+        for velocity in (np.zeros(2), np.array([0.05, 0.02])):
+            normal, depth = half_plane(offset, velocity, radius_m, 3.0, 0.1)
+            changed = velocity + normal * depth
+            assert np.hypot(*(offset - changed * 0.1)) == pytest.approx(radius_m)
+    normal, depth = half_plane(np.zeros(2), np.zeros(2), 0.15, 3.0, 0.1)
+    assert normal.tolist() == [-1.0, 0.0] and depth == pytest.approx(1.5)
+
+
+def test_each_robot_takes_half_of_the_change_and_looks_at_the_nearest_ones():
+    still = np.zeros((2, 2))
+    places = np.array([(0.0, 0.0), (0.3, 0.0)])
+    wanted = np.array([(0.08, 0.0), (0.0, 0.0)])
+    gap_m = 0.3 - 2.0 * LAW.radius_m
+    # Head on, from rest: together they may close the gap within the horizon, each half of it.
+    found = avoid_others(places, still, wanted, LAW, STEP_S, [0])
+    assert found.tolist() == [pytest.approx((0.5 * gap_m / LAW.horizon_s, 0.0))]
+    fence = (np.array([(-1.0, 0.0)]), np.array([-0.01]))
+    none = (np.empty((0, 2)), np.empty(0))
+    assert avoid_others(places, still, wanted, LAW, STEP_S, [0], [fence, none])[0, 0] == pytest.approx(0.01)
+    assert avoid_others(places, still, wanted, LAW, STEP_S, [1], [fence, none]).tolist() == [[0.0, 0.0]]
+    crowd = np.vstack((places, [(-0.2, 0.001 * index) for index in range(LAW.neighbors)]))
+    wanted = np.zeros((len(crowd), 2))
+    wanted[0] = 0.08, 0.0
+    is_first_counted = avoid_others(crowd, np.zeros_like(crowd), wanted, LAW, STEP_S, [0])[0, 0] < 0.07
+    assert not is_first_counted, "six are nearer"
+    assert avoid_others(crowd[:-1], np.zeros_like(crowd[:-1]), wanted[:-1], LAW, STEP_S, [0])[0, 0] < 0.07
+
+
+def test_where_nothing_is_allowed_all_give_way_by_the_same():
+    normals, bounds = np.array([(1.0, 0.0), (-1.0, 0.0)]), np.array([0.06, 0.02])
+    found = nearest_allowed(np.zeros(2), normals, bounds, 0.1)
+    assert bounds - normals @ found == pytest.approx([0.04, 0.04], abs=1e-3)
+
+
+def test_commands_beyond_the_limits_are_slowed_down_as_a_whole():
+    for velocity, expected in (
+        ((0.08, 0.0), (0.08, 0.0)),
+        ((0.16, 0.03), (0.08, 0.5)),
+        ((0.02, -0.15), (0.01, -2.5)),
+        ((-0.1, 0.0), (-0.08, 0.0)),
+    ):
+        assert steer(HERE, np.array(velocity), LAW) == pytest.approx(expected)
