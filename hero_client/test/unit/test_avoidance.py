@@ -13,7 +13,7 @@ from hero_client.controllers.avoidance import (
     split_sectors,
     wander,
 )
-from hero_client.values.geometry import STOP, Velocity
+from hero_node.geometry import STOP, Velocity
 
 INF = math.inf
 AHEAD = Velocity(0.05, 0.1)

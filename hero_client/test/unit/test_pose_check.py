@@ -3,7 +3,7 @@
 import math
 
 from hero_client.controllers.pose_check import PoseCheck
-from hero_client.values.geometry import Pose
+from hero_node.geometry import Pose
 
 OFF = Pose(3.0, -2.0, 0.0)
 

@@ -8,9 +8,9 @@ from fake_robot import make_robot
 from hero_client.robots.group import READY_TIMEOUT_S
 from hero_client.robots.robot_base import NEXT_ODOM_S, STOPPED_WARNING_PERIOD_S
 from hero_client.values.errors import GoalError, RobotNotReadyError, StaleDataError, StoppedError
-from hero_client.values.geometry import Pose, Velocity
 from hero_client.values.readings import FRESH_S
 from hero_client.values.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
+from hero_node.geometry import Pose, Velocity
 
 
 def test_data_count_until_they_are_a_second_old():

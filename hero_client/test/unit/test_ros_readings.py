@@ -16,8 +16,8 @@ from hero_client.ros.robot_topics import CommandTopic, NewestMessages
 from hero_client.ros.ros_link import RosLink, ThreadMotion
 from hero_client.values.background_motion import Hold
 from hero_client.values.errors import FrameError, GoalError, RobotError, StaleDataError
-from hero_client.values.geometry import Pose
 from hero_msgs.msg import RobotPoses
+from hero_node.geometry import Pose
 
 
 class Time:

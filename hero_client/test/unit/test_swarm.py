@@ -11,8 +11,8 @@ from hero_client.robots.common_frame import POLL_HZ, CommonFrame
 from hero_client.robots.group import NAMES_SHOWN, wait_for_all
 from hero_client.robots.swarm_base import FIRST_REPORT_S, REPORT_PERIOD_S
 from hero_client.values.errors import FrameError, GoalError, RobotNotReadyError, StaleDataError, StoppedError
-from hero_client.values.geometry import Pose, Velocity
 from hero_node.errors import ProgramError
+from hero_node.geometry import Pose, Velocity
 
 
 def test_robots_are_taken_by_their_numbers():

@@ -21,8 +21,8 @@ from hero_client.controllers.swarm_go_to import (
     SwarmGoToController,
     _Jam,
 )
-from hero_client.values.geometry import STOP, Pose
 from hero_client.values.robot_constants import BODY_RADIUS_M
+from hero_node.geometry import STOP, Pose
 
 LAW = AvoidanceLaw()
 STEP_S = 0.1
