@@ -119,11 +119,24 @@ def test_wheels_that_stand_still_are_told_from_slow_commands_and_noise():
         assert (step_until_end(controller, swing, 9.0) < 9.0) == is_stalled
 
 
+def test_wheels_that_a_pause_of_the_program_stopped_have_their_time_anew():
+    for pause_s, goes_on in ((0.39, False), (0.41, True)):
+        controller, now_s = Steady(0.1, 0.0), 0.0
+        for _ in range(int(0.8 * STALL_S / STEP_S)):
+            now_s += STEP_S
+            controller.step(HERE, None, now_s)
+        now_s += pause_s
+        for _ in range(int(0.8 * STALL_S / STEP_S)):
+            controller.step(HERE, None, now_s)
+            now_s += STEP_S
+        assert (controller.state is State.ACTIVE) == goes_on
+
+
 def test_a_frozen_pose_is_told_from_blocked_wheels():
     frozen, held = Steady(0.1, 0.0), Steady(0.1, 0.0)
-    assert step_until_end(frozen, lambda now_s: HERE, 9.0, odometry=lambda now_s: Pose(0.01 * now_s, 0.0, 0.0)) < 4.0
+    assert step_until_end(frozen, lambda now_s: HERE, 9.0, odometry=lambda now_s: Pose(0.01 * now_s, 0.0, 0.0)) < STALL_S + 0.2
     assert "its wheels turn, but its pose stays the same" in frozen.reason
-    assert step_until_end(held, lambda now_s: HERE, 9.0, odometry=lambda now_s: HERE) < 4.0
+    assert step_until_end(held, lambda now_s: HERE, 9.0, odometry=lambda now_s: HERE) < STALL_S + 0.2
     assert "its wheels do not turn" in held.reason
 
 

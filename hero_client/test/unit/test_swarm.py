@@ -111,9 +111,9 @@ def test_robots_cross_without_touching_and_those_without_a_goal_stay():
 def test_goals_too_near_to_each_other_or_to_a_robot_that_stays_are_refused():
     swarm = FakeSwarm(0, 1, 2)
     for goals, says in (
-        ({0: (0.3, 0.0), 1: (0.3, 0.17)}, "hero_0 and hero_1 are 0.17 m apart: robots need 0.18 m"),
-        ({0: (0.0, 0.9)}, "hero_0 and hero_2 are 0.10 m apart"),
-        ({2: (0.0, 0.4)}, "hero_1 and hero_2 are 0.10 m apart"),
+        ({0: (0.3, 0.0), 1: (0.3, 0.17)}, "hero_0 and hero_1 are 0.170 m apart: robots need 0.178 m"),
+        ({0: (0.0, 0.9)}, "hero_0 and hero_2 are 0.100 m apart"),
+        ({2: (0.0, 0.4)}, "hero_1 and hero_2 are 0.100 m apart"),
     ):
         with pytest.raises(GoalError, match=says):
             swarm.go_to_each(goals, frame="world")
