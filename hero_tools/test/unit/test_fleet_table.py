@@ -78,6 +78,12 @@ def test_json_has_no_infinity():
     assert robot["id"] == 0
 
 
+def test_rates_are_rounded_in_json():
+    row = make_row(0, bytes_per_s=44051.2345, packets_per_s=99.876)._replace(odom_hz=29.3456)
+    (robot,) = json.loads(format_json([row], "", False))["robots"]
+    assert (robot["odom_hz"], robot["packets_per_s"], robot["bytes_per_s"]) == (29.35, 99.88, 44051.2)
+
+
 def test_the_state_of_a_stop_stands_beside_the_robots_state():
     row = make_row(3, stop_state=Robot.MOVING)
     assert "READY, MOVING " in format_table([row], 200, 10)[1]

@@ -20,10 +20,17 @@ def nmcli(tmp_path, monkeypatch):
     return ScriptedNmcli(tmp_path, monkeypatch)
 
 
+class Terminal(io.StringIO):
+    """Standard input where a person sits."""
+
+    def isatty(self):
+        return True
+
+
 def run(monkeypatch, capsys, *arguments, typed=PASSWORD + "\n"):
-    """Run the program and return exit code, output and errors."""
+    """Run the program and return exit code, output and errors; typed: None at a terminal."""
     monkeypatch.setattr(sys, "argv", ["hotspot", *arguments])
-    monkeypatch.setattr(sys, "stdin", io.StringIO(typed))
+    monkeypatch.setattr(sys, "stdin", io.StringIO(typed) if typed else Terminal())
     with pytest.raises(SystemExit) as ended:
         hotspot.main()
     captured = capsys.readouterr()
@@ -74,6 +81,25 @@ def test_a_password_that_wpa2_does_not_take_is_refused_and_not_repeated(
     assert says in errors
     assert password not in errors
     assert not [call for call in nmcli.read_calls() if "add" in call.arguments]
+
+
+def test_passwords_of_8_and_of_63_characters_are_taken(nmcli, monkeypatch, capsys):
+    for length in (8, 63):
+        code, _, errors = run(monkeypatch, capsys, "create", "--password-stdin", typed="x" * length + "\n")
+        assert code == 0, errors
+
+
+def test_a_password_that_is_repeated_wrongly_is_refused(nmcli, monkeypatch, capsys):
+    for repeated, wanted in ((PASSWORD, 0), ("another password", 1)):
+        typed = iter([PASSWORD, repeated])
+        monkeypatch.setattr(hotspot.getpass, "getpass", lambda prompt, typed=typed: next(typed))
+        code, _, errors = run(monkeypatch, capsys, "create", "--yes", typed=None)
+        assert code == wanted and ("differ" in errors) == bool(wanted)
+
+
+def test_without_a_command_the_commands_are_named(nmcli, monkeypatch, capsys):
+    code, _, errors = run(monkeypatch, capsys)
+    assert code == 2 and "create | status | remove" in errors
 
 
 def test_without_a_terminal_the_password_is_not_guessed(nmcli, monkeypatch, capsys):
