@@ -158,15 +158,15 @@ class DriverConfig:
             0.0,
             10.0,
             "s",
-            "silence of a program that commands a robot regularly (at least six times) after which the robot is"
-            " stopped, at least four periods of the program; 0: never",
+            "silence, of at least four periods, after which the robot of a program that sent at least six commands is"
+            " stopped; 0: never",
         )
     )
     allow_self_tuning: bool = _declare(
         flag(
             False,
-            "allow pid_calibration, during which a robot spins for up to a minute and finds no gains that it keeps; if"
-            " driver or Wi-Fi fail meanwhile it spins on until it is connected again",
+            "allow pid_calibration: the robot spins for up to a minute and keeps no gains; without driver or Wi-Fi it"
+            " never stops",
         )
     )
     start_stopped: str = _declare(
@@ -189,18 +189,18 @@ class DriverConfig:
         )
     )
     wheel_diameter_m: float = _declare(
-        number(WHEEL_DIAMETER_M, 0.001, 1.0, "m", "diameter of a wheel, but of HeRo+")
+        number(WHEEL_DIAMETER_M, 0.001, 1.0, "m", "diameter of a wheel, except HeRo+'s")
     )
     wheel_separation_m: float = _declare(
-        number(WHEEL_SEPARATION_M, 0.001, 1.0, "m", "distance between the wheels, but of HeRo+")
+        number(WHEEL_SEPARATION_M, 0.001, 1.0, "m", "distance between the wheels, except HeRo+'s")
     )
     ticks_per_turn: float = _declare(
-        number(TICKS_PER_TURN, 1.0, 1000000.0, "", "encoder ticks per revolution of a wheel, but of HeRo+")
+        number(TICKS_PER_TURN, 1.0, 1000000.0, "", "encoder ticks per revolution of a wheel, except HeRo+'s")
     )
     calibration_folder: str = _declare(
         words(
             "~/hero_calibration",
-            "folder of calibrate's files, hero_N.yaml, whose wheels replace the ones above for that robot; empty: none",
+            "folder of calibrate's files hero_N.yaml, whose wheels replace those above; empty: none",
         )
     )
     pose_covariance: Tuple[float, ...] = _declare(

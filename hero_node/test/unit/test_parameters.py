@@ -1,4 +1,4 @@
-"""Parameters are declared once: checked values, one line for wrong ones, and the documents' table."""
+"""Parameters are declared once: checked values, one line for wrong ones, and the documents' list."""
 
 import argparse
 import math
@@ -6,7 +6,7 @@ import math
 import pytest
 
 from hero_node.errors import ProgramError
-from hero_node.parameter_table import make_table
+from hero_node.parameter_list import make_list
 from hero_node.parameters import (
     MAX_COORDINATE_M,
     MAX_ROBOTS_IN_RANGE,
@@ -24,11 +24,11 @@ from hero_node.parameters import (
 
 DECLARED = {
     "rate_hz": number(10.0, 1.0, 30.0, "Hz", "of updates"),
-    "port": whole_number(8088, 0, 65535),
+    "port": whole_number(8088, 0, 65535, text="TCP port"),
     "control": flag(False, "whether pages may drive"),
-    "view": choice("orbit", ("orbit", "top")),
+    "view": choice("orbit", ("orbit", "top"), "of the camera"),
     "frame": words("map", "where poses are"),
-    "robots": robot_ids("0-2"),
+    "robots": robot_ids("0-2", "their ids"),
 }
 
 
@@ -60,12 +60,16 @@ def test_a_wrong_value_is_one_line_with_what_is_allowed(name, value, allowed):
     assert allowed in str(raised.value) and "\n" not in str(raised.value)
 
 
-def test_a_table_says_what_is_declared():
-    lines = make_table(DECLARED)
-    assert "| `~rate_hz` | `10.0` | 1.0 to 30.0 Hz | of updates |" in lines
-    assert "| `~port` | `8088` | 0 to 65,535 |  |" in lines
-    assert "| `~control` | `false` | true, false | whether pages may drive |" in lines
-    assert "| `~view` | `orbit` | `orbit`, `top` |  |" in lines
+def test_a_list_says_what_is_declared():
+    assert make_list(DECLARED) == [
+        "- `~rate_hz` (`10.0`, 1.0 to 30.0 Hz): of updates",
+        "- `~port` (`8088`, 0 to 65,535): TCP port",
+        "- `~control` (`false`): whether pages may drive",
+        "- `~view` (`orbit`, `top`): of the camera",
+        "- `~frame` (`map`): where poses are",
+        "- `~robots` (`0-2`): their ids",
+    ]
+    assert make_list({"mean": words("x", "many words " * 20)})[0].splitlines()[1].startswith("  ")
 
 
 @pytest.mark.parametrize("low, high, unit", [(1.0, 30.0, ""), (-1.0, 1.0, "m")])
