@@ -15,14 +15,16 @@ import sys
 import threading
 import time
 import urllib.parse
+import xmlrpc.client
 from typing import Any, Callable, List, Optional
 
 import rosgraph
 import rospy
 
-from hero_node.errors import ProgramError
+from hero_node.errors import NodeError, ProgramError
 from hero_node.ros.connections import limit_xmlrpc_connections, open_tcpros_server
 from hero_node.ros.master import find_running_node
+from hero_node.ros.master_watch import MasterWatch
 from hero_node.ros.ros_node import end_ros_node, init_ros_node
 
 from .config import FORMER_STOP, DriverConfig, read_config
@@ -30,7 +32,6 @@ from .gateway import STOP_LIMIT_S, Gateway
 from .kept_stop import KeptStop
 from .reports import FleetStatus, Reporter
 from .ros.log_relay import LogRelay, prepare_logging, tell_of_lost_log_lines
-from .ros.master_watch import MasterWatch
 from .ros.rospy_internals import (
     call_before_shutdown,
     keep_publishers_connected,
@@ -52,6 +53,10 @@ are what robots were delayed by while the driver logged a lot, or spoke with the
 REPORT_CHECK_S = 0.1
 
 MASTER_CHECK_S = 0.5
+"""Between two looks for the ROS master at the start."""
+
+MASTER_WATCH_S = 2.0
+"""Between two looks whether the ROS master still knows this node."""
 
 LEAVE_WAIT_S = 3.0
 """Time limit for unregistering at the ROS master; 50 robots take 0.5 s."""
@@ -89,7 +94,7 @@ class DriverNode:
         self._crash: Optional[BaseException] = None
         self._kept = KeptStop(rospy.get_name())
         self._stop_interface = StopInterface(self._loop, self._gateway, self._kept, self._log)
-        self._master_watch = MasterWatch("~stop", self._log.log)
+        self._is_closed = threading.Event()
 
     def open(self) -> None:
         """Listen, dial and serve. Raises: OSError if the port cannot be had."""
@@ -98,7 +103,7 @@ class DriverNode:
         since = self._kept.read_since() if self._config.start_stopped == "as_before" else ""
         self._stop_interface.open(bool(since) or self._config.start_stopped == "always", since)
         self._thread.start()
-        self._master_watch.open()
+        threading.Thread(target=self._watch_master, name="master watch", daemon=True).start()
         self._log.log("info", self._describe_start())
         # Whatever ~host calls it: "0" is every address too.
         listening = self._loop.listening
@@ -140,7 +145,7 @@ class DriverNode:
             self._loop.stop()
             self._thread.join(1.0)
         self._stop_interface.close()
-        self._master_watch.close()
+        self._is_closed.set()
         self._registrar.close()
         self._log.close()
 
@@ -159,6 +164,19 @@ class DriverNode:
             self._crash = error
             self.end()
             raise
+
+    def _watch_master(self) -> None:
+        watch, was_lost = MasterWatch(), False
+        while not self._is_closed.wait(MASTER_WATCH_S):
+            try:
+                news = watch.look()
+                if news:
+                    self._log.log("warn", news)
+            except (NodeError, OSError, xmlrpc.client.Error) as error:
+                if not was_lost and not self._is_closed.is_set():
+                    text = "%s: existing connections keep working; programs that start now find no robots"
+                    self._log.log("error", text % error)
+            was_lost = watch.is_lost
 
     def _describe_start(self) -> str:
         parts = []

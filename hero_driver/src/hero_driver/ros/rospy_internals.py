@@ -18,7 +18,6 @@ from rospy.impl import rosout, tcpros_pubsub
 from rospy.impl.registration import (
     RegManager,
     get_registration_listeners,
-    get_service_manager,
     get_topic_manager,
 )
 
@@ -179,22 +178,6 @@ def unregister(topic: Any) -> None:
             close = getattr(impl.connection_poll.poller, "close", None)  # not every system's poller is a file
             if close is not None:
                 close()
-
-
-class Registrations(NamedTuple):
-    """Registrations of this node at the ROS master: pairs of a name, and a type or a service's URI."""
-
-    publications: List[Tuple[str, str]]
-    subscriptions: List[Tuple[str, str]]
-    services: List[Tuple[str, str]]
-
-
-def list_registrations() -> Registrations:
-    """Return what this node has registered: rospy registers a topic once, and not again with a new master."""
-    topics, services = get_topic_manager(), get_service_manager()
-    return Registrations(
-        list(topics.get_publications()), list(topics.get_subscriptions()), list(services.get_services())
-    )
 
 
 # Log lines.

@@ -1,19 +1,13 @@
-"""Asks the ROS master again and again whether it is there, and registers at one that was started again.
-
-Pages are told, and go on without it. That the master knows this node does not say that it knows all its topics: one
-that was registered meanwhile, or a registration that a timeout cut off, is enough for that. So registering is repeated
-until it has succeeded as a whole.
-"""
+"""Asks the ROS master again and again whether it is there. Pages are told if it is lost, and go on without it."""
 
 import time
-from typing import Optional
+from contextlib import suppress
 
 import rosgraph
 import rospy
 
 from hero_node.errors import NodeError
-from hero_node.ros.master import ask_master
-from hero_node.ros.registration import is_registered, register_again
+from hero_node.ros.master_watch import MasterWatch
 
 from ..background import Background
 from .losses import MASTER_PERIOD_S, MASTER_SILENT_S
@@ -24,10 +18,9 @@ class MasterLink:
 
     def __init__(self, background: Background) -> None:
         self._background = background
+        self._watch = MasterWatch()
         self._asked_s = -MASTER_PERIOD_S
         self._is_pending = False
-        self._has_failed = False
-        self._master_pid: Optional[int] = None  # of the master that has all registrations
 
     def check(self) -> str:
         """Ask if it is time to; return why the master is lost, empty if it answers. Returns at once."""
@@ -36,18 +29,13 @@ class MasterLink:
             self._asked_s, self._is_pending = now_s, True
             self._background.submit(self._ask)
         is_late = self._is_pending and now_s - self._asked_s > MASTER_SILENT_S
-        return "%s does not answer" % rosgraph.get_master_uri() if self._has_failed or is_late else ""
+        return "%s does not answer" % rosgraph.get_master_uri() if self._watch.is_lost or is_late else ""
 
     def _ask(self) -> None:
         try:
-            pid = ask_master("getPid")
-            is_another = self._master_pid not in (None, pid)
-            if is_another or self._has_failed or not is_registered():
-                self._has_failed = True
-                register_again()
-                rospy.logwarn("the ROS master is back: the monitor is registered again")
-            self._master_pid, self._has_failed = pid, False
-        except NodeError:
-            self._has_failed = True
+            with suppress(NodeError):
+                news = self._watch.look()
+                if news:
+                    rospy.logwarn(news)
         finally:
             self._is_pending = False

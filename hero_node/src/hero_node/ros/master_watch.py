@@ -1,0 +1,75 @@
+"""Notices that the ROS master was started again, and registers everything with it once more.
+
+rospy registers a topic once; a master that ends takes all registrations with it, and programs that start afterwards do
+not find this node. Connections that stand go on by themselves. rospy tells what is registered only by its internals.
+"""
+
+import xmlrpc.client
+from typing import Tuple
+
+import rospy
+from rospy.impl.registration import get_service_manager, get_topic_manager
+
+from ..errors import NodeError
+from .master import LimitedTransport, ask_master
+
+__all__ = ["MasterWatch"]
+
+SENTINEL = "~get_loggers"
+"""A service that rospy registers when a node starts, and not again: what the node registers later does not tell."""
+
+
+class MasterWatch:
+    """The ROS master as look() finds it.
+
+    Attributes:
+        is_lost: whether the master did not answer, or lacks registrations.
+    """
+
+    def __init__(self) -> None:
+        self.is_lost = False
+
+    def look(self) -> str:
+        """Ask the master, and register with one that was started again; return what was registered, for users.
+
+        Registering is repeated by the next look() until it has succeeded as a whole.
+
+        Raises: NodeError, OSError or xmlrpc.client.Error if the master or this node does not answer in time.
+        """
+        try:
+            ask_master("getPid")
+        except NodeError:
+            self.is_lost = True
+            raise
+        was_restarted = not _is_known()
+        if not was_restarted and not self.is_lost:
+            return ""
+        self.is_lost = True
+        counts = _register_again()
+        self.is_lost = False
+        if was_restarted:
+            text = "the ROS master was started again: %d topics and %d services are registered again; restart"
+            return text % counts + " the programs that were there before"
+        return "the ROS master answers again; %d topics and %d services are registered again" % counts
+
+
+def _is_known() -> bool:
+    try:
+        return bool(ask_master("lookupService", rospy.resolve_name(SENTINEL)))
+    except NodeError:
+        return False
+
+
+def _register_again() -> Tuple[int, int]:
+    uri = rospy.get_node_uri()
+    publications, subscriptions = get_topic_manager().get_publications(), get_topic_manager().get_subscriptions()
+    services = get_service_manager().get_services()
+    for topic, kind in publications:
+        ask_master("registerPublisher", topic, kind, uri)
+    with xmlrpc.client.ServerProxy(uri, transport=LimitedTransport()) as own:
+        for topic, kind in subscriptions:
+            # What the master tells a node when publishers come; rospy connects to those it lacks.
+            own.publisherUpdate("/master", topic, ask_master("registerSubscriber", topic, kind, uri))
+    for service, service_uri in services:
+        ask_master("registerService", service, service_uri, uri)
+    return len(publications) + len(subscriptions), len(services)
