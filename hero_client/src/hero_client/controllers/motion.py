@@ -49,6 +49,9 @@ STALL_S = 5.0
 """After so long without motion of the wheels although they were told to move, the motion has failed. The slowest
 command moves wheels after up to 3 s, when the robot's own controller has overcome friction."""
 
+FROZEN_S = 3.0
+"""After so long with wheels that turn and a pose that stays the same, the motion has failed."""
+
 SILENCE_S = 0.4
 """The driver may have stopped a robot whose program took longer for a step; its wheels then start anew."""
 
@@ -176,13 +179,13 @@ class MotionController:
         )
         if not is_told_to_move or _has_moved(self._moved_pose, pose):
             self._moved_pose, self._moved_odometry, self._moved_s = pose, odometry, seen_s
-        elif seen_s - self._moved_s >= STALL_S:
-            if odometry is not None and _has_moved(self._moved_odometry, odometry):
-                self._fail(
-                    "its wheels turn, but its pose stays the same: is the camera's image frozen, or is the robot"
-                    " held?"
-                )
-                return
+            return
+        turns = odometry is not None and _has_moved(self._moved_odometry, odometry)
+        if turns and seen_s - self._moved_s >= FROZEN_S:
+            self._fail(
+                "its wheels turn, but its pose stays the same: is the camera's image frozen, or is the robot held?"
+            )
+        elif not turns and seen_s - self._moved_s >= STALL_S:
             self._fail(
                 "its wheels do not turn: is something blocking them, is the battery empty, or does another program"
                 " stop the robot?"
