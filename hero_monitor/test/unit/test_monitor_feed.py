@@ -1,0 +1,409 @@
+"""ROS messages become what pages show: rows, places, lights and goals, the outcome of a stop, and what is silent."""
+
+import json
+import math
+from collections import deque
+from concurrent.futures import Future
+from io import BytesIO
+from types import SimpleNamespace
+
+import pytest
+import rospy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import PoseStamped, TransformStamped
+from rosgraph_msgs.msg import Log
+from std_msgs.msg import ColorRGBA
+from tf2_msgs.msg import TFMessage
+from visualization_msgs.msg import Marker, MarkerArray
+
+from hero_client.ros.robot_listener import RobotTrack
+from hero_client.ros.stop_status import StopStatus
+from hero_monitor.fleet_feed import feed as feed_module
+from hero_monitor.fleet_feed import robot_feed as robot_feed_module
+from hero_monitor.fleet_feed.feed import (
+    LOG_LINES_PER_READ,
+    MARKERS_MAX,
+    ROBOTS_MAX,
+    ROW_PERIOD_S,
+    FleetFeed,
+    describe_arena,
+    describe_stop_of_others,
+    find_true_poses,
+)
+from hero_monitor.fleet_feed.losses import FORGOTTEN_S, SILENT_S, LocalizationWatch, list_losses
+from hero_monitor.fleet_feed.page_state import (
+    LOG_LINES_KEPT,
+    MAX_LINE_LENGTH,
+    Received,
+    encode_ranges,
+    shorten,
+)
+from hero_monitor.fleet_feed.placement import Placement
+from hero_monitor.fleet_feed.robot_feed import LIGHT_S, REACHED_M, RobotFeed
+from hero_msgs.msg import Robot, RobotArray, RobotPose, RobotPoses
+from hero_node.geometry import Pose
+
+NOW_S = 100.0
+
+
+class Newest:
+    """A subscription whose newest message a test gives."""
+
+    def __init__(self, *arguments):
+        self.message, self.is_closed = None, False
+
+    def take(self):
+        taken, self.message = self.message, None
+        return taken
+
+    def close(self):
+        self.is_closed = True
+
+
+class Fleet:
+    """A FleetFeed with drivers and subscriptions of the test's own."""
+
+    def __init__(self, monkeypatch):
+        self.now_s, self.report, self.count, self.status = NOW_S, None, 0, None
+        self.answering, self.names, self.found = {"/hero_driver": True}, ["/hero_driver"], "/hero_driver"
+        drivers = SimpleNamespace(
+            find_answering=lambda limit_s: dict(self.answering),
+            count=lambda: self.count,
+            read=lambda: self.report,
+            stop_status=lambda: self.status,
+            names=lambda: self.names,
+            find=lambda namespace: self.found,
+        )
+        monkeypatch.setattr(feed_module, "Drivers", lambda: drivers)
+        monkeypatch.setattr(feed_module, "NewestMessage", Newest)
+        monkeypatch.setattr(feed_module, "RobotFeed", self.make_robot_feed)
+        monkeypatch.setattr(feed_module, "MasterLink", lambda background: SimpleNamespace(check=lambda: ""))
+        monkeypatch.setattr(feed_module.rospy, "Subscriber", lambda *arguments, **options: None)
+        monkeypatch.setattr(feed_module, "time", SimpleNamespace(monotonic=lambda: self.now_s))
+        self.feed = FleetFeed("world", SimpleNamespace(submit=self.submit, warn=lambda *said: None))
+        self.page = Received()
+
+    def make_robot_feed(self, namespace):
+        listener = SimpleNamespace(track=RobotTrack(), ranges_m=[0.1, math.inf])
+        return SimpleNamespace(
+            name=namespace.strip("/"),
+            listener=listener,
+            light=None,
+            is_closed=False,
+            read_newest=lambda: None,
+            find_goal=lambda placement: None,
+            close=lambda: None,
+        )
+
+    def submit(self, function, *arguments):
+        done = Future()
+        done.set_result(function(*arguments))
+        return done
+
+    def receive(self, *robots, stopped=False):
+        self.report = RobotArray(robots=list(robots), stopped=stopped, listening="10.42.0.1:11411")
+        self.report.header.stamp = rospy.Time(1000)
+        self.count += 1
+
+    def subscribe(self):
+        self.feed.read()
+        self.feed.update_subscriptions(True, True, True)
+
+    def put(self, topic, message):
+        self.feed._scene[topic].message = message
+
+    def read(self):
+        """Return all parts of the state, after a turn."""
+        self.feed.read()
+        return json.loads(self.feed.page_state.take_updates(Received()))
+
+
+def make_row(number, state=Robot.READY, **fields):
+    return Robot(id=number, namespace="/hero_%d" % number, state=state, stop_state=Robot.AT_REST, **fields)
+
+
+@pytest.fixture(name="fleet")
+def make_fleet(monkeypatch):
+    return Fleet(monkeypatch)
+
+
+def test_a_row_says_what_the_driver_and_the_odometry_say(fleet):
+    row = make_row(3, packets_per_s=211.26, bytes_per_s=4000.6, clock_offset=-0.01234, reconnects=2)
+    row.since, row.uptime = rospy.Time(940), rospy.Duration(61)
+    row.dropped_messages, row.bad_packets, row.last_error = 5, 6, "e" * 500
+    fleet.receive(row)
+    fleet.subscribe()
+    track = fleet.feed._feeds["/hero_3"].listener.track
+    for pose in (Pose(0.0, 0.0, 0.0), Pose(0.3, 0.4, 0.0)):
+        track.receive_pose(pose)
+    fleet.now_s += ROW_PERIOD_S
+    state = fleet.read()["fleet"]
+    assert (state["driver"], state["listening"], state["stopped"], state["frame"]) == (
+        True,
+        "10.42.0.1:11411",
+        False,
+        "world",
+    )
+    (shown,) = state["robots"]
+    expected = {
+        "name": "hero_3", "id": 3, "state": "READY", "known": True, "stop": "at rest", "since": 60, "uptime": 61,
+        "reconnects": 2, "packets": 211.3, "bytes": 4001, "distance": 0.5, "dropped": 5, "bad": 6, "clock": -0.0123,
+        "source": "", "health": [0, ""],
+    }  # fmt: skip
+    assert {name: shown[name] for name in expected} == expected and len(shown["error"]) == MAX_LINE_LENGTH
+
+
+def test_rows_are_renewed_by_reports_answers_and_twice_a_second(fleet):
+    fleet.receive(make_row(0))
+    fleet.read()
+    fleet.receive(make_row(0), make_row(1))
+    assert len(fleet.read()["fleet"]["robots"]) == 2
+    fleet.report = None  # not read again without a new report
+    fleet.answering = {"/hero_driver": False}
+    assert fleet.read()["fleet"]["driver"] is False
+    fleet.now_s += 0.9 * ROW_PERIOD_S
+    fleet.feed.placement.localize("map", {"hero_0": (Pose(0, 0, 0),) * 2})
+    assert fleet.read()["fleet"]["frame"] == "world"
+    fleet.now_s += 0.2 * ROW_PERIOD_S
+    assert fleet.read()["fleet"]["frame"] == "map"
+    fleet.receive(*(make_row(number) for number in range(ROBOTS_MAX + 1)))
+    assert len(fleet.read()["fleet"]["robots"]) == ROBOTS_MAX
+
+
+def test_a_refused_robot_is_shown_with_nothing_of_its_namesake(fleet):
+    fleet.receive(make_row(0), make_row(0, Robot.REFUSED))
+    fleet.subscribe()
+    fleet.feed._health["hero_0"] = [1, "low voltage"]
+    fleet.now_s += 1.0
+    own, refused = fleet.read()["fleet"]["robots"]
+    assert own["stop"] == "at rest" and own["health"] == [1, "low voltage"] and own["odom"] is not None
+    assert (refused["stop"], refused["health"], refused["odom"], refused["state"]) == ("", [0, ""], None, "REFUSED")
+    assert list(fleet.feed.robots) == ["hero_0"] and fleet.feed.robots["hero_0"].state == Robot.READY
+
+
+def test_all_is_stopped_only_while_every_driver_says_so(fleet):
+    fleet.answering = {"/hero_driver": True, "/lab": True}
+    fleet.receive(make_row(0), stopped=True)
+    assert fleet.read()["fleet"]["stopped"] and fleet.feed.stopped
+    fleet.answering, fleet.found = {"/hero_driver": True, "/lab": False}, "/lab"
+    state = fleet.read()["fleet"]
+    assert (state["driver"], state["stopped"], state["robots"][0]["known"]) == (True, False, False)
+    fleet.found = "/hero_driver"
+    fleet.now_s += 1.0
+    assert fleet.read()["fleet"]["robots"][0]["known"]
+    fleet.answering = {"/hero_driver": False, "/lab": False}
+    state = fleet.read()["fleet"]
+    assert not state["driver"] and not state["robots"][0]["known"]
+
+
+def test_topics_are_subscribed_to_while_pages_show_them(fleet):
+    fleet.receive(make_row(0), make_row(1), make_row(2, Robot.REFUSED), Robot(state=Robot.JOINING))
+    fleet.feed.read()
+    for ground_truth, picture in ((False, False), (True, True)):
+        fleet.feed.update_subscriptions(True, ground_truth, picture)
+        assert set(fleet.feed._feeds) == {"/hero_0", "/hero_1"}
+        assert ("/hero_sim/markers" in fleet.feed._scene) == ground_truth
+        assert (
+            ("/track/picture/outline" in fleet.feed._scene)
+            == ("/track/picture/compressed" in fleet.feed._scene)
+            == picture
+        )
+        assert "/localization/poses" in fleet.feed._scene
+    fleet.receive(make_row(1))
+    fleet.feed.read()
+    fleet.feed.update_subscriptions(True, True, True)
+    assert set(fleet.feed._feeds) == {"/hero_1"}
+    pending, scene = Future(), dict(fleet.feed._scene)
+    fleet.feed._change = pending
+    fleet.feed.update_subscriptions(False, False, False)
+    assert fleet.feed._feeds and not any(newest.is_closed for newest in scene.values()), "one change at a time"
+    pending.set_result(None)
+    fleet.feed.update_subscriptions(False, False, False)
+    assert fleet.feed._feeds == fleet.feed._scene == {} and all(newest.is_closed for newest in scene.values())
+
+
+def test_places_come_from_static_transforms_and_from_localization(fleet):
+    fleet.receive(make_row(0), make_row(1))
+    fleet.subscribe()
+    for feed in fleet.feed._feeds.values():
+        feed.listener.track.receive_pose(Pose(0.1, 0.0, 0.0))
+    transform = TransformStamped(child_frame_id="hero_0/odom")
+    transform.header.frame_id = "world"
+    transform.transform.translation.x, transform.transform.rotation.w = 1.0, 1.0
+    broken = TransformStamped(child_frame_id="hero_1/odom")
+    broken.header.frame_id, broken.transform.translation.x = "world", math.nan
+    fleet.put("/tf_static", TFMessage([transform, broken]))
+    state = fleet.read()
+    assert state["poses"] == {"hero_0": [1100, 0, 0], "hero_1": [100, 0, 0]} and state["ranges"]["hero_0"] == [
+        100,
+        None,
+    ]
+    assert [row["source"] for row in state["fleet"]["robots"]] == ["", ""] and fleet.feed.placement.knows("hero_0")
+
+    def localize(*poses):
+        message = RobotPoses()
+        message.header.frame_id = "map"
+        message.robots = [RobotPose(id=number, state=state, x=x_m) for number, state, x_m in poses]
+        fleet.put("/localization/poses", message)
+        fleet.now_s += 1.0
+        fleet.read()
+        fleet.now_s += 1.0
+        return fleet.read()
+
+    tracked, lost, unknown = RobotPose.TRACKED, RobotPose.LOST, RobotPose.UNKNOWN
+    state = localize((0, tracked, 2.0), (1, lost, 3.0))
+    assert state["poses"] == {"hero_0": [2000, 0, 0], "hero_1": [3000, 0, 0]} and state["fleet"]["frame"] == "map"
+    assert [row["source"] for row in state["fleet"]["robots"]] == ["camera", "odometry"]
+    fleet.now_s += SILENT_S
+    state = fleet.read()
+    assert [row["source"] for row in state["fleet"]["robots"]] == ["unknown"] * 2
+    assert [loss["source"] for loss in state["losses"]] == ["localization"]
+    fleet.now_s += FORGOTTEN_S
+    fleet.read()
+    fleet.now_s += 1.0
+    assert fleet.read()["fleet"]["frame"] == "world"
+    assert localize((0, unknown, 2.0), (1, tracked, math.inf))["fleet"]["frame"] == "world"
+
+
+def test_health_lights_and_goals_are_those_of_the_fleets_robots(fleet):
+    fleet.receive(make_row(0))
+    fleet.subscribe()
+    said = [
+        DiagnosticStatus(name="hero_driver: hero_0", level=1, message="low"),
+        DiagnosticStatus(name="x: hero_9", level=2),
+    ]
+    fleet.put("/diagnostics", DiagnosticArray(status=said))
+    feed = fleet.feed._feeds["/hero_0"]
+    feed.light, feed.find_goal = "#ff0000", lambda placement: Pose(1.0, 2.0, 0.5)
+    fleet.read()
+    fleet.now_s += 1.0
+    state = fleet.read()
+    assert state["fleet"]["robots"][0]["health"] == [1, "low"] and list(fleet.feed._health) == ["hero_0"]
+    assert state["lights"] == {"hero_0": "#ff0000"} and state["goals"] == {"hero_0": [1000, 2000, 500]}
+    assert state["poses"] == state["ranges"] == {}, "no odometry yet"
+
+
+def test_the_outcome_of_a_stop_is_that_of_a_page_or_a_program(fleet):
+    assert fleet.read()["stop"] is None
+    fleet.status = StopStatus("warn", "stopping", False)
+    assert [fleet.read()["stop"]["reads"] for _ in range(3)] == [1, 2, 3], "shows that the monitor is alive"
+    for status in (StopStatus("error", "NOT STOPPED", False), StopStatus("info", "stopped", True)):
+        fleet.status = status
+        assert fleet.read()["stop"] == {**status._asdict(), "reads": 0} and not fleet.feed.read_stop()
+    fleet.status = None
+    moving = make_row(0)
+    moving.stop_state = Robot.MOVING
+    fleet.receive(moving, make_row(1), stopped=True)
+    fleet.read()
+    assert fleet.read()["stop"]["text"] == "NOT STOPPED: hero_0 moves"
+    assert describe_stop_of_others(True, ["hero_0", "hero_1"]) == ("error", "NOT STOPPED: hero_0, hero_1 move", False)
+    assert describe_stop_of_others(True, []) == ("info", "stopped by another program", True)
+    assert describe_stop_of_others(False, []) is None
+
+
+def test_lines_of_the_log_are_counted_and_known_by_their_robot(fleet):
+    fleet.receive(make_row(0))
+    fleet.read()
+
+    def say(node, text, count=1):
+        buffer = BytesIO()
+        Log(name=node, level=2, msg=text).serialize(buffer)
+        message = SimpleNamespace(_connection_header={"md5sum": Log._md5sum}, _buff=buffer.getvalue())
+        for _ in range(count):
+            fleet.feed._keep_log_line(message)
+
+    fleet.feed._keep_log_line(SimpleNamespace(_connection_header={"md5sum": "other"}, _buff=b"x"))
+    for text in ("hero_0: voltage low", "hero_0 left (10.0.0.1:1)", "hero_9: voltage low"):
+        say("/hero_driver", text)
+    say("/other", "hero_0: hello")
+    lines = fleet.read()["log"]["lines"]
+    assert [line[4] for line in lines] == ["hero_0", "hero_0", "", ""] and lines[0][3] == "hero_driver"
+    say("/other", "much", LOG_LINES_PER_READ + 10)
+    fleet.feed.read()
+    assert fleet.feed.page_state.log.count == 4 + LOG_LINES_PER_READ + 10 and fleet.feed._log_bytes == deque()
+    say("/other", "more", LOG_LINES_KEPT + 10)
+    assert len(fleet.feed._log_bytes) == LOG_LINES_KEPT
+
+
+def make_marker(kind, *scale, **fields):
+    marker = Marker(type=kind, action=Marker.ADD, **fields)
+    marker.pose.position.x, marker.pose.orientation.w = 1.0, 1.0
+    marker.scale.x, marker.scale.y, marker.scale.z = scale
+    return marker
+
+
+def test_arena_and_ground_truth_are_drawn_in_millimeters():
+    box, disc = make_marker(Marker.CUBE, 0.5, 0.02, 0.1), make_marker(Marker.CYLINDER, 0.1, 0.1, 0.1)
+    gone, other = make_marker(Marker.CUBE, 1.0, 1.0, 1.0), make_marker(Marker.SPHERE, 1.0, 1.0, 1.0)
+    gone.action = Marker.DELETE
+    odd = make_marker(Marker.CUBE, math.nan, 1.0, 1.0)
+    shown = describe_arena(MarkerArray([box, disc, gone, other, odd]))
+    assert shown == {"boxes": [[1000, 0, 0, 500, 20]], "circles": [[1000, 0, 50]]}
+    assert len(describe_arena(MarkerArray([box] * (MARKERS_MAX + 1)))["boxes"]) == MARKERS_MAX
+    heading, name = (
+        make_marker(Marker.ARROW, 1, 1, 1, ns="headings", id=3),
+        make_marker(9, 1, 1, 1, ns="names", id=3, text="hero_3"),
+    )
+    alone = make_marker(9, 1, 1, 1, ns="names", id=4, text="hero_4")
+    assert find_true_poses(MarkerArray([heading, name, alone])) == {"hero_3": [1000, 0, 0]}
+
+
+def test_a_light_goes_out_and_a_goal_is_drawn_until_reached(monkeypatch):
+    time = SimpleNamespace(now_s=NOW_S)
+    monkeypatch.setattr(robot_feed_module, "time", SimpleNamespace(monotonic=lambda: time.now_s))
+    monkeypatch.setattr(robot_feed_module, "NewestMessage", Newest)
+    listener = SimpleNamespace(read_newest=lambda: None, track=RobotTrack(), close=lambda: None)
+    monkeypatch.setattr(robot_feed_module, "RobotListener", lambda namespace: listener)
+    feed, placement = RobotFeed("/hero_0"), Placement("world")
+    placement.receive_transform("world", "hero_0/odom", Pose(1.0, 0.0, 0.0))
+    feed._led.message = ColorRGBA(1.0, 0.0, 0.0, 1.0)
+    for after_s, is_lit in ((0.0, True), (LIGHT_S - 0.1, True), (0.2, False)):
+        time.now_s += after_s
+        feed.read_newest()
+        assert feed.light == ("#ff0000" if is_lit else None)
+
+    def send(frame, x_m):
+        goal = PoseStamped()
+        goal.header.frame_id, goal.pose.position.x, goal.pose.orientation.w = frame, x_m, 1.0
+        feed._goals.message = goal
+        feed.read_newest()
+
+    for frame, x_m, shown_m in (
+        ("hero_0/odom", 0.5, 1.5),
+        ("/world", 0.5, 0.5),
+        ("map", 0.5, None),
+        ("world", math.nan, None),
+    ):
+        send(frame, x_m)
+        found = feed.find_goal(placement)
+        assert (None if found is None else found.x_m) == shown_m
+    send("world", 1.5)
+    for x_m, is_shown in ((0.5 - REACHED_M - 0.001, True), (0.5 - REACHED_M + 0.001, False), (0.3, False)):
+        listener.track.receive_pose(Pose(x_m, 0.0, 0.0))
+        assert (feed.find_goal(placement) is not None) == is_shown, "once reached, it is no longer drawn"
+
+
+def test_losses_begin_and_end_at_their_times():
+    watch, drivers = LocalizationWatch(), {"/a": True}
+
+    def list_sources(now_s):
+        return [loss.source for loss in list_losses(drivers, "", watch, now_s)]
+
+    watch.receive(1, NOW_S)
+    watch.receive(0, NOW_S)
+    for silent_s, lost in (
+        (SILENT_S - 0.01, ["camera"]),
+        (SILENT_S + 0.01, ["localization"]),
+        (FORGOTTEN_S - 0.01, ["localization"]),
+        (FORGOTTEN_S + 0.01, []),
+    ):
+        assert list_sources(NOW_S + silent_s) == lost
+    several = list_losses({"/a": False, "/lab/b": False}, "http://pc does not answer", LocalizationWatch(), 0.0)
+    assert several[0].cause == "No answer from a, lab/b: their robots are unknown"
+    assert "http://pc does not answer" in several[1].cause and len(several) == 2
+
+
+def test_texts_and_ranges_are_cut_at_their_limits():
+    assert shorten("x" * MAX_LINE_LENGTH) == "x" * MAX_LINE_LENGTH
+    assert shorten("x" * (MAX_LINE_LENGTH + 1)) == "x" * (MAX_LINE_LENGTH - 3) + "..."
+    assert encode_ranges([100.0, 100.1, -0.5, 0.0]) == [100000, -1, 0, 0]

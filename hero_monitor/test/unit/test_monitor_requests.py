@@ -1,0 +1,416 @@
+"""What pages' requests do to robots and programs, and why they are refused; what is sent to robots, and how often."""
+
+import json
+import math
+import struct
+from types import SimpleNamespace
+
+import pytest
+
+from hero_client.ros.stop_status import StopStatus
+from hero_monitor import page_requests
+from hero_monitor.control import commander as commander_module
+from hero_monitor.control.commander import LISTENER_TIMEOUT_S, Commander
+from hero_monitor.control.dead_man import HOLD_TIMEOUT_S, DriveCommand
+from hero_monitor.control.freshness import AGE_MAX_S, INERT_S
+from hero_monitor.control.programs import PROGRAMS_MAX
+from hero_monitor.fleet_feed.placement import Placement
+from hero_monitor.page_requests import GOALS_AT_ONCE, PageRequests
+from hero_node.errors import NodeError
+from hero_node.geometry import Pose
+
+NOW_MS = 5000000
+
+
+class Page:
+    """Notes what it is told."""
+
+    def __init__(self, number=1):
+        self.number, self.told, self.received = number, [], []
+        self.ground_truth = self.picture = self.visible = None
+
+    def tell(self, level, text):
+        self.told.append((level, text))
+
+    def acknowledge(self, request):
+        self.received.append(request)
+
+    def take(self):
+        told, self.told = self.told, []
+        return [text for _, text in told]
+
+
+class Desk:
+    """PageRequests with a fleet, a commander and programs that note what is asked of them."""
+
+    def __init__(self, monkeypatch, control=True):
+        self.noted, self.now_ms, self.pages = [], NOW_MS, [Page(1), Page(2)]
+        self.may_drive, self.taken, self.submitted = True, set(), []
+        monkeypatch.setattr(page_requests, "read_clock_ms", lambda: self.now_ms)
+        monkeypatch.setattr(page_requests.rospy, "get_name", lambda: "/hero_monitor")
+        placement = Placement("world")
+        placement.receive_transform("world", "hero_0/odom", Pose(1.0, 0.0, 0.0))
+        self.feed = SimpleNamespace(
+            robots={"hero_%d" % number: SimpleNamespace(id=number) for number in range(3)},
+            stopped=False,
+            placement=placement,
+            read_stop=lambda: self.note("read_stop"),
+        )
+        commander = SimpleNamespace(
+            stopped_ms=None,
+            may_drive=lambda: self.may_drive,
+            request_stop=lambda stop: self.note("request_stop", stop),
+            end_drive=lambda page, namespace: self.note("end_drive", page, namespace),
+            stop_robot=lambda namespace: self.note("stop_robot", namespace),
+            prepare=lambda namespace: self.note("prepare", namespace),
+            drive=lambda page, velocity: self.note("drive", page, *velocity) or velocity.namespace not in self.taken,
+            send_goal=None,
+        )
+        self.commander = commander
+        background = SimpleNamespace(submit=self.submit, warn=lambda text, *period_s: self.note("warn", text))
+        parameters = SimpleNamespace(control=control, record_folder="/tmp/recordings")
+        self.requests = PageRequests(
+            parameters,
+            self.feed,
+            commander,
+            background,
+            lambda call, *arguments: call(*arguments),
+            lambda: self.note("broadcast"),
+        )
+        self.started, self.recording = [], None
+        self.requests.programs = self.programs = SimpleNamespace(
+            paths={"random_walk": "/walk", "follow": "/follow", "swarm_go_to": "/go", "record": "/record"},
+            count=0,
+            driver="",
+            find_driver=lambda robots: self.programs.driver,
+            start=lambda child, arguments: self.started.append((child, arguments)),
+            end=lambda number: self.note("end", number),
+            end_all=lambda: self.note("end_all"),
+            end_those_of=lambda robots: self.note("end_those_of", *robots),
+            find_recording=lambda: self.recording,
+        )
+
+    def note(self, *words):
+        self.noted.append(words)
+
+    def submit(self, function, *arguments):
+        future = SimpleNamespace(calls=[], add_done_callback=lambda call: future.calls.append(call))
+        self.submitted.append((arguments, future))
+        return future
+
+    def take(self):
+        noted, self.noted = self.noted, []
+        return noted
+
+    def ask(self, do, page=0, age_s=0.0, **fields):
+        """Send a request; return what the page is told."""
+        request = {"do": do, "heard_ms": self.now_ms - round(1e3 * age_s), **fields}
+        self.requests.receive(self.pages[page], json.dumps(request))
+        return self.pages[page].take()
+
+
+WALK = {"program": "random_walk", "robots": ["hero_0", "hero_1"], "values": {"linear_m_s": 0.1, "angular_rad_s": 1.0}}
+DRIVE = {"robots": ["hero_0", "hero_1"], "linear": 0.1, "angular": -1.0}
+GOAL = {"robots": ["hero_0"], "x": 2.0, "y": 0.5}
+MOVING = (("drive", DRIVE), ("goal", GOAL), ("start", WALK))
+
+
+@pytest.fixture(name="desk")
+def make_desk(monkeypatch):
+    return Desk(monkeypatch)
+
+
+def test_a_button_drives_each_robot_of_its_page(desk):
+    assert desk.ask("drive", **DRIVE) == []
+    assert desk.take() == [("drive", 1, "/hero_0", 0.1, -1.0), ("drive", 1, "/hero_1", 0.1, -1.0)]
+    desk.taken = {"/hero_1"}
+    assert desk.ask("drive", **DRIVE) == ["hero_1 is driven from another page"]
+    desk.taken = {"/hero_0", "/hero_1"}
+    assert desk.ask("drive", **DRIVE) == ["hero_0, hero_1 are driven from another page"]
+    desk.take()
+    assert desk.ask("end_drive", page=1, robots=["hero_0", "hero_7"]) == []
+    assert desk.take() == [("end_drive", 2, "/hero_0"), ("end_drive", 2, "/hero_7")]
+
+
+def test_what_makes_robots_move_is_refused_with_the_reason(monkeypatch, desk):
+    viewing = Desk(monkeypatch, control=False)
+    for do, fields in MOVING:
+        assert viewing.ask(do, **fields) == ["this monitor is view only: start it with control:=true to drive robots"]
+        absent = {**fields, "robots": ["hero_7"]}
+        assert desk.ask(do, **absent) == ["hero_7 is not connected"]
+        desk.feed.stopped = True
+        assert desk.ask(do, **fields) == ["all robots are stopped: release them first"]
+        desk.feed.stopped, desk.may_drive = False, False
+        assert desk.ask(do, **fields) == ["all robots are stopped: release them first"]
+        desk.may_drive, desk.programs.driver = True, "random walk drives hero_0: end it first"
+        assert desk.ask(do, **fields) == ([] if do == "goal" else [desk.programs.driver])
+        desk.programs.driver = ""
+        late_s = AGE_MAX_S[do] + 0.01
+        assert desk.ask(do, age_s=late_s, **fields) == (
+            [] if do == "drive" else ["the request was delayed: nothing was done"]
+        )
+    assert desk.ask("drive", **{**DRIVE, "robots": ["hero_7", "hero_8"]}) == ["hero_7, hero_8 are not connected"]
+    assert viewing.ask("record", on=True) == ["this monitor is view only: start it with control:=true to drive robots"]
+    assert desk.noted == viewing.noted == [] and desk.started == viewing.started == []
+    desk.requests.receive(desk.pages[0], "{")
+    assert desk.pages[0].take() == ["invalid request (not JSON): reload the page"]
+    assert "invalid request" in desk.ask("start", **{**WALK, "values": {}})[0]
+
+
+def test_a_stop_always_counts_and_a_release_only_when_it_is_meant(monkeypatch):
+    for control in (True, False):
+        desk = Desk(monkeypatch, control)
+        assert desk.ask("stop", age_s=60.0) == []
+        assert [words for words in desk.take() if words[0] != "warn"] == [
+            ("request_stop", True),
+            ("read_stop",),
+            ("broadcast",),
+        ]
+        assert desk.pages[0].received == ["stop"]
+        desk.commander.stopped_ms, desk.feed.stopped = desk.now_ms, True
+        desk.now_ms += round(1e3 * INERT_S) - 1
+        assert "robots were stopped less than 2 s ago" in desk.ask("release")[0]
+        desk.now_ms += 1
+        assert "the request was delayed" in desk.ask("release", age_s=AGE_MAX_S["release"] + 0.01)[0]
+        assert desk.noted == [] and desk.pages[0].received == ["stop"]
+        assert desk.ask("release") == []
+        assert ("request_stop", False) in desk.take() and desk.pages[0].received == ["stop", "release"]
+
+
+def test_programs_end_while_all_robots_are_stopped(desk):
+    desk.requests.end_programs_of_stopped_robots()
+    assert desk.take() == []
+    for stopped, may_drive in ((True, True), (False, False)):
+        desk.feed.stopped, desk.may_drive = stopped, may_drive
+        desk.requests.end_programs_of_stopped_robots()
+        assert desk.take() == [("end_all",)]
+    desk.feed.stopped, desk.may_drive = False, True
+    assert desk.ask("stop_some", robots=["hero_1", "hero_7"]) == []
+    assert desk.take() == [("end_those_of", "hero_1", "hero_7"), ("stop_robot", "/hero_1")]
+    assert desk.ask("end", number=3) == [] and desk.take() == [("end", 3)]
+
+
+def test_a_goal_is_sent_in_the_background_and_its_outcome_told(desk):
+    assert desk.ask("goal", yaw=1.5, **GOAL) == [] == desk.ask("goal", **GOAL)
+    (namespace, frame, goal, with_heading), future = desk.submitted[0]
+    assert (namespace, frame, goal, with_heading) == ("/hero_0", "hero_0/odom", pytest.approx((1.0, 0.5, 1.5)), True)
+    assert desk.submitted[1][0][3] is False
+    for _ in range(GOALS_AT_ONCE - 2):
+        assert desk.ask("goal", **GOAL) == []
+    assert desk.ask("goal", **GOAL) == ["too many goals at once"]
+    (tell,) = future.calls
+    tell(SimpleNamespace(result=lambda: ("info", "hero_0 has a new goal")))
+    assert desk.pages[0].told == [("info", "hero_0 has a new goal")]
+    desk.pages[0].take()
+    assert desk.ask("goal", **GOAL) == [] and len(desk.submitted) == GOALS_AT_ONCE + 1
+
+
+def test_a_program_is_started_with_its_robots_and_their_topics_open(desk):
+    assert desk.ask("start", **WALK) == []
+    ((child, arguments),) = desk.started
+    assert (child.program, child.robots, child.places) == ("random_walk", ["hero_0", "hero_1"], [])
+    assert '_robots:="0 1"' in arguments and desk.take() == [("prepare", "/hero_0"), ("prepare", "/hero_1")]
+    child.end()
+    desk.requests._stop_robots_of(child)
+    assert desk.take() == [("stop_robot", "/hero_0"), ("stop_robot", "/hero_1")]
+    formation = {"shape": "line", "spacing_m": 0.3, "turn_deg": 0.0, "x_m": 1.0, "y_m": 0.0, "linear_m_s": 0.08}
+    go = {"program": "swarm_go_to", "robots": ["hero_0"], "values": formation}
+    assert desk.ask("start", **go) == [] and desk.started[1][0].places == [(1.0, 0.0)]
+    desk.started[1][0].end()
+    for fields, says in (
+        ({"robots": ["hero_0", "hero_1"]}, "swarm_go_to needs the robots' places, but that of hero_1 is unknown"),
+        (
+            {"program": "led_show", "values": {"pattern": "chase", "period_s": 4.0, "brightness": 1.0}},
+            "led_show is not installed",
+        ),
+    ):
+        assert says in desk.ask("start", **{**go, **fields})[0]
+    desk.feed.placement.localize("map", {"hero_0": (Pose(0, 0, 0),) * 2, "hero_1": (Pose(0, 0, 0),) * 2})
+    wide = {**go, "robots": ["hero_0", "hero_1"]}
+    desk.programs.count = PROGRAMS_MAX - 1
+    assert desk.ask("start", **wide) == [] and '_frame:="map"' in desk.started[2][1]
+    desk.started[2][0].end()
+    desk.programs.count = PROGRAMS_MAX
+    assert desk.ask("start", **wide) == ["20 programs run: end one first"] and len(desk.started) == 3
+
+
+def test_a_recording_begins_once_and_ends_on_request(desk, monkeypatch):
+    assert desk.ask("record", on=False) == [] and desk.started == []
+    assert desk.ask("record", on=True) == []
+    ((child, arguments),) = desk.started
+    assert str(child.folder).startswith("/tmp/recordings/2") and arguments == ["--folder=%s" % child.folder]
+    child.end()
+    ended = []
+    desk.recording = SimpleNamespace(end=lambda: ended.append("ended"))
+    assert desk.ask("record", on=True) == [] and ended == []
+    assert desk.ask("record", on=False) == [] and ended == ["ended"] and len(desk.started) == 1
+    desk.recording = None
+    del desk.programs.paths["record"]
+    assert desk.ask("record", on=True) == ["hero_recording is not installed"]
+
+
+def test_a_page_says_what_it_shows(desk):
+    assert desk.ask("show", page=1, ground_truth=True, picture=False, visible=False) == []
+    assert (desk.pages[1].ground_truth, desk.pages[1].picture, desk.pages[1].visible) == (True, False, False)
+
+
+def test_foxglove_clients_drive_and_stop_by_the_rules_of_pages(desk, monkeypatch):
+    def publish(topic, kind, content, client=9):
+        return desk.requests.publish(client, topic, kind, content)
+
+    def drive(*velocity):
+        return publish(
+            "/hero_0/cmd_vel", "geometry_msgs/Twist", struct.pack("<6d", velocity[0], 0, 0, 0, 0, velocity[1])
+        )
+
+    assert drive(0.1, 0.0) == "" == drive(0.0, 0.5)
+    assert desk.take() == [("drive", 9, "/hero_0", 0.1, 0.0), ("drive", 9, "/hero_0", 0.0, 0.5)]
+    assert drive(0.0, 0.0) == "" and desk.take() == [("end_drive", 9, "/hero_0")]
+    desk.taken = {"/hero_0"}
+    assert drive(0.1, 0.0) == "hero_0 is driven from another page"
+    desk.feed.stopped = True
+    desk.take()
+    assert drive(0.1, 0.0) == "all robots are stopped: release them first" and desk.take() == []
+    assert drive(0.0, 0.0) == "", "a stop is taken"
+    desk.take()
+    assert publish("/hero_driver/stop_request", "std_msgs/Bool", b"\0") == "robots are released on the page only"
+    assert desk.take() == []
+    assert publish("/hero_driver/stop_request", "std_msgs/Bool", b"\1") == ""
+    assert desk.take()[:2] == [("request_stop", True), ("end_all",)]
+    assert "/chatter: only /hero_N/cmd_vel" in publish("/chatter", "std_msgs/String", b"")
+
+
+class Ros:
+    """What the commander uses of ROS; topics connect connect_s after they were opened."""
+
+    def __init__(self, monkeypatch, connect_s=0.0):
+        self.now_s, self.sent, self.connect_s, self.queued = 100.0, [], connect_s, []
+        self.requests, self.status, self.listeners, self.master_fails = [], None, {}, False
+        time = SimpleNamespace(monotonic=lambda: self.now_s, sleep=self.sleep)
+        monkeypatch.setattr(commander_module, "time", time)
+        monkeypatch.setattr(commander_module.rospy, "Publisher", self.open)
+        monkeypatch.setattr(commander_module.rospy, "get_name", lambda: "/hero_monitor")
+        monkeypatch.setattr(commander_module.rospy.Time, "now", staticmethod(lambda: commander_module.rospy.Time(7)))
+        monkeypatch.setattr(commander_module, "ask_master", self.ask_master)
+        monkeypatch.setattr(commander_module, "read_clock_ms", lambda: round(1e3 * self.now_s))
+        drivers = SimpleNamespace(request_stop=self.requests.append, stop_status=lambda: self.status)
+        background = SimpleNamespace(submit=lambda function, *arguments: self.queued.append((function, arguments)))
+        self.commander = Commander(drivers, background)
+
+    def sleep(self, duration_s):
+        self.now_s += duration_s
+
+    def open(self, topic, kind, **options):
+        opened_s = self.now_s
+        return SimpleNamespace(
+            publish=lambda message: self.sent.append((topic, message)),
+            get_num_connections=lambda: 2
+            if self.now_s - opened_s >= self.connect_s - 1e-9
+            else 1
+            if topic.endswith("goal")
+            else 0,
+        )
+
+    def ask_master(self, call):
+        if self.master_fails:
+            raise NodeError("no ROS master")
+        return [], [[topic, nodes] for topic, nodes in self.listeners.items()], []
+
+    def work(self):
+        """Do what was submitted to the background."""
+        queued, self.queued = self.queued, []
+        for function, arguments in queued:
+            function(*arguments)
+
+    def take(self):
+        sent, self.sent = self.sent, []
+        return [(topic, message.linear.x, message.angular.z) for topic, message in sent]
+
+
+MOVE = DriveCommand("/hero_0", 0.1, 0.5)
+TOPIC = "/hero_0/velocity_controller/cmd_vel"
+
+
+def test_a_topic_is_opened_once_and_a_stop_waits_for_it(monkeypatch):
+    ros = Ros(monkeypatch, connect_s=0.3)
+    assert ros.commander.drive(1, MOVE) and ros.commander.drive(1, MOVE)
+    assert len(ros.queued) == 1 and ros.take() == []
+    ros.commander.end_drive(1, "/hero_0")
+    for _ in range(3):
+        ros.commander.step()
+    assert ros.take() == [], "not lost: the topic is yet to be opened"
+    ros.work()
+    assert ros.now_s == pytest.approx(100.3, abs=0.03)
+    ros.commander.step()
+    assert ros.take() == [(TOPIC, 0.0, 0.0)]
+    ros.commander.step()
+    assert ros.take() == []
+    assert ros.commander.drive(1, MOVE) and ros.take() == [(TOPIC, 0.1, 0.5)]
+
+
+def test_a_driver_that_never_connects_is_waited_for_two_seconds(monkeypatch):
+    ros = Ros(monkeypatch, connect_s=math.inf)
+    ros.commander.prepare("/hero_0")
+    ros.work()
+    assert ros.now_s == pytest.approx(100.0 + LISTENER_TIMEOUT_S, abs=0.03)
+    ros.commander.drive(1, MOVE)
+    assert ros.take() == [(TOPIC, 0.1, 0.5)]
+
+
+def test_silence_the_end_of_a_page_and_a_stop_of_all_stop_robots(monkeypatch):
+    for end in (
+        lambda ros: ros.sleep(HOLD_TIMEOUT_S + 0.01),
+        lambda ros: ros.commander.drop_page(1),
+        lambda ros: ros.commander.stop_robot("/hero_0"),
+        lambda ros: ros.commander.request_stop(True),
+        lambda ros: ros.commander.close(),
+    ):
+        ros = Ros(monkeypatch)
+        ros.commander.drive(1, MOVE)
+        ros.work()
+        ros.commander.drive(1, MOVE)
+        assert not ros.commander.drive(2, MOVE)
+        ros.commander.drop_page(2)
+        ros.commander.step()
+        assert ros.take() == [(TOPIC, 0.1, 0.5)]
+        end(ros)
+        ros.commander.step()
+        assert ros.take() == [(TOPIC, 0.0, 0.0)]
+        assert ros.commander.drive(2, MOVE)
+
+
+def test_pages_may_drive_when_the_outcome_of_a_stop_is_known(monkeypatch):
+    ros = Ros(monkeypatch)
+    assert ros.commander.may_drive() and ros.commander.stopped_ms is None
+    for status in (StopStatus("warn", "stopping", False), StopStatus("info", "released", True)):
+        ros.status = status
+        assert ros.commander.may_drive() == status.is_final
+    ros.commander.request_stop(False)
+    assert ros.commander.stopped_ms is None
+    ros.commander.request_stop(True)
+    assert ros.requests == [False, True] and ros.commander.stopped_ms == 100000
+
+
+def test_a_goal_is_sent_to_a_program_that_takes_it(monkeypatch):
+    ros = Ros(monkeypatch, connect_s=0.5)
+
+    def send(with_heading):
+        return ros.commander.send_goal("/hero_12", "map", Pose(1.0, 2.0, math.pi / 2.0), with_heading)
+
+    ros.listeners = {"/hero_12/goal": ["/hero_monitor"]}
+    level, text = send(True)
+    assert level == "error" and "no program takes goals for hero_12" in text and "go_to_goal.launch robots:=12" in text
+    ros.listeners = {"/hero_12/goal": ["/hero_monitor", "/go_to_goal"]}
+    assert send(True) == ("info", "hero_12 has a new goal")
+    assert ros.now_s == pytest.approx(100.5, abs=0.03), "as soon as it is connected"
+    assert send(False)[0] == "info" and ros.now_s < 100.6
+    (_, turned), (topic, free) = ros.sent
+    assert topic == "/hero_12/goal" and turned.header.frame_id == "map" and turned.header.stamp.secs == 7
+    assert (turned.pose.position.x, turned.pose.position.y) == (1.0, 2.0)
+    assert (turned.pose.orientation.z, turned.pose.orientation.w) == pytest.approx((math.sqrt(0.5),) * 2)
+    assert (free.pose.orientation.z, free.pose.orientation.w) == (0.0, 0.0)
+    ros.listeners["/hero_12/goal"].append("/another")
+    send(False)
+    assert ros.now_s == pytest.approx(100.5 + LISTENER_TIMEOUT_S, abs=0.05), "one that hangs is waited for this long"
+    ros.master_fails = True
+    assert send(False) == ("error", "no ROS master")

@@ -1,0 +1,216 @@
+"""The monitor's parameters, sockets and background: tokens, limits, and pages that take nothing."""
+
+import json
+from types import SimpleNamespace
+
+import pytest
+
+from hero_monitor import background as background_module
+from hero_monitor import parameters as parameters_module
+from hero_monitor.background import Background
+from hero_monitor.control.offers import OFFERS, describe_offers
+from hero_monitor.foxglove import hub as hub_module
+from hero_monitor.foxglove.hub import Client, Hub, TopicType
+from hero_monitor.foxglove.ros_topics import LOOK_UP_PERIOD_S, RosTopics
+from hero_monitor.parameters import load_parameters, read_token
+from hero_monitor.serving import server as server_module
+from hero_monitor.serving.access import TOKEN_LENGTH_MIN, Access
+from hero_monitor.serving.server import STUCK_S, WAITING_MAX, PageSocket
+from hero_node.errors import ProgramError
+from hero_node.parameters import check_parameters
+
+TOKEN = "x" * TOKEN_LENGTH_MIN
+
+
+def test_a_token_is_needed_where_others_can_reach_the_page(tmp_path):
+    assert read_token("127.0.0.1", "") is None
+    with pytest.raises(ProgramError, match="~host is 0.0.0.0, which other machines can reach: that needs a token"):
+        read_token("0.0.0.0", "")
+    file = tmp_path / "token"
+    file.write_text(" %s\n" % TOKEN)
+    for mode, is_private in ((0o600, True), (0o400, True), (0o640, False), (0o604, False), (0o610, False)):
+        file.chmod(mode)
+        if is_private:
+            assert read_token("0.0.0.0", str(file)) == TOKEN == read_token("127.0.0.1", str(file))
+        else:
+            with pytest.raises(ProgramError, match="can be read by others: chmod 600"):
+                read_token("0.0.0.0", str(file))
+    file.chmod(0o600)
+    file.write_text(TOKEN[1:])
+    with pytest.raises(ProgramError, match="holds less than 16 characters"):
+        read_token("0.0.0.0", str(file))
+    file.write_bytes(b"\xff" * 20)
+    for wrong in (str(file), str(tmp_path / "none")):
+        with pytest.raises(ProgramError, match="cannot be read"):
+            read_token("0.0.0.0", wrong)
+
+
+def test_parameters_are_checked_and_name_this_pc(monkeypatch):
+    given = {}
+    monkeypatch.setattr(parameters_module, "read_parameters", lambda declared: check_parameters(declared, given))
+    monkeypatch.setattr(parameters_module.platform, "node", lambda: "pc.lab")
+    defaults = load_parameters()
+    assert (defaults.host, defaults.port, defaults.token, defaults.control) == ("127.0.0.1", 8088, None, False)
+    assert defaults.host_names == ["pc.lab", "pc.local", "127.0.0.1"]
+    assert (defaults.map_frame, defaults.foxglove_origins, defaults.foxglove_publish) == ("world", [], False)
+    given.update(
+        host_names=" a, b c", map_frame="/map", foxglove_origins="https://a.example, https://b.example", control=True
+    )
+    loaded = load_parameters()
+    assert loaded.host_names[:3] == ["a", "b", "c"] and loaded.map_frame == "map" and loaded.control
+    assert loaded.foxglove_origins == ["https://a.example", "https://b.example"]
+    for wrong in ({"port": 65536}, {"rate_hz": 0.5}, {"rate_hz": 31.0}, {"host": ""}):
+        given.clear()
+        given.update(wrong)
+        with pytest.raises(ProgramError, match=next(iter(wrong))):
+            load_parameters()
+
+
+def test_a_token_of_any_characters_is_compared_and_names_without_case():
+    access = Access("geheim-äöü-1234567", ["PC.lab."])
+    assert access.admits_token("geheim-äöü-1234567") and not access.admits_token("geheim-äöü-1234568")
+    assert not access.admits_token("\ud800") and access.admits_host("pc.LAB") and not access.admits_host("pc")
+
+
+class Socket(PageSocket):
+    """A page's socket of which a test says when it has sent."""
+
+    def __init__(self):
+        self.written, self.seen, self.is_done = [], None, True
+        self.visible, self._sent_s, self._sending = True, server_module.time.monotonic(), None
+        self._waiting = server_module.deque(maxlen=WAITING_MAX)
+
+    def write_message(self, text):
+        self.written.append(json.loads(text))
+        return SimpleNamespace(done=lambda: self.is_done)
+
+
+def test_a_slow_page_keeps_its_newest_notices_and_counts_as_idle(monkeypatch):
+    clock = SimpleNamespace(now_s=100.0)
+    monkeypatch.setattr(server_module, "time", SimpleNamespace(monotonic=lambda: clock.now_s))
+    page = Socket()
+    page.tell("info", "hello")
+    assert page.written == [{"notice": {"level": "info", "text": "hello"}}] and page.ready
+    page.is_done = False
+    page.acknowledge("stop")
+    for number in range(WAITING_MAX + 2):
+        page.tell("warn", str(number))
+    assert len(page.written) == 1
+    for silent_s, is_idle in ((STUCK_S, False), (STUCK_S + 0.01, True)):
+        clock.now_s = 100.0 + silent_s
+        page.send("{}")  # what is sent meanwhile is no sign of life
+        assert page.is_idle == is_idle
+    page.is_done = True
+    assert not page.is_idle
+    page.send_waiting()
+    waited = [value["notice"]["text"] for value in page.written[1:] if "notice" in value]
+    assert waited == [str(number) for number in range(2, WAITING_MAX + 2)]
+    page.visible = False
+    assert page.is_idle
+
+
+def test_warnings_wait_for_no_terminal(monkeypatch):
+    said = []
+    monkeypatch.setattr(background_module.rospy, "logwarn_throttle", None, raising=False)
+    background = Background()
+    jobs = []
+    background.submit = lambda function, *arguments: jobs.append(arguments) or SimpleNamespace(done=lambda: bool(said))
+    background.warn("first", 2.0)
+    background.warn("second")
+    assert jobs == [(2.0, "first")], "the terminal is paused"
+    said.append("printed")
+    background.warn("third")
+    assert jobs[1:] == [(0.0, "third")]
+    background.close()
+
+
+def test_a_client_has_so_many_subscriptions_and_topics_of_its_own(monkeypatch):
+    monkeypatch.setattr(hub_module, "SUBSCRIPTIONS_MAX", 2)
+    monkeypatch.setattr(hub_module, "PUBLISHED_MAX", 2)
+    texts = []
+    hub, client = Hub(lambda *message: ""), Client(lambda text: texts.append(json.loads(text)))
+    hub.update_topics({"/a": TopicType("std_msgs/Bool", "bool data")})
+    hub.add(client)
+
+    def ask(**request):
+        texts.clear()
+        hub.receive(client, json.dumps(request))
+        return [text["message"] for text in texts]
+
+    assert ask(op="subscribe", subscriptions=[{"id": number, "channelId": 1} for number in (5, 6, 7)]) == [
+        "subscription 7 to channel 1 refused"
+    ]
+    assert ask(op="unsubscribe", subscriptionIds=[5]) == [] and list(client.subscriptions) == [6]
+    assert ask(op="subscribe", subscriptions=[{"id": 6, "channelId": 1}, {"id": 8, "channelId": 2}]) == [
+        "subscription 6 to channel 1 refused",
+        "subscription 8 to channel 2 refused",
+    ]
+    channels = [{"id": number, "topic": "/b", "schemaName": "std_msgs/Bool", "encoding": "ros1"} for number in range(3)]
+    assert ask(op="advertise", channels=channels) == [] and list(client.published) == [0, 1]
+    ask(op="advertise", channels=channels[2:])
+    assert len(client.published) == 2
+    ask(op="unadvertise", channelIds=[0])
+    assert 0 not in client.published
+
+
+def test_ros_topics_are_looked_up_and_subscribed_to_in_the_background(monkeypatch):
+    from hero_monitor.foxglove import ros_topics as module
+    from hero_msgs.msg import RobotArray
+
+    clock, jobs, subscribed = SimpleNamespace(now_s=100.0), [], {}
+    monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: clock.now_s, time_ns=lambda: 7))
+    published = [["/flag", "std_msgs/Bool"], ["/hero_driver/robots", "hero_msgs/RobotArray"], ["/odd", "no_such/Type"]]
+    monkeypatch.setattr(module, "ask_master", lambda call, subgraph: published)
+
+    def subscribe(topic, kind, *arguments, **options):
+        subscribed[topic] = kind
+        return SimpleNamespace(unregister=lambda: subscribed.pop(topic))
+
+    monkeypatch.setattr(module.rospy, "Subscriber", subscribe)
+
+    def submit(function, *arguments):
+        jobs.append((function, arguments))
+        return SimpleNamespace(done=lambda: (function, arguments) not in jobs)
+
+    def work():
+        while jobs:
+            function, arguments = jobs[0]
+            function(*arguments)
+            jobs.pop(0)
+
+    topics = RosTopics(SimpleNamespace(submit=submit, warn=lambda *said: None))
+    assert topics.find_types() == {}
+    clock.now_s += 2.0 * LOOK_UP_PERIOD_S
+    topics.find_types()
+    assert len(jobs) == 1, "the master is asked one question at a time"
+    work()
+    assert set(topics.find_types()) == {"/flag", "/hero_driver/robots"} and len(jobs) == 1
+    work()
+    clock.now_s += 0.9 * LOOK_UP_PERIOD_S
+    topics.find_types()
+    assert jobs == []
+    assert not topics.want({"/flag", "/hero_driver/robots"}) and not topics.want(set())
+    work()
+    assert topics.want({"/flag", "/hero_driver/robots"})
+    assert subscribed == {"/flag": module.rospy.AnyMsg, "/hero_driver/robots": RobotArray}, "STOP ALL reads it, too"
+    message = module.rospy.AnyMsg()
+    message._buff = b"\1"
+    for md5, latching in ((module.roslib.message.get_message_class("std_msgs/Bool")._md5sum, "1"), ("other", "0")):
+        message._connection_header = {"md5sum": md5, "latching": latching, "callerid": "/node"}
+        topics._keep(message, "/flag")
+    assert topics.take() == [("/flag", b"\1", 7, "/node")] and topics.take() == []
+    topics.want(set())
+    work()
+    assert subscribed == {}
+
+
+def test_limits_of_what_pages_may_set_are_the_ends_of_their_fields():
+    for offer in OFFERS.values():
+        for name, field in offer.fields.items():
+            assert field.admits(field.default), name
+            if not isinstance(field.default, float):
+                continue
+            outside = 1e-6 * max(1.0, abs(field.high))
+            assert field.admits(field.low) and field.admits(field.high)
+            assert not field.admits(field.low - outside) and not field.admits(field.high + outside)
+    assert [offer["program"] for offer in describe_offers(["follow", "led_show"])] == ["follow", "led_show"]
