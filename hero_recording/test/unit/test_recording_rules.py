@@ -1,0 +1,302 @@
+"""Limits of the analysis, the columns of all tables, and a recording that the disk, the user or nobody ends."""
+
+import math
+import signal
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import synthetic_bag
+from geometry_msgs.msg import Quaternion, Twist
+from sensor_msgs.msg import Imu, LaserScan, Range
+from std_msgs.msg import ColorRGBA
+from visualization_msgs.msg import Marker, MarkerArray
+
+from hero_msgs.msg import Encoder, Motor, Robot, RobotArray
+from hero_recording import analysis, disk_guard, plot, record
+from hero_recording.analysis import COMMAND_TIMEOUT_S, ODOMETRY_GAP_S, REPORT_GAP_S, SAME_TIME_S, STANDSTILL_S
+from hero_recording.errors import RecordingError
+from hero_recording.observations import Observations, Origin, RobotObservations, StateReport
+from hero_recording.record import CHECK_PERIOD_S, EMPTY_BAG_BYTES, SILENCE_S, Recording
+from hero_recording.series import MAX_VALUE
+from hero_recording.tables import BEAMS, TABLES, read_rows
+from hero_recording.topics import Message
+
+PERIOD_S = 0.034
+
+
+def make_robot(*rows, true_rows=()):
+    """Rows: stamp s, x m, y m, yaw rad; each arrives 0.02 s later."""
+    robot = RobotObservations()
+    for series, values in ((robot.odometry, rows), (robot.ground_truth, true_rows)):
+        for stamp_s, *pose in values:
+            series.add(stamp_s + 0.02, stamp_s, *pose, 0.0, 0.0)
+    return robot
+
+
+def test_a_pose_is_compared_only_with_ground_truth_of_its_time():
+    true_rows = [(10.0, 0.0, 0.0, 0.0), (11.0, 1.0, 0.0, 0.0), (20.0, 1.0, 0.0, 0.0)]
+    stamps_s = (10.0 - SAME_TIME_S - 0.01, 10.0 - SAME_TIME_S + 0.01, 10.19, 10.5, 10.81, 20.19, 20.21)
+    robot = make_robot(*((stamp_s, 0.0, 0.0, 0.0) for stamp_s in stamps_s), true_rows=true_rows)
+    robot.origins.append(Origin(0.0, 0.0, 0.0, 0.0))
+    errors = analysis.compute_odometry_errors(robot)
+    assert errors.times_s - 0.02 == pytest.approx([stamps_s[1], 10.19, 10.81, 20.19])
+    assert errors.position_m == pytest.approx([0.0, 0.19, 0.81, 1.0]), "in between by its stamp"
+    assert analysis.compute_odometry_errors(make_robot((10.5, 0.0, 0.0, 0.0), true_rows=true_rows)) is None
+    assert analysis.compute_odometry_errors(make_robot((10.0, 0.0, 0.0, 0.0), true_rows=true_rows[:1])) is None
+    assert analysis.compute_odometry_errors(make_robot(true_rows=true_rows)) is None
+
+
+def test_odometry_without_an_origin_is_laid_on_the_first_true_pose():
+    true_rows = [(0.1 * step, 2.0, 1.0 + 0.1 * step, math.pi / 2.0) for step in range(5)]
+    robot = make_robot(*((0.1 * step, 5.0 + 0.2 * step, 7.0, 0.0) for step in range(5)), true_rows=true_rows)
+    errors = analysis.compute_odometry_errors(robot)
+    assert errors.position_m == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4])
+    assert errors.yaw_rad == pytest.approx(np.zeros(5), abs=1e-12)
+
+
+def turn_wheels(moves_at_s, moves=True, moved=2.0, length_s=12.0):
+    """Return a robot whose wheels make `moved` ticks together at this time, and go on if moves."""
+    robot = RobotObservations()
+    for reading in range(int(length_s / PERIOD_S)):
+        time_s = reading * PERIOD_S
+        ticks = 0.0 if time_s < moves_at_s else moved / 2.0 + (time_s - moves_at_s) * 100.0 * moves
+        robot.encoder.add(time_s, ticks, ticks)
+    return robot
+
+
+def test_the_delay_of_a_motion_counts_from_the_first_command_at_rest():
+    for commands, moves_at_s, expected_s in (
+        ([(5.0, 0.1, 0.0), (5.1, 0.1, 0.0)], 5.3, [0.3]),
+        ([(5.0, 0.0, -1.0)], 5.3, [0.3]),
+        ([(5.0, 0.0, 0.0), (5.1, 0.1, 0.0)], 5.3, [0.2]),  # a stop is no command to move
+        ([(2.0, 0.1, 0.0), (2.0 + COMMAND_TIMEOUT_S + 0.1, 0.1, 0.0)], 4.3, [0.2]),  # the first one had no effect
+        ([(3.5, 0.1, 0.0), (5.0, 0.1, 0.0)], 5.6, []),  # later than the watchdog allows
+        ([(5.0, 0.1, 0.0)], 5.0 + COMMAND_TIMEOUT_S + 0.05, []),
+        ([(5.0, 0.1, 0.0)], 4.9, []),  # it was moving already
+        ([(0.1, 0.1, 0.0)], 0.3, []),  # too few readings before
+        ([], 5.0, []),
+    ):
+        robot = turn_wheels(moves_at_s)
+        for command in commands:
+            robot.commands.add(*command)
+        assert analysis.compute_motion_delays(robot) == pytest.approx(expected_s, abs=PERIOD_S)
+    settling = turn_wheels(5.3, moves=False, moved=1.0)
+    settling.commands.add(5.0, 0.1, 0.0)
+    assert len(analysis.compute_motion_delays(settling)) == 0, "one tick is no motion"
+    rested = turn_wheels(5.0 - STANDSTILL_S - 0.1, moves=False)
+    rested.commands.add(5.0, 0.1, 0.0)
+    assert len(analysis.compute_motion_delays(rested)) == 0
+    assert rested.encoder.columns()[1].max() == 1.0
+
+
+def test_gaps_begin_beyond_their_limits():
+    reports = [
+        StateReport(0.0, "ready", 0),
+        StateReport(REPORT_GAP_S, "ready", 0),
+        StateReport(2.0 * REPORT_GAP_S + 0.1, "ready", 0),
+    ]
+    assert [span[:2] for span in analysis.find_spans(reports)] == [(0.0, 3.0), (6.1, 6.1)]
+    times_s = np.array([0.0, ODOMETRY_GAP_S, 2.0 * ODOMETRY_GAP_S + 0.1, 1.2])
+    assert analysis.find_gaps(times_s) == [(0.5, 1.1)]
+    broken_s, values = analysis.break_at_gaps(times_s, np.arange(4.0))
+    assert broken_s.tolist() == [0.0, 0.5, 1.1, 1.1, 1.2] and np.isnan(values[2]) and values[3] == 2.0
+    ended = analysis.end_commands(np.array([0.0, COMMAND_TIMEOUT_S, 5.0]), np.ones(3), np.ones(3))
+    assert ended[0].tolist() == [0.0, 2.0, 4.0, 5.0, 7.0] and ended[1].tolist() == ended[2].tolist() == [1, 1, 0, 1, 0]
+
+
+def test_numbers_beyond_what_robots_measure_are_not_drawn():
+    robot = make_robot((1.0, MAX_VALUE, 0.0, 0.0), (2.0, 0.0, -1.01 * MAX_VALUE, 0.0), (3e9, 0.0, 0.0, math.nan))
+    assert len(robot.odometry) == 1 and robot.skipped == 2
+    robot.encoder.add(1.0, 1e9, -1e9)
+    assert len(robot.encoder) == 1 and robot.skipped == 2, "ticks grow without end"
+
+
+def test_the_table_gives_errors_as_a_share_only_of_a_drive():
+    def describe(length_m):
+        true_rows = [(0.1 * step, 0.0, 0.0, 0.0) for step in range(11)]
+        robot = make_robot(*((0.1 * step, 0.1 * length_m * step, 0.0, 0.0) for step in range(11)), true_rows=true_rows)
+        robot.origins.append(Origin(0.0, 0.0, 0.0, 0.0))
+        robot.states.append(StateReport(0.0, "ready", 3))
+        return plot.describe_robot(robot)
+
+    cells = describe(0.2)
+    assert (cells["DISTANCE"], cells["FINAL ERROR"]) == ("0.20 m", "200 mm (100.0 % of the distance)")
+    assert (cells["ODOM"], cells["LONGEST GAP"], cells["MESSAGE DELAY"], cells["99 %"]) == (
+        "10.0 Hz",
+        "0.10 s",
+        "20 ms",
+        "20 ms",
+    )
+    assert (cells["RECONNECTS"], cells["COMMAND TO MOTION"], cells["LOCALIZATION RMS"]) == ("3", "-", "-")
+    assert describe(0.049)["FINAL ERROR"] == "49 mm"
+    assert set(plot.describe_robot(RobotObservations()).values()) == {"0.00 m", "-"}
+
+
+def test_origins_count_once_and_walls_lie_as_their_markers():
+    seen = Observations({1})
+    transforms = synthetic_bag.make_origins((1, 2))
+    for time_s, x_m in ((1.0, 1.0), (2.0, 1.0), (3.0, 4.0), (4.0, math.nan)):
+        transforms.transforms[0].transform.translation.x = x_m
+        seen.receive(Message("/tf_static", "tf2_msgs/TFMessage", transforms, time_s))
+    assert seen.robots[1].origins == [(1.0, 1.0, 0.0, 0.0), (3.0, 4.0, 0.0, 0.0)] and list(seen.robots) == [1]
+    wall, post = Marker(type=Marker.CUBE), Marker(type=Marker.CYLINDER)
+    wall.pose.position.x, wall.pose.position.y = 1.0, 2.0
+    wall.pose.orientation = synthetic_bag.make_quaternion(math.pi / 2.0)
+    wall.scale.x = post.scale.x = 0.5
+    for _ in range(2):
+        seen.receive(Message("/hero_sim/arena", "visualization_msgs/MarkerArray", MarkerArray([wall, post]), 1.0))
+    assert seen.walls_m == [pytest.approx((1.0, 1.75, 1.0, 2.25))] and seen.circles_m == [(0.0, 0.0, 0.25)]
+    for topic, kind, is_wanted in (
+        ("/hero_1/odom", "nav_msgs/Odometry", True),
+        ("/hero_2/odom", "nav_msgs/Odometry", False),
+        ("/hero_1/led", "std_msgs/ColorRGBA", False),
+        ("/tf_static", "tf/tfMessage", True),
+        ("/tf_static", "std_msgs/String", False),
+        ("/hero_driver/robots", "hero_msgs/RobotArray", True),
+    ):
+        assert seen.wants(topic, kind) == is_wanted
+
+
+def test_every_column_holds_the_number_of_its_name():
+    def read(topic, kind, content):
+        ((robot_id, table, row),) = read_rows("/hero_7/" + topic, kind, content, 9.0)
+        assert robot_id == 7 and row[0] == 9.0
+        return dict(zip(TABLES[table], row[1:]))
+
+    encoder = Encoder(
+        left_ticks=1, right_ticks=2, left_speed=3, right_speed=4, left_speed_filtered=5, right_speed_filtered=6
+    )
+    assert list(read("encoder", "hero_msgs/Encoder", encoder).values()) == [0.0, 1, 2, 3, 4, 5, 6]
+    scan = read("proximity", "sensor_msgs/LaserScan", LaserScan(ranges=[0, 1, 2, 3, 4, 5, 6]))
+    assert [scan[beam + "_m"] for beam in BEAMS[:7]] == list(range(7)) and math.isnan(scan["rear_left_m"])
+    assert read("range", "sensor_msgs/Range", Range(range=0.3))["range_m"] == 0.3
+    twist = Twist()
+    twist.linear.x, twist.linear.y, twist.angular.x, twist.angular.z = 1.0, 2.0, 3.0, 4.0
+    for topic in ("cmd_vel", "velocity_controller/cmd_vel", "position_controller/cmd_vel"):
+        assert read(topic, "geometry_msgs/Twist", twist) == {"linear_m_s": 1.0, "angular_rad_s": 4.0}
+    motor = read("cmd_motor", "hero_msgs/Motor", Motor(left_motor_pwm=1400, right_motor_pwm=1600))
+    assert motor == {"left_us": 1400, "right_us": 1600}
+    assert list(read("led", "std_msgs/ColorRGBA", ColorRGBA(0.1, 0.2, 0.3, 0.4)).values()) == [0.1, 0.2, 0.3, 0.4]
+    imu = Imu(orientation=Quaternion(1, 2, 3, 4))
+    for number, axis in enumerate("xyz"):
+        setattr(imu.angular_velocity, axis, 5 + number)
+        setattr(imu.linear_acceleration, axis, 8 + number)
+    assert list(read("imu", "sensor_msgs/Imu", imu).values()) == [0.0, *range(1, 11)]
+    robot = Robot(
+        id=7, state=Robot.AWAY, address="a:1", packets_per_s=1.0, bytes_per_s=2.0, clock_offset=3.0, reconnects=4
+    )
+    robot.dropped_messages, robot.bad_packets, robot.last_error = 5, 6, "e"
+    rows = read_rows("/hero_driver/robots", "hero_msgs/RobotArray", RobotArray(robots=[robot, Robot(id=-1)]), 9.0)
+    assert rows == [(7, "status", (9.0, "away", "a:1", 1.0, 2.0, 3.0, 4, 5, 6, "e"))]
+    pose = synthetic_bag.make_localized(5.0, 1.0, 2.0, 0.5)
+    pose.pose.covariance = [float(index) for index in range(36)]
+    row = read("pose", "geometry_msgs/PoseWithCovarianceStamped", pose)
+    assert list(row.values()) == pytest.approx([5.0, 1.0, 2.0, 0.5, 0.0, math.sqrt(7.0), math.sqrt(35.0)])
+    odometry = read("odom", "nav_msgs/Odometry", synthetic_bag.make_pose("odom", 5.0, 1.0, 2.0, 0.5, 0.4))
+    assert list(odometry.values()) == pytest.approx([5.0, 1.0, 2.0, 0.5, 0.4, 2.0])
+
+
+def test_a_disk_is_full_below_its_limit(monkeypatch, tmp_path):
+    free = {"bytes": 5_000_000}
+    monkeypatch.setattr(disk_guard.shutil, "disk_usage", lambda folder: SimpleNamespace(free=free["bytes"]))
+    folder = str(tmp_path / "new" / "folder")
+    assert disk_guard.prepare_folder(folder, 5.0) == 5.0 and disk_guard.find_reason_to_stop(folder, 5.0) is None
+    free["bytes"] -= 1
+    assert "only 5 MB are left in" in disk_guard.find_reason_to_stop(folder, 5.0)
+    with pytest.raises(RecordingError, match="only 5 MB are free in .* so nothing is recorded"):
+        disk_guard.prepare_folder(folder, 5.0)
+    (tmp_path / "file").write_text("")
+    with pytest.raises(RecordingError, match="cannot be created or read: .*; choose another folder"):
+        disk_guard.prepare_folder(str(tmp_path / "file" / "folder"), 0.0)
+    monkeypatch.setattr(disk_guard.os, "access", lambda path, mode: False)
+    with pytest.raises(RecordingError, match="is not writable"):
+        disk_guard.prepare_folder(folder, 0.0)
+
+
+@pytest.fixture(name="recording")
+def make_recording(monkeypatch, tmp_path):
+    """A Recording in virtual time, whose recorder writes what a test writes."""
+    made = SimpleNamespace(now_s=100.0, said=[], errors=[], reasons={}, ends_s=math.inf, code=0)
+
+    def sleep(duration_s):
+        made.now_s += duration_s
+        for at_s in sorted(made.reasons):
+            if made.now_s >= 100.0 + at_s and made.reasons[at_s]:
+                made.reasons.pop(at_s)()
+
+    monkeypatch.setattr(record, "time", SimpleNamespace(monotonic=lambda: made.now_s, sleep=sleep))
+    monkeypatch.setattr(record, "say", made.said.append)
+    monkeypatch.setattr(record.command_line, "print_error", made.errors.append)
+    monkeypatch.setattr(record.signal, "signal", lambda *arguments: None)
+    monkeypatch.setattr(record.roslib.packages, "find_node", lambda package, name: ["/opt/record"])
+    made.reason = None
+    monkeypatch.setattr(record, "find_reason_to_stop", lambda folder, limit_mb: made.reason)
+    monkeypatch.setattr(record, "repair_bag", lambda path: "repaired " + path)
+    monkeypatch.setattr(record, "end_process", lambda process, patience_s: made.code)
+    poll = SimpleNamespace(poll=lambda: None if made.now_s < 100.0 + made.ends_s else 1)
+    monkeypatch.setattr(record.subprocess, "Popen", lambda command, **options: made.commands.append(command) or poll)
+    made.commands = []
+    made.folder = tmp_path
+
+    def run(*arguments):
+        made.recording = Recording(
+            record.parse_options(["--folder", str(tmp_path), "--min-free-mb", "0", *arguments]), []
+        )
+        return made.recording.run()
+
+    made.run = run
+    return made
+
+
+def test_a_recording_ends_by_its_time_a_signal_or_the_disk(recording):
+    bag = recording.folder / "hero_2026_0.bag"
+
+    def write():
+        bag.write_bytes(bytes(EMPTY_BAG_BYTES + 1))
+
+    recording.reasons[1.0] = write
+    assert recording.run("--seconds", "20") == 0
+    assert recording.now_s == pytest.approx(120.0, abs=CHECK_PERIOD_S) and recording.errors == []
+    assert recording.said[-2:] == ["%s  0.0 MB" % bag, "0.0 MB in 20 s"] and "nothing" not in "".join(recording.said)
+    recording.now_s, recording.reasons = 100.0, {3.0: lambda: recording.recording._receive_signal(signal.SIGINT, None)}
+    assert recording.run() == 0 and recording.now_s == pytest.approx(103.0, abs=CHECK_PERIOD_S)
+    assert "nothing was recorded: no robot and no driver published anything" in recording.said, (
+        "the old file is not its own"
+    )
+    recording.now_s, recording.reasons = 100.0, {3.0: lambda: setattr(recording, "reason", "only 5 MB are left")}
+    assert recording.run() == 1 and recording.errors == ["stopped: only 5 MB are left"]
+
+
+def test_silence_and_a_recorder_that_fails_are_told(recording):
+    recording.ends_s, recording.code = SILENCE_S + 5.0, 3
+    assert recording.run() == 1
+    assert [
+        text for text in recording.said if "nothing received in 15 s" in text
+    ] and "exit code 3" in recording.errors[0]
+    recording.now_s, recording.ends_s, recording.code = 100.0, 1.0, -signal.SIGTERM
+    active = recording.folder / "hero_2026_1.bag.active"
+    recording.reasons[0.5] = lambda: active.write_bytes(bytes(2 * EMPTY_BAG_BYTES))
+    recording.said.clear()
+    assert recording.run() == 1 and "repaired %s" % active in recording.said
+    recording.now_s, recording.reasons = 100.0, {}
+    recording.said.clear()
+    assert recording.run() == 0
+    assert any("was cut off, or is being recorded" in text for text in recording.said)
+
+
+def test_the_recorder_is_told_folder_split_compression_and_topics(recording):
+    recording.ends_s = 0.1
+    recording.run(
+        "--max-files", "3", "--split-mb", "7", "--topics", "/a /b", "--compression", "none", "--robots", "1 2"
+    )
+    (command,) = recording.commands
+    assert command[:3] == ["/opt/record", "--quiet", "--regex"] and "--repeat-latched" in command
+    pairs = list(zip(command, command[1:]))
+    for pair in (("--size", "7"), ("--max-splits", "3"), ("--min-space", "1k"), ("-o", str(recording.folder / "hero"))):
+        assert pair in pairs
+    assert "--lz4" not in command and command[-2:] == ["/a", "/b"] and any("/hero_(1|2)/" in word for word in command)
+    recording.run("--min-free-mb", "1.024")
+    assert ("--min-space", "100k") in list(zip(recording.commands[1], recording.commands[1][1:]))
+    assert "--lz4" in recording.commands[1] and "--max-splits" not in recording.commands[1]
+    assert record.format_size(999_900_000) == "999.9 MB" and record.format_size(1e9) == "1.0 GB"
