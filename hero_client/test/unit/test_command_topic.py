@@ -64,6 +64,18 @@ def test_a_command_without_subscribers_is_warned_about_once(ros):
     assert "fast" not in ros.sent[1:]
 
 
+def test_a_command_long_after_the_start_is_lost_and_said_anew_later(ros):
+    ros.now_s += CONNECT_S + 0.1
+    for _ in range(2):
+        ros.topic.publish("fast")
+    assert ros.timers == [] and len(ros.warned) == 1 and ros.sent == ["fast"] * 2  # which rospy drops
+    ros.subscribers = 1
+    ros.topic.publish("fast")
+    ros.subscribers = 0
+    ros.topic.publish("fast")
+    assert len(ros.warned) == 2
+
+
 def test_a_robot_without_the_imu_that_was_asked_for_is_ready(monkeypatch):
     monkeypatch.setattr(robot_topics.rospy, "Subscriber", lambda *arguments, **options: None)
     messages = NewestMessages("/hero_0")

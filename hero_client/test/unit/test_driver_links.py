@@ -197,6 +197,8 @@ def test_why_a_robot_is_absent_is_told_by_its_driver(ros):
     assert ros.drivers.explain_absence("/hero_0").startswith("no driver answers; start one: roslaunch")
     ros.report(A, *((number, Robot.READY) for number in range(NAMES_SHOWN)), (77, Robot.AWAY))
     assert ros.drivers.explain_absence("/hero_77") == "the driver reports hero_77 as AWAY"
+    ros.drivers._links[A + "/robots"].report.robots[-1].last_error = "left"
+    assert ros.drivers.explain_absence("/hero_77") == "the driver reports hero_77 as AWAY: left"
     assert ros.drivers.explain_absence("/hero_99").startswith("connected are hero_0, ")
     assert "hero_9: is the robot on" in ros.drivers.explain_absence("/hero_99")
     ros.report(A, *((number, Robot.READY) for number in range(NAMES_SHOWN + 2)))

@@ -42,7 +42,7 @@ def test_a_formation_has_its_spacing_and_its_center(shape):
         if count > 1:
             nearest_m = min(math.dist(a, b) for a, b in itertools.combinations(places, 2))
             assert nearest_m == pytest.approx(0.3)
-        if shape != "grid":
+        if shape != "grid" or count in (1, 2, 4, 6, 9, 12):  # whole rows
             assert sum(x for x, _ in places) / count == pytest.approx(1.0)
             assert sum(y for _, y in places) / count == pytest.approx(-2.0)
 

@@ -14,6 +14,7 @@ from hero_client.apps.goals import (
     InvalidGoalError,
 )
 from hero_client.controllers.go_to_goal import Goal
+from hero_node.geometry import Pose
 
 
 class Listener:
@@ -106,6 +107,14 @@ def test_a_goal_of_the_same_frame_turns_the_robot_and_another_one_stops_it():
             assert listener.outcomes[1].elapsed_s == pytest.approx(link.clock.now_s - 101.0, abs=0.25)
         else:
             assert link.velocity == (0.0, 0.0) and drive(queue, link) and queue.reached
+
+
+def test_a_goal_is_driven_to_in_its_frame():
+    for frame, x_m in (("", 0.2), ("map", -0.3), ("odom", 0.2)):
+        queue, _, link = make_queue()
+        link.origin = Pose(0.5, 0.0, 0.0)
+        queue.put(ask(0.2, frame))
+        assert drive(queue, link) and queue.reached and link.pose.x_m == pytest.approx(x_m, abs=0.01)
 
 
 def test_each_goal_on_the_way_has_its_own_limits():

@@ -14,6 +14,23 @@ def test_a_single_press_drives_until_its_time_is_out():
         assert drive.command(10.8) == STOP
 
 
+def test_keys_drive_where_the_help_says():
+    for keys, ahead, left in (
+        (("w", "up", "W"), 1, 0),
+        (("x", "down"), -1, 0),
+        (("a", "left"), 0, 1),
+        (("d", "right"), 0, -1),
+        (("q",), 1, 1),
+        (("e",), 1, -1),
+        (("z",), -1, -1),
+        (("c",), -1, 1),
+    ):
+        for key in keys:
+            drive = KeyDrive(0.1, 1.5)
+            drive.press(key, 0.0)
+            assert drive.command(0.0) == (0.1 * ahead, 1.5 * left)
+
+
 def test_a_held_key_drives_without_a_break_and_stops_soon_after():
     drive = KeyDrive(0.1, 1.0)
     presses_s = [0.0] + [0.66 + index * 0.04 for index in range(50)]  # the slowest usual keyboard
@@ -43,6 +60,9 @@ def test_two_keys_together_make_a_curve():
 
 def test_speeds_stay_within_the_robots_limits():
     drive = KeyDrive(0.1, 1.0)
+    for key, linear_m_s, angular_rad_s in (("+", 0.12, 1.0), ("_", 0.1, 1.0), (".", 0.1, 1.25), ("<", 0.1, 1.0)):
+        drive.press(key, 0.0)
+        assert (round(drive.linear_m_s, 9), drive.angular_rad_s) == (linear_m_s, angular_rad_s)
     for key, low, high in (("+", 0.2, 0.2), ("-", 0.02, 0.02)):
         for _ in range(50):
             assert drive.press(key, 0.0)

@@ -25,6 +25,7 @@ def sense(robots, objects, sensor=None, radius_m=0.05):
 
 
 def test_a_beam_tells_what_it_touches_first():
+    assert len({NOTHING, OBJECT, ROBOT}) == 3
     assert sense([(0, 0, 0)], []) == [NOTHING]
     assert sense([(0, 0, 0)], [(1, 0.049, 0)]) == [OBJECT]
     assert sense([(0, 0, 0)], [(1, 0.051, 0), (-1, 0, 0)]) == [NOTHING]

@@ -6,7 +6,7 @@ import pytest
 from fake_robot import make_robot
 
 from hero_client.robots.group import READY_TIMEOUT_S
-from hero_client.robots.robot_base import NEXT_ODOM_S, STOPPED_WARNING_PERIOD_S
+from hero_client.robots.robot_base import STOPPED_WARNING_PERIOD_S
 from hero_client.values.errors import GoalError, RobotNotReadyError, StaleDataError, StoppedError
 from hero_client.values.readings import FRESH_S
 from hero_client.values.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
@@ -59,9 +59,12 @@ def test_topics_that_few_read_are_subscribed_to_and_waited_for():
     robot, link = make_robot()
     with pytest.raises(StaleDataError):
         assert robot.infrared_counts
-    assert link.subscribed == ["laser"] and link.waited == [("laser", NEXT_ODOM_S, 1)]
+    assert link.subscribed == ["laser"] and link.waited == [("laser", 5.0, 1)]
     link.silent_s["laser"] = 0.2
     assert robot.infrared_counts == [5.0] * 8 and len(link.waited) == 1
+    link.silent_s["laser"] = 1.1
+    with pytest.raises(StaleDataError, match="the last message on /hero_3/laser came 1.1 s ago"):
+        assert robot.infrared_counts
     assert robot.wait_for_scan(0.7) == link.ranges
     assert link.waited[-1] == ("proximity", 0.7, 1) and link.subscribed[-1] == "proximity"
 
@@ -70,7 +73,7 @@ def test_a_new_pose_counts_when_two_messages_came():
     robot, link = make_robot()
     robot.set_pose(1.0, 2.0, 3.0)
     assert link.odometries == [(1.0, 2.0, 3.0)] and link.subscribed == ["odom"]
-    assert link.waited == [("odom", NEXT_ODOM_S, 2)]
+    assert link.waited == [("odom", 5.0, 2)]
 
 
 def test_speeds_are_limited_and_that_is_said_once():

@@ -28,6 +28,24 @@ def test_a_robot_that_falls_silent_is_at_zero_within_a_few_seconds():
     assert rate_hz == 0.0
 
 
+def test_a_rate_is_that_of_the_last_three_seconds():
+    meter = RateMeter()
+    rates_hz = []
+    for tick in range(41):
+        meter.count(0 if tick < 20 else 5)
+        rates_hz.append(meter.rate_hz(0.5 * tick))
+    assert rates_hz[19] == 0.0 and rates_hz[20] == pytest.approx(5.0 / 3.0)
+    assert rates_hz[25] == pytest.approx(10.0) == rates_hz[40]
+    assert RateMeter().rate_hz(1.0) == 0.0 and not RobotTrack().proximity_seen
+
+
+def test_turns_add_up_the_short_way():
+    track = RobotTrack()
+    for yaw_rad in (0.5, 0.8, 0.7, 3.0, -3.0):
+        track.receive_pose(Pose(0.0, 0.0, yaw_rad))
+    assert track.turned_rad == pytest.approx(0.3 + 0.1 + 2.3 + math.tau - 6.0)
+
+
 def test_distances_add_up_from_the_first_pose_on():
     track = RobotTrack()
     for pose in (Pose(5.0, 5.0, 3.0), Pose(5.3, 5.4, 3.0), Pose(5.0, 5.0, -3.0)):

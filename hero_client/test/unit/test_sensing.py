@@ -113,6 +113,17 @@ def test_range_and_field_of_view_end_what_is_sensed():
     assert not sense_neighbors(pair(0.5, 0.51), Neighbors(field_rad=1.0)).seen[0, 1]
 
 
+def test_a_sensor_without_settings_has_no_noise_and_sees_through_bodies():
+    line = np.array([[(0.0, 0.0, 0.0), (0.5, 0.0, 0.0), (1.0, 0.0, 0.0)]])
+    near = sense_neighbors(line, Neighbors(), Fixed(0.0))
+    assert near.counts.tolist() == [2, 2, 2] and near.range_m[0].tolist() == [0.0, 0.5, 1.0]
+    assert near.average(np.array([(9.0, 1.0, 4.0), (1.0, 9.0, 2.0), (0.0, 0.0, 9.0)])).tolist() == [2.5, 1.5, 0.0]
+    nothing = sense_neighbors(line, Neighbors(range_m=0.1))
+    assert nothing.average(np.ones((3, 3))).tolist() == [0.0] * 3
+    worlds = np.concatenate((line, line))
+    assert sense_neighbors(worlds, Neighbors()).rows.tolist() == [[0, 1, 2]] * 3 + [[3, 4, 5]] * 3
+
+
 def test_a_body_between_two_robots_hides_them_from_each_other():
     line = np.array([[(0.0, 0.0, 0.0), (0.5, 0.0, 0.0), (1.0, 0.0, 0.0)]])
     assert sense_neighbors(line, Neighbors(occlusion=True)).counts.tolist() == [1, 2, 1]

@@ -54,6 +54,16 @@ def test_a_report_that_crosses_the_request_is_not_believed():
     assert describe([make_reply(A, rest(0))], SOON_S - 0.01).text == "stopping"
 
 
+def test_a_stop_is_told_within_one_and_a_half_seconds_of_its_request():
+    assert CROSSING_S == 0.15 and TIME_LIMIT_S == 1.4
+    request = StopRequest(True, 100.0)
+    request.update([make_reply(A, rest(0))], True, 100.1)
+    assert not request.is_over and show(request, [make_reply(A, rest(0))], 100.1).text == "stopping"
+    request.update([make_reply(A, rest(0))], True, 100.2)
+    assert request.is_over and show(request, [make_reply(A, rest(0))], 100.2).is_final
+    assert show(request, [silent(A)], 101.3).text == "stopping" and show(request, [silent(A)], 101.4).level == "error"
+
+
 def test_without_robots_nothing_is_said_about_wheels():
     assert describe([make_reply(A)]).text == "stopped, no robot is connected"
 

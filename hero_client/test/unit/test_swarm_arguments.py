@@ -1,9 +1,67 @@
 """What a Swarm is made of: numbers of robots, or an error that says so before anything is connected."""
 
+from types import SimpleNamespace
+
 import pytest
 
 pytest.importorskip("rospy", reason="Swarm imports rospy")
+from hero_client import swarm as swarm_module
 from hero_client.swarm import Swarm
+from hero_client.values.errors import RobotNotReadyError
+from hero_msgs.msg import Robot, RobotArray
+from hero_node.errors import ProgramError
+
+
+def test_a_program_opens_its_swarm_or_waits_for_robots(monkeypatch):
+    opened, logged = [], []
+    program = SimpleNamespace(running=True, sleep=None)
+    monkeypatch.setattr(swarm_module, "Swarm", lambda *given: opened.append(given) or "swarm")
+    assert swarm_module.open_swarm(program, [1]) == "swarm" and opened == [([1], True, True)]
+    assert swarm_module.open_swarm(program, [], False, False) == "swarm" and opened[1] == ([], False, False)
+    answers = [RobotNotReadyError("no driver"), RobotNotReadyError("ends")]
+
+    def discover(timeout_s, *given):
+        if not answers:
+            return (timeout_s, *given)
+        program.running = len(answers) > 1
+        raise answers.pop(0)
+
+    monkeypatch.setattr(swarm_module, "Swarm", SimpleNamespace(discover=discover))
+    monkeypatch.setattr(swarm_module.rospy, "logwarn", lambda *said: logged.append(said[1]))
+    with pytest.raises(ProgramError, match="ended before any robot was there"):
+        swarm_module.open_swarm(program, None)
+    assert list(map(str, logged)) == ["no driver"]
+    program.running = True
+    assert swarm_module.open_swarm(program, None) == (5.0, True, True, None)
+
+
+def test_a_swarm_is_discovered_when_all_drivers_are_known(monkeypatch):
+    made, clock = [], SimpleNamespace(now_s=100.0)
+
+    def sleep(duration_s):
+        clock.now_s += duration_s
+        return True
+
+    rows = [Robot(id=number, state=Robot.READY) for number in (5, 2, -1)] + [Robot(id=3)]
+    drivers = SimpleNamespace(is_settled=False, report=None, read=lambda: drivers.report)
+    monkeypatch.setattr(swarm_module, "start_node", lambda: None)
+    monkeypatch.setattr(swarm_module, "share_drivers", lambda: drivers)
+    monkeypatch.setattr(swarm_module, "ROS_CLOCK", clock)
+    monkeypatch.setattr(Swarm, "__init__", lambda self, *given: made.append(given))
+    for report, says in (
+        (None, "nothing on /hero_driver/robots within 3 s"),
+        (RobotArray(robots=rows[2:]), "no robot joined"),
+    ):
+        drivers.report, clock.now_s = report, 100.0
+        with pytest.raises(RobotNotReadyError, match=says):
+            Swarm.discover(3.0, sleep=sleep)
+        assert clock.now_s == pytest.approx(103.0, abs=0.03)
+    drivers.report = RobotArray(robots=rows)
+    with pytest.raises(RobotNotReadyError):
+        Swarm.discover(3.0, sleep=sleep)
+    drivers.is_settled = True
+    Swarm.discover(3.0, proximity=False, sleep=sleep)
+    assert made == [([2, 5], True, False)]
 
 
 @pytest.mark.parametrize("wrong", [3, "012", True, None])

@@ -17,7 +17,7 @@ from hero_client.apps.teleop_output import PAUSE_S, TeleopOutput
 from hero_client.ros.stop_status import StopStatus
 from hero_node.errors import ProgramError
 
-MAPPING = JoystickMapping(0.1, 1.0, 1, 0, 4, 1)
+MAPPING = JoystickMapping(0.1, 2.0, 1, 0, 4, 1)
 
 
 class FakeDrivers:
@@ -166,12 +166,14 @@ def test_a_joystick_drives_only_while_enabled_and_finite(shown):
     def read(axes, pressed=(4,), buttons=6):
         return MAPPING.read(Joy(axes=axes, buttons=[int(index in pressed) for index in range(buttons)]))
 
-    assert read([0.5, -1.0]) == (-0.1, 0.5)
+    assert read([0.5, -1.0]) == (-0.1, 1.0)
     assert read([0.5, -1.0], ()) == (0.0, 0.0) == read([0.5, math.nan]) == read([math.inf, 0.0])
     for axes, buttons in (([0.5], 6), ([0.5, 1.0], 4)):
         with pytest.raises(ProgramError, match="the joystick has %d axes and %d buttons" % (len(axes), buttons)):
             read(axes, buttons=buttons)
     read([0.5, 1.0], buttons=5)
+    with pytest.raises(ProgramError):
+        MAPPING._replace(linear_axis=0, angular_axis=2).read(Joy(axes=[0.5, 1.0], buttons=[1] * 6))
 
 
 def push(teleop, *pressed, stick=1.0):
@@ -189,9 +191,11 @@ def test_a_joystick_that_falls_silent_stops_the_robots(shown):
     assert max(moved_s) == pytest.approx(SILENCE_S - 0.1, abs=0.11)
     for link in swarm.links:
         assert velocities(link)[-2:] == [(0.1, 0.0), (0.0, 0.0)]
+    swarm.links[1].ready_s = math.inf
     for _ in range(120):
         swarm.sleep(0.1)
         teleop.step(swarm.now_s)
+    assert "hero_1: waiting: nothing subscribes" in swarm.logged[0]
     assert not velocities(swarm.links[0]) and [level for level, _ in shown] == ["logwarn"] * 3, "every 5 s from 2 s on"
 
 

@@ -51,6 +51,12 @@ def test_a_turn_that_is_too_fast_slows_the_same_curve_down(place, yaw_rad):
     assert slow.angular_rad_s / slow.linear_m_s == pytest.approx(free.angular_rad_s / free.linear_m_s)
 
 
+def test_robots_are_driven_as_fast_as_the_documents_say():
+    assert (GO_TO.max_linear_m_s, GO_TO.max_angular_rad_s, GO_TO.tolerance_m) == (0.12, 1.5, 0.01)
+    assert (SMOOTH.max_linear_m_s, SMOOTH.max_angular_rad_s, SMOOTH.tolerance_m) == (0.12, 1.5, 0.01)
+    assert (FOLLOW.gap_m, FOLLOW.max_linear_m_s, FOLLOW.max_angular_rad_s) == (0.15, 0.15, 2.0)
+
+
 def test_the_curve_is_that_of_the_paper():
     # Equation 13 by hand: r = 0.5 m straight ahead, theta = 1 rad, delta = 0, k1 = 1, k2 = 2.
     command = go_to_pose(Pose(0.0, 0.0, 0.0), Pose(0.5, 0.0, 1.0))

@@ -79,8 +79,9 @@ class SafetyFilter:
         lacking = np.maximum(bounds - (normals * wanted[:, :, None]).sum(axis=-1), 0.0)
         right = np.stack((-normals[..., 1], normals[..., 0]), axis=-1)
         wanted = wanted + self.sidestep * (lacking[..., None] * right).sum(axis=2)
+        rows = known.size  # not -1: a robot alone has no half planes
         found = nearest_allowed_all(
-            wanted.reshape(-1, 2), normals.reshape(-1, *normals.shape[2:]), bounds.reshape(-1, bounds.shape[2]),
+            wanted.reshape(rows, 2), normals.reshape(rows, *normals.shape[2:]), bounds.reshape(rows, bounds.shape[2]),
             self.max_speed_m_s,
         ).reshape(wanted.shape)  # fmt: skip
         linear_m_s = (found[..., 0] * cosine + found[..., 1] * sine) * known

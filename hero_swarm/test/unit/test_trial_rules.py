@@ -1,0 +1,167 @@
+"""Limits of the safety filter, of trials and of episodes: ages, fences, delays, rewards, and where runs begin."""
+
+import math
+
+import numpy as np
+import pytest
+
+from hero_client.values.robot_constants import BODY_RADIUS_M, MAX_LINEAR_M_S
+from hero_sim.world.arena import build_rectangle
+from hero_swarm import metrics
+from hero_swarm.behavior import Behavior
+from hero_swarm.experiments.starts import _place_in_circle, _place_in_grid
+from hero_swarm.learning.episode import MAX_ANGULAR_RAD_S, Episode, count_observations
+from hero_swarm.safety import FENCE, MAX_AGE_S, ROBOTS, SafetyFilter
+from hero_swarm.trial import OPEN, Trial, scatter
+
+REACH_M = BODY_RADIUS_M + 0.03
+"""Of the body from the steered point."""
+
+RADIUS_M = REACH_M + 0.012
+
+
+def keep_safe(poses, linear_m_s, angular_rad_s=0.0, mode=ROBOTS, fence_m=None, ages_s=None, safe=None):
+    count = len(poses)
+    speeds = [np.broadcast_to(np.array(values, dtype=float), (1, count)) for values in (linear_m_s, angular_rad_s)]
+    ages_s = None if ages_s is None else np.array([ages_s])
+    found = (safe or SafetyFilter(mode, fence_m))(np.array([poses], dtype=float), *speeds, ages_s)
+    return [tuple(map(float, pair)) for pair in zip(found[0][0], found[1][0])]
+
+
+def test_two_robots_close_no_faster_than_what_is_left_of_their_distance():
+    for left_m, expected_m_s in ((0.05, 0.05), (0.2, 0.1), (0.0, 0.0), (-0.02, -0.02)):
+        apart_m = left_m + 2.0 * RADIUS_M + 0.06  # both steered points lie 0.03 m nearer
+        safe = SafetyFilter(ROBOTS)
+        safe.sidestep = 0.0
+        commands = keep_safe([(0, 0, 0), (apart_m, 0, math.pi)], 0.1, safe=safe)
+        assert commands == [pytest.approx((expected_m_s, 0.0), abs=1e-6)] * 2
+    commands = keep_safe([(0, 0, 0), (0.05 + 2.0 * RADIUS_M + 0.06, 0, math.pi)], 0.1)
+    assert commands[0] == pytest.approx((0.05, -0.05 / 0.03), abs=1e-6), "what is left over goes to the right"
+    free = keep_safe([(0, 0, 0), (0.0 + 2.0 * RADIUS_M + 0.06, 0, math.pi)], 0.1, mode=FENCE)
+    assert free == [pytest.approx((0.1, 0.0))] * 2
+
+
+def test_a_fence_is_approached_no_faster_than_its_distance_allows():
+    fence_m = np.array((-1.0, -0.5, 1.0, 0.5))
+    for pose in (
+        (0.9 - REACH_M, 0, 0),
+        (-0.9 + REACH_M, 0, math.pi),
+        (0, 0.4 - REACH_M, math.pi / 2),
+        (0, REACH_M - 0.4, -math.pi / 2),
+    ):
+        safe = SafetyFilter(FENCE, fence_m)
+        safe.sidestep = 0.0
+        away = (pose[0] - 0.03 * math.cos(pose[2]), pose[1] - 0.03 * math.sin(pose[2]), pose[2])
+        assert keep_safe([away], 0.2, safe=safe) == [pytest.approx((0.2, 0.0), abs=1e-6)]
+        near = (
+            pose[0] + 0.05 * math.cos(pose[2]) - 0.03 * math.cos(pose[2]),
+            pose[1] + 0.02 * math.sin(pose[2]),
+            pose[2],
+        )
+        assert keep_safe([near], 0.2, safe=safe) == [pytest.approx((0.1, 0.0), abs=1e-6)]
+
+
+def test_robots_drove_on_while_their_poses_were_on_the_way():
+    for age_s, expected in ((MAX_AGE_S, True), (MAX_AGE_S + 0.01, False)):
+        safe = SafetyFilter(FENCE, np.array((-9.0, -9.0, 1.0, 9.0)))
+        safe.sidestep = 0.0
+        assert keep_safe([(0, 0, 0)], 0.1, safe=safe) == [(pytest.approx(0.1), pytest.approx(0.0))]
+        x_m = 1.0 - REACH_M - 0.03 - 0.04
+        ((linear_m_s, _),) = keep_safe([(x_m, 0, 0)], 0.1, ages_s=[age_s], safe=safe)
+        # 0.04 m were left, and 0.5 s at 0.1 m/s are 0.05 m.
+        assert linear_m_s == pytest.approx(-0.02, abs=1e-6) if expected else linear_m_s == 0.0
+    turning = SafetyFilter(FENCE, np.array((-9.0, -9.0, 1.0, 9.0)))
+    keep_safe([(0, 0, 0)], 0.0, 2.0, safe=turning)
+    ((linear_m_s, angular_rad_s),) = keep_safe([(0.0, 0.0, 0.0)], 0.1, ages_s=[0.4], safe=turning)
+    assert (linear_m_s, angular_rad_s) == (pytest.approx(0.1), pytest.approx(0.0)), "speeds are the robot's own"
+
+
+def test_commands_keep_their_limits_and_their_curve():
+    assert keep_safe([(0, 0, 0)], 0.3) == [pytest.approx((0.2, 0.0))]
+    ((linear_m_s, angular_rad_s),) = keep_safe([(0, 0, 0)], 0.05, 6.5)
+    assert angular_rad_s == pytest.approx(6.0) and linear_m_s / angular_rad_s == pytest.approx(0.05 / 6.5, rel=0.05)
+    with pytest.raises(ValueError, match="safety 'walls': must be one of off, fence, fence and robots"):
+        SafetyFilter("walls")
+
+
+class Note(Behavior):
+    """Drives straight on, and keeps what it sensed."""
+
+    rate_hz = 10.0
+
+    def step(self, sensed, memory, random):
+        poses = [*(memory or []), (sensed.time_s, sensed.poses.copy())]
+        return np.full(len(sensed.poses), 0.1), 0.0 * sensed.poses[:, 0], poses
+
+
+def test_a_trial_senses_poses_of_a_while_ago_and_tells_speeds():
+    for delay_s, steps in ((0.0, 0), (0.2, 2), (0.25, 3)):
+        trial = Trial(Note(), OPEN, 2, (1,), (1.0, 1.0), delay_s=delay_s)
+        true = []
+        for time_s, poses in trial.run(1.0, every_s=0.1):
+            true.append(poses[0].copy())
+            assert time_s == pytest.approx(0.1 * (len(true) - 1))
+            seen = trial.memory[-1]
+            assert seen[1] == pytest.approx(true[max(0, len(true) - 1 - steps)]) and seen[0] == pytest.approx(time_s)
+            if len(true) > 1:
+                assert trial.velocities[0] == pytest.approx((true[-1] - true[-2]) * 10.0)
+        assert len(true) == 10
+    assert len(list(Trial(Note(), OPEN, 1, (1,), (1.0, 1.0)).run(2.0, every_s=0.5))) == 4
+
+
+def test_robots_are_scattered_inside_and_apart():
+    poses = scatter(10, 1.0, 0.5, 3, gap_m=0.02)
+    apart_m = np.hypot(*np.moveaxis(poses[:, None, :2] - poses[None, :, :2], -1, 0)) + np.eye(10)
+    assert apart_m.min() > 2.0 * BODY_RADIUS_M + 0.02
+    assert np.abs(poses[:, 0]).max() < 0.5 - BODY_RADIUS_M and np.abs(poses[:, 1]).max() < 0.25 - BODY_RADIUS_M
+    assert np.abs(poses[:, 2]).max() > 2.0 and np.abs(poses[:, 1]).max() > 0.1
+    with pytest.raises(ValueError, match=r"60 robots find no place in 0.5 m x 0.5 m"):
+        scatter(60, 0.5, 0.5, 1)
+
+
+def test_starts_in_rows_and_circles_have_their_spacing():
+    grid = _place_in_grid(7, 0.1, 5)
+    assert grid[:, :2].tolist() == pytest.approx(
+        np.array([(-0.1, -0.1), (0, -0.1), (0.1, -0.1), (-0.1, 0), (0, 0), (0.1, 0), (-0.1, 0.1)])
+    )
+    assert np.ptp(grid[:, 2]) > 1.0 and (grid == _place_in_grid(7, 0.1, 5)).all()
+    circle = _place_in_circle(6, 0.1)
+    assert np.hypot(circle[:, 0], circle[:, 1]) == pytest.approx(np.full(6, 0.1))
+    assert circle[:, 2] == pytest.approx(
+        [math.pi / 2, 5 * math.pi / 6, -5 * math.pi / 6, -math.pi / 2, -math.pi / 6, math.pi / 6]
+    )
+    assert _place_in_circle(1, 0.1)[0, :2] == pytest.approx((0.05, 0.0))
+
+
+def test_an_episode_rewards_what_gets_better_and_observes_shares():
+    arena = build_rectangle(2.0, 1.0, 3)
+    episode = Episode(3, arena, 7, errors=0.0, metric="dispersion_ratio", neighbors=2, range_m=0.8)
+    rising = Episode(3, arena, 7, errors=0.0, metric="cluster_fraction")
+    plain = Episode(3, arena, 7, errors=0.0, metric=None)
+    values = [metrics.dispersion_ratio(episode._poses[..., :2])[0]]
+    for _ in range(5):
+        rewards = episode.step(np.array([(5.0, 0.0), (0.5, -1.0), (-1.0, 0.0)]))
+        values.append(metrics.dispersion_ratio(episode._rows.world.poses[None, :, :2])[0])
+        assert rewards == pytest.approx(np.full(3, values[-2] - values[-1])), "a falling metric"
+        assert plain.step(np.zeros((3, 2))).tolist() == [0.0] * 3
+        before = metrics.cluster_fraction(rising._poses[..., :2])[0]
+        gain = rising.step(np.array([(1.0, 0.0), (0.5, -1.0), (-1.0, 0.0)]))[0]
+        assert gain == pytest.approx(metrics.cluster_fraction(rising._poses[..., :2])[0] - before)
+    assert episode.time_s == pytest.approx(0.5)
+    observed = episode.observe()
+    assert observed.shape == (3, count_observations(2)) == (3, 18)
+    poses, rows = episode._poses[0], episode._rows
+    assert observed[:, 8:10] == pytest.approx(rows.velocities / (MAX_LINEAR_M_S, MAX_ANGULAR_RAD_S), abs=1e-6)
+    assert observed[:, 10:12] == pytest.approx(poses[:, :2] / (1.0, 0.5), abs=1e-6)
+    assert observed[:, 12:14] == pytest.approx(np.column_stack((np.cos(poses[:, 2]), np.sin(poses[:, 2]))), abs=1e-6)
+    for row, pose in enumerate(poses):
+        others = sorted((math.dist(pose[:2], other[:2]), index) for index, other in enumerate(poses) if index != row)
+        for column, (range_m, index) in enumerate(others):
+            shares = observed[row, 14 + 2 * column : 16 + 2 * column]
+            if range_m > 0.8:
+                assert shares.tolist() == [0.0, 0.0]
+                continue
+            bearing_rad = math.atan2(poses[index, 1] - pose[1], poses[index, 0] - pose[0]) - pose[2]
+            expected = range_m / 0.8 * np.array((math.cos(bearing_rad), math.sin(bearing_rad)))
+            assert shares == pytest.approx(expected, abs=1e-6)
+    assert observed[:, :8].min() >= 0.0 and observed[:, :8].max() == 1.0
