@@ -73,7 +73,7 @@ def connect(endpoint, attempts, token=TOKEN, uri="/foxglove", protocol="foxglove
     return connection.write_headers.call_args[0][0].code
 
 
-def test_clients_need_the_token_the_protocol_and_an_origin_that_is_admitted(topics):
+def test_clients_need_the_token_the_protocol_and_an_admitted_origin(topics):
     endpoint, attempts = FoxgloveEndpoint(topics.source, ["https://Studio.example"]), TokenAttempts()
     right = "/foxglove?token=" + TOKEN.replace(" ", "%20")
     for changes, status in (
