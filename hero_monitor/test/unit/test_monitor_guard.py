@@ -135,8 +135,7 @@ def test_programs_are_waited_for_together_at_the_end_and_their_robots_stopped(mo
 def test_the_master_is_asked_in_turn_and_missed_after_a_while(monkeypatch):
     clock, jobs = SimpleNamespace(now_s=100.0), []
     monkeypatch.setattr(master_link_module, "time", SimpleNamespace(monotonic=lambda: clock.now_s))
-    monkeypatch.setattr(master_link_module, "ask_master", lambda call: 7)
-    monkeypatch.setattr(master_link_module, "is_registered", lambda: True)
+    monkeypatch.setattr(master_link_module, "MasterWatch", lambda: SimpleNamespace(is_lost=False, look=lambda: ""))
     link = MasterLink(SimpleNamespace(submit=jobs.append))
     for after_s, asked, is_lost in ((0.0, 1, False), (0.7, 1, False), (0.55, 1, False), (0.1, 1, True)):
         clock.now_s += after_s
