@@ -36,8 +36,8 @@ GROUPS = {
 }
 PAGE_HEAD = """# Driver parameters
 
-Private parameters of the node `hero_driver`, read once at startup; in brackets: default, and what else is allowed. Floats
-in YAML need a point: `1.0e-4`, not `1e-4`. To change them, edit a copy of the file with the defaults:
+Private parameters of the node `hero_driver`, read once at startup; in brackets: default, and what else is allowed.
+Floats in YAML need a point: `1.0e-4`, not `1e-4`. To change them, edit a copy of the file with the defaults:
 
     cp $(rospack find hero_driver)/config/hero_driver.yaml my_driver.yaml
     roslaunch hero_bringup hero_bringup.launch config:=$PWD/my_driver.yaml
