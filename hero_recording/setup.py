@@ -3,4 +3,5 @@
 from catkin_pkg.python_setup import generate_distutils_setup
 from setuptools import setup
 
-setup(**generate_distutils_setup(packages=["hero_recording", "hero_recording.formats"], package_dir={"": "src"}))
+packages = ["hero_recording", "hero_recording.formats", "hero_recording.readers"]
+setup(**generate_distutils_setup(packages=packages, package_dir={"": "src"}))

@@ -16,6 +16,7 @@ SOCKET_OWNERS = (
     "hero_tools.checkup.network",
     "hero_monitor.serving.server",
     "hero_monitor.foxglove.endpoint",
+    "hero_monitor.live_view",
     "hero_monitor.program",
 )
 
@@ -31,7 +32,7 @@ ROOMS = {
     "hero_sim.world": SIM_GROUND,
     "hero_sim.robot": SIM_GROUND | {"world"},
     "hero_sim.link": SIM_GROUND,
-    "hero_sim.stepped": SIM_GROUND | {"world", "robot", "link", "population"},
+    "hero_sim.stepped": SIM_GROUND | {"world", "robot", "link", "population", "scene"},
     "hero_client.values": set(),
     "hero_client.controllers": {"values"},
     "hero_client.ros": {"values"},
@@ -46,7 +47,8 @@ ROOMS = {
     "hero_localization.mapping": {"errors", "filter"},
     "hero_localization.calibration": {"errors", "prints", "camera", "tracking", "filter"},
     "hero_localization.simulated_camera": {"errors", "prints"},
-    "hero_recording.formats": {"bags", "errors", "tables"},
+    "hero_recording.formats": {"bags", "errors", "optional", "tables", "topics"},
+    "hero_recording.readers": {"optional", "topics"},
     "hero_swarm.behaviors": {"behavior", "steering"},
     "hero_swarm.experiments": {"behavior", "behaviors", "metrics", "trial"},
     "hero_swarm.learning": {"behavior", "experiments", "metrics"},
@@ -60,6 +62,7 @@ PURE_ROOMS = (
     "hero_sim.population",
     "hero_sim.world",
     "hero_sim.robot",
+    "hero_sim.scene",
     "hero_sim.stepped",
     "hero_sim.swarm",  # moves both through simulated time
     "hero_client.values",

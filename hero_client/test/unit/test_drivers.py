@@ -5,6 +5,7 @@ import math
 import pytest
 
 from hero_client.ros.drivers import clean, find_drivers, merge
+from hero_client.values.robot_states import STATES, STOP_STATES
 from hero_msgs.msg import Robot, RobotArray
 
 
@@ -91,3 +92,10 @@ def test_a_clock_offset_that_cannot_be_shown_is_unknown(number):
 def test_usual_numbers_stay_what_they_are():
     (robot,) = clean(RobotArray(robots=[Robot(packets_per_s=1e9, bytes_per_s=4e4, clock_offset=-0.02)])).robots
     assert (robot.packets_per_s, robot.bytes_per_s, robot.clock_offset) == (1e9, 4e4, -0.02)
+
+
+def test_the_states_of_tables_are_those_of_the_messages():
+    names = ("JOINING", "READY", "AWAY", "REFUSED")
+    assert [STATES[getattr(Robot, name)] for name in names] == list(names)
+    names = ("NOT_STOPPED", "STOPPING", "AT_REST", "MOVING", "UNCONFIRMED")
+    assert [getattr(Robot, name) for name in names] == list(STOP_STATES)

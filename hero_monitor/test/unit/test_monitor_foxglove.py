@@ -120,13 +120,17 @@ def test_a_later_client_gets_latched_messages_too(hub):
     assert [content for *_, content in second.take()] == [b"new"]
 
 
-def test_latched_messages_are_forgotten_with_the_last_subscriber(hub):
-    first, second = Reader(hub), Reader(hub)
+def test_latched_messages_are_kept_until_the_topic_is_unsubscribed(hub):
+    first, second, third = Reader(hub), Reader(hub), Reader(hub)
     first.subscribe(1, "/pose")
     hub.deliver([make_message("/pose", b"old", latched_by="/a")])
     hub.remove(first.client)
-    second.subscribe(2, "/pose")
-    assert second.take() == []
+    second.subscribe(2, "/pose")  # before the source has heard that the topic is not wanted any more
+    assert [content for *_, content in second.take()] == [b"old"]
+    hub.remove(second.client)
+    hub.forget_latched()
+    third.subscribe(3, "/pose")
+    assert third.take() == []
 
 
 def test_a_slow_client_loses_the_oldest_and_others_lose_nothing(hub, monkeypatch):

@@ -1,26 +1,20 @@
 """Reads the messages of bag files in order of time; a file that cannot be read is refused in one line."""
 
 import os
-from typing import Any, Callable, Dict, List, NamedTuple, Sequence, Tuple
+from typing import Any, Callable, Dict, Iterable, List, Sequence, Tuple
 
-import rosbag
-from rosbag.bag import ROSBagUnindexedException
 from tqdm import tqdm
 
 from .errors import RecordingError, explain_bag_errors
-from .repair import ACTIVE_SUFFIX
-from .topics import Message
+from .topics import Message, RawMessage
 
+try:
+    from .readers.ros_reader import Reader
+except ImportError:  # a PC without ROS
+    from .readers.plain_reader import Reader  # type: ignore[assignment]
 
-class RawMessage(NamedTuple):
-    """A message as bytes, as it was recorded."""
-
-    topic: str
-    header: Dict[str, str]
-    """Of the connection: type, md5sum, message_definition; callerid and latching, if the publisher sent them."""
-    content: bytes
-    time_ns: int
-    """When the recorder received it, since 1970."""
+ACTIVE_SUFFIX = ".active"
+"""Of a file that is being written, or was not closed."""
 
 
 class BagSet:
@@ -39,12 +33,12 @@ class BagSet:
         spans: List[Tuple[float, float, str]] = []
         for path in {os.path.realpath(path): path for path in paths}.values():
             with open_bag(path, skip_index=True) as bag, explain_bag_errors("%s cannot be read" % path):
-                topics = bag.get_type_and_topic_info().topics
-                self._counts[path] = {topic: info.message_count for topic, info in topics.items()}
+                topics = bag.list_topics()
+                self._counts[path] = {topic: count for topic, (_, count) in topics.items()}
                 if not any(self._counts[path].values()):
                     continue  # rosbag opens the next file of a split before anything arrives for it
-                self.topics.update({topic: info.msg_type for topic, info in topics.items()})
-                spans.append((bag.get_start_time(), bag.get_end_time(), path))
+                self.topics.update({topic: message_type for topic, (message_type, _) in topics.items()})
+                spans.append((*bag.find_span(), path))
         if not spans:
             raise RecordingError("%s: no messages in it" % ", ".join(paths))
         self.paths = [path for _, _, path in sorted(spans)]
@@ -54,41 +48,33 @@ class BagSet:
     def read(self, is_wanted: Callable[[str, str], bool], receive: Callable[[Message], None]) -> None:
         """Pass every message whose topic and type is_wanted() accepts to receive. Raises: RecordingError."""
         wanted = [topic for topic, message_type in self.topics.items() if is_wanted(topic, message_type)]
-        if not wanted:
-            return
-
-        def decode(topic: str, content: Any, time: Any) -> None:
-            receive(Message(topic, content._type, content, time.to_sec()))
-
-        self._read(wanted, decode)
+        if wanted:
+            self._read(wanted, lambda bag: bag.read(wanted), receive)
 
     def read_raw(self, receive: Callable[[RawMessage], None]) -> None:
         """Pass every message of every topic to receive, without decoding it. Raises: RecordingError."""
+        topics = list(self.topics)
+        self._read(topics, lambda bag: bag.read_raw(topics), receive)
 
-        def pass_on(topic: str, raw: Any, time: Any, header: Dict[str, Any]) -> None:
-            texts = {name: value.decode() if isinstance(value, bytes) else value for name, value in header.items()}
-            receive(RawMessage(topic, texts, raw[1], time.to_nsec()))
-
-        self._read(list(self.topics), pass_on, raw=True, return_connection_header=True)
-
-    def _read(self, topics: Sequence[str], receive: Callable[..., None], **how: bool) -> None:
+    def _read(
+        self, topics: Sequence[str], read: Callable[[Reader], Iterable[Any]], receive: Callable[[Any], None]
+    ) -> None:
         for path in self.paths:
             total = sum(self._counts[path].get(topic, 0) for topic in topics)
             # receive() fails as well where a message definition in the bag is damaged.
             with open_bag(path) as bag, explain_bag_errors("%s cannot be read" % path):
-                messages = bag.read_messages(topics, **how)
                 # disable=None: no bar in a log.
                 for message in tqdm(
-                    messages, os.path.basename(path), total, unit=" messages", leave=False, disable=None
+                    read(bag), os.path.basename(path), total, unit=" messages", leave=False, disable=None
                 ):
-                    receive(*message)
+                    receive(message)
 
     def describe_topics(self) -> str:
         """Return some of the topics for an error message."""
         return ", ".join(sorted(self.topics)[:8]) or "none"
 
 
-def open_bag(path: str, skip_index: bool = False) -> rosbag.Bag:
+def open_bag(path: str, skip_index: bool = False) -> Reader:
     """Open a bag for reading. Raises: RecordingError with the remedy."""
     repair = "if it was cut off, repair it: rosrun hero_recording record --repair %s" % path
     if path.endswith(ACTIVE_SUFFIX):
@@ -97,8 +83,8 @@ def open_bag(path: str, skip_index: bool = False) -> rosbag.Bag:
         raise RecordingError("%s is a folder; name the bags in it: %s" % (path, os.path.join(path, "*.bag")))
     try:
         with explain_bag_errors("%s cannot be read" % path):
-            return rosbag.Bag(path, "r", skip_index=skip_index)
+            return Reader(path, skip_index)
     except RecordingError as error:
-        if isinstance(error.__cause__, ROSBagUnindexedException):
+        if type(error.__cause__).__name__ in Reader.unindexed:
             raise RecordingError("%s has no index, or a damaged one; %s" % (path, repair)) from error
         raise

@@ -3,10 +3,11 @@
 from contextlib import contextmanager
 from typing import Iterator
 
+from hero_node.errors import HeroError
 from hero_node.texts import make_printable
 
 
-class RecordingError(Exception):
+class RecordingError(HeroError):
     """A recording cannot be made or read; the text says why and what to do."""
 
 

@@ -26,9 +26,10 @@ from hero_node.parameters import robot_ids_option
 from hero_node.processes import end_process
 from hero_node.ros.master import ask_master, check_master
 
+from .bags import ACTIVE_SUFFIX
 from .disk_guard import MB, find_reason_to_stop, prepare_folder
 from .errors import RecordingError
-from .repair import ACTIVE_SUFFIX, repair_bag
+from .repair import repair_bag
 from .topics import make_patterns
 
 CHECK_PERIOD_S = 0.5

@@ -14,9 +14,9 @@ from typing import Optional
 import rosbag
 from tqdm import tqdm
 
+from .bags import ACTIVE_SUFFIX
 from .errors import RecordingError, explain_bag_errors
 
-ACTIVE_SUFFIX = ".active"
 CHUNK_MARK = b"\4\0\0\0op=\5"
 """In the header of each chunk (wiki.ros.org/Bags/Format/2.0)."""
 

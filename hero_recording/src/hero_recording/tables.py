@@ -8,7 +8,7 @@ import math
 from operator import attrgetter
 from typing import Any, Callable, Dict, List, Tuple
 
-from hero_client.ros.drivers import STATES
+from hero_client.values.robot_states import STATES
 from hero_node.geometry import yaw_of
 
 from . import topics
@@ -25,7 +25,9 @@ BEAMS = ("rear", "rear_right", "right", "front_right", "front", "front_left", "l
 
 
 def _read_stamp(content: Any) -> float:
-    return float(content.header.stamp.to_sec())
+    stamp = content.header.stamp
+    # rosbags decodes what was recorded under ROS 1 with the names of ROS 2.
+    return stamp.sec + stamp.nanosec / 1e9 if hasattr(stamp, "nanosec") else float(stamp.to_sec())
 
 
 def _range_reader(index: int) -> Callable[[Any], Any]:

@@ -4,7 +4,7 @@ The patterns are regular expressions: robots that join later are recorded too.
 """
 
 import re
-from typing import Any, List, NamedTuple, Optional, Sequence
+from typing import Any, Dict, List, NamedTuple, Optional, Sequence
 
 ODOMETRY = "odometry"
 GROUND_TRUTH = "ground_truth"
@@ -67,6 +67,17 @@ class Message(NamedTuple):
     type: str
     content: Any
     time_s: float
+    """When the recorder received it, since 1970."""
+
+
+class RawMessage(NamedTuple):
+    """A message as bytes, as it was recorded."""
+
+    topic: str
+    header: Dict[str, str]
+    """Of the connection: type, md5sum, message_definition; callerid and latching, if the publisher sent them."""
+    content: bytes
+    time_ns: int
     """When the recorder received it, since 1970."""
 
 

@@ -11,13 +11,14 @@ from geometry_msgs.msg import Point, TransformStamped
 from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Clock
 from tf2_msgs.msg import TFMessage
-from visualization_msgs.msg import Marker, MarkerArray
+from visualization_msgs.msg import MarkerArray
 
 from hero_msgs.msg import ObjectPose, ObjectPoses
 from hero_node.geometry import Pose
 
 from .robot.firmware import Firmware
-from .scene_markers import FRAME, draw_arena, draw_objects, draw_robot, rotate_about_z
+from .scene import FRAME, START_S, Shape, draw_arena, draw_objects, draw_robot
+from .scene_markers import make_markers, rotate_about_z
 from .simulator import Simulator
 
 __all__ = ["GroundTruth"]
@@ -25,9 +26,6 @@ __all__ = ["GroundTruth"]
 POSE_PERIOD_MS = 50
 MARKER_PERIOD_MS = 100
 """Simulated time between two publications."""
-
-CLOCK_START_S = 1600000000
-"""Initial time of /clock: late enough not to be taken for a robot's uptime."""
 
 
 class GroundTruth:
@@ -47,14 +45,14 @@ class GroundTruth:
             rospy.Publisher("/%s/ground_truth" % robot.name, Odometry, queue_size=2) for robot in self._swarm.robots
         ]
         self._odom_origins: List[Pose] = []
-        self._arena.publish(MarkerArray(draw_arena(self._swarm.world.arena)))
+        self._arena.publish(make_markers(draw_arena(self._swarm.world.arena)))
         self._swarm.after_step = self.publish
         self.publish(self._swarm.world.time_ms)
 
     def publish(self, time_ms: int) -> None:
         """Publish what is due at time_ms of the world."""
         if self._clock is not None:
-            stamp = rospy.Time(CLOCK_START_S + time_ms // 1000, time_ms % 1000 * 10**6)
+            stamp = rospy.Time(START_S + time_ms // 1000, time_ms % 1000 * 10**6)
             self._clock.publish(Clock(stamp))
         else:
             stamp = rospy.Time.now()
@@ -64,14 +62,12 @@ class GroundTruth:
                 self._publish_odom_frames(self._static, stamp)
             self._publish_objects(stamp)
         if time_ms % MARKER_PERIOD_MS == 0 and self._markers.get_num_connections():
-            markers: List[Marker] = []
+            shapes: List[Shape] = []
             for robot in self._swarm.robots:
                 light = robot.sensing.show_light(robot.to_millis(time_ms))
                 pose, radius_m = robot.body.true_pose, robot.model.radius_m
-                markers += draw_robot(robot.body.index, robot.name, pose, light, radius_m)
-            for marker in markers:
-                marker.header.stamp = stamp
-            self._markers.publish(MarkerArray(markers))
+                shapes += draw_robot(robot.body.index, robot.name, pose, light, radius_m)
+            self._markers.publish(make_markers(shapes, stamp))
 
     def _publish_poses(self, stamp: rospy.Time) -> None:
         watched = [index for index, publisher in enumerate(self._poses) if publisher.get_num_connections()]
@@ -100,7 +96,7 @@ class GroundTruth:
         self._objects.publish(message)
         if poses != self._drawn:
             self._drawn = poses
-            self._object_markers.publish(MarkerArray(draw_objects(self._swarm.world.list_objects())))
+            self._object_markers.publish(make_markers(draw_objects(self._swarm.world.list_objects())))
 
     def _publish_odom_frames(self, publisher: rospy.Publisher, stamp: rospy.Time) -> None:
         """Place each robot's odom frame in the world, anew whenever its odometry was set."""

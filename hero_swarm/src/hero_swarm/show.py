@@ -1,4 +1,4 @@
-"""Program show: replays one run of an experiment in RViz and on the monitor's map, or writes it as a video.
+"""Program show: replays one run of an experiment in RViz, on the monitor's map or in Foxglove, or writes it to a file.
 
 A run is computed again: seed and code give the same bytes, and nothing has to have been recorded.
 """
@@ -7,7 +7,9 @@ import argparse
 import json
 import os
 import sys
-from typing import Optional, Sequence
+from collections import deque
+from importlib import import_module
+from typing import Any, Optional, Sequence
 
 from hero_node import command_line
 from hero_node.errors import HeroError
@@ -28,7 +30,11 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--seed", type=int, help="of the run (the first one)")
     parser.add_argument("--cell", type=int, default=1, metavar="K", help="number of the cell, from 1 (1)")
     parser.add_argument("--speed", type=float, default=1.0, help="simulated seconds per second (1)")
-    parser.add_argument("--video", metavar="FILE", help="write an .mp4 or .gif instead, without ROS")
+    instead = parser.add_mutually_exclusive_group()
+    instead.add_argument("--video", metavar="FILE", help="write an .mp4 or .gif instead, without ROS")
+    instead.add_argument("--bag", metavar="FILE", help="write a bag instead, without ROS")
+    text = "show it in Foxglove instead, at ws://127.0.0.1:PORT/foxglove, without ROS (PORT: 8088)"
+    instead.add_argument("--foxglove", nargs="?", type=int, const=8088, metavar="PORT", help=text)
     return parser.parse_args(arguments)
 
 
@@ -37,6 +43,14 @@ def _choose_cell(experiment: Experiment, number: int) -> Cell:
         known = "; ".join("%d: %s" % item for item in enumerate((cell.label for cell in experiment.cells), 1))
         raise ExperimentError("--cell %d: must be one of %s" % (number, known))
     return experiment.cells[number - 1]
+
+
+def _find(module: str) -> Any:
+    """Import a module of a package that hero_swarm otherwise does without. Raises: ExperimentError."""
+    try:
+        return import_module(module)
+    except ImportError as error:
+        raise ExperimentError("%s cannot be used: %s; install the package" % (module, error)) from None
 
 
 def show_run(options: argparse.Namespace) -> None:
@@ -58,12 +72,21 @@ def show_run(options: argparse.Namespace) -> None:
     if code != hash_code(experiment.behavior):
         print("note: the results are of other code (%s), so this run may differ from theirs" % code, file=sys.stderr)
     trial = build_trial(experiment, cell, [seed])
+    robot_ids = range(trial.poses.shape[1])
     print("%s, seed %d, %g s" % (cell.label, seed, experiment.time_s))
     if options.video:
         from .experiments.video import write_video
 
         write_video(trial, experiment.time_s, options.speed, options.video)
         print(options.video)
+    elif options.bag:
+        with _find("hero_recording.step_recorder").StepRecorder(trial.rows, robot_ids, options.bag):
+            deque(trial.run(experiment.time_s), maxlen=0)
+        print(options.bag)
+    elif options.foxglove is not None:
+        with _find("hero_monitor.live_view").LiveView(trial.rows, robot_ids, options.foxglove, options.speed) as view:
+            print("Foxglove: ws://127.0.0.1:%d/foxglove" % view.port, flush=True)
+            deque(trial.run(experiment.time_s), maxlen=0)
     else:
         from .ros.replay import replay
 

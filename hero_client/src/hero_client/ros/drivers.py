@@ -20,6 +20,7 @@ from hero_msgs.msg import Robot, RobotArray
 from hero_node.errors import NodeError, ProgramError
 from hero_node.ros.master import ask_master
 
+from ..values.robot_states import STATES, STOP_STATES
 from .stop_status import TIME_LIMIT_S, DriverReply, StopRequest, StopStatus
 
 __all__ = ["STATES", "STOP_STATES", "USUAL_TOPIC", "Drivers", "share_drivers"]
@@ -41,16 +42,6 @@ SILENT_S = 2.5
 POLL_PERIOD_S = 0.02
 
 NAMES_SHOWN = 10
-
-STATES = {Robot.JOINING: "JOINING", Robot.READY: "READY", Robot.AWAY: "AWAY", Robot.REFUSED: "REFUSED"}
-STOP_STATES = {
-    Robot.NOT_STOPPED: "",
-    Robot.STOPPING: "stopping",
-    Robot.AT_REST: "at rest",
-    Robot.MOVING: "MOVING",
-    Robot.UNCONFIRMED: "unconfirmed",
-}
-"""As tables show them."""
 
 PREFERENCE = (Robot.READY, Robot.JOINING, Robot.AWAY)
 """If a robot has moved from one driver to another, the entry that counts."""

@@ -25,6 +25,7 @@ class TopicSource(NamedTuple):
 
     find_types: Callable[[], Dict[str, TopicType]]
     want: Callable[[Set[str]], bool]
+    """Takes the topics whose messages take() is to return; returns whether those, and no others, are received."""
     take: Callable[[], List[TopicMessage]]
 
 
@@ -150,6 +151,8 @@ class FoxgloveEndpoint:
 
     def _update(self) -> None:
         is_done = self._source.want(self.hub.wanted_topics)
+        if is_done:
+            self.hub.forget_latched()
         if self._sockets:
             self.hub.update_topics(self._source.find_types())
         elif is_done:

@@ -104,13 +104,13 @@ class Hub:
     def remove(self, client: Client) -> None:
         """Forget a client; safe twice."""
         self.clients.discard(client)
-        self._forget_latched()
 
     def update_topics(self, topics: Dict[str, TopicType]) -> None:
         """Offer the topics that appeared, and withdraw those that vanished or changed their type."""
         gone = [known for known in self._channels.values() if topics.get(known.topic) != (known.type, known.definition)]
         for channel in gone:
             del self._channels[channel.topic]
+            self._latched.pop(channel.topic, None)
             for client in self.clients:
                 kept = {number: known for number, known in client.subscriptions.items() if known is not channel}
                 client.subscriptions = kept
@@ -121,7 +121,6 @@ class Hub:
             self._next_id += 1
         if gone:
             self._tell_all(make_unadvertise(channel.id for channel in gone))
-            self._forget_latched()
         if new:
             self._tell_all(make_advertise(new))
 
@@ -143,7 +142,6 @@ class Hub:
         elif request.op == "unsubscribe":
             for number, _ in request.subscriptions:
                 client.subscriptions.pop(number, None)
-            self._forget_latched()
         elif self._publish is None:
             client.send_text(make_status(WARNING, NO_PUBLISHING))
         elif request.op == "advertise":
@@ -194,7 +192,7 @@ class Hub:
             for client, number in subscribers[message.topic]:
                 client.put(number, message)
 
-    def _forget_latched(self) -> None:
-        """Keep latched messages only while ROS sends new ones."""
+    def forget_latched(self) -> None:
+        """Keep latched messages only of topics that are wanted; those of others will come anew with the topic."""
         wanted = self.wanted_topics
         self._latched = {topic: kept for topic, kept in self._latched.items() if topic in wanted}

@@ -5,9 +5,10 @@ import io
 from pathlib import Path
 from typing import Any, Dict, Tuple
 
-from ..bags import BagSet, RawMessage
+from ..bags import BagSet
 from ..errors import RecordingError, explain_write_errors
-from .optional import import_optional
+from ..optional import import_optional
+from ..topics import RawMessage
 
 
 def write_mcap(bags: BagSet, path: str) -> int:

@@ -10,8 +10,8 @@ from typing import Any, Callable, Dict, List, Tuple
 import numpy as np
 
 from ..errors import explain_write_errors
+from ..optional import import_optional
 from ..tables import TABLES, TEXT_COLUMNS, Row
-from .optional import import_optional
 
 BATCH_ROWS = 4096
 """Buffered rows of a table: 8 numbers take some 0.8 MB."""

@@ -5,7 +5,8 @@ from visualization_msgs.msg import MarkerArray
 
 from hero_client import Program
 from hero_node.geometry import Pose
-from hero_sim.scene_markers import draw_arena, draw_objects, draw_robot
+from hero_sim.scene import draw_arena, draw_objects, draw_robot
+from hero_sim.scene_markers import make_markers
 
 from ..trial import Trial
 
@@ -22,9 +23,9 @@ def replay(trial: Trial, time_s: float, speed: float) -> None:
             for name in ("arena", "object_markers", "markers")
         )
         world = trial.rows.world
-        arena.publish(MarkerArray(draw_arena(world.arena)))
+        arena.publish(make_markers(draw_arena(world.arena)))
         for (_, poses), _ in zip(trial.run(time_s, PERIOD_S * speed), program.rate(1.0 / PERIOD_S)):
             lights = trial.rows.lights.tolist()
             drawn = [draw_robot(n, "hero_%d" % n, Pose(*pose), lights[n]) for n, pose in enumerate(poses[0].tolist())]
-            robots.publish(MarkerArray([marker for markers in drawn for marker in markers]))
-            objects.publish(MarkerArray(draw_objects(world.list_objects())))
+            robots.publish(make_markers(shape for shapes in drawn for shape in shapes))
+            objects.publish(make_markers(draw_objects(world.list_objects())))

@@ -1,10 +1,10 @@
-"""Imports libraries that only one format needs."""
+"""Imports libraries that not everyone needs."""
 
 import importlib
 import sys
 from types import ModuleType
 
-from ..errors import RecordingError
+from .errors import RecordingError
 
 
 def import_optional(module: str, requirement: str) -> ModuleType:
@@ -13,6 +13,6 @@ def import_optional(module: str, requirement: str) -> ModuleType:
         return importlib.import_module(module)
     except ImportError as error:
         raise RecordingError(
-            "this format needs the Python package %s (%s): %s -m pip install '%s'"
+            "this needs the Python package %s (%s): %s -m pip install '%s'"
             % (requirement, error, sys.executable, requirement)
         ) from None

@@ -1,0 +1,146 @@
+"""Shows stepped robots live in Foxglove, Lichtblick or PlotJuggler, without ROS and without a page.
+
+    with StepSwarm(5) as swarm, LiveView(swarm.rows, range(5)):
+        ...  # open ws://127.0.0.1:8088/foxglove
+
+Simulated time is slowed down to real time meanwhile. The server runs in a thread of its own.
+"""
+
+import asyncio
+import threading
+import time
+from collections import deque
+from typing import Any, Deque, Dict, List, Optional, Sequence, Set
+
+import tornado.httpserver
+import tornado.ioloop
+import tornado.netutil
+import tornado.web
+
+from hero_node.errors import ProgramError
+from hero_sim.stepped.robot_rows import RobotRows
+from hero_sim.stepped.ros_messages import MessageType
+from hero_sim.stepped.topics import LATCHED, StepTopics
+
+from .foxglove.endpoint import FoxgloveEndpoint, TopicSource
+from .foxglove.hub import TopicMessage, TopicType
+from .serving.access import Access
+from .serving.connection_limits import CONNECTIONS_MAX, ConnectionLimits, TokenAttempts
+from .serving.server import ignore_request
+
+__all__ = ["LiveView"]
+
+WAITING_MAX = 20_000
+"""Messages between two turns of the server; the oldest are dropped."""
+
+_sleep, _monotonic = time.sleep, time.monotonic  # hero_sim.in_process replaces those of scripts
+
+
+class LiveView:
+    """A Foxglove endpoint on this PC that shows robots until it is closed.
+
+    Attributes:
+        port: on which it listens.
+    """
+
+    def __init__(
+        self,
+        rows: RobotRows,
+        robot_ids: Sequence[int],
+        port: int = 8088,
+        speed: float = 1.0,
+        origins: Sequence[str] = (),
+    ) -> None:
+        """Listen; robots are those of the first world.
+
+        port: 0 for any that is free. speed: simulated seconds per second. origins: of web pages that may connect.
+        Raises: ProgramError if the port is taken.
+        """
+        self._rows = rows
+        self._speed = speed
+        self._origins = list(origins)
+        self._wanted: Set[str] = set()
+        self._waiting: Deque[TopicMessage] = deque(maxlen=WAITING_MAX)
+        self._latched: Dict[str, TopicMessage] = {}
+        self._topics = StepTopics(rows, robot_ids, self._receive)
+        self._types = {name: TopicType(kind.name, kind.definition) for name, kind in self._topics.types.items()}
+        self._loop: Any = None
+        self._error: Optional[OSError] = None
+        self.port = port
+        self._start_s = _monotonic() - rows.now_ms / 1000.0 / speed
+        is_ready = threading.Event()
+        self._thread = threading.Thread(target=self._serve, args=(port, is_ready), name="live view", daemon=True)
+        self._thread.start()
+        is_ready.wait()
+        if self._error is not None:
+            self._topics.close()
+            raise ProgramError("cannot listen on port %d: %s; choose another" % (port, self._error.strerror))
+        rows.on_cycle.append(self._pace)
+
+    def __enter__(self) -> "LiveView":
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Disconnect viewers, and let simulated time pass as fast as it can; safe twice."""
+        if self._thread.is_alive():
+            self._topics.close()
+            self._rows.on_cycle.remove(self._pace)
+            self._loop.add_callback(self._loop.stop)
+            self._thread.join()
+
+    def _pace(self, rows: Any) -> None:
+        """Wait until real time has come as far; a program that was slower does not catch up."""
+        del rows
+        due_s = self._start_s + self._rows.now_ms / 1000.0 / self._speed
+        ahead_s = due_s - _monotonic()
+        if ahead_s > 0.0:
+            _sleep(ahead_s)
+        else:
+            self._start_s -= ahead_s
+
+    def _receive(self, topic: str, kind: MessageType, content: bytes, time_ns: int) -> None:
+        """Keep a message that a viewer shows (the program's thread)."""
+        del kind
+        message = TopicMessage(topic, content, time_ns, "hero_sim" if topic in LATCHED else "")
+        if topic in LATCHED:
+            self._latched[topic] = message
+        elif topic in self._wanted:
+            self._waiting.append(message)
+
+    def _serve(self, port: int, is_ready: threading.Event) -> None:
+        asyncio.set_event_loop(asyncio.new_event_loop())
+        self._loop = tornado.ioloop.IOLoop.current()
+        endpoint = FoxgloveEndpoint(TopicSource(lambda: self._types, self._want, self._take), self._origins)
+        shared = {"access": Access(None, ()), "limits": ConnectionLimits(CONNECTIONS_MAX), "attempts": TokenAttempts()}
+        route = endpoint.route
+        application = tornado.web.Application(
+            [(route.pattern, route.handler, {**shared, **route.values})], log_function=ignore_request
+        )
+        server = tornado.httpserver.HTTPServer(application)
+        try:
+            sockets = tornado.netutil.bind_sockets(port, "127.0.0.1")
+            self.port = sockets[0].getsockname()[1]
+            server.add_sockets(sockets)
+        except OSError as error:
+            self._error = error
+            return
+        finally:
+            is_ready.set()
+        self._loop.start()
+        endpoint.close()
+        server.stop()
+        self._loop.close()
+
+    def _want(self, topics: Set[str]) -> bool:
+        for topic in topics - self._wanted:
+            if topic in self._latched:
+                self._waiting.append(self._latched[topic])
+        self._wanted = topics
+        return True
+
+    def _take(self) -> List[TopicMessage]:
+        return [self._waiting.popleft() for _ in range(len(self._waiting))]
+

@@ -1,0 +1,47 @@
+"""Reads a bag with ROS's rosbag."""
+
+from typing import Any, Dict, Iterator, Sequence, Tuple
+
+import rosbag
+
+from ..topics import Message, RawMessage
+
+
+class Reader:
+    """One open bag; a context manager.
+
+    Attributes:
+        unindexed: names of the errors that a bag without index raises.
+    """
+
+    unindexed = ("ROSBagUnindexedException",)
+
+    def __init__(self, path: str, skip_index: bool = False) -> None:
+        """Open the file; skip_index: only to list topics. Raises: whatever rosbag does."""
+        self._bag = rosbag.Bag(path, "r", skip_index=skip_index)
+
+    def __enter__(self) -> "Reader":
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        self._bag.close()
+
+    def list_topics(self) -> Dict[str, Tuple[str, int]]:
+        """Return the type of every topic, and the number of its messages."""
+        topics = self._bag.get_type_and_topic_info().topics
+        return {topic: (info.msg_type, info.message_count) for topic, info in topics.items()}
+
+    def find_span(self) -> Tuple[float, float]:
+        """Return the times of the first and the last message, seconds since 1970."""
+        return self._bag.get_start_time(), self._bag.get_end_time()
+
+    def read(self, topics: Sequence[str]) -> Iterator[Message]:
+        """Yield messages in order of time."""
+        for topic, content, time in self._bag.read_messages(topics):
+            yield Message(topic, content._type, content, time.to_sec())
+
+    def read_raw(self, topics: Sequence[str]) -> Iterator[RawMessage]:
+        """Yield messages in order of time, without decoding them."""
+        for topic, raw, time, header in self._bag.read_messages(topics, raw=True, return_connection_header=True):
+            texts = {name: value.decode() if isinstance(value, bytes) else value for name, value in header.items()}
+            yield RawMessage(topic, texts, raw[1], time.to_nsec())

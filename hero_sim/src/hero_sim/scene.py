@@ -1,0 +1,91 @@
+"""Shapes of the simulated world as viewers draw them: arena, objects and robots, in the frame `world`. Pure."""
+
+import math
+from typing import List, NamedTuple, Sequence, Tuple
+
+from hero_node.geometry import Pose
+
+from .robot_constants import BODY_RADIUS_M
+from .world.arena import Arena
+from .world.pushing.shapes import Body, Disc
+
+__all__ = ["FRAME", "START_S", "Shape", "draw_arena", "draw_objects", "draw_robot"]
+
+FRAME = "world"
+
+START_S = 1600000000
+"""Stamp of simulated second 0: late enough not to be taken for a robot's uptime."""
+
+ARROW, CUBE, CYLINDER, TEXT = 0, 1, 3, 9
+"""Types of visualization_msgs/Marker."""
+
+BODY_HEIGHT_M = 0.045
+WALL_HEIGHT_M = 0.05
+_WALL_THICKNESS_M = 0.005
+
+Color = Tuple[float, float, float, float]
+"""Red, green, blue, alpha, each 0..1."""
+
+_WALL_COLOR = (0.6, 0.6, 0.6, 1.0)
+_OBJECT_COLOR = (0.8, 0.5, 0.2, 1.0)
+_DARK_COLOR = (0.15, 0.15, 0.15, 1.0)
+_NOSE_COLOR = (1.0, 1.0, 1.0, 1.0)
+
+
+class Shape(NamedTuple):
+    """One visualization_msgs/Marker: namespace and number together name it; pose and z_m are those of its middle."""
+
+    namespace: str
+    number: int
+    kind: int
+    color: Color
+    pose: Pose
+    z_m: float
+    size_m: Tuple[float, float, float]
+    text: str = ""
+
+
+def draw_robot(
+    index: int, name: str, pose: Pose, light: Sequence[float], radius_m: float = BODY_RADIUS_M
+) -> List[Shape]:
+    """Return a robot with its heading and name; light: red green blue alpha, dark if it is off."""
+    red, green, blue, alpha = light
+    color = (red, green, blue, 1.0) if alpha > 0.0 and max(red, green, blue) > 0.0 else _DARK_COLOR
+    body_m = (2.0 * radius_m, 2.0 * radius_m, BODY_HEIGHT_M)
+    nose_m = (BODY_RADIUS_M, 0.008, 0.004)
+    return [
+        Shape("robots", index, CYLINDER, color, pose, BODY_HEIGHT_M / 2.0, body_m),
+        Shape("headings", index, ARROW, _NOSE_COLOR, pose, BODY_HEIGHT_M + 0.002, nose_m),
+        Shape("names", index, TEXT, _NOSE_COLOR, pose, BODY_HEIGHT_M + 0.04, (0.0, 0.0, 0.03), name),
+    ]
+
+
+def draw_objects(bodies: Sequence[Body]) -> List[Shape]:
+    """Return discs, and the edges of polygons, where they are."""
+    shapes: List[Shape] = []
+    for body in bodies:
+        if isinstance(body.shape, Disc):
+            circle = (body.x_m, body.y_m, body.shape.reach_m)
+            shapes.append(_draw_circle("objects", len(shapes), circle, _OBJECT_COLOR))
+        for start_m, end_m in zip(body.corners_m, [*body.corners_m[1:], *body.corners_m[:1]]):
+            shapes.append(_draw_wall("objects", len(shapes), (*start_m, *end_m), _OBJECT_COLOR))
+    return shapes
+
+
+def draw_arena(arena: Arena) -> List[Shape]:
+    """Return walls and obstacles."""
+    walls = [_draw_wall("walls", *item, _WALL_COLOR) for item in enumerate(arena.segments_m.tolist())]
+    return walls + [_draw_circle("obstacles", *item, _WALL_COLOR) for item in enumerate(arena.circles_m.tolist())]
+
+
+def _draw_wall(namespace: str, number: int, ends_m: Sequence[float], color: Color) -> Shape:
+    x1_m, y1_m, x2_m, y2_m = ends_m
+    middle = Pose((x1_m + x2_m) / 2.0, (y1_m + y2_m) / 2.0, math.atan2(y2_m - y1_m, x2_m - x1_m))
+    size_m = (math.hypot(x2_m - x1_m, y2_m - y1_m) + _WALL_THICKNESS_M, _WALL_THICKNESS_M, WALL_HEIGHT_M)
+    return Shape(namespace, number, CUBE, color, middle, WALL_HEIGHT_M / 2.0, size_m)
+
+
+def _draw_circle(namespace: str, number: int, circle_m: Sequence[float], color: Color) -> Shape:
+    x_m, y_m, radius_m = circle_m
+    size_m = (2.0 * radius_m, 2.0 * radius_m, WALL_HEIGHT_M)
+    return Shape(namespace, number, CYLINDER, color, Pose(x_m, y_m, 0.0), WALL_HEIGHT_M / 2.0, size_m)
