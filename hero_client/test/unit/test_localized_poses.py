@@ -66,3 +66,10 @@ def test_nothing_that_localizes_is_named():
 def test_an_old_or_uncertain_pose_is_an_error_with_its_cause(robot, now_s, text):
     with pytest.raises(StaleDataError, match=text):
         receive(robot).find(3, now_s)
+
+
+def test_the_age_of_a_pose_is_that_of_its_stamp_and_of_the_silence_since():
+    poses = receive(make_pose(3, age_s=0.03))
+    assert poses.age_s(3, 7.1) == pytest.approx(0.13)
+    assert poses.age_s(0, 7.1) == math.inf
+    assert LocalizedPoses().age_s(3, 7.1) == math.inf

@@ -1,5 +1,6 @@
 """Where robots are by hero_localization's program localize: one subscription for all robots of a program."""
 
+import math
 import threading
 import time
 from functools import lru_cache
@@ -76,8 +77,7 @@ class LocalizedPoses:
                 "the pose of %s in the frame %s is old: no message on %s for %.1f s: does localize still run?"
                 % (name, report.frame, TOPIC, silent_s)
             )
-        # Both stamps are of the clock of localize, which need not agree with that of this machine.
-        age_s = silent_s + report.sent_s - robot.stamp.to_sec()
+        age_s = self.age_s(robot_id, now_s)
         if age_s > FRESH_S:
             raise StaleDataError(
                 "the pose of %s in the frame %s is %.1f s old, as is its odometry: is the robot on and in reach?"
@@ -89,6 +89,15 @@ class LocalizedPoses:
                 " view?" % (name, report.frame, 1e3 * robot.position_sd)
             )
         return pose
+
+
+    def age_s(self, robot_id: int, now_s: float) -> float:
+        """Return how old the pose of a robot is; inf if it has none."""
+        report = self._newest
+        if report is None or robot_id not in report.robots:
+            return math.inf
+        # Both stamps are of the clock of localize, which need not agree with that of this machine.
+        return now_s - report.arrived_s + report.sent_s - report.robots[robot_id].stamp.to_sec()
 
 
 class PoseListener:
@@ -121,6 +130,12 @@ class PoseListener:
                     if time.monotonic() >= deadline_s or rospy.is_shutdown():
                         raise
             time.sleep(POLL_PERIOD_S)
+
+
+    def age_s(self, robot_id: int) -> float:
+        """Return how old the pose of a robot is; inf if it has none."""
+        with self._lock:
+            return self._poses.age_s(robot_id, time.monotonic())
 
 
 def _is_published(topic: str) -> bool:

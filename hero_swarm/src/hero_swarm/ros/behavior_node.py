@@ -56,7 +56,7 @@ class BehaviorNode:
         self._behavior = _make_behavior(parameters["behavior"])
         self._frame = parameters["frame"]
         ids = [robot.robot_id for robot in swarm]
-        self._source = PoseSource(ids, self._frame, parameters["poses_topic"])
+        self._source = PoseSource(ids, self._frame)
         are_needed = any(isinstance(sensor, Objects) for sensor in self._behavior.sensors().values())
         topic, radius_m = parameters["objects_topic"], parameters["object_radius_m"]
         self._objects = ObjectSource(self._frame, topic, radius_m, are_needed)
@@ -94,7 +94,7 @@ class BehaviorNode:
         self._show_colors()
         if time.monotonic() >= self._next_report_s and not known.all():
             self._next_report_s = time.monotonic() + REPORT_PERIOD_S
-            rospy.logwarn(self._objects.describe_missing() or self._source.describe_missing(poses))
+            rospy.logwarn(self._objects.describe_missing() or self._source.describe_missing())
         if time.monotonic() >= self._next_show_s and known.all():
             last_s, last = self._last or (now_s - SHOW_PERIOD_S, poses)
             velocities = (poses - last) / max(now_s - last_s, 1e-3)
@@ -120,7 +120,6 @@ PARAMETERS = {
     "behavior": words("aggregation", "a built-in behavior, FILE.py, or FILE.py:Class"),
     "robots": robot_ids("all", "ids; all: those that have joined a driver"),
     "frame": words("map", "frame of the poses: that of localize, or `world` for the simulator's ground truth"),
-    "poses_topic": words("/localization/poses", "hero_msgs/RobotPoses of `localize`"),
     "objects_topic": words("", "hero_msgs/ObjectPoses; empty: of hero_sim for the frame world, of track else"),
     "object_radius_m": number(0.05, 0.001, 5.0, "m", "of the circle around an object"),
     "safety": choice("off", MODES, "safety filter: off, fence, or fence and robots"),

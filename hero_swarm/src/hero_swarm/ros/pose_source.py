@@ -1,6 +1,5 @@
 """Poses of all robots in one frame as arrays: from localize, or the ground truth of the simulator."""
 
-import threading
 from functools import partial
 from typing import Dict, List, Sequence, Tuple
 
@@ -8,10 +7,11 @@ import numpy as np
 import rospy
 from nav_msgs.msg import Odometry
 
-from hero_client.ros.localized_poses import MAX_POSITION_SD_M
+from hero_client.ros.localized_poses import share_poses
+from hero_client.values.errors import FrameError, StaleDataError
 from hero_client.values.object_sensing import NO_OBJECTS, Things
-from hero_msgs.msg import ObjectPoses, RobotPose, RobotPoses
-from hero_node.geometry import yaw_of
+from hero_msgs.msg import ObjectPoses
+from hero_node.geometry import Pose, yaw_of
 
 __all__ = ["SIMULATOR_FRAME", "ObjectSource", "PoseSource"]
 
@@ -25,56 +25,54 @@ MAX_AGE_S = 0.5
 class PoseSource:
     """The newest pose of each robot."""
 
-    def __init__(self, robot_ids: Sequence[int], frame: str, poses_topic: str) -> None:
+    def __init__(self, robot_ids: Sequence[int], frame: str) -> None:
         """Subscribe to the poses of these robots in frame."""
         self._ids = list(robot_ids)
         self._frame = frame
-        self._lock = threading.Lock()
-        self._newest: Dict[int, Tuple[float, Tuple[float, float, float]]] = {}
-        self._subscribers: List[rospy.Subscriber] = []
+        self._true: Dict[int, Tuple[Pose, float]] = {}
+        self._missing: List[str] = []
         if frame == SIMULATOR_FRAME:
             for robot_id in self._ids:
                 topic, receive = "/hero_%d/ground_truth" % robot_id, partial(self._receive_truth, robot_id)
-                self._subscribers.append(rospy.Subscriber(topic, Odometry, receive, queue_size=1, tcp_nodelay=True))
+                rospy.Subscriber(topic, Odometry, receive, queue_size=1, tcp_nodelay=True)
         else:
-            self._subscribers.append(
-                rospy.Subscriber(poses_topic, RobotPoses, self._receive_report, queue_size=1, tcp_nodelay=True)
-            )
+            share_poses()  # subscribes
 
     def _receive_truth(self, robot_id: int, message: Odometry) -> None:
-        pose = message.pose.pose
-        with self._lock:
-            found = (pose.position.x, pose.position.y, yaw_of(pose.orientation))
-            self._newest[robot_id] = (message.header.stamp.to_sec(), found)
-
-    def _receive_report(self, report: RobotPoses) -> None:
-        if report.header.frame_id != self._frame:
-            return
-        with self._lock:
-            for robot in report.robots:
-                if robot.state != RobotPose.UNKNOWN and robot.position_sd <= MAX_POSITION_SD_M:
-                    self._newest[robot.id] = (robot.stamp.to_sec(), (robot.x, robot.y, robot.yaw))
+        place, yaw_rad = message.pose.pose.position, yaw_of(message.pose.pose.orientation)
+        self._true[robot_id] = Pose(place.x, place.y, yaw_rad), message.header.stamp.to_sec()
 
     def read(self) -> Tuple[np.ndarray, np.ndarray]:
         """Return the poses (N, 3), NaN for those that are not known or too old, and their ages in s (N,)."""
         poses, ages_s = np.full((len(self._ids), 3), np.nan), np.full(len(self._ids), np.inf)
-        now_s = rospy.get_time()
-        with self._lock:
-            for row, robot_id in enumerate(self._ids):
-                stamp_s, pose = self._newest.get(robot_id, (-np.inf, (np.nan, np.nan, np.nan)))
-                ages_s[row] = now_s - stamp_s
-                if -MAX_AGE_S < ages_s[row] <= MAX_AGE_S:
-                    poses[row] = pose
+        self._missing = []
+        for row, robot_id in enumerate(self._ids):
+            try:
+                poses[row], ages_s[row] = self._find(robot_id)
+            except (FrameError, StaleDataError) as error:
+                self._missing.append(str(error))
         return poses, ages_s
 
-    def describe_missing(self, poses: np.ndarray) -> str:
-        """Return which robots have no pose, and why, for users; empty if all have one."""
-        missing = [robot_id for robot_id, pose in zip(self._ids, poses) if not np.isfinite(pose).all()]
-        if not missing:
-            return ""
-        names = ", ".join("hero_%d" % robot_id for robot_id in missing[:8]) + (", ..." if len(missing) > 8 else "")
-        source = "the simulator" if self._frame == SIMULATOR_FRAME else "localize"
-        return "no pose of %s in the frame %s: does %s run? They are stopped meanwhile" % (names, self._frame, source)
+    def _find(self, robot_id: int) -> Tuple[Pose, float]:
+        """Return a robot's pose and its age in s. Raises: FrameError or StaleDataError with why it is not known."""
+        name = "hero_%d" % robot_id
+        if self._frame == SIMULATOR_FRAME:
+            pose, stamp_s = self._true.get(robot_id, (None, -np.inf))
+            age_s = rospy.get_time() - stamp_s
+        else:
+            pose = share_poses().find(robot_id, self._frame, timeout_s=0.0)
+            age_s = share_poses().age_s(robot_id)
+        if pose is None:
+            source = "the simulator" if self._frame == SIMULATOR_FRAME else "localize"
+            raise FrameError("%s has no pose in the frame %s: does %s run?" % (name, self._frame, source))
+        if not -MAX_AGE_S < age_s <= MAX_AGE_S:
+            raise StaleDataError("the pose of %s in the frame %s is %.1f s old" % (name, self._frame, age_s))
+        return pose, age_s
+
+    def describe_missing(self) -> str:
+        """Return why the last read() lacks poses, for users; empty if all are known."""
+        more = " (and %d more robots)" % (len(self._missing) - 1) if len(self._missing) > 1 else ""
+        return "%s%s; they are stopped meanwhile" % (self._missing[0], more) if self._missing else ""
 
 
 class ObjectSource:
