@@ -287,6 +287,35 @@ class TestSpeedResponse:
         with pytest.raises(CalibrationError, match="no encoder readings came"):
             step_response.find_start(make_readings(stamps_s[:0], ticks[:0]), 10.0)
 
+    def test_a_speed_belongs_to_the_middle_between_its_readings(self):
+        stamps_s = 9.0 + 0.034 * np.arange(80)
+        ticks = 0.5 * np.arange(80.0)
+        times_s, speeds_m_s = step_response.measure_speed(make_readings(stamps_s, ticks), ticks, 30, 12.0)
+        assert times_s[:2] == pytest.approx([-2 * 0.034 + 0.051, -0.034 + 0.051])  # from 0.1 s before the start on
+        assert times_s[-1] <= step_response.STEP_S - 0.1 - 0.051 < times_s[-1] + 0.034
+        assert speeds_m_s == pytest.approx(0.5 * TICK_M / 0.034)
+
+    def test_the_response_is_the_mean_of_both_directions(self):
+        times_s, target = np.array([-0.1, 0.0, 0.1, 0.2]), step_response.STEP_M_S
+        quick, slow = np.array([0.0, 1.0, 0.9, 1.2]), np.array([0.0, 0.5, 0.5, 0.8])
+        response = step_response.evaluate_response([(times_s, target * quick), (times_s, target * slow)])
+        assert response.mean_error == pytest.approx((0.3 / 3 + 1.2 / 3) / 2)
+        assert response.overshoot == pytest.approx(0.2 / 2)
+        assert response.reached_s == pytest.approx((0.0 + step_response.STEP_S) / 2)
+        assert response.score == pytest.approx(response.mean_error + 0.3 * response.overshoot)
+
+    def test_gains_are_scaled_to_the_servo_and_limited(self):
+        for gain_m_s_us, scale in ((step_response.NOMINAL_GAIN_M_S_US, 1.0), (1e-9, 2.0), (1.0, 0.5)):
+            search, tried = step_response.GainSearch(gain_m_s_us), []
+            for number in range(search.count_rounds()):
+                tried.append(search.next_gains())
+                search.receive(step_response.Response(1.0 - 0.1 * (number == 2), 0.0, 0.3, ()))
+            assert tried[0] == step_response.DEFAULT_GAINS
+            assert tried[1:4] == [(650.0 * scale, integral * scale, 0.1) for integral in (4000.0, 6000.0, 8500.0)]
+            assert tried[4:] == [(first * scale, 6000.0 * scale, 0.1) for first in (400.0, 900.0, 1400.0)]
+            with pytest.raises(IndexError):
+                search.next_gains()
+
     def test_the_search_finds_the_best_gains_within_range(self):
         search = step_response.GainSearch(servo_gain_m_s_us=1e-9)
 

@@ -119,6 +119,39 @@ def test_a_wrong_file_is_refused_with_file_key_and_value(change, words, tmp_path
     assert str(caught.value).startswith(str(path)) and str(caught.value).isprintable()
 
 
+def test_numbers_at_their_limits_are_taken_and_beyond_them_refused(tmp_path):
+    path = tmp_path / "hero_3.yaml"
+    limits = {
+        "motor_centers_us": (2, 1200, 1800),
+        "velocity_gains": (6, 0, 100000),
+        "infrared_counts_m2": (8, 0.001, 100),
+        "wheels_m": (3, 0.01, 1),
+        "dead_zones_us": (4, 0, 3000),
+        "velocity_errors": (2, 0, 100),
+        "range_errors_before_m": (8, -10, 10),
+        "range_errors_after_m": (8, -10, 10),
+    }
+    assert set(limits) == {*store.SETTINGS, *store.RESULTS}
+    for key, (count, low, high) in limits.items():
+        for number, allowed in ((low, True), (high, True), (low - 1e-6, False), (high + 1e-6, False)):
+            path.write_text("robot: hero_3\n%s: %s\n" % (key, [number] * count))
+            if allowed:
+                assert store.load(str(path)).values[key] == [number] * count
+            else:
+                with pytest.raises(CalibrationError, match=key + " must be"):
+                    store.load(str(path))
+
+
+def test_files_of_robots_are_listed_and_a_folder_that_cannot_be_is_named(tmp_path):
+    for name in ("hero_1.yaml", "hero_0.yaml", "hero_0.previous.yaml", "notes.txt"):
+        (tmp_path / name).write_text("")
+    assert [os.path.basename(path) for path in store.list_files(str(tmp_path))] == ["hero_0.yaml", "hero_1.yaml"]
+    assert store.list_files(str(tmp_path / "nothing")) == []
+    store.make_folder(str(tmp_path))
+    with pytest.raises(CalibrationError, match="notes.txt/hero cannot be created: Not a directory"):
+        store.make_folder(str(tmp_path / "notes.txt" / "hero"))
+
+
 def test_a_date_cannot_draw_on_the_terminal(tmp_path):
     (tmp_path / "hero_3.yaml").write_text('robot: hero_3\ndate: "\\e[2J"\n')
     assert store.load(str(tmp_path / "hero_3.yaml")).date.isprintable()
