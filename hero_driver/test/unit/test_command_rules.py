@@ -202,7 +202,7 @@ def test_the_light_is_remembered_by_its_topic_and_length(bench):
     assert bench.commands.light == color and bench.commands.refused == 1
 
 
-def test_speeds_are_clamped_in_both_directions_and_requests_end_at_their_limits():
+def test_speeds_are_clamped_both_ways_and_requests_end_at_their_limits():
     for linear_m_s, angular_rad_s, expected in (
         (0.1, -9.0, (0.1, -8.0)),
         (-0.3, 1.0, (-0.2, 1.0)),
@@ -238,7 +238,7 @@ def test_odometry_that_is_written_lies_in_the_plane_and_counts_round():
     assert numbers[43:49] == (0.1, 0.0, 0.0, 0.0, 0.0, 0.5) and sum(numbers[49:]) == 42.0
 
 
-def test_ticks_are_believed_up_to_the_speed_of_a_wheel_and_a_pause_of_ten_seconds():
+def test_ticks_are_believed_up_to_the_speed_of_a_wheel_in_ten_seconds():
     tick_m = WheelGeometry().ticks_m[0]
     for pause_s, limit_s in (
         (0.034, MIN_GAP_S),

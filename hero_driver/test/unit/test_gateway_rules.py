@@ -4,8 +4,7 @@ import struct
 from types import SimpleNamespace
 
 import pytest
-from fake_robot import STOCK_DECLARATIONS, FakeRobot
-from test_gateway import HELLO, HOST, OTHER_HOST, PUBLISHED, FakeLink
+from test_gateway import HELLO, HOST, OTHER_HOST, PUBLISHED, STOCK_DECLARATIONS, FakeLink, FakeRobot
 
 from hero_driver import gateway as gateway_module
 from hero_driver import stop_delivery
@@ -213,7 +212,7 @@ def test_a_duplicate_is_named_kept_and_let_in_when_its_place_is_free(driver):
     assert driver.gateway.bridges == {} and driver.list_rows() == []
 
 
-def test_a_robot_that_comes_again_has_its_topics_and_counts_anew_after_a_reboot(driver, monkeypatch):
+def test_a_robot_that_comes_again_keeps_its_topics(driver, monkeypatch):
     driver.join()
     bridge = driver.gateway.bridges["/hero_0"]
     restarts = []
