@@ -116,7 +116,7 @@ def test_old_commands_and_those_to_stopped_robots_move_nothing(bench):
     assert bench.take() == [] and bench.commands.refused == 4 and bench.commands.queue.cleared == 1
 
 
-def test_two_programs_that_take_turns_are_named_and_one_that_follows_is_not(bench):
+def test_only_two_programs_that_take_turns_are_named(bench):
     for sender, after_s in (("/a", 0.0), ("/b", 1.0), ("/b", 1.0), ("/a", TURNS_S + 0.1), ("", 0.1), ("/b", 0.1)):
         bench.command(twist(0.1), sender, after_s=after_s)
     assert bench.lines == []

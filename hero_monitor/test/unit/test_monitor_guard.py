@@ -104,7 +104,7 @@ def test_requests_end_at_the_limits_of_robots_and_texts():
             read_request(wrong)
 
 
-def test_programs_are_waited_for_together_at_the_end_and_their_robots_stopped(monkeypatch):
+def test_all_programs_are_waited_for_together_at_the_end(monkeypatch):
     clock, ended, joined = SimpleNamespace(now_s=100.0), [], []
     monkeypatch.setattr(programs_module, "time", SimpleNamespace(monotonic=lambda: clock.now_s))
     programs = Programs("/hero_monitor", None, ended.append)

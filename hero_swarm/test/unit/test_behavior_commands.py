@@ -65,7 +65,7 @@ def test_wheels_of_one_bit_behaviors_turn_as_published():
         assert act(name, *pair)[0] == close_to(*expected), name
 
 
-def test_a_point_before_the_axle_is_steered_and_slowed_down_in_its_direction():
+def test_a_point_before_the_axle_is_slowed_down_in_its_direction():
     for forward, left, expected in (
         (0.05, 0.03, (0.05, 0.5)),
         (0.2, 0.06, (0.1, 0.5)),
