@@ -38,9 +38,9 @@ class SafetyFilter:
 
     lookahead_m = 0.03
     margin_m = 0.012
-    gain_1_s = 2.0
+    gain_1_s = 4.0
     neighbors = 6
-    sidestep = 1.0
+    sidestep = 3.0
     max_speed_m_s = 0.2
     max_angular_rad_s = 6.0
 
@@ -108,8 +108,7 @@ class SafetyFilter:
             # Half of the closing speed that the pair may have.
             bounds.append(-0.5 * self.gain_1_s * (distance_m - 2.0 * radius_m))
         if self._fence_m is not None:
-            inside = BODY_RADIUS_M + self.lookahead_m
-            gaps_m = np.concatenate((points_m - self._fence_m[:2], self._fence_m[2:] - points_m), axis=-1) - inside
+            gaps_m = np.concatenate((points_m - self._fence_m[:2], self._fence_m[2:] - points_m), axis=-1) - radius_m
             inward = np.array([(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)])
             normals.append(np.broadcast_to(inward, (*points_m.shape[:2], 4, 2)))
             bounds.append(-self.gain_1_s * gaps_m)

@@ -10,6 +10,7 @@ from hero_client.values.robot_constants import BODY_RADIUS_M
 from hero_swarm.behavior import Behavior
 from hero_swarm.metrics.graphs import measure_distances
 from hero_swarm.safety import OFF, ROBOTS, SafetyFilter
+from hero_swarm.steering import steer
 from hero_swarm.trial import OPEN, Trial
 
 FENCE_M = np.array((-0.7, -0.7, 0.7, 0.7))
@@ -55,3 +56,41 @@ def test_of_the_allowed_velocities_the_nearest_is_found():
     assert found == pytest.approx(np.array([(0.1, 0.02), (0.0, 0.05)]))
     fast = nearest_allowed_all(np.array([(0.3, 0.4)]), normals[:1], np.array([[-1.0, -1.0]]), 0.2)
     assert fast == pytest.approx(np.array([(0.12, 0.16)]))
+
+
+RING_M = 0.6
+
+
+class CrossRing(Behavior):
+    """Each robot drives to the opposite place of a ring."""
+
+    def step(self, sensed, memory, random):
+        x_m, y_m, yaw_rad = sensed.poses.T
+        angle_rad = 2.0 * np.pi * sensed.numbers / sensed.count + np.pi
+        to_x_m, to_y_m = RING_M * np.cos(angle_rad) - x_m, RING_M * np.sin(angle_rad) - y_m
+        cosine, sine = np.cos(yaw_rad), np.sin(yaw_rad)
+        forward_m_s, left_m_s = 0.5 * (cosine * to_x_m + sine * to_y_m), 0.5 * (cosine * to_y_m - sine * to_x_m)
+        return (*steer(forward_m_s, left_m_s, 0.1), memory)
+
+
+def cross_ring(mode):
+    """Return when all ten robots of each world are across, and the least distance between two."""
+    angles_rad = 2.0 * np.pi * np.arange(10) / 10
+    ring_m = RING_M * np.column_stack((np.cos(angles_rad), np.sin(angles_rad)))
+    turned_rad = np.random.RandomState(1).normal(0.0, 0.3, (3, 10, 1)) + angles_rad[:, None] + np.pi
+    starts = np.concatenate((np.broadcast_to(ring_m, (3, 10, 2)), turned_rad), axis=2)
+    trial = Trial(CrossRing(), OPEN, 10, (1, 2, 3), starts=starts, filter_commands=SafetyFilter(mode))
+    across_s, nearest_m = np.full(3, np.inf), np.inf
+    while np.isinf(across_s).any() and trial.rows.now_ms < 40000:
+        now_s = trial.step()
+        are_across = (np.hypot(*np.moveaxis(trial.poses[..., :2] + ring_m, -1, 0)) < 0.05).all(axis=1)
+        across_s = np.where(are_across, np.minimum(across_s, now_s), across_s)
+        nearest_m = min(nearest_m, measure_distances(trial.poses[..., :2]).min())
+    return np.median(across_s), nearest_m
+
+
+def test_robots_cross_a_ring_untouched_in_little_more_time_than_pushing():
+    pushing_s, _ = cross_ring(OFF)
+    across_s, nearest_m = cross_ring(ROBOTS)
+    assert nearest_m > 2.0 * BODY_RADIUS_M + 0.01
+    assert across_s < 1.3 * pushing_s

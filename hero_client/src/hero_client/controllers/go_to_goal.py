@@ -8,12 +8,13 @@ from typing import NamedTuple, Optional, Sequence
 
 from hero_node.geometry import STOP, Pose, Velocity, wrap_angle
 
+from ..values.checks import check_finite
 from ..values.readings import find_nearest
 from .avoidance import bend_around
 from .motion import AIM_SHARE, DEFAULT_TIMEOUT_S, MotionController
 from .unicycle import GoToLaw, GoToPoseLaw, go_to_point, go_to_pose
 
-__all__ = ["DEFAULT_TOLERANCE_M", "GoToGoalController", "Goal"]
+__all__ = ["DEFAULT_TOLERANCE_M", "GoToGoalController", "Goal", "make_goal"]
 
 DEFAULT_TOLERANCE_M = 0.01
 
@@ -34,6 +35,12 @@ class Goal(NamedTuple):
     y_m: float
     yaw_rad: Optional[float] = None
     """Heading at the end; None for any."""
+
+
+def make_goal(x_m: float, y_m: float, yaw_rad: Optional[float]) -> Goal:
+    """Return a goal that a user gives. Raises: ValueError unless its numbers are finite."""
+    check_finite("x, y and yaw of a goal", x_m, y_m, 0.0 if yaw_rad is None else yaw_rad)
+    return Goal(x_m, y_m, yaw_rad)
 
 
 class GoToGoalController(MotionController):

@@ -12,15 +12,16 @@ from typing import Callable, Generator, List, Optional, SupportsIndex, Tuple
 
 from hero_node.geometry import Pose, Velocity, clamp, transform_pose, wrap_angle
 
-from ..controllers.go_to_goal import DEFAULT_TOLERANCE_M, Goal, GoToGoalController
+from ..controllers.go_to_goal import DEFAULT_TOLERANCE_M, Goal, GoToGoalController, make_goal
 from ..controllers.motion import DEFAULT_TIMEOUT_S, MotionController, State
 from ..controllers.straight_and_turn import ForwardController, TurnController
 from ..values.background_motion import BackgroundMotion, Sleep, Steps
-from ..values.checks import check_finite, is_finite
+from ..values.checks import check_finite, check_speed
 from ..values.colors import Color
 from ..values.errors import GoalError, StaleDataError, StoppedError
 from ..values.readings import FRESH_S, Obstacle, find_nearest
 from ..values.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S, WHEEL_SEPARATION_M
+from ..values.sensing import Neighbor
 from .group import POLL_PERIOD_S, READY_TIMEOUT_S, REPEAT_PERIOD_S, Group, stop_after, wait_for_all
 from .light import Light
 from .robot_link import RobotLink
@@ -166,6 +167,18 @@ class BaseRobot(Group):
         self._check_asked("laser")
         return self._link.read_infrared_counts()
 
+    @property
+    def neighbors(self) -> List[Neighbor]:
+        """Robots around, nearest first, which `rosrun hero_swarm neighbors` computes; in process, all of the world.
+
+        The first use waits up to 5 s. Raises: StaleDataError if they are older than 1 s, or the own pose is not known.
+        """
+        try:
+            self._check_asked("neighbors")
+        except StaleDataError as error:
+            raise StaleDataError("%s: does `rosrun hero_swarm neighbors` run?" % str(error).split(":")[0]) from None
+        return self._link.read_neighbors()
+
     def wait_for_scan(self, timeout_s: float = 2.0) -> List[float]:
         """Wait for the next scan, which comes 5 times a second, and return its ranges as `proximity` does.
 
@@ -295,13 +308,13 @@ class BaseRobot(Group):
 
     def forward_steps(self, distance_m: float, linear_m_s: float) -> Steps:
         """Return forward() as steps. Raises: ValueError for a speed that is not positive."""
-        _check_speed(distance_m, linear_m_s)
+        check_speed(distance_m, linear_m_s)
         controller = ForwardController(distance_m, self.now_s, linear_m_s)
         return self._follow(controller, lambda: "drive %g m" % distance_m)
 
     def turn_steps(self, angle_rad: float, angular_rad_s: float) -> Steps:
         """Return turn() as steps. Raises: ValueError for a speed that is not positive."""
-        _check_speed(angle_rad, angular_rad_s)
+        check_speed(angle_rad, angular_rad_s)
         if abs(angle_rad) > math.tau and float(angle_rad).is_integer():
             text = "%s turns by %g rad, %.1f full turns: for degrees, turn(math.radians(%g))"
             self._link.log_warning(text % (self.name, angle_rad, abs(angle_rad) / math.tau, angle_rad))
@@ -344,7 +357,7 @@ class BaseRobot(Group):
         that do not turn, no pose for 2 s, or timeout_s. RobotNotReadyError if the robot is not there within 2 s.
         StoppedError if all robots are stopped. FrameError as pose_in(). The robot is stopped then.
         """
-        steps = self._pursue(_make_goal(x_m, y_m, yaw_rad), frame, avoid, timeout_s, tolerance_m, on_step)
+        steps = self._pursue(make_goal(x_m, y_m, yaw_rad), frame, avoid, timeout_s, tolerance_m, on_step)
         self._end_motion()
         self._run(steps, sleep)
 
@@ -364,7 +377,7 @@ class BaseRobot(Group):
         motion.cancel(), stop() or another motion of this robot ends it, and result() then raises GoalError. Several
         robots at once: start all, then ask each motion for its result().
         """
-        return self.start_motion(self._pursue(_make_goal(x_m, y_m, yaw_rad), frame, avoid, timeout_s, tolerance_m))
+        return self.start_motion(self._pursue(make_goal(x_m, y_m, yaw_rad), frame, avoid, timeout_s, tolerance_m))
 
     def _pursue(
         self,
@@ -482,13 +495,3 @@ class BaseRobot(Group):
         state = self.missing() or ("stopped" if self._link.is_stopped else "ready")
         pose = self.fresh_pose()
         return "<%s: %s%s>" % (self.name, state, ", %r" % (pose,) if pose else "")
-
-
-def _make_goal(x_m: float, y_m: float, yaw_rad: Optional[float]) -> Goal:
-    check_finite("x, y and yaw of a goal", x_m, y_m, 0.0 if yaw_rad is None else yaw_rad)
-    return Goal(x_m, y_m, yaw_rad)
-
-
-def _check_speed(distance: float, speed: float) -> None:
-    if not (is_finite(distance) and is_finite(speed) and speed > 0.0):
-        raise ValueError("distance or angle must be finite, the speed positive, not %r and %r" % (distance, speed))

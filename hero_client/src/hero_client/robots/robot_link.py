@@ -6,6 +6,7 @@ from hero_node.clock import Clock
 from hero_node.geometry import Pose, Velocity
 
 from ..values.background_motion import BackgroundMotion, Steps
+from ..values.sensing import Neighbor
 
 __all__ = ["MAP", "RobotLink"]
 
@@ -14,7 +15,7 @@ MAP = "map"
 
 
 class RobotLink(Protocol):
-    """One robot. Topics go by their names: "odom", "proximity", "encoder", "laser"."""
+    """One robot. Topics go by their names: "odom", "proximity", "encoder", "laser", "neighbors"."""
 
     @property
     def clock(self) -> Clock:
@@ -49,6 +50,9 @@ class RobotLink(Protocol):
 
     def read_infrared_counts(self) -> List[float]:
         """Return the newest counts of the infrared sensors, of which there are some: see Robot.infrared_counts."""
+
+    def read_neighbors(self) -> List[Neighbor]:
+        """Return the newest neighbors, of which there is a message. Raises: StaleDataError without a fresh own pose."""
 
     def find_localized(self, frame: str, timeout_s: float) -> Optional[Pose]:
         """Return where hero_localization says that the robot is; None if that is in another frame, or does not run.

@@ -10,7 +10,7 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, LaserScan
 from std_msgs.msg import ColorRGBA
 
-from hero_msgs.msg import Encoder
+from hero_msgs.msg import Encoder, Neighbors
 from hero_msgs.srv import SetOdom
 from hero_node.errors import HeroError
 from hero_node.geometry import Pose, Velocity, yaw_of
@@ -18,8 +18,9 @@ from hero_node.ros.ros_clock import ROS_CLOCK
 from hero_node.texts import one_line
 
 from ..values.background_motion import BackgroundMotion, Steps, run_steps
-from ..values.errors import RobotError
+from ..values.errors import RobotError, StaleDataError
 from ..values.readings import FRESH_S, front_first
+from ..values.sensing import Neighbor
 from .drivers import share_drivers
 from .frames import share_frames
 from .localized_poses import share_poses
@@ -35,7 +36,14 @@ END_TIMEOUT_S = 3.0
 NEEDED = ("odom", "proximity")
 """What a robot that can be driven sends, where it is subscribed to; others, such as the IMU, it may lack."""
 
-MESSAGE_CLASSES = {"odom": Odometry, "proximity": LaserScan, "laser": LaserScan, "encoder": Encoder, "imu": Imu}
+MESSAGE_CLASSES = {
+    "odom": Odometry,
+    "proximity": LaserScan,
+    "laser": LaserScan,
+    "encoder": Encoder,
+    "imu": Imu,
+    "neighbors": Neighbors,
+}
 
 
 class ThreadMotion(BackgroundMotion):
@@ -138,6 +146,16 @@ class RosLink:
         """See RobotLink."""
         counts = [float(count) for count in self.messages.read("laser").intensities[::2]]  # the others are averages
         return counts[len(counts) // 2 :] + counts[: len(counts) // 2]
+
+    def read_neighbors(self) -> List[Neighbor]:
+        """See RobotLink."""
+        message = self.messages.read("neighbors")
+        if not message.is_known:
+            raise StaleDataError(
+                "%s senses no neighbors, as its own pose is not known or old: does localize run, and is its tag in view"
+                " of the camera?" % self._name
+            )
+        return [Neighbor(found.id, found.range, found.bearing, found.heading) for found in message.neighbors]
 
     def find_localized(self, frame: str, timeout_s: float) -> Optional[Pose]:
         """See RobotLink; the first call subscribes to /localization/poses, for all robots."""

@@ -6,13 +6,22 @@ and is not sensed. Only places count, so the order of the robots, and their ids,
 """
 
 import math
-from typing import Any, NamedTuple, Optional
+from typing import Any, List, NamedTuple, Optional, Sequence
 
 import numpy as np
 
 from .robot_constants import BODY_RADIUS_M
 
-__all__ = ["Binary", "Neighborhood", "Neighbors", "look_at", "sense_binary", "sense_neighbors"]
+__all__ = [
+    "Binary",
+    "Neighbor",
+    "Neighborhood",
+    "Neighbors",
+    "list_neighbors",
+    "look_at",
+    "sense_binary",
+    "sense_neighbors",
+]
 
 
 class Binary(NamedTuple):
@@ -40,6 +49,18 @@ class Neighbors(NamedTuple):
     """Probability that a neighbor is missed."""
     occlusion: bool = False
     """Whether bodies hide those behind them."""
+
+
+class Neighbor(NamedTuple):
+    """One robot that another one senses."""
+
+    robot_id: int
+    range_m: float
+    """Between the centers."""
+    bearing_rad: float
+    """Counter-clockwise from the front of the robot that senses, -pi..pi."""
+    heading_rad: float
+    """Relative to the heading of the robot that senses, -pi..pi."""
 
 
 class Neighborhood(NamedTuple):
@@ -76,6 +97,13 @@ class Neighborhood(NamedTuple):
     def average(self, values: np.ndarray) -> np.ndarray:
         """Return the mean of values (R, N) over the neighbors of each robot (R,); 0 without neighbors."""
         return (values * self.seen).sum(axis=1) / np.maximum(self.counts, 1)
+
+
+def list_neighbors(near: Neighborhood, row: int, ids: Sequence[int]) -> List[Neighbor]:
+    """Return what the robot at row senses, nearest first; ids: of the robots of its world, by column (N,)."""
+    values = zip(ids, near.range_m[row].tolist(), near.bearing_rad[row].tolist(), near.heading_rad[row].tolist())
+    found = [Neighbor(*value) for value, is_seen in zip(values, near.seen[row].tolist()) if is_seen]
+    return sorted(found, key=lambda neighbor: neighbor.range_m)
 
 
 def look_at(poses: np.ndarray, others: np.ndarray, forward_m: float) -> Any:

@@ -9,6 +9,7 @@ from hero_client.robots.robot_link import MAP
 from hero_client.values.background_motion import BackgroundMotion, Steps
 from hero_client.values.errors import FrameError, StaleDataError
 from hero_client.values.readings import FRESH_S
+from hero_client.values.sensing import Neighbor, Neighbors, list_neighbors, sense_neighbors
 from hero_node.command_line import say
 from hero_node.geometry import Pose, Velocity, find_frame
 
@@ -31,15 +32,16 @@ class StepLink:
 
     connected = True
 
-    def __init__(self, clock: StepClock, row: int, name: str) -> None:
+    def __init__(self, clock: StepClock, row: int, robot_id: int) -> None:
         """Be the robot at row, whose odometry begins where it is."""
         self.clock = clock
         self.row = row
         self.is_stopped = False
-        self._name = name
+        self._robot_id = robot_id
+        self._name = "hero_%d" % robot_id
         self._rows = rows = clock.rows
         self._arrivals_ms = {
-            **dict.fromkeys(("odom", "encoder"), rows.odometry_ms),
+            **dict.fromkeys(("odom", "encoder", "neighbors"), rows.odometry_ms),
             **dict.fromkeys(("proximity", "laser"), rows.scan_ms),
         }
         self._origin = self.true_pose
@@ -93,6 +95,16 @@ class StepLink:
         """See RobotLink."""
         counts: List[float] = np.roll(self._rows.counts[self.row], 4).tolist()
         return counts
+
+    def read_neighbors(self) -> List[Neighbor]:
+        """See RobotLink; all robots of the same world are sensed, where they are."""
+        world = self._rows.world
+        poses = world.poses.reshape(world.worlds, -1, 3)
+        robots = poses.shape[1]
+        world_row, number = divmod(self.row, robots)
+        first_id = self._robot_id - number
+        near = sense_neighbors(poses[world_row : world_row + 1], Neighbors())
+        return list_neighbors(near, number, range(first_id, first_id + robots))
 
     def find_localized(self, frame: str, timeout_s: float) -> Optional[Pose]:
         """See RobotLink; there is always a localization."""

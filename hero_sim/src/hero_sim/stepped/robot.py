@@ -19,7 +19,7 @@ class StepRobot(BaseRobot):
 
     def __init__(self, robot_id: int, clock: StepClock, row: int) -> None:
         """Be the robot at row of the clock's robots."""
-        super().__init__(robot_id, StepLink(clock, row, "hero_%d" % robot_id))
+        super().__init__(robot_id, StepLink(clock, row, robot_id))
 
     def __getattr__(self, name: str) -> Any:
         if name in ("encoder", "imu", "odometry"):

@@ -94,7 +94,8 @@ class BehaviorNode:
         self._show_colors()
         if time.monotonic() >= self._next_report_s and not known.all():
             self._next_report_s = time.monotonic() + REPORT_PERIOD_S
-            rospy.logwarn(self._objects.describe_missing() or self._source.describe_missing())
+            missing = self._objects.describe_missing() or self._source.describe_missing()
+            rospy.logwarn("%s; the robots are stopped meanwhile", missing)
         if time.monotonic() >= self._next_show_s and known.all():
             last_s, last = self._last or (now_s - SHOW_PERIOD_S, poses)
             velocities = (poses - last) / max(now_s - last_s, 1e-3)

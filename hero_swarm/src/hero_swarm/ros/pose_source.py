@@ -27,16 +27,20 @@ class PoseSource:
 
     def __init__(self, robot_ids: Sequence[int], frame: str) -> None:
         """Subscribe to the poses of these robots in frame."""
-        self._ids = list(robot_ids)
+        self._ids: List[int] = []
         self._frame = frame
         self._true: Dict[int, Tuple[Pose, float]] = {}
         self._missing: List[str] = []
-        if frame == SIMULATOR_FRAME:
-            for robot_id in self._ids:
-                topic, receive = "/hero_%d/ground_truth" % robot_id, partial(self._receive_truth, robot_id)
-                rospy.Subscriber(topic, Odometry, receive, queue_size=1, tcp_nodelay=True)
-        else:
+        if frame != SIMULATOR_FRAME:
             share_poses()  # subscribes
+        self.add_robots(robot_ids)
+
+    def add_robots(self, robot_ids: Sequence[int]) -> None:
+        """Read these robots, too, after those that are read already."""
+        self._ids += robot_ids
+        for robot_id in robot_ids if self._frame == SIMULATOR_FRAME else ():
+            topic, receive = "/hero_%d/ground_truth" % robot_id, partial(self._receive_truth, robot_id)
+            rospy.Subscriber(topic, Odometry, receive, queue_size=1, tcp_nodelay=True)
 
     def _receive_truth(self, robot_id: int, message: Odometry) -> None:
         place, yaw_rad = message.pose.pose.position, yaw_of(message.pose.pose.orientation)
@@ -72,7 +76,7 @@ class PoseSource:
     def describe_missing(self) -> str:
         """Return why the last read() lacks poses, for users; empty if all are known."""
         more = " (and %d more robots)" % (len(self._missing) - 1) if len(self._missing) > 1 else ""
-        return "%s%s; they are stopped meanwhile" % (self._missing[0], more) if self._missing else ""
+        return "%s%s" % (self._missing[0], more) if self._missing else ""
 
 
 class ObjectSource:
@@ -106,4 +110,4 @@ class ObjectSource:
         """Return that there are no objects that are needed, for users; empty if there are."""
         if self._known or not self.are_needed:
             return ""
-        return "no object on %s in the frame %s: the robots are stopped meanwhile" % (self._topic, self._frame)
+        return "no object on %s in the frame %s." % (self._topic, self._frame)

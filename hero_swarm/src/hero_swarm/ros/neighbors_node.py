@@ -1,0 +1,122 @@
+"""Program neighbors: publishes what robots sense of each other, computed from the poses of localize or the simulator.
+
+rosrun hero_swarm neighbors _range_m:=1.0
+"""
+
+import math
+import time
+from typing import Any, Dict, List, Sequence
+
+import numpy as np
+import rospy
+
+from hero_client import Program, read_parameters, run
+from hero_client.ros.drivers import share_drivers
+from hero_client.swarm import ready_ids
+from hero_client.values.sensing import Neighbors, list_neighbors, sense_neighbors
+from hero_msgs.msg import Neighbor as NeighborMessage
+from hero_msgs.msg import Neighbors as NeighborsMessage
+from hero_node.parameters import flag, number, robot_ids, whole_number, words
+
+from ..behavior import Random
+from .pose_source import PoseSource
+
+__all__ = ["NeighborsNode", "make_messages"]
+
+FIRST_REPORT_S, REPORT_PERIOD_S = 3.0, 5.0
+
+PARAMETERS = {
+    "robots": robot_ids("all", "ids; all: those that have joined a driver"),
+    "frame": words("map", "frame of the poses: that of localize, or `world` for the simulator's ground truth"),
+    "range_m": number(1000.0, 0.0, 1000.0, "m", "between the centers, of neighbors that are sensed"),
+    "field_rad": number(2.0 * math.pi, 0.0, 2.0 * math.pi, "rad", "width of the field of view, centered on the front"),
+    "range_noise_m": number(0.0, 0.0, 1.0, "m", "standard deviation of ranges"),
+    "bearing_noise_rad": number(0.0, 0.0, 1.0, "rad", "the same of bearings and headings"),
+    "dropout": number(0.0, 0.0, 1.0, "", "probability that a neighbor is missed"),
+    "occlusion": flag(False, "whether bodies hide those behind them"),
+    "seed": whole_number(0, 0, 2**31 - 1, "", "of noise and drop-outs"),
+    "rate_hz": number(10.0, 1.0, 50.0, "Hz", "of the messages"),
+}
+
+
+def make_messages(
+    ids: Sequence[int], poses: np.ndarray, ages_s: np.ndarray, sensor: Neighbors, random: Random
+) -> List[NeighborsMessage]:
+    """Return the message of each robot (N,), from the poses (N, 3), NaN for those not known, and their ages (N,)."""
+    near = sense_neighbors(poses[None], sensor, random)
+    ages_of = dict(zip(ids, ages_s.tolist()))
+    messages = []
+    for row, robot_id in enumerate(ids):
+        message = NeighborsMessage(is_known=bool(np.isfinite(poses[row]).all()))
+        message.header.frame_id = "hero_%d/base_link" % robot_id
+        message.neighbors = [
+            NeighborMessage(*neighbor, max(ages_of[robot_id], ages_of[neighbor.robot_id]))
+            for neighbor in list_neighbors(near, row, ids)
+        ]
+        messages.append(message)
+    return messages
+
+
+class NeighborsNode:
+    """What all robots sense; robots that join a driver are added."""
+
+    def __init__(self, parameters: Dict[str, Any]) -> None:
+        """Begin with the robots of ~robots."""
+        self._chosen = parameters["robots"]
+        self._sensor = Neighbors(**{name: parameters[name] for name in Neighbors._fields})
+        self._seed = parameters["seed"]
+        self._source = PoseSource([], parameters["frame"])
+        self._publishers: Dict[int, rospy.Publisher] = {}
+        self._random = Random([self._seed], 0)
+        self._next_report_s = time.monotonic() + FIRST_REPORT_S
+        self._add_robots(self._chosen or [])
+
+    def _add_robots(self, ids: Sequence[int]) -> None:
+        new = [robot_id for robot_id in ids if robot_id not in self._publishers]
+        if not new:
+            return
+        self._source.add_robots(new)
+        for robot_id in new:
+            topic = "/hero_%d/neighbors" % robot_id
+            self._publishers[robot_id] = rospy.Publisher(topic, NeighborsMessage, queue_size=1, tcp_nodelay=True)
+        self._random = Random([self._seed], len(self._publishers))
+
+    def step(self) -> None:
+        """Publish the neighbors of all robots."""
+        if self._chosen is None:
+            report = share_drivers().read()
+            self._add_robots(ready_ids(report) if report else [])
+        if not self._publishers:
+            self._report("no robot has joined a driver yet: are the robots on?")
+            return
+        poses, ages_s = self._source.read()
+        now = rospy.Time.now()
+        for publisher, message in zip(
+            self._publishers.values(),
+            make_messages(list(self._publishers), poses, ages_s, self._sensor, self._random),
+        ):
+            message.header.stamp = now
+            publisher.publish(message)
+        missing = self._source.describe_missing()
+        if missing:
+            self._report(missing + "; who has no pose senses nothing")
+
+    def _report(self, text: str) -> None:
+        """Warn, every few seconds, and not while all starts at once."""
+        if time.monotonic() >= self._next_report_s:
+            self._next_report_s = time.monotonic() + REPORT_PERIOD_S
+            rospy.logwarn(text)
+
+
+def neighbors() -> None:
+    """Publish neighbors until the program is to end. Raises: ProgramError for a wrong parameter."""
+    with Program("neighbors") as program:
+        parameters = read_parameters(PARAMETERS)
+        node = NeighborsNode(parameters)
+        for _ in program.rate(parameters["rate_hz"]):
+            node.step()
+
+
+def main() -> None:
+    """Run the program neighbors."""
+    run(neighbors)
