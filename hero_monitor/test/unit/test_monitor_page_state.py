@@ -5,11 +5,14 @@ import math
 
 import pytest
 import rospy
-from geometry_msgs.msg import Point32, Polygon, PolygonStamped
+from geometry_msgs.msg import Point, Point32, Polygon, PolygonStamped
 from nav_msgs.msg import MapMetaData, OccupancyGrid
 from sensor_msgs.msg import CompressedImage
+from std_msgs.msg import ColorRGBA
+from visualization_msgs.msg import Marker, MarkerArray
 
 from hero_monitor.control.requests import RequestError, read_request
+from hero_monitor.fleet_feed import drawings
 from hero_monitor.fleet_feed.camera_picture import BYTES_MAX, SILENT_S, CameraPicture
 from hero_monitor.fleet_feed.occupancy import MAX_CELLS, encode_grid
 from hero_monitor.fleet_feed.page_state import (
@@ -286,3 +289,44 @@ def test_an_occupancy_grid_becomes_runs_of_unknown_free_and_occupied_cells():
 )
 def test_an_occupancy_grid_without_a_place_or_of_another_size_is_not_drawn(change):
     assert encode_grid(make_grid(**{"data": [0] * 4, "columns": 4, **change}), "map") is None
+
+
+def make_drawing(name, frame="map", end_m=1.0):
+    """Return two beams, one of which sees something, and the metric of a behavior."""
+    beams = Marker(ns="/%s/sees" % name, type=Marker.LINE_LIST)
+    beams.points = [Point(0.0, 0.0, 0.0), Point(end_m, 0.0, 0.0), Point(0.0, 0.5, 0.0), Point(0.0, 1.0, 0.0)]
+    beams.colors = [ColorRGBA(1.0, 0.0, 0.0, 1.0)] * 2 + [ColorRGBA(0.0, 0.0, 1.0, 1.0)] * 2
+    line = Marker(ns="/%s/line" % name, type=Marker.LINE_STRIP, color=ColorRGBA(0.0, 1.0, 0.0, 1.0))
+    line.points = [Point(0.0, 0.0, 0.0), Point(0.1, 0.2, 0.0), Point(math.nan, 0.0, 0.0), Point(0.2, 0.1, 0.0)]
+    text = Marker(ns="/%s/metric" % name, type=Marker.TEXT_VIEW_FACING, text="order 0.91")
+    text.pose.position, text.scale.z = Point(0.5, 1.5, 0.0), 0.05
+    markers = [beams, line, text]
+    for marker in markers:
+        marker.header.frame_id = frame
+    return MarkerArray(markers)
+
+
+def test_beams_and_metric_of_each_behavior_are_drawn_while_it_runs():
+    found = drawings.Drawings()
+    found.receive(make_drawing("one"), 10.0)
+    assert found.describe("map", 10.5) == [
+        {"lines": [[[0, 0], [1000, 0]]], "color": "#ff0000", "isBeam": True},
+        {"lines": [[[0, 500], [0, 1000]]], "color": "#0000ff", "isBeam": True},
+        {"lines": [[[0, 0], [100, 200], [200, 100]]], "color": "#00ff00", "isBeam": False},
+        {"text": "order 0.91", "at": [500, 1500, 50], "color": "#000000"},
+    ]
+    found.receive(make_drawing("two", end_m=2.0), 11.0)
+    assert len(found.describe("map", 11.0)) == 8
+    assert found.describe("odom", 11.0) == []
+    assert len(found.describe("map", 12.5)) == 4, "the first one has ended"
+    assert found.describe("map", 20.0) == []
+
+
+def test_drawings_that_no_page_can_show_are_left_out():
+    found = drawings.Drawings()
+    wrong = make_drawing("one", end_m=math.inf)
+    wrong.markers[1].points = [Point(0.0, 0.0, 0.0)] * (drawings.POINTS_MAX + 1)
+    wrong.markers[2].scale.z = math.nan
+    found.receive(wrong, 0.0)
+    assert [drawn["color"] for drawn in found.describe("map", 0.0)] == ["#0000ff"]
+    found.receive(MarkerArray(), 0.0)

@@ -30,6 +30,7 @@ from hero_node.texts import make_printable
 
 from ..background import Background
 from .camera_picture import CameraPicture
+from .drawings import Drawings
 from .losses import SILENT_S, LocalizationWatch, list_losses
 from .master_link import MasterLink
 from .occupancy import encode_grid
@@ -51,6 +52,7 @@ ROBOTS_MAX = 1000
 
 SCENE_TYPES = {
     "/tf_static": TFMessage,
+    "/behavior/markers": MarkerArray,
     "/diagnostics": DiagnosticArray,
     "/hero_sim/arena": MarkerArray,
     "/hero_sim/markers": MarkerArray,
@@ -80,6 +82,7 @@ class FleetFeed:
         self.page_state = PageState()
         self.placement = Placement(map_frame)
         self.picture = CameraPicture()
+        self._drawings = Drawings()
         self.robots: Dict[str, Robot] = {}
         self.stopped = False
         self._feeds: Dict[str, RobotFeed] = {}
@@ -286,6 +289,9 @@ class FleetFeed:
         if taken.get("/track/picture/compressed") is not None:
             self.picture.receive(taken["/track/picture/compressed"], now_s)
         self.page_state.put("picture", self.picture.describe(self.placement.frame, now_s))
+        if taken.get("/behavior/markers") is not None:
+            self._drawings.receive(taken["/behavior/markers"], now_s)
+        self.page_state.put("drawings", self._drawings.describe(self.placement.frame, now_s))
         if taken.get("/hero_sim/markers") is not None:
             self.page_state.put("ground_truth", find_true_poses(taken["/hero_sim/markers"]))
         elif "/hero_sim/markers" not in self._scene:

@@ -35,6 +35,7 @@ const state = {
   arena: { boxes: [], circles: [] },
   grid: null,
   objects: { boxes: [], circles: [] },
+  drawings: [],
   isFresh: false,
   offers: { programs: [], record: false },
   programs: [],

@@ -1,7 +1,7 @@
-"""What RViz shows of a behavior: beams of its sensors, and its metric as a line over time."""
+"""What RViz and the monitor show of a behavior: beams of its sensors, and its metric as a line over time."""
 
 from collections import deque
-from typing import Deque, List, Tuple
+from typing import Deque, List, Optional, Tuple
 
 import numpy as np
 import rospy
@@ -18,9 +18,11 @@ __all__ = ["BehaviorMarkers"]
 BEAM_M = 3.0
 """Length at which a beam of endless range is drawn."""
 
-PLOT_S = 120.0
+PLOT_S, PLOT_STEP_S = 120.0, 0.5
 PLOT_M = (0.8, 0.12)
-"""Time and size, wide and high, of the metric's line, which scales itself to its values."""
+"""Time, time between points, and size, wide and high, of the metric's line, which scales itself to its values."""
+
+PLOT_GAP_M = 0.12
 
 _FREE_COLOR, _SEEN_COLOR = ColorRGBA(0.4, 0.6, 1.0, 0.5), ColorRGBA(1.0, 0.3, 0.1, 0.9)
 _PLOT_COLOR, _AXES_COLOR = ColorRGBA(0.9, 0.5, 0.0, 1.0), ColorRGBA(0.5, 0.5, 0.5, 1.0)
@@ -29,26 +31,29 @@ _PLOT_COLOR, _AXES_COLOR = ColorRGBA(0.9, 0.5, 0.0, 1.0), ColorRGBA(0.5, 0.5, 0.
 class BehaviorMarkers:
     """The markers of one behavior in one frame."""
 
-    def __init__(self, behavior: Behavior, frame: str) -> None:
+    def __init__(self, behavior: Behavior, frame: str, node: str) -> None:
+        """node: name of the node, with which names of the markers begin: several behaviors share a topic."""
         self._behavior = behavior
-        self._frame = frame
+        self._frame, self._node = frame, node
         self._history: Deque[Tuple[float, float]] = deque()
-        self._corner = (np.nan, np.nan)
+        self._corner: Optional[Tuple[float, float]] = None
 
     def draw(self, poses: np.ndarray, sensed: Sensed, value: float) -> List[Marker]:
-        """Return all markers for poses (R, 3), all known, and the metric's value."""
-        self._history.append((sensed.time_s, value))
+        """Return all markers for poses (R, 3), NaN for unknown ones but not for all, and the metric's value."""
+        if not self._history or sensed.time_s >= self._history[-1][0] + PLOT_STEP_S:
+            self._history.append((sensed.time_s, value))
         while self._history[0][0] < sensed.time_s - PLOT_S:
             self._history.popleft()
-        if not np.isfinite(self._corner[0]):
-            self._corner = (float(poses[:, 0].mean()) - PLOT_M[0] / 2.0, float(poses[:, 1].max()) + 0.12)
+        # Where it was first, or higher: robots that drive into it would hide it.
+        left_m, low_m = float(np.nanmean(poses[:, 0])) - PLOT_M[0] / 2.0, float(np.nanmax(poses[:, 1])) + PLOT_GAP_M
+        self._corner = (left_m, low_m) if self._corner is None else (self._corner[0], max(self._corner[1], low_m))
         beams = [self._draw_sensor(name, poses, sensed) for name in self._behavior.sensors()]
-        return [*beams, *self._draw_plot(sensed.time_s, value)]
+        return [*beams, *self._draw_plot(self._corner, sensed.time_s, value)]
 
     def _make_marker(self, name: str, kind: int) -> Marker:
         marker = Marker()
         marker.header.frame_id, marker.header.stamp = self._frame, rospy.Time.now()
-        marker.ns, marker.type, marker.action = name, kind, Marker.ADD
+        marker.ns, marker.type, marker.action = "%s/%s" % (self._node, name), kind, Marker.ADD
         marker.pose.orientation.w = 1.0
         return marker
 
@@ -57,7 +62,8 @@ class BehaviorMarkers:
         marker = self._make_marker(name, Marker.LINE_LIST)
         marker.scale.x = 0.004
         sensor, reading = self._behavior.sensors()[name], getattr(sensed, name)
-        for row, (x_m, y_m, yaw_rad) in enumerate(poses.tolist()):
+        for row in sensed.is_known.nonzero()[0].tolist():
+            x_m, y_m, yaw_rad = poses[row].tolist()
             if isinstance(sensor, (Binary, Sight)):
                 ends = [(BODY_RADIUS_M + min(sensor.range_m, BEAM_M), 0.0)]
                 color = _SEEN_COLOR if reading[row] else _FREE_COLOR
@@ -73,9 +79,9 @@ class BehaviorMarkers:
                 marker.colors += [color, color]
         return marker
 
-    def _draw_plot(self, now_s: float, value: float) -> List[Marker]:
+    def _draw_plot(self, corner_m: Tuple[float, float], now_s: float, value: float) -> List[Marker]:
         """Return the metric's line over the last PLOT_S, its axes, and their scale and value as text."""
-        (left_m, low_m), (width_m, height_m) = self._corner, PLOT_M
+        (left_m, low_m), (width_m, height_m) = corner_m, PLOT_M
         times_s, values = np.array(self._history).T
         least, most = float(values.min()), float(values.max())
         x_m = left_m + width_m * (1.0 + (times_s - now_s) / PLOT_S)

@@ -15,7 +15,7 @@ from hero_client import Program, ProgramError, Swarm, read_parameters, run
 from hero_client.values.object_sensing import Things
 from hero_node.parameters import choice, number, robot_ids, whole_number, words
 
-from ..behavior import Behavior, Objects, Random, sense
+from ..behavior import Behavior, Objects, Random, Sensed, sense
 from ..behaviors import find_behavior
 from ..metrics import METRICS
 from ..safety import MODES, SafetyFilter
@@ -23,7 +23,7 @@ from .behavior_markers import BehaviorMarkers
 from .pose_source import ObjectSource, PoseSource
 from .wheel_commands import WheelCommands
 
-REPORT_PERIOD_S = 5.0
+FIRST_REPORT_S, REPORT_PERIOD_S = 3.0, 5.0
 SHOW_PERIOD_S = 0.1
 
 
@@ -66,11 +66,11 @@ class BehaviorNode:
         self._memory: Any = None
         self._start_s = rospy.get_time()
         self._last: Optional[Tuple[float, np.ndarray]] = None
-        self._next_report_s = self._next_show_s = 0.0
+        self._next_report_s, self._next_show_s = time.monotonic() + FIRST_REPORT_S, 0.0
         self._colors: Optional[np.ndarray] = None
         self._metric = rospy.Publisher("~metric", Float32, queue_size=5)
-        self._drawing = BehaviorMarkers(self._behavior, self._frame)
-        self._markers = rospy.Publisher("~markers", MarkerArray, queue_size=2)
+        self._drawing = BehaviorMarkers(self._behavior, self._frame, rospy.get_name())
+        self._markers = rospy.Publisher("behavior/markers", MarkerArray, queue_size=2)
 
     @property
     def period_s(self) -> float:
@@ -96,16 +96,23 @@ class BehaviorNode:
             self._next_report_s = time.monotonic() + REPORT_PERIOD_S
             missing = self._objects.describe_missing() or self._source.describe_missing()
             rospy.logwarn("%s; the robots are stopped meanwhile", missing)
-        if time.monotonic() >= self._next_show_s and known.all():
-            last_s, last = self._last or (now_s - SHOW_PERIOD_S, poses)
-            velocities = (poses - last) / max(now_s - last_s, 1e-3)
+        if time.monotonic() >= self._next_show_s and known.any():
             self._next_show_s = time.monotonic() + SHOW_PERIOD_S
-            self._last = now_s, poses
-            value = float(METRICS[self._behavior.metric](poses[None], velocities[None], things.poses)[0])
-            self._metric.publish(Float32(value))
-            markers = self._drawing.draw(poses, sensed, value)
-            if self._markers.get_num_connections():
-                self._markers.publish(MarkerArray(markers))
+            self._show(now_s, poses, sensed, things)
+
+    def _show(self, now_s: float, poses: np.ndarray, sensed: Sensed, things: Things) -> None:
+        """Publish the metric of the robots whose poses are known, and what RViz and the monitor draw."""
+        last_s, last = self._last or (now_s - SHOW_PERIOD_S, poses)
+        velocities = (poses - last) / max(now_s - last_s, 1e-3)
+        self._last = now_s, poses
+        known = np.isfinite(velocities).all(axis=1)
+        if not known.any():
+            return
+        value = float(METRICS[self._behavior.metric](poses[None, known], velocities[None, known], things.poses)[0])
+        self._metric.publish(Float32(value))
+        markers = self._drawing.draw(poses, sensed, value)
+        if self._markers.get_num_connections():
+            self._markers.publish(MarkerArray(markers))
 
     def _show_colors(self) -> None:
         colors = self._behavior.colors(self._memory)

@@ -110,4 +110,4 @@ class ObjectSource:
         """Return that there are no objects that are needed, for users; empty if there are."""
         if self._known or not self.are_needed:
             return ""
-        return "no object on %s in the frame %s." % (self._topic, self._frame)
+        return "no object on %s in the frame %s" % (self._topic, self._frame)

@@ -233,6 +233,7 @@ export class FleetMap {
       ys.push(y - (length * sine + width * cosine) / 2, y + (length * sine + width * cosine) / 2);
     }
     for (const [x, y, radius] of this.state.arena.circles) add(x, y, radius);
+    for (const { lines = [], isBeam } of this.state.drawings) if (!isBeam) for (const [x, y] of lines.flat()) add(x, y, 60);
     for (const [x, y] of this.state.grid ? Occupancy.corners(this.state.grid) : []) add(x, y, 0);
     if (this.picture.box) {
       const [left, low, right, high] = this.picture.box;
@@ -277,7 +278,7 @@ export class FleetMap {
 
   /** What there is to see: when it changes, the view fits it again. */
   sceneKey(count) {
-    return `${count} ${this.state.fleet.frame} ${this.picture.box} ${this.state.grid?.columns} ${this.state.arena.boxes.length} ${this.state.fleet.robots.filter((robot) => robot.source).length}`;
+    return `${count} ${this.state.fleet.frame} ${this.picture.box} ${this.state.grid?.columns} ${this.state.arena.boxes.length} ${this.state.drawings.length > 0} ${this.state.fleet.robots.filter((robot) => robot.source).length}`;
   }
 
   keepTrails() {

@@ -48,6 +48,7 @@ export class MapPainter {
     if (shows.ground_truth) for (const robot of robots) this.paintGroundTruth(robot);
     this.paintPlaces();
     for (const robot of robots) this.paintGoal(robot);
+    for (const drawing of state.drawings) if (shows.beams || !drawing.isBeam) this.paintDrawing(drawing);
     if (shows.beams) for (const robot of robots) this.paintBeams(robot);
     for (const robot of robots) this.paintRobot(robot);
     if (map.aim) this.paintAim(map.aim);
@@ -194,6 +195,28 @@ export class MapPainter {
       context.arc(x, y, BODY_MM * this.enlarged, 0, 2 * Math.PI);
       context.stroke();
     }
+  }
+
+  /** Beams of a behavior's sensors, or its metric: lines over time and a text. */
+  paintDrawing({ lines = [], text, at, color, isBeam }) {
+    const { context, view } = this;
+    context.strokeStyle = context.fillStyle = color;
+    context.lineWidth = 1.5 / view.scale;
+    context.globalAlpha = isBeam ? 0.5 : 1;
+    context.beginPath();
+    for (const line of lines) line.forEach(([x, y], index) => (index ? context.lineTo(x, y) : context.moveTo(x, y)));
+    context.stroke();
+    context.globalAlpha = 1;
+    if (text === undefined) return;
+    const [x, y, height] = at;
+    context.save();
+    context.translate(x, y);
+    context.scale(1, -1);
+    context.font = `600 ${Math.max(height, 12 / view.scale)}px system-ui, sans-serif`;
+    context.textAlign = "center";
+    context.textBaseline = "middle";
+    context.fillText(text, 0, 0);
+    context.restore();
   }
 
   paintLasso(points) {
