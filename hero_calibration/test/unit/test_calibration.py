@@ -304,18 +304,6 @@ class TestSpeedResponse:
         assert response.reached_s == pytest.approx((0.0 + step_response.STEP_S) / 2)
         assert response.score == pytest.approx(response.mean_error + 0.3 * response.overshoot)
 
-    def test_gains_are_scaled_to_the_servo_and_limited(self):
-        for gain_m_s_us, scale in ((step_response.NOMINAL_GAIN_M_S_US, 1.0), (1e-9, 2.0), (1.0, 0.5)):
-            search, tried = step_response.GainSearch(gain_m_s_us), []
-            for number in range(search.count_rounds()):
-                tried.append(search.next_gains())
-                search.receive(step_response.Response(1.0 - 0.1 * (number == 2), 0.0, 0.3, ()))
-            assert tried[0] == step_response.DEFAULT_GAINS
-            assert tried[1:4] == [(650.0 * scale, integral * scale, 0.1) for integral in (4000.0, 6000.0, 8500.0)]
-            assert tried[4:] == [(first * scale, 6000.0 * scale, 0.1) for first in (400.0, 900.0, 1400.0)]
-            with pytest.raises(IndexError):
-                search.next_gains()
-
     def test_the_search_finds_the_best_gains_within_range(self):
         search = step_response.GainSearch(servo_gain_m_s_us=1e-9)
 

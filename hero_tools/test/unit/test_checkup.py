@@ -237,12 +237,6 @@ def test_every_tcp_port_can_be_checked():
     assert [check.parse_options(["--port", port]).port for port in ("1", "65535")] == [1, 65535]
 
 
-def test_modules_that_are_missing_are_named(monkeypatch):
-    monkeypatch.setattr(computer, "NEEDED_MODULES", ("json", "no_such_module", "no_other_module"))
-    finding = computer.check_python()
-    assert finding.state == FAIL and finding.text.endswith("lacks no_such_module, no_other_module")
-
-
 def test_only_addresses_of_the_loopback_are_loopback():
     for address, wanted in (("127.0.0.1", True), ("[::1]", True), ("10.42.0.1", False), ("robots.lan", False)):
         assert network.is_loopback(address) is wanted, address

@@ -49,12 +49,6 @@ def test_a_robot_that_did_not_join_or_move_is_named_with_the_reason(changes, wor
     assert words in missing[0]
 
 
-def test_a_robot_has_moved_from_5_cm_or_1_rad_on():
-    for distance_m, turned_rad, moved in ((0.05, 0.0, True), (0.049, 0.99, False), (0.0, 1.0, True)):
-        missing = find_missing([make_row(0, distance_m=distance_m, turned_rad=turned_rad)], [0])
-        assert (not missing) == moved, (distance_m, turned_rad)
-
-
 def test_rows_are_sorted_by_id_state_or_nearest_obstacle():
     far = make_row(2, nearest=Obstacle(0.2, 0.0))
     near = make_row(10, nearest=Obstacle(0.1, 0.0))

@@ -83,12 +83,6 @@ def test_a_password_that_wpa2_does_not_take_is_refused_and_not_repeated(
     assert not [call for call in nmcli.read_calls() if "add" in call.arguments]
 
 
-def test_passwords_of_8_and_of_63_characters_are_taken(nmcli, monkeypatch, capsys):
-    for length in (8, 63):
-        code, _, errors = run(monkeypatch, capsys, "create", "--password-stdin", typed="x" * length + "\n")
-        assert code == 0, errors
-
-
 def test_a_password_that_is_repeated_wrongly_is_refused(nmcli, monkeypatch, capsys):
     for repeated, wanted in ((PASSWORD, 0), ("another password", 1)):
         typed = iter([PASSWORD, repeated])
