@@ -330,7 +330,7 @@ class Gateway(LinkHandler):
             self._robot_log.receive(peer, log, record.joined_s)
 
     def _admit_duplicates(self, record: RobotRecord, may_come: Callable[[str], bool]) -> None:
-        """Let robots in that wait because another one has their id, by having them dial again."""
+        """Close connections that waited because another robot has their id: they dial again, and are admitted."""
         for peer in list(self.peers.values()):
             if peer.refused and peer.record is record and may_come(peer.link.address.host):
                 peer.link.close("the robot with the same id left; this one may try again")

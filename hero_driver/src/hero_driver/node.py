@@ -47,8 +47,8 @@ REGISTRAR_QUEUE_LENGTH = 20000
 """Topics that may wait for the ROS master: 200 robots of 24 topics that come, leave and come again."""
 
 SWITCH_INTERVAL_S = 0.001
-"""How long another thread may keep Python's one lock while the thread of the sockets waits for it; Python's own 5 ms
-are what robots were delayed by while the driver logged a lot, or spoke with the ROS master."""
+"""Time limit of other threads on the GIL while the thread of the sockets waits for it; Python's default of 5 ms delayed
+robots while the driver logged a lot, or spoke with the ROS master."""
 
 REPORT_CHECK_S = 0.1
 

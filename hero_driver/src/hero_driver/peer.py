@@ -51,7 +51,7 @@ class Peer:
         return NO_LIGHT if self.bridge is None else self.bridge.commands.light
 
     def watch_wheels(self, topic: Topic) -> None:
-        """Let the encoder's readings of a robot without a bridge tell of its wheels."""
+        """Read the wheels of a robot without a bridge from its encoder."""
         if topic.info.message_type.endswith("/Encoder"):
             convert = CONVERSIONS.get(("hero_msgs/Encoder", topic.info.md5sum), bytes)
             topic.receive = lambda payload, _arrival_ns: self._read_wheels(convert(payload))
@@ -67,7 +67,7 @@ class Peer:
 
 
 class PeerOwner(Protocol):
-    """What stops and commands need of the gateway, on the thread of the sockets."""
+    """Interface of the gateway for stops and commands, on the thread of the sockets."""
 
     stopped: bool
     """Whether all robots are stopped until they are released."""

@@ -1,4 +1,4 @@
-"""What is a number in files, parameters and pages: True and False, ints of Python, are none, and NaN is none. Pure."""
+"""Checks of numbers from files, parameters and pages: True and False (ints of Python) and NaN are none. Pure."""
 
 import sys
 from typing import Any

@@ -10,7 +10,7 @@ __all__ = ["dump_yaml", "replace_values"]
 
 
 class _Edit(NamedTuple):
-    """What stands from start to end becomes text."""
+    """Replacement of the characters from start to end by text."""
 
     start: int
     end: int

@@ -69,7 +69,7 @@ def end_at(duration_s: float) -> Steps:
 
 
 def replace_ros(swarm: StepSwarm) -> None:
-    """Let what a script imports from hero_client and time be that of these robots, in this process from now on."""
+    """Replace what scripts import from hero_client and time by these robots', in this process from now on."""
 
     def find_robot(robot_id: int, odom: bool = True, proximity: bool = True) -> StepRobot:
         if robot_id not in swarm._by_id:

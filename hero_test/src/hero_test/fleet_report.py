@@ -1,4 +1,4 @@
-"""What the driver reports of its robots, for tests that need some of them ready."""
+"""The driver's reports of its robots, for tests that need some of them ready."""
 
 import rospy
 

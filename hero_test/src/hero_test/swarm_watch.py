@@ -1,4 +1,4 @@
-"""What the simulator knows to be true of its robots, recorded for tests."""
+"""Records the simulator's ground truth for tests."""
 
 import math
 import threading

@@ -27,7 +27,7 @@ class RosSession(Session):
         return rospy.get_time()
 
     def sleep(self, duration_s: float) -> None:
-        """Let so much time of this computer pass."""
+        """Sleep by the clock of this computer."""
         time.sleep(duration_s)
 
     @property

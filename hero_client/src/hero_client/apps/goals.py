@@ -113,7 +113,7 @@ class GoalOutcome(NamedTuple):
 
 
 class GoalListener(Protocol):
-    """What is told of each goal."""
+    """Interface of those that are told of each goal."""
 
     def accept_goal(self, request: GoalRequest) -> None:
         """The robot begins to drive to a goal."""

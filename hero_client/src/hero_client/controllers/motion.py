@@ -31,7 +31,7 @@ SILENT_STEPS = 20
 was kept from running has not heard the robot either."""
 
 MAX_STEP_S = 0.2
-"""What a step takes longer does not count as time in which the robot was seen: the PC was too busy to run all."""
+"""The part of a step beyond this does not count as time in which the robot was seen: the PC was too busy to run all."""
 
 CLEARANCE_M = 0.02
 """Free space kept between the body and an obstacle in the way."""

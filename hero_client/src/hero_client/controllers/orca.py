@@ -51,7 +51,7 @@ class AvoidanceLaw(NamedTuple):
     max_linear_m_s: float = 0.08
     max_angular_rad_s: float = 2.5
     sense_m: float = 0.10
-    """What a proximity sensor sees nearer to the body than this counts, whatever odometry says."""
+    """Obstacles that a proximity sensor sees nearer to the body than this count, whatever odometry says."""
     clearance_m: float = 0.03
     """So near to it the robot drives no further: as far as it rolls until a stop is measured, sent and obeyed."""
     closing_gain: float = 1.0

@@ -57,9 +57,9 @@ class GoToPoseLaw(NamedTuple):
     """Gains and limits of going to a point and ending with a heading."""
 
     k1: float = 1.0
-    """How early the robot bends towards the final heading."""
+    """Larger: the robot bends earlier towards the final heading."""
     k2: float = 2.0
-    """How fast it comes onto that curve, against how fast it drives."""
+    """Rate of convergence onto that curve, relative to the speed."""
     slowing_m2: float = 0.003
     """beta: how much it slows down in curves: to half where the curve has a radius of sqrt(beta)."""
     linear_gain: float = 0.8

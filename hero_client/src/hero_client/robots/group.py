@@ -29,7 +29,7 @@ Self = TypeVar("Self", bound="Group")
 
 
 class Member(Protocol):
-    """What is used here of a robot."""
+    """Interface of a robot, as this module uses it."""
 
     name: str
     driven: bool

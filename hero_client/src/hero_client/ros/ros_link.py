@@ -34,7 +34,7 @@ END_TIMEOUT_S = 3.0
 """A cancelled motion ends within 0.3 s; one that hangs must not hang its robot's next motion."""
 
 NEEDED = ("odom", "proximity")
-"""What a robot that can be driven sends, where it is subscribed to; others, such as the IMU, it may lack."""
+"""Topics that a robot must send to be ready, if subscribed to; others, such as the IMU, it may lack."""
 
 MESSAGE_CLASSES = {
     "odom": Odometry,

@@ -1,4 +1,4 @@
-"""What robots sense of objects that they can push, computed from poses, as what they sense of each other is (sensing).
+"""Sensors of objects that robots can push, computed from poses as those of neighbors are (sensing).
 
 Pure: numpy only, over W worlds with N robots and M objects each. An object counts as the circle around it.
 """

@@ -9,15 +9,15 @@ from typing import Dict, Union
 NS_PER_S = 10**9
 
 STEP_NS = 1000
-"""How far a stamp is put behind the one before it when the robot's clock went back: 1 us keeps them distinct."""
+"""Distance of a stamp from the one before it while the robot's clock has gone back: 1 us keeps them distinct."""
 
 
 STEP_SLACK_NS = 1000 * STEP_NS
-"""How far many such steps in a row may lead ahead."""
+"""Limit of many such steps in a row."""
 
 
 Topic = Union[str, bytes]
-"""What has stamps that go forward: a topic by its name, a transform by its frames."""
+"""Key of a sequence of rising stamps: a topic by its name, a transform by its frames."""
 
 
 class StampFilter:

@@ -26,7 +26,7 @@ ANGULAR_REST_RAD_S = 0.05
 
 
 class WheelMotion:
-    """What the readings of one connection tell.
+    """Motion of the wheels by the readings of one connection.
 
     Attributes:
         readings: how many came.

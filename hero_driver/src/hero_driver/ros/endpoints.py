@@ -20,7 +20,7 @@ QUEUE_LENGTH = 50
 
 
 class Layout(NamedTuple):
-    """What a robot declares of a topic or service besides its name."""
+    """Declared type of a topic or service."""
 
     message_type: str
     md5sums: Tuple[str, ...]  # of a service: of its request and of its answer

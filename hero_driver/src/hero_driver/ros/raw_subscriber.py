@@ -100,7 +100,7 @@ class RawSubscriber:
         self.receive(payload)
 
     def _hand_over(self, connection: Any) -> None:
-        """Let the loop read connection; return never, but raise as rospy's own reading does when it ends."""
+        """Have the loop read connection; never return, but raise as rospy's own reading does when it ends."""
         sock, rest = take_socket(connection)
         if sock is None:
             raise TransportTerminated("closed")

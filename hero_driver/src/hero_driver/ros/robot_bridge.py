@@ -28,8 +28,8 @@ from .worker import Worker
 
 VELOCITY_CONTROLLER = "/velocity_controller/cmd_vel"
 VELOCITY_ALIAS = "/cmd_vel"
-"""What teleop_twist_keyboard, move_base and the like publish on: the same commands as VELOCITY_CONTROLLER's, as if two
-programs published on one topic. The newest command wins."""
+"""Topic of teleop_twist_keyboard, move_base and the like, an alias of VELOCITY_CONTROLLER: the newest command wins, as
+if two programs published on one topic."""
 
 ENCODER_TYPE = "hero_msgs/Encoder"
 TRANSFORM_TYPE = "tf2_msgs/TFMessage"

@@ -138,7 +138,7 @@ def read_caller(connection: Any) -> str:
 
 
 def replace_reading(connection: Any, read: Callable[[], List[Any]]) -> None:
-    """Let rospy's thread call read() instead of its own, once it has passed on all that it has read.
+    """Make rospy's thread call read() instead of its own, once it has passed on all that it has read.
 
     Waking that thread, and then the thread of the sockets, for every command costs several times what the command
     itself costs. read() raises as rospy's own reading does when the connection ends.

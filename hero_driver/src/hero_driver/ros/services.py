@@ -18,7 +18,7 @@ Answer = Tuple[bytes, str]
 """The robot's answer, and empty text; or nothing, and why there is none."""
 
 HANG_WAIT_S = 1.0
-"""How long after its time limit a call may stay unanswered by the thread of the sockets."""
+"""Grace after a call's time limit: the thread of the sockets hangs if it has not answered by then."""
 
 
 class _Call:

@@ -29,7 +29,7 @@ class Worker:
         return self._calls.submit(call, always)
 
     def end(self, drain: bool = False) -> None:
-        """Let the thread end, with drain after the calls that wait."""
+        """End the thread, with drain after the calls that wait, without waiting for it."""
         self._ended = True
         self._calls.close(drain)
 

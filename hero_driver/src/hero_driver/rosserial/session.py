@@ -35,7 +35,7 @@ REQUEST_INTERVAL_S = 1.5
 """Between two requests for topics while none were declared: the robot's boot takes 1.07 s (LEDStatus.ino:93)."""
 
 TIME_WITHOUT_TOPICS_S = 0.2
-"""How long topics may stay away after a time request while nothing is declared. In a whole handshake they
+"""Time limit for topics after a time request while nothing is declared. In a whole handshake they
 follow in the same burst (node_handle.h:301); alone it is the zero-topic handshake, cured by a new request."""
 
 REPEAT_INTERVAL_S = 0.5

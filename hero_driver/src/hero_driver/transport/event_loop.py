@@ -78,7 +78,7 @@ class Reader:
         raise NotImplementedError
 
     def resume(self) -> None:
-        """What can be read now may have come in a pause in which the loop did not run."""
+        """Be told that data may have come in a pause in which the loop did not run."""
 
     def close(self) -> None:
         """Release the socket: read() returned False or raised, or the loop ends."""

@@ -1,4 +1,4 @@
-"""How the tag sits on a robot, and by how much the camera's stamps are late: from a drive on the spot and straight on.
+"""Calibrates the tag's mount on a robot and the latency of the camera's stamps by a drive on the spot and straight on.
 
 Pure. The robot turns left and right on the spot, then drives forward and back. Turning moves the tag round the robot's
 center and shows the stamps' delay; driving shows which way is forward.
@@ -26,7 +26,7 @@ CALIBRATION_DRIVE = (
     (2.0, -0.06, 0.0),
     (0.8, 0.0, 0.0),
 )
-"""What the robot drives: so long (s), m/s, rad/s. A turn to each side, and 0.12 m forward and back."""
+"""The drive: duration (s), m/s, rad/s. A turn to each side, and 0.12 m forward and back."""
 
 MIN_POSES = 40
 MIN_TURN_RAD = 4.0

@@ -26,7 +26,7 @@ __all__ = [
 ]
 
 _MIN_MARGIN = {"36h11": 10.0, "16h5": 30.0}
-"""How clearly black and white must differ, of 255: what 16h5 finds in noise and floor textures stays below."""
+"""Minimum contrast of black and white, of 255: false detections of 16h5 in noise and floor textures stay below."""
 
 SHARPEN_PX = 1.0
 """Radius of the unsharp mask of fine detectors: cells of 2 px are as wide as the blur of a webcam."""

@@ -31,7 +31,7 @@ NEARBY_EXPECTED_S = 1.0
 """So long a lost tag is searched around its place; if its robot's odometry tells where it is, one that is carried."""
 
 NEARBY_SIDES_S, MAX_NEARBY_SIDES = 24.0, 12.0
-"""How far a tag may have come, in its sides: 1 m/s by hand at first, 0.24 m/s by itself for 2 s."""
+"""Largest distance that a tag has moved, in its sides: 1 m/s by hand at first, 0.24 m/s by itself for 2 s."""
 
 NEARBY_IMAGES_S, NEARBY_START_IMAGES = 0.9, 0.1
 """Pixels that are searched around lost tags in a second, and at once, by those of an image."""

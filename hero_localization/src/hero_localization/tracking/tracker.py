@@ -50,7 +50,7 @@ class Problem(NamedTuple):
     """Something that people should see to."""
 
     name: str
-    """What: camera, or "tag 17"."""
+    """Its subject: camera, or "tag 17"."""
     text: str
     is_error: bool
     """Whether poses are missing or wrong because of it."""

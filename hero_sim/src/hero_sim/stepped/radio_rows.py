@@ -73,7 +73,7 @@ class RadioRows:
         return arrivals
 
     def drop_readings(self, row: int) -> None:
-        """Let no readings arrive that one robot has sent up to now."""
+        """Drop the readings of one robot that are on their way."""
         self._up = [sent for sent in self._up if sent[2] != row]
         heapq.heapify(self._up)
         self.due_ms = self._up[0][0] if self._up else _NEVER_MS

@@ -1,4 +1,4 @@
-"""What stepped robots would publish over ROS, as bytes, for viewers and bags. Pure.
+"""Topics of stepped robots as bytes, for viewers and bags. Pure.
 
 Names, types and frames are those of driver and simulator; stamps are simulated time.
 """

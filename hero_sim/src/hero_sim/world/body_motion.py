@@ -68,7 +68,7 @@ class BodyMotion:
                 self._push(before_m)
 
     def _push(self, before_m: np.ndarray) -> None:
-        """Let robots that have moved from before_m (2, R) push objects, and stay outside of them and each other."""
+        """Push objects by the robots that moved from before_m (2, R), and move all bodies out of each other."""
         places_m = self.poses[:2]
         befores_m, afters_m = self._list_places(before_m), self._list_places(places_m)
         slipped_m = self._place(map(Pushing.step, self.pushing, befores_m, afters_m))

@@ -23,7 +23,7 @@ _SETTLED_M = 2e-5
 _TOUCH_M = 1e-9
 
 _SHIFT_M = 0.006
-"""How much nearer two robots, or a robot and an obstacle, come at most while a step's contacts are solved."""
+"""Largest approach of two robots, or of a robot and an obstacle, while a step's contacts are solved."""
 
 _MARGIN_M = 0.03
 """Distance that bodies may move until their neighbors are listed again; a larger margin makes each step slower."""

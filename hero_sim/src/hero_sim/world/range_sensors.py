@@ -66,7 +66,7 @@ class Rays:
         self.distance_m, self.cosine = np.full(x.shape, _FAR_M), np.zeros(x.shape)
 
     def meet_walls(self, x_m: np.ndarray, y_m: np.ndarray, walls: Segments) -> None:
-        """Let rays from x_m and y_m (K, 1), which have met nothing yet, end at walls."""
+        """Cut rays from x_m and y_m (K, 1), which have met nothing yet, at walls."""
         start_x, start_y = walls.start_m[0] - x_m, walls.start_m[1] - y_m
         area_m2 = start_x * walls.along_m[1] - start_y * walls.along_m[0]
         robots, seen = (area_m2 * area_m2 < (self._reach_m * self._reach_m) * walls.length_m2).nonzero()
@@ -88,7 +88,7 @@ class Rays:
         self.cosine[robots[first]] = np.maximum.reduceat(cosine, first)
 
     def meet_circles(self, to_x_m: np.ndarray, to_y_m: np.ndarray, radii_m: np.ndarray) -> None:
-        """Let rays end at circles (C,) whose centers are to_x_m and to_y_m (K, C) from the robots'.
+        """Cut rays at circles (C,) whose centers are to_x_m and to_y_m (K, C) from the robots'.
 
         A circle around the robot's own center, its body, is not seen.
         """

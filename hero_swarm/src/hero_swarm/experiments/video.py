@@ -103,7 +103,7 @@ def _find_limits(trial: Trial, frames: List[Any]) -> Tuple[np.ndarray, np.ndarra
 
 
 class Film:
-    """What moves in the picture."""
+    """The moving parts of the picture."""
 
     def __init__(self, axes: Any) -> None:
         """Draw nothing yet."""

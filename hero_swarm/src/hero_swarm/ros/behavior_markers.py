@@ -1,4 +1,4 @@
-"""What RViz and the monitor show of a behavior: beams of its sensors, and its metric as a line over time."""
+"""Markers of a behavior for RViz and the monitor: beams of its sensors, and its metric as a line over time."""
 
 from collections import deque
 from typing import Deque, List, Optional, Tuple

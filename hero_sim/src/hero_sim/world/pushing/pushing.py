@@ -28,7 +28,7 @@ SWEEPS = 60
 TOLERANCE_M = 1e-7
 
 SLIPS = 8
-"""How often the limit of a robot's pressure is halved, before all are taken to be too weak."""
+"""Halvings of the limit of a robot's pressure before all are taken to be too weak."""
 
 COMPLIANCE = 0.002
 """Of a contact with a robot, as a share of the body's own: how robots that press side by side share the force."""
@@ -74,7 +74,7 @@ class Pushing:
         self._circles_m = list(circles_m)
 
     def step(self, before_m: Sequence[Place], after_m: Sequence[Place]) -> List[Place]:
-        """Let robots that have moved from before_m to after_m push; return where they stay outside of all bodies."""
+        """Push bodies by robots that moved from before_m to after_m; return places of the robots outside of bodies."""
         pushes = self._list_pushes(before_m, after_m)
         if not pushes:
             return list(after_m)
