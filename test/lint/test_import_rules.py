@@ -50,7 +50,7 @@ ROOMS = {
     "hero_recording.formats": {"bags", "errors", "optional", "tables", "topics"},
     "hero_recording.readers": {"optional", "topics"},
     "hero_swarm.behaviors": {"behavior", "steering"},
-    "hero_swarm.experiments": {"behavior", "behaviors", "metrics", "trial"},
+    "hero_swarm.experiments": {"behavior", "behaviors", "metrics", "safety", "trial"},
     "hero_swarm.learning": {"behavior", "experiments", "metrics"},
     "hero_swarm.metrics": set(),
 }

@@ -36,6 +36,8 @@ __all__ = [
     "compute_batch",
     "list_sources",
     "load_checked",
+    "place_cell",
+    "take_values",
 ]
 
 SAMPLE_S = 1.0
@@ -96,6 +98,12 @@ def _load_arena(cell: Cell) -> Arena:
         raise ExperimentError(str(error)) from error
 
 
+def place_cell(experiment: Experiment, cell: Cell, seed: int) -> np.ndarray:
+    """Return where the robots of a run begin (N, 3)."""
+    poses: np.ndarray = place_all(experiment.start, _load_arena(cell), cell.settings["robots"], [seed])[0]
+    return poses
+
+
 def build_trial(experiment: Experiment, cell: Cell, seeds: Sequence[int]) -> Trial:
     """Return the worlds of a cell with these seeds, at their start."""
     behavior, arena = find_behavior(experiment.behavior)(**cell.parameters), _load_arena(cell)
@@ -141,13 +149,8 @@ def compute_batch(
                 place.lineno,
             )
         ) from error
-    names = list_sources(experiment)
     runs = [
-        Run(
-            cell_index,
-            seed,
-            tuple(_take(metric, names, series[: ends[world] + 1, world]) for metric in experiment.metrics),
-        )
+        Run(cell_index, seed, take_values(experiment, series[: ends[world] + 1, world]))
         for world, seed in enumerate(seeds)
     ]
     return BatchResult(runs, time.monotonic() - began_s)
@@ -200,6 +203,12 @@ def _run(experiment: Experiment, trial: Trial, stem: str, with_poses: bool) -> T
         file.append(values)
     file.close()
     return series, ends.tolist()
+
+
+def take_values(experiment: Experiment, series: np.ndarray) -> Tuple[float, ...]:
+    """Return the values of the columns from the samples (T, metrics) of one run."""
+    names = list_sources(experiment)
+    return tuple(_take(metric, names, series) for metric in experiment.metrics)
 
 
 def _take(metric: Metric, names: Sequence[str], series: np.ndarray) -> float:

@@ -17,7 +17,7 @@ from .batch import METRICS_ENDING, SAMPLE_S, list_sources
 from .errors import ExperimentError
 from .experiment_file import Experiment
 from .report_page import OverTime, draw_page
-from .results_folder import ResultsFolder
+from .results_folder import REAL, SIMULATED, ResultsFolder
 from .runner import read_experiment
 from .summary import build_report, describe, format_summaries
 
@@ -41,13 +41,18 @@ def write_report(path: str) -> None:
     text, experiment = read_experiment(file)
     folder = ResultsFolder(path, experiment, None)
     runs = folder.read_runs()
-    report = build_report(experiment, runs)
     folder.write_table(runs)
-    write_file(os.path.join(path, "summary.csv"), format_summaries(report).encode())
-    page = draw_page(report, UNITS, _read_over_time(folder, experiment), text, _read_about(path))
-    write_file(os.path.join(path, "report.html"), page.encode())
-    print(describe(report))
-    print(os.path.join(path, "report.html"))
+    kinds = [kind for kind in (SIMULATED, REAL) if any(run.kind == kind for run in runs)] or [SIMULATED]
+    for kind in kinds:
+        # Robots and the simulator are never mixed in one median.
+        report = build_report(experiment, [run for run in runs if run.kind == kind])
+        suffix = "" if kind == SIMULATED else "_robots"
+        over_time = _read_over_time(folder, experiment) if kind == SIMULATED else {}
+        page = draw_page(report, UNITS, over_time, text, _read_about(path))
+        write_file(os.path.join(path, "summary%s.csv" % suffix), format_summaries(report).encode())
+        write_file(os.path.join(path, "report%s.html" % suffix), page.encode())
+        print(describe(report))
+        print(os.path.join(path, "report%s.html" % suffix))
 
 
 def _read_over_time(folder: ResultsFolder, experiment: Experiment) -> Dict[str, OverTime]:

@@ -180,9 +180,9 @@ class ResultsFolder:
                 file.write("cell,first_seed,runs,wall_s\n")
             file.write("%d,%d,%d,%.3f\n" % (cell, seeds[0], len(seeds), wall_s))
 
-    def list_missing(self, runs: Iterable[Run]) -> List[RunKey]:
-        """Return cell and seed of the runs that are still to be computed, cell by cell."""
-        done: Set[RunKey] = {(run.cell, run.seed) for run in runs}
+    def list_missing(self, runs: Iterable[Run], kind: str = SIMULATED) -> List[RunKey]:
+        """Return cell and seed of the runs of this kind that are still to be done, or do not count, cell by cell."""
+        done: Set[RunKey] = {(run.cell, run.seed) for run in runs if run.kind == kind and not run.remark}
         every = ((cell, seed) for cell in range(len(self._cells)) for seed in self._experiment.seeds)
         return [key for key in every if key not in done]
 

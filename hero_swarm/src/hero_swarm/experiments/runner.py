@@ -1,4 +1,4 @@
-"""Program run: computes the runs that an experiment lacks, and writes the table of all runs."""
+"""Computes the runs that an experiment lacks, and writes the table of all runs: what the program run does."""
 
 import argparse
 import functools
@@ -7,12 +7,11 @@ import os
 import sys
 import time
 from concurrent.futures import Executor
-from typing import Any, Callable, Iterable, Iterator, Optional, Sequence, Tuple
+from typing import Any, Callable, Iterable, Iterator, List, Optional, Sequence, Tuple
 
 from tqdm import tqdm
 
-from hero_node import command_line
-from hero_node.errors import HeroError
+from hero_node.parameters import robot_ids_option
 from hero_node.yaml_text import YamlError, read_text
 
 from ..metrics import METRICS
@@ -23,7 +22,7 @@ from .errors import ExperimentError
 from .experiment_file import MAX_ROBOTS, Experiment, parse_experiment
 from .results_folder import ResultsFolder, RunKey
 
-__all__ = ["run_experiment"]
+__all__ = ["open_folder", "parse_options", "read_experiment", "run_experiment"]
 
 MAX_BATCH = 1000
 
@@ -47,6 +46,13 @@ def _parse_executor(text: str) -> str:
     if not text.startswith(DASK) or text == DASK:
         raise argparse.ArgumentTypeError("%r must be dask:tcp://HOST:PORT or dask:SCHEDULER_FILE" % text)
     return text[len(DASK) :]
+
+
+def _parse_robots(text: str) -> List[int]:
+    ids = robot_ids_option(text)
+    if ids is None:
+        raise argparse.ArgumentTypeError("name the robots, such as 0-9")
+    return ids
 
 
 def _whole(low: int, high: int) -> Callable[[str], int]:
@@ -78,6 +84,10 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument(
         "--part", type=_parse_part, default=(1, 1), metavar="K/N", help="only the K-th of N parts"
     )
+    parser.add_argument(
+        "--robots", type=_parse_robots, metavar="IDS", help="run trials on these robots instead, such as 0-9"
+    )
+    parser.add_argument("--frame", default="map", help="of robots' poses: of localize (map), or world in the simulator")
     parser.add_argument("--fresh", action="store_true", help="delete earlier results in the folder")
     return parser.parse_args(arguments)
 
@@ -128,17 +138,26 @@ def _watch(done: Iterable[Tuple[Any, Any]], missing: int, begun: int) -> Iterato
             bar.update(len(task[2]))
 
 
-def run_experiment(options: argparse.Namespace) -> str:
-    """Run what is missing; return a line for people.
+def open_folder(options: argparse.Namespace) -> Tuple[str, Experiment, ResultsFolder]:
+    """Return the text of the experiment's file, what it describes, and the folder of its results, created if missing.
 
     Raises: ExperimentError.
     """
     text, experiment = read_experiment(options.file)
     load_checked(experiment)
-    folder = ResultsFolder(
-        options.out or os.path.splitext(options.file)[0], experiment, hash_code(experiment.behavior)
-    )
-    runs = folder.begin(text, describe_machine(), options.fresh)
+    path = options.out or os.path.splitext(options.file)[0]
+    folder = ResultsFolder(path, experiment, hash_code(experiment.behavior))
+    folder.begin(text, describe_machine(), options.fresh)
+    return text, experiment, folder
+
+
+def run_experiment(options: argparse.Namespace) -> str:
+    """Run what is missing; return a line for people.
+
+    Raises: ExperimentError.
+    """
+    text, experiment, folder = open_folder(options)
+    runs = folder.read_runs()
     part, parts = options.part
     # Whatever is there already, the parts share out all runs in the same way.
     own = set(folder.list_missing(())[part - 1 :: parts])
@@ -161,12 +180,3 @@ def run_experiment(options: argparse.Namespace) -> str:
     return "%s: all runs of %d cells with %d seeds each" % (
         folder.write_table(folder.read_runs()), len(experiment.cells), len(experiment.seeds)
     )  # fmt: skip
-
-
-def main(arguments: Optional[Sequence[str]] = None) -> None:
-    """Run the program."""
-
-    def run() -> None:
-        print(run_experiment(parse_options(sys.argv[1:] if arguments is None else arguments)))
-
-    command_line.run(run, HeroError)

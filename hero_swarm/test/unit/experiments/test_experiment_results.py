@@ -137,6 +137,8 @@ def test_runs_on_robots_stay_marked_and_beside_simulated_ones(tmp_path):
     folder.write_batch(RUNS[:1])
     folder.write_batch(real)
     assert folder.read_runs() == [real[0], RUNS[0]]
+    assert (0, 5) not in folder.list_missing(folder.read_runs()), "computed"
+    assert (0, 5) in folder.list_missing(folder.read_runs(), REAL), "a trial that does not count is repeated"
     with open(folder.write_table(folder.read_runs())) as file:
         assert "2,5,real,1.0,2.0,hero_2 lost its pose" in file.read()
 

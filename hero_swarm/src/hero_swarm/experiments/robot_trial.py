@@ -1,0 +1,86 @@
+"""One trial of an experiment on robots: from their poses to commands and to the values of its columns. Pure.
+
+The caller measures poses and moves the robots; time is that since the start of the trial.
+"""
+
+import math
+from typing import List, Optional, Sequence, Tuple
+
+import numpy as np
+
+from hero_client.values.object_sensing import NO_OBJECTS, Things
+
+from ..behavior import Random, derive_seed, sense
+from ..behaviors import find_behavior
+from ..metrics import METRICS
+from ..safety import SafetyFilter
+from .batch import SAMPLE_S, list_sources, take_values
+from .experiment_file import Cell, Experiment
+
+__all__ = ["RobotTrial"]
+
+
+class RobotTrial:
+    """A behavior with its metrics and the end of the trial.
+
+    Attributes:
+        remark: why the trial does not count; empty while it does.
+    """
+
+    def __init__(
+        self, experiment: Experiment, cell: Cell, seed: int, names: Sequence[str], safety: SafetyFilter
+    ) -> None:
+        """Begin; names: of the robots, in the order of their poses."""
+        self.remark = ""
+        self._experiment = experiment
+        self._behavior = find_behavior(experiment.behavior)(**cell.parameters)
+        self._names = names
+        self._filter = safety
+        self._random = Random([derive_seed(seed, "behavior")], len(names))
+        self._memory = None
+        self._samples: List[List[float]] = []
+        self._last: Optional[Tuple[float, np.ndarray]] = None
+        self._reached = False
+
+    @property
+    def period_s(self) -> float:
+        """Time between two steps."""
+        return 1.0 / self._behavior.rate_hz
+
+    def step(
+        self, time_s: float, poses: np.ndarray, ages_s: np.ndarray, things: Things = NO_OBJECTS
+    ) -> Optional[Tuple[np.ndarray, np.ndarray]]:
+        """Return the speeds of all robots, m/s and rad/s (N,), at poses (N, 3); None: the trial has ended.
+
+        A robot without a pose, NaN, ends the trial with a remark.
+        """
+        lost = [name for name, pose in zip(self._names, poses) if not np.isfinite(pose).all()]
+        if lost:
+            self.remark = "no pose of %s at %.1f s" % (", ".join(lost), time_s)
+            return None
+        if time_s >= len(self._samples) * SAMPLE_S:
+            self._sample(time_s, poses, things)
+        if self._reached or time_s >= self._experiment.time_s:
+            return None
+        sensed = sense(self._behavior, time_s, poses[None], self._random, things)
+        linear_m_s, angular_rad_s, self._memory = self._behavior.step(sensed, self._memory, self._random)
+        wanted = (np.broadcast_to(values, (1, len(poses))) for values in (linear_m_s, angular_rad_s))
+        linear_m_s, angular_rad_s = self._filter(poses[None], *wanted, ages_s[None])
+        return linear_m_s[0], angular_rad_s[0]
+
+    def _sample(self, time_s: float, poses: np.ndarray, things: Things) -> None:
+        if self._last is None:
+            velocities = np.zeros_like(poses)
+        else:
+            velocities = (poses - self._last[1]) / max(time_s - self._last[0], 1e-3)
+        self._last = (time_s, poses.copy())
+        names, until = list_sources(self._experiment), self._experiment.until
+        values = [float(METRICS[name](poses[None], velocities[None], things.poses)[0]) for name in names]
+        self._samples.append(values)
+        self._reached = until is not None and bool(until.holds(values[names.index(until.metric)]))
+
+    def list_values(self) -> Tuple[float, ...]:
+        """Return the values of the columns, from the samples that were taken; nan without any."""
+        if not self._samples:
+            return (math.nan,) * len(self._experiment.metrics)
+        return take_values(self._experiment, np.array(self._samples))

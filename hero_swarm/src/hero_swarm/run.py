@@ -1,0 +1,27 @@
+"""Program run: an experiment in the simulator, or with --robots on robots."""
+
+import sys
+from typing import Optional, Sequence
+
+from hero_node import command_line
+from hero_node.errors import HeroError
+
+from .experiments.runner import open_folder, parse_options, run_experiment
+
+__all__ = ["main"]
+
+
+def main(arguments: Optional[Sequence[str]] = None) -> None:
+    """Run the program."""
+
+    def run() -> None:
+        options = parse_options(sys.argv[1:] if arguments is None else arguments)
+        if options.robots is None:
+            print(run_experiment(options))
+            return
+        from .ros.robot_runs import run_on_robots  # the simulator needs no ROS
+
+        _, experiment, folder = open_folder(options)
+        print(run_on_robots(experiment, folder, options.robots, options.frame))
+
+    command_line.run(run, HeroError)

@@ -1,0 +1,65 @@
+"""Trials on robots, on stepped ones: their ends, their values, and trials that do not count."""
+
+import math
+
+import numpy as np
+import pytest
+
+from hero_sim.population import place_worlds
+from hero_sim.stepped.robot_rows import RobotRows
+from hero_swarm.experiments.experiment_file import parse_experiment
+from hero_swarm.experiments.robot_trial import RobotTrial
+from hero_swarm.metrics import METRICS
+from hero_swarm.safety import ROBOTS, SafetyFilter
+from hero_swarm.trial import OPEN
+
+FILE = """\
+behavior: rendezvous
+robots: 3
+time_s: 12
+seeds: {count: 1}
+metrics: [consensus_error, {time_until: {consensus_error: 0.25}}]
+"""
+STARTS = np.array([(0.0, 0.0, 0.0), (0.6, 0.0, 2.0), (0.0, 0.6, -1.0)])
+
+
+def drive(text=FILE, lost_s=math.inf):
+    """Return the trial, when it ended, and the poses then; robot 1 has no pose from lost_s on."""
+    experiment = parse_experiment(text, "e.yaml", METRICS)
+    names = ["hero_%d" % number for number in range(3)]
+    trial = RobotTrial(experiment, experiment.cells[0], 1, names, SafetyFilter(ROBOTS))
+    rows = RobotRows(place_worlds(OPEN, STARTS[None], [1], 1.0))
+    while True:
+        time_s, poses = rows.now_ms / 1000.0, rows.world.poses.copy()
+        poses[1] += math.nan if time_s >= lost_s else 0.0
+        speeds = trial.step(time_s, poses, np.zeros(3))
+        if speeds is None:
+            return trial, time_s, poses
+        rows.send_velocity(np.arange(3), *speeds)
+        rows.advance(rows.now_ms + round(1000.0 * trial.period_s))
+
+
+def test_a_trial_ends_at_its_time_with_values_and_without_contact():
+    trial, end_s, poses = drive()
+    assert end_s == pytest.approx(12.0) and trial.remark == ""
+    error_m, reached_s = trial.list_values()
+    assert error_m == pytest.approx(METRICS["consensus_error"](poses[None], None)[0], abs=0.01) and error_m < 0.2
+    assert 1.0 <= reached_s <= 11.0
+    assert METRICS["collisions"](poses[None], None)[0] == 0.0
+
+
+def test_a_trial_ends_when_its_condition_holds():
+    trial, end_s, _ = drive(FILE + "until: {consensus_error: 0.25}\n")
+    error_m, reached_s = trial.list_values()
+    assert end_s == reached_s < 11.0 and error_m <= 0.25
+
+
+def test_a_lost_pose_ends_the_trial_with_a_remark():
+    trial, end_s, _ = drive(lost_s=2.5)
+    assert trial.remark == "no pose of hero_1 at 2.5 s" and end_s == pytest.approx(2.5)
+    assert trial.list_values()[1] == math.inf
+
+
+def test_a_trial_that_never_began_has_no_values():
+    trial, _, _ = drive(lost_s=0.0)
+    assert all(map(math.isnan, trial.list_values())) and trial.remark
