@@ -22,6 +22,6 @@ def main(arguments: Optional[Sequence[str]] = None) -> None:
         from .ros.robot_runs import run_on_robots  # the simulator needs no ROS
 
         _, experiment, folder = open_folder(options)
-        print(run_on_robots(experiment, folder, options.robots, options.frame))
+        print(run_on_robots(experiment, folder, options))
 
     command_line.run(run, HeroError)

@@ -35,6 +35,7 @@ __all__ = [
     "build_trial",
     "compute_batch",
     "list_sources",
+    "load_cell_arena",
     "load_checked",
     "place_cell",
     "take_values",
@@ -71,7 +72,7 @@ def load_checked(experiment: Experiment) -> None:
                 text = "%s: %s has no parameter %r; it has %s"
                 raise ExperimentError(text % (experiment.places[name], experiment.behavior, name, ", ".join(allowed)))
         with _at(experiment, "arena"):
-            arena = _load_arena(cell)
+            arena = load_cell_arena(cell)
             if pushes and not arena.objects:
                 raise ExperimentError("%s pushes objects: arena must have them, as box does" % experiment.behavior)
         with _at(experiment, "start"):
@@ -90,7 +91,8 @@ def _at(experiment: Experiment, name: str) -> Iterator[None]:
         raise ExperimentError("%s: %s" % (place, error)) from error
 
 
-def _load_arena(cell: Cell) -> Arena:
+def load_cell_arena(cell: Cell) -> Arena:
+    """Return the arena of a cell, an open plane without one. Raises: ExperimentError."""
     name = cell.settings.get("arena")
     try:
         return load_arena(name) if name else OPEN
@@ -100,13 +102,13 @@ def _load_arena(cell: Cell) -> Arena:
 
 def place_cell(experiment: Experiment, cell: Cell, seed: int) -> np.ndarray:
     """Return where the robots of a run begin (N, 3)."""
-    poses: np.ndarray = place_all(experiment.start, _load_arena(cell), cell.settings["robots"], [seed])[0]
+    poses: np.ndarray = place_all(experiment.start, load_cell_arena(cell), cell.settings["robots"], [seed])[0]
     return poses
 
 
 def build_trial(experiment: Experiment, cell: Cell, seeds: Sequence[int]) -> Trial:
     """Return the worlds of a cell with these seeds, at their start."""
-    behavior, arena = find_behavior(experiment.behavior)(**cell.parameters), _load_arena(cell)
+    behavior, arena = find_behavior(experiment.behavior)(**cell.parameters), load_cell_arena(cell)
     starts = place_all(experiment.start, arena, cell.settings["robots"], seeds)
     return Trial(
         behavior,

@@ -70,29 +70,37 @@ class ResultsFolder:
         ]
         self._batches = os.path.join(path, "batches")
 
-    def begin(self, text: str, about: Dict[str, str], fresh: bool) -> List[Run]:
+    def begin(self, text: str, about: Dict[str, str], fresh: bool, kind: str = SIMULATED) -> List[Run]:
         """Create the folder, or go on with it; return the runs that it holds already.
 
-        text: of the experiment's file; fresh: delete what earlier runs left.
+        text: of the experiment's file; fresh: delete the earlier runs of this kind, and all of other experiments.
         Raises: ExperimentError if it holds runs of another experiment or of other code, or something else.
         """
         if os.path.isdir(self.path) and os.listdir(self.path) and not os.path.isdir(self._batches):
             raise ExperimentError(
                 "%s: holds files, but no results of an experiment; choose another --out" % self.path
             )
-        if fresh:
-            for name in ("batches", "series"):
-                shutil.rmtree(os.path.join(self.path, name), ignore_errors=True)
-            for name in ("runs.csv", "times.csv", "about.json"):
-                with suppress(FileNotFoundError):
-                    os.remove(os.path.join(self.path, name))
         os.makedirs(self._batches, exist_ok=True)
+        if fresh:
+            self._delete(kind)
         runs = self.read_runs()
-        if not runs:
-            write_file(os.path.join(self.path, "experiment.yaml"), text.encode())
+        write_file(os.path.join(self.path, "experiment.yaml"), text.encode())
+        if fresh or not runs:
             about_text = json.dumps({"code": self._code, **about}, indent=2) + "\n"
             write_file(os.path.join(self.path, "about.json"), about_text.encode())
         return runs
+
+    def _delete(self, kind: str) -> None:
+        """Delete the runs of a kind, and all of other experiments: trials on robots outlive changes of the code."""
+        for name in os.listdir(self._batches):
+            header = self._read_header(name)
+            if header is None or header["kind"] == kind or header["cell"] not in self._cells:
+                os.remove(os.path.join(self._batches, name))
+        if kind == SIMULATED:
+            shutil.rmtree(os.path.join(self.path, "series"), ignore_errors=True)
+        for name in ("runs.csv", "times.csv"):
+            with suppress(FileNotFoundError):
+                os.remove(os.path.join(self.path, name))
 
     def read_runs(self) -> List[Run]:
         """Return the runs of all finished batches, sorted.
@@ -103,18 +111,31 @@ class ResultsFolder:
         for name in sorted(os.listdir(self._batches)):
             if name.endswith(".jsonl"):
                 for run in self._read_batch(name):
-                    found[run.cell, run.seed, run.kind] = run
+                    key = (run.cell, run.seed, run.kind)
+                    if key not in found or not run.remark:  # a trial on robots that counts replaces one that does not
+                        found[key] = run
         return [found[key] for key in sorted(found)]
+
+    def _read_header(self, name: str) -> Optional[Dict[str, Any]]:
+        """Return cell, code, kind and seeds of a batch; None if the file is damaged."""
+        try:
+            with open(os.path.join(self._batches, name), encoding="utf-8") as file:
+                header = json.loads(file.readline())
+            seeds = [int(seed) for seed in header["seeds"]]
+            return {"cell": header["cell"], "code": header["code"], "kind": header["kind"], "seeds": seeds}
+        except (ValueError, KeyError, TypeError):
+            return None
 
     def _read_batch(self, name: str) -> List[Run]:
         """Return the runs of a batch; none if the file is damaged, so that they are computed again."""
         path = os.path.join(self._batches, name)
+        header = self._read_header(name)
+        if header is None:
+            return []
+        digest, code, kind, seeds = header["cell"], header["code"], header["kind"], header["seeds"]
         try:
             with open(path, encoding="utf-8") as file:
-                header, *lines = [json.loads(line) for line in file]
-            digest, code, kind = header["cell"], header["code"], header["kind"]
-            seeds = [int(seed) for seed in header["seeds"]]
-            by_seed = {int(line["seed"]): line for line in lines}
+                by_seed = {int(line["seed"]): line for line in map(json.loads, list(file)[1:])}
         except (ValueError, KeyError, TypeError):
             return []
         remedy = "start over with --fresh, or choose another --out"
@@ -167,8 +188,8 @@ class ResultsFolder:
             if name.endswith(".jsonl") and os.path.isfile(path):
                 runs = [run for run in self._read_batch(name) if run.cell == cell]
                 recorded = np.load(path, mmap_mode="r")
-                with open(os.path.join(self._batches, name), encoding="utf-8") as file:
-                    seeds = json.loads(file.readline())["seeds"]
+                header = self._read_header(name)
+                seeds = header["seeds"] if header else []
                 series.update({run.seed: recorded[:, seeds.index(run.seed)] for run in runs})
         return series
 

@@ -14,7 +14,7 @@ from ..behavior import Random, derive_seed, sense
 from ..behaviors import find_behavior
 from ..metrics import METRICS
 from ..safety import SafetyFilter
-from .batch import SAMPLE_S, list_sources, take_values
+from .batch import SAMPLE_S, list_sources, load_cell_arena, take_values
 from .experiment_file import Cell, Experiment
 
 __all__ = ["RobotTrial"]
@@ -34,6 +34,7 @@ class RobotTrial:
         self.remark = ""
         self._experiment = experiment
         self._behavior = find_behavior(experiment.behavior)(**cell.parameters)
+        self._objects = len(load_cell_arena(cell).objects)
         self._names = names
         self._filter = safety
         self._random = Random([derive_seed(seed, "behavior")], len(names))
@@ -47,16 +48,24 @@ class RobotTrial:
         """Time between two steps."""
         return 1.0 / self._behavior.rate_hz
 
+    @property
+    def drive(self) -> str:
+        """How the behavior wants the wheels to be driven: see Behavior."""
+        return self._behavior.drive
+
     def step(
         self, time_s: float, poses: np.ndarray, ages_s: np.ndarray, things: Things = NO_OBJECTS
     ) -> Optional[Tuple[np.ndarray, np.ndarray]]:
         """Return the speeds of all robots, m/s and rad/s (N,), at poses (N, 3); None: the trial has ended.
 
-        A robot without a pose, NaN, ends the trial with a remark.
+        A robot without a pose, NaN, or an object of the arena without one ends the trial with a remark.
         """
         lost = [name for name, pose in zip(self._names, poses) if not np.isfinite(pose).all()]
         if lost:
             self.remark = "no pose of %s at %.1f s" % (", ".join(lost), time_s)
+            return None
+        if len(things.radii_m) < self._objects:
+            self.remark = "poses of %d of the arena's %d objects" % (len(things.radii_m), self._objects)
             return None
         if time_s >= len(self._samples) * SAMPLE_S:
             self._sample(time_s, poses, things)
@@ -64,8 +73,8 @@ class RobotTrial:
             return None
         sensed = sense(self._behavior, time_s, poses[None], self._random, things)
         linear_m_s, angular_rad_s, self._memory = self._behavior.step(sensed, self._memory, self._random)
-        wanted = (np.broadcast_to(values, (1, len(poses))) for values in (linear_m_s, angular_rad_s))
-        linear_m_s, angular_rad_s = self._filter(poses[None], *wanted, ages_s[None])
+        wanted = np.array([np.broadcast_to(values, (1, len(poses))) for values in (linear_m_s, angular_rad_s)])
+        linear_m_s, angular_rad_s = self._filter(poses[None], wanted[0], wanted[1], ages_s[None])
         return linear_m_s[0], angular_rad_s[0]
 
     def _sample(self, time_s: float, poses: np.ndarray, things: Things) -> None:

@@ -20,7 +20,7 @@ from .batch import compute_batch, load_checked
 from .code_version import describe_machine, hash_code
 from .errors import ExperimentError
 from .experiment_file import MAX_ROBOTS, Experiment, parse_experiment
-from .results_folder import ResultsFolder, RunKey
+from .results_folder import REAL, SIMULATED, ResultsFolder, RunKey
 
 __all__ = ["open_folder", "parse_options", "read_experiment", "run_experiment"]
 
@@ -88,7 +88,15 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
         "--robots", type=_parse_robots, metavar="IDS", help="run trials on these robots instead, such as 0-9"
     )
     parser.add_argument("--frame", default="map", help="of robots' poses: of localize (map), or world in the simulator")
-    parser.add_argument("--fresh", action="store_true", help="delete earlier results in the folder")
+    parser.add_argument(
+        "--calibration",
+        metavar="FOLDER",
+        default="~/hero_calibration",
+        help="of `calibrate`: robots whose motors are calibrated are driven by pulses, if the behavior wants it",
+    )
+    parser.add_argument(
+        "--fresh", action="store_true", help="delete earlier runs in the folder; with --robots trials on robots instead"
+    )
     return parser.parse_args(arguments)
 
 
@@ -147,7 +155,7 @@ def open_folder(options: argparse.Namespace) -> Tuple[str, Experiment, ResultsFo
     load_checked(experiment)
     path = options.out or os.path.splitext(options.file)[0]
     folder = ResultsFolder(path, experiment, hash_code(experiment.behavior))
-    folder.begin(text, describe_machine(), options.fresh)
+    folder.begin(text, describe_machine(), options.fresh, SIMULATED if options.robots is None else REAL)
     return text, experiment, folder
 
 

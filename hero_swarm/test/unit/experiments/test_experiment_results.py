@@ -143,6 +143,29 @@ def test_runs_on_robots_stay_marked_and_beside_simulated_ones(tmp_path):
         assert "2,5,real,1.0,2.0,hero_2 lost its pose" in file.read()
 
 
+def test_fresh_deletes_simulated_runs_or_trials_on_robots(tmp_path):
+    folder, _ = open_folder(tmp_path)
+    real = Run(0, 6, (1.0, 2.0), REAL)
+    for runs in (RUNS[:1], [real]):
+        folder.write_batch(runs)
+    _, runs = open_folder(tmp_path, code="0ther", fresh=True)
+    assert runs == [real], "trials on robots outlive a change of the code"
+    folder, _ = open_folder(tmp_path, code="0ther")
+    folder.write_batch(RUNS[:1])
+    assert folder.begin(FILE, {}, fresh=True, kind=REAL) == RUNS[:1]
+    folder.write_batch([real])
+    assert open_folder(tmp_path, FILE.replace("time_s: 10", "time_s: 11"), fresh=True)[1] == []
+
+
+def test_a_trial_that_counts_replaces_one_that_does_not(tmp_path):
+    good, bad = Run(0, 5, (1.0, 2.0), REAL), Run(0, 5, (3.0, 4.0), REAL, "stopped at 2.0 s")
+    for number, order in enumerate(((good, bad), (bad, good))):
+        path = tmp_path / str(number)
+        for code, run in zip(("c0de", "0ther"), order):
+            open_folder(path, code=code)[0].write_batch([run])
+        assert open_folder(path)[0].read_runs() == [good]
+
+
 def test_the_folder_says_what_made_it(tmp_path):
     open_folder(tmp_path)
     assert (tmp_path / "experiment.yaml").read_text() == FILE

@@ -63,3 +63,8 @@ def test_a_lost_pose_ends_the_trial_with_a_remark():
 def test_a_trial_that_never_began_has_no_values():
     trial, _, _ = drive(lost_s=0.0)
     assert all(map(math.isnan, trial.list_values())) and trial.remark
+
+
+def test_a_trial_with_objects_needs_the_poses_of_all():
+    trial, end_s, _ = drive(FILE + "arena: box\n")
+    assert trial.remark == "poses of 0 of the arena's 1 objects" and end_s == 0.0
