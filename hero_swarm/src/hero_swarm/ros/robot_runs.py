@@ -13,7 +13,7 @@ from typing import Iterator, Sequence
 import numpy as np
 import rospy
 
-from hero_client import GoalError, Program, StoppedError, Swarm
+from hero_client import Program, StoppedError, Swarm
 from hero_node.processes import end_process
 
 from ..experiments.batch import place_cell
@@ -21,6 +21,7 @@ from ..experiments.errors import ExperimentError
 from ..experiments.experiment_file import Experiment
 from ..experiments.results_folder import REAL, ResultsFolder, Run
 from ..experiments.robot_trial import RobotTrial
+from ..experiments.start_drive import PERIOD_S, StartDrive
 from ..safety import ROBOTS, SafetyFilter
 from .pose_source import ObjectSource, PoseSource
 from .wheel_commands import WheelCommands
@@ -32,7 +33,11 @@ OBJECT_RADIUS_M = 0.05
 RECORD_START_S = 20.0
 """The recorder has opened its first file by then."""
 RECORD_END_S = 15.0
-START_TURN_RAD_S = 1.5
+START_LIMIT_S = 120.0
+"""For driving to the start; then robots are placed by hand."""
+
+START, DRIVE, END = "", "d", "q"
+"""Answers of the operator."""
 
 
 def run_on_robots(experiment: Experiment, folder: ResultsFolder, options: argparse.Namespace) -> str:
@@ -56,9 +61,11 @@ def run_on_robots(experiment: Experiment, folder: ResultsFolder, options: argpar
             cell = experiment.cells[cell_index]
             starts = place_cell(experiment, cell, seed)
             label = "%s, seed %d" % (cell.label, seed)
-            if not _drive_to_starts(program, swarm, starts, frame, label):
-                break
-            if not _confirm(program, swarm, starts, source, label):
+            answer = DRIVE
+            while answer == DRIVE:
+                _drive_to_starts(program, swarm, starts, source, label)
+                answer = _ask(program, swarm, starts, source, label)
+            if answer == END:
                 break
             trial = RobotTrial(experiment, cell, seed, [robot.name for robot in swarm], SafetyFilter(ROBOTS))
             commands = WheelCommands(swarm, trial.drive, options.calibration)
@@ -75,35 +82,72 @@ def run_on_robots(experiment: Experiment, folder: ResultsFolder, options: argpar
     return "%s: %d of %d missing trials done%s" % (os.path.join(folder.path, "runs.csv"), done, len(missing), again)
 
 
-def _drive_to_starts(program: Program, swarm: Swarm, starts: np.ndarray, frame: str, label: str) -> bool:
-    """Drive all robots to their places, and turn them; return whether the program is to continue."""
+def _drive_to_starts(program: Program, swarm: Swarm, starts: np.ndarray, source: PoseSource, label: str) -> None:
+    """Drive all robots to their places, and turn them; the time limit and a stop end it, too."""
     print("%s: driving to the start" % label)
-    places = {robot.robot_id: (x_m, y_m) for robot, (x_m, y_m, _) in zip(swarm, starts.tolist())}
+    drive, end_s = StartDrive(starts), time.monotonic() + START_LIMIT_S
     try:
-        swarm.go_to_each(places, frame=frame)
-        turns = []
-        for robot, yaw_rad in zip(swarm, starts[:, 2].tolist()):
-            angle_rad = math.remainder(yaw_rad - robot.pose_in(frame).yaw_rad, 2.0 * math.pi)
-            turns.append(robot.start_motion(robot.turn_steps(angle_rad, START_TURN_RAD_S)))
-        for turn in turns:
-            turn.result()
-    except GoalError as error:
-        print("%s: %s; place them by hand" % (label, error), file=sys.stderr)
-    return program.running
+        for _ in program.rate(1.0 / PERIOD_S):
+            if drive.done or time.monotonic() > end_s:
+                return
+            missing = {robot.name: robot.missing() for robot in swarm}
+            swarm.report_missing(missing)
+            poses = source.read()[0]
+            poses[[missing[robot.name] is not None for robot in swarm]] = np.nan
+            speeds = drive.step(poses, [robot.fresh_proximity() for robot in swarm])
+            for robot, speed in zip(swarm, speeds.T.tolist()):
+                robot.check_not_stopped()
+                if missing[robot.name] is None:
+                    robot.drive(*speed)
+    except StoppedError:
+        pass  # _confirm() tells
+    finally:
+        swarm.stop()
 
 
-def _confirm(program: Program, swarm: Swarm, starts: np.ndarray, source: PoseSource, label: str) -> bool:
-    """Say how far robots are from their places, and ask the operator; return whether to start."""
-    offsets_m = np.nan_to_num(np.hypot(*(source.read()[0] - starts)[:, :2].T), nan=np.inf)
-    farthest = swarm.robots[int(offsets_m.argmax())].name
-    offset_mm = 1e3 * float(offsets_m.max())
-    where = "is farthest from its place, %.0f mm" % offset_mm if math.isfinite(offset_mm) else "has no pose"
-    print("%s: %s %s; Enter starts, q ends" % (label, farthest, where))
+def _ask(program: Program, swarm: Swarm, starts: np.ndarray, source: PoseSource, label: str) -> str:
+    """Say how far robots are from their places; return START once the operator says so and all are ready, or
+    DRIVE to drive there again, or END."""
     while program.running:
-        if program.wait_readable([sys.stdin.fileno()], 1.0):
-            answer = sys.stdin.readline()
-            return bool(answer) and answer.strip().lower() != "q"
-    return False
+        print("%s: %s. Enter starts, d drives there again, q ends" % (label, _describe_offsets(swarm, starts, source)))
+        while not program.wait_readable([sys.stdin.fileno()], 1.0):
+            if not program.running:
+                return END
+        line = sys.stdin.readline()
+        answer = line.strip().lower() if line else END
+        if answer in (DRIVE, END):
+            return answer
+        obstacle = _find_obstacle(swarm, source)
+        if not obstacle:
+            return START
+        print("%s: cannot start: %s" % (label, obstacle), file=sys.stderr)
+        program.sleep(1.0)  # where answers come from a file
+    return END
+
+
+def _describe_offsets(swarm: Swarm, starts: np.ndarray, source: PoseSource) -> str:
+    offsets = source.read()[0] - starts
+    offsets_m = np.nan_to_num(np.hypot(offsets[:, 0], offsets[:, 1]), nan=np.inf)
+    row = int(offsets_m.argmax())
+    if math.isinf(offsets_m[row]):
+        return "%s has no pose" % swarm.robots[row].name
+    turns_rad = np.abs(np.remainder(offsets[:, 2] + math.pi, 2.0 * math.pi) - math.pi)
+    text = "robots are up to %.0f mm (%s) and %.0f degrees (%s) from their places"
+    names = swarm.robots[row].name, swarm.robots[int(turns_rad.argmax())].name
+    return text % (1e3 * offsets_m[row], names[0], math.degrees(turns_rad.max()), names[1])
+
+
+def _find_obstacle(swarm: Swarm, source: PoseSource) -> str:
+    """Return why no trial can start; empty if it can."""
+    for robot in swarm:
+        try:
+            robot.check_not_stopped()
+        except StoppedError as error:
+            return str(error)
+        reason = robot.missing()
+        if reason:
+            return "%s: %s" % (robot.name, reason)
+    return source.describe_missing(source.read()[0])
 
 
 @contextmanager

@@ -9,6 +9,7 @@ from hero_sim.population import place_worlds
 from hero_sim.stepped.robot_rows import RobotRows
 from hero_swarm.experiments.experiment_file import parse_experiment
 from hero_swarm.experiments.robot_trial import RobotTrial
+from hero_swarm.experiments.start_drive import PERIOD_S, StartDrive
 from hero_swarm.metrics import METRICS
 from hero_swarm.safety import ROBOTS, SafetyFilter
 from hero_swarm.trial import OPEN
@@ -68,3 +69,29 @@ def test_a_trial_that_never_began_has_no_values():
 def test_a_trial_with_objects_needs_the_poses_of_all():
     trial, end_s, _ = drive(FILE + "arena: box\n")
     assert trial.remark == "poses of 0 of the arena's 1 objects" and end_s == 0.0
+
+
+def drive_to(places, lost_s=(0.0, 0.0)):
+    """Return where robots that began at STARTS are, and when; robot 1 has no pose between two times."""
+    start_drive = StartDrive(places)
+    rows = RobotRows(place_worlds(OPEN, STARTS[None], [1], 1.0))
+    while not start_drive.done and rows.now_ms < 120_000:
+        poses = rows.world.poses.copy()
+        if lost_s[0] <= rows.now_ms / 1000.0 < lost_s[1]:
+            poses[1] = math.nan
+        rows.send_velocity(np.arange(3), *start_drive.step(poses))
+        rows.advance(rows.now_ms + round(1000.0 * PERIOD_S))
+        assert METRICS["collisions"](rows.world.poses[None], None)[0] == 0.0
+    return rows.world.poses.copy(), rows.now_ms / 1000.0
+
+
+def test_robots_that_change_places_drive_around_each_other_and_turn():
+    places = STARTS[[1, 2, 0]] + (0.0, 0.0, 1.0)
+    poses, _ = drive_to(places)
+    assert np.hypot(*(poses - places)[:, :2].T).max() < 0.015
+    assert np.abs(np.remainder(poses - places + math.pi, 2.0 * math.pi) - math.pi)[:, 2].max() < 0.1
+
+
+def test_robots_wait_for_a_pose_that_is_lost_on_the_way():
+    usual_s, later_s = drive_to(STARTS[[1, 2, 0]])[1], drive_to(STARTS[[1, 2, 0]], (3.0, 13.0))[1]
+    assert 8.0 < later_s - usual_s < 14.0
