@@ -180,7 +180,7 @@ def make_config(
             "Alpha": 0.5,
         },
         make_marker_display("arena (simulated)", "/hero_sim/arena"),
-        {**make_marker_display("robots of a replay", "/hero_sim/markers"), "Enabled": False},
+        make_marker_display("robots of a replay", "/hero_sim/replay"),
         make_marker_display("objects (simulated)", "/hero_sim/object_markers"),
         make_marker_display("names, rings, lights", LIGHTS_TOPIC),
         make_marker_display("selected robot", CHOICE_TOPIC),

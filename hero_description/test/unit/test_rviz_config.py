@@ -34,7 +34,7 @@ def test_rviz_displays_robots_arena_and_lights():
         assert ("rviz/Odometry", "/%s/odom" % name) in shown
         assert ("rviz/Odometry", "/%s/ground_truth" % name) in shown
         assert ("rviz/LaserScan", "/%s/proximity" % name) in shown
-    for topic in ("/hero_sim/arena", "/hero_sim/object_markers"):
+    for topic in ("/hero_sim/arena", "/hero_sim/object_markers", "/hero_sim/replay"):
         assert ("rviz/MarkerArray", topic) in shown
     assert ("rviz/MarkerArray", "/hero_lights") in shown
     assert ("rviz/MarkerArray", "/behavior/markers") in shown

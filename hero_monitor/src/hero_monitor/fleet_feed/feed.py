@@ -57,6 +57,7 @@ SCENE_TYPES = {
     "/hero_sim/arena": MarkerArray,
     "/hero_sim/markers": MarkerArray,
     "/hero_sim/object_markers": MarkerArray,
+    "/hero_sim/replay": MarkerArray,
     "/localization/poses": RobotPoses,
     "/map": OccupancyGrid,
     "/track/picture/compressed": CompressedImage,
@@ -66,6 +67,9 @@ SCENE_TYPES = {
 
 GROUND_TRUTH_TOPICS = {"/hero_sim/markers"}
 PICTURE_TOPICS = {"/track/picture/compressed", "/track/picture/outline"}
+
+REPLAY_KEPT_S = 3.0
+"""Robots of a replay disappear so long after its last message."""
 
 MARKERS_MAX = 2000
 """Of the arena, or of ground truth."""
@@ -93,6 +97,7 @@ class FleetFeed:
         self._localization = LocalizationWatch()
         self._grid: Optional[OccupancyGrid] = None
         self._grid_frame = ""
+        self._replay_s = 0.0
         self._tracked: Set[str] = set()
         self._master = MasterLink(background)
         self._pending_reads = 0
@@ -296,6 +301,11 @@ class FleetFeed:
             self.page_state.put("ground_truth", find_true_poses(taken["/hero_sim/markers"]))
         elif "/hero_sim/markers" not in self._scene:
             self.page_state.put("ground_truth", {})
+        if taken.get("/hero_sim/replay") is not None:
+            self._replay_s = now_s
+            self.page_state.put("replay", find_true_poses(taken["/hero_sim/replay"]))
+        elif now_s - self._replay_s > REPLAY_KEPT_S:
+            self.page_state.put("replay", {})
 
     def _localize(self, report: RobotPoses, now_s: float) -> None:
         self._tracked = {"hero_%d" % robot.id for robot in report.robots if robot.state == RobotPose.TRACKED}

@@ -31,6 +31,7 @@ const state = {
   lights: {},
   goals: {},
   ground_truth: {},
+  replay: {},
   picture: null,
   arena: { boxes: [], circles: [] },
   grid: null,
@@ -136,7 +137,7 @@ function showHead() {
   const source = localized ? "localized" : "odometry drifts";
   element("frame").textContent = robots.length ? `frame ${frame}, ${source}` : "";
   document.body.classList.toggle("stale", !state.isFresh);
-  element("empty").hidden = robots.length > 0 || !isLive;
+  element("empty").hidden = robots.length > 0 || !isLive || Object.keys(state.replay).length > 0;
   element("empty").textContent = "No robots. Robots appear here when they connect to the driver.";
   showLosses(state, connection);
 }

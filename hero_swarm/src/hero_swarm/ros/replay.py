@@ -20,7 +20,7 @@ def replay(trial: Trial, time_s: float, speed: float) -> None:
     with Program("show") as program:
         arena, objects, robots = (
             rospy.Publisher("/hero_sim/" + name, MarkerArray, queue_size=2, latch=True)
-            for name in ("arena", "object_markers", "markers")
+            for name in ("arena", "object_markers", "replay")
         )
         world = trial.rows.world
         arena.publish(make_markers(draw_arena(world.arena)))

@@ -226,7 +226,7 @@ export class FleetMap {
       xs.push(x - reach, x + reach);
       ys.push(y - reach, y + reach);
     };
-    for (const pose of Object.values(this.state.poses)) if (pose) add(pose[0], pose[1], 150);
+    for (const pose of Object.values({ ...this.state.replay, ...this.state.poses })) if (pose) add(pose[0], pose[1], 150);
     for (const [x, y, yaw, length, width] of this.state.arena.boxes) {
       const [cosine, sine] = [Math.abs(Math.cos(yaw / 1000)), Math.abs(Math.sin(yaw / 1000))];
       xs.push(x - (length * cosine + width * sine) / 2, x + (length * cosine + width * sine) / 2);
@@ -271,7 +271,7 @@ export class FleetMap {
   update(updates) {
     if ("poses" in updates) this.keepTrails();
     if ("picture" in updates) this.picture.show(this.shows.picture, this.state.picture);
-    const count = Object.keys(this.state.poses).length;
+    const count = Object.keys(this.state.poses).length + Object.keys(this.state.replay).length;
     if (!this.pinned && this.fittedFor !== this.sceneKey(count) && this.fit()) this.fittedFor = this.sceneKey(count);
     this.draw();
   }

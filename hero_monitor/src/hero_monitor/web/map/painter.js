@@ -51,6 +51,7 @@ export class MapPainter {
     for (const drawing of state.drawings) if (shows.beams || !drawing.isBeam) this.paintDrawing(drawing);
     if (shows.beams) for (const robot of robots) this.paintBeams(robot);
     for (const robot of robots) this.paintRobot(robot);
+    for (const [name, pose] of Object.entries(state.replay)) this.paintBody(pose, { ink: colorOf(Number(name.split("_")[1])) });
     if (map.aim) this.paintAim(map.aim);
     else if (map.onPlace && map.canvas.matches(":focus-visible")) this.paintAim({ from: [view.x, view.y] }); // where Enter puts it
     if (map.lasso) this.paintLasso(map.lasso);
@@ -268,19 +269,25 @@ export class MapPainter {
   }
 
   paintRobot(robot) {
-    const { context, view, state } = this;
+    const { state } = this;
     const here = stateOf(robot, state) === "READY";
     const isPlaced = here && sourceOf(robot, state) !== "unknown";
     const ink = here ? colorOf(robot.id) : this.ink("--quiet");
     const light = here ? state.lights[robot.name] : null;
-    this.at(state.poses[robot.name], () => {
+    const isChosen = state.chosen.has(robot.name);
+    this.paintBody(state.poses[robot.name], { ink, light, isPlaced, isChosen, hasShield: robot.model === "hero_plus" });
+  }
+
+  paintBody(pose, { ink, light = null, isPlaced = true, isChosen = false, hasShield = false }) {
+    const { context, view } = this;
+    this.at(pose, () => {
       context.scale(this.enlarged, this.enlarged);
       context.globalAlpha = isPlaced ? 1 : 0.4;
       context.fillStyle = this.ink("--tyre");
       for (const side of [-1, 1]) {
         context.fillRect(-WHEEL_MM[0], side * WHEEL_MM[2] - WHEEL_MM[1] / 2, 2 * WHEEL_MM[0], WHEEL_MM[1]);
       }
-      if (robot.model === "hero_plus") {
+      if (hasShield) {
         context.strokeStyle = this.ink("--tyre");
         context.lineWidth = 3;
         context.beginPath();
@@ -310,7 +317,7 @@ export class MapPainter {
       context.arc(0, 0, BODY_MM * (light ? 0.58 : 0.3), 0, 2 * Math.PI);
       context.fill();
       context.globalAlpha = 1;
-      if (state.chosen.has(robot.name)) {
+      if (isChosen) {
         context.strokeStyle = this.ink("--accent");
         context.lineWidth = 2.5 / view.scale / this.enlarged;
         context.beginPath();
