@@ -19,24 +19,22 @@ _POINT_SPREAD = 0.12
 _COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 
 
-def _begin(title: str, height_in: float) -> Tuple[Figure, Any]:
+def _begin(height_in: float) -> Tuple[Figure, Any]:
     figure = Figure(figsize=(_WIDTH_IN, height_in), constrained_layout=True)
     axes = figure.subplots()
-    axes.set_title(title, fontsize=11)
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
     return figure, axes
 
 
 def draw_runs(
-    metric: str,
     unit: str,
     labels: Sequence[str],
     values: Sequence[Sequence[float]],
     intervals: Sequence[Interval],
 ) -> Figure:
     """Draw every run of each cell beside its median and interval; infinite values are counted in words."""
-    figure, axes = _begin(metric, 1.2 + 0.45 * len(labels))
+    figure, axes = _begin(1.2 + 0.45 * len(labels))
     for row, (runs, interval) in enumerate(zip(values, intervals)):
         color = _COLORS[row % len(_COLORS)]
         finite = [value for value in runs if np.isfinite(value)]
@@ -50,12 +48,12 @@ def draw_runs(
         if len(finite) < len(runs):
             text = "not reached in %d of %d" % (len(runs) - len(finite), len(runs))
             axes.annotate(
-                text, (1.0, row), xycoords=("axes fraction", "data"), ha="right", va="center", fontsize=8
+                text, (1.0, row - 0.25), xycoords=("axes fraction", "data"), ha="right", va="center", fontsize=8
             )
     axes.set_yticks(range(len(labels)))
     axes.set_yticklabels(labels, fontsize=8)
     axes.set_ylim(len(labels) - 0.4, -0.6)
-    axes.set_xlabel("%s; median and 95 %% interval, every run" % (unit or "-"), fontsize=9)
+    axes.set_xlabel(unit, fontsize=9)
     return figure
 
 
@@ -66,14 +64,14 @@ def draw_over_time(
 
     values: (T, runs) of each cell, nan after a run's end.
     """
-    figure, axes = _begin("%s over time" % metric, 3.6)
+    figure, axes = _begin(3.6)
     for index, (label, runs) in enumerate(zip(labels, values)):
         color = _COLORS[index % len(_COLORS)]
         has_runs = ~np.isnan(runs).all(axis=1)
         low, middle, high = np.nanpercentile(runs[has_runs], (25.0, 50.0, 75.0), axis=1)
         axes.plot(times_s[has_runs], middle, color=color, label=label)
         axes.fill_between(times_s[has_runs], low, high, color=color, alpha=0.2, linewidth=0.0)
-    axes.set_xlabel("s", fontsize=9)
+    axes.set_xlabel("time (s)", fontsize=9)
     axes.set_ylabel("%s%s" % (metric, " (%s)" % unit if unit else ""), fontsize=9)
     axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
     axes.legend(fontsize=8, frameon=False)

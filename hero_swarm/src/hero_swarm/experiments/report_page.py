@@ -39,9 +39,12 @@ def draw_page(
     experiment = report.experiment
     parts = ["<h1>%s</h1>" % html.escape(experiment.behavior)]
     parts += ['<p class="note">%s</p>' % html.escape(remark) for remark in report.remarks]
+    parts.append("<p>Each point is a run; large points are medians, with 95 % intervals.</p>")
     for metric in experiment.metrics:
         unit = units.get(metric.source, "")
         parts += _draw_metric(report, metric.name, unit if metric.bound is None else "s")
+    if over_time:
+        parts.append("<h2>Over time</h2><p>Median of each cell, and the middle half of its runs.</p>")
     for source, (times_s, values) in over_time.items():
         figure = draw_over_time(
             source,
@@ -64,7 +67,6 @@ def _draw_metric(report: Report, metric: str, unit: str) -> List[str]:
     summaries = [summary for summary in report.summaries if summary.metric == metric]
     labels = list_labels(report.experiment, [summary.cell for summary in summaries])
     figure = draw_runs(
-        metric,
         unit,
         labels,
         [summary.values for summary in summaries],
