@@ -28,7 +28,6 @@ from .wheel_commands import WheelCommands
 
 __all__ = ["run_on_robots"]
 
-POSES_TOPIC = "/localization/poses"
 OBJECT_RADIUS_M = 0.05
 RECORD_START_S = 20.0
 """The recorder has opened its first file by then."""
@@ -55,7 +54,7 @@ def run_on_robots(experiment: Experiment, folder: ResultsFolder, options: argpar
     missing = folder.list_missing(folder.read_runs(), REAL)
     done = 0
     with Program("experiment") as program, Swarm(ids) as swarm:
-        source = PoseSource(ids, frame, POSES_TOPIC)
+        source = PoseSource(ids, frame)
         objects = ObjectSource(frame, "", OBJECT_RADIUS_M, are_needed=False)
         for cell_index, seed in missing:
             cell = experiment.cells[cell_index]
@@ -147,7 +146,8 @@ def _find_obstacle(swarm: Swarm, source: PoseSource) -> str:
         reason = robot.missing()
         if reason:
             return "%s: %s" % (robot.name, reason)
-    return source.describe_missing(source.read()[0])
+    source.read()
+    return source.describe_missing()
 
 
 @contextmanager
