@@ -9,6 +9,7 @@ import rospy
 from sensor_msgs.msg import CompressedImage, Image
 
 from hero_localization.camera import frame_source
+from hero_localization.camera.device_controls import DeviceControls
 from hero_localization.camera.frame_source import TopicSource, open_source
 from hero_localization.errors import FrameSourceError
 
@@ -112,7 +113,7 @@ def video(clock, tmp_path, monkeypatch):
     for shade in SHADES:
         writer.write(np.full((48, 64, 3), shade, np.uint8))
     writer.release()
-    source = open_source("", "~/arena.avi", "1920x1080", 30.0)
+    source = open_source("", "~/arena.avi", "1920x1080", 30.0, DeviceControls())
     yield source
     source.close()
     source.close()
@@ -160,54 +161,4 @@ def test_a_video_waits_for_a_slow_program(video, clock):
 def test_what_cannot_be_opened_is_told_with_the_reason(tmp_path, device, reason):
     device = device.format(folder=tmp_path)
     with pytest.raises(FrameSourceError, match=re.escape("%s %s" % (device, reason))):
-        open_source("", device, "640x480", 30.0)
-
-
-class ScriptedCaptures:
-    """Stands in for cv2.VideoCapture: each opening gives its images, then fails; None: it cannot be opened."""
-
-    def __init__(self, *openings):
-        self.openings, self.released = list(openings), 0
-
-    def __call__(self, path, backend):
-        images = self.openings.pop(0) if self.openings else None
-        return ScriptedCapture(self, images)
-
-
-class ScriptedCapture:
-    def __init__(self, owner, images):
-        self.owner, self.images = owner, images
-
-    def isOpened(self):  # noqa: N802 - OpenCV's name
-        return self.images is not None
-
-    def set(self, name, value):
-        pass
-
-    def get(self, name):
-        return 0.0
-
-    def read(self):
-        return (True, self.images.pop(0)) if self.images else (False, None)
-
-    def release(self):
-        self.owner.released += 1
-
-
-def test_a_camera_that_ends_is_opened_again_until_it_gives_images(monkeypatch):
-    captures = ScriptedCaptures([GRAY], None, [], [GRAY + 1])
-    monkeypatch.setattr(frame_source.cv2, "VideoCapture", captures)
-    monkeypatch.setattr(frame_source, "MIN_BACKOFF_S", 0.001)
-    monkeypatch.setattr(rospy, "get_time", lambda: 100.0)
-    source = frame_source.DeviceSource("rtsp://camera", (64, 48), 30.0)
-    try:
-        frame = None
-        while frame is None or frame.number == 0:
-            frame = source.poll(10.0)
-        np.testing.assert_array_equal(frame.gray, GRAY + 1)
-        while not source.problem:  # it has ended again, and says so
-            source.poll(0.01)
-        assert source.problem.startswith("rtsp://camera")
-    finally:
-        source.close()
-    assert captures.released >= 3
+        open_source("", device, "640x480", 30.0, DeviceControls())

@@ -119,6 +119,9 @@ def test_yaml_of_any_form_keeps_its_values(path, text):
         (LENS_TEXT + "camera: {rotation: [1, 0, 0, 0, 1, 0, 0, 0, -1], position_m: [0, 0, 2]}", "must hold rotation"),
         ("camera: {rotation: [1, 0, 0, 0, 1, 0, 0, 0, 1], position_m: [0, 0, 2]}", "calibrate the lens, then"),
         ("lens: {width_px: 10, height_px: 10, matrix: [0], distortion: []}", "not calibrated"),
+        ("exposure_s: 8", "exposure_s is 8, but must be a number from 0.0001 to 1"),
+        ("focus: auto", "focus is 'auto', but must be a whole number from 0 on"),
+        ("power_line_hz: 55", "power_line_hz is 55, but must be 0, 50 or 60"),
     ],
 )
 def test_a_wrong_file_is_refused_with_file_and_remedy(path, text, reason):
@@ -126,6 +129,11 @@ def test_a_wrong_file_is_refused_with_file_and_remedy(path, text, reason):
     with pytest.raises(SettingsError, match=reason) as error:
         settings.load(path)
     assert path in str(error.value)
+
+
+def test_controls_of_a_camera_are_read(path):
+    write(path, "exposure_s: 0.008\nfocus: 0\npower_line_hz: 50\n")
+    assert settings.load(path).controls == (0.008, None, 0, 50)
 
 
 def test_a_file_that_cannot_be_written_is_an_error(tmp_path):

@@ -16,6 +16,7 @@ from hero_node.geometry import clamp
 
 from ..errors import FrameSourceError
 from .camera_model import Lens
+from .device_controls import ControlPort, DeviceControls, apply_controls
 
 __all__ = ["DeviceSource", "Frame", "FrameSource", "LiveSource", "Newest", "TopicSource", "VideoSource", "open_source"]
 
@@ -36,6 +37,9 @@ _URL = "://"
 PLAUSIBLE_AGE_S = 5.0
 """V4L2 stamps its buffers by the clock that does not jump; a time that is further from it is of another clock."""
 
+
+MAX_FAILURES, HANG_S = 4, 1.0
+"""So many reads in a row that give no whole image, or one that takes so long, end a camera; a cable damages some."""
 
 MIN_BACKOFF_S, MAX_BACKOFF_S = 0.5, 8.0
 """Between two attempts to open a camera that ended."""
@@ -83,12 +87,13 @@ class FrameSource:
     Attributes:
         lens: as the camera's driver tells; None if it does not.
         problem: why there are no usable images, for people; empty if there are.
+        warning: what may spoil images that come, for people; empty if nothing is known.
         arrived_s: when the newest image came; before, when the source was opened.
     """
 
     def __init__(self) -> None:
         self.lens: Optional[Lens] = None
-        self.problem = ""
+        self.problem = self.warning = ""
         self.arrived_s = rospy.get_time()
 
     def poll(self, timeout_s: float) -> Any:
@@ -173,13 +178,13 @@ class TopicSource(LiveSource):
 class DeviceSource(LiveSource):
     """A V4L2 device such as /dev/video0, or the URL of a network camera; opened again whenever it ends."""
 
-    def __init__(self, path: str, size_px: Tuple[int, int], rate_hz: float) -> None:
+    def __init__(self, path: str, size_px: Tuple[int, int], rate_hz: float, controls: DeviceControls) -> None:
         """size_px: width and height to ask the device for.
 
         Raises: FrameSourceError if it cannot be opened.
         """
         super().__init__()
-        self._path, self._size_px, self._rate_hz = path, size_px, rate_hz
+        self._path, self._size_px, self._rate_hz, self._controls = path, size_px, rate_hz, controls
         self._capture = self._open()
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._read, name="camera", daemon=True)
@@ -196,18 +201,28 @@ class DeviceSource(LiveSource):
         return capture
 
     def _read(self) -> None:
-        number, backoff_s = 0, MIN_BACKOFF_S
-        while not self._ending.is_set():
+        shape: Optional[Tuple[int, ...]] = None
+        backoff_s, failures = MIN_BACKOFF_S, 0
+        for number in itertools.count():
+            if self._ending.is_set():
+                return
+            asked_s = time.monotonic()
             is_read, image = self._capture.read()
-            if is_read:
+            if is_read and image.size and image.shape == (shape or image.shape):
                 taken_s = self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0
                 self._keep((rospy.get_time() - self._find_age(taken_s), image, number))
-                number, backoff_s, self.problem = number + 1, MIN_BACKOFF_S, ""
+                backoff_s, failures, self.problem = MIN_BACKOFF_S, 0, ""
+                if shape is None and self._path.startswith(_DEVICES):
+                    self.warning = "; ".join(apply_controls(self._controls, ControlPort(self._path)))
+                shape = image.shape
+                continue
+            failures += 1
+            if failures < MAX_FAILURES and time.monotonic() - asked_s < HANG_S:
                 continue
             self._capture.release()
             self.problem = "%s gives no more images: is it plugged in? It is opened again" % self._path
             self._ending.wait(backoff_s)
-            backoff_s = min(2.0 * backoff_s, MAX_BACKOFF_S)
+            backoff_s, failures, shape = min(2.0 * backoff_s, MAX_BACKOFF_S), 0, None
             try:
                 self._capture = self._open()
             except FrameSourceError as error:
@@ -295,7 +310,7 @@ def _check_path(path: str) -> None:
         raise FrameSourceError("%s may not be read by this user%s" % (path, remedy))
 
 
-def open_source(image: str, device: str, size_px: str, rate_hz: float) -> FrameSource:
+def open_source(image: str, device: str, size_px: str, rate_hz: float, controls: DeviceControls) -> FrameSource:
     """Return the source of images: the device or video if one is named, else the topic image.
 
     Raises: FrameSourceError for a device or video that cannot be opened, or a size that is none.
@@ -308,4 +323,4 @@ def open_source(image: str, device: str, size_px: str, rate_hz: float) -> FrameS
     words = size_px.split("x")
     if len(words) != 2 or not all(word.strip().isdecimal() for word in words):
         raise FrameSourceError("the size of images is %r, but must be such as 1920x1080" % size_px)
-    return DeviceSource(path, (int(words[0]), int(words[1])), rate_hz)
+    return DeviceSource(path, (int(words[0]), int(words[1])), rate_hz, controls)

@@ -41,6 +41,7 @@ from ..calibration.lens_calibration import (
 from ..calibration.print_fit import refine_corners
 from ..calibration.robot_calibration import CALIBRATION_DRIVE, RobotCalibration, calibrate_robot
 from ..camera.camera_model import Lens
+from ..camera.device_controls import DeviceControls
 from ..camera.frame_source import Frame, open_source
 from ..camera.lens_file import load_lens
 from ..errors import CalibrationError, DetectorError, LocalizationError
@@ -74,11 +75,11 @@ LOOK_S = 3.0
 class Pictures:
     """The newest image of the camera, for a program that works on one after another."""
 
-    def __init__(self, options: argparse.Namespace, program: Program) -> None:
+    def __init__(self, options: argparse.Namespace, program: Program, controls: DeviceControls) -> None:
         """Open the camera. Raises: FrameSourceError."""
         self._finder: Optional[DetectorProcess] = None
         self._program = program
-        self.source = open_source(options.image, options.device, options.size, options.rate)
+        self.source = open_source(options.image, options.device, options.size, options.rate, controls)
         self._name = options.device or options.image
 
     def poll(self) -> Optional[Frame]:
@@ -95,6 +96,9 @@ class Pictures:
         """Wait for the next image. Raises: CalibrationError if none comes; as poll()."""
         for _ in range(round(FRAME_S / WAIT_S)):
             frame = self.poll()
+            if self.source.warning:
+                say("  " + self.source.warning)
+                self.source.warning = ""
             if frame is not None:
                 return frame
         reason = self.source.problem or "is the camera's driver running?"
@@ -329,8 +333,8 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     return options
 
 
-def _check_file(options: argparse.Namespace) -> None:
-    """Refuse a file that lacks what a part needs. Raises: CalibrationError, SettingsError."""
+def _check_file(options: argparse.Namespace) -> Settings:
+    """Return the settings of a file. Raises: CalibrationError if it lacks what a part needs, SettingsError."""
     settings = camera_file.load(options.file)
     count = len(settings.layout.references)
     if options.part == "arena" and count < MIN_TAGS:
@@ -340,6 +344,7 @@ def _check_file(options: argparse.Namespace) -> None:
         )
     if options.part == "robots" and settings.camera is None:
         raise CalibrationError("%s has no camera pose (extrinsics): run calibrate_camera arena first" % options.file)
+    return settings
 
 
 def run(arguments: Sequence[str]) -> int:
@@ -347,9 +352,9 @@ def run(arguments: Sequence[str]) -> int:
     options = parse_options(arguments)
     if options.part == "lens" and options.yaml:
         return import_lens(options)
-    _check_file(options)
+    settings = _check_file(options)
     with Program("calibrate_camera", anonymous=True) as program:
-        pictures = Pictures(options, program)
+        pictures = Pictures(options, program, settings.controls)
         try:
             if options.part == "lens":
                 return calibrate_lens_by_board(options, pictures, program)

@@ -53,9 +53,8 @@ class TrackNode:
         self._pictures = PictureOutput(self._frame_id, self._settings.layout.default_mount.height_m)
         self._diagnostics = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=2)
         rospy.Subscriber(parameters["poses_topic"], RobotPoses, self._expect, queue_size=2, tcp_nodelay=True)
-        self._source = open_source(
-            str(parameters["image"]), str(parameters["device"]), str(parameters["size_px"]), parameters["rate_hz"]
-        )
+        image, device, size_px = (str(parameters[name]) for name in ("image", "device", "size_px"))
+        self._source = open_source(image, device, size_px, parameters["rate_hz"], self._settings.controls)
 
     def _expect(self, report: RobotPoses) -> None:
         self._expected = {
@@ -153,7 +152,8 @@ class TrackNode:
         if silent_s > SILENT_S:
             text = "no image for %.0f s: is the camera's driver running?"
             return [("camera", text % silent_s, True)]
-        return [tuple(problem) for problem in self._tracker.list_problems()]
+        warnings = [("camera controls", self._source.warning, False)] if self._source.warning else []
+        return warnings + [tuple(problem) for problem in self._tracker.list_problems()]
 
     def close(self) -> None:
         """End the detector and leave the camera; safe twice."""

@@ -17,6 +17,7 @@ from hero_node.yaml_edit import replace_values
 from hero_node.yaml_text import YamlError, parse_yaml, read_text
 
 from ..camera.camera_model import Camera, Lens
+from ..camera.device_controls import POWER_LINES_HZ, DeviceControls
 from ..errors import SettingsError
 from ..prints.tag_images import DEFAULT_SIZE_M, REFERENCE_SIZE_M
 from .detectors import DEFAULT_BACKEND
@@ -49,6 +50,7 @@ class Settings(NamedTuple):
     """Images were taken so long before their stamps."""
     seen_references: Mapping[int, Pose] = {}
     """Where the calibration of the arena saw the reference tags."""
+    controls: DeviceControls = DeviceControls()
 
 
 def load(path: str) -> Settings:
@@ -135,7 +137,7 @@ def _parse(path: str, text: str) -> Dict[str, Any]:
 def _build(content: Mapping[str, Any]) -> Settings:
     known = (
         "detector family decimate tag_size_m tag_height_m lens camera delay_s references reference_size_m"
-        " seen_references objects tag_robots mounts"
+        " seen_references objects tag_robots mounts exposure_s gain focus power_line_hz"
     ).split()
     for key in content:
         if key not in known:
@@ -170,7 +172,19 @@ def _build(content: Mapping[str, Any]) -> Settings:
         _build_camera(content["camera"], lens) if "camera" in content else None,
         _number(content, "delay_s", 0.0, -1.0, 5.0),
         _by_tag(content, "seen_references", "[x_m, y_m, yaw_deg]", _pose),
+        _build_controls(content),
     )
+
+
+def _build_controls(content: Mapping[str, Any]) -> DeviceControls:
+    exposure_s = _number(content, "exposure_s", 0.0, 0.0001, 1.0) if "exposure_s" in content else None
+    for key in ("gain", "focus"):
+        if not is_whole_number(content.get(key, 0), low=0):
+            raise ValueError("%s is %s, but must be a whole number from 0 on" % (key, shorten(content[key])))
+    power_line_hz = content.get("power_line_hz", 0)
+    if power_line_hz not in POWER_LINES_HZ:
+        raise ValueError("power_line_hz is %s, but must be 0, 50 or 60" % shorten(power_line_hz))
+    return DeviceControls(exposure_s, content.get("gain"), content.get("focus"), content.get("power_line_hz"))
 
 
 def _number(content: Mapping[str, Any], key: str, default: float, low: float, high: float) -> float:

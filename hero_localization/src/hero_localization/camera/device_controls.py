@@ -1,0 +1,102 @@
+"""Controls of a USB camera that must not change by themselves: exposure, gain, focus; and its power-line filter.
+
+A lens is calibrated for one focus; a long exposure blurs moving tags. OpenCV knows no power-line filter, and not what a
+camera made of a value: they are written and read back through the kernel. Source: linux/videodev2.h, v4l2-controls.h.
+"""
+
+import fcntl
+import os
+import struct
+from typing import Dict, List, NamedTuple, Optional
+
+__all__ = ["POWER_LINES_HZ", "ControlPort", "DeviceControls", "apply_controls"]
+
+GET_CONTROL, SET_CONTROL = 0xC008561B, 0xC008561C
+"""VIDIOC_G_CTRL, VIDIOC_S_CTRL: of a struct v4l2_control, id and value."""
+_CONTROL = struct.Struct("=Ii")
+
+AUTO_GAIN, GAIN, POWER_LINE = 0x00980912, 0x00980913, 0x00980918
+AUTO_EXPOSURE, EXPOSURE, AUTO_EXPOSURE_RATE = 0x009A0901, 0x009A0902, 0x009A0903
+FOCUS, AUTO_FOCUS = 0x009A090A, 0x009A090C
+
+AUTO_EXPOSURE_ON = (0, 3)
+MANUAL_EXPOSURE = 1
+"""Values of AUTO_EXPOSURE; both that are on leave the time to the camera."""
+
+EXPOSURE_STEP_S = 1e-4
+POWER_LINES_HZ = (0, 50, 60)
+"""By the value of POWER_LINE; 0: no filter."""
+
+
+class DeviceControls(NamedTuple):
+    """What a camera file sets; None: stays as it is. gain and focus are in the camera's own units."""
+
+    exposure_s: Optional[float] = None
+    gain: Optional[int] = None
+    focus: Optional[int] = None
+    power_line_hz: Optional[int] = None
+
+
+class ControlPort:
+    """The controls of one V4L2 device, which another program may be reading images from."""
+
+    def __init__(self, path: str) -> None:
+        self._path = path
+
+    def read(self, control: int) -> Optional[int]:
+        """Return its value; None if the camera has no such control."""
+        return self._call(GET_CONTROL, control, 0)
+
+    def write(self, control: int, value: int) -> None:
+        """Ask for a value; read() tells what became of it."""
+        self._call(SET_CONTROL, control, value)
+
+    def _call(self, request: int, control: int, value: int) -> Optional[int]:
+        data = bytearray(_CONTROL.pack(control, value))
+        try:
+            device = os.open(self._path, os.O_RDWR | os.O_NONBLOCK)
+            try:
+                fcntl.ioctl(device, request, data)
+            finally:
+                os.close(device)
+        except OSError:
+            return None
+        return int(_CONTROL.unpack(data)[1])
+
+
+def apply_controls(controls: DeviceControls, port: ControlPort) -> List[str]:
+    """Set what the camera file sets. Return what the camera did not take, and what it still changes by itself."""
+    problems = []
+    wanted: Dict[str, Dict[int, int]] = {}
+    if controls.exposure_s is not None:
+        ticks = round(controls.exposure_s / EXPOSURE_STEP_S)
+        wanted["exposure_s"] = {AUTO_EXPOSURE: MANUAL_EXPOSURE, AUTO_EXPOSURE_RATE: 0, EXPOSURE: ticks}
+    if controls.gain is not None:
+        wanted["gain"] = {AUTO_GAIN: 0, GAIN: controls.gain}
+    if controls.focus is not None:
+        wanted["focus"] = {AUTO_FOCUS: 0, FOCUS: controls.focus}
+    if controls.power_line_hz is not None:
+        wanted["power_line_hz"] = {POWER_LINE: POWER_LINES_HZ.index(controls.power_line_hz)}
+    for key, values in wanted.items():
+        for control, value in values.items():
+            port.write(control, value)
+        control, value = list(values.items())[-1]
+        found = port.read(control)
+        if found is None:
+            problems.append("the camera has no %s to set: take it out of the camera file" % key)
+        elif found != value:
+            problems.append("%s: the camera has %s, not %s" % (key, _scale(key, found), _scale(key, value)))
+    if port.read(AUTO_EXPOSURE) in AUTO_EXPOSURE_ON:
+        problems.append("the camera changes its exposure by itself: set exposure_s, such as 0.008, in the camera file")
+    if port.read(AUTO_FOCUS):
+        problems.append("the camera changes its focus by itself: set focus in the camera file, then calibrate the lens")
+    return problems
+
+
+def _scale(key: str, value: int) -> str:
+    """Return a value of the device in units of the camera file."""
+    if key == "exposure_s":
+        return "%g" % (value * EXPOSURE_STEP_S)
+    if key == "power_line_hz" and 0 <= value < len(POWER_LINES_HZ):
+        return str(POWER_LINES_HZ[value])
+    return str(value)
