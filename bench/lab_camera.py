@@ -4,6 +4,7 @@ Each tag, and a calibration board, is sampled along the rays of 4 x 4 points of 
 exposure; the lens is inverted by a table along the radius. Then, in this order: vignette, blur, gamma, noise, JPEG.
 """
 
+import itertools
 import math
 from typing import List, NamedTuple, Sequence, Tuple
 
@@ -130,15 +131,21 @@ class LabCamera(NamedTuple):
         rim_px = self._bend(seen[:, :2] / seen[:, 2:])
         low = np.maximum(np.floor(rim_px.min(axis=0)).astype(int) - 4, 0)
         high = np.minimum(np.ceil(rim_px.max(axis=0)).astype(int) + 4, self.lens.size_px)
-        u, v = np.meshgrid(*_list_samples(low, high))
+        u, v = np.meshgrid(*[np.arange(start, end) for start, end in zip(low, high)])
         rays = self._find_rays(np.column_stack((u.ravel(), v.ravel())))
         found = np.column_stack((rays, np.ones(len(rays)))) @ np.linalg.inv(to_ray).T
-        column, row = ((found[:, :2] / found[:, 2:] + half_m) * cells_m).astype(int).T
-        inside = (np.minimum(column, row) > 0) & (column < printed.shape[1]) & (row < printed.shape[0])
-        shade = np.full(len(rays), FLOOR)
-        shade[inside] = np.where(printed[row[inside], column[inside]] > 127, WHITE, BLACK)
+        cells = ((found[:, :2] / found[:, 2:] + half_m) * cells_m).reshape(*u.shape, 2)
+        down, right = np.gradient(cells, axis=(0, 1))
+        patch = np.zeros(u.shape)
+        steps = (np.arange(SAMPLES) + 0.5) / SAMPLES - 0.5
+        for step_u, step_v in itertools.product(steps, steps):
+            column, row = np.moveaxis((cells + step_u * right + step_v * down).astype(int), 2, 0)
+            inside = (np.minimum(column, row) > 0) & (column < printed.shape[1]) & (row < printed.shape[0])
+            shade = np.full(u.shape, FLOOR)
+            shade[inside] = np.where(printed[row[inside], column[inside]] > 127, WHITE, BLACK)
+            patch += shade / SAMPLES**2
         light = np.full(self.lens.size_px[::-1], FLOOR)
-        light[low[1] : high[1], low[0] : high[0]] = _average(shade, low, high)
+        light[low[1] : high[1], low[0] : high[0]] = patch
         return self._expose(light, random)
 
     def _expose(self, light: np.ndarray, random: np.random.RandomState) -> np.ndarray:
