@@ -263,6 +263,13 @@ class ViewTest(unittest.TestCase):
         self.assertEqual((request["program"], request["robots"]), ("random_walk", ["hero_1"]))
         self.assertEqual(request["values"], {"linear_m_s": 0.05, "angular_rad_s": 1.5})
         self.monitor.requests.clear()
+        self.page.find("#program [label=behaviors] [value='behavior_segregation']").click()
+        self.page.run("document.querySelector('[name=groups]').value = 2.5")
+        self.page.click("#start")  # refused by the page: no whole number
+        self.page.run("document.querySelector('[name=groups]').value = 3")
+        request = self.send_until("start", lambda: self.page.click("#start"))
+        self.assertEqual((request["program"], request["values"]["groups"]), ("behavior_segregation", 3))
+        self.monitor.requests.clear()
         self.page.find("#program [value='swarm_go_to']").click()
         self.page.click("#start")
         request = self.send_until("start", lambda: self.page.click("#canvas"))

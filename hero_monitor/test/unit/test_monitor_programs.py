@@ -15,7 +15,7 @@ from hero_monitor.control import programs as programs_module
 from hero_monitor.control.offers import BEHAVIORS, OFFERS, check_values, make_arguments, place_robots
 from hero_monitor.control.programs import Child, Programs
 from hero_monitor.control.requests import RequestError
-from hero_swarm.behaviors import list_names
+from hero_swarm.behaviors import find_behavior, list_names
 
 PACKAGES = Path(__file__).resolve().parents[3]
 DEADLINE_S = 300.0
@@ -40,13 +40,24 @@ def test_all_that_pages_may_set_are_parameters_of_the_program(program):
     defaults = {name: field.default for name, field in offer.fields.items()}
     check_values(program, defaults)
     arguments = dict(text[1:].split(":=", 1) for text in make_arguments(program, [0, 12], "map", defaults))
-    assert set(arguments) <= set(read_launch_arguments(offer.package, program))
+    assert set(arguments) <= set(read_launch_arguments(offer.package, offer.program))
     assert yaml.safe_load(arguments["robots"]) == "0 12"
     assert ("frame" in arguments) == offer.has_frame
 
 
-def test_all_built_in_behaviors_are_offered():
+def test_all_built_in_behaviors_are_offered_with_numbers_they_have():
     assert sorted(BEHAVIORS) == list_names()
+    for name, fields in BEHAVIORS.items():
+        numbers = find_behavior(name)().numbers()
+        assert {key: field.default for key, field in fields.items()} == {key: numbers[key] for key in fields}
+
+
+def test_numbers_of_a_behavior_are_one_parameter_of_its_program():
+    values = {"groups": 3, "own_m": 0.2, "others_m": 1.0, "max_linear_m_s": 0.05, "safety": "off"}
+    check_values("behavior_segregation", values)
+    arguments = dict(text[1:].split(":=", 1) for text in make_arguments("behavior_segregation", [1], "map", values))
+    assert yaml.safe_load(arguments["parameters"]) == {key: values[key] for key in values if key != "safety"}
+    assert (arguments["behavior"], arguments["safety"]) == ('"segregation"', '"off"')
 
 
 def test_a_formation_is_placed_where_the_map_was_clicked():
@@ -75,6 +86,12 @@ def test_a_formation_is_placed_where_the_map_was_clicked():
         ("random_walk", {"linear_m_s": "0.1", "angular_rad_s": 1.0}),
         ("go_to_goal", {"avoid": "true"}),
         ("behavior", {"behavior": "/tmp/mine.py", "safety": "off"}),
+        ("behavior_aggregation", {"safety": "off", "behavior": "/tmp/mine.py"}),
+        ("behavior_rendezvous", {"gain_1_s": -1.0, "max_linear_m_s": 0.1, "safety": "off"}),
+        (
+            "behavior_segregation",
+            {"groups": 2.5, "own_m": 0.2, "others_m": 1.0, "max_linear_m_s": 0.1, "safety": "off"},
+        ),
         ("swarm_go_to", {**CIRCLE, "shape": ["circle"]}),
     ],
 )

@@ -121,6 +121,10 @@ class Behavior:
         names = [name for name in dir(self) if not name.startswith("_")]
         return {name: getattr(self, name) for name in names if not callable(getattr(self, name))}
 
+    def numbers(self) -> Dict[str, float]:
+        """Return the parameters that are numbers, with their values."""
+        return {name: value for name, value in self.parameters().items() if isinstance(value, (int, float))}
+
     def sensors(self) -> Dict[str, Any]:
         """Return the sensors by name."""
         return {name: value for name, value in self.parameters().items() if isinstance(value, SENSORS)}

@@ -9,7 +9,7 @@ from hero_sim.world.arena import build_rectangle, place_robots
 from hero_sim.world.arena_file import load_arena
 from hero_swarm import metrics
 from hero_swarm.behavior import Behavior
-from hero_swarm.behaviors import find_behavior, list_names
+from hero_swarm.behaviors import find_behavior, list_names, make_behavior
 from hero_swarm.behaviors.consensus import Formation, LeaderFollowers
 from hero_swarm.behaviors.coverage import VoronoiCoverage
 from hero_swarm.trial import OPEN, Trial, scatter_objects
@@ -171,6 +171,24 @@ def test_a_parameter_that_a_behavior_lacks_is_refused():
     assert VoronoiCoverage(width_m=3.0).width_m == 3.0
     with pytest.raises(TypeError, match="no parameter 'with_m'"):
         VoronoiCoverage(with_m=3.0)
+
+
+def test_numbers_of_a_behavior_are_given_by_name_or_as_yaml():
+    for given in ({"spacing_m": 0.3, "rate_hz": 5}, "{spacing_m: 0.3, rate_hz: 5}"):
+        made = make_behavior("flocking", given)
+        assert (made.spacing_m, made.rate_hz, made.cruise_m_s) == (0.3, 5, 0.05)
+    assert make_behavior("flocking", "{}").spacing_m == 0.25
+    for wrong, told in (
+        ({"spacing": 0.3}, "flocking has no number 'spacing'; it has .*spacing_m"),
+        ({"near": 0.3}, "no number 'near'"),
+        ({"spacing_m": "0.3"}, "spacing_m is '0.3', but must be a number"),
+        ({"spacing_m": float("nan")}, "spacing_m is nan"),
+        ({"rate_hz": 0}, "rate_hz is 0, but must be a number from 0.1 to 100"),
+        ("0.3", "is 0.3, but must be numbers such as"),
+        ("{spacing_m", "not YAML"),
+    ):
+        with pytest.raises(ValueError, match="^parameters.*" + told):
+            make_behavior("flocking", wrong)
 
 
 def test_a_behavior_of_a_file_is_found_by_its_name(tmp_path):

@@ -6,19 +6,12 @@ from typing import Any, Dict, List, NamedTuple, Sequence, Union
 from hero_client.apps.formations import Point, place_formation
 from hero_client.controllers.orca import AvoidanceLaw
 from hero_client.values.robot_constants import MAX_LINEAR_M_S
-from hero_node.number_checks import is_number
+from hero_node.number_checks import is_number, is_whole_number
 
 from .requests import MAX_GOAL_M, RequestError
 
 FORMATION_KEYS = ("shape", "spacing_m", "turn_deg", "x_m", "y_m")
 """Of the formation; all others are parameters of the program."""
-
-BEHAVIORS = (
-    "aggregation", "box_pushing", "cooperative_transport", "coverage", "cyclic_pursuit", "dispersal", "dispersion",
-    "evolved_aggregation", "flocking", "formation", "leader_followers", "majority", "milling", "object_clustering",
-    "rendezvous", "segregation", "voter", "wall_following",
-)  # fmt: skip
-
 
 class Field(NamedTuple):
     """A parameter: a number within limits, one of some options, or a flag."""
@@ -29,6 +22,7 @@ class Field(NamedTuple):
     unit: str = ""
     options: Sequence[str] = ()
     on_map: bool = False  # a click on the map sets it
+    whole: bool = False
 
     def admits(self, value: Any) -> bool:
         """Return whether a page may set this value."""
@@ -36,24 +30,72 @@ class Field(NamedTuple):
             return isinstance(value, bool)
         if self.options:
             return isinstance(value, str) and value in self.options
-        return is_number(value, self.low, self.high)
+        return (is_whole_number if self.whole else is_number)(value, self.low, self.high)
 
 
 class Offer(NamedTuple):
-    """A program, by the name that its package installs it under."""
+    """A program of a package."""
 
     package: str
+    program: str
     title: str
     fields: Dict[str, Field] = {}
     has_frame: bool = False  # it needs the robots' places on the map
     drives: slice = slice(None)  # which of its robots, in their order; pages may drive the others meanwhile
+    behavior: str = ""  # the built-in one that program behavior runs; fields but safety are numbers of its class
 
 
 _SPEED = Field(0.08, 0.01, MAX_LINEAR_M_S, "m/s")
+_SPEED_LIMIT = {"max_linear_m_s": _SPEED._replace(default=0.1)}
+_WHEELS = {"wheel_m_s": _SPEED._replace(default=0.12)}
+_GAIN = Field(0.5, 0.0, 5.0, "1/s")
+_RANGE = Field(0.5, 0.05, 5.0, "m")
+_COORDINATE = Field(0.0, -MAX_GOAL_M, MAX_GOAL_M, "m")
+_PUSH = {"goal_x_m": _COORDINATE, "goal_y_m": _COORDINATE, "linear_m_s": _SPEED}
+_VOTE = {"changes_hz": Field(0.5, 0.01, 10.0, "1/s"), "cruise_m_s": _SPEED._replace(default=0.1)}
+
+BEHAVIORS: Dict[str, Dict[str, Field]] = {
+    "aggregation": {},
+    "evolved_aggregation": _WHEELS,
+    "cyclic_pursuit": _WHEELS,
+    "dispersal": _WHEELS,
+    "milling": _WHEELS,
+    "wall_following": _WHEELS,
+    "flocking": {
+        "spacing_m": _RANGE._replace(default=0.25),
+        "alignment": Field(0.1, 0.0, 1.0, "m/s"),
+        "cohesion": Field(0.15, 0.0, 2.0, "1/s"),
+        "cruise_m_s": _SPEED._replace(default=0.05),
+        **_SPEED_LIMIT,
+    },
+    "dispersion": {"spacing_m": _RANGE, "gain_1_s": _GAIN._replace(default=0.4), **_SPEED_LIMIT},
+    "segregation": {
+        "groups": Field(2, 2, 6, whole=True),
+        "own_m": _RANGE._replace(default=0.15),
+        "others_m": _RANGE._replace(default=1.0),
+        **_SPEED_LIMIT,
+    },
+    "rendezvous": {"gain_1_s": _GAIN, **_SPEED_LIMIT},
+    "leader_followers": {"gap_m": _RANGE._replace(default=0.15), "leader_m_s": _SPEED._replace(default=0.05)},
+    "formation": {"side_m": _RANGE._replace(default=0.25), "max_linear_m_s": _SPEED},
+    "coverage": {"width_m": Field(2.0, 0.2, 20.0, "m"), "height_m": Field(2.0, 0.2, 20.0, "m"), **_SPEED_LIMIT},
+    "object_clustering": _WHEELS,
+    "box_pushing": _PUSH,
+    "cooperative_transport": _PUSH,
+    "voter": _VOTE,
+    "majority": _VOTE,
+}
+"""Built-in behaviors, with those of their numbers that pages may set."""
+
+_SAFETY = Field("fence and robots", options=("off", "fence and robots"))
+
+_BEHAVIOR_TITLES = {"formation": "formation by distances"}
+"""Where the name without underscores would not do."""
 
 OFFERS = {
     "swarm_go_to": Offer(
         "hero_examples",
+        "swarm_go_to",
         "formation",
         {
             "shape": Field("circle", options=("circle", "line", "grid")),
@@ -65,16 +107,16 @@ OFFERS = {
         },
         has_frame=True,
     ),
-    "go_to_goal": Offer(
-        "hero_examples", "take goals from the map", {"avoid": Field(False)}
-    ),
+    "go_to_goal": Offer("hero_examples", "go_to_goal", "take goals from the map", {"avoid": Field(False)}),
     "random_walk": Offer(
         "hero_examples",
+        "random_walk",
         "random walk",
         {"linear_m_s": _SPEED._replace(default=0.1), "angular_rad_s": Field(1.5, 0.1, 4.0, "rad/s")},
     ),
     "follow": Offer(
         "hero_examples",
+        "follow",
         "follow the first one",
         {"gap_m": Field(0.15, 0.1, 2.0, "m"), "linear_m_s": _SPEED._replace(default=0.15)},
         has_frame=True,
@@ -82,6 +124,7 @@ OFFERS = {
     ),
     "led_show": Offer(
         "hero_examples",
+        "led_show",
         "light show",
         {
             "pattern": Field("rainbow", options=("rainbow", "chase", "blink")),
@@ -90,15 +133,17 @@ OFFERS = {
         },
         drives=slice(0, 0),
     ),
-    "behavior": Offer(
-        "hero_swarm",
-        "behavior",
-        {
-            "behavior": Field("milling", options=BEHAVIORS),
-            "safety": Field("fence and robots", options=("off", "fence and robots")),
-        },
-        has_frame=True,
-    ),
+    **{
+        "behavior_" + name: Offer(
+            "hero_swarm",
+            "behavior",
+            _BEHAVIOR_TITLES.get(name, name.replace("_", " ")),
+            {**fields, "safety": _SAFETY},
+            has_frame=True,
+            behavior=name,
+        )
+        for name, fields in BEHAVIORS.items()
+    },
 }
 """The programs, in the order in which pages list them. Pages send "values" for the fields of one."""
 
@@ -129,12 +174,17 @@ def _make_formation(values: Dict[str, Any]) -> Dict[str, Any]:
 
 def make_arguments(program: str, robot_ids: Sequence[int], frame: str, values: Dict[str, Any]) -> List[str]:
     """Return the private parameters of a program as arguments; frame: the map's."""
+    offer = OFFERS[program]
     parameters: Dict[str, Any] = {"robots": " ".join(map(str, robot_ids))}
-    parameters.update(values)
+    if offer.behavior:
+        numbers = {name: value for name, value in values.items() if name in BEHAVIORS[offer.behavior]}
+        parameters.update(behavior=offer.behavior, safety=values["safety"], parameters=numbers)
+    else:
+        parameters.update(values)
     if "shape" in values:
         parameters = {name: value for name, value in parameters.items() if name not in FORMATION_KEYS}
         parameters["formation"] = _make_formation(values)
-    if OFFERS[program].has_frame:
+    if offer.has_frame:
         parameters["frame"] = frame
     # JSON is YAML, as rospy reads arguments: no value becomes another one, or another type.
     return ["_%s:=%s" % (name, json.dumps(value)) for name, value in parameters.items()]
@@ -146,6 +196,7 @@ def describe_offers(names: Sequence[str]) -> List[Dict[str, Any]]:
         {
             "program": name,
             "title": OFFERS[name].title,
+            "is_behavior": OFFERS[name].behavior != "",
             "fields": [{"name": field, **OFFERS[name].fields[field]._asdict()} for field in OFFERS[name].fields],
         }
         for name in OFFERS

@@ -41,12 +41,13 @@ LAST_BYTES = 2000
 
 def find_programs() -> Dict[str, str]:
     """Return the programs that are installed here, with their paths; may take a second."""
-    packages = {"record": "hero_recording", **{name: offer.package for name, offer in OFFERS.items()}}
+    wanted = {"record": ("hero_recording", "record")}
+    wanted.update((name, (offer.package, offer.program)) for name, offer in OFFERS.items())
     found = {}
-    for name, package in packages.items():
+    for package, program in set(wanted.values()):
         with contextlib.suppress(roslib.packages.ROSPkgException):
-            found[name] = next(iter(roslib.packages.find_node(package, name) or []), "")
-    return {name: path for name, path in found.items() if path}
+            found[package, program] = next(iter(roslib.packages.find_node(package, program) or []), "")
+    return {name: found[program] for name, program in wanted.items() if found.get(program)}
 
 
 class Child:

@@ -4,11 +4,18 @@ import importlib
 import importlib.util
 import inspect
 import os
-from typing import Dict, List, Type
+from typing import Any, Dict, List, Type
+
+from hero_node.number_checks import is_number
+from hero_node.yaml_text import YamlError, parse_yaml
 
 from ..behavior import Behavior
 
-__all__ = ["find_behavior", "list_names"]
+__all__ = ["find_behavior", "list_names", "make_behavior"]
+
+MIN_RATE_HZ, MAX_RATE_HZ = 0.1, 100.0
+MAX_NUMBER = 1e6
+"""Of the other parameters, whatever their unit."""
 
 _MODULES: Dict[str, str] = {
     "aggregation": "aggregation.Aggregation",
@@ -67,3 +74,26 @@ def find_behavior(name: str) -> Type[Behavior]:
             "behavior %s: name one class as %s:CLASS; it has %s" % (name, path, ", ".join(sorted(classes)) or "none")
         )
     return next(iter(classes.values()))
+
+
+def make_behavior(name: str, numbers: Any) -> Behavior:
+    """Return a behavior by its name, as of find_behavior(); numbers: those that differ, by name, or as YAML.
+
+    Raises: ValueError that says what there is.
+    """
+    kind = find_behavior(name)
+    defaults = kind().numbers()
+    if isinstance(numbers, str):
+        try:
+            numbers = parse_yaml(numbers)
+        except YamlError as error:
+            raise ValueError("parameters: not YAML: %s" % error) from None
+    if not isinstance(numbers, dict):
+        raise ValueError("parameters is %r, but must be numbers such as {rate_hz: %g}" % (numbers, kind.rate_hz))
+    for key, value in numbers.items():
+        if key not in defaults:
+            raise ValueError("parameters: %s has no number %r; it has %s" % (name, key, ", ".join(defaults)))
+        low, high = (MIN_RATE_HZ, MAX_RATE_HZ) if key == "rate_hz" else (-MAX_NUMBER, MAX_NUMBER)
+        if not is_number(value, low, high):
+            raise ValueError("parameters: %s is %r, but must be a number from %g to %g" % (key, value, low, high))
+    return kind(**numbers)

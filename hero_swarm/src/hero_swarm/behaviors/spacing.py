@@ -47,7 +47,7 @@ class Segregation(Behavior):
 
     def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:
         """See Behavior; the memory is the group of each robot."""
-        near, group = sensed.near, sensed.numbers % self.groups
+        near, group = sensed.near, sensed.numbers % int(self.groups)
         range_m = np.maximum(near.range_m, 1e-6)
         is_own = group[near.rows] == group[:, None]
         rest_m = np.where(is_own, self.own_m, self.others_m)

@@ -64,7 +64,7 @@ def load_checked(experiment: Experiment) -> None:
     seeds = experiment.seeds[:1]
     with _at(experiment, "behavior"):
         behavior = find_behavior(experiment.behavior)()
-        allowed = [name for name, value in behavior.parameters().items() if isinstance(value, (int, float))]
+        allowed = list(behavior.numbers())
         pushes = any(isinstance(sensor, Objects) for sensor in behavior.sensors().values())
     for cell in experiment.cells:
         for name in cell.parameters:

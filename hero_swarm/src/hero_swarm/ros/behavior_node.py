@@ -16,7 +16,7 @@ from hero_client.values.object_sensing import Things
 from hero_node.parameters import choice, number, robot_ids, whole_number, words
 
 from ..behavior import Behavior, Objects, Random, Sensed, sense
-from ..behaviors import find_behavior
+from ..behaviors import make_behavior
 from ..metrics import METRICS
 from ..safety import MODES, SafetyFilter
 from .behavior_markers import BehaviorMarkers
@@ -27,9 +27,9 @@ FIRST_REPORT_S, REPORT_PERIOD_S = 3.0, 5.0
 SHOW_PERIOD_S = 0.1
 
 
-def _make_behavior(name: str) -> Behavior:
+def _make_behavior(parameters: Any) -> Behavior:
     try:
-        return find_behavior(name)()
+        return make_behavior(parameters["behavior"], parameters["parameters"])
     except ValueError as error:
         raise ProgramError("~" + str(error)) from None
 
@@ -53,7 +53,7 @@ class BehaviorNode:
     def __init__(self, swarm: Swarm, parameters: Any) -> None:
         """Begin; robots are stopped until their poses are known. Raises: ProgramError for a wrong parameter."""
         self._swarm = swarm
-        self._behavior = _make_behavior(parameters["behavior"])
+        self._behavior = _make_behavior(parameters)
         self._frame = parameters["frame"]
         ids = [robot.robot_id for robot in swarm]
         self._source = PoseSource(ids, self._frame)
@@ -126,6 +126,7 @@ class BehaviorNode:
 
 PARAMETERS = {
     "behavior": words("aggregation", "a built-in behavior, FILE.py, or FILE.py:Class"),
+    "parameters": {},
     "robots": robot_ids("all", "ids; all: those that have joined a driver"),
     "frame": words("map", "frame of the poses: that of localize, or `world` for the simulator's ground truth"),
     "objects_topic": words("", "hero_msgs/ObjectPoses; empty: of hero_sim for the frame world, of track else"),
@@ -142,7 +143,7 @@ def behavior() -> None:
     """Run the behavior until the program is to end. Raises: ProgramError for a wrong parameter."""
     with Program("behavior") as program:
         parameters = read_parameters(PARAMETERS)
-        _make_behavior(parameters["behavior"])
+        _make_behavior(parameters)
         ids = parameters["robots"]
         with (Swarm.discover(odom=False, proximity=False, sleep=program.sleep) if ids is None
               else Swarm(ids, odom=False, proximity=False)) as swarm:  # fmt: skip

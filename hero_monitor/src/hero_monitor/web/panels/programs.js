@@ -1,7 +1,16 @@
 // Programs on the chosen robots, those that run, and the recording. They belong to the monitor: every page shows them.
 
-const UNIT = /_(m_s|rad_s|m|s|deg)$/;
-const WORDS = { linear_m_s: "speed", angular_rad_s: "turn rate" };
+const UNIT = /_(m_s|rad_s|1_s|m|s|deg|hz)$/;
+const WORDS = {
+  linear_m_s: "speed",
+  cruise_m_s: "speed",
+  leader_m_s: "leader's speed",
+  max_linear_m_s: "speed limit",
+  wheel_m_s: "wheel speed",
+  angular_rad_s: "turn rate",
+  own_m: "to own group",
+  others_m: "to others",
+};
 
 const element = (id) => document.getElementById(id);
 const clock = (seconds) => `${Math.floor(seconds / 60)}:${String(seconds % 60).padStart(2, "0")}`;
@@ -56,10 +65,10 @@ export class ProgramPanel {
         input.name = field.name;
         if (field.options.length) for (const option of field.options) input.add(new Option(option));
         else input.type = typeof field.default === "boolean" ? "checkbox" : "number";
-        if (input.type === "number") Object.assign(input, { min: field.low, max: field.high, step: "any", required: true });
+        if (input.type === "number") Object.assign(input, { min: field.low, max: field.high, step: field.whole ? 1 : "any", required: true });
         if (input.type === "checkbox") input.checked = field.default;
         else input.value = field.default;
-        const words = WORDS[field.name] || field.name.replace(UNIT, "");
+        const words = WORDS[field.name] || field.name.replace(UNIT, "").replaceAll("_", " ");
         label.append(field.unit ? `${words}, ${field.unit}` : words, input);
         return label;
       }),
@@ -72,7 +81,11 @@ export class ProgramPanel {
     if (this.offers !== programs) {
       const chosen = element("program").value;
       this.offers = programs;
-      element("program").replaceChildren(...programs.map(({ title, program }) => new Option(title, program)));
+      const options = (some) => some.map(({ title, program }) => new Option(title, program));
+      const behaviors = document.createElement("optgroup");
+      behaviors.label = "behaviors";
+      behaviors.append(...options(programs.filter((offer) => offer.is_behavior)));
+      element("program").replaceChildren(...options(programs.filter((offer) => !offer.is_behavior)), behaviors);
       if (programs.some(({ program }) => program === chosen)) element("program").value = chosen;
       this.showFields();
     }
