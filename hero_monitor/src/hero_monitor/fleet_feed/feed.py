@@ -173,7 +173,7 @@ class FleetFeed:
         if message is not None:
             self._listening, self.stopped = message.listening, message.stopped
             self._fleet_stamp_s = message.header.stamp.to_sec()
-            self._rows = message.robots[:ROBOTS_MAX]
+            self._rows = sorted(message.robots, key=lambda row: row.id)[:ROBOTS_MAX]
             self.robots = {row.namespace.strip("/"): row for row in self._rows if row.state != Robot.REFUSED}
             self.placement.set_robots(self.robots)
         elif answering == self._answering and now_s < self._fleet_s + ROW_PERIOD_S:

@@ -8,6 +8,7 @@ import { BODY_MM, MapPainter, TRAIL_MS } from "./painter.js";
 const TRAIL_STEP_MM = 8;
 const CLICK_PX = 6;
 const PIXELS_PER_MM = { least: 0.01, most: 8 };
+const LABEL_PX = 28; // of the frame's distance from the edge, and of the name below a robot
 const MARGIN = 0.05; // of the map's size, around what Fit shows
 const EDGE_PX = 36; // covered by tools above and hints below
 
@@ -243,7 +244,7 @@ export class FleetMap {
     if (!xs.length) return false;
     const [left, right, low, high] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
     const room = 1 - MARGIN;
-    const edge = Math.max(EDGE_PX, element("frame").offsetHeight + 14);
+    const edge = Math.max(EDGE_PX, element("frame").offsetHeight + LABEL_PX);
     this.view.x = (left + right) / 2;
     this.view.y = (low + high) / 2;
     this.view.scale = Math.min(
