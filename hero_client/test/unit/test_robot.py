@@ -291,6 +291,8 @@ def test_a_robot_tells_its_state():
     assert repr(robot) == "<hero_3: ready, Pose(x_m=0.000, y_m=0.000, yaw_rad=0.000)>"
     link.is_stopped = True
     assert robot.is_stopped and repr(robot).startswith("<hero_3: stopped")
-    link.ready_s += 1.0
+    link.ready_s = math.inf
+    assert repr(robot).startswith("<hero_3: connecting")
+    link.clock.now_s += READY_TIMEOUT_S
     assert repr(robot).startswith("<hero_3: nothing subscribes")
     assert robot.connected and robot.age_s("odom") == 0.03

@@ -316,10 +316,12 @@ class ViewTest(unittest.TestCase):
         self.page.click("[data-panel=fleet]")
         loss = {"source": "driver", "cause": "No answer from hero_driver", "remedy": "Start it again: " + 9 * "word "}
         status = {"level": "error", "text": "NOT STOPPED: hero_3 moves" + 20 * " word", "is_final": True, "reads": 0}
-        self.show([make_robot(number, stop="MOVING") for number in range(4)], stopped=True)
+        self.show([make_robot(number, stop="MOVING", known=number > 0) for number in range(4)], stopped=True)
         self.monitor.show(losses=[loss], stop=status)
         for banner in ("#losses", "#stopping", "#release_bar"):
             wait_for(self.page.find(banner).is_displayed, banner)
+        self.page.wait_for_text("#fleet tbody", "UNKNOWN")
+        wait_for(lambda: self.page.run(FIND_CUT) == [], lambda: self.page.run(FIND_CUT))
         self.page.click("#fleet tbody tr:nth-child(2) button")  # scrolls, and fails unless it can be reached
         self.page.wait_for_text("#name", "hero_1")
 

@@ -491,7 +491,10 @@ class BaseRobot(Group):
         self._link.close()
 
     def __repr__(self) -> str:
-        """Return the robot's name with its pose, or with why it is not ready."""
-        state = self.missing() or ("stopped" if self._link.is_stopped else "ready")
+        """Return the robot's name with its pose, or with why it is not ready; never waits."""
+        missing = self.missing()
+        if missing and self.now_s < self._first_data_s:
+            missing = "connecting"
+        state = missing or ("stopped" if self._link.is_stopped else "ready")
         pose = self.fresh_pose()
         return "<%s: %s%s>" % (self.name, state, ", %r" % (pose,) if pose else "")
