@@ -5,9 +5,7 @@ config/hero_driver.yaml are generated.
 """
 
 import dataclasses
-import glob
 import ipaddress
-import os
 from dataclasses import dataclass
 from typing import Any, Dict, Mapping, Optional, Tuple
 
@@ -24,8 +22,7 @@ from hero_node.parameters import (
     whole_number,
     words,
 )
-from hero_node.texts import one_line
-from hero_node.yaml_text import parse_yaml, read_text
+from hero_node.yaml_text import read_calibrations
 
 from .commands.command_settings import CommandSettings
 from .corrections.robot_corrections import CorrectionSettings, OwnWheels
@@ -258,6 +255,10 @@ class DriverConfig:
             self.max_bytes_per_s,
         )
 
+    def read_own_wheels(self) -> Dict[str, OwnWheels]:
+        """Return the wheels of calibrated robots. Raises: ProgramError for a file that is none of calibrate's."""
+        return read_calibrations(self.calibration_folder, "wheels_m", _convert_wheels)
+
     @property
     def correction_settings(self) -> CorrectionSettings:
         """Settings of corrections."""
@@ -269,7 +270,7 @@ class DriverConfig:
             self.stamps,
             self.max_future_s,
             self.max_age_s,
-            read_wheel_files(self.calibration_folder),
+            self.read_own_wheels(),
             frozenset(self.hero_plus),
         )
 
@@ -292,26 +293,15 @@ class DriverConfig:
         return WheelGeometry(self.wheel_diameter_m, self.wheel_separation_m, self.ticks_per_turn)
 
 
-def read_wheel_files(folder: str) -> Dict[str, OwnWheels]:
-    """Return the wheels in a folder's files by robot. Raises: ProgramError for a file that is none of calibrate's."""
-    wheels = {}
-    for path in sorted(glob.glob(os.path.join(os.path.expanduser(folder), "hero_*.yaml"))) if folder else []:
-        try:
-            content = parse_yaml(read_text(path))
-            if isinstance(content, dict) and "wheels_m" in content:
-                left_m, right_m, separation_m = wheels_m = [float(length) for length in content["wheels_m"]]
-                if not all(0.01 <= length_m <= 1.0 for length_m in wheels_m):
-                    raise ValueError("wheels_m must be from 0.01 to 1 m")
-                ticks_per_turn: Optional[float] = content.get("ticks_per_turn")
-                if ticks_per_turn is not None and not float(ticks_per_turn) >= 1.0:
-                    raise ValueError("ticks_per_turn must be 1 or more")
-                wheels[str(content.get("robot"))] = OwnWheels(
-                    (left_m + right_m) / 2.0, separation_m, right_m / left_m, ticks_per_turn and float(ticks_per_turn)
-                )
-        except (OSError, TypeError, ValueError) as error:
-            text = "%s: %s; correct the file, move it away, or set ~calibration_folder"
-            raise ProgramError(text % (path, one_line(error))) from None
-    return wheels
+def _convert_wheels(lengths: Any, content: Dict[str, Any]) -> OwnWheels:
+    left_m, right_m, separation_m = wheels_m = [float(length) for length in lengths]
+    if not all(0.01 <= length_m <= 1.0 for length_m in wheels_m):
+        raise ValueError("wheels_m must be from 0.01 to 1 m")
+    ticks_per_turn: Optional[float] = content.get("ticks_per_turn")
+    if ticks_per_turn is not None and not float(ticks_per_turn) >= 1.0:
+        raise ValueError("ticks_per_turn must be 1 or more")
+    diameter_m, ratio = (left_m + right_m) / 2.0, right_m / left_m
+    return OwnWheels(diameter_m, separation_m, ratio, ticks_per_turn and float(ticks_per_turn))
 
 
 PARAMETERS: Dict[str, Parameter] = {
@@ -335,5 +325,5 @@ def read_config(given: Mapping[str, Any]) -> DriverConfig:
             "~host is empty and ~robots too: the driver would neither listen nor dial;"
             " give an address to listen on (0.0.0.0 for all) or robots to dial"
         )
-    read_wheel_files(config.calibration_folder)  # refused before anything starts
+    config.read_own_wheels()  # refused before anything starts
     return config

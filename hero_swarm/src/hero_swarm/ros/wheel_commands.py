@@ -1,17 +1,14 @@
 """Speeds to robots over ROS: velocities, or servo pulses if `calibrate motors` has measured their dead zones."""
 
-import glob
 import math
-import os
-from typing import Dict, List, Optional
+from typing import Any, List, Optional
 
 import numpy as np
 import rospy
 
-from hero_client import ProgramError, Swarm
+from hero_client import Swarm
 from hero_msgs.msg import Motor
-from hero_node.texts import one_line
-from hero_node.yaml_text import parse_yaml, read_text
+from hero_node.yaml_text import read_calibrations
 
 from ..behavior import PULSES
 from ..wheel_pulses import find_pulses
@@ -19,21 +16,11 @@ from ..wheel_pulses import find_pulses
 __all__ = ["WheelCommands"]
 
 
-def _read_dead_zones(folder: str) -> Dict[str, List[float]]:
-    """Return the dead zones in a folder's files of `calibrate` by robot. Raises: ProgramError for an unusable file."""
-    found = {}
-    for path in sorted(glob.glob(os.path.join(os.path.expanduser(folder), "hero_*.yaml"))) if folder else []:
-        try:
-            content = parse_yaml(read_text(path))
-            if isinstance(content, dict) and "dead_zones_us" in content and ".previous." not in path:
-                edges_us = [float(edge_us) for edge_us in content["dead_zones_us"]]
-                if len(edges_us) != 4 or not all(map(math.isfinite, edges_us)):
-                    raise ValueError("dead_zones_us must be four numbers")
-                found[str(content.get("robot"))] = edges_us
-        except (OSError, TypeError, ValueError) as error:
-            text = "%s: %s; calibrate the robot again, or move the file away"
-            raise ProgramError(text % (path, one_line(error))) from None
-    return found
+def _convert_dead_zones(edges: Any, _content: Any) -> List[float]:
+    edges_us = [float(edge_us) for edge_us in edges]
+    if len(edges_us) != 4 or not all(map(math.isfinite, edges_us)):
+        raise ValueError("dead_zones_us must be four numbers")
+    return edges_us
 
 
 class WheelCommands:
@@ -46,7 +33,8 @@ class WheelCommands:
         self._dead_zones_us: Optional[np.ndarray] = None
         if drive != PULSES:
             return
-        found, names = _read_dead_zones(folder), ["hero_%d" % robot.robot_id for robot in swarm]
+        found = read_calibrations(folder, "dead_zones_us", _convert_dead_zones)
+        names = ["hero_%d" % robot.robot_id for robot in swarm]
         missing = [name for name in names if name not in found]
         if missing:
             shown = ", ".join(missing[:8]) + (", ..." if len(missing) > 8 else "")
