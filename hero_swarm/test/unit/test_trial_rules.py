@@ -14,10 +14,8 @@ from hero_swarm.learning.episode import MAX_ANGULAR_RAD_S, Episode, count_observ
 from hero_swarm.safety import FENCE, MAX_AGE_S, ROBOTS, SafetyFilter
 from hero_swarm.trial import OPEN, Trial, scatter
 
-REACH_M = BODY_RADIUS_M + 0.03
-"""Of the body from the steered point."""
-
-RADIUS_M = REACH_M + 0.012
+RADIUS_M = BODY_RADIUS_M + 0.03 + 0.012
+"""Of the body around the steered point, with the margin."""
 
 
 def keep_safe(poses, linear_m_s, angular_rad_s=0.0, mode=ROBOTS, fence_m=None, ages_s=None, safe=None):
@@ -28,14 +26,21 @@ def keep_safe(poses, linear_m_s, angular_rad_s=0.0, mode=ROBOTS, fence_m=None, a
     return [tuple(map(float, pair)) for pair in zip(found[0][0], found[1][0])]
 
 
+def make_filter(mode, fence_m=None):
+    """Return a filter that lets robots close half of what is left in a second, and does not turn them aside."""
+    safe = SafetyFilter(mode, fence_m)
+    safe.gain_1_s, safe.sidestep = 2.0, 0.0
+    return safe
+
+
 def test_two_robots_close_no_faster_than_what_is_left_of_their_distance():
     for left_m, expected_m_s in ((0.05, 0.05), (0.2, 0.1), (0.0, 0.0), (-0.02, -0.02)):
         apart_m = left_m + 2.0 * RADIUS_M + 0.06  # both steered points lie 0.03 m nearer
-        safe = SafetyFilter(ROBOTS)
-        safe.sidestep = 0.0
+        safe = make_filter(ROBOTS)
         commands = keep_safe([(0, 0, 0), (apart_m, 0, math.pi)], 0.1, safe=safe)
         assert commands == [pytest.approx((expected_m_s, 0.0), abs=1e-6)] * 2
-    commands = keep_safe([(0, 0, 0), (0.05 + 2.0 * RADIUS_M + 0.06, 0, math.pi)], 0.1)
+    safe.sidestep = 1.0
+    commands = keep_safe([(0, 0, 0), (0.05 + 2.0 * RADIUS_M + 0.06, 0, math.pi)], 0.1, safe=safe)
     assert commands[0] == pytest.approx((0.05, -0.05 / 0.03), abs=1e-6), "what is left over goes to the right"
     free = keep_safe([(0, 0, 0), (0.0 + 2.0 * RADIUS_M + 0.06, 0, math.pi)], 0.1, mode=FENCE)
     assert free == [pytest.approx((0.1, 0.0))] * 2
@@ -44,13 +49,12 @@ def test_two_robots_close_no_faster_than_what_is_left_of_their_distance():
 def test_a_fence_is_approached_no_faster_than_its_distance_allows():
     fence_m = np.array((-1.0, -0.5, 1.0, 0.5))
     for pose in (
-        (0.9 - REACH_M, 0, 0),
-        (-0.9 + REACH_M, 0, math.pi),
-        (0, 0.4 - REACH_M, math.pi / 2),
-        (0, REACH_M - 0.4, -math.pi / 2),
+        (0.9 - RADIUS_M, 0, 0),
+        (-0.9 + RADIUS_M, 0, math.pi),
+        (0, 0.4 - RADIUS_M, math.pi / 2),
+        (0, RADIUS_M - 0.4, -math.pi / 2),
     ):
-        safe = SafetyFilter(FENCE, fence_m)
-        safe.sidestep = 0.0
+        safe = make_filter(FENCE, fence_m)
         away = (pose[0] - 0.03 * math.cos(pose[2]), pose[1] - 0.03 * math.sin(pose[2]), pose[2])
         assert keep_safe([away], 0.2, safe=safe) == [pytest.approx((0.2, 0.0), abs=1e-6)]
         near = (
@@ -63,10 +67,9 @@ def test_a_fence_is_approached_no_faster_than_its_distance_allows():
 
 def test_robots_drove_on_while_their_poses_were_on_the_way():
     for age_s, expected in ((MAX_AGE_S, True), (MAX_AGE_S + 0.01, False)):
-        safe = SafetyFilter(FENCE, np.array((-9.0, -9.0, 1.0, 9.0)))
-        safe.sidestep = 0.0
+        safe = make_filter(FENCE, np.array((-9.0, -9.0, 1.0, 9.0)))
         assert keep_safe([(0, 0, 0)], 0.1, safe=safe) == [(pytest.approx(0.1), pytest.approx(0.0))]
-        x_m = 1.0 - REACH_M - 0.03 - 0.04
+        x_m = 1.0 - RADIUS_M - 0.03 - 0.04
         ((linear_m_s, _),) = keep_safe([(x_m, 0, 0)], 0.1, ages_s=[age_s], safe=safe)
         # 0.04 m were left, and 0.5 s at 0.1 m/s are 0.05 m.
         assert linear_m_s == pytest.approx(-0.02, abs=1e-6) if expected else linear_m_s == 0.0
