@@ -69,7 +69,11 @@ def connect(endpoint, attempts, token=TOKEN, uri="/foxglove", protocol="foxglove
         limits=ConnectionLimits(9),
         **values,
     )
-    asyncio.run(handler._execute([]))
+
+    async def answer():
+        await handler._execute([])  # tornado 5 gives no coroutine
+
+    asyncio.run(answer())
     return connection.write_headers.call_args[0][0].code
 
 
