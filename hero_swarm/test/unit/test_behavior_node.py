@@ -18,6 +18,10 @@ from hero_swarm.ros.behavior_node import PARAMETERS, BehaviorNode
 DEAD_ZONE_US = [1470.0, 1530.0, 1480.0, 1540.0]
 
 
+def write_calibration(folder, number):
+    (folder / ("hero_%d.yaml" % number)).write_text("robot: hero_%d\ndead_zones_us: %s\n" % (number, DEAD_ZONE_US))
+
+
 class Stage:
     """Stepped robots, in place of all that the node has of ROS."""
 
@@ -98,11 +102,13 @@ def test_a_robot_whose_pose_is_old_stops_alone_and_is_named(stage):
 
 def test_calibrated_motors_get_pulses_and_zero_velocity_at_rest(stage, tmp_path):
     for number in range(6):
-        (tmp_path / ("hero_%d.yaml" % number)).write_text("robot: hero_%d\ndead_zones_us: %s\n" % (number, DEAD_ZONE_US))
+        write_calibration(tmp_path, number)
     stage.start("milling", calibration_folder=str(tmp_path))
     stage.run(0.2)
     pulses = stage.sent["/hero_4/cmd_motor"]
-    assert pulses and all(1000 < message.left_motor_pwm < 1500 < message.right_motor_pwm < 2000 for message in pulses), "both wheels forward"
+    assert pulses
+    for message in pulses:
+        assert 1000 < message.left_motor_pwm < 1500 < message.right_motor_pwm < 2000, "both wheels forward"
     count = len(pulses)
     stage.silent = set(range(6))
     stage.run(2.0)
@@ -111,7 +117,7 @@ def test_calibrated_motors_get_pulses_and_zero_velocity_at_rest(stage, tmp_path)
 
 
 def test_without_all_motors_calibrated_velocities_drive_and_are_explained(stage, tmp_path):
-    (tmp_path / "hero_0.yaml").write_text("robot: hero_0\ndead_zones_us: %s\n" % DEAD_ZONE_US)
+    write_calibration(tmp_path, 0)
     stage.start("milling", calibration_folder=str(tmp_path))
     before_m = stage.places_m
     stage.run(2.0)
