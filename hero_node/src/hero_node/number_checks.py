@@ -1,9 +1,11 @@
 """Checks of numbers from files, parameters and pages: True and False (ints of Python) and NaN are none. Pure."""
 
+import math
 import sys
+from numbers import Real
 from typing import Any
 
-__all__ = ["is_number", "is_whole_number"]
+__all__ = ["check_finite", "check_speed", "is_finite", "is_number", "is_whole_number"]
 
 LARGEST = sys.float_info.max
 """Larger ints cannot become floats."""
@@ -17,3 +19,20 @@ def is_number(value: Any, low: float = -LARGEST, high: float = LARGEST) -> bool:
 def is_whole_number(value: Any, low: float = -LARGEST, high: float = LARGEST) -> bool:
     """Return whether value is an int in low..high."""
     return isinstance(value, int) and is_number(value, low, high)
+
+
+def is_finite(value: object) -> bool:
+    """Return whether value, which may be of numpy, is a number and neither infinite nor NaN."""
+    return isinstance(value, Real) and math.isfinite(value)
+
+
+def check_finite(what: str, *values: object) -> None:
+    """Check that all are finite numbers. Raises: ValueError."""
+    if not all(map(is_finite, values)):
+        raise ValueError("%s must be finite numbers, not %s" % (what, ", ".join(map(repr, values))))
+
+
+def check_speed(distance: float, speed: float) -> None:
+    """Check that a distance or angle is finite, and a speed positive. Raises: ValueError."""
+    if not (is_finite(distance) and is_finite(speed) and speed > 0.0):
+        raise ValueError("distance or angle must be finite, the speed positive, not %r and %r" % (distance, speed))

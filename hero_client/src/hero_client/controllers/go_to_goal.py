@@ -7,8 +7,8 @@ import math
 from typing import NamedTuple, Optional, Sequence
 
 from hero_node.geometry import STOP, Pose, Velocity, wrap_angle
+from hero_node.number_checks import check_finite
 
-from ..values.checks import check_finite
 from ..values.readings import find_nearest
 from .avoidance import bend_around
 from .motion import AIM_SHARE, DEFAULT_TIMEOUT_S, MotionController

@@ -11,12 +11,12 @@ from operator import index
 from typing import Callable, Generator, List, Optional, SupportsIndex, Tuple
 
 from hero_node.geometry import Pose, Velocity, clamp, transform_pose, wrap_angle
+from hero_node.number_checks import check_finite, check_speed
 
 from ..controllers.go_to_goal import DEFAULT_TOLERANCE_M, Goal, GoToGoalController, make_goal
 from ..controllers.motion import DEFAULT_TIMEOUT_S, MotionController, State
 from ..controllers.straight_and_turn import ForwardController, TurnController
 from ..values.background_motion import BackgroundMotion, Sleep, Steps
-from ..values.checks import check_finite, check_speed
 from ..values.colors import Color
 from ..values.errors import GoalError, StaleDataError, StoppedError
 from ..values.readings import FRESH_S, Obstacle, find_nearest

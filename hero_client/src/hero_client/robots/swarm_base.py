@@ -10,13 +10,13 @@ import numpy as np
 from hero_node.clock import Clock
 from hero_node.errors import HeroError
 from hero_node.geometry import Pose
+from hero_node.number_checks import check_finite
 
 from ..controllers.go_to_goal import DEFAULT_TOLERANCE_M
 from ..controllers.motion import DEFAULT_TIMEOUT_S
 from ..controllers.orca import AvoidanceLaw
 from ..controllers.swarm_go_to import SwarmGoToController
 from ..values.background_motion import BackgroundMotion, Steps
-from ..values.checks import check_finite
 from ..values.colors import Color
 from ..values.errors import GoalError, StaleDataError
 from .group import REPEAT_PERIOD_S, Group, stop_after, wait_for_all
