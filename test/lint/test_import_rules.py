@@ -16,6 +16,7 @@ SOCKET_OWNERS = (
     "hero_tools.checkup.network",
     "hero_monitor.serving.server",
     "hero_monitor.foxglove.endpoint",
+    "hero_monitor.foxglove.topic_streams",
     "hero_monitor.live_view",
     "hero_monitor.program",
 )

@@ -11,7 +11,6 @@ from hero_monitor.background import Background
 from hero_monitor.control.offers import OFFERS, describe_offers
 from hero_monitor.foxglove import hub as hub_module
 from hero_monitor.foxglove.hub import Client, Hub, TopicType
-from hero_monitor.foxglove.ros_topics import LOOK_UP_PERIOD_S, RosTopics
 from hero_monitor.parameters import load_parameters, read_token
 from hero_monitor.serving import server as server_module
 from hero_monitor.serving.access import TOKEN_LENGTH_MIN, Access
@@ -151,57 +150,6 @@ def test_a_client_has_so_many_subscriptions_and_topics_of_its_own(monkeypatch):
     assert len(client.published) == 2
     ask(op="unadvertise", channelIds=[0])
     assert 0 not in client.published
-
-
-def test_ros_topics_are_looked_up_and_subscribed_to_in_the_background(monkeypatch):
-    from hero_monitor.foxglove import ros_topics as module
-    from hero_msgs.msg import RobotArray
-
-    clock, jobs, subscribed = SimpleNamespace(now_s=100.0), [], {}
-    monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: clock.now_s, time_ns=lambda: 7))
-    published = [["/flag", "std_msgs/Bool"], ["/hero_driver/robots", "hero_msgs/RobotArray"], ["/odd", "no_such/Type"]]
-    monkeypatch.setattr(module, "ask_master", lambda call, subgraph: published)
-
-    def subscribe(topic, kind, *arguments, **options):
-        subscribed[topic] = kind
-        return SimpleNamespace(unregister=lambda: subscribed.pop(topic))
-
-    monkeypatch.setattr(module.rospy, "Subscriber", subscribe)
-
-    def submit(function, *arguments):
-        jobs.append((function, arguments))
-        return SimpleNamespace(done=lambda: (function, arguments) not in jobs)
-
-    def work():
-        while jobs:
-            function, arguments = jobs[0]
-            function(*arguments)
-            jobs.pop(0)
-
-    topics = RosTopics(SimpleNamespace(submit=submit, warn=lambda *said: None))
-    assert topics.find_types() == {}
-    clock.now_s += 2.0 * LOOK_UP_PERIOD_S
-    topics.find_types()
-    assert len(jobs) == 1, "the master is asked one question at a time"
-    work()
-    assert set(topics.find_types()) == {"/flag", "/hero_driver/robots"} and len(jobs) == 1
-    work()
-    clock.now_s += 0.9 * LOOK_UP_PERIOD_S
-    topics.find_types()
-    assert jobs == []
-    assert not topics.want({"/flag", "/hero_driver/robots"}) and not topics.want(set())
-    work()
-    assert topics.want({"/flag", "/hero_driver/robots"})
-    assert subscribed == {"/flag": module.rospy.AnyMsg, "/hero_driver/robots": RobotArray}, "STOP ALL reads it, too"
-    message = module.rospy.AnyMsg()
-    message._buff = b"\1"
-    for md5, latching in ((module.roslib.message.get_message_class("std_msgs/Bool")._md5sum, "1"), ("other", "0")):
-        message._connection_header = {"md5sum": md5, "latching": latching, "callerid": "/node"}
-        topics._keep(message, "/flag")
-    assert topics.take() == [("/flag", b"\1", 7, "/node")] and topics.take() == []
-    topics.want(set())
-    work()
-    assert subscribed == {}
 
 
 def test_limits_of_what_pages_may_set_are_the_ends_of_their_fields():

@@ -1,47 +1,45 @@
-"""The topics that exist, and the bytes of those that clients want; decodes only drivers' reports.
+"""The topics that exist, and the bytes of those that clients want.
 
-The ROS master is asked in the background, because it may block.
+The ROS master and publishers are asked in the background, because they may block.
 """
 
 import time
 from collections import deque
 from concurrent.futures import Future
-from io import BytesIO
-from typing import Any, Deque, Dict, List, Optional, Set
+from typing import Deque, Dict, List, Optional, Set, Tuple
 
 import roslib.message
 import rospy
 
-from hero_msgs.msg import RobotArray
 from hero_node.errors import NodeError
 from hero_node.ros.master import ask_master
 
 from ..background import Background
 from .hub import TopicMessage, TopicType
+from .topic_streams import Source, Stream, StreamSet, open_stream
 
 LOOK_UP_PERIOD_S = 1.0
-WAITING_MAX = 20_000
-"""Messages between two turns of the web server; the oldest are dropped."""
+OPENING_MAX = 3
+"""Nodes that are connected to at once: those that hang must leave workers to all else."""
 
 WARN_PERIOD_S = 10.0
 
-DECODED = {RobotArray._type: RobotArray}
-"""Written again as they were: the monitor subscribes to drivers' reports, and rospy gives all subscribers of a topic in
-one process the class of the first. As bytes they would be lost to STOP ALL."""
-
 
 class RosTopics:
-    """Topics with a publisher, and a subscription for each that is wanted."""
+    """Topics with a publisher, and a connection to each publisher of those that are wanted."""
 
     def __init__(self, background: Background) -> None:
         self._types: Dict[str, TopicType] = {}
         self._background = background
         self._md5: Dict[str, str] = {}
-        self._subscribers: Dict[str, rospy.Subscriber] = {}
-        self._messages: Deque[TopicMessage] = deque(maxlen=WAITING_MAX)
+        self._publishers: Dict[str, Set[str]] = {}  # nodes by topic
+        self._wanted: Set[str] = set()
+        self._streams = StreamSet()
+        self._opened: Deque[Tuple[Source, Stream]] = deque()
+        self._opening: Dict[str, Future[None]] = {}  # by node
+        self._failed: Set[str] = set()  # nodes, since the last look-up
         self._look_up: Optional[Future[None]] = None
         self._looked_up_s = -LOOK_UP_PERIOD_S
-        self._change: Optional[Future[None]] = None
 
     def find_types(self) -> Dict[str, TopicType]:
         """Return the topics known, and ask for them anew if it is time to; returns at once."""
@@ -50,11 +48,14 @@ class RosTopics:
         if not is_pending and now_s - self._looked_up_s >= LOOK_UP_PERIOD_S:
             self._looked_up_s = now_s
             self._look_up = self._background.submit(self._ask)
+            self._failed = set()
+            self._connect()
         return self._types
 
     def _ask(self) -> None:
         try:
             published = ask_master("getPublishedTopics", "")
+            publishers, _, _ = ask_master("getSystemState")
         except NodeError:
             return  # the known ones remain: their publishers go on without a master
         types: Dict[str, TopicType] = {}
@@ -65,39 +66,52 @@ class RosTopics:
                 continue
             self._md5[topic] = message_class._md5sum
             types[topic] = TopicType(type_name, message_class._full_text)
+        self._publishers = {topic: set(nodes) for topic, nodes in publishers}
         self._types = types
 
     def want(self, topics: Set[str]) -> bool:
-        """Subscribe to these topics and no others; return whether that is done. Returns at once."""
-        if self._change is not None and not self._change.done():
-            return False
-        if topics == set(self._subscribers):
-            return True
-        self._change = self._background.submit(self._change_subscriptions, topics)
-        return False
+        """See TopicSource; returns at once."""
+        opening = {node: future for node, future in self._opening.items() if not future.done()}
+        has_news = topics != self._wanted or len(opening) < len(self._opening)
+        self._wanted, self._opening = topics, opening
+        while self._opened:
+            source, stream = self._opened.popleft()
+            if source.topic in topics and source not in self._streams:
+                self._streams.add(source, stream)
+            else:
+                stream.close()
+        for source in self._streams:
+            if source.topic not in topics:
+                self._streams.drop(source)
+        if has_news:
+            self._connect()
+        return not self._opening
 
-    def _change_subscriptions(self, topics: Set[str]) -> None:
-        for topic in set(self._subscribers) - topics:
-            self._subscribers.pop(topic).unregister()
-        for topic in topics - set(self._subscribers):
-            known = self._types.get(topic)
-            message_class = rospy.AnyMsg if known is None else DECODED.get(known.name, rospy.AnyMsg)
-            self._subscribers[topic] = rospy.Subscriber(topic, message_class, self._keep, topic, queue_size=100)
+    def _connect(self) -> None:
+        """Connect to publishers of wanted topics, a node on each worker."""
+        missing: Dict[str, List[str]] = {}
+        for topic in self._wanted:
+            for node in self._publishers.get(topic, ()):
+                if node not in {*self._opening, *self._failed} and Source(topic, node) not in self._streams:
+                    missing.setdefault(node, []).append(topic)
+        for node, topics in sorted(missing.items())[: OPENING_MAX - len(self._opening)]:
+            self._opening[node] = self._background.submit(self._open, node, sorted(topics))
 
-    def _keep(self, message: Any, topic: str) -> None:
-        header = message._connection_header
-        content = message._buff if isinstance(message, rospy.AnyMsg) else _write(message)
-        # Bytes of another definition than the one offered would be shown as wrong numbers.
-        if header["md5sum"] == self._md5.get(topic):
-            latched_by = header["callerid"] if header.get("latching") == "1" else ""
-            self._messages.append(TopicMessage(topic, content, time.time_ns(), latched_by))
+    def _open(self, node: str, topics: List[str]) -> None:
+        try:
+            uri = ask_master("lookupNode", node)
+            for topic in topics:
+                self._opened.append((Source(topic, node), open_stream(topic, uri, rospy.get_name())))
+        except (NodeError, OSError):
+            self._failed.add(node)
 
     def take(self) -> List[TopicMessage]:
         """Return what has arrived since the last call."""
-        return [self._messages.popleft() for _ in range(len(self._messages))]
-
-
-def _write(message: Any) -> bytes:
-    buffer = BytesIO()
-    message.serialize(buffer)
-    return buffer.getvalue()
+        now_ns = time.time_ns()
+        taken = []
+        for source, header, messages in self._streams.read():
+            # Bytes of another definition than the one offered would be shown as wrong numbers.
+            if header.get("md5sum") == self._md5.get(source.topic):
+                latched_by = source.node if header.get("latching") == "1" else ""
+                taken += [TopicMessage(source.topic, content, now_ns, latched_by) for content in messages]
+        return taken

@@ -1,0 +1,164 @@
+"""Connections to publishers of topics, read when the web server is ready for it: one thread for all of them.
+
+rospy reads each publisher on a thread of its own, and waking it costs several times what a message costs.
+Source: ROS TCPROS and Slave API.
+"""
+
+import errno
+import http.client
+import select
+import socket
+import struct
+import xmlrpc.client
+from io import BytesIO
+from typing import Any, Dict, List, NamedTuple
+from urllib.parse import urlsplit
+from xml.parsers.expat import ExpatError
+
+import rosgraph.network
+
+from hero_node.ros.master import MASTER_TIMEOUT_S, SUCCESS, LimitedTransport
+
+__all__ = ["Source", "Stream", "StreamSet", "open_stream"]
+
+READ_LENGTH = 65536
+READS_MAX = 200
+"""Reads of one publisher at a time, so that none keeps others waiting."""
+
+MESSAGE_LENGTH_MAX = 1 << 28
+"""A publisher that announces more does not speak TCPROS."""
+
+_LENGTH = struct.Struct("<I")
+
+
+class Source(NamedTuple):
+    """A publisher of a topic."""
+
+    topic: str
+    node: str
+
+
+class Stream:
+    """One connection.
+
+    Attributes:
+        header: what the publisher says of itself: md5sum, callerid, latching.
+    """
+
+    def __init__(self, sock: socket.socket, header: Dict[str, str], begun: bytes = b"") -> None:
+        """begun: what was read behind the header."""
+        self.header = header
+        self.is_open = True
+        self._socket = sock
+        self._data = bytearray(begun)
+        sock.setblocking(False)
+
+    def fileno(self) -> int:
+        """Return the socket's file descriptor, the same one until close()."""
+        return self._socket.fileno()
+
+    def read(self) -> List[bytes]:
+        """Return the messages that are complete; returns at once. At the publisher's end is_open becomes False."""
+        try:
+            for _ in range(READS_MAX):
+                chunk = self._socket.recv(READ_LENGTH)
+                self._data += chunk
+                self.is_open = bool(chunk)
+                if len(chunk) < READ_LENGTH:
+                    break
+        except OSError as error:
+            self.is_open = error.errno in (errno.EAGAIN, errno.EINTR)
+        return self._split()
+
+    def _split(self) -> List[bytes]:
+        data, position, messages = self._data, 0, []
+        while len(data) - position >= _LENGTH.size:
+            start = position + _LENGTH.size
+            (length,) = _LENGTH.unpack_from(data, position)
+            if length > MESSAGE_LENGTH_MAX:
+                self.is_open = False
+                break
+            if len(data) < start + length:
+                break
+            position = start + length
+            messages.append(bytes(data[start:position]))
+        del data[:position]
+        return messages
+
+    def close(self) -> None:
+        """Disconnect; safe twice."""
+        self.is_open = False
+        self._socket.close()
+
+
+def open_stream(topic: str, node_uri: str, own_name: str) -> Stream:
+    """Connect to a node that publishes a topic; blocks, for seconds if the node hangs. Raises: OSError."""
+    try:
+        with xmlrpc.client.ServerProxy(node_uri, transport=LimitedTransport()) as node:
+            code, text, protocol = node.requestTopic(own_name, topic, [["TCPROS"]])
+        if code != SUCCESS or not protocol:
+            raise OSError("%s: %s" % (topic, text))
+        _, host, port = protocol
+    except (http.client.HTTPException, xmlrpc.client.Error, ExpatError, ValueError, TypeError) as error:
+        raise OSError("%s: %s" % (urlsplit(node_uri).netloc, error)) from None
+    sock = socket.create_connection((host, port), MASTER_TIMEOUT_S)
+    try:
+        wish = {"topic": topic, "callerid": own_name, "type": "*", "md5sum": "*", "tcp_nodelay": "0"}
+        rosgraph.network.write_ros_handshake_header(sock, wish)
+        buffer = BytesIO()
+        header = rosgraph.network.read_ros_handshake_header(sock, buffer, READ_LENGTH)
+    except rosgraph.network.ROSHandshakeException as error:
+        sock.close()
+        raise OSError(str(error)) from None
+    except OSError:
+        sock.close()
+        raise
+    if "error" in header:
+        sock.close()
+        raise OSError(header["error"])
+    return Stream(sock, header, buffer.getvalue())
+
+
+class StreamSet:
+    """Streams by their sources."""
+
+    def __init__(self) -> None:
+        self._streams: Dict[Source, Stream] = {}
+        self._by_file: Dict[int, Source] = {}
+        self._poll = select.poll()
+        self._unread: List[Source] = []  # whose first message may have come with the header
+
+    def __contains__(self, source: Source) -> bool:
+        return source in self._streams
+
+    def __iter__(self) -> Any:
+        return iter(list(self._streams))
+
+    def add(self, source: Source, stream: Stream) -> None:
+        """Read a stream from now on."""
+        self._streams[source] = stream
+        self._by_file[stream.fileno()] = source
+        self._poll.register(stream, select.POLLIN)
+        self._unread.append(source)
+
+    def drop(self, source: Source) -> None:
+        """Close a stream."""
+        stream = self._streams.pop(source)
+        del self._by_file[stream.fileno()]
+        self._poll.unregister(stream)
+        stream.close()
+
+    def read(self) -> List[Any]:
+        """Return (source, header, messages) of all that have some, and drop those that have ended; returns at once."""
+        found = []
+        ready = [self._by_file[file] for file, _ in self._poll.poll(0)]
+        ready += [source for source in self._unread if source in self._streams and source not in ready]
+        self._unread = []
+        for source in ready:
+            stream = self._streams[source]
+            messages = stream.read()
+            if messages:
+                found.append((source, stream.header, messages))
+            if not stream.is_open:
+                self.drop(source)
+        return found
