@@ -271,7 +271,7 @@ def test_a_choice_goes_round_keeps_and_returns_to_all():
         assert [robot.robot_id for robot in choice.robots] == chosen
         lit = [link.colors[-1][1] == (1.0, 1.0, 1.0) if link.colors else False for link in swarm.links]
         assert lit == [len(chosen) < 3 and number in chosen for number in range(3)]
-    assert ChoiceButtons() == (5, 2, 3), "as the documents say"
+    assert ChoiceButtons() == (5, 2, 3, 0), "as the documents say"
 
 
 def test_a_program_with_a_keyboard_ends_and_reads_as_it_should(shown, monkeypatch):

@@ -21,16 +21,18 @@ def drive():
                 "next_button": whole_number(5, 0, 63),
                 "keep_button": whole_number(2, 0, 63),
                 "all_button": whole_number(3, 0, 63),
+                "formation_button": whole_number(0, 0, 63),
+                "frame": "map",
             }
         )
-        ids = parameters.pop("robots")
+        ids, frame = parameters.pop("robots"), parameters.pop("frame")
         choice = ChoiceButtons(**{name: parameters.pop(name) for name in ChoiceButtons._fields})
         mapping = JoystickMapping(**parameters)
         for name, button in (("enable_button", mapping.enable_button), *choice._asdict().items()):
             if mapping.stop_button == button:
                 raise ProgramError("~stop_button is %d, the same as ~%s" % (button, name))
         with open_swarm(program, ids, odom=False, proximity=False) as swarm:
-            JoystickTeleop(swarm, mapping, choice).run(program)
+            JoystickTeleop(swarm, mapping, choice, frame).run(program)
 
 
 def main():

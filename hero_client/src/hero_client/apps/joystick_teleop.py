@@ -1,11 +1,11 @@
 """Drives robots with a joystick (sensor_msgs/Joy): only while the enable button is held and /joy is alive.
 
-Other buttons choose which ones, and stop all robots of all drivers.
+Other buttons choose which ones, drive them as a formation, and stop all robots of all drivers.
 """
 
 import math
 from collections import deque
-from typing import Deque, NamedTuple, Optional, Sequence
+from typing import Deque, Dict, NamedTuple, Optional, Sequence
 
 import rospy
 from sensor_msgs.msg import Joy
@@ -14,6 +14,8 @@ from hero_node.errors import ProgramError
 from hero_node.geometry import STOP, Velocity
 from hero_node.ros.program import Program
 
+from ..controllers.formation_drive import FormationDrive
+from ..robots.common_frame import CommonFrame
 from ..swarm import REPORT_PERIOD_S, Swarm
 from .robot_choice import ChoiceButtons, RobotChoice
 from .teleop_output import PauseDetector, TeleopOutput
@@ -68,8 +70,12 @@ class JoystickMapping(NamedTuple):
 class JoystickTeleop:
     """Sends the joystick's commands to all robots of a swarm, or those that its buttons choose."""
 
-    def __init__(self, swarm: Swarm, mapping: JoystickMapping, choice: Optional[ChoiceButtons] = None) -> None:
-        """Start stopped."""
+    def __init__(
+        self, swarm: Swarm, mapping: JoystickMapping, choice: Optional[ChoiceButtons] = None, frame: str = "map"
+    ) -> None:
+        """Start stopped; frame: in which the poses of a formation are known."""
+        self._formation: Optional[FormationDrive] = None
+        self._frame = CommonFrame(frame)
         self._choice = RobotChoice(list(swarm), ChoiceButtons() if choice is None else choice)
         self._presses: Deque[Sequence[int]] = deque(maxlen=PRESSES_MAX)
         self._swarm = swarm
@@ -125,13 +131,34 @@ class JoystickTeleop:
             self._next_warning_s = now_s + REPORT_PERIOD_S
             rospy.logwarn("nothing on /joy: is a joystick plugged in, and does its driver (package joy) run?")
         while self._presses:
+            was_formation = self._choice.is_formation
             for robot in self._choice.read(self._presses.popleft()):
                 robot.drive(*STOP)
-        if self._output.passes(command):
-            for robot in self._choice.robots:
-                robot.drive(*command)
+            if self._choice.is_formation != was_formation:
+                self._formation = None
+                for robot in self._choice.robots:
+                    robot.drive(*STOP)
+                    robot._link.subscribe("odom")  # by each alone none is read
+        missing = self._drive(command) if self._output.passes(command) else None
         self._report_stop()
-        self._swarm.report_missing()
+        self._swarm.report_missing(missing)
+
+    def _drive(self, command: Velocity) -> Optional[Dict[str, Optional[str]]]:
+        """Send a command to the chosen robots, or to the body that they form; return why it stands, if it does."""
+        missing: Optional[Dict[str, Optional[str]]] = None
+        robots = self._choice.robots
+        commands = [command] * len(robots)
+        if self._choice.is_formation and command != STOP:
+            poses = [self._frame.pose_of(robot) for robot in robots]
+            known = [pose for pose in poses if pose is not None]
+            if len(known) == len(robots):
+                self._formation = self._formation or FormationDrive(known)
+                commands = self._formation.step(known, command, 1.0 / STEP_HZ)
+            else:
+                commands, missing = [STOP] * len(robots), self._frame.missing
+        for robot, each in zip(robots, commands):
+            robot.drive(*each)
+        return missing
 
     def _report_stop(self) -> None:
         """Log once what came of a stop of all robots."""
