@@ -58,6 +58,10 @@ def test_a_number_of_numpy_names_a_robot(number):
     assert check_robot_id(number) == 3 and type(check_robot_id(number)) is int
 
 
+def test_the_first_robot_has_the_number_0():
+    assert check_robot_id(0) == 0
+
+
 @pytest.mark.parametrize("wrong", ["hero_0", -1, 1.0, True, None, [0]])
 def test_what_names_no_robot_is_refused(wrong):
     with pytest.raises(ValueError, match="a robot is named by its number, 0 or more, not by"):

@@ -4,7 +4,7 @@ import math
 from types import SimpleNamespace
 
 import pytest
-from fake_robot import make_robot
+from linkless_robot import make_robot
 
 from hero_client.apps.goals import (
     FEEDBACK_PERIOD_S,

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from fake_robot import make_robot
+from linkless_robot import make_robot
 
 from hero_client.robots.light import MIN_BLINK_PERIOD_S, REPEAT_PERIOD_S
 

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from fake_robot import make_robot
+from linkless_robot import make_robot
 
 from hero_client.robots.group import READY_TIMEOUT_S
 from hero_client.robots.robot_base import STOPPED_WARNING_PERIOD_S

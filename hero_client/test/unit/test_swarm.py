@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from fake_robot import FakeSwarm
+from linkless_robot import FakeSwarm
 
 from hero_client.robots.common_frame import POLL_HZ, CommonFrame
 from hero_client.robots.group import NAMES_SHOWN, wait_for_all

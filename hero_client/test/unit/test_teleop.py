@@ -4,7 +4,7 @@ import math
 from types import SimpleNamespace
 
 import pytest
-from fake_robot import FakeSwarm
+from linkless_robot import FakeSwarm
 
 pytest.importorskip("rospy", reason="teleoperation is made for ROS programs")
 from sensor_msgs.msg import Joy

@@ -6,7 +6,10 @@ from fake_motors import LAG_S, FakeMotors
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hero_driver.commands.commander import Commanders
 from hero_driver.commands.velocity_shaper import STOPPED_MOTORS, ZERO_TWIST
+from hero_driver.corrections.wheel_motion import WheelMotion
+from hero_driver.robot_constants import MAX_WATCHDOG_S
 
 NAN_TWIST = bytes(6) + b"\xf8\x7f" + bytes(40)
 STOP_S = 0.5
@@ -229,3 +232,11 @@ def test_after_a_pause_of_the_driver_a_command_that_waited_is_forgotten():
         robot.bridge.commands.resume(clock.now_s)
         clock.run(2.0)
     assert [speed for _, speed in robot.list_speeds()] == [0.05]
+
+
+def test_motion_counts_until_the_firmware_has_ended_it():
+    commanders = Commanders(WheelMotion())
+    commanders.note_command(POSITION, "a", "sender", "/other", True, 100.0)
+    for now_s, is_moving in ((100.0 + MAX_WATCHDOG_S - 0.01, True), (100.0 + MAX_WATCHDOG_S + 0.01, False)):
+        stopper = commanders.note_command(VELOCITY, "b", "sender", "/program", False, now_s)
+        assert commanders.has_more_to_stop(stopper, now_s) == is_moving

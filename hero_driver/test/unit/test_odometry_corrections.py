@@ -179,8 +179,17 @@ def test_the_pose_goes_on_over_a_lost_connection():
     robot.receive_burst(NOW_NS, (100.0, 100.0))
     robot.receive_burst(NOW_NS + PERIOD_NS, (200.0, 200.0))
     robot.reconnect(rebooted=False)
-    outputs = robot.receive_burst(NOW_NS + 3000 * MS, (300.0, 300.0))
+    outputs = robot.receive_burst(NOW_NS + 3000 * MS, (300.0, 300.0), arrival_ns=NOW_NS + 3200 * MS)
     assert list_odometry(outputs)[0][2] == pytest.approx(200.0 * TICK_M)
+
+
+def test_counters_with_stamps_since_boot_are_of_a_new_boot():
+    robot = CorrectedRobot()
+    robot.receive_burst(NOW_NS, (100.0, 100.0))
+    robot.reconnect(rebooted=False)
+    robot.receive_burst(3000 * MS, (300.0, 300.0), arrival_ns=NOW_NS + 3000 * MS)
+    outputs = robot.receive_burst(3034 * MS, (310.0, 310.0), arrival_ns=NOW_NS + 3034 * MS)
+    assert list_odometry(outputs)[0][2] == pytest.approx(10.0 * TICK_M)
 
 
 def test_the_pose_stays_where_it_was_when_the_robot_reboots():

@@ -1,5 +1,7 @@
 """Stops in the driver's own time: whatever moves a robot and whenever it reads, it is at rest, and soon."""
 
+from types import SimpleNamespace
+
 import pytest
 from commanded_robot import LIGHT, MOTORS, POSITION, VELOCITY, WINDOW_LENGTH, Clock, CommandedRobot
 from fake_motors import LAG_S, FakeMotors
@@ -7,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hero_driver.commands.stop_progress import StopState
-from hero_driver.stop_delivery import BURST_LIGHTS
+from hero_driver.stop_delivery import BURST_LIGHTS, LIGHT_MD5, LIGHT_TYPE, is_light
 
 phases = st.floats(0.0, 0.051)
 networks = st.floats(0.0, 0.05)
@@ -241,3 +243,14 @@ def test_zeros_of_an_earlier_stop_do_not_end_servo_pulses(pause_s):
         assert robot.taken[-1][1:] == (MOTORS, FAST)
         assert robot.motors.is_turning
     assert len([name for _, name, _ in robot.taken if name == MOTORS]) == 1
+
+
+def test_only_what_colors_the_light_is_lit_in_a_stop():
+    for name, message_type, md5sum, is_lit in (
+        ("/hero_1/led", LIGHT_TYPE, LIGHT_MD5, True),
+        ("/hero_1/led", LIGHT_TYPE, "0" * 32, False),
+        ("/hero_1/led", "std_msgs/String", LIGHT_MD5, False),
+        ("/hero_1/seen_color", LIGHT_TYPE, LIGHT_MD5, False),
+    ):
+        info = SimpleNamespace(name=name, message_type=message_type, md5sum=md5sum)
+        assert is_light(SimpleNamespace(info=info)) == is_lit

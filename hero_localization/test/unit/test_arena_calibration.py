@@ -256,6 +256,8 @@ def test_reference_tag_that_was_moved_is_told_from_a_camera_that_was():
     at_calibration = see_poses(CAMERA, CAMERA)
     seen = {**at_calibration, 101: at_calibration[101]._replace(x_m=at_calibration[101].x_m + 0.02)}
     assert find_moved_references(seen, at_calibration) == pytest.approx({101: 0.02})
+    seen[101] = seen[101]._replace(x_m=math.nan)
+    assert list(find_moved_references(seen, at_calibration)) == [101], "a pose that is no number is no match"
 
 
 def test_residuals_of_a_camera_are_those_of_the_places():

@@ -31,6 +31,18 @@ def test_private_parameters_are_options_and_other_remappings_rosbags():
     assert ros_arguments == ["__name:=my_record", "/tf:=/other"]
     parsed = record.parse_options(options)
     assert (parsed.split_mb, parsed.name, parsed.raw) == (7, "a", True)
+    for value, is_raw in (("true", True), ("false", False)):
+        assert record.parse_options(record.split_arguments(["_raw:=" + value])[0]).raw == is_raw
+
+
+def test_the_ends_of_what_options_may_be_are_allowed():
+    lowest = ["--split-mb=1", "--max-files=0", "--min-free-mb=0.0", "--seconds=0.001"]
+    highest = ["--split-mb=100000", "--max-files=10000", "--min-free-mb=1e9"]
+    for words in (lowest, highest):
+        parsed = record.parse_options(words)
+        for word in words:
+            name, _, value = word[2:].partition("=")
+            assert getattr(parsed, name.replace("-", "_")) == float(value)
 
 
 def test_an_unknown_private_parameter_is_refused_by_name(capsys):

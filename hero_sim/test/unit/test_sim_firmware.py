@@ -231,3 +231,14 @@ def test_robots_started_together_do_the_same_for_the_same_seed():
         driver.run(3000)
         runs.append((driver.arrivals, driver.swarm.world.poses.tolist()))
     assert runs[0] == runs[1]
+
+
+def test_the_rest_of_a_packet_does_not_outlive_its_connection():
+    driver = DriverSide()
+    driver.start_streaming()
+    firmware, now_ms = driver.swarm.robots[0], driver.swarm.now_ms
+    firmware.receive_bytes(now_ms, b"\xff\xfe\x30")
+    assert firmware.received_length >= 3
+    firmware.connection_lost()
+    firmware.connection_made(now_ms)
+    assert firmware.received_length == 0

@@ -25,6 +25,8 @@ def test_rows_that_do_not_fit_are_counted():
     lines = format_table([make_row(robot_id) for robot_id in range(50)], 200, 10)
     assert "42 more" in lines[-1]
     assert lines[-2].startswith("hero_7 ")
+    rows = [make_row(robot_id) for robot_id in range(9)]
+    assert len(format_table(rows, 200, 10)) == 10 and "3 more" in format_table(rows, 200, 8)[-1]
 
 
 def test_columns_are_aligned_with_their_headings():
