@@ -26,8 +26,11 @@ __all__ = ["open_folder", "parse_options", "read_experiment", "run_experiment"]
 
 MAX_BATCH = 1000
 
-BATCH_ROBOT_S = 20_000.0
-"""Robot-seconds in a batch: 1 to 5 s of work, compared with which a task's few ms of overhead are small."""
+BATCH_ROBOT_S = 240_000.0
+"""Robot-seconds in a batch: about 10 s of work. Beyond some thousand robots at once, more of them save nothing."""
+
+_BATCHES_PER_WORKER = 2
+"""At least, where there are enough runs: no worker idles long while another computes the last batch."""
 
 DASK = "dask:"
 
@@ -73,7 +76,7 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
         "--jobs", type=_whole(1, 1024), default=os.cpu_count() or 1, help="worker processes (%(default)s)"
     )
     parser.add_argument(
-        "--batch", type=_whole(1, MAX_BATCH), help="runs that are computed together (1 to 5 s of work)"
+        "--batch", type=_whole(1, MAX_BATCH), help="runs that are computed together (about 10 s of work)"
     )
     parser.add_argument(
         "--executor",
@@ -119,12 +122,21 @@ def choose_batch(experiment: Experiment, cell: int) -> int:
 
 
 def list_tasks(
-    text: str, experiment: Experiment, missing: Sequence[RunKey], batch: Optional[int], folder: ResultsFolder
+    text: str,
+    experiment: Experiment,
+    missing: Sequence[RunKey],
+    batch: Optional[int],
+    workers: int,
+    folder: ResultsFolder,
 ) -> Iterator[Task]:
-    """Yield the arguments of compute_batch() for the missing runs, which are sorted by cell."""
+    """Yield the arguments of compute_batch() for the missing runs, which are sorted by cell.
+
+    batch: runs that are computed together; None: as many as is fast, but something to do for each of the workers.
+    """
+    share = math.ceil(len(missing) / (_BATCHES_PER_WORKER * workers))
     for cell in range(len(experiment.cells)):
         seeds = [seed for own, seed in missing if own == cell]
-        size = batch or choose_batch(experiment, cell)
+        size = batch or min(share, choose_batch(experiment, cell))
         for start in range(0, len(seeds), size):
             chosen = tuple(seeds[start : start + size])
             yield text, cell, chosen, folder.name_series(cell, chosen), experiment.record_hz > 0.0
@@ -170,9 +182,9 @@ def run_experiment(options: argparse.Namespace) -> str:
     # Whatever is there already, the parts share out all runs in the same way.
     own = set(folder.list_missing(())[part - 1 :: parts])
     missing = [key for key in folder.list_missing(runs) if key in own]
-    tasks = list_tasks(text, experiment, missing, options.batch, folder)
     if missing:
         opener, workers = _choose_engine(options, experiment.behavior)
+        tasks = list_tasks(text, experiment, missing, options.batch, workers, folder)
         began_s = time.monotonic()
         for task, results in _watch(
             engines.compute(opener, workers, compute_batch, tasks), len(missing), len(runs)
