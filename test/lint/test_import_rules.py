@@ -52,6 +52,7 @@ ROOMS = {
     "hero_recording.readers": {"optional", "topics"},
     "hero_swarm.behaviors": {"behavior", "steering"},
     "hero_swarm.experiments": {"behavior", "behaviors", "metrics", "safety", "trial"},
+    "hero_swarm.fitting": {"trial"},
     "hero_swarm.learning": {"behavior", "experiments", "metrics"},
     "hero_swarm.metrics": set(),
 }
@@ -93,6 +94,7 @@ PURE_ROOMS = (
     "hero_localization.tracking",
     "hero_swarm.behavior",
     "hero_swarm.behaviors",
+    "hero_swarm.fitting",
     "hero_swarm.metrics",
     "hero_swarm.safety",
     "hero_swarm.trial",

@@ -72,6 +72,7 @@ def _add_robot_options(group: "argparse._ArgumentGroup") -> None:
         metavar="KEY=VALUE,..[,robot=ID]",
         help="a known error of a robot, or of all, e.g. robot=1,left_center_us=1530; may be repeated",
     )
+    add("--errors", metavar="FILE", help="lines as --error takes them, such as `fit` of hero_swarm writes")
     add("--print-errors", action="store_true", help="print the robots' differences as --error takes them, and exit")
     add(
         "--ir",

@@ -17,7 +17,7 @@ from .robot.servo_pins import CORE_2, CORE_3
 from .robot_constants import MAX_ID
 from .world.arena import Arena, MovableObject, build_default, place_robots
 from .world.arena_file import load_arena
-from .world.robot_errors import RobotErrors, draw_errors, set_known
+from .world.robot_errors import RobotErrors, draw_errors, read_known, set_known
 from .world.world import World
 
 __all__ = [
@@ -89,7 +89,8 @@ def build_errors(options: argparse.Namespace) -> RobotErrors:
     errors = draw_errors(rngs, 0.0 if options.perfect else 1.0)
     for row, model in enumerate(parse_models(options.model, options.first_id, options.count)):
         build_body(model, errors, row)
-    for text in options.error:
+    known = read_known(options.errors, ids) if options.errors else []
+    for text in [*known, *options.error]:
         set_known(errors, options.first_id, text)
     return errors
 
@@ -121,13 +122,19 @@ def place_worlds(
     seeds: Sequence[int],
     errors: float,
     objects: Optional[Sequence[Sequence[MovableObject]]] = None,
+    known: Sequence[str] = (),
 ) -> World:
     """Return one world of robots at poses (W, N, 3) for each seed; errors: 0 for robots as on the drawing, 1 usual.
 
-    objects: of each world; None: those of the arena.
+    objects: of each world; None: those of the arena. known: errors of robots 0 to N - 1 of each world: see set_known().
+    Raises: OptionError for an error that cannot be set.
     """
     worlds, robots, _ = poses.shape
     drawn = draw_errors((_reseed([seed, robot]) for seed in seeds for robot in range(robots)), errors)
+    for world in range(worlds):
+        own = RobotErrors(*(array[world * robots : (world + 1) * robots] for array in drawn))
+        for text in known:
+            set_known(own, 0, text)
     rngs = [np.random.RandomState(seed) for seed in seeds]
     return World(arena, poses.reshape(worlds * robots, 3), rngs, drawn, objects)
 

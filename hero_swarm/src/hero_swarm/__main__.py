@@ -3,7 +3,7 @@
 import sys
 from importlib import import_module
 
-PROGRAMS = {"run": "run", "report": "experiments.report", "show": "show"}
+PROGRAMS = {"fit": "fit", "run": "run", "report": "experiments.report", "show": "show"}
 
 
 def main() -> None:

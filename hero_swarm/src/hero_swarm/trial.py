@@ -95,19 +95,21 @@ class Trial:
         filter_commands: Any = None,
         starts: Optional[np.ndarray] = None,
         objects: Optional[Sequence[Sequence[MovableObject]]] = None,
+        known_errors: Sequence[str] = (),
     ) -> None:
         """Put robots at starts (W, N, 3), or scatter them over size_m, or over the arena. Each seed is one world.
 
         errors: 0 for robots as on the drawing, 1 for usual ones. delay_s: age of the poses that robots sense each
         other by. filter_commands: called with poses (W, N, 3), linear and angular speeds (W, N), returns speeds.
-        objects: of each world; None: those of the arena, where it has them.
+        objects: of each world; None: those of the arena, where it has them. known_errors: of robots 0 to N - 1, as
+        hero_sim --error takes them.
         """
         x_min, y_min, x_max, y_max = arena.bounds_m
         width_m, height_m = (x_max - x_min, y_max - y_min) if size_m is None else size_m
         if starts is None:
             starts = np.array([scatter(robots, width_m, height_m, seed) for seed in seeds])
         self.behavior = behavior
-        self.rows = RobotRows(place_worlds(arena, starts, seeds, errors, objects))
+        self.rows = RobotRows(place_worlds(arena, starts, seeds, errors, objects, known_errors))
         self._dead_zones_us = list_dead_zones(self.rows.world.errors)
         self.poses, self.velocities = starts, np.zeros_like(starts)
         self.memory: Any = None

@@ -92,6 +92,7 @@ class StepSwarm(StepWorld):
             wifi=wifi,
             perfect=perfect,
             first_id=first_id,
+            errors=None,
             error=list(error),
             model=[],
         )

@@ -4,10 +4,11 @@
 calibration is in its flash, not here.
 """
 
-from typing import Dict, Iterable, List, NamedTuple
+from typing import Collection, Dict, Iterable, List, NamedTuple
 
 import numpy as np
 
+from ..errors import OptionError
 from ..key_values import parse_values
 from ..robot_constants import BODY_RADIUS_M, WHEEL_SEPARATION_M
 from .noise import draw_normal
@@ -15,7 +16,7 @@ from .range_sensors import ALPHA_COUNTS_M2, BEAMS, BETA_COUNTS
 
 __all__ = [
     "KINDS", "MAX_WHEEL_M_S", "SERVO_CENTER_US", "SERVO_GAIN_M_S_US", "RobotErrors", "describe_errors",
-    "draw_errors", "set_known",
+    "draw_errors", "read_known", "set_known",
 ]  # fmt: skip
 
 SERVO_CENTER_US = 1500.0
@@ -124,6 +125,21 @@ def set_known(errors: RobotErrors, first_id: int, text: str) -> None:
     # A key for all sensors comes first, so that single ones can differ from it.
     for key in sorted(values, key=lambda key: KINDS[key].columns != _ALL):
         getattr(errors, KINDS[key].array)[rows, KINDS[key].columns] = values[key]
+
+
+def read_known(path: str, ids: Collection[int]) -> List[str]:
+    """Return the lines of an error file, each a text for set_known(), that are of all robots or of these ids.
+
+    Empty lines and those that begin with # are remarks. Raises: OptionError if the file cannot be read.
+    """
+    try:
+        with open(path, encoding="utf-8") as file:
+            lines = [line.strip() for line in file]
+    except (OSError, UnicodeDecodeError) as error:
+        raise OptionError("errors %s cannot be read: %s" % (path, getattr(error, "strerror", None) or error)) from error
+    own = {"robot=%d" % robot_id for robot_id in ids}
+    given = [line for line in lines if line and not line.startswith("#")]
+    return [line for line in given if all(part in own for part in line.split(",") if part.startswith("robot="))]
 
 
 def describe_errors(errors: RobotErrors, first_id: int) -> List[str]:

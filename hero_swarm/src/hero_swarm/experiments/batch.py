@@ -16,6 +16,7 @@ import numpy as np
 from hero_sim.errors import OptionError
 from hero_sim.world.arena import Arena
 from hero_sim.world.arena_file import load_arena
+from hero_sim.world.robot_errors import draw_errors, read_known, set_known
 
 from ..behavior import Objects
 from ..behaviors import find_behavior
@@ -38,6 +39,7 @@ __all__ = [
     "load_cell_arena",
     "load_checked",
     "place_cell",
+    "read_cell_errors",
     "take_values",
 ]
 
@@ -75,6 +77,8 @@ def load_checked(experiment: Experiment) -> None:
             arena = load_cell_arena(cell)
             if pushes and not arena.objects:
                 raise ExperimentError("%s pushes objects: arena must have them, as box does" % experiment.behavior)
+        with _at(experiment, "errors"):
+            read_cell_errors(cell)
         with _at(experiment, "start"):
             starts = place_all(experiment.start, arena, cell.settings["robots"], seeds)
         with _at(experiment, "objects"):
@@ -100,6 +104,19 @@ def load_cell_arena(cell: Cell) -> Arena:
         raise ExperimentError(str(error)) from error
 
 
+def read_cell_errors(cell: Cell) -> List[str]:
+    """Return the errors of a cell's file, a text for each robot; none without a file. Raises: ExperimentError."""
+    name, robots = cell.settings.get("errors", "default"), range(cell.settings["robots"])
+    try:
+        known = [] if name in ERRORS else read_known(name, robots)
+        own = draw_errors(map(np.random.RandomState, robots))
+        for text in known:
+            set_known(own, 0, text)
+    except OptionError as error:
+        raise ExperimentError(str(error)) from error
+    return known
+
+
 def place_cell(experiment: Experiment, cell: Cell, seed: int) -> np.ndarray:
     """Return where the robots of a run begin (N, 3)."""
     poses: np.ndarray = place_all(experiment.start, load_cell_arena(cell), cell.settings["robots"], [seed])[0]
@@ -117,7 +134,8 @@ def build_trial(experiment: Experiment, cell: Cell, seeds: Sequence[int]) -> Tri
         seeds,
         starts=starts,
         objects=place_objects(cell.settings.get("objects", "arena"), arena, starts, seeds),
-        errors=ERRORS[cell.settings.get("errors", "default")],
+        errors=ERRORS.get(cell.settings.get("errors", "default"), ERRORS["default"]),
+        known_errors=read_cell_errors(cell),
         delay_s=cell.settings.get("delay_s", 0.0),
     )
 

@@ -136,6 +136,11 @@ class Experiment(NamedTuple):
     compare: Optional[Comparing]
     places: Mapping[str, str]
 
+    def list_files(self, cell: Cell) -> List[str]:
+        """Return the names of what a run of cell depends on that may be files."""
+        names = (cell.settings.get("arena"), cell.settings.get("errors"), self.start.file)
+        return [name for name in names if name]
+
     def describe_cell(self, cell: Cell) -> str:
         """Return all that a run of cell depends on besides its seed and the code, as JSON."""
         description = {
@@ -212,7 +217,7 @@ def _parse_setting(name: str, entry: Entry) -> Any:
         return entry.number(0.0, 10.0, "s")
     if name == "objects":
         return entry.choice(OBJECTS)
-    return entry.choice(tuple(ERRORS)) if name == "errors" else entry.text()
+    return entry.text()
 
 
 def _parse_parameter(entry: Entry) -> float:

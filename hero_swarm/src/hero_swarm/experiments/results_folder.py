@@ -25,7 +25,7 @@ import numpy as np
 from hero_node.safe_file import write_file
 
 from .errors import ExperimentError
-from .experiment_file import Experiment
+from .experiment_file import Cell, Experiment
 
 __all__ = ["REAL", "SIMULATED", "ResultsFolder", "Run", "RunKey", "format_csv", "format_table"]
 
@@ -65,9 +65,7 @@ class ResultsFolder:
         self.path = path
         self._experiment = experiment
         self._code = code
-        self._cells = [
-            hashlib.sha256(experiment.describe_cell(cell).encode()).hexdigest() for cell in experiment.cells
-        ]
+        self._cells = [_digest_cell(experiment, cell) for cell in experiment.cells]
         self._batches = os.path.join(path, "batches")
 
     def begin(self, text: str, about: Dict[str, str], fresh: bool, kind: str = SIMULATED) -> List[Run]:
@@ -212,6 +210,14 @@ class ResultsFolder:
         path = os.path.join(self.path, "runs.csv")
         write_file(path, format_table(self._experiment, runs).encode())
         return path
+
+
+def _digest_cell(experiment: Experiment, cell: Cell) -> str:
+    digest = hashlib.sha256(experiment.describe_cell(cell).encode())
+    for name in filter(os.path.isfile, experiment.list_files(cell)):
+        with open(name, "rb") as file:
+            digest.update(file.read())
+    return digest.hexdigest()
 
 
 def format_table(experiment: Experiment, runs: Sequence[Run]) -> str:

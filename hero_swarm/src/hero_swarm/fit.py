@@ -1,0 +1,46 @@
+"""Program fit: fits the simulator to robots, from recordings to the error file of its option --errors."""
+
+import argparse
+import sys
+from typing import Optional, Sequence
+
+from hero_node import command_line
+from hero_node.errors import HeroError
+from hero_node.safe_file import write_file
+
+from .experiments.errors import ExperimentError
+from .fitting.robot_fit import describe_fit, fit_robot
+
+__all__ = ["main"]
+
+
+def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
+    """Read the command line."""
+    parser = argparse.ArgumentParser(prog="fit", description="Fit the simulator to the robots of recordings.")
+    parser.add_argument("bags", nargs="+", metavar="BAG", help="recordings of odometry, commands and poses")
+    parser.add_argument("--out", metavar="FILE", default="robots.errors", help="error file (%(default)s)")
+    return parser.parse_args(arguments)
+
+
+def fit(options: argparse.Namespace) -> None:
+    """Fit each robot, print what was found, and write the file. Raises: ExperimentError."""
+    from .ros.recording_reader import read_recordings  # --help needs no ROS
+
+    lines = []
+    for robot_id, recordings in sorted(read_recordings(options.bags).items()):
+        try:
+            own = describe_fit(fit_robot(recordings), robot_id)
+        except ValueError as error:
+            print("hero_%d: %s" % (robot_id, error), file=sys.stderr)
+            continue
+        print("\n".join(own))
+        lines += own
+    if not lines:
+        raise ExperimentError("no robot could be fitted")
+    write_file(options.out, ("\n".join(lines) + "\n").encode())
+    print("written: %s" % options.out)
+
+
+def main(arguments: Optional[Sequence[str]] = None) -> None:
+    """Run the program."""
+    command_line.run(lambda: fit(parse_options(sys.argv[1:] if arguments is None else arguments)), HeroError)

@@ -1,0 +1,84 @@
+"""Fits how far wheels really roll, and how far apart they are, to poses in a fixed frame. Pure.
+
+Odometry by the ticks is laid over the poses of each short stretch; what does not fit is the body's (the idea is that of
+J. Borenstein, L. Feng, Measurement and correction of systematic odometry errors in mobile robots, IEEE T-RA 1996,
+on any path instead of a square).
+"""
+
+from typing import Iterator, List
+
+import numpy as np
+
+from hero_client.values.robot_constants import WHEEL_SEPARATION_M
+
+from .recording import Recording, measure_wheels
+
+__all__ = ["MIN_TURN_RAD", "fit_body", "follow_wheels"]
+
+STRETCH_S = 8.0
+POSE_PERIOD_S = 0.1
+HEADING_M = 0.1
+"""An error of one radian counts as one of so many meters."""
+
+MIN_TURN_RAD = 6.0
+"""Less turning tells too little of the distance between the wheels."""
+
+_ITERATIONS = 8
+_STEP = 1e-4
+
+
+def follow_wheels(wheels_m: np.ndarray, body: np.ndarray) -> np.ndarray:
+    """Return poses (K, 3) from 0, 0, 0 for what the ticks of both wheels say (K, 2).
+
+    body: travel by travel of the ticks, left and right, and distance between the wheels by that on the drawing (3,).
+    """
+    left_m, right_m = np.diff(wheels_m * body[:2], axis=0).T
+    yaw_rad = np.concatenate(([0.0], np.cumsum((right_m - left_m) / (WHEEL_SEPARATION_M * body[2]))))
+    middle_rad = (yaw_rad[1:] + yaw_rad[:-1]) / 2.0
+    paths_m = (left_m + right_m) / 2.0
+    places_m = np.cumsum(np.column_stack((paths_m * np.cos(middle_rad), paths_m * np.sin(middle_rad))), axis=0)
+    return np.column_stack((np.vstack(([(0.0, 0.0)], places_m)), yaw_rad))
+
+
+def fit_body(recordings: List[Recording]) -> np.ndarray:
+    """Return the body (3,), as follow_wheels() takes it, from what was recorded of one robot.
+
+    Raises: ValueError if the robot did not move enough.
+    """
+    stretches = [stretch for recording in recordings for stretch in _list_stretches(recording)]
+    turned_rad = sum(float(np.abs(np.diff(np.unwrap(poses[:, 2]))).sum()) for _, poses in stretches)
+    if turned_rad < MIN_TURN_RAD:
+        raise ValueError("turned by %.1f rad only; %.0f are needed, with poses" % (turned_rad, MIN_TURN_RAD))
+    body = np.ones(3)
+    for _ in range(_ITERATIONS):
+        residual = _compare(stretches, body)
+        slopes = np.column_stack([(_compare(stretches, body + _STEP * unit) - residual) / _STEP for unit in np.eye(3)])
+        body = body - np.linalg.lstsq(slopes, residual, rcond=None)[0]
+    return np.clip(body, 0.5, 2.0)
+
+
+def _list_stretches(recording: Recording) -> Iterator[List[np.ndarray]]:
+    """Yield wheels (K, 2) and poses (K, 3) of stretches of the recording that have poses throughout."""
+    times_s = recording.poses[:, 0]
+    if not len(times_s):
+        return
+    for start_s in np.arange(times_s[0], times_s[-1] - STRETCH_S, STRETCH_S):
+        wanted_s = start_s + np.arange(0.0, STRETCH_S, POSE_PERIOD_S)
+        index = np.unique(np.searchsorted(times_s, wanted_s))
+        index = index[index < len(times_s)]
+        chosen = recording.poses[index]
+        if len(chosen) > STRETCH_S and np.diff(chosen[:, 0]).max() < 1.0:
+            yield [measure_wheels(recording, chosen[:, 0]), chosen[:, 1:]]
+
+
+def _compare(stretches: List[List[np.ndarray]], body: np.ndarray) -> np.ndarray:
+    """Return the differences in m of all poses, with the odometry of each stretch laid over them as well as it goes."""
+    differences = []
+    for wheels_m, poses in stretches:
+        path = follow_wheels(wheels_m, body)
+        turn_rad = np.unwrap(poses[:, 2]) - path[:, 2]
+        yaw_rad = turn_rad.mean()
+        rotation = np.array(((np.cos(yaw_rad), -np.sin(yaw_rad)), (np.sin(yaw_rad), np.cos(yaw_rad))))
+        places_m: np.ndarray = poses[:, :2] - path[:, :2] @ rotation.T
+        differences += [(places_m - places_m.mean(axis=0)).ravel(), HEADING_M * (turn_rad - yaw_rad)]
+    return np.concatenate(differences)

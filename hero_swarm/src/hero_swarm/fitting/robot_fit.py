@@ -1,0 +1,54 @@
+"""Fits the simulator to one robot, and tells how much better it predicts paths that the fit has not seen. Pure."""
+
+from typing import List
+
+import numpy as np
+
+from hero_client.values.robot_constants import WHEEL_SEPARATION_M
+
+from .body_fit import fit_body
+from .motor_fit import SLIP_MEAN, Fit, fit_motors, predict_ends
+from .recording import Recording
+
+__all__ = ["describe_fit", "fit_robot"]
+
+HELD_OUT_SHARE = 1.0 / 3.0
+"""The end of each recording, which the fit does not see."""
+
+PATH_S = 5.0
+
+SLIP = 0.02
+"""Cannot be told from rolling less far: the usual one; what is lost by it, wheels roll farther."""
+
+
+def fit_robot(recordings: List[Recording]) -> Fit:
+    """Return the differences of the robot of these recordings. Raises: ValueError if they tell too little."""
+    share = 1.0 - HELD_OUT_SHARE
+    body = fit_body([recording.cut(0.0, share * recording.time_s) for recording in recordings])
+    motors, delay_s = fit_motors(recordings, share)
+    rolled = {
+        "left_wheel": float(body[0]),
+        "right_wheel": float(body[1]),
+        "wheel_separation_m": float(body[2]) * WHEEL_SEPARATION_M,
+    }
+    robots = [({}, 0.0), ({**motors, **rolled}, delay_s)]
+    ends_m = np.hstack([predict_ends(recording, robots, share, PATH_S) for recording in recordings])
+    if not ends_m.size:
+        raise ValueError("too short: %.0f s hold no path that the fit has not seen" % recordings[0].time_s)
+    before_m, after_m = np.median(ends_m, axis=1).tolist()
+    kept = 1.0 - SLIP * SLIP_MEAN
+    rolled = {**rolled, "left_wheel": rolled["left_wheel"] / kept, "right_wheel": rolled["right_wheel"] / kept}
+    return Fit(recordings[0].name, {**motors, **rolled, "slip": SLIP}, delay_s, before_m, after_m)
+
+
+def describe_fit(fit: Fit, robot_id: int) -> List[str]:
+    """Return the lines of a robot in an error file: what was found as a remark, and its differences."""
+    values = ",".join("%s=%.5g" % item for item in fit.values.items())
+    remark = "# %s: held-out paths of %g s end %.1f mm off, before the fit %.1f mm"
+    delay = "# %s: commands work %.0f ms later than in the simulator" % (fit.name, 1e3 * fit.delay_s)
+    motors = delay if "lag_s" in fit.values else "# %s: no servo pulses were recorded, so motors are as on the drawing"
+    return [
+        remark % (fit.name, PATH_S, 1e3 * fit.after_m, 1e3 * fit.before_m),
+        motors.replace("%s", fit.name),
+        "robot=%d,%s" % (robot_id, values),
+    ]

@@ -1,0 +1,91 @@
+"""Reads bags for the fit: odometry, commands and poses of each robot."""
+
+import re
+from typing import Any, Dict, List, Sequence, Tuple
+
+import numpy as np
+import rosbag
+
+from hero_msgs.msg import RobotPose
+from hero_node.geometry import yaw_of
+
+from ..experiments.errors import ExperimentError
+from ..fitting.recording import PULSES, VELOCITY, Recording
+
+__all__ = ["read_recordings"]
+
+POSES_TOPIC = "/localization/poses"
+
+_ROBOT = re.compile(r"/hero_(\d+)/(odom|ground_truth|cmd_motor|cmd_vel|velocity_controller/cmd_vel)$")
+
+MAX_SPEED_M_S = 1.0
+"""Faster odometry was set, or its robot started anew."""
+
+Rows = List[Tuple[float, ...]]
+
+
+def read_recordings(paths: Sequence[str]) -> Dict[int, List[Recording]]:
+    """Return what each bag holds of each robot that has odometry, commands and poses, by its id.
+
+    Poses are those of localize; without them, those of the simulator. Raises: ExperimentError.
+    """
+    found: Dict[int, List[Recording]] = {}
+    for path in paths:
+        try:
+            with rosbag.Bag(path) as bag:
+                tables = _read_tables(bag)
+        except (OSError, rosbag.ROSBagException) as error:
+            raise ExperimentError("%s cannot be read: %s" % (path, error or type(error).__name__)) from error
+        for robot_id in sorted({robot_id for robot_id, _ in tables}):
+            odometry, commands = (tables.get((robot_id, kind), []) for kind in ("odom", "commands"))
+            poses = tables.get((robot_id, "map")) or tables.get((robot_id, "ground_truth")) or []
+            if len(odometry) > 1 and commands and poses:
+                found.setdefault(robot_id, []).append(_align(robot_id, odometry, commands, poses))
+    if not found:
+        text = "%s: no robot with odometry, commands and poses (of localize, or ground truth) in it"
+        raise ExperimentError(text % ", ".join(paths))
+    return found
+
+
+def _read_tables(bag: rosbag.Bag) -> Dict[Tuple[int, str], Rows]:
+    tables: Dict[Tuple[int, str], Rows] = {}
+    topics = [topic for topic in bag.get_type_and_topic_info().topics if topic == POSES_TOPIC or _ROBOT.match(topic)]
+    if not topics:
+        return tables  # rosbag would take that for all
+    for topic, message, received in bag.read_messages(topics=topics):
+        if topic == POSES_TOPIC:
+            for robot in message.robots:
+                if robot.state == RobotPose.TRACKED:
+                    row = (robot.stamp.to_sec(), robot.x, robot.y, robot.yaw)
+                    tables.setdefault((robot.id, "map"), []).append(row)
+            continue
+        match = _ROBOT.match(topic)
+        assert match is not None
+        kind, row = _read_row(match.group(2), message, received.to_sec())
+        tables.setdefault((int(match.group(1)), kind), []).append(row)
+    return tables
+
+
+def _read_row(topic: str, message: Any, received_s: float) -> Tuple[str, Tuple[float, ...]]:
+    """Return the table of a message, and its row there."""
+    if topic in ("odom", "ground_truth"):
+        pose = message.pose.pose
+        place = (pose.position.x, pose.position.y, yaw_of(pose.orientation))
+        return topic, (message.header.stamp.to_sec(), *place)
+    if topic == "cmd_motor":
+        return "commands", (received_s, PULSES, message.left_motor_pwm, message.right_motor_pwm)
+    return "commands", (received_s, VELOCITY, message.linear.x, message.angular.z)
+
+
+def _align(robot_id: int, odometry: Rows, commands: Rows, poses: Rows) -> Recording:
+    """Return a recording whose time begins with the odometry."""
+    tables = []
+    for rows in (commands, odometry, poses):
+        table = np.array(sorted(rows))
+        table[:, 0] -= min(odometry)[0]
+        tables.append(table[table[:, 0] >= 0.0])
+    name = "hero_%d" % robot_id
+    steps = np.diff(tables[1], axis=0)
+    if (np.hypot(steps[:, 1], steps[:, 2]) > MAX_SPEED_M_S * np.maximum(steps[:, 0], 0.02)).any():
+        raise ExperimentError("%s: its odometry jumps: it was set, or the robot started anew; record again" % name)
+    return Recording(name, *tables)

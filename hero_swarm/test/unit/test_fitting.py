@@ -1,0 +1,117 @@
+"""Fitting the simulator to simulated robots with hidden errors, and the file of what was found."""
+
+import numpy as np
+import pytest
+
+from hero_sim.errors import OptionError
+from hero_sim.stepped.robot_rows import RobotRows
+from hero_sim.world.robot_errors import draw_errors, read_known, set_known
+from hero_sim.world.world import World
+from hero_swarm.experiments.batch import build_trial, load_checked
+from hero_swarm.experiments.errors import ExperimentError
+from hero_swarm.experiments.experiment_file import parse_experiment
+from hero_swarm.experiments.results_folder import ResultsFolder
+from hero_swarm.fitting.recording import PULSES, VELOCITY, Recording
+from hero_swarm.fitting.robot_fit import describe_fit, fit_robot
+from hero_swarm.metrics import METRICS
+from hero_swarm.trial import OPEN
+
+PERIOD_S = 0.03
+HIDDEN = (
+    "left_gain=1.15,right_gain=0.85,dead_zone_us=38,lag_s=0.12,left_wheel=1.05,right_wheel=0.97,"
+    "wheel_separation_m=0.067,left_center_us=1522,right_center_us=1485"
+)
+
+
+def record(kind, time_s=60.0, delay_s=0.0, turns=True):
+    """Return the recording of a robot with hidden errors that drives at random, with poses of a camera's noise."""
+    errors = draw_errors([np.random.RandomState(1)])
+    set_known(errors, 0, HIDDEN)
+    rows = RobotRows(World(OPEN, np.zeros((1, 3)), [np.random.RandomState(2)], errors))
+    random = np.random.RandomState(3)
+    send, tables = rows.send_pulses if kind == PULSES else rows.send_velocity, ([], [], [])
+    command, next_s, sent = None, 0.0, 0
+    for step in range(round(time_s / PERIOD_S)):
+        now_s = step * PERIOD_S
+        if now_s >= next_s:
+            pulses_us = np.rint(1500.0 + random.uniform(-80.0, 80.0, 2))
+            speeds = (random.uniform(-0.05, 0.15), random.uniform(-2.5, 2.5) if turns else 0.0)
+            command, next_s = pulses_us if kind == PULSES else speeds, now_s + random.uniform(0.6, 2.0)
+        if step % 3 == 0:
+            tables[0].append((now_s, kind, *command))
+        while sent < len(tables[0]) and tables[0][sent][0] + delay_s <= now_s:
+            send(np.arange(1), *tables[0][sent][2:])
+            sent += 1
+        rows.advance(round(1000.0 * (now_s + PERIOD_S)))
+        if not tables[1] or rows.odometry_ms[0] > 1000.0 * tables[1][-1][0]:
+            tables[1].append((rows.odometry_ms[0] / 1000.0, *rows.odometry[0, :3]))
+        noise = random.normal(0.0, (0.001, 0.001, 0.01))
+        tables[2].append((now_s + PERIOD_S, *(rows.world.poses[0] + noise)))
+    return Recording("hero_4", *map(np.array, tables))
+
+
+def test_hidden_errors_come_back_and_predict_paths_not_seen():
+    fit = fit_robot([record(PULSES, delay_s=0.09)])
+    for key, hidden in (entry.split("=") for entry in HIDDEN.split(",")):
+        assert fit.values[key] == pytest.approx(float(hidden), rel=0.005 if "center" in key else 0.1), key
+    assert 0.06 < fit.delay_s < 0.12
+    assert fit.after_m < fit.before_m / 3.0 and fit.after_m < 0.01
+
+
+def test_velocities_tell_the_body_but_no_motors():
+    fit = fit_robot([record(VELOCITY, 40.0)])
+    assert set(fit.values) == {"left_wheel", "right_wheel", "wheel_separation_m", "slip"}
+    assert fit.values["wheel_separation_m"] == pytest.approx(0.067, rel=0.01)
+    assert fit.values["right_wheel"] == pytest.approx(0.97, rel=0.01)
+    lines = describe_fit(fit, 4)
+    assert "no servo pulses were recorded" in lines[1]
+    errors = draw_errors([np.random.RandomState(1)])
+    set_known(errors, 4, lines[-1])
+    assert errors.wheel_scale[0, 1] == pytest.approx(fit.values["right_wheel"], rel=1e-4)
+
+
+def test_a_robot_that_hardly_turns_cannot_be_fitted():
+    with pytest.raises(ValueError, match="turned by .* rad only"):
+        fit_robot([record(VELOCITY, 20.0, turns=False)])
+
+
+EXPERIMENT = """\
+behavior: milling
+robots: 2
+errors: %s
+start: {kind: circle, gap_m: 0.2}
+time_s: 1
+seeds: {count: 2}
+metrics: [rotation]
+"""
+
+
+def test_an_experiment_takes_the_errors_of_a_file_for_its_robots(tmp_path):
+    file = tmp_path / "robots.errors"
+    file.write_text("# found\nslip=0.01\nrobot=1,lag_s=0.11\nrobot=7,lag_s=0.3\n", encoding="utf-8")
+    experiment = parse_experiment(EXPERIMENT % file, "e.yaml", METRICS)
+    load_checked(experiment)
+    errors = build_trial(experiment, experiment.cells[0], [1, 2]).rows.world.errors
+    assert errors.servo_lag_s.ravel().tolist() == [0.08, 0.11, 0.08, 0.11]
+    assert set(errors.slip.ravel().tolist()) == {0.01}
+    assert len(set(errors.servo_gain.ravel().tolist())) == 8  # the rest is drawn
+
+
+def test_an_error_file_that_changes_makes_results_stale(tmp_path):
+    file = tmp_path / "robots.errors"
+    digests = set()
+    for text in ("slip=0.01", "slip=0.02"):
+        file.write_text(text, encoding="utf-8")
+        experiment = parse_experiment(EXPERIMENT % file, "e.yaml", METRICS)
+        digests.add(ResultsFolder(str(tmp_path), experiment, "code").name_series(0, [1]))
+    assert len(digests) == 2
+
+
+def test_wrong_error_files_are_refused_with_the_line(tmp_path):
+    file = tmp_path / "robots.errors"
+    file.write_text("lagg_s=0.1\n", encoding="utf-8")
+    for name, text in ((file, "lagg_s"), ("no_such", "no_such cannot be read")):
+        with pytest.raises(ExperimentError, match="e.yaml, line 3: .*" + text):
+            load_checked(parse_experiment(EXPERIMENT % name, "e.yaml", METRICS))
+    with pytest.raises(OptionError, match="cannot be read"):
+        read_known(str(tmp_path), range(2))
