@@ -7,7 +7,7 @@ pytest.importorskip("cv2")
 
 from hero_localization.calibration.lens_calibration import BoardView, calibrate_lens, find_board, is_mirrored
 from hero_localization.errors import CalibrationError
-from hero_localization.prints.boards import Board, list_board_corners
+from hero_localization.prints.boards import Board, draw_board, list_board_corners
 from hero_localization.simulated_camera.board_renderer import BoardRenderer
 from hero_localization.simulated_camera.view import CameraOptions, View
 
@@ -62,6 +62,24 @@ def project(holds, noise_px=0.1, seed=0):
         noisy = pixels + random.normal(0.0, noise_px, pixels.shape)
         result.append(BoardView(np.nonzero(inside)[0], noisy[inside].astype(np.float32)))
     return result
+
+
+def test_corners_of_a_tilted_board_are_right_near_and_far():
+    import cv2
+
+    fine, cell_px = 4, 120
+    printed = np.pad(draw_board(BOARD, cell_px), cell_px, constant_values=255)
+    rows, columns = printed.shape
+    rim = np.array(((0, 0), (columns, 0), (columns, rows), (0, rows)), np.float32)
+    seen = fine * np.array(((280, 60), (660, 130), (840, 500), (90, 430)), np.float32)
+    homography = cv2.getPerspectiveTransform(rim, seen)
+    light = cv2.warpPerspective(printed, homography, (fine * 960, fine * 540), borderValue=120)
+    gray = cv2.GaussianBlur(cv2.resize(light, (960, 540), interpolation=cv2.INTER_AREA), (0, 0), 0.7)
+    view = find_board(gray, BOARD)
+    corners = (list_board_corners(BOARD)[:, :2] / BOARD.square_m + 1.0) * cell_px - 0.5
+    expected = (cv2.perspectiveTransform(corners[None], homography)[0] + 0.5) / fine - 0.5
+    assert len(view.ids) == len(corners)
+    assert np.abs(view.pixels - expected[view.ids]).max() < 0.15
 
 
 def calibrate(views):

@@ -28,8 +28,9 @@ TILTED_RAD = 0.25
 MIN_TILTED = 4
 """Images with a tilted board: without them nearness cannot be told from focal length."""
 
-_WINDOW_SHARE = 0.12
+_WINDOW_SHARE = 0.1
 """Half a window by the side of a square; the markers begin at 0.13 of it."""
+_CRITERIA = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 30, 0.001)
 
 REGIONS = (
     ("upper left", "upper middle", "upper right"),
@@ -90,9 +91,13 @@ def _refine(gray: np.ndarray, pixels: np.ndarray) -> np.ndarray:
     """Return corners found again in windows well within their squares: OpenCV 4.6 leaves them half a pixel off."""
     apart_px = np.linalg.norm(pixels[:, None] - pixels, axis=2)
     np.fill_diagonal(apart_px, np.inf)
-    half_px = int(np.clip(_WINDOW_SHARE * np.median(apart_px.min(axis=0)), 2, 11))
-    criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 30, 0.001)
-    return cv2.cornerSubPix(gray, pixels[:, None].copy(), (half_px, half_px), (-1, -1), criteria)[:, 0]
+    # Each by the squares around it: a tilted board's far ones are smaller.
+    halves_px = np.clip(_WINDOW_SHARE * apart_px.min(axis=0), 2, 11).astype(int)
+    refined = pixels[:, None].copy()
+    for half_px in set(halves_px.tolist()):
+        chosen = halves_px == half_px
+        refined[chosen] = cv2.cornerSubPix(gray, refined[chosen], (half_px, half_px), (-1, -1), _CRITERIA)
+    return refined[:, 0]
 
 
 def calibrate_lens(
@@ -142,17 +147,21 @@ class _Fit(NamedTuple):
     tilts_rad: np.ndarray
 
 
-def _fit(views: Sequence[BoardView], width_px: int, height_px: int, board: Board) -> _Fit:
+def _fit(
+    views: Sequence[BoardView], width_px: int, height_px: int, board: Board, guess: Optional[Lens] = None
+) -> _Fit:
+    """Return the lens that explains the views best, sought from a guess; None: from OpenCV's own."""
     corners_m = list_board_corners(board).astype(np.float32)
     # k3 trades with k1 and k2: webcams whose field is below 90 degrees do without it.
+    flags = cv2.CALIB_FIX_K3 | (0 if guess is None else cv2.CALIB_USE_INTRINSIC_GUESS)
     try:
         rms_px, matrix, distortion, turns, _, _, _, errors_px = cv2.calibrateCameraExtended(
             [corners_m[view.ids] for view in views],
             [view.pixels for view in views],
             (width_px, height_px),
-            None,
-            None,
-            flags=cv2.CALIB_FIX_K3,
+            None if guess is None else guess.matrix.copy(),
+            None if guess is None else guess.distortion.copy(),
+            flags=flags,
         )
     except cv2.error as error:
         raise CalibrationError(
@@ -174,7 +183,7 @@ def _measure_focal_error(views: Sequence[BoardView], fit: _Fit, width_px: int, h
     groups, focals_px = np.random.RandomState(0).permutation(len(views)) % JACKKNIFE_GROUPS, []
     for left_out in range(JACKKNIFE_GROUPS):
         others = [view for view, group in zip(views, groups) if group != left_out]
-        focals_px.append(np.diagonal(_fit(others, width_px, height_px, board).lens.matrix)[:2])
+        focals_px.append(np.diagonal(_fit(others, width_px, height_px, board, fit.lens).lens.matrix)[:2])
     deviations = np.array(focals_px) / np.diagonal(fit.lens.matrix)[:2] - 1.0
     share = (JACKKNIFE_GROUPS - 1.0) / JACKKNIFE_GROUPS
     return float(np.sqrt(share * ((deviations - deviations.mean(axis=0)) ** 2).sum(axis=0)).max())
