@@ -11,10 +11,13 @@ from nav_msgs.msg import Odometry
 
 from hero_client import ProgramError
 from hero_node.parameters import check_parameters
+from hero_sim.build import build_swarm
+from hero_sim.main import build_parser
 from hero_sim.stepped.swarm import StepSwarm
 from hero_swarm.metrics import consensus_error
 from hero_swarm.ros import behavior_node
 from hero_swarm.ros.behavior_node import PARAMETERS, BehaviorNode
+from hero_swarm.wheel_pulses import find_pulses, list_dead_zones
 
 DEAD_ZONE_US = [1470.0, 1530.0, 1480.0, 1540.0]
 
@@ -115,6 +118,17 @@ def test_calibrated_motors_get_pulses_and_zero_velocity_at_rest(stage, tmp_path)
     stage.run(2.0)
     assert len(pulses) < count + 15
     assert np.abs(stage.swarm.rows.world.speeds_m_s).max() < 1e-6
+
+
+def test_the_robots_of_hero_sim_count_as_calibrated(stage):
+    stage.start("milling", simulated=6)
+    simulator = build_swarm(build_parser().parse_args(["--count", "6", "--arena", "empty"]), [""] * 6, print)
+    left_us, right_us = find_pulses(0.08, 0.0, list_dead_zones(simulator.world.errors))
+    stage.node._commands.send(np.full(6, 0.08), np.zeros(6), np.full(6, True))
+    sent = [stage.sent["/hero_%d/cmd_motor" % number][0] for number in range(6)]
+    assert [message.left_motor_pwm for message in sent] == left_us.tolist()
+    assert [message.right_motor_pwm for message in sent] == right_us.tolist()
+    assert not stage.warnings
 
 
 def test_without_all_motors_calibrated_velocities_drive_and_are_explained(stage, tmp_path):

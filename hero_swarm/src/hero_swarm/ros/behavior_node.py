@@ -61,7 +61,8 @@ class BehaviorNode:
         topic, radius_m = parameters["objects_topic"], parameters["object_radius_m"]
         self._objects = ObjectSource(self._frame, topic, radius_m, are_needed)
         self._filter = SafetyFilter(parameters["safety"], _parse_fence(parameters["fence"]))
-        self._commands = WheelCommands(swarm, self._behavior.drive, parameters["calibration_folder"])
+        folder, simulated = parameters["calibration_folder"], parameters["simulated"]
+        self._commands = WheelCommands(swarm, self._behavior.drive, folder, simulated)
         self._random = Random([parameters["seed"]], len(ids))
         self._memory: Any = None
         self._start_s = rospy.get_time()
@@ -134,6 +135,7 @@ PARAMETERS = {
     "safety": choice("off", MODES, "safety filter: off, fence, or fence and robots"),
     "fence": words("", "x min, y min, x max, y max of the fence, m"),
     "calibration_folder": words("~/hero_calibration", "of `calibrate`; behaviors with drive = pulses need its files"),
+    "simulated": whole_number(0, 0, 1000, "", "robots of a simulator with seed 0, whose motors count as calibrated"),
     "seed": whole_number(0, 0, 2**31 - 1, "", "of the behavior's random numbers"),
     "time_s": number(0.0, 0.0, 1e6, "s", "stop after so long; 0 runs until Ctrl-C"),
 }

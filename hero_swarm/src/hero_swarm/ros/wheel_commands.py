@@ -1,7 +1,7 @@
 """Speeds to robots over ROS: velocities, or servo pulses if `calibrate motors` has measured their dead zones."""
 
 import math
-from typing import Any, List, Optional
+from typing import Any, Dict, List, Optional
 
 import numpy as np
 import rospy
@@ -9,9 +9,10 @@ import rospy
 from hero_client import Swarm
 from hero_msgs.msg import Motor
 from hero_node.yaml_text import read_calibrations
+from hero_sim.stepped.swarm import StepSwarm
 
 from ..behavior import PULSES
-from ..wheel_pulses import find_pulses
+from ..wheel_pulses import find_pulses, list_dead_zones
 
 __all__ = ["WheelCommands"]
 
@@ -23,17 +24,26 @@ def _convert_dead_zones(edges: Any, _content: Any) -> List[float]:
     return edges_us
 
 
+def _list_simulated(count: int) -> Dict[str, List[float]]:
+    """Return the dead zones of the robots of `hero_sim --count COUNT`, as `calibrate motors` would find them."""
+    edges_us = list_dead_zones(StepSwarm(count).rows.world.errors) if count else np.empty((0, 4))
+    return {"hero_%d" % number: found for number, found in enumerate(edges_us.tolist())}
+
+
 class WheelCommands:
     """Commands to all robots of a swarm."""
 
-    def __init__(self, swarm: Swarm, drive: str, folder: str) -> None:
-        """Take the dead zones from folder if drive is "pulses". Raises: ProgramError for an unusable file."""
+    def __init__(self, swarm: Swarm, drive: str, folder: str, simulated: int = 0) -> None:
+        """Take the dead zones from folder if drive is "pulses". Raises: ProgramError for an unusable file.
+
+        simulated: so many robots are those of a simulator with seed 0; their motors are as if calibrated.
+        """
         self._swarm = swarm
         self._publishers: List[rospy.Publisher] = []
         self._dead_zones_us: Optional[np.ndarray] = None
         if drive != PULSES:
             return
-        found = read_calibrations(folder, "dead_zones_us", _convert_dead_zones)
+        found = {**_list_simulated(simulated), **read_calibrations(folder, "dead_zones_us", _convert_dead_zones)}
         names = ["hero_%d" % robot.robot_id for robot in swarm]
         missing = [name for name in names if name not in found]
         if missing:
