@@ -1,12 +1,13 @@
 """random_walk in virtual time: the robots of twenty worlds, each with errors of its own."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import true_paths
 
-from hero_client.controllers.avoidance import WanderLaw
+from hero_client.controllers.avoidance import WanderLaw, WanderMemory
 from hero_sim.stepped.swarm import StepSwarm
 from hero_sim.world.arena_file import load_arena
 
@@ -62,3 +63,17 @@ def test_a_walker_without_usable_ranges_stops_and_says_why():
         path = true_paths.run(swarm, lambda time_s: "infrared calibration" not in walker.step(), 2.0)[0]
         assert np.ptp(path[-20:], axis=0).max() < 1e-6
         assert swarm[0].light == (0.0, 0.0, 1.0)
+
+
+def test_a_walker_that_lost_its_ranges_forgets_where_it_turned():
+    sent = []
+    robot = SimpleNamespace(
+        fresh_proximity=lambda: [math.nan] * 8,
+        missing=lambda: "no laser",
+        drive=lambda *command: sent.append(command),
+        led=sent.append,
+    )
+    walker = Walker(robot, WanderLaw(), 0)
+    walker.memory = WanderMemory(1, 2, 0.3)
+    assert walker.step() == "no laser" and sent == [(0.0, 0.0), "blue"]
+    assert walker.memory == WanderMemory()

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from hero_localization.filter.pose_filter import Measurement, Outcome, PoseFilter
+from hero_localization.filter.pose_filter import REPLAYED_S, Measurement, Outcome, PoseFilter
 from hero_localization.filter.stamped_history import interpolate_pose
 from hero_node.geometry import Pose, invert_pose, transform_pose, wrap_angle
 
@@ -291,3 +291,14 @@ def test_a_pose_that_is_not_finite_is_refused(pose):
 def test_a_covariance_that_is_none_is_refused(covariance):
     with pytest.raises(ValueError, match="covariance"):
         PoseFilter().add_measurement(Measurement(0.0, Pose(0.0, 0.0, 0.0), covariance))
+
+
+def test_after_a_long_occlusion_a_pose_of_the_last_second_is_used():
+    for readings in range(20, 50):
+        filter_ = PoseFilter()
+        filter_.add_odometry(0.0, Pose(0.0, 0.0, 0.0))
+        filter_.add_measurement(Measurement(0.0, ORIGIN, COVARIANCE))
+        for number in range(1, readings):
+            filter_.add_odometry(0.1 * number, Pose(0.0, 0.0, 0.0))
+        seen_s = 0.1 * (readings - 1) - 0.9 * REPLAYED_S
+        assert filter_.add_measurement(Measurement(seen_s, ORIGIN, COVARIANCE)) is Outcome.USED

@@ -269,3 +269,21 @@ def test_passwords_and_names_of_networks_end_at_their_limits(monkeypatch):
     assert len(create("swarm", "y" * 8)) == 3, "its own is made anew"
     with pytest.raises(hotspot.HotspotError, match="omit --ssid"):
         create("swarm", "", "--factory")
+
+
+def test_what_nmcli_says_becomes_one_line_with_a_remedy(monkeypatch):
+    def answer(code, text, typed=""):
+        result = SimpleNamespace(returncode=code, stdout=text.encode())
+        monkeypatch.setattr(hotspot.subprocess, "run", lambda command, **options: result)
+        return hotspot.run_nmcli("connection", "up", "x", typed=typed)
+
+    assert answer(0, "a:b\n") == "a:b\n" and answer(0, "successfully updated", "save") == "successfully updated"
+    for code, text, typed, words in (
+        (hotspot.NMCLI_NOT_RUNNING, "", "", "NetworkManager is not running"),
+        (1, "Error: Could not create NMClient object", "", "NetworkManager is not running"),
+        (4, "secret typed\nError: Not authorized", "", "^Error: Not authorized: run this in a desktop session"),
+        (3, "", "", "^nmcli connection up failed$"),
+        (0, "Error: no such property", "save", "^Error: no such property$"),
+    ):
+        with pytest.raises(hotspot.HotspotError, match=words):
+            answer(code, text, typed)

@@ -9,6 +9,7 @@ import pytest
 from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.experiment_file import parse_experiment
 from hero_swarm.experiments.results_folder import REAL, ResultsFolder, Run
+from hero_swarm.experiments.summary import build_report
 
 FILE = """\
 behavior: a.B
@@ -170,3 +171,23 @@ def test_the_folder_says_what_made_it(tmp_path):
     open_folder(tmp_path)
     assert (tmp_path / "experiment.yaml").read_text() == FILE
     assert json.loads((tmp_path / "about.json").read_text()) == {"code": "c0de", "numpy": "1"}
+
+
+def test_a_report_compares_runs_of_one_seed_and_says_what_is_missing():
+    experiment = parse(FILE + "compare: {metric: dispersion, between: robots}\n")
+    runs = [
+        Run(0, 5, (1.0, math.inf)),
+        Run(1, 5, (3.0, 1.0)),
+        Run(0, 6, (1.0, 1.0)),
+        Run(1, 6, (7.0, 1.0), remark="a robot was lifted"),
+        Run(1, 6, (6.0, 1.0), kind=REAL),
+        Run(1, 7, (9.0, 1.0)),
+    ]
+    report = build_report(experiment, runs)
+    (compared,) = report.compared
+    assert (compared.first, compared.second, compared.comparison.pairs) == (0, 1, 1)
+    assert compared.comparison.difference.median == 2.0 and compared.comparison.delta == 1.0
+    assert [summary.values for summary in report.summaries][:2] == [(1.0, 1.0), (3.0, 6.0, 9.0)]
+    remarks = "\n".join(report.remarks)
+    for words in ("2 of 8 runs are still missing", "4 seeds: ", "1 runs are left out", "not reached in 1 runs"):
+        assert words in remarks
