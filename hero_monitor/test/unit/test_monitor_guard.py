@@ -66,7 +66,7 @@ def test_a_program_ends_with_the_monitor_after_five_seconds_of_silence(monkeypat
 
 def test_what_pages_offer_is_what_launch_files_say():
     for name, offer in OFFERS.items():
-        text = (PACKAGES / offer.package / "launch" / (name + ".launch")).read_text(encoding="utf-8")
+        text = (PACKAGES / offer.package / "launch" / (offer.program + ".launch")).read_text(encoding="utf-8")
         for field, default, doc in re.findall(r'<arg name="(\w+)" default="([^"]*)" doc="([^"]*)"', text):
             given = offer.fields.get(field)
             if given is None or not isinstance(given.default, float):
@@ -75,7 +75,7 @@ def test_what_pages_offer_is_what_launch_files_say():
             low, high = re.search(r"\(?(-?[\d.]+)\.\.([\d.]+)\)?", doc).groups()
             assert float(low) <= given.low < given.high == float(high), (name, field)
     assert OFFERS["go_to_goal"].fields["avoid"].default is False
-    assert OFFERS["behavior"].fields["safety"].default == "fence and robots", "which the user has to switch off"
+    assert OFFERS["behavior_milling"].fields["safety"].default == "fence and robots", "which the user has to switch off"
     formation = OFFERS["swarm_go_to"].fields
     assert [(formation[name].low, formation[name].high) for name in ("x_m", "turn_deg")] == [(-1e3, 1e3), (-360, 360)]
     assert formation["spacing_m"].high == 2.0 and OFFERS["led_show"].fields["period_s"].low == 0.5
