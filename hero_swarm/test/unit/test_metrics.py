@@ -17,6 +17,8 @@ def ring(robots, radius_m=0.5):
 
 def test_the_ideal_dispersion_is_that_of_the_densest_packing():
     assert ideal_dispersion(1) == 0.0
+    for robots, least_m in ((2, 2.0), (3, 2.0 * math.sqrt(3.0)), (4, 2.0 + 2.0 * math.sqrt(3.0))):
+        assert ideal_dispersion(robots, 1.0) == pytest.approx(least_m)
     assert ideal_dispersion(7, 1.0) == pytest.approx(12.0)
     assert ideal_dispersion(100, 0.037) == pytest.approx(26.03, rel=0.01)
 
@@ -67,6 +69,8 @@ def test_connectivity_of_a_path_is_the_closed_form_and_zero_if_apart():
 def test_collisions_and_the_nearest_neighbor_ignore_the_robot_itself():
     places_m = np.array([[(0.0, 0.0), (0.07, 0.0), (0.5, 0.0)]])
     assert metrics.collisions(places_m).tolist() == [1]
+    for apart_m, collisions in ((2.0 * BODY_RADIUS_M - 1e-6, 1), (2.0 * BODY_RADIUS_M + 1e-6, 0)):
+        assert metrics.collisions(np.array([[(0.0, 0.0), (0.0, apart_m)]])).tolist() == [collisions]
     assert metrics.nearest_neighbor(places_m) == pytest.approx([(0.07 + 0.07 + 0.43) / 3.0])
 
 
@@ -74,6 +78,10 @@ def test_coverage_is_the_share_of_the_area_in_range():
     bounds_m = np.array((-1.0, -1.0, 1.0, 1.0))
     assert metrics.coverage(np.zeros((1, 1, 2)), bounds_m, 0.5) == pytest.approx([math.pi * 0.25 / 4.0], abs=0.01)
     assert metrics.coverage(np.zeros((1, 1, 2)), bounds_m, 2.0) == pytest.approx([1.0])
+    # Of 10 x 5 cells those whose middles are near the robot in a corner, or another one in the corner across.
+    corners_m, bounds_m = np.array([[(1.0, 2.0)], [(2.0, 2.5)]]), np.array((1.0, 2.0, 2.0, 2.5))
+    assert metrics.coverage(corners_m, bounds_m, 0.2, 0.1) == pytest.approx([3.0 / 50.0] * 2)
+    assert metrics.coverage(corners_m.reshape(1, 2, 2), bounds_m, 0.2, 0.1) == pytest.approx([6.0 / 50.0])
 
 
 def test_consensus_is_the_spread_about_the_mean():

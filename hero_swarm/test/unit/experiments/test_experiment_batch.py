@@ -1,0 +1,74 @@
+"""Runs of one cell in this process: what columns take of the samples, where a run ends, and what is recorded."""
+
+import math
+
+import numpy as np
+import pytest
+
+from hero_swarm import metrics
+from hero_swarm.experiments.batch import METRICS_ENDING, POSES_ENDING, compute_batch, take_values
+from hero_swarm.experiments.errors import ExperimentError
+from hero_swarm.experiments.experiment_file import parse_experiment
+
+FILE = """\
+behavior: aggregation
+vary: {robots: [3]}
+start: {kind: uniform, cover: 0.05}
+time_s: 4
+seeds: {from: 11, count: 3}
+metrics: [dispersion, {mean_of_last_s: {nearest_neighbor: 2}}, {time_until: {dispersion_ratio: 1.5}}]
+record: {hz: 2}
+"""
+
+
+def take(text, series):
+    return take_values(parse_experiment(FILE.replace("nearest_neighbor: 2", text), "e.yaml", metrics.METRICS), series)
+
+
+def test_columns_are_the_last_sample_the_mean_of_the_last_and_the_first_time_below_a_bound():
+    # Of each second: dispersion, dispersion_ratio, nearest_neighbor.
+    series = np.array([(1.0, 2.0, 10.0), (2.0, 1.6, 20.0), (3.0, 1.4, 40.0), (4.0, 1.7, 80.0), (5.0, 1.3, 160.0)])
+    assert take("nearest_neighbor: 2", series) == (5.0, 120.0, 2.0)
+    assert take("nearest_neighbor: 3", series)[1] == pytest.approx(280.0 / 3.0)
+    assert take("nearest_neighbor: 60", series)[1] == 62.0
+    assert take("nearest_neighbor: 1", series[:2]) == (2.0, 20.0, math.inf)
+    series[0, 1] = 1.5
+    assert take("nearest_neighbor: 1", series)[2] == 0.0, "it holds from the start on"
+
+
+def test_a_run_that_has_ended_has_no_samples_afterwards_and_others_go_on(tmp_path):
+    whole = compute_batch(FILE, 0, [11, 12, 13], str(tmp_path / "a"), True).runs
+    series, poses = (np.load(str(tmp_path / ("a" + ending))) for ending in (METRICS_ENDING, POSES_ENDING))
+    assert series.shape == (5, 3, 3) and poses.shape == (9, 3, 3, 3) and np.isfinite(poses).all()
+    assert [run.seed for run in whole] == [11, 12, 13] and {run.cell for run in whole} == {0}
+    # Samples lie 1 s apart and poses 0.5 s: both are of the same times.
+    assert metrics.dispersion(poses[::2, 1, :, :2].astype(float)) == pytest.approx(series[:, 1, 0], rel=1e-5)
+    assert [run.values[0] for run in whole] == pytest.approx(series[-1, :, 0].tolist())
+
+    bound = float(np.sort(series[2, :, 0])[0]) * 1.0001  # one run is below it after 2 s
+    text = FILE.replace("time_s: 4", "time_s: 4\nuntil: {dispersion: %r}" % bound)
+    runs = compute_batch(text, 0, [11, 12, 13], str(tmp_path / "b"), False).runs
+    ended = np.load(str(tmp_path / ("b" + METRICS_ENDING)))
+    for world in range(3):
+        below = np.flatnonzero(series[:, world, 0] <= bound)
+        last = below[0] if len(below) else 4
+        assert np.isfinite(ended[: last + 1, world]).all() and np.isnan(ended[last + 1 :, world]).all()
+        assert runs[world].values[0] == pytest.approx(series[last, world, 0])
+    assert np.isnan(ended[-1]).any()
+    assert not (tmp_path / ("b" + POSES_ENDING)).exists()
+    alone = compute_batch(FILE, 0, [12], str(tmp_path / "c"), False).runs
+    assert alone == whole[1:2], "a run has the same values alone"
+
+
+def test_metrics_get_speeds_in_meters_per_second(tmp_path, monkeypatch):
+    monkeypatch.setitem(metrics.METRICS, "dispersion", lambda poses, velocities, objects: velocities[:, 0, 0])
+    compute_batch(FILE.replace("hz: 2", "hz: 20"), 0, [11], str(tmp_path / "a"), True)
+    series, poses = (np.load(str(tmp_path / ("a" + ending))) for ending in (METRICS_ENDING, POSES_ENDING))
+    moved_m = float(poses[40, 0, 0, 0] - poses[39, 0, 0, 0])  # in the last cycle before 2 s
+    assert series[2, 0, 0] == pytest.approx(moved_m * 20.0, rel=1e-3) and abs(moved_m) > 1e-4
+
+
+def test_what_a_behavior_raises_names_the_cell_and_the_seeds(tmp_path, monkeypatch):
+    monkeypatch.setitem(metrics.METRICS, "dispersion", lambda *arguments: 1 // 0)
+    with pytest.raises(ExperimentError, match="with seeds 11 to 13: ZeroDivisionError: .*test_experiment_batch"):
+        compute_batch(FILE, 0, [11, 12, 13], str(tmp_path / "a"), False)
