@@ -25,7 +25,7 @@ def take(text, series):
     return take_values(parse_experiment(FILE.replace("nearest_neighbor: 2", text), "e.yaml", metrics.METRICS), series)
 
 
-def test_columns_are_the_last_sample_the_mean_of_the_last_and_the_first_time_below_a_bound():
+def test_columns_are_a_last_sample_a_mean_or_the_first_time_below_a_bound():
     # Of each second: dispersion, dispersion_ratio, nearest_neighbor.
     series = np.array([(1.0, 2.0, 10.0), (2.0, 1.6, 20.0), (3.0, 1.4, 40.0), (4.0, 1.7, 80.0), (5.0, 1.3, 160.0)])
     assert take("nearest_neighbor: 2", series) == (5.0, 120.0, 2.0)
@@ -36,7 +36,7 @@ def test_columns_are_the_last_sample_the_mean_of_the_last_and_the_first_time_bel
     assert take("nearest_neighbor: 1", series)[2] == 0.0, "it holds from the start on"
 
 
-def test_a_run_that_has_ended_has_no_samples_afterwards_and_others_go_on(tmp_path):
+def test_a_run_that_has_ended_has_no_more_samples_and_others_go_on(tmp_path):
     whole = compute_batch(FILE, 0, [11, 12, 13], str(tmp_path / "a"), True).runs
     series, poses = (np.load(str(tmp_path / ("a" + ending))) for ending in (METRICS_ENDING, POSES_ENDING))
     assert series.shape == (5, 3, 3) and poses.shape == (9, 3, 3, 3) and np.isfinite(poses).all()
