@@ -307,7 +307,7 @@ def main():
     )
     parser.add_argument("--warn", action="store_true", help="each robot sends one warning per second")
     server = parser.add_mutually_exclusive_group()
-    server.add_argument("--server-command", default=DRIVER_COMMAND, help="{port} stands for the port")
+    server.add_argument("--server-command", default=DRIVER_COMMAND, help="{port} is replaced by the port")
     server.add_argument(
         "--against",
         type=Path,

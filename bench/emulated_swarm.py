@@ -155,7 +155,7 @@ class EmulatedRobot:
                 self.synchronized_s = now_s
                 is_new = True
             elif topic_id == declarations.ID_VELOCITY_CMD_VEL and payload != ZERO:
-                # Zeros are the driver's own: it stops robots whose commander has gone.
+                # Zeros are the driver's own: it stops robots whose commander has disconnected.
                 self.commands += 1
                 if self._keeps_times:
                     # The commander writes the time of sending into linear.y, which robots ignore.

@@ -1,6 +1,6 @@
 """CPU of the nodes track and localize, and the age of their poses, for robots that turn on the spot.
 
-The nodes run as launched; this process stands for camera and driver. It renders one turn of the robots beforehand, and
+The nodes run as launched; this process replaces camera and driver. It renders one turn of the robots beforehand, and
 publishes pictures and odometry at the times at which a camera and a driver would.
 """
 

@@ -50,7 +50,7 @@ class RunningSuite:
             if value:
                 return value
             time.sleep(0.02)
-        raise SystemExit("bench: waited in vain for " + what)
+        raise SystemExit("bench: timed out waiting for " + what)
 
     def start(self, command, **options):
         """Start a program that ends with the suite."""

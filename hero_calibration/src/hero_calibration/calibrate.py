@@ -60,7 +60,7 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
 def run(arguments: Sequence[str]) -> int:
     """Run with the arguments of the command line; return the exit code. Raises: CalibrationError, ProgramError."""
     options = parse_options(arguments)
-    # What is wrong with files and folders is told before robots are waited for.
+    # Errors in files and folders are reported before waiting for robots.
     if options.restore:
         calibrations = load_calibrations(options.folder, options.files, options.robots)
         robot_ids = list(calibrations)

@@ -6,4 +6,4 @@ class CalibrationError(Exception):
 
 
 class EndedError(Exception):
-    """The program was told to end in the middle of a procedure."""
+    """The program was interrupted during a procedure."""

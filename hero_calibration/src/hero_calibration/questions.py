@@ -18,7 +18,7 @@ def ask(program: Program, question: str) -> str:
     if sys.stdin is None:
         raise CalibrationError(NO_TERMINAL)
     say(question, end="")
-    # input() would go on waiting after Ctrl-C: signals only set a flag here.
+    # input() would keep waiting after Ctrl-C: signals only set a flag here.
     while not program.wait_readable([sys.stdin.fileno()], 1.0):
         if not program.running:
             say("")

@@ -246,7 +246,7 @@ def test_dead_zones_have_their_widths_and_sweeps_their_pulses():
     zone = dead_zone.find_dead_zone(pulses, sweep(80.0, 1e-3, 99.0))
     assert (zone.low_us, zone.high_us, zone.gain_m_s_us) == pytest.approx((1420.0, 1580.0, 1e-3))
     assert dead_zone.find_dead_zone(pulses, sweep(99.0, 0.01, 103.0)).high_us == pytest.approx(1599.0)
-    with pytest.raises(CalibrationError, match="stops from 1399 to 1601 us, which no servo does"):
+    with pytest.raises(CalibrationError, match="stops from 1399 to 1601 us, which is implausible"):
         dead_zone.find_dead_zone(pulses, sweep(101.0, 0.01, 103.0))
 
 

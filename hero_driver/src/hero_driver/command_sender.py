@@ -12,7 +12,7 @@ from .transport import CallLater
 
 HEARD_S = 0.5
 """A robot that has stopped sending for so long gets no motion commands: it would take them late, all at once. Pauses of
-0.1 s are common on Wi-Fi; motion that waits is sent when the robot is heard again."""
+0.1 s are common on Wi-Fi; motion that waits is sent when the robot sends again."""
 
 
 class CommandSender:
@@ -35,7 +35,7 @@ class CommandSender:
         peer.link.send_packet(packet)
 
     def send_commands(self, namespace: str) -> None:
-        """Send the commands of a robot that may go out; come back for the remainder."""
+        """Send the commands of a robot that may go out; retry later with the remainder."""
         peer = self._owner.find_peer(namespace)
         if peer is None:
             return

@@ -157,7 +157,7 @@ class Gateway(LinkHandler):
             self._send_outgoing(peer)
 
     def resume(self, now_s: float) -> None:
-        """Keep robots that could not be heard meanwhile, forget commands that waited, and go on with stops at once."""
+        """Keep robots that could not be read meanwhile, drop commands that waited, and continue stops at once."""
         for bridge in self.bridges.values():
             bridge.commands.resume(now_s)
         for peer in self.peers.values():
@@ -434,7 +434,7 @@ class Gateway(LinkHandler):
             data = peer.link.read()
             if data:
                 self.receive_data(peer.link, data, time.monotonic())
-        except Exception as error:  # noqa: BLE001 - one robot's trouble must not keep the others moving
+        except Exception as error:  # noqa: BLE001 - an error with one robot must not keep the others moving
             self.report_bug(error)
 
     def _poll_commanders(self) -> None:
@@ -450,7 +450,7 @@ class Gateway(LinkHandler):
             bridge = self.bridges.pop(record.identity.namespace, None)
             if bridge is not None:
                 bridge.close()
-                text = "%s is gone; its topics and services are taken down" % bridge.label
+                text = "%s has left; its topics and services are unregistered" % bridge.label
                 self._log.log_throttled("info", "gone " + bridge.label, text, host=record.host)
             self._admit_duplicates(record, lambda host: True)
             self.note_change()

@@ -209,7 +209,7 @@ class TestDriverFleet(DriverCase):
             return entry is not None and entry.address == second.address
 
         wait_for(look, "the second robot to join")
-        self.wait_log("hero_7 is gone")
+        self.wait_log("hero_7 has left")
         self.assertIsNone(self.fleet.find("/hero_7", Robot.REFUSED))
 
     def test_a_refused_robot_that_keeps_dialling_does_not_fill_the_log(self):

@@ -208,7 +208,7 @@ def test_a_duplicate_is_named_kept_and_let_in_when_its_place_is_free(driver):
     driver.gateway.open()
     driver.run(61.0)
     assert third.reason == "the robot with the same id left; this one may try again"
-    assert ("info", "hero_0 is gone; its topics and services are taken down") in driver.lines
+    assert ("info", "hero_0 has left; its topics and services are unregistered") in driver.lines
     assert driver.gateway.bridges == {} and driver.list_rows() == []
 
 

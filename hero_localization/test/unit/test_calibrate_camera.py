@@ -66,7 +66,7 @@ def test_a_robot_that_is_not_seen_does_not_keep_others_from_the_file(calibrate, 
 def test_a_robot_whose_tag_is_another_ones_is_not_driven(calibrate, capsys):
     status, found = calibrate("0 12")
     assert status == 1 and 12 not in found.layout.mounts
-    assert "hero_12: tag 12 stands for something else: name the robot's in tag_robots" in capsys.readouterr().out
+    assert "hero_12: tag 12 is assigned to something else: name the robot's in tag_robots" in capsys.readouterr().out
 
 
 def test_without_any_robot_seen_the_file_stays_as_it_was(calibrate):

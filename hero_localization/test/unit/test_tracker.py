@@ -48,7 +48,7 @@ def test_a_tag_that_counts_for_nothing_is_named_for_a_while():
     tracker = make_tracker()
     tracker.take([see(1, 0.0, 0.0), see(3, 0.2, 0.0), see(3, 0.4, 0.0), see(4, 0.0, 0.3, size_m=0.03)], 10.0, 0)
     names = {problem.name: problem.text for problem in tracker.list_problems()}
-    assert "stands for no robot" in names["tag 1"] and "more than once" in names["tag 3"]
+    assert "is assigned to no robot" in names["tag 1"] and "more than once" in names["tag 3"]
     assert "measures 75 % of its size" in names["tag 4"]
     tracker.take([], 11.9, 1)
     assert len(tracker.list_problems()) == 3

@@ -1,7 +1,7 @@
 """Runs the main function of a command: an error becomes one line and an exit status, even if the output is closed.
 
 Exit status: 0 done, 1 failed (the line on stderr says why), 2 wrong arguments (argparse), 130 Ctrl-C, 141 the reader of
-the output is gone (as shells report a program that ends by a closed pipe). Knows neither ROS nor robots.
+the output is closed (as shells report a program that ends by a closed pipe). Knows neither ROS nor robots.
 """
 
 import argparse
@@ -130,7 +130,7 @@ def print_error(text: str) -> None:
 
 
 def _report(failure: OSError) -> int:
-    """Print why the output is lost, unless it is a pipe whose reader has gone; return the exit status."""
+    """Print why the output is lost, unless it is a pipe whose reader has ended; return the exit status."""
     if isinstance(failure, BrokenPipeError):
         return PIPE_CLOSED
     print_error("the output cannot be written: %s" % failure.strerror)

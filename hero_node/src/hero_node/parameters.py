@@ -149,7 +149,7 @@ def make_error(name: str, value: Any, allowed: str) -> ProgramError:
 def parse_robot_ids(name: str, value: Any) -> Optional[List[int]]:
     """Return the ids in value: a number, a list of numbers, or text such as "0 1 2", "0,1,2" or "0-3".
 
-    Returns None, which stands for all robots, for the word "all".
+    Returns None, which means all robots, for the word "all".
     Raises: ProgramError for anything else, for a negative or repeated id, and for an empty list.
     """
     example = 'ids such as "0 1 2 3" or "0-3", or "all"'

@@ -31,7 +31,7 @@ class TokenBucket:
         return min(self._burst, self._tokens + self._per_s * (now_s - self._filled_s))
 
     def is_full(self, now_s: float) -> bool:
-        """Return whether nothing was taken, or all of it has come back."""
+        """Return whether the bucket is full."""
         return self.count(now_s) >= self._burst
 
 

@@ -1,4 +1,4 @@
-"""Decides from the free space of a disk whether a recording may start or go on. Writes no files."""
+"""Decides from the free space of a disk whether a recording may start or continue. Writes no files."""
 
 import os
 import shutil
@@ -37,11 +37,11 @@ def prepare_folder(folder: str, limit_mb: float) -> float:
 
 
 def find_reason_to_stop(folder: str, limit_mb: float) -> Optional[str]:
-    """Return why a recording in a folder has to stop now, as text; None if it may go on."""
+    """Return why a recording in a folder has to stop now, as text; None if it may continue."""
     try:
         free_mb = read_free_mb(folder)
     except OSError as error:
-        return "%s is gone: %s" % (folder, error.strerror)
+        return "%s no longer exists: %s" % (folder, error.strerror)
     if free_mb >= limit_mb:
         return None
     return "only %.0f MB are left in %s, less than the limit of %.0f MB (min_free_mb)" % (free_mb, folder, limit_mb)

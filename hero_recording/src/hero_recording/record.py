@@ -162,7 +162,7 @@ def _end_with_parent() -> None:
 
 
 def say(text: str) -> None:
-    """Write a line; the recording goes on if its output is closed."""
+    """Write a line; the recording continues if its output is closed."""
     command_line.say("record: " + text)
 
 
@@ -175,7 +175,7 @@ def make_command(options: argparse.Namespace, recorder_arguments: Sequence[str])
         )
     command = [found[0], "--quiet", "--regex", "--repeat-latched", "--buffsize", "256", "--tcpnodelay"]
     command += ["-o", os.path.join(options.folder, options.name), "--split", "--size", str(options.split_mb)]
-    # The recorder's own guard only stops writing and goes on; it is the second line, should this program be killed.
+    # The recorder's own guard only stops writing; it is the second line, should this program be killed.
     command += ["--min-space", "%dk" % max(1, options.min_free_mb * MB / 1024 / 10)]
     if options.max_files:
         command += ["--max-splits", str(options.max_files)]

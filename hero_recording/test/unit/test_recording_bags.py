@@ -230,4 +230,4 @@ class TestDiskGuard:
         assert "less than the limit of 501 MB" in disk_guard.find_reason_to_stop("/folder", 501.0)
 
     def test_a_recording_stops_when_its_disk_is_pulled_out(self, tmp_path):
-        assert "is gone" in disk_guard.find_reason_to_stop(str(tmp_path / "gone"), 1.0)
+        assert "no longer exists" in disk_guard.find_reason_to_stop(str(tmp_path / "gone"), 1.0)

@@ -33,7 +33,7 @@ SERVICE_LIMIT_S = 2.0
 """A service call that the simulator's thread does not serve by then is answered with a failure."""
 
 MASTER_WAIT_S = 0.7
-"""A master that is gone must not delay the end for longer."""
+"""An unreachable master must not delay the end for longer."""
 
 DRIVER_WAIT_S = 1.0
 """Between two looks whether this node is to end."""

@@ -71,7 +71,7 @@ class Simulator(LinkHandler):
     def linger(self, limit_s: float) -> None:
         """Run on until the driver closes a connection or stopping is set again, at most for limit_s of wall clock.
 
-        A driver that ends at the same time then sees its robots stop before they are gone.
+        A driver that ends at the same time then sees its robots stop before they disconnect.
         """
         self.stopping = False
         self._report = lambda text: None
@@ -114,7 +114,7 @@ class Simulator(LinkHandler):
         return now_ms + 1
 
     def _find_wait(self) -> float:
-        """Return how long (s) to wait for the link until the swarm has to go on."""
+        """Return how long (s) to wait for the link until the swarm has to continue."""
         next_ms = min(self.swarm.next_due_ms, self.swarm.world.time_ms + STEP_MS)
         wait_s = (next_ms - self._anchor_ms) / 1000.0 / self._speed - (time.monotonic() - self._anchor_s)
         return min(max(wait_s, _MIN_WAIT_S), _MAX_WAIT_S)

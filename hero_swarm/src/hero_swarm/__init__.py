@@ -1,1 +1,1 @@
-"""Behaviors of swarms as array functions, the metrics that judge them, and the programs that run them."""
+"""Behaviors of swarms as array functions, their metrics, and the programs that run them."""

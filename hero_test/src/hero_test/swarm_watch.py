@@ -68,5 +68,5 @@ class SwarmWatch:
             return np.array(self.rows[robot_id]).reshape(-1, 5)
 
     def wait_until_complete(self, timeout_s=TIMEOUT_S):
-        """Wait until every robot was heard of."""
+        """Wait until every robot was reported."""
         wait_for(lambda: all(self.rows.values()), "ground truth of %s" % sorted(self.rows), timeout_s)

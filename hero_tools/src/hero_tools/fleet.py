@@ -119,7 +119,7 @@ class Screen:
         sys.stdout.flush()
 
     def wait_for_keys(self, program: Program, timeout_s: float) -> Optional[List[str]]:
-        """Return the keys pressed within the time; None if the terminal is gone."""
+        """Return the keys pressed within the time; None if the terminal is closed."""
         if program.wait_readable([self._keyboard.fileno()], timeout_s):
             return self._keyboard.read_keys()
         return []

@@ -134,7 +134,7 @@ def _find_zone(pulses: np.ndarray, speeds: np.ndarray) -> DeadZone:
     low_us, low_slope = _find_edge(pulses[below[-FIT_POINTS:]], speeds[below[-FIT_POINTS:]])
     high_us, high_slope = _find_edge(pulses[above[:FIT_POINTS]], speeds[above[:FIT_POINTS]])
     if not -STEP_US <= high_us - low_us <= WIDEST_US:
-        raise CalibrationError("stops from %.0f to %.0f us, which no servo does: try again" % (low_us, high_us))
+        raise CalibrationError("stops from %.0f to %.0f us, which is implausible: try again" % (low_us, high_us))
     # If the dead zone is narrow, noise may show the edges in the wrong order.
     return DeadZone(min(low_us, high_us), max(low_us, high_us), (low_slope + high_slope) / 2.0)
 

@@ -1,6 +1,6 @@
 """Takes all robots through a procedure together: each step moves all of them, and the data of each is evaluated alone.
 
-A robot that fails is stopped, keeps its reason, and takes no further part; the others go on. Knows neither ROS nor the
+A robot that fails is stopped, keeps its reason, and is excluded; the others continue. Knows neither ROS nor the
 clock of this computer: a subclass has the time (ros_session).
 """
 
@@ -97,7 +97,7 @@ class Session(ABC):
     ) -> None:
         """Move robots and evaluate their data; those whose data is unusable try again, and fail in the end.
 
-        Wi-Fi stalls for a second now and then, and delays readings and commands. evaluate is told whether this is the
+        Wi-Fi stalls for a second now and then, and delays readings and commands. evaluate receives whether this is the
         last try.
         """
         waiting = self.active

@@ -113,7 +113,7 @@ class GoalOutcome(NamedTuple):
 
 
 class GoalListener(Protocol):
-    """Interface of those that are told of each goal."""
+    """Interface of receivers of each goal's events."""
 
     def accept_goal(self, request: GoalRequest) -> None:
         """The robot begins to drive to a goal."""

@@ -70,7 +70,7 @@ class Keyboard:
         return self.file.fileno()
 
     def read_keys(self) -> Optional[List[str]]:
-        """Return the keys that were pressed since the last call; None if the terminal is gone.
+        """Return the keys that were pressed since the last call; None if the terminal is closed.
 
         A key is its character, or "up", "down", "left", "right" for an arrow. Never waits.
         """

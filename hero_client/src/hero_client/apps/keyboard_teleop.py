@@ -139,7 +139,7 @@ class KeyboardTeleop:
         self._has_reported_stopped = False
 
     def run(self, program: Program, keyboard: Keyboard) -> None:
-        """Show the keys and drive until the program is to end, the user presses Ctrl-D or the terminal is gone.
+        """Show the keys and drive until the program is to end, the user presses Ctrl-D or the terminal is closed.
 
         Raises: ProgramError if robots or drivers did not obey the last stop or release of all robots.
         """
@@ -252,7 +252,7 @@ class KeyboardTeleop:
 
 
 def read_stops(keyboard: Keyboard) -> Optional[List[str]]:
-    """Return the keys that stop or end among all that wait; None if the terminal is gone.
+    """Return the keys that stop or end among all that wait; None if the terminal is closed.
 
     After a pause of the program: what was typed meanwhile must drive no robot.
     """

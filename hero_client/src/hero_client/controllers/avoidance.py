@@ -73,7 +73,7 @@ class WanderLaw(NamedTuple):
     stop_m: float = 0.10
     """Nearer than this in a front sector: blocked (the body ends at 0.037 m)."""
     free_m: float = 0.14
-    """A turn on the spot goes on until all front sectors see further than this."""
+    """A turn on the spot continues until all front sectors see further than this."""
     slow_m: float = 0.20
     """From here on the robot slows down and bends away."""
 

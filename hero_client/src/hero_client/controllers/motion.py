@@ -1,6 +1,6 @@
 """The frame of a motion with an end: it is reached, or fails with a reason. Pure.
 
-Two things are judged by what a stock robot knows. Its proximity sensors show an obstacle in the way; without them
+Two things are detected by what a stock robot knows. Its proximity sensors show an obstacle in the way; without them
 nothing would, because wheels that slip at a wall count on, and odometry with them. Its odometry shows wheels that do
 not turn. Poses from elsewhere, such as those in map, are compared with odometry. now_s is any clock that never steps
 back.
@@ -27,8 +27,8 @@ AIM_SHARE = 0.7
 """The robot stops at this share of the tolerance, to be within it after coming to rest."""
 
 SILENT_STEPS = 20
-"""After so many steps without a pose, 2 s, the motion has failed: the robot is gone. Steps, not seconds: a program that
-was kept from running has not heard the robot either."""
+"""After so many steps without a pose, 2 s, the motion has failed: the robot has disconnected. Steps, not seconds: a
+program that was suspended has not received poses either."""
 
 MAX_STEP_S = 0.2
 """The part of a step beyond this does not count as time in which the robot was seen: the PC was too busy to run all."""

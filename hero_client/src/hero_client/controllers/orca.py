@@ -120,7 +120,7 @@ def nearest_allowed(
 ) -> np.ndarray:
     """Return the velocity nearest to wanted with normals @ v >= bounds and no faster than max_speed_m_s.
 
-    Where there is none, all half planes give way by the same, least amount. normals (N, 2), bounds (N,).
+    Where there is none, all half planes are relaxed by the same, least amount. normals (N, 2), bounds (N,).
     """
     found = _best_corner(wanted, normals, bounds, max_speed_m_s)
     if found is not None:

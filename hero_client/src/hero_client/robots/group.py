@@ -69,7 +69,7 @@ def wait_for_all(robots: Sequence[Member], timeout_s: float = READY_TIMEOUT_S) -
 def send_stops(robots: Sequence[Member]) -> Steps:
     """Send every robot one stop, which the driver repeats; ends when they, and what was published before, are sent.
 
-    A stop that a program fails to send is the driver's: it stops robots whose program hangs or has gone.
+    A stop that a program fails to send is the driver's: it stops robots whose program hangs or has ended.
     """
     for robot in robots:
         robot._send_velocity(0.0, 0.0)

@@ -214,7 +214,7 @@ class Drivers:
             if not listed <= self._listed:
                 listed = (listed & self._listed) | find_drivers(ask_master("getSystemState"), listed - self._listed)
         except NodeError:
-            return  # it may come back; what is known stays
+            return  # it may return; keep what is known
         new = {topic: _DriverLink(driver_of(topic), topic) for topic in listed - set(self._links)}
         # The usual driver may be started again at any time. Others come under any name, and are forgotten.
         gone = {

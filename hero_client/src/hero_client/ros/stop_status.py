@@ -10,7 +10,7 @@ from hero_msgs.msg import Robot, RobotArray
 __all__ = ["TIME_LIMIT_S", "DriverReply", "StopRequest", "StopStatus", "paint"]
 
 TIME_LIMIT_S = 1.4
-"""Then users are told who did not stop, and see it on any screen within 1.5 s. A driver reports once per second, and
+"""Then users are shown which robots did not stop, on any screen within 1.5 s. A driver reports once per second, and
 each change within 0.1 s."""
 
 CROSSING_S = 0.15

@@ -17,7 +17,7 @@ class FrameError(HeroError):
 
 
 class RobotError(HeroError):
-    """A robot cannot do what it was told."""
+    """A robot cannot carry out a command."""
 
 
 class RobotNotReadyError(RobotError):

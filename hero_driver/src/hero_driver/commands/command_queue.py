@@ -72,7 +72,7 @@ class CommandQueue:
             shaper.delay_until(resume_s)
 
     def clear(self) -> None:
-        """Forget everything: the connection is gone."""
+        """Drop all commands: the connection is closed."""
         with self._lock:
             self.dropped += len(self._waiting)
             self._waiting.clear()

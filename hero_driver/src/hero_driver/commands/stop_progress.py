@@ -1,6 +1,6 @@
 """The stop of one robot: when to send it, and what the robot's wheels show. Pure: times and readings go in.
 
-See stop_delivery for what is sent and why. Wheels are judged by readings and by time since the robot acknowledged a
+See stop_delivery for what is sent and why. Wheels are classified by readings and by time since the robot acknowledged a
 stop: readings that a network or a busy PC delays come all at once, and an ordinary stop takes 0.25 to 0.35 s.
 """
 
@@ -34,7 +34,7 @@ STUBBORN_AFTER_S = 0.5
 STUBBORN_INTERVAL_S = 0.25
 TIRED_AFTER_S = 5.0
 TIRED_INTERVAL_S = 1.0
-"""Wheels that go on turning, of a robot that is pushed perhaps, get fewer stops, but get them for ever."""
+"""Wheels that keep turning, as of a robot that is pushed, get fewer stops, but without end."""
 
 
 READING_S = 0.034

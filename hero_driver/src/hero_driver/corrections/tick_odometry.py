@@ -19,7 +19,7 @@ TWIST_WINDOW = 6
 """Readings over which the velocity is taken: one tick per reading would be 16 mm/s of noise, six make 3 mm/s."""
 
 RESET_TICKS = 5
-"""A robot that has just booted stands: its counters are this close to zero (3 mm) when it is heard again."""
+"""A robot that has just booted is at rest: its counters are this close to zero (3 mm) when it sends again."""
 
 MIN_GAP_S = 0.2
 """Ticks of so long are believed however close two stamps are: the robot's clock may be set back between them."""

@@ -18,7 +18,7 @@ REST_READINGS = 5
 """Readings without a turn after which wheels are at rest: 0.17 s; 6 mm/s and more would show."""
 
 MOVES_KEPT = 24
-"""Readings by which wheels are seen to go on: 0.8 s, more than twice what an ordinary stop takes."""
+"""Readings that show that wheels keep turning: 0.8 s, more than twice what an ordinary stop takes."""
 
 LINEAR_REST_M_S = 0.002
 ANGULAR_REST_RAD_S = 0.05

@@ -80,7 +80,7 @@ class Admission:
         _decrement(self._unidentified, host)
 
     def release(self, host: str) -> None:
-        """An admitted connection from host is gone."""
+        """An admitted connection from host is closed."""
         _decrement(self._by_host, host)
 
     def admit_new_robot(self, host: str, now_s: float) -> Optional[str]:

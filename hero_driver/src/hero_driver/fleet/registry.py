@@ -16,7 +16,7 @@ from .namespaces import Identity
 __all__ = ["Decision", "FleetRegistry", "RobotEvent", "RobotRecord", "RobotState", "Verdict"]
 
 ALIVE_S = 3.0
-"""A robot that was heard within this time is alive: stock robots speak at least every 2.5 s."""
+"""A robot that sent something within this time is connected: stock robots speak at least every 2.5 s."""
 
 FLAP_S = 5.0
 """Two take-overs within this time, where the loser still speaks while the winner does, are two robots behind

@@ -1,7 +1,7 @@
 """Registers the publishers, subscribers and services of one robot with the ROS master, which may block.
 
 Everything here is a job of the registrar, except what says otherwise. A topic or service that a robot declares again
-with another type or md5 is taken down first: programs made for the one before must not reach the other.
+with another type or md5 is unregistered first: programs made for the previous one must not reach the other.
 """
 
 import functools
@@ -124,11 +124,11 @@ class Endpoints:
         for call in calls:
             try:
                 call()
-            except Exception as error:  # noqa: BLE001 - what cannot be taken down must not keep the others up
+            except Exception as error:  # noqa: BLE001 - one that cannot be unregistered must not keep the others
                 self._log(
                     "error",
                     "unregister " + type(error).__name__,
-                    "%s: a topic or service could not be taken down: %s: %s"
+                    "%s: a topic or service could not be unregistered: %s: %s"
                     % (self._label, type(error).__name__, error),
                 )
 

@@ -111,7 +111,7 @@ def _write_to_terminal(text: str) -> None:
     try:
         sys.stderr.write(text)
     except OSError:
-        # The terminal, or the disk that it goes to, is what is gone: there is nowhere left to log to.
+        # The terminal, or the disk that it goes to, cannot be written: there is nowhere to log to.
         return
 
 

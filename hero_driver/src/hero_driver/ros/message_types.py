@@ -20,7 +20,7 @@ class MessageTypeError(Exception):
 
 
 def apply_aliases(type_name: str) -> str:
-    """Return the ROS type that stands for type_name on this side."""
+    """Return the ROS type that replaces type_name on this side."""
     if type_name in TYPE_ALIASES:
         return TYPE_ALIASES[type_name]
     package, _, name = type_name.partition("/")

@@ -3,7 +3,7 @@
 rospy reads each publisher of a topic on its own thread; waking it, and then the thread of the sockets,
 for every command costs several times what the command itself costs. Here rospy does the registration and the
 handshake and hands over the first message; then its thread rests, and the publisher's socket is read by the
-loop until it ends. After that rospy goes on by its own rules: it closes, or it connects again.
+loop until it ends. After that rospy proceeds by its own rules: it closes, or it connects again.
 Source of the framing: ROS TCPROS, a 32-bit length before each message.
 """
 
@@ -111,7 +111,7 @@ class RawSubscriber:
         stream.ended.wait()
         if stream.error is not None:
             raise TransportException("read failed: %s" % stream.error)
-        # rospy 1.15.9 (Debian 11) would for ever try to connect again to a publisher that has gone.
+        # rospy 1.15.9 (Debian 11) would for ever try to connect again to a publisher that has ended.
         connection.close()
         raise TransportTerminated("closed")
 
@@ -141,7 +141,7 @@ class MessageStream(Reader):
         self._old_length = _INT.unpack(answer)[0]
 
     def read(self) -> bool:
-        """Pass on the messages that have come; return whether the connection still stands."""
+        """Pass on the messages that have come; return whether the connection is still open."""
         try:
             data = self._socket.recv(READ_LENGTH, socket.MSG_DONTWAIT)
         except (BlockingIOError, InterruptedError):

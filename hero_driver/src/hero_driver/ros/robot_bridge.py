@@ -77,14 +77,14 @@ class RobotBridge:
     # The connection's life.
 
     def attach(self) -> None:
-        """A connection stands; its topics are declared next."""
+        """A connection is open; its topics are declared next."""
         self._connection += 1
         self._ids.clear()
         self._service_halves.clear()
         self.commands.attach(self.corrections.wheels)
 
     def detach(self, reason: str) -> None:
-        """The connection is gone; endpoints stay, calls that wait fail now, commands that wait are dropped."""
+        """The connection is closed; endpoints remain, pending calls fail now, pending commands are dropped."""
         self._connection += 1  # what waits for the ROS master is left out
         self._ids.clear()
         self.commands.detach()

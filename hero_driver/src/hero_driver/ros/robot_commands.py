@@ -134,7 +134,7 @@ class RobotCommands:
                 % (self._label, source),
             )
             if self._commanders.find(name) is not None or self.tunes(time.monotonic()):
-                # It must not go on with what it was told before.
+                # It must not continue its previous command.
                 self._owner.stop_robot(self._namespace)
             return
         moves, subscriber = command != stop_payload, self._subscribers[source]
@@ -203,7 +203,7 @@ class RobotCommands:
         return None
 
     def _lose_sender(self, name: str, source: str) -> None:
-        """The program that sent the newest command on source has gone."""
+        """The program that sent the newest command on source has disconnected."""
         commander = self._commanders.find(name)
         if commander is None or commander.source != source:
             return

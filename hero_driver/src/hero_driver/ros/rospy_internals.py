@@ -35,7 +35,7 @@ def keep_publishers_connected() -> None:
     """Connect again to publishers that rospy would overlook for ever; call it before rospy.init_node().
 
     rospy connects to a publisher that is announced unless it has a connection to that node. It keeps one that the
-    publisher refused because it had gone meanwhile, and does not look again when one ends whose publisher has been
+    publisher refused because it had ended meanwhile, and does not look again when one ends whose publisher has been
     replaced by another in the same program: every later publisher of that program would go unheard, its stops too.
     """
     connect = tcpros_pubsub.robust_connect_subscriber
@@ -212,7 +212,7 @@ class RosoutHandler(logging.Handler):
             )
             line.header.stamp = rospy.Time.now()
             publisher.publish(line)
-        except Exception:  # noqa: BLE001 - as rospy: a line that cannot be published stands in the log file
+        except Exception:  # noqa: BLE001 - as rospy: a line that cannot be published is in the log file
             logging.getLogger("rospy.rosout").error("/rosout: %s", traceback.format_exc())
         finally:
             self._of_this_thread.is_publishing = False

@@ -29,7 +29,7 @@ READ = select.EPOLLIN
 WRITE = select.EPOLLOUT
 
 LISTEN_BACKLOG = 256
-"""A whole swarm reconnects within 51 ms when the driver comes back (ArduinoTcpHardware.h:99)."""
+"""A whole swarm reconnects within 51 ms when the driver is restarted (ArduinoTcpHardware.h:99)."""
 
 POLL_INTERVAL_S = 0.1
 """Sessions are polled this often for what is due (repeated requests, silence)."""
@@ -74,7 +74,7 @@ class Reader:
         raise NotImplementedError
 
     def read(self) -> bool:
-        """Read what there is, without waiting; return whether to go on. On the loop's thread."""
+        """Read what there is, without waiting; return whether to continue. On the loop's thread."""
         raise NotImplementedError
 
     def resume(self) -> None:
@@ -99,7 +99,7 @@ class EventLoop(LinkOwner):
         self._readers: Set[Reader] = set()
         self._thread_id = 0
         self._turned_s = 0.0  # when the last turn ended
-        self._ran_s = math.inf  # when the loop was last seen to run, on a clock that goes on while the PC sleeps
+        self._ran_s = math.inf  # when the loop was last seen to run, on a clock that runs while the PC sleeps
         self._resumed_s = -math.inf
         self._timers: List[Tuple[float, int, Callable[[], None]]] = []
         self._timer_numbers = itertools.count()
@@ -113,7 +113,7 @@ class EventLoop(LinkOwner):
         self.listening: Optional[Address] = None
 
     def open(self, handler: LinkHandler) -> None:
-        """Bind the listening socket and begin to dial; handler is told of all links.
+        """Bind the listening socket and begin to dial; handler receives the events of all links.
 
         Raises: OSError if the address cannot be bound.
         """
@@ -287,7 +287,7 @@ class EventLoop(LinkOwner):
                 data = link.read()
                 if data:
                     self._handler.receive_data(link, data, time.monotonic())
-        except Exception as error:  # noqa: BLE001 - one robot's trouble, or our mistake with it, is not the others'
+        except Exception as error:  # noqa: BLE001 - an error with one robot is not the others'
             self._handler.report_bug(error)
             self.close_link(link, "a bug of the driver")
 

@@ -47,7 +47,7 @@ class LinkHandler:
     """Callbacks of the transport, always on the loop's thread."""
 
     def open_link(self, link: "Link") -> Optional[str]:
-        """A connection stands; return a reason to refuse it, or None."""
+        """A connection is open; return a reason to refuse it, or None."""
         raise NotImplementedError
 
     def receive_data(self, link: "Link", data: bytes, now_s: float) -> None:
@@ -55,7 +55,7 @@ class LinkHandler:
         raise NotImplementedError
 
     def close_link(self, link: "Link", reason: str) -> None:
-        """The connection is gone, by whichever side."""
+        """The connection was closed, by either side."""
         raise NotImplementedError
 
     def poll_link(self, link: "Link", now_s: float) -> None:
@@ -67,7 +67,7 @@ class LinkHandler:
         raise NotImplementedError
 
     def report_bug(self, error: Exception) -> None:
-        """One of the calls above, or one made for the loop, raised error; the loop goes on."""
+        """One of the calls above, or one made for the loop, raised error; the loop continues."""
         raise NotImplementedError
 
     def stop_without_loop(self) -> None:

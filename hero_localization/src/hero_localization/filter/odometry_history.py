@@ -1,7 +1,7 @@
 """The odometry of one robot over the last seconds, without jumps, at any time between two readings. Pure.
 
 A robot that restarts begins again at 0, 0, 0, and a program may set its odometry; neither moves the robot. The history
-is continuous: it goes on from where it was.
+is continuous.
 """
 
 from typing import NamedTuple, Optional

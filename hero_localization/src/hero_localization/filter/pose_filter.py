@@ -2,9 +2,9 @@
 
 An extended Kalman filter of x, y and yaw. Odometry is the motion, not a measurement: between two measured poses the
 estimate follows it exactly, and grows less certain with each meter and radian. A measured pose counts at the time at
-which it was measured, not at which it arrived: the filter goes back there, and plays what it knew of the time since
-again; one that is newer than the newest odometry waits for the next. A robot that a wall holds turns its wheels in
-vain: a measured pose that odometry cannot explain may still be one to which the robot came with slipping wheels.
+which it was measured, not at which it arrived: the filter returns to that time, and replays the odometry
+since then; one that is newer than the newest odometry waits for the next. The wheels of a robot that pushes a wall
+slip: a measured pose that odometry cannot explain may still be one that the robot reached with slipping wheels.
 
 Odometry is wrong by a scale rather than by chance: wheels of unequal size turn a robot by the same angle in each meter.
 So its error grows with the distance since the last measured pose, not with the root of it.

@@ -1,4 +1,4 @@
-"""Where all robots of a swarm are in one frame: a filter for each, and what people are told. Pure.
+"""Where all robots of a swarm are in one frame: a filter for each, and reports. Pure.
 
 now_s and stamps are ROS time.
 """
@@ -162,7 +162,7 @@ class SwarmLocalizer:
     def find_lost(self, now_s: float) -> List[str]:
         """Notice robots that are not measured any more; return lines for people. Call it some times a second.
 
-        If time has gone back, as when a recording is played again, all robots are to be found anew.
+        If time jumps back, as when a recording is played again, all robots are to be found anew.
         """
         lines = []
         if now_s < self._now_s - LOST_S:

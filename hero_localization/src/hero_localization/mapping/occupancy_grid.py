@@ -23,7 +23,7 @@ REACH_M = 0.20
 """Of a range, from the robot's center: weak echoes beyond are noise."""
 
 FREE_REACH_M = 0.15
-"""Up to here nothing in range means free; an obstacle that stands at an angle may not be seen from further away."""
+"""Up to here nothing in range means free; an obstacle at an angle may not be detected from further away."""
 
 NEAR_SD_M = 0.004
 SD_SHARE = 0.04
@@ -37,7 +37,7 @@ HIT_SD_RAD = 0.08
 HIT_LOG_ODDS = 1.6
 FREE_LOG_ODDS = -0.35
 BODY_LOG_ODDS = -2.0
-"""A robot's own body stands only where it is free."""
+"""The cells under a robot's own body are free."""
 
 LIMIT_LOG_ODDS = 8.0
 KNOWN_LOG_ODDS = 0.5

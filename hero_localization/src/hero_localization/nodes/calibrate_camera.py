@@ -222,7 +222,7 @@ def calibrate_robot_tags(options: argparse.Namespace, pictures: Pictures, progra
     for robot_id in robots:
         tag_id = tags.get(robot_id)
         if tag_id is None:
-            text = "hero_%d: tag %d stands for something else: name the robot's in tag_robots"
+            text = "hero_%d: tag %d is assigned to something else: name the robot's in tag_robots"
             problems.append(text % (robot_id, robot_id))
             continue
         try:

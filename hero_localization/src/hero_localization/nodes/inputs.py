@@ -65,7 +65,7 @@ def find_pose_mistake(pose: PoseMessage) -> str:
     turn, place = pose.orientation, pose.position
     farthest_m = max(abs(place.x), abs(place.y))
     if MAX_FIELD_M < farthest_m < math.inf:
-        return "holds a position of %.0f m: does the motion capture system publish mm?" % farthest_m
+        return "has a position of %.0f m: does the motion capture system publish mm?" % farthest_m
     norm2 = turn.x**2 + turn.y**2 + turn.z**2 + turn.w**2
     if norm2 > 0.5 and 1.0 - 2.0 * (turn.x**2 + turn.y**2) / norm2 < MIN_UPRIGHT:
         return "holds a robot that lies on its side: is the up axis of the motion capture system z?"

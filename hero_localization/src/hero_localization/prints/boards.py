@@ -9,7 +9,7 @@ __all__ = ["Board", "create_board", "draw_board", "list_board_corners"]
 
 
 class Board(NamedTuple):
-    """A chessboard with markers in its white squares; as it stands, it fits A4 and letter paper.
+    """A chessboard with markers in its white squares; by default it fits A4 and letter paper.
 
     The rows are odd: boards with even rows differ between versions of OpenCV.
     """

@@ -168,7 +168,7 @@ class CameraRenderer:
         return _Plate(tag, texture, texel @ turn @ move, reach_m)
 
     def _draw_plate(self, image: np.ndarray, plate: _Plate, poses: np.ndarray) -> None:
-        """Draw a plate as its robot stands at poses (M, 3), the moments of one exposure."""
+        """Draw a plate at its robot's poses (M, 3) during one exposure."""
         tag = plate.tag
         around = PrintedTag(tag.tag_id, 2.0 * plate.reach_m, tag.height_m, tag.x_m, tag.y_m, tag.yaw_rad)
         corners = self.view.project(tag_corners(around, poses[[0, -1]])).reshape(-1, 2)

@@ -21,7 +21,7 @@ ARM_M = (0.08, 2.0)
 
 
 class CameraOptions(NamedTuple):
-    """The simulated camera; as it stands, a webcam 2.2 m above the floor that sees 3 m by 1.7 m."""
+    """The simulated camera; by default, a webcam 2.2 m above the floor that sees 3 m by 1.7 m."""
 
     width_px: int = 1920
     height_px: int = 1080

@@ -1,6 +1,6 @@
 """The search for tags in its own process: detectors hold the GIL for many milliseconds, and one takes SIGINT over.
 
-Images go over in shared memory, all else over a pipe. The process knows nothing of ROS, and ends with its parent.
+Images go over in shared memory, all else over a pipe. The process does not use ROS, and ends with its parent.
 """
 
 import math
@@ -108,7 +108,7 @@ class DetectorProcess:
 
 
 def serve(connection: Connection, memory: int) -> None:
-    """Answer questions until the parent is gone."""
+    """Answer requests until the parent has ended."""
     backend, family, decimate, width_px, height_px, smallest_px = connection.recv()
     frame = np.frombuffer(mmap.mmap(memory, width_px * height_px), np.uint8).reshape(height_px, width_px)
     try:

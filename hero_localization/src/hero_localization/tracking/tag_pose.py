@@ -84,7 +84,7 @@ class TagLayout(NamedTuple):
         return None if tag_id in self.tag_robots.values() else tag_id
 
     def find_tags(self, robots: Iterable[int]) -> Dict[int, int]:
-        """Return the tag that each of robots wears, by robot; those whose tag stands for something else have none."""
+        """Return the tag of each of robots, by robot; those whose tag is assigned to something else have none."""
         others = {robot: tag_id for tag_id, robot in self.tag_robots.items()}
         tags = {robot: others.get(robot, robot) for robot in robots}
         return {robot: tag_id for robot, tag_id in tags.items() if self.find_robot(tag_id) == robot}

@@ -133,7 +133,7 @@ class Tracker:
     def _note_problems(self, sightings: Sightings, stamp_s: float) -> None:
         note = self._tag_problems
         for tag_id in sightings.unknown:
-            note[tag_id] = (stamp_s, "stands for no robot, object or reference: name it in the camera's file")
+            note[tag_id] = (stamp_s, "is assigned to no robot, object or reference: name it in the camera file")
         for tag_id in sightings.doubled:
             note[tag_id] = (stamp_s, "appears more than once in the image and is ignored: remove one")
         for tag_id, share in sightings.misshapen.items():

@@ -1,6 +1,6 @@
 """Dead man's switch: a robot drives only while a page keeps reporting that a button is held. Pure.
 
-Silence stops it: a hidden page, a browser that crashed and a network that is gone send nothing. Times enter as now_s,
+Silence stops it: a hidden page, a browser that crashed and a lost network send nothing. Times enter as now_s,
 any clock that never steps.
 """
 

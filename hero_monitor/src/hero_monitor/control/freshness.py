@@ -20,7 +20,7 @@ INERT_S = 2.0
 
 
 def read_clock_ms() -> int:
-    """Return the time in ms; unlike CLOCK_MONOTONIC it goes on while the PC sleeps."""
+    """Return the time in ms; unlike CLOCK_MONOTONIC it runs while the PC sleeps."""
     return round(1e3 * time.clock_gettime(time.CLOCK_BOOTTIME))
 
 

@@ -1,4 +1,4 @@
-"""Asks the ROS master again and again whether it is there. Pages are told if it is lost, and go on without it."""
+"""Asks the ROS master periodically whether it answers. Pages show if it is lost, and work without it."""
 
 import time
 from contextlib import suppress

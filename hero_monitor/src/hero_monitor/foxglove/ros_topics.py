@@ -57,7 +57,7 @@ class RosTopics:
             published = ask_master("getPublishedTopics", "")
             publishers, _, _ = ask_master("getSystemState")
         except NodeError:
-            return  # the known ones remain: their publishers go on without a master
+            return  # the known ones remain: their publishers work without a master
         types: Dict[str, TopicType] = {}
         for topic, type_name in published:
             message_class = roslib.message.get_message_class(type_name)

@@ -4,7 +4,7 @@ const STEP_MS = 50;
 const GAP_MS = 400; // the page was suspended: the hold does not count
 
 export class HoldButton {
-  /** mayHold(): whether a hold may begin or go on. */
+  /** mayHold(): whether a hold may begin or continue. */
   constructor(button, holdMs, { mayHold, onHeld, onShort }) {
     Object.assign(this, { button, holdMs, mayHold, onHeld, onShort });
     this.timer = null;

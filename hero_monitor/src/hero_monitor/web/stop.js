@@ -1,6 +1,6 @@
 // STOP ALL: its status from the press until all wheels are at rest, even if the monitor does not answer; and Release.
 //
-// STOP ALL acts when it is pressed, at a place that never changes. Release stands at the other end of the page, needs
+// STOP ALL acts when it is pressed, at a place that never changes. Release is at the other end of the page, needs
 // a hold, and does nothing for a while after a stop.
 
 import { HoldButton } from "./hold.js";

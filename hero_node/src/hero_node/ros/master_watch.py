@@ -1,7 +1,7 @@
 """Notices that the ROS master was started again, and registers everything with it once more.
 
 rospy registers a topic once; a master that ends takes all registrations with it, and programs that start afterwards do
-not find this node. Connections that stand go on by themselves. rospy tells what is registered only by its internals.
+not find this node. Open connections are not affected. rospy tells what is registered only by its internals.
 """
 
 import xmlrpc.client

@@ -70,7 +70,7 @@ class TcpLink:
 
     Attributes:
         own_addresses: of each robot, as the driver sees it.
-        handler: is told what happens.
+        handler: receives the events.
     """
 
     def __init__(self, count: int, host: str, port: int, first_number: int = 0) -> None:
@@ -109,7 +109,7 @@ class TcpLink:
                 return "127.0.0.1" if is_local else "0.0.0.0"
 
     def connect(self, index: int) -> None:
-        """Begin to connect a robot; the handler is told the outcome."""
+        """Begin to connect a robot; the handler receives the outcome."""
         self.close(index)
         try:
             sock = self._begin_connect(self.own_addresses[index])
@@ -263,7 +263,7 @@ class TcpLink:
         """Leave a robot's connection without a word, as one without power does.
 
         The driver gets no FIN, and on Linux not even acknowledgements: what it sends stays unsent. Elsewhere the
-        system goes on acknowledging until its buffer is full. The socket stays open until the program ends.
+        system keeps acknowledging until its buffer is full. The socket stays open until the program ends.
         """
         connection = self._find_open(index)
         if connection is None:
@@ -292,7 +292,7 @@ def _resolve(host: str, port: int) -> Tuple[int, Tuple]:
         found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
     except (OSError, UnicodeError) as error:
         raise OptionError("host %r cannot be resolved: %s; give a name or an address" % (host, error)) from error
-    # IPv4 first: robots know nothing else.
+    # IPv4 first: robots use nothing else.
     found.sort(key=lambda entry: entry[0] != socket.AF_INET)
     return found[0][0], found[0][4]
 

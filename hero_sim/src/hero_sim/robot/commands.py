@@ -153,7 +153,7 @@ class CommandTable:
         return self._answer(answer_id, True, text)
 
     def _save_flash(self) -> None:
-        """Write the flash; where that fails, the robot goes on with its new parameters, and people are told."""
+        """Write the flash; where that fails, the robot uses its new parameters, and an error is reported."""
         try:
             self._flash.save()
         except CommandError as error:

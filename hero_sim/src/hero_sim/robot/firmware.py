@@ -376,7 +376,7 @@ class Firmware:
             del self._received[:RECEIVE_WINDOW_LENGTH]
 
     def _read_packets(self, now_ms: int) -> None:
-        """Handle packets until they have blocked the loop for a millisecond; the spin goes on after that time."""
+        """Handle packets until they have blocked the loop for a millisecond; the spin continues after that time."""
         millis = self.to_millis(now_ms)
         while self._pending:
             if not self._receive_packet(self._pending.popleft(), millis, now_ms):
@@ -390,7 +390,7 @@ class Firmware:
             self._request_time(millis)
 
     def _hold(self, now_ms: int) -> bool:
-        """Return whether the loop goes on later, at due_ms, because what it called has taken a millisecond or more."""
+        """Return whether the loop continues later, at due_ms, because a call has taken a millisecond or more."""
         self._blocked_us += self.motors.motors.held_us
         self.motors.motors.held_us = 0
         blocked_ms, self._blocked_us = divmod(self._blocked_us, 1000)
@@ -399,7 +399,7 @@ class Firmware:
         return blocked_ms > 0
 
     def _receive_packet(self, packet: packets.Packet, millis: int, now_ms: int) -> bool:
-        """Handle one packet; return whether the firmware goes on reading."""
+        """Handle one packet; return whether the firmware keeps reading."""
         topic_id = packet.topic_id
         if topic_id == packets.ID_PUBLISHER:
             self._answer_topics(millis)

@@ -56,7 +56,7 @@ class MotorDriver:
         centers_us: the robot's calibration: the pulses at which its wheels should rest, left and right.
         attached: whether pulses go out.
         stop_at_ms: when the watchdog stops them.
-        held_us: how long the calls of write() and stop() have held the robot's loop; the caller takes it away.
+        held_us: how long the calls of write() and stop() have blocked the robot's loop; the caller resets it.
     """
 
     def __init__(self, body: Body, centers_us: Sequence[float], pins: ServoPins) -> None:

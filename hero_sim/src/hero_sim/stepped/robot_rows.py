@@ -161,7 +161,7 @@ class RobotRows:
         self._servos.centers_us[:, row] = centers_us
 
     def set_infrared_calibration(self, row: int, constants_counts_m2: Sequence[float]) -> None:
-        """Set the constants of the eight sensors of one robot, rear first; nan stands for not calibrated."""
+        """Set the constants of the eight sensors of one robot, rear first; nan means not calibrated."""
         self._read_scan()
         self._calibration_counts_m2[row] = constants_counts_m2
 

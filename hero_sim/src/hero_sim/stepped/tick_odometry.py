@@ -62,7 +62,7 @@ class TickOdometryRows:
         self._newest = (self._newest + 1) % TWIST_WINDOW
         self._window_ticks[self._newest], self._window_ms[self._newest] = ticks, now_ms
         if self._any_cleared:
-            # The first reading stands for all those before it.
+            # The first reading replaces all those before it.
             self._window_ticks[:, :, self._is_cleared] = ticks[:, self._is_cleared]
             self._window_ms[:, self._is_cleared] = now_ms
             self._is_cleared[:] = self._any_cleared = False

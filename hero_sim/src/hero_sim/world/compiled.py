@@ -1,6 +1,6 @@
 """Compiles loops over numbers with numba where it is installed; without, the same source runs on lists.
 
-Both give the same bytes: numba contracts and reorders nothing unless it is told to (no fastmath), and only operations
+Both give the same bytes: numba contracts and reorders nothing by default (no fastmath), and only operations
 that IEEE 754 defines to the last bit are used.
 """
 

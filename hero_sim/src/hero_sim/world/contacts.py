@@ -1,7 +1,7 @@
 """Contacts of bodies with walls, obstacles and each other, solved one after the other in a fixed order.
 
 Pure: numpy only, over all robots of all worlds at once; robots of different worlds never meet. Two robots that touch
-push each other by the same amount, walls and obstacles do not give way. Method: projected Gauss-Seidel over
+push each other by the same amount, walls and obstacles do not move. Method: projected Gauss-Seidel over
 displacements that begins with those of the step before, so that robots which press on each other hardly have to be
 solved anew (E. Catto, Iterative Dynamics with Temporal Coherence, 2005).
 """

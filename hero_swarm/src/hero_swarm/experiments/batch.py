@@ -59,7 +59,7 @@ class BatchResult(NamedTuple):
 
 
 def load_checked(experiment: Experiment) -> None:
-    """Load the behavior, arenas and starts of all cells once, so that what is wrong is told before anything runs.
+    """Load the behavior, arenas and starts of all cells once, to report errors before anything runs.
 
     Raises: ExperimentError.
     """

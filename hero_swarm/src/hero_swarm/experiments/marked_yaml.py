@@ -1,4 +1,4 @@
-"""YAML with line numbers: each value knows where it stands, so that an error names its line. Pure but for PyYAML.
+"""YAML with line numbers: each value knows its line, for errors. Pure but for PyYAML.
 
 Anchors and merge keys are refused: a line would not be unique, and a short file could stand for a huge one.
 """
@@ -167,7 +167,7 @@ def _convert_mapping(node: yaml.MappingNode, name: str, file: str, loader: Any) 
             raise ExperimentError("%s: a name must be a text" % place)
         key = str(key_node.value)
         if key in mapping:
-            raise ExperimentError("%s: %s stands twice" % (place, _quote(key)))
+            raise ExperimentError("%s: %s appears twice" % (place, _quote(key)))
         mapping[key] = _convert(value_node, "%s.%s" % (name, key) if name else key, file, loader)
     return mapping
 

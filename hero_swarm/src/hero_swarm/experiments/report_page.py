@@ -1,4 +1,4 @@
-"""The report as a page that stands alone: no other file, no network."""
+"""The report as a self-contained page: no other file, no network."""
 
 import html
 from typing import List, Mapping, Sequence, Tuple

@@ -69,7 +69,7 @@ class ResultsFolder:
         self._batches = os.path.join(path, "batches")
 
     def begin(self, text: str, about: Dict[str, str], fresh: bool, kind: str = SIMULATED) -> List[Run]:
-        """Create the folder, or go on with it; return the runs that it holds already.
+        """Create the folder, or continue with it; return the runs that it holds already.
 
         text: of the experiment's file; fresh: delete the earlier runs of this kind, and all of other experiments.
         Raises: ExperimentError if it holds runs of another experiment or of other code, or something else.

@@ -24,7 +24,7 @@ _OWN = 14
 
 
 def count_observations(neighbors: int) -> int:
-    """Return how many numbers a robot observes that is told of so many neighbors."""
+    """Return how many numbers a robot with so many neighbors observes."""
     return _OWN + 2 * neighbors
 
 

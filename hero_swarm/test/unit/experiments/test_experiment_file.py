@@ -102,7 +102,7 @@ def test_a_cell_is_described_by_everything_that_its_runs_depend_on():
         ("between: errors", "between: wifi", 8, "must be one of: robots, errors"),
         ("vary: {robots: [10, 25], errors: [perfect, default]}", "robots: 5", 8, "needs something that varies"),
         ("time_s: 300", "time_s: 300\nrobots: 5", 2, "robots is given twice"),
-        ("time_s: 300", "time_s: 300\ntime_s: 3", 5, "'time_s' stands twice"),
+        ("time_s: 300", "time_s: 300\ntime_s: 3", 5, "'time_s' appears twice"),
         ("time_s: 300", "time_s: [", 6, "not YAML"),
         ("time_s: 300", "time_s: &a 300", 4, "anchors cannot be used"),
         ("time_s: 300", "time_s: " + "[" * 30 + "]" * 30, 4, "more than 20 levels"),
