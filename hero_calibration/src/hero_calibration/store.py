@@ -39,7 +39,7 @@ RESULTS: Dict[str, Range] = {
 """The same for what the user may want to look up; a number may be .nan: unknown."""
 
 
-class Calibration(NamedTuple):
+class KeptCalibration(NamedTuple):
     """The file of one robot: N of hero_N, date as text, and numbers by key of SETTINGS and RESULTS."""
 
     robot_id: int
@@ -66,7 +66,7 @@ def list_files(folder: str) -> List[str]:
     return [os.path.join(folder, name) for name in names if name.endswith(".yaml") and PREVIOUS not in name]
 
 
-def save(path: str, calibration: Calibration) -> None:
+def save(path: str, calibration: KeptCalibration) -> None:
     """Write a file; the previous one is kept beside it. Its comments and values that were not measured again stay.
 
     A damaged previous file, or one of another robot, does not prevent the new one.
@@ -90,7 +90,7 @@ def save(path: str, calibration: Calibration) -> None:
         raise CalibrationError("%s cannot be written: %s" % (path, error.strerror)) from error
 
 
-def load(path: str) -> Calibration:
+def load(path: str) -> KeptCalibration:
     """Read a file. Raises: CalibrationError with file, key, value and what is allowed."""
     try:
         content = parse_yaml(read_text(path))
@@ -108,7 +108,7 @@ def load(path: str) -> Calibration:
     if match is None:
         raise _refuse(path, "robot must be hero_N, not %s" % _shorten(content["robot"]))
     values = {key: _read_numbers(path, key, content[key], allowed) for key, allowed in known.items() if key in content}
-    return Calibration(int(match.group(1)), make_printable(str(content.get("date", ""))), values)
+    return KeptCalibration(int(match.group(1)), make_printable(str(content.get("date", ""))), values)
 
 
 def _read_numbers(path: str, key: str, found: Any, allowed: Range) -> List[float]:

@@ -335,7 +335,7 @@ class TestRestore:
         session = make_session(count=2)
         values = {"motor_centers_us": [1511, 1489], "velocity_gains": [7.0] * 6, "velocity_errors": [0.2, 0.1]}
         session.probes[1].is_lost = True
-        assert restore(session, {row: store.Calibration(row, "today", values) for row in (0, 1)}) == 1
+        assert restore(session, {row: store.KeptCalibration(row, "today", values) for row in (0, 1)}) == 1
         assert session.probes[0].written == {key: values[key] for key in ("motor_centers_us", "velocity_gains")}
         output = capsys.readouterr().out
         assert "hero_0: restored motor_centers_us, velocity_gains of today" in output

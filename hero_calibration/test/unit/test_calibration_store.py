@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hero_calibration import store
 from hero_calibration.errors import CalibrationError
 
-WHOLE = store.Calibration(
+WHOLE = store.KeptCalibration(
     3,
     "2026-11-21 10:00:00",
     {
@@ -21,7 +21,7 @@ WHOLE = store.Calibration(
         "range_errors_before_m": [float("nan"), *[0.1] * 7],
     },
 )
-NEWER = store.Calibration(3, "later", {"motor_centers_us": [1520, 1480], "dead_zones_us": [1500, 1540, 1460, 1500]})
+NEWER = store.KeptCalibration(3, "later", {"motor_centers_us": [1520, 1480], "dead_zones_us": [1500, 1540, 1460, 1500]})
 
 
 def save_whole(folder):
@@ -53,12 +53,12 @@ def test_values_that_were_not_measured_again_stay_and_the_old_file_is_kept(tmp_p
 
 def test_comments_stay_when_a_robot_is_calibrated_again(tmp_path):
     path = store.name_file(str(tmp_path), 3)
-    store.save(path, store.Calibration(3, "2026-11-01", {"motor_centers_us": [1500.0, 1510.0]}))
+    store.save(path, store.KeptCalibration(3, "2026-11-01", {"motor_centers_us": [1500.0, 1510.0]}))
     with open(path, encoding="utf-8") as file:
         text = "# new servos\n" + file.read().replace("1510.0]", "1510.0]  # by hand")
     with open(path, "w", encoding="utf-8") as file:
         file.write(text)
-    store.save(path, store.Calibration(3, "2026-11-02", {"motor_centers_us": [1505.0, 1510.0]}))
+    store.save(path, store.KeptCalibration(3, "2026-11-02", {"motor_centers_us": [1505.0, 1510.0]}))
     with open(path, encoding="utf-8") as file:
         assert file.read() == text.replace("[1500.0", "[1505.0").replace("11-01", "11-02")
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from hero_client.values.background_motion import Hold, run_steps
+from hero_client.values.background_motion import FullWait, run_steps
 
 
 def take_notes(notes):
@@ -12,7 +12,7 @@ def take_notes(notes):
         notes.append("told to end")
     finally:
         notes.append("stop")
-        yield Hold(0.06)
+        yield FullWait(0.06)
         notes.append("stop")
 
 

@@ -14,7 +14,7 @@ from hero_client.ros.frames import FrameListener
 from hero_client.ros.localized_poses import LocalizedPoses, PoseListener
 from hero_client.ros.robot_topics import CommandTopic, NewestMessages
 from hero_client.ros.ros_link import RosLink, ThreadMotion
-from hero_client.values.background_motion import Hold
+from hero_client.values.background_motion import FullWait
 from hero_client.values.errors import FrameError, GoalError, RobotError, StaleDataError
 from hero_msgs.msg import RobotPoses
 from hero_node.geometry import Pose
@@ -188,7 +188,7 @@ def test_a_motion_on_a_thread_ends_with_its_steps_its_error_or_cancel(monkeypatc
             if error:
                 raise error
         sent.append("stop")
-        yield Hold(0.0)
+        yield FullWait(0.0)
         sent.append("sent")
 
     for error in (GoalError("no"), ValueError("wrong")):

@@ -12,12 +12,12 @@ from ..robots.session import Session
 
 def load_calibrations(
     folder: str, files: Sequence[str], robot_ids: Optional[Sequence[int]]
-) -> Dict[int, store.Calibration]:
+) -> Dict[int, store.KeptCalibration]:
     """Return the calibrations of robots (None: all) in files (none: all of folder), by id.
 
     Raises: CalibrationError for a wrong file, two files of one robot, or none at all.
     """
-    calibrations: Dict[int, store.Calibration] = {}
+    calibrations: Dict[int, store.KeptCalibration] = {}
     for path in files or store.list_files(folder):
         calibration = store.load(path)
         if robot_ids is not None and calibration.robot_id not in robot_ids:
@@ -30,7 +30,7 @@ def load_calibrations(
     return calibrations
 
 
-def restore(session: Session, calibrations: Dict[int, store.Calibration]) -> int:
+def restore(session: Session, calibrations: Dict[int, store.KeptCalibration]) -> int:
     """Write calibrations into the robots of session; return the exit code."""
     written: Dict[int, List[str]] = {probe.robot_id: [] for probe in session.probes}
 

@@ -6,7 +6,7 @@ from typing import Optional, Protocol, Sequence, TypeVar
 
 from hero_node.clock import Clock
 
-from ..values.background_motion import SEND_TIME_S, BackgroundMotion, Hold, Sleep, Steps, run_steps
+from ..values.background_motion import SEND_TIME_S, BackgroundMotion, FullWait, Sleep, Steps, run_steps
 from ..values.errors import RobotNotReadyError
 
 __all__ = ["POLL_PERIOD_S", "READY_TIMEOUT_S", "REPEAT_PERIOD_S", "Group", "Member", "stop_after", "wait_for_all"]
@@ -73,7 +73,7 @@ def send_stops(robots: Sequence[Member]) -> Steps:
     """
     for robot in robots:
         robot._send_velocity(0.0, 0.0)
-    yield Hold(SEND_TIME_S)
+    yield FullWait(SEND_TIME_S)
 
 
 def stop_after(steps: Steps, robots: Sequence[Member]) -> Steps:

@@ -4,7 +4,7 @@ from abc import abstractmethod
 from concurrent.futures import Future
 from typing import Callable, Generator
 
-__all__ = ["SEND_TIME_S", "BackgroundMotion", "Hold", "Sleep", "Steps", "run_steps"]
+__all__ = ["SEND_TIME_S", "BackgroundMotion", "FullWait", "Sleep", "Steps", "run_steps"]
 
 SEND_TIME_S = 0.1
 """rospy sends on threads of its own and does not say when it has; this is many times what a send takes."""
@@ -16,20 +16,20 @@ Steps = Generator[float, bool, None]
 """Does a step, yields the seconds until the next one, and is sent whether to continue."""
 
 
-class Hold(float):
+class FullWait(float):
     """A wait between steps that nothing cuts short, such as that for a stop to be sent."""
 
 
-def run_steps(steps: Steps, sleep: Sleep, hold: Sleep) -> None:
+def run_steps(steps: Steps, sleep: Sleep, sleep_fully: Sleep) -> None:
     """Take all steps. What a wait raises, such as Ctrl-C, is raised in the steps, which then stop their robots.
 
-    hold: waits where sleep, which may be cut short, is not allowed to.
+    sleep_fully: waits where sleep, which may be cut short, is not allowed to.
     """
     try:
         wait_s = next(steps)
         while True:
             try:
-                is_to_continue = (hold if isinstance(wait_s, Hold) else sleep)(wait_s)
+                is_to_continue = (sleep_fully if isinstance(wait_s, FullWait) else sleep)(wait_s)
             except BaseException as error:  # noqa: BLE001 - the steps raise it again
                 wait_s = steps.throw(error)
             else:

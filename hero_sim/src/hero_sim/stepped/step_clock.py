@@ -9,7 +9,7 @@ import itertools
 import math
 from typing import Any, List, Optional, Tuple
 
-from hero_client.values.background_motion import BackgroundMotion, Hold, Steps
+from hero_client.values.background_motion import BackgroundMotion, FullWait, Steps
 from hero_node.clock import Clock
 from hero_node.errors import HeroError
 
@@ -88,7 +88,7 @@ class StepMotion(BackgroundMotion):
             self.set_exception(error)
         else:
             self._has_begun = True
-            self._is_held = isinstance(wait_s, Hold)
+            self._is_held = isinstance(wait_s, FullWait)
             self.due_ms = self._clock.rows.now_ms + _to_ms(wait_s)
             self._clock.schedule(self)
 
