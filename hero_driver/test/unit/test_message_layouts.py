@@ -321,3 +321,11 @@ def test_a_scan_that_is_cut_or_too_long_is_refused():
     for length in range(len(payload)):
         assert message_layouts.make_proximity(payload[:length], 0, NOW_NS, 0.2) is None
     assert message_layouts.make_proximity(payload + b"\x00", 0, NOW_NS, 0.2) is None
+
+
+def test_numbers_of_messages_begin_anew_after_the_largest():
+    payload = build_odometry(NOW_NS)
+    for seq, expected in ((2**32 - 1, 2**32 - 1), (2**32, 0), (2**32 + 7, 7)):
+        rewritten = make_writer().rewrite(payload, seq, NOW_NS, None)
+        for written in (message_layouts.restamp(payload, seq, NOW_NS), rewritten):
+            assert struct.unpack_from("<I", written) == (expected,)

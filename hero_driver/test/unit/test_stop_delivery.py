@@ -9,7 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hero_driver.commands.stop_progress import StopState
-from hero_driver.stop_delivery import BURST_LIGHTS, LIGHT_MD5, LIGHT_TYPE, is_light
+from hero_driver.corrections.message_layouts import MD5SUMS
+from hero_driver.rosserial.errors import RosserialError
+from hero_driver.stop_delivery import BURST_LIGHTS, LIGHT_MD5, LIGHT_TYPE, encode_stop, is_light
 
 phases = st.floats(0.0, 0.051)
 networks = st.floats(0.0, 0.05)
@@ -254,3 +256,27 @@ def test_only_what_colors_the_light_is_lit_in_a_stop():
     ):
         info = SimpleNamespace(name=name, message_type=message_type, md5sum=md5sum)
         assert is_light(SimpleNamespace(info=info)) == is_lit
+
+
+def test_a_robot_that_only_motor_commands_reach_is_stopped_by_them():
+    twist, motor = "geometry_msgs/Twist", "hero_msgs/Motor"
+    kind = SimpleNamespace(is_from_robot=False)
+
+    def encode(topic_id, payload):
+        if topic_id == 9:
+            raise RosserialError("its buffer is too small")
+        return b"%d," % topic_id
+
+    def stop_by(*topics, with_burst=False):
+        infos = [
+            SimpleNamespace(name=LIGHT, message_type=name, md5sum=MD5SUMS.get(name, LIGHT_MD5)) for _, name in topics
+        ]
+        topics = {topic_id: SimpleNamespace(info=info, kind=kind) for (topic_id, _), info in zip(topics, infos)}
+        session = SimpleNamespace(topics=topics, encode_message=encode)
+        return encode_stop(SimpleNamespace(session=session, light=b""), with_burst)
+
+    light = (4, LIGHT_TYPE)
+    assert stop_by((1, motor), (2, twist), (3, twist), light) == b"2,3,", "the controllers overwrite pulses"
+    assert stop_by((1, motor), (9, twist), light) == stop_by((1, motor), light) == b"1,"
+    assert stop_by((1, motor), light, with_burst=True) == b"4," * BURST_LIGHTS + b"1,"
+    assert stop_by((1, "nav_msgs/Odometry"), light) == b""
