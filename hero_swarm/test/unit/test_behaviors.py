@@ -32,13 +32,19 @@ class RandomWalk(Behavior):
         return np.full(len(turn_rad_s), 0.1), turn_rad_s, turn_rad_s
 
 
-def measure(behavior, metric, robots, time_s, arena=OPEN, size_m=(1.5, 1.5), last_s=30):
-    """Return the median of a metric (poses, velocities, trial) over the last seconds, for each seed."""
+def place(arena, robots, seeds):
+    """Return starts of robots and places of objects where an arena has some; else None, to scatter them."""
     starts = objects = None
     if arena.objects:
-        starts = np.array([place_robots(arena, robots, np.random.RandomState(seed)) for seed in SEEDS])
+        starts = np.array([place_robots(arena, robots, np.random.RandomState(seed)) for seed in seeds])
     if arena is DISCS:
-        objects = [scatter_objects(arena, poses, seed) for poses, seed in zip(starts, SEEDS)]
+        objects = [scatter_objects(arena, poses, seed) for poses, seed in zip(starts, seeds)]
+    return starts, objects
+
+
+def measure(behavior, metric, robots, time_s, arena=OPEN, size_m=(1.5, 1.5), last_s=30):
+    """Return the median of a metric (poses, velocities, trial) over the last seconds, for each seed."""
+    starts, objects = place(arena, robots, SEEDS)
     trial = Trial(behavior, arena, robots, SEEDS, size_m, starts=starts, objects=objects)
     values = [
         metric(poses, trial.velocities, trial) for time, poses in trial.run(time_s) if time >= time_s - last_s
