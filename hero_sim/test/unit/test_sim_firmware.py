@@ -242,3 +242,16 @@ def test_the_rest_of_a_packet_does_not_outlive_its_connection():
     firmware.connection_lost()
     firmware.connection_made(now_ms)
     assert firmware.received_length == 0
+
+
+def test_a_robot_that_cannot_write_blocks_for_5_s_unless_it_can_again():
+    for freed_after_ms, silent_ms in ((None, 5000), (1200, 1200)):
+        driver = DriverSide()
+        driver.start_streaming()
+        firmware, now_ms = driver.swarm.robots[0], driver.swarm.now_ms
+        firmware.block_writing(now_ms)
+        firmware.block_writing(now_ms + 100)  # it blocks already
+        assert firmware.due_ms == now_ms + 5000
+        if freed_after_ms:
+            firmware.unblock_writing(now_ms + freed_after_ms)
+        assert abs(firmware.due_ms - now_ms - silent_ms) <= 60

@@ -1,0 +1,101 @@
+"""The odometry of one robot without its jumps, and what its drives tell of the heading of its tag."""
+
+import math
+
+import pytest
+
+from hero_localization.filter.heading_check import DRIVES, MIN_DRIVE_M, HeadingCheck, is_upside_down
+from hero_localization.filter.odometry_history import (
+    JUMP_MARGIN_M,
+    JUMP_MARGIN_RAD,
+    KEPT_S,
+    MAX_SPEED_M_S,
+    MAX_TURN_RAD_S,
+    OdometryHistory,
+)
+from hero_localization.filter.pose_filter import REPLAYED_S
+from hero_node.geometry import Pose, transform_pose
+
+ORIGIN = Pose(0.0, 0.0, 0.0)
+
+
+def make_history(*readings):
+    history = OdometryHistory()
+    for stamp_s, *pose in readings:
+        history.add(stamp_s, Pose(*pose))
+    return history
+
+
+def test_only_what_wheels_cannot_do_in_the_time_is_a_jump():
+    for elapsed_s in (0.034, 0.5):
+        far_m, turn_rad = MAX_SPEED_M_S * elapsed_s + JUMP_MARGIN_M, MAX_TURN_RAD_S * elapsed_s + JUMP_MARGIN_RAD
+        turn_rad = min(turn_rad, 3.0)
+        for pose, jumps in (
+            ((far_m - 1e-6, 0.0, 0.0), 0),
+            ((0.0, far_m + 1e-6, 0.0), 1),
+            ((0.0, 0.0, 1e-6 - turn_rad), 0),
+            ((0.0, 0.0, -1e-6 - turn_rad), 1 if turn_rad < 3.0 else 0),
+        ):
+            assert make_history((1.0, *ORIGIN), (1.0 + elapsed_s, *pose)).jumps == jumps
+
+
+def test_a_restart_goes_on_where_the_robot_stood_with_its_lengths():
+    history = make_history((0.0, 1.0, 2.0, 0.0), (0.1, 1.05, 2.0, 0.2), (0.2, 0.0, 0.0, 0.0), (0.3, 0.03, 0.0, -0.1))
+    assert history.jumps == 1 and history.raw_pose == (0.03, 0.0, -0.1)
+    expected = transform_pose(Pose(1.05, 2.0, 0.2), Pose(0.03, 0.0, -0.1))
+    found = history.find(0.3)
+    assert found.pose == pytest.approx(expected)
+    assert (found.distance_m, found.turned_rad, found.heading_rad) == pytest.approx((0.08, 0.3, 0.1))
+    middle = history.find(0.05)
+    assert middle.pose == pytest.approx((1.025, 2.0, 0.1)) and middle.turned_rad == pytest.approx(0.1)
+    assert history.find(9.0) == found and history.find(-0.01) is None
+
+
+def test_odometry_is_kept_for_a_time_and_old_readings_are_left_out():
+    assert KEPT_S > 2.0 * REPLAYED_S, "the start of the filter may be so old"
+    history = make_history(*((0.1 * number, 0.01 * number, 0.0, 0.0) for number in range(51)))
+    assert history.find(5.0 - KEPT_S + 0.05) is not None and history.find(5.0 - KEPT_S - 0.15) is None
+    history.add(4.9, Pose(7.0, 0.0, 0.0))
+    assert history.find(5.0).pose.x_m == pytest.approx(0.5) and history.jumps == 0
+
+
+def test_turns_over_the_half_circle_are_short_and_add_up():
+    history = make_history((0.0, 0.0, 0.0, 3.1), (0.1, 0.0, 0.0, -3.1), (0.2, 0.0, 0.0, 3.1))
+    short_rad = 2.0 * math.pi - 6.2
+    assert history.find(0.2).turned_rad == pytest.approx(2.0 * short_rad)
+    assert history.find(0.2).heading_rad == pytest.approx(0.0, abs=1e-9)
+    assert abs(history.find(0.05).pose.yaw_rad) == pytest.approx(math.pi, abs=1e-6), "between, it looks back"
+
+
+def test_ticks_to_and_fro_are_no_distance():
+    history = make_history(*((0.1 * number, 0.001 * (number % 2), 0.0, 0.0) for number in range(40)))
+    assert history.find(3.9).distance_m == 0.0
+    history.add(4.0, Pose(0.002, 0.0, 0.0))
+    assert history.find(4.0).distance_m == pytest.approx(0.002)
+
+
+def drive(check, error_rad, steps_m, share=1.0, turn_rad=0.0):
+    seen = odometry = ORIGIN
+    check.add(Pose(*seen[:2], error_rad), odometry)
+    for step_m in steps_m:
+        odometry = transform_pose(odometry, Pose(step_m, 0.0, turn_rad))
+        seen = transform_pose(seen, Pose(share * step_m, 0.0, turn_rad))
+        check.add(Pose(*seen[:2], seen.yaw_rad + error_rad), odometry)
+    return check.error_rad
+
+
+def test_a_tag_that_is_turned_shows_after_some_straight_drives():
+    for error_rad in (0.2, -0.4, math.pi - 0.01):
+        assert drive(HeadingCheck(), error_rad, [MIN_DRIVE_M + 0.001] * DRIVES) == pytest.approx(error_rad)
+        assert drive(HeadingCheck(), error_rad, [MIN_DRIVE_M + 0.001] * (DRIVES - 1)) is None
+        assert drive(HeadingCheck(), error_rad, [-0.05] * DRIVES) == pytest.approx(error_rad), "backward, too"
+    assert drive(HeadingCheck(), 0.2, [MIN_DRIVE_M / 4.0 + 0.001] * 4 * DRIVES) == pytest.approx(0.2), "by and by"
+
+
+def test_what_is_too_short_curved_or_held_shows_no_heading():
+    assert drive(HeadingCheck(), 0.2, [MIN_DRIVE_M / 20.0] * 20) is None
+    assert drive(HeadingCheck(), 0.2, [0.05] * 9, turn_rad=0.2) is None
+    assert drive(HeadingCheck(), 0.2, [0.05] * 9, share=0.45) is None
+    assert drive(HeadingCheck(), 0.2, [0.05] * 9, share=0.55, turn_rad=0.0) == pytest.approx(0.2)
+    for error_rad, is_so in ((2.3, False), (2.4, True), (-2.4, True), (2.0 * math.pi - 0.1, False)):
+        assert is_upside_down(error_rad) == is_so
