@@ -321,6 +321,7 @@ def test_a_signal_ends_it_quietly(simulate, server, number):
         (("--wifi", "string"), "string"),
         (("--error", "slip=much"), "slip=much"),
         (("--print-errors", "--error", "robot=4,slip=0"), "robot must be 0..0, not 4"),
+        (("--print-errors", "--errors", "no_such"), "errors no_such cannot be read: No such file or directory"),
         (("--flash-dir", "/proc/flash"), "/proc/flash"),
         (("--print-errors", "--model", "turtle"), "must be one of hero, v3.0, hero_plus"),
         (("--print-errors", "--model", "hero_plus,robot=3"), "robot must be 0..0, not 3"),
