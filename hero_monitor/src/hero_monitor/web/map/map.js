@@ -244,7 +244,7 @@ export class FleetMap {
     if (!xs.length) return false;
     const [left, right, low, high] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
     const room = 1 - MARGIN;
-    const edge = Math.max(EDGE_PX, element("frame").offsetHeight + LABEL_PX);
+    const edge = Math.min(this.height / 4, Math.max(EDGE_PX, element("frame").offsetHeight + LABEL_PX));
     this.view.x = (left + right) / 2;
     this.view.y = (low + high) / 2;
     this.view.scale = Math.min(
