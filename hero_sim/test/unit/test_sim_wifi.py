@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hero_sim.link.wifi import PROFILES, Radio
+from hero_sim.link.wifi import PROFILES, Radio, WifiProfile
 
 
 def carry(profile, seconds=60, period_ms=34, length=1500, seed=0):
@@ -94,3 +94,37 @@ def test_nothing_is_lost_whatever_the_pace(profile, gaps, seed):
         received += radio.down.take(now_ms)
     received += radio.down.take(now_ms + 60000)
     assert received == bytes(range(len(gaps)))
+
+
+def make_profile(**changes):
+    return WifiProfile(0.0, 0.0, 0.0, (0.0, 0.0), 0.0, (0.0, 0.0), 0.0)._replace(**changes)
+
+
+def test_what_was_sent_later_never_arrives_earlier():
+    radio = Radio(make_profile(jitter_ms=200.0), np.random.RandomState(1))
+    arrivals_ms = [radio.up.send(now_ms, 10) for now_ms in range(100)]
+    assert arrivals_ms == sorted(arrivals_ms)
+    assert len(set(arrivals_ms)) < 100, "some wait behind others"
+    radio.up.clear()
+    assert radio.up.send(100, 10) < arrivals_ms[-1], "not behind an earlier connection's"
+
+
+def test_a_connection_that_ends_drops_what_is_on_its_way_up_and_down():
+    radio = Radio(make_profile(base_ms=50.0), np.random.RandomState(1))
+    for direction in (radio.up, radio.down):
+        direction.put(0, b"old")
+        assert radio.is_carrying and direction.length == 3
+        radio.clear()
+        assert not radio.is_carrying
+        direction.put(10, b"new")
+        assert direction.take(59) == b"" and direction.take(60) == b"new"
+
+
+def test_outages_last_as_long_and_come_as_often_as_the_profile_says():
+    profile = make_profile(spike_every_ms=500.0, spike_ms=(100.0, 100.0))
+    radio = Radio(profile, np.random.RandomState(1))
+    delays_ms = np.array([radio.find_arrival(float(now_ms)) - now_ms for now_ms in range(200000)])
+    assert delays_ms.max() == pytest.approx(100.0, abs=1.0)
+    assert np.count_nonzero(delays_ms) / 200000 == pytest.approx(100.0 / 600.0, rel=0.15)
+    late = Radio(profile, np.random.RandomState(1))
+    assert [late.find_arrival(199990.0 + step) - 199990.0 - step for step in range(10)] == list(delays_ms[-10:])
