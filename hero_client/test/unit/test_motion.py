@@ -142,7 +142,8 @@ def test_wheels_that_a_pause_of_the_program_stopped_have_their_time_anew():
 
 def test_a_frozen_pose_is_told_from_blocked_wheels():
     frozen, held = Steady(0.1, 0.0), Steady(0.1, 0.0)
-    assert step_until_end(frozen, lambda now_s: HERE, 9.0, odometry=lambda now_s: Pose(0.01 * now_s, 0.0, 0.0)) < FROZEN_S + 0.2
+    ended_s = step_until_end(frozen, lambda now_s: HERE, 9.0, odometry=lambda now_s: Pose(0.01 * now_s, 0.0, 0.0))
+    assert ended_s < FROZEN_S + 0.2
     assert "its wheels turn, but its pose stays the same" in frozen.reason
     assert step_until_end(held, lambda now_s: HERE, 9.0, odometry=lambda now_s: HERE) < STALL_S + 0.2
     assert "its wheels do not turn" in held.reason

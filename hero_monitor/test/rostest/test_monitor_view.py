@@ -103,7 +103,8 @@ class ViewTest(unittest.TestCase):
         return {name: int(self.page.text("#count_" + name)) for name in ("ready", "driving", "stopped", "lost")}
 
     def test_the_summary_counts_each_robot_once(self):
-        states = [{}, {"stop": "at rest"}, {"state": "AWAY"}, {"known": False}, {"state": "REFUSED"}, {"state": "JOINING"}]
+        others = [{"state": state} for state in ("AWAY", "REFUSED", "JOINING")]
+        states = [{}, {"stop": "at rest"}, {"known": False}, *others]
         self.show([make_robot(number, **changes) for number, changes in enumerate(states)])
         wait_for(lambda: self.counts() == {"ready": 1, "driving": 0, "stopped": 1, "lost": 2}, self.counts)
 
@@ -329,7 +330,8 @@ class ViewTest(unittest.TestCase):
         self.addCleanup(self.page.resize, 1440, 900)
         for width, height in ((568, 320), (844, 390)):
             self.page.resize(width, height)
-            wait_for(lambda: self.page.find("#fleet .scroll").rect["height"] >= height / 3, (width, height))
+            least = height / 3
+            wait_for(lambda least=least: self.page.find("#fleet .scroll").rect["height"] >= least, (width, height))
             for panel in ("fleet", "robot", "log"):
                 self.page.click("[data-panel=%s]" % panel)
                 self.assertEqual(self.page.run(FIND_CUT), [], panel)

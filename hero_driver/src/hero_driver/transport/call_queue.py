@@ -1,7 +1,7 @@
 """Work handed between threads: a bounded queue of calls, which the receiving thread makes in order.
 
-When the queue is full the new call is refused and counted, and its sender notified. The loop of the sockets has one such
-queue, and so has every worker.
+When the queue is full the new call is refused and counted, and its sender notified. The loop of the sockets has one
+such queue, and so has every worker.
 """
 
 import collections

@@ -1,7 +1,8 @@
 """The true size of a print in an image, whatever the camera's gamma, blur and exposure. Pure but for OpenCV.
 
-Where a camera brightens dark shades (gamma), white grows by half a pixel or more, and black squares measure up to 2 % less.
-How much follows from the shades of the edges: the print is rendered with the blur and gamma that explain the image best.
+Where a camera brightens dark shades (gamma), white grows by half a pixel or more, and black squares measure up to 2 %
+less. How much follows from the shades of the edges: the print is rendered with the blur and gamma that explain the
+image best.
 
 Source: D. W. Marquardt, An Algorithm for Least-Squares Estimation of Nonlinear Parameters, 1963.
 """

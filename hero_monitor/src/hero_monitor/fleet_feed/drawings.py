@@ -49,7 +49,8 @@ def _encode_marker(marker: Marker) -> List[Dict[str, Any]]:
     if marker.type == Marker.TEXT_VIEW_FACING:
         place = marker.pose.position
         found = encode_pose(Pose(place.x, place.y, marker.scale.z))
-        return [] if found is None else [{"text": shorten(marker.text), "at": found, "color": _encode_rgb(marker.color)}]
+        text = {"text": shorten(marker.text), "at": found, "color": _encode_rgb(marker.color)}
+        return [] if found is None else [text]
     if marker.type not in (Marker.LINE_LIST, Marker.LINE_STRIP):
         return []
     points = [encode_pose(Pose(point.x, point.y, 0.0)) for point in marker.points]

@@ -92,5 +92,5 @@ def _list_events(
     """Yield time, receivers and command, sorted by time; those with the same delay get a command together."""
     groups = {delay_s: [row for row, own_s in enumerate(delays_s) if own_s == delay_s] for delay_s in set(delays_s)}
     commands = [tuple(command) for command in recording.commands.tolist()]
-    events = [(command[0] + delay_s, receivers, command) for delay_s, receivers in groups.items() for command in commands]
+    events = [(command[0] + delay_s, rows, command) for delay_s, rows in groups.items() for command in commands]
     return iter(sorted(events))
