@@ -2,8 +2,8 @@
 
 aggregation: 100 robots scattered over 4.64 m (2 % cover) without walls, poses 50 ms old, 300 s. evolved: the behaviors
 of binary_family, 20 robots (wall following: 9) in 1.71 m x 1.42 m, 200 s, medians of the last 60 s. filter: of 12
-robots at random in a fence of 2 m x 2 m for 30 s, and of ten that cross a circle of 1.2 m; which touch, and the time. speed:
-CPU seconds of 20 milling robots in 100 worlds for 120 s, and of one step of the filter for 100 dense robots.
+robots at random in a fence of 2 m x 2 m for 30 s, and of ten that cross a circle of 1.2 m; which touch, and the time.
+speed: CPU seconds of 20 milling robots in 100 worlds for 120 s, and of one step of the filter for 100 dense robots.
 """
 
 import argparse
