@@ -1,6 +1,7 @@
 """The camera pose from reference tags: right ones, misplaced ones, too few; and a camera that was moved."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -147,6 +148,21 @@ def test_one_tag_5_mm_from_its_place_is_named_among_six(tag_id):
     found = calibrate_arena(LENS, see_all(shifts_m), REFERENCES)
     assert found.left_out == [tag_id]
     assert found.problems[0].startswith("tag %d was left out" % tag_id)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_wrong_place_of_five_is_named_alone_or_among_others(seed):
+    random = np.random.RandomState(seed)
+    ids = sorted(PLACES)[:5]
+    bad = int(random.choice(ids))
+    places = {tag_id: REFERENCES[tag_id].pose for tag_id in ids}
+    taped = {tag_id: ReferenceTag(Pose(*(random.normal(pose[:2], 0.0007)), 0.0)) for tag_id, pose in places.items()}
+    x_m, y_m, _ = taped[bad].pose
+    angle_rad = random.uniform(0.0, math.tau)
+    taped[bad] = ReferenceTag(Pose(x_m + 0.008 * math.cos(angle_rad), y_m + 0.008 * math.sin(angle_rad), 0.0))
+    found = calibrate_arena(LENS, see_all(ids=ids), taped)
+    assert found.problems and re.search(r"\b%d\b" % bad, found.problems[0]), found.problems
+    assert found.left_out in ([], [bad])
 
 
 @pytest.mark.parametrize("scale", [0.98, 0.992, 1.009, 1.02])

@@ -35,6 +35,10 @@ WRONG_PLACE_M = 0.004
 WRONG_SHARE = 3.0
 """A tag is wrong that lies so far from where all others put it, and so many times as far as these disagree."""
 
+AMBIGUOUS_M2 = 2e-6
+"""Two tags may both be the wrong one if, without either, the others' squared residuals sum up to less than this apart:
+with places right to 0.7 mm in x and y, another tag than the wrong one of five would be named in a tenth of cases."""
+
 SUSPICIOUS_RMS_M = 0.02
 """No tape is so wrong at all tags."""
 
@@ -111,12 +115,17 @@ def calibrate_arena(
     residuals_m = measure_residuals(camera, seen, references)
     left_out: List[int] = []
     wrong = _find_wrong_tag(lens, seen, references)
-    if wrong is not None:
-        left_out, camera = [wrong.tag_id], wrong.camera_without
+    suspects = wrong.tag_ids if wrong is not None else []
+    if wrong is not None and len(suspects) == 1:
+        left_out, camera = suspects, wrong.camera_without
         residuals_m = measure_residuals(camera, seen, references)
     if _compute_rms(residuals_m, left_out) < WORST_RESIDUAL_M:  # or it is no matter of scale
         _check_sizes(camera, [tag for tag in seen if tag.tag_id not in left_out], references)
-    return ArenaCalibration(camera, residuals_m, left_out, _judge(residuals_m, left_out, missing))
+    problems = _judge(residuals_m, left_out, missing)
+    if wrong is not None and len(suspects) > 1:
+        text = "tag %s is about %.0f mm from its place: measure them again"
+        problems.insert(0, text % (" or ".join(map(str, suspects)), 1e3 * wrong.off_m))
+    return ArenaCalibration(camera, residuals_m, left_out, problems)
 
 
 def _refuse_mistakes(lens: Lens, seen: Sequence[TagCorners], references: Mapping[int, ReferenceTag]) -> None:
@@ -138,20 +147,21 @@ def _refuse_mistakes(lens: Lens, seen: Sequence[TagCorners], references: Mapping
 
 
 class _WrongTag(NamedTuple):
-    """A tag that contradicts all others, and the camera without it."""
+    """Tags of which one contradicts all others, the likeliest first; how far (m) it is off; the camera without it."""
 
-    tag_id: int
+    tag_ids: List[int]
+    off_m: float
     camera_without: Camera
 
 
 def _find_wrong_tag(
     lens: Lens, seen: Sequence[TagCorners], references: Mapping[int, ReferenceTag]
 ) -> Optional[_WrongTag]:
-    """Return the tag without which the others agree by far better; None if there is none, or none to spare."""
+    """Return the tags without one of which the others agree by far better; None if there is none, or none to spare."""
     if len(seen) <= MIN_TAGS:
         return None
     found: Optional[_WrongTag] = None
-    min_rest_m = math.inf
+    squares_m2: Dict[int, float] = {}
     for tag in seen:
         others = [other for other in seen if other is not tag]
         camera = _fit(lens, others, references)
@@ -159,11 +169,15 @@ def _find_wrong_tag(
             continue
         rest_m = _compute_rms(measure_residuals(camera, others, references), ())
         alone_m = measure_residuals(camera, [tag], references)[tag.tag_id]
-        if rest_m < min_rest_m:
-            min_rest_m = rest_m
+        squares_m2[tag.tag_id] = len(others) * rest_m**2
+        if squares_m2[tag.tag_id] == min(squares_m2.values()):
             is_wrong = alone_m > WRONG_PLACE_M and alone_m > WRONG_SHARE * rest_m
-            found = _WrongTag(tag.tag_id, camera) if is_wrong else None
-    return found
+            found = _WrongTag([tag.tag_id], alone_m, camera) if is_wrong else None
+    if found is None:
+        return None
+    limit_m2 = min(squares_m2.values()) + AMBIGUOUS_M2
+    suspects = [tag_id for tag_id, sum_m2 in squares_m2.items() if sum_m2 <= limit_m2]
+    return found._replace(tag_ids=sorted(suspects, key=squares_m2.__getitem__))
 
 
 def _check_sizes(camera: Camera, seen: Sequence[TagCorners], references: Mapping[int, ReferenceTag]) -> None:
