@@ -1,6 +1,7 @@
 """Limits of the calibration one by one: what is too old, too near, too far off; and the numbers that files hold."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from hero_calibration.models import infrared_model as model
 from hero_calibration.models.encoder_readings import TICK_M, make_readings
 from hero_calibration.models.infrared_model import Facing
 from hero_calibration.models.step_response import DEFAULT_GAINS, NOMINAL_GAIN_M_S_US, GainSearch, Response
-from hero_calibration.procedures import restore
+from hero_calibration.procedures import restore, wheels
 from hero_calibration.procedures.infrared import InfraredResult
 from hero_calibration.procedures.motors import MotorResult
 from hero_calibration.procedures.placement import place_robots
@@ -341,3 +342,23 @@ def test_kept_calibrations_are_restored_robot_by_robot(tmp_path, capsys):
     session.probes[0].write = lambda key, values: (_ for _ in ()).throw(CalibrationError("no answer"))
     assert restore.restore(session, restore.load_calibrations(str(tmp_path), [], None)) == 1
     assert "hero_0: FAILED: restore: no answer; restored nothing" in capsys.readouterr().out
+
+
+def test_wheels_drive_a_square_to_each_side_and_are_looked_at_at_rest(monkeypatch):
+    driven, looked = [], []
+    now_s = [100.0]
+    monkeypatch.setattr(wheels, "_drive", lambda session, probes, part: driven.append(part))
+    probe = SimpleNamespace(robot_id=3, find_place=looked.append)
+    session = SimpleNamespace(
+        probes=[probe],
+        now_s=lambda: now_s[0],
+        pause=lambda duration_s: now_s.append(now_s.pop() + duration_s),
+        repeat=lambda title, tries, drive, evaluate: drive([probe]),
+    )
+    wheels.calibrate_wheels(session)
+    turns_rad = [angular_rad_s * duration_s for _, angular_rad_s, duration_s in driven]
+    sides_m = [linear_m_s * duration_s for linear_m_s, _, duration_s in driven]
+    assert sum(turns_rad[:8]) == pytest.approx(-sum(turns_rad[8:])) and min(turns_rad[:8]) == 0.0 < turns_rad[1]
+    assert sum(turns_rad[:8]) == pytest.approx(2.0 * math.pi, rel=0.1) and len(set(sides_m)) == 2
+    # One look before the first part and one after each; only the second half of a stop counts.
+    assert looked == pytest.approx([100.0 + (count + 0.5) * wheels.MEASURE_S for count in range(17)])
