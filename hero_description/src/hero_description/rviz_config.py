@@ -133,7 +133,13 @@ def make_picture_display() -> Dict[str, Any]:
 
 def make_marker_display(name: str, topic: str) -> Dict[str, Any]:
     """Return a display of a visualization_msgs/MarkerArray."""
-    return {"Class": "rviz/MarkerArray", "Name": name, "Enabled": True, "Marker Topic": topic, "Queue Size": 10}
+    return {
+        "Class": "rviz/MarkerArray",
+        "Name": name,
+        "Enabled": True,
+        "Marker Topic": topic,
+        "Queue Size": 10000,  # single markers that wait for their transform; RViz drops the oldest, of walls for good
+    }
 
 
 def make_view(view: str) -> Dict[str, Any]:

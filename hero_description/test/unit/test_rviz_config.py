@@ -40,6 +40,13 @@ def test_rviz_displays_robots_arena_and_lights():
     assert ("rviz/MarkerArray", "/behavior/markers") in shown
 
 
+def test_rviz_keeps_all_walls_until_their_transform_is_known():
+    """Its queue holds single markers: of a longer array it drops the first ones for good."""
+    displays = yaml.safe_load(make_config(["hero_0"], "map"))["Visualization Manager"]["Displays"]
+    queues = {display["Marker Topic"]: display["Queue Size"] for display in displays if "Marker Topic" in display}
+    assert queues["/hero_sim/arena"] >= 10000 and min(queues.values()) >= 10000
+
+
 def list_switches(displays):
     """Return which displays, also of those in groups, are enabled, by name."""
     switches = {}
