@@ -7,6 +7,8 @@ import os
 import queue
 import signal
 import sys
+import threading
+import xmlrpc.client
 from contextlib import suppress
 from typing import Tuple
 
@@ -18,6 +20,7 @@ from hero_msgs.msg import RobotArray
 from hero_node.command_line import call
 from hero_node.errors import NodeError
 from hero_node.ros.master import find_running_node
+from hero_node.ros.master_watch import MasterWatch
 from hero_node.ros.ros_node import end_ros_node, init_ros_node
 
 from . import main as command_line
@@ -37,6 +40,9 @@ MASTER_WAIT_S = 0.7
 
 DRIVER_WAIT_S = 1.0
 """Between two looks whether this node is to end."""
+
+MASTER_WATCH_S = 2.0
+"""Between two looks at the master."""
 
 LINGER_S = 2.5
 """roslaunch ends all of its nodes at once; the driver takes up to 2 s to stop its robots."""
@@ -96,6 +102,16 @@ def wait_for_driver(name: str) -> bool:
     return False
 
 
+def watch_master(has_ended: threading.Event) -> None:
+    """Register with a master that was started again, until the event is set."""
+    watch = MasterWatch()
+    while not has_ended.wait(MASTER_WATCH_S):
+        with suppress(NodeError, OSError, xmlrpc.client.Error):  # the driver reports a lost master
+            news = watch.look()
+            if news:
+                rospy.logwarn(news)
+
+
 def main() -> None:
     """Run the simulator until ROS or a signal ends it."""
     status = call(_run, SimulatorError, NodeError)
@@ -122,6 +138,9 @@ def _run() -> None:
         rospy.on_shutdown(lambda: setattr(simulator, "stopping", True))
         GroundTruth(simulator, options.clock, not options.no_tf)
         FaultService(simulator, injector)
+        has_ended = threading.Event()
+        rospy.on_shutdown(has_ended.set)
+        threading.Thread(target=watch_master, args=(has_ended,), daemon=True).start()
         simulator.run(options.seconds)
         if simulator.stopping and not rospy.is_shutdown():
             simulator.linger(LINGER_S)
