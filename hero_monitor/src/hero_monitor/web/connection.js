@@ -48,10 +48,10 @@ export class Connection {
       this.onPause();
     }
     this.steppedMs = now;
-    this.judge();
+    this.updateFreshness();
   }
 
-  judge() {
+  updateFreshness() {
     const isFresh = this.isOpen && Date.now() - this.heardMs <= SILENT_MS;
     if (isFresh === this.isFresh) return;
     this.isFresh = isFresh;
@@ -81,7 +81,7 @@ export class Connection {
         this.clockMs = updates.clock_ms;
         this.noteServed(updates.served);
       }
-      this.judge();
+      this.updateFreshness();
       this.onUpdates(updates);
     });
     socket.addEventListener("close", async () => {
