@@ -61,7 +61,7 @@ class Monitor:
             self._broadcast_updates,
         )
         self._programs = self._requests.programs
-        actions = Actions(self._open_page, self._requests.receive, self._close_page, lambda: self._feed.picture.jpeg)
+        actions = Actions(self._open_page, self._requests.receive, self._close_page, self._feed.picture.find_jpeg)
         # The other half of the files is for ROS: some per robot.
         limits = ConnectionLimits(min(CONNECTIONS_MAX, raise_file_limit() // 2))
         topics = RosTopics(self._background)

@@ -133,7 +133,7 @@ class AccessTest(unittest.TestCase):
                 wait_until_it_answers(host)
                 self.assertIn("login.js", ask(host)[2])
                 self.assertEqual(self.open_socket(host, **own), 403)
-                self.assertEqual(ask(host, "/picture", own)[0], 403)
+                self.assertEqual(ask(host, "/picture/1", own)[0], 403)
                 topics = {**UPGRADE, "Sec-WebSocket-Protocol": FOXGLOVE}
                 self.assertEqual(ask(host, "/foxglove", topics)[0], 403)
                 self.assertEqual(ask(host, "/foxglove?token=" + TOKEN, topics)[0], 101)
@@ -146,7 +146,7 @@ class AccessTest(unittest.TestCase):
                 self.assertIn("SameSite=Strict", headers["Set-Cookie"])
                 cookie = headers["Set-Cookie"].partition(";")[0]
                 self.assertIn("main.js", ask(host, "/", {"Cookie": cookie})[2])
-                self.assertEqual(ask(host, "/picture", {"Cookie": cookie})[0], 404)  # no camera
+                self.assertEqual(ask(host, "/picture/1", {"Cookie": cookie})[0], 404)  # no camera
                 self.assertEqual(self.open_socket(host, Cookie=cookie, **own), 101)
                 self.assertEqual(self.open_socket(host, Cookie=cookie, Origin="http://evil.example"), 403)
             finally:

@@ -60,7 +60,7 @@ return [(count * step * step) / (width * height), x / (count || 1) / width, y / 
 """
 
 COUNT_FETCHES = (
-    "return performance.getEntriesByType('resource').filter((one) => one.name.includes('/picture?')).length"
+    "return performance.getEntriesByType('resource').filter((one) => one.name.includes('/picture/')).length"
 )
 
 

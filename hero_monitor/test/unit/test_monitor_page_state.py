@@ -13,7 +13,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from hero_monitor.control.requests import RequestError, read_request
 from hero_monitor.fleet_feed import drawings
-from hero_monitor.fleet_feed.camera_picture import BYTES_MAX, SILENT_S, CameraPicture
+from hero_monitor.fleet_feed.camera_picture import BYTES_MAX, JPEGS_KEPT, SILENT_S, CameraPicture
 from hero_monitor.fleet_feed.occupancy import MAX_CELLS, encode_grid
 from hero_monitor.fleet_feed.page_state import (
     LOG_LINES_AT_ONCE,
@@ -167,7 +167,7 @@ def test_a_picture_lies_on_the_map_of_its_frame_and_elsewhere_beside_it():
     picture = CameraPicture()
     assert picture.describe("map", 0.0) is None
     picture.receive(CompressedImage(data=JPEG), 10.0)
-    assert picture.jpeg == JPEG
+    assert picture.find_jpeg(1) == JPEG
     assert picture.describe("map", 10.1) == {"number": 1, "box": None, "poses": {}}
     picture.receive(CompressedImage(data=JPEG), 10.15)  # sooner than pages fetch pictures
     picture.receive_outline(make_outline((-1.0, -0.5), (1.0, -0.5), (1.0, 0.5), (-1.0, 0.5)))
@@ -203,7 +203,16 @@ def test_a_picture_that_is_old_or_none_is_not_shown():
     assert picture.describe("map", 10.0) is None
     picture.receive(CompressedImage(data=JPEG), 10.0)
     assert picture.describe("map", 10.0 + SILENT_S + 0.1) is None
-    assert picture.jpeg == b""
+    assert picture.find_jpeg(1) == b""
+
+
+def test_pictures_are_kept_for_pages_that_ask_late():
+    picture = CameraPicture()
+    for number in range(1, JPEGS_KEPT + 2):
+        picture.receive(CompressedImage(data=JPEG + bytes([number])), 10.0 + number)
+    assert picture.find_jpeg(1) == b""
+    assert picture.find_jpeg(2) == JPEG + b"\x02"
+    assert picture.find_jpeg(JPEGS_KEPT + 1) == JPEG + bytes([JPEGS_KEPT + 1])
 
 
 def read(**fields):

@@ -19,6 +19,9 @@ BYTES_MAX = 2000000
 PERIOD_S = 0.2
 """Between two pictures that pages fetch, however many are published."""
 
+JPEGS_KEPT = 5
+"""A page on a busy computer asks for one when newer ones have come: the robots it was told of are on no other."""
+
 SILENT_S = 3.0
 """The tracker publishes five pictures a second; an older one shows no robot where it is."""
 
@@ -32,15 +35,11 @@ Track = Deque[Tuple[float, Pose]]
 
 
 class CameraPicture:
-    """The newest picture.
-
-    Attributes:
-        jpeg: the picture; empty without one.
-    """
+    """The newest pictures, by number."""
 
     def __init__(self) -> None:
-        self.jpeg = b""
         self._number = 0
+        self._jpegs: Dict[int, bytes] = {}
         self._received_s = -math.inf
         self._frame = ""
         self._box_mm: Optional[List[int]] = None
@@ -53,10 +52,15 @@ class CameraPicture:
             return
         data = bytes(picture.data)
         if data.startswith(JPEG_START) and len(data) <= BYTES_MAX:
-            self.jpeg = data
             self._number += 1
+            self._jpegs[self._number] = data
+            self._jpegs.pop(self._number - JPEGS_KEPT, None)
             self._received_s = now_s
             self._stamp_s = picture.header.stamp.to_sec()
+
+    def find_jpeg(self, number: int) -> bytes:
+        """Return a picture by the number that describe() tells; empty if it is gone."""
+        return self._jpegs.get(number, b"")
 
     def receive_outline(self, outline: Any) -> None:
         """Take the places of the picture's corners: a geometry_msgs/PolygonStamped."""
@@ -78,7 +82,7 @@ class CameraPicture:
         box: x min, y min, x max, y max in mm; None if its place on this map is unknown.
         """
         if now_s > self._received_s + SILENT_S:
-            self.jpeg = b""
+            self._jpegs.clear()
             return None
         if self._frame != map_frame or self._box_mm is None:
             return {"number": self._number, "box": None, "poses": {}}

@@ -69,7 +69,7 @@ class Actions(NamedTuple):
     open_page: Callable[["PageSocket"], None]
     receive: Callable[["PageSocket", Union[str, bytes]], None]
     close_page: Callable[["PageSocket"], None]
-    read_picture: Callable[[], bytes]
+    find_picture: Callable[[int], bytes]
 
 
 class Route(NamedTuple):
@@ -147,15 +147,15 @@ class FileHandler(BaseHandler):
 
 
 class PictureHandler(BaseHandler):
-    """The camera's newest picture, for browsers that are logged in."""
+    """A picture of the camera by its number, for browsers that are logged in."""
 
     actions: Actions
 
-    def get(self) -> None:
+    def get(self, number: str) -> None:
         """Send the picture."""
         if not self.is_logged_in:
             raise tornado.web.HTTPError(403)
-        picture = self.actions.read_picture()
+        picture = self.actions.find_picture(int(number))
         if not picture:
             raise tornado.web.HTTPError(404)
         self.set_header("Content-Type", "image/jpeg")
@@ -306,7 +306,7 @@ class Server:
             [
                 (r"/live", PageSocket, {**shared, "actions": actions, "pages": self.pages}),
                 (r"/login", LoginHandler, with_attempts),
-                (r"/picture", PictureHandler, {**shared, "actions": actions}),
+                (r"/picture/([0-9]{1,9})", PictureHandler, {**shared, "actions": actions}),
                 *((route.pattern, route.handler, {**with_attempts, **route.values}) for route in routes),
                 (r"/(.*)", FileHandler, shared),
             ],

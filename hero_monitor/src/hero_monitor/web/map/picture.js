@@ -44,7 +44,7 @@ export class CameraPicture {
       }
       end();
     });
-    image.src = `picture?${number}`;
+    image.src = `picture/${number}`;
   }
 
   /** Put a picture without a place on the map into the panel. */
