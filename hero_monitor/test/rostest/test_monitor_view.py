@@ -284,6 +284,7 @@ class ViewTest(unittest.TestCase):
         self.monitor.show(programs=[make_program(7, failure="no pose of hero_1")])
         self.page.wait_for_text("#running", "random walk failed: no pose of hero_1")
         self.assertFalse(self.page.find("#rec").is_displayed())
+        self.page.wait_for_text("#recorded", "recorded 1:05, 2.4 MB in /tmp/recordings")
 
     def test_messages_that_differ_only_in_numbers_are_one_line(self):
         texts = ["hero_%d: silent for %d.5 s" % (number % 3, number) for number in range(6)]

@@ -23,6 +23,7 @@ export class ProgramPanel {
     this.names = [];
     this.offers = [];
     this.rows = new Map(); // of programs that run, by number
+    this.recorded = ""; // by the last recording that this page has seen
     element("program").addEventListener("change", () => this.showFields());
     element("start").addEventListener("click", () => this.start());
     element("stop_some").addEventListener("pointerdown", () => this.stopSome());
@@ -97,7 +98,8 @@ export class ProgramPanel {
     element("record").setAttribute("aria-pressed", String(Boolean(this.recording)));
     const length = this.recording ? clock(this.recording.seconds) : "";
     const size = this.recording ? `${(this.recording.bytes / 1e6).toFixed(1)} MB` : "";
-    element("recorded").textContent = this.recording ? `${length}, ${size} in ${this.recording.folder}` : "";
+    if (this.recording) this.recorded = `${length}, ${size} in ${this.recording.folder}`;
+    element("recorded").textContent = this.recording ? this.recorded : this.recorded && `recorded ${this.recorded}`;
     element("rec").hidden = !this.recording;
     element("rec").textContent = `rec ${length}`;
   }
