@@ -202,6 +202,14 @@ def test_the_smallest_tags_are_found_by_the_finest_detector(side_px, found, monk
     assert watch.see(tags, frames=30) == found
 
 
+def test_a_tag_too_small_for_the_tiles_is_found_where_it_is_expected():
+    watch = Watch(with_fine=True, smallest_px=16.0)
+    watch.detector.blind = watch.fine.blind = {3}
+    tags = [(3, (800.0, 600.0))]
+    assert watch.see(tags, frames=150) == []
+    assert watch.see(tags, expected={3: (802.0, 599.0)}) == [3]
+
+
 def test_large_tags_need_no_fine_detector():
     watch = Watch(with_fine=True, smallest_px=40.0)
     watch.see(everywhere()[:100:4], frames=80)

@@ -99,6 +99,7 @@ class TagSearch:
         self._due = 0.0
         self._nearby_px = 0.0
         self._previous_s: Optional[float] = None
+        self._smallest_px = smallest_px
         self._sides_px: Dict[int, float] = {}
         self._hard: Dict[int, Tuple[int, float]] = {}
         """The detector that found a tag which coarser ones missed, and when; by tag."""
@@ -131,9 +132,10 @@ class TagSearch:
             )
         tracked = {track.tag_id for track in self._tracks}
         for tag_id, place in places.items():
-            # Lost for long: where it is expected, it costs no more than a window.
-            if tag_id in self._sides_px and tag_id not in tracked:
-                self._look_for(gray, tag_id, place, self._sides_px[tag_id], MAX_STEP_S, stamp_s, found)
+            # Lost for long, or too small for the tiles: where it is expected, it costs no more than a window.
+            side_px = self._sides_px.get(tag_id, self._smallest_px)
+            if tag_id not in tracked and math.isfinite(side_px):
+                self._look_for(gray, tag_id, place, side_px, MAX_STEP_S, stamp_s, found)
         for detector, (left, top, right, bottom) in self._take_tiles(stamp_s):
             _add_new(found, detector.detect(gray[top:bottom, left:right], (left, top)))
         self._search_nearby(gray, stamp_s, places, found)
