@@ -299,9 +299,9 @@ class Figures:
         known = {}
         computers = {"odometry": analysis.compute_odometry_errors, "localization": analysis.compute_localization_errors}
         for name, compute in computers.items():
-            errors = {key: compute(robot) for key, robot in self._robots.items()}
-            if any(errors.values()):
-                known[name] = {key: error for key, error in errors.items() if error is not None}
+            found = {key: compute(robot) for key, robot in self._robots.items()}
+            if any(found.values()):
+                known[name] = {key: error for key, error in found.items() if error is not None}
         if not known:
             return None
         title = "Errors of %s against ground truth" % " and ".join(known)
