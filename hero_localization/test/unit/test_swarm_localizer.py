@@ -37,6 +37,16 @@ class Swarm:
         return {robot.robot_id: robot for robot in self.localizer.list_robots(self.now_s)}[robot_id]
 
 
+def test_a_lost_robot_is_not_found_by_poses_that_come_a_second_late():
+    swarm = Swarm(0).run(1.0, {0: (1.0, 2.0, 0.0)}).run(2.0)
+    for late_s, state, count in ((1.1, RobotState.LOST, 2), (0.9, RobotState.TRACKED, 3)):
+        for _ in range(10):
+            swarm.run(0.1)
+            measurement = Measurement(swarm.now_s - late_s, Pose(1.0, 2.0, 0.0), COVARIANCE)
+            swarm.lines += swarm.localizer.add_measurement(0, measurement)
+        assert swarm[0].state is state and len(swarm.lines) == count, swarm.lines
+
+
 def test_robots_are_found_once_and_then_tracked_silently():
     swarm = Swarm(0, 1).run(1.0, {0: (1.0, 2.0, 0.0)}, robots=(0, 1))
     assert swarm.lines == ["hero_0 found at (1.000, 2.000) m, 0 degrees"]

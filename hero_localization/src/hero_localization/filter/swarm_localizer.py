@@ -134,7 +134,9 @@ class SwarmLocalizer:
             robot.outliers += outcome is Outcome.OUTLIER
             return []
         robot.outliers = 0
-        was_lost, robot.is_lost, robot.untrusted_s = robot.is_lost, False, -math.inf
+        was_lost, robot.untrusted_s = robot.is_lost, -math.inf
+        # What comes late tells where a lost robot was; it would be lost again at once.
+        robot.is_lost = was_lost and measurement.stamp_s < self._now_s - LOST_S
         after = robot.filter.pose()
         if before is None or after is None:
             return ["hero_%d found at %s" % (robot_id, _describe_pose(measurement.pose))]
@@ -143,6 +145,8 @@ class SwarmLocalizer:
         step = "%.0f mm and %.0f degrees" % (1e3 * step_m, step_deg)
         if outcome is Outcome.MOVED:
             return ["hero_%d was moved by hand: pose reset by %s to %s" % (robot_id, step, _describe_pose(after))]
+        if robot.is_lost:
+            return []
         if was_lost:
             unseen_s = measurement.stamp_s - used_s
             line = "hero_%d found again after %.1f s, %s off its odometry" % (robot_id, unseen_s, step)
