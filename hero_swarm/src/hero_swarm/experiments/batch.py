@@ -107,8 +107,10 @@ def load_cell_arena(cell: Cell) -> Arena:
 def read_cell_errors(cell: Cell) -> List[str]:
     """Return the errors of a cell's file, a text for each robot; none without a file. Raises: ExperimentError."""
     name, robots = cell.settings.get("errors", "default"), range(cell.settings["robots"])
+    if name in ERRORS:
+        return []
     try:
-        known = [] if name in ERRORS else read_known(name, robots)
+        known = read_known(name, robots)
         own = draw_errors(map(np.random.RandomState, robots))
         for text in known:
             set_known(own, 0, text)

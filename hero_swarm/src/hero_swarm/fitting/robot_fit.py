@@ -44,11 +44,12 @@ def fit_robot(recordings: List[Recording]) -> Fit:
 def describe_fit(fit: Fit, robot_id: int) -> List[str]:
     """Return the lines of a robot in an error file: what was found as a remark, and its differences."""
     values = ",".join("%s=%.5g" % item for item in fit.values.items())
-    remark = "# %s: held-out paths of %g s end %.1f mm off, before the fit %.1f mm"
-    delay = "# %s: commands work %.0f ms later than in the simulator" % (fit.name, 1e3 * fit.delay_s)
-    motors = delay if "lag_s" in fit.values else "# %s: no servo pulses were recorded, so motors are as on the drawing"
+    ends = "held-out paths of %g s end %.1f mm off, before the fit %.1f mm"
+    motors = "no servo pulses were recorded, so motors are as on the drawing"
+    if "lag_s" in fit.values:
+        motors = "commands work %.0f ms later than in the simulator" % (1e3 * fit.delay_s)
     return [
-        remark % (fit.name, PATH_S, 1e3 * fit.after_m, 1e3 * fit.before_m),
-        motors.replace("%s", fit.name),
+        "# %s: %s" % (fit.name, ends % (PATH_S, 1e3 * fit.after_m, 1e3 * fit.before_m)),
+        "# %s: %s" % (fit.name, motors),
         "robot=%d,%s" % (robot_id, values),
     ]
