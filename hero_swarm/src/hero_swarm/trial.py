@@ -139,9 +139,8 @@ class Trial:
         sensed = sense(self.behavior, now_s, sensed_poses, self._random, self.things)
         linear_m_s, angular_rad_s, self.memory = self.behavior.step(sensed, self.memory, self._random)
         if self._filter is not None:
-            shape = self.poses.shape[:2]
-            speeds = (np.broadcast_to(values, self._all.shape).reshape(shape) for values in (linear_m_s, angular_rad_s))
-            linear_m_s, angular_rad_s = (values.ravel() for values in self._filter(sensed_poses, *speeds))
+            safe = self._filter(sensed_poses, linear_m_s, angular_rad_s)
+            linear_m_s, angular_rad_s = (values.ravel() for values in safe)
         if self.behavior.drive == PULSES:
             rows.send_pulses(self._all, *find_pulses(linear_m_s, angular_rad_s, self._dead_zones_us))
         else:

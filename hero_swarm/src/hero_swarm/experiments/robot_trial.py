@@ -73,8 +73,7 @@ class RobotTrial:
             return None
         sensed = sense(self._behavior, time_s, poses[None], self._random, things)
         linear_m_s, angular_rad_s, self._memory = self._behavior.step(sensed, self._memory, self._random)
-        wanted = np.array([np.broadcast_to(values, (1, len(poses))) for values in (linear_m_s, angular_rad_s)])
-        linear_m_s, angular_rad_s = self._filter(poses[None], wanted[0], wanted[1], ages_s[None])
+        linear_m_s, angular_rad_s = self._filter(poses[None], linear_m_s, angular_rad_s, ages_s[None])
         return linear_m_s[0], angular_rad_s[0]
 
     def _sample(self, time_s: float, poses: np.ndarray, things: Things) -> None:
