@@ -21,7 +21,7 @@ def main(arguments: Optional[Sequence[str]] = None) -> None:
             return
         from .ros.robot_runs import run_on_robots  # the simulator needs no ROS
 
-        _, experiment, folder = open_folder(options)
-        print(run_on_robots(experiment, folder, options))
+        _, experiment, folder, runs = open_folder(options)
+        print(run_on_robots(experiment, folder, runs, options))
 
     command_line.run(run, HeroError)

@@ -57,8 +57,8 @@ class SafetyFilter:
     ) -> Tuple[np.ndarray, np.ndarray]:
         """Return safe linear and angular speeds (W, N) for those wanted, at poses (W, N, 3) that are ages_s old (W, N).
 
-        Wanted ones are those of all robots of all worlds (W * N,), or one for all, as a behavior gives them. Robots drove
-        on as they were told meanwhile. One whose pose is NaN or too old is stopped, and others ignore it.
+        Wanted ones are those of all robots of all worlds (W * N,), or one for all, as a behavior gives them. Robots
+        drove on as they were told meanwhile. One whose pose is NaN or too old is stopped, and others ignore it.
         """
         linear_m_s, angular_rad_s = (
             np.broadcast_to(np.ravel(values), poses[..., 0].size).reshape(poses.shape[:2])

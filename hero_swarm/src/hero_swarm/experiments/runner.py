@@ -20,7 +20,7 @@ from .batch import compute_batch, load_checked
 from .code_version import describe_machine, hash_code
 from .errors import ExperimentError
 from .experiment_file import MAX_ROBOTS, Experiment, parse_experiment
-from .results_folder import REAL, SIMULATED, ResultsFolder, RunKey
+from .results_folder import REAL, SIMULATED, ResultsFolder, Run, RunKey
 
 __all__ = ["open_folder", "parse_options", "read_experiment", "run_experiment"]
 
@@ -158,8 +158,8 @@ def _watch(done: Iterable[Tuple[Any, Any]], missing: int, begun: int) -> Iterato
             bar.update(len(task[2]))
 
 
-def open_folder(options: argparse.Namespace) -> Tuple[str, Experiment, ResultsFolder]:
-    """Return the text of the experiment's file, what it describes, and the folder of its results, created if missing.
+def open_folder(options: argparse.Namespace) -> Tuple[str, Experiment, ResultsFolder, List[Run]]:
+    """Return text and content of the experiment's file, the folder of its results, created if missing, and its runs.
 
     Raises: ExperimentError.
     """
@@ -167,8 +167,8 @@ def open_folder(options: argparse.Namespace) -> Tuple[str, Experiment, ResultsFo
     load_checked(experiment)
     path = options.out or os.path.splitext(options.file)[0]
     folder = ResultsFolder(path, experiment, hash_code(experiment.behavior))
-    folder.begin(text, describe_machine(), options.fresh, SIMULATED if options.robots is None else REAL)
-    return text, experiment, folder
+    runs = folder.begin(text, describe_machine(), options.fresh, SIMULATED if options.robots is None else REAL)
+    return text, experiment, folder, runs
 
 
 def run_experiment(options: argparse.Namespace) -> str:
@@ -176,8 +176,7 @@ def run_experiment(options: argparse.Namespace) -> str:
 
     Raises: ExperimentError.
     """
-    text, experiment, folder = open_folder(options)
-    runs = folder.read_runs()
+    text, experiment, folder, runs = open_folder(options)
     part, parts = options.part
     # Whatever is there already, the parts share out all runs in the same way.
     own = set(folder.list_missing(())[part - 1 :: parts])
@@ -192,11 +191,12 @@ def run_experiment(options: argparse.Namespace) -> str:
             folder.write_batch(results.runs)
             folder.note_time(task[1], task[2], results.wall_s)
         print("%d runs in %.1f s" % (len(missing), time.monotonic() - began_s), file=sys.stderr)
-    left = folder.list_missing(folder.read_runs())
+    runs = folder.read_runs()
+    left = folder.list_missing(runs)
     if left:
         return "%s: %d of %d runs are still to be computed, by other parts" % (
             folder.path, len(left), len(experiment.cells) * len(experiment.seeds)
         )  # fmt: skip
     return "%s: all runs of %d cells with %d seeds each" % (
-        folder.write_table(folder.read_runs()), len(experiment.cells), len(experiment.seeds)
+        folder.write_table(runs), len(experiment.cells), len(experiment.seeds)
     )  # fmt: skip

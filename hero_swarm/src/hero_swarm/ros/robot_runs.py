@@ -39,11 +39,13 @@ START, DRIVE, END = "", "d", "q"
 """Answers of the operator."""
 
 
-def run_on_robots(experiment: Experiment, folder: ResultsFolder, options: argparse.Namespace) -> str:
+def run_on_robots(
+    experiment: Experiment, folder: ResultsFolder, runs: Sequence[Run], options: argparse.Namespace
+) -> str:
     """Run the trials that are missing on robots, one after the other; return a line for people.
 
-    options: robots; frame of the start places and of the poses, that of localize, or world for the simulator's ground
-    truth; calibration, the folder of `calibrate`.
+    runs: those that folder holds already. options: robots; frame of the start places and of the poses, that of
+    localize, or world for the simulator's ground truth; calibration, the folder of `calibrate`.
     Raises: ExperimentError for a cell with another number of robots, and if nothing can be recorded.
     """
     ids, frame = options.robots, options.frame
@@ -51,7 +53,7 @@ def run_on_robots(experiment: Experiment, folder: ResultsFolder, options: argpar
         if cell.settings["robots"] != len(ids):
             text = "--robots names %d robots, but %s has %d: give each number an experiment of its own"
             raise ExperimentError(text % (len(ids), cell.label, cell.settings["robots"]))
-    missing = folder.list_missing(folder.read_runs(), REAL)
+    missing = folder.list_missing(runs, REAL)
     done = 0
     with Program("experiment") as program, Swarm(ids) as swarm:
         source = PoseSource(ids, frame)
