@@ -61,7 +61,10 @@ class TestDriverStop(OwnDriverCase):
     def drive(self, robot, controller=VELOCITY):
         """Let a robot move; return the publisher of its commands."""
         publisher = make_publisher("%s/%s/cmd_vel" % (robot.namespace, controller), Twist)
+        before = len(robot.velocities)
         publisher.publish(make_command(0.1))
+        # Wheels may turn by an earlier command: wait for this one.
+        wait_for(lambda: any(v.linear_m_s == 0.1 for v in robot.velocities[before:]), "the command to arrive")
         wait_for(lambda: robot.motors.is_turning, "the wheels to turn")
         return publisher
 
