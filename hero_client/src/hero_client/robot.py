@@ -20,7 +20,8 @@ from hero_msgs.msg import Encoder
 from hero_node.command_line import print_error
 from hero_node.ros.script import start_node
 
-from .robots.robot_base import COMMAND_S, BaseRobot, check_robot_id
+from .robots.group import check_robot_id
+from .robots.robot_base import COMMAND_S, BaseRobot
 from .ros.ros_link import RosLink
 from .values.errors import StaleDataError
 

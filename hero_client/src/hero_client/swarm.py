@@ -11,7 +11,7 @@ from hero_node.ros.ros_clock import ROS_CLOCK
 from hero_node.ros.script import start_node
 
 from .robot import Robot
-from .robots.robot_base import check_robot_id
+from .robots.group import check_robot_id
 from .robots.swarm_base import REPORT_PERIOD_S, BaseSwarm
 from .ros.drivers import USUAL_TOPIC, share_drivers
 from .ros.stop_status import StopStatus

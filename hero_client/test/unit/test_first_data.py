@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from hero_client.robots.robot_base import BaseRobot, check_robot_id
+from hero_client.robots.group import check_robot_id
+from hero_client.robots.robot_base import BaseRobot
 from hero_client.values.errors import StaleDataError
 from hero_node.clock import Clock
 from hero_node.geometry import Pose

@@ -26,7 +26,9 @@ def measure(pose, bodies_m=(POST_M,)):
     place_m, heading = np.array([pose[:2]]), np.array([(math.cos(pose.yaw_rad), math.sin(pose.yaw_rad))])
     walls, circles_m = Segments.from_ends(ROOM.segments_m), np.array(bodies_m).reshape(-1, 3)
     bodies = place_m[:, None], np.array([BODY_RADIUS_M])
-    counts = range_sensors.measure_signals(place_m, heading, *bodies, walls, circles_m, alpha, beta)
+    counts = range_sensors.measure_signals(
+        range_sensors.Sight(place_m, heading, *bodies, walls, circles_m), alpha, beta
+    )
     ranges_m = np.roll(convert_to_ranges(np.rint(counts[0]).clip(0.0), calibrate(alpha[0], beta[0])), -BEAMS // 2)
     return [math.inf if range_m > 0.2368 else range_m for range_m in ranges_m]
 

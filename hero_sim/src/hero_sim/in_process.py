@@ -35,6 +35,9 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="seed of differences and noise (%(default)s)")
     parser.add_argument("--arena", metavar="ARENA", help="arena, as for the simulator")
     parser.add_argument("--wifi", default="ideal", help="network, as for the simulator (%(default)s)")
+    parser.add_argument(
+        "--model", action="append", default=[], metavar="MODEL[,robot=ID]", help="model, as for the simulator"
+    )
     parser.add_argument("--seconds", type=float, metavar="S", help="end the script at this simulated time")
     parser.add_argument("--perfect", action="store_true", help="robots without differences and noise")
     parser.add_argument("script", help="a script that uses hero_client")
@@ -47,7 +50,9 @@ def run_script(options: argparse.Namespace) -> None:
     """Run the script on its robots, and print where these are at its end."""
     if not Path(options.script).is_file():
         raise ProgramError("%s: no such script" % options.script)
-    swarm = StepSwarm(options.count, options.seed, options.arena, options.wifi, options.perfect)
+    swarm = StepSwarm(
+        options.count, options.seed, options.arena, options.wifi, options.perfect, model=options.model
+    )
     replace_ros(swarm)
     if options.seconds is not None:
         StepMotion(swarm._clock, end_at(options.seconds))

@@ -34,7 +34,8 @@ def measure_all(arena, poses, alpha, beta, which):
     everybody = np.repeat(poses[None, :, :2], len(which), axis=0)
     walls = Segments.from_ends(arena.segments_m)
     bodies = everybody, np.full(len(poses), BODY_RADIUS_M)
-    return range_sensors.measure_signals(poses[which, :2], headings, *bodies, walls, arena.circles_m, alpha, beta)
+    sight = range_sensors.Sight(poses[which, :2], headings, *bodies, walls, arena.circles_m)
+    return range_sensors.measure_signals(sight, alpha, beta)
 
 
 @pytest.mark.parametrize("distance_m", [0.03, 0.05, 0.08, 0.10, 0.15, 0.18])

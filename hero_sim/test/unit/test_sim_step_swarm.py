@@ -123,6 +123,24 @@ def test_robots_and_places_are_those_of_the_command_line():
     assert swarm.rows.world.errors.servo_center_us[1, 0] == 1540.0
 
 
+@pytest.mark.parametrize("wifi", ["ideal", "hotspot"])
+def test_hero_plus_beside_a_stock_robot_drives_and_measures_ahead(wifi):
+    options = {"perfect": True, "error": ["slip=0"], "model": ["hero_plus,robot=1"]}
+    swarm = StepSwarm(2, arena="empty", wifi=wifi, worlds=2, **options)
+    assert swarm.rows.distance_rows.tolist() == [1, 3]
+    starts, seen_m = [robot.true_pose for robot in swarm], [world[1].distance for world in swarm.worlds]
+    for robot in swarm:
+        robot.forward(0.15)
+    swarm.sleep(0.5)
+    for robot, start in zip(swarm, starts):
+        x_m, y_m = robot.true_pose[0] - start[0], robot.true_pose[1] - start[1]
+        assert math.hypot(x_m, y_m) == pytest.approx(robot.pose.x_m, rel=0.01)
+        assert robot.pose.x_m == pytest.approx(0.15, abs=0.01)
+    assert [world[1].distance + 0.15 for world in swarm.worlds] == pytest.approx(seen_m, abs=0.03)
+    with pytest.raises(StaleDataError, match="no message on /hero_0/distance"):
+        swarm[0].distance  # noqa: B018
+
+
 def test_proximity_begins_ahead_and_goes_round_to_the_left():
     swarm = StepSwarm(6, arena=CORNER_ARENA)
     robot = swarm[CORNERED]

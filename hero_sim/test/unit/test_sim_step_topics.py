@@ -7,16 +7,18 @@ import pytest
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
+from std_msgs.msg import Float32
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
 from hero_node.geometry import yaw_of
-from hero_sim.stepped.ros_messages import LASER_SCAN, MARKER_ARRAY, ODOMETRY, TF_MESSAGE, TWIST
+from hero_sim.stepped.ros_messages import FLOAT, LASER_SCAN, MARKER_ARRAY, ODOMETRY, TF_MESSAGE, TWIST
 from hero_sim.stepped.swarm import StepSwarm
 from hero_sim.stepped.topics import ARENA, MARKERS, OBJECTS, StepTopics
 
 CLASSES = {kind.name: message for kind, message in (
-    (LASER_SCAN, LaserScan), (MARKER_ARRAY, MarkerArray), (ODOMETRY, Odometry), (TF_MESSAGE, TFMessage), (TWIST, Twist)
+    (LASER_SCAN, LaserScan), (MARKER_ARRAY, MarkerArray), (ODOMETRY, Odometry), (TF_MESSAGE, TFMessage), (TWIST, Twist),
+    (FLOAT, Float32),
 )}  # fmt: skip
 
 
@@ -43,7 +45,10 @@ def fields(definition):
     return sorted(line for line in lines if line)
 
 
-@pytest.mark.parametrize("kind", [LASER_SCAN, MARKER_ARRAY, ODOMETRY, TF_MESSAGE, TWIST], ids=lambda kind: kind.name)
+TYPES = [FLOAT, LASER_SCAN, MARKER_ARRAY, ODOMETRY, TF_MESSAGE, TWIST]
+
+
+@pytest.mark.parametrize("kind", TYPES, ids=lambda kind: kind.name)
 def test_types_are_those_of_ros(kind):
     message = CLASSES[kind.name]
     assert (kind.name, kind.md5) == (message._type, message._md5sum)
@@ -69,6 +74,15 @@ def test_a_command_is_sent_when_it_changes():
     (command,) = messages["/hero_4/cmd_vel"]
     assert (command.linear.x, command.angular.z) == (0.1, 0.5)
     assert "/hero_5/cmd_vel" not in messages
+
+
+def test_distances_are_sent_for_robots_that_measure_them():
+    swarm, topics, messages = drive(model=["hero_plus,robot=5"])
+    assert "/hero_4/distance" not in topics.types
+    assert len(messages["/hero_5/distance"]) == 21  # at 0, 50, ..., 1000 ms
+    assert messages["/hero_5/distance"][-1].data == pytest.approx(swarm[5].distance)
+    marker = messages[MARKERS][-1].markers
+    assert sorted({round(found.scale.x, 4) for found in marker if found.type == Marker.CYLINDER}) == [0.0737, 0.12]
 
 
 def test_ranges_are_in_the_order_of_the_topic_and_by_rep_117():

@@ -15,6 +15,7 @@ from hero_driver.commands.velocity_shaper import (
     check_twist,
 )
 from hero_driver.corrections.message_layouts import make_proximity
+from hero_driver.corrections.robot_models import PLUS_WHEELS
 from hero_driver.corrections.tick_odometry import TickOdometry, WheelGeometry
 from hero_driver.rosserial import packets, payloads
 from hero_node.geometry import Pose
@@ -23,9 +24,10 @@ from hero_sim.robot.commands import CommandTable
 from hero_sim.robot.firmware import Firmware
 from hero_sim.robot.flash import Flash
 from hero_sim.robot.messages import LaserMessages
+from hero_sim.robot.models import HERO, MODELS
 from hero_sim.robot.motor_control import MotorControl
 from hero_sim.robot.ranges import calibrate, convert_to_ranges
-from hero_sim.robot.sensing import Sensing
+from hero_sim.robot.sensing import DISTANCE_MS, Sensing
 from hero_sim.robot.servo_pins import CORE_2, ServoPins
 from hero_sim.stepped.proximity import correct_ranges, measure_ranges
 from hero_sim.stepped.robot_rows import RobotRows
@@ -55,24 +57,26 @@ def read_proximity(laser_payload):
 class ScalarRobot:
     """One robot of the parts that the simulator behind sockets is made of, and its half of the driver."""
 
-    def __init__(self, world, index):
+    def __init__(self, world, index, model):
         name, errors = "hero_%d" % index, world.errors
         body = Body(world, index)
         calibration = calibrate(errors.alpha_counts_m2[index], errors.beta_counts[index])
         self.flash = flash = Flash(calibration.tolist(), np.rint(errors.servo_center_us[index]).tolist())
-        self.sensing = Sensing(name, body, False, flash)
+        self.sensing = Sensing(name, body, False, flash, model)
         rng = np.random.RandomState(0)
         self.motors = MotorControl(
             name, body, self.sensing.odometry, flash, ServoPins(CORE_2), rng, lambda text: None
         )
-        self.table = CommandTable(name, self.sensing, self.motors, flash, lambda text: None, pytest.fail)
+        self.table = CommandTable(name, self.sensing, self.motors, flash, lambda text: None, pytest.fail, model)
+        self.model, self.own_ids = model, model.own_ids
         self.shapers = {
             topic_id: VelocityShaper(STOP_PAYLOADS[kind], round(COMMAND_INTERVAL_S * 1000))
             for topic_id, kind in SHAPED_TYPES.items()
         }
-        self.odometry = TickOdometry(WheelGeometry())
+        self.odometry = TickOdometry(PLUS_WHEELS if model.measures_distance else WheelGeometry())
         self.inbox = []
         self.ticks = (0.0, 0.0)
+        self.distance_m = math.nan
 
     def offer(self, now_ms, topic_id, payload):
         if SHAPED_TYPES[topic_id] == "geometry_msgs/Twist":
@@ -101,13 +105,19 @@ class ScalarRobot:
 
     def run_cycle(self, now_ms):
         for packet in packets.PacketReader().receive_bytes(self.sensing.run_cycle(READY_MS + now_ms, now_ms, (0, 0))):
-            if packet.topic_id == ids.ID_LASER:
+            if packet.topic_id == self.own_ids[ids.ID_LASER]:
                 header = len(packet.payload) - struct.calcsize("<7fI16fI16f")
                 self.counts = struct.unpack_from("<16f", packet.payload, header + 28 + 4 + 64 + 4)[::2]
                 self.proximity = read_proximity(packet.payload)
-            elif packet.topic_id == ids.ID_ENCODER:
-                self.ticks = struct.unpack_from("<2d", packet.payload, len(packet.payload) - 88)
+            elif packet.topic_id == self.own_ids[ids.ID_ENCODER]:
+                (frame_length,) = struct.unpack_from("<I", packet.payload, 12)
+                self.ticks = struct.unpack_from("<2d", packet.payload, 16 + frame_length)
                 self.odometry.integrate(*self.ticks, now_ms / 1000.0)
+
+    def measure_distance(self, now_ms):
+        if self.model.measures_distance and now_ms % DISTANCE_MS == 0:
+            packet = self.sensing.measure_distance(READY_MS + now_ms)
+            (self.distance_m,) = struct.unpack_from("<f", packet, len(packet) - 5)
 
     def run_motors(self, now_ms, control):
         motors = self.motors.motors
@@ -118,10 +128,10 @@ class ScalarRobot:
 class ScalarRobots:
     """The same robots, world and timers as RobotRows; what may differ is every rule."""
 
-    def __init__(self, world):
+    def __init__(self, world, models):
         self.world = world
         self.now_ms = -1
-        self.robots = [ScalarRobot(world, index) for index in range(len(world.poses))]
+        self.robots = [ScalarRobot(world, index, model) for index, model in enumerate(models)]
         for robot in self.robots:
             robot.sensing.begin(READY_MS)
         self._control_ms, self._read_ms = 9, 50
@@ -151,6 +161,8 @@ class ScalarRobots:
             self._control_ms += 21 * control
             for robot in self.robots:
                 robot.run_motors(now_ms, control)
+        for robot in self.robots:
+            robot.measure_distance(now_ms)
         if now_ms == self._read_ms:
             self._read_ms += 51
             for robot in self.robots:
@@ -166,6 +178,7 @@ def compare(rows, scalar):
     np.testing.assert_array_equal(rows.ticks, [robot.ticks for robot in robots])
     np.testing.assert_array_equal(rows.counts, [robot.counts for robot in robots])
     np.testing.assert_array_equal(rows.proximity_m, [robot.proximity for robot in robots])
+    np.testing.assert_array_equal(rows.distance_m.astype(np.float32), [robot.distance_m for robot in robots])
     odometry = [robot.odometry for robot in robots]
     poses = [(each.x_m, each.y_m, math.remainder(each.yaw_rad, math.tau)) for each in odometry]
     np.testing.assert_allclose(rows.odometry, poses, rtol=0, atol=1e-6)
@@ -215,7 +228,9 @@ def act_at_random(rng, rows, scalar):
 @pytest.mark.parametrize("seed", range(4))
 def test_robot_rows_do_what_the_scalar_robots_and_the_driver_do(seed):
     rng = np.random.RandomState(seed)
-    rows, scalar = RobotRows(build_world(3, seed)), ScalarRobots(build_world(3, seed))
+    models = [HERO, MODELS["hero_plus"], HERO] if seed % 2 else [HERO] * 3
+    rows = RobotRows(build_world(3, seed, models=models), models=models)
+    scalar = ScalarRobots(build_world(3, seed, models=models), models)
     while rows.now_ms < 12000:
         for each in (rows, scalar):
             each.advance(rows.now_ms)

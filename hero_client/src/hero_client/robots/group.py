@@ -1,15 +1,20 @@
 """Common base of robot and swarm: a robot is a group of one. Pure."""
 
 import math
+from contextlib import suppress
 from numbers import Real
-from typing import Optional, Protocol, Sequence, TypeVar
+from operator import index
+from typing import Optional, Protocol, Sequence, SupportsIndex, TypeVar
 
 from hero_node.clock import Clock
 
 from ..values.background_motion import SEND_TIME_S, BackgroundMotion, FullWait, Sleep, Steps, run_steps
 from ..values.errors import RobotNotReadyError
 
-__all__ = ["POLL_PERIOD_S", "READY_TIMEOUT_S", "REPEAT_PERIOD_S", "Group", "Member", "stop_after", "wait_for_all"]
+__all__ = [
+    "POLL_PERIOD_S", "READY_TIMEOUT_S", "REPEAT_PERIOD_S", "Group", "Member", "check_robot_id", "stop_after",
+    "wait_for_all",
+]  # fmt: skip
 
 REPEAT_PERIOD_S = 0.1
 """Between the commands of a motion: well within the robot's watchdog of about 2 s."""
@@ -26,6 +31,15 @@ ROUNDING_S = 1e-6
 NAMES_SHOWN = 10
 
 Self = TypeVar("Self", bound="Group")
+
+
+def check_robot_id(robot_id: SupportsIndex) -> int:
+    """Return the number, also one of numpy, as int. Raises: ValueError for one that no robot can have."""
+    with suppress(TypeError):
+        number = index(robot_id)
+        if number >= 0 and not isinstance(robot_id, bool):
+            return number
+    raise ValueError("a robot is named by its number, 0 or more, not by %r" % (robot_id,))
 
 
 class Member(Protocol):

@@ -7,8 +7,7 @@ front, y to the left, angles counter-clockwise from the front.
 import math
 from contextlib import suppress
 from functools import partial
-from operator import index
-from typing import Callable, Generator, List, Optional, SupportsIndex, Tuple
+from typing import Callable, Generator, List, Optional, Tuple
 
 from hero_node.geometry import Pose, Velocity, clamp, transform_pose, wrap_angle
 from hero_node.number_checks import check_finite, check_speed
@@ -26,7 +25,7 @@ from .group import POLL_PERIOD_S, READY_TIMEOUT_S, REPEAT_PERIOD_S, Group, stop_
 from .light import Light
 from .robot_link import RobotLink
 
-__all__ = ["BaseRobot", "check_robot_id"]
+__all__ = ["BaseRobot"]
 
 NEXT_ODOM_S = 5.0
 """The next odometry comes within 0.1 s, on a busy machine within a second."""
@@ -37,15 +36,6 @@ COMMAND_S = 2.0
 """For so long a robot obeys a command that no other follows."""
 
 OnStep = Callable[[GoToGoalController], None]
-
-
-def check_robot_id(robot_id: SupportsIndex) -> int:
-    """Return the number, also one of numpy, as int. Raises: ValueError for one that no robot can have."""
-    with suppress(TypeError):
-        number = index(robot_id)
-        if number >= 0 and not isinstance(robot_id, bool):
-            return number
-    raise ValueError("a robot is named by its number, 0 or more, not by %r" % (robot_id,))
 
 
 class BaseRobot(Group):
@@ -166,6 +156,15 @@ class BaseRobot(Group):
         """
         self._check_asked("laser")
         return self._link.read_infrared_counts()
+
+    @property
+    def distance(self) -> float:
+        """What HeRo+'s sensor measures ahead, in m from the robot's center; it sees 0.04 to 2.9 m.
+
+        The first use waits up to 5 s. Raises: StaleDataError if it is older than 1 s, as on a robot without the sensor.
+        """
+        self._check_asked("distance")
+        return self._link.read_distance()
 
     @property
     def neighbors(self) -> List[Neighbor]:

@@ -15,7 +15,8 @@ MAP = "map"
 
 
 class RobotLink(Protocol):
-    """One robot. Topics go by their names: "odom", "proximity", "encoder", "laser", "neighbors"."""
+    """One robot. Topics go by their names: "odom", "proximity", "encoder", "laser", "neighbors",
+    "distance"."""
 
     @property
     def clock(self) -> Clock:
@@ -50,6 +51,9 @@ class RobotLink(Protocol):
 
     def read_infrared_counts(self) -> List[float]:
         """Return the newest counts of the infrared sensors, of which there are some: see Robot.infrared_counts."""
+
+    def read_distance(self) -> float:
+        """Return the newest distance ahead, of which there is one: see Robot.distance."""
 
     def read_neighbors(self) -> List[Neighbor]:
         """Return the newest neighbors, of which there is a message. Raises: StaleDataError without a fresh own pose."""

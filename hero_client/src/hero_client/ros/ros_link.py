@@ -8,7 +8,7 @@ import rospy
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, LaserScan
-from std_msgs.msg import ColorRGBA
+from std_msgs.msg import ColorRGBA, Float32
 
 from hero_msgs.msg import Encoder, Neighbors
 from hero_msgs.srv import SetOdom
@@ -43,6 +43,7 @@ MESSAGE_CLASSES = {
     "encoder": Encoder,
     "imu": Imu,
     "neighbors": Neighbors,
+    "distance": Float32,
 }
 
 
@@ -146,6 +147,10 @@ class RosLink:
         """See RobotLink."""
         counts = [float(count) for count in self.messages.read("laser").intensities[::2]]  # the others are averages
         return counts[len(counts) // 2 :] + counts[: len(counts) // 2]
+
+    def read_distance(self) -> float:
+        """See RobotLink."""
+        return float(self.messages.read("distance").data)
 
     def read_neighbors(self) -> List[Neighbor]:
         """See RobotLink."""

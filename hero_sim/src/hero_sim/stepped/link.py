@@ -1,5 +1,6 @@
 """A robot that is stepped in process, as a BaseRobot needs it: see hero_client.robots.robot_link. Pure."""
 
+import math
 import sys
 from typing import Callable, List, Optional, Tuple
 
@@ -43,6 +44,7 @@ class StepLink:
         self._arrivals_ms = {
             **dict.fromkeys(("odom", "encoder", "neighbors"), rows.odometry_ms),
             **dict.fromkeys(("proximity", "laser"), rows.scan_ms),
+            "distance": rows.distance_ms,
         }
         self._origin = self.true_pose
         self.localize: Callable[[], Pose] = lambda: self.true_pose
@@ -64,8 +66,8 @@ class StepLink:
 
     def age_s(self, topic: str) -> float:
         """See RobotLink."""
-        rows = self._rows
-        return (rows.now_ms - self._arrivals_ms[topic].item(self.row)) / 1000.0
+        arrival_ms = self._arrivals_ms[topic].item(self.row)
+        return math.inf if arrival_ms < 0 else (self._rows.now_ms - arrival_ms) / 1000.0
 
     def wait_for_next(self, topic: str, timeout_s: float, count: int = 1) -> None:
         """See RobotLink."""
@@ -95,6 +97,10 @@ class StepLink:
         """See RobotLink."""
         counts: List[float] = np.roll(self._rows.counts[self.row], 4).tolist()
         return counts
+
+    def read_distance(self) -> float:
+        """See RobotLink."""
+        return float(self._rows.distance_m[self.row])
 
     def read_neighbors(self) -> List[Neighbor]:
         """See RobotLink; all robots of the same world are sensed, where they are."""

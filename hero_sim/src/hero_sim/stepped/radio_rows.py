@@ -6,22 +6,21 @@ Pure. The only loops over robots in a step are here, since each robot has a conn
 import heapq
 import itertools
 import math
-from typing import Dict, List, NamedTuple, Sequence, Tuple
+from typing import Collection, Dict, List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
 from ..link.wifi import Radio
 from .command_shaper import Sent
-from .readings import Readings
+from .readings import DISTANCE, SCAN, WHEELS, Readings
 
 __all__ = ["Arrival", "RadioRows"]
 
-CYCLE_LENGTH = 1469
-"""Bytes of an odometry, five transforms and an encoder reading."""
+LENGTHS = {WHEELS: 1469, SCAN: 205, DISTANCE: 12}
+"""Bytes of an odometry, five transforms and an encoder reading; of a scan; of a distance."""
 
-SCAN_LENGTH = 205
 COMMAND_LENGTH = 56
-"""Bytes of a scan, and of a Twist (servo pulses have fewer)."""
+"""Bytes of a Twist (servo pulses have fewer)."""
 
 _NEVER_MS = 2**62
 
@@ -32,12 +31,12 @@ class Arrival(NamedTuple):
     Attributes:
         readings: of all robots, as they were sent.
         rows: from which robots (K,).
-        has_scan: whether they include a scan.
+        parts: which of them.
     """
 
     readings: Readings
     rows: np.ndarray
-    has_scan: bool
+    parts: Collection[str]
 
 
 class RadioRows:
@@ -51,24 +50,24 @@ class RadioRows:
         """Take the radio of each robot."""
         self._radios = radios
         self._order = itertools.count()
-        self._up: List[Tuple[int, int, int, Readings, bool]] = []
+        self._up: List[Tuple[int, int, int, Readings, Collection[str]]] = []
         self._down: Dict[int, List[Tuple[int, int, int, Tuple[float, float]]]] = {}
         self.due_ms = _NEVER_MS
 
-    def send_readings(self, now_ms: int, readings: Readings, has_scan: bool) -> None:
-        """Send the readings of all robots, which must not change any more."""
-        length = CYCLE_LENGTH + SCAN_LENGTH * has_scan
-        for row, radio in enumerate(self._radios):
-            arrival_ms = math.ceil(radio.up.send(now_ms, length))
-            heapq.heappush(self._up, (arrival_ms, next(self._order), row, readings, has_scan))
+    def send_readings(self, now_ms: int, readings: Readings, rows: np.ndarray, parts: Collection[str]) -> None:
+        """Send parts of the readings of the robots at rows, which must not change any more."""
+        length = sum(LENGTHS[part] for part in parts)
+        for row in rows.tolist():
+            arrival_ms = math.ceil(self._radios[row].up.send(now_ms, length))
+            heapq.heappush(self._up, (arrival_ms, next(self._order), row, readings, parts))
         self.due_ms = self._up[0][0]
 
     def receive_readings(self, now_ms: int) -> List[Arrival]:
         """Return what has arrived by now, in order."""
         arrivals = []
         while self._up and self._up[0][0] <= now_ms:
-            _, _, row, readings, has_scan = heapq.heappop(self._up)
-            arrivals.append(Arrival(readings, np.array([row]), has_scan))
+            _, _, row, readings, parts = heapq.heappop(self._up)
+            arrivals.append(Arrival(readings, np.array([row]), parts))
         self.due_ms = self._up[0][0] if self._up else _NEVER_MS
         return arrivals
 

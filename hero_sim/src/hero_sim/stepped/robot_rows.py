@@ -5,25 +5,27 @@ timers, which depend on the time alone, so that a world of a batch gives what it
 boot, self-tuning, the IMU hat, faults, and the time for which a command or a servo pulse (of core 3) blocks its loop.
 """
 
-from typing import Callable, List, Optional, Sequence
+from typing import Callable, Collection, List, Optional, Sequence
 
 import numpy as np
 
+from hero_driver.corrections.robot_models import PLUS_WHEELS
+from hero_driver.corrections.tick_odometry import WheelGeometry
 from hero_driver.robot_constants import SERVO_CENTER_US
 
 from ..link.wifi import Radio
 from ..robot.firmware import SPIN_MS
+from ..robot.models import HERO, RobotModel
 from ..robot.motor_control import CONTROL_MS
 from ..robot.motor_pid import POSITION_GAINS, VELOCITY_GAINS
 from ..robot.ranges import calibrate
-from ..robot.sensing import CYCLE_MS, LASER_GATE_MS, LASER_READ_MS
+from ..robot.sensing import CYCLE_MS, DISTANCE_MS, LASER_GATE_MS, LASER_READ_MS
 from ..robot_constants import (
     LED_WATCHDOG_MS,
     MAX_ANGULAR_RAD_S,
     MAX_LINEAR_M_S,
     POSITION_LIMIT_US,
     POSITION_WATCHDOG_MS,
-    TICK_M,
     VELOCITY_LIMIT_US,
     VELOCITY_WATCHDOG_MS,
 )
@@ -32,7 +34,7 @@ from ..world.world import STEP_MS, View, World
 from .command_shaper import CommandShaper, Rows, Values
 from .proximity import correct_ranges, measure_ranges
 from .radio_rows import RadioRows
-from .readings import Readings
+from .readings import DISTANCE, SCAN, WHEELS, Readings
 from .servo_pulses import ServoPulses
 from .tick_odometry import TickOdometryRows
 from .wheel_controllers import WheelControllers
@@ -41,6 +43,7 @@ from .wheel_encoders import WheelEncoders
 __all__ = ["Hook", "RobotRows"]
 
 _LIMITS = np.array([[MAX_LINEAR_M_S], [MAX_ANGULAR_RAD_S]])
+_NEVER_MS = 2**62
 
 Hook = Callable[[np.ndarray], None]
 """Called with the rows (K,) of the robots whose data the program has just received."""
@@ -65,16 +68,20 @@ class RobotRows:
         ticks: of both wheels since the odometry was last set (R, 2), whole numbers, read every 34 ms.
         odometry_ms: when the program received these (R,).
         scan_ms: when the program received these (R,), every 205 ms.
+        distance_rows: of those that have a distance sensor.
+        distance_ms: when the program received the distance (R,), every 50 ms.
         commands: the velocity that was sent last, linear m/s and angular rad/s (R, 2).
-        on_cycle, on_scan: called when the program has received odometry and ticks, and ranges.
+        on_cycle, on_scan, on_distance: called when the program has received odometry and ticks, ranges, distances.
     """
 
-    def __init__(self, world: World, radios: Sequence[Radio] = ()) -> None:
+    def __init__(self, world: World, radios: Sequence[Radio] = (), models: Sequence[RobotModel] = ()) -> None:
         """Take the robots of world, which are at rest, from the world's time on; first readings are there at once.
 
-        radios: the Wi-Fi of each robot; without, readings and commands arrive at once.
+        radios: the Wi-Fi of each robot; without, readings and commands arrive at once. models: of each robot, whose
+        bodies are in the world already; without, all are stock robots.
         """
         rows = len(world.poses)
+        models = models or [HERO] * rows
         self.world = world
         self.now_ms = now_ms = world.time_ms
         self._radios = RadioRows(radios)
@@ -83,16 +90,21 @@ class RobotRows:
         self._received = received = self._measured if self._is_ideal else Readings(rows)
         self.on_cycle: List[Hook] = []
         self.on_scan: List[Hook] = []
+        self.on_distance: List[Hook] = []
         self._rows = np.arange(rows)
         self._lights = np.zeros((rows, 4), dtype=np.float32)
         self._light_end_ms = np.zeros(rows, dtype=np.int64)
         errors = world.errors
         self._calibration_counts_m2 = calibrate(errors.alpha_counts_m2, errors.beta_counts)
-        self._encoders = WheelEncoders(world)
-        self._odometry = TickOdometryRows(rows)
+        self._encoders = WheelEncoders(world, np.array([model.tick_m for model in models]))
+        wheels = [PLUS_WHEELS if model.measures_distance else WheelGeometry() for model in models]
+        self._odometry = TickOdometryRows(wheels)
         self.ticks, self.odometry_ms = received.ticks, received.odometry_ms
-        self.scan_ms = received.scan_ms
+        self.scan_ms, self.distance_ms = received.scan_ms, received.distance_ms
         self._view: Optional[View] = None  # of the newest scan, until it is read
+        self.distance_rows = np.array([model.measures_distance for model in models]).nonzero()[0]
+        self._distance_view: Optional[View] = None
+        self._distance_due_ms = now_ms if len(self.distance_rows) else _NEVER_MS
         self._servos = ServoPulses(world, np.rint(errors.servo_center_us.T))
         self._velocity = WheelControllers(rows, VELOCITY_GAINS, VELOCITY_LIMIT_US, VELOCITY_WATCHDOG_MS)
         self._position = WheelControllers(rows, POSITION_GAINS, POSITION_LIMIT_US, POSITION_WATCHDOG_MS)
@@ -109,8 +121,7 @@ class RobotRows:
         self._cycle_ms = now_ms
         self._scanned_ms = now_ms - LASER_GATE_MS - 1
         self._measure(now_ms)
-        received.receive_odometry(self._measured, self._rows, now_ms)
-        received.receive_scan(self._measured, self._rows, now_ms)
+        received.receive(self._measured, self._rows, now_ms, (WHEELS, SCAN))
         # The first read is that of a robot that was configured a millisecond before its first cycle; a controller that
         # is commanded in it runs a millisecond later.
         self._read_ms = now_ms + SPIN_MS - 1
@@ -184,6 +195,11 @@ class RobotRows:
         return self._read_scan().proximity_m
 
     @property
+    def distance_m(self) -> np.ndarray:
+        """What HeRo+'s sensor measures ahead of the robot's center (R,), nan without. Ask anew after advance()."""
+        return self._read_distance().distance_m
+
+    @property
     def ranges_m(self) -> np.ndarray:
         """Ranges of the eight sensors (R, 8) as in /laser, rear first."""
         return self._read_scan().ranges_m
@@ -201,7 +217,9 @@ class RobotRows:
             raise ValueError("it is %d ms already, later than %d ms" % (self.now_ms, until_ms))
         world, servos, radios = self.world, self._servos, self._radios
         while True:
-            now_ms = min(self._cycle_ms, self._control_ms, self._read_ms, servos.check_ms, radios.due_ms)
+            now_ms = min(
+                self._cycle_ms, self._distance_due_ms, self._control_ms, self._read_ms, servos.check_ms, radios.due_ms
+            )
             while world.time_ms + STEP_MS < min(now_ms, until_ms + 1):
                 world.step()
             if now_ms > until_ms:
@@ -213,6 +231,8 @@ class RobotRows:
                 self._run_cycle(now_ms)
                 # Sending a cycle takes about a millisecond; controllers that are due wait for it.
                 self._control_ms = max(self._control_ms, now_ms + 1)
+            if now_ms >= self._distance_due_ms:
+                self._measure_distance(now_ms)
             if now_ms >= self._control_ms:
                 self._run_controllers(now_ms)
             if now_ms >= servos.check_ms:
@@ -226,12 +246,32 @@ class RobotRows:
     def _run_cycle(self, now_ms: int) -> None:
         """Send the robots' readings."""
         has_scan = self._measure(now_ms)
-        if self._is_ideal:
-            self._call_hooks(self._rows, has_scan)
-        else:
+        parts = (WHEELS, SCAN) if has_scan else (WHEELS,)
+        if not self._is_ideal:
             self._measured.odometry = self._odometry.poses.T
             self._measured.velocities = self._odometry.measure_velocities().T
-            self._radios.send_readings(now_ms, self._measured.copy(), has_scan)
+        self._send(now_ms, self._rows, parts)
+
+    def _send(self, now_ms: int, rows: np.ndarray, parts: Collection[str]) -> None:
+        if self._is_ideal:
+            self._call_hooks(rows, parts)
+        else:
+            self._radios.send_readings(now_ms, self._measured.copy(), rows, parts)
+
+    def _measure_distance(self, now_ms: int) -> None:
+        self._distance_due_ms = now_ms + DISTANCE_MS
+        self._distance_view = self.world.observe()
+        self._measured.distance_ms[self.distance_rows] = now_ms
+        if not self._is_ideal:
+            self._read_distance()
+        self._send(now_ms, self.distance_rows, (DISTANCE,))
+
+    def _read_distance(self) -> Readings:
+        if self._distance_view is not None:
+            rows, view = self.distance_rows, self._distance_view
+            self._measured.distance_m[rows] = self.world.read_distances(rows, view)
+            self._distance_view = None
+        return self._received
 
     def _measure(self, now_ms: int) -> bool:
         """Read the encoders, and the infrared sensors if their gate is open; return whether it was."""
@@ -263,17 +303,14 @@ class RobotRows:
         return self._received
 
     def _receive_readings(self, now_ms: int) -> None:
-        for readings, rows, has_scan in self._radios.receive_readings(now_ms):
-            self._received.receive_odometry(readings, rows, now_ms)
-            if has_scan:
-                self._received.receive_scan(readings, rows, now_ms)
-            self._call_hooks(rows, has_scan)
+        for readings, rows, parts in self._radios.receive_readings(now_ms):
+            self._received.receive(readings, rows, now_ms, parts)
+            self._call_hooks(rows, parts)
 
-    def _call_hooks(self, rows: np.ndarray, has_scan: bool) -> None:
-        for hook in self.on_cycle:
-            hook(rows)
-        for hook in self.on_scan if has_scan else ():
-            hook(rows)
+    def _call_hooks(self, rows: np.ndarray, parts: Collection[str]) -> None:
+        for part, hooks in ((WHEELS, self.on_cycle), (SCAN, self.on_scan), (DISTANCE, self.on_distance)):
+            for hook in hooks if part in parts else ():
+                hook(rows)
 
     def _run_controllers(self, now_ms: int) -> None:
         self._control_ms = now_ms + CONTROL_MS
@@ -309,7 +346,8 @@ class RobotRows:
         accepted = self._position.find_accepted(now_ms, rows)
         rows = rows[accepted]
         self._start_ticks[:, rows] = self._encoders.count(now_ms)[:, rows]
-        self._command(self._position, now_ms, rows, _limit_to_wheels(values[:, accepted]) / TICK_M)
+        targets = _limit_to_wheels(values[:, accepted]) / self._encoders.tick_m[rows]
+        self._command(self._position, now_ms, rows, targets)
 
     def _command(self, controller: WheelControllers, now_ms: int, rows: np.ndarray, targets: np.ndarray) -> None:
         stopped = controller.command(now_ms, rows, targets)

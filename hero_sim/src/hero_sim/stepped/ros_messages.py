@@ -12,8 +12,8 @@ from hero_node.geometry import Pose
 from ..scene import Shape
 
 __all__ = [
-    "LASER_SCAN", "MARKER_ARRAY", "ODOMETRY", "TF_MESSAGE", "TWIST", "MessageType", "encode_markers", "encode_odometry",
-    "encode_scan", "encode_transforms", "encode_twist",
+    "FLOAT", "LASER_SCAN", "MARKER_ARRAY", "ODOMETRY", "TF_MESSAGE", "TWIST", "MessageType", "encode_markers",
+    "encode_odometry", "encode_scan", "encode_transforms", "encode_twist",
 ]  # fmt: skip
 
 
@@ -70,6 +70,7 @@ LASER_SCAN = _define(
     "float32 scan_time\nfloat32 range_min\nfloat32 range_max\nfloat32[] ranges\nfloat32[] intensities",
     "std_msgs/Header",
 )
+FLOAT = _define("std_msgs/Float32", "73fcbf46b49191e672908e50842a83d4", "float32 data")
 TWIST = _define(
     "geometry_msgs/Twist",
     "9f195f881246fdfa2798d1d3eebca84a",

@@ -20,6 +20,7 @@ from hero_node.command_line import say
 from ..errors import OptionError
 from ..link.wifi import PROFILES
 from ..population import build_radios, build_world, check_population
+from ..robot.models import parse_models
 from .robot import StepRobot
 from .robot_rows import RobotRows
 from .step_clock import StepClock, StepMotion
@@ -80,6 +81,7 @@ class StepSwarm(StepWorld):
         first_id: int = 0,
         worlds: int = 1,
         error: Sequence[str] = (),
+        model: Sequence[str] = (),
     ) -> None:
         """Switch on count robots in each world; the options are those of the simulator's command line.
 
@@ -94,12 +96,14 @@ class StepSwarm(StepWorld):
             first_id=first_id,
             errors=None,
             error=list(error),
-            model=[],
+            model=list(model),
         )
         check_population(options, worlds)
         if wifi not in PROFILES:
             raise OptionError("--wifi %r: must be one of %s" % (wifi, ", ".join(PROFILES)))
-        self.rows = RobotRows(build_world(options, worlds), () if wifi == IDEAL else build_radios(options, worlds))
+        radios = () if wifi == IDEAL else build_radios(options, worlds)
+        models = parse_models(options.model, first_id, count) * worlds
+        self.rows = RobotRows(build_world(options, worlds), radios, models)
         clock = StepClock(self.rows)
         robots = [StepRobot(first_id + row % count, clock, row) for row in range(count * worlds)]
         super().__init__(robots, clock)

@@ -5,13 +5,12 @@ kept as an angle and as its cosine and sine, which give the same bytes on every 
 """
 
 import math
-from typing import List, Optional
+from typing import List, Optional, Sequence
 
 import numpy as np
 
-from hero_driver.corrections.tick_odometry import TWIST_WINDOW
+from hero_driver.corrections.tick_odometry import TWIST_WINDOW, WheelGeometry
 
-from ..robot_constants import TICK_M
 from ..world.kinematics import find_heading, follow_arcs, join_wheels
 
 __all__ = ["TickOdometryRows"]
@@ -24,8 +23,11 @@ _MAX_WAITING = 32
 class TickOdometryRows:
     """The odometry of all robots; it is computed when it is read, from several readings at once."""
 
-    def __init__(self, rows: int) -> None:
-        """Begin at the origin, without a reading."""
+    def __init__(self, wheels: Sequence[WheelGeometry]) -> None:
+        """Begin at the origin, without a reading; wheels of each robot, the left like the right."""
+        rows = len(wheels)
+        self._tick_m = np.array([geometry.ticks_m[0] for geometry in wheels])
+        self._separation_m = np.array([geometry.wheel_separation_m for geometry in wheels])
         self._poses = np.zeros((3, rows))
         self._moved_ticks: List[np.ndarray] = []
         self._headings = np.array((np.ones(rows), np.zeros(rows)))
@@ -68,9 +70,9 @@ class TickOdometryRows:
             self._is_cleared[:] = self._any_cleared = False
 
     def _move(self) -> None:
-        moved_m = np.array(self._moved_ticks) * TICK_M
+        moved_m = np.array(self._moved_ticks) * self._tick_m
         self._moved_ticks.clear()
-        distances_m, turns_rad = join_wheels(moved_m[:, 0], moved_m[:, 1])
+        distances_m, turns_rad = join_wheels(moved_m[:, 0], moved_m[:, 1], self._separation_m)
         ways_m, self._headings[:] = follow_arcs(self._headings, distances_m, turns_rad)
         places_m, yaw_rad = self._poses[:2], self._poses[2]
         for way_m, turn_rad in zip(ways_m, turns_rad):
@@ -87,7 +89,8 @@ class TickOdometryRows:
     def _compute_velocities(self) -> np.ndarray:
         oldest = (self._newest + 1) % TWIST_WINDOW
         elapsed_ms = np.maximum(self._window_ms[self._newest] - self._window_ms[oldest], 1)
-        rolled_m = (self._window_ticks[self._newest] - self._window_ticks[oldest]) * TICK_M
-        velocities = np.array(join_wheels(*(rolled_m / (elapsed_ms / 1000.0))))
+        rolled_m = (self._window_ticks[self._newest] - self._window_ticks[oldest]) * self._tick_m
+        left_m_s, right_m_s = rolled_m / (elapsed_ms / 1000.0)
+        velocities = np.array(join_wheels(left_m_s, right_m_s, self._separation_m))
         velocities[:, self._is_cleared] = 0.0
         return velocities

@@ -4,6 +4,7 @@ Names, types and frames are those of driver and simulator; stamps are simulated 
 """
 
 import math
+import struct
 from typing import Callable, Dict, List, Sequence
 
 import numpy as np
@@ -14,6 +15,7 @@ from hero_node.geometry import Pose, find_frame
 from ..scene import FRAME, START_S, Shape, draw_arena, draw_objects, draw_robot
 from .robot_rows import RobotRows
 from .ros_messages import (
+    FLOAT,
     LASER_SCAN,
     MARKER_ARRAY,
     ODOMETRY,
@@ -62,10 +64,12 @@ class StepTopics:
             MARKERS: MARKER_ARRAY,
             **({OBJECTS: MARKER_ARRAY} if self._has_objects else {}),
         }
-        for name in self._names:
+        for row, name in enumerate(self._names):
             self.types["/%s/odom" % name] = self.types["/%s/ground_truth" % name] = ODOMETRY
             self.types["/%s/proximity" % name] = LASER_SCAN
             self.types["/%s/cmd_vel" % name] = TWIST
+            if row in rows.distance_rows:
+                self.types["/%s/distance" % name] = FLOAT
         origins = [
             (FRAME, name + "/odom", find_frame(true_pose, pose))
             for name, true_pose, pose in zip(self._names, self._true_poses, _list_poses(rows.odometry))
@@ -75,11 +79,13 @@ class StepTopics:
         self._send(ARENA, encode_markers(self._time_ns, FRAME, draw_arena(rows.world.arena)))
         rows.on_cycle.append(self._take_cycle)
         rows.on_scan.append(self._take_scan)
+        rows.on_distance.append(self._take_distance)
 
     def close(self) -> None:
         """Pass nothing more."""
         self._rows.on_cycle.remove(self._take_cycle)
         self._rows.on_scan.remove(self._take_scan)
+        self._rows.on_distance.remove(self._take_distance)
 
     @property
     def _time_ns(self) -> int:
@@ -133,6 +139,12 @@ class StepTopics:
                 name = self._names[row]
                 scan = encode_scan(self._time_ns, name + "/laser_link", ranges_m[row], _LIMITS_M, SCAN_TIME_S)
                 self._send("/%s/proximity" % name, scan)
+
+    def _take_distance(self, rows: np.ndarray) -> None:
+        for row in rows.tolist():
+            if row < len(self._names):
+                distance_m = self._rows.distance_m[row]
+                self._send("/%s/distance" % self._names[row], struct.pack("<f", distance_m))
 
 
 def _list_poses(poses: np.ndarray) -> List[Pose]:

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from ..robot.wheel_odometry import FILTER_FIRST_ERROR, FILTER_PROCESS_NOISE_S_M
-from ..robot_constants import TICK_M
 from ..world.world import World
 from .which import Which, choose
 
@@ -21,15 +20,17 @@ class WheelEncoders:
     Attributes:
         ticks: counts (2, R) since the odometry was last set, as last read.
         filtered_m_s: speeds (2, R) behind the filter, as last read.
+        tick_m: travel per tick (R,) as the firmware computes it.
     """
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: World, tick_m: np.ndarray) -> None:
         """Count from the present travel of the world's wheels, which are at rest."""
+        self.tick_m = tick_m
         self._travels_m, self._speeds_m_s = world.travels_m.T, world.speeds_m_s.T
         self._world = world
         self.ticks = np.zeros_like(self._travels_m)
         self.filtered_m_s = np.zeros_like(self._travels_m)
-        self._base_ticks = np.floor(self._travels_m / TICK_M)
+        self._base_ticks = np.floor(self._travels_m / tick_m)
         self._errors = np.full_like(self._travels_m, FILTER_FIRST_ERROR)
         self._read_at_ms: Any = world.time_ms - 1  # of each robot (R,), or of all
 
@@ -37,7 +38,7 @@ class WheelEncoders:
         """Return the counters (2, R) at now_ms, a time within the running physics step, without reading them."""
         travels_m = self._speeds_m_s * ((now_ms - self._world.time_ms) / 1000.0)
         travels_m += self._travels_m
-        travels_m /= TICK_M
+        travels_m /= self.tick_m
         np.floor(travels_m, out=travels_m)
         travels_m -= self._base_ticks
         return travels_m
@@ -46,7 +47,7 @@ class WheelEncoders:
         """Read the counters and update the filtered speeds of the robots which."""
         ticks = self.count(now_ms)
         speeds_m_s = ticks - self.ticks
-        speeds_m_s *= TICK_M
+        speeds_m_s *= self.tick_m
         speeds_m_s /= (now_ms - self._read_at_ms) / 1000.0
         # A one-dimensional Kalman filter whose process noise grows with each change of its own estimate.
         gains = self._errors + 1.0

@@ -63,7 +63,7 @@ class Body:
 
     def read_distance(self) -> float:
         """Return one noisy reading (m) of the distance sensor ahead, from the robot's center."""
-        return self._world.read_distance(self.index)
+        return float(self._world.read_distances(np.array([self.index]))[0])
 
     def write_pulses(self, left_us: int, right_us: int) -> None:
         """Set the servos' pulses; below its center the left wheel rolls forward."""

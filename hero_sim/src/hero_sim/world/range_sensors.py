@@ -5,6 +5,7 @@ model: measurements published by the robot's authors (signal of a TCRT5000 again
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -111,60 +112,51 @@ class Rays:
         self.cosine[robots[nearest], rays[nearest]] = (depth_m / radius_m)[nearest]
 
 
-def measure_signals(
-    places_m: np.ndarray,
-    headings: np.ndarray,
-    bodies_m: np.ndarray,
-    radii_m: np.ndarray,
-    walls: Segments,
-    circles_m: np.ndarray,
-    alpha_counts_m2: np.ndarray,
-    beta_counts: np.ndarray,
-) -> np.ndarray:
+class Sight(NamedTuple):
+    """What robots with the same walls and obstacles may see.
+
+    Attributes:
+        places_m (K, 2), headings (K, 2): of the robots that look; headings are cosine and sine.
+        bodies_m (K, N, 2): of the robots that each could see, itself among them; radii_m (N,) theirs.
+        walls: all walls.
+        circles_m (C, 3): x, y, radius.
+    """
+
+    places_m: np.ndarray
+    headings: np.ndarray
+    bodies_m: np.ndarray
+    radii_m: np.ndarray
+    walls: Segments
+    circles_m: np.ndarray
+
+
+def measure_signals(sight: Sight, alpha_counts_m2: np.ndarray, beta_counts: np.ndarray) -> np.ndarray:
     """Return the noiseless signal (counts) of the eight sensors of each robot, shape (K, 8).
 
-    places_m (K, 2) and headings (K, 2), cosine and sine, of the robots that look; bodies_m (K, N, 2) the places of
-    the robots that each could see, itself among them, radii_m (N,) theirs; circles_m (C, 3), x y radius;
     alpha_counts_m2 (K, 8) of each sensor, beta_counts (K, 1) of each robot.
     """
-    cosine, sine = headings[:, :1], headings[:, 1:]
+    cosine, sine = sight.headings[:, :1], sight.headings[:, 1:]
     rays = Rays(cosine * _RAYS_X - sine * _RAYS_Y, sine * _RAYS_X + cosine * _RAYS_Y)
-    _meet_all(rays, places_m, bodies_m, radii_m, walls, circles_m)
+    _meet_all(rays, sight)
     distance_m = np.maximum(rays.distance_m - BODY_RADIUS_M, 1e-3)
     bright = rays.cosine / (distance_m * distance_m)
     bright = (bright.reshape(-1, len(_CONE_RAD), BEAMS) * _CONE_WEIGHT).max(axis=1)
     return np.minimum(alpha_counts_m2 * bright + _offset(bright, beta_counts), SATURATION_COUNTS)
 
 
-def measure_distance(
-    place_m: np.ndarray,
-    heading: np.ndarray,
-    bodies_m: np.ndarray,
-    radii_m: np.ndarray,
-    walls: Segments,
-    circles_m: np.ndarray,
-) -> float:
-    """Return how far (m) ahead of the center of the robot at place_m (2,) something is, DISTANCE_REACH_M at most.
-
-    heading (2,), cosine and sine; bodies_m (N, 2) the places of all robots, the others as in measure_signals().
-    """
-    rays = Rays(heading[None, :1], heading[None, 1:], DISTANCE_REACH_M)
-    _meet_all(rays, place_m[None], bodies_m[None], radii_m, walls, circles_m)
-    return min(float(rays.distance_m[0, 0]), DISTANCE_REACH_M)
+def measure_distances(sight: Sight) -> np.ndarray:
+    """Return how far (m) ahead of each robot's center something is (K,), DISTANCE_REACH_M at most."""
+    rays = Rays(sight.headings[:, :1], sight.headings[:, 1:], DISTANCE_REACH_M)
+    _meet_all(rays, sight)
+    return np.minimum(rays.distance_m[:, 0], DISTANCE_REACH_M)
 
 
-def _meet_all(
-    rays: Rays,
-    places_m: np.ndarray,
-    bodies_m: np.ndarray,
-    radii_m: np.ndarray,
-    walls: Segments,
-    circles_m: np.ndarray,
-) -> None:
-    x_m, y_m = places_m[:, :1], places_m[:, 1:]
-    rays.meet_walls(x_m, y_m, walls)
-    rays.meet_circles(bodies_m[..., 0] - x_m, bodies_m[..., 1] - y_m, radii_m)
-    if len(circles_m):
+def _meet_all(rays: Rays, sight: Sight) -> None:
+    x_m, y_m = sight.places_m[:, :1], sight.places_m[:, 1:]
+    rays.meet_walls(x_m, y_m, sight.walls)
+    rays.meet_circles(sight.bodies_m[..., 0] - x_m, sight.bodies_m[..., 1] - y_m, sight.radii_m)
+    if len(sight.circles_m):
+        circles_m = sight.circles_m
         rays.meet_circles(circles_m[:, 0] - x_m, circles_m[:, 1] - y_m, circles_m[:, 2])
 
 

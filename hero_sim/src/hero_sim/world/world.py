@@ -7,7 +7,7 @@ only operations that IEEE 754 defines to the last bit, and random numbers are ro
 which the differences between mathematical libraries vanish.
 """
 
-from typing import List, NamedTuple, Optional, Sequence, Tuple, Union
+from typing import Iterator, List, NamedTuple, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
@@ -22,7 +22,8 @@ from .range_sensors import (
     DISTANCE_NOISE_M,
     DISTANCE_REACH_M,
     NOISE_COUNTS,
-    measure_distance,
+    Sight,
+    measure_distances,
     measure_signals,
 )
 from .robot_errors import MAX_WHEEL_M_S, SERVO_GAIN_M_S_US, RobotErrors
@@ -219,44 +220,39 @@ class World:
         which (K,): rows in ascending order, at least one. view: when it was taken; None for now.
         """
         view = self.observe() if view is None else view
-        parts = [which[start : start + _SCAN_ROWS] for start in range(0, len(which), _SCAN_ROWS)]
-        signals = np.concatenate([self._measure_signals(part, view) for part in parts])
-        # Each world draws for its own robots.
-        counts = np.bincount(which // self._robots, minlength=self.worlds)
-        noise = [self._draw_scan_noise(world, view, counts[world]) for world in counts.nonzero()[0].tolist()]
-        counts_read = np.rint(signals + np.concatenate(noise) * NOISE_COUNTS)
+        alpha_counts_m2, beta_counts = self.errors.alpha_counts_m2, self.errors.beta_counts
+        looks = self._look(which, view)
+        seen = [measure_signals(sight, alpha_counts_m2[rows], beta_counts[rows]) for rows, sight in looks]
+        counts_read = np.rint(np.concatenate(seen) + self._draw_noise(which, view) * NOISE_COUNTS)
         # Adding zero turns -0.0 into 0.0, whose inverse is the right infinity.
         return np.minimum(np.maximum(counts_read, 0.0), 1023.0) + 0.0
 
-    def _draw_scan_noise(self, world: int, view: View, robots: int) -> np.ndarray:
-        """Return the noise of a view (robots, 8): motion is the same whether it is read or not."""
-        self._scan_rng.seed((self._scan_seeds[world], view.number))
-        return draw_normal(self._scan_rng, (robots, BEAMS))
+    def read_distances(self, which: np.ndarray, view: Optional[View] = None) -> np.ndarray:
+        """Return one noisy reading (m) of a sensor that looks ahead from the middle of the robots which, (K,).
 
-    def _measure_signals(self, which: np.ndarray, view: View) -> np.ndarray:
-        if not view.obstacles:
-            return self._look(which, view, (self._walls, self.arena.circles_m))
+        which, view: as for read_infrared().
+        """
+        view = self.observe() if view is None else view
+        seen_m = np.concatenate([measure_distances(sight) for _, sight in self._look(which, view)])
+        read_m = np.round(seen_m + self._draw_noise(which, view)[:, 0] * DISTANCE_NOISE_M, 3)
+        return np.minimum(np.maximum(read_m, 0.001), DISTANCE_REACH_M)
+
+    def _draw_noise(self, which: np.ndarray, view: View) -> np.ndarray:
+        """Return the noise of a view (K, 8), each world's for its own robots: motion is the same if it is not read."""
+        counts, noise = np.bincount(which // self._robots, minlength=self.worlds), []
+        for world in counts.nonzero()[0].tolist():
+            self._scan_rng.seed((self._scan_seeds[world], view.number))
+            noise.append(draw_normal(self._scan_rng, (counts[world], BEAMS)))
+        return np.concatenate(noise)
+
+    def _look(self, which: np.ndarray, view: View) -> Iterator[Tuple[np.ndarray, Sight]]:
+        """Yield rows that see the same obstacles, a few at a time, with what they may see."""
         worlds = which // self._robots
-        each = worlds[np.append(True, worlds[1:] != worlds[:-1])].tolist()
-        return np.concatenate([self._look(which[worlds == world], view, view.obstacles[world]) for world in each])
-
-    def _look(self, which: np.ndarray, view: View, obstacles: Obstacles) -> np.ndarray:
-        return measure_signals(
-            view.places_m[which],
-            view.headings[which],
-            view.places_m.reshape(self.worlds, self._robots, 2)[which // self._robots],
-            self.errors.radius_m[: self._robots, 0],
-            *obstacles,
-            self.errors.alpha_counts_m2[which],
-            self.errors.beta_counts[which],
-        )
-
-    def read_distance(self, row: int) -> float:
-        """Return one noisy reading (m) of a distance sensor that looks ahead from the middle of the robot in a row."""
-        view, world = self.observe(), row // self._robots
-        bodies_m = view.places_m[world * self._robots : (world + 1) * self._robots]
-        obstacles = view.obstacles[world] if view.obstacles else (self._walls, self.arena.circles_m)
-        radii_m = self.errors.radius_m[: self._robots, 0]
-        distance_m = measure_distance(view.places_m[row], view.headings[row], bodies_m, radii_m, *obstacles)
-        noise = float(self._draw_scan_noise(world, view, 1)[0, 0])
-        return min(max(round(distance_m + noise * DISTANCE_NOISE_M, 3), 0.001), DISTANCE_REACH_M)
+        starts = (worlds[1:] != worlds[:-1]).nonzero()[0] + 1 if view.obstacles else ()
+        for first, end in zip([0, *starts], [*starts, len(which)]):
+            obstacles = view.obstacles[worlds[first]] if view.obstacles else (self._walls, self.arena.circles_m)
+            for start in range(first, end, _SCAN_ROWS):
+                rows = which[start : min(start + _SCAN_ROWS, end)]
+                bodies_m = view.places_m.reshape(self.worlds, self._robots, 2)[rows // self._robots]
+                radii_m = self.errors.radius_m[: self._robots, 0]
+                yield rows, Sight(view.places_m[rows], view.headings[rows], bodies_m, radii_m, *obstacles)
