@@ -222,6 +222,17 @@ def test_the_pose_of_a_robot_moved_by_hand_is_reset_and_reported():
     np.testing.assert_allclose(pose_filter.estimate().pose, pose, atol=1e-3)
 
 
+def test_a_robot_off_by_degrees_is_set_right_but_was_moved_by_no_hand():
+    pose_filter, outcomes = PoseFilter(), []
+    for index in range(40):
+        stamp_s = CAMERA_S * index
+        pose_filter.add_odometry(stamp_s, Pose(0.0, 0.0, 0.0))
+        pose = Pose(0.0, 0.0, 0.0 if index < 30 else 0.06)
+        outcomes.append(pose_filter.add_measurement(Measurement(stamp_s, pose, COVARIANCE)))
+    assert outcomes[30:34] == [Outcome.OUTLIER] * 3 + [Outcome.USED]
+    assert pose_filter.estimate().pose.yaw_rad == pytest.approx(0.06, abs=0.002)
+
+
 @pytest.mark.parametrize("linear_m_s", [0.1, 0.2])
 def test_a_robot_that_a_wall_holds_stays_where_it_is_measured(linear_m_s):
     drive, pose_filter = Drive(4, linear_m_s).run(5.0), PoseFilter()

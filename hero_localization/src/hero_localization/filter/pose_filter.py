@@ -64,6 +64,9 @@ MOVED_POSES = 4
 MOVED_S = 0.1
 """So many outliers in a row, over so long, that agree with each other: the robot was moved by hand (kidnapped)."""
 
+MIN_MOVED_M, MIN_MOVED_RAD = 0.01, 0.1
+"""No hand moves a robot by less: stamps of a busy computer are so far off while the robot drives."""
+
 REPLAYED_S = 1.0
 """Poses that arrive later than this after a newer one are left out."""
 
@@ -183,8 +186,9 @@ class PoseFilter:
             self._rejected = [*self._rejected[1 - MOVED_POSES :], measurement]
             if not self._was_moved():
                 return Outcome.OUTLIER
+            expected = self._predict(kept[-1], stamp_s).pose
             self._start(measurement)
-            return Outcome.MOVED
+            return Outcome.USED if _is_near(expected, measurement.pose) else Outcome.MOVED
         kept.append(step)
         for newer in later:
             replayed = self._correct(kept, newer.measurement) if newer.measurement else None
@@ -330,6 +334,11 @@ class PoseFilter:
 def make_covariance(position_sd_m: float, yaw_sd_rad: float) -> np.ndarray:
     """Return the covariance of x, y and yaw, (3, 3), of independent errors; position_sd_m: in x and y each."""
     return np.diag((position_sd_m**2, position_sd_m**2, yaw_sd_rad**2))
+
+
+def _is_near(one: Pose, other: Pose) -> bool:
+    turned_rad = abs(wrap_angle(other.yaw_rad - one.yaw_rad))
+    return measure_distance(one, other) < MIN_MOVED_M and turned_rad < MIN_MOVED_RAD
 
 
 def _take_as_estimate(measurement: Measurement) -> Estimate:
