@@ -16,10 +16,11 @@ const overlap = (one, other) =>
 /**
  * Return for each label its upper left corner, or null where there is no room for it.
  * labels: {x, y, radius, width, height, isNeeded} in px; those that are needed come first.
+ * boxes: [left, top, width, height] of what no label may be behind.
  */
-export function placeLabels(labels) {
+export function placeLabels(labels, boxes) {
   const bodies = labels.map(({ x, y, radius }) => [x - radius, y - radius, 2 * radius, 2 * radius]);
-  const taken = [];
+  const taken = [...boxes];
   const corners = labels.map(() => null);
   const order = [...labels.keys()].sort((one, other) => labels[other].isNeeded - labels[one].isNeeded);
   for (const index of order) {

@@ -267,6 +267,14 @@ export class FleetMap {
     this.draw();
   }
 
+  /** Return [left, top, width, height] of the buttons and texts before the map, px. */
+  listCovered() {
+    const { left, top } = this.canvas.getBoundingClientRect();
+    return [...element("map").querySelectorAll(".tools button, .place span")]
+      .map((one) => one.getBoundingClientRect())
+      .map((box) => [box.left - left, box.top - top, box.width, box.height]);
+  }
+
   // ------------------------------------------------------------ updates
 
   update(updates) {

@@ -360,7 +360,7 @@ export class MapPainter {
       const isNeeded = isChosen || stateOf(robot, state) !== "READY";
       return { x, y, radius: isChosen ? radius * 1.5 + 6 : radius * 1.15, width: context.measureText(text).width, height: size, isNeeded, text, robot };
     });
-    placeLabels(labels).forEach((corner, index) => {
+    placeLabels(labels, this.map.listCovered()).forEach((corner, index) => {
       if (!corner) return;
       const { text, robot } = labels[index];
       context.strokeText(text, ...corner);
