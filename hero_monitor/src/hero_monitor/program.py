@@ -34,6 +34,9 @@ LINGER_S = 10.0
 
 END_CHECK_PERIOD_S = 0.2
 
+UNWATCHED_S = 2.0
+"""Between two looks at the ROS master while no page is open."""
+
 
 class Monitor:
     """Pages, the fleet that they show, and what they may do with it."""
@@ -116,6 +119,7 @@ class Monitor:
 
     def _check_end(self) -> None:
         self._programs.beat()
+        self._feed.master.check(UNWATCHED_S)
         if not self._program.running:
             self._loop.stop()
 

@@ -16,6 +16,7 @@ from hero_monitor.control.offers import BEHAVIORS, OFFERS, check_values, make_ar
 from hero_monitor.control.programs import Child, Programs
 from hero_monitor.control.requests import RequestError
 from hero_swarm.behaviors import find_behavior, list_names
+from hero_test.waiting import wait_for
 
 PACKAGES = Path(__file__).resolve().parents[3]
 DEADLINE_S = 300.0
@@ -205,6 +206,24 @@ def test_a_stop_of_all_robots_ends_programs_but_not_the_recording(started, monke
     started.wait()
     assert recording.bytes == 7
     assert started.programs.find_recording() is None
+
+
+def test_the_length_of_a_recording_counts_from_its_file_on(started, monkeypatch, tmp_path):
+    read = wait_for_output(monkeypatch)
+    starts_s = []
+
+    def measure(folder):
+        starts_s.append(recording.start_s)
+        return 7 if len(starts_s) >= 3 else 0
+
+    monkeypatch.setattr(programs_module, "measure", measure)
+    monkeypatch.setattr(programs_module, "SIZE_PERIOD_S", 0.01)
+    recording = started.start(OBEDIENT, "record", robots=(), folder=tmp_path)
+    assert read() == b"runs\n"
+    wait_for(lambda: len(starts_s) >= 4, "four looks at the folder")
+    recording.end()
+    started.wait()
+    assert starts_s[0] < starts_s[1] < starts_s[2] == starts_s[3]
 
 
 @pytest.mark.parametrize(("program", "driven"), [("follow", ["hero_1"]), ("led_show", [])])

@@ -85,6 +85,8 @@ class Child:
                 with contextlib.suppress(subprocess.TimeoutExpired):
                     code = process.wait(SIZE_PERIOD_S)
                 if self.folder is not None:
+                    if not self.bytes:  # the recorder takes seconds to start
+                        self.start_s = time.monotonic()
                     self.bytes = measure(self.folder)
             # A guard that was killed leaves its program behind.
             with contextlib.suppress(ProcessLookupError):

@@ -99,7 +99,7 @@ class FleetFeed:
         self._grid_frame = ""
         self._replay_s = 0.0
         self._tracked: Set[str] = set()
-        self._master = MasterLink(background)
+        self.master = MasterLink(background)
         self._pending_reads = 0
         self._listening = ""
         self._rows: Sequence[Robot] = ()
@@ -192,7 +192,7 @@ class FleetFeed:
         self.page_state.put("fleet", fleet)
 
     def _list_losses(self) -> None:
-        losses = list_losses(self._answering, self._master.check(), self._localization, time.monotonic())
+        losses = list_losses(self._answering, self.master.check(), self._localization, time.monotonic())
         self.page_state.put("losses", [loss._asdict() for loss in losses])
 
     def _make_row(self, row: Robot) -> Dict[str, Any]:

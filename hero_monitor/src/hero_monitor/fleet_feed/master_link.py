@@ -1,4 +1,7 @@
-"""Asks the ROS master periodically whether it answers. Pages show if it is lost, and work without it."""
+"""Asks the ROS master periodically whether it answers, and registers with one that was started again.
+
+Pages show if it is lost, and work without it.
+"""
 
 import time
 from contextlib import suppress
@@ -22,10 +25,10 @@ class MasterLink:
         self._asked_s = -MASTER_PERIOD_S
         self._is_pending = False
 
-    def check(self) -> str:
+    def check(self, period_s: float = MASTER_PERIOD_S) -> str:
         """Ask if it is time to; return why the master is lost, empty if it answers. Returns at once."""
         now_s = time.monotonic()
-        if not self._is_pending and now_s - self._asked_s >= MASTER_PERIOD_S:
+        if not self._is_pending and now_s - self._asked_s >= period_s:
             self._asked_s, self._is_pending = now_s, True
             self._background.submit(self._ask)
         is_late = self._is_pending and now_s - self._asked_s > MASTER_SILENT_S

@@ -96,9 +96,9 @@ export class ProgramPanel {
     this.recording = state.programs.find(({ program, failure }) => program === "record" && !failure);
     element("recorder").hidden = !record || !state.hello.control;
     element("record").setAttribute("aria-pressed", String(Boolean(this.recording)));
-    const length = this.recording ? clock(this.recording.seconds) : "";
-    const size = this.recording ? `${(this.recording.bytes / 1e6).toFixed(1)} MB` : "";
-    if (this.recording) this.recorded = `${length}, ${size} in ${this.recording.folder}`;
+    const { seconds = 0, bytes = 0, folder = "" } = this.recording || {};
+    const length = bytes ? clock(seconds) : "starting";
+    if (this.recording) this.recorded = `${length}, ${(bytes / 1e6).toFixed(1)} MB in ${folder}`;
     element("recorded").textContent = this.recording ? this.recorded : this.recorded && `recorded ${this.recorded}`;
     element("rec").hidden = !this.recording;
     element("rec").textContent = `rec ${length}`;
