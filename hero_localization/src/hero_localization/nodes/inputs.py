@@ -2,13 +2,13 @@
 
 import math
 import struct
-from typing import Callable, Tuple
+from typing import Callable, Optional, Tuple
 
 import genpy
 import numpy as np
 import rospy
+from geometry_msgs.msg import Point, PoseStamped, PoseWithCovarianceStamped
 from geometry_msgs.msg import Pose as PoseMessage
-from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry
 
 from hero_client.values.readings import is_plausible, read_pose
@@ -25,6 +25,9 @@ _POSE = struct.Struct("<7d")
 MAX_FIELD_M = 100.0
 MIN_UPRIGHT = 0.7
 """Of the robot's axis, the part that points up: 45 degrees."""
+
+RISE_M, STILL_M = 0.15, 0.02
+"""A robot that comes so far up or down, but not even the second along y, drives where y points up."""
 
 POSE_TYPES = {kind._md5sum: kind for kind in (PoseStamped, PoseWithCovarianceStamped, Odometry)}
 """Types of measured poses, by md5; of an Odometry the pose counts."""
@@ -93,7 +96,14 @@ class PoseInput:
         self._default_covariance = default_covariance
         self._receive = receive
         self._warn = warn
+        self._start: Optional[Point] = None
         rospy.Subscriber(topic, rospy.AnyMsg, self._receive_message, queue_size=30, tcp_nodelay=True)
+
+    def _rises(self, place: Point) -> bool:
+        """Return whether the robot is higher or lower than where its y was last another one."""
+        if self._start is None or not abs(place.y - self._start.y) <= STILL_M:
+            self._start = place
+        return abs(place.z - self._start.z) > RISE_M
 
     def _receive_message(self, message: rospy.AnyMsg) -> None:
         kind = POSE_TYPES.get(message._connection_header["md5sum"])
@@ -120,6 +130,10 @@ class PoseInput:
             return
         has_covariance = kind is not PoseStamped
         message_pose = content.pose.pose if has_covariance else content.pose
+        if self._rises(message_pose.position):
+            text = "%s rises by more than %g m, but stays at one y: is the up axis of the motion capture system z?"
+            self._warn(text % (self._topic, RISE_M))
+            return
         mistake = find_pose_mistake(message_pose)
         if mistake:
             self._warn("%s %s" % (self._topic, mistake))
