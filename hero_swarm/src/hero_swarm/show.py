@@ -50,7 +50,8 @@ def _find(module: str) -> Any:
     try:
         return import_module(module)
     except ImportError as error:
-        raise ExperimentError("%s cannot be used: %s; install the package" % (module, error)) from None
+        text = "%s needs %s: install it, by pip or as python3-%s"
+        raise ExperimentError(text % (module, error.name, error.name)) from None
 
 
 def show_run(options: argparse.Namespace) -> None:
