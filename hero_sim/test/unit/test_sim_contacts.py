@@ -172,6 +172,18 @@ def test_pressed_robots_give_the_same_bytes_compiled_and_not(monkeypatch):
     assert results[0] == results[1]
 
 
+def test_nothing_is_compiled_at_the_first_contact(monkeypatch):
+    """Robots in real time would pause meanwhile."""
+    pytest.importorskip("numba", reason="the compiled loops need numba")
+    monkeypatch.setattr(compiled, "COMPILED_ROWS", 0)
+    compiled._compile.cache_clear()
+    build_world([(0.0, 0.0, 0.0)])
+    loop = compiled.compile_loop(contacts._relax, 1)
+    known = list(loop.signatures)
+    press(20, math.pi / 4, 30)
+    assert known and loop.signatures == known
+
+
 def test_the_order_of_rows_matters_less_than_a_tenth_of_a_millimeter():
     rng = np.random.RandomState(3)
     poses = np.column_stack((rng.uniform(-0.012, 0.012, (8, 2)), rng.uniform(-math.pi, math.pi, 8)))

@@ -124,6 +124,8 @@ class Contacts:
         self._beside, self._wall_pushes_m = np.empty((2, 0), dtype=int), _NO_M
         self._near, self._near_free_m = self._obstacles.take(_NONE), _NO_M
         self._world_ends = np.arange(1, worlds + 1) * self._shape[1]
+        # Load what is compiled now: at the first contact robots in real time would pause meanwhile.
+        self._solve(np.zeros((2, rows)), _NONE, _NO_M, _NONE)
 
     def could_touch(self, moved_m: float) -> bool:
         """Note how far the fastest has moved; return whether bodies could have come to touch something."""
