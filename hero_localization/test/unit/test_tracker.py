@@ -81,10 +81,12 @@ def test_dark_and_bright_pictures_are_named(shade, word):
 
 
 def test_small_tags_are_named():
+    text = "tags measure only 8 px, less than 14: mount the camera lower, or print larger tags"
     tracker = make_tracker()
     tracker.take([see(0, 0.0, 0.0, size_m=0.012)], 1.0, 0)
-    text = "tags measure only 8 px, less than 14: mount the camera lower, or print larger tags"
     assert Problem("camera", text, False) in tracker.list_problems()
+    tracker = make_tracker(layout=TagLayout(default_mount=MountedTag(size_m=0.012)))
+    assert Problem("camera", text, False) in tracker.list_problems(), "before any is found"
 
 
 def test_tags_that_are_often_missed_where_they_are_expected_are_named():

@@ -12,7 +12,7 @@ from ..camera.camera_model import Camera
 from .moved_references import find_moved_references
 from .settings import Settings
 from .tag_corners import TagCorners
-from .tag_pose import Sightings, locate
+from .tag_pose import Sightings, find_smallest_side, locate
 
 __all__ = ["Problem", "Tracker"]
 
@@ -72,6 +72,7 @@ class Tracker:
         self.sightings: Optional[Sightings] = None
         self._settings = settings
         self.camera = camera
+        self._smallest_px = find_smallest_side(camera, settings.layout.default_mount)
         self._pictures: Deque[Tuple[float, int]] = deque(maxlen=RATE_FRAMES)
         self._shade = math.nan
         self._tag_problems: Dict[int, Tuple[float, str]] = {}
@@ -180,9 +181,10 @@ class Tracker:
             text = "images are too %s (mean %.0f of 255): give %s light or exposure" % (kind, self._shade, remedy)
             problems.append(Problem("camera", text, True))
         sides_px = [tag.side_px for tag in self.found if self._settings.layout.find_robot(tag.tag_id) is not None]
-        if sides_px and min(sides_px) < MIN_SIDE_PX:
+        smallest_px = min(sides_px, default=self._smallest_px)
+        if smallest_px < MIN_SIDE_PX:
             text = "tags measure only %.0f px, less than %.0f: mount the camera lower, or print larger tags"
-            problems.append(Problem("camera", text % (min(sides_px), MIN_SIDE_PX), False))
+            problems.append(Problem("camera", text % (smallest_px, MIN_SIDE_PX), False))
         missed = [
             tag_id
             for tag_id, seen in sorted(self._expected.items())
