@@ -82,10 +82,13 @@ def test_silence_does_not_count_while_the_driver_itself_did_not_run():
     with Clock().is_the_drivers() as clock:
         robot = CommandedRobot(clock, has_readings=True)
         robot.publish_at(10, 2.0)
-        robot.bridge.commands.resume(clock.now_s + 0.5)
-        clock.run(0.8)
+        clock.run(0.3)
+        robot.bridge.commands.excuse_silence(0.3, clock.now_s)
+        clock.run(0.3)
         assert robot.motors.is_turning
-        clock.run(0.2 + STOP_S)
+        # What is not silence is not added to what may come.
+        robot.bridge.commands.excuse_silence(30.0, clock.now_s)
+        clock.run(0.6 + STOP_S)
         assert not robot.motors.is_turning
 
 

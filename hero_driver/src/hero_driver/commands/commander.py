@@ -60,9 +60,9 @@ class Commander:
         else:
             self._intervals_s.append(interval_s)
 
-    def forgive_silence(self, now_s: float) -> None:
-        """Count silence from now on: until now nothing could be heard."""
-        self.commanded_s = max(self.commanded_s, now_s)
+    def excuse_silence(self, pause_s: float, now_s: float) -> None:
+        """Do not count the pause_s until now, in which nothing could be heard."""
+        self.commanded_s = min(self.commanded_s + pause_s, now_s)
 
     def find_period_s(self) -> Optional[float]:
         """Return the period of its commands, None while they are not known to be regular."""
@@ -120,10 +120,10 @@ class Commanders:
         for commander in self._by_topic.values():
             commander.moves = False
 
-    def forgive_silence(self, now_s: float) -> None:
-        """Count silence from now on."""
+    def excuse_silence(self, pause_s: float, now_s: float) -> None:
+        """Do not count the pause_s until now as silence."""
         for commander in self._by_topic.values():
-            commander.forgive_silence(now_s)
+            commander.excuse_silence(pause_s, now_s)
 
     def is_zero_missed(self, now_s: float) -> bool:
         """Return, once, whether the wheels show that the robot did not take a zero.

@@ -225,9 +225,12 @@ class RobotCommands:
         self.queue.discard_motion(time.monotonic())
 
     def resume(self, now_s: float) -> None:
-        """The driver runs again after a pause: what waits is old, and silence counts from now on."""
+        """The driver runs again after a pause: what waits is old."""
         self.queue.discard_motion(now_s)
-        self._commanders.forgive_silence(now_s)
+
+    def excuse_silence(self, pause_s: float, now_s: float) -> None:
+        """Do not count the pause, in which nothing could be heard, as silence of a program."""
+        self._commanders.excuse_silence(pause_s, now_s)
 
     @property
     def is_commanded(self) -> bool:
