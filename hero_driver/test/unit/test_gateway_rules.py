@@ -287,7 +287,7 @@ def test_a_pause_of_the_driver_forgives_silence_and_renews_stops(driver):
     assert not link.closed
 
 
-def test_programs_are_not_called_silent_before_what_came_in_a_pause_is_read(driver):
+def test_programs_are_not_silent_while_the_driver_does_not_run(driver):
     driver.gateway.open()
     commands, looks = driver.gateway.peers[driver.join(declarations=STOCK_DECLARATIONS)].bridge.commands, []
     commands.watch_commanders = lambda now_s: looks.append("look")
