@@ -21,6 +21,7 @@ from hero_node.command_line import call, find_line, say
 from hero_node.errors import HeroError, ProgramError
 from hero_node.parameters import check_parameters
 
+from .errors import OptionError
 from .stepped.robot import StepRobot
 from .stepped.step_clock import StepMotion
 from .stepped.swarm import StepSwarm, StepWorld
@@ -43,7 +44,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     parser.add_argument("script", help="a script that uses hero_client")
     parser.add_argument("arguments", nargs=argparse.REMAINDER, help="arguments of the script")
     options = parser.parse_args(argv)
-    return call(lambda: run_script(options), HeroError)
+    return call(lambda: run_script(options), HeroError, OptionError)
 
 
 def run_script(options: argparse.Namespace) -> None:

@@ -82,3 +82,9 @@ def test_what_simulated_robots_cannot_do_is_one_line(tmp_path, text, message):
     ended = run(tmp_path, text)
     assert ended.returncode == 1
     assert message in ended.stderr and "Traceback" not in ended.stderr
+
+
+def test_an_option_that_cannot_be_used_is_one_line(tmp_path):
+    ended = run(tmp_path, "", "--model", "hero_minus")
+    assert ended.returncode == 1
+    assert "--model hero_minus: must be one of" in ended.stderr and "Traceback" not in ended.stderr

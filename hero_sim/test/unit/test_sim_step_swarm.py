@@ -125,7 +125,7 @@ def test_robots_and_places_are_those_of_the_command_line():
 
 @pytest.mark.parametrize("wifi", ["ideal", "hotspot"])
 def test_hero_plus_beside_a_stock_robot_drives_and_measures_ahead(wifi):
-    options = {"perfect": True, "error": ["slip=0"], "model": ["hero_plus,robot=1"]}
+    options = {"perfect": True, "error": ["slip=0"], "model": "hero_plus,robot=1"}
     swarm = StepSwarm(2, arena="empty", wifi=wifi, worlds=2, **options)
     assert swarm.rows.distance_rows.tolist() == [1, 3]
     starts, seen_m = [robot.true_pose for robot in swarm], [world[1].distance for world in swarm.worlds]
@@ -275,7 +275,7 @@ def test_data_that_no_longer_come_are_refused_after_a_while():
         robot.wait_for_scan()
 
 
-OPTIONS = {"count": "--count", "first_id": "--first-id", "seed": "--seed", "arena": "--arena", "error": "--error"}
+OPTIONS = {name: "--" + name.replace("_", "-") for name in ("count", "first_id", "seed", "arena", "error", "model")}
 
 
 @pytest.mark.parametrize(
@@ -291,14 +291,14 @@ OPTIONS = {"count": "--count", "first_id": "--first-id", "seed": "--seed", "aren
         {"count": 500, "arena": "maze"},
         {"error": "slip=2"},
         {"error": "robot=9,slip=0"},
+        {"model": "hero_plus,robot=9"},
     ],
     ids=str,
 )
 def test_wrong_options_are_refused_in_the_words_of_the_command_line(wrong, capsys, monkeypatch):
     monkeypatch.setattr(arena, "_MAX_TRIES", 100)  # so that a full arena is soon found to be full
-    options = {name: [value] if name == "error" else value for name, value in wrong.items()}
     with pytest.raises(OptionError) as refused:
-        StepSwarm(**{"count": 1, **options})
+        StepSwarm(**{"count": 1, **wrong})
     monkeypatch.setattr(sys, "argv", ["hero_sim"])
     arguments = [OPTIONS[name] + "=" + str(value) for name, value in wrong.items()]
     assert main.main(["--port", "9", *arguments]) in (1, 2)

@@ -11,7 +11,7 @@
 
 import argparse
 import sys
-from typing import Optional, Sequence
+from typing import List, Optional, Sequence, Union
 
 from hero_client.robots.swarm_base import BaseSwarm
 from hero_client.values.background_motion import Steps
@@ -80,8 +80,8 @@ class StepSwarm(StepWorld):
         perfect: bool = False,
         first_id: int = 0,
         worlds: int = 1,
-        error: Sequence[str] = (),
-        model: Sequence[str] = (),
+        error: Union[str, Sequence[str]] = (),
+        model: Union[str, Sequence[str]] = (),
     ) -> None:
         """Switch on count robots in each world; the options are those of the simulator's command line.
 
@@ -95,8 +95,8 @@ class StepSwarm(StepWorld):
             perfect=perfect,
             first_id=first_id,
             errors=None,
-            error=list(error),
-            model=list(model),
+            error=_list_texts(error),
+            model=_list_texts(model),
         )
         check_population(options, worlds)
         if wifi not in PROFILES:
@@ -123,3 +123,7 @@ class StepSwarm(StepWorld):
         while True:
             log.note()
             yield LOG_PERIOD_S
+
+
+def _list_texts(texts: Union[str, Sequence[str]]) -> List[str]:
+    return [texts] if isinstance(texts, str) else [str(text) for text in texts]
