@@ -226,6 +226,14 @@ def test_the_length_of_a_recording_counts_from_its_file_on(started, monkeypatch,
     assert starts_s[0] < starts_s[1] < starts_s[2] == starts_s[3]
 
 
+def test_the_length_of_a_recording_ends_when_it_is_told_to(started, tmp_path):
+    recording = started.programs._running[1] = Child("record", folder=tmp_path)
+    recording.end()
+    recording.start_s -= 100.0
+    recording.end_s = recording.start_s + 7.5
+    assert started.programs.describe()[0]["seconds"] == 7
+
+
 @pytest.mark.parametrize(("program", "driven"), [("follow", ["hero_1"]), ("led_show", [])])
 def test_robots_that_a_program_does_not_drive_are_left_alone(program, driven):
     child = Child(program, ["hero_0", "hero_1"])

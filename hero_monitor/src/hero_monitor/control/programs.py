@@ -6,6 +6,7 @@ robots are stopped afterwards. Those that have robots also end when all robots a
 
 import contextlib
 import itertools
+import math
 import os
 import signal
 import subprocess
@@ -60,6 +61,7 @@ class Child:
         self.program, self.robots, self.places, self.folder = program, list(robots), places, folder
         self.driven = self.robots[OFFERS[program].drives] if program in OFFERS else []
         self.start_s = time.monotonic()
+        self.end_s = math.inf
         self.bytes = 0
         self.is_ending = False
         self.failure = ""
@@ -106,7 +108,7 @@ class Child:
     def end(self) -> None:
         """Begin to end it."""
         if not self.is_ending:
-            self.is_ending = True
+            self.is_ending, self.end_s = True, time.monotonic()
             os.close(self._monitor_end)
 
 
@@ -215,7 +217,7 @@ class Programs:
                 "title": OFFERS[child.program].title if child.program in OFFERS else "recording",
                 "robots": child.robots,
                 "places": [[round(1000 * x_m), round(1000 * y_m)] for x_m, y_m in child.places],
-                "seconds": int(now_s - child.start_s) if number in self._running else 0,
+                "seconds": int(max(0.0, min(now_s, child.end_s) - child.start_s)) if number in self._running else 0,
                 "bytes": child.bytes,
                 "folder": str(child.folder or ""),
                 "ending": child.is_ending,
