@@ -6,7 +6,6 @@
 Everything here runs on the thread of the sockets, except what says otherwise. It never blocks.
 """
 
-import math
 import time
 import traceback
 from typing import Callable, Dict, List, Optional, Tuple
@@ -42,8 +41,6 @@ NS_PER_S = 10**9
 
 FLEET_POLL_S = 0.1
 COMMANDER_POLL_S = 0.05
-COMMANDER_PAUSE_S = 0.2
-"""Between two looks at the programs: after more, the driver did not run, and commands that came wait to be read."""
 
 STOP_LIMIT_S = 2.0
 """At the end of the driver, and of a connection, robots get this long to come to rest; 0.4 s is usual."""
@@ -85,7 +82,6 @@ class Gateway(LinkHandler):
         self.fleet = FleetRegistry(config.grace_s)
         self.bridges: Dict[str, RobotBridge] = {}
         self.stopped = False
-        self._watched_s = math.inf  # when the programs were last looked at
         self.refused_connections = 0
         self.last_refusal = ""
 
@@ -444,12 +440,8 @@ class Gateway(LinkHandler):
     def _poll_commanders(self) -> None:
         self._loop.call_later(COMMANDER_POLL_S, self._poll_commanders)
         now_s = time.monotonic()
-        watched_s, self._watched_s = self._watched_s, now_s
         for bridge in self.bridges.values():
-            if now_s - watched_s > COMMANDER_PAUSE_S:
-                bridge.commands.excuse_silence(now_s - watched_s, now_s)
-            else:
-                bridge.commands.watch_commanders(now_s)
+            bridge.commands.watch_commanders(now_s)
 
     def _poll_fleet(self) -> None:
         self._loop.call_later(FLEET_POLL_S, self._poll_fleet)

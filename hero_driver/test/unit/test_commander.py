@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from hero_driver.commands.commander import Commanders
 from hero_driver.commands.velocity_shaper import STOPPED_MOTORS, ZERO_TWIST
 from hero_driver.corrections.wheel_motion import WheelMotion
+from hero_driver.gateway import COMMANDER_POLL_S
 from hero_driver.robot_constants import MAX_WATCHDOG_S
 
 NAN_TWIST = bytes(6) + b"\xf8\x7f" + bytes(40)
@@ -78,18 +79,52 @@ def test_a_program_that_hangs_twice_within_seconds_is_stopped_twice(pause_s):
             assert not robot.motors.is_turning
 
 
-def test_silence_does_not_count_while_the_driver_itself_did_not_run():
-    with Clock().is_the_drivers() as clock:
-        robot = CommandedRobot(clock, has_readings=True)
-        robot.publish_at(10, 2.0)
-        clock.run(0.3)
-        robot.bridge.commands.excuse_silence(0.3, clock.now_s)
-        clock.run(0.3)
-        assert robot.motors.is_turning
-        # What is not silence is not added to what may come.
-        robot.bridge.commands.excuse_silence(30.0, clock.now_s)
-        clock.run(0.6 + STOP_S)
-        assert not robot.motors.is_turning
+def find_silence_s(period_s, end_s, pauses, is_read_first=True, until_s=6.0):
+    """Return when a program is found silent that commands until end_s; the driver does not run in pauses (s, s)."""
+    commanders, next_s, now_s = Commanders(WheelMotion()), 0.0, 0.0
+    while now_s < until_s:
+        now_s = next((after_s for before_s, after_s in pauses if before_s <= now_s < after_s), now_s)
+        is_silent = not is_read_first and commanders.find_silent(STOP_S, now_s) is not None
+        while next_s <= min(now_s, end_s):
+            commanders.note_command(VELOCITY, VELOCITY, "sender", "/program", True, now_s)
+            next_s += period_s
+        if is_silent or commanders.find_silent(STOP_S, now_s) is not None:
+            return now_s
+        now_s += COMMANDER_POLL_S
+    return None
+
+
+@given(
+    period_s=st.floats(0.02, 0.12),
+    begin_s=st.floats(1.0, 2.0),
+    pause_s=st.floats(0.2, 3.0),
+    is_read_first=st.booleans(),
+)
+def test_a_pause_of_the_driver_itself_is_no_silence_of_a_program(period_s, begin_s, pause_s, is_read_first):
+    pauses = [(begin_s, begin_s + pause_s)]
+    assert find_silence_s(period_s, 9.0, pauses, is_read_first) is None
+    # The program is suspended as well.
+    commanders, commands = Commanders(WheelMotion()), int(begin_s / period_s)
+    for index in range(commands):
+        commanders.note_command(VELOCITY, VELOCITY, "sender", "/program", True, index * period_s)
+        assert commanders.find_silent(STOP_S, index * period_s) is None
+    for look_s in (0.0, period_s / 2.0):
+        assert commanders.find_silent(STOP_S, (commands - 1) * period_s + pause_s + look_s) is None
+
+
+@given(
+    period_s=st.floats(0.02, 0.12),
+    pauses=st.lists(st.tuples(st.floats(0.0, 0.5), st.floats(0.25, 0.9)), min_size=1, max_size=8),
+)
+def test_pauses_of_the_driver_keep_no_robot_of_a_hung_program_moving(period_s, pauses):
+    times_s, end_s = [], 2.0
+    for running_s, pause_s in pauses:
+        begin_s = (times_s[-1][1] if times_s else end_s) + running_s
+        times_s.append((begin_s, begin_s + pause_s))
+    longest_s = max(pause_s for _, pause_s in pauses)
+    stopped_s = find_silence_s(period_s, end_s, times_s, until_s=20.0)
+    # One pause that does not count, and one in which the time is over.
+    assert stopped_s <= end_s + max(STOP_S, 4.0 * period_s) + 2.0 * longest_s + 2.0 * COMMANDER_POLL_S + 0.2
 
 
 def test_of_two_programs_the_one_that_goes_on_keeps_the_robot_moving():

@@ -287,19 +287,6 @@ def test_a_pause_of_the_driver_forgives_silence_and_renews_stops(driver):
     assert not link.closed
 
 
-def test_programs_are_not_silent_while_the_driver_does_not_run(driver):
-    driver.gateway.open()
-    commands, looks = driver.gateway.peers[driver.join(declarations=STOCK_DECLARATIONS)].bridge.commands, []
-    commands.watch_commanders = lambda now_s: looks.append("look")
-    commands.excuse_silence = lambda pause_s, now_s: looks.append(round(pause_s, 3))
-    driver.run(0.11)
-    assert looks == ["look", "look"]
-    # Suspended: its timers are late.
-    driver.later[:] = [(max(at_s, driver.now_s + 0.7), call) for at_s, call in driver.later]
-    driver.run(0.76)
-    assert looks == ["look", "look", 0.71, "look"]
-
-
 def test_a_bug_is_reported_with_its_place_and_costs_one_connection(driver):
     try:
         raise KeyError("ours")

@@ -1,6 +1,7 @@
 """Which programs command one robot on its motion topics, how regularly, and whether it takes their zeros. Pure."""
 
 import collections
+import math
 from typing import Deque, Dict, NamedTuple, Optional
 
 from ..corrections.wheel_motion import WheelMotion
@@ -13,6 +14,9 @@ INTERVALS_KEPT = 8
 """Its period is the longest of these intervals: a program with jitter, or with pauses, is not taken for a hung one."""
 
 SILENT_PERIODS = 4
+
+LATE_S = 0.2
+"""Between two looks for silence, which is due more often: after more, the driver itself was suspended or too busy."""
 
 RIVAL_SILENCE_S = 0.5
 """A program that commands regularly, and did so within this time or SILENT_PERIODS, drives the robot at this moment."""
@@ -38,7 +42,7 @@ class Commander:
         node: the name of its node, empty where that is not known.
         source: the topic of ROS that it publishes on.
         moves: whether its newest command moves the robot.
-        commanded_s: when that came.
+        commanded_s: when that came; later where the driver could not hear what followed.
     """
 
     def __init__(self, sender: object, node: str, source: str) -> None:
@@ -47,6 +51,7 @@ class Commander:
         self.source = source
         self.moves = False
         self.commanded_s = 0.0
+        self._was_forgiven = False  # since its newest command
         self._intervals_s: Optional[Deque[float]] = None  # None before the first command
 
     def note_command(self, moves: bool, now_s: float) -> None:
@@ -54,15 +59,20 @@ class Commander:
         interval_s = now_s - self.commanded_s
         # What it does after a silence tells its period anew: the silence itself is none.
         begins = interval_s > MAX_WATCHDOG_S or self.has_fallen_silent(RIVAL_SILENCE_S, now_s)
-        self.moves, self.commanded_s = moves, now_s
+        self.moves, self.commanded_s, self._was_forgiven = moves, now_s, False
         if self._intervals_s is None or begins:
             self._intervals_s = collections.deque(maxlen=INTERVALS_KEPT)
         else:
             self._intervals_s.append(interval_s)
 
-    def excuse_silence(self, pause_s: float, now_s: float) -> None:
-        """Do not count the pause_s until now, in which nothing could be heard."""
-        self.commanded_s = min(self.commanded_s + pause_s, now_s)
+    def forgive_pause(self, pause_s: float, now_s: float) -> None:
+        """Do not count a pause of the driver as silence.
+
+        Once between two commands: a driver that pauses again and again must stop a robot whose program hangs.
+        """
+        if not self._was_forgiven:
+            self._was_forgiven = True
+            self.commanded_s = min(self.commanded_s + pause_s, now_s)
 
     def find_period_s(self) -> Optional[float]:
         """Return the period of its commands, None while they are not known to be regular."""
@@ -85,11 +95,13 @@ class Commanders:
         self._wheels = wheels
         self._by_topic: Dict[str, Commander] = {}
         self._zero: Optional[_Zero] = None  # until its effect shows
+        self._looked_s = math.inf
 
     def note_command(
         self, name: str, source: str, sender: object, node: str, moves: bool, now_s: float
     ) -> Commander:
         """A command came on the motion topic called name; return its commander. The others are its attributes."""
+        self._forgive_pause(now_s)
         commander = self._by_topic.get(name)
         ends_motion = not moves and self.are_moving
         if commander is None or commander.sender is not sender or commander.source != source:
@@ -120,10 +132,13 @@ class Commanders:
         for commander in self._by_topic.values():
             commander.moves = False
 
-    def excuse_silence(self, pause_s: float, now_s: float) -> None:
-        """Do not count the pause_s until now as silence."""
-        for commander in self._by_topic.values():
-            commander.excuse_silence(pause_s, now_s)
+    def _forgive_pause(self, now_s: float) -> None:
+        """Notice a pause of the driver itself, before what was heard in it counts or what was not."""
+        pause_s = now_s - self._looked_s
+        if pause_s > LATE_S:
+            self._looked_s = now_s
+            for commander in self._by_topic.values():
+                commander.forgive_pause(pause_s, now_s)
 
     def is_zero_missed(self, now_s: float) -> bool:
         """Return, once, whether the wheels show that the robot did not take a zero.
@@ -137,7 +152,13 @@ class Commanders:
         return wheels.readings > 0 and not (is_heard and wheels.still_readings >= STILL_READINGS)
 
     def find_silent(self, silence_s: float, now_s: float) -> Optional[Commander]:
-        """Return a program that moves the robot and has fallen silent, None if there is none."""
+        """Return a program that moves the robot and has fallen silent, None if there is none.
+
+        A call that comes LATE_S after the last one does not count that time: the driver heard nothing meanwhile, or has
+        not read it yet.
+        """
+        self._forgive_pause(now_s)
+        self._looked_s = now_s
         for commander in self._by_topic.values():
             if commander.moves and commander.has_fallen_silent(silence_s, now_s):
                 return commander

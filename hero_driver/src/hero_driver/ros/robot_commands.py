@@ -228,10 +228,6 @@ class RobotCommands:
         """The driver runs again after a pause: what waits is old."""
         self.queue.discard_motion(now_s)
 
-    def excuse_silence(self, pause_s: float, now_s: float) -> None:
-        """Do not count the pause, in which nothing could be heard, as silence of a program."""
-        self._commanders.excuse_silence(pause_s, now_s)
-
     @property
     def is_commanded(self) -> bool:
         """Whether a program has asked for motion, and not for a stop, since the last stop()."""
