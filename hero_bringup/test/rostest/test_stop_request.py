@@ -80,6 +80,10 @@ class StopRequestTest(unittest.TestCase):
 
         wait_for(release, self.drivers.stop_status)
 
+    def wait_for_report(self, stopped):
+        """Wait until the drivers report this: others were told of it over connections of their own."""
+        wait_for(lambda: self.drivers.read().stopped == stopped, "stopped: %s" % stopped)
+
     def wait_until_named(self, driver):
         """Wait until who waits for the stop is told that this driver does not answer."""
         wait_for(
@@ -95,14 +99,14 @@ class StopRequestTest(unittest.TestCase):
     def test_a_stop_of_all_is_told_as_at_rest(self):
         self.drivers.request_stop(True)
         wait_for(lambda: self.drivers.stop_status() == AT_REST, self.drivers.stop_status)
-        self.assertTrue(self.drivers.read().stopped)
+        self.wait_for_report(True)
 
     def test_a_hung_driver_is_named_and_stopped_when_it_goes_on(self):
         with suspended(self.hung_pid):
             self.drivers.request_stop(True)
             self.wait_until_named("hero_driver_b")
             wait_for(lambda: self.drivers.stop_status() == HUNG, self.drivers.stop_status)
-            self.assertTrue(self.healthy.newest.stopped)
+            wait_for(lambda: self.healthy.newest.stopped, "the stop of the healthy driver")
             wait_for(self.drivers.find_silent, "the silence of the hung driver")
             self.assertFalse(self.drivers.read().stopped, "stopped, though a driver does not answer")
         wait_for(lambda: self.drivers.stop_status() == AT_REST, "the stop of the driver that hung")
@@ -143,7 +147,7 @@ class StopRequestTest(unittest.TestCase):
         table.wait_for_next(b"ALL STOPPED")
         table.press(b"r")
         table.wait_for_next(b"released: robots may move again")
-        self.assertFalse(self.healthy.newest.stopped)
+        wait_for(lambda: not self.healthy.newest.stopped, "the release")
         table.press(b"q")
         self.assertEqual(table.wait_for_end(), 0)
 
@@ -170,7 +174,7 @@ class StopRequestTest(unittest.TestCase):
         teleop.wait_for(b"Enter: STOP ALL ROBOTS")
         teleop.press(b"\r")
         teleop.wait_for(b"stopped, all wheels at rest: r releases them")
-        self.assertTrue(self.drivers.read().stopped)
+        self.wait_for_report(True)
         teleop.press(b"w")
         teleop.wait_for(b"all robots are stopped, so hero_0 cannot move: r releases them\r\n")
         with suspended(self.hung_pid, self.master_pid):
@@ -191,7 +195,7 @@ class StopRequestTest(unittest.TestCase):
         for is_pressed in (0, 1, 0):  # so short a press must not be missed
             joystick.publish(Joy(axes=[math.nan, 1.0], buttons=[0, is_pressed, 0, 0, 1]))
         teleop.wait_for_text("stopped, all wheels at rest")
-        self.assertTrue(self.drivers.read().stopped)
+        self.wait_for_report(True)
         joystick.publish(Joy(axes=[0.0, 1.0], buttons=[0, 0, 0, 0, 1]))
         teleop.wait_for_text("hero_0 does not move: the driver hero_driver has stopped all robots")
         self.assertEqual(teleop.end(), 0)
@@ -201,9 +205,9 @@ class StopRequestTest(unittest.TestCase):
         with Swarm([0], odom=False, proximity=False) as swarm:
             # A machine that stands still for a moment must not fail the test: the first answer may be too early.
             wait_for(lambda: swarm.emergency_stop() == AT_REST, swarm.drivers.stop_status)
-            self.assertTrue(self.drivers.read().stopped)
+            self.wait_for_report(True)
             wait_for(lambda: swarm.release_stop() == RELEASED, swarm.drivers.stop_status)
-            self.assertFalse(self.drivers.read().stopped)
+            self.wait_for_report(False)
 
     def test_lists_that_are_not_published_by_a_driver_are_ignored(self):
         listener = Drivers()

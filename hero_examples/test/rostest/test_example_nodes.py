@@ -90,8 +90,8 @@ class ExampleNodesTest(unittest.TestCase):
         program = self.programs["go_to_goal"]
         self.assertEqual(0, program.wait_end(), program.text())
         self.assertIn("hero_3 is at its goal", program.text())
+        wait_for(lambda: math.dist(self.watch.pose(3)[:2], (-1.8, 0.8)) < NEAR_M, "hero_3 at its goal")
         self.wait_until_stopped(3)
-        self.assertLess(math.dist(self.watch.pose(3)[:2], (-1.8, 0.8)), NEAR_M)
 
     def test_a_goal_that_cannot_be_reached_ends_with_the_reason(self):
         program = self.programs["go_to_goal in vain"]
@@ -112,9 +112,12 @@ class ExampleNodesTest(unittest.TestCase):
         program = self.programs["swarm_go_to"]
         self.assertEqual(0, program.wait_end(), program.text())
         self.assertIn("formation complete", program.text())
-        self.wait_until_stopped(*PLACES)
         for robot_id, place in PLACES.items():
-            self.assertLess(math.dist(self.watch.pose(robot_id)[:2], place), NEAR_M)
+            wait_for(
+                lambda robot_id=robot_id, place=place: math.dist(self.watch.pose(robot_id)[:2], place) < NEAR_M,
+                "hero_%d at its place" % robot_id,
+            )
+        self.wait_until_stopped(*PLACES)
 
     def test_a_light_runs_over_the_swarm_and_is_put_out_at_the_end(self):
         lit = set()

@@ -88,9 +88,13 @@ class FirstScriptsTest(unittest.TestCase):
         program = ExampleProgram("all_robots")
         self.addCleanup(program.close)
         self.assertEqual(0, program.wait_end(), program.text())
+
+        def have_all_turned():
+            turned_rad = [math.remainder(self.watch.pose(i)[2] - yaw_rad, math.tau) for i, yaw_rad in before.items()]
+            return min(map(abs, turned_rad)) > 0.3
+
+        wait_for(have_all_turned, "every robot to have turned")
         self.wait_until_stopped(*ROBOTS)
-        for robot_id, yaw_rad in before.items():
-            self.assertGreater(abs(math.remainder(self.watch.pose(robot_id)[2] - yaw_rad, math.tau)), 0.3)
 
 
 if __name__ == "__main__":

@@ -50,10 +50,13 @@ class GoToGoalTest(unittest.TestCase):
         self.assertTrue(client.wait_for_result(rospy.Duration(TIMEOUT_S)))
         return client.get_result()
 
-    def assert_is_at(self, robot_id, place):
-        x_m, y_m, yaw_rad = self.watch.pose(robot_id)
-        self.assertLess(math.dist((x_m, y_m), place[:2]), NEAR_M)
-        self.assertLess(abs(math.remainder(yaw_rad - place[2], math.tau)), 0.3)
+    def wait_until_at(self, robot_id, place):
+        def is_there():
+            x_m, y_m, yaw_rad = self.watch.pose(robot_id)
+            is_near = math.dist((x_m, y_m), place[:2]) < NEAR_M
+            return is_near and abs(math.remainder(yaw_rad - place[2], math.tau)) < 0.3
+
+        wait_for(is_there, lambda: "hero_%d, at %s, to be at %s" % (robot_id, self.watch.pose(robot_id), place))
 
     def test_an_action_moves_the_robot_tells_of_its_way_and_succeeds(self):
         client, place, feedback = self.connect(0), self.choose_place(0, 0.1), []
@@ -66,7 +69,7 @@ class GoToGoalTest(unittest.TestCase):
         self.assertGreater(feedback[-1].elapsed, feedback[0].elapsed)
         self.commands.wait_for_stops(0)
         self.watch.wait_until_stopped(0)
-        self.assert_is_at(0, place)
+        self.wait_until_at(0, place)
 
     def test_a_new_goal_takes_the_place_of_the_old_one(self):
         first, second, feedback = self.connect(1), self.connect(1), []

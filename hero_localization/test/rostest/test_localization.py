@@ -133,8 +133,8 @@ class LocalizationTest(unittest.TestCase):
 
     def test_4_a_covered_robot_is_lost_and_found_again(self):
         self.capture.set(covered={0})
-        wait_for(lambda: self.find(0, RobotPose.LOST), "hero_0 lost")
-        self.assertTrue(self.is_at_truth(self.find(0, RobotPose.LOST).x, self.find(0, RobotPose.LOST).y, 0))
+        lost = wait_for(lambda: self.find(0, RobotPose.LOST), "hero_0 lost")
+        self.assertTrue(self.is_at_truth(lost.x, lost.y, 0))
         self.wait_for_line("hero_0 lost: its pose follows its odometry")
         self.capture.set(covered=set())
         wait_for(lambda: self.find(0, RobotPose.TRACKED), "hero_0 tracked")

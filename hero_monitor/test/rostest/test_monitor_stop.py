@@ -105,8 +105,9 @@ class StopTest(unittest.TestCase):
         self.wait_for_banner(GREEN, "stopped, all wheels at rest")
         self.page.save("monitor_at_rest.png")
         for page in (self.page, self.other):
-            self.assertEqual(set(self.stop_states(page).values()), {"at rest"})
-            self.assertEqual(page.text("#stop"), "STOPPED")
+            # Banner and table are told one after the other.
+            wait_for(lambda page=page: set(self.stop_states(page).values()) == {"at rest"}, page.rows)
+            page.wait_for_text("#stop", "STOPPED")
 
     def test_a_robot_that_moves_though_stopped_is_named_in_red_until_it_stands(self):
         self.set_behavior(moving=[3])
@@ -114,8 +115,8 @@ class StopTest(unittest.TestCase):
         self.wait_for_banner(RED, "NOT STOPPED: hero_3 moves")
         self.page.save("monitor_not_stopped.png")
         for page in (self.page, self.other):
-            self.assertEqual(self.stop_states(page)["hero_3"], "MOVING")
-            self.assertEqual(page.text("#stop"), "STOP ALL")
+            wait_for(lambda page=page: self.stop_states(page)["hero_3"] == "MOVING", page.rows)
+            page.wait_for_text("#stop", "STOP ALL")
         self.set_behavior()
         self.wait_for_banner(GREEN, "stopped, all wheels at rest")
 
@@ -163,7 +164,7 @@ class StopTest(unittest.TestCase):
         with suspended(self.drivers[1].pid):
             wait_for(lambda: self.states("hero_100", "hero_101") == {"UNKNOWN"}, self.page.rows)
             self.page.wait_for_text("#losses", "No answer from hero_driver_b: its robots are unknown")
-            self.assertEqual(self.states("hero_1"), {"READY"})
+            wait_for(lambda: self.states("hero_1") == {"READY"}, self.page.rows)
             self.page.save("monitor_unknown.png")
         wait_for(lambda: self.states("hero_100") == {"READY"}, self.page.rows)
         end(self.drivers[0])
@@ -194,7 +195,7 @@ class StopTest(unittest.TestCase):
             end(driver)
             self.page.wait_for_text("#losses", "No answer from hero_driver")
             self.page.wait_for_text("#losses", "No ROS master")
-            self.assertEqual(self.page.text("#ready"), "2 of 2 unknown")
+            self.page.wait_for_text("#ready", "2 of 2 unknown")
             start(start_master, port)
             start(start_scripted_driver, "hero_driver", [0, 1, 2], prefix=prefix)
             self.page.wait_for_text("#ready", "3 of 3 ready")
@@ -220,7 +221,7 @@ class StopTest(unittest.TestCase):
         finally:
             end(process)
         self.page.wait_for_text("#losses", "No connection to the monitor")
-        self.assertEqual({row["State"] for row in self.page.rows()}, {"UNKNOWN"})
+        wait_for(lambda: {row["State"] for row in self.page.rows()} == {"UNKNOWN"}, self.page.rows)
         self.page.click("#stop")
         self.assertEqual(self.page.banner(), (RED, "NOT STOPPED: there is no connection to the monitor"))
         process = start_monitor()

@@ -228,10 +228,10 @@ class ViewTest(unittest.TestCase):
 
         self.page.find("#fleet tbody tr:nth-child(2) button").send_keys(Keys.SPACE)
         self.page.actions().key_down(Keys.SHIFT).send_keys(Keys.ARROW_DOWN).key_up(Keys.SHIFT).perform()
-        self.assertEqual(self.page.text("#name"), "2 robots")
+        self.page.wait_for_text("#name", "2 robots")
         self.page.click("#select")
         self.page.find("#fleet tbody tr:nth-child(4) button").send_keys(Keys.ENTER)
-        self.assertEqual(self.page.text("#name"), "3 robots")
+        self.page.wait_for_text("#name", "3 robots")
         self.page.click("#goto")
         self.page.find("#canvas").send_keys(Keys.ARROW_LEFT, Keys.ENTER)  # the middle of the view
         wait_for(lambda: len(self.monitor.requested("goal")) == 3, "a goal for each")

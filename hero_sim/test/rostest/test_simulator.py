@@ -242,7 +242,7 @@ class SimulatorTest(unittest.TestCase):
     def test_a_stalled_radio_delivers_everything_afterwards(self):
         odom = Newest("/hero_2/odom", Odometry)
         odom.wait()
-        self.inject("stall:robot=2,for=1.5")
+        self.inject("stall:robot=2,for=4")
         wait_for(lambda: (rospy.Time.now() - odom.message.header.stamp).to_sec() > 1.0, "silence of hero_2")
         odom.wait_for_more(40)
         self.assertTrue(self.is_ready(2))
@@ -250,7 +250,7 @@ class SimulatorTest(unittest.TestCase):
     def test_a_frozen_robot_goes_on_afterwards(self):
         odom = Newest("/hero_5/odom", Odometry)
         odom.wait()
-        self.inject("frozen:robot=5,for=1")
+        self.inject("frozen:robot=5,for=4")
         wait_for(lambda: (rospy.Time.now() - odom.message.header.stamp).to_sec() > 0.6, "silence of hero_5")
         odom.wait_for_more()
 
