@@ -16,10 +16,10 @@ from ..metrics import UNITS
 from .batch import METRICS_ENDING, SAMPLE_S, list_sources
 from .errors import ExperimentError
 from .experiment_file import Experiment
-from .report_page import OverTime, draw_page
+from .reporting.report_page import OverTime, draw_page
+from .reporting.summary import build_report, describe, format_summaries
 from .results_folder import REAL, SIMULATED, ResultsFolder
 from .runner import read_experiment
-from .summary import build_report, describe, format_summaries
 
 __all__ = ["main", "write_report"]
 

@@ -8,8 +8,8 @@ import pytest
 
 from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.experiment_file import parse_experiment
+from hero_swarm.experiments.reporting.summary import build_report
 from hero_swarm.experiments.results_folder import REAL, ResultsFolder, Run
-from hero_swarm.experiments.summary import build_report
 
 FILE = """\
 behavior: a.B

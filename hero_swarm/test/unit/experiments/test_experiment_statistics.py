@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from hero_swarm.experiments import statistics
 from hero_swarm.experiments.errors import ExperimentError
+from hero_swarm.experiments.reporting import statistics
 
 
 def test_equal_values_give_equal_bounds():

@@ -4,9 +4,9 @@ from typing import Any, Dict, List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
-from .errors import ExperimentError
-from .experiment_file import Experiment, Metric
-from .results_folder import Run, format_csv
+from ..errors import ExperimentError
+from ..experiment_file import Experiment, Metric
+from ..results_folder import Run, format_csv
 from .statistics import FEW_SEEDS, Comparison, Interval, bootstrap_median, compare_pairs, correct_by_holm
 
 __all__ = ["Compared", "Report", "Summary", "build_report", "describe", "format_interval", "format_summaries"]

@@ -6,7 +6,7 @@ from typing import Any, List, Sequence, Tuple
 import numpy as np
 from matplotlib.figure import Figure
 
-from .experiment_file import Experiment
+from ..experiment_file import Experiment
 from .statistics import Interval
 
 __all__ = ["draw_over_time", "draw_runs", "to_svg"]

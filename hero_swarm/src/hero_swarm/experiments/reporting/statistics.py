@@ -10,7 +10,7 @@ from typing import List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
-from .errors import ExperimentError
+from ..errors import ExperimentError
 
 __all__ = [
     "FEW_SEEDS",
