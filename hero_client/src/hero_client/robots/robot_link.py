@@ -15,8 +15,7 @@ MAP = "map"
 
 
 class RobotLink(Protocol):
-    """One robot. Topics go by their names: "odom", "proximity", "encoder", "laser", "neighbors",
-    "distance"."""
+    """One robot. Names of topics: "odom", "proximity", "encoder", "laser", "neighbors", "distance"."""
 
     @property
     def clock(self) -> Clock:

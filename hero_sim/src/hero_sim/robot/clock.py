@@ -1,4 +1,4 @@
-"""Stamps from the server's time answers, as ros_lib's NodeHandle computes them in whole milliseconds.
+"""Times of one robot, and stamps by the server's time answers, in whole ms as ros_lib's NodeHandle computes them.
 
 Pure. Source: setNow(), now() and syncTime() of ros_lib's node_handle.h, by their documented behavior.
 """
@@ -6,6 +6,10 @@ Pure. Source: setNow(), now() and syncTime() of ros_lib's node_handle.h, by thei
 from typing import Tuple
 
 from hero_driver.rosserial.payloads import WireTime
+
+NEVER_MS = 2**62
+LONG_AGO_MS = -(2**40)
+"""Later, and earlier, than any simulated time."""
 
 _NS_PER_S = 10**9
 

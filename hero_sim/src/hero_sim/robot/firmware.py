@@ -18,7 +18,7 @@ from ..errors import CommandError
 from ..robot_constants import CONNECT_TIMEOUT_MS, RECEIVE_WINDOW_LENGTH, TIME_LOST_MS
 from ..world.body import Body
 from . import declarations
-from .clock import RobotClock
+from .clock import NEVER_MS, RobotClock
 from .commands import CommandTable
 from .flash import Flash
 from .models import HERO, RobotModel
@@ -52,8 +52,6 @@ TIME_REQUEST_MS = 2500
 
 ANSWER_MS = (42, 75)
 """From the arrival of a service call to its answer (measured)."""
-
-_NEVER_MS = 2**62
 
 _PHASE_OFF = "off"
 _PHASE_BOOT = "boot"  # until the first attempt to connect has ended
@@ -157,7 +155,7 @@ class Firmware:
         self._phase = _PHASE_OFF
         self.body.release()
         self._reset_memory()
-        self.due_ms = _NEVER_MS
+        self.due_ms = NEVER_MS
 
     @property
     def is_on(self) -> bool:
@@ -236,7 +234,7 @@ class Firmware:
     def run(self, now_ms: int) -> None:
         """Do everything that is due at now_ms, and set due_ms."""
         if self._phase == _PHASE_OFF:
-            self.due_ms = _NEVER_MS
+            self.due_ms = NEVER_MS
             return
         if self._blocked_until_ms is not None:
             if now_ms < self._blocked_until_ms:

@@ -15,6 +15,7 @@ from hero_node.geometry import Pose
 from ..robot_constants import LED_WATCHDOG_MS
 from ..world.body import Body
 from . import declarations, messages
+from .clock import NEVER_MS
 from .flash import Flash
 from .imu_hat import ImuHat
 from .models import HERO, RobotModel
@@ -43,7 +44,6 @@ Color = Tuple[float, ...]  # red, green, blue, alpha (0..1)
 _BLUE: Color = (0.0, 0.0, 1.0, 1.0)
 _RED: Color = (1.0, 0.0, 0.0, 1.0)
 _DARK: Color = (0.0, 0.0, 0.0, 0.0)
-_FOREVER_MS = 2**62
 
 
 class Sensing:
@@ -59,7 +59,7 @@ class Sensing:
         self, name: str, body: Body, has_imu_hat: bool, flash: Flash, model: RobotModel = HERO
     ) -> None:
         """Build the sensors of the robot called name (hero_N)."""
-        self.distance_due_ms = 0 if model.measures_distance else _FOREVER_MS
+        self.distance_due_ms = 0 if model.measures_distance else NEVER_MS
         self._distance_id = model.own_ids[declarations.ID_IMU]
         self.due_ms = 0
         self.laser_enabled = True
@@ -89,7 +89,7 @@ class Sensing:
 
     def show_searching(self) -> None:
         """Light up red, as while looking for the network."""
-        self._light, self._light_until_ms = _RED, _FOREVER_MS
+        self._light, self._light_until_ms = _RED, NEVER_MS
 
     def set_light(self, now_ms: int, color: Color) -> None:
         """Obey a command for the light."""

@@ -11,6 +11,7 @@ from typing import Collection, Dict, List, NamedTuple, Sequence, Tuple
 import numpy as np
 
 from ..link.wifi import Radio
+from ..robot.clock import NEVER_MS
 from .command_shaper import Sent
 from .readings import DISTANCE, SCAN, WHEELS, Readings
 
@@ -21,8 +22,6 @@ LENGTHS = {WHEELS: 1469, SCAN: 205, DISTANCE: 12}
 
 COMMAND_LENGTH = 56
 """Bytes of a Twist (servo pulses have fewer)."""
-
-_NEVER_MS = 2**62
 
 
 class Arrival(NamedTuple):
@@ -52,7 +51,7 @@ class RadioRows:
         self._order = itertools.count()
         self._up: List[Tuple[int, int, int, Readings, Collection[str]]] = []
         self._down: Dict[int, List[Tuple[int, int, int, Tuple[float, float]]]] = {}
-        self.due_ms = _NEVER_MS
+        self.due_ms = NEVER_MS
 
     def send_readings(self, now_ms: int, readings: Readings, rows: np.ndarray, parts: Collection[str]) -> None:
         """Send parts of the readings of the robots at rows, which must not change any more."""
@@ -68,14 +67,14 @@ class RadioRows:
         while self._up and self._up[0][0] <= now_ms:
             _, _, row, readings, parts = heapq.heappop(self._up)
             arrivals.append(Arrival(readings, np.array([row]), parts))
-        self.due_ms = self._up[0][0] if self._up else _NEVER_MS
+        self.due_ms = self._up[0][0] if self._up else NEVER_MS
         return arrivals
 
     def drop_readings(self, row: int) -> None:
         """Drop the readings of one robot that are on their way."""
         self._up = [sent for sent in self._up if sent[2] != row]
         heapq.heapify(self._up)
-        self.due_ms = self._up[0][0] if self._up else _NEVER_MS
+        self.due_ms = self._up[0][0] if self._up else NEVER_MS
 
     def send_commands(self, topic: int, sent: Sent) -> np.ndarray:
         """Send commands to robots; return when they arrive, ms (K,)."""

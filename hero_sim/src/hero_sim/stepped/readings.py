@@ -5,6 +5,8 @@ from typing import Collection
 
 import numpy as np
 
+from ..robot.clock import LONG_AGO_MS
+
 __all__ = ["DISTANCE", "SCAN", "WHEELS", "Readings"]
 
 WHEELS, SCAN, DISTANCE = "wheels", "scan", "distance"
@@ -26,7 +28,7 @@ class Readings:
         self.velocities, self.ticks = np.zeros((2, rows)).T, np.zeros((2, rows)).T
         self.counts, self.ranges_m, self.proximity_m = np.zeros((3, rows, 8))
         self.odometry_ms, self.scan_ms = np.zeros((2, rows), dtype=np.int64)
-        self.distance_ms = np.full(rows, -(2**40))
+        self.distance_ms = np.full(rows, LONG_AGO_MS)
         self.distance_m = np.full(rows, np.nan)
 
     def copy(self) -> "Readings":

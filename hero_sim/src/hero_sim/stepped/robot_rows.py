@@ -9,11 +9,12 @@ from typing import Callable, Collection, List, Optional, Sequence
 
 import numpy as np
 
-from hero_driver.corrections.robot_models import PLUS_WHEELS
+from hero_driver.corrections.robot_models import PLUS_ENCODER_MD5, PLUS_WHEELS
 from hero_driver.corrections.tick_odometry import WheelGeometry
 from hero_driver.robot_constants import SERVO_CENTER_US
 
 from ..link.wifi import Radio
+from ..robot.clock import NEVER_MS
 from ..robot.firmware import SPIN_MS
 from ..robot.models import HERO, RobotModel
 from ..robot.motor_control import CONTROL_MS
@@ -43,7 +44,6 @@ from .wheel_encoders import WheelEncoders
 __all__ = ["Hook", "RobotRows"]
 
 _LIMITS = np.array([[MAX_LINEAR_M_S], [MAX_ANGULAR_RAD_S]])
-_NEVER_MS = 2**62
 
 Hook = Callable[[np.ndarray], None]
 """Called with the rows (K,) of the robots whose data the program has just received."""
@@ -97,14 +97,14 @@ class RobotRows:
         errors = world.errors
         self._calibration_counts_m2 = calibrate(errors.alpha_counts_m2, errors.beta_counts)
         self._encoders = WheelEncoders(world, np.array([model.tick_m for model in models]))
-        wheels = [PLUS_WHEELS if model.measures_distance else WheelGeometry() for model in models]
-        self._odometry = TickOdometryRows(wheels)
+        is_plus = [model.encoder_md5 == PLUS_ENCODER_MD5 for model in models]
+        self._odometry = TickOdometryRows([PLUS_WHEELS if plus else WheelGeometry() for plus in is_plus])
         self.ticks, self.odometry_ms = received.ticks, received.odometry_ms
         self.scan_ms, self.distance_ms = received.scan_ms, received.distance_ms
         self._view: Optional[View] = None  # of the newest scan, until it is read
         self.distance_rows = np.array([model.measures_distance for model in models]).nonzero()[0]
         self._distance_view: Optional[View] = None
-        self._distance_due_ms = now_ms if len(self.distance_rows) else _NEVER_MS
+        self._distance_due_ms = now_ms if len(self.distance_rows) else NEVER_MS
         self._servos = ServoPulses(world, np.rint(errors.servo_center_us.T))
         self._velocity = WheelControllers(rows, VELOCITY_GAINS, VELOCITY_LIMIT_US, VELOCITY_WATCHDOG_MS)
         self._position = WheelControllers(rows, POSITION_GAINS, POSITION_LIMIT_US, POSITION_WATCHDOG_MS)

@@ -7,6 +7,7 @@ from typing import Union
 
 import numpy as np
 
+from ..robot.clock import NEVER_MS
 from ..robot_constants import MOTOR_WATCHDOG_MS, PULSE_RANGE_US
 from ..world.world import World
 from .which import Which, assign
@@ -15,8 +16,6 @@ __all__ = ["ServoPulses"]
 
 _FORWARD = np.array([[-1.0], [1.0]])
 """The servos are mounted as mirror images: a pulse below the center drives the left wheel forward."""
-
-_NEVER_MS = 2**62
 
 
 class ServoPulses:
@@ -31,10 +30,10 @@ class ServoPulses:
         """Begin without pulses."""
         rows = centers_us.shape[1]
         self.centers_us = np.array(centers_us, dtype=float)
-        self.check_ms = _NEVER_MS
+        self.check_ms = NEVER_MS
         self._world = world
         self._pulses_us = np.full((2, rows), np.nan)  # nan: no pulses go out
-        self._stop_at_ms = np.full(rows, _NEVER_MS)
+        self._stop_at_ms = np.full(rows, NEVER_MS)
 
     def write(self, now_ms: int, pulses_us: np.ndarray, which: Which) -> None:
         """Write pulses (2, R), limited to 1000..2000 us, to the robots which."""
@@ -57,7 +56,7 @@ class ServoPulses:
     def stop(self, rows: np.ndarray) -> None:
         """Stop the pulses of the robots at rows (K,)."""
         self._pulses_us[:, rows] = np.nan
-        self._stop_at_ms[rows] = _NEVER_MS
+        self._stop_at_ms[rows] = NEVER_MS
         self._world.release(rows)
 
     def check_watchdog(self, now_ms: int) -> None:

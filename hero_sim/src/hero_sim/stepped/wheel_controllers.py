@@ -8,13 +8,13 @@ from typing import Sequence, Union
 
 import numpy as np
 
+from ..robot.clock import LONG_AGO_MS
 from ..robot.motor_pid import SAMPLE_MS, Gains
 from ..robot_constants import COMMAND_GAP_MS
 from .which import Which, assign, simplify
 
 __all__ = ["WheelControllers"]
 
-_LONG_AGO_MS = -(2**40)
 _SAMPLE_S = SAMPLE_MS / 1000.0
 
 
@@ -31,13 +31,13 @@ class WheelControllers:
         """Begin without a command; the outputs stay within limit_us either way."""
         self.targets = np.zeros((2, rows))
         self.outputs_us = np.zeros((2, rows))
-        self.end_ms = self._all_end_ms = _LONG_AGO_MS
+        self.end_ms = self._all_end_ms = LONG_AGO_MS
         self._limit_us = limit_us
         self._timeout_ms = timeout_ms
         self._gains = np.tile(np.reshape(gains, (3, 1, 1)), (1, 2, rows))
-        self._watchdog_ms = np.full(rows, _LONG_AGO_MS, dtype=np.int64)
-        self._computed_ms = np.full(rows, _LONG_AGO_MS, dtype=np.int64)
-        self._due_ms = _LONG_AGO_MS  # when the first of them computes again
+        self._watchdog_ms = np.full(rows, LONG_AGO_MS, dtype=np.int64)
+        self._computed_ms = np.full(rows, LONG_AGO_MS, dtype=np.int64)
+        self._due_ms = LONG_AGO_MS  # when the first of them computes again
         self._sums_us = np.zeros((2, rows))
         self._last_inputs = np.zeros((2, rows))
         self._scale_gains()
@@ -68,7 +68,7 @@ class WheelControllers:
         """
         moves = np.logical_or(*targets)
         stopped, rows, targets = rows[~moves], rows[moves], targets[:, moves]
-        self._watchdog_ms[stopped] = _LONG_AGO_MS
+        self._watchdog_ms[stopped] = LONG_AGO_MS
         self._reset(slice(None), stopped)
         if len(rows):
             wheels, places = np.nonzero(targets * self.targets[:, rows] < 0.0)
